@@ -1,0 +1,17 @@
+# What every translation unit is compiled with.
+add_library(ewa_compiler INTERFACE)
+target_compile_features(ewa_compiler INTERFACE cxx_std_20)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+target_compile_options(ewa_compiler INTERFACE -Wall -Wextra -Werror -Wshadow -Wnon-virtual-dtor
+    # The float64 twin and the host must round as written: no fused multiply-add behind the formulas.
+    -ffp-contract=off)
+target_compile_definitions(ewa_compiler INTERFACE EWA_VERSION="${PROJECT_VERSION}")
+if(EWA_SANITIZE)
+    target_compile_options(ewa_compiler INTERFACE -fsanitize=address,undefined -fno-omit-frame-pointer)
+    target_link_options(ewa_compiler INTERFACE -fsanitize=address,undefined)
+endif()
+find_program(CCACHE ccache)
+if(CCACHE)
+    set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE})
+endif()

@@ -1,0 +1,74 @@
+// Photographs with their cameras, and the points they were reconstructed from.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "ewa/camera.h"
+#include "ewa/gaussians.h"
+#include "ewa/image.h"
+
+namespace ewa {
+
+/// Brown-Conrady coefficients in OpenCV's order and sign (OpenCV calib3d, "Detailed Description").
+struct Distortion {
+    double k1 = 0, k2 = 0, p1 = 0, p2 = 0;
+    bool none() const { return k1 == 0 && k2 == 0 && p1 == 0 && p2 == 0; }
+};
+
+struct Frame {
+    std::string name;                     // as the dataset names it, e.g. "0001.jpg"
+    std::filesystem::path image_path;     // may not exist: see image_exists
+    bool image_exists = false;
+    Camera camera;                        // the pinhole camera that load_frame_image's picture has
+    Camera source;                        // intrinsics of the file itself (differs where it is distorted or scaled)
+    Distortion distortion;                // of the file
+    int downscale = 1;
+    int split = 0;                        // 0 by the rule of split_frames; 1 train, 2 test where the dataset says so
+};
+
+struct PointCloud {
+    std::vector<glm::dvec3> positions;             // world
+    std::vector<std::array<uint8_t, 3>> colors;    // sRGB
+};
+
+struct Dataset {
+    std::filesystem::path root;
+    std::vector<Frame> frames;            // sorted by name
+    PointCloud points;                    // may be empty
+    int missing_images = 0;               // entries whose image file is not there
+    int dropped_points = 0;               // points with a coordinate that is not finite, left out of `points`
+};
+
+struct DatasetOptions {
+    int downscale = 1;                    // >= 1
+    bool need_images = true;              // false: cameras alone; frames without a file are kept where the size is known
+};
+
+/// A folder with sparse/0 (COLMAP .bin or .txt) and images/, a folder or file with transforms.json
+/// (transforms_train.json and transforms_test.json also). World coordinates and camera axes come out in the OpenCV
+/// convention; the world frame is the file's own. With need_images, frames without a file are left out and counted,
+/// and every other file's size is checked against the model. Throws InputError.
+Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& options);
+
+/// The frame's picture as the pinhole `frame.camera` sees it: undistorted (bilinear) and downscaled as the frame says.
+/// 3 or 4 channels. Throws InputError.
+Image load_frame_image(const Frame& frame);
+
+/// Indices of train and test frames: a frame's own split where the dataset has one, else test where its index in
+/// name order is a multiple of test_every (INRIA's and gsplat's rule); test_every 0: all train.
+struct Split {
+    std::vector<int> train, test;
+};
+Split split_frames(const Dataset& dataset, int test_every);
+
+/// 1.1 times the largest distance of a camera from the cameras' mean position (INRIA's cameras_extent, getNerfppNorm).
+double scene_extent(const Dataset& dataset, const std::vector<int>& frames);
+
+/// One splat a point: scale sqrt(mean squared distance to the 3 nearest neighbours, squared distance at least 1e-7),
+/// identity rotation, opacity 0.1, colour in SH degree 0 (INRIA's create_from_pcd). Throws InputError without points.
+Gaussians gaussians_from_points(const PointCloud& points, int sh_degree);
+
+}  // namespace ewa

@@ -1,0 +1,44 @@
+// Pictures in memory, on disk, and their distance from each other.
+#pragma once
+#include <filesystem>
+#include <vector>
+
+namespace ewa {
+
+/// Row-major, interleaved, first row at the top. 8-bit sRGB files become value / 255 with no linearisation; that is
+/// the space splats are trained and blended in.
+struct Image {
+    int width = 0, height = 0, channels = 0;
+    std::vector<float> pixels;  // width * height * channels
+
+    Image() = default;
+    Image(int width_, int height_, int channels_)
+        : width(width_), height(height_), channels(channels_), pixels(size_t(width_) * height_ * channels_) {}
+    float* at(int x, int y) { return &pixels[(size_t(y) * width + x) * channels]; }
+    const float* at(int x, int y) const { return &pixels[(size_t(y) * width + x) * channels]; }
+};
+
+/// Width and height from the file's header alone. Throws InputError.
+struct ImageSize {
+    int width = 0, height = 0;
+};
+ImageSize read_image_size(const std::filesystem::path& path);
+
+/// Any format OpenImageIO reads, as 3 (RGB) or 4 (RGBA) channels; grey becomes RGB. Throws InputError.
+Image load_image(const std::filesystem::path& path);
+
+/// .png: 8 bit, rounded, clamped to [0, 1]. .exr: float32, not clamped. Written beside and renamed. Throws RunError.
+void save_image(const std::filesystem::path& path, const Image& image);
+
+/// Mean of factor x factor blocks (the last ones smaller where the size is not a multiple); size is rounded down,
+/// at least 1. factor >= 1.
+Image downscale(const Image& image, int factor);
+
+/// 10 log10(1 / MSE) over RGB, both pictures clamped to [0, 1]; +inf for equal pictures. Sizes must agree.
+double psnr(const Image& a, const Image& b);
+
+/// Mean SSIM over pixels and RGB: 11 x 11 Gaussian window, sigma 1.5, zero padded (Wang et al. 2004), both pictures
+/// clamped to [0, 1], computed in float64. Sizes must agree.
+double ssim(const Image& a, const Image& b);
+
+}  // namespace ewa

@@ -1,0 +1,56 @@
+// Every constant of the rendering model, defined once for the shaders, the host and the float64 twin.
+// Values are those of gsplat 1.6 unless a line says otherwise.
+#ifndef EWA_SHARED_CONSTANTS_H
+#define EWA_SHARED_CONSTANTS_H
+#include "glue.h"
+EWA_BEGIN_SHARED
+
+// Projection.
+EWA_REAL(NEAR_PLANE, 0.01);           // a splat is drawn where view z > NEAR_PLANE (world units)
+EWA_REAL(LOW_PASS, 0.3);              // added to both diagonal entries of the 2D covariance (px^2)
+EWA_REAL(JACOBIAN_MARGIN, 0.3);       // x/z in J is clamped to this share of the half image beyond each border
+
+// Compositing.
+EWA_REAL(ALPHA_MAX, 0.99);            // alpha = min(ALPHA_MAX, opacity * exp(power))
+EWA_REAL(ALPHA_MIN, 1.0 / 255.0);     // a contribution below this is skipped
+EWA_REAL(TRANSMITTANCE_STOP, 1e-4);   // blending stops before T would fall to this or under, that splat excluded
+
+// Real spherical harmonics in INRIA's order and signs (3DGS, utils/sh_utils.py; Sloan 2013).
+EWA_REAL(SH_C0, 0.28209479177387814);
+EWA_REAL(SH_C1, 0.4886025119029199);
+EWA_REAL(SH_C2_0, 1.0925484305920792);
+EWA_REAL(SH_C2_1, -1.0925484305920792);
+EWA_REAL(SH_C2_2, 0.31539156525252005);
+EWA_REAL(SH_C2_3, -1.0925484305920792);
+EWA_REAL(SH_C2_4, 0.5462742152960396);
+EWA_REAL(SH_C3_0, -0.5900435899266435);
+EWA_REAL(SH_C3_1, 2.890611442640554);
+EWA_REAL(SH_C3_2, -0.4570457994644658);
+EWA_REAL(SH_C3_3, 0.3731763325901154);
+EWA_REAL(SH_C3_4, -0.4570457994644658);
+EWA_REAL(SH_C3_5, 1.445305721320277);
+EWA_REAL(SH_C3_6, -0.5900435899266435);
+EWA_REAL(COLOR_OFFSET, 0.5);          // colour = max(0, SH sum + COLOR_OFFSET)
+
+// Loss: (1 - SSIM_WEIGHT) * L1 + SSIM_WEIGHT * (1 - SSIM), mean over pixels and channels, images in [0, 1].
+EWA_REAL(SSIM_WEIGHT, 0.2);
+EWA_REAL(SSIM_C1, 0.01 * 0.01);
+EWA_REAL(SSIM_C2, 0.03 * 0.03);
+EWA_REAL(SSIM_SIGMA, 1.5);            // standard deviation of the window (px)
+EWA_UINT(SSIM_RADIUS, 5u);            // window of 2 * SSIM_RADIUS + 1 taps, zero padded
+
+// Adam (Kingma and Ba 2015), with the epsilon of 3DGS.
+EWA_REAL(ADAM_BETA1, 0.9);
+EWA_REAL(ADAM_BETA2, 0.999);
+EWA_REAL(ADAM_EPSILON, 1e-15);
+
+// Adaptive density control (3DGS, section 5.2 and its published code).
+EWA_REAL(SPLIT_SCALE, 1.6);           // a split child's scales are the parent's divided by this
+
+// Kernels: how a splat's opacity depends on its footprint.
+EWA_UINT(KERNEL_PEAK, 0u);            // 3DGS: the opacity is the peak of the footprint
+EWA_UINT(KERNEL_ANTIALIAS, 1u);       // Mip-Splatting (Yu et al. 2024, eq. 9): times sqrt(det before / det after low-pass)
+EWA_UINT(KERNEL_UNIT_MASS, 2u);       // EWA (Zwicker et al. 2001): times 1 / (2 pi sqrt(det)) per px^2
+
+EWA_END_SHARED
+#endif
