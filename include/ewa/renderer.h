@@ -1,0 +1,65 @@
+// Pictures and gradients of a fixed splat scene.
+#pragma once
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ewa/camera.h"
+#include "ewa/device.h"
+#include "ewa/gaussians.h"
+#include "ewa/image.h"
+#include "ewa/render_options.h"
+
+namespace ewa {
+
+struct Rendering {
+    Image color;  // RGB, background blended in, not clamped
+    Image alpha;  // one channel, 1 - T
+    Image depth;  // one channel, sum of view z * alpha_i * T_i, divided by alpha where alpha > 0; empty unless asked for
+};
+
+/// What the plan left out, for `ewa info` and `--verbose`: one line each, with the bytes it saves.
+struct PlanLine {
+    std::string what;
+    std::string why;
+    uint64_t bytes_saved = 0;
+};
+
+struct PassTime {
+    std::string pass;
+    double milliseconds = 0;  // of the last frame
+};
+
+class Renderer {
+  public:
+    /// Uploads the scene. Throws RunError when it does not fit in the device's memory (the text says how much it needs).
+    Renderer(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians, const RenderOptions& options);
+    ~Renderer();
+    Renderer(Renderer&&) noexcept;
+
+    /// Throws InputError when the camera's size is not positive or exceeds what the device can address.
+    Rendering render(const Camera& camera, bool with_depth = false);
+
+    /// Splats skipped in the last picture because a stored value is not finite or the quaternion is zero.
+    uint32_t skipped_nonfinite() const;
+    std::vector<PassTime> pass_times() const;
+
+  private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+struct LossGradient {
+    double loss = 0, l1 = 0, ssim = 0;
+    Gaussians gradient;  // dL/d(stored value) in place of each stored value
+    uint32_t skipped_nonfinite = 0;
+};
+
+/// The training loss of one view and its gradient. target: RGB (alpha ignored), size of the camera.
+LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians, const Camera& camera,
+                           const Image& target, const RenderOptions& options);
+
+/// What is left out for this scene and request.
+std::vector<PlanLine> plan_lines(const Gaussians& gaussians, const RenderOptions& options, bool training);
+
+}  // namespace ewa

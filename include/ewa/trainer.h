@@ -1,0 +1,92 @@
+// From photographs to splats.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "ewa/dataset.h"
+#include "ewa/device.h"
+#include "ewa/gaussians.h"
+#include "ewa/render_options.h"
+#include "ewa/renderer.h"
+
+namespace ewa {
+
+enum class Strategy { none, adc };
+
+struct TrainOptions {
+    int steps = 30000;
+    Strategy strategy = Strategy::adc;
+    uint32_t max_splats = 1000000;       // hard cap
+    int sh_degree = 3;
+    uint64_t seed = 0;
+    bool random_background = false;
+    RenderOptions render;                // background, kernel
+
+    // Learning rates of 3DGS (arguments/__init__.py); means are per unit of scene extent.
+    double means_rate = 1.6e-4, means_rate_final = 1.6e-6;
+    double sh0_rate = 2.5e-3, sh_rest_rate = 1.25e-4;
+    double opacity_rate = 0.025;
+    double scale_rate = 5e-3, quaternion_rate = 1e-3;
+
+    // Adaptive density control, in steps of a 30,000 step run; a shorter run scales them (src/train/schedule.h).
+    int refine_start = 500, refine_stop = 15000, refine_every = 100;
+    int opacity_reset_every = 3000;
+    int sh_degree_every = 1000;
+    double grow_gradient = 2e-4;         // mean norm of dL/d(mean in normalised device coordinates)
+    double split_scale = 0.01;           // larger than this share of the scene extent: split, else clone
+    double prune_opacity = 0.005;
+    double prune_scale = 0.1;            // share of the scene extent, once opacity has been reset
+};
+
+struct EvalFrame {
+    std::string name;
+    double psnr = 0, ssim = 0;
+};
+struct Evaluation {
+    double psnr = 0, ssim = 0;           // means over frames
+    std::vector<EvalFrame> frames;
+    double seconds = 0;
+};
+
+/// Renders each frame, and compares with its photograph. Frame pictures are quantised to 8 bit before the comparison,
+/// as a saved picture would be.
+Evaluation evaluate(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians, const Dataset& dataset,
+                    const std::vector<int>& frames, const RenderOptions& options);
+
+struct StepReport {
+    int step = 0;                        // steps done
+    double seconds = 0;                  // of training alone
+    double loss = 0;                     // of the last step
+    uint32_t splats = 0;
+    uint64_t dropped_updates = 0;        // parameter updates that were not finite, dropped
+    uint32_t skipped_nonfinite = 0;      // splats skipped in the last step
+};
+
+/// Owns the model on the device and the photographs of the training frames. One step is one submission.
+class Trainer {
+  public:
+    Trainer(std::shared_ptr<gpu::Device> device, const Dataset& dataset, const std::vector<int>& train_frames,
+            const Gaussians& start, const TrainOptions& options);
+    ~Trainer();
+
+    /// One optimisation step, and densification where the schedule has it. Throws RunError when memory runs out (the
+    /// text says how much was needed).
+    StepReport step();
+
+    Gaussians gaussians() const;         // read back from the device
+    uint32_t splats() const;
+    int steps_done() const;
+    std::vector<PassTime> pass_times() const;  // medians over the last steps, in recording order
+
+  private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace ewa
