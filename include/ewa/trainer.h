@@ -54,8 +54,7 @@ struct Evaluation {
     double seconds = 0;
 };
 
-/// Renders each frame, and compares with its photograph. Frame pictures are quantised to 8 bit before the comparison,
-/// as a saved picture would be.
+/// Renders each frame and compares it with its photograph, both clamped to [0, 1].
 Evaluation evaluate(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians, const Dataset& dataset,
                     const std::vector<int>& frames, const RenderOptions& options);
 
