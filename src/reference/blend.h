@@ -1,7 +1,10 @@
 // Front-to-back compositing of each pixel over its tile's list (Kerbl et al. 2023, eq. 3):
 //   colour = sum_i c_i alpha_i T_i + T background,  T_i = prod_{j < i} (1 - alpha_j)
 //   depth  = sum_i z_i alpha_i T_i
-// It stops before T would fall to TRANSMITTANCE_STOP or under; the splat that would do it is left out.
+// It stops before T would fall to TRANSMITTANCE_STOP or under; the splat that would do it is left out. Two
+// opaque splats leave (1 - ALPHA_MAX)^2, which is TRANSMITTANCE_STOP itself: the second is left out, worth
+// 0.01 of its colour. So it comes out in float32, as T * (1 - alpha); in float64 the product rounds to a
+// little above, hence kStopMargin.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -27,6 +30,13 @@ struct Blended {
 Blended blend(std::span<const Projected> projected, const Instances& instances,
               const std::array<float, 3>& background, const Smoothing& smoothing = {});
 
+/// Relative; above the rounding of a few factors in float64, far below a float32 step.
+inline constexpr double kStopMargin = 1e-13;
+
+inline bool stops(double next_transmittance) {
+    return next_transmittance <= shared::TRANSMITTANCE_STOP * (1 + kStopMargin);
+}
+
 /// One splat's part in one pixel.
 struct Contribution {
     size_t instance = 0;  // into instances.sorted
@@ -51,8 +61,7 @@ uint32_t walk_pixel(std::span<const Projected> projected, std::span<const Whiten
         c.alpha = alpha_of(c.sample.raw, smoothing);
         if (!c.alpha.kept) continue;
         const double next = transmittance * (1 - c.alpha.value);
-        if (smoothing.transmittance_stop && next <= shared::TRANSMITTANCE_STOP)
-            return uint32_t(k + 1 - first);
+        if (smoothing.transmittance_stop && stops(next)) return uint32_t(k + 1 - first);
         visit(c);
         transmittance = next;
     }
