@@ -28,8 +28,8 @@ void check_use(const Pipeline& pipeline, const Binding& declared, const Use& use
 
 }  // namespace
 
-void Recording::dispatch(const Pipeline& pipeline, std::string name, std::vector<Use> uses,
-                         std::span<const std::byte> push, std::array<uint32_t, 3> groups) {
+void Recording::dispatch_bytes(const Pipeline& pipeline, std::string name, std::vector<Use> uses,
+                               std::span<const std::byte> push, std::array<uint32_t, 3> groups) {
     const Reflection& shader = pipeline.reflection();
     std::sort(uses.begin(), uses.end(), [](const Use& a, const Use& b) { return a.binding < b.binding; });
     if (uses.size() != shader.bindings.size())

@@ -57,13 +57,13 @@ class Recording {
     /// - the bindings are not exactly those the shader declares, or a declared access is not the shader's;
     /// - a texel or uniform binding stands on a buffer without that usage;
     /// - the push constants' size is not the shader's; a group count is zero or over the device's limit.
-    void dispatch(const Pipeline& pipeline, std::string name, std::vector<Use> uses,
-                  std::span<const std::byte> push, std::array<uint32_t, 3> groups);
+    void dispatch_bytes(const Pipeline& pipeline, std::string name, std::vector<Use> uses,
+                        std::span<const std::byte> push, std::array<uint32_t, 3> groups);
     template <class Push>
     void dispatch(const Pipeline& pipeline, std::string name, std::vector<Use> uses, const Push& push,
                   std::array<uint32_t, 3> groups) {
-        dispatch(pipeline, std::move(name), std::move(uses),
-                 std::as_bytes(std::span<const Push, 1>(&push, 1)), groups);
+        dispatch_bytes(pipeline, std::move(name), std::move(uses),
+                       std::as_bytes(std::span<const Push>(&push, 1)), groups);
     }
     /// Sets bytes [offset, offset + bytes) to a repeated 32 bit value; both multiples of 4.
     void fill(const Buffer& target, uint32_t value, uint64_t offset, uint64_t bytes);
