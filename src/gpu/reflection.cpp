@@ -10,16 +10,21 @@ namespace {
 
 // Numbers of the SPIR-V specification, section 3.
 enum Op : uint32_t {
+    kOpTypeInt = 21,
+    kOpTypeFloat = 22,
+    kOpTypeVector = 23,
     kOpTypeImage = 25,
     kOpTypeSampledImage = 27,
+    kOpTypeArray = 28,
     kOpTypeStruct = 30,
     kOpTypePointer = 32,
+    kOpConstant = 43,
     kOpVariable = 59,
     kOpDecorate = 71,
     kOpMemberDecorate = 72
 };
 enum Decoration : uint32_t {
-    kDecorationBlock = 2,
+    kDecorationArrayStride = 6,
     kNonWritable = 24,
     kNonReadable = 25,
     kDecorationBinding = 33,
@@ -32,10 +37,14 @@ struct Module {
     std::map<uint32_t, uint32_t> binding, set;                     // variable -> number
     std::map<uint32_t, std::set<uint32_t>> read_only, write_only;  // struct -> members
     std::set<uint32_t> variable_read_only, variable_write_only;
-    std::map<uint32_t, uint32_t> last_offset;  // struct -> largest member offset
-    std::map<uint32_t, uint32_t> members;      // struct -> count
-    std::map<uint32_t, uint32_t> pointee;      // pointer type -> type
-    std::map<uint32_t, bool> image;            // sampled image types
+    std::map<uint32_t, std::map<uint32_t, uint32_t>> offsets;   // struct -> member -> byte offset
+    std::map<uint32_t, std::vector<uint32_t>> members;          // struct -> member types
+    std::map<uint32_t, uint32_t> scalar_bytes;                  // int and float types
+    std::map<uint32_t, std::pair<uint32_t, uint32_t>> vectors;  // type -> component type, count
+    std::map<uint32_t, uint32_t> array_length;                  // type -> constant
+    std::map<uint32_t, uint32_t> array_stride, constants;
+    std::map<uint32_t, uint32_t> pointee;  // pointer type -> type
+    std::map<uint32_t, bool> image;        // sampled image types
     struct Variable {
         uint32_t id, type, storage;
     };
@@ -49,12 +58,12 @@ void read_decoration(Module& module, uint32_t op, std::span<const uint32_t> word
         if (words[2] == kDecorationSet) module.set[target] = words[3];
         if (words[2] == kNonWritable) module.variable_read_only.insert(target);
         if (words[2] == kNonReadable) module.variable_write_only.insert(target);
+        if (words[2] == kDecorationArrayStride) module.array_stride[target] = words[3];
     } else {
         const uint32_t member = words[2];
         if (words[3] == kNonWritable) module.read_only[target].insert(member);
         if (words[3] == kNonReadable) module.write_only[target].insert(member);
-        if (words[3] == kDecorationOffset)
-            module.last_offset[target] = std::max(module.last_offset[target], words[4]);
+        if (words[3] == kDecorationOffset) module.offsets[target][member] = words[4];
     }
 }
 
@@ -66,7 +75,11 @@ Module parse(std::span<const uint32_t> spirv) {
         if (length == 0 || at + length > spirv.size()) throw std::logic_error("damaged SPIR-V module");
         const auto words = spirv.subspan(at, length);
         if (op == kOpDecorate || op == kOpMemberDecorate) read_decoration(module, op, words);
-        if (op == kOpTypeStruct) module.members[words[1]] = length - 2;
+        if (op == kOpTypeStruct) module.members[words[1]].assign(words.begin() + 2, words.end());
+        if (op == kOpTypeInt || op == kOpTypeFloat) module.scalar_bytes[words[1]] = words[2] / 8;
+        if (op == kOpTypeVector) module.vectors[words[1]] = {words[2], words[3]};
+        if (op == kOpTypeArray) module.array_length[words[1]] = words[3];
+        if (op == kOpConstant) module.constants[words[2]] = words[3];
         if (op == kOpTypePointer) module.pointee[words[1]] = words[3];
         if (op == kOpTypeImage || op == kOpTypeSampledImage) module.image[words[1]] = true;
         if (op == kOpVariable) module.variables.push_back({words[2], words[1], words[3]});
@@ -75,8 +88,25 @@ Module parse(std::span<const uint32_t> spirv) {
     return module;
 }
 
+/// Bytes up to the end of a type's last member.
+uint32_t size_of(const Module& module, uint32_t type) {
+    if (const auto scalar = module.scalar_bytes.find(type); scalar != module.scalar_bytes.end())
+        return scalar->second;
+    if (const auto vector = module.vectors.find(type); vector != module.vectors.end())
+        return vector->second.second * size_of(module, vector->second.first);
+    if (const auto length = module.array_length.find(type); length != module.array_length.end())
+        return module.constants.at(length->second) * module.array_stride.at(type);
+    const auto members = module.members.find(type);
+    if (members == module.members.end())
+        throw std::logic_error("a push constant of a type this project does not use");
+    uint32_t end = 0;
+    for (uint32_t member = 0; member < members->second.size(); ++member)
+        end = std::max(end, module.offsets.at(type).at(member) + size_of(module, members->second[member]));
+    return end;
+}
+
 Access storage_access(const Module& module, uint32_t variable, uint32_t type) {
-    const uint32_t count = module.members.at(type);
+    const uint32_t count = uint32_t(module.members.at(type).size());
     const auto all = [&](const auto& table) {
         const auto found = table.find(type);
         return found != table.end() && found->second.size() == count;
@@ -100,8 +130,7 @@ Reflection reflect(std::span<const uint32_t> spirv) {
         if (pointee == module.pointee.end()) continue;
         const uint32_t type = pointee->second;
         if (variable.storage == kPushConstant) {
-            const auto offset = module.last_offset.find(type);
-            result.push_constant_bytes = (offset == module.last_offset.end() ? 0 : offset->second) + 4;
+            result.push_constant_bytes = size_of(module, type);
             continue;
         }
         const auto binding = module.binding.find(variable.id);

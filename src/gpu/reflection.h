@@ -24,8 +24,8 @@ struct Reflection {
 };
 
 /// Storage blocks: read where every member is NonWritable, write where every member is NonReadable, else
-/// read_write (GLSL readonly and writeonly). Uniform blocks and texel buffers: read. Push constants: the end
-/// of the last member of a flat block of 4-byte scalars. Throws std::logic_error for a module this project
+/// read_write (GLSL readonly and writeonly). Uniform blocks and texel buffers: read. Push constants: bytes
+/// up to the end of the last member. Throws std::logic_error for a module this project
 /// does not produce.
 Reflection reflect(std::span<const uint32_t> spirv);
 

@@ -9,11 +9,13 @@ struct Rates {
     uint32_t step = 1;  // Adam's, from 1
 };
 
-/// photo: width * height texels, RGBA. Leaves the loss's parts in Counts and dL/d(image) in frame.image_gradient.
+/// photo: width * height texels, RGBA. Leaves the loss's parts in Counts and dL/d(image) in
+/// frame.image_gradient.
 void record_loss(gpu::Recording& recording, Kernels& kernels, const Frame& frame, const CameraUse& camera,
                  const gpu::Buffer& photo);
 
-/// Blend backward and projection backward. plan.adam: moves the model; else writes the gradient to model.moments1.
+/// Blend backward and projection backward. plan.adam: moves the model; else writes the gradient to
+/// model.moments1.
 void record_backward(gpu::Recording& recording, Kernels& kernels, const Plan& plan, const Model& model,
                      const Frame& frame, const CameraUse& camera, const std::array<float, 3>& background,
                      const Sorted& sorted, const Rates& rates);

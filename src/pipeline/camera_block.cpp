@@ -14,13 +14,16 @@ void split(double value, float& high, float& low) {
 }
 
 void check(const Camera& camera) {
-    bool good = camera.width > 0 && camera.height > 0 && camera.fx > 0 && camera.fy > 0 && std::isfinite(camera.fx) &&
-                std::isfinite(camera.fy) && std::isfinite(camera.cx) && std::isfinite(camera.cy);
+    bool good = camera.width > 0 && camera.height > 0 && camera.fx > 0 && camera.fy > 0 &&
+                std::isfinite(camera.fx) && std::isfinite(camera.fy) && std::isfinite(camera.cx) &&
+                std::isfinite(camera.cy);
     for (int i = 0; i < 3; ++i) {
         good = good && std::isfinite(camera.translation[i]);
         for (int j = 0; j < 3; ++j) good = good && std::isfinite(camera.rotation[i][j]);
     }
-    if (!good) throw InputError("a camera with a value that is not finite, or a size or focal length not above zero");
+    if (!good)
+        throw InputError(
+            "a camera with a value that is not finite, or a size or focal length not above zero");
 }
 
 }  // namespace

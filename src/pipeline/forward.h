@@ -1,4 +1,5 @@
-// The forward frame: from parameters to image planes. The order of its passes is written here and nowhere else.
+// The forward frame: from parameters to image planes. The order of its passes is written here and nowhere
+// else.
 #pragma once
 #include <array>
 
@@ -20,9 +21,10 @@ struct Sorted {
     const gpu::Buffer* values = nullptr;
 };
 
-/// Records: project, depth order, instances, tile order, tile starts, blend. Frame must have been reserved for the
-/// model's splats and the camera's size. After the submission Counts.instances tells what was needed; where that is
-/// more than frame.instance_capacity nothing was drawn, and the frame is to be repeated with more room.
+/// Records: project, depth order, instances, tile order, tile starts, blend. Frame must have been reserved
+/// for the model's splats and the camera's size. After the submission Counts.instances tells what was needed;
+/// where that is more than frame.instance_capacity nothing was drawn, and the frame is to be repeated with
+/// more room.
 Sorted record_forward(gpu::Recording& recording, Kernels& kernels, const Plan& plan, const Model& model,
                       const Frame& frame, const CameraUse& camera, const std::array<float, 3>& background);
 

@@ -9,7 +9,8 @@ namespace {
 
 using gpu::Texel;
 
-void grow(gpu::Device& device, gpu::Buffer& buffer, const char* name, uint64_t bytes, Texel texel = Texel::none) {
+void grow(gpu::Device& device, gpu::Buffer& buffer, const char* name, uint64_t bytes,
+          Texel texel = Texel::none) {
     if (bytes == 0 || (buffer && buffer.bytes() >= bytes)) return;
     buffer = gpu::Buffer();  // the old one goes first: nothing in it is needed
     buffer = gpu::Buffer(device, name, bytes, texel);
@@ -35,11 +36,14 @@ void Frame::reserve(gpu::Device& device, const passes::Shape& shape, const Frame
     grow(device, counters, "counters", sizes.counters);
     grow(device, counter_prefix, "counter prefix", sizes.counters);
     grow(device, digit_totals, "digit totals", sizes.digit_totals);
-    for (auto& buffer : instance_keys) grow(device, buffer, "instance keys", sizes.instance_words, Texel::rgba32ui);
-    for (auto& buffer : instance_values) grow(device, buffer, "instance values", sizes.instance_words, Texel::rgba32ui);
+    for (auto& buffer : instance_keys)
+        grow(device, buffer, "instance keys", sizes.instance_words, Texel::rgba32ui);
+    for (auto& buffer : instance_values)
+        grow(device, buffer, "instance values", sizes.instance_words, Texel::rgba32ui);
     grow(device, instance_splats, "instance splats", sizes.instance_words, Texel::rgba32ui);
     grow(device, tile_starts, "tile starts", sizes.tile_starts);
-    // Outside gradients nobody reads where a splat's instances begin, but the kernel's binding wants a buffer.
+    // Outside gradients nobody reads where a splat's instances begin, but the kernel's binding wants a
+    // buffer.
     grow(device, first_instances, "first instances", request.gradients ? sizes.splat_words : 16);
 
     grow(device, planes, "planes", sizes.planes, Texel::rgba32f);
@@ -54,7 +58,8 @@ void Frame::reserve(gpu::Device& device, const passes::Shape& shape, const Frame
         grow(device, slots, "slots", sizes.slots, Texel::rgba32f);
     }
     // The columns between an image's width and its stride count as black in the loss; no kernel writes them.
-    if (old.plane_floats != sizes.plane_floats || old.stride != sizes.stride || old.image_planes != sizes.image_planes) {
+    if (old.plane_floats != sizes.plane_floats || old.stride != sizes.stride ||
+        old.image_planes != sizes.image_planes) {
         zero(planes);
         if (target) zero(target);
     }

@@ -1,4 +1,5 @@
-// A splat scene on the device: parameters, and in training Adam's moments. The only thing that a step changes.
+// A splat scene on the device: parameters, and in training Adam's moments. The only thing that a step
+// changes.
 #pragma once
 #include <cstdint>
 
@@ -20,10 +21,10 @@ constexpr uint64_t parameter_bytes(uint32_t capacity, int sh_degree) {
 
 struct Model {
     uint32_t splats = 0, capacity = 0;
-    int sh_degree = 0;                  // stored
+    int sh_degree = 0;  // stored
     gpu::Buffer params;
-    gpu::Buffer moments1, moments2;     // only where it is trained, or a gradient is taken (moments1)
-    gpu::Buffer statistics;             // vec2 a splat; only where a strategy needs it
+    gpu::Buffer moments1, moments2;  // only where it is trained, or a gradient is taken (moments1)
+    gpu::Buffer statistics;          // vec2 a splat; only where a strategy needs it
 };
 
 /// moments: 0 none, 1 the first only (a gradient), 2 both, zeroed.

@@ -38,9 +38,10 @@ std::vector<PlanLine> describe(const Plan& plan, int file_degree, uint64_t splat
     const uint32_t count = uint32_t(std::min<uint64_t>(splats, 0xffffffffu));
     const uint64_t parameters = parameter_bytes(count, plan.stored_degree);
     if (plan.stored_degree < file_degree)
-        lines.push_back({"SH degrees " + std::to_string(plan.stored_degree + 1) + " to " + std::to_string(file_degree),
-                         "every coefficient is zero, or the degree was not asked for",
-                         parameter_bytes(count, file_degree) - parameters});
+        lines.push_back(
+            {"SH degrees " + std::to_string(plan.stored_degree + 1) + " to " + std::to_string(file_degree),
+             "every coefficient is zero, or the degree was not asked for",
+             parameter_bytes(count, file_degree) - parameters});
     if (!plan.gradients)
         lines.push_back({"loss, backward passes and gradient slots", "a picture needs no gradient", 0});
     if (!plan.adam) lines.push_back({"Adam's moments", "nothing is optimised", 2 * parameters});
@@ -54,8 +55,9 @@ std::vector<PlanLine> describe(const Plan& plan, int file_degree, uint64_t splat
 }  // namespace pipeline
 
 std::vector<PlanLine> plan_lines(const Gaussians& gaussians, const RenderOptions& options, bool training) {
-    const auto plan = training ? pipeline::plan_training(std::min(gaussians.sh_degree, options.sh_degree), options, true)
-                               : pipeline::plan_picture(gaussians, options, false);
+    const auto plan =
+        training ? pipeline::plan_training(std::min(gaussians.sh_degree, options.sh_degree), options, true)
+                 : pipeline::plan_picture(gaussians, options, false);
     return pipeline::describe(plan, gaussians.sh_degree, gaussians.size());
 }
 

@@ -1,4 +1,5 @@
-// What a scene and a request need: which kernels run, with which constants, and which buffers exist. A pure function.
+// What a scene and a request need: which kernels run, with which constants, and which buffers exist. A pure
+// function.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -10,8 +11,8 @@
 namespace ewa::pipeline {
 
 struct Plan {
-    int sh_degree = 0;        // evaluated
-    int stored_degree = 0;    // kept on the device
+    int sh_degree = 0;      // evaluated
+    int stored_degree = 0;  // kept on the device
     Kernel kernel = Kernel::peak;
     bool gradients = false;   // loss, backward passes and their buffers
     bool adam = false;        // both moments

@@ -46,7 +46,8 @@ gpu::Buffer upload_photo(gpu::Device& device, const Image& image) {
     if (eight_bit) {
         std::vector<uint8_t> texels(4 * pixels, 255);
         for (size_t i = 0; i < pixels; ++i)
-            for (size_t c = 0; c < 3; ++c) texels[4 * i + c] = uint8_t(level(image.pixels[i * size_t(image.channels) + c]));
+            for (size_t c = 0; c < 3; ++c)
+                texels[4 * i + c] = uint8_t(level(image.pixels[i * size_t(image.channels) + c]));
         gpu::Buffer buffer(device, "photo", texels.size(), gpu::Texel::rgba8);
         buffer.upload(std::span<const uint8_t>(texels));
         return buffer;
@@ -60,7 +61,9 @@ gpu::Buffer upload_photo(gpu::Device& device, const Image& image) {
 }
 
 /// Room for instances in a first try: most scenes have a few tiles a splat.
-uint32_t first_capacity(size_t splats) { return uint32_t(std::min<size_t>(std::max<size_t>(8 * splats, 4096), 1u << 24)); }
+uint32_t first_capacity(size_t splats) {
+    return uint32_t(std::min<size_t>(std::max<size_t>(8 * splats, 4096), 1u << 24));
+}
 
 uint32_t grown_capacity(uint32_t needed) {
     if (needed > 0xe0000000u) throw RunError("more than 3.7 billion (splat, tile) pairs in one picture");
@@ -69,8 +72,8 @@ uint32_t grown_capacity(uint32_t needed) {
 
 /// Runs a frame until its instances fit. record: fills a recording for the frame as reserved.
 template <class Record>
-shared::Counts run_until_it_fits(Kernels& kernels, gpu::Executor& executor, Frame& frame, FrameRequest request,
-                                 Record record) {
+shared::Counts run_until_it_fits(Kernels& kernels, gpu::Executor& executor, Frame& frame,
+                                 FrameRequest request, Record record) {
     for (;;) {
         frame.reserve(kernels.device(), kernels.shape(), request);
         gpu::Recording recording(kernels.device().limits());
@@ -83,10 +86,12 @@ shared::Counts run_until_it_fits(Kernels& kernels, gpu::Executor& executor, Fram
 }
 
 /// One plane of an image, spread over channel c of a picture.
-void copy_plane(const std::vector<float>& planes, const Sizes& sizes, uint32_t plane, Image& image, int channel) {
+void copy_plane(const std::vector<float>& planes, const Sizes& sizes, uint32_t plane, Image& image,
+                int channel) {
     for (int y = 0; y < image.height; ++y)
         for (int x = 0; x < image.width; ++x)
-            image.at(x, y)[channel] = planes[size_t(plane) * sizes.plane_floats + size_t(y) * sizes.stride + size_t(x)];
+            image.at(x, y)[channel] =
+                planes[size_t(plane) * sizes.plane_floats + size_t(y) * sizes.stride + size_t(x)];
 }
 
 }  // namespace
@@ -102,12 +107,16 @@ struct Renderer::State {
     uint32_t skipped = 0;
 
     State(std::shared_ptr<gpu::Device> d, const Gaussians& gaussians, const RenderOptions& o)
-        : device(std::move(d)), kernels(*device), executor(*device), options(o),
+        : device(std::move(d)),
+          kernels(*device),
+          executor(*device),
+          options(o),
           plan(plan_picture(gaussians, o, false)),
           model(upload_model(*device, with_degree(gaussians, plan.stored_degree), 0, false)) {}
 };
 
-Renderer::Renderer(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians, const RenderOptions& options)
+Renderer::Renderer(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians,
+                   const RenderOptions& options)
     : state_(std::make_unique<State>(std::move(device), gaussians, options)) {}
 Renderer::~Renderer() = default;
 Renderer::Renderer(Renderer&&) noexcept = default;
@@ -140,20 +149,24 @@ Rendering Renderer::render(const Camera& camera, bool with_depth) {
     return result;
 }
 
-uint32_t Renderer::skipped_nonfinite() const { return state_->skipped; }
+uint32_t Renderer::skipped_nonfinite() const {
+    return state_->skipped;
+}
 
 std::vector<PassTime> Renderer::pass_times() const {
     std::vector<PassTime> times;
-    for (const gpu::Timing& timing : state_->executor.timings()) times.push_back({timing.name, timing.milliseconds});
+    for (const gpu::Timing& timing : state_->executor.timings())
+        times.push_back({timing.name, timing.milliseconds});
     return times;
 }
 
-LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians, const Camera& camera,
-                           const Image& target, const RenderOptions& options) {
+LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians,
+                           const Camera& camera, const Image& target, const RenderOptions& options) {
     if (target.width != camera.width || target.height != camera.height || target.channels < 3)
-        throw InputError("the photograph is " + std::to_string(target.width) + "x" + std::to_string(target.height) +
-                         " with " + std::to_string(target.channels) + " channels, the camera " +
-                         std::to_string(camera.width) + "x" + std::to_string(camera.height) + " RGB");
+        throw InputError("the photograph is " + std::to_string(target.width) + "x" +
+                         std::to_string(target.height) + " with " + std::to_string(target.channels) +
+                         " channels, the camera " + std::to_string(camera.width) + "x" +
+                         std::to_string(camera.height) + " RGB");
     Kernels kernels(*device);
     gpu::Executor executor(*device);
     const Plan plan = plan_gradient(gaussians, options);
@@ -166,7 +179,8 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
         kernels, executor, frame,
         {model.splats, use.width, use.height, first_capacity(model.splats), true, false},
         [&](gpu::Recording& recording) {
-            const Sorted sorted = record_forward(recording, kernels, plan, model, frame, use, options.background);
+            const Sorted sorted =
+                record_forward(recording, kernels, plan, model, frame, use, options.background);
             record_loss(recording, kernels, frame, use, photo);
             record_backward(recording, kernels, plan, model, frame, use, options.background, sorted, {});
         });

@@ -10,7 +10,9 @@
 namespace ewa::pipeline {
 namespace {
 
-uint32_t divide_up(uint64_t a, uint64_t b) { return uint32_t((a + b - 1) / b); }
+uint32_t divide_up(uint64_t a, uint64_t b) {
+    return uint32_t((a + b - 1) / b);
+}
 
 RadixCut radix_cut(const passes::Shape& shape, uint32_t items, uint32_t key_bits) {
     RadixCut cut;
@@ -20,7 +22,9 @@ RadixCut radix_cut(const passes::Shape& shape, uint32_t items, uint32_t key_bits
     return cut;
 }
 
-uint64_t counter_words(const RadixCut& cut) { return uint64_t(cut.lanes) << cut.bits; }
+uint64_t counter_words(const RadixCut& cut) {
+    return uint64_t(cut.lanes) << cut.bits;
+}
 
 void check_image(const passes::Shape& shape, const FrameRequest& request, const Sizes& sizes) {
     const std::string size = std::to_string(request.width) + "x" + std::to_string(request.height);
@@ -37,8 +41,8 @@ void check_image(const passes::Shape& shape, const FrameRequest& request, const 
 Sizes sizes_for(const passes::Shape& shape, const FrameRequest& request) {
     Sizes s;
     if (request.width > 1u << 20 || request.height > 1u << 20)
-        throw InputError("an image of " + std::to_string(request.width) + "x" + std::to_string(request.height) +
-                         " pixels; at most 1048576 a side can be drawn");
+        throw InputError("an image of " + std::to_string(request.width) + "x" +
+                         std::to_string(request.height) + " pixels; at most 1048576 a side can be drawn");
     s.tiles_x = divide_up(request.width, shape.tile_width);
     s.tiles_y = divide_up(request.height, shape.tile_height);
     const uint64_t tiles = uint64_t(s.tiles_x) * s.tiles_y;

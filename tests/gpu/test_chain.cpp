@@ -1,0 +1,118 @@
+// The whole chain on the device against the float64 twin: pictures, and gradients of the loss.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "ewa/renderer.h"
+#include "gpu/test_device.h"
+#include "reference/render.h"
+#include "support/gradient_check.h"
+#include "support/random_scene.h"
+
+namespace ewa::test {
+namespace {
+
+struct Case {
+    SplatKind kind;
+    size_t splats;
+    int width, height, sh_degree;
+    Kernel kernel;
+    uint64_t seed;
+};
+
+void PrintTo(const Case& c, std::ostream* out) {
+    *out << name_of(c.kind) << " seed " << c.seed;
+}
+
+std::string case_name(const testing::TestParamInfo<Case>& info) {
+    const Case& c = info.param;
+    return std::string(name_of(c.kind)) + "_" + std::to_string(c.splats) + "_" + std::to_string(c.width) +
+           "x" + std::to_string(c.height) + "_sh" + std::to_string(c.sh_degree) + "_kernel" +
+           std::to_string(int(c.kernel)) + "_seed" + std::to_string(c.seed);
+}
+
+class Chain : public testing::TestWithParam<Case> {
+  protected:
+    void SetUp() override {
+        const Case& c = GetParam();
+        camera = random_camera(c.seed, c.width, c.height);
+        gaussians = random_gaussians(c.seed + 1, c.splats, c.kind, camera, c.sh_degree);
+        target = random_target(c.seed + 2, c.width, c.height);
+        options.kernel = c.kernel;
+        options.background = {0.2f, 0.5f, 0.8f};
+    }
+    Camera camera;
+    Gaussians gaussians;
+    Image target;
+    RenderOptions options;
+};
+
+/// Share of pixels whose error exceeds the bound: a contribution on the 1/255 threshold may go either way in
+/// float32.
+struct Errors {
+    double worst = 0, median = 0;
+    size_t over = 0, pixels = 0;
+};
+
+Errors compare(const Image& actual, const reference::Raster& expected, double bound) {
+    Errors errors;
+    errors.pixels = size_t(actual.width) * size_t(actual.height);
+    for (int y = 0; y < actual.height; ++y)
+        for (int x = 0; x < actual.width; ++x) {
+            double error = 0;
+            for (int c = 0; c < actual.channels; ++c) {
+                const double e = std::abs(double(actual.at(x, y)[c]) - expected.at(x, y)[c]);
+                error = std::isfinite(e) ? std::max(error, e) : INFINITY;
+            }
+            errors.worst = std::max(errors.worst, error);
+            if (!(error <= bound)) ++errors.over;
+        }
+    return errors;
+}
+
+TEST_P(Chain, PictureIsTheTwins) {
+    Renderer renderer(device(), gaussians, options);
+    const Rendering rendering = renderer.render(camera, true);
+    const reference::Picture twin = reference::render(gaussians, camera, options);
+    const Errors color = compare(rendering.color, twin.blended.color, 1e-5);
+    RecordProperty("worst", std::to_string(color.worst));
+    printf("    worst %.2e, over 1e-5: %zu of %zu\n", color.worst, color.over, color.pixels);
+    EXPECT_LE(color.over, color.pixels / 1000);
+    EXPECT_LT(color.worst, 1.0 / 255 + 1e-5);
+    EXPECT_EQ(renderer.skipped_nonfinite(), twin.skipped_nonfinite);
+}
+
+TEST_P(Chain, GradientIsTheTwins) {
+    const LossGradient actual = loss_gradient(device(), gaussians, camera, target, options);
+    const auto expected = reference::loss_gradient(gaussians, camera, target, options);
+    EXPECT_NEAR(actual.loss, expected.loss, 1e-6);
+    EXPECT_NEAR(actual.l1, expected.l1, 1e-6);
+    EXPECT_NEAR(actual.ssim, expected.ssim, 1e-6);
+    GradientTolerance tolerance;
+    tolerance.cosine = 1e-6;
+    tolerance.norm = 2e-4;
+    tolerance.element_relative = 1e-2;
+    tolerance.element_absolute = 1e-4;
+    EXPECT_TRUE(splat_gradients_agree(actual.gradient, expected.gradient, tolerance));
+}
+
+std::vector<Case> cases() {
+    std::vector<Case> all;
+    uint64_t seed = 100;
+    for (const SplatKind kind :
+         {SplatKind::ordinary, SplatKind::needles, SplatKind::sub_pixel, SplatKind::off_screen_and_close,
+          SplatKind::opacity_extremes, SplatKind::mixed})
+        for (const size_t splats : {size_t(20), size_t(600)})
+            all.push_back({kind, splats, 61, 47, int(seed % 4), Kernel::peak, seed++});
+    for (const Kernel kernel : {Kernel::antialias, Kernel::unit_mass})
+        all.push_back({SplatKind::mixed, 300, 53, 39, 3, kernel, seed++});
+    for (const auto& [w, h] : {std::pair{1, 1}, {17, 3}, {3, 17}, {200, 150}, {257, 129}})
+        all.push_back({SplatKind::mixed, 400, w, h, 2, Kernel::peak, seed++});
+    all.push_back({SplatKind::mixed, 3000, 160, 120, 1, Kernel::peak, seed++});
+    return all;
+}
+
+INSTANTIATE_TEST_SUITE_P(All, Chain, testing::ValuesIn(cases()), case_name);
+
+}  // namespace
+}  // namespace ewa::test
