@@ -9,8 +9,8 @@ namespace ewa::report {
 namespace {
 
 // The drawing's own units; the page scales it.
-constexpr double kWidth = 480, kHeight = 260;
-constexpr double kLeft = 56, kRight = 16, kTop = 12, kBottom = 42;
+constexpr double kWidth = 400, kHeight = 240;
+constexpr double kLeft = 48, kRight = 16, kTop = 12, kBottom = 44;
 
 struct Axis {
     double low = 0, high = 1, tick = 1;
@@ -136,7 +136,7 @@ std::string chart_svg(const Chart& chart) {
     const auto [low, high] =
         std::minmax_element(points.begin(), points.end(), [](auto& a, auto& b) { return a.y < b.y; });
     Frame frame;
-    frame.x = make_axis(points.front().x, points.back().x, 5, false);
+    frame.x = make_axis(std::min(0.0, points.front().x), points.back().x, 4, false);
     frame.y = make_axis(chart.zero_based ? std::min(0.0, low->y) : low->y, high->y, 4, true);
 
     std::string svg = fmt::format(

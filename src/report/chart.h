@@ -18,9 +18,10 @@ struct ChartPoint {
 
 struct Chart {
     std::string title, x_label, y_label;
-    std::vector<ChartPoint> points;  // in the order of x; points that are not finite are left out
-    bool smooth = false;             // draws a running mean over the points, these faint behind it
-    bool zero_based = false;         // the y axis starts at 0
+    std::vector<ChartPoint>
+        points;           // in the order of x, which is drawn from 0; points that are not finite are left out
+    bool smooth = false;  // draws a running mean over the points, these faint behind it
+    bool zero_based = false;  // the y axis starts at 0
 };
 
 /// A <figure> with one chart; empty where fewer than two points are finite.

@@ -35,7 +35,10 @@ std::string duration(double seconds) {
 }
 
 std::string bytes_text(uint64_t bytes) {
-    return short_number(double(bytes)) + "B";
+    const std::string number = short_number(double(bytes));
+    const size_t digits = number.find_first_of("kMGT");
+    return digits == std::string::npos ? number + " B"
+                                       : number.substr(0, digits) + " " + number.substr(digits) + "B";
 }
 
 std::string headline(const ReportData& data) {

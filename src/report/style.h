@@ -15,10 +15,10 @@ main { max-width: 1120px; margin: 0 auto; padding: 36px 24px 60px; }
 h1 { font-size: 27px; line-height: 1.2; margin: 0; font-weight: 650; letter-spacing: -0.01em; }
 h2 { font-size: 17px; margin: 40px 0 12px; font-weight: 650; }
 p { margin: 6px 0; } .soft { color: var(--soft); } .warn { color: var(--warn); }
-.figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(135px, 1fr)); gap: 1px; margin: 24px 0 0;
+.figures { display: grid; grid-template-columns: repeat(4, 1fr); gap: 1px; margin: 24px 0 0;
            background: var(--rule); border: 1px solid var(--rule); border-radius: 8px; overflow: hidden; }
 .figures div { background: var(--card); padding: 12px 16px; }
-.figures b { display: block; font-size: 23px; font-weight: 600; font-variant-numeric: tabular-nums; }
+.figures b { display: block; font-size: 22px; white-space: nowrap; font-weight: 600; font-variant-numeric: tabular-nums; }
 .figures span { color: var(--soft); font-size: 13px; }
 .charts { display: grid; grid-template-columns: repeat(auto-fill, minmax(330px, 1fr)); gap: 16px; }
 figure { margin: 0; }
@@ -40,9 +40,10 @@ th { text-align: left; font-weight: 600; color: var(--soft); font-size: 13px; }
 th, td { padding: 5px 12px 5px 0; border-bottom: 1px solid var(--rule); vertical-align: top; overflow-wrap: anywhere; }
 td.number, th.number { text-align: right; white-space: nowrap; }
 td.bar { width: 45%; } td.bar i { display: block; height: 10px; margin-top: 6px; background: var(--line); border-radius: 2px; }
-.columns { display: grid; grid-template-columns: repeat(auto-fit, minmax(330px, 1fr)); gap: 0 40px; }
+.columns { display: grid; align-items: start; grid-template-columns: repeat(auto-fit, minmax(330px, 1fr)); gap: 0 40px; }
 pre { background: var(--card); border: 1px solid var(--rule); border-radius: 8px; padding: 12px 16px; margin: 0;
       white-space: pre-wrap; overflow-wrap: anywhere; font: 13px/1.5 ui-monospace, "DejaVu Sans Mono", monospace; }
+@media (max-width: 640px) { .figures { grid-template-columns: repeat(2, 1fr); } main { padding: 24px 14px; } }
 @media print { main { max-width: none; } .view, .chart, tr { break-inside: avoid; } }
 )css";
 
