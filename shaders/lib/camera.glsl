@@ -1,0 +1,42 @@
+// The camera's uniform block, and points seen from it. The including pass defines BINDING_CAMERA.
+#ifndef EWA_LIB_CAMERA
+#define EWA_LIB_CAMERA
+#include "lib/double_float.glsl"
+
+layout(set = 0, binding = BINDING_CAMERA, scalar) uniform CameraUniform { CameraBlock camera; };
+
+// Rows of the world to camera rotation as a matrix that multiplies column vectors.
+mat3 camera_rotation() {
+    return mat3(camera.rotation_hi[0], camera.rotation_hi[3], camera.rotation_hi[6], camera.rotation_hi[1],
+                camera.rotation_hi[4], camera.rotation_hi[7], camera.rotation_hi[2], camera.rotation_hi[5],
+                camera.rotation_hi[8]);
+}
+
+struct View {
+    vec3 offset;     // mean - camera position, world axes
+    vec2 x, y, z;    // camera coordinates as float pairs
+};
+
+// The camera's position leaves first, in two floats, so that a scene far from the origin loses nothing to float32.
+View view_point(vec3 mean) {
+    vec2 d[3];
+    [[unroll]] for (int j = 0; j < 3; ++j) {
+        d[j] = df_add(two_sum(mean[j], -camera.position_hi[j]), vec2(-camera.position_lo[j], 0.0));
+    }
+    vec2 p[3];
+    [[unroll]] for (int i = 0; i < 3; ++i) {
+        p[i] = vec2(0.0);
+        [[unroll]] for (int j = 0; j < 3; ++j) {
+            p[i] = df_add(p[i], df_mul(vec2(camera.rotation_hi[3 * i + j], camera.rotation_lo[3 * i + j]), d[j]));
+        }
+    }
+    return View(vec3(d[0].x, d[1].x, d[2].x), p[0], p[1], p[2]);
+}
+
+// Pixel position of axis 0 (x) or 1 (y): focal * p / z + centre, as a float pair.
+vec2 pixel_position(vec2 p, vec2 z, int axis) {
+    const vec2 focal = vec2(camera.focal_hi[axis], camera.focal_lo[axis]);
+    const vec2 center = vec2(camera.center_hi[axis], camera.center_lo[axis]);
+    return df_add(df_mul(df_div(p, z), focal), center);
+}
+#endif

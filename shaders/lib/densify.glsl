@@ -1,0 +1,22 @@
+// What adaptive density control does with one splat (3DGS, section 5.2 and densify_and_prune of its code): a splat
+// whose mean gradient is above the threshold is cloned where it is small and split where it is large; one that has
+// become transparent, or too large once that is asked for, goes. A split's children are judged by their own size.
+#ifndef EWA_LIB_DENSIFY
+#define EWA_LIB_DENSIFY
+const uint ACTION_PRUNE = 0u, ACTION_KEEP = 1u, ACTION_CLONE = 2u, ACTION_SPLIT = 3u;
+
+uint outputs_of(uint action) { return min(action, 2u); }
+
+uint action_of(DensifyPush push, vec4 mean_logit, vec4 quaternion, vec4 scale_red, vec2 statistics) {
+    const bool whole = is_finite(mean_logit) && is_finite(quaternion) && is_finite(scale_red);
+    const bool opaque = mean_logit.w >= push.prune_opacity;
+    if (!(whole && opaque)) return ACTION_PRUNE;
+    const float size = exp(max(scale_red.x, max(scale_red.y, scale_red.z)));
+    const bool limited = push.prune_scale > 0.0;
+    const bool grow = statistics.y > 0.0 && statistics.x / statistics.y >= push.grow_gradient;
+    if (grow && size > push.split_scale)
+        return limited && size / float(SPLIT_SCALE) > push.prune_scale ? ACTION_PRUNE : ACTION_SPLIT;
+    if (limited && size > push.prune_scale) return ACTION_PRUNE;
+    return grow ? ACTION_CLONE : ACTION_KEEP;
+}
+#endif

@@ -1,0 +1,77 @@
+// Which tiles a splat's ellipse {alpha >= ALPHA_MIN} reaches, tile row by tile row, in closed form.
+// The answer errs to the large side only, so leaving out the other tiles never changes the picture.
+#ifndef EWA_LIB_FOOTPRINT
+#define EWA_LIB_FOOTPRINT
+
+layout(constant_id = SPEC_TILE_WIDTH) const uint TILE_WIDTH = 8;
+layout(constant_id = SPEC_TILE_HEIGHT) const uint TILE_HEIGHT = 8;
+
+struct Footprint {
+    vec2 mean;       // px
+    float ux, k, vy; // as in the record
+    float reach;     // u^2 + v^2 <= reach^2 where alpha >= ALPHA_MIN
+    uint row_begin, row_end;
+};
+
+// Slack for the rounding of what follows, in units of u and v; 3.3 is the largest reach an ordinary splat has.
+const float REACH_SLACK = 1e-3;
+
+// First and one-past-last tile that holds a pixel centre in [low, high] (px), of `tiles` tiles over `size` pixels.
+uvec2 tiles_between(float low, float high, uint tile, uint size) {
+    const float slack = 1e-3 + 4e-7 * (abs(low) + abs(high));
+    const float first = ceil(clamp(low - slack - 0.5, -1.0, float(size)));
+    const float last = floor(clamp(high + slack - 0.5, -1.0, float(size)));
+    const int begin = max(int(first), 0), end = min(int(last), int(size) - 1);
+    return begin <= end ? uvec2(uint(begin) / tile, uint(end) / tile + 1u) : uvec2(0u);
+}
+
+// Empty (row_begin == row_end) where the opacity is under ALPHA_MIN, or anything is NaN.
+Footprint footprint_of(vec4 record0, vec4 record1, uvec2 size) {
+    Footprint f;
+    f.mean = record0.xy;
+    f.ux = record1.x;
+    f.k = record1.y;
+    f.vy = record1.z;
+    const float ratio = record1.w / float(ALPHA_MIN);
+    f.reach = sqrt(max(0.0, log(max(ratio, 1.0)) * 1.00001 + 1e-5)) + REACH_SLACK;
+    f.row_begin = f.row_end = 0u;
+    if (ratio >= 1.0) {
+        const float half_height = f.reach / f.vy;
+        const uvec2 rows = tiles_between(f.mean.y - half_height, f.mean.y + half_height, TILE_HEIGHT, size.y);
+        f.row_begin = rows.x;
+        f.row_end = rows.y;
+    }
+    return f;
+}
+
+// Right border of the ellipse at height dy, relative to the mean: x with ux (x - k dy) = sqrt(reach^2 - (vy dy)^2).
+float border(Footprint f, float dy) {
+    const float v = f.vy * dy;
+    return f.k * dy + (sqrt(max(0.0, f.reach * f.reach - v * v)) + REACH_SLACK) / f.ux;
+}
+
+// Tile columns reached in a tile row: the border is concave in dy, so its maximum over the row's pixel centres stands
+// at its peak or, where that lies outside, at the nearer end. The left border is the right one turned by 180 degrees.
+uvec2 columns_of(Footprint f, uint row, uvec2 size) {
+    const float half_height = f.reach / f.vy;
+    const float low = clamp(float(row * TILE_HEIGHT) + 0.5 - f.mean.y, -half_height, half_height);
+    const float high =
+        clamp(float(min((row + 1u) * TILE_HEIGHT, size.y)) - 0.5 - f.mean.y, -half_height, half_height);
+    // Peak of the border: d/d(dy) = 0 at vy dy = reach * t / sqrt(1 + t^2), t = k ux / vy.
+    const float t = f.k * f.ux / f.vy;
+    const float peak = half_height * t / sqrt(1.0 + t * t);
+    const float right = border(f, clamp(peak, low, high));
+    const float left = -border(f, -clamp(-peak, low, high));
+    return tiles_between(f.mean.x + left, f.mean.x + right, TILE_WIDTH, size.x);
+}
+
+// Pairs (splat, tile) in tile rows [begin, end).
+uint count_tiles(Footprint f, uint begin, uint end, uvec2 size) {
+    uint count = 0u;
+    for (uint row = begin; row < end; ++row) {
+        const uvec2 columns = columns_of(f, row, size);
+        count += columns.y - columns.x;
+    }
+    return count;
+}
+#endif

@@ -1,0 +1,75 @@
+#version 460
+// Blends the splats of a tile front to back into the image planes: C = sum c alpha T + T background. One workgroup is
+// one subgroup and owns one tile. SPEC_MODE bit 0 (gradients): sorted values are instance numbers, and
+// instance_splats gives their splat; else they are splats. Bit 1: writes the depth plane also.
+#extension GL_GOOGLE_include_directive : require
+#include "lib/prelude.glsl"
+#include "lib/subgroup.glsl"
+#include "lib/tile.glsl"
+
+layout(local_size_x_id = SPEC_GROUP_SIZE) in;
+layout(constant_id = SPEC_MODE) const uint MODE = 0;
+const bool BY_INSTANCE = (MODE & 1u) != 0u, WITH_DEPTH = (MODE & 2u) != 0u;
+
+layout(set = 0, binding = 0) uniform samplerBuffer records;
+layout(set = 0, binding = 1, scalar) readonly buffer Values { uint values[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer InstanceSplats { uint instance_splats[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer TileStarts { uint tile_starts[]; };
+layout(set = 0, binding = 4, scalar) writeonly buffer Planes { float planes[]; };
+layout(push_constant, scalar) uniform Push { BlendPush push; };
+
+void main() {
+    const uint tile = gl_WorkGroupID.x * push.tile_step[0] + gl_WorkGroupID.y * push.tile_step[1];
+    if (tile >= push.tiles[0] * push.tiles[1]) return;
+    const uint lane = gl_SubgroupInvocationID;
+    const uint px = (tile % push.tiles[0]) * TILE_WIDTH + lane % TILE_WIDTH;
+    const uint py = (tile / push.tiles[0]) * TILE_HEIGHT + lane / TILE_WIDTH;
+    const vec2 pixel = vec2(px, py) + 0.5;
+
+    float T[PIXELS], depth[PIXELS];
+    vec3 color[PIXELS];
+    [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
+        // A pixel outside the image is closed from the start, so that it never keeps the tile going.
+        T[p] = px < push.size[0] && py + p * ROW_STEP < push.size[1] ? 1.0 : -1.0;
+        color[p] = vec3(0.0);
+        depth[p] = 0.0;
+    }
+    const uint end = tile_starts[tile + 1u];
+    for (uint k = tile_starts[tile]; k < end; k += SUBGROUP) {
+        const uint value = values[min(k + lane, end - 1u)];
+        const int splat = int(RECORD_TEXELS * (BY_INSTANCE ? instance_splats[value] : value));
+        const vec4 record0 = texelFetch(records, splat);
+        vec4 record1 = texelFetch(records, splat + 1);
+        const vec4 record2 = texelFetch(records, splat + 2);
+        record1.w = k + lane < end ? record1.w : 0.0;
+        [[unroll]] for (uint j = 0; j < SUBGROUP; ++j) {
+            const LaneSplat s = lane_splat(record0, record1, record2, j, pixel);
+            const float z = WITH_DEPTH ? subgroupShuffle(record2.w, j) : 0.0;
+            [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
+                const float u = s.u + s.u_step * float(p), v = s.v + s.v_step * float(p);
+                float alpha = min(float(ALPHA_MAX), s.opacity * exp(-(u * u + v * v)));
+                alpha = alpha >= float(ALPHA_MIN) ? alpha : 0.0;
+                bool blended;
+                const float weight = composite(alpha, T[p], blended);
+                color[p] += weight * s.color;
+                if (WITH_DEPTH) depth[p] += weight * z;
+            }
+        }
+        bool open = false;
+        [[unroll]] for (uint p = 0; p < PIXELS; ++p) open = open || T[p] > 0.0;
+        if (subgroupAll(!open)) break;
+    }
+    const vec3 background = vec3(push.background[0], push.background[1], push.background[2]);
+    [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
+        const uint y = py + p * ROW_STEP;
+        if (px < push.size[0] && y < push.size[1]) {
+            const uint at = y * push.stride + px;
+            const float left = abs(T[p]);
+            planes[PLANE_R * push.plane_floats + at] = color[p].r + left * background.r;
+            planes[PLANE_G * push.plane_floats + at] = color[p].g + left * background.g;
+            planes[PLANE_B * push.plane_floats + at] = color[p].b + left * background.b;
+            planes[PLANE_T * push.plane_floats + at] = left;
+            if (WITH_DEPTH) planes[PLANE_DEPTH * push.plane_floats + at] = depth[p];
+        }
+    }
+}

@@ -1,0 +1,125 @@
+#version 460
+// Gradients of blending, front to back: with R = (what is blended behind a splat) . dL/dC,
+// dL/d(alpha) = T c . dL/dC - R / (1 - alpha); R starts as C . dL/dC and each splat takes its own share off, so nothing
+// is divided by 1 - alpha splat after splat. One workgroup is one subgroup and owns one tile, and the gradient slots
+// of its instances: each slot is written by exactly one tile, once.
+#extension GL_GOOGLE_include_directive : require
+#include "lib/prelude.glsl"
+#include "lib/subgroup.glsl"
+#include "lib/tile.glsl"
+
+layout(local_size_x_id = SPEC_GROUP_SIZE) in;
+layout(set = 0, binding = 0) uniform samplerBuffer records;
+layout(set = 0, binding = 1, scalar) readonly buffer Values { uint values[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer InstanceSplats { uint instance_splats[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer TileStarts { uint tile_starts[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer Planes { float planes[]; };
+layout(set = 0, binding = 5, scalar) readonly buffer ImageGradient { float image_gradient[]; };
+layout(set = 0, binding = 6, scalar) writeonly buffer Slots { float slots[]; };
+layout(push_constant, scalar) uniform Push { BlendPush push; };
+
+// Sums 8 values over the subgroup at once: at each step a lane keeps half of its values and sends the other half
+// away, so that lane l ends with the sum of value l % 8 after 7 shuffles. Lanes 8 apart then add up.
+float transposing_sum(float v[8]) {
+    const uint lane = gl_SubgroupInvocationID;
+    const bool b0 = (lane & 1u) != 0u, b1 = (lane & 2u) != 0u, b2 = (lane & 4u) != 0u;
+    float four[4], two[2];
+    [[unroll]] for (uint i = 0; i < 4; ++i)
+        four[i] = (b0 ? v[2 * i + 1] : v[2 * i]) + subgroupShuffleXor(b0 ? v[2 * i] : v[2 * i + 1], 1u);
+    [[unroll]] for (uint i = 0; i < 2; ++i)
+        two[i] = (b1 ? four[2 * i + 1] : four[2 * i]) + subgroupShuffleXor(b1 ? four[2 * i] : four[2 * i + 1], 2u);
+    float sum = (b2 ? two[1] : two[0]) + subgroupShuffleXor(b2 ? two[0] : two[1], 4u);
+    [[unroll]] for (uint d = 8u; d < SUBGROUP; d *= 2u) sum += subgroupShuffleXor(sum, d);
+    return sum;
+}
+
+void store_slot(uint instance, float v[8], float last, bool valid) {
+    const uint lane = gl_SubgroupInvocationID;
+    const uint slot = SLOT_FLOATS * instance;
+    if (SUBGROUP >= 8u) {
+        const float sum = transposing_sum(v), last_sum = subgroup_sum(last);
+        if (valid && lane < 8u) slots[slot + lane] = sum;
+        if (valid && lane == 0u) slots[slot + 8u] = last_sum;
+    } else {
+        [[unroll]] for (uint i = 0; i < 9; ++i) {
+            const float sum = subgroup_sum(i < 8u ? v[i % 8u] : last);
+            if (valid && lane == i % SUBGROUP) slots[slot + i] = sum;
+        }
+    }
+}
+
+void main() {
+    const uint tile = gl_WorkGroupID.x * push.tile_step[0] + gl_WorkGroupID.y * push.tile_step[1];
+    if (tile >= push.tiles[0] * push.tiles[1]) return;
+    const uint lane = gl_SubgroupInvocationID;
+    const uint px = (tile % push.tiles[0]) * TILE_WIDTH + lane % TILE_WIDTH;
+    const uint py = (tile / push.tiles[0]) * TILE_HEIGHT + lane / TILE_WIDTH;
+    const vec2 pixel = vec2(px, py) + 0.5;
+
+    float T[PIXELS], rest[PIXELS];
+    vec3 gradient[PIXELS];
+    [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
+        const uint y = py + p * ROW_STEP;
+        const bool inside = px < push.size[0] && y < push.size[1];
+        const uint at = min(y, push.size[1] - 1u) * push.stride + min(px, push.size[0] - 1u);
+        T[p] = inside ? 1.0 : -1.0;
+        gradient[p] = vec3(image_gradient[PLANE_R * push.plane_floats + at],
+                           image_gradient[PLANE_G * push.plane_floats + at],
+                           image_gradient[PLANE_B * push.plane_floats + at]);
+        rest[p] = dot(gradient[p], vec3(planes[PLANE_R * push.plane_floats + at],
+                                        planes[PLANE_G * push.plane_floats + at],
+                                        planes[PLANE_B * push.plane_floats + at]));
+    }
+    const uint end = tile_starts[tile + 1u];
+    uint k = tile_starts[tile];
+    for (; k < end; k += SUBGROUP) {
+        const uint instance = values[min(k + lane, end - 1u)];
+        const int splat = int(RECORD_TEXELS * instance_splats[instance]);
+        const vec4 record0 = texelFetch(records, splat);
+        vec4 record1 = texelFetch(records, splat + 1);
+        const vec4 record2 = texelFetch(records, splat + 2);
+        record1.w = k + lane < end ? record1.w : 0.0;
+        [[unroll]] for (uint j = 0; j < SUBGROUP; ++j) {
+            const LaneSplat s = lane_splat(record0, record1, record2, j, pixel);
+            float sum[8] = {0, 0, 0, 0, 0, 0, 0, 0};
+            float sum_blue = 0.0;
+            [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
+                const float u = s.u + s.u_step * float(p), v = s.v + s.v_step * float(p);
+                const float raw = s.opacity * exp(-(u * u + v * v));
+                float alpha = min(float(ALPHA_MAX), raw);
+                alpha = alpha >= float(ALPHA_MIN) ? alpha : 0.0;
+                bool blended;
+                const float weight = composite(alpha, T[p], blended);
+                const float own = weight * dot(s.color, gradient[p]);
+                rest[p] -= own;
+                // dL/d(power) = alpha dL/d(alpha); none where the clamp holds alpha.
+                const bool moves = blended && raw <= float(ALPHA_MAX);
+                const float g = moves ? own - rest[p] * (alpha / (1.0 - alpha)) : 0.0;
+                const float gu = g * u, gv = g * v;
+                sum[0] += g;
+                sum[1] += gu;
+                sum[2] += gv;
+                sum[3] += gu * u;
+                sum[4] += gu * v;
+                sum[5] += gv * v;
+                sum[6] += weight * gradient[p].r;
+                sum[7] += weight * gradient[p].g;
+                sum_blue += weight * gradient[p].b;
+            }
+            store_slot(subgroupShuffle(instance, j), sum, sum_blue, k + j < end);
+        }
+        bool open = false;
+        [[unroll]] for (uint p = 0; p < PIXELS; ++p) open = open || T[p] > 0.0;
+        if (subgroupAll(!open)) {
+            k += SUBGROUP;
+            break;
+        }
+    }
+    // Instances behind the last open pixel got nothing.
+    for (; k < end; k += SUBGROUP) {
+        if (k + lane < end) {
+            const uint slot = SLOT_FLOATS * values[k + lane];
+            [[unroll]] for (uint i = 0; i < 9; ++i) slots[slot + i] = 0.0;
+        }
+    }
+}

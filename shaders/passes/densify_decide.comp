@@ -1,0 +1,18 @@
+#version 460
+// Decides how many splats each one becomes: 0, 1 or 2. One invocation owns splat i.
+#extension GL_GOOGLE_include_directive : require
+#include "lib/prelude.glsl"
+#include "lib/densify.glsl"
+
+layout(local_size_x_id = SPEC_GROUP_SIZE) in;
+layout(set = 0, binding = 0) uniform samplerBuffer params;
+layout(set = 0, binding = 1, scalar) readonly buffer Statistics { vec2 statistics[]; };
+layout(set = 0, binding = 2, scalar) writeonly buffer Outputs { uint outputs[]; };
+layout(push_constant, scalar) uniform Push { DensifyPush push; };
+
+void main() {
+    const uint i = item_index();
+    if (i >= push.splats) return;
+    outputs[i] = outputs_of(action_of(push, texelFetch(params, int(i)), texelFetch(params, int(push.capacity + i)),
+                                      texelFetch(params, int(2u * push.capacity + i)), statistics[i]));
+}

@@ -1,0 +1,58 @@
+#version 460
+// Writes the splats of the next generation into new buffers. One invocation owns old splat i and writes what it
+// becomes, side by side in the old order. A kept splat and a clone's original keep their moments; what is new starts
+// with none. Children of a split are drawn from the parent's Gaussian and are SPLIT_SCALE times smaller.
+#extension GL_GOOGLE_include_directive : require
+#include "lib/prelude.glsl"
+#include "lib/quaternion.glsl"
+#include "lib/random.glsl"
+#include "lib/densify.glsl"
+
+layout(local_size_x_id = SPEC_GROUP_SIZE) in;
+layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3; // the degree stored
+layout(set = 0, binding = 0) uniform samplerBuffer params;
+layout(set = 0, binding = 1) uniform samplerBuffer moments1;
+layout(set = 0, binding = 2) uniform samplerBuffer moments2;
+layout(set = 0, binding = 3, scalar) readonly buffer Statistics { vec2 statistics[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer Prefix { uint prefix[]; };
+layout(set = 0, binding = 5, scalar) readonly buffer Totals { uint totals[]; };
+layout(set = 0, binding = 6, scalar) writeonly buffer ParamsOut { vec4 params_out[]; };
+layout(set = 0, binding = 7, scalar) writeonly buffer Moments1Out { vec4 moments1_out[]; };
+layout(set = 0, binding = 8, scalar) writeonly buffer Moments2Out { vec4 moments2_out[]; };
+layout(push_constant, scalar) uniform Push { DensifyPush push; };
+
+const uint PLANES = (PARAM_SH + 3 * (SH_DEGREE + 1) * (SH_DEGREE + 1) + 3) / 4;
+
+void main() {
+    const uint i = item_index();
+    if (i >= push.splats) return;
+    const vec4 p0 = texelFetch(params, int(i)), p1 = texelFetch(params, int(push.capacity + i)),
+               p2 = texelFetch(params, int(2u * push.capacity + i));
+    const uint action = action_of(push, p0, p1, p2, statistics[i]);
+    const uint first = totals[i / push.scan_block] + prefix[i];
+    [[unroll]] for (uint child = 0; child < 2; ++child) {
+        const uint to = first + child;
+        const bool written = child < outputs_of(action) && to < push.new_capacity;
+        const bool keeps_moments = child == 0u && action != ACTION_SPLIT;
+        vec3 mean = p0.xyz, log_scale = p2.xyz;
+        if (action == ACTION_SPLIT) {
+            float norm;
+            const vec3 normal = normal3(uvec4(i, 2u * push.step + child, push.seed[0], push.seed[1]));
+            mean += rotation_of(normalize_quaternion(p1, norm)) * (exp(p2.xyz) * normal);
+            log_scale -= log(float(SPLIT_SCALE));
+        }
+        [[unroll]] for (uint plane = 0; plane < PLANES; ++plane) {
+            const int from = int(plane * push.capacity + i);
+            vec4 value = texelFetch(params, from);
+            if (plane == 0u) value.xyz = mean;
+            if (plane == 2u) value.xyz = log_scale;
+            const vec4 m1 = keeps_moments ? texelFetch(moments1, from) : vec4(0.0);
+            const vec4 m2 = keeps_moments ? texelFetch(moments2, from) : vec4(0.0);
+            if (written) {
+                params_out[plane * push.new_capacity + to] = value;
+                moments1_out[plane * push.new_capacity + to] = m1;
+                moments2_out[plane * push.new_capacity + to] = m2;
+            }
+        }
+    }
+}

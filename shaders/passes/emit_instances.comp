@@ -1,0 +1,63 @@
+#version 460
+// Writes the (splat, tile) instances in depth order. One invocation owns the splat at one depth rank, and of its tile
+// rows the strip given by the workgroup's y (a strip bounds the loop: a splat may cover more tiles than some drivers
+// allow iterations). Instances of a splat are contiguous, in rows from top to bottom. SPEC_MODE 1 (gradients): also
+// tells where each splat's instances begin.
+#extension GL_GOOGLE_include_directive : require
+#include "lib/prelude.glsl"
+#include "lib/footprint.glsl"
+
+layout(local_size_x_id = SPEC_GROUP_SIZE) in;
+layout(constant_id = SPEC_MODE) const uint MODE = 0;
+layout(set = 0, binding = 0) uniform samplerBuffer records;
+layout(set = 0, binding = 1, scalar) readonly buffer Order { uint order[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer TileCounts { uint tile_counts[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer Prefix { uint prefix[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer Totals { uint totals[]; };
+layout(set = 0, binding = 5, scalar) readonly buffer CountsBlock { Counts counts; };
+layout(set = 0, binding = 6, scalar) writeonly buffer Keys { uint keys[]; };
+layout(set = 0, binding = 7, scalar) writeonly buffer Splats { uint splats[]; };
+layout(set = 0, binding = 8, scalar) writeonly buffer FirstInstances { uint first_instances[]; };
+layout(push_constant, scalar) uniform Push { EmitPush push; };
+
+void main() {
+    const uint rank = gl_WorkGroupID.x * GROUP_SIZE + gl_LocalInvocationID.x;
+    if (rank >= push.splats || counts.instances > push.capacity) return;
+    const uint splat = order[rank];
+    const uint count = tile_counts[splat];
+    if (count == 0u) return;
+    const uvec2 size = uvec2(push.size[0], push.size[1]);
+    const Footprint f = footprint_of(texelFetch(records, int(RECORD_TEXELS * splat)),
+                                     texelFetch(records, int(RECORD_TEXELS * splat + 1u)), size);
+    const uint strip = gl_WorkGroupID.y;
+    const uint begin = max(f.row_begin, strip * push.strip_rows), end = min(f.row_end, (strip + 1u) * push.strip_rows);
+    const uint first = totals[rank / push.scan_block] + prefix[rank];
+    if (strip == 0u && MODE == 1u) first_instances[splat] = first;
+    if (begin >= end) return;
+
+    uint at = first + count_tiles(f, f.row_begin, begin, size);
+    uint row = begin;
+    uvec2 columns = columns_of(f, row, size);
+    uint column = columns.x;
+    // One flat loop over rows and columns. The count bounds it, so that nothing is written past the splat's own range
+    // even where another compiler rounds the footprint differently.
+    while (row < end) {
+        if (column < columns.y) {
+            if (at < first + count) {
+                keys[at] = row * push.tiles[0] + column;
+                splats[at] = splat;
+            }
+            ++at;
+            ++column;
+        } else {
+            ++row;
+            columns = columns_of(f, row, size);
+            column = columns.x;
+        }
+    }
+    // And what it promised but did not reach stands behind the last tile.
+    for (; end == f.row_end && at < first + count; ++at) {
+        keys[at] = push.tiles[0] * push.tiles[1];
+        splats[at] = splat;
+    }
+}

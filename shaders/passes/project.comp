@@ -1,0 +1,74 @@
+#version 460
+// Projects splats into pixels. One invocation owns splat i: it reads its parameters and the camera, and writes its
+// record, its depth key and the number of tiles it reaches. A splat that is not drawn gets count 0 and the last key.
+#extension GL_GOOGLE_include_directive : require
+#define BINDING_CAMERA 1
+#include "lib/prelude.glsl"
+#include "lib/projection.glsl"
+#include "lib/footprint.glsl"
+#include "lib/sh.glsl"
+
+layout(local_size_x_id = SPEC_GROUP_SIZE) in;
+layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3;
+
+layout(set = 0, binding = 0) uniform samplerBuffer params;
+layout(set = 0, binding = 2, scalar) writeonly buffer Records { vec4 records[]; };
+layout(set = 0, binding = 3, scalar) writeonly buffer DepthKeys { uint depth_keys[]; };
+layout(set = 0, binding = 4, scalar) writeonly buffer TileCounts { uint tile_counts[]; };
+layout(set = 0, binding = 5, scalar) buffer CountsBlock { Counts counts; };
+layout(push_constant, scalar) uniform Push { ProjectPush push; };
+
+vec4 param(uint plane, uint i) { return texelFetch(params, int(plane * push.capacity + i)); }
+
+const uint SH_FLOATS = 3 * (SH_DEGREE + 1) * (SH_DEGREE + 1);
+const uint PLANES = (PARAM_SH + SH_FLOATS + 3) / 4;
+
+// Colour seen along a direction; finite: whether every coefficient was.
+vec3 sh_color(uint i, vec4 plane2, vec3 direction, out bool finite) {
+    float basis[16];
+    sh_basis(SH_DEGREE, direction, basis);
+    vec3 sum = vec3(0.0);
+    [[unroll]] for (uint plane = PARAM_SH / 4; plane < PLANES; ++plane) {
+        const vec4 value = plane == 2u ? plane2 : param(plane, i);
+        [[unroll]] for (uint c = 0; c < 4; ++c) {
+            const uint f = 4 * plane + c;
+            if (f >= PARAM_SH && f < PARAM_SH + SH_FLOATS)
+                sum[(f - PARAM_SH) % 3] += basis[(f - PARAM_SH) / 3] * value[c];
+        }
+    }
+    finite = is_finite(sum);
+    return max(vec3(0.0), sum + float(COLOR_OFFSET));
+}
+
+void main() {
+    const uint i = item_index();
+    if (i >= push.splats) return;
+    const vec4 p0 = param(0, i), p1 = param(1, i), p2 = param(2, i);
+    const Projection p = project_splat(SplatShape(p0.xyz, p0.w, p1, p2.xyz));
+    const float z = p.view.z.x;
+    bool finite_color;
+    const vec3 color = sh_color(i, p2, normalize(p.view.offset), finite_color);
+
+    const float opacity = p.peak * p.factor;
+    const vec2 x = pixel_position(p.view.x, p.view.z, 0), y = pixel_position(p.view.y, p.view.z, 1);
+    const float ux = sqrt(0.5 * p.c / p.det), k = p.b / p.c, vy = sqrt(0.5 / p.c);
+    const vec4 record0 = vec4(x.x, y.x, x.y, y.y), record1 = vec4(ux, k, vy, opacity);
+    const uvec2 size = uvec2(camera.size[0], camera.size[1]);
+
+    const bool stored_finite = is_finite(p0) && is_finite(p1) && is_finite(p2.xyz) && p.quaternion_norm > 0.0;
+    const bool in_front = z > float(NEAR_PLANE);
+    const bool projected_finite = finite_color && is_finite(record0) && is_finite(record1) && ux > 0.0 && vy > 0.0;
+    const bool drawn = stored_finite && in_front && projected_finite;
+
+    uint count = 0u;
+    if (drawn) {
+        const Footprint f = footprint_of(record0, record1, size);
+        count = count_tiles(f, f.row_begin, f.row_end, size);
+    }
+    records[RECORD_TEXELS * i] = record0;
+    records[RECORD_TEXELS * i + 1] = record1;
+    records[RECORD_TEXELS * i + 2] = vec4(color, z);
+    depth_keys[i] = count > 0u ? floatBitsToUint(z) : 0xffffffffu;
+    tile_counts[i] = count;
+    if (!stored_finite || (in_front && !projected_finite)) atomicAdd(counts.skipped_nonfinite, 1u);
+}

@@ -1,0 +1,23 @@
+#version 460
+// Adds up floats in a fixed order. One workgroup is one subgroup and owns one block of them.
+#extension GL_GOOGLE_include_directive : require
+#include "lib/prelude.glsl"
+#include "lib/subgroup.glsl"
+
+layout(local_size_x_id = SPEC_GROUP_SIZE) in;
+layout(set = 0, binding = 0, scalar) readonly buffer Source { float source[]; };
+layout(set = 0, binding = 1, scalar) writeonly buffer Sums { float sums[]; };
+layout(set = 0, binding = 2, scalar) writeonly buffer CountsBlock { Counts counts; };
+layout(push_constant, scalar) uniform Push { ReducePush push; };
+
+void main() {
+    const uint block = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+    const uint begin = block * push.block, end = min(begin + push.block, push.items);
+    float sum = 0.0;
+    for (uint e = begin + gl_SubgroupInvocationID; e < end; e += SUBGROUP) sum += source[e];
+    sum = subgroup_sum(sum) * push.scale;
+    if (gl_SubgroupInvocationID != 0u) return;
+    if (push.target == 0u) sums[block] = sum;
+    if (push.target == 1u) counts.l1 = sum;
+    if (push.target == 2u) counts.ssim = sum;
+}

@@ -1,0 +1,18 @@
+#version 460
+// Lowers every opacity to at most a given one and forgets its moments (3DGS, section 5.2). One invocation owns splat i.
+#extension GL_GOOGLE_include_directive : require
+#include "lib/prelude.glsl"
+
+layout(local_size_x_id = SPEC_GROUP_SIZE) in;
+layout(set = 0, binding = 0, scalar) buffer Params { vec4 params[]; };
+layout(set = 0, binding = 1, scalar) buffer Moments1 { vec4 moments1[]; };
+layout(set = 0, binding = 2, scalar) buffer Moments2 { vec4 moments2[]; };
+layout(push_constant, scalar) uniform Push { ResetPush push; };
+
+void main() {
+    const uint i = item_index();
+    if (i >= push.splats) return;
+    params[i].w = min(params[i].w, push.logit);
+    moments1[i].w = 0.0;
+    moments2[i].w = 0.0;
+}

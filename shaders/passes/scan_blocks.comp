@@ -1,0 +1,31 @@
+#version 460
+// Exclusive prefix sums within blocks. One workgroup is one subgroup and owns block b of `block` entries; it writes the
+// sum of the entries before each one in the block, and the block's total. SPEC_MODE 1: entry e is source[order[e]].
+#extension GL_GOOGLE_include_directive : require
+#include "lib/prelude.glsl"
+#include "lib/subgroup.glsl"
+
+layout(local_size_x_id = SPEC_GROUP_SIZE) in;
+layout(constant_id = SPEC_MODE) const uint MODE = 0;
+layout(set = 0, binding = 0, scalar) readonly buffer Source { uint source[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer Order { uint order[]; };
+layout(set = 0, binding = 2, scalar) writeonly buffer Prefix { uint prefix[]; };
+layout(set = 0, binding = 3, scalar) writeonly buffer Totals { uint totals[]; };
+layout(push_constant, scalar) uniform Push { ScanPush push; };
+
+void main() {
+    const uint block = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+    const uint begin = block * push.block;
+    if (begin >= push.items) return;
+    const uint end = min(begin + push.block, push.items);
+    uint carry = 0u;
+    for (uint base = begin; base < end; base += SUBGROUP) {
+        const uint e = base + gl_SubgroupInvocationID;
+        uint value = 0u;
+        if (e < end) value = source[MODE == 1u ? order[e] : e];
+        const uint sum = subgroup_inclusive_sum(value);
+        if (e < end) prefix[e] = carry + sum - value;
+        carry += subgroupShuffle(sum, SUBGROUP - 1u);
+    }
+    if (gl_SubgroupInvocationID == 0u) totals[block] = carry;
+}

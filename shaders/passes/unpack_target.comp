@@ -1,0 +1,19 @@
+#version 460
+// Spreads a photograph's RGBA texels into planes. One invocation owns one pixel.
+#extension GL_GOOGLE_include_directive : require
+#include "lib/prelude.glsl"
+
+layout(local_size_x_id = SPEC_GROUP_SIZE) in;
+layout(set = 0, binding = 0) uniform samplerBuffer photo;
+layout(set = 0, binding = 1, scalar) writeonly buffer Planes { float planes[]; };
+layout(push_constant, scalar) uniform Push { UnpackPush push; };
+
+void main() {
+    const uint i = item_index();
+    if (i >= push.size[0] * push.size[1]) return;
+    const vec4 color = texelFetch(photo, int(push.first_texel + i));
+    const uint at = (i / push.size[0]) * push.stride + i % push.size[0];
+    planes[PLANE_R * push.plane_floats + at] = color.r;
+    planes[PLANE_G * push.plane_floats + at] = color.g;
+    planes[PLANE_B * push.plane_floats + at] = color.b;
+}

@@ -1,0 +1,189 @@
+#version 460
+// Gradient of the projection, and Adam in the same breath, so that no gradient buffer of the parameters' size exists.
+// One invocation owns splat i: it adds up the splat's slots in the order of its tiles, carries the sums back through
+// the projection, and moves its parameters and moments. A splat that was not drawn has gradient zero and still moves by
+// its moments. An update that is not finite is dropped and counted. Nothing happens in a frame whose instances did not
+// fit (the host repeats it). SPEC_MODE bit 0: writes the gradient into moments1 and moves nothing. Bit 1: adds to the
+// densification statistics (norm of dL/d(mean) in normalised device coordinates, number of views drawn in).
+#extension GL_GOOGLE_include_directive : require
+#define BINDING_CAMERA 1
+#include "lib/prelude.glsl"
+#include "lib/projection.glsl"
+#include "lib/sh.glsl"
+
+layout(local_size_x_id = SPEC_GROUP_SIZE) in;
+layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3;
+layout(constant_id = SPEC_MODE) const uint MODE = 0;
+const bool GRADIENT_ONLY = (MODE & 1u) != 0u, STATISTICS = (MODE & 2u) != 0u;
+
+layout(set = 0, binding = 0) uniform samplerBuffer params;
+layout(set = 0, binding = 2) uniform samplerBuffer records;
+layout(set = 0, binding = 3) uniform samplerBuffer slots;
+layout(set = 0, binding = 4) uniform samplerBuffer moments1;
+layout(set = 0, binding = 5) uniform samplerBuffer moments2;
+layout(set = 0, binding = 6, scalar) readonly buffer TileCounts { uint tile_counts[]; };
+layout(set = 0, binding = 7, scalar) readonly buffer FirstInstances { uint first_instances[]; };
+layout(set = 0, binding = 8, scalar) buffer CountsBlock { Counts counts; };
+layout(set = 0, binding = 9, scalar) writeonly buffer ParamsOut { vec4 params_out[]; };
+layout(set = 0, binding = 10, scalar) writeonly buffer Moments1Out { vec4 moments1_out[]; };
+layout(set = 0, binding = 11, scalar) writeonly buffer Moments2Out { vec4 moments2_out[]; };
+layout(set = 0, binding = 12, scalar) buffer Statistics { vec2 statistics[]; };
+layout(push_constant, scalar) uniform Push { UpdatePush push; };
+
+const uint SH_FLOATS = 3 * (SH_DEGREE + 1) * (SH_DEGREE + 1);
+const uint PLANES = (PARAM_SH + SH_FLOATS + 3) / 4;
+
+// What the tiles added to a splat, see SLOT_FLOATS.
+struct Sums {
+    float g;
+    vec2 gw;       // sum g u, sum g v
+    vec3 gww;      // sum g u^2, g u v, g v^2
+    vec3 color;
+};
+
+// Some drivers stop a loop after 65,535 turns, so a turn takes 8 slots.
+Sums sum_slots(uint first, uint count) {
+    vec4 s0 = vec4(0.0), s1 = vec4(0.0);
+    float s2 = 0.0;
+    for (uint j = 0u; j < count; j += 8u) {
+        [[unroll]] for (uint c = 0; c < 8; ++c) {
+            const bool there = j + c < count;
+            const int slot = int(SLOT_TEXELS * (there ? first + j + c : first));
+            const vec4 t0 = texelFetch(slots, slot), t1 = texelFetch(slots, slot + 1), t2 = texelFetch(slots, slot + 2);
+            if (there) {
+                s0 += t0;
+                s1 += t1;
+                s2 += t2.x;
+            }
+        }
+    }
+    return Sums(s0.x, s0.yz, vec3(s0.w, s1.xy), vec3(s1.zw, s2));
+}
+
+uint index_of(uint plane, uint i) { return plane * push.capacity + i; }
+
+// One texel of parameters with its gradient: Adam (Kingma and Ba 2015, algorithm 1).
+void move(uint plane, uint i, vec4 value, vec4 gradient, vec4 rate) {
+    const uint at = index_of(plane, i);
+    if (GRADIENT_ONLY) {
+        moments1_out[at] = gradient;
+        return;
+    }
+    const vec4 m = mix(gradient, texelFetch(moments1, int(at)), float(ADAM_BETA1));
+    const vec4 v = mix(gradient * gradient, texelFetch(moments2, int(at)), float(ADAM_BETA2));
+    const vec4 moved = value - rate * (m * push.bias1) / (sqrt(v * push.bias2) + float(ADAM_EPSILON));
+    if (is_finite(moved) && is_finite(m) && is_finite(v)) {
+        params_out[at] = moved;
+        moments1_out[at] = m;
+        moments2_out[at] = v;
+    } else if (is_finite(value)) {
+        atomicAdd(counts.dropped_updates, 1u);
+    }
+}
+
+// All spherical harmonics but those of plane 2, which a splat's scales share; that one's gradient is returned.
+// direction_gradient: dL/d(unit direction).
+float move_sh(uint i, vec3 color_gradient, vec3 direction, out vec3 direction_gradient) {
+    float basis[16];
+    vec3 slope[16];
+    sh_basis(SH_DEGREE, direction, basis);
+    sh_basis_gradient(SH_DEGREE, direction, slope);
+    direction_gradient = vec3(0.0);
+    [[unroll]] for (uint plane = PARAM_SH / 4 + 1; plane < PLANES; ++plane) {
+        const vec4 value = texelFetch(params, int(index_of(plane, i)));
+        vec4 gradient = vec4(0.0), rate = vec4(0.0);
+        [[unroll]] for (uint c = 0; c < 4; ++c) {
+            const uint s = 4 * plane + c - PARAM_SH;
+            if (s < SH_FLOATS) {
+                gradient[c] = basis[s / 3] * color_gradient[s % 3];
+                rate[c] = s < 3 ? push.sh0_rate : push.sh_rest_rate;
+                direction_gradient += (value[c] * color_gradient[s % 3]) * slope[s / 3];
+            }
+        }
+        move(plane, i, value, gradient, rate);
+    }
+    return basis[0] * color_gradient.r;
+}
+
+struct FootprintGradient {
+    vec2 mean;         // dL/d(mean in px)
+    vec3 covariance;   // dL/da, dL/db, dL/dc; b is the value of both off-diagonal entries
+};
+
+// From the whitened sums to the 2D Gaussian. With power = -(u^2 + v^2): d(power)/d(mean) = 2 (ux u, vy v - k ux u),
+// d(power)/d(Sigma2) = 2 y y^T with y = (ux u, vy v - k ux u).
+FootprintGradient footprint_gradient(Sums s, Projection p) {
+    const float ux = sqrt(0.5 * p.c / p.det), k = p.b / p.c, vy = sqrt(0.5 / p.c);
+    const float skew = -k * ux;
+    FootprintGradient f;
+    f.mean = 2.0 * vec2(ux * s.gw.x, skew * s.gw.x + vy * s.gw.y);
+    f.covariance = 2.0 * vec3(ux * ux * s.gww.x, 2.0 * ux * (skew * s.gww.x + vy * s.gww.y),
+                              skew * skew * s.gww.x + 2.0 * skew * vy * s.gww.y + vy * vy * s.gww.z);
+    // The kernel's factor falls with det: d(ln factor)/d(Sigma2) = -Sigma2^-1 / 2.
+    if (KERNEL != KERNEL_PEAK) f.covariance += (-0.5 * s.g / p.det) * vec3(p.c, -2.0 * p.b, p.a);
+    return f;
+}
+
+void main() {
+    const uint i = item_index();
+    if (i >= push.splats || counts.instances > push.instance_capacity) return;
+    const uint count = tile_counts[i];
+    const bool drawn = count > 0u;
+    const vec4 p0 = texelFetch(params, int(index_of(0, i))), p1 = texelFetch(params, int(index_of(1, i))),
+               p2 = texelFetch(params, int(index_of(2, i)));
+    const Sums s = sum_slots(drawn ? first_instances[i] : 0u, count);
+    const Projection p = project_splat(SplatShape(p0.xyz, p0.w, p1, p2.xyz));
+    const vec3 direction = normalize(p.view.offset);
+    // max(0, .) passes no gradient where the colour stands at zero.
+    const vec3 shown = texelFetch(records, int(RECORD_TEXELS * i + 2u)).rgb;
+    const vec3 color_gradient = drawn ? s.color * vec3(greaterThan(shown, vec3(0.0))) : vec3(0.0);
+    vec3 direction_gradient;
+    const float red_gradient = move_sh(i, color_gradient, direction, direction_gradient);
+
+    const FootprintGradient f = footprint_gradient(s, p);
+    const vec3 cov = f.covariance;
+    vec3 dm0 = 2.0 * cov.x * p.m0 + cov.y * p.m1, dm1 = 2.0 * cov.z * p.m1 + cov.y * p.m0;
+    if (KERNEL == KERNEL_ANTIALIAS && p.det0 > 0.0) {
+        // d(ln det0) = 2 (m1 x n . dm0 + n x m0 . dm1) / |n|^2 with n = m0 x m1.
+        const vec3 n = cross(p.m0, p.m1);
+        dm0 += s.g * cross(p.m1, n) / p.det0;
+        dm1 += s.g * cross(n, p.m0) / p.det0;
+    }
+    // M's rows are focal/z (row x or y of the axes - tangent * row z).
+    const float inverse_z = 1.0 / p.view.z.x;
+    const vec3 row_z = vec3(p.axes[0].z, p.axes[1].z, p.axes[2].z);
+    const vec3 dx_axes = p.focal_over_z.x * dm0, dy_axes = p.focal_over_z.y * dm1;
+    const vec3 dz_axes = -p.tangent.x * dx_axes - p.tangent.y * dy_axes;
+    vec3 view_gradient = vec3(p.focal_over_z * f.mean, 0.0);
+    const vec2 tangent = vec2(p.view.x.x, p.view.y.x) * inverse_z;
+    view_gradient.z = -dot(tangent, view_gradient.xy) - inverse_z * (dot(dm0, p.m0) + dot(dm1, p.m1));
+    const vec2 tangent_gradient = vec2(p.tangent_clamped.x ? 0.0 : -dot(dx_axes, row_z),
+                                       p.tangent_clamped.y ? 0.0 : -dot(dy_axes, row_z));
+    view_gradient += vec3(tangent_gradient, -dot(tangent_gradient, tangent)) * inverse_z;
+
+    const mat3 to_world = transpose(camera_rotation());
+    vec3 log_scale_gradient;
+    mat3 rotation_gradient;
+    const vec3 scale = exp(p2.xyz);
+    [[unroll]] for (int k = 0; k < 3; ++k) {
+        const vec3 axis_gradient = vec3(dx_axes[k], dy_axes[k], dz_axes[k]);
+        log_scale_gradient[k] = dot(p.axes[k], axis_gradient);
+        rotation_gradient[k] = to_world * axis_gradient * scale[k];
+    }
+    const vec4 unit = p.unit_quaternion;
+    const vec4 unit_gradient = rotation_backward(unit, rotation_gradient);
+    const vec4 quaternion_gradient = (unit_gradient - unit * dot(unit, unit_gradient)) / p.quaternion_norm;
+    const vec3 direction_part =
+        (direction_gradient - direction * dot(direction, direction_gradient)) / length(p.view.offset);
+    const vec3 mean_gradient = to_world * view_gradient + direction_part;
+    const float logit_gradient = s.g * (1.0 - p.peak);
+
+    const vec4 zero = vec4(0.0);
+    move(2, i, p2, drawn ? vec4(log_scale_gradient, red_gradient) : zero, vec4(vec3(push.scale_rate), push.sh0_rate));
+    move(1, i, p1, drawn ? quaternion_gradient : zero, vec4(push.quaternion_rate));
+    move(0, i, p0, drawn ? vec4(mean_gradient, logit_gradient) : zero, vec4(vec3(push.mean_rate), push.opacity_rate));
+    if (STATISTICS && drawn) {
+        const float norm = length(f.mean * vec2(push.half_size[0], push.half_size[1]));
+        if (is_finite(norm)) statistics[i] += vec2(norm, 1.0);
+    }
+}

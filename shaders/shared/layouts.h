@@ -1,0 +1,168 @@
+// Every block that host and shaders share, under the scalar block layout. src/passes/layout_checks.cpp asserts sizes.
+#ifndef EWA_SHARED_LAYOUTS_H
+#define EWA_SHARED_LAYOUTS_H
+#include "glue.h"
+EWA_BEGIN_SHARED
+
+// ---- Specialisation constants, the same id in every shader that has one ----
+EWA_UINT(SPEC_GROUP_SIZE, 0u);     // invocations a workgroup
+EWA_UINT(SPEC_SUBGROUP, 1u);       // lanes a subgroup
+EWA_UINT(SPEC_TILE_WIDTH, 2u);     // px; tile width * tile height is a multiple of the subgroup
+EWA_UINT(SPEC_TILE_HEIGHT, 3u);
+EWA_UINT(SPEC_SH_DEGREE, 4u);      // 0..3, the degree evaluated
+EWA_UINT(SPEC_KERNEL, 5u);         // KERNEL_*
+EWA_UINT(SPEC_MODE, 6u);           // per shader, see there
+EWA_UINT(SPEC_RADIX_BITS, 7u);     // bits a radix pass sorts by, 1..8
+
+// ---- A splat's parameters: flat float f stands in component f % 4 of texel plane f / 4; plane p of splat i is texel
+// p * capacity + i. Adam's two moments and gradients have the same layout. ----
+EWA_UINT(PARAM_MEAN, 0u);          // 3 floats, world units
+EWA_UINT(PARAM_OPACITY, 3u);       // logit
+EWA_UINT(PARAM_QUATERNION, 4u);    // w x y z
+EWA_UINT(PARAM_LOG_SCALE, 8u);     // 3 floats
+EWA_UINT(PARAM_SH, 11u);           // 3 (degree + 1)^2 floats: coefficient after coefficient, RGB inner
+
+// ---- A projected splat: 3 texels at 3 * i ----
+// 0: mean in px, high parts x y, low parts x y (their sum is the mean to about 48 bits)
+// 1: ux, k, vy, opacity: with d = pixel - mean, u = ux (d.x - k d.y), v = vy d.y, alpha = opacity exp(-(u^2 + v^2)).
+//    Of the covariance [a b; b c]: ux = sqrt(c / (2 det)), k = b / c, vy = 1 / sqrt(2 c).
+// 2: colour r g b, view z
+EWA_UINT(RECORD_TEXELS, 3u);
+
+// ---- A gradient slot: what one tile adds to one splat, 12 floats (3 texels) ----
+// g = dL/d(power) of a pixel. 0: sum g; 1 2: sum g u, g v; 3 4 5: sum g u^2, g u v, g v^2; 6 7 8: dL/d(colour)
+EWA_UINT(SLOT_FLOATS, 12u);
+EWA_UINT(SLOT_TEXELS, 3u);
+
+// ---- Image planes: plane p of pixel (x, y) is float p * plane_floats + y * stride + x; stride is a multiple of 4 ----
+EWA_UINT(PLANE_R, 0u);
+EWA_UINT(PLANE_G, 1u);
+EWA_UINT(PLANE_B, 2u);
+EWA_UINT(PLANE_T, 3u);             // transmittance that reaches the background
+EWA_UINT(PLANE_DEPTH, 4u);         // sum of z alpha T
+
+// ---- Loss planes per colour channel c ----
+EWA_UINT(MOMENT_PLANES, 4u);       // of 4 c + 0: mean x; 1: mean y; 2: mean x^2 + y^2; 3: mean x y
+EWA_UINT(DERIVATIVE_PLANES, 3u);   // of 3 c + 0: dS/d(mean x); 1: dS/d(mean x^2); 2: dS/d(mean x y)
+
+EWA_UINT(RADIX_DIGITS_MAX, 256u);
+
+struct CameraBlock {
+    float rotation_hi[9];          // world to camera, rows; high and low parts of the float64 values
+    float rotation_lo[9];
+    float position_hi[3];          // camera centre in world coordinates
+    float position_lo[3];
+    float focal_hi[2];             // px
+    float focal_lo[2];
+    float center_hi[2];            // principal point, px
+    float center_lo[2];
+    float tan_min[2];              // bounds of x/z, y/z in the Jacobian
+    float tan_max[2];
+    uint size[2];                  // px
+    uint tiles[2];
+};
+
+// Written by the device, read back by the host after a submission.
+struct Counts {
+    uint instances;                // (splat, tile) pairs this frame needs; may exceed the capacity
+    uint skipped_nonfinite;        // splats left out because a value is not finite or the quaternion is zero
+    uint dropped_updates;          // parameter updates that were not finite
+    uint densified;                // splats after densification
+    float l1;                      // mean |x - y|
+    float ssim;                    // mean SSIM
+};
+
+struct ProjectPush {
+    uint splats, capacity;
+};
+
+struct SortPush {
+    uint items;                    // number of items, or 0: Counts.instances, where that does not exceed `capacity`
+    uint capacity;
+    uint lanes;                    // lanes that share the items in contiguous chunks
+    uint shift;                    // first bit of the digit
+};
+
+struct ScanPush {
+    uint items;                    // entries in all
+    uint block;                    // entries a subgroup scans
+};
+
+struct ScanTotalsPush {
+    uint blocks;
+    uint write_instances;          // 1: the grand total is Counts.instances
+};
+
+struct EmitPush {
+    uint splats;
+    uint capacity;                 // instances there is room for
+    uint scan_block;
+    uint strip_rows;               // tile rows one lane walks
+    uint size[2];                  // px
+    uint tiles[2];
+};
+
+struct TileStartsPush {
+    uint tiles;
+    uint capacity;
+};
+
+struct BlendPush {
+    float background[3];
+    uint size[2];                  // px
+    uint stride;                   // floats a row
+    uint plane_floats;
+    uint tiles[2];
+    uint tile_step[2];             // tile = workgroup.x * step.x + workgroup.y * step.y
+    uint capacity;                 // instances there is room for
+};
+
+struct UnpackPush {
+    uint size[2];
+    uint stride;
+    uint plane_floats;
+    uint first_texel;              // of the photograph in its buffer
+};
+
+struct LossPush {
+    uint size[2];
+    uint stride;
+    uint plane_floats;
+    float ssim_scale;              // d(loss)/d(SSIM of one pixel and channel)
+    float l1_scale;                // d(loss)/d|x - y| of one pixel and channel
+};
+
+struct ReducePush {
+    uint items;
+    uint block;                    // items a subgroup adds up
+    uint target;                   // 0: sums[block number]; 1: Counts.l1; 2: Counts.ssim
+    float scale;                   // applied to the result
+};
+
+struct UpdatePush {
+    uint splats, capacity;
+    uint instance_capacity;
+    float mean_rate, opacity_rate, quaternion_rate, scale_rate, sh0_rate, sh_rest_rate;
+    float bias1, bias2;            // 1 / (1 - beta^step)
+    float half_size[2];            // W / 2, H / 2: px to normalised device coordinates
+};
+
+struct DensifyPush {
+    uint splats, capacity;         // of the old buffers
+    uint new_capacity;
+    uint scan_block;
+    float grow_gradient;           // threshold of the mean gradient norm
+    float split_scale;             // world units; larger than this: split, else clone
+    float prune_opacity;           // logit
+    float prune_scale;             // world units; 0: do not prune by scale
+    uint seed[2];
+    uint step;
+};
+
+struct ResetPush {
+    uint splats, capacity;
+    float logit;
+};
+
+EWA_END_SHARED
+#endif

@@ -1,0 +1,128 @@
+#include "gpu/buffer.h"
+
+#include <cassert>
+#include <cstring>
+#include <utility>
+
+#include "ewa/error.h"
+
+namespace ewa::gpu {
+namespace {
+
+vk::Format format_of(Texel texel) {
+    switch (texel) {
+        case Texel::rgba32f: return vk::Format::eR32G32B32A32Sfloat;
+        case Texel::rgba32ui: return vk::Format::eR32G32B32A32Uint;
+        case Texel::rgba8: return vk::Format::eR8G8B8A8Unorm;
+        default: return vk::Format::eUndefined;
+    }
+}
+
+uint64_t texel_bytes(Texel texel) { return texel == Texel::rgba8 ? 4 : 16; }
+
+}  // namespace
+
+Buffer::Buffer(Device& device, std::string name, uint64_t bytes, Texel texel, bool uniform, bool host_visible)
+    : device_(&device), name_(std::move(name)), bytes_((std::max<uint64_t>(bytes, 1) + 15) / 16 * 16), texel_(texel) {
+    if (texel != Texel::none && bytes_ / texel_bytes(texel) > device.limits().max_texels)
+        throw RunError("buffer " + name_ + " needs " + std::to_string(bytes_ >> 20) +
+                       " MiB, more than this device can fetch texels from; fewer splats or a smaller image need less");
+    using Usage = vk::BufferUsageFlagBits;
+    vk::BufferCreateInfo create;
+    create.setSize(bytes_).setUsage(Usage::eStorageBuffer | Usage::eTransferSrc | Usage::eTransferDst);
+    if (texel != Texel::none) create.usage |= Usage::eUniformTexelBuffer;
+    if (uniform) create.usage |= Usage::eUniformBuffer;
+    try {
+        buffer_ = device.handle().createBufferUnique(create);
+        const auto requirements = device.handle().getBufferMemoryRequirements(*buffer_);
+        bool mappable = false;
+        memory_ = device.allocate(requirements, host_visible, mappable);
+        allocated_ = requirements.size;
+        device.handle().bindBufferMemory(*buffer_, *memory_, 0);
+        if (mappable) mapped_ = static_cast<std::byte*>(device.handle().mapMemory(*memory_, 0, VK_WHOLE_SIZE));
+        if (texel != Texel::none) {
+            vk::BufferViewCreateInfo view;
+            view.setBuffer(*buffer_).setFormat(format_of(texel)).setRange(bytes_);
+            view_ = device.handle().createBufferViewUnique(view);
+        }
+    } catch (const vk::SystemError& error) {
+        throw RunError("buffer " + name_ + " of " + std::to_string(bytes_ >> 20) + " MiB: " + error.what());
+    }
+}
+
+Buffer::~Buffer() {
+    if (memory_) device_->released(allocated_);
+}
+
+Buffer::Buffer(Buffer&& other) noexcept { *this = std::move(other); }
+
+Buffer& Buffer::operator=(Buffer&& other) noexcept {
+    if (this == &other) return *this;
+    if (memory_) device_->released(allocated_);
+    device_ = other.device_;
+    name_ = std::move(other.name_);
+    bytes_ = std::exchange(other.bytes_, 0);
+    allocated_ = std::exchange(other.allocated_, 0);
+    texel_ = other.texel_;
+    view_ = std::move(other.view_);
+    buffer_ = std::move(other.buffer_);
+    memory_ = std::move(other.memory_);
+    mapped_ = std::exchange(other.mapped_, nullptr);
+    return *this;
+}
+
+void Buffer::upload(std::span<const std::byte> data, uint64_t offset) {
+    assert(offset + data.size() <= bytes_);
+    if (data.empty()) return;
+    if (mapped_)
+        std::memcpy(mapped_ + offset, data.data(), data.size());
+    else
+        copy_through_staging(data, {}, offset);
+}
+
+void Buffer::download(std::span<std::byte> data, uint64_t offset) const {
+    assert(offset + data.size() <= bytes_);
+    if (data.empty()) return;
+    if (mapped_)
+        std::memcpy(data.data(), mapped_ + offset, data.size());
+    else
+        copy_through_staging({}, data, offset);
+}
+
+void Buffer::copy_through_staging(std::span<const std::byte> source, std::span<std::byte> target,
+                                  uint64_t offset) const {
+    constexpr size_t kPiece = size_t(64) << 20;
+    const bool up = !source.empty();
+    const size_t total = up ? source.size() : target.size();
+    Buffer staging(*device_, "staging", std::min(total, kPiece), Texel::none, false, true);
+    const vk::Device device = device_->handle();
+    vk::CommandPoolCreateInfo pool_info;
+    pool_info.setQueueFamilyIndex(device_->queue_family());
+    const auto pool = device.createCommandPoolUnique(pool_info);
+    for (size_t done = 0; done < total; done += kPiece) {
+        const size_t size = std::min(kPiece, total - done);
+        if (up) std::memcpy(staging.mapped_, source.data() + done, size);
+        vk::CommandBufferAllocateInfo allocate;
+        allocate.setCommandPool(*pool).setCommandBufferCount(1);
+        auto commands = std::move(device.allocateCommandBuffersUnique(allocate).front());
+        commands->begin({vk::CommandBufferUsageFlagBits::eOneTimeSubmit});
+        // Orders the copy after earlier submissions and before later ones, and makes it visible to the host.
+        const vk::MemoryBarrier all(vk::AccessFlagBits::eMemoryWrite | vk::AccessFlagBits::eMemoryRead,
+                                    vk::AccessFlagBits::eMemoryWrite | vk::AccessFlagBits::eMemoryRead);
+        const auto everything = vk::PipelineStageFlagBits::eAllCommands;
+        commands->pipelineBarrier(everything, everything, {}, all, {}, {});
+        if (up)
+            commands->copyBuffer(*staging.buffer_, *buffer_, vk::BufferCopy(0, offset + done, size));
+        else
+            commands->copyBuffer(*buffer_, *staging.buffer_, vk::BufferCopy(offset + done, 0, size));
+        commands->pipelineBarrier(everything, everything | vk::PipelineStageFlagBits::eHost, {}, all, {}, {});
+        commands->end();
+        vk::SubmitInfo submit;
+        submit.setCommandBuffers(*commands);
+        device_->queue().submit(submit);
+        device_->queue().waitIdle();
+        if (!up) std::memcpy(target.data() + done, staging.mapped_, size);
+    }
+}
+
+}  // namespace ewa::gpu

@@ -1,0 +1,145 @@
+#include "gpu/executor.h"
+
+#include <algorithm>
+#include <deque>
+
+#include "ewa/error.h"
+
+namespace ewa::gpu {
+
+Executor::Executor(Device& device) : device_(device) {
+    vk::CommandPoolCreateInfo pool;
+    pool.setQueueFamilyIndex(device.queue_family());
+    command_pool_ = device.handle().createCommandPoolUnique(pool);
+    vk::CommandBufferAllocateInfo allocate;
+    allocate.setCommandPool(*command_pool_).setCommandBufferCount(1);
+    commands_ = std::move(device.handle().allocateCommandBuffersUnique(allocate).front());
+    fence_ = device.handle().createFenceUnique({});
+}
+
+void Executor::reserve(const Recording& recording, bool timed) {
+    uint32_t sets = 0, bindings = 0;
+    for (const Command& command : recording.commands()) {
+        if (command.kind != Command::Kind::dispatch) continue;
+        ++sets;
+        bindings += uint32_t(command.uses.size());
+    }
+    if (!descriptor_pool_ || sets > pool_sets_ || bindings > pool_bindings_) {
+        pool_sets_ = std::max(1u, 2 * sets);
+        pool_bindings_ = std::max(1u, 2 * bindings);
+        const std::array sizes{vk::DescriptorPoolSize(vk::DescriptorType::eStorageBuffer, pool_bindings_),
+                               vk::DescriptorPoolSize(vk::DescriptorType::eUniformBuffer, pool_bindings_),
+                               vk::DescriptorPoolSize(vk::DescriptorType::eUniformTexelBuffer, pool_bindings_)};
+        vk::DescriptorPoolCreateInfo create;
+        create.setMaxSets(pool_sets_).setPoolSizes(sizes);
+        descriptor_pool_ = device_.handle().createDescriptorPoolUnique(create);
+    } else {
+        device_.handle().resetDescriptorPool(*descriptor_pool_);
+    }
+    const uint32_t queries = uint32_t(recording.commands().size()) + 1;
+    if (timed && queries > query_count_) {
+        query_count_ = 2 * queries;
+        vk::QueryPoolCreateInfo create;
+        create.setQueryType(vk::QueryType::eTimestamp).setQueryCount(query_count_);
+        queries_ = device_.handle().createQueryPoolUnique(create);
+    }
+}
+
+vk::DescriptorSet Executor::bind(const Command& command, vk::DescriptorPool pool) {
+    const auto layout = command.pipeline->set_layout();
+    vk::DescriptorSetAllocateInfo allocate;
+    allocate.setDescriptorPool(pool).setSetLayouts(layout);
+    const vk::DescriptorSet set = device_.handle().allocateDescriptorSets(allocate).front();
+    std::deque<vk::DescriptorBufferInfo> infos;
+    std::deque<vk::BufferView> views;
+    std::vector<vk::WriteDescriptorSet> updates;
+    for (size_t i = 0; i < command.uses.size(); ++i) {
+        const Use& use = command.uses[i];
+        const BindingKind kind = command.pipeline->reflection().bindings[i].kind;
+        vk::WriteDescriptorSet update;
+        update.setDstSet(set).setDstBinding(use.binding).setDescriptorType(descriptor_type(kind));
+        if (kind == BindingKind::texel)
+            update.setTexelBufferView(views.emplace_back(use.buffer->view()));
+        else
+            update.setBufferInfo(infos.emplace_back(use.buffer->handle(), use.offset,
+                                                    use.bytes ? use.bytes : use.buffer->bytes() - use.offset));
+        updates.push_back(update);
+    }
+    device_.handle().updateDescriptorSets(updates, {});
+    return set;
+}
+
+void Executor::record(const Recording& recording, vk::CommandBuffer commands, bool timed) {
+    using Stage = vk::PipelineStageFlagBits;
+    using Flag = vk::AccessFlagBits;
+    const vk::PipelineStageFlags work = Stage::eComputeShader | Stage::eTransfer;
+    const vk::AccessFlags written = Flag::eShaderWrite | Flag::eTransferWrite;
+    const vk::AccessFlags used = written | Flag::eShaderRead | Flag::eTransferRead | Flag::eUniformRead;
+    uint32_t query = 0;
+    const auto stamp = [&] {
+        if (timed) commands.writeTimestamp(Stage::eBottomOfPipe, *queries_, query++);
+    };
+    if (timed) commands.resetQueryPool(*queries_, 0, uint32_t(recording.commands().size()) + 1);
+    stamp();
+    for (const Command& command : recording.commands()) {
+        if (command.barrier_before)
+            commands.pipelineBarrier(work, work, {}, vk::MemoryBarrier(written, used), {}, {});
+        if (command.kind == Command::Kind::fill) {
+            commands.fillBuffer(command.uses[0].buffer->handle(), command.target_offset, command.bytes,
+                                command.fill_value);
+        } else if (command.kind == Command::Kind::copy) {
+            commands.copyBuffer(command.uses[0].buffer->handle(), command.uses[1].buffer->handle(),
+                                vk::BufferCopy(command.source_offset, command.target_offset, command.bytes));
+        } else {
+            const vk::PipelineBindPoint compute = vk::PipelineBindPoint::eCompute;
+            commands.bindPipeline(compute, command.pipeline->handle());
+            commands.bindDescriptorSets(compute, command.pipeline->layout(), 0, bind(command, *descriptor_pool_), {});
+            if (!command.push.empty())
+                commands.pushConstants(command.pipeline->layout(), vk::ShaderStageFlagBits::eCompute, 0,
+                                       uint32_t(command.push.size()), command.push.data());
+            commands.dispatch(command.groups[0], command.groups[1], command.groups[2]);
+        }
+        stamp();
+    }
+    // The fence alone makes nothing visible to the host.
+    commands.pipelineBarrier(work, Stage::eHost, {}, vk::MemoryBarrier(written, Flag::eHostRead), {}, {});
+}
+
+void Executor::run(const Recording& recording, bool timed) {
+    timed = timed && device_.limits().timestamps;
+    try {
+        reserve(recording, timed);
+        commands_->reset();
+        commands_->begin(vk::CommandBufferBeginInfo(vk::CommandBufferUsageFlagBits::eOneTimeSubmit));
+        record(recording, *commands_, timed);
+        commands_->end();
+        vk::SubmitInfo submit;
+        submit.setCommandBuffers(*commands_);
+        device_.handle().resetFences(*fence_);
+        device_.queue().submit(submit, *fence_);
+        constexpr uint64_t kForever = ~uint64_t(0);
+        if (device_.handle().waitForFences(*fence_, true, kForever) != vk::Result::eSuccess)
+            throw RunError("the device did not finish");
+        if (timed) read_timings(recording);
+    } catch (const vk::SystemError& error) {
+        throw RunError("device " + device_.info().name + ": " + error.what());
+    }
+    device_.check_validation();
+}
+
+void Executor::read_timings(const Recording& recording) {
+    const uint32_t count = uint32_t(recording.commands().size()) + 1;
+    const auto stamps = device_.handle().getQueryPoolResults<uint64_t>(
+        *queries_, 0, count, count * sizeof(uint64_t), sizeof(uint64_t),
+        vk::QueryResultFlagBits::e64 | vk::QueryResultFlagBits::eWait);
+    timings_.clear();
+    for (uint32_t i = 0; i + 1 < count; ++i) {
+        const std::string& name = recording.commands()[i].name;
+        const double ticks = double(stamps.value[i + 1] - stamps.value[i]);
+        auto found = std::find_if(timings_.begin(), timings_.end(), [&](const Timing& t) { return t.name == name; });
+        if (found == timings_.end()) found = timings_.insert(timings_.end(), {name, 0});
+        found->milliseconds += ticks * device_.limits().timestamp_nanoseconds * 1e-6;
+    }
+}
+
+}  // namespace ewa::gpu

@@ -1,0 +1,118 @@
+#include "gpu/recording.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace ewa::gpu {
+namespace {
+
+bool has(Access access, Access part) { return (uint32_t(access) & uint32_t(part)) != 0; }
+
+[[noreturn]] void fail(const Pipeline& pipeline, const std::string& what) {
+    throw std::logic_error("shader " + pipeline.name() + ": " + what);
+}
+
+void check_use(const Pipeline& pipeline, const Binding& declared, const Use& use) {
+    const std::string at = "binding " + std::to_string(use.binding) + " (" + use.buffer->name() + ")";
+    if (declared.access != use.access)
+        fail(pipeline, at + " is declared " + to_string(use.access) + " by the pass and " +
+                           to_string(declared.access) + " by the shader");
+    if (declared.kind == BindingKind::texel && use.buffer->texel() == Texel::none)
+        fail(pipeline, at + " is fetched as texels, and the buffer has no texel format");
+    if (declared.kind == BindingKind::texel && use.offset != 0) fail(pipeline, at + " is a part of a texel buffer");
+    if (use.offset + use.bytes > use.buffer->bytes()) fail(pipeline, at + " reaches past the buffer's end");
+}
+
+}  // namespace
+
+void Recording::dispatch(const Pipeline& pipeline, std::string name, std::vector<Use> uses,
+                         std::span<const std::byte> push, std::array<uint32_t, 3> groups) {
+    const Reflection& shader = pipeline.reflection();
+    std::sort(uses.begin(), uses.end(), [](const Use& a, const Use& b) { return a.binding < b.binding; });
+    if (uses.size() != shader.bindings.size())
+        fail(pipeline, "declares " + std::to_string(shader.bindings.size()) + " bindings, the pass gives " +
+                           std::to_string(uses.size()));
+    for (size_t i = 0; i < uses.size(); ++i) {
+        if (uses[i].binding != shader.bindings[i].binding)
+            fail(pipeline, "has no binding " + std::to_string(uses[i].binding) + ", or it was given twice");
+        check_use(pipeline, shader.bindings[i], uses[i]);
+    }
+    if (push.size() != shader.push_constant_bytes)
+        fail(pipeline, "takes " + std::to_string(shader.push_constant_bytes) + " bytes of push constants, the pass gives " +
+                           std::to_string(push.size()));
+    for (const uint32_t count : groups)
+        if (count == 0 || count > limits_.max_groups)
+            fail(pipeline, "a dispatch of " + std::to_string(count) + " workgroups (1 to " +
+                               std::to_string(limits_.max_groups) + " are possible)");
+    Command command;
+    command.name = std::move(name);
+    command.pipeline = &pipeline;
+    command.uses = std::move(uses);
+    command.push.assign(push.begin(), push.end());
+    command.groups = groups;
+    append(std::move(command));
+}
+
+void Recording::fill(const Buffer& target, uint32_t value, uint64_t offset, uint64_t bytes) {
+    if (bytes == 0) return;
+    if (offset % 4 || bytes % 4 || offset + bytes > target.bytes())
+        throw std::logic_error("fill of " + target.name() + " outside the buffer or off its 4 byte grid");
+    Command command;
+    command.kind = Command::Kind::fill;
+    command.name = "fill " + target.name();
+    command.uses = {writes(0, target)};
+    command.fill_value = value;
+    command.target_offset = offset;
+    command.bytes = bytes;
+    append(std::move(command));
+}
+
+void Recording::copy(const Buffer& source, uint64_t source_offset, const Buffer& target, uint64_t target_offset,
+                     uint64_t bytes) {
+    if (bytes == 0) return;
+    if (source_offset + bytes > source.bytes() || target_offset + bytes > target.bytes())
+        throw std::logic_error("copy from " + source.name() + " to " + target.name() + " outside a buffer");
+    Command command;
+    command.kind = Command::Kind::copy;
+    command.name = "copy " + source.name();
+    command.uses = {reads(0, source), writes(1, target)};
+    command.source_offset = source_offset;
+    command.target_offset = target_offset;
+    command.bytes = bytes;
+    append(std::move(command));
+}
+
+void Recording::append(Command command) {
+    const auto state_of = [&](const Buffer* buffer) {
+        return std::find_if(states_.begin(), states_.end(), [&](const State& s) { return s.buffer == buffer; });
+    };
+    // A command must wait when it reads what was written, or writes what was read or written, since the last barrier.
+    for (const Use& use : command.uses) {
+        const auto state = state_of(use.buffer);
+        if (state == states_.end()) continue;
+        if (state->written || (state->read && has(use.access, Access::write))) command.barrier_before = true;
+    }
+    if (command.barrier_before) states_.clear();
+    for (const Use& use : command.uses) {
+        auto state = state_of(use.buffer);
+        if (state == states_.end()) state = states_.insert(states_.end(), {use.buffer, false, false});
+        state->read = state->read || has(use.access, Access::read);
+        state->written = state->written || has(use.access, Access::write);
+    }
+    commands_.push_back(std::move(command));
+}
+
+std::string Recording::describe() const {
+    std::string text;
+    for (const Command& command : commands_) {
+        if (command.barrier_before) text += "barrier\n";
+        text += command.name + ":";
+        for (const Use& use : command.uses)
+            text += " " + use.buffer->name() + (has(use.access, Access::read) ? ":r" : ":") +
+                    (has(use.access, Access::write) ? "w" : "");
+        text += "\n";
+    }
+    return text;
+}
+
+}  // namespace ewa::gpu
