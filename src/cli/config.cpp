@@ -1,7 +1,8 @@
 #include "cli/config.h"
 
-#include "cli/output.h"
+#include "core/file_reader.h"
 #include "ewa/error.h"
+#include "report/summary.h"
 
 namespace ewa::cli {
 namespace {
@@ -35,7 +36,7 @@ bool given(CLI::App& app, const std::string& name) {
 Json parse(const std::filesystem::path& file) {
     Json json;
     try {
-        json = Json::parse(read_text(file));
+        json = Json::parse(core::read_text_file(file));
     } catch (const Json::parse_error& error) {
         throw InputError(file.string() + ": not JSON, at byte " + std::to_string(error.byte));
     }

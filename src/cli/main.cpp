@@ -6,6 +6,7 @@
 
 #include "cli/command.h"
 #include "cli/text.h"
+#include "core/text.h"
 #include "ewa/error.h"
 
 namespace {
@@ -22,7 +23,7 @@ struct Command {
 
 int fail(const std::string& who, const std::string& what, int status) {
     std::fflush(stdout);
-    std::fprintf(stderr, "%s: %s\n", who.c_str(), one_line(what).c_str());
+    std::fprintf(stderr, "%s: %s\n", who.c_str(), core::one_line(what).c_str());
     return status;
 }
 

@@ -1,9 +1,6 @@
 #include "cli/output.h"
 
-#include <cerrno>
-#include <cstring>
-#include <fstream>
-#include <iterator>
+#include <system_error>
 
 #include "core/atomic_file.h"
 #include "ewa/error.h"
@@ -22,16 +19,8 @@ void make_folder(const std::filesystem::path& folder) {
 void write_json(const std::filesystem::path& path, const report::Json& json) {
     make_folder(path.parent_path());
     // Names and paths may hold bytes that are not UTF-8; those become U+FFFD.
-    core::write_file_atomically(path,
+    core::write_text_file(path,
                                 json.dump(2, ' ', false, report::Json::error_handler_t::replace) + "\n");
-}
-
-std::string read_text(const std::filesystem::path& path) {
-    std::ifstream file(path, std::ios::binary);
-    std::string text{std::istreambuf_iterator<char>(file), {}};
-    if (!file || std::filesystem::is_directory(path))
-        throw InputError("cannot read " + path.string() + ": " + std::strerror(errno ? errno : EISDIR));
-    return text;
 }
 
 }  // namespace ewa::cli

@@ -13,7 +13,4 @@ void make_folder(const std::filesystem::path& folder);
 /// Pretty-printed, in one piece or not at all; the file's folder is made. Throws RunError.
 void write_json(const std::filesystem::path& path, const report::Json& json);
 
-/// The file's whole text. Throws InputError.
-std::string read_text(const std::filesystem::path& path);
-
 }  // namespace ewa::cli

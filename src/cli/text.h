@@ -5,9 +5,6 @@
 
 namespace ewa::cli {
 
-/// Line breaks and other control characters become spaces: an error is one line.
-std::string one_line(std::string text);
-
 /// As a POSIX shell reads it back as one word.
 std::string shell_quoted(const std::string& word);
 

@@ -60,7 +60,7 @@ std::vector<report::ReportPicture> draw_report_pictures(const PictureRequest& re
 }
 
 void write_report(const fs::path& path, const report::ReportData& data) {
-    core::write_file_atomically(path, report::html_report(data));
+    core::write_text_file(path, report::html_report(data));
 }
 
 uint64_t peak_host_bytes() {

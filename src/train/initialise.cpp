@@ -1,36 +1,31 @@
 #include "train/initialise.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 #include <numbers>
 
+#include "core/random.h"
+
 namespace ewa::train {
 namespace {
 
-/// SplitMix64's output function (Steele, Lea and Flood 2014): a good hash of 64 bits.
-uint64_t mix(uint64_t x) {
-    x += 0x9e3779b97f4a7c15u;
-    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-    return x ^ (x >> 31);
-}
-
-/// A number of [0, 1) for each seed, splat and use of it.
-double uniform(uint64_t seed, uint64_t index, uint64_t use) {
-    return static_cast<double>(mix(mix(mix(seed) ^ index) ^ use) >> 11) * 0x1p-53;
+/// Four numbers of (0, 1) for each seed, splat and use of it.
+std::array<double, 4> uniform(uint64_t seed, uint32_t index, uint32_t use) {
+    return core::uniform4({static_cast<uint32_t>(seed), static_cast<uint32_t>(seed >> 32), index, use});
 }
 
 glm::dvec3 viewing_direction(const Camera& camera) {
     return glm::normalize(glm::transpose(camera.rotation) * glm::dvec3(0, 0, 1));
 }
 
-glm::dvec3 point_in_sphere(const Sphere& sphere, uint64_t seed, uint64_t index) {
-    const double z = 2 * uniform(seed, index, 0) - 1;
-    const double angle = 2 * std::numbers::pi * uniform(seed, index, 1);
-    const double radius = sphere.radius * std::cbrt(uniform(seed, index, 2));
+glm::dvec3 point_in_sphere(const Sphere& sphere, const std::array<double, 4>& u) {
+    const double z = 2 * u[0] - 1;
+    const double angle = 2 * std::numbers::pi * u[1];
+    const double radius = sphere.radius * std::cbrt(u[2]);
     const double flat = std::sqrt(1 - z * z);
     return sphere.center + radius * glm::dvec3(flat * std::cos(angle), flat * std::sin(angle), z);
 }
@@ -75,11 +70,11 @@ Gaussians random_gaussians(const Dataset& dataset, const std::vector<int>& frame
     const Sphere sphere = viewed_sphere(dataset, frames);
     PointCloud points;
     for (int i = 0; i < count; ++i) {
-        const auto index = static_cast<uint64_t>(i);
-        points.positions.push_back(point_in_sphere(sphere, seed, index));
+        const auto index = static_cast<uint32_t>(i);
+        points.positions.push_back(point_in_sphere(sphere, uniform(seed, index, 0)));
+        const auto shade = uniform(seed, index, 1);
         std::array<uint8_t, 3> color;
-        for (uint64_t c = 0; c < 3; ++c)
-            color[c] = static_cast<uint8_t>(96 + 64 * uniform(seed, index, 3 + c));
+        for (size_t c = 0; c < 3; ++c) color[c] = static_cast<uint8_t>(96 + 64 * shade[c]);
         points.colors.push_back(color);
     }
     return gaussians_from_points(points, sh_degree);
