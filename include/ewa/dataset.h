@@ -68,7 +68,8 @@ Split split_frames(const Dataset& dataset, int test_every);
 double scene_extent(const Dataset& dataset, const std::vector<int>& frames);
 
 /// One splat a point: scale sqrt(mean squared distance to the 3 nearest neighbours, squared distance at least 1e-7),
-/// identity rotation, opacity 0.1, colour in SH degree 0 (INRIA's create_from_pcd). Throws InputError without points.
+/// identity rotation, opacity 0.1, colour in SH degree 0 (INRIA's create_from_pcd). With fewer than 3 other points the
+/// mean is over those there are; a single point gets scale 1. Throws InputError without points, or when one is not finite.
 Gaussians gaussians_from_points(const PointCloud& points, int sh_degree);
 
 }  // namespace ewa

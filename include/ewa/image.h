@@ -1,5 +1,6 @@
 // Pictures in memory, on disk, and their distance from each other.
 #pragma once
+#include <cstddef>
 #include <filesystem>
 #include <vector>
 
@@ -24,21 +25,24 @@ struct ImageSize {
 };
 ImageSize read_image_size(const std::filesystem::path& path);
 
-/// Any format OpenImageIO reads, as 3 (RGB) or 4 (RGBA) channels; grey becomes RGB. Throws InputError.
+/// Any format OpenImageIO reads, as 3 (RGB) or 4 (RGBA, colour not multiplied by alpha) channels; grey becomes RGB.
+/// 16-bit integers become value / 65535, floating-point files stay as they are. Throws InputError.
 Image load_image(const std::filesystem::path& path);
 
-/// .png: 8 bit, rounded, clamped to [0, 1]. .exr: float32, not clamped. Written beside and renamed. Throws RunError.
+/// .png: 8 bit, rounded, clamped to [0, 1], NaN as 0. .exr: float32, not clamped. Colour is not multiplied by alpha.
+/// Written beside and renamed. Throws RunError (disk), InputError (extension, no pixels).
 void save_image(const std::filesystem::path& path, const Image& image);
 
-/// Mean of factor x factor blocks (the last ones smaller where the size is not a multiple); size is rounded down,
-/// at least 1. factor >= 1.
+/// The size divided by factor, rounded down, at least 1; each new pixel is the mean over the area it covers: factor x
+/// factor blocks where the size is a multiple, else blocks of the exact size ratio, borders weighted. factor >= 1.
 Image downscale(const Image& image, int factor);
 
-/// 10 log10(1 / MSE) over RGB, both pictures clamped to [0, 1]; +inf for equal pictures. Sizes must agree.
+/// 10 log10(1 / MSE) over RGB, both pictures clamped to [0, 1]; +inf for equal pictures.
+/// Throws InputError when sizes differ.
 double psnr(const Image& a, const Image& b);
 
 /// Mean SSIM over pixels and RGB: 11 x 11 Gaussian window, sigma 1.5, zero padded (Wang et al. 2004), both pictures
-/// clamped to [0, 1], computed in float64. Sizes must agree.
+/// clamped to [0, 1], computed in float64. Throws InputError when sizes differ.
 double ssim(const Image& a, const Image& b);
 
 }  // namespace ewa

@@ -11,7 +11,7 @@ layout(push_constant, scalar) uniform Push { UnpackPush push; };
 void main() {
     const uint i = item_index();
     if (i >= push.size[0] * push.size[1]) return;
-    const vec4 color = texelFetch(photo, int(push.first_texel + i));
+    const vec4 color = texelFetch(photo, int(i));
     const uint at = (i / push.size[0]) * push.stride + i % push.size[0];
     planes[PLANE_R * push.plane_floats + at] = color.r;
     planes[PLANE_G * push.plane_floats + at] = color.g;

@@ -121,7 +121,6 @@ struct UnpackPush {
     uint size[2];
     uint stride;
     uint plane_floats;
-    uint first_texel;              // of the photograph in its buffer
 };
 
 struct LossPush {

@@ -11,22 +11,32 @@ namespace {
 
 vk::Format format_of(Texel texel) {
     switch (texel) {
-        case Texel::rgba32f: return vk::Format::eR32G32B32A32Sfloat;
-        case Texel::rgba32ui: return vk::Format::eR32G32B32A32Uint;
-        case Texel::rgba8: return vk::Format::eR8G8B8A8Unorm;
-        default: return vk::Format::eUndefined;
+        case Texel::rgba32f:
+            return vk::Format::eR32G32B32A32Sfloat;
+        case Texel::rgba32ui:
+            return vk::Format::eR32G32B32A32Uint;
+        case Texel::rgba8:
+            return vk::Format::eR8G8B8A8Unorm;
+        default:
+            return vk::Format::eUndefined;
     }
 }
 
-uint64_t texel_bytes(Texel texel) { return texel == Texel::rgba8 ? 4 : 16; }
+uint64_t texel_bytes(Texel texel) {
+    return texel == Texel::rgba8 ? 4 : 16;
+}
 
 }  // namespace
 
 Buffer::Buffer(Device& device, std::string name, uint64_t bytes, Texel texel, bool uniform, bool host_visible)
-    : device_(&device), name_(std::move(name)), bytes_((std::max<uint64_t>(bytes, 1) + 15) / 16 * 16), texel_(texel) {
+    : device_(&device),
+      name_(std::move(name)),
+      bytes_((std::max<uint64_t>(bytes, 1) + 15) / 16 * 16),
+      texel_(texel) {
     if (texel != Texel::none && bytes_ / texel_bytes(texel) > device.limits().max_texels)
-        throw RunError("buffer " + name_ + " needs " + std::to_string(bytes_ >> 20) +
-                       " MiB, more than this device can fetch texels from; fewer splats or a smaller image need less");
+        throw RunError(
+            "buffer " + name_ + " needs " + std::to_string(bytes_ >> 20) +
+            " MiB, more than this device can fetch texels from; fewer splats or a smaller image need less");
     using Usage = vk::BufferUsageFlagBits;
     vk::BufferCreateInfo create;
     create.setSize(bytes_).setUsage(Usage::eStorageBuffer | Usage::eTransferSrc | Usage::eTransferDst);
@@ -39,7 +49,8 @@ Buffer::Buffer(Device& device, std::string name, uint64_t bytes, Texel texel, bo
         memory_ = device.allocate(requirements, host_visible, mappable);
         allocated_ = requirements.size;
         device.handle().bindBufferMemory(*buffer_, *memory_, 0);
-        if (mappable) mapped_ = static_cast<std::byte*>(device.handle().mapMemory(*memory_, 0, VK_WHOLE_SIZE));
+        if (mappable)
+            mapped_ = static_cast<std::byte*>(device.handle().mapMemory(*memory_, 0, VK_WHOLE_SIZE));
         if (texel != Texel::none) {
             vk::BufferViewCreateInfo view;
             view.setBuffer(*buffer_).setFormat(format_of(texel)).setRange(bytes_);
@@ -54,7 +65,9 @@ Buffer::~Buffer() {
     if (memory_) device_->released(allocated_);
 }
 
-Buffer::Buffer(Buffer&& other) noexcept { *this = std::move(other); }
+Buffer::Buffer(Buffer&& other) noexcept {
+    *this = std::move(other);
+}
 
 Buffer& Buffer::operator=(Buffer&& other) noexcept {
     if (this == &other) return *this;

@@ -16,9 +16,9 @@ enum class Texel { none, rgba32f, rgba32ui, rgba8 };
 class Buffer {
   public:
     Buffer() = default;
-    /// name: for errors, timing and tests. bytes >= 1 is rounded up to whole 16 byte texels. uniform: may also be
-    /// bound as a uniform block. The contents are undefined until written. Throws RunError when memory runs out or
-    /// the device cannot address that many bytes through one binding.
+    /// name: for errors, timing and tests. bytes >= 1 is rounded up to whole 16 byte texels. uniform: may
+    /// also be bound as a uniform block. The contents are undefined until written. Throws RunError when
+    /// memory runs out or the device cannot address that many bytes through one binding.
     Buffer(Device& device, std::string name, uint64_t bytes, Texel texel = Texel::none, bool uniform = false,
            bool host_visible = false);
     ~Buffer();
@@ -50,7 +50,8 @@ class Buffer {
     }
 
   private:
-    void copy_through_staging(std::span<const std::byte> source, std::span<std::byte> target, uint64_t offset) const;
+    void copy_through_staging(std::span<const std::byte> source, std::span<std::byte> target,
+                              uint64_t offset) const;
 
     Device* device_ = nullptr;
     std::string name_;

@@ -19,17 +19,23 @@ vk::ApplicationInfo application_info() {
 }
 
 std::string version_text(uint32_t version) {
-    return std::to_string(VK_API_VERSION_MAJOR(version)) + "." + std::to_string(VK_API_VERSION_MINOR(version)) +
-           "." + std::to_string(VK_API_VERSION_PATCH(version));
+    return std::to_string(VK_API_VERSION_MAJOR(version)) + "." +
+           std::to_string(VK_API_VERSION_MINOR(version)) + "." +
+           std::to_string(VK_API_VERSION_PATCH(version));
 }
 
 std::string type_text(vk::PhysicalDeviceType type) {
     switch (type) {
-        case vk::PhysicalDeviceType::eCpu: return "cpu";
-        case vk::PhysicalDeviceType::eIntegratedGpu: return "integrated";
-        case vk::PhysicalDeviceType::eDiscreteGpu: return "discrete";
-        case vk::PhysicalDeviceType::eVirtualGpu: return "virtual";
-        default: return "other";
+        case vk::PhysicalDeviceType::eCpu:
+            return "cpu";
+        case vk::PhysicalDeviceType::eIntegratedGpu:
+            return "integrated";
+        case vk::PhysicalDeviceType::eDiscreteGpu:
+            return "discrete";
+        case vk::PhysicalDeviceType::eVirtualGpu:
+            return "virtual";
+        default:
+            return "other";
     }
 }
 
@@ -48,8 +54,9 @@ std::string missing_features(vk::PhysicalDevice device) {
         device.getFeatures2<vk::PhysicalDeviceFeatures2, vk::PhysicalDeviceVulkan12Features>()
             .get<vk::PhysicalDeviceVulkan12Features>();
     if (!features.scalarBlockLayout) return "scalarBlockLayout";
-    const auto subgroup = device.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceSubgroupProperties>()
-                              .get<vk::PhysicalDeviceSubgroupProperties>();
+    const auto subgroup =
+        device.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceSubgroupProperties>()
+            .get<vk::PhysicalDeviceSubgroupProperties>();
     const auto needed = vk::SubgroupFeatureFlagBits::eBasic | vk::SubgroupFeatureFlagBits::eVote |
                         vk::SubgroupFeatureFlagBits::eShuffle;
     if ((subgroup.supportedOperations & needed) != needed ||
@@ -59,8 +66,9 @@ std::string missing_features(vk::PhysicalDevice device) {
 }
 
 DeviceInfo describe(vk::PhysicalDevice device, int index) {
-    const auto chain = device.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceDriverProperties,
-                                             vk::PhysicalDeviceSubgroupProperties>();
+    const auto chain =
+        device.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceDriverProperties,
+                              vk::PhysicalDeviceSubgroupProperties>();
     const auto& properties = chain.get<vk::PhysicalDeviceProperties2>().properties;
     const auto& driver = chain.get<vk::PhysicalDeviceDriverProperties>();
     DeviceInfo info;
@@ -78,7 +86,8 @@ DeviceInfo describe(vk::PhysicalDevice device, int index) {
     return info;
 }
 
-VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT, VkDebugUtilsMessageTypeFlagsEXT,
+VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT,
+                                          VkDebugUtilsMessageTypeFlagsEXT,
                                           const VkDebugUtilsMessengerCallbackDataEXT* data, void* user) {
     static_cast<Device*>(user)->add_validation_message(data->pMessage);
     return VK_FALSE;
@@ -112,13 +121,18 @@ void Device::create_instance(bool validation) {
         layers.push_back("VK_LAYER_KHRONOS_validation");
         extensions.push_back(VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
         const auto available = vk::enumerateInstanceLayerProperties();
-        const bool found = std::any_of(available.begin(), available.end(), [](const vk::LayerProperties& layer) {
-            return std::string(layer.layerName.data()) == "VK_LAYER_KHRONOS_validation";
-        });
-        if (!found) throw InputError("the Khronos validation layer is not installed (Debian: vulkan-validationlayers)");
+        const bool found =
+            std::any_of(available.begin(), available.end(), [](const vk::LayerProperties& layer) {
+                return std::string(layer.layerName.data()) == "VK_LAYER_KHRONOS_validation";
+            });
+        if (!found)
+            throw InputError(
+                "the Khronos validation layer is not installed (Debian: vulkan-validationlayers)");
     }
     vk::InstanceCreateInfo create;
-    create.setPApplicationInfo(&application).setPEnabledLayerNames(layers).setPEnabledExtensionNames(extensions);
+    create.setPApplicationInfo(&application)
+        .setPEnabledLayerNames(layers)
+        .setPEnabledExtensionNames(extensions);
     instance_ = vk::createInstanceUnique(create);
     if (!validation) return;
     VkDebugUtilsMessengerCreateInfoEXT messenger{};
@@ -136,8 +150,9 @@ void Device::create_instance(bool validation) {
 }
 
 void Device::create_device() {
-    const auto chain = physical_.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceSubgroupProperties,
-                                                vk::PhysicalDeviceMaintenance3Properties>();
+    const auto chain =
+        physical_.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceSubgroupProperties,
+                                 vk::PhysicalDeviceMaintenance3Properties>();
     const auto& properties = chain.get<vk::PhysicalDeviceProperties2>().properties;
     const auto available = physical_.enumerateDeviceExtensionProperties();
     subgroup_size_control_ = std::any_of(available.begin(), available.end(), [](const auto& extension) {
@@ -147,11 +162,13 @@ void Device::create_device() {
     vk::PhysicalDeviceSubgroupSizeControlFeaturesEXT wanted_sizes;
     if (subgroup_size_control_) {
         const auto features =
-            physical_.getFeatures2<vk::PhysicalDeviceFeatures2, vk::PhysicalDeviceSubgroupSizeControlFeaturesEXT>()
+            physical_
+                .getFeatures2<vk::PhysicalDeviceFeatures2, vk::PhysicalDeviceSubgroupSizeControlFeaturesEXT>()
                 .get<vk::PhysicalDeviceSubgroupSizeControlFeaturesEXT>();
-        const auto sizes =
-            physical_.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceSubgroupSizeControlPropertiesEXT>()
-                .get<vk::PhysicalDeviceSubgroupSizeControlPropertiesEXT>();
+        const auto sizes = physical_
+                               .getProperties2<vk::PhysicalDeviceProperties2,
+                                               vk::PhysicalDeviceSubgroupSizeControlPropertiesEXT>()
+                               .get<vk::PhysicalDeviceSubgroupSizeControlPropertiesEXT>();
         subgroup_size_control_ = features.subgroupSizeControl && features.computeFullSubgroups &&
                                  bool(sizes.requiredSubgroupSizeStages & vk::ShaderStageFlagBits::eCompute);
         limits_.subgroup_size =
@@ -186,7 +203,8 @@ void Device::create_device() {
     limits_.timestamp_nanoseconds = properties.limits.timestampPeriod;
 }
 
-vk::UniqueDeviceMemory Device::allocate(const vk::MemoryRequirements& requirements, bool host_visible, bool& mapped_kind) {
+vk::UniqueDeviceMemory Device::allocate(const vk::MemoryRequirements& requirements, bool host_visible,
+                                        bool& mapped_kind) {
     const auto memory = physical_.getMemoryProperties();
     using Flag = vk::MemoryPropertyFlagBits;
     const vk::MemoryPropertyFlags host = Flag::eHostVisible | Flag::eHostCoherent;
@@ -195,7 +213,8 @@ vk::UniqueDeviceMemory Device::allocate(const vk::MemoryRequirements& requiremen
     if (host_visible) {
         wishes = {host | Flag::eHostCached, host};
     } else {
-        if (limits_.cpu || info_.type == "integrated") wishes.push_back(Flag::eDeviceLocal | host | Flag::eHostCached);
+        if (limits_.cpu || info_.type == "integrated")
+            wishes.push_back(Flag::eDeviceLocal | host | Flag::eHostCached);
         wishes.push_back(Flag::eDeviceLocal);
         wishes.push_back({});
     }
@@ -245,7 +264,8 @@ std::vector<DeviceInfo> list_devices() {
         const auto instance = vk::createInstanceUnique(create);
         std::vector<DeviceInfo> infos;
         int index = 0;
-        for (const auto& device : instance->enumeratePhysicalDevices()) infos.push_back(gpu::describe(device, index++));
+        for (const auto& device : instance->enumeratePhysicalDevices())
+            infos.push_back(gpu::describe(device, index++));
         if (infos.empty())
             throw RunError("no Vulkan device; a CPU device comes with Mesa (Debian: mesa-vulkan-drivers)");
         return infos;
@@ -257,7 +277,8 @@ std::vector<DeviceInfo> list_devices() {
 namespace {
 
 std::string lower(std::string text) {
-    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+    std::transform(text.begin(), text.end(), text.begin(),
+                   [](unsigned char c) { return char(std::tolower(c)); });
     return text;
 }
 
@@ -278,19 +299,28 @@ std::shared_ptr<gpu::Device> open_device(const DeviceOptions& options) {
     for (const auto& info : infos) {
         present += (present.empty() ? "" : "; ") + std::to_string(info.index) + " " + info.name +
                    (info.unusable.empty() ? "" : " (lacks " + info.unusable + ")");
-        if (!info.unusable.empty() || (!options.selector.empty() && !matches(info, options.selector))) continue;
-        const size_t rank = size_t(std::find(preference.begin(), preference.end(), info.type) - preference.begin());
+        if (!info.unusable.empty() || (!options.selector.empty() && !matches(info, options.selector)))
+            continue;
+        const size_t rank =
+            size_t(std::find(preference.begin(), preference.end(), info.type) - preference.begin());
         if (!best || rank < best_rank) best = &info, best_rank = rank;
     }
     if (!best)
-        throw InputError((options.selector.empty() ? "no usable Vulkan device"
-                                                   : "no usable Vulkan device matches '" + options.selector + "'") +
+        throw InputError((options.selector.empty()
+                              ? "no usable Vulkan device"
+                              : "no usable Vulkan device matches '" + options.selector + "'") +
                          "; present: " + present);
     return std::make_shared<gpu::Device>(*best, options.validation);
 }
 
-DeviceInfo device_info(const gpu::Device& device) { return device.info(); }
-uint64_t device_bytes(const gpu::Device& device) { return device.held_bytes(); }
-uint64_t peak_device_bytes(const gpu::Device& device) { return device.peak_bytes(); }
+DeviceInfo device_info(const gpu::Device& device) {
+    return device.info();
+}
+uint64_t device_bytes(const gpu::Device& device) {
+    return device.held_bytes();
+}
+uint64_t peak_device_bytes(const gpu::Device& device) {
+    return device.peak_bytes();
+}
 
 }  // namespace ewa

@@ -13,14 +13,14 @@ namespace ewa::gpu {
 
 /// What kernel shapes and sizes are chosen from.
 struct Limits {
-    bool cpu = false;                        // a software device: threads take contiguous halves of a dispatch
-    uint32_t subgroup_size = 0;              // lanes; what every pipeline of this device runs with
-    uint32_t max_groups = 65535;             // workgroups a dispatch, per dimension
-    uint32_t max_group_size = 0;             // invocations a workgroup
-    uint64_t max_storage_range = 0;          // bytes a storage binding may span
-    uint64_t max_texels = 0;                 // elements a texel buffer view may span
-    uint64_t uniform_alignment = 256;        // bytes
-    uint64_t max_allocation = 0;             // bytes
+    bool cpu = false;                  // a software device: threads take contiguous halves of a dispatch
+    uint32_t subgroup_size = 0;        // lanes; what every pipeline of this device runs with
+    uint32_t max_groups = 65535;       // workgroups a dispatch, per dimension
+    uint32_t max_group_size = 0;       // invocations a workgroup
+    uint64_t max_storage_range = 0;    // bytes a storage binding may span
+    uint64_t max_texels = 0;           // elements a texel buffer view may span
+    uint64_t uniform_alignment = 256;  // bytes
+    uint64_t max_allocation = 0;       // bytes
     bool timestamps = false;
     double timestamp_nanoseconds = 1.0;
 };
@@ -42,7 +42,8 @@ class Device {
     vk::PipelineCache pipeline_cache() const { return *pipeline_cache_; }
 
     /// Throws RunError with the bytes asked for and held when the driver is out of memory.
-    vk::UniqueDeviceMemory allocate(const vk::MemoryRequirements& requirements, bool host_visible, bool& mapped_kind);
+    vk::UniqueDeviceMemory allocate(const vk::MemoryRequirements& requirements, bool host_visible,
+                                    bool& mapped_kind);
     void released(uint64_t bytes) { held_bytes_ -= bytes; }
     uint64_t held_bytes() const { return held_bytes_; }
     uint64_t peak_bytes() const { return peak_bytes_; }

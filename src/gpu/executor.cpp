@@ -27,9 +27,10 @@ void Executor::reserve(const Recording& recording, bool timed) {
     if (!descriptor_pool_ || sets > pool_sets_ || bindings > pool_bindings_) {
         pool_sets_ = std::max(1u, 2 * sets);
         pool_bindings_ = std::max(1u, 2 * bindings);
-        const std::array sizes{vk::DescriptorPoolSize(vk::DescriptorType::eStorageBuffer, pool_bindings_),
-                               vk::DescriptorPoolSize(vk::DescriptorType::eUniformBuffer, pool_bindings_),
-                               vk::DescriptorPoolSize(vk::DescriptorType::eUniformTexelBuffer, pool_bindings_)};
+        const std::array sizes{
+            vk::DescriptorPoolSize(vk::DescriptorType::eStorageBuffer, pool_bindings_),
+            vk::DescriptorPoolSize(vk::DescriptorType::eUniformBuffer, pool_bindings_),
+            vk::DescriptorPoolSize(vk::DescriptorType::eUniformTexelBuffer, pool_bindings_)};
         vk::DescriptorPoolCreateInfo create;
         create.setMaxSets(pool_sets_).setPoolSizes(sizes);
         descriptor_pool_ = device_.handle().createDescriptorPoolUnique(create);
@@ -61,8 +62,8 @@ vk::DescriptorSet Executor::bind(const Command& command, vk::DescriptorPool pool
         if (kind == BindingKind::texel)
             update.setTexelBufferView(views.emplace_back(use.buffer->view()));
         else
-            update.setBufferInfo(infos.emplace_back(use.buffer->handle(), use.offset,
-                                                    use.bytes ? use.bytes : use.buffer->bytes() - use.offset));
+            update.setBufferInfo(infos.emplace_back(
+                use.buffer->handle(), use.offset, use.bytes ? use.bytes : use.buffer->bytes() - use.offset));
         updates.push_back(update);
     }
     device_.handle().updateDescriptorSets(updates, {});
@@ -93,7 +94,8 @@ void Executor::record(const Recording& recording, vk::CommandBuffer commands, bo
         } else {
             const vk::PipelineBindPoint compute = vk::PipelineBindPoint::eCompute;
             commands.bindPipeline(compute, command.pipeline->handle());
-            commands.bindDescriptorSets(compute, command.pipeline->layout(), 0, bind(command, *descriptor_pool_), {});
+            commands.bindDescriptorSets(compute, command.pipeline->layout(), 0,
+                                        bind(command, *descriptor_pool_), {});
             if (!command.push.empty())
                 commands.pushConstants(command.pipeline->layout(), vk::ShaderStageFlagBits::eCompute, 0,
                                        uint32_t(command.push.size()), command.push.data());
@@ -136,7 +138,8 @@ void Executor::read_timings(const Recording& recording) {
     for (uint32_t i = 0; i + 1 < count; ++i) {
         const std::string& name = recording.commands()[i].name;
         const double ticks = double(stamps.value[i + 1] - stamps.value[i]);
-        auto found = std::find_if(timings_.begin(), timings_.end(), [&](const Timing& t) { return t.name == name; });
+        auto found =
+            std::find_if(timings_.begin(), timings_.end(), [&](const Timing& t) { return t.name == name; });
         if (found == timings_.end()) found = timings_.insert(timings_.end(), {name, 0});
         found->milliseconds += ticks * device_.limits().timestamp_nanoseconds * 1e-6;
     }

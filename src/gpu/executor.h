@@ -17,12 +17,12 @@ class Executor {
   public:
     explicit Executor(Device& device);
 
-    /// Submits and waits until the device is done; everything it wrote is then visible to the host. timed: keep the
-    /// time of each command. Throws RunError when the device is lost or the validation layer speaks.
+    /// Submits and waits until the device is done; everything it wrote is then visible to the host. timed:
+    /// keep the time of each command. Throws RunError when the device is lost or the validation layer speaks.
     void run(const Recording& recording, bool timed = false);
 
-    /// Of the last timed run: one entry a name, in order of first appearance, times of equal names added up. The time
-    /// of a command reaches from the end of the one before it to its own end.
+    /// Of the last timed run: one entry a name, in order of first appearance, times of equal names added up.
+    /// The time of a command reaches from the end of the one before it to its own end.
     const std::vector<Timing>& timings() const { return timings_; }
 
   private:

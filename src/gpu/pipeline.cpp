@@ -6,9 +6,12 @@ namespace ewa::gpu {
 
 vk::DescriptorType descriptor_type(BindingKind kind) {
     switch (kind) {
-        case BindingKind::uniform: return vk::DescriptorType::eUniformBuffer;
-        case BindingKind::texel: return vk::DescriptorType::eUniformTexelBuffer;
-        default: return vk::DescriptorType::eStorageBuffer;
+        case BindingKind::uniform:
+            return vk::DescriptorType::eUniformBuffer;
+        case BindingKind::texel:
+            return vk::DescriptorType::eUniformTexelBuffer;
+        default:
+            return vk::DescriptorType::eStorageBuffer;
     }
 }
 
@@ -23,7 +26,8 @@ Pipeline::Pipeline(Device& device, std::string name, std::span<const uint32_t> s
         vk::DescriptorSetLayoutCreateInfo set;
         set.setBindings(bindings);
         set_layout_ = device.handle().createDescriptorSetLayoutUnique(set);
-        const vk::PushConstantRange push(vk::ShaderStageFlagBits::eCompute, 0, reflection_.push_constant_bytes);
+        const vk::PushConstantRange push(vk::ShaderStageFlagBits::eCompute, 0,
+                                         reflection_.push_constant_bytes);
         vk::PipelineLayoutCreateInfo layout;
         layout.setSetLayouts(*set_layout_);
         if (reflection_.push_constant_bytes) layout.setPushConstantRanges(push);
@@ -36,7 +40,8 @@ Pipeline::Pipeline(Device& device, std::string name, std::span<const uint32_t> s
         for (uint32_t i = 0; i < constants.size(); ++i)
             entries.emplace_back(constants[i].id, i * uint32_t(sizeof(SpecConstant)) + 4, 4);
         const vk::SpecializationInfo specialization(uint32_t(entries.size()), entries.data(),
-                                                    constants.size() * sizeof(SpecConstant), constants.data());
+                                                    constants.size() * sizeof(SpecConstant),
+                                                    constants.data());
         vk::PipelineShaderStageRequiredSubgroupSizeCreateInfoEXT size(device.limits().subgroup_size);
         vk::ComputePipelineCreateInfo create;
         create.stage.setStage(vk::ShaderStageFlagBits::eCompute).setModule(*module).setPName("main");

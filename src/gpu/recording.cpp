@@ -6,7 +6,9 @@
 namespace ewa::gpu {
 namespace {
 
-bool has(Access access, Access part) { return (uint32_t(access) & uint32_t(part)) != 0; }
+bool has(Access access, Access part) {
+    return (uint32_t(access) & uint32_t(part)) != 0;
+}
 
 [[noreturn]] void fail(const Pipeline& pipeline, const std::string& what) {
     throw std::logic_error("shader " + pipeline.name() + ": " + what);
@@ -19,7 +21,8 @@ void check_use(const Pipeline& pipeline, const Binding& declared, const Use& use
                            to_string(declared.access) + " by the shader");
     if (declared.kind == BindingKind::texel && use.buffer->texel() == Texel::none)
         fail(pipeline, at + " is fetched as texels, and the buffer has no texel format");
-    if (declared.kind == BindingKind::texel && use.offset != 0) fail(pipeline, at + " is a part of a texel buffer");
+    if (declared.kind == BindingKind::texel && use.offset != 0)
+        fail(pipeline, at + " is a part of a texel buffer");
     if (use.offset + use.bytes > use.buffer->bytes()) fail(pipeline, at + " reaches past the buffer's end");
 }
 
@@ -38,8 +41,8 @@ void Recording::dispatch(const Pipeline& pipeline, std::string name, std::vector
         check_use(pipeline, shader.bindings[i], uses[i]);
     }
     if (push.size() != shader.push_constant_bytes)
-        fail(pipeline, "takes " + std::to_string(shader.push_constant_bytes) + " bytes of push constants, the pass gives " +
-                           std::to_string(push.size()));
+        fail(pipeline, "takes " + std::to_string(shader.push_constant_bytes) +
+                           " bytes of push constants, the pass gives " + std::to_string(push.size()));
     for (const uint32_t count : groups)
         if (count == 0 || count > limits_.max_groups)
             fail(pipeline, "a dispatch of " + std::to_string(count) + " workgroups (1 to " +
@@ -67,8 +70,8 @@ void Recording::fill(const Buffer& target, uint32_t value, uint64_t offset, uint
     append(std::move(command));
 }
 
-void Recording::copy(const Buffer& source, uint64_t source_offset, const Buffer& target, uint64_t target_offset,
-                     uint64_t bytes) {
+void Recording::copy(const Buffer& source, uint64_t source_offset, const Buffer& target,
+                     uint64_t target_offset, uint64_t bytes) {
     if (bytes == 0) return;
     if (source_offset + bytes > source.bytes() || target_offset + bytes > target.bytes())
         throw std::logic_error("copy from " + source.name() + " to " + target.name() + " outside a buffer");
@@ -84,9 +87,11 @@ void Recording::copy(const Buffer& source, uint64_t source_offset, const Buffer&
 
 void Recording::append(Command command) {
     const auto state_of = [&](const Buffer* buffer) {
-        return std::find_if(states_.begin(), states_.end(), [&](const State& s) { return s.buffer == buffer; });
+        return std::find_if(states_.begin(), states_.end(),
+                            [&](const State& s) { return s.buffer == buffer; });
     };
-    // A command must wait when it reads what was written, or writes what was read or written, since the last barrier.
+    // A command must wait when it reads what was written, or writes what was read or written, since the last
+    // barrier.
     for (const Use& use : command.uses) {
         const auto state = state_of(use.buffer);
         if (state == states_.end()) continue;

@@ -29,13 +29,13 @@ enum Decoration : uint32_t {
 enum Storage : uint32_t { kUniformConstant = 0, kUniform = 2, kPushConstant = 9, kStorageBuffer = 12 };
 
 struct Module {
-    std::map<uint32_t, uint32_t> binding, set;                  // variable -> number
+    std::map<uint32_t, uint32_t> binding, set;                     // variable -> number
     std::map<uint32_t, std::set<uint32_t>> read_only, write_only;  // struct -> members
     std::set<uint32_t> variable_read_only, variable_write_only;
-    std::map<uint32_t, uint32_t> last_offset;                   // struct -> largest member offset
-    std::map<uint32_t, uint32_t> members;                       // struct -> count
-    std::map<uint32_t, uint32_t> pointee;                       // pointer type -> type
-    std::map<uint32_t, bool> image;                             // sampled image types
+    std::map<uint32_t, uint32_t> last_offset;  // struct -> largest member offset
+    std::map<uint32_t, uint32_t> members;      // struct -> count
+    std::map<uint32_t, uint32_t> pointee;      // pointer type -> type
+    std::map<uint32_t, bool> image;            // sampled image types
     struct Variable {
         uint32_t id, type, storage;
     };

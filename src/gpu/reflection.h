@@ -19,13 +19,14 @@ struct Binding {
 };
 
 struct Reflection {
-    std::vector<Binding> bindings;    // of set 0, ascending; every variable the module declares
+    std::vector<Binding> bindings;  // of set 0, ascending; every variable the module declares
     uint32_t push_constant_bytes = 0;
 };
 
-/// Storage blocks: read where every member is NonWritable, write where every member is NonReadable, else read_write
-/// (GLSL readonly and writeonly). Uniform blocks and texel buffers: read. Push constants: the end of the last member
-/// of a flat block of 4-byte scalars. Throws std::logic_error for a module this project does not produce.
+/// Storage blocks: read where every member is NonWritable, write where every member is NonReadable, else
+/// read_write (GLSL readonly and writeonly). Uniform blocks and texel buffers: read. Push constants: the end
+/// of the last member of a flat block of 4-byte scalars. Throws std::logic_error for a module this project
+/// does not produce.
 Reflection reflect(std::span<const uint32_t> spirv);
 
 }  // namespace ewa::gpu

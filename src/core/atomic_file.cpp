@@ -1,0 +1,87 @@
+#include "core/atomic_file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+#include <string>
+#include <utility>
+
+#include "core/text.h"
+#include "ewa/error.h"
+
+namespace ewa::core {
+
+void AtomicFile::fail(const char* doing) const {
+    const int reason = errno;
+    throw RunError(one_line(target_.string()) + ": " + doing + ": " + std::strerror(reason));
+}
+
+AtomicFile::AtomicFile(const std::filesystem::path& path) : target_(path) {
+    if (path.filename().empty() || path.filename() == "." || path.filename() == "..")
+        throw RunError(one_line(path.string()) + ": cannot be written: it names a folder");
+    std::error_code ignored;
+    if (std::filesystem::is_symlink(path, ignored)) {
+        const std::filesystem::path resolved = std::filesystem::weakly_canonical(path, ignored);
+        if (!resolved.empty()) target_ = resolved;
+    }
+    struct stat existing {};
+    const bool exists = stat(target_.c_str(), &existing) == 0;
+    if (exists && !S_ISREG(existing.st_mode))
+        throw RunError(one_line(path.string()) +
+                       ": cannot be written: it is there and is not a regular file");
+
+    // A name of its own, not one made from the target's, which may already be as long as a name can be.
+    static std::atomic<unsigned> counter{0};
+    do {
+        temporary_ = target_.parent_path() /
+                     (".ewa-" + std::to_string(getpid()) + "-" + std::to_string(counter++) + ".tmp");
+        descriptor_ = open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    } while (descriptor_ < 0 && errno == EEXIST);
+    if (descriptor_ < 0) fail("cannot be written");
+    // Where the file system has no permissions to keep, the file is still as good as any new one.
+    if (exists && fchmod(descriptor_, existing.st_mode & 07777) != 0) errno = 0;
+}
+
+AtomicFile::~AtomicFile() {
+    if (descriptor_ >= 0) close(descriptor_);
+    if (!temporary_.empty()) unlink(temporary_.c_str());
+}
+
+void AtomicFile::write(const void* bytes, size_t count) {
+    const char* next = static_cast<const char*>(bytes);
+    while (count > 0) {
+        const ssize_t written = ::write(descriptor_, next, count);
+        if (written < 0 && errno == EINTR) continue;
+        if (written < 0) fail("cannot be written");
+        next += written;
+        count -= static_cast<size_t>(written);
+    }
+}
+
+void AtomicFile::commit() {
+    // Network and quota file systems report a full disk as late as here.
+    if (fsync(descriptor_) != 0 && errno != EINVAL && errno != EROFS) fail("cannot be written to disk");
+    if (close(std::exchange(descriptor_, -1)) != 0) fail("cannot be written to disk");
+    if (rename(temporary_.c_str(), target_.c_str()) != 0) fail("cannot be put in place");
+    temporary_.clear();
+    // The new name reaches the disk with its directory. The file itself is safe already, so failing is no
+    // error.
+    const std::filesystem::path parent = target_.has_parent_path() ? target_.parent_path() : ".";
+    const int directory = open(parent.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (directory >= 0) {
+        fsync(directory);
+        close(directory);
+    }
+}
+
+void write_text_file(const std::filesystem::path& path, std::string_view text) {
+    AtomicFile file(path);
+    file.write(text);
+    file.commit();
+}
+
+}  // namespace ewa::core

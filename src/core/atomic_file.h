@@ -1,0 +1,37 @@
+// Files that are there whole or not at all.
+#pragma once
+#include <cstddef>
+#include <filesystem>
+#include <string_view>
+
+namespace ewa::core {
+
+/// Writes beside the path, in the same directory, and takes the path's place when commit() is called: until
+/// then, and whenever something fails, the path keeps what it held. The temporary is removed by the
+/// destructor. Throws RunError that names the path and the system's reason (a full disk is found at write,
+/// fsync or close). An existing target keeps its permissions; a symbolic link is followed; a target that is
+/// no regular file is refused.
+class AtomicFile {
+  public:
+    explicit AtomicFile(const std::filesystem::path& path);
+    ~AtomicFile();
+    AtomicFile(const AtomicFile&) = delete;
+    AtomicFile& operator=(const AtomicFile&) = delete;
+
+    void write(const void* bytes, size_t count);
+    void write(std::string_view text) { write(text.data(), text.size()); }
+
+    /// Everything on disk, then the rename. Call once, last.
+    void commit();
+
+  private:
+    [[noreturn]] void fail(const char* doing) const;
+
+    std::filesystem::path target_, temporary_;
+    int descriptor_ = -1;
+};
+
+/// The file becomes `text`, or stays as it was and RunError is thrown.
+void write_text_file(const std::filesystem::path& path, std::string_view text);
+
+}  // namespace ewa::core

@@ -1,0 +1,118 @@
+#include "core/file_reader.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+
+#include "core/text.h"
+#include "ewa/error.h"
+
+namespace ewa::core {
+
+namespace {
+constexpr size_t kBufferBytes = size_t(1) << 20;
+}
+
+FileReader::FileReader(const std::filesystem::path& path) : name_(one_line(path.string())) {
+    struct stat status {};
+    // Looked at before it is opened: opening a named pipe would wait for a writer.
+    if (stat(path.c_str(), &status) != 0)
+        throw InputError(name_ + ": cannot be read: " + std::strerror(errno));
+    if (!S_ISREG(status.st_mode)) throw InputError(name_ + ": is not a regular file");
+    descriptor_ = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    if (descriptor_ < 0) throw InputError(name_ + ": cannot be opened: " + std::strerror(errno));
+    size_ = static_cast<uint64_t>(status.st_size);
+    buffer_.resize(static_cast<size_t>(std::min<uint64_t>(size_, kBufferBytes)));
+}
+
+FileReader::~FileReader() {
+    close(descriptor_);
+}
+
+void FileReader::fail(std::string_view text) const {
+    throw InputError(name_ + ": byte " + std::to_string(offset_) + ": " + one_line(text));
+}
+
+void FileReader::fill(size_t n) {
+    if (end_ - begin_ >= n) return;
+    std::memmove(buffer_.data(), buffer_.data() + begin_, end_ - begin_);
+    end_ -= begin_;
+    begin_ = 0;
+    if (buffer_.size() < n) buffer_.resize(n);
+    while (end_ < n) {
+        const ssize_t got = ::read(descriptor_, buffer_.data() + end_, buffer_.size() - end_);
+        if (got < 0 && errno == EINTR) continue;
+        if (got < 0) fail(std::string("cannot be read: ") + std::strerror(errno));
+        if (got == 0) fail("the file became shorter while it was read");
+        end_ += static_cast<size_t>(got);
+    }
+}
+
+const std::byte* FileReader::take(size_t n, std::string_view what) {
+    if (n > remaining())
+        fail("the file ends inside " + std::string(what) + " (" + std::to_string(n) + " bytes needed, " +
+             std::to_string(remaining()) + " left)");
+    fill(n);
+    const std::byte* bytes = buffer_.data() + begin_;
+    begin_ += n;
+    offset_ += n;
+    return bytes;
+}
+
+void FileReader::skip(uint64_t n, std::string_view what) {
+    if (n > remaining())
+        fail("the file ends inside " + std::string(what) + " (" + std::to_string(n) + " bytes needed, " +
+             std::to_string(remaining()) + " left)");
+    const size_t buffered = static_cast<size_t>(std::min<uint64_t>(n, end_ - begin_));
+    begin_ += buffered;
+    if (n > buffered && lseek(descriptor_, static_cast<off_t>(n - buffered), SEEK_CUR) < 0)
+        fail(std::string("cannot be read: ") + std::strerror(errno));
+    offset_ += n;
+}
+
+std::string FileReader::read_zero_terminated(size_t limit, std::string_view what) {
+    std::string text;
+    while (const char c = read<char>(what)) {
+        if (text.size() == limit)
+            fail(std::string(what) + " is longer than " + std::to_string(limit) + " bytes");
+        text += c;
+    }
+    return text;
+}
+
+bool FileReader::read_line(std::string& line, size_t limit) {
+    line.clear();
+    if (remaining() == 0) return false;
+    while (remaining() > 0) {
+        fill(1);
+        const auto* begin = reinterpret_cast<const char*>(buffer_.data()) + begin_;
+        const size_t available = end_ - begin_;
+        const auto* feed = static_cast<const char*>(std::memchr(begin, '\n', available));
+        const size_t length = feed ? static_cast<size_t>(feed - begin) : available;
+        if (line.size() + length > limit) fail("a line is longer than " + std::to_string(limit) + " bytes");
+        line.append(begin, length);
+        begin_ += length + (feed != nullptr);
+        offset_ += length + (feed != nullptr);
+        if (feed) break;
+    }
+    if (line.ends_with('\r')) line.pop_back();
+    return true;
+}
+
+void FileReader::require_room(uint64_t count, uint64_t bytes_each, std::string_view what) const {
+    if (bytes_each != 0 && count > remaining() / bytes_each)
+        fail("the file claims " + std::to_string(count) + " " + std::string(what) + " of at least " +
+             std::to_string(bytes_each) + " bytes each, but only " + std::to_string(remaining()) +
+             " bytes follow; it is truncated or damaged");
+}
+
+std::string read_text_file(const std::filesystem::path& path) {
+    FileReader reader(path);
+    const size_t size = static_cast<size_t>(reader.size());
+    return std::string(reinterpret_cast<const char*>(reader.take(size, "the text")), size);
+}
+
+}  // namespace ewa::core

@@ -1,0 +1,71 @@
+// A file read from front to back with every byte accounted for.
+#pragma once
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace ewa::core {
+
+/// Buffered reader of a regular file of known size. Every read is checked against what the file still holds,
+/// and what cannot be read is an InputError "path: byte N: ...", so no claim inside a file makes memory be
+/// taken for data that is not there. The file is read, not mapped: one that shrinks meanwhile is an error and
+/// not a SIGBUS.
+class FileReader {
+  public:
+    /// Throws InputError when there is no such file, it is not a regular file or cannot be opened.
+    explicit FileReader(const std::filesystem::path& path);
+    ~FileReader();
+    FileReader(const FileReader&) = delete;
+    FileReader& operator=(const FileReader&) = delete;
+
+    const std::string& name() const { return name_; }
+    uint64_t size() const { return size_; }
+    uint64_t offset() const { return offset_; }  // bytes read so far
+    uint64_t remaining() const { return size_ - offset_; }
+
+    /// The next n bytes, valid until the next call. `what` names them in the error.
+    const std::byte* take(size_t n, std::string_view what);
+
+    /// The next value, little endian, of an arithmetic type.
+    template <class T>
+    T read(std::string_view what) {
+        static_assert(std::is_arithmetic_v<T> && std::endian::native == std::endian::little);
+        T value;
+        std::memcpy(&value, take(sizeof(T), what), sizeof(T));
+        return value;
+    }
+
+    void skip(uint64_t n, std::string_view what);
+
+    /// The text up to a zero byte, which is read too; at most `limit` bytes long.
+    std::string read_zero_terminated(size_t limit, std::string_view what);
+
+    /// The text up to a line feed (read, not returned; a carriage return before it neither) or the end of the
+    /// file; at most `limit` bytes long. False where there is nothing left.
+    bool read_line(std::string& line, size_t limit);
+
+    /// Throws unless the rest of the file has room for `count` items of at least `bytes_each` bytes.
+    void require_room(uint64_t count, uint64_t bytes_each, std::string_view what) const;
+
+    /// Throws InputError "path: byte N: text".
+    [[noreturn]] void fail(std::string_view text) const;
+
+  private:
+    void fill(size_t n);  // makes at least n bytes available in the buffer
+
+    std::string name_;
+    int descriptor_ = -1;
+    uint64_t size_ = 0, offset_ = 0;
+    std::vector<std::byte> buffer_;
+    size_t begin_ = 0, end_ = 0;  // the part of the buffer that was read from the file and not yet taken
+};
+
+/// The whole file as text. Throws InputError.
+std::string read_text_file(const std::filesystem::path& path);
+
+}  // namespace ewa::core

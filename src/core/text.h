@@ -1,0 +1,34 @@
+// Small text helpers shared by the readers of text files.
+#pragma once
+#include <charconv>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace ewa::core {
+
+/// The text with every control character as a space: an error is one line whatever a file or a path holds.
+std::string one_line(std::string_view text);
+
+/// Cuts the first word (separated by blanks, tabs or carriage returns) off `rest`; empty at the end.
+std::string_view next_word(std::string_view& rest);
+
+/// Without leading and trailing white space.
+std::string_view trim(std::string_view text);
+
+/// In lower case (ASCII).
+std::string lower(std::string_view text);
+
+/// The whole word as a number, "nan" and "inf" included; independent of the locale.
+std::optional<double> parse_number(std::string_view word);
+
+/// The whole word as an integer that fits T.
+template <class T>
+std::optional<T> parse_integer(std::string_view word) {
+    T value{};
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (error != std::errc() || end != word.data() + word.size()) return std::nullopt;
+    return value;
+}
+
+}  // namespace ewa::core

@@ -1,0 +1,153 @@
+// Pictures on disk, through OpenImageIO.
+#include <OpenImageIO/filesystem.h>
+#include <OpenImageIO/imageio.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <new>
+
+#include "core/atomic_file.h"
+#include "core/text.h"
+#include "ewa/error.h"
+#include "ewa/image.h"
+
+namespace ewa {
+
+namespace {
+
+// A picture this large has to have a file that could hold it: what formats compress best (a single colour)
+// stays under this ratio, and a damaged header does not make gigabytes be taken.
+constexpr uint64_t kUncheckedBytes = uint64_t(256) << 20;
+constexpr uint64_t kMaxCompression = 5000;
+
+[[noreturn]] void fail(const std::filesystem::path& path, const std::string& reason) {
+    throw InputError(core::one_line(path.string() + ": not a readable image: " + reason));
+}
+
+std::unique_ptr<OIIO::ImageInput> open_image(const std::filesystem::path& path) {
+    std::error_code error;
+    const std::filesystem::file_status status = std::filesystem::status(path, error);
+    if (!std::filesystem::exists(status)) fail(path, "there is no such file");
+    if (!std::filesystem::is_regular_file(status)) fail(path, "it is not a regular file");
+    // Colour stays as the file has it; OpenImageIO would multiply it by alpha.
+    OIIO::ImageSpec request;
+    request.attribute("oiio:UnassociatedAlpha", 1);
+    auto input = OIIO::ImageInput::open(path.string(), &request);
+    if (!input) fail(path, OIIO::geterror());
+    const OIIO::ImageSpec& spec = input->spec();
+    if (spec.width < 1 || spec.height < 1 || spec.depth > 1 || spec.nchannels < 1)
+        fail(path, "it is not a two-dimensional picture");
+    const double bytes = double(spec.width) * spec.height * spec.nchannels * sizeof(float);
+    const double file_bytes = double(std::filesystem::file_size(path, error));
+    if (bytes > double(kUncheckedBytes) && bytes > file_bytes * kMaxCompression)
+        fail(path, "its header claims " + std::to_string(spec.width) + " x " + std::to_string(spec.height) +
+                       " pixels, too many for its " + std::to_string(int64_t(file_bytes)) + " bytes");
+    return input;
+}
+
+/// The first `channels` channels, as float. Integers are divided by their largest value, rounded once.
+std::vector<float> read_channels(OIIO::ImageInput& input, int channels, const std::filesystem::path& path) {
+    const OIIO::ImageSpec& spec = input.spec();
+    const size_t count = size_t(spec.width) * size_t(spec.height) * size_t(channels);
+    std::vector<float> values(count);
+    const auto read = [&](OIIO::TypeDesc type, void* into) {
+        if (!input.read_image(0, 0, 0, channels, type, into)) fail(path, input.geterror());
+    };
+    if (spec.format == OIIO::TypeDesc::UINT8) {
+        std::vector<uint8_t> bytes(count);
+        read(OIIO::TypeDesc::UINT8, bytes.data());
+        std::transform(bytes.begin(), bytes.end(), values.begin(),
+                       [](uint8_t v) { return float(v) / 255.0f; });
+    } else if (spec.format == OIIO::TypeDesc::UINT16) {
+        std::vector<uint16_t> words(count);
+        read(OIIO::TypeDesc::UINT16, words.data());
+        std::transform(words.begin(), words.end(), values.begin(),
+                       [](uint16_t v) { return float(v) / 65535.0f; });
+    } else {
+        read(OIIO::TypeDesc::FLOAT, values.data());
+    }
+    return values;
+}
+
+std::vector<unsigned char> encode(const std::filesystem::path& path, const Image& image, OIIO::TypeDesc type,
+                                  const void* pixels) {
+    std::vector<unsigned char> bytes;
+    OIIO::Filesystem::IOVecOutput memory(bytes);
+    auto output = OIIO::ImageOutput::create(path.filename().string());
+    if (!output) throw RunError(core::one_line(path.string() + ": cannot be written: " + OIIO::geterror()));
+    OIIO::ImageSpec spec(image.width, image.height, image.channels, type);
+    spec.attribute("oiio:UnassociatedAlpha", 1);
+    // Encoded in memory and written by AtomicFile, which sees a full disk where the codecs' own writers may
+    // not.
+    OIIO::Filesystem::IOProxy* proxy = &memory;
+    spec.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);
+    if (!output->open(path.filename().string(), spec) || !output->write_image(type, pixels) ||
+        !output->close())
+        throw RunError(core::one_line(path.string() + ": cannot be encoded: " + output->geterror()));
+    return bytes;
+}
+
+}  // namespace
+
+ImageSize read_image_size(const std::filesystem::path& path) {
+    const auto input = open_image(path);
+    return {input->spec().width, input->spec().height};
+}
+
+Image load_image(const std::filesystem::path& path) try {
+    const auto input = open_image(path);
+    const OIIO::ImageSpec& spec = input->spec();
+    // Grey, grey and alpha, RGB, RGBA; whatever else a file has (depth, ids) is not colour. The EXIF
+    // orientation is left alone, as the reconstruction tools leave it: the cameras belong to the pixels as
+    // they are stored.
+    const bool grey = spec.nchannels < 3;
+    const int colors = grey ? 1 : 3;
+    const bool alpha = spec.nchannels > colors && spec.alpha_channel == colors;
+    const int stored = colors + (alpha ? 1 : 0);
+    std::vector<float> values = read_channels(*input, stored, path);
+
+    Image image;
+    image.width = spec.width;
+    image.height = spec.height;
+    image.channels = alpha ? 4 : 3;
+    if (!grey) {
+        image.pixels = std::move(values);
+        return image;
+    }
+    const size_t count = size_t(image.width) * size_t(image.height);
+    image.pixels.resize(count * size_t(image.channels));
+    for (size_t i = 0; i < count; ++i) {
+        float* pixel = &image.pixels[i * size_t(image.channels)];
+        pixel[0] = pixel[1] = pixel[2] = values[i * size_t(stored)];
+        if (alpha) pixel[3] = values[i * size_t(stored) + 1];
+    }
+    return image;
+} catch (const std::bad_alloc&) {
+    fail(path, "it is too large for this machine's memory");
+}
+
+void save_image(const std::filesystem::path& path, const Image& image) {
+    const std::string extension = core::lower(path.extension().string());
+    if (extension != ".png" && extension != ".exr")
+        throw InputError(core::one_line(path.string() + ": pictures are written as .png or .exr"));
+    if (image.width < 1 || image.height < 1 || image.channels < 1)
+        throw InputError(core::one_line(path.string() + ": a picture without pixels cannot be written"));
+    std::vector<unsigned char> bytes;
+    if (extension == ".exr") {
+        bytes = encode(path, image, OIIO::TypeDesc::FLOAT, image.pixels.data());
+    } else {
+        std::vector<uint8_t> rounded(image.pixels.size());
+        // Written so that NaN becomes 0.
+        std::transform(image.pixels.begin(), image.pixels.end(), rounded.begin(), [](float v) {
+            return v > 0.0f ? static_cast<uint8_t>(std::lround(std::min(v, 1.0f) * 255.0f)) : uint8_t(0);
+        });
+        bytes = encode(path, image, OIIO::TypeDesc::UINT8, rounded.data());
+    }
+    core::AtomicFile file(path);
+    file.write(bytes.data(), bytes.size());
+    file.commit();
+}
+
+}  // namespace ewa

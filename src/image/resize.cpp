@@ -1,0 +1,58 @@
+#include <algorithm>
+#include <cassert>
+
+#include "ewa/image.h"
+
+namespace ewa {
+
+namespace {
+
+/// The old pixels under one new pixel along an axis: the first, and the share of each that is covered.
+struct Cover {
+    int first = 0;
+    std::vector<double> weights;
+};
+
+std::vector<Cover> covers(int old_size, int new_size) {
+    std::vector<Cover> result(static_cast<size_t>(new_size));
+    for (int i = 0; i < new_size; ++i) {
+        // In units of 1 / new_size of an old pixel, so that the borders are exact.
+        const int64_t begin = int64_t(i) * old_size, end = int64_t(i + 1) * old_size;
+        Cover& cover = result[size_t(i)];
+        cover.first = static_cast<int>(begin / new_size);
+        for (int64_t old = cover.first; old * new_size < end; ++old) {
+            const int64_t covered = std::min(end, (old + 1) * new_size) - std::max(begin, old * new_size);
+            cover.weights.push_back(double(covered) / new_size);
+        }
+    }
+    return result;
+}
+
+}  // namespace
+
+Image downscale(const Image& image, int factor) {
+    assert(factor >= 1);
+    if (factor == 1) return image;
+    Image result(std::max(1, image.width / factor), std::max(1, image.height / factor), image.channels);
+    const std::vector<Cover> columns = covers(image.width, result.width);
+    const std::vector<Cover> rows = covers(image.height, result.height);
+    const double area = double(image.width) / result.width * (double(image.height) / result.height);
+    std::vector<double> sum(static_cast<size_t>(image.channels));
+    for (int y = 0; y < result.height; ++y) {
+        const Cover& row = rows[size_t(y)];
+        for (int x = 0; x < result.width; ++x) {
+            const Cover& column = columns[size_t(x)];
+            std::fill(sum.begin(), sum.end(), 0.0);
+            for (size_t j = 0; j < row.weights.size(); ++j) {
+                const float* pixel = image.at(column.first, row.first + int(j));
+                for (size_t i = 0; i < column.weights.size(); ++i)
+                    for (size_t c = 0; c < sum.size(); ++c)
+                        sum[c] += row.weights[j] * column.weights[i] * double(*pixel++);
+            }
+            for (size_t c = 0; c < sum.size(); ++c) result.at(x, y)[c] = static_cast<float>(sum[c] / area);
+        }
+    }
+    return result;
+}
+
+}  // namespace ewa

@@ -1,0 +1,161 @@
+// Which kind of dataset a path holds, and what every kind is checked for once its model is read.
+#include "ewa/dataset.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/text.h"
+#include "ewa/error.h"
+#include "io/colmap.h"
+#include "io/transforms.h"
+#include "scene/undistort.h"
+
+namespace ewa {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_file(const fs::path& path) {
+    std::error_code ignored;
+    return fs::is_regular_file(path, ignored);
+}
+
+bool is_folder(const fs::path& path) {
+    std::error_code ignored;
+    return fs::is_directory(path, ignored);
+}
+
+std::string size_text(int width, int height) {
+    return std::to_string(width) + " x " + std::to_string(height);
+}
+
+/// True where a picture of the new size is the old one resized by one factor, each side rounded to a whole
+/// pixel. A factor near 1 has to be exact: a picture a pixel off is another picture (cropped, or of another
+/// camera).
+bool same_shape(int old_width, int old_height, int width, int height) {
+    if (int64_t(width) * old_height == int64_t(height) * old_width) return true;
+    const double x = double(width) / old_width, y = double(height) / old_height;
+    if (x > 0.9 && x < 1.1) return false;
+    const double low = std::max((width - 1.0) / old_width, (height - 1.0) / old_height);
+    const double high = std::min((width + 1.0) / old_width, (height + 1.0) / old_height);
+    return low < high && x > 0 && y > 0;
+}
+
+/// The camera of the file's own pixels.
+Camera fit_to_file(const io::PosedImage& image) {
+    const ImageSize size = read_image_size(image.path);
+    Camera camera = image.camera;
+    if (size.width == camera.width && size.height == camera.height) return camera;
+    if (!same_shape(camera.width, camera.height, size.width, size.height))
+        throw InputError(core::one_line(image.path.string() + ": frame \"" + image.name + "\" is " +
+                                        size_text(size.width, size.height) + " pixels, but its camera has " +
+                                        size_text(camera.width, camera.height)));
+    const double x = double(size.width) / camera.width, y = double(size.height) / camera.height;
+    camera.width = size.width;
+    camera.height = size.height;
+    camera.fx *= x;
+    camera.cx *= x;
+    camera.fy *= y;
+    camera.cy *= y;
+    return camera;
+}
+
+Frame make_frame(const io::PosedImage& image, bool exists, const DatasetOptions& options) {
+    Frame frame;
+    frame.name = image.name;
+    frame.image_path = image.path;
+    frame.image_exists = exists;
+    frame.source = options.need_images ? fit_to_file(image) : image.camera;
+    frame.distortion = image.distortion;
+    frame.downscale = options.downscale;
+    frame.split = image.split;
+    try {
+        frame.camera =
+            downscale(scene::undistorted_camera(frame.source, frame.distortion), options.downscale);
+    } catch (const InputError& error) {
+        throw InputError(core::one_line("frame \"" + image.name + "\": " + error.what()));
+    }
+    return frame;
+}
+
+/// The images folder that belongs to a COLMAP model.
+fs::path images_folder(const fs::path& root, const fs::path& model) {
+    if (model != root) return root / "images";
+    // The model's own folder was given: its pictures stand beside it, or beside the sparse/ it lies in.
+    const fs::path absolute = fs::absolute(root / "x").parent_path();
+    for (const fs::path& folder : {absolute, absolute.parent_path(), absolute.parent_path().parent_path()})
+        if (is_folder(folder / "images")) return folder / "images";
+    return root / "images";
+}
+
+void append(io::PosedImages& all, io::PosedImages more) {
+    std::move(more.images.begin(), more.images.end(), std::back_inserter(all.images));
+    if (all.points.positions.empty()) all.points = std::move(more.points);
+    all.dropped_points += more.dropped_points;
+}
+
+/// Blender's scenes say by the file's name what its frames are for.
+int split_of(const fs::path& path) {
+    const std::string stem = path.stem().string();
+    return stem == "transforms_train" ? 1 : stem == "transforms_test" ? 2 : 0;
+}
+
+io::PosedImages read_model(const fs::path& path, const DatasetOptions& options) {
+    const std::string name = core::one_line(path.string());
+    if (is_file(path)) {
+        if (core::lower(path.extension().string()) != ".json")
+            throw InputError(name + ": not a dataset; a dataset is a folder or a transforms.json");
+        return io::read_transforms(path, split_of(path), options.need_images);
+    }
+    if (!is_folder(path)) throw InputError(name + ": there is no such file or folder");
+    if (const std::optional<fs::path> model = io::find_colmap_model(path)) {
+        const fs::path images = images_folder(path, *model);
+        if (options.need_images && !is_folder(images))
+            throw InputError(core::one_line(images.string()) + ": the folder of the images is missing");
+        return io::read_colmap(*model, images);
+    }
+    if (is_file(path / "transforms.json"))
+        return io::read_transforms(path / "transforms.json", 0, options.need_images);
+    io::PosedImages all;
+    bool found = false;
+    for (const char* file : {"transforms_train.json", "transforms_test.json"})
+        if (is_file(path / file)) {
+            append(all, io::read_transforms(path / file, split_of(file), options.need_images));
+            found = true;
+        }
+    if (!found)
+        throw InputError(
+            name +
+            ": not a dataset; looked for cameras and images (.bin or .txt) in sparse/0, sparse and the "
+            "folder itself, transforms.json, transforms_train.json and transforms_test.json");
+    return all;
+}
+
+}  // namespace
+
+Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& options) {
+    if (options.downscale < 1) throw InputError("the downscale factor has to be 1 or more");
+    io::PosedImages model = read_model(path, options);
+    const std::string name = core::one_line(path.string());
+    if (model.images.empty()) throw InputError(name + ": the dataset has no images");
+    Dataset dataset;
+    dataset.root = is_folder(path) ? path : path.parent_path();
+    dataset.points = std::move(model.points);
+    dataset.dropped_points = model.dropped_points;
+    std::stable_sort(model.images.begin(), model.images.end(),
+                     [](const io::PosedImage& a, const io::PosedImage& b) { return a.name < b.name; });
+    for (const io::PosedImage& image : model.images) {
+        const bool exists = is_file(image.path);
+        dataset.missing_images += !exists;
+        const bool usable = image.camera.width > 0 && (exists || !options.need_images);
+        if (usable) dataset.frames.push_back(make_frame(image, exists, options));
+    }
+    if (dataset.frames.empty())
+        throw InputError(name + ": none of the " + std::to_string(model.images.size()) +
+                         " images is there, the first being " +
+                         core::one_line(model.images.front().path.string()));
+    return dataset;
+}
+
+}  // namespace ewa

@@ -1,0 +1,134 @@
+#include "io/ply.h"
+
+#include <cassert>
+#include <cstring>
+
+#include "core/atomic_file.h"
+#include "core/text.h"
+#include "ewa/error.h"
+#include "io/ply_table.h"
+
+namespace ewa::io {
+
+namespace {
+
+constexpr size_t kBeforeSh = 11;  // columns before f_rest: x y z opacity scale_0..2 rot_0..3
+constexpr int kMaxFileDegree = 4;
+
+/// K of f_rest_0..3K-1 as the degree it belongs to.
+int degree_of(const PlyTable& table, const PlyElement& vertex) {
+    size_t count = 0;
+    for (const PlyProperty& property : vertex.properties) count += property.name.starts_with("f_rest_");
+    for (int degree = 0; degree <= kMaxFileDegree; ++degree)
+        if (count == 3 * (size_t(sh_coefficients(degree)) - 1)) return degree;
+    throw InputError(table.name() + ": " + std::to_string(count) +
+                     " properties f_rest_* fit no SH degree (0, 9, 24 or 45 are degree 0 to 3)");
+}
+
+size_t column(const PlyTable& table, const PlyElement& vertex, const std::string& name) {
+    const std::optional<size_t> found = vertex.find(name);
+    if (found && !vertex.properties[*found].list_count) return *found;
+    std::string text = table.name() + ": the vertices have no property \"" + name + "\"";
+    if (found) text = table.name() + ": the property \"" + name + "\" is a list, not a number";
+    if (vertex.find("packed_position"))
+        text += "; this is SuperSplat's compressed layout, export it as an uncompressed PLY";
+    else if (name == "scale_2")
+        text += "; 2D Gaussian splats are not supported";
+    else if (name.starts_with("f_dc_") && !vertex.find("opacity"))
+        text += "; this is a point cloud, not a splat file";
+    throw InputError(text);
+}
+
+/// Columns in the order that read_ply's rows use: the eleven, then SH as it is in memory.
+std::vector<size_t> splat_columns(const PlyTable& table, const PlyElement& vertex, int degree,
+                                  int file_degree) {
+    std::vector<size_t> columns;
+    const auto add = [&](const std::string& name) { columns.push_back(column(table, vertex, name)); };
+    for (const char* name : {"x", "y", "z"}) add(name);
+    for (int i = 0; i < 3; ++i) column(table, vertex, "f_dc_" + std::to_string(i));
+    add("opacity");
+    for (int i = 0; i < 3; ++i) add("scale_" + std::to_string(i));
+    for (int i = 0; i < 4; ++i) add("rot_" + std::to_string(i));
+    for (int channel = 0; channel < 3; ++channel) add("f_dc_" + std::to_string(channel));
+    const int per_channel = sh_coefficients(file_degree) - 1;
+    for (int k = 0; k < sh_coefficients(degree) - 1; ++k)
+        for (int channel = 0; channel < 3; ++channel)
+            add("f_rest_" + std::to_string(channel * per_channel + k));
+    return columns;
+}
+
+std::string header(const Gaussians& gaussians, const std::vector<std::string>& comments) {
+    std::string text = "ply\nformat binary_little_endian 1.0\n";
+    for (const std::string& comment : comments) text += "comment " + core::one_line(comment) + "\n";
+    text += "element vertex " + std::to_string(gaussians.size()) + "\n";
+    const auto property = [&](const std::string& name) { text += "property float " + name + "\n"; };
+    for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) property(name);
+    for (int i = 0; i < 3; ++i) property("f_dc_" + std::to_string(i));
+    for (int i = 0; i < 3 * (sh_coefficients(gaussians.sh_degree) - 1); ++i)
+        property("f_rest_" + std::to_string(i));
+    property("opacity");
+    for (int i = 0; i < 3; ++i) property("scale_" + std::to_string(i));
+    for (int i = 0; i < 4; ++i) property("rot_" + std::to_string(i));
+    return text + "end_header\n";
+}
+
+void append_row(const Gaussians& gaussians, size_t i, std::vector<float>& rows) {
+    const size_t stride = gaussians.sh_stride();
+    const auto append = [&](const float* values, size_t n) { rows.insert(rows.end(), values, values + n); };
+    append(&gaussians.means[3 * i], 3);
+    rows.insert(rows.end(), 3, 0.0f);
+    append(&gaussians.sh[stride * i], 3);
+    for (size_t channel = 0; channel < 3; ++channel)
+        for (size_t k = 3; k < stride; k += 3) rows.push_back(gaussians.sh[stride * i + k + channel]);
+    rows.push_back(gaussians.opacity_logits[i]);
+    append(&gaussians.log_scales[3 * i], 3);
+    append(&gaussians.quaternions[4 * i], 4);
+}
+
+}  // namespace
+
+PlySplats read_ply(const std::filesystem::path& path) {
+    PlyTable table(path);
+    PlySplats result;
+    result.comments = table.comments();
+    const PlyElement& vertex = table.go_to("vertex");
+    result.file_sh_degree = degree_of(table, vertex);
+    Gaussians& gaussians = result.gaussians;
+    gaussians.sh_degree = std::min(result.file_sh_degree, kMaxShDegree);
+    const std::vector<size_t> columns =
+        splat_columns(table, vertex, gaussians.sh_degree, result.file_sh_degree);
+    gaussians.resize(static_cast<size_t>(vertex.count));
+    const size_t stride = gaussians.sh_stride();
+    const auto copy = [](const double* from, float* to, size_t n) {
+        for (size_t k = 0; k < n; ++k) to[k] = static_cast<float>(from[k]);
+    };
+    table.read(columns, [&](size_t i, const double* row) {
+        copy(row, &gaussians.means[3 * i], 3);
+        gaussians.opacity_logits[i] = static_cast<float>(row[3]);
+        copy(row + 4, &gaussians.log_scales[3 * i], 3);
+        copy(row + 7, &gaussians.quaternions[4 * i], 4);
+        copy(row + kBeforeSh, &gaussians.sh[stride * i], stride);
+    });
+    return result;
+}
+
+void write_ply(const std::filesystem::path& path, const Gaussians& gaussians,
+               const std::vector<std::string>& comments) {
+    const size_t n = gaussians.size();
+    assert(gaussians.means.size() == 3 * n && gaussians.quaternions.size() == 4 * n);
+    assert(gaussians.log_scales.size() == 3 * n && gaussians.sh.size() == gaussians.sh_stride() * n);
+    core::AtomicFile file(path);
+    file.write(header(gaussians, comments));
+    constexpr size_t kRowsAtOnce = 4096;
+    std::vector<float> rows;
+    for (size_t i = 0; i < n; ++i) {
+        append_row(gaussians, i, rows);
+        if ((i + 1) % kRowsAtOnce == 0 || i + 1 == n) {
+            file.write(rows.data(), rows.size() * sizeof(float));
+            rows.clear();
+        }
+    }
+    file.commit();
+}
+
+}  // namespace ewa::io

@@ -1,0 +1,35 @@
+// Splats in INRIA's PLY layout (3D Gaussian Splatting, scene/gaussian_model.py save_ply).
+//
+// Element "vertex", one row a splat, properties found by name:
+//   x y z                                  means
+//   nx ny nz                               written as zero, ignored when read
+//   f_dc_0..2                              SH coefficient 0 of R, G, B
+//   f_rest_0..3K-1                         SH coefficients 1..K of R, then of G, then of B; K = 0, 3, 8, 15
+//   (degree 0..3) opacity                                logit scale_0..2                             natural
+//   logarithm rot_0..3                               w x y z
+// In memory a splat's SH is coefficient after coefficient, RGB inner, so f_rest is transposed here.
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "ewa/gaussians.h"
+
+namespace ewa::io {
+
+struct PlySplats {
+    Gaussians gaussians;
+    int file_sh_degree = 0;  // 4 where the file had one more degree than is read: the rest was left out
+    std::vector<std::string> comments;
+};
+
+/// Any property order and scalar type, binary of either byte order or ascii; other properties and elements
+/// are ignored. Values are kept as they are, finite or not. Throws InputError that names the file and the
+/// byte or property.
+PlySplats read_ply(const std::filesystem::path& path);
+
+/// binary_little_endian, float32, the properties above in that order. Throws RunError.
+void write_ply(const std::filesystem::path& path, const Gaussians& gaussians,
+               const std::vector<std::string>& comments);
+
+}  // namespace ewa::io

@@ -1,0 +1,20 @@
+// Coloured point clouds in PLY files.
+#pragma once
+#include <filesystem>
+
+#include "ewa/dataset.h"
+
+namespace ewa::io {
+
+struct PlyPoints {
+    PointCloud points;
+    int dropped_points =
+        0;  // with a coordinate that float32 cannot hold as a finite number, left out of `points`
+};
+
+/// Vertices with x y z and, where there are, red green blue (integers 0..255, or floating-point 0..1);
+/// without colours mid-grey. Positions in the file's own frame. Throws InputError that names the file and the
+/// byte or property.
+PlyPoints read_points_ply(const std::filesystem::path& path);
+
+}  // namespace ewa::io

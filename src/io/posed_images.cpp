@@ -1,0 +1,18 @@
+#include "io/posed_images.h"
+
+#include <cmath>
+
+namespace ewa::io {
+
+void add_point(PointCloud& points, int& dropped, const glm::dvec3& position,
+               const std::array<uint8_t, 3>& color) {
+    for (int axis = 0; axis < 3; ++axis)
+        if (!std::isfinite(static_cast<float>(position[axis]))) {
+            ++dropped;
+            return;
+        }
+    points.positions.push_back(position);
+    points.colors.push_back(color);
+}
+
+}  // namespace ewa::io

@@ -1,0 +1,240 @@
+#include "io/transforms.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "core/file_reader.h"
+#include "core/text.h"
+#include "ewa/error.h"
+#include "io/points_ply.h"
+
+namespace ewa::io {
+
+namespace {
+
+using nlohmann::json;
+
+constexpr double kMaxSize = 1 << 20;  // px
+// Of the columns of a rotation from unit length and right angles. Files with four decimals stay under it.
+constexpr double kMaxRotationError = 1e-2;
+
+/// A frame and the top of its file, asked together: what a frame does not say, the top says for all.
+class Entry {
+  public:
+    Entry(const std::string& file, const json& top, const json& frame, size_t index)
+        : top_(top), frame_(frame), where_(file + ": frame " + std::to_string(index)) {}
+
+    const json* find(const char* key) const {
+        if (const auto it = frame_.find(key); it != frame_.end() && !it->is_null()) return &*it;
+        if (const auto it = top_.find(key); it != top_.end() && !it->is_null()) return &*it;
+        return nullptr;
+    }
+
+    std::optional<double> number(const char* key) const {
+        const json* value = find(key);
+        if (!value) return std::nullopt;
+        if (!value->is_number()) fail(std::string("\"") + key + "\" is no number");
+        const double number = value->get<double>();
+        if (!std::isfinite(number)) fail(std::string("\"") + key + "\" is not finite");
+        return number;
+    }
+
+    std::string text(const char* key) const {
+        const json* value = find(key);
+        if (!value) return {};
+        if (!value->is_string()) fail(std::string("\"") + key + "\" is no text");
+        return value->get<std::string>();
+    }
+
+    [[noreturn]] void fail(const std::string& text) const {
+        throw InputError(where_ + ": " + core::one_line(text));
+    }
+
+  private:
+    const json& top_;
+    const json& frame_;
+    std::string where_;
+};
+
+void check_lens(const Entry& entry) {
+    const std::string model = entry.text("camera_model");
+    static constexpr std::string_view kTaken[] = {"",       "PINHOLE",       "SIMPLE_PINHOLE",
+                                                  "OPENCV", "SIMPLE_RADIAL", "RADIAL"};
+    if (std::find(std::begin(kTaken), std::end(kTaken), model) == std::end(kTaken))
+        entry.fail("the camera model " + model + " is not supported; undistort the images to PINHOLE first");
+    const json* fisheye = entry.find("is_fisheye");
+    if (fisheye && *fisheye != json(false) && *fisheye != json(0))
+        entry.fail("fisheye cameras are not supported; undistort the images to PINHOLE first");
+    for (const char* key : {"k3", "k4", "k5", "k6", "ftheta_p0"})
+        if (entry.number(key).value_or(0) != 0)
+            entry.fail(std::string("the distortion term ") + key +
+                       " is not supported; undistort the images to PINHOLE first");
+}
+
+/// A path as a file wrote it, perhaps on Windows, from the folder of that file.
+std::filesystem::path resolve(const std::filesystem::path& folder, std::string text) {
+    std::replace(text.begin(), text.end(), '\\', '/');
+    return folder / std::filesystem::path(text).lexically_normal();
+}
+
+bool is_file(const std::filesystem::path& path) {
+    std::error_code ignored;
+    return std::filesystem::is_regular_file(path, ignored);
+}
+
+void find_picture(const Entry& entry, const std::filesystem::path& folder, PosedImage& image) {
+    std::string name = entry.text("file_path");
+    if (name.empty()) entry.fail("\"file_path\" is missing");
+    std::replace(name.begin(), name.end(), '\\', '/');
+    name = std::filesystem::path(name).lexically_normal().string();
+    image.path = resolve(folder, name);
+    image.name = name;
+    if (is_file(image.path)) return;
+    for (const char* extension : {".png", ".jpg", ".jpeg"})
+        if (is_file(image.path.string() + extension)) {
+            image.path += extension;
+            image.name += extension;
+            return;
+        }
+}
+
+int whole_size(const Entry& entry, const char* key, double value) {
+    if (!(value >= 1 && value <= kMaxSize) || value != std::floor(value))
+        entry.fail(std::string("\"") + key + "\" is no size in pixels");
+    return static_cast<int>(value);
+}
+
+double focal_from_angle(const Entry& entry, const char* key, int size) {
+    const double angle = *entry.number(key);
+    if (!(angle > 0 && angle < std::numbers::pi))
+        entry.fail(std::string("\"") + key + "\" is no angle between 0 and pi (radians)");
+    return 0.5 * size / std::tan(0.5 * angle);
+}
+
+/// Width and height stay 0 where nothing tells them.
+void read_intrinsics(const Entry& entry, PosedImage& image) {
+    Camera& camera = image.camera;
+    const std::optional<double> w = entry.number("w"), h = entry.number("h");
+    if (w && h) {
+        camera.width = whole_size(entry, "w", *w);
+        camera.height = whole_size(entry, "h", *h);
+    } else if (is_file(image.path)) {
+        const ImageSize size = read_image_size(image.path);
+        camera.width = size.width;
+        camera.height = size.height;
+    } else {
+        return;
+    }
+    if (const auto fl_x = entry.number("fl_x"))
+        camera.fx = *fl_x;
+    else if (entry.number("camera_angle_x"))
+        camera.fx = focal_from_angle(entry, "camera_angle_x", camera.width);
+    else
+        entry.fail("neither \"fl_x\" nor \"camera_angle_x\" is there");
+    if (const auto fl_y = entry.number("fl_y"))
+        camera.fy = *fl_y;
+    else if (!entry.number("fl_x") && entry.number("camera_angle_y"))
+        camera.fy = focal_from_angle(entry, "camera_angle_y", camera.height);
+    else
+        camera.fy = camera.fx;
+    if (!(camera.fx > 0 && camera.fy > 0)) entry.fail("a focal length is not positive");
+    camera.cx = entry.number("cx").value_or(0.5 * camera.width);
+    camera.cy = entry.number("cy").value_or(0.5 * camera.height);
+    image.distortion.k1 = entry.number("k1").value_or(0);
+    image.distortion.k2 = entry.number("k2").value_or(0);
+    image.distortion.p1 = entry.number("p1").value_or(0);
+    image.distortion.p2 = entry.number("p2").value_or(0);
+}
+
+/// The nearest rotation (the orthogonal factor of the polar decomposition), by Higham's iteration.
+glm::dmat3 nearest_rotation(glm::dmat3 m) {
+    for (int i = 0; i < 30; ++i) m = 0.5 * (m + glm::transpose(glm::inverse(m)));
+    return m;
+}
+
+double rotation_error(const glm::dmat3& m) {
+    const glm::dmat3 product = glm::transpose(m) * m;
+    double error = 0;
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) error = std::max(error, std::abs(product[i][j] - (i == j ? 1.0 : 0.0)));
+    return error;
+}
+
+void read_pose(const Entry& entry, Camera& camera) {
+    const json* rows = entry.find("transform_matrix");
+    if (!rows) entry.fail("\"transform_matrix\" is missing");
+    if (!rows->is_array() || (rows->size() != 3 && rows->size() != 4))
+        entry.fail("\"transform_matrix\" has no 3 or 4 rows");
+    glm::dmat3 axes;
+    glm::dvec3 center;
+    for (int row = 0; row < 3; ++row) {
+        const json& values = (*rows)[size_t(row)];
+        if (!values.is_array() || values.size() != 4)
+            entry.fail("a row of \"transform_matrix\" has no 4 numbers");
+        for (int column = 0; column < 4; ++column) {
+            const json& value = values[size_t(column)];
+            if (!value.is_number() || !std::isfinite(value.get<double>()))
+                entry.fail("\"transform_matrix\" holds something that is no finite number");
+            (column < 3 ? axes[column][row] : center[row]) = value.get<double>();
+        }
+    }
+    const double determinant = glm::determinant(axes);
+    if (!(determinant > 0)) entry.fail("\"transform_matrix\" is no rotation: it mirrors or is degenerate");
+    axes /= std::cbrt(determinant);
+    if (!(rotation_error(axes) <= kMaxRotationError))
+        entry.fail(
+            "\"transform_matrix\" is no rotation: its columns differ in length or are not at right angles");
+    axes = nearest_rotation(axes);
+    // OpenGL's camera looks along -z with y up; OpenCV's along z with y down.
+    axes[1] = -axes[1];
+    axes[2] = -axes[2];
+    camera.rotation = glm::transpose(axes);
+    camera.translation = -(camera.rotation * center);
+}
+
+json parse(const std::filesystem::path& path) {
+    const std::string text = core::read_text_file(path), name = core::one_line(path.string());
+    try {
+        constexpr bool kThrow = true, kComments = true;
+        return json::parse(text, nullptr, kThrow, kComments);
+    } catch (const json::parse_error& error) {
+        throw InputError(name + ": byte " + std::to_string(error.byte) +
+                         ": not valid JSON: " + core::one_line(error.what()));
+    } catch (const json::exception& error) {
+        throw InputError(name + ": not valid JSON: " + core::one_line(error.what()));
+    }
+}
+
+}  // namespace
+
+PosedImages read_transforms(const std::filesystem::path& path, int split, bool with_points) {
+    const std::string name = core::one_line(path.string());
+    const json top = parse(path);
+    if (!top.is_object()) throw InputError(name + ": is no JSON object");
+    const auto frames = top.find("frames");
+    if (frames == top.end() || !frames->is_array()) throw InputError(name + ": has no list \"frames\"");
+    PosedImages result;
+    for (size_t i = 0; i < frames->size(); ++i) {
+        const Entry entry(name, top, (*frames)[i], i);
+        if (!(*frames)[i].is_object()) entry.fail("is no JSON object");
+        check_lens(entry);
+        PosedImage image;
+        image.split = split;
+        find_picture(entry, path.parent_path(), image);
+        read_pose(entry, image.camera);
+        read_intrinsics(entry, image);
+        result.images.push_back(std::move(image));
+    }
+    const json empty = json::object();
+    const std::string points_path = Entry(name, top, empty, 0).text("ply_file_path");
+    if (with_points && !points_path.empty()) {
+        PlyPoints points = read_points_ply(resolve(path.parent_path(), points_path));
+        result.points = std::move(points.points);
+        result.dropped_points = points.dropped_points;
+    }
+    return result;
+}
+
+}  // namespace ewa::io

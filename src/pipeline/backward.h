@@ -1,0 +1,24 @@
+// Loss and the way back: from image planes to moved parameters (or to their gradient).
+#pragma once
+#include "pipeline/forward.h"
+
+namespace ewa::pipeline {
+
+struct Rates {
+    float mean = 0, opacity = 0, quaternion = 0, scale = 0, sh0 = 0, sh_rest = 0;
+    uint32_t step = 1;  // Adam's, from 1
+};
+
+/// photo: width * height texels, RGBA. Leaves the loss's parts in Counts and dL/d(image) in frame.image_gradient.
+void record_loss(gpu::Recording& recording, Kernels& kernels, const Frame& frame, const CameraUse& camera,
+                 const gpu::Buffer& photo);
+
+/// Blend backward and projection backward. plan.adam: moves the model; else writes the gradient to model.moments1.
+void record_backward(gpu::Recording& recording, Kernels& kernels, const Plan& plan, const Model& model,
+                     const Frame& frame, const CameraUse& camera, const std::array<float, 3>& background,
+                     const Sorted& sorted, const Rates& rates);
+
+/// (1 - SSIM_WEIGHT) l1 + SSIM_WEIGHT (1 - ssim).
+double loss_of(const shared::Counts& counts);
+
+}  // namespace ewa::pipeline

@@ -1,0 +1,67 @@
+#include "pipeline/forward.h"
+
+#include "pipeline/sorting.h"
+
+namespace ewa::pipeline {
+
+shared::BlendPush blend_push(const Kernels& kernels, const Frame& frame, const CameraUse& camera,
+                             const std::array<float, 3>& background) {
+    const Sizes& s = frame.sizes;
+    const auto steps = passes::tile_steps(kernels.shape(), s.tiles);
+    return {{background[0], background[1], background[2]},
+            {camera.width, camera.height},
+            s.stride,
+            s.plane_floats,
+            {s.tiles_x, s.tiles_y},
+            {steps[0], steps[1]},
+            frame.instance_capacity};
+}
+
+Sorted record_forward(gpu::Recording& recording, Kernels& kernels, const Plan& plan, const Model& model,
+                      const Frame& frame, const CameraUse& camera, const std::array<float, 3>& background) {
+    const passes::Shape& shape = kernels.shape();
+    const Sizes& s = frame.sizes;
+    recording.fill(frame.counts, 0, 0, sizeof(shared::Counts));
+
+    kernels.get<passes::Project>(uint32_t(plan.sh_degree), uint32_t(plan.kernel))
+        .record(recording, shape,
+                {model.params, *camera.buffer, camera.offset, frame.records, frame.depth_keys[0], frame.tile_counts,
+                 frame.counts},
+                {model.splats, model.capacity});
+
+    const uint32_t order_index = record_sort(
+        recording, kernels,
+        {{&frame.depth_keys[0], &frame.depth_keys[1]}, {&frame.order[0], &frame.order[1]}, nullptr, frame.counters,
+         frame.counter_prefix, frame.digit_totals, frame.counts},
+        s.depth_sort, model.splats, model.splats, false, "depth order");
+    const gpu::Buffer& order = frame.order[order_index];
+
+    record_scan(recording, kernels, {frame.tile_counts, &order, frame.prefix, frame.scan_totals, frame.counts},
+                model.splats, s.scan_block, Total::instances, "instance offsets");
+    kernels.get<passes::EmitInstances>(plan.gradients)
+        .record(recording, shape,
+                {frame.records, order, frame.tile_counts, frame.prefix, frame.scan_totals, frame.counts,
+                 frame.instance_keys[0], frame.instance_splats, frame.first_instances},
+                {model.splats, frame.instance_capacity, s.scan_block, s.strip_rows, {camera.width, camera.height},
+                 {s.tiles_x, s.tiles_y}});
+
+    // With gradients the instances' own numbers are sorted, since each owns a slot; else the splats.
+    const uint32_t sorted = record_sort(
+        recording, kernels,
+        {{&frame.instance_keys[0], &frame.instance_keys[1]}, {&frame.instance_values[0], &frame.instance_values[1]},
+         plan.gradients ? nullptr : &frame.instance_splats, frame.counters, frame.counter_prefix, frame.digit_totals,
+         frame.counts},
+        s.tile_sort, 0, frame.instance_capacity, true, "tile order");
+    const gpu::Buffer& values = frame.instance_values[sorted];
+    kernels.get<passes::TileStarts>().record(recording, shape,
+                                             {frame.instance_keys[sorted], frame.counts, frame.tile_starts},
+                                             {s.tiles, frame.instance_capacity});
+
+    const uint32_t mode = (plan.gradients ? 1u : 0u) | (plan.depth ? 2u : 0u);
+    kernels.get<passes::Blend>(mode).record(
+        recording, shape, {frame.records, values, frame.instance_splats, frame.tile_starts, frame.planes},
+        blend_push(kernels, frame, camera, background));
+    return {&values};
+}
+
+}  // namespace ewa::pipeline

@@ -1,0 +1,66 @@
+#include "pipeline/model.h"
+
+#include <algorithm>
+#include <cstring>
+#include <vector>
+
+namespace ewa::pipeline {
+namespace {
+
+/// Flat float f of splat i in the plane layout (shared/layouts.h).
+size_t flat_index(uint32_t capacity, uint32_t f, size_t i) { return (size_t(f / 4) * capacity + i) * 4 + f % 4; }
+
+/// Calls visit(position in the buffer, float of the scene) for every stored value.
+template <class Scene, class Visit>
+void for_each_value(Scene& g, uint32_t capacity, Visit visit) {
+    const size_t sh = g.sh_stride();
+    for (size_t i = 0; i < g.size(); ++i) {
+        for (uint32_t c = 0; c < 3; ++c) visit(flat_index(capacity, shared::PARAM_MEAN + c, i), g.means[3 * i + c]);
+        visit(flat_index(capacity, shared::PARAM_OPACITY, i), g.opacity_logits[i]);
+        for (uint32_t c = 0; c < 4; ++c)
+            visit(flat_index(capacity, shared::PARAM_QUATERNION + c, i), g.quaternions[4 * i + c]);
+        for (uint32_t c = 0; c < 3; ++c)
+            visit(flat_index(capacity, shared::PARAM_LOG_SCALE + c, i), g.log_scales[3 * i + c]);
+        for (uint32_t c = 0; c < sh; ++c) visit(flat_index(capacity, shared::PARAM_SH + c, i), g.sh[sh * i + c]);
+    }
+}
+
+}  // namespace
+
+void zero(gpu::Buffer& buffer) {
+    if (buffer.mapped()) {
+        std::memset(buffer.mapped(), 0, buffer.bytes());
+        return;
+    }
+    const std::vector<std::byte> zeros(std::min<uint64_t>(buffer.bytes(), 1u << 24));
+    for (uint64_t at = 0; at < buffer.bytes(); at += zeros.size())
+        buffer.upload(std::span(zeros).first(std::min<uint64_t>(zeros.size(), buffer.bytes() - at)), at);
+}
+
+Model upload_model(gpu::Device& device, const Gaussians& gaussians, int moments, bool statistics) {
+    Model model;
+    model.splats = model.capacity = uint32_t(gaussians.size());
+    model.sh_degree = gaussians.sh_degree;
+    const uint64_t bytes = parameter_bytes(model.capacity, model.sh_degree);
+    model.params = gpu::Buffer(device, "params", bytes, gpu::Texel::rgba32f);
+    std::vector<float> values(bytes / 4);
+    for_each_value(gaussians, model.capacity, [&](size_t at, float value) { values[at] = value; });
+    model.params.upload(std::span<const float>(values));
+    if (moments >= 1) model.moments1 = gpu::Buffer(device, "moments1", bytes, gpu::Texel::rgba32f);
+    if (moments >= 2) model.moments2 = gpu::Buffer(device, "moments2", bytes, gpu::Texel::rgba32f);
+    if (statistics) model.statistics = gpu::Buffer(device, "statistics", std::max<uint64_t>(8ull * model.capacity, 8));
+    for (gpu::Buffer* buffer : {&model.moments1, &model.moments2, &model.statistics})
+        if (*buffer) zero(*buffer);
+    return model;
+}
+
+Gaussians download_model(const Model& model, const gpu::Buffer& buffer) {
+    Gaussians gaussians;
+    gaussians.sh_degree = model.sh_degree;
+    gaussians.resize(model.splats);
+    const auto values = buffer.download<float>(parameter_bytes(model.capacity, model.sh_degree) / 4);
+    for_each_value(gaussians, model.capacity, [&](size_t at, float& value) { value = values[at]; });
+    return gaussians;
+}
+
+}  // namespace ewa::pipeline

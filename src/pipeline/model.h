@@ -1,0 +1,38 @@
+// A splat scene on the device: parameters, and in training Adam's moments. The only thing that a step changes.
+#pragma once
+#include <cstdint>
+
+#include "ewa/gaussians.h"
+#include "gpu/buffer.h"
+#include "shared/layouts.h"
+
+namespace ewa::pipeline {
+
+/// Texel planes of the parameters at a stored SH degree.
+constexpr uint32_t parameter_planes(int sh_degree) {
+    return (shared::PARAM_SH + 3u * uint32_t(sh_coefficients(sh_degree)) + 3u) / 4u;
+}
+
+/// Bytes of one parameter-sized buffer.
+constexpr uint64_t parameter_bytes(uint32_t capacity, int sh_degree) {
+    return uint64_t(parameter_planes(sh_degree)) * (capacity > 0 ? capacity : 1) * 16;
+}
+
+struct Model {
+    uint32_t splats = 0, capacity = 0;
+    int sh_degree = 0;                  // stored
+    gpu::Buffer params;
+    gpu::Buffer moments1, moments2;     // only where it is trained, or a gradient is taken (moments1)
+    gpu::Buffer statistics;             // vec2 a splat; only where a strategy needs it
+};
+
+/// moments: 0 none, 1 the first only (a gradient), 2 both, zeroed.
+Model upload_model(gpu::Device& device, const Gaussians& gaussians, int moments, bool statistics);
+
+/// The parameters, or the buffer of the same layout given (moments1 holds a gradient after a gradient step).
+Gaussians download_model(const Model& model, const gpu::Buffer& values);
+
+/// Sets a buffer to zero bytes from the host; the device must be idle.
+void zero(gpu::Buffer& buffer);
+
+}  // namespace ewa::pipeline

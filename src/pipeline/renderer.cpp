@@ -1,0 +1,182 @@
+// Pictures and gradients of a fixed scene: the public face of the forward and backward frames.
+#include "ewa/renderer.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "ewa/error.h"
+#include "gpu/executor.h"
+#include "pipeline/backward.h"
+#include "pipeline/camera_block.h"
+#include "pipeline/plan.h"
+
+namespace ewa {
+namespace {
+
+using namespace pipeline;
+
+/// The scene with no coefficient above a degree.
+Gaussians with_degree(const Gaussians& gaussians, int degree) {
+    if (degree >= gaussians.sh_degree) return gaussians;
+    Gaussians result = gaussians;
+    result.sh_degree = degree;
+    result.resize(gaussians.size());
+    const size_t from = gaussians.sh_stride(), to = result.sh_stride();
+    for (size_t i = 0; i < gaussians.size(); ++i)
+        std::copy_n(&gaussians.sh[i * from], to, &result.sh[i * to]);
+    return result;
+}
+
+gpu::Buffer upload_camera(gpu::Device& device, const Camera& camera, const passes::Shape& shape) {
+    const shared::CameraBlock block = camera_block(camera, shape);
+    gpu::Buffer buffer(device, "camera", sizeof(block), gpu::Texel::none, true);
+    buffer.upload(std::span<const shared::CameraBlock>(&block, 1));
+    return buffer;
+}
+
+/// RGBA texels of a picture: 8 bit where every value is one of 256 levels, else float32.
+gpu::Buffer upload_photo(gpu::Device& device, const Image& image) {
+    const size_t pixels = size_t(image.width) * image.height;
+    const auto level = [](float value) { return std::round(value * 255.0f); };
+    bool eight_bit = true;
+    for (size_t i = 0; i < pixels * size_t(image.channels) && eight_bit; ++i) {
+        const float value = image.pixels[i];
+        eight_bit = value >= 0 && value <= 1 && level(value) / 255.0f == value;
+    }
+    if (eight_bit) {
+        std::vector<uint8_t> texels(4 * pixels, 255);
+        for (size_t i = 0; i < pixels; ++i)
+            for (size_t c = 0; c < 3; ++c) texels[4 * i + c] = uint8_t(level(image.pixels[i * size_t(image.channels) + c]));
+        gpu::Buffer buffer(device, "photo", texels.size(), gpu::Texel::rgba8);
+        buffer.upload(std::span<const uint8_t>(texels));
+        return buffer;
+    }
+    std::vector<float> texels(4 * pixels, 1.0f);
+    for (size_t i = 0; i < pixels; ++i)
+        for (size_t c = 0; c < 3; ++c) texels[4 * i + c] = image.pixels[i * size_t(image.channels) + c];
+    gpu::Buffer buffer(device, "photo", texels.size() * 4, gpu::Texel::rgba32f);
+    buffer.upload(std::span<const float>(texels));
+    return buffer;
+}
+
+/// Room for instances in a first try: most scenes have a few tiles a splat.
+uint32_t first_capacity(size_t splats) { return uint32_t(std::min<size_t>(std::max<size_t>(8 * splats, 4096), 1u << 24)); }
+
+uint32_t grown_capacity(uint32_t needed) {
+    if (needed > 0xe0000000u) throw RunError("more than 3.7 billion (splat, tile) pairs in one picture");
+    return needed + needed / 4;
+}
+
+/// Runs a frame until its instances fit. record: fills a recording for the frame as reserved.
+template <class Record>
+shared::Counts run_until_it_fits(Kernels& kernels, gpu::Executor& executor, Frame& frame, FrameRequest request,
+                                 Record record) {
+    for (;;) {
+        frame.reserve(kernels.device(), kernels.shape(), request);
+        gpu::Recording recording(kernels.device().limits());
+        record(recording);
+        executor.run(recording, true);
+        const shared::Counts counts = frame.read_counts();
+        if (counts.instances <= frame.instance_capacity) return counts;
+        request.instances = grown_capacity(counts.instances);
+    }
+}
+
+/// One plane of an image, spread over channel c of a picture.
+void copy_plane(const std::vector<float>& planes, const Sizes& sizes, uint32_t plane, Image& image, int channel) {
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x)
+            image.at(x, y)[channel] = planes[size_t(plane) * sizes.plane_floats + size_t(y) * sizes.stride + size_t(x)];
+}
+
+}  // namespace
+
+struct Renderer::State {
+    std::shared_ptr<gpu::Device> device;
+    Kernels kernels;
+    gpu::Executor executor;
+    RenderOptions options;
+    Plan plan;
+    Model model;
+    Frame frame;
+    uint32_t skipped = 0;
+
+    State(std::shared_ptr<gpu::Device> d, const Gaussians& gaussians, const RenderOptions& o)
+        : device(std::move(d)), kernels(*device), executor(*device), options(o),
+          plan(plan_picture(gaussians, o, false)),
+          model(upload_model(*device, with_degree(gaussians, plan.stored_degree), 0, false)) {}
+};
+
+Renderer::Renderer(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians, const RenderOptions& options)
+    : state_(std::make_unique<State>(std::move(device), gaussians, options)) {}
+Renderer::~Renderer() = default;
+Renderer::Renderer(Renderer&&) noexcept = default;
+
+Rendering Renderer::render(const Camera& camera, bool with_depth) {
+    State& s = *state_;
+    s.plan.depth = with_depth;
+    const gpu::Buffer block = upload_camera(*s.device, camera, s.kernels.shape());
+    const CameraUse use{&block, 0, uint32_t(camera.width), uint32_t(camera.height)};
+    const uint32_t room = std::max(s.frame.instance_capacity, first_capacity(s.model.splats));
+    const shared::Counts counts = run_until_it_fits(
+        s.kernels, s.executor, s.frame, {s.model.splats, use.width, use.height, room, false, with_depth},
+        [&](gpu::Recording& recording) {
+            record_forward(recording, s.kernels, s.plan, s.model, s.frame, use, s.options.background);
+        });
+    s.skipped = counts.skipped_nonfinite;
+
+    const Sizes& sizes = s.frame.sizes;
+    const auto planes = s.frame.planes.download<float>(sizes.planes / 4);
+    Rendering result{Image(camera.width, camera.height, 3), Image(camera.width, camera.height, 1), Image()};
+    for (int c = 0; c < 3; ++c) copy_plane(planes, sizes, shared::PLANE_R + uint32_t(c), result.color, c);
+    copy_plane(planes, sizes, shared::PLANE_T, result.alpha, 0);
+    for (float& value : result.alpha.pixels) value = 1.0f - value;
+    if (with_depth) {
+        result.depth = Image(camera.width, camera.height, 1);
+        copy_plane(planes, sizes, shared::PLANE_DEPTH, result.depth, 0);
+        for (size_t i = 0; i < result.depth.pixels.size(); ++i)
+            if (result.alpha.pixels[i] > 0) result.depth.pixels[i] /= result.alpha.pixels[i];
+    }
+    return result;
+}
+
+uint32_t Renderer::skipped_nonfinite() const { return state_->skipped; }
+
+std::vector<PassTime> Renderer::pass_times() const {
+    std::vector<PassTime> times;
+    for (const gpu::Timing& timing : state_->executor.timings()) times.push_back({timing.name, timing.milliseconds});
+    return times;
+}
+
+LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians, const Camera& camera,
+                           const Image& target, const RenderOptions& options) {
+    if (target.width != camera.width || target.height != camera.height || target.channels < 3)
+        throw InputError("the photograph is " + std::to_string(target.width) + "x" + std::to_string(target.height) +
+                         " with " + std::to_string(target.channels) + " channels, the camera " +
+                         std::to_string(camera.width) + "x" + std::to_string(camera.height) + " RGB");
+    Kernels kernels(*device);
+    gpu::Executor executor(*device);
+    const Plan plan = plan_gradient(gaussians, options);
+    const Model model = upload_model(*device, gaussians, 1, false);
+    const gpu::Buffer block = upload_camera(*device, camera, kernels.shape());
+    const gpu::Buffer photo = upload_photo(*device, target);
+    const CameraUse use{&block, 0, uint32_t(camera.width), uint32_t(camera.height)};
+    Frame frame;
+    const shared::Counts counts = run_until_it_fits(
+        kernels, executor, frame,
+        {model.splats, use.width, use.height, first_capacity(model.splats), true, false},
+        [&](gpu::Recording& recording) {
+            const Sorted sorted = record_forward(recording, kernels, plan, model, frame, use, options.background);
+            record_loss(recording, kernels, frame, use, photo);
+            record_backward(recording, kernels, plan, model, frame, use, options.background, sorted, {});
+        });
+    LossGradient result;
+    result.l1 = counts.l1;
+    result.ssim = counts.ssim;
+    result.loss = loss_of(counts);
+    result.gradient = download_model(model, model.moments1);
+    result.skipped_nonfinite = counts.skipped_nonfinite;
+    return result;
+}
+
+}  // namespace ewa

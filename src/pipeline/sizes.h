@@ -1,0 +1,44 @@
+// The size of every buffer of a frame and the cut of every dispatch over it: one pure function.
+#pragma once
+#include <cstdint>
+
+#include "passes/shape.h"
+
+namespace ewa::pipeline {
+
+struct FrameRequest {
+    uint32_t splats = 0;
+    uint32_t width = 0, height = 0;  // px
+    uint32_t instances = 0;          // (splat, tile) pairs to make room for
+    bool gradients = false;
+    bool depth = false;
+};
+
+struct RadixCut {
+    uint32_t lanes = 0;
+    uint32_t passes = 0, bits = 0;   // of each pass
+};
+
+struct Sizes {
+    uint32_t tiles_x = 0, tiles_y = 0, tiles = 0;
+    uint32_t stride = 0, plane_floats = 0;       // of an image plane
+    uint32_t scan_block = 0, scan_blocks = 0;    // of the prefix sum over tile counts
+    RadixCut depth_sort, tile_sort;
+    uint32_t strip_rows = 0;                     // tile rows an emitting lane walks
+    uint32_t image_planes = 0;
+    uint32_t partials = 0;                       // partial sums of a loss kernel
+    uint32_t reduce_block = 0, reduce_blocks = 0;
+
+    // Bytes.
+    uint64_t records = 0, splat_words = 0, scan_totals = 0, counters = 0, digit_totals = 0;
+    uint64_t instance_words = 0, tile_starts = 0, planes = 0, target = 0;
+    uint64_t moments = 0, derivatives = 0, image_gradient = 0, partial_sums = 0, reduced = 0, slots = 0;
+
+    uint64_t total() const;                      // of all buffers a frame with this request holds
+};
+
+/// Throws InputError where the image is empty, or larger than tile numbers and loop limits allow (the text says what
+/// the limit is).
+Sizes sizes_for(const passes::Shape& shape, const FrameRequest& request);
+
+}  // namespace ewa::pipeline

@@ -1,0 +1,105 @@
+#include "reference/densify.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+#include "reference/projection.h"
+#include "shared/constants.h"
+
+namespace ewa::reference {
+
+void accumulate(DensifyStatistics& statistics, std::span<const ScreenGradient> gradients,
+                std::span<const uint8_t> in_view, const Camera& camera) {
+    assert(gradients.size() == in_view.size() && statistics.views.size() == in_view.size());
+    for (size_t i = 0; i < gradients.size(); ++i) {
+        if (!in_view[i]) continue;
+        statistics.gradient_sum[i] +=
+            std::hypot(gradients[i].mean2d.x * camera.width / 2, gradients[i].mean2d.y * camera.height / 2);
+        ++statistics.views[i];
+    }
+}
+
+Decision decide(const Splat& splat, double mean_gradient, const DensifyOptions& options) {
+    const double opacity = 1 / (1 + std::exp(-splat.opacity_logit));
+    // Phrased so that an opacity that is not a number is pruned.
+    if (!(opacity >= options.prune_opacity)) return Decision::prune;
+    const double scale = std::exp(std::max({splat.log_scale.x, splat.log_scale.y, splat.log_scale.z}));
+    const bool grows = mean_gradient >= options.grow_gradient;
+    const bool splits = grows && scale > options.split_scale * options.extent;
+    const double left = splits ? scale / shared::SPLIT_SCALE : scale;
+    if (options.prune_large && left > options.prune_scale * options.extent) return Decision::prune;
+    if (splits) return Decision::split;
+    return grows ? Decision::clone : Decision::keep;
+}
+
+std::vector<Decision> decide(const Values& values, const DensifyStatistics& statistics,
+                             const DensifyOptions& options) {
+    assert(statistics.views.size() == values.size());
+    std::vector<Decision> decisions;
+    uint64_t left = 0;
+    for (size_t i = 0; i < values.size(); ++i) {
+        const double mean = statistics.views[i] ? statistics.gradient_sum[i] / statistics.views[i] : 0;
+        decisions.push_back(decide(read_splat(values, i), mean, options));
+        if (decisions.back() != Decision::prune) ++left;
+    }
+    uint64_t room = options.max_splats > left ? options.max_splats - left : 0;
+    for (Decision& decision : decisions) {
+        if (decision != Decision::clone && decision != Decision::split) continue;
+        if (room == 0)
+            decision = Decision::keep;
+        else
+            --room;
+    }
+    return decisions;
+}
+
+Splat split_child(const Splat& parent, const glm::dvec3& normal) {
+    const double norm = robust_norm(parent.quaternion);
+    std::array<double, 4> unit{};
+    for (int k = 0; k < 4; ++k) unit[k] = parent.quaternion[k] / norm;
+    Splat child = parent;
+    glm::dvec3 step(0);
+    for (int k = 0; k < 3; ++k) {
+        step[k] = std::exp(parent.log_scale[k]) * normal[k];
+        child.log_scale[k] = parent.log_scale[k] - std::log(shared::SPLIT_SCALE);
+    }
+    child.mean += rotation_matrix(unit) * step;
+    return child;
+}
+
+Densified densify(const Values& values, std::span<const Decision> decisions,
+                  std::span<const glm::dvec3> normals) {
+    assert(decisions.size() == values.size());
+    std::vector<Splat> splats;
+    Densified out;
+    const auto add = [&](const Splat& splat, size_t source, bool fresh) {
+        splats.push_back(splat);
+        out.source.push_back(uint32_t(source));
+        out.fresh.push_back(fresh);
+    };
+    for (size_t i = 0; i < values.size(); ++i)
+        if (decisions[i] == Decision::keep || decisions[i] == Decision::clone)
+            add(read_splat(values, i), i, false);
+    for (size_t i = 0; i < values.size(); ++i)
+        if (decisions[i] == Decision::clone) add(read_splat(values, i), i, true);
+    size_t next = 0;
+    for (size_t i = 0; i < values.size(); ++i) {
+        if (decisions[i] != Decision::split) continue;
+        assert(next + 2 <= normals.size());
+        const Splat parent = read_splat(values, i);
+        for (int child = 0; child < 2; ++child) add(split_child(parent, normals[next++]), i, true);
+    }
+    out.values.sh_degree = values.sh_degree;
+    out.values.resize(splats.size());
+    for (size_t i = 0; i < splats.size(); ++i) write_splat(out.values, i, splats[i]);
+    return out;
+}
+
+void reset_opacity(Values& values, double ceiling) {
+    assert(ceiling > 0 && ceiling < 1);
+    const double logit = std::log(ceiling / (1 - ceiling));
+    for (double& value : values.opacity_logits) value = std::min(value, logit);
+}
+
+}  // namespace ewa::reference

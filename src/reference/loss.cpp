@@ -1,0 +1,116 @@
+#include "reference/loss.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+#include "shared/constants.h"
+
+namespace ewa::reference {
+
+using namespace shared;
+
+std::vector<double> ssim_window() {
+    const int radius = int(SSIM_RADIUS);
+    std::vector<double> window;
+    double sum = 0;
+    for (int k = -radius; k <= radius; ++k) {
+        window.push_back(std::exp(-k * k / (2 * SSIM_SIGMA * SSIM_SIGMA)));
+        sum += window.back();
+    }
+    for (double& w : window) w /= sum;
+    return window;
+}
+
+namespace {
+
+/// One channel of a picture.
+using Plane = std::vector<double>;
+
+/// dot(window, values around i), with zeros outside [0, size).
+double tap(const std::vector<double>& window, const double* values, int i, int size, size_t stride) {
+    const int radius = int(window.size() / 2);
+    double sum = 0;
+    for (int k = std::max(-radius, -i); k <= std::min(radius, size - 1 - i); ++k)
+        sum += window[size_t(k + radius)] * values[size_t(i + k) * stride];
+    return sum;
+}
+
+Plane blur(const std::vector<double>& window, const Plane& in, int width, int height) {
+    Plane rows(in.size()), out(in.size());
+    for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x)
+            rows[size_t(y) * width + x] = tap(window, &in[size_t(y) * width], x, width, 1);
+    for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x)
+            out[size_t(y) * width + x] = tap(window, &rows[size_t(x)], y, height, size_t(width));
+    return out;
+}
+
+Plane product(const Plane& a, const Plane& b) {
+    Plane out(a.size());
+    for (size_t i = 0; i < a.size(); ++i) out[i] = a[i] * b[i];
+    return out;
+}
+
+Plane channel(const Raster& raster, int k) {
+    Plane out(size_t(raster.width) * raster.height);
+    for (size_t i = 0; i < out.size(); ++i) out[i] = raster.values[3 * i + k];
+    return out;
+}
+
+/// Returns the sum of SSIM over the plane; gradient is that sum's.
+double ssim_sum(const Plane& x, const Plane& y, int width, int height, Plane& gradient) {
+    const std::vector<double> window = ssim_window();
+    const Plane mx = blur(window, x, width, height), my = blur(window, y, width, height);
+    const Plane xx = blur(window, product(x, x), width, height),
+                yy = blur(window, product(y, y), width, height);
+    const Plane xy = blur(window, product(x, y), width, height);
+    Plane by_mx(x.size()), by_xx(x.size()), by_xy(x.size());
+    double sum = 0;
+    for (size_t i = 0; i < x.size(); ++i) {
+        const double sxx = xx[i] - mx[i] * mx[i], syy = yy[i] - my[i] * my[i], sxy = xy[i] - mx[i] * my[i];
+        const double n1 = 2 * mx[i] * my[i] + SSIM_C1, n2 = 2 * sxy + SSIM_C2;
+        const double d1 = mx[i] * mx[i] + my[i] * my[i] + SSIM_C1, d2 = sxx + syy + SSIM_C2;
+        const double ssim = n1 * n2 / (d1 * d2);
+        sum += ssim;
+        by_xx[i] = -ssim / d2;
+        by_xy[i] = 2 * n1 / (d1 * d2);
+        // mx stands in n1 and d1, and in sxx and sxy through their products of means.
+        by_mx[i] =
+            2 * my[i] * n2 / (d1 * d2) - 2 * mx[i] * ssim / d1 - 2 * mx[i] * by_xx[i] - my[i] * by_xy[i];
+    }
+    const Plane from_mx = blur(window, by_mx, width, height);
+    const Plane from_xx = blur(window, by_xx, width, height), from_xy = blur(window, by_xy, width, height);
+    gradient.resize(x.size());
+    for (size_t i = 0; i < x.size(); ++i)
+        gradient[i] = from_mx[i] + 2 * x[i] * from_xx[i] + y[i] * from_xy[i];
+    return sum;
+}
+
+}  // namespace
+
+Loss image_loss(const Raster& rendered, const Raster& target) {
+    assert(rendered.width == target.width && rendered.height == target.height);
+    assert(rendered.channels == 3 && target.channels == 3);
+    const double count = double(rendered.values.size());
+    Loss out;
+    out.gradient = Raster(rendered.width, rendered.height, 3);
+    for (size_t i = 0; i < rendered.values.size(); ++i) {
+        const double difference = rendered.values[i] - target.values[i];
+        out.l1 += std::abs(difference) / count;
+        const double sign = difference > 0 ? 1 : difference < 0 ? -1 : 0;
+        out.gradient.values[i] = (1 - SSIM_WEIGHT) * sign / count;
+    }
+    for (int k = 0; k < 3; ++k) {
+        Plane by_x;
+        out.ssim +=
+            ssim_sum(channel(rendered, k), channel(target, k), rendered.width, rendered.height, by_x) / count;
+        for (size_t i = 0; i < by_x.size(); ++i)
+            out.gradient.values[3 * i + k] -= SSIM_WEIGHT * by_x[i] / count;
+    }
+    out.loss = (1 - SSIM_WEIGHT) * out.l1 + SSIM_WEIGHT * (1 - out.ssim);
+    return out;
+}
+
+}  // namespace ewa::reference

@@ -1,0 +1,30 @@
+// The training loss of a picture and its gradient.
+//
+//   L    = (1 - SSIM_WEIGHT) mean|x - y| + SSIM_WEIGHT (1 - mean SSIM)       means over pixels and RGB
+//   SSIM = (2 mx my + C1)(2 sxy + C2) / ((mx^2 + my^2 + C1)(sxx + syy + C2)) Wang et al. 2004, eq. 13
+// with mx = w * x, sxx = w * x^2 - mx^2, sxy = w * xy - mx my and so on; w is a Gaussian window whose weights
+// add up to 1, zero padded at the border (3DGS, utils/loss_utils.py), where the sums are therefore smaller.
+// The rendering x is not clamped.
+//
+// As w is symmetric, with the partial derivatives taken with mx, E[xx], E[xy] as the variables:
+//   dSSIM/dx = w * (dSSIM/dmx) + 2 x (w * dSSIM/dE[xx]) + y (w * dSSIM/dE[xy])
+// The derivative of |.| at 0 is 0.
+#pragma once
+#include <vector>
+
+#include "reference/values.h"
+
+namespace ewa::reference {
+
+struct Loss {
+    double loss = 0, l1 = 0, ssim = 0;
+    Raster gradient;  // dL/d(rendered), RGB
+};
+
+/// Both RGB of one size.
+Loss image_loss(const Raster& rendered, const Raster& target);
+
+/// The window's 2 * SSIM_RADIUS + 1 taps along one axis.
+std::vector<double> ssim_window();
+
+}  // namespace ewa::reference

@@ -1,0 +1,52 @@
+#include "reference/render.h"
+
+#include "reference/order.h"
+#include "reference/project_backward.h"
+
+namespace ewa::reference {
+
+Picture render(const Values& values, const Camera& camera, const RenderOptions& options,
+               const TwinOptions& twin) {
+    Picture out;
+    for (size_t i = 0; i < values.size(); ++i) {
+        out.projected.push_back(project(values, i, camera, options));
+        if (out.projected.back().skipped_nonfinite) ++out.skipped_nonfinite;
+    }
+    out.order = depth_order(out.projected);
+    const TileGrid grid{camera.width, camera.height, twin.tile_width, twin.tile_height};
+    out.instances = make_instances(out.projected, out.order, grid, twin.smoothing);
+    out.blended = blend(out.projected, out.instances, options.background, twin.smoothing);
+    return out;
+}
+
+Picture render(const Gaussians& gaussians, const Camera& camera, const RenderOptions& options,
+               const TwinOptions& twin) {
+    return render(to_double(gaussians), camera, options, twin);
+}
+
+LossGradientTwin loss_gradient(const Values& values, const Camera& camera, const Image& target,
+                               const RenderOptions& options, const TwinOptions& twin) {
+    LossGradientTwin out;
+    out.picture = render(values, camera, options, twin);
+    const Loss loss = image_loss(out.picture.blended.color, to_double(target));
+    out.loss = loss.loss;
+    out.l1 = loss.l1;
+    out.ssim = loss.ssim;
+    out.picture_gradient = loss.gradient;
+    out.blend = blend_backward(out.picture.projected, out.picture.instances, out.picture.blended,
+                               loss.gradient, twin.smoothing);
+    out.gradient = zeros_like(values);
+    for (size_t i = 0; i < values.size(); ++i)
+        write_splat(out.gradient, i,
+                    project_backward(read_splat(values, i), camera, options, out.blend.splats[i]));
+    out.in_view.assign(values.size(), 0);
+    for (const Instance& instance : out.picture.instances.sorted) out.in_view[instance.splat] = 1;
+    return out;
+}
+
+LossGradientTwin loss_gradient(const Gaussians& gaussians, const Camera& camera, const Image& target,
+                               const RenderOptions& options, const TwinOptions& twin) {
+    return loss_gradient(to_double(gaussians), camera, target, options, twin);
+}
+
+}  // namespace ewa::reference

@@ -1,0 +1,77 @@
+#include "reference/values.h"
+
+#include <cassert>
+
+namespace ewa::reference {
+
+void Values::resize(size_t n) {
+    means.resize(3 * n);
+    quaternions.resize(4 * n);
+    log_scales.resize(3 * n);
+    opacity_logits.resize(n);
+    sh.resize(n * sh_stride());
+}
+
+Values to_double(const Gaussians& gaussians) {
+    Values values;
+    values.sh_degree = gaussians.sh_degree;
+    values.means.assign(gaussians.means.begin(), gaussians.means.end());
+    values.quaternions.assign(gaussians.quaternions.begin(), gaussians.quaternions.end());
+    values.log_scales.assign(gaussians.log_scales.begin(), gaussians.log_scales.end());
+    values.opacity_logits.assign(gaussians.opacity_logits.begin(), gaussians.opacity_logits.end());
+    values.sh.assign(gaussians.sh.begin(), gaussians.sh.end());
+    return values;
+}
+
+Values zeros_like(const Values& values) {
+    Values zeros;
+    zeros.sh_degree = values.sh_degree;
+    zeros.resize(values.size());
+    return zeros;
+}
+
+namespace {
+
+template <class Scene>
+Splat read(const Scene& scene, size_t i) {
+    assert(i < scene.size());
+    Splat splat;
+    for (int k = 0; k < 3; ++k) splat.mean[k] = scene.means[3 * i + k];
+    for (int k = 0; k < 4; ++k) splat.quaternion[k] = scene.quaternions[4 * i + k];
+    for (int k = 0; k < 3; ++k) splat.log_scale[k] = scene.log_scales[3 * i + k];
+    splat.opacity_logit = scene.opacity_logits[i];
+    splat.sh_degree = scene.sh_degree;
+    for (int j = 0; j < sh_coefficients(scene.sh_degree); ++j)
+        for (int k = 0; k < 3; ++k) splat.sh[j][k] = scene.sh[i * scene.sh_stride() + 3 * j + k];
+    return splat;
+}
+
+}  // namespace
+
+Splat read_splat(const Gaussians& gaussians, size_t i) {
+    return read(gaussians, i);
+}
+Splat read_splat(const Values& values, size_t i) {
+    return read(values, i);
+}
+
+void write_splat(Values& values, size_t i, const Splat& splat) {
+    assert(i < values.size());
+    for (int k = 0; k < 3; ++k) values.means[3 * i + k] = splat.mean[k];
+    for (int k = 0; k < 4; ++k) values.quaternions[4 * i + k] = splat.quaternion[k];
+    for (int k = 0; k < 3; ++k) values.log_scales[3 * i + k] = splat.log_scale[k];
+    values.opacity_logits[i] = splat.opacity_logit;
+    for (int j = 0; j < sh_coefficients(values.sh_degree); ++j)
+        for (int k = 0; k < 3; ++k) values.sh[i * values.sh_stride() + 3 * j + k] = splat.sh[j][k];
+}
+
+Raster to_double(const Image& image) {
+    assert(image.channels >= 3);
+    Raster raster(image.width, image.height, 3);
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x)
+            for (int k = 0; k < 3; ++k) raster.at(x, y)[k] = image.at(x, y)[k];
+    return raster;
+}
+
+}  // namespace ewa::reference

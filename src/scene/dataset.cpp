@@ -1,0 +1,42 @@
+// What is asked of a dataset once it is loaded. Loading it is src/io/dataset.cpp.
+#include "ewa/dataset.h"
+
+#include <algorithm>
+
+#include "ewa/error.h"
+#include "scene/undistort.h"
+
+namespace ewa {
+
+Split split_frames(const Dataset& dataset, int test_every) {
+    Split split;
+    for (int i = 0; i < int(dataset.frames.size()); ++i) {
+        const int own = dataset.frames[size_t(i)].split;
+        const bool test = own != 0 ? own == 2 : test_every > 0 && i % test_every == 0;
+        (test ? split.test : split.train).push_back(i);
+    }
+    return split;
+}
+
+double scene_extent(const Dataset& dataset, const std::vector<int>& frames) {
+    glm::dvec3 mean(0.0);
+    for (int i : frames) mean += dataset.frames[size_t(i)].camera.position() / double(frames.size());
+    double largest = 0;
+    for (int i : frames)
+        largest = std::max(largest, glm::length(dataset.frames[size_t(i)].camera.position() - mean));
+    return 1.1 * largest;
+}
+
+Image load_frame_image(const Frame& frame) {
+    Image image = load_image(frame.image_path);
+    if (image.width != frame.source.width || image.height != frame.source.height)
+        throw InputError(frame.image_path.string() + ": is " + std::to_string(image.width) + " x " +
+                         std::to_string(image.height) + " pixels, but its camera has " +
+                         std::to_string(frame.source.width) + " x " + std::to_string(frame.source.height));
+    if (!frame.distortion.none())
+        image = scene::undistort_image(image, frame.source, frame.distortion,
+                                       scene::undistorted_camera(frame.source, frame.distortion));
+    return frame.downscale == 1 ? image : downscale(image, frame.downscale);
+}
+
+}  // namespace ewa

@@ -1,0 +1,63 @@
+#include "ewa/gaussians.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "ewa/dataset.h"
+#include "ewa/error.h"
+#include "scene/neighbors.h"
+#include "shared/constants.h"
+
+namespace ewa {
+
+namespace {
+constexpr double kInitialOpacity = 0.1;
+constexpr double kMinSquaredDistance = 1e-7;  // keeps the logarithm of a duplicate's scale finite
+constexpr double kLonelyScale = 1.0;  // world units; a single point has no neighbour to take a scale from
+}  // namespace
+
+int sh_degree_present(const Gaussians& gaussians) {
+    const size_t stride = gaussians.sh_stride();
+    for (int degree = gaussians.sh_degree; degree > 0; --degree) {
+        const size_t begin = size_t(sh_coefficients(degree - 1)) * 3,
+                     end = size_t(sh_coefficients(degree)) * 3;
+        for (size_t splat = 0; splat < gaussians.size(); ++splat) {
+            const float* sh = &gaussians.sh[splat * stride];
+            // NaN counts as present: it has to reach the check that reports it.
+            if (std::any_of(sh + begin, sh + end, [](float v) { return v != 0.0f; })) return degree;
+        }
+    }
+    return 0;
+}
+
+Gaussians gaussians_from_points(const PointCloud& points, int sh_degree) {
+    if (points.positions.empty()) throw InputError("there are no points to start splats from");
+    if (points.colors.size() != points.positions.size())
+        throw InputError(std::to_string(points.positions.size()) + " points have " +
+                         std::to_string(points.colors.size()) + " colours");
+    const size_t n = points.positions.size();
+    for (size_t i = 0; i < n; ++i)
+        for (int axis = 0; axis < 3; ++axis)
+            if (!std::isfinite(static_cast<float>(points.positions[i][axis])))
+                throw InputError("point " + std::to_string(i) + " has a coordinate that is not finite");
+
+    const std::vector<double> squared = scene::mean_squared_neighbor_distance(points.positions);
+    Gaussians gaussians;
+    gaussians.sh_degree = sh_degree;
+    gaussians.resize(n);
+    for (size_t i = 0; i < n; ++i) {
+        const double scale =
+            squared[i] < 0 ? kLonelyScale : std::sqrt(std::max(squared[i], kMinSquaredDistance));
+        for (int axis = 0; axis < 3; ++axis) {
+            gaussians.means[3 * i + size_t(axis)] = static_cast<float>(points.positions[i][axis]);
+            gaussians.log_scales[3 * i + size_t(axis)] = static_cast<float>(std::log(scale));
+            gaussians.sh[gaussians.sh_stride() * i + size_t(axis)] = static_cast<float>(
+                (points.colors[i][size_t(axis)] / 255.0 - shared::COLOR_OFFSET) / shared::SH_C0);
+        }
+        gaussians.quaternions[4 * i] = 1;
+        gaussians.opacity_logits[i] = static_cast<float>(std::log(kInitialOpacity / (1 - kInitialOpacity)));
+    }
+    return gaussians;
+}
+
+}  // namespace ewa

@@ -1,0 +1,79 @@
+#include "scene/neighbors.h"
+
+#include <algorithm>
+#include <array>
+#include <nanoflann.hpp>
+#include <numeric>
+
+namespace ewa::scene {
+
+namespace {
+
+constexpr size_t kNeighbors = 3;
+
+/// The points at different places, and how many stand at each. The tree is built over these: with duplicates
+/// in it a query would have to visit all of them, n queries n^2.
+struct Places {
+    std::vector<glm::dvec3> positions;
+    std::vector<size_t> counts;
+
+    size_t kdtree_get_point_count() const { return positions.size(); }
+    double kdtree_get_pt(size_t i, size_t axis) const { return positions[i][int(axis)]; }
+    template <class Box>
+    bool kdtree_get_bbox(Box&) const {
+        return false;
+    }
+};
+
+using Tree =
+    nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Places>, Places, 3, size_t>;
+
+bool before(const glm::dvec3& a, const glm::dvec3& b) {
+    return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
+}
+
+/// Sum over the nearest others, the nearest first, until there are three or none is left.
+double mean_at(const Places& places, const Tree& tree, size_t place) {
+    std::array<size_t, kNeighbors + 1> index{};
+    std::array<double, kNeighbors + 1> squared{};
+    const size_t found =
+        tree.knnSearch(&places.positions[place].x, index.size(), index.data(), squared.data());
+    size_t taken = std::min(places.counts[place] - 1, kNeighbors);
+    double sum = 0;
+    for (size_t i = 0; i < found; ++i) {
+        if (index[i] == place) continue;
+        const size_t share = std::min(places.counts[index[i]], kNeighbors - taken);
+        sum += double(share) * squared[i];
+        taken += share;
+    }
+    return taken == 0 ? -1.0 : sum / double(taken);
+}
+
+}  // namespace
+
+std::vector<double> mean_squared_neighbor_distance(const std::vector<glm::dvec3>& positions) {
+    std::vector<size_t> order(positions.size());
+    std::iota(order.begin(), order.end(), size_t(0));
+    std::sort(order.begin(), order.end(),
+              [&](size_t a, size_t b) { return before(positions[a], positions[b]); });
+
+    Places places;
+    std::vector<size_t> place_of(positions.size());
+    for (size_t i : order) {
+        if (places.positions.empty() || places.positions.back() != positions[i]) {
+            places.positions.push_back(positions[i]);
+            places.counts.push_back(0);
+        }
+        ++places.counts.back();
+        place_of[i] = places.positions.size() - 1;
+    }
+    if (places.positions.empty()) return {};
+
+    const Tree tree(3, places);
+    std::vector<double> mean(places.positions.size()), result(positions.size());
+    for (size_t i = 0; i < mean.size(); ++i) mean[i] = mean_at(places, tree, i);
+    for (size_t i = 0; i < result.size(); ++i) result[i] = mean[place_of[i]];
+    return result;
+}
+
+}  // namespace ewa::scene
