@@ -1,6 +1,7 @@
 // Pictures in memory, on disk, and their distance from each other.
 #pragma once
 #include <cstddef>
+#include <array>
 #include <filesystem>
 #include <vector>
 
@@ -36,6 +37,9 @@ void save_image(const std::filesystem::path& path, const Image& image);
 /// The size divided by factor, rounded down, at least 1; each new pixel is the mean over the area it covers: factor x
 /// factor blocks where the size is a multiple, else blocks of the exact size ratio, borders weighted. factor >= 1.
 Image downscale(const Image& image, int factor);
+
+/// RGB of a picture, where it is transparent over a background. RGB pictures come back as they are.
+Image over_background(const Image& image, const std::array<float, 3>& background);
 
 /// 10 log10(1 / MSE) over RGB, both pictures clamped to [0, 1]; +inf for equal pictures.
 /// Throws InputError when sizes differ.

@@ -55,7 +55,8 @@ struct LossGradient {
     uint32_t skipped_nonfinite = 0;
 };
 
-/// The training loss of one view and its gradient. target: RGB (alpha ignored), size of the camera.
+/// The training loss of one view and its gradient. target: RGB, or RGBA that is composited over the background; of
+/// the camera's size.
 LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians, const Camera& camera,
                            const Image& target, const RenderOptions& options);
 

@@ -1,5 +1,5 @@
 #version 460
-// Spreads a photograph's RGBA texels into planes. One invocation owns one pixel.
+// Spreads a photograph's RGBA texels into planes, over the background where it is transparent. One invocation owns one pixel.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 
@@ -11,7 +11,9 @@ layout(push_constant, scalar) uniform Push { UnpackPush push; };
 void main() {
     const uint i = item_index();
     if (i >= push.size[0] * push.size[1]) return;
-    const vec4 color = texelFetch(photo, int(i));
+    const vec4 texel = texelFetch(photo, int(i));
+    const vec3 background = vec3(push.background[0], push.background[1], push.background[2]);
+    const vec3 color = texel.rgb * texel.a + background * (1.0 - texel.a);
     const uint at = (i / push.size[0]) * push.stride + i % push.size[0];
     planes[PLANE_R * push.plane_floats + at] = color.r;
     planes[PLANE_G * push.plane_floats + at] = color.g;

@@ -118,6 +118,7 @@ struct BlendPush {
 };
 
 struct UnpackPush {
+    float background[3];
     uint size[2];
     uint stride;
     uint plane_floats;

@@ -25,7 +25,7 @@ double loss_of(const shared::Counts& counts) {
 }
 
 void record_loss(gpu::Recording& recording, Kernels& kernels, const Frame& frame, const CameraUse& camera,
-                 const gpu::Buffer& photo) {
+                 const std::array<float, 3>& background, const gpu::Buffer& photo) {
     const passes::Shape& shape = kernels.shape();
     const Sizes& s = frame.sizes;
     const double share = 1.0 / (3.0 * camera.width * camera.height);
@@ -35,7 +35,7 @@ void record_loss(gpu::Recording& recording, Kernels& kernels, const Frame& frame
                                 float(-shared::SSIM_WEIGHT * share),
                                 float((1 - shared::SSIM_WEIGHT) * share)};
     kernels.get<passes::UnpackTarget>().record(recording, shape, {photo, frame.target},
-                                               {{camera.width, camera.height}, s.stride, s.plane_floats});
+                                               {{background[0], background[1], background[2]}, {camera.width, camera.height}, s.stride, s.plane_floats});
     kernels.get<passes::LossColumns>().record(recording, shape, {frame.planes, frame.target, frame.moments},
                                               push);
     kernels.get<passes::LossRows>().record(recording, shape,

@@ -12,7 +12,7 @@ struct Rates {
 /// photo: width * height texels, RGBA. Leaves the loss's parts in Counts and dL/d(image) in
 /// frame.image_gradient.
 void record_loss(gpu::Recording& recording, Kernels& kernels, const Frame& frame, const CameraUse& camera,
-                 const gpu::Buffer& photo);
+                 const std::array<float, 3>& background, const gpu::Buffer& photo);
 
 /// Blend backward and projection backward. plan.adam: moves the model; else writes the gradient to
 /// model.moments1.

@@ -8,6 +8,8 @@
 #include "gpu/executor.h"
 #include "pipeline/backward.h"
 #include "pipeline/camera_block.h"
+#include "pipeline/capacity.h"
+#include "pipeline/photo.h"
 #include "pipeline/plan.h"
 
 namespace ewa {
@@ -32,57 +34,6 @@ gpu::Buffer upload_camera(gpu::Device& device, const Camera& camera, const passe
     gpu::Buffer buffer(device, "camera", sizeof(block), gpu::Texel::none, true);
     buffer.upload(std::span<const shared::CameraBlock>(&block, 1));
     return buffer;
-}
-
-/// RGBA texels of a picture: 8 bit where every value is one of 256 levels, else float32.
-gpu::Buffer upload_photo(gpu::Device& device, const Image& image) {
-    const size_t pixels = size_t(image.width) * image.height;
-    const auto level = [](float value) { return std::round(value * 255.0f); };
-    bool eight_bit = true;
-    for (size_t i = 0; i < pixels * size_t(image.channels) && eight_bit; ++i) {
-        const float value = image.pixels[i];
-        eight_bit = value >= 0 && value <= 1 && level(value) / 255.0f == value;
-    }
-    if (eight_bit) {
-        std::vector<uint8_t> texels(4 * pixels, 255);
-        for (size_t i = 0; i < pixels; ++i)
-            for (size_t c = 0; c < 3; ++c)
-                texels[4 * i + c] = uint8_t(level(image.pixels[i * size_t(image.channels) + c]));
-        gpu::Buffer buffer(device, "photo", texels.size(), gpu::Texel::rgba8);
-        buffer.upload(std::span<const uint8_t>(texels));
-        return buffer;
-    }
-    std::vector<float> texels(4 * pixels, 1.0f);
-    for (size_t i = 0; i < pixels; ++i)
-        for (size_t c = 0; c < 3; ++c) texels[4 * i + c] = image.pixels[i * size_t(image.channels) + c];
-    gpu::Buffer buffer(device, "photo", texels.size() * 4, gpu::Texel::rgba32f);
-    buffer.upload(std::span<const float>(texels));
-    return buffer;
-}
-
-/// Room for instances in a first try: most scenes have a few tiles a splat.
-uint32_t first_capacity(size_t splats) {
-    return uint32_t(std::min<size_t>(std::max<size_t>(8 * splats, 4096), 1u << 24));
-}
-
-uint32_t grown_capacity(uint32_t needed) {
-    if (needed > 0xe0000000u) throw RunError("more than 3.7 billion (splat, tile) pairs in one picture");
-    return needed + needed / 4;
-}
-
-/// Runs a frame until its instances fit. record: fills a recording for the frame as reserved.
-template <class Record>
-shared::Counts run_until_it_fits(Kernels& kernels, gpu::Executor& executor, Frame& frame,
-                                 FrameRequest request, Record record) {
-    for (;;) {
-        frame.reserve(kernels.device(), kernels.shape(), request);
-        gpu::Recording recording(kernels.device().limits());
-        record(recording);
-        executor.run(recording, true);
-        const shared::Counts counts = frame.read_counts();
-        if (counts.instances <= frame.instance_capacity) return counts;
-        request.instances = grown_capacity(counts.instances);
-    }
 }
 
 /// One plane of an image, spread over channel c of a picture.
@@ -181,7 +132,7 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
         [&](gpu::Recording& recording) {
             const Sorted sorted =
                 record_forward(recording, kernels, plan, model, frame, use, options.background);
-            record_loss(recording, kernels, frame, use, photo);
+            record_loss(recording, kernels, frame, use, options.background, photo);
             record_backward(recording, kernels, plan, model, frame, use, options.background, sorted, {});
         });
     LossGradient result;

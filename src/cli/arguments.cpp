@@ -1,0 +1,117 @@
+#include "cli/arguments.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <charconv>
+
+#include "ewa/error.h"
+
+namespace ewa::cli {
+namespace {
+
+std::vector<std::string> comma_separated(const std::string& text) {
+    std::vector<std::string> parts(1);
+    for (const char c : text) {
+        if (c == ',')
+            parts.emplace_back();
+        else
+            parts.back() += c;
+    }
+    return parts;
+}
+
+template <typename T>
+bool parse_number(const std::string& text, T& value) {
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    return error == std::errc() && end == text.data() + text.size();
+}
+
+std::array<float, 3> parse_background(const std::string& text) {
+    const auto parts = comma_separated(text);
+    std::array<float, 3> color{};
+    bool good = parts.size() == 3;
+    for (size_t i = 0; good && i < 3; ++i)
+        good = parse_number(parts[i], color[i]) && color[i] >= 0 && color[i] <= 1;
+    if (!good) throw InputError("--background: '" + text + "' is not r,g,b with each in 0..1, such as 1,1,1");
+    return color;
+}
+
+std::vector<int> listed_frames(const Dataset& dataset, const std::string& list) {
+    std::vector<int> frames;
+    for (const std::string& part : comma_separated(list)) {
+        int index = 0;
+        if (!parse_number(part, index))
+            throw InputError("'" + list + "' is not all, train, test or frame indices such as 0,3,7");
+        if (index < 0 || index >= static_cast<int>(dataset.frames.size()))
+            throw InputError(
+                fmt::format("there is no frame {}: {} has {} frames, numbered from 0 in name order", index,
+                            dataset.root.string(), dataset.frames.size()));
+        if (std::find(frames.begin(), frames.end(), index) == frames.end()) frames.push_back(index);
+    }
+    return frames;
+}
+
+}  // namespace
+
+RenderOptions DrawArguments::options() const {
+    RenderOptions render;
+    if (!random_background()) render.background = parse_background(background);
+    if (antialias && kernel == "ewa") throw InputError("--antialias and --kernel ewa exclude each other");
+    render.kernel = antialias || kernel == "antialias" ? Kernel::antialias
+                    : kernel == "ewa"                  ? Kernel::unit_mass
+                                                       : Kernel::peak;
+    render.sh_degree = sh_degree;
+    return render;
+}
+
+void add_draw_options(CLI::App& app, DrawArguments& arguments, bool random_background_allowed) {
+    app.add_option("--background", arguments.background,
+                   random_background_allowed
+                       ? "Colour behind the splats: r,g,b in 0..1, or random (a new one each step)"
+                       : "Colour behind the splats: r,g,b in 0..1")
+        ->capture_default_str();
+    app.add_option("--kernel", arguments.kernel,
+                   "Footprint: peak (3DGS), antialias (Mip-Splatting), ewa (unit mass)")
+        ->check(CLI::IsMember({"peak", "antialias", "ewa"}))
+        ->capture_default_str();
+    app.add_flag("--antialias", arguments.antialias, "The same as --kernel antialias");
+    app.add_option("--sh-degree", arguments.sh_degree, "Highest degree of view-dependent colour")
+        ->check(CLI::Range(0, kMaxShDegree))
+        ->capture_default_str();
+}
+
+void add_device_options(CLI::App& app, DeviceOptions& options) {
+    app.add_option("--device", options.selector, "Number or part of the name of a device (see ewa devices)");
+    app.add_flag("--validation", options.validation, "Turn the Vulkan validation layer on")
+        ->group("For developers");
+}
+
+void add_downscale_option(CLI::App& app, int& downscale) {
+    app.add_option("--downscale", downscale, "Divide the pictures' width and height by this")
+        ->check(CLI::Range(1, 1024))
+        ->capture_default_str();
+}
+
+void add_test_every_option(CLI::App& app, int& test_every) {
+    app.add_option("--test-every", test_every, "Every K-th picture in name order is held out; 0: none")
+        ->check(CLI::Range(0, 1000000000))
+        ->capture_default_str();
+}
+
+std::vector<int> select_frames(const Dataset& dataset, const std::string& which, int test_every) {
+    if (dataset.frames.empty()) throw InputError(dataset.root.string() + " has no frames");
+    if (which != "all" && which != "train" && which != "test") return listed_frames(dataset, which);
+
+    const Split split = split_frames(dataset, test_every);
+    std::vector<int> frames;
+    if (which != "test") frames.insert(frames.end(), split.train.begin(), split.train.end());
+    if (which != "train") frames.insert(frames.end(), split.test.begin(), split.test.end());
+    std::sort(frames.begin(), frames.end());
+    if (frames.empty())
+        throw InputError(fmt::format("no frame of {} is in the {} split with --test-every {}",
+                                     dataset.root.string(), which, test_every));
+    return frames;
+}
+
+}  // namespace ewa::cli

@@ -1,0 +1,21 @@
+// The commands of the program, one file each.
+#pragma once
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <string>
+
+namespace ewa::cli {
+
+/// What a command does once its options are read; returns the exit status. InputError ends with 2, anything
+/// else thrown with 1.
+using Action = std::function<int()>;
+
+/// Each adds its options to its own sub-command.
+Action add_train(CLI::App& app, const std::string& command_line);
+Action add_render(CLI::App& app);
+Action add_eval(CLI::App& app);
+Action add_grad(CLI::App& app);
+Action add_info(CLI::App& app);
+Action add_devices(CLI::App& app);
+
+}  // namespace ewa::cli

@@ -1,0 +1,50 @@
+// ewa devices: what --device can name.
+#include <spdlog/fmt/fmt.h>
+
+#include <memory>
+
+#include "cli/command.h"
+#include "cli/text.h"
+#include "ewa/device.h"
+#include "report/summary.h"
+
+namespace ewa::cli {
+namespace {
+
+report::Json to_json(const DeviceInfo& device) {
+    return {{"index", device.index},
+            {"name", device.name},
+            {"type", device.type},
+            {"driver", device.driver},
+            {"api_version", device.api_version},
+            {"subgroup_size", device.subgroup_size},
+            {"memory_bytes", device.memory_bytes},
+            {"unusable", device.unusable}};
+}
+
+int run(bool json) {
+    const auto devices = list_devices();
+    if (json) {
+        report::Json list = report::Json::array();
+        for (const DeviceInfo& device : devices) list.push_back(to_json(device));
+        fmt::print("{}\n", list.dump(2, ' ', false, report::Json::error_handler_t::replace));
+        return 0;
+    }
+    if (devices.empty())
+        fmt::print("no Vulkan device; the package mesa-vulkan-drivers brings one for the CPU\n");
+    for (const DeviceInfo& device : devices)
+        fmt::print("{}  {} ({}, {}, Vulkan {}, {} lanes, {}){}\n", device.index, device.name, device.type,
+                   device.driver, device.api_version, device.subgroup_size, bytes_text(device.memory_bytes),
+                   device.unusable.empty() ? "" : "  unusable: " + device.unusable);
+    return 0;
+}
+
+}  // namespace
+
+Action add_devices(CLI::App& app) {
+    const auto json = std::make_shared<bool>(false);
+    app.add_flag("--json", *json, "As JSON");
+    return [json] { return run(*json); };
+}
+
+}  // namespace ewa::cli

@@ -1,0 +1,70 @@
+// ewa eval: PSNR and SSIM of a splat scene against a dataset's photographs.
+#include <spdlog/fmt/fmt.h>
+
+#include <memory>
+
+#include "cli/arguments.h"
+#include "cli/command.h"
+#include "cli/output.h"
+#include "ewa/splat_files.h"
+#include "ewa/trainer.h"
+
+namespace ewa::cli {
+namespace {
+
+struct EvalArguments {
+    std::filesystem::path splats, dataset, json;
+    std::string split = "test";
+    int test_every = 8, downscale = 1;
+    DrawArguments draw;
+    DeviceOptions device;
+};
+
+report::Json to_json(const Evaluation& evaluation) {
+    report::Json frames = report::Json::array();
+    for (const EvalFrame& frame : evaluation.frames)
+        frames.push_back({{"name", frame.name}, {"psnr", frame.psnr}, {"ssim", frame.ssim}});
+    return {{"psnr", evaluation.psnr},
+            {"ssim", evaluation.ssim},
+            {"frames", frames},
+            {"seconds", evaluation.seconds}};
+}
+
+int run(const EvalArguments& arguments) {
+    const RenderOptions options = arguments.draw.options();
+    const Gaussians gaussians = load_splats(arguments.splats);
+    const Dataset dataset = load_dataset(arguments.dataset, {.downscale = arguments.downscale});
+    const std::vector<int> frames = select_frames(dataset, arguments.split, arguments.test_every);
+
+    const Evaluation evaluation =
+        evaluate(open_device(arguments.device), gaussians, dataset, frames, options);
+    for (const EvalFrame& frame : evaluation.frames)
+        fmt::print("{}  PSNR {:.3f} dB  SSIM {:.5f}\n", frame.name, frame.psnr, frame.ssim);
+    if (dataset.missing_images > 0)
+        fmt::print("{} images are missing and left out\n", dataset.missing_images);
+    fmt::print("mean of {} frames ({})  PSNR {:.3f} dB  SSIM {:.5f}  in {:.2f} s\n", evaluation.frames.size(),
+               arguments.split, evaluation.psnr, evaluation.ssim, evaluation.seconds);
+    if (!arguments.json.empty()) write_json(arguments.json, to_json(evaluation));
+    return 0;
+}
+
+}  // namespace
+
+Action add_eval(CLI::App& app) {
+    const auto arguments = std::make_shared<EvalArguments>();
+    app.add_option("SPLATS", arguments->splats, "The splat scene (.ply)")->required();
+    app.add_option("DATASET", arguments->dataset,
+                   "Photographs with cameras: COLMAP folder or transforms.json")
+        ->required();
+    app.add_option("--split", arguments->split, "test, train or all")
+        ->check(CLI::IsMember({"test", "train", "all"}))
+        ->capture_default_str();
+    add_test_every_option(app, arguments->test_every);
+    app.add_option("--json", arguments->json, "Write the figures to this file");
+    add_draw_options(app, arguments->draw);
+    add_downscale_option(app, arguments->downscale);
+    add_device_options(app, arguments->device);
+    return [arguments] { return run(*arguments); };
+}
+
+}  // namespace ewa::cli

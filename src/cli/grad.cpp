@@ -1,0 +1,70 @@
+// ewa grad: the training loss of one view, and its gradient with respect to every stored value.
+#include <spdlog/fmt/fmt.h>
+
+#include <memory>
+
+#include "cli/arguments.h"
+#include "cli/command.h"
+#include "cli/output.h"
+#include "ewa/error.h"
+#include "ewa/renderer.h"
+#include "ewa/splat_files.h"
+
+namespace ewa::cli {
+namespace {
+
+struct GradArguments {
+    std::filesystem::path splats, dataset, output, json;
+    int frame = 0, downscale = 1;
+    DrawArguments draw;
+    DeviceOptions device;
+};
+
+int run(const GradArguments& arguments) {
+    const RenderOptions options = arguments.draw.options();
+    if (arguments.output.extension() != ".ply")
+        throw InputError("the gradient is written as a PLY: -o " + arguments.output.string() +
+                         " does not end in .ply");
+    const Gaussians gaussians = load_splats(arguments.splats);
+    const Dataset dataset = load_dataset(arguments.dataset, {.downscale = arguments.downscale});
+    const int index = select_frames(dataset, std::to_string(arguments.frame), 0).front();
+    const Frame& frame = dataset.frames[index];
+    make_folder(arguments.output.parent_path());
+
+    const LossGradient result = loss_gradient(open_device(arguments.device), gaussians, frame.camera,
+                                              load_frame_image(frame), options);
+    save_splats(arguments.output, result.gradient,
+                {"ewa " EWA_VERSION, fmt::format("gradient of the training loss of frame {}", index)});
+    if (!arguments.json.empty())
+        write_json(arguments.json,
+                   {{"loss", result.loss}, {"l1", result.l1}, {"ssim", result.ssim}, {"frame", frame.name}});
+    fmt::print("{}  loss {:.7g}  L1 {:.7g}  SSIM {:.7g}\n", frame.name, result.loss, result.l1, result.ssim);
+    if (result.skipped_nonfinite > 0)
+        fmt::print("{} splats have a value that is not finite and were not drawn\n",
+                   result.skipped_nonfinite);
+    fmt::print("the gradient of {} splats is in {}\n", result.gradient.size(), arguments.output.string());
+    return 0;
+}
+
+}  // namespace
+
+Action add_grad(CLI::App& app) {
+    const auto arguments = std::make_shared<GradArguments>();
+    app.add_option("SPLATS", arguments->splats, "The splat scene (.ply)")->required();
+    app.add_option("DATASET", arguments->dataset,
+                   "Photographs with cameras: COLMAP folder or transforms.json")
+        ->required();
+    app.add_option("--frame", arguments->frame, "Which view: index in name order over all frames, from 0")
+        ->required()
+        ->check(CLI::Range(0, 1000000000));
+    app.add_option("-o,--output", arguments->output,
+                   "PLY with the properties of a splat file, each holding dL/d(that stored value)")
+        ->required();
+    app.add_option("--json", arguments->json, "Write loss, l1, ssim and frame to this file");
+    add_draw_options(app, arguments->draw);
+    add_downscale_option(app, arguments->downscale);
+    add_device_options(app, arguments->device);
+    return [arguments] { return run(*arguments); };
+}
+
+}  // namespace ewa::cli

@@ -1,0 +1,96 @@
+// ewa: reads the arguments, runs one command, and turns every failure into one line and an exit status.
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <new>
+
+#include "cli/command.h"
+#include "cli/text.h"
+#include "core/text.h"
+#include "ewa/error.h"
+
+namespace {
+
+using namespace ewa;
+using namespace ewa::cli;
+
+enum ExitStatus { kDone = 0, kFailed = 1, kWrongUse = 2 };
+
+struct Command {
+    CLI::App* app;
+    Action action;
+};
+
+int fail(const std::string& who, const std::string& what, int status) {
+    std::fflush(stdout);
+    std::fprintf(stderr, "%s: %s\n", who.c_str(), core::one_line(what).c_str());
+    return status;
+}
+
+int run(const Command& command) {
+    const std::string who = "ewa " + command.app->get_name();
+    try {
+        const int status = command.action();
+        // A full disk behind a redirected output shows up only here.
+        if (std::fflush(stdout) != 0 || std::ferror(stdout))
+            return fail(who, std::string("cannot write to standard output: ") + std::strerror(errno),
+                        kFailed);
+        return status;
+    } catch (const InputError& error) {
+        return fail(who, error.what(), kWrongUse);
+    } catch (const CLI::Error& error) {  // a value of --config that its option refuses
+        return fail(who, error.what(), kWrongUse);
+    } catch (const RunError& error) {
+        return fail(who, error.what(), kFailed);
+    } catch (const std::bad_alloc&) {
+        return fail(who, "out of host memory; --downscale or a smaller scene needs less", kFailed);
+    } catch (const std::exception& error) {
+        return fail(who, std::string("unexpected failure: ") + error.what(), kFailed);
+    }
+}
+
+std::string command_line(int argc, char** argv) {
+    std::string line = "ewa";
+    for (int i = 1; i < argc; ++i) line += " " + shell_quoted(argv[i]);
+    return line;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    CLI::App app{
+        "Trains, renders and inspects 3D Gaussian splats on any Vulkan device, a plain CPU included."};
+    app.name("ewa");
+    app.set_version_flag("--version", "ewa " EWA_VERSION);
+    app.require_subcommand(1);
+    app.get_formatter()->column_width(34);
+
+    Command commands[] = {
+        {app.add_subcommand("train", "From photographs with cameras to splats"), {}},
+        {app.add_subcommand("render", "Pictures of a splat scene through a dataset's cameras"), {}},
+        {app.add_subcommand("eval", "PSNR and SSIM of a splat scene against photographs"), {}},
+        {app.add_subcommand("grad", "Gradient of the training loss for one view"), {}},
+        {app.add_subcommand("info", "What is in a splat file or a dataset, and what rendering it leaves out"),
+         {}},
+        {app.add_subcommand("devices", "The Vulkan devices of this machine"), {}},
+    };
+    commands[0].action = add_train(*commands[0].app, command_line(argc, argv));
+    commands[1].action = add_render(*commands[1].app);
+    commands[2].action = add_eval(*commands[2].app);
+    commands[3].action = add_grad(*commands[3].app);
+    commands[4].action = add_info(*commands[4].app);
+    commands[5].action = add_devices(*commands[5].app);
+
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+        if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) return app.exit(error);
+        std::string who = "ewa";
+        for (const Command& command : commands)
+            if (command.app->parsed()) who += " " + command.app->get_name();
+        return fail(who, std::string(error.what()) + " (see " + who + " --help)", kWrongUse);
+    }
+    for (const Command& command : commands)
+        if (command.app->parsed()) return run(command);
+    return kWrongUse;
+}

@@ -1,0 +1,78 @@
+#include "cli/progress.h"
+
+#include <spdlog/fmt/fmt.h>
+#include <unistd.h>
+
+#include <cstdio>
+
+#include "cli/text.h"
+
+namespace ewa::cli {
+namespace {
+
+constexpr std::chrono::milliseconds kRedraw{100};
+constexpr double kWindowSeconds = 2;
+
+double seconds(std::chrono::steady_clock::duration time) {
+    return std::chrono::duration<double>(time).count();
+}
+
+}  // namespace
+
+Progress::Progress(std::string what, int total, std::string unit, bool quiet)
+    : what_(std::move(what)),
+      unit_(std::move(unit)),
+      total_(total),
+      quiet_(quiet),
+      terminal_(isatty(STDOUT_FILENO)) {}
+
+Progress::~Progress() {
+    if (drawn_) std::fputc('\n', stdout);
+}
+
+bool Progress::due(int done) const {
+    if (quiet_) return false;
+    if (done == total_) return true;
+    return terminal_ ? Clock::now() - printed_ >= kRedraw
+                     : 10LL * done >= static_cast<long long>(total_) * next_tenth_;
+}
+
+void Progress::update(int done, const std::string& details) {
+    if (!due(done)) return;
+    const auto now = Clock::now();
+    printed_ = now;
+    next_tenth_ = static_cast<int>(10LL * done / total_) + 1;
+
+    const double span = seconds(now - window_start_);
+    if (span > 0 && done > window_done_) rate_ = (done - window_done_) / span;
+    if (span >= kWindowSeconds) {
+        window_start_ = now;
+        window_done_ = done;
+    }
+    std::string line = fmt::format("{} {}/{} {}", what_, done, total_, unit_);
+    if (!details.empty()) line += ", " + details;
+    if (rate_ > 0) line += fmt::format(", {:.3g} {}/s", rate_, unit_);
+    if (rate_ > 0 && done < total_) line += ", " + duration_text((total_ - done) / rate_) + " left";
+
+    clear_line();
+    std::fputs(line.c_str(), stdout);
+    if (terminal_)
+        drawn_ = true;
+    else
+        std::fputc('\n', stdout);
+    std::fflush(stdout);
+}
+
+void Progress::note(const std::string& line) {
+    if (quiet_) return;
+    clear_line();
+    std::puts(line.c_str());
+    std::fflush(stdout);
+}
+
+void Progress::clear_line() {
+    if (drawn_) std::fputs("\r\033[K", stdout);
+    drawn_ = false;
+}
+
+}  // namespace ewa::cli

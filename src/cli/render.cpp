@@ -1,0 +1,130 @@
+// ewa render: pictures of a splat scene through a dataset's cameras. The photographs themselves are not
+// needed.
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "cli/arguments.h"
+#include "cli/command.h"
+#include "cli/interrupt.h"
+#include "cli/output.h"
+#include "cli/progress.h"
+#include "ewa/error.h"
+#include "ewa/renderer.h"
+#include "ewa/splat_files.h"
+#include "report/pictures.h"
+
+namespace ewa::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct RenderArguments {
+    fs::path splats, cameras, output = "out/render";
+    std::string frames = "all", format = "png", mode = "color";
+    int test_every = 8, downscale = 1;
+    DrawArguments draw;
+    DeviceOptions device;
+    bool quiet = false;
+};
+
+/// Frames without a photograph are left out of the train and test split, since training never saw them either
+/// and counting them would shift which ones are held out. Where no photograph is there at all, every camera
+/// counts.
+Dataset load_cameras(const RenderArguments& arguments) {
+    Dataset dataset =
+        load_dataset(arguments.cameras, {.downscale = arguments.downscale, .need_images = false});
+    const bool by_split = arguments.frames == "train" || arguments.frames == "test";
+    auto missing = [](const Frame& frame) { return !frame.image_exists; };
+    if (by_split && !std::all_of(dataset.frames.begin(), dataset.frames.end(), missing))
+        std::erase_if(dataset.frames, missing);
+    return dataset;
+}
+
+Image with_alpha(const Image& color, const Image& alpha) {
+    Image out(color.width, color.height, 4);
+    for (int y = 0; y < out.height; ++y)
+        for (int x = 0; x < out.width; ++x) {
+            std::copy_n(color.at(x, y), 3, out.at(x, y));
+            out.at(x, y)[3] = *alpha.at(x, y);
+        }
+    return out;
+}
+
+/// Divides by the largest value, which is returned: what a PNG's white stands for.
+float normalize(Image& image) {
+    float largest = 0;
+    for (const float v : image.pixels) largest = std::max(largest, v);
+    if (largest > 0)
+        for (float& v : image.pixels) v /= largest;
+    return largest;
+}
+
+/// The picture to save; `remark` is what the reader of the file must know besides.
+Image picture(Rendering&& rendering, const RenderArguments& arguments, std::string& remark) {
+    const bool exr = arguments.format == "exr";
+    if (arguments.mode == "alpha") return std::move(rendering.alpha);
+    if (arguments.mode == "color")
+        return exr ? with_alpha(rendering.color, rendering.alpha) : std::move(rendering.color);
+    if (!exr) remark = fmt::format("white is depth {:.6g}", normalize(rendering.depth));
+    return std::move(rendering.depth);
+}
+
+int run(const RenderArguments& arguments) {
+    const RenderOptions options = arguments.draw.options();
+    const Gaussians gaussians = load_splats(arguments.splats);
+    const Dataset dataset = load_cameras(arguments);
+    const std::vector<int> frames = select_frames(dataset, arguments.frames, arguments.test_every);
+    const std::vector<fs::path> names = report::picture_names(dataset.frames);
+    make_folder(arguments.output);
+
+    Renderer renderer(open_device(arguments.device), gaussians, options);
+    watch_for_interrupt();
+    Progress progress("rendered", static_cast<int>(frames.size()), "frames", arguments.quiet);
+    uint32_t skipped = 0;
+    for (size_t i = 0; i < frames.size(); ++i) {
+        if (interrupted()) return kInterruptedStatus;
+        const Frame& frame = dataset.frames[frames[i]];
+        Rendering rendering = renderer.render(frame.camera, arguments.mode == "depth");
+        skipped = std::max(skipped, renderer.skipped_nonfinite());
+
+        std::string remark;
+        const fs::path file = arguments.output / (names[frames[i]].string() + "." + arguments.format);
+        make_folder(file.parent_path());
+        save_image(file, picture(std::move(rendering), arguments, remark));
+        if (!remark.empty()) progress.note(file.string() + ": " + remark);
+        progress.update(static_cast<int>(i) + 1);
+    }
+    if (skipped > 0)
+        progress.note(fmt::format("{} splats have a value that is not finite and were not drawn", skipped));
+    progress.note(fmt::format("{} pictures are in {}", frames.size(), arguments.output.string()));
+    return 0;
+}
+
+}  // namespace
+
+Action add_render(CLI::App& app) {
+    const auto arguments = std::make_shared<RenderArguments>();
+    app.add_option("SPLATS", arguments->splats, "The splat scene (.ply)")->required();
+    app.add_option("--cameras", arguments->cameras, "The dataset whose cameras to look through")->required();
+    app.add_option("-o,--output", arguments->output, "Folder for the pictures, named like the dataset's")
+        ->capture_default_str();
+    app.add_option("--frames", arguments->frames, "all, train, test, or indices in name order: 0,3,7")
+        ->capture_default_str();
+    add_test_every_option(app, arguments->test_every);
+    app.add_option("--format", arguments->format, "png (8 bit, clamped) or exr (float32, not clamped)")
+        ->check(CLI::IsMember({"png", "exr"}))
+        ->capture_default_str();
+    app.add_option("--mode", arguments->mode,
+                   "color, depth (view z; a png is divided by its maximum) or alpha")
+        ->check(CLI::IsMember({"color", "depth", "alpha"}))
+        ->capture_default_str();
+    add_draw_options(app, arguments->draw);
+    add_downscale_option(app, arguments->downscale);
+    add_device_options(app, arguments->device);
+    app.add_flag("--quiet", arguments->quiet, "Print nothing but errors");
+    return [arguments] { return run(*arguments); };
+}
+
+}  // namespace ewa::cli

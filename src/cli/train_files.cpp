@@ -1,0 +1,72 @@
+#include "cli/train_files.h"
+
+#include <sys/resource.h>
+
+#include <algorithm>
+
+#include "cli/output.h"
+#include "core/atomic_file.h"
+
+namespace ewa::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+Image first_three_channels(const Image& image) {
+    if (image.channels == 3) return image;
+    Image rgb(image.width, image.height, 3);
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x) std::copy_n(image.at(x, y), 3, rgb.at(x, y));
+    return rgb;
+}
+
+}  // namespace
+
+std::vector<int> spread_out(const std::vector<int>& frames, size_t count) {
+    if (frames.size() <= count) return frames;
+    std::vector<int> some;
+    for (size_t i = 0; i < count; ++i) some.push_back(frames[i * frames.size() / count]);
+    return some;
+}
+
+std::string dataset_name(const fs::path& dataset) {
+    std::error_code error;
+    fs::path path = fs::weakly_canonical(dataset, error);
+    if (error) path = dataset;
+    if (path.has_extension() && !fs::is_directory(path, error)) path = path.parent_path();
+    const std::string name = path.filename().string();
+    return name.empty() || name == "." || name == ".." ? "dataset" : name;
+}
+
+std::vector<report::ReportPicture> draw_report_pictures(const PictureRequest& request,
+                                                        const fs::path& folder) {
+    const auto names = report::picture_names(request.dataset.frames);
+    Renderer renderer(request.device, request.gaussians, request.options);
+    std::vector<report::ReportPicture> pictures;
+    for (const int index : request.frames) {
+        const Frame& frame = request.dataset.frames[index];
+        report::ReportPicture picture;
+        picture.name = frame.name;
+        picture.photograph = first_three_channels(load_frame_image(frame));
+        picture.rendering = renderer.render(frame.camera).color;
+        picture.psnr = psnr(picture.rendering, picture.photograph);
+        picture.ssim = ssim(picture.rendering, picture.photograph);
+        const fs::path file = folder / (names[index].string() + ".png");
+        make_folder(file.parent_path());
+        save_image(file, picture.rendering);
+        pictures.push_back(std::move(picture));
+    }
+    return pictures;
+}
+
+void write_report(const fs::path& path, const report::ReportData& data) {
+    core::write_text_file(path, report::html_report(data));
+}
+
+uint64_t peak_host_bytes() {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return static_cast<uint64_t>(usage.ru_maxrss) * 1024;  // Linux counts in KiB
+}
+
+}  // namespace ewa::cli

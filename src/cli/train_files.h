@@ -1,0 +1,43 @@
+// What a training run leaves besides the splats, and what it needs to know for it.
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ewa/dataset.h"
+#include "ewa/renderer.h"
+#include "report/html.h"
+#include "report/pictures.h"
+
+namespace ewa::cli {
+
+/// Pictures that a report shows at most.
+inline constexpr size_t kReportPictures = 4;
+
+/// At most `count` of the frames, spread evenly, the first among them.
+std::vector<int> spread_out(const std::vector<int>& frames, size_t count);
+
+/// What the dataset is called: its folder's name.
+std::string dataset_name(const std::filesystem::path& dataset);
+
+struct PictureRequest {
+    std::shared_ptr<gpu::Device> device;
+    const Gaussians& gaussians;
+    const Dataset& dataset;
+    const std::vector<int>& frames;
+    const RenderOptions& options;
+};
+
+/// Draws the frames, saves each as folder/<name>.png, and returns them with their photographs. Throws
+/// RunError, InputError.
+std::vector<report::ReportPicture> draw_report_pictures(const PictureRequest& request,
+                                                        const std::filesystem::path& folder);
+
+void write_report(const std::filesystem::path& path, const report::ReportData& data);
+
+/// The most memory this process has had, in bytes.
+uint64_t peak_host_bytes();
+
+}  // namespace ewa::cli

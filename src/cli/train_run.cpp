@@ -1,0 +1,292 @@
+#include "cli/train_run.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "cli/interrupt.h"
+#include "cli/output.h"
+#include "cli/progress.h"
+#include "cli/text.h"
+#include "cli/train_files.h"
+#include "ewa/error.h"
+#include "ewa/splat_files.h"
+#include "train/initialise.h"
+
+namespace ewa::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Splats to start from with --init random.
+constexpr uint32_t kRandomSplats = 50000;
+// Training views evaluated at the end; their mean says enough, and a large set would take longer than the
+// training.
+constexpr size_t kTrainViewsEvaluated = 40;
+
+TrainOptions train_options(const TrainArguments& arguments) {
+    TrainOptions options;
+    options.steps = arguments.steps;
+    options.strategy = arguments.strategy == "none" ? Strategy::none : Strategy::adc;
+    options.max_splats = arguments.max_splats;
+    options.sh_degree = arguments.draw.sh_degree;
+    options.seed = arguments.seed;
+    options.random_background = arguments.draw.random_background();
+    options.render = arguments.draw.options();
+    return options;
+}
+
+Gaussians start_splats(const TrainArguments& arguments, const Dataset& dataset,
+                       const std::vector<int>& frames) {
+    const int degree = arguments.draw.sh_degree;
+    Gaussians start;
+    if (arguments.init == "sfm") {
+        if (dataset.points.positions.empty())
+            throw InputError(dataset.root.string() +
+                             " has no points to start from; --init random needs none");
+        start = gaussians_from_points(dataset.points, degree);
+    } else if (arguments.init == "random") {
+        const uint32_t count = std::min(kRandomSplats, arguments.max_splats);
+        start = train::random_gaussians(dataset, frames, static_cast<int>(count), arguments.seed, degree);
+    } else {
+        start = train::with_sh_degree(load_splats(arguments.init), degree);
+    }
+    if (start.size() > arguments.max_splats)
+        throw InputError(fmt::format("there are {} splats to start from, more than --max-splats {}",
+                                     start.size(), arguments.max_splats));
+    return start;
+}
+
+class TrainRun {
+  public:
+    explicit TrainRun(const TrainArguments& arguments)
+        : arguments_(arguments), options_(train_options(arguments)) {}
+    int run();
+
+  private:
+    using Clock = std::chrono::steady_clock;
+    double wall_seconds() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
+    void say(const std::string& line) const {
+        if (!arguments_.quiet) fmt::print("{}\n", line);
+    }
+    void load();
+    void describe() const;
+    void train(Trainer& trainer, Progress& progress);
+    void log(const StepReport& report, const std::optional<Evaluation>& evaluation);
+    Evaluation evaluate_frames(const Gaussians& gaussians, const std::vector<int>& frames) const;
+    void save(const Gaussians& gaussians) const;
+    int finish(const Trainer& trainer);
+    void print_result() const;
+
+    const TrainArguments& arguments_;
+    TrainOptions options_;
+    Clock::time_point begin_ = Clock::now();
+    fs::path folder_;
+    Dataset dataset_;
+    Split split_;
+    Gaussians start_;
+    std::shared_ptr<gpu::Device> device_;
+    std::optional<report::MetricsLog> log_file_;
+    StepReport last_;
+    report::ReportData report_;
+    fs::path first_picture_;
+};
+
+void TrainRun::load() {
+    dataset_ = load_dataset(arguments_.dataset, {.downscale = arguments_.downscale});
+    split_ = split_frames(dataset_, arguments_.test_every);
+    if (split_.train.empty())
+        throw InputError(fmt::format("{}: of {} images ({} missing) none is left to train on",
+                                     arguments_.dataset.string(), dataset_.frames.size(),
+                                     dataset_.missing_images));
+    start_ = start_splats(arguments_, dataset_, split_.train);
+
+    folder_ =
+        arguments_.output.empty() ? fs::path("out") / dataset_name(arguments_.dataset) : arguments_.output;
+    make_folder(folder_);
+    // The first file written tells before the training whether the folder takes any.
+    const report::Json config = to_config(arguments_);
+    write_json(folder_ / "config.json", config);
+    // An earlier run's figures must not stand beside this run's log if it fails.
+    std::error_code absent;
+    fs::remove(folder_ / "summary.json", absent);
+    fs::remove(folder_ / "report.html", absent);
+    log_file_.emplace(folder_ / "metrics.jsonl");
+    for (const auto& [name, value] : config.items())
+        report_.settings.emplace_back(name, value.is_string() ? value.get<std::string>() : value.dump());
+
+    report_.title = dataset_name(arguments_.dataset);
+    if (dataset_.missing_images > 0)
+        report_.remarks.push_back(fmt::format("{} images are missing and left out", dataset_.missing_images));
+    if (dataset_.dropped_points > 0)
+        report_.remarks.push_back(fmt::format(
+            "{} points have a coordinate that is not finite and are left out", dataset_.dropped_points));
+}
+
+void TrainRun::describe() const {
+    const Camera& camera = dataset_.frames[split_.train.front()].camera;
+    say(fmt::format("{}: {} views to train on, {} held out, {}x{}; {} splats to start from", report_.title,
+                    split_.train.size(), split_.test.size(), camera.width, camera.height, start_.size()));
+    for (const std::string& remark : report_.remarks) say(remark);
+    say("device: " + report_.summary.device);
+    if (!arguments_.verbose) return;
+    for (const PlanLine& line : report_.plan)
+        say(fmt::format("left out: {} ({}{})", line.what, line.why,
+                        line.bytes_saved > 0 ? ", saves " + bytes_text(line.bytes_saved) : ""));
+}
+
+Evaluation TrainRun::evaluate_frames(const Gaussians& gaussians, const std::vector<int>& frames) const {
+    return evaluate(device_, gaussians, dataset_, frames, options_.render);
+}
+
+void TrainRun::log(const StepReport& step, const std::optional<Evaluation>& evaluation) {
+    report::MetricsLine line;
+    line.step = step.step;
+    line.seconds = step.seconds;
+    line.wall_seconds = wall_seconds();
+    line.loss = step.loss;
+    line.splats = step.splats;
+    if (evaluation) {
+        line.test_psnr = evaluation->psnr;
+        line.test_ssim = evaluation->ssim;
+    }
+    log_file_->append(line);
+    report_.metrics.push_back(line);
+}
+
+void TrainRun::save(const Gaussians& gaussians) const {
+    save_splats(folder_ / "splats.ply", gaussians,
+                {fmt::format("Generated by ewa " EWA_VERSION " at step {}", last_.step),
+                 fmt::format("SplatRenderMode: {}",
+                             options_.render.kernel == Kernel::antialias ? "mip" : "default")});
+}
+
+void TrainRun::train(Trainer& trainer, Progress& progress) {
+    const int report_every = std::max(1, arguments_.steps / 100);
+    auto at = [](int step, int every) { return every > 0 && step % every == 0; };
+    while (trainer.steps_done() < arguments_.steps && !interrupted()) {
+        last_ = trainer.step();
+        const int step = last_.step;
+        if (progress.due(step))
+            progress.update(step, fmt::format("loss {:.4f}, {} splats", last_.loss, last_.splats));
+        if (step == arguments_.steps) break;  // finish() evaluates and saves
+
+        std::optional<Evaluation> evaluation;
+        if (at(step, arguments_.eval_every) && !split_.test.empty()) {
+            evaluation = evaluate_frames(trainer.gaussians(), split_.test);
+            progress.note(fmt::format("step {}: held-out PSNR {:.2f} dB, SSIM {:.4f}", step, evaluation->psnr,
+                                      evaluation->ssim));
+        }
+        if (evaluation || step == 1 || at(step, report_every)) log(last_, evaluation);
+        if (at(step, arguments_.save_every)) save(trainer.gaussians());
+    }
+}
+
+int TrainRun::finish(const Trainer& trainer) {
+    const bool cut_short = interrupted();
+    const Gaussians gaussians = trainer.gaussians();
+    save(gaussians);
+
+    report::Summary& summary = report_.summary;
+    std::optional<Evaluation> test;
+    if (!cut_short) {
+        say("evaluating");
+        if (!split_.test.empty()) test = evaluate_frames(gaussians, split_.test);
+        summary.train_psnr = evaluate_frames(gaussians, spread_out(split_.train, kTrainViewsEvaluated)).psnr;
+    }
+    if (test) {
+        summary.test_psnr = test->psnr;
+        summary.test_ssim = test->ssim;
+    }
+    if (last_.step > 0) log(last_, test);
+    report_.pass_times = trainer.pass_times();
+    report_.held_out = !split_.test.empty();
+    if (!cut_short) {
+        const auto frames = spread_out(report_.held_out ? split_.test : split_.train, kReportPictures);
+        const fs::path subfolder = folder_ / (report_.held_out ? "test" : "train");
+        report_.pictures =
+            draw_report_pictures({device_, gaussians, dataset_, frames, options_.render}, subfolder);
+        first_picture_ =
+            subfolder / (report::picture_names(dataset_.frames)[frames.front()].string() + ".png");
+    }
+
+    summary.steps = last_.step;
+    summary.seconds = last_.seconds;
+    summary.splats = static_cast<uint32_t>(gaussians.size());
+    summary.skipped_nonfinite = last_.skipped_nonfinite;
+    summary.dropped_updates = last_.dropped_updates;
+    summary.interrupted = cut_short;
+    summary.peak_device_bytes = peak_device_bytes(*device_);
+    summary.peak_host_bytes = peak_host_bytes();
+    summary.wall_seconds = wall_seconds();
+    write_json(folder_ / "summary.json", report::to_json(summary));
+    write_report(folder_ / "report.html", report_);
+    print_result();
+    return cut_short ? kInterruptedStatus : 0;
+}
+
+void TrainRun::print_result() const {
+    const report::Summary& s = report_.summary;
+    say(fmt::format("{} {} steps in {} of training ({} in all), {} splats",
+                    s.interrupted ? "interrupted after" : "trained", s.steps, duration_text(s.seconds),
+                    duration_text(s.wall_seconds), s.splats));
+    if (s.test_psnr) say(fmt::format("held-out PSNR {:.2f} dB, SSIM {:.4f}", *s.test_psnr, *s.test_ssim));
+    if (s.train_psnr) say(fmt::format("training PSNR {:.2f} dB", *s.train_psnr));
+    if (s.skipped_nonfinite > 0)
+        say(fmt::format("{} splats are not finite and not drawn", s.skipped_nonfinite));
+    if (s.dropped_updates > 0) say(fmt::format("{} updates were not finite and dropped", s.dropped_updates));
+    say("splats:  " + (folder_ / "splats.ply").string());
+    say("report:  " + (folder_ / "report.html").string());
+    if (!first_picture_.empty()) say("picture: " + first_picture_.string());
+}
+
+int TrainRun::run() {
+    load();
+    device_ = open_device(arguments_.device);
+    report::Summary& summary = report_.summary;
+    summary.device = device_info(*device_).name;
+    summary.seed = arguments_.seed;
+    summary.version = EWA_VERSION;
+    summary.command = arguments_.command_line;
+    summary.strategy = arguments_.strategy;
+    report_.plan = plan_lines(start_, options_.render, true);
+    describe();
+
+    watch_for_interrupt();
+    Trainer trainer(device_, dataset_, split_.train, start_, options_);
+    start_ = {};
+    last_.splats = trainer.splats();
+    {
+        Progress progress("trained", arguments_.steps, "steps", arguments_.quiet);
+        train(trainer, progress);
+    }
+    return finish(trainer);
+}
+
+}  // namespace
+
+report::Json to_config(const TrainArguments& a) {
+    report::Json json;
+    json["dataset"] = a.dataset.string();
+    json["steps"] = a.steps;
+    json["strategy"] = a.strategy;
+    json["max-splats"] = a.max_splats;
+    json["sh-degree"] = a.draw.sh_degree;
+    json["init"] = a.init;
+    json["downscale"] = a.downscale;
+    json["test-every"] = a.test_every;
+    json["seed"] = a.seed;
+    json["background"] = a.draw.background;
+    json["kernel"] = a.draw.antialias ? "antialias" : a.draw.kernel;
+    json["eval-every"] = a.eval_every;
+    json["save-every"] = a.save_every;
+    json["device"] = a.device.selector;
+    return json;
+}
+
+int run_train(const TrainArguments& arguments) {
+    return TrainRun(arguments).run();
+}
+
+}  // namespace ewa::cli

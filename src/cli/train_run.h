@@ -1,0 +1,33 @@
+// One training run: from the arguments to the files in its folder.
+#pragma once
+#include <filesystem>
+#include <string>
+
+#include "cli/arguments.h"
+#include "ewa/trainer.h"
+#include "report/summary.h"
+
+namespace ewa::cli {
+
+struct TrainArguments {
+    std::filesystem::path dataset, output;  // output empty: out/<dataset name>
+    int steps = TrainOptions{}.steps;
+    std::string strategy = "adc";
+    uint32_t max_splats = TrainOptions{}.max_splats;
+    std::string init = "sfm";  // sfm, random, or a splat file
+    int downscale = 1, test_every = 8;
+    uint64_t seed = 0;
+    DrawArguments draw;
+    int eval_every = 0, save_every = 0;  // steps; 0: only at the end
+    DeviceOptions device;
+    bool quiet = false, verbose = false;
+    std::string command_line;
+};
+
+/// The options that decide the result, under the names of the command line: what config.json holds.
+report::Json to_config(const TrainArguments& arguments);
+
+/// Returns the exit status.
+int run_train(const TrainArguments& arguments);
+
+}  // namespace ewa::cli

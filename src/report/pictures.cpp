@@ -1,0 +1,121 @@
+#include "report/pictures.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <set>
+#include <stdexcept>
+
+#include "image/encode_png.h"
+
+namespace ewa::report {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The name's parts without root, "." and "..", so that it stays inside the output folder. Backslashes are
+/// separators in models written on Windows.
+std::vector<std::string> inner_parts(std::string name) {
+    std::replace(name.begin(), name.end(), '\\', '/');
+    std::vector<std::string> parts;
+    for (const fs::path& part : fs::path(name).relative_path().lexically_normal())
+        if (part != ".." && part != "." && !part.empty()) parts.push_back(part.string());
+    if (parts.empty()) parts.push_back("frame");
+    return parts;
+}
+
+/// How many leading folders all names share.
+size_t shared_folders(const std::vector<std::vector<std::string>>& names) {
+    if (names.empty()) return 0;
+    size_t shared = names.front().size() - 1;
+    for (const auto& parts : names) {
+        size_t same = 0;
+        while (same < std::min(shared, parts.size() - 1) && parts[same] == names.front()[same]) ++same;
+        shared = same;
+    }
+    return shared;
+}
+
+/// Dark violet over orange to pale yellow, even in lightness (matplotlib's inferno at five places).
+std::array<float, 3> heat(double t) {
+    static constexpr double kColors[5][3] = {{0.001, 0.000, 0.014},
+                                             {0.342, 0.062, 0.429},
+                                             {0.736, 0.216, 0.330},
+                                             {0.978, 0.557, 0.035},
+                                             {0.988, 0.998, 0.645}};
+    const double at = std::clamp(t, 0.0, 1.0) * 4;
+    const int i = std::min(3, static_cast<int>(at));
+    const double f = at - i;
+    std::array<float, 3> color;
+    for (int c = 0; c < 3; ++c)
+        color[c] = static_cast<float>(kColors[i][c] * (1 - f) + kColors[i + 1][c] * f);
+    return color;
+}
+
+}  // namespace
+
+std::vector<fs::path> picture_names(const std::vector<Frame>& frames) {
+    std::vector<std::vector<std::string>> parts;
+    for (const Frame& frame : frames) parts.push_back(inner_parts(frame.name));
+    const size_t shared = shared_folders(parts);
+
+    std::vector<fs::path> folders, files;
+    std::map<fs::path, int> uses;
+    for (const auto& name : parts) {
+        fs::path folder;
+        for (size_t i = shared; i + 1 < name.size(); ++i) folder /= name[i];
+        folders.push_back(folder);
+        files.push_back(name.back());
+        ++uses[folder / files.back().stem()];
+    }
+
+    std::vector<fs::path> names;
+    std::set<fs::path> taken;
+    for (size_t i = 0; i < frames.size(); ++i) {
+        fs::path name = folders[i] / files[i].stem();
+        if (uses[name] > 1) name = folders[i] / files[i];
+        fs::path unique = name;
+        for (int n = 2; !taken.insert(unique).second; ++n) unique = name.string() + "-" + std::to_string(n);
+        names.push_back(unique);
+    }
+    return names;
+}
+
+Image error_map(const Image& a, const Image& b, double full_scale) {
+    if (a.width != b.width || a.height != b.height || a.channels < 3 || b.channels < 3)
+        throw std::logic_error("error_map: pictures of different sizes");
+    Image map(a.width, a.height, 3);
+    for (int y = 0; y < a.height; ++y)
+        for (int x = 0; x < a.width; ++x) {
+            double error = 0;
+            for (int c = 0; c < 3; ++c)
+                error +=
+                    std::abs(std::clamp(a.at(x, y)[c], 0.0f, 1.0f) - std::clamp(b.at(x, y)[c], 0.0f, 1.0f)) /
+                    3.0;
+            const auto color = heat(error / full_scale);
+            std::copy(color.begin(), color.end(), map.at(x, y));
+        }
+    return map;
+}
+
+std::string base64(const std::vector<unsigned char>& bytes) {
+    static constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    std::string text;
+    text.reserve((bytes.size() + 2) / 3 * 4);
+    for (size_t i = 0; i < bytes.size(); i += 3) {
+        const size_t count = std::min<size_t>(3, bytes.size() - i);
+        uint32_t group = 0;
+        for (size_t k = 0; k < 3; ++k) group = group << 8 | (k < count ? bytes[i + k] : 0u);
+        for (size_t k = 0; k < 4; ++k) text += k <= count ? kDigits[group >> (18 - 6 * k) & 63] : '=';
+    }
+    return text;
+}
+
+std::string data_uri(const Image& image, int max_width) {
+    const int factor = (image.width + max_width - 1) / max_width;
+    return "data:image/png;base64," +
+           base64(image::encode_png(factor > 1 ? downscale(image, factor) : image));
+}
+
+}  // namespace ewa::report

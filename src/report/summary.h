@@ -1,0 +1,58 @@
+// What a training run leaves in numbers: summary.json and the lines of metrics.jsonl.
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+namespace ewa::report {
+
+/// Keys keep the order they were written in, so that two runs' files can be compared line by line.
+using Json = nlohmann::ordered_json;
+
+/// A figure that does not exist (no test set, nothing evaluated) is null in the file; so is one that is not
+/// finite, which JSON has no number for (the PSNR of equal pictures).
+struct Summary {
+    int steps = 0;
+    double seconds = 0;       // training alone
+    double wall_seconds = 0;  // with start-up, evaluation and saving
+    uint32_t splats = 0;
+    std::optional<double> test_psnr, test_ssim, train_psnr;
+    std::string device;
+    uint64_t peak_device_bytes = 0, peak_host_bytes = 0;
+    uint64_t seed = 0;
+    uint32_t skipped_nonfinite = 0;
+    uint64_t dropped_updates = 0;
+    std::string version, command, strategy;
+    bool interrupted = false;
+};
+
+Json to_json(const Summary& summary);
+
+struct MetricsLine {
+    int step = 0;
+    double seconds = 0, wall_seconds = 0, loss = 0;
+    uint32_t splats = 0;
+    std::optional<double> test_psnr, test_ssim;
+};
+
+Json to_json(const MetricsLine& line);
+
+/// Appends one JSON object a line and hands each to the operating system at once, so that a run can be
+/// watched, and an interrupted one keeps what it had. Starts an empty file.
+class MetricsLog {
+  public:
+    /// Throws RunError when the file cannot be created.
+    explicit MetricsLog(const std::filesystem::path& path);
+
+    /// Throws RunError when the line cannot be written.
+    void append(const MetricsLine& line);
+
+  private:
+    std::filesystem::path path_;
+    std::ofstream file_;
+};
+
+}  // namespace ewa::report

@@ -1,0 +1,94 @@
+#include "train/initialise.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+#include <numbers>
+
+#include "core/random.h"
+
+namespace ewa::train {
+namespace {
+
+/// Four numbers of (0, 1) for each seed, splat and use of it.
+std::array<double, 4> uniform(uint64_t seed, uint32_t index, uint32_t use) {
+    return core::uniform4({static_cast<uint32_t>(seed), static_cast<uint32_t>(seed >> 32), index, use});
+}
+
+glm::dvec3 viewing_direction(const Camera& camera) {
+    return glm::normalize(glm::transpose(camera.rotation) * glm::dvec3(0, 0, 1));
+}
+
+glm::dvec3 point_in_sphere(const Sphere& sphere, const std::array<double, 4>& u) {
+    const double z = 2 * u[0] - 1;
+    const double angle = 2 * std::numbers::pi * u[1];
+    const double radius = sphere.radius * std::cbrt(u[2]);
+    const double flat = std::sqrt(1 - z * z);
+    return sphere.center + radius * glm::dvec3(flat * std::cos(angle), flat * std::sin(angle), z);
+}
+
+}  // namespace
+
+Sphere viewed_sphere(const Dataset& dataset, const std::vector<int>& frames) {
+    glm::dvec3 mean(0.0);
+    for (const int i : frames) mean += dataset.frames[i].camera.position() / double(frames.size());
+
+    // The sum of squared distances from the axes is least where sum(I - d d^T) (p - o) = 0. Positions are
+    // taken relative to their mean, so that a scene far from the origin loses no digits.
+    glm::dmat3 normal(0.0);
+    glm::dvec3 right(0.0);
+    for (const int i : frames) {
+        const glm::dvec3 d = viewing_direction(dataset.frames[i].camera);
+        const glm::dmat3 across = glm::dmat3(1.0) - glm::outerProduct(d, d);
+        normal += across;
+        right += across * (dataset.frames[i].camera.position() - mean);
+    }
+    const double count = double(frames.size());
+    // Near-parallel axes: the determinant over its largest possible value, 8/27 for directions in all of
+    // space.
+    if (glm::determinant(normal) > 1e-4 * count * count * count) {
+        const glm::dvec3 offset = glm::inverse(normal) * right;
+        double distance = 0, towards = 0;
+        for (const int i : frames) {
+            const glm::dvec3 to_center = mean + offset - dataset.frames[i].camera.position();
+            distance += glm::length(to_center) / count;
+            towards += glm::dot(to_center, viewing_direction(dataset.frames[i].camera));
+        }
+        if (towards > 0.5 * distance * count) return {mean + offset, distance};
+    }
+    double farthest = 0;
+    for (const int i : frames)
+        farthest = std::max(farthest, glm::length(dataset.frames[i].camera.position() - mean));
+    return {mean, farthest > 0 ? 4 * farthest : 1};
+}
+
+Gaussians random_gaussians(const Dataset& dataset, const std::vector<int>& frames, int count, uint64_t seed,
+                           int sh_degree) {
+    const Sphere sphere = viewed_sphere(dataset, frames);
+    PointCloud points;
+    for (int i = 0; i < count; ++i) {
+        const auto index = static_cast<uint32_t>(i);
+        points.positions.push_back(point_in_sphere(sphere, uniform(seed, index, 0)));
+        const auto shade = uniform(seed, index, 1);
+        std::array<uint8_t, 3> color;
+        for (size_t c = 0; c < 3; ++c) color[c] = static_cast<uint8_t>(96 + 64 * shade[c]);
+        points.colors.push_back(color);
+    }
+    return gaussians_from_points(points, sh_degree);
+}
+
+Gaussians with_sh_degree(const Gaussians& gaussians, int degree) {
+    if (gaussians.sh_degree == degree) return gaussians;
+    Gaussians out = gaussians;
+    out.sh_degree = degree;
+    out.sh.assign(out.size() * out.sh_stride(), 0.0f);
+    const size_t kept = std::min(gaussians.sh_stride(), out.sh_stride());
+    for (size_t i = 0; i < out.size(); ++i)
+        std::copy_n(&gaussians.sh[i * gaussians.sh_stride()], kept, &out.sh[i * out.sh_stride()]);
+    return out;
+}
+
+}  // namespace ewa::train

@@ -1,0 +1,35 @@
+// When a run does what: pure functions of the step and the options.
+//
+// The intervals of TrainOptions are those of a 30,000 step run. A shorter run keeps their proportions as far as
+// sense allows: a densification needs statistics over many views, and an opacity reset needs a few hundred steps to
+// heal, so both have a floor below which they do not shrink.
+#pragma once
+#include <cstdint>
+
+#include "ewa/trainer.h"
+
+namespace ewa::train {
+
+struct Schedule {
+    int steps = 0;
+    int refine_start = 0, refine_stop = 0, refine_every = 0;  // steps
+    int opacity_reset_every = 0;                              // 0: never
+    int sh_degree_every = 0;
+    int sh_degree = 0;                                        // the highest
+    double means_rate = 0, means_rate_final = 0;              // per unit of scene extent
+
+    /// Densify after this step (steps count from 1)?
+    bool densifies(int step) const;
+    bool resets_opacity(int step) const;
+    /// Has an opacity reset happened at or before this step? Only then does size prune.
+    bool was_reset(int step) const;
+    /// SH degree evaluated in this step.
+    int degree(int step) const;
+    /// Learning rate of the means: exponential from means_rate to means_rate_final over the run (Plenoxels' decay, as
+    /// 3DGS uses it), times the scene extent.
+    double mean_rate(int step, double extent) const;
+};
+
+Schedule schedule_for(const TrainOptions& options);
+
+}  // namespace ewa::train

@@ -1,0 +1,51 @@
+// Runs the built program as a process, and makes small inputs for it.
+#pragma once
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+namespace ewa::test {
+
+struct Outcome {
+    int status = -1;  // exit status; 128 + the signal that ended it
+    std::string out, err;
+};
+
+struct Circumstances {
+    std::string out_path;    // standard output goes here instead of Outcome::out
+    size_t file_limit = 0;   // bytes that no file may exceed, as on a full disk; 0: none
+    std::string await_file;  // as soon as this file has a byte, `signal` is sent
+    int signal = 0;
+};
+
+Outcome run_ewa(const std::vector<std::string>& arguments, const Circumstances& circumstances = {});
+
+/// A folder of its own, removed at the end.
+class Folder {
+  public:
+    Folder();
+    ~Folder();
+    Folder(const Folder&) = delete;
+    Folder& operator=(const Folder&) = delete;
+    std::string operator/(const std::string& name) const { return (path_ / name).string(); }
+
+  private:
+    std::filesystem::path path_;
+};
+
+/// Pictures of a coloured disc from a circle of cameras: folder/transforms.json and folder/images/<name>.
+void make_dataset(const std::string& folder,
+                  const std::vector<std::string>& names = {"0.png", "1.png", "2.png", "3.png"});
+
+/// Splats in a ball at the origin.
+void make_splats(const std::string& path, int count = 50, int sh_degree = 1);
+
+void write_file(const std::string& path, const std::string& bytes);
+std::string read_file(const std::string& path);
+nlohmann::json read_json(const std::string& path);
+
+/// Names of the files below a folder, sorted, with their folders.
+std::vector<std::string> files_below(const std::string& folder);
+
+}  // namespace ewa::test

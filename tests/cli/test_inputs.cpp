@@ -1,0 +1,103 @@
+// Damaged and hostile inputs: exit status 2 and one line that names the file.
+#include <gtest/gtest.h>
+
+#include "cli/expect.h"
+#include "ewa/image.h"
+
+namespace {
+
+using namespace ewa::test;
+namespace fs = std::filesystem;
+
+TEST(Inputs, DamagedSplatFiles) {
+    const Folder folder;
+    make_splats(folder / "good.ply");
+    const std::string good = read_file(folder / "good.ply");
+    std::string huge = good;
+    huge.replace(huge.find("vertex 50"), 9, "vertex 4000000000");
+    const std::pair<std::string, std::string> cases[] = {{"truncated", good.substr(0, good.size() - 7)},
+                                                         {"headless", good.substr(0, 100)},
+                                                         {"huge", huge},
+                                                         {"empty", ""},
+                                                         {"text", "not a ply at all\n"}};
+    for (const auto& [name, bytes] : cases) {
+        const std::string path = folder / (name + ".ply");
+        write_file(path, bytes);
+        expect_failure(run_ewa({"info", path}), 2, name + ".ply");
+    }
+    fs::create_directory(folder / "folder.ply");
+    expect_failure(run_ewa({"render", folder / "folder.ply", "--cameras", "/nowhere"}), 2, "folder.ply");
+    write_file(folder / "splats.xyz", "x");
+    expect_failure(run_ewa({"info", folder / "splats.xyz"}), 2, "splats.xyz");
+}
+
+TEST(Inputs, DatasetsThatAreNone) {
+    const Folder folder;
+    fs::create_directory(folder / "empty");
+    expect_failure(run_ewa({"train", folder / "empty", "-o", folder / "out"}), 2, "empty");
+    fs::create_directory(folder / "garbage");
+    write_file(folder / "garbage/transforms.json", "{\"frames\": [");
+    expect_failure(run_ewa({"train", folder / "garbage", "-o", folder / "out"}), 2, "transforms.json");
+    make_dataset(folder / "frameless", {});
+    expect_failure(run_ewa({"train", folder / "frameless", "-o", folder / "out"}), 2, "frameless");
+    EXPECT_FALSE(fs::exists(folder / "out"));
+}
+
+TEST(Inputs, DatasetWithoutAnyImage) {
+    const Folder folder;
+    make_dataset(folder / "data");
+    fs::remove_all(folder / "data/images");
+    expect_failure(run_ewa({"train", folder / "data", "-o", folder / "out", "--init", "random"}), 2, "data");
+}
+
+TEST(Inputs, DatasetWithoutPoints) {
+    const Folder folder;
+    make_dataset(folder / "data");
+    expect_failure(run_ewa({"train", folder / "data", "-o", folder / "out"}), 2, "--init random");
+}
+
+TEST(Inputs, EveryFrameHeldOut) {
+    const Folder folder;
+    make_dataset(folder / "data");
+    expect_failure(
+        run_ewa({"train", folder / "data", "-o", folder / "out", "--init", "random", "--test-every", "1"}), 2,
+        "none is left to train on");
+}
+
+TEST(Inputs, ImageOfAnotherSizeOrCutShort) {
+    const Folder folder;
+    make_dataset(folder / "data");
+    const std::string image = folder / "data/images/1.png";
+    const std::string good = read_file(image);
+    write_file(image, good.substr(0, good.size() / 2));
+    expect_failure(run_ewa({"train", folder / "data", "-o", folder / "out", "--init", "random", "--quiet"}),
+                   2, "1.png");
+    ewa::save_image(image, ewa::Image(8, 8, 3));
+    expect_failure(run_ewa({"train", folder / "data", "-o", folder / "out", "--init", "random", "--quiet"}),
+                   2, "1.png");
+}
+
+TEST(Inputs, FramesThatAreNotThere) {
+    const Folder folder;
+    make_dataset(folder / "data");
+    make_splats(folder / "s.ply");
+    const std::string splats = folder / "s.ply", data = folder / "data";
+    expect_failure(run_ewa({"render", splats, "--cameras", data, "--frames", "9", "-o", folder / "o"}), 2,
+                   "frame 9");
+    expect_failure(run_ewa({"render", splats, "--cameras", data, "--frames", "1,", "-o", folder / "o"}), 2,
+                   "1,");
+    expect_failure(run_ewa({"grad", splats, data, "--frame", "4", "-o", folder / "g.ply"}), 2, "frame 4");
+    expect_failure(run_ewa({"eval", splats, data, "--test-every", "0"}), 2, "test split");
+    expect_failure(run_ewa({"train", data, "--init", splats, "--max-splats", "49", "-o", folder / "o"}), 2,
+                   "--max-splats");
+}
+
+TEST(Inputs, DevicesThatAreNotThere) {
+    const Folder folder;
+    make_dataset(folder / "data");
+    make_splats(folder / "s.ply");
+    for (const char* device : {"999", "no such device", "-1"})
+        expect_failure(run_ewa({"eval", folder / "s.ply", folder / "data", "--device", device}), 2, device);
+}
+
+}  // namespace

@@ -1,0 +1,211 @@
+// What the commands write, and what happens where they cannot.
+#include <gtest/gtest.h>
+
+#include "cli/expect.h"
+#include "ewa/image.h"
+#include "ewa/splat_files.h"
+
+namespace {
+
+using namespace ewa::test;
+using ewa::Gaussians;
+using ewa::Image;
+namespace fs = std::filesystem;
+using Names = std::vector<std::string>;
+
+TEST(Outputs, RenderNamesPicturesByStem) {
+    const Folder folder;
+    make_dataset(folder / "data");
+    make_splats(folder / "s.ply");
+    const Names render{"render", folder / "s.ply", "--cameras", folder / "data", "-o"};
+    auto files = [&](const std::string& out, const Names& more) {
+        Names arguments = render;
+        arguments.push_back(folder / out);
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        expect_success(run_ewa(arguments));
+        return files_below(folder / out);
+    };
+    EXPECT_EQ(files("all", {}), (Names{"0.png", "1.png", "2.png", "3.png"}));
+    EXPECT_EQ(files("test", {"--frames", "test", "--test-every", "2"}), (Names{"0.png", "2.png"}));
+    EXPECT_EQ(files("list", {"--frames", "3,1", "--format", "exr"}), (Names{"1.exr", "3.exr"}));
+    // The photographs are not needed.
+    fs::remove_all(folder / "data/images");
+    EXPECT_EQ(files("bare", {"--frames", "train", "--test-every", "2"}), (Names{"1.png", "3.png"}));
+}
+
+TEST(Outputs, SameStemsDoNotOverwriteEachOther) {
+    const Folder folder;
+    make_dataset(folder / "data", {"left/1.png", "right/1.png", "right/2.png"});
+    make_splats(folder / "s.ply");
+    expect_success(
+        run_ewa({"render", folder / "s.ply", "--cameras", folder / "data", "-o", folder / "o", "--quiet"}));
+    EXPECT_EQ(files_below(folder / "o"), (Names{"left/1.png", "right/1.png", "right/2.png"}));
+}
+
+TEST(Outputs, ExrKeepsWhatAPngClamps) {
+    const Folder folder;
+    make_dataset(folder / "data");
+    Gaussians bright;
+    bright.resize(1);
+    bright.quaternions[0] = 1;
+    bright.opacity_logits[0] = 4;
+    for (float& v : bright.log_scales) v = -0.5f;
+    for (float& v : bright.sh) v = 10;
+    ewa::save_splats(folder / "bright.ply", bright);
+    const Names render{
+        "render", folder / "bright.ply", "--cameras", folder / "data", "--frames", "0", "--quiet", "-o"};
+    auto picture = [&](const std::string& out, const Names& more) {
+        Names arguments = render;
+        arguments.push_back(folder / out);
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        expect_success(run_ewa(arguments));
+        return ewa::load_image((folder / out) + "/" + files_below(folder / out).front());
+    };
+    const Image exr = picture("exr", {"--format", "exr"});
+    ASSERT_EQ(exr.channels, 4);
+    EXPECT_GT(exr.at(24, 16)[0], 2.0f);
+    EXPECT_NEAR(exr.at(24, 16)[3], 1 / (1 + std::exp(-4.0)), 0.01);
+    EXPECT_EQ(exr.at(0, 0)[3], 0.0f);
+    const Image depth = picture("depth", {"--format", "exr", "--mode", "depth"});
+    EXPECT_NEAR(depth.at(24, 16)[0], std::sqrt(17.0), 0.01);
+    const Image alpha = picture("alpha", {"--mode", "alpha"});
+    EXPECT_NEAR(alpha.at(24, 16)[0], 1 / (1 + std::exp(-4.0)), 0.01);
+    const Image white = picture("white", {"--background", "0.2,0.4,0.6"});
+    EXPECT_EQ(white.at(24, 16)[0], 1.0f);
+    EXPECT_NEAR(white.at(0, 0)[1], 0.4, 1.0 / 255);
+    const Image small = picture("small", {"--downscale", "2"});
+    EXPECT_EQ(small.width, 24);
+    const Outcome told = run_ewa({"render", folder / "bright.ply", "--cameras", folder / "data", "--frames",
+                                  "0", "--mode", "depth", "-o", folder / "told"});
+    EXPECT_NE(told.out.find("white is depth 4.1"), std::string::npos) << told.out;
+}
+
+TEST(Outputs, Eval) {
+    const Folder folder;
+    make_dataset(folder / "data");
+    make_splats(folder / "s.ply");
+    const Outcome outcome =
+        run_ewa({"eval", folder / "s.ply", folder / "data", "--split", "all", "--json", folder / "e/e.json"});
+    expect_success(outcome);
+    EXPECT_NE(outcome.out.find("mean of 4 frames"), std::string::npos) << outcome.out;
+    const auto json = read_json(folder / "e/e.json");
+    for (const char* key : {"psnr", "ssim", "frames", "seconds"}) EXPECT_TRUE(json.contains(key)) << key;
+    ASSERT_EQ(json["frames"].size(), 4u);
+    double sum = 0;
+    for (const auto& frame : json["frames"]) {
+        EXPECT_TRUE(frame["name"].is_string() && frame["ssim"].is_number());
+        sum += frame["psnr"].get<double>();
+    }
+    EXPECT_NEAR(json["psnr"].get<double>(), sum / 4, 1e-9);
+}
+
+TEST(Outputs, Grad) {
+    const Folder folder;
+    make_dataset(folder / "data");
+    make_splats(folder / "s.ply");
+    expect_success(run_ewa({"grad", folder / "s.ply", folder / "data", "--frame", "1", "-o", folder / "g.ply",
+                            "--json", folder / "g.json"}));
+    const auto json = read_json(folder / "g.json");
+    EXPECT_NEAR(json["loss"].get<double>(),
+                0.8 * json["l1"].get<double>() + 0.2 * (1 - json["ssim"].get<double>()), 1e-5);
+    EXPECT_TRUE(json.contains("frame"));
+    auto properties = [](const std::string& ply) {
+        return ply.substr(ply.find("element"), ply.find("end_header") - ply.find("element"));
+    };
+    EXPECT_EQ(properties(read_file(folder / "g.ply")), properties(read_file(folder / "s.ply")));
+    const Gaussians gradient = ewa::load_splats(folder / "g.ply");
+    EXPECT_EQ(gradient.size(), 50u);
+    double size = 0;
+    for (const float v : gradient.opacity_logits) size += std::abs(v);
+    EXPECT_GT(size, 0);
+}
+
+TEST(Outputs, Info) {
+    const Folder folder;
+    make_dataset(folder / "data");
+    make_splats(folder / "s.ply", 50, 2);
+    const Outcome text = run_ewa({"info", folder / "s.ply"});
+    expect_success(text);
+    EXPECT_NE(text.out.find("2 stored, 0 present"), std::string::npos) << text.out;
+    const Outcome splats = run_ewa({"info", folder / "s.ply", "--json"});
+    expect_success(splats);
+    const auto json = nlohmann::json::parse(splats.out);
+    EXPECT_EQ(json["splats"], 50);
+    EXPECT_EQ(json["sh_degree"], 2);
+    EXPECT_EQ(json["sh_degree_present"], 0);
+    EXPECT_EQ(json["nonfinite"], 0);
+    EXPECT_NEAR(json["scale"]["median"].get<double>(), std::exp(-2.0), 1e-6);
+    EXPECT_TRUE(json["plan"]["rendering"].is_array());
+
+    fs::remove(folder / "data/images/2.png");
+    const Outcome data = run_ewa({"info", folder / "data", "--json", "--test-every", "2"});
+    expect_success(data);
+    const auto dataset = nlohmann::json::parse(data.out);
+    EXPECT_EQ(dataset["frames"], 4);
+    EXPECT_EQ(dataset["missing_images"], 1);
+    EXPECT_EQ(dataset["test"], 2);
+    EXPECT_EQ(dataset["cameras"][0]["width"], 48);
+    expect_success(run_ewa({"info", folder / "data"}));
+}
+
+TEST(Outputs, InfoCountsWhatIsNotDrawn) {
+    const Folder folder;
+    make_splats(folder / "s.ply");
+    Gaussians splats = ewa::load_splats(folder / "s.ply");
+    splats.means[0] = std::numeric_limits<float>::quiet_NaN();
+    std::fill_n(&splats.quaternions[4], 4, 0.0f);
+    ewa::save_splats(folder / "s.ply", splats);
+    const Outcome outcome = run_ewa({"info", folder / "s.ply", "--json"});
+    expect_success(outcome);
+    EXPECT_EQ(nlohmann::json::parse(outcome.out)["nonfinite"], 2);
+}
+
+TEST(Outputs, Devices) {
+    const Outcome outcome = run_ewa({"devices", "--json"});
+    expect_success(outcome);
+    const auto json = nlohmann::json::parse(outcome.out);
+    ASSERT_FALSE(json.empty());
+    EXPECT_TRUE(json[0]["name"].is_string());
+    expect_success(run_ewa({"devices"}));
+}
+
+TEST(Outputs, PlacesThatCannotBeWritten) {
+    const Folder folder;
+    make_dataset(folder / "data");
+    make_splats(folder / "s.ply");
+    write_file(folder / "file", "in the way");
+    const std::string splats = folder / "s.ply", data = folder / "data";
+    expect_failure(run_ewa({"train", data, "--init", splats, "-o", folder / "file/out"}), 1, "file/out");
+    expect_failure(run_ewa({"train", data, "--init", splats, "-o", folder / "file"}), 1, "file");
+    expect_failure(run_ewa({"render", splats, "--cameras", data, "-o", folder / "file/out"}), 1, "file/out");
+    expect_failure(run_ewa({"grad", splats, data, "--frame", "0", "-o", folder / "file/g.ply"}), 1, "file");
+    expect_failure(run_ewa({"eval", splats, data, "--json", folder / "file/e.json"}), 1, "file");
+    EXPECT_EQ(read_file(folder / "file"), "in the way");
+}
+
+TEST(Outputs, StandardOutputThatIsFull) {
+    const Folder folder;
+    make_splats(folder / "s.ply");
+    Circumstances full;
+    full.out_path = "/dev/full";
+    expect_failure(run_ewa({"info", folder / "s.ply"}, full), 1, "standard output");
+}
+
+TEST(Outputs, FullDiskLeavesNoHalfFile) {
+    const Folder folder;
+    make_dataset(folder / "data");
+    make_splats(folder / "s.ply");
+    Circumstances full;
+    full.file_limit = 2048;
+    expect_failure(
+        run_ewa({"grad", folder / "s.ply", folder / "data", "--frame", "0", "-o", folder / "o/g.ply"}, full),
+        1, "g.ply");
+    EXPECT_EQ(files_below(folder / "o"), Names{});
+    expect_failure(run_ewa({"render", folder / "s.ply", "--cameras", folder / "data", "--format", "exr", "-o",
+                            folder / "r"},
+                           full),
+                   1, ".exr");
+    EXPECT_EQ(files_below(folder / "r"), Names{});
+}
+
+}  // namespace

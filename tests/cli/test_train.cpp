@@ -1,0 +1,137 @@
+// ewa train as a whole, on four small pictures.
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <sstream>
+
+#include "cli/expect.h"
+#include "ewa/splat_files.h"
+
+namespace {
+
+using namespace ewa::test;
+namespace fs = std::filesystem;
+using Names = std::vector<std::string>;
+
+class Train : public testing::Test {
+  protected:
+    void SetUp() override {
+        make_dataset(folder / "data");
+        make_splats(folder / "s.ply");
+    }
+    Outcome train(const std::string& out, const Names& more, const Circumstances& circumstances = {}) {
+        Names arguments{"train", folder / "data", "-o", folder / out, "--init", folder / "s.ply"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return run_ewa(arguments, circumstances);
+    }
+    Folder folder;
+};
+
+TEST_F(Train, WritesEverythingItPromises) {
+    const Outcome outcome =
+        train("o", {"--steps", "20", "--eval-every", "10", "--save-every", "5", "--seed", "7"});
+    expect_success(outcome);
+    EXPECT_NE(outcome.out.find("held-out PSNR"), std::string::npos) << outcome.out;
+    EXPECT_NE(outcome.out.find("report.html"), std::string::npos) << outcome.out;
+    EXPECT_EQ(files_below(folder / "o"), (Names{"config.json", "metrics.jsonl", "report.html", "splats.ply",
+                                                "summary.json", "test/0.png"}));
+
+    const auto summary = read_json(folder / "o/summary.json");
+    EXPECT_EQ(summary["steps"], 20);
+    EXPECT_EQ(summary["seed"], 7);
+    EXPECT_EQ(summary["interrupted"], false);
+    EXPECT_GT(summary["test_psnr"].get<double>(), 0);
+    EXPECT_GT(summary["train_psnr"].get<double>(), 0);
+    EXPECT_GT(summary["peak_host_bytes"].get<uint64_t>(), 1000000u);
+    EXPECT_GT(summary["peak_device_bytes"].get<uint64_t>(), 0u);
+    EXPECT_LE(summary["seconds"].get<double>(), summary["wall_seconds"].get<double>());
+    EXPECT_EQ(summary["splats"], ewa::load_splats(folder / "o/splats.ply").size());
+
+    std::istringstream metrics(read_file(folder / "o/metrics.jsonl"));
+    std::string line;
+    std::vector<int> steps, evaluated;
+    while (std::getline(metrics, line)) {
+        const auto json = nlohmann::json::parse(line);
+        EXPECT_TRUE(json["loss"].is_number());
+        steps.push_back(json["step"]);
+        if (json.contains("test_psnr")) evaluated.push_back(json["step"]);
+    }
+    EXPECT_EQ(steps.size(), 20u);
+    EXPECT_EQ(evaluated, (std::vector<int>{10, 20}));
+    EXPECT_NE(read_file(folder / "o/report.html").find("data:image/png;base64,"), std::string::npos);
+}
+
+TEST_F(Train, QuietIsQuiet) {
+    const Outcome outcome = train("o", {"--steps", "2", "--quiet"});
+    expect_success(outcome);
+    EXPECT_EQ(outcome.out, "");
+}
+
+TEST_F(Train, VerboseTellsThePlan) {
+    const Outcome outcome = train("o", {"--steps", "1", "--verbose"});
+    expect_success(outcome);
+    EXPECT_NE(outcome.out.find("left out:"), std::string::npos) << outcome.out;
+}
+
+TEST_F(Train, ConfigOfARunRepeatsIt) {
+    expect_success(
+        train("a", {"--steps", "15", "--seed", "3", "--antialias", "--background", "1,1,1", "--quiet"}));
+    expect_success(run_ewa({"train", "--config", folder / "a/config.json", "-o", folder / "b", "--quiet"}));
+    EXPECT_EQ(read_file(folder / "a/splats.ply"), read_file(folder / "b/splats.ply"));
+    EXPECT_EQ(read_file(folder / "a/config.json"), read_file(folder / "b/config.json"));
+    expect_success(run_ewa({"train", "--config", folder / "a/config.json", "-o", folder / "c", "--quiet",
+                            "--seed", "4", "--kernel", "peak"}));
+    EXPECT_EQ(read_json(folder / "c/config.json")["seed"], 4);
+    EXPECT_EQ(read_json(folder / "c/config.json")["kernel"], "peak");
+    EXPECT_EQ(read_json(folder / "c/config.json")["steps"], 15);
+    EXPECT_NE(read_file(folder / "a/splats.ply"), read_file(folder / "c/splats.ply"));
+}
+
+TEST_F(Train, WithoutATestSetItsFiguresAreNull) {
+    expect_success(train("o", {"--steps", "3", "--test-every", "0", "--quiet"}));
+    const auto summary = read_json(folder / "o/summary.json");
+    EXPECT_TRUE(summary["test_psnr"].is_null());
+    EXPECT_TRUE(summary["train_psnr"].is_number());
+}
+
+TEST_F(Train, StartsFromNothing) {
+    expect_success(
+        run_ewa({"train", folder / "data", "-o", folder / "o", "--init", "random", "--max-splats", "200",
+                 "--steps", "3", "--background", "random", "--strategy", "none", "--quiet"}));
+    EXPECT_EQ(ewa::load_splats(folder / "o/splats.ply").size(), 200u);
+}
+
+TEST_F(Train, MissingImagesAreTold) {
+    fs::remove(folder / "data/images/1.png");
+    const Outcome outcome = train("o", {"--steps", "2"});
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_NE(outcome.out.find("1 images are missing"), std::string::npos) << outcome.out;
+}
+
+TEST_F(Train, InterruptKeepsWhatIsThere) {
+    for (const int signal : {SIGINT, SIGTERM}) {
+        const std::string out = "o" + std::to_string(signal);
+        Circumstances interrupt;
+        interrupt.signal = signal;
+        interrupt.await_file = folder / (out + "/metrics.jsonl");
+        const Outcome outcome = train(out, {"--steps", "100000000", "--strategy", "none"}, interrupt);
+        EXPECT_EQ(outcome.status, 130) << outcome.err;
+        EXPECT_EQ(outcome.err, "");
+        const auto summary = read_json(folder / (out + "/summary.json"));
+        EXPECT_EQ(summary["interrupted"], true);
+        EXPECT_GE(summary["steps"].get<int>(), 1);
+        EXPECT_EQ(ewa::load_splats(folder / (out + "/splats.ply")).size(), 50u);
+    }
+}
+
+TEST_F(Train, FullDiskKeepsTheEarlierSplats) {
+    expect_success(train("o", {"--steps", "1", "--quiet"}));
+    const std::string before = read_file(folder / "o/splats.ply");
+    Circumstances full;
+    full.file_limit = 4096;
+    expect_failure(train("o", {"--steps", "2", "--quiet"}, full), 1, "splats.ply");
+    EXPECT_EQ(read_file(folder / "o/splats.ply"), before);
+    EXPECT_FALSE(fs::exists(folder / "o/summary.json"));
+}
+
+}  // namespace

@@ -1,0 +1,97 @@
+// Wrong use: exit status 2, one line, nothing written.
+#include <gtest/gtest.h>
+
+#include "cli/expect.h"
+
+namespace {
+
+using namespace ewa::test;
+
+TEST(Usage, HelpAndVersion) {
+    const Outcome version = run_ewa({"--version"});
+    EXPECT_EQ(version.status, 0);
+    EXPECT_EQ(version.out.rfind("ewa ", 0), 0u) << version.out;
+    for (const char* command : {"train", "render", "eval", "grad", "info", "devices"}) {
+        const Outcome help = run_ewa({command, "--help"});
+        expect_success(help);
+        EXPECT_NE(help.out.find("--"), std::string::npos) << command;
+    }
+    EXPECT_NE(run_ewa({"train", "--help"}).out.find("--max-splats"), std::string::npos);
+}
+
+struct WrongUse {
+    std::vector<std::string> arguments;
+    std::string text;
+};
+
+class WrongUseTest : public testing::TestWithParam<WrongUse> {};
+
+TEST_P(WrongUseTest, IsOneLineAndStatus2) {
+    const Outcome outcome = run_ewa(GetParam().arguments);
+    expect_failure(outcome, 2, GetParam().text);
+    EXPECT_EQ(outcome.out, "");
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Usage, WrongUseTest,
+    testing::Values(
+        WrongUse{{}, "subcommand"}, WrongUse{{"fly"}, "fly"}, WrongUse{{"train"}, "DATASET"},
+        WrongUse{{"train", "/nowhere", "--wings"}, "--wings"},
+        WrongUse{{"train", "/nowhere", "--steps", "0"}, "--steps"},
+        WrongUse{{"train", "/nowhere", "--steps", "-3"}, "--steps"},
+        WrongUse{{"train", "/nowhere", "--steps", "many"}, "--steps"},
+        WrongUse{{"train", "/nowhere", "--steps", "1e99"}, "--steps"},
+        WrongUse{{"train", "/nowhere", "--steps"}, "--steps"},
+        WrongUse{{"train", "/nowhere", "--sh-degree", "4"}, "--sh-degree"},
+        WrongUse{{"train", "/nowhere", "--downscale", "0"}, "--downscale"},
+        WrongUse{{"train", "/nowhere", "--test-every", "-1"}, "--test-every"},
+        WrongUse{{"train", "/nowhere", "--max-splats", "0"}, "--max-splats"},
+        WrongUse{{"train", "/nowhere", "--max-splats", "-1"}, "--max-splats"},
+        WrongUse{{"train", "/nowhere", "--seed", "-1"}, "--seed"},
+        WrongUse{{"train", "/nowhere", "--eval-every", "-1"}, "--eval-every"},
+        WrongUse{{"train", "/nowhere", "--save-every", "x"}, "--save-every"},
+        WrongUse{{"train", "/nowhere", "--strategy", "mcmc"}, "not available in this version; use adc"},
+        WrongUse{{"train", "/nowhere", "--strategy", "luck"}, "--strategy"},
+        WrongUse{{"train", "/nowhere", "--kernel", "box"}, "--kernel"},
+        WrongUse{{"train", "/nowhere", "--kernel", "ewa", "--antialias"}, "--antialias"},
+        WrongUse{{"train", "/nowhere", "--background", "1,1"}, "--background"},
+        WrongUse{{"train", "/nowhere", "--background", "1,nan,1"}, "--background"},
+        WrongUse{{"train", "/nowhere", "--background", "0,0,2"}, "--background"},
+        WrongUse{{"train", "/nowhere", "--quiet", "--verbose"}, "--verbose"},
+        WrongUse{{"train", "/nowhere", "--resume"}, "--resume"}, WrongUse{{"train", "/nowhere"}, "/nowhere"},
+        WrongUse{{"render", "/nowhere.ply"}, "--cameras"},
+        WrongUse{{"render", "/nowhere.ply", "--cameras", "/nowhere"}, "/nowhere.ply"},
+        WrongUse{{"render", "/a.ply", "--cameras", "/b", "--background", "random"}, "--background"},
+        WrongUse{{"render", "/a.ply", "--cameras", "/b", "--format", "gif"}, "--format"},
+        WrongUse{{"render", "/a.ply", "--cameras", "/b", "--mode", "smell"}, "--mode"},
+        WrongUse{{"eval", "/a.ply"}, "DATASET"},
+        WrongUse{{"eval", "/a.ply", "/b", "--split", "x"}, "--split"},
+        WrongUse{{"grad", "/a.ply", "/b", "--frame", "0"}, "--output"},
+        WrongUse{{"grad", "/a.ply", "/b", "-o", "/c.ply"}, "--frame"},
+        WrongUse{{"grad", "/a.ply", "/b", "--frame", "-1", "-o", "/c.ply"}, "--frame"},
+        WrongUse{{"grad", "/a.ply", "/b", "--frame", "0", "-o", "/c.txt"}, ".ply"},
+        WrongUse{{"info"}, "PATH"}, WrongUse{{"info", "/nowhere"}, "/nowhere"},
+        WrongUse{{"devices", "extra"}, "extra"}));
+
+TEST(Usage, ConfigNamesItsMistake) {
+    const Folder folder;
+    const std::string file = folder / "c.json";
+    const std::pair<const char*, const char*> cases[] = {{R"({"wings": 2})", "wings"},
+                                                         {R"({"steps": 0})", "--steps"},
+                                                         {R"({"steps": "many"})", "--steps"},
+                                                         {R"({"steps": {}})", "steps"},
+                                                         {R"([1])", "object"},
+                                                         {R"({"steps": 3)", "byte"},
+                                                         {R"({"config": "c.json"})", "config"},
+                                                         {R"({"strategy": "mcmc"})", "mcmc"}};
+    for (const auto& [text, mistake] : cases) {
+        write_file(file, text);
+        expect_failure(run_ewa({"train", "/nowhere", "--config", file}), 2, mistake);
+    }
+    expect_failure(run_ewa({"train", "/nowhere", "--config", folder / "absent.json"}), 2, "absent.json");
+    // The command line wins over the file, so its mistake does not count.
+    write_file(file, R"({"steps": 0, "dataset": "/elsewhere"})");
+    expect_failure(run_ewa({"train", "/nowhere", "--steps", "5", "--config", file}), 2, "/nowhere");
+}
+
+}  // namespace

@@ -1,0 +1,194 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <limits>
+
+#include "ewa/error.h"
+#include "report/chart.h"
+#include "report/html.h"
+#include "report/pictures.h"
+#include "report/summary.h"
+
+namespace {
+
+using namespace ewa;
+using namespace ewa::report;
+
+TEST(Report, SummaryHasTheKeysThatScriptsRead) {
+    Summary summary;
+    summary.steps = 200;
+    summary.seconds = 4;
+    summary.test_psnr = 21.5;
+    summary.seed = std::numeric_limits<uint64_t>::max();
+    const Json json = to_json(summary);
+    for (const char* key :
+         {"steps", "seconds", "seconds_per_step", "splats", "test_psnr", "test_ssim", "train_psnr", "device",
+          "peak_device_bytes", "peak_host_bytes", "seed", "skipped_nonfinite", "wall_seconds",
+          "dropped_updates", "version", "command", "strategy"})
+        EXPECT_TRUE(json.contains(key)) << key;
+    EXPECT_DOUBLE_EQ(json["seconds_per_step"].get<double>(), 0.02);
+    EXPECT_EQ(json["seed"].get<uint64_t>(), std::numeric_limits<uint64_t>::max());
+    EXPECT_TRUE(json["test_ssim"].is_null());
+}
+
+TEST(Report, FiguresThatDoNotExistAreNull) {
+    Summary summary;
+    summary.test_psnr = std::numeric_limits<double>::infinity();
+    const Json json = to_json(summary);
+    EXPECT_TRUE(json["test_psnr"].is_null());
+    EXPECT_TRUE(json["seconds_per_step"].is_null());
+    EXPECT_NO_THROW(static_cast<void>(Json::parse(json.dump())));
+}
+
+TEST(Report, MetricsHaveTestFiguresOnlyWhereEvaluated) {
+    MetricsLine line;
+    line.step = 3;
+    const Json plain = to_json(line);
+    for (const char* key : {"step", "seconds", "wall_seconds", "loss", "splats"})
+        EXPECT_TRUE(plain.contains(key)) << key;
+    EXPECT_FALSE(plain.contains("test_psnr"));
+    line.test_psnr = 20;
+    line.test_ssim = 0.5;
+    EXPECT_EQ(to_json(line)["test_psnr"], 20);
+    EXPECT_EQ(to_json(line)["test_ssim"], 0.5);
+}
+
+TEST(Report, MetricsLogCanBeReadWhileItGrows) {
+    const auto path = std::filesystem::temp_directory_path() / "ewa_test_metrics.jsonl";
+    {
+        MetricsLog log(path);
+        for (int step = 1; step <= 2; ++step) {
+            MetricsLine line;
+            line.step = step;
+            log.append(line);
+            std::ifstream file(path);
+            std::string text;
+            int lines = 0;
+            while (std::getline(file, text)) EXPECT_EQ(Json::parse(text)["step"], ++lines);
+            EXPECT_EQ(lines, step);
+        }
+    }
+    std::filesystem::remove(path);
+}
+
+TEST(Report, MetricsLogSaysWhenTheDiskIsFull) {
+    MetricsLog log("/dev/full");
+    EXPECT_THROW(log.append({}), RunError);
+    EXPECT_THROW(MetricsLog("/nowhere/at/all/metrics.jsonl"), RunError);
+}
+
+TEST(Report, HtmlEscapes) {
+    EXPECT_EQ(escape_html("<a href=\"x\">&'\x01"), "&lt;a href=&quot;x&quot;&gt;&amp;&#39;");
+    EXPECT_EQ(escape_html("größe"), "größe");
+}
+
+TEST(Report, ShortNumbers) {
+    EXPECT_EQ(short_number(0), "0");
+    EXPECT_EQ(short_number(1234), "1.23k");
+    EXPECT_EQ(short_number(2.5e9), "2.5G");
+    EXPECT_EQ(short_number(-0.25), "-0.25");
+}
+
+ReportData made_up_data() {
+    ReportData data;
+    data.title = "<script>alert(1)</script>";
+    data.summary.steps = 100;
+    data.summary.command = "ewa train 'a & b'";
+    data.summary.version = "9.8.7";
+    data.summary.device = "llvmpipe <x>";
+    for (int i = 1; i <= 100; ++i) {
+        MetricsLine line;
+        line.step = i;
+        line.wall_seconds = i * 0.5;
+        line.loss = i == 50 ? std::numeric_limits<double>::quiet_NaN() : 1.0 / i;
+        line.splats = 1000 + 10 * i;
+        if (i % 10 == 0) line.test_psnr = 20 + i * 0.1;
+        data.metrics.push_back(line);
+    }
+    data.pass_times = {{"project", 1.5}, {"blend", 4.5}};
+    data.plan = {{"SH buffers", "no view-dependent colour", 45000000}};
+    data.remarks = {"3 images are missing and left out"};
+    data.settings = {{"steps", "100"}};
+    ReportPicture picture;
+    picture.name = "a\"b.jpg";
+    picture.photograph = Image(16, 12, 3);
+    picture.rendering = Image(16, 12, 3);
+    picture.psnr = 23.456;
+    data.pictures.push_back(picture);
+    return data;
+}
+
+TEST(Report, HtmlHoldsEverythingAndNothingFromOutside) {
+    const std::string html = html_report(made_up_data());
+    for (const char* part : {"&lt;script&gt;", "ewa train &#39;a &amp; b&#39;", "9.8.7", "llvmpipe &lt;x&gt;",
+                             "a&quot;b.jpg", "23.46 dB", "data:image/png;base64,iVBORw0KGgo", "<svg",
+                             "project", "SH buffers", "no view-dependent colour", "3 images are missing",
+                             "PSNR of held-out views", "prefers-color-scheme: dark"})
+        EXPECT_NE(html.find(part), std::string::npos) << part;
+    for (const char* part : {"<script", "http://", "https://", "url(", "<link", "nan", "@import"})
+        EXPECT_EQ(html.find(part), std::string::npos) << part;
+}
+
+TEST(Report, HtmlOfARunWithoutAnything) {
+    const std::string html = html_report({});
+    EXPECT_EQ(html.find("<svg"), std::string::npos);
+    EXPECT_NE(html.find("</html>"), std::string::npos);
+}
+
+TEST(Report, ChartNeedsTwoFinitePoints) {
+    Chart chart{"t", "x", "y", {{0, 1}}, false, false};
+    EXPECT_EQ(chart_svg(chart), "");
+    chart.points.push_back({1, std::numeric_limits<double>::infinity()});
+    EXPECT_EQ(chart_svg(chart), "");
+    chart.points.push_back({2, 1});  // a flat line has no extent of its own
+    EXPECT_NE(chart_svg(chart).find("<polyline"), std::string::npos);
+}
+
+TEST(Report, Base64) {
+    auto encode = [](std::string_view text) { return base64({text.begin(), text.end()}); };
+    EXPECT_EQ(encode(""), "");
+    EXPECT_EQ(encode("f"), "Zg==");
+    EXPECT_EQ(encode("fo"), "Zm8=");
+    EXPECT_EQ(encode("foobar"), "Zm9vYmFy");  // RFC 4648, section 10
+}
+
+TEST(Report, ErrorMapIsDarkWhereEqualAndBrightWhereNot) {
+    Image a(2, 1, 3), b(2, 1, 3);
+    for (int c = 0; c < 3; ++c) b.at(1, 0)[c] = 1;
+    const Image map = error_map(a, b, 0.25);
+    EXPECT_LT(map.at(0, 0)[0], 0.05f);
+    EXPECT_GT(map.at(1, 0)[0], 0.9f);
+    EXPECT_GT(map.at(1, 0)[1], 0.9f);
+}
+
+std::vector<std::string> names_of(const std::vector<std::string>& frame_names) {
+    std::vector<Frame> frames;
+    for (const std::string& name : frame_names) {
+        frames.emplace_back();
+        frames.back().name = name;
+    }
+    std::vector<std::string> names;
+    for (const auto& path : picture_names(frames)) names.push_back(path.string());
+    return names;
+}
+
+TEST(Report, PictureNamesAreStems) {
+    using Names = std::vector<std::string>;
+    EXPECT_EQ(names_of({"0001.jpg", "0002.jpg"}), (Names{"0001", "0002"}));
+    EXPECT_EQ(names_of({"images/1.jpg", "images/2.jpg"}), (Names{"1", "2"}));
+    EXPECT_EQ(names_of({"a.b.jpg"}), (Names{"a.b"}));
+    EXPECT_EQ(names_of({"r_1"}), (Names{"r_1"}));
+}
+
+TEST(Report, PictureNamesNeverCollideNorEscape) {
+    using Names = std::vector<std::string>;
+    EXPECT_EQ(names_of({"left/1.jpg", "right/1.jpg"}), (Names{"left/1", "right/1"}));
+    EXPECT_EQ(names_of({"1.jpg", "1.png"}), (Names{"1.jpg", "1.png"}));
+    EXPECT_EQ(names_of({"1.jpg", "1.jpg"}), (Names{"1.jpg", "1.jpg-2"}));
+    EXPECT_EQ(names_of({"../../etc/1.jpg", "/2.jpg"}), (Names{"etc/1", "2"}));
+    EXPECT_EQ(names_of({"a\\1.jpg", "b\\1.jpg"}), (Names{"a/1", "b/1"}));
+    EXPECT_EQ(names_of({"", ".."}), (Names{"frame", "frame-2"}));
+}
+
+}  // namespace
