@@ -27,8 +27,19 @@ void add_draw_options(CLI::App& app, DrawArguments& arguments, bool random_backg
 /// --device and --validation.
 void add_device_options(CLI::App& app, DeviceOptions& options);
 
+/// For a number from low to high; the help shows it as type_name("N") instead of the range.
+template <typename T>
+CLI::Validator in_range(T low, T high) {
+    return CLI::Range(low, high).description("");
+}
+
 void add_downscale_option(CLI::App& app, int& downscale);
 void add_test_every_option(CLI::App& app, int& test_every);
+
+/// The cameras of a dataset whose photographs need not be there. Where some are, frames without one are left
+/// out, as training leaves them out: otherwise they would shift which frames are held out.
+/// Dataset::missing_images counts them.
+Dataset load_cameras_as_trained(const std::filesystem::path& path, int downscale);
 
 /// Indices of frames for "all", "train", "test" or a list like "0,3,7" in name order. Throws InputError, also
 /// when there are none.

@@ -11,6 +11,7 @@
 #include <csignal>
 #include <fstream>
 #include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
 #include <iterator>
 #include <numbers>
 #include <stdexcept>
