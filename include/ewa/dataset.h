@@ -47,14 +47,16 @@ struct DatasetOptions {
     bool need_images = true;              // false: cameras alone; frames without a file are kept where the size is known
 };
 
-/// A folder with sparse/0 (COLMAP .bin or .txt) and images/, a folder or file with transforms.json
-/// (transforms_train.json and transforms_test.json also). World coordinates and camera axes come out in the OpenCV
-/// convention; the world frame is the file's own. With need_images, frames without a file are left out and counted,
-/// and every other file's size is checked against the model. Throws InputError.
+/// A folder with a COLMAP model (.bin or .txt, in sparse/0, sparse or the folder itself) and images/, else a folder with
+/// transforms.json or transforms_train.json and transforms_test.json, or one of these files (src/io/transforms.h has the
+/// dialects). World coordinates and camera axes come out in the OpenCV convention; the world frame is the file's own.
+/// With need_images, frames without a file are left out and counted, and every other file's size is checked against the
+/// model: it is the model's, or the model's resized by one factor, which the intrinsics then follow. Throws InputError.
 Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& options);
 
-/// The frame's picture as the pinhole `frame.camera` sees it: undistorted (bilinear) and downscaled as the frame says.
-/// 3 or 4 channels. Throws InputError.
+/// The frame's picture as the pinhole `frame.camera` sees it: undistorted (bilinear, cropped and stretched to the file's
+/// size so that no pixel is blank, src/scene/undistort.h) and downscaled as the frame says. 3 or 4 channels. Throws
+/// InputError.
 Image load_frame_image(const Frame& frame);
 
 /// Indices of train and test frames: a frame's own split where the dataset has one, else test where its index in

@@ -12,6 +12,7 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/image.h"
+#include "image/integrity.h"
 
 namespace ewa {
 
@@ -26,11 +27,14 @@ constexpr uint64_t kMaxCompression = 5000;
     throw InputError(core::one_line(path.string() + ": not a readable image: " + reason));
 }
 
-std::unique_ptr<OIIO::ImageInput> open_image(const std::filesystem::path& path) {
+/// whole: the pixels will be read too, so they have to be there.
+std::unique_ptr<OIIO::ImageInput> open_image(const std::filesystem::path& path, bool whole) {
     std::error_code error;
     const std::filesystem::file_status status = std::filesystem::status(path, error);
     if (!std::filesystem::exists(status)) fail(path, "there is no such file");
     if (!std::filesystem::is_regular_file(status)) fail(path, "it is not a regular file");
+    image::check_png(path, whole);
+    if (whole) image::check_jpeg(path);
     // Colour stays as the file has it; OpenImageIO would multiply it by alpha.
     OIIO::ImageSpec request;
     request.attribute("oiio:UnassociatedAlpha", 1);
@@ -92,12 +96,12 @@ std::vector<unsigned char> encode(const std::filesystem::path& path, const Image
 }  // namespace
 
 ImageSize read_image_size(const std::filesystem::path& path) {
-    const auto input = open_image(path);
+    const auto input = open_image(path, false);
     return {input->spec().width, input->spec().height};
 }
 
 Image load_image(const std::filesystem::path& path) try {
-    const auto input = open_image(path);
+    const auto input = open_image(path, true);
     const OIIO::ImageSpec& spec = input->spec();
     // Grey, grey and alpha, RGB, RGBA; whatever else a file has (depth, ids) is not colour. The EXIF
     // orientation is left alone, as the reconstruction tools leave it: the cameras belong to the pixels as

@@ -35,7 +35,10 @@ void record_loss(gpu::Recording& recording, Kernels& kernels, const Frame& frame
                                 float(-shared::SSIM_WEIGHT * share),
                                 float((1 - shared::SSIM_WEIGHT) * share)};
     kernels.get<passes::UnpackTarget>().record(recording, shape, {photo, frame.target},
-                                               {{background[0], background[1], background[2]}, {camera.width, camera.height}, s.stride, s.plane_floats});
+                                               {{background[0], background[1], background[2]},
+                                                {camera.width, camera.height},
+                                                s.stride,
+                                                s.plane_floats});
     kernels.get<passes::LossColumns>().record(recording, shape, {frame.planes, frame.target, frame.moments},
                                               push);
     kernels.get<passes::LossRows>().record(recording, shape,

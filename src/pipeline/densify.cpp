@@ -8,8 +8,8 @@
 namespace ewa::pipeline {
 namespace {
 
-shared::DensifyPush push_of(const Model& model, const Frame& frame, const DensifyRules& rules, float threshold,
-                            uint32_t new_capacity) {
+shared::DensifyPush push_of(const Model& model, const Frame& frame, const DensifyRules& rules,
+                            float threshold, uint32_t new_capacity) {
     return {model.splats,
             model.capacity,
             new_capacity,
@@ -29,13 +29,15 @@ uint32_t count_outputs(Kernels& kernels, gpu::Executor& executor, const Model& m
     kernels.get<passes::DensifyDecide>().record(recording, kernels.shape(),
                                                 {model.params, model.statistics, frame.tile_counts},
                                                 push_of(model, frame, rules, threshold, 0));
-    record_scan(recording, kernels, {frame.tile_counts, nullptr, frame.prefix, frame.scan_totals, frame.counts},
-                model.splats, frame.sizes.scan_block, Total::densified, "densify offsets");
+    record_scan(recording, kernels,
+                {frame.tile_counts, nullptr, frame.prefix, frame.scan_totals, frame.counts}, model.splats,
+                frame.sizes.scan_block, Total::densified, "densify offsets");
     executor.run(recording);
     return frame.read_counts().densified;
 }
 
-/// The lowest threshold, at least the rules' own, whose generation fits under the cap; infinity where none does.
+/// The lowest threshold, at least the rules' own, whose generation fits under the cap; infinity where none
+/// does.
 float fitting_threshold(Kernels& kernels, gpu::Executor& executor, const Model& model, const Frame& frame,
                         const DensifyRules& rules) {
     const float never = std::numeric_limits<float>::infinity();
@@ -72,8 +74,8 @@ DensifyResult densify(Kernels& kernels, gpu::Executor& executor, Model& model, F
     gpu::Recording recording(device.limits());
     kernels.get<passes::DensifyWrite>(uint32_t(model.sh_degree))
         .record(recording, kernels.shape(),
-                {model.params, model.moments1, model.moments2, model.statistics, frame.prefix, frame.scan_totals,
-                 next.params, next.moments1, next.moments2},
+                {model.params, model.moments1, model.moments2, model.statistics, frame.prefix,
+                 frame.scan_totals, next.params, next.moments1, next.moments2},
                 push_of(model, frame, rules, threshold, after));
     executor.run(recording);
     next.statistics = gpu::Buffer(device, "statistics", uint64_t(after) * 8);

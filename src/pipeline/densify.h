@@ -10,21 +10,21 @@
 namespace ewa::pipeline {
 
 struct DensifyRules {
-    float grow_gradient = 0;   // threshold of the mean gradient norm
-    float split_scale = 0;     // world units
+    float grow_gradient = 0;  // threshold of the mean gradient norm
+    float split_scale = 0;    // world units
     float prune_logit = 0;
-    float prune_scale = 0;     // world units; 0: scale does not prune
+    float prune_scale = 0;  // world units; 0: scale does not prune
     uint64_t seed = 0;
     uint32_t step = 0;
-    uint32_t max_splats = 0;   // hard cap; the threshold is raised until the next generation fits under it
+    uint32_t max_splats = 0;  // hard cap; the threshold is raised until the next generation fits under it
 };
 
 struct DensifyResult {
     uint32_t before = 0, after = 0;
 };
 
-/// Replaces the model's buffers. frame: for its scratch buffers and counts. Statistics stand at zero afterwards. A
-/// next generation without a single splat is not written: the model stays as it is.
+/// Replaces the model's buffers. frame: for its scratch buffers and counts. Statistics stand at zero
+/// afterwards. A next generation without a single splat is not written: the model stays as it is.
 DensifyResult densify(Kernels& kernels, gpu::Executor& executor, Model& model, Frame& frame,
                       const DensifyRules& rules);
 

@@ -8,7 +8,8 @@ namespace ewa::pipeline {
 namespace {
 
 template <class Value, class Convert>
-gpu::Buffer upload_texels(gpu::Device& device, const Image& image, gpu::Texel texel, Value opaque, Convert convert) {
+gpu::Buffer upload_texels(gpu::Device& device, const Image& image, gpu::Texel texel, Value opaque,
+                          Convert convert) {
     const size_t pixels = size_t(image.width) * size_t(image.height), channels = size_t(image.channels);
     std::vector<Value> texels(4 * pixels, opaque);
     for (size_t i = 0; i < pixels; ++i)

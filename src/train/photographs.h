@@ -12,7 +12,8 @@ namespace ewa::train {
 class Photographs {
   public:
     /// Loads and uploads every frame's picture. Throws InputError that names the frame.
-    Photographs(gpu::Device& device, const passes::Shape& shape, const Dataset& dataset, const std::vector<int>& frames);
+    Photographs(gpu::Device& device, const passes::Shape& shape, const Dataset& dataset,
+                const std::vector<int>& frames);
 
     size_t count() const { return photos_.size(); }
     const gpu::Buffer& photo(size_t i) const { return photos_[i]; }
@@ -31,8 +32,8 @@ class Photographs {
     uint32_t max_width_ = 0, max_height_ = 0;
 };
 
-/// The frame of a step (from 1): each photograph once an epoch, every epoch in an order of its own, a pure function of
-/// the seed.
+/// The frame of a step (from 1): each photograph once an epoch, every epoch in an order of its own, a pure
+/// function of the seed.
 size_t frame_of_step(int step, size_t count, uint64_t seed);
 
 }  // namespace ewa::train

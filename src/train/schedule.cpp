@@ -7,9 +7,9 @@ namespace ewa::train {
 namespace {
 
 constexpr double kFullRun = 30000;
-constexpr int kLeastRefineEvery = 50;        // steps: about one look at each photograph of a small capture
-constexpr int kLeastResetEvery = 1000;       // steps
-constexpr int kLeastShEvery = 50;            // steps
+constexpr int kLeastRefineEvery = 50;   // steps: about one look at each photograph of a small capture
+constexpr int kLeastResetEvery = 1000;  // steps
+constexpr int kLeastShEvery = 50;       // steps
 
 }  // namespace
 
@@ -21,9 +21,13 @@ bool Schedule::resets_opacity(int step) const {
     return opacity_reset_every > 0 && step < refine_stop && step % opacity_reset_every == 0;
 }
 
-bool Schedule::was_reset(int step) const { return opacity_reset_every > 0 && step > opacity_reset_every; }
+bool Schedule::was_reset(int step) const {
+    return opacity_reset_every > 0 && step > opacity_reset_every;
+}
 
-int Schedule::degree(int step) const { return std::min(sh_degree, (step - 1) / sh_degree_every); }
+int Schedule::degree(int step) const {
+    return std::min(sh_degree, (step - 1) / sh_degree_every);
+}
 
 double Schedule::mean_rate(int step, double extent) const {
     const double t = std::clamp(double(step) / steps, 0.0, 1.0);
@@ -32,14 +36,17 @@ double Schedule::mean_rate(int step, double extent) const {
 
 Schedule schedule_for(const TrainOptions& options) {
     const double share = std::min(1.0, options.steps / kFullRun);
-    const auto scaled = [&](int steps, int least) { return std::max(int(std::lround(steps * share)), least); };
+    const auto scaled = [&](int steps, int least) {
+        return std::max(int(std::lround(steps * share)), least);
+    };
     Schedule s;
     s.steps = options.steps;
     s.refine_every = scaled(options.refine_every, std::min(options.refine_every, kLeastRefineEvery));
     s.refine_start = scaled(options.refine_start, std::min(options.refine_start, 2 * kLeastRefineEvery));
     s.refine_stop = scaled(options.refine_stop, 1);
     if (options.opacity_reset_every > 0)
-        s.opacity_reset_every = scaled(options.opacity_reset_every, std::min(options.opacity_reset_every, kLeastResetEvery));
+        s.opacity_reset_every =
+            scaled(options.opacity_reset_every, std::min(options.opacity_reset_every, kLeastResetEvery));
     s.sh_degree_every = scaled(options.sh_degree_every, std::min(options.sh_degree_every, kLeastShEvery));
     s.sh_degree = options.sh_degree;
     s.means_rate = options.means_rate;

@@ -1,8 +1,8 @@
 // When a run does what: pure functions of the step and the options.
 //
-// The intervals of TrainOptions are those of a 30,000 step run. A shorter run keeps their proportions as far as
-// sense allows: a densification needs statistics over many views, and an opacity reset needs a few hundred steps to
-// heal, so both have a floor below which they do not shrink.
+// The intervals of TrainOptions are those of a 30,000 step run. A shorter run keeps their proportions as far
+// as sense allows: a densification needs statistics over many views, and an opacity reset needs a few hundred
+// steps to heal, so both have a floor below which they do not shrink.
 #pragma once
 #include <cstdint>
 
@@ -15,8 +15,8 @@ struct Schedule {
     int refine_start = 0, refine_stop = 0, refine_every = 0;  // steps
     int opacity_reset_every = 0;                              // 0: never
     int sh_degree_every = 0;
-    int sh_degree = 0;                                        // the highest
-    double means_rate = 0, means_rate_final = 0;              // per unit of scene extent
+    int sh_degree = 0;                            // the highest
+    double means_rate = 0, means_rate_final = 0;  // per unit of scene extent
 
     /// Densify after this step (steps count from 1)?
     bool densifies(int step) const;
@@ -25,8 +25,8 @@ struct Schedule {
     bool was_reset(int step) const;
     /// SH degree evaluated in this step.
     int degree(int step) const;
-    /// Learning rate of the means: exponential from means_rate to means_rate_final over the run (Plenoxels' decay, as
-    /// 3DGS uses it), times the scene extent.
+    /// Learning rate of the means: exponential from means_rate to means_rate_final over the run (Plenoxels'
+    /// decay, as 3DGS uses it), times the scene extent.
     double mean_rate(int step, double extent) const;
 };
 

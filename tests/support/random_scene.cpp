@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <glm/vec2.hpp>
 #include <numbers>
 
 namespace ewa::test {
@@ -30,9 +31,14 @@ int Random::integer(int low, int high) {
 
 namespace {
 
+// Braces, where parentheses would leave the order of the draws to the compiler.
+glm::dvec3 random_direction(Random& random) {
+    return glm::normalize(glm::dvec3{random.normal(), random.normal(), random.normal()});
+}
+
 glm::dmat3 random_rotation(Random& random) {
-    const glm::dvec3 x = glm::normalize(glm::dvec3(random.normal(), random.normal(), random.normal()));
-    const glm::dvec3 other(random.normal(), random.normal(), random.normal());
+    const glm::dvec3 x = random_direction(random);
+    const glm::dvec3 other = random_direction(random);
     const glm::dvec3 y = glm::normalize(other - x * glm::dot(x, other));
     return glm::dmat3(x, y, glm::cross(x, y));
 }
@@ -44,9 +50,9 @@ struct Shape {
 };
 
 /// A point that lands at a share of the picture's size, at a depth.
-glm::dvec3 behind_pixel(const Camera& camera, double share_x, double share_y, double z) {
-    return {(share_x * camera.width - camera.cx) / camera.fx * z,
-            (share_y * camera.height - camera.cy) / camera.fy * z, z};
+glm::dvec3 behind_pixel(const Camera& camera, const glm::dvec2& share, double z) {
+    return {(share.x * camera.width - camera.cx) / camera.fx * z,
+            (share.y * camera.height - camera.cy) / camera.fy * z, z};
 }
 
 Shape random_shape(Random& random, SplatKind kind, const Camera& camera) {
@@ -55,7 +61,7 @@ Shape random_shape(Random& random, SplatKind kind, const Camera& camera) {
     // World units a pixel spans at depth z.
     const double pixel = z / std::min(camera.fx, camera.fy);
     const double side = std::min(camera.width, camera.height);
-    shape.view = behind_pixel(camera, random.uniform(-0.1, 1.1), random.uniform(-0.1, 1.1), z);
+    shape.view = behind_pixel(camera, {random.uniform(-0.1, 1.1), random.uniform(-0.1, 1.1)}, z);
     const double size = pixel * std::exp(random.uniform(std::log(0.8), std::log(std::max(1.6, 0.2 * side))));
     for (int k = 0; k < 3; ++k) shape.scale[k] = size * std::exp(random.uniform(-0.7, 0.7));
     shape.opacity = random.uniform(0.1, 0.95);
@@ -75,7 +81,7 @@ Shape random_shape(Random& random, SplatKind kind, const Camera& camera) {
             z = 0.02 * std::exp(random.uniform(0, 3));
             const bool left = random.uniform() < 0.5;
             const double beyond = random.uniform(0, 0.3);
-            shape.view = behind_pixel(camera, left ? -beyond : 1 + beyond, random.uniform(-0.2, 1.2), z);
+            shape.view = behind_pixel(camera, {left ? -beyond : 1 + beyond, random.uniform(-0.2, 1.2)}, z);
             shape.scale *= z / (pixel * std::min(camera.fx, camera.fy));
             break;
         }

@@ -47,6 +47,10 @@ TEST(ReferenceAdam, NotFiniteIsDroppedAndCounted) {
     EXPECT_NEAR(values[3], 3.9, 1e-12);
     EXPECT_EQ(state.m[0], 0);
     EXPECT_EQ(state.v[1], 0);
+    // Finite, but its square is not: v would be stuck at infinity and the value never move again.
+    EXPECT_EQ(adam_step(values, std::vector<double>{1e200, 0, 0, 0}, state, 0.1, 2), 1u);
+    EXPECT_EQ(state.v[0], 0);
+    EXPECT_EQ(state.m[0], 0);
 }
 
 }  // namespace

@@ -106,7 +106,10 @@ TEST(ReferenceChain, SkippedSplatsChangeNothing) {
         for (double g : *array) EXPECT_TRUE(std::isfinite(g));
     EXPECT_EQ(with.gradient.means[60], 0);
     EXPECT_EQ(with.in_view[20], 0);
-    EXPECT_EQ(with.in_view.size(), 22u);
+    ASSERT_EQ(with.in_view.size(), 22u);
+    const TileGrid whole{camera.width, camera.height, camera.width, camera.height};
+    for (size_t i = 0; i < 22; ++i)
+        EXPECT_EQ(with.in_view[i] != 0, !covered_tiles(with.picture.projected[i], whole).empty()) << i;
 }
 
 TEST(ReferenceChain, ExtremesStayFinite) {

@@ -1,0 +1,28 @@
+// A scene's pictures against photographs.
+#include <chrono>
+
+#include "ewa/error.h"
+#include "ewa/trainer.h"
+
+namespace ewa {
+
+Evaluation evaluate(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians, const Dataset& dataset,
+                    const std::vector<int>& frames, const RenderOptions& options) {
+    const auto start = std::chrono::steady_clock::now();
+    Renderer renderer(std::move(device), gaussians, options);
+    Evaluation result;
+    for (const int index : frames) {
+        const Frame& frame = dataset.frames[size_t(index)];
+        const Image photo = over_background(load_frame_image(frame), options.background);
+        const Image picture = renderer.render(frame.camera).color;
+        if (photo.width != picture.width || photo.height != picture.height)
+            throw InputError("frame " + frame.name + ": the picture's size is not the camera's");
+        result.frames.push_back({frame.name, psnr(picture, photo), ssim(picture, photo)});
+        result.psnr += result.frames.back().psnr / double(frames.size());
+        result.ssim += result.frames.back().ssim / double(frames.size());
+    }
+    result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return result;
+}
+
+}  // namespace ewa

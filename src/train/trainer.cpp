@@ -1,0 +1,178 @@
+// The training loop's one step: which photograph, which rates, one submission, and what follows it on
+// schedule.
+#include "ewa/trainer.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <deque>
+#include <map>
+
+#include "core/random.h"
+#include "ewa/error.h"
+#include "gpu/executor.h"
+#include "pipeline/backward.h"
+#include "pipeline/capacity.h"
+#include "pipeline/densify.h"
+#include "train/photographs.h"
+#include "train/schedule.h"
+
+namespace ewa {
+namespace {
+
+using namespace pipeline;
+using Clock = std::chrono::steady_clock;
+
+constexpr size_t kTimedSteps = 100;     // steps whose pass times the medians are taken over
+constexpr double kResetOpacity = 0.01;  // 3DGS: opacities after a reset are at most this
+
+double logit(double p) {
+    return std::log(p / (1 - p));
+}
+
+std::array<float, 3> random_background(int step, uint64_t seed) {
+    const auto u = core::uniform4({uint32_t(step), 0x62636b67u, uint32_t(seed), uint32_t(seed >> 32)});
+    return {float(u[0]), float(u[1]), float(u[2])};
+}
+
+}  // namespace
+
+struct Trainer::State {
+    std::shared_ptr<gpu::Device> device;
+    TrainOptions options;
+    train::Schedule schedule;
+    double extent;
+    Kernels kernels;
+    gpu::Executor executor;
+    Plan plan;
+    Model model;
+    pipeline::Frame frame;
+    train::Photographs photographs;
+    uint32_t instance_room;
+    StepReport report;
+    std::deque<std::vector<gpu::Timing>> timings;
+
+    State(std::shared_ptr<gpu::Device> d, const Dataset& dataset, const std::vector<int>& frames,
+          const Gaussians& start, const TrainOptions& o)
+        : device(std::move(d)),
+          options(o),
+          schedule(train::schedule_for(o)),
+          extent(scene_extent(dataset, frames)),
+          kernels(*device),
+          executor(*device),
+          plan(plan_training(start.sh_degree, o.render, o.strategy == Strategy::adc)),
+          model(upload_model(*device, start, 2, plan.statistics)),
+          photographs(*device, kernels.shape(), dataset, frames),
+          instance_room(first_capacity(start.size())) {
+        report.splats = model.splats;
+    }
+
+    Rates rates(int step) const {
+        Rates r;
+        r.mean = float(schedule.mean_rate(step, extent));
+        r.opacity = float(options.opacity_rate);
+        r.quaternion = float(options.quaternion_rate);
+        r.scale = float(options.scale_rate);
+        r.sh0 = float(options.sh0_rate);
+        r.sh_rest = float(options.sh_rest_rate);
+        r.step = uint32_t(step);
+        return r;
+    }
+
+    void optimise(int step) {
+        const size_t index = train::frame_of_step(step, photographs.count(), options.seed);
+        const CameraUse camera = photographs.camera(index);
+        const auto background =
+            options.random_background ? random_background(step, options.seed) : options.render.background;
+        plan.sh_degree = std::min(plan.stored_degree, schedule.degree(step));
+        const shared::Counts counts = run_until_it_fits(
+            kernels, executor, frame, {model.splats, camera.width, camera.height, instance_room, true, false},
+            [&](gpu::Recording& recording) {
+                const Sorted sorted =
+                    record_forward(recording, kernels, plan, model, frame, camera, background);
+                record_loss(recording, kernels, frame, camera, background, photographs.photo(index));
+                record_backward(recording, kernels, plan, model, frame, camera, background, sorted,
+                                rates(step));
+            });
+        instance_room = frame.instance_capacity;
+        report.loss = loss_of(counts);
+        report.skipped_nonfinite = counts.skipped_nonfinite;
+        report.dropped_updates += counts.dropped_updates;
+        timings.push_back(executor.timings());
+        if (timings.size() > kTimedSteps) timings.pop_front();
+    }
+
+    void follow_up(int step) {
+        if (options.strategy != Strategy::adc) return;
+        if (schedule.densifies(step)) {
+            DensifyRules rules;
+            rules.grow_gradient = float(options.grow_gradient);
+            rules.split_scale = float(options.split_scale * extent);
+            rules.prune_logit = float(logit(options.prune_opacity));
+            rules.prune_scale = schedule.was_reset(step) ? float(options.prune_scale * extent) : 0.0f;
+            rules.seed = options.seed;
+            rules.step = uint32_t(step);
+            rules.max_splats = options.max_splats;
+            densify(kernels, executor, model, frame, rules);
+        }
+        if (schedule.resets_opacity(step)) {
+            gpu::Recording recording(device->limits());
+            record_reset_opacity(recording, kernels, model, float(logit(kResetOpacity)));
+            executor.run(recording);
+        }
+    }
+};
+
+Trainer::Trainer(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
+                 const std::vector<int>& train_frames, const Gaussians& start, const TrainOptions& options) {
+    if (train_frames.empty())
+        throw InputError("no training photograph; a smaller --test-every share leaves some");
+    if (start.size() == 0) throw InputError("no splat to start from");
+    if (start.size() > options.max_splats)
+        throw InputError("the start has " + std::to_string(start.size()) +
+                         " splats, more than --max-splats " + std::to_string(options.max_splats));
+    state_ = std::make_unique<State>(std::move(device), dataset, train_frames, start, options);
+}
+Trainer::~Trainer() = default;
+
+StepReport Trainer::step() {
+    State& s = *state_;
+    const auto start = Clock::now();
+    const int step = s.report.step + 1;
+    s.optimise(step);
+    s.follow_up(step);
+    s.report.step = step;
+    s.report.splats = s.model.splats;
+    s.report.seconds += std::chrono::duration<double>(Clock::now() - start).count();
+    return s.report;
+}
+
+Gaussians Trainer::gaussians() const {
+    return download_model(state_->model, state_->model.params);
+}
+uint32_t Trainer::splats() const {
+    return state_->model.splats;
+}
+int Trainer::steps_done() const {
+    return state_->report.step;
+}
+
+std::vector<PassTime> Trainer::pass_times() const {
+    std::vector<PassTime> result;
+    std::map<std::string, std::vector<double>> samples;
+    for (const auto& step : state_->timings)
+        for (const gpu::Timing& timing : step) {
+            auto& values = samples[timing.name];
+            if (values.empty()) result.push_back({timing.name, 0});
+            values.push_back(timing.milliseconds);
+        }
+    for (PassTime& time : result) {
+        auto& values = samples[time.pass];
+        const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+        std::nth_element(values.begin(), middle, values.end());
+        time.milliseconds = *middle;
+    }
+    return result;
+}
+
+}  // namespace ewa

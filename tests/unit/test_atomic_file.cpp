@@ -1,0 +1,85 @@
+#include <sys/resource.h>
+#include <sys/stat.h>
+
+#include <csignal>
+
+#include "core/atomic_file.h"
+#include "support/temp_folder.h"
+
+namespace {
+
+using namespace ewa;
+using core::AtomicFile;
+using test::expect_error;
+using test::file_bytes;
+using test::files_in;
+using test::TempFolder;
+
+TEST(AtomicFile, ReplacesOnlyAtCommit) {
+    TempFolder folder;
+    const auto path = folder.write("a.txt", "old");
+    {
+        AtomicFile file(path);
+        file.write("new text");
+        EXPECT_EQ(file_bytes(path), "old");
+        file.commit();
+        EXPECT_EQ(file_bytes(path), "new text");
+    }
+    EXPECT_EQ(file_bytes(path), "new text");
+    EXPECT_EQ(files_in(folder.path()), 1u);
+}
+
+TEST(AtomicFile, LeavesNothingWithoutCommit) {
+    TempFolder folder;
+    { AtomicFile(folder / "a.txt").write("text"); }
+    EXPECT_EQ(files_in(folder.path()), 0u);
+}
+
+TEST(AtomicFile, NamesPathAndReason) {
+    TempFolder folder;
+    expect_error<RunError>([&] { AtomicFile file(folder / "none" / "a.txt"); },
+                           {"none/a.txt", "No such file or directory"});
+    std::filesystem::create_directory(folder / "folder");
+    expect_error<RunError>([&] { AtomicFile file(folder / "folder"); }, {"folder", "not a regular file"});
+    expect_error<RunError>([&] { AtomicFile file(folder / ""); }, {"names a folder"});
+    expect_error<RunError>([&] { AtomicFile file("/dev/null"); }, {"/dev/null", "not a regular file"});
+}
+
+// A limit on the size of files stands for the full disk: write returns an error in the same place.
+TEST(AtomicFile, FailedWriteKeepsTheOldFile) {
+    TempFolder folder;
+    const auto path = folder.write("a.txt", "old");
+    rlimit before{};
+    getrlimit(RLIMIT_FSIZE, &before);
+    const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit small{1000, before.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &small);
+    expect_error<RunError>([&] { core::write_text_file(path, std::string(5000, 'x')); },
+                           {"a.txt", "File too large"});
+    setrlimit(RLIMIT_FSIZE, &before);
+    std::signal(SIGXFSZ, handler);
+    EXPECT_EQ(file_bytes(path), "old");
+    EXPECT_EQ(files_in(folder.path()), 1u);
+}
+
+TEST(AtomicFile, KeepsPermissionsAndFollowsLinks) {
+    TempFolder folder;
+    const auto path = folder.write("a.txt", "old");
+    chmod(path.c_str(), 0640);
+    std::filesystem::create_symlink("a.txt", folder / "link");
+    core::write_text_file(folder / "link", "new");
+    EXPECT_TRUE(std::filesystem::is_symlink(folder / "link"));
+    EXPECT_EQ(file_bytes(path), "new");
+    struct stat status {};
+    stat(path.c_str(), &status);
+    EXPECT_EQ(status.st_mode & 0777, 0640u);
+}
+
+TEST(AtomicFile, TakesTheLongestName) {
+    TempFolder folder;
+    const std::string name(255, 'n');
+    core::write_text_file(folder / name, "text");
+    EXPECT_EQ(file_bytes(folder / name), "text");
+}
+
+}  // namespace

@@ -1,0 +1,262 @@
+#include <OpenImageIO/imageio.h>
+#include <sys/resource.h>
+#include <zlib.h>
+
+#include <cmath>
+#include <csignal>
+#include <random>
+
+#include "ewa/camera.h"
+#include "ewa/image.h"
+#include "support/temp_folder.h"
+
+namespace {
+
+using namespace ewa;
+using test::expect_error;
+using test::TempFolder;
+
+Image noise(int width, int height, int channels, unsigned seed, float low = 0, float high = 1) {
+    Image image(width, height, channels);
+    std::mt19937 generator(seed);
+    std::uniform_real_distribution<float> uniform(low, high);
+    for (float& v : image.pixels) v = uniform(generator);
+    return image;
+}
+
+/// As OpenImageIO writes it, for the kinds of file that save_image does not make.
+template <class T>
+void write_file(const std::filesystem::path& path, int width, int height, int channels, OIIO::TypeDesc type,
+                const std::vector<T>& values) {
+    auto output = OIIO::ImageOutput::create(path.string());
+    OIIO::ImageSpec spec(width, height, channels, type);
+    spec.attribute("oiio:UnassociatedAlpha", 1);
+    ASSERT_TRUE(output->open(path.string(), spec));
+    ASSERT_TRUE(output->write_image(type, values.data()));
+    ASSERT_TRUE(output->close());
+}
+
+TEST(ImageFiles, PngRoundsAndClamps) {
+    TempFolder folder;
+    Image image(4, 1, 3);
+    const float nan = std::nanf("");
+    image.pixels = {
+        0, 1, 0.5f, -3, 7, 0.4999f / 255, 0.5001f / 255, nan, 100.0f / 255, 254.4f / 255, 254.6f / 255, 2};
+    save_image(folder / "a.png", image);
+    const Image loaded = load_image(folder / "a.png");
+    const int expected[] = {0, 255, 128, 0, 255, 0, 1, 0, 100, 254, 255, 255};
+    ASSERT_EQ(loaded.channels, 3);
+    for (size_t i = 0; i < 12; ++i) EXPECT_EQ(loaded.pixels[i], float(expected[i]) / 255.0f) << i;
+    EXPECT_EQ(test::files_in(folder.path()), 1u);
+}
+
+TEST(ImageFiles, ExrKeepsEveryBit) {
+    TempFolder folder;
+    const Image image = noise(37, 21, 4, 1, -5, 20);
+    save_image(folder / "a.exr", image);
+    const Image loaded = load_image(folder / "a.exr");
+    EXPECT_EQ(loaded.channels, 4);
+    EXPECT_EQ(loaded.pixels, image.pixels);
+    const ImageSize size = read_image_size(folder / "a.exr");
+    EXPECT_EQ(size.width, 37);
+    EXPECT_EQ(size.height, 21);
+}
+
+TEST(ImageFiles, AlphaDoesNotTouchColour) {
+    TempFolder folder;
+    Image image(2, 1, 4);
+    image.pixels = {1, 0.2f, 0.4f, 0, 0.6f, 0.8f, 1, 0.2f};
+    save_image(folder / "a.png", image);
+    const Image loaded = load_image(folder / "a.png");
+    ASSERT_EQ(loaded.channels, 4);
+    for (size_t i = 0; i < 8; ++i) EXPECT_EQ(loaded.pixels[i], std::round(image.pixels[i] * 255) / 255) << i;
+}
+
+TEST(ImageFiles, GreyAndDeepFiles) {
+    TempFolder folder;
+    write_file<uint8_t>(folder / "grey.png", 2, 1, 1, OIIO::TypeDesc::UINT8, {10, 200});
+    const Image grey = load_image(folder / "grey.png");
+    EXPECT_EQ(grey.pixels, (std::vector<float>{10 / 255.f, 10 / 255.f, 10 / 255.f, 200 / 255.f, 200 / 255.f,
+                                               200 / 255.f}));
+    write_file<uint8_t>(folder / "ga.png", 1, 1, 2, OIIO::TypeDesc::UINT8, {10, 51});
+    const Image grey_alpha = load_image(folder / "ga.png");
+    EXPECT_EQ(grey_alpha.pixels, (std::vector<float>{10 / 255.f, 10 / 255.f, 10 / 255.f, 51 / 255.f}));
+    write_file<uint16_t>(folder / "deep.png", 1, 1, 3, OIIO::TypeDesc::UINT16, {1, 256, 65535});
+    EXPECT_EQ(load_image(folder / "deep.png").pixels, (std::vector<float>{1 / 65535.f, 256 / 65535.f, 1}));
+}
+
+TEST(ImageFiles, RefusesWhatItCannotRead) {
+    TempFolder folder;
+    expect_error<InputError>([&] { load_image(folder / "none.png"); }, {"none.png", "no such file"});
+    expect_error<InputError>([&] { load_image(folder.path()); }, {"not a regular file"});
+    const auto text = folder.write("text.jpg", "this is\nno picture\n");
+    expect_error<InputError>([&] { load_image(text); }, {"text.jpg"});
+    expect_error<InputError>([&] { read_image_size(text); }, {"text.jpg"});
+    expect_error<InputError>([&] { save_image(folder / "a.jpg", Image(1, 1, 3)); }, {".png or .exr"});
+    expect_error<InputError>([&] { save_image(folder / "a.png", Image()); }, {"without pixels"});
+    expect_error<RunError>([&] { save_image(folder / "none" / "a.png", Image(1, 1, 3)); }, {"none/a.png"});
+}
+
+TEST(ImageFiles, ReadsNoPartOfATruncatedFile) {
+    TempFolder folder;
+    const Image image = noise(5, 4, 3, 2);
+    save_image(folder / "a.png", image);
+    save_image(folder / "a.exr", image);
+    std::vector<uint8_t> bytes(16 * 16 * 3);
+    for (size_t i = 0; i < bytes.size(); ++i) bytes[i] = uint8_t(i * 37);
+    write_file(folder / "a.jpg", 16, 16, 3, OIIO::TypeDesc::UINT8, bytes);
+    for (const char* name : {"a.png", "a.exr", "a.jpg"}) {
+        const auto path = folder / name;
+        const std::string whole = test::file_bytes(path);
+        const size_t succeeded = test::read_every_cut(path, whole, [&] { load_image(path); });
+        EXPECT_EQ(succeeded, 0u) << name;
+        EXPECT_NO_THROW(load_image(path));
+    }
+}
+
+TEST(ImageFiles, HugeClaimIsRefused) {
+    TempFolder folder;
+    save_image(folder / "a.png", Image(3, 3, 3));
+    std::string bytes = test::file_bytes(folder / "a.png");
+    bytes.replace(16, 8,
+                  std::string("\x00\x00\xf0\x00\x00\x00\xf0\x00", 8));  // IHDR's width and height: 61440
+    const auto checksum = uint32_t(crc32(0, reinterpret_cast<const Bytef*>(&bytes[12]), 17));
+    for (size_t i = 0; i < 4; ++i) bytes[29 + i] = char(checksum >> (24 - 8 * i));
+    const auto path = folder.write("huge.png", bytes);
+    expect_error<InputError>([&] { load_image(path); }, {"huge.png", "61440 x 61440"});
+    bytes[29] ^= 1;
+    folder.write("huge.png", bytes);
+    expect_error<InputError>([&] { read_image_size(path); }, {"huge.png", "checksum"});
+}
+
+TEST(ImageFiles, FullDiskIsNoticed) {
+    TempFolder folder;
+    rlimit before{};
+    getrlimit(RLIMIT_FSIZE, &before);
+    const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit small{1000, before.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &small);
+    for (const char* name : {"a.png", "a.exr"})
+        expect_error<RunError>([&] { save_image(folder / name, noise(64, 64, 3, 3)); },
+                               {name, "File too large"});
+    setrlimit(RLIMIT_FSIZE, &before);
+    std::signal(SIGXFSZ, handler);
+    EXPECT_EQ(test::files_in(folder.path()), 0u);
+}
+
+TEST(Downscale, MeansOfBlocks) {
+    Image image(4, 2, 1);
+    image.pixels = {1, 2, 3, 4, 5, 6, 7, 8};
+    const Image half = downscale(image, 2);
+    EXPECT_EQ(half.width, 2);
+    EXPECT_EQ(half.height, 1);
+    EXPECT_EQ(half.pixels, (std::vector<float>{3.5f, 5.5f}));
+    const Image dot = downscale(image, 9);
+    EXPECT_EQ(dot.width, 1);
+    EXPECT_EQ(dot.height, 1);
+    EXPECT_FLOAT_EQ(dot.pixels[0], 4.5f);
+    EXPECT_EQ(downscale(image, 1).pixels, image.pixels);
+}
+
+// A picture whose value is the ray that its camera sees stays one, when the camera is scaled alike: the mean
+// of a linear function over a pixel is its value in the middle.
+TEST(Downscale, CameraAndPictureAgree) {
+    Camera camera;
+    camera.width = 37;
+    camera.height = 22;
+    camera.fx = 30;
+    camera.fy = 25;
+    camera.cx = 17.3;
+    camera.cy = 12.1;
+    Image image(camera.width, camera.height, 2);
+    const auto ray = [](const Camera& c, int x, int y) {
+        return std::pair((x + 0.5 - c.cx) / c.fx, (y + 0.5 - c.cy) / c.fy);
+    };
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x) {
+            image.at(x, y)[0] = float(ray(camera, x, y).first);
+            image.at(x, y)[1] = float(ray(camera, x, y).second);
+        }
+    for (int factor : {2, 3, 5, 11, 50}) {
+        const Image small = downscale(image, factor);
+        const Camera scaled = downscale(camera, factor);
+        ASSERT_EQ(small.width, scaled.width);
+        ASSERT_EQ(small.height, scaled.height);
+        for (int y = 0; y < small.height; ++y)
+            for (int x = 0; x < small.width; ++x) {
+                EXPECT_NEAR(small.at(x, y)[0], ray(scaled, x, y).first, 1e-3);
+                EXPECT_NEAR(small.at(x, y)[1], ray(scaled, x, y).second,
+                            small.height * factor == image.height ? 1e-6 : 1e-3);
+            }
+    }
+}
+
+TEST(Metrics, PsnrByHand) {
+    Image a(5, 4, 3), b(5, 4, 3);
+    EXPECT_EQ(psnr(a, b), INFINITY);
+    for (float& v : b.pixels) v = 0.5f;
+    EXPECT_NEAR(psnr(a, b), 10 * std::log10(4.0), 1e-12);
+    b = Image(5, 4, 3);
+    b.at(2, 3)[1] = 7;  // clamped to 1
+    EXPECT_NEAR(psnr(a, b), 10 * std::log10(60.0), 1e-12);
+    Image with_alpha(5, 4, 4);
+    for (int x = 0; x < 5; ++x) with_alpha.at(x, 0)[3] = 1;
+    EXPECT_EQ(psnr(a, with_alpha), INFINITY);
+    expect_error<InputError>([&] { psnr(a, Image(4, 5, 3)); }, {"5 x 4 x 3", "4 x 5 x 3"});
+    expect_error<InputError>([&] { ssim(a, Image(4, 5, 3)); }, {"5 x 4 x 3", "4 x 5 x 3"});
+}
+
+/// SSIM from its definition: one 11 x 11 window per pixel, zeros outside.
+double brute_force_ssim(const Image& a, const Image& b) {
+    double weights[11][11], sum = 0, total = 0;
+    for (int j = 0; j < 11; ++j)
+        for (int i = 0; i < 11; ++i)
+            sum += weights[j][i] = std::exp(-((i - 5) * (i - 5) + (j - 5) * (j - 5)) / 4.5);
+    for (int c = 0; c < 3; ++c)
+        for (int y = 0; y < a.height; ++y)
+            for (int x = 0; x < a.width; ++x) {
+                double ma = 0, mb = 0, aa = 0, bb = 0, ab = 0;
+                for (int j = -5; j <= 5; ++j)
+                    for (int i = -5; i <= 5; ++i) {
+                        if (x + i < 0 || y + j < 0 || x + i >= a.width || y + j >= a.height) continue;
+                        const double w = weights[j + 5][i + 5] / sum;
+                        const double va = std::clamp(double(a.at(x + i, y + j)[c]), 0.0, 1.0);
+                        const double vb = std::clamp(double(b.at(x + i, y + j)[c]), 0.0, 1.0);
+                        ma += w * va, mb += w * vb, aa += w * va * va, bb += w * vb * vb, ab += w * va * vb;
+                    }
+                total += (2 * ma * mb + 1e-4) * (2 * (ab - ma * mb) + 9e-4) /
+                         ((ma * ma + mb * mb + 1e-4) * (aa - ma * ma + bb - mb * mb + 9e-4));
+            }
+    return total / (a.width * a.height * 3);
+}
+
+TEST(Metrics, SsimAgainstBruteForce) {
+    for (const auto& [width, height] : {std::pair(1, 1), {3, 20}, {11, 11}, {31, 27}}) {
+        const Image a = noise(width, height, 3, 4, -0.1f, 1.1f), b = noise(width, height, 4, 5, -0.1f, 1.1f);
+        EXPECT_NEAR(ssim(a, b), brute_force_ssim(a, b), 1e-12);
+        EXPECT_NEAR(ssim(a, a), 1, 1e-12);
+        Image close = a;
+        for (size_t i = 0; i < close.pixels.size(); i += 7) close.pixels[i] += 0.05f;
+        EXPECT_NEAR(ssim(a, close), brute_force_ssim(a, close), 1e-12);
+        if (width > 1) {
+            EXPECT_LT(ssim(a, close), 1 - 1e-6);
+        }
+    }
+}
+
+// Two grey pictures of one pixel: the window's middle weight is all there is.
+TEST(Metrics, SsimByHand) {
+    Image a(1, 1, 3), b(1, 1, 3);
+    for (float& v : a.pixels) v = 0.25f;
+    for (float& v : b.pixels) v = 0.5f;
+    double sum = 0;
+    for (int d = -5; d <= 5; ++d) sum += std::exp(-d * d / 4.5);
+    const double w = 1 / (sum * sum), ma = w * 0.25, mb = w * 0.5;
+    const double covariance = w * 0.125 - ma * mb, variances = w * (0.0625 + 0.25) - ma * ma - mb * mb;
+    EXPECT_NEAR(
+        ssim(a, b),
+        (2 * ma * mb + 1e-4) * (2 * covariance + 9e-4) / ((ma * ma + mb * mb + 1e-4) * (variances + 9e-4)),
+        1e-12);
+}
+
+}  // namespace

@@ -1,0 +1,158 @@
+// Each room of the house may include only what stands after its arrow (docs/ARCHITECTURE.md, "The house").
+#include <algorithm>
+#include <fstream>
+#include <map>
+#include <set>
+
+#include "support/temp_folder.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using Rooms = std::set<std::string>;
+
+/// The arrows. What a room reaches is what stands here and what those reach in turn.
+const std::map<std::string, Rooms> kArrows = {
+    {"shaders/shared", {}},
+    {"shaders/lib", {"shaders/shared"}},
+    {"shaders/passes", {"shaders/lib", "shaders/shared"}},
+    {"src/core", {}},
+    {"src/image", {"src/core", "shaders/shared"}},
+    {"src/scene", {"src/core", "src/image"}},
+    {"src/io", {"src/scene", "src/image"}},
+    {"src/gpu", {"src/core"}},
+    {"src/passes", {"src/gpu", "shaders/shared"}},
+    {"src/pipeline", {"src/passes", "src/scene"}},
+    {"src/train", {"src/pipeline", "src/scene", "src/io"}},
+    {"src/report", {"src/scene", "src/image"}},
+    {"src/reference", {"src/scene"}},
+};
+const Rooms kLeaves = {"src/cli", "src/viewer"};
+
+/// The room whose promises a public header declares; those not named here are plain values that any room may
+/// use.
+const std::map<std::string, std::string> kOwners = {
+    {"image.h", "src/image"},       {"camera.h", "src/scene"},   {"gaussians.h", "src/scene"},
+    {"dataset.h", "src/scene"},     {"splat_files.h", "src/io"}, {"device.h", "src/gpu"},
+    {"renderer.h", "src/pipeline"}, {"trainer.h", "src/train"}};
+
+/// Libraries that only some rooms may know.
+const std::vector<std::pair<std::string, Rooms>> kLibraries = {
+    {"OpenImageIO/", {"src/image"}},
+    {"vulkan/", {"src/gpu", "src/passes", "src/pipeline", "src/viewer"}},
+    {"GLFW/", {"src/viewer"}},
+    {"imgui", {"src/viewer"}},
+    {"nanoflann", {"src/scene"}},
+    {"nlohmann/", {"src/io", "src/train", "src/report", "src/cli", "src/viewer"}},
+    {"CLI/", {"src/cli", "src/viewer"}}};
+
+Rooms reached_from(const std::string& room) {
+    Rooms reached = {room}, next = {room};
+    while (!next.empty()) {
+        Rooms found;
+        for (const std::string& from : next)
+            for (const std::string& to : kArrows.at(from))
+                if (reached.insert(to).second) found.insert(to);
+        next = found;
+    }
+    return reached;
+}
+
+/// The first two parts of a path in the source tree, e.g. "src/io"; "include/ewa" for a public header.
+std::string room_of(const fs::path& path) {
+    auto part = path.begin();
+    const std::string first = part->string();
+    return first + "/" + (++part)->string();
+}
+
+/// What the include names, as a path in the source tree; empty for a file of a library.
+fs::path resolve(const fs::path& root, const fs::path& from, const std::string& included) {
+    for (const fs::path& folder :
+         {from.parent_path(), fs::path("src"), fs::path("include"), fs::path("shaders")}) {
+        const fs::path candidate = (folder / included).lexically_normal();
+        if (fs::is_regular_file(root / candidate)) return candidate;
+    }
+    return {};
+}
+
+/// Why `from` may not include it, or nothing.
+std::string complaint(const fs::path& root, const fs::path& from, const std::string& included) {
+    const std::string room = room_of(from);
+    for (const auto& [library, rooms] : kLibraries)
+        if (included.starts_with(library) && !rooms.contains(room)) return room + " may not use " + included;
+    if (kLeaves.contains(room)) return {};
+    const fs::path target = resolve(root, from, included);
+    if (target.empty()) return {};
+    std::string other = room_of(target);
+    if (room == "include/ewa")
+        return other == room ? "" : "a public header may not include " + target.string();
+    if (!kArrows.contains(room)) return "the room " + room + " has no arrow";
+    if (other == "include/ewa") {
+        const auto owner = kOwners.find(target.filename().string());
+        if (owner == kOwners.end()) return {};
+        other = owner->second;
+    }
+    return reached_from(room).contains(other) ? "" : room + " may not include " + target.string();
+}
+
+std::vector<std::string> complaints(const fs::path& root, size_t& files) {
+    std::vector<std::string> found;
+    for (const char* top : {"src", "include", "shaders"}) {
+        if (!fs::is_directory(root / top)) continue;
+        for (const auto& entry : fs::recursive_directory_iterator(root / top)) {
+            if (!entry.is_regular_file()) continue;
+            ++files;
+            const fs::path from = fs::relative(entry.path(), root);
+            std::ifstream file(entry.path());
+            int number = 0;
+            for (std::string line; std::getline(file, line);) {
+                ++number;
+                const size_t word = line.find_first_not_of(" \t");
+                if (word == std::string::npos || line[word] != '#' ||
+                    line.find("include", word) == std::string::npos)
+                    continue;
+                const size_t begin = line.find_first_of("\"<", word);
+                const size_t end = begin == std::string::npos ? begin : line.find_first_of("\">", begin + 1);
+                if (end == std::string::npos) continue;
+                const std::string text = complaint(root, from, line.substr(begin + 1, end - begin - 1));
+                if (!text.empty())
+                    found.push_back(from.string() + ":" + std::to_string(number) + ": " + text);
+            }
+        }
+    }
+    return found;
+}
+
+TEST(IncludeArrow, EveryRoomKeepsToItsArrow) {
+    size_t files = 0;
+    for (const std::string& text : complaints(EWA_SOURCE_DIR, files)) ADD_FAILURE() << text;
+    EXPECT_GT(files, 30u);
+}
+
+TEST(IncludeArrow, BreachesAreFound) {
+    const ewa::test::TempFolder folder;
+    folder.write("include/ewa/image.h", "#include <vector>\n");
+    folder.write("include/ewa/trainer.h", "#include \"ewa/image.h\"\n");
+    folder.write("include/ewa/wrong.h", "#include \"core/a.h\"\n");
+    folder.write("src/core/a.h", "#include <string>\n");
+    folder.write("src/core/wrong.h", "#  include \"io/a.h\"\n");
+    folder.write("src/core/wrong_public.h", "#include \"ewa/image.h\"\n");
+    folder.write("src/io/a.h", "#include \"core/a.h\"\n#include \"ewa/image.h\"\n");
+    folder.write("src/io/wrong.cpp", "#include \"../train/a.h\"\n");
+    folder.write("src/io/wrong_library.cpp", "#include <vulkan/vulkan.h>\n");
+    folder.write("src/train/a.h", "#include \"io/a.h\"\n");
+    folder.write("src/cellar/wrong.h", "#include \"core/a.h\"\n");
+    folder.write("src/cli/main.cpp", "#include \"train/a.h\"\n#include \"io/a.h\"\n");
+    folder.write("src/cli/wrong.cpp", "#include <GLFW/glfw3.h>\n");
+    folder.write("shaders/shared/a.h", "");
+    folder.write("shaders/lib/a.glsl", "#include \"../shared/a.h\"\n");
+    folder.write("shaders/lib/wrong.glsl", "#include \"passes/a.comp\"\n");
+    folder.write("shaders/passes/a.comp", "#include \"lib/a.glsl\"\n");
+    size_t files = 0;
+    const std::vector<std::string> found = complaints(folder.path(), files);
+    EXPECT_EQ(files, 17u);
+    for (const std::string& text : found) EXPECT_NE(text.find("wrong"), std::string::npos) << text;
+    EXPECT_EQ(found.size(), 8u);
+}
+
+}  // namespace

@@ -1,0 +1,239 @@
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "ewa/dataset.h"
+#include "io/transforms.h"
+#include "support/temp_folder.h"
+
+namespace {
+
+using namespace ewa;
+using nlohmann::json;
+using test::expect_error;
+using test::TempFolder;
+
+// A camera at (1, 2, 3) that looks along world -x with world z up: its x axis is +y, its y axis +z, its z
+// axis +x.
+const json kMatrix = {{0, 0, 1, 1}, {1, 0, 0, 2}, {0, 1, 0, 3}, {0, 0, 0, 1}};
+
+json frame(const std::string& path) {
+    return {{"file_path", path}, {"transform_matrix", kMatrix}};
+}
+
+/// Two pictures of 8 x 6 and a transforms.json.
+struct Scene {
+    TempFolder folder;
+    json model = {{"fl_x", 10},      {"fl_y", 11},
+                  {"cx", 4.5},       {"cy", 2.5},
+                  {"w", 8},          {"h", 6.0},
+                  {"aabb_scale", 4}, {"frames", {frame("./images/b.png"), frame("images\\a.png")}}};
+
+    Scene() {
+        std::filesystem::create_directories(folder / "images");
+        for (const char* name : {"a.png", "b.png"}) save_image(folder / "images" / name, Image(8, 6, 3));
+    }
+    std::filesystem::path write(const char* name = "transforms.json") const {
+        return folder.write(name, model.dump());
+    }
+    Dataset load(bool need_images = true) const {
+        write();
+        DatasetOptions options;
+        options.need_images = need_images;
+        return load_dataset(folder.path(), options);
+    }
+    void refuse(std::initializer_list<std::string> parts) const {
+        expect_error<InputError>([&] { load(); }, parts);
+    }
+};
+
+TEST(Transforms, InstantNgp) {
+    Scene scene;
+    const Dataset dataset = scene.load();
+    ASSERT_EQ(dataset.frames.size(), 2u);
+    EXPECT_EQ(dataset.frames[0].name, "images/a.png");
+    const Camera& camera = dataset.frames[1].camera;
+    EXPECT_EQ(dataset.frames[1].name, "images/b.png");
+    EXPECT_EQ(dataset.frames[1].split, 0);
+    EXPECT_EQ(camera.width, 8);
+    EXPECT_EQ(camera.height, 6);
+    EXPECT_EQ(camera.fx, 10);
+    EXPECT_EQ(camera.fy, 11);
+    EXPECT_EQ(camera.cx, 4.5);
+    EXPECT_EQ(camera.cy, 2.5);
+    // The world is the file's: the camera stands where the matrix says, a point ahead is at (-x), one above
+    // at +z.
+    EXPECT_NEAR(glm::length(camera.position() - glm::dvec3(1, 2, 3)), 0, 1e-15);
+    const auto to_camera = [&](const glm::dvec3& p) { return camera.rotation * p + camera.translation; };
+    EXPECT_NEAR(glm::length(to_camera({-4, 2, 3}) - glm::dvec3(0, 0, 5)), 0, 1e-14);
+    EXPECT_NEAR(glm::length(to_camera({1, 2, 4}) - glm::dvec3(0, -1, 0)), 0, 1e-14);
+    EXPECT_NEAR(glm::length(to_camera({1, 3, 3}) - glm::dvec3(1, 0, 0)), 0, 1e-14);
+    EXPECT_EQ(load_dataset(scene.folder / "transforms.json", {}).frames.size(), 2u);
+}
+
+TEST(Transforms, NerfstudioFramesHaveTheirOwnIntrinsicsAndPoints) {
+    Scene scene;
+    scene.model["camera_model"] = "OPENCV";
+    scene.model["applied_transform"] = {{0, 1, 0, 0}, {1, 0, 0, 0}, {0, 0, -1, 0}};
+    scene.model["frames"][0].update({{"fl_x", 20}, {"fl_y", 21}, {"cx", 3}, {"camera_model", "PINHOLE"}});
+    scene.model["ply_file_path"] = "sparse.ply";
+    scene.folder.write("sparse.ply",
+                       "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
+                       "property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
+                       "end_header\n1 2 3 4 5 6\nnan 0 0 0 0 0\n");
+    const Dataset dataset = scene.load();
+    EXPECT_EQ(dataset.frames[0].camera.fx, 10);
+    EXPECT_EQ(dataset.frames[1].camera.fx, 20);
+    EXPECT_EQ(dataset.frames[1].camera.fy, 21);
+    EXPECT_EQ(dataset.frames[1].camera.cx, 3);
+    EXPECT_EQ(dataset.frames[1].camera.cy, 2.5);
+    EXPECT_EQ(dataset.points.positions, (std::vector<glm::dvec3>{{1, 2, 3}}));
+    EXPECT_EQ(dataset.points.colors[0], (std::array<uint8_t, 3>{4, 5, 6}));
+    EXPECT_EQ(dataset.dropped_points, 1);
+    EXPECT_NEAR(glm::length(dataset.frames[0].camera.position() - glm::dvec3(1, 2, 3)), 0, 1e-15);
+    std::filesystem::remove(scene.folder / "sparse.ply");
+    scene.refuse({"sparse.ply"});
+    EXPECT_EQ(scene.load(false).frames.size(), 2u);
+}
+
+TEST(Transforms, BlenderSplits) {
+    TempFolder folder;
+    for (const char* set : {"train", "test", "val"}) {
+        const json model = {
+            {"camera_angle_x", 2 * std::atan(0.5)},
+            {"frames", {frame(std::string("./") + set + "/r_0"), frame(std::string("./") + set + "/r_1")}}};
+        folder.write(std::string("transforms_") + set + ".json", model.dump());
+        std::filesystem::create_directories(folder / set);
+        save_image(folder / set / "r_0.png", Image(8, 6, 4));
+    }
+    const Dataset dataset = load_dataset(folder.path(), {});
+    ASSERT_EQ(dataset.frames.size(), 2u);
+    EXPECT_EQ(dataset.missing_images, 2);
+    EXPECT_EQ(dataset.frames[0].name, "test/r_0.png");
+    EXPECT_EQ(dataset.frames[0].split, 2);
+    EXPECT_EQ(dataset.frames[1].name, "train/r_0.png");
+    EXPECT_EQ(dataset.frames[1].split, 1);
+    EXPECT_NEAR(dataset.frames[0].camera.fx, 8, 1e-12);
+    EXPECT_NEAR(dataset.frames[0].camera.fy, 8, 1e-12);
+    EXPECT_EQ(dataset.frames[0].camera.cx, 4);
+    EXPECT_EQ(dataset.frames[0].camera.cy, 3);
+    const Split split = split_frames(dataset, 1);
+    EXPECT_EQ(split.train, std::vector<int>{1});
+    EXPECT_EQ(split.test, std::vector<int>{0});
+    EXPECT_EQ(load_frame_image(dataset.frames[0]).channels, 4);
+    // Without their pictures the sizes of r_1 are not known.
+    DatasetOptions cameras_only;
+    cameras_only.need_images = false;
+    EXPECT_EQ(load_dataset(folder.path(), cameras_only).frames.size(), 2u);
+    EXPECT_EQ(load_dataset(folder / "transforms_val.json", {}).frames.size(), 1u);
+}
+
+TEST(Transforms, MissingImagesAreCounted) {
+    Scene scene;
+    std::filesystem::remove(scene.folder / "images" / "a.png");
+    EXPECT_EQ(scene.load().frames.size(), 1u);
+    EXPECT_EQ(scene.load().missing_images, 1);
+    EXPECT_EQ(scene.load(false).frames.size(), 2u);
+    std::filesystem::remove(scene.folder / "images" / "b.png");
+    scene.refuse({"none of the 2 images"});
+    save_image(scene.folder / "images" / "b.png", Image(6, 8, 3));
+    scene.refuse({"b.png", "6 x 8", "8 x 6"});
+}
+
+TEST(Transforms, RotationsAreMadeOrthonormal) {
+    Scene scene;
+    json& matrix = scene.model["frames"][0]["transform_matrix"];
+    for (int row = 0; row < 3; ++row)
+        for (int column = 0; column < 3; ++column)
+            matrix[size_t(row)][size_t(column)] =
+                3 * (kMatrix[size_t(row)][size_t(column)].get<double>() + 3e-4 * (row - column));
+    const glm::dmat3 r = scene.load().frames[1].camera.rotation;
+    const glm::dmat3 product = glm::transpose(r) * r;
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) EXPECT_NEAR(product[i][j], i == j, 1e-14);
+    EXPECT_NEAR(r[0][2], -1, 1e-3);
+    const auto refuse = [&](json wrong, const char* part) {
+        matrix = std::move(wrong);
+        scene.refuse({"transforms.json: frame 0", part});
+    };
+    refuse({{0, 0, 1, 1}, {1, 0, 0, 2}, {0, 1.1, 0, 3}, {0, 0, 0, 1}}, "right angles");
+    refuse({{0, 0, 1, 1}, {1, 0.1, 0, 2}, {0, 1, 0, 3}, {0, 0, 0, 1}}, "right angles");
+    refuse({{0, 0, 1, 1}, {1, 0, 0, 2}, {0, -1, 0, 3}, {0, 0, 0, 1}}, "mirrors");
+    refuse({{0, 0, 0, 1}, {0, 0, 0, 2}, {0, 0, 0, 3}, {0, 0, 0, 1}}, "degenerate");
+    refuse({{0, 0, 1, 1}, {1, 0, 0, 2}}, "rows");
+    refuse({{0, 0, 1, 1}, {1, 0, 0}, {0, 1, 0, 3}}, "4 numbers");
+    refuse({{0, 0, 1, "x"}, {1, 0, 0, 2}, {0, 1, 0, 3}}, "finite number");
+    refuse("text", "rows");
+}
+
+TEST(Transforms, OtherLensesAreNamed) {
+    for (const char* model : {"OPENCV_FISHEYE", "EQUIRECTANGULAR"}) {
+        Scene scene;
+        scene.model["camera_model"] = model;
+        scene.refuse({"frame 0", model, "undistort"});
+    }
+    for (const char* key : {"k3", "k4"}) {
+        Scene scene;
+        scene.model[key] = 0.0;
+        EXPECT_NO_THROW(scene.load());
+        scene.model["frames"][1][key] = 0.1;
+        scene.refuse({"frame 1", key});
+    }
+    Scene fisheye;
+    fisheye.model["is_fisheye"] = true;
+    fisheye.refuse({"fisheye"});
+}
+
+TEST(Transforms, NamesWhatIsWrong) {
+    const auto refuse = [](const char* key, json value, std::initializer_list<std::string> parts) {
+        Scene scene;
+        scene.model[key] = std::move(value);
+        scene.refuse(parts);
+    };
+    refuse("fl_x", 0, {"not positive"});
+    refuse("fl_x", "ten", {"\"fl_x\"", "no number"});
+    refuse("w", 7.5, {"\"w\""});
+    refuse("w", -8, {"\"w\""});
+    refuse("w", 1e12, {"\"w\""});
+    refuse("frames", 3, {"\"frames\""});
+    refuse("frames", json::array(), {"no images"});
+    refuse("frames", {3}, {"frame 0", "object"});
+    refuse("frames", {{{"file_path", "a.png"}}}, {"frame 0", "transform_matrix"});
+    refuse("frames", {{{"transform_matrix", kMatrix}}}, {"frame 0", "file_path"});
+    refuse("frames", {{{"transform_matrix", kMatrix}, {"file_path", 3}}}, {"frame 0", "file_path"});
+    refuse("k1", -3, {"folds"});
+    Scene scene;
+    scene.model.erase("fl_x");
+    scene.refuse({"camera_angle_x"});
+    scene.model["camera_angle_x"] = 4;
+    scene.refuse({"camera_angle_x", "radians"});
+    scene.folder.write("transforms.json", "[1, 2]");
+    expect_error<InputError>([&] { load_dataset(scene.folder.path(), {}); }, {"transforms.json"});
+    scene.folder.write("transforms.json", "{\"frames\": [\n  oops\n]}");
+    expect_error<InputError>([&] { load_dataset(scene.folder.path(), {}); }, {"transforms.json: byte 16"});
+    scene.folder.write("transforms.json", "{\"fl_x\": 1e999}");
+    expect_error<InputError>([&] { load_dataset(scene.folder.path(), {}); }, {"transforms.json"});
+    scene.folder.write("transforms.json", std::string(200000, '['));
+    expect_error<InputError>([&] { load_dataset(scene.folder.path(), {}); }, {"transforms.json: byte"});
+}
+
+TEST(Transforms, EveryCutIsAnError) {
+    const Scene scene;
+    const auto path = scene.write();
+    EXPECT_EQ(test::read_every_cut(path, scene.model.dump(), [&] { load_dataset(path, {}); }), 0u);
+}
+
+TEST(Transforms, RealScene) {
+    const auto data = test::shared_data();
+    if (!data) GTEST_SKIP() << "no real inputs here";
+    const Dataset dataset = load_dataset(*data / "fox_nerf", {});
+    EXPECT_EQ(dataset.frames.size() + size_t(dataset.missing_images), 67u);
+    EXPECT_EQ(dataset.frames.size(), 50u);
+    const Frame& frame = dataset.frames[0];
+    EXPECT_EQ(frame.distortion.k1, 0.0578421);
+    EXPECT_NEAR(frame.camera.fx, frame.source.fx, 0.1 * frame.source.fx);
+    EXPECT_NE(frame.camera.fx, frame.source.fx);
+    EXPECT_EQ(load_frame_image(frame).width, 270);
+}
+
+}  // namespace
