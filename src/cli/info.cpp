@@ -106,8 +106,7 @@ std::vector<CameraGroup> camera_groups(const Dataset& dataset) {
     return list;
 }
 
-Json dataset_json(const Dataset& dataset, const char* kind, const Split& split, double extent,
-                  size_t photographs) {
+Json dataset_json(const Dataset& dataset, const char* kind, const Split& split, double extent) {
     Json cameras = Json::array();
     for (const CameraGroup& group : camera_groups(dataset))
         cameras.push_back({{"frames", group.frames},
@@ -155,12 +154,9 @@ int info_dataset(const fs::path& path, int test_every, bool json) {
     fmt::print("{}\nkind            {}\n", path.string(), kind);
     fmt::print("frames          {} ({} train, {} test with --test-every {})\n", dataset.frames.size(),
                split.train.size(), split.test.size(), test_every);
-    fmt::print(
-        "images          {} missing{}
-        ", dataset.missing_images,
-                dataset.missing_images == 0
-            ? ""
-            : ", their frames left out unless all are");
+    if (dataset.missing_images > 0)
+        fmt::print("images          {} are missing, their frames left out unless all are\n",
+                   dataset.missing_images);
     print_cameras(dataset);
     fmt::print("points          {} ({} dropped: a coordinate is not finite)\n",
                dataset.points.positions.size(), dataset.dropped_points);
