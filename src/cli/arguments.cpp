@@ -65,9 +65,9 @@ RenderOptions DrawArguments::options() const {
     return render;
 }
 
-void add_draw_options(CLI::App& app, DrawArguments& arguments, bool random_background_allowed) {
+void add_draw_options(CLI::App& app, DrawArguments& arguments) {
     app.add_option("--background", arguments.background,
-                   random_background_allowed
+                   arguments.random_allowed
                        ? "Colour behind the splats: r,g,b in 0..1, or random (a new one each step)"
                        : "Colour behind the splats: r,g,b in 0..1")
         ->type_name("COLOUR")
@@ -81,6 +81,16 @@ void add_draw_options(CLI::App& app, DrawArguments& arguments, bool random_backg
         ->check(in_range(0, kMaxShDegree))
         ->type_name("0..3")
         ->capture_default_str();
+}
+
+CLI::Validator without_sign() {
+    return CLI::Validator(
+        [](std::string& text) {
+            return text.find_first_not_of("0123456789") == std::string::npos
+                       ? ""
+                       : text + " is not a whole number from 0";
+        },
+        "");
 }
 
 void add_device_options(CLI::App& app, DeviceOptions& options) {

@@ -17,12 +17,14 @@ struct DrawArguments {
     bool antialias = false;  // the short form of --kernel antialias
     int sh_degree = kMaxShDegree;
 
-    bool random_background() const { return background == "random"; }
+    bool random_allowed = false;  // whether the background may be random, as in training
+
+    bool random_background() const { return random_allowed && background == "random"; }
     /// Throws InputError for a background that is not three numbers of [0, 1]. A random background is black
     /// here.
     RenderOptions options() const;
 };
-void add_draw_options(CLI::App& app, DrawArguments& arguments, bool random_background_allowed = false);
+void add_draw_options(CLI::App& app, DrawArguments& arguments);
 
 /// --device and --validation.
 void add_device_options(CLI::App& app, DeviceOptions& options);
@@ -32,6 +34,9 @@ template <typename T>
 CLI::Validator in_range(T low, T high) {
     return CLI::Range(low, high).description("");
 }
+
+/// Refuses a sign: CLI11 reads -1 into an unsigned number as its largest value.
+CLI::Validator without_sign();
 
 void add_downscale_option(CLI::App& app, int& downscale);
 void add_test_every_option(CLI::App& app, int& test_every);

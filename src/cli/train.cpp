@@ -26,6 +26,7 @@ void add_model_options(CLI::App& app, TrainArguments& arguments) {
         ->check(CLI::IsMember({"adc", "mcmc", "none"}))
         ->capture_default_str();
     app.add_option("--max-splats", arguments.max_splats, "Never more splats than this")
+        ->check(without_sign())
         ->check(in_range(1u, 1000000000u))
         ->type_name("N")
         ->capture_default_str();
@@ -34,9 +35,11 @@ void add_model_options(CLI::App& app, TrainArguments& arguments) {
         ->type_name("sfm|random|FILE")
         ->capture_default_str();
     app.add_option("--seed", arguments.seed, "Same seed, same device: same bytes")
+        ->check(without_sign())
         ->type_name("S")
         ->capture_default_str();
-    add_draw_options(app, arguments.draw, true);
+    arguments.draw.random_allowed = true;
+    add_draw_options(app, arguments.draw);
     add_downscale_option(app, arguments.downscale);
     add_test_every_option(app, arguments.test_every);
 }
