@@ -36,8 +36,11 @@ int run(const GradArguments& arguments) {
     save_splats(arguments.output, result.gradient,
                 {"ewa " EWA_VERSION, fmt::format("gradient of the training loss of frame {}", index)});
     if (!arguments.json.empty())
-        write_json(arguments.json,
-                   {{"loss", result.loss}, {"l1", result.l1}, {"ssim", result.ssim}, {"frame", frame.name}});
+        write_json(arguments.json, {{"loss", result.loss},
+                                    {"l1", result.l1},
+                                    {"ssim", result.ssim},
+                                    {"frame", index},
+                                    {"name", frame.name}});
     fmt::print("{}  loss {:.7g}  L1 {:.7g}  SSIM {:.7g}\n", frame.name, result.loss, result.l1, result.ssim);
     if (result.skipped_nonfinite > 0)
         fmt::print("{} splats have a value that is not finite and were not drawn\n",
@@ -63,7 +66,7 @@ Action add_grad(CLI::App& app) {
                    "PLY with the properties of a splat file, each holding dL/d(that stored value)")
         ->required()
         ->type_name("OUT.ply");
-    app.add_option("--json", arguments->json, "Write loss, l1, ssim and frame to this file")
+    app.add_option("--json", arguments->json, "Write loss, l1, ssim, frame (its index) and name to this file")
         ->type_name("FILE");
     add_draw_options(app, arguments->draw);
     add_downscale_option(app, arguments->downscale);

@@ -50,8 +50,8 @@ void print_spread(const char* name, const Spread& spread) {
 int info_splats(const fs::path& path, bool json) {
     const Gaussians gaussians = load_splats(path);
     const SplatStatistics statistics = splat_statistics(gaussians);
-    const auto rendering = plan_lines(gaussians, RenderOptions{}, false);
-    const auto training = plan_lines(gaussians, RenderOptions{}, true);
+    const auto rendering = plan_lines(gaussians, RenderOptions{}, Purpose::picture);
+    const auto training = plan_lines(gaussians, RenderOptions{}, Purpose::densifying);
     if (json) {
         const Json out = {{"kind", "splats"},
                           {"splats", gaussians.size()},

@@ -63,10 +63,12 @@ void write_report(const fs::path& path, const report::ReportData& data) {
     core::write_text_file(path, report::html_report(data));
 }
 
-uint64_t peak_host_bytes() {
+uint64_t peak_host_bytes(const gpu::Device& device) {
     rusage usage{};
     getrusage(RUSAGE_SELF, &usage);
-    return static_cast<uint64_t>(usage.ru_maxrss) * 1024;  // Linux counts in KiB
+    const uint64_t resident = static_cast<uint64_t>(usage.ru_maxrss) * 1024;  // Linux counts in KiB
+    const uint64_t on_device = device_info(device).type == "cpu" ? peak_device_bytes(device) : 0;
+    return resident - std::min(resident, on_device);
 }
 
 }  // namespace ewa::cli

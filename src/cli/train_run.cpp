@@ -219,7 +219,7 @@ int TrainRun::finish(const Trainer& trainer) {
     summary.dropped_updates = last_.dropped_updates;
     summary.interrupted = cut_short;
     summary.peak_device_bytes = peak_device_bytes(*device_);
-    summary.peak_host_bytes = peak_host_bytes();
+    summary.peak_host_bytes = peak_host_bytes(*device_);
     summary.wall_seconds = wall_seconds();
     write_json(folder_ / "summary.json", report::to_json(summary));
     write_report(folder_ / "report.html", report_);
@@ -251,7 +251,9 @@ int TrainRun::run() {
     summary.version = EWA_VERSION;
     summary.command = arguments_.command_line;
     summary.strategy = arguments_.strategy;
-    for (const PlanLine& line : plan_lines(start_, options_.render, true))
+    for (const PlanLine& line :
+         plan_lines(start_, options_.render,
+                    options_.strategy == Strategy::none ? Purpose::training : Purpose::densifying))
         report_.plan.push_back({line.what, line.why, line.bytes_saved});
     describe();
 
