@@ -17,5 +17,6 @@ Action add_eval(CLI::App& app);
 Action add_grad(CLI::App& app);
 Action add_info(CLI::App& app);
 Action add_devices(CLI::App& app);
+Action add_bench(CLI::App& app);
 
 }  // namespace ewa::cli

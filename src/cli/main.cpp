@@ -73,6 +73,7 @@ int main(int argc, char** argv) {
         {app.add_subcommand("info", "What is in a splat file or a dataset, and what rendering it leaves out"),
          {}},
         {app.add_subcommand("devices", "The Vulkan devices of this machine"), {}},
+        {app.add_subcommand("bench", "Speed of every pass, and its error against the float64 twin"), {}},
     };
     commands[0].action = add_train(*commands[0].app, command_line(argc, argv));
     commands[1].action = add_render(*commands[1].app);
@@ -80,6 +81,7 @@ int main(int argc, char** argv) {
     commands[3].action = add_grad(*commands[3].app);
     commands[4].action = add_info(*commands[4].app);
     commands[5].action = add_devices(*commands[5].app);
+    commands[6].action = add_bench(*commands[6].app);
 
     try {
         app.parse(argc, argv);

@@ -1,0 +1,121 @@
+#include "bench/bench.h"
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <fstream>
+
+#include "bench/ceiling/ceiling.h"
+#include "bench/measure.h"
+#include "bench/report.h"
+#include "core/atomic_file.h"
+#include "core/file_reader.h"
+#include "ewa/device.h"
+#include "ewa/error.h"
+
+namespace ewa::bench {
+namespace {
+
+std::string cpu_name() {
+    std::ifstream file("/proc/cpuinfo");
+    for (std::string line; std::getline(file, line);)
+        if (line.starts_with("model name")) return line.substr(std::min(line.size(), line.find(':') + 2));
+    return "unknown";
+}
+
+double load() {
+    double value = 0;
+    std::ifstream("/proc/loadavg") >> value;
+    return value;
+}
+
+Json read_json(const std::filesystem::path& path) {
+    try {
+        return Json::parse(core::read_text_file(path));
+    } catch (const Json::exception& error) {
+        throw InputError(path.string() + ": " + error.what());
+    }
+}
+
+int list_cases() {
+    for (const Case& one : all_cases())
+        std::printf("%s%s\n", one.name.c_str(), one.large ? "  (--large)" : "");
+    return 0;
+}
+
+bool all_good(const Result& result) {
+    for (const CaseResult& one : result.cases)
+        for (const Check& check : one.checks)
+            if (!check.good()) return false;
+    return true;
+}
+
+void print(const std::string& text) {
+    std::fputs(text.c_str(), stdout);
+    std::fflush(stdout);  // a run takes minutes: each case shows when it is done
+}
+
+Result measure_all(const Options& options, const std::vector<std::string>& program) {
+    const std::vector<Case> cases = select_cases(options.cases, options.large);
+    Result result;
+    result.version = EWA_VERSION;
+    result.host = {cpu_name(), host_threads(), vector_text(), load(), copy_bandwidth()};
+    const auto device = open_device({.selector = options.device});
+    result.device = device_info(*device);
+    print(header_text(result));
+
+    MeasureOptions measuring{options.runs, options.check, program};
+    measuring.first_step_command.insert(measuring.first_step_command.end(),
+                                        {"--first-step", "--device", std::to_string(result.device.index)});
+    for (const Case& one : cases) {
+        result.cases.push_back(measure(device, one, measuring, result.host.copy_bandwidth));
+        print(case_text(result.cases.back()));
+    }
+    result.scaling = fit_scaling(result.cases);
+    print(scaling_text(result.scaling));
+    return result;
+}
+
+}  // namespace
+
+void add_options(CLI::App& app, Options& options) {
+    app.add_option("--json", options.json, "Write the results to this file")->type_name("FILE");
+    app.add_option("--cases", options.cases,
+                   "Only cases whose name holds, or with * or ? matches, one of these")
+        ->type_name("PATTERN,...");
+    app.add_flag("--list", options.list, "Name the cases and do nothing");
+    app.add_option("--runs", options.runs, "How often a case runs (0: for about a second, 5 to 25 times)")
+        ->check(CLI::Range(0, 1000).description(""))
+        ->type_name("N");
+    app.add_option("--device", options.device, "Number or part of the name of a device, see ewa devices")
+        ->type_name("NAME|N");
+    app.add_flag("--check", options.check,
+                 "Compare the results with the float64 twin; exit status 1 where one is off");
+    app.add_flag("--large", options.large, "Also the cases that take gigabytes, or minutes on a CPU");
+    app.add_option("--compare", options.compare, "Print new over old per case and pass, old from this file")
+        ->type_name("OLD.json");
+    app.add_option("--results", options.results, "With --compare: take the new results from this file")
+        ->type_name("NEW.json");
+    app.add_flag("--first-step", options.first_step, "What the case first_step starts as a new process")
+        ->group("");
+}
+
+int run(const Options& options, const std::vector<std::string>& program) {
+    if (options.list) return list_cases();
+    if (options.first_step) return run_first_step(options.device);
+    if (!options.results.empty() && options.compare.empty())
+        throw InputError("--results is for --compare, which says what they are compared with");
+    const Json before = options.compare.empty() ? Json() : read_json(options.compare);
+    if (!options.results.empty()) {
+        print(compare_text(before, read_json(options.results)));
+        return 0;
+    }
+    const Result result = measure_all(options, program);
+    const Json json = to_json(result);
+    if (!options.json.empty())
+        core::write_text_file(options.json, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+    if (!options.compare.empty())
+        print("\nagainst " + options.compare.string() + "\n" + compare_text(before, json));
+    return all_good(result) ? 0 : 1;
+}
+
+}  // namespace ewa::bench

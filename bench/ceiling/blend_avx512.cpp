@@ -1,0 +1,11 @@
+// Compiled with -mavx512f -mfma: 16 pixels a vector.
+#define EWA_BENCH_LANES 16
+#include "bench/ceiling/blend_loop.inc"
+
+namespace ewa::bench {
+
+void blend_tile_avx512(const BlendLists& lists, std::uint32_t tile, float* planes) {
+    blend_whole_tile(lists, tile, planes);
+}
+
+}  // namespace ewa::bench

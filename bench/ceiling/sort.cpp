@@ -1,0 +1,92 @@
+// A stable radix sort of pairs on all threads, least significant digit first.
+#include <algorithm>
+#include <barrier>
+#include <utility>
+
+#include "bench/ceiling/ceiling.h"
+#include "core/random.h"
+
+namespace ewa::bench {
+namespace {
+
+constexpr uint32_t kDigitBits = 11;
+
+struct Pairs {
+    std::vector<uint32_t> keys, values;
+    void resize(size_t items) {
+        keys.resize(items);
+        values.resize(items);
+    }
+};
+
+/// One pass: each thread owns a contiguous share of the items, counts its digits, learns from the counts of
+/// all where its items of each digit begin, and moves them.
+void sort_pass(const Pairs& from, Pairs& to, uint32_t shift, uint32_t digits, std::vector<uint32_t>& counts) {
+    const unsigned threads = host_threads();
+    const size_t items = from.keys.size(), share = (items + threads - 1) / threads;
+    const uint32_t mask = digits - 1;
+    counts.assign(size_t(threads) * digits, 0);
+    std::barrier all(threads);
+    on_all_threads([&](unsigned thread) {
+        const size_t begin = std::min(thread * share, items), end = std::min(begin + share, items);
+        uint32_t* own = &counts[size_t(thread) * digits];
+        for (size_t i = begin; i < end; ++i) ++own[(from.keys[i] >> shift) & mask];
+        all.arrive_and_wait();
+        if (thread == 0) {
+            uint32_t sum = 0;
+            for (uint32_t digit = 0; digit < digits; ++digit)
+                for (unsigned t = 0; t < threads; ++t)
+                    sum += std::exchange(counts[size_t(t) * digits + digit], sum);
+        }
+        all.arrive_and_wait();
+        for (size_t i = begin; i < end; ++i) {
+            const uint32_t place = own[(from.keys[i] >> shift) & mask]++;
+            to.keys[place] = from.keys[i];
+            to.values[place] = from.values[i];
+        }
+    });
+}
+
+void sort_in_place(Pairs& pairs, Pairs& scratch, uint32_t bits, std::vector<uint32_t>& counts) {
+    const uint32_t passes = (bits + kDigitBits - 1) / kDigitBits;
+    const uint32_t digit_bits = (bits + passes - 1) / passes;
+    for (uint32_t pass = 0; pass < passes; ++pass) {
+        sort_pass(pairs, scratch, pass * digit_bits, 1u << digit_bits, counts);
+        std::swap(pairs, scratch);
+    }
+}
+
+}  // namespace
+
+void sort_pairs(std::vector<uint32_t>& keys, std::vector<uint32_t>& values, uint32_t bits) {
+    Pairs pairs{std::move(keys), std::move(values)}, scratch;
+    scratch.resize(pairs.keys.size());
+    std::vector<uint32_t> counts;
+    sort_in_place(pairs, scratch, bits, counts);
+    keys = std::move(pairs.keys);
+    values = std::move(pairs.values);
+}
+
+Spread time_sort(uint32_t items, uint32_t bits, int runs) {
+    if (items == 0) return {};
+    Pairs input, pairs, scratch;
+    input.resize(items);
+    for (uint32_t i = 0; i < items; ++i) {
+        input.keys[i] = core::pcg4d({i, 0x736f7274u, 0, 0})[0] >> (32 - bits);
+        input.values[i] = i;
+    }
+    scratch.resize(items);
+    std::vector<uint32_t> counts;
+    std::vector<double> samples;
+    bool first = true;
+    repeat(runs > 0 ? runs + 1 : 0, [&] {
+        pairs = input;
+        const double start = wall_milliseconds();
+        sort_in_place(pairs, scratch, bits, counts);
+        if (!first) samples.push_back(wall_milliseconds() - start);
+        first = false;
+    });
+    return spread_of(std::move(samples));
+}
+
+}  // namespace ewa::bench

@@ -1,0 +1,84 @@
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "bench/report.h"
+#include "bench/text.h"
+#include "ewa/error.h"
+
+namespace ewa::bench {
+namespace {
+
+constexpr double kSigmas = 3;       // how many standard deviations of the ratio are still noise
+constexpr double kSmallest = 0.02;  // a change under this is noise whatever the spread of a quiet run says
+
+const Json* named(const Json& list, const std::string& name) {
+    for (const Json& one : list)
+        if (one.at("name") == name) return &one;
+    return nullptr;
+}
+
+Spread spread_from(const Json& json) {
+    Spread spread;
+    spread.median = json.at("median");
+    spread.mad = json.at("mad");
+    spread.samples = json.at("samples");
+    return spread;
+}
+
+std::string ratio_line(const std::string& name, const Spread& before, const Spread& after) {
+    if (!(before.median > 0) || !(after.median > 0)) return "";
+    const double ratio = after.median / before.median;
+    const double sigma = std::hypot(relative_noise(before), relative_noise(after));
+    const double noise = std::max(kSigmas * sigma, kSmallest);
+    const char* mark = std::abs(std::log(ratio)) <= std::log1p(noise) ? ""
+                       : ratio < 1                                    ? "  faster"
+                                                                      : "  SLOWER";
+    return text_of("  %-26s %9.3f -> %9.3f ms  x %.3f +- %.3f%s\n", name.c_str(), before.median, after.median,
+                   ratio, ratio * noise, mark);
+}
+
+std::string compare_case(const Json& before, const Json& after) {
+    std::string text = text_of("\n%s\n", after.at("name").get<std::string>().c_str());
+    for (const char* count : {"instances", "pairs_evaluated", "pairs_blended", "device_bytes"})
+        if (before.at(count) != after.at(count))
+            text += text_of("  %-26s %s -> %s\n", count, before.at(count).dump().c_str(),
+                            after.at(count).dump().c_str());
+    for (const Json& pass : after.at("passes")) {
+        const std::string name = pass.at("name");
+        const Json* old_pass = named(before.at("passes"), name);
+        text += old_pass ? ratio_line(name, spread_from(old_pass->at("milliseconds")),
+                                      spread_from(pass.at("milliseconds")))
+                         : text_of("  %s: new\n", name.c_str());
+    }
+    for (const Json& pass : before.at("passes"))
+        if (!named(after.at("passes"), pass.at("name")))
+            text += text_of("  %s: gone\n", pass.at("name").get<std::string>().c_str());
+    for (const auto& [name, key] : {std::pair{"wall", "wall_milliseconds"},
+                                    {"CPU time of all threads", "cpu_milliseconds"},
+                                    {"blend on the host", "ceiling_blend_milliseconds"}})
+        text += ratio_line(name, spread_from(before.at(key)), spread_from(after.at(key)));
+    return text;
+}
+
+}  // namespace
+
+std::string compare_text(const Json& old_results, const Json& new_results) {
+    try {
+        if (old_results.at("schema") != new_results.at("schema"))
+            throw InputError("results of schema " + old_results.at("schema").dump() +
+                             " cannot be compared with those of " + new_results.at("schema").dump());
+        std::string text;
+        const std::string before = old_results.at("device").at("name"),
+                          after = new_results.at("device").at("name");
+        if (before != after) text += "not the same device: " + before + " -> " + after + "\n";
+        for (const Json& one : new_results.at("cases"))
+            if (const Json* old_case = named(old_results.at("cases"), one.at("name")))
+                text += compare_case(*old_case, one);
+        return text.empty() ? "no case is in both\n" : text;
+    } catch (const Json::exception& error) {
+        throw InputError(std::string("not results of the benchmark: ") + error.what());
+    }
+}
+
+}  // namespace ewa::bench

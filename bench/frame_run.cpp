@@ -1,0 +1,85 @@
+#include "bench/frame_run.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "pipeline/camera_block.h"
+#include "pipeline/photo.h"
+
+namespace ewa::bench {
+namespace {
+
+using namespace pipeline;
+
+RenderOptions black_background(int sh_degree) {
+    RenderOptions options;
+    options.sh_degree = sh_degree;
+    return options;
+}
+
+}  // namespace
+
+FrameRun::FrameRun(std::shared_ptr<gpu::Device> device, const Scene& scene, bool train)
+    : device_(std::move(device)),
+      kernels_(*device_),
+      executor_(*device_),
+      options_(black_background(scene.gaussians.sh_degree)),
+      plan_(train ? plan_training(scene.gaussians.sh_degree, options_, false)
+                  : plan_picture(scene.gaussians, options_, false)),
+      model_(upload_model(*device_, scene.gaussians, train ? 2 : 0, false)),
+      camera_(scene.camera),
+      train_(train) {
+    const shared::CameraBlock block = camera_block(camera_, kernels_.shape());
+    camera_buffer_ = gpu::Buffer(*device_, "camera", sizeof(block), gpu::Texel::none, true);
+    camera_buffer_.upload(std::span<const shared::CameraBlock>(&block, 1));
+    camera_use_ = {&camera_buffer_, 0, uint32_t(camera_.width), uint32_t(camera_.height)};
+    if (train_) photo_ = upload_photo(*device_, scene.photo);
+    frame_.instance_capacity = first_capacity(model_.splats);
+    run();
+}
+
+void FrameRun::record(gpu::Recording& recording) {
+    sorted_ = record_forward(recording, kernels_, plan_, model_, frame_, camera_use_, options_.background);
+    if (!train_) return;
+    record_loss(recording, kernels_, frame_, camera_use_, options_.background, photo_);
+    record_backward(recording, kernels_, plan_, model_, frame_, camera_use_, options_.background, sorted_,
+                    rates_);
+}
+
+void FrameRun::run() {
+    counts_ = run_until_it_fits(
+        kernels_, executor_, frame_,
+        {model_.splats, camera_use_.width, camera_use_.height, frame_.instance_capacity, train_, false},
+        [&](gpu::Recording& recording) { record(recording); });
+}
+
+void FrameRun::run_update() {
+    // The whole frame is recorded and its last pass taken out: what that pass binds is written in one place
+    // alone.
+    gpu::Recording whole(device_->limits());
+    record(whole);
+    const gpu::Command& update = whole.commands().back();
+    gpu::Recording alone(device_->limits());
+    alone.dispatch_bytes(*update.pipeline, update.name, update.uses, update.push, update.groups);
+    executor_.run(alone, true);
+}
+
+std::vector<uint32_t> FrameRun::sorted_splats() const {
+    const uint32_t instances = counts_.instances;
+    auto values = sorted_.values->download<uint32_t>(instances);
+    if (!plan_.gradients) return values;
+    const auto splats = frame_.instance_splats.download<uint32_t>(instances);
+    std::transform(values.begin(), values.end(), values.begin(),
+                   [&](uint32_t instance) { return splats[instance]; });
+    return values;
+}
+
+std::vector<uint32_t> FrameRun::tile_starts() const {
+    return frame_.tile_starts.download<uint32_t>(size_t(frame_.sizes.tiles) + 1);
+}
+
+std::vector<float> FrameRun::records() const {
+    return frame_.records.download<float>(size_t(model_.splats) * shared::RECORD_TEXELS * 4);
+}
+
+}  // namespace ewa::bench

@@ -1,0 +1,62 @@
+// One frame or training step of a scene on the device, again and again.
+#pragma once
+#include <memory>
+#include <vector>
+
+#include "bench/scene.h"
+#include "ewa/device.h"
+#include "gpu/executor.h"
+#include "pipeline/backward.h"
+#include "pipeline/capacity.h"
+
+namespace ewa::bench {
+
+class FrameRun {
+  public:
+    /// Uploads the scene and runs once, which settles how much room the instances need and compiles the
+    /// kernels.
+    FrameRun(std::shared_ptr<gpu::Device> device, const Scene& scene, bool train);
+
+    /// One more. Records, submits and waits.
+    void run();
+    /// Runs the projection's gradient and Adam alone, on the slots the last run left.
+    void run_update();
+    /// Adam's learning rates; zero at first, so that every run meets the same parameters and does the same
+    /// work.
+    void set_rates(const pipeline::Rates& rates) { rates_ = rates; }
+
+    const std::vector<gpu::Timing>& timings() const { return executor_.timings(); }
+    const pipeline::Kernels& kernels() const { return kernels_; }
+    const pipeline::Plan& plan() const { return plan_; }
+    const pipeline::Model& model() const { return model_; }
+    const pipeline::Frame& frame() const { return frame_; }
+    const pipeline::Sorted& sorted() const { return sorted_; }
+    const Camera& camera() const { return camera_; }
+    const RenderOptions& options() const { return options_; }
+    const shared::Counts& counts() const { return counts_; }
+
+    /// The splat of each sorted instance.
+    std::vector<uint32_t> sorted_splats() const;
+    std::vector<uint32_t> tile_starts() const;
+    std::vector<float> records() const;
+
+  private:
+    void record(gpu::Recording& recording);
+
+    std::shared_ptr<gpu::Device> device_;
+    pipeline::Kernels kernels_;
+    gpu::Executor executor_;
+    RenderOptions options_;
+    pipeline::Plan plan_;
+    pipeline::Model model_;
+    pipeline::Frame frame_;
+    pipeline::Rates rates_;
+    Camera camera_;
+    gpu::Buffer camera_buffer_, photo_;
+    pipeline::CameraUse camera_use_;
+    pipeline::Sorted sorted_;
+    shared::Counts counts_{};
+    bool train_ = false;
+};
+
+}  // namespace ewa::bench
