@@ -67,7 +67,7 @@ Result measure_all(const Options& options, const std::vector<std::string>& progr
     measuring.first_step_command.insert(measuring.first_step_command.end(),
                                         {"--first-step", "--device", std::to_string(result.device.index)});
     for (const Case& one : cases) {
-        result.cases.push_back(measure(device, one, measuring, result.host.copy_bandwidth));
+        result.cases.push_back(measure(device, one, measuring, result.host.copies));
         print(case_text(result.cases.back()));
     }
     result.scaling = fit_scaling(result.cases);

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "bench/report.h"
 #include "bench/text.h"
@@ -18,47 +17,51 @@ const Json* named(const Json& list, const std::string& name) {
     return nullptr;
 }
 
-Spread spread_from(const Json& json) {
+/// The spread under a key, of no samples where there is none.
+Spread spread_at(const Json& json, const std::string& key) {
     Spread spread;
-    spread.median = json.at("median");
-    spread.mad = json.at("mad");
-    spread.samples = json.at("samples");
+    if (!json.contains(key)) return spread;
+    spread.median = json.at(key).at("median");
+    spread.mad = json.at(key).at("mad");
+    spread.samples = json.at(key).at("samples");
     return spread;
 }
 
-std::string ratio_line(const std::string& name, const Spread& before, const Spread& after) {
+std::string ratio_text(const char* what, const Spread& before, const Spread& after) {
     if (!(before.median > 0) || !(after.median > 0)) return "";
     const double ratio = after.median / before.median;
     const double sigma = std::hypot(relative_noise(before), relative_noise(after));
     const double noise = std::max(kSigmas * sigma, kSmallest);
-    const char* mark = std::abs(std::log(ratio)) <= std::log1p(noise) ? ""
-                       : ratio < 1                                    ? "  faster"
-                                                                      : "  SLOWER";
-    return text_of("  %-26s %9.3f -> %9.3f ms  x %.3f +- %.3f%s\n", name.c_str(), before.median, after.median,
-                   ratio, ratio * noise, mark);
+    const char* mark = std::abs(std::log(ratio)) <= std::log1p(noise) ? "" : ratio < 1 ? "faster" : "SLOWER";
+    return text_of("  %s %9.3f -> %9.3f  x %.3f +- %.3f %-6s", what, before.median, after.median, ratio,
+                   ratio * noise, mark);
+}
+
+/// prefix: of the keys of the wall and the processor time.
+std::string ratio_line(const std::string& name, const Json& before, const Json& after,
+                       const std::string& prefix) {
+    const std::string wall = prefix + "milliseconds", cpu = prefix + "cpu_milliseconds";
+    const std::string text = ratio_text("wall", spread_at(before, wall), spread_at(after, wall)) +
+                             ratio_text("CPU", spread_at(before, cpu), spread_at(after, cpu));
+    return text.empty() ? text : text_of("  %-22s%s\n", name.c_str(), text.c_str());
 }
 
 std::string compare_case(const Json& before, const Json& after) {
     std::string text = text_of("\n%s\n", after.at("name").get<std::string>().c_str());
     for (const char* count : {"instances", "pairs_evaluated", "pairs_blended", "device_bytes"})
         if (before.at(count) != after.at(count))
-            text += text_of("  %-26s %s -> %s\n", count, before.at(count).dump().c_str(),
+            text += text_of("  %-22s  %s -> %s\n", count, before.at(count).dump().c_str(),
                             after.at(count).dump().c_str());
     for (const Json& pass : after.at("passes")) {
         const std::string name = pass.at("name");
         const Json* old_pass = named(before.at("passes"), name);
-        text += old_pass ? ratio_line(name, spread_from(old_pass->at("milliseconds")),
-                                      spread_from(pass.at("milliseconds")))
-                         : text_of("  %s: new\n", name.c_str());
+        text += old_pass ? ratio_line(name, *old_pass, pass, "") : text_of("  %s: new\n", name.c_str());
     }
     for (const Json& pass : before.at("passes"))
         if (!named(after.at("passes"), pass.at("name")))
             text += text_of("  %s: gone\n", pass.at("name").get<std::string>().c_str());
-    for (const auto& [name, key] : {std::pair{"wall", "wall_milliseconds"},
-                                    {"CPU time of all threads", "cpu_milliseconds"},
-                                    {"blend on the host", "ceiling_blend_milliseconds"}})
-        text += ratio_line(name, spread_from(before.at(key)), spread_from(after.at(key)));
-    return text;
+    return text + ratio_line("with the host's part", before, after, "") +
+           ratio_line("blend on the host", before, after, "ceiling_blend_");
 }
 
 }  // namespace

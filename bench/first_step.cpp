@@ -117,9 +117,9 @@ CaseResult measure_first_step(const Case& one, const MeasureOptions& options) {
     }
     CaseResult result;
     result.one = one;
-    result.passes = {{"shader cache cold", spread_of(cold), 0, 0},
-                     {"shader cache warm", spread_of(warm), 0, 0}};
-    result.wall = result.passes[1].milliseconds;
+    result.passes = {{"shader cache cold", {spread_of(cold), {}}, 0, {}},
+                     {"shader cache warm", {spread_of(warm), {}}, 0, {}}};
+    result.total = result.passes[1].time;
     return result;
 }
 

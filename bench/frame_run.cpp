@@ -53,15 +53,31 @@ void FrameRun::run() {
         [&](gpu::Recording& recording) { record(recording); });
 }
 
+gpu::Recording FrameRun::only(const gpu::Command& command) const {
+    gpu::Recording alone(device_->limits());
+    const gpu::Use& target = command.uses.front();
+    if (command.kind == gpu::Command::Kind::fill)
+        alone.fill(*target.buffer, command.fill_value, command.target_offset, command.bytes);
+    else
+        alone.dispatch_bytes(*command.pipeline, command.name, command.uses, command.push, command.groups);
+    return alone;
+}
+
+void FrameRun::run_apart(const std::function<void(const std::string&, const std::function<void()>&)>& each) {
+    gpu::Recording whole(device_->limits());
+    record(whole);
+    for (const gpu::Command& command : whole.commands()) {
+        const gpu::Recording alone = only(command);
+        each(command.name, [&] { executor_.run(alone); });
+    }
+}
+
 void FrameRun::run_update() {
     // The whole frame is recorded and its last pass taken out: what that pass binds is written in one place
     // alone.
     gpu::Recording whole(device_->limits());
     record(whole);
-    const gpu::Command& update = whole.commands().back();
-    gpu::Recording alone(device_->limits());
-    alone.dispatch_bytes(*update.pipeline, update.name, update.uses, update.push, update.groups);
-    executor_.run(alone, true);
+    executor_.run(only(whole.commands().back()), true);
 }
 
 std::vector<uint32_t> FrameRun::sorted_splats() const {

@@ -1,5 +1,6 @@
 // One frame or training step of a scene on the device, again and again.
 #pragma once
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -19,6 +20,8 @@ class FrameRun {
 
     /// One more. Records, submits and waits.
     void run();
+    /// The same work, but every command is a submission of its own with each(name, submit) around it.
+    void run_apart(const std::function<void(const std::string&, const std::function<void()>&)>& each);
     /// Runs the projection's gradient and Adam alone, on the slots the last run left.
     void run_update();
     /// Adam's learning rates; zero at first, so that every run meets the same parameters and does the same
@@ -42,6 +45,7 @@ class FrameRun {
 
   private:
     void record(gpu::Recording& recording);
+    gpu::Recording only(const gpu::Command& command) const;  // a dispatch or a fill
 
     std::shared_ptr<gpu::Device> device_;
     pipeline::Kernels kernels_;

@@ -1,6 +1,8 @@
 #include "bench/measure.h"
 
-#include <algorithm>
+#include <functional>
+#include <string>
+#include <vector>
 
 #include "bench/ceiling/ceiling.h"
 #include "bench/check.h"
@@ -10,41 +12,82 @@
 namespace ewa::bench {
 namespace {
 
-/// Times of a case's runs, by pass.
-class Stopwatch {
+/// Samples by pass, in order of first appearance. Times of one run under one name are added up.
+class PassSamples {
   public:
-    void start() {
-        wall_start_ = wall_milliseconds();
-        cpu_start_ = process_cpu_milliseconds();
-    }
-    void stop(const std::vector<gpu::Timing>& timings) {
-        wall_.push_back(wall_milliseconds() - wall_start_);
-        cpu_.push_back(process_cpu_milliseconds() - cpu_start_);
-        double sum = 0;
-        for (const gpu::Timing& timing : timings) {
-            times_of(timing.name).push_back(timing.milliseconds);
-            sum += timing.milliseconds;
+    void add(const std::string& name, double milliseconds) { running(name) += milliseconds; }
+    void end_run() {
+        for (Samples& one : samples_) {
+            one.times.push_back(one.running);
+            one.running = 0;
         }
-        device_.push_back(sum);
     }
-    void write(CaseResult& result) const {
-        result.wall = spread_of(wall_);
-        result.cpu = spread_of(cpu_);
-        result.device = spread_of(device_);
-        for (const auto& [name, times] : passes_) result.passes.push_back({name, spread_of(times), 0, 0});
+    template <class Visit>
+    void visit(Visit visit) const {
+        for (const Samples& one : samples_) visit(one.name, spread_of(one.times));
     }
 
   private:
-    std::vector<double>& times_of(const std::string& name) {
-        for (auto& [known, times] : passes_)
-            if (known == name) return times;
-        return passes_.emplace_back(name, std::vector<double>()).second;
+    struct Samples {
+        std::string name;
+        double running = 0;
+        std::vector<double> times;
+    };
+    double& running(const std::string& name) {
+        for (Samples& one : samples_)
+            if (one.name == name) return one.running;
+        return samples_.emplace_back(Samples{name, 0, {}}).running;
     }
-
-    double wall_start_ = 0, cpu_start_ = 0;
-    std::vector<double> wall_, cpu_, device_;
-    std::vector<std::pair<std::string, std::vector<double>>> passes_;  // in order of appearance
+    std::vector<Samples> samples_;
 };
+
+PassResult& pass_of(CaseResult& result, const std::string& name) {
+    for (PassResult& pass : result.passes)
+        if (pass.name == name) return pass;
+    result.passes.push_back({name, {}, 0, {}});
+    return result.passes.back();
+}
+
+/// work() runs and leaves the device's own times of its passes behind.
+template <class Work, class Timings>
+void time_passes(CaseResult& result, int runs, Work work, Timings timings) {
+    PassSamples samples;
+    Stopwatch watch;
+    std::vector<double> sums;
+    repeat(runs, [&] {
+        watch.start();
+        work();
+        watch.stop();
+        double sum = 0;
+        for (const gpu::Timing& timing : timings()) {
+            samples.add(timing.name, timing.milliseconds);
+            sum += timing.milliseconds;
+        }
+        samples.end_run();
+        sums.push_back(sum);
+    });
+    result.total = watch.timed();
+    result.device = spread_of(sums);
+    samples.visit(
+        [&](const std::string& name, const Spread& spread) { pass_of(result, name).time.wall = spread; });
+}
+
+/// The processor time of each pass, by submissions of their own.
+void time_passes_apart(CaseResult& result, FrameRun& run, int runs) {
+    PassSamples samples;
+    repeat(runs, [&] {
+        run.run_apart([&](const std::string& name, const std::function<void()>& submit) {
+            Stopwatch watch;
+            watch.start();
+            submit();
+            watch.stop();
+            samples.add(name, watch.timed().cpu.median);
+        });
+        samples.end_run();
+    });
+    samples.visit(
+        [&](const std::string& name, const Spread& spread) { pass_of(result, name).time.cpu = spread; });
+}
 
 PassResult* find_pass(CaseResult& result, const std::string& name) {
     for (PassResult& pass : result.passes)
@@ -52,12 +95,19 @@ PassResult* find_pass(CaseResult& result, const std::string& name) {
     return nullptr;
 }
 
+void set_ceiling(CaseResult& result, const std::string& name, const Timed& ceiling) {
+    if (PassResult* pass = find_pass(result, name)) pass->ceiling = ceiling;
+}
+
 void set_bytes(CaseResult& result, const std::string& name, double bytes) {
     if (PassResult* pass = find_pass(result, name)) pass->bytes = bytes;
 }
 
-void set_ceiling(CaseResult& result, const std::string& name, double milliseconds) {
-    if (PassResult* pass = find_pass(result, name)) pass->ceiling = milliseconds;
+/// For a pass that does little but move memory: as long as the host takes to copy as much.
+void set_copy_ceiling(CaseResult& result, const std::string& name, double bytes, const Bandwidth& copies) {
+    set_bytes(result, name, bytes);
+    set_ceiling(result, name,
+                {spread_of({bytes / copies.wall * 1e-6}), spread_of({bytes / copies.cpu * 1e-6})});
 }
 
 /// A pass of the sort reads the keys to count, then reads and writes keys and values.
@@ -66,18 +116,15 @@ double sort_bytes(uint64_t items, const pipeline::RadixCut& cut) {
 }
 
 /// Parameters, moments and records are read and written once; slots are read.
-void add_bytes(CaseResult& result, const FrameRun& run, double copy_bandwidth) {
+void add_bytes(CaseResult& result, const FrameRun& run, const Bandwidth& copies) {
     const double params = double(pipeline::parameter_bytes(run.model().capacity, run.model().sh_degree));
     const double records = double(run.model().splats) * shared::RECORD_TEXELS * 16;
     const double slots = double(result.instances) * shared::SLOT_FLOATS * 4;
     const pipeline::Sizes& sizes = run.frame().sizes;
-    set_bytes(result, "project", params + records);
-    set_bytes(result, "update", 6 * params + slots);
+    set_copy_ceiling(result, "project", params + records, copies);
+    set_copy_ceiling(result, "update", 6 * params + slots, copies);
     set_bytes(result, "depth order", sort_bytes(run.model().splats, sizes.depth_sort));
     set_bytes(result, "tile order", sort_bytes(result.instances, sizes.tile_sort));
-    for (const char* name : {"project", "update"})
-        if (const PassResult* pass = find_pass(result, name))
-            set_ceiling(result, name, pass->bytes / copy_bandwidth * 1e-6);
 }
 
 void add_ceilings(CaseResult& result, const FrameRun& run, int runs) {
@@ -99,12 +146,12 @@ void add_ceilings(CaseResult& result, const FrameRun& run, int runs) {
     result.pairs_blended = pairs.blended;
     std::vector<float> planes;
     result.ceiling_blend = time_blend(lists, sizes.tiles, runs, planes);
-    set_ceiling(result, "blend", result.ceiling_blend.median);
-    set_ceiling(result, "blend_backward", result.ceiling_blend.median);
+    set_ceiling(result, "blend", result.ceiling_blend);
+    set_ceiling(result, "blend_backward", result.ceiling_blend);
 
     const uint32_t tile_bits = sizes.tile_sort.passes * sizes.tile_sort.bits;
-    set_ceiling(result, "depth order", time_sort(run.model().splats, 32, runs).median);
-    set_ceiling(result, "tile order", time_sort(result.instances, tile_bits, runs).median);
+    set_ceiling(result, "depth order", time_sort(run.model().splats, 32, runs));
+    set_ceiling(result, "tile order", time_sort(result.instances, tile_bits, runs));
 }
 
 void check_frame(CaseResult& result, const std::shared_ptr<gpu::Device>& device, const FrameRun& run,
@@ -122,28 +169,36 @@ void check_frame(CaseResult& result, const std::shared_ptr<gpu::Device>& device,
     if (result.one.kind == Kind::update) add(check_update(device, scene));
 }
 
+/// Processor time tells something only of a device that runs on the processor.
+void leave_cpu_to_cpu_devices(CaseResult& result, const gpu::Device& device) {
+    if (device.limits().cpu) return;
+    result.total.cpu = {};
+    for (PassResult& pass : result.passes) pass.time.cpu = {};
+}
+
 CaseResult measure_frame(const std::shared_ptr<gpu::Device>& device, const Case& one,
-                         const MeasureOptions& options, double copy_bandwidth) {
+                         const MeasureOptions& options, const Bandwidth& copies) {
     CaseResult result;
     result.one = one;
     const Scene scene = make_scene(one);
     FrameRun run(device, scene, one.kind != Kind::forward);
     run.run();
-    Stopwatch watch;
-    repeat(options.runs, [&] {
-        watch.start();
-        if (one.kind == Kind::update)
-            run.run_update();
-        else
-            run.run();
-        watch.stop(run.timings());
-    });
-    watch.write(result);
+    const auto timings = [&] { return run.timings(); };
+    if (one.kind == Kind::update) {
+        time_passes(
+            result, options.runs, [&] { run.run_update(); }, timings);
+        pass_of(result, "update").time.cpu = result.total.cpu;
+    } else {
+        time_passes(
+            result, options.runs, [&] { run.run(); }, timings);
+        if (device->limits().cpu) time_passes_apart(result, run, options.runs);
+    }
     result.instances = run.counts().instances;
     result.device_bytes = device_bytes(*device);
-    add_bytes(result, run, copy_bandwidth);
+    add_bytes(result, run, copies);
     if (one.kind != Kind::update) add_ceilings(result, run, options.runs);
     if (options.check) check_frame(result, device, run, scene);
+    leave_cpu_to_cpu_devices(result, *device);
     return result;
 }
 
@@ -153,31 +208,28 @@ CaseResult measure_sort(const std::shared_ptr<gpu::Device>& device, const Case& 
     result.one = one;
     SortRun run(device, one.splats);
     run.run();
-    Stopwatch watch;
-    repeat(options.runs, [&] {
-        watch.start();
-        run.run();
-        watch.stop(run.timings());
-    });
-    watch.write(result);
+    time_passes(
+        result, options.runs, [&] { run.run(); }, [&] { return run.timings(); });
+    pass_of(result, "sort").time.cpu = result.total.cpu;
     result.device_bytes = device_bytes(*device);
-    set_bytes(result, "sort", 20.0 * one.splats * 4);
-    set_ceiling(result, "sort", time_sort(one.splats, 32, options.runs).median);
+    set_bytes(result, "sort", sort_bytes(one.splats, run.cut()));
+    set_ceiling(result, "sort", time_sort(one.splats, 32, options.runs));
     if (options.check) result.checks.push_back(run.check());
+    leave_cpu_to_cpu_devices(result, *device);
     return result;
 }
 
 }  // namespace
 
 CaseResult measure(const std::shared_ptr<gpu::Device>& device, const Case& one, const MeasureOptions& options,
-                   double copy_bandwidth) {
+                   const Bandwidth& copies) {
     switch (one.kind) {
         case Kind::sort:
             return measure_sort(device, one, options);
         case Kind::first_step:
             return measure_first_step(one, options);
         default:
-            return measure_frame(device, one, options, copy_bandwidth);
+            return measure_frame(device, one, options, copies);
     }
 }
 

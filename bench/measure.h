@@ -15,7 +15,7 @@ struct MeasureOptions {
 };
 
 CaseResult measure(const std::shared_ptr<gpu::Device>& device, const Case& one, const MeasureOptions& options,
-                   double copy_bandwidth);
+                   const Bandwidth& copies);
 
 /// Opens a device, uploads a scene, trains one step and prints the steady clock's nanoseconds at its end.
 int run_first_step(const std::string& device);

@@ -8,18 +8,26 @@ Json to_json(const Spread& spread) {
             {"high", spread.high},     {"least", spread.least}, {"samples", spread.samples}};
 }
 
+void add_times(Json& json, const char* prefix, const Timed& timed) {
+    if (timed.wall.samples > 0) json[std::string(prefix) + "milliseconds"] = to_json(timed.wall);
+    if (timed.cpu.samples > 0) json[std::string(prefix) + "cpu_milliseconds"] = to_json(timed.cpu);
+}
+
 Json to_json(const CaseResult& result, const PassResult& pass) {
-    Json json{{"name", pass.name}, {"milliseconds", to_json(pass.milliseconds)}};
-    const double seconds = pass.milliseconds.median * 1e-3;
-    if (pass.bytes > 0) json["bytes"] = pass.bytes;
-    if (pass.bytes > 0 && seconds > 0) json["gigabytes_per_second"] = pass.bytes / seconds * 1e-9;
-    if (pass.ceiling > 0) {
-        json["ceiling_milliseconds"] = pass.ceiling;
-        if (seconds > 0) json["ceiling_share"] = pass.ceiling / pass.milliseconds.median;
-    }
-    if (pass.name.starts_with("blend") && result.pairs_evaluated > 0 && seconds > 0) {
-        json["pairs_evaluated_per_second"] = double(result.pairs_evaluated) / seconds;
-        json["pairs_blended_per_second"] = double(result.pairs_blended) / seconds;
+    Json json{{"name", pass.name}};
+    add_times(json, "", pass.time);
+    add_times(json, "ceiling_", pass.ceiling);
+    const double seconds = pass.time.wall.median * 1e-3;
+    const auto add = [&](const char* name, double value, double by) {
+        if (value > 0 && by > 0) json[name] = value / by;
+    };
+    add("bytes", pass.bytes, 1);
+    add("gigabytes_per_second", pass.bytes * 1e-9, seconds);
+    add("ceiling_share", pass.ceiling.wall.median, pass.time.wall.median);
+    add("ceiling_share_cpu", pass.ceiling.cpu.median, pass.time.cpu.median);
+    if (pass.name.starts_with("blend")) {
+        add("pairs_evaluated_per_second", double(result.pairs_evaluated), seconds);
+        add("pairs_blended_per_second", double(result.pairs_blended), seconds);
     }
     return json;
 }
@@ -42,11 +50,10 @@ Json to_json(const CaseResult& result) {
               {"pairs_evaluated", result.pairs_evaluated},
               {"pairs_blended", result.pairs_blended},
               {"device_bytes", result.device_bytes},
-              {"wall_milliseconds", to_json(result.wall)},
-              {"cpu_milliseconds", to_json(result.cpu)},
               {"device_milliseconds", to_json(result.device)},
-              {"ceiling_blend_milliseconds", to_json(result.ceiling_blend)},
               {"passes", Json::array()}};
+    add_times(json, "", result.total);
+    add_times(json, "ceiling_blend_", result.ceiling_blend);
     for (const PassResult& pass : result.passes) json["passes"].push_back(to_json(result, pass));
     if (!result.checks.empty()) json["checks"] = Json::array();
     for (const Check& check : result.checks) json["checks"].push_back(to_json(check));
@@ -72,7 +79,8 @@ Json to_json(const Result& result) {
                 {"threads", result.host.threads},
                 {"vectors", result.host.vectors},
                 {"load", result.host.load},
-                {"copy_gigabytes_per_second", result.host.copy_bandwidth}}},
+                {"copy_gigabytes_per_second", result.host.copies.wall},
+                {"copy_gigabytes_per_second_cpu", result.host.copies.cpu}}},
               {"cases", Json::array()},
               {"scaling", Json::array()}};
     for (const CaseResult& one : result.cases) json["cases"].push_back(to_json(one));

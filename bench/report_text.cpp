@@ -4,26 +4,37 @@
 namespace ewa::bench {
 namespace {
 
+std::string share_text(double part, double whole) {
+    return part > 0 && whole > 0 ? text_of("%5.1f %%", 100 * part / whole) : "      -";
+}
+
 std::string pass_line(const CaseResult& result, const PassResult& pass) {
-    const double median = pass.milliseconds.median;
-    std::string line = text_of("  %-26s %9.3f ms  +- %5.1f %%", pass.name.c_str(), median,
-                               100 * relative_noise(pass.milliseconds));
-    if (result.device.median > 0) line += text_of("  %5.1f %% of all", 100 * median / result.device.median);
-    if (pass.ceiling > 0 && median > 0)
-        line += text_of("  %5.1f %% of the host", 100 * pass.ceiling / median);
-    if (pass.name.starts_with("blend") && result.pairs_evaluated > 0 && median > 0)
+    const Spread &wall = pass.time.wall, &cpu = pass.time.cpu;
+    // Of a CPU device on a busy machine the processor time says more.
+    const double best = cpu.samples > 0 ? cpu.median : wall.median;
+    std::string line =
+        text_of("  %-22s %9.3f +- %5.1f %%", pass.name.c_str(), wall.median, 100 * relative_noise(wall));
+    line += cpu.samples > 0 ? text_of(" %9.3f +- %5.1f %%", cpu.median, 100 * relative_noise(cpu))
+                            : std::string(20, ' ');
+    line += text_of("  %s  %s  %s", share_text(wall.median, result.device.median).c_str(),
+                    share_text(pass.ceiling.wall.median, wall.median).c_str(),
+                    share_text(pass.ceiling.cpu.median, cpu.median).c_str());
+    if (pass.name.starts_with("blend") && result.pairs_evaluated > 0 && best > 0)
         line +=
-            text_of("  %s pairs/s, %s blended", scaled(double(result.pairs_evaluated) / median * 1e3).c_str(),
-                    scaled(double(result.pairs_blended) / median * 1e3).c_str());
-    else if (pass.bytes > 0 && median > 0)
-        line += text_of("  %.2f GB/s", pass.bytes / median * 1e-6);
+            text_of("  %s pairs/s, %s blended", scaled(double(result.pairs_evaluated) / best * 1e3).c_str(),
+                    scaled(double(result.pairs_blended) / best * 1e3).c_str());
+    else if (pass.bytes > 0 && best > 0)
+        line += text_of("  %.2f GB/s", pass.bytes / best * 1e-6);
     return line + "\n";
 }
 
-std::string total_line(const char* name, const Spread& spread) {
-    return text_of("  %-26s %9.3f ms  +- %5.1f %%  quartiles %.3f to %.3f, least %.3f, of %d\n", name,
-                   spread.median, 100 * relative_noise(spread), spread.low, spread.high, spread.least,
-                   spread.samples);
+std::string total_line(const char* name, const Timed& timed) {
+    std::string line =
+        text_of("  %-22s %9.3f +- %5.1f %%", name, timed.wall.median, 100 * relative_noise(timed.wall));
+    if (timed.cpu.samples > 0)
+        line += text_of(" %9.3f +- %5.1f %%", timed.cpu.median, 100 * relative_noise(timed.cpu));
+    return line + text_of("  quartiles %.3f to %.3f, least %.3f, of %d\n", timed.wall.low, timed.wall.high,
+                          timed.wall.least, timed.wall.samples);
 }
 
 }  // namespace
@@ -33,7 +44,7 @@ std::string header_text(const Result& result) {
     return text_of("ewa %s on %s (%s, %u lanes)\nhost: %s, %u threads, %s, copies %.1f GB/s, load %.1f\n",
                    result.version.c_str(), result.device.name.c_str(), result.device.driver.c_str(),
                    result.device.subgroup_size, host.cpu.c_str(), host.threads, host.vectors.c_str(),
-                   host.copy_bandwidth, host.load);
+                   host.copies.wall, host.load);
 }
 
 std::string case_text(const CaseResult& result) {
@@ -43,16 +54,12 @@ std::string case_text(const CaseResult& result) {
                         scaled(result.instances).c_str(), scaled(double(result.pairs_evaluated)).c_str(),
                         scaled(double(result.pairs_blended)).c_str(),
                         scaled(double(result.device_bytes)).c_str());
+    text += text_of("  %-22s %9s %9s %9s %9s  %7s  %7s  %7s\n", "ms", "wall", "",
+                    result.total.cpu.samples > 0 ? "CPU" : "", "", "of all", "of host", "by CPU");
     for (const PassResult& pass : result.passes) text += pass_line(result, pass);
-    if (result.device.samples > 0) text += total_line("all passes", result.device);
-    if (result.one.kind != Kind::first_step) text += total_line("wall", result.wall);
-    if (result.cpu.samples > 0) text += total_line("CPU time of all threads", result.cpu);
-    if (result.ceiling_blend.samples > 0) {
-        text += total_line("blend on the host", result.ceiling_blend);
-        text.back() = ' ';
-        text += text_of(" %s pairs/s\n",
-                        scaled(double(result.pairs_evaluated) / result.ceiling_blend.median * 1e3).c_str());
-    }
+    if (result.device.samples > 0) text += total_line("all passes", {result.device, {}});
+    if (result.one.kind != Kind::first_step) text += total_line("with the host's part", result.total);
+    if (result.ceiling_blend.wall.samples > 0) text += total_line("blend on the host", result.ceiling_blend);
     for (const Check& check : result.checks)
         text += text_of("  %s %-52s %.3g (at most %.3g)\n", check.good() ? "good " : "WRONG",
                         check.what.c_str(), check.error, check.bound);

@@ -1,11 +1,11 @@
 // What a run of the benchmark found out.
 #pragma once
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "bench/cases.h"
+#include "bench/ceiling/ceiling.h"
 #include "bench/spread.h"
 #include "ewa/device.h"
 
@@ -13,9 +13,9 @@ namespace ewa::bench {
 
 struct PassResult {
     std::string name;
-    Spread milliseconds;
-    double bytes = 0;    // moved at least, where that is known; else 0
-    double ceiling = 0;  // ms that the host takes for the same work; 0 where there is no such figure
+    Timed time;        // cpu only on a CPU device
+    double bytes = 0;  // moved at least, where that is known; else 0
+    Timed ceiling;     // the host at the same work; no samples where there is no such figure
 };
 
 /// One comparison with the float64 twin, or with the rule that a sort or a scan follows.
@@ -28,14 +28,13 @@ struct Check {
 
 struct CaseResult {
     Case one;
-    Spread wall;    // ms, from recording to the end of the wait
-    Spread cpu;     // ms of all of the process's threads: what a CPU device costs whatever else runs
-    Spread device;  // ms, the sum of the passes
+    Timed total;    // from recording to the end of the wait
+    Spread device;  // the sum of the passes
     std::vector<PassResult> passes;
     uint32_t instances = 0;
     uint64_t pairs_evaluated = 0, pairs_blended = 0;
     uint64_t device_bytes = 0;
-    Spread ceiling_blend;  // ms of the same lists on the host
+    Timed ceiling_blend;  // the same lists on the host
     std::vector<Check> checks;
     std::string note;  // what was left out and why
 };
@@ -53,8 +52,8 @@ struct Host {
     std::string cpu;
     unsigned threads = 0;
     std::string vectors;
-    double load = 0;            // of the last minute, before the run
-    double copy_bandwidth = 0;  // GB/s read and written
+    double load = 0;  // of the last minute, before the run
+    Bandwidth copies;
 };
 
 struct Result {

@@ -45,13 +45,15 @@ std::vector<Scaling> fit_scaling(const std::vector<CaseResult>& cases) {
     Points by_pairs;
     for (const CaseResult& c : cases) {
         const bool frame = c.one.kind == Kind::forward || c.one.kind == Kind::train;
-        if (!frame || c.one.splats < kFewestSplats || !(c.wall.median > 0)) continue;
+        // What the machine spends, where that can be told from what else it was busy with.
+        const double time = c.total.cpu.samples > 0 ? c.total.cpu.median : c.total.wall.median;
+        if (!frame || c.one.splats < kFewestSplats || !(time > 0)) continue;
         Points& series = by_splats[series_of(c.one)];
         series.x.push_back(double(c.one.splats));
-        series.y.push_back(c.wall.median);
+        series.y.push_back(time);
         if (c.one.kind != Kind::forward || c.pairs_evaluated == 0) continue;
         by_pairs.x.push_back(double(c.pairs_evaluated));
-        by_pairs.y.push_back(c.wall.median);
+        by_pairs.y.push_back(time);
     }
     std::vector<Scaling> scaling;
     for (const auto& [name, points] : by_splats)

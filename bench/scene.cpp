@@ -25,7 +25,7 @@ struct Style {
 Style style_of(Layout layout) {
     switch (layout) {
         case Layout::capture:
-            return {12, 0.22, 0.45, 0.6, {0.35, 0.35, 0.30}};
+            return {12, 0.22, 0.36, 0.6, {0.35, 0.35, 0.30}};
         case Layout::cloud:
             return {60, 0.10, 0.45, 0.7, {0.30, 0.40, 0.30}};
         case Layout::sparse:

@@ -13,6 +13,8 @@ SortRun::SortRun(std::shared_ptr<gpu::Device> device, uint32_t items)
     const pipeline::Sizes sizes = pipeline::sizes_for(kernels_.shape(), request);
     cut_ = sizes.depth_sort;
     for (uint32_t i = 0; i < items; ++i) input_[i] = core::pcg4d({i, 0x736f7274u, 0, 0})[0];
+    source_ = gpu::Buffer(*device_, "input", sizes.splat_words);
+    source_.upload(std::span<const uint32_t>(input_));
     for (gpu::Buffer* buffer : {&keys_[0], &keys_[1], &values_[0], &values_[1]})
         *buffer = gpu::Buffer(*device_, "pairs", sizes.splat_words, gpu::Texel::rgba32ui);
     counters_ = gpu::Buffer(*device_, "counters", sizes.counters);
@@ -22,8 +24,8 @@ SortRun::SortRun(std::shared_ptr<gpu::Device> device, uint32_t items)
 }
 
 void SortRun::run() {
-    keys_[0].upload(std::span<const uint32_t>(input_));
     gpu::Recording recording(device_->limits());
+    recording.copy(source_, 0, keys_[0], 0, uint64_t(items_) * 4);
     result_ = record_sort(recording, kernels_,
                           {{&keys_[0], &keys_[1]},
                            {&values_[0], &values_[1]},

@@ -13,8 +13,9 @@ class SortRun {
   public:
     SortRun(std::shared_ptr<gpu::Device> device, uint32_t items);
 
-    /// Writes the input again and sorts it.
+    /// Copies the input and sorts the copy.
     void run();
+    const pipeline::RadixCut& cut() const { return cut_; }
     const std::vector<gpu::Timing>& timings() const { return executor_.timings(); }
     /// Against a stable sort on the host.
     Check check() const;
@@ -26,7 +27,7 @@ class SortRun {
     pipeline::RadixCut cut_;
     uint32_t items_;
     std::vector<uint32_t> input_;
-    gpu::Buffer keys_[2], values_[2], counters_, counter_prefix_, digit_totals_, counts_;
+    gpu::Buffer source_, keys_[2], values_[2], counters_, counter_prefix_, digit_totals_, counts_;
     uint32_t result_ = 0;
 };
 

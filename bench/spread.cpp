@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <ctime>
+#include <thread>
 
 namespace ewa::bench {
 namespace {
@@ -13,6 +14,17 @@ double quantile(const std::vector<double>& sorted, double q) {
     const double at = q * double(sorted.size() - 1);
     const size_t below = size_t(at), above = std::min(below + 1, sorted.size() - 1);
     return sorted[below] + (at - double(below)) * (sorted[above] - sorted[below]);
+}
+
+double wall_milliseconds() {
+    using namespace std::chrono;
+    return duration<double, std::milli>(steady_clock::now().time_since_epoch()).count();
+}
+
+double cpu_milliseconds_a_thread() {
+    timespec now{};
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return (double(now.tv_sec) * 1e3 + double(now.tv_nsec) * 1e-6) / host_threads();
 }
 
 constexpr int kFewest = 5, kMost = 25;
@@ -49,26 +61,29 @@ void repeat(int runs, const std::function<void()>& work) {
     }
 }
 
-Spread time_repeated(int runs, const std::function<void()>& work) {
+Timed time_repeated(int runs, const std::function<void()>& work) {
     work();
-    std::vector<double> samples;
+    Stopwatch watch;
     repeat(runs, [&] {
-        const double start = wall_milliseconds();
+        watch.start();
         work();
-        samples.push_back(wall_milliseconds() - start);
+        watch.stop();
     });
-    return spread_of(std::move(samples));
+    return watch.timed();
 }
 
-double process_cpu_milliseconds() {
-    timespec now{};
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-    return double(now.tv_sec) * 1e3 + double(now.tv_nsec) * 1e-6;
+unsigned host_threads() {
+    return std::max(1u, std::thread::hardware_concurrency());
 }
 
-double wall_milliseconds() {
-    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch())
-        .count();
+void Stopwatch::start() {
+    wall_start_ = wall_milliseconds();
+    cpu_start_ = cpu_milliseconds_a_thread();
+}
+
+void Stopwatch::stop() {
+    wall_.push_back(wall_milliseconds() - wall_start_);
+    cpu_.push_back(cpu_milliseconds_a_thread() - cpu_start_);
 }
 
 }  // namespace ewa::bench

@@ -46,10 +46,6 @@ std::string vector_text() {
     return best_kernel().text;
 }
 
-unsigned host_threads() {
-    return std::max(1u, std::thread::hardware_concurrency());
-}
-
 void on_all_threads(const std::function<void(unsigned)>& work) {
     std::vector<std::thread> threads;
     for (unsigned i = 1; i < host_threads(); ++i) threads.emplace_back(work, i);
@@ -57,7 +53,7 @@ void on_all_threads(const std::function<void(unsigned)>& work) {
     for (std::thread& thread : threads) thread.join();
 }
 
-Spread time_blend(const BlendLists& lists, uint32_t tiles, int runs, std::vector<float>& planes) {
+Timed time_blend(const BlendLists& lists, uint32_t tiles, int runs, std::vector<float>& planes) {
     planes.assign(size_t(4) * lists.width * lists.height, 0.0f);
     const BlendTile blend = best_kernel().blend;
     return time_repeated(runs, [&] {
@@ -82,16 +78,17 @@ PairCounts count_pairs(const BlendLists& lists, uint32_t tiles) {
     return total;
 }
 
-double copy_bandwidth() {
+Bandwidth copy_bandwidth() {
     constexpr size_t kBytes = size_t(128) << 20;
     std::vector<char> source(kBytes, 1), target(kBytes, 2);
     const size_t share = kBytes / host_threads();
-    const Spread spread = time_repeated(0, [&] {
+    const Timed timed = time_repeated(0, [&] {
         on_all_threads([&](unsigned thread) {
             std::memcpy(target.data() + thread * share, source.data() + thread * share, share);
         });
     });
-    return 2e-6 * double(share * host_threads()) / spread.least;
+    const double gigabytes = 2e-6 * double(share * host_threads());  // a millisecond
+    return {gigabytes / timed.wall.least, gigabytes / timed.cpu.least};
 }
 
 }  // namespace ewa::bench

@@ -67,7 +67,7 @@ void sort_pairs(std::vector<uint32_t>& keys, std::vector<uint32_t>& values, uint
     values = std::move(pairs.values);
 }
 
-Spread time_sort(uint32_t items, uint32_t bits, int runs) {
+Timed time_sort(uint32_t items, uint32_t bits, int runs) {
     if (items == 0) return {};
     Pairs input, pairs, scratch;
     input.resize(items);
@@ -77,16 +77,16 @@ Spread time_sort(uint32_t items, uint32_t bits, int runs) {
     }
     scratch.resize(items);
     std::vector<uint32_t> counts;
-    std::vector<double> samples;
+    Stopwatch watch;
     bool first = true;
     repeat(runs > 0 ? runs + 1 : 0, [&] {
         pairs = input;
-        const double start = wall_milliseconds();
+        if (!first) watch.start();
         sort_in_place(pairs, scratch, bits, counts);
-        if (!first) samples.push_back(wall_milliseconds() - start);
+        if (!first) watch.stop();
         first = false;
     });
-    return spread_of(std::move(samples));
+    return watch.timed();
 }
 
 }  // namespace ewa::bench
