@@ -30,7 +30,7 @@ Kernel best_kernel() {
 template <class Visit>
 void for_all_tiles(uint32_t tiles, Visit visit) {
     std::atomic<uint32_t> next{0};
-    on_all_threads([&](unsigned thread) {
+    on_threads(host_threads(), [&](unsigned thread) {
         for (;;) {
             const uint32_t begin = next.fetch_add(kTilesATurn);
             if (begin >= tiles) return;
@@ -46,9 +46,9 @@ std::string vector_text() {
     return best_kernel().text;
 }
 
-void on_all_threads(const std::function<void(unsigned)>& work) {
+void on_threads(unsigned count, const std::function<void(unsigned)>& work) {
     std::vector<std::thread> threads;
-    for (unsigned i = 1; i < host_threads(); ++i) threads.emplace_back(work, i);
+    for (unsigned i = 1; i < count; ++i) threads.emplace_back(work, i);
     work(0);
     for (std::thread& thread : threads) thread.join();
 }
@@ -64,7 +64,7 @@ Timed time_blend(const BlendLists& lists, uint32_t tiles, int runs, std::vector<
 PairCounts count_pairs(const BlendLists& lists, uint32_t tiles) {
     std::mutex mutex;
     PairCounts total;
-    on_all_threads([&](unsigned thread) {
+    on_threads(host_threads(), [&](unsigned thread) {
         PairCounts own;
         for (uint32_t tile = thread; tile < tiles; tile += host_threads()) {
             const PairCounts more = count_tile(lists, tile);
@@ -83,7 +83,7 @@ Bandwidth copy_bandwidth() {
     std::vector<char> source(kBytes, 1), target(kBytes, 2);
     const size_t share = kBytes / host_threads();
     const Timed timed = time_repeated(0, [&] {
-        on_all_threads([&](unsigned thread) {
+        on_threads(host_threads(), [&](unsigned thread) {
             std::memcpy(target.data() + thread * share, source.data() + thread * share, share);
         });
     });

@@ -13,8 +13,8 @@ namespace ewa::bench {
 /// "AVX-512 and FMA", "AVX2 and FMA" or "portable": what the loops use on this CPU.
 std::string vector_text();
 
-/// work(thread) on each of host_threads() threads, the caller's among them; returns when all are done.
-void on_all_threads(const std::function<void(unsigned)>& work);
+/// work(number) on that many threads, the caller's among them; returns when all are done.
+void on_threads(unsigned threads, const std::function<void(unsigned)>& work);
 
 /// A whole picture on all threads. planes: 4 * width * height floats.
 Timed time_blend(const BlendLists& lists, uint32_t tiles, int runs, std::vector<float>& planes);

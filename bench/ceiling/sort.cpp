@@ -10,6 +10,7 @@ namespace ewa::bench {
 namespace {
 
 constexpr uint32_t kDigitBits = 11;
+constexpr size_t kFewestOfAThread = 32768;  // fewer items are sorted before another thread has started
 
 struct Pairs {
     std::vector<uint32_t> keys, values;
@@ -22,12 +23,13 @@ struct Pairs {
 /// One pass: each thread owns a contiguous share of the items, counts its digits, learns from the counts of
 /// all where its items of each digit begin, and moves them.
 void sort_pass(const Pairs& from, Pairs& to, uint32_t shift, uint32_t digits, std::vector<uint32_t>& counts) {
-    const unsigned threads = host_threads();
-    const size_t items = from.keys.size(), share = (items + threads - 1) / threads;
+    const size_t items = from.keys.size();
+    const unsigned threads = unsigned(std::clamp<size_t>(items / kFewestOfAThread, 1, host_threads()));
+    const size_t share = (items + threads - 1) / threads;
     const uint32_t mask = digits - 1;
     counts.assign(size_t(threads) * digits, 0);
     std::barrier all(threads);
-    on_all_threads([&](unsigned thread) {
+    on_threads(threads, [&](unsigned thread) {
         const size_t begin = std::min(thread * share, items), end = std::min(begin + share, items);
         uint32_t* own = &counts[size_t(thread) * digits];
         for (size_t i = begin; i < end; ++i) ++own[(from.keys[i] >> shift) & mask];

@@ -1,0 +1,109 @@
+// The host's loops do what they are the ceiling of.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "bench/ceiling/ceiling.h"
+#include "bench/scene.h"
+#include "core/random.h"
+#include "reference/render.h"
+#include "reference/sort.h"
+
+namespace ewa::test {
+namespace {
+
+TEST(Ceiling, SortsStablyByTheLowBits) {
+    for (const uint32_t bits : {1u, 7u, 11u, 13u, 23u, 32u})
+        for (const uint32_t items : {0u, 1u, 1000u, 100000u}) {
+            std::vector<uint32_t> keys(items), values(items);
+            for (uint32_t i = 0; i < items; ++i) {
+                keys[i] = core::pcg4d({i, bits, 0, 0})[0] >> (32 - bits);
+                values[i] = i;
+            }
+            const auto expected = reference::stable_order<uint32_t>(keys);
+            bench::sort_pairs(keys, values, bits);
+            EXPECT_EQ(values, expected) << bits << " bits, " << items << " items";
+        }
+}
+
+/// A tiny case as the twin draws it, and its lists as the device would hand them over.
+struct Drawn {
+    bench::Scene scene;
+    reference::Picture picture;
+    std::vector<float> records;
+    std::vector<uint32_t> splats, tile_starts;
+    bench::BlendLists lists;
+
+    explicit Drawn(int tile_width) {
+        bench::Case one;
+        one.layout = bench::Layout::capture;
+        one.splats = 1500;
+        one.width = 61;
+        one.height = 43;
+        scene = bench::make_scene(one);
+        RenderOptions options;
+        options.background = {0.1f, 0.2f, 0.3f};
+        picture =
+            reference::render(scene.gaussians, scene.camera, options, {tile_width, 64 / tile_width, {}});
+        for (const reference::Projected& splat : picture.projected) add_record(splat);
+        for (const reference::Instance& instance : picture.instances.sorted) splats.push_back(instance.splat);
+        for (const uint64_t first : picture.instances.first_of_tile) tile_starts.push_back(uint32_t(first));
+        lists.records = records.data();
+        lists.splats = splats.data();
+        lists.tile_starts = tile_starts.data();
+        lists.width = uint32_t(one.width);
+        lists.height = uint32_t(one.height);
+        lists.tile_width = uint32_t(tile_width);
+        lists.tiles_x = uint32_t(picture.instances.grid.columns());
+        for (size_t c = 0; c < 3; ++c) lists.background[c] = options.background[c];
+    }
+
+  private:
+    void add_record(const reference::Projected& splat) {
+        std::array<float, 12> record{};
+        if (splat.visible) {
+            const auto w = reference::whitener(splat);
+            const double half = std::sqrt(0.5);
+            record = {float(splat.mean2d.x),
+                      float(splat.mean2d.y),
+                      0,
+                      0,
+                      float(half * w.ux),
+                      float(-w.uy / w.ux),
+                      float(half * w.vy),
+                      float(splat.opacity),
+                      float(splat.color.r),
+                      float(splat.color.g),
+                      float(splat.color.b),
+                      float(splat.z)};
+        }
+        records.insert(records.end(), record.begin(), record.end());
+    }
+};
+
+TEST(Ceiling, BlendsAndCountsAsTheTwinDoes) {
+    for (const int tile_width : {4, 8}) {
+        const Drawn drawn(tile_width);
+        const uint32_t tiles = drawn.picture.instances.grid.count();
+        std::vector<float> planes;
+        bench::time_blend(drawn.lists, tiles, 1, planes);
+        const size_t pixels = size_t(drawn.lists.width) * drawn.lists.height;
+        uint64_t evaluated = 0, blended = 0;
+        size_t off = 0;
+        for (size_t i = 0; i < pixels; ++i) {
+            evaluated += drawn.picture.blended.evaluated[i];
+            blended += drawn.picture.blended.blended[i];
+            for (size_t c = 0; c < 3; ++c)
+                off += !(std::abs(planes[c * pixels + i] - drawn.picture.blended.color.values[3 * i + c]) <
+                         1e-5);
+        }
+        EXPECT_LE(off, pixels / 1000);
+        // A contribution on a threshold may go either way in float32.
+        const bench::PairCounts counts = bench::count_pairs(drawn.lists, tiles);
+        EXPECT_NEAR(double(counts.evaluated), double(evaluated), 1e-3 * double(evaluated));
+        EXPECT_NEAR(double(counts.blended), double(blended), 1e-3 * double(blended));
+    }
+}
+
+}  // namespace
+}  // namespace ewa::test

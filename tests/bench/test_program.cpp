@@ -1,0 +1,108 @@
+// The stand-alone benchmark as a process.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <cstdio>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+
+#include "support/temp_folder.h"
+
+namespace ewa::test {
+namespace {
+
+struct Ended {
+    int status = -1;
+    std::string output;  // both streams
+};
+
+Ended run(const std::string& command) {
+    Ended ended;
+    FILE* pipe = popen((command + " 2>&1").c_str(), "r");
+    if (!pipe) return ended;
+    char piece[4096];
+    for (size_t n; (n = fread(piece, 1, sizeof(piece), pipe)) > 0;) ended.output.append(piece, n);
+    const int status = pclose(pipe);
+    ended.status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    return ended;
+}
+
+nlohmann::json read_json(const std::filesystem::path& path) {
+    std::ifstream file(path);
+    return nlohmann::json::parse(file);
+}
+
+const std::string kProgram = EWA_BENCH_PROGRAM;
+
+TEST(BenchProgram, LinksTheVulkanLoaderAndTheRuntimeAlone) {
+    const Ended ended = run("ldd " + kProgram);
+    ASSERT_EQ(ended.status, 0) << ended.output;
+    const std::set<std::string> allowed = {"linux-vdso.so.1", "libvulkan.so.1", "libstdc++.so.6",
+                                           "libm.so.6",       "libgcc_s.so.1",  "libc.so.6"};
+    std::istringstream lines(ended.output);
+    int libraries = 0;
+    for (std::string line; std::getline(lines, line);) {
+        std::string name;
+        std::istringstream(line) >> name;
+        const bool loader = name.find("/ld-linux") != std::string::npos;
+        EXPECT_TRUE(loader || allowed.contains(name)) << line;
+        ++libraries;
+    }
+    EXPECT_GE(libraries, 5);
+}
+
+TEST(BenchProgram, ATinyCaseIsMeasuredCheckedAndComparedWithItself) {
+    const TempFolder folder;
+    const std::string json = (folder.path() / "results.json").string();
+    const Ended ended = run(kProgram + " --cases capture_2k --runs 3 --check --json " + json);
+    ASSERT_EQ(ended.status, 0) << ended.output;
+
+    const nlohmann::json results = read_json(json);
+    EXPECT_EQ(results.at("schema"), "ewa-bench-1");
+    ASSERT_EQ(results.at("cases").size(), 2u);
+    for (const auto& one : results.at("cases")) {
+        EXPECT_GT(one.at("instances").get<int>(), 1000);
+        EXPECT_GT(one.at("pairs_evaluated"), one.at("pairs_blended"));
+        EXPECT_GT(one.at("milliseconds").at("median").get<double>(), 0);
+        EXPECT_EQ(one.at("milliseconds").at("samples"), 3);
+        EXPECT_GE(one.at("checks").size(), 10u);
+        for (const auto& check : one.at("checks")) EXPECT_EQ(check.at("good"), true) << check;
+        std::set<std::string> passes;
+        for (const auto& pass : one.at("passes")) passes.insert(pass.at("name"));
+        EXPECT_TRUE(passes.contains("blend"));
+        EXPECT_EQ(passes.contains("blend_backward"), one.at("kind") == "train");
+    }
+
+    const Ended compared = run(kProgram + " --compare " + json + " --results " + json);
+    EXPECT_EQ(compared.status, 0) << compared.output;
+    EXPECT_NE(compared.output.find("x 1.000"), std::string::npos) << compared.output;
+    EXPECT_EQ(compared.output.find("SLOWER"), std::string::npos) << compared.output;
+}
+
+TEST(BenchProgram, WrongUseIsToldInOneLine) {
+    const TempFolder folder;
+    folder.write("other.json", "{}\n");
+    folder.write("broken.json", "{");
+    const std::string at = (folder.path() / "").string();
+    for (const std::string& arguments :
+         {std::string("--cases nosuchcase"), std::string("--nosuchoption"), std::string("--results x.json"),
+          "--compare " + at + "missing.json", "--compare " + at + "broken.json",
+          "--compare " + at + "other.json --results " + at + "other.json"}) {
+        const Ended ended = run(kProgram + " " + arguments);
+        EXPECT_EQ(ended.status, 2) << arguments << ": " << ended.output;
+        EXPECT_EQ(std::count(ended.output.begin(), ended.output.end(), '\n'), 1) << ended.output;
+    }
+}
+
+TEST(BenchProgram, ListsItsCases) {
+    const Ended ended = run(kProgram + " --list");
+    EXPECT_EQ(ended.status, 0);
+    for (const char* name :
+         {"capture_14k_270x480_sh3_train", "cloud_1m_1920x1080_sh3_forward", "sort_1m", "first_step"})
+        EXPECT_NE(ended.output.find(name), std::string::npos) << name;
+}
+
+}  // namespace
+}  // namespace ewa::test
