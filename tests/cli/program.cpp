@@ -11,7 +11,7 @@
 #include <csignal>
 #include <fstream>
 #include <glm/geometric.hpp>
-#include <iterator>
+#include <glm/vec3.hpp>
 #include <numbers>
 #include <stdexcept>
 #include <thread>
@@ -103,17 +103,6 @@ Outcome run_ewa(const std::vector<std::string>& arguments, const Circumstances& 
     return outcome;
 }
 
-Folder::Folder() {
-    std::string pattern = (fs::temp_directory_path() / "ewa_cli_XXXXXX").string();
-    if (!mkdtemp(pattern.data())) throw std::runtime_error("mkdtemp failed");
-    path_ = pattern;
-}
-
-Folder::~Folder() {
-    std::error_code error;
-    fs::remove_all(path_, error);
-}
-
 void make_dataset(const std::string& folder, const std::vector<std::string>& names) {
     constexpr int kWidth = 48, kHeight = 32;
     nlohmann::json frames = nlohmann::json::array();
@@ -155,8 +144,7 @@ void write_file(const std::string& path, const std::string& bytes) {
 }
 
 std::string read_file(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
+    return file_bytes(path);
 }
 
 nlohmann::json read_json(const std::string& path) {
