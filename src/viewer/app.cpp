@@ -192,7 +192,7 @@ void App::take_news() {
     shown_ = news.picture;
     presenter_.set_picture(shown_->picture);
     pace_.drawn(shown_->request.divisor, shown_->milliseconds);
-    redraws_ = std::max(redraws_, 1);
+    redraws_ = std::max(redraws_, 2);  // a panel that has more to say takes its new size a frame later
 }
 
 bool App::settled() const {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <numbers>
 #include <vector>
 
@@ -11,11 +12,12 @@ namespace {
 
 constexpr size_t kSamples = 200000;  // means looked at; percentiles of more change nothing that is seen
 
-std::vector<glm::dvec3> sampled_means(const Gaussians& gaussians) {
+std::vector<glm::dvec3> sampled_means(const Gaussians& gaussians, float least_logit) {
     std::vector<glm::dvec3> means;
     const size_t stride = std::max<size_t>(1, gaussians.size() / kSamples);
     for (size_t i = 0; i < gaussians.size(); i += stride) {
         const float* mean = &gaussians.means[3 * i];
+        if (!(gaussians.opacity_logits[i] >= least_logit)) continue;
         if (std::isfinite(mean[0]) && std::isfinite(mean[1]) && std::isfinite(mean[2]))
             means.emplace_back(mean[0], mean[1], mean[2]);
     }
@@ -29,10 +31,11 @@ double quantile(std::vector<double>& values, double share) {
     return *at;
 }
 
-/// The median view z of what the middle third of the picture holds; 0 where it holds too little to tell.
+/// The median view z of the splats at least half opaque in the picture's middle third; 0 where it holds too
+/// little to tell.
 double middle_depth(const Gaussians& gaussians, const Camera& camera) {
     std::vector<double> depths;
-    for (const glm::dvec3& mean : sampled_means(gaussians)) {
+    for (const glm::dvec3& mean : sampled_means(gaussians, 0.0f)) {
         const glm::dvec3 p = camera.rotation * mean + camera.translation;
         if (!(p.z > 0)) continue;
         const double x = camera.fx * p.x / p.z + camera.cx, y = camera.fy * p.y / p.z + camera.cy;
@@ -61,7 +64,7 @@ glm::dvec3 mean_up(const Dataset& dataset) {
 }  // namespace
 
 SceneBounds scene_bounds(const Gaussians& gaussians) {
-    const std::vector<glm::dvec3> means = sampled_means(gaussians);
+    const std::vector<glm::dvec3> means = sampled_means(gaussians, -std::numeric_limits<float>::infinity());
     SceneBounds bounds;
     if (means.empty()) return bounds;
     glm::dvec3 low(0), high(0);

@@ -15,7 +15,7 @@ void check(VkResult result) {
 
 }  // namespace
 
-Gui::Gui(const Window& window, const PresentDevice& device, Presenter& presenter) {
+Gui::Gui(const Window& window, const PresentDevice& device, Presenter& presenter) : device_(device) {
     const vk::DescriptorPoolSize size(vk::DescriptorType::eCombinedImageSampler, 1);
     vk::DescriptorPoolCreateInfo create;
     create.setMaxSets(1).setPoolSizes(size);
@@ -48,6 +48,7 @@ Gui::Gui(const Window& window, const PresentDevice& device, Presenter& presenter
 }
 
 Gui::~Gui() {
+    (void)vkDeviceWaitIdle(device_.handle());  // the last frame may still be drawn
     ImGui_ImplVulkan_Shutdown();
     ImGui_ImplGlfw_Shutdown();
     ImGui::DestroyContext();

@@ -16,6 +16,7 @@ class Gui {
     ImDrawData* end_frame();
 
   private:
+    const PresentDevice& device_;
     vk::UniqueDescriptorPool pool_;
 };
 

@@ -2,6 +2,7 @@
 
 #include <imgui.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -59,6 +60,9 @@ PanelActions draw_panel(const PanelFacts& facts, Look& look, int& frame) {
     ImGui::SetNextWindowPos(ImVec2(line * 0.6f, line * 0.6f), ImGuiCond_FirstUseEver);
     ImGui::SetNextWindowBgAlpha(0.85f);
     if (ImGui::Begin("ewa", nullptr, ImGuiWindowFlags_AlwaysAutoResize)) {
+        // A window that was tiny for a moment has pushed the panel out of it.
+        const ImVec2 at = ImGui::GetWindowPos();
+        if (at.x < 0 || at.y < 0) ImGui::SetWindowPos(ImVec2(std::max(at.x, 0.0f), std::max(at.y, 0.0f)));
         show_facts(facts);
         ImGui::Separator();
         ImGui::PushItemWidth(line * 13);
