@@ -32,7 +32,8 @@ Buffer::Buffer(Device& device, std::string name, uint64_t bytes, Texel texel, bo
     : device_(&device),
       name_(std::move(name)),
       bytes_((std::max<uint64_t>(bytes, 1) + 15) / 16 * 16),
-      texel_(texel) {
+      texel_(texel),
+      uniform_(uniform) {
     if (texel != Texel::none && bytes_ / texel_bytes(texel) > device.limits().max_texels)
         throw RunError(
             "buffer " + name_ + " needs " + std::to_string(bytes_ >> 20) +
@@ -83,6 +84,7 @@ Buffer& Buffer::operator=(Buffer&& other) noexcept {
     bytes_ = std::exchange(other.bytes_, 0);
     allocated_ = std::exchange(other.allocated_, 0);
     texel_ = other.texel_;
+    uniform_ = other.uniform_;
     view_ = std::move(other.view_);
     buffer_ = std::move(other.buffer_);
     memory_ = std::move(other.memory_);
