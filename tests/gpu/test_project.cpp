@@ -81,10 +81,10 @@ TEST_P(ProjectPass, RecordsAreTheTwins) {
     }
     printf("    mean %.1e, shape %.1e, opacity %.1e, colour %.1e\n", worst_mean, worst_shape, worst_opacity,
            worst_color);
-    EXPECT_LT(worst_mean, 1e-11);    // 48 bits less a few for the dozen operations
+    EXPECT_LT(worst_mean, 3e-12);    // 48 bits less a few for the dozen operations
     EXPECT_LT(worst_shape, 2e-5);    // float32; a needle's determinant takes its worst
-    EXPECT_LT(worst_opacity, 2e-5);  // with antialiasing it follows the determinant
-    EXPECT_LT(worst_color, 4e-6);    // 16 float32 products of a few units
+    EXPECT_LT(worst_opacity, 3e-6);  // with antialiasing it follows the determinant
+    EXPECT_LT(worst_color, 2e-6);    // 16 float32 products of a few units
     EXPECT_EQ(out.totals.skipped_nonfinite, twin.skipped_nonfinite);
 }
 
@@ -104,8 +104,7 @@ TEST_P(ProjectPass, TileCountsNeverMissATile) {
     }
     // The device takes the ellipse's extent over a tile row, not the pixel centres: a tile that the ellipse
     // enters between two centres is listed too. Small splats pay most for that.
-    const double share = c.kind == SplatKind::needles ? 1.25 : 1.06;
-    EXPECT_LE(double(actual), share * double(exact) + 4);
+    EXPECT_LE(double(actual), 1.02 * double(exact) + 4);
     printf("    tiles: exact %zu, listed %zu\n", size_t(exact), size_t(actual));
 }
 
