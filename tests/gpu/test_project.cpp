@@ -184,6 +184,20 @@ TEST(ProjectEdges, PoisonIsSkippedAndCounted) {
     EXPECT_EQ(out.totals.skipped_nonfinite, all.size() - 1);
 }
 
+/// The norm of a quaternion does not matter, though its square leaves float32.
+TEST(ProjectEdges, QuaternionsOfAnyNormTurnTheSame) {
+    Scene scene = random_scene(5, 100, SplatKind::ordinary, 160, 120);
+    const Output expected = run_project(scene);
+    for (const float norm : {0x1p-80f, 0x1p-30f, 0x1p90f}) {  // powers of two: the direction stays exact
+        Scene scaled = scene;
+        for (float& q : scaled.gaussians.quaternions) q *= norm;
+        const Output actual = run_project(scaled);
+        EXPECT_EQ(actual.totals.skipped_nonfinite, 0u);
+        EXPECT_EQ(actual.counts, expected.counts) << norm;
+        EXPECT_EQ(actual.records, expected.records) << norm;
+    }
+}
+
 /// A camera far from the origin sees what it sees at the origin.
 TEST(ProjectEdges, GeoreferencedSceneKeepsItsSharpness) {
     Scene scene = random_scene(4, 200, SplatKind::ordinary, 160, 120);

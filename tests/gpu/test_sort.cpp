@@ -158,6 +158,15 @@ TEST(SortEdges, EqualKeysKeepTheirOrderAndAFewLanesAreEnough) {
     }
 }
 
+/// Keys that nobody reads again are not written: the last of one pass leaves its output alone.
+TEST(SortEdges, KeysAreDroppedWhereNobodyReadsThem) {
+    const std::vector<uint32_t> keys{5, 3, 9, 1, 7};
+    for (const uint32_t key : run_sort(keys, cut_for(5, 8), true, false, false, 5).keys)
+        EXPECT_EQ(key, kPoison);
+    EXPECT_EQ(run_sort(keys, cut_for(5, 8), true, true, false, 5).keys,
+              (std::vector<uint32_t>{1, 3, 5, 7, 9}));
+}
+
 /// Depths are sorted by their bits: for positive floats that is their order.
 TEST(SortEdges, PositiveFloatsSortByTheirBits) {
     Random random(5);
