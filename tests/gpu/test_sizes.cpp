@@ -32,7 +32,7 @@ TEST(Shape, TilesAreWholeSubgroupsForEverySubgroupSize) {
             const passes::Shape shape = shape_of(subgroup, cpu);
             const uint32_t pixels = shape.tile_width * shape.tile_height;
             EXPECT_EQ(pixels % subgroup, 0u);
-            EXPECT_LE(pixels, 8 * subgroup + 0u);
+            EXPECT_EQ(pixels, 64u);
             EXPECT_EQ(subgroup % shape.tile_width, 0u);  // rows of lanes
             EXPECT_EQ(shape.group % subgroup, 0u);
             EXPECT_EQ(shape.sort_group % (cpu ? subgroup : 1), 0u);
