@@ -61,6 +61,7 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
                            const Image& target, const RenderOptions& options);
 
 /// What is left out for this scene and request.
-std::vector<PlanLine> plan_lines(const Gaussians& gaussians, const RenderOptions& options, bool training);
+enum class Purpose { picture, training, densifying };  // densifying: training with a strategy that adds splats
+std::vector<PlanLine> plan_lines(const Gaussians& gaussians, const RenderOptions& options, Purpose purpose);
 
 }  // namespace ewa

@@ -18,6 +18,9 @@ layout(set = 0, binding = 5, scalar) readonly buffer ImageGradient { float image
 layout(set = 0, binding = 6, scalar) writeonly buffer Slots { float slots[]; };
 layout(push_constant, scalar) uniform Push { BlendPush push; };
 
+// The middle of a lane's pixels, in pixels of its column.
+#define MIDDLE (0.5 * float(PIXELS - 1u))
+
 // Sums 8 values over the subgroup at once: at each step a lane keeps half of its values and sends the other half
 // away, so that lane l ends with the sum of value l % 8 after 7 shuffles. Lanes 8 apart then add up.
 float transposing_sum(float v[8]) {
@@ -81,8 +84,10 @@ void main() {
         record1.w = k + lane < end ? record1.w : 0.0;
         [[unroll]] for (uint j = 0; j < SUBGROUP; ++j) {
             const LaneSplat s = lane_splat(record0, record1, record2, j, pixel);
-            float sum[8] = {0, 0, 0, 0, 0, 0, 0, 0};
-            float sum_blue = 0.0;
+            // u and v are affine along the lane's column, so three sums over it, with the pixel's number counted from
+            // the middle, give all six: products with constants, and a third of the registers.
+            float s0 = 0.0, s1 = 0.0, s2 = 0.0;
+            vec3 color_sum = vec3(0.0);
             [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
                 const float u = s.u + s.u_step * float(p), v = s.v + s.v_step * float(p);
                 const float raw = s.opacity * exp(-(u * u + v * v));
@@ -95,18 +100,23 @@ void main() {
                 // dL/d(power) = alpha dL/d(alpha); none where the clamp holds alpha.
                 const bool moves = blended && raw <= float(ALPHA_MAX);
                 const float g = moves ? own - rest[p] * (alpha / (1.0 - alpha)) : 0.0;
-                const float gu = g * u, gv = g * v;
-                sum[0] += g;
-                sum[1] += gu;
-                sum[2] += gv;
-                sum[3] += gu * u;
-                sum[4] += gu * v;
-                sum[5] += gv * v;
-                sum[6] += weight * gradient[p].r;
-                sum[7] += weight * gradient[p].g;
-                sum_blue += weight * gradient[p].b;
+                const float step = float(p) - MIDDLE;
+                s0 += g;
+                s1 += g * step;
+                s2 += g * (step * step);
+                color_sum += weight * gradient[p];
             }
-            store_slot(subgroupShuffle(instance, j), sum, sum_blue, k + j < end);
+            const float u = s.u + s.u_step * MIDDLE, v = s.v + s.v_step * MIDDLE;
+            const float us1 = s.u_step * s1, vs1 = s.v_step * s1, us2 = s.u_step * s2;
+            const float sum[8] = {s0,
+                                  u * s0 + us1,
+                                  v * s0 + vs1,
+                                  u * (u * s0 + 2.0 * us1) + s.u_step * us2,
+                                  u * (v * s0 + vs1) + v * us1 + s.v_step * us2,
+                                  v * (v * s0 + 2.0 * vs1) + s.v_step * s.v_step * s2,
+                                  color_sum.r,
+                                  color_sum.g};
+            store_slot(subgroupShuffle(instance, j), sum, color_sum.b, k + j < end);
         }
         bool open = false;
         [[unroll]] for (uint p = 0; p < PIXELS; ++p) open = open || T[p] > 0.0;

@@ -65,11 +65,12 @@ RenderOptions DrawArguments::options() const {
     return render;
 }
 
-void add_draw_options(CLI::App& app, DrawArguments& arguments, bool random_background_allowed) {
+void add_draw_options(CLI::App& app, DrawArguments& arguments) {
     app.add_option("--background", arguments.background,
-                   random_background_allowed
+                   arguments.random_allowed
                        ? "Colour behind the splats: r,g,b in 0..1, or random (a new one each step)"
                        : "Colour behind the splats: r,g,b in 0..1")
+        ->type_name("COLOUR")
         ->capture_default_str();
     app.add_option("--kernel", arguments.kernel,
                    "Footprint: peak (3DGS), antialias (Mip-Splatting), ewa (unit mass)")
@@ -77,26 +78,49 @@ void add_draw_options(CLI::App& app, DrawArguments& arguments, bool random_backg
         ->capture_default_str();
     app.add_flag("--antialias", arguments.antialias, "The same as --kernel antialias");
     app.add_option("--sh-degree", arguments.sh_degree, "Highest degree of view-dependent colour")
-        ->check(CLI::Range(0, kMaxShDegree))
+        ->check(in_range(0, kMaxShDegree))
+        ->type_name("0..3")
         ->capture_default_str();
 }
 
+CLI::Validator without_sign() {
+    return CLI::Validator(
+        [](std::string& text) {
+            return text.find_first_not_of("0123456789") == std::string::npos
+                       ? ""
+                       : text + " is not a whole number from 0";
+        },
+        "");
+}
+
 void add_device_options(CLI::App& app, DeviceOptions& options) {
-    app.add_option("--device", options.selector, "Number or part of the name of a device (see ewa devices)");
+    app.add_option("--device", options.selector, "Number or part of the name of a device (see ewa devices)")
+        ->type_name("NAME|N");
     app.add_flag("--validation", options.validation, "Turn the Vulkan validation layer on")
         ->group("For developers");
 }
 
 void add_downscale_option(CLI::App& app, int& downscale) {
     app.add_option("--downscale", downscale, "Divide the pictures' width and height by this")
-        ->check(CLI::Range(1, 1024))
+        ->check(in_range(1, 1024))
+        ->type_name("K")
         ->capture_default_str();
 }
 
 void add_test_every_option(CLI::App& app, int& test_every) {
     app.add_option("--test-every", test_every, "Every K-th picture in name order is held out; 0: none")
-        ->check(CLI::Range(0, 1000000000))
+        ->check(in_range(0, 1000000000))
+        ->type_name("K")
         ->capture_default_str();
+}
+
+Dataset load_cameras_as_trained(const std::filesystem::path& path, int downscale) {
+    Dataset dataset = load_dataset(path, {.downscale = downscale, .need_images = false});
+    auto missing = [](const Frame& frame) { return !frame.image_exists; };
+    const auto count = std::count_if(dataset.frames.begin(), dataset.frames.end(), missing);
+    dataset.missing_images = static_cast<int>(count);
+    if (count < std::ssize(dataset.frames)) std::erase_if(dataset.frames, missing);
+    return dataset;
 }
 
 std::vector<int> select_frames(const Dataset& dataset, const std::string& which, int test_every) {

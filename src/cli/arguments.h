@@ -17,18 +17,34 @@ struct DrawArguments {
     bool antialias = false;  // the short form of --kernel antialias
     int sh_degree = kMaxShDegree;
 
-    bool random_background() const { return background == "random"; }
+    bool random_allowed = false;  // whether the background may be random, as in training
+
+    bool random_background() const { return random_allowed && background == "random"; }
     /// Throws InputError for a background that is not three numbers of [0, 1]. A random background is black
     /// here.
     RenderOptions options() const;
 };
-void add_draw_options(CLI::App& app, DrawArguments& arguments, bool random_background_allowed = false);
+void add_draw_options(CLI::App& app, DrawArguments& arguments);
 
 /// --device and --validation.
 void add_device_options(CLI::App& app, DeviceOptions& options);
 
+/// For a number from low to high; the help shows it as type_name("N") instead of the range.
+template <typename T>
+CLI::Validator in_range(T low, T high) {
+    return CLI::Range(low, high).description("");
+}
+
+/// Refuses a sign: CLI11 reads -1 into an unsigned number as its largest value.
+CLI::Validator without_sign();
+
 void add_downscale_option(CLI::App& app, int& downscale);
 void add_test_every_option(CLI::App& app, int& test_every);
+
+/// The cameras of a dataset whose photographs need not be there. Where some are, frames without one are left
+/// out, as training leaves them out: otherwise they would shift which frames are held out.
+/// Dataset::missing_images counts them.
+Dataset load_cameras_as_trained(const std::filesystem::path& path, int downscale);
 
 /// Indices of frames for "all", "train", "test" or a list like "0,3,7" in name order. Throws InputError, also
 /// when there are none.

@@ -52,15 +52,16 @@ int run(const EvalArguments& arguments) {
 
 Action add_eval(CLI::App& app) {
     const auto arguments = std::make_shared<EvalArguments>();
-    app.add_option("SPLATS", arguments->splats, "The splat scene (.ply)")->required();
+    app.add_option("SPLATS", arguments->splats, "The splat scene (.ply)")->required()->type_name("");
     app.add_option("DATASET", arguments->dataset,
                    "Photographs with cameras: COLMAP folder or transforms.json")
-        ->required();
+        ->required()
+        ->type_name("");
     app.add_option("--split", arguments->split, "test, train or all")
         ->check(CLI::IsMember({"test", "train", "all"}))
         ->capture_default_str();
     add_test_every_option(app, arguments->test_every);
-    app.add_option("--json", arguments->json, "Write the figures to this file");
+    app.add_option("--json", arguments->json, "Write the figures to this file")->type_name("FILE");
     add_draw_options(app, arguments->draw);
     add_downscale_option(app, arguments->downscale);
     add_device_options(app, arguments->device);

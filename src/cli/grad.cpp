@@ -36,8 +36,11 @@ int run(const GradArguments& arguments) {
     save_splats(arguments.output, result.gradient,
                 {"ewa " EWA_VERSION, fmt::format("gradient of the training loss of frame {}", index)});
     if (!arguments.json.empty())
-        write_json(arguments.json,
-                   {{"loss", result.loss}, {"l1", result.l1}, {"ssim", result.ssim}, {"frame", frame.name}});
+        write_json(arguments.json, {{"loss", result.loss},
+                                    {"l1", result.l1},
+                                    {"ssim", result.ssim},
+                                    {"frame", index},
+                                    {"name", frame.name}});
     fmt::print("{}  loss {:.7g}  L1 {:.7g}  SSIM {:.7g}\n", frame.name, result.loss, result.l1, result.ssim);
     if (result.skipped_nonfinite > 0)
         fmt::print("{} splats have a value that is not finite and were not drawn\n",
@@ -50,17 +53,21 @@ int run(const GradArguments& arguments) {
 
 Action add_grad(CLI::App& app) {
     const auto arguments = std::make_shared<GradArguments>();
-    app.add_option("SPLATS", arguments->splats, "The splat scene (.ply)")->required();
+    app.add_option("SPLATS", arguments->splats, "The splat scene (.ply)")->required()->type_name("");
     app.add_option("DATASET", arguments->dataset,
                    "Photographs with cameras: COLMAP folder or transforms.json")
-        ->required();
+        ->required()
+        ->type_name("");
     app.add_option("--frame", arguments->frame, "Which view: index in name order over all frames, from 0")
         ->required()
-        ->check(CLI::Range(0, 1000000000));
+        ->check(in_range(0, 1000000000))
+        ->type_name("I");
     app.add_option("-o,--output", arguments->output,
                    "PLY with the properties of a splat file, each holding dL/d(that stored value)")
-        ->required();
-    app.add_option("--json", arguments->json, "Write loss, l1, ssim and frame to this file");
+        ->required()
+        ->type_name("OUT.ply");
+    app.add_option("--json", arguments->json, "Write loss, l1, ssim, frame (its index) and name to this file")
+        ->type_name("FILE");
     add_draw_options(app, arguments->draw);
     add_downscale_option(app, arguments->downscale);
     add_device_options(app, arguments->device);

@@ -50,8 +50,8 @@ void print_spread(const char* name, const Spread& spread) {
 int info_splats(const fs::path& path, bool json) {
     const Gaussians gaussians = load_splats(path);
     const SplatStatistics statistics = splat_statistics(gaussians);
-    const auto rendering = plan_lines(gaussians, RenderOptions{}, false);
-    const auto training = plan_lines(gaussians, RenderOptions{}, true);
+    const auto rendering = plan_lines(gaussians, RenderOptions{}, Purpose::picture);
+    const auto training = plan_lines(gaussians, RenderOptions{}, Purpose::densifying);
     if (json) {
         const Json out = {{"kind", "splats"},
                           {"splats", gaussians.size()},
@@ -106,8 +106,7 @@ std::vector<CameraGroup> camera_groups(const Dataset& dataset) {
     return list;
 }
 
-Json dataset_json(const Dataset& dataset, const char* kind, const Split& split, double extent,
-                  size_t photographs) {
+Json dataset_json(const Dataset& dataset, const char* kind, const Split& split, double extent) {
     Json cameras = Json::array();
     for (const CameraGroup& group : camera_groups(dataset))
         cameras.push_back({{"frames", group.frames},
@@ -120,8 +119,7 @@ Json dataset_json(const Dataset& dataset, const char* kind, const Split& split, 
                            {"distorted", group.distorted}});
     return {{"kind", kind},
             {"frames", dataset.frames.size()},
-            {"images", photographs},
-            {"missing_images", dataset.frames.size() - photographs},
+            {"missing_images", dataset.missing_images},
             {"cameras", cameras},
             {"points", dataset.points.positions.size()},
             {"dropped_points", dataset.dropped_points},
@@ -143,22 +141,22 @@ void print_cameras(const Dataset& dataset) {
 }
 
 int info_dataset(const fs::path& path, int test_every, bool json) {
-    const Dataset dataset = load_dataset(path, {.need_images = false});
+    const Dataset dataset = load_cameras_as_trained(path, 1);
     const char* kind = dataset_kind(path);
     const Split split = split_frames(dataset, test_every);
     std::vector<int> every(dataset.frames.size());
     for (size_t i = 0; i < every.size(); ++i) every[i] = static_cast<int>(i);
     const double extent = every.empty() ? 0 : scene_extent(dataset, every);
-    const size_t photographs = static_cast<size_t>(std::count_if(
-        dataset.frames.begin(), dataset.frames.end(), [](auto& frame) { return frame.image_exists; }));
     if (json) {
-        fmt::print("{}\n", dataset_json(dataset, kind, split, extent, photographs).dump(2));
+        fmt::print("{}\n", dataset_json(dataset, kind, split, extent).dump(2));
         return 0;
     }
     fmt::print("{}\nkind            {}\n", path.string(), kind);
     fmt::print("frames          {} ({} train, {} test with --test-every {})\n", dataset.frames.size(),
                split.train.size(), split.test.size(), test_every);
-    fmt::print("images          {} there, {} missing\n", photographs, dataset.frames.size() - photographs);
+    if (dataset.missing_images > 0)
+        fmt::print("images          {} are missing, their frames left out unless all are\n",
+                   dataset.missing_images);
     print_cameras(dataset);
     fmt::print("points          {} ({} dropped: a coordinate is not finite)\n",
                dataset.points.positions.size(), dataset.dropped_points);

@@ -88,7 +88,11 @@ int main(int argc, char** argv) {
         std::string who = "ewa";
         for (const Command& command : commands)
             if (command.app->parsed()) who += " " + command.app->get_name();
-        return fail(who, std::string(error.what()) + " (see " + who + " --help)", kWrongUse);
+        std::string what = error.what();
+        // CLI11 asks for a sub-command without a word on the one it does not know.
+        if (who == "ewa" && argc > 1 && argv[1][0] != '-')
+            what = "there is no command " + shell_quoted(argv[1]);
+        return fail(who, what + " (see " + who + " --help)", kWrongUse);
     }
     for (const Command& command : commands)
         if (command.app->parsed()) return run(command);

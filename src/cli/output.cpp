@@ -19,8 +19,7 @@ void make_folder(const std::filesystem::path& folder) {
 void write_json(const std::filesystem::path& path, const report::Json& json) {
     make_folder(path.parent_path());
     // Names and paths may hold bytes that are not UTF-8; those become U+FFFD.
-    core::write_text_file(path,
-                                json.dump(2, ' ', false, report::Json::error_handler_t::replace) + "\n");
+    core::write_text_file(path, json.dump(2, ' ', false, report::Json::error_handler_t::replace) + "\n");
 }
 
 }  // namespace ewa::cli

@@ -29,19 +29,6 @@ struct RenderArguments {
     bool quiet = false;
 };
 
-/// Frames without a photograph are left out of the train and test split, since training never saw them either
-/// and counting them would shift which ones are held out. Where no photograph is there at all, every camera
-/// counts.
-Dataset load_cameras(const RenderArguments& arguments) {
-    Dataset dataset =
-        load_dataset(arguments.cameras, {.downscale = arguments.downscale, .need_images = false});
-    const bool by_split = arguments.frames == "train" || arguments.frames == "test";
-    auto missing = [](const Frame& frame) { return !frame.image_exists; };
-    if (by_split && !std::all_of(dataset.frames.begin(), dataset.frames.end(), missing))
-        std::erase_if(dataset.frames, missing);
-    return dataset;
-}
-
 Image with_alpha(const Image& color, const Image& alpha) {
     Image out(color.width, color.height, 4);
     for (int y = 0; y < out.height; ++y)
@@ -74,7 +61,7 @@ Image picture(Rendering&& rendering, const RenderArguments& arguments, std::stri
 int run(const RenderArguments& arguments) {
     const RenderOptions options = arguments.draw.options();
     const Gaussians gaussians = load_splats(arguments.splats);
-    const Dataset dataset = load_cameras(arguments);
+    const Dataset dataset = load_cameras_as_trained(arguments.cameras, arguments.downscale);
     const std::vector<int> frames = select_frames(dataset, arguments.frames, arguments.test_every);
     const std::vector<fs::path> names = report::picture_names(dataset.frames);
     make_folder(arguments.output);
@@ -106,11 +93,15 @@ int run(const RenderArguments& arguments) {
 
 Action add_render(CLI::App& app) {
     const auto arguments = std::make_shared<RenderArguments>();
-    app.add_option("SPLATS", arguments->splats, "The splat scene (.ply)")->required();
-    app.add_option("--cameras", arguments->cameras, "The dataset whose cameras to look through")->required();
+    app.add_option("SPLATS", arguments->splats, "The splat scene (.ply)")->required()->type_name("");
+    app.add_option("--cameras", arguments->cameras, "The dataset whose cameras to look through")
+        ->required()
+        ->type_name("DATASET");
     app.add_option("-o,--output", arguments->output, "Folder for the pictures, named like the dataset's")
+        ->type_name("DIR")
         ->capture_default_str();
     app.add_option("--frames", arguments->frames, "all, train, test, or indices in name order: 0,3,7")
+        ->type_name("FRAMES")
         ->capture_default_str();
     add_test_every_option(app, arguments->test_every);
     app.add_option("--format", arguments->format, "png (8 bit, clamped) or exr (float32, not clamped)")

@@ -18,20 +18,28 @@ constexpr int kMaxSteps = 1000000000;
 
 void add_model_options(CLI::App& app, TrainArguments& arguments) {
     app.add_option("--steps", arguments.steps, "Optimisation steps, one view each")
-        ->check(CLI::Range(1, kMaxSteps))
+        ->check(in_range(1, kMaxSteps))
+        ->type_name("N")
         ->capture_default_str();
     app.add_option("--strategy", arguments.strategy,
                    "adc grows and prunes splats (3DGS); none keeps their number")
         ->check(CLI::IsMember({"adc", "mcmc", "none"}))
         ->capture_default_str();
     app.add_option("--max-splats", arguments.max_splats, "Never more splats than this")
-        ->check(CLI::Range(1u, 1000000000u))
+        ->check(without_sign())
+        ->check(in_range(1u, 1000000000u))
+        ->type_name("N")
         ->capture_default_str();
     app.add_option("--init", arguments.init,
                    "sfm (the dataset's points), random, or a splat file to go on from")
+        ->type_name("sfm|random|FILE")
         ->capture_default_str();
-    app.add_option("--seed", arguments.seed, "Same seed, same device: same bytes")->capture_default_str();
-    add_draw_options(app, arguments.draw, true);
+    app.add_option("--seed", arguments.seed, "Same seed, same device: same bytes")
+        ->check(without_sign())
+        ->type_name("S")
+        ->capture_default_str();
+    arguments.draw.random_allowed = true;
+    add_draw_options(app, arguments.draw);
     add_downscale_option(app, arguments.downscale);
     add_test_every_option(app, arguments.test_every);
 }
@@ -51,22 +59,25 @@ Action add_train(CLI::App& app, const std::string& command_line) {
     const auto state = std::make_shared<CommandState>();
     TrainArguments& arguments = state->arguments;
     arguments.command_line = command_line;
-    app.add_option("DATASET", arguments.dataset,
-                   "Photographs with cameras: COLMAP folder or transforms.json");
+    app.add_option("DATASET", arguments.dataset, "Photographs with cameras: COLMAP folder or transforms.json")
+        ->type_name("");
     app.add_option("-o,--output", arguments.output,
                    "Folder for splats.ply, summary.json, metrics.jsonl, report.html and config.json "
-                   "[out/<name of the dataset>]");
+                   "[out/<name of the dataset>]")
+        ->type_name("DIR");
     add_model_options(app, arguments);
     app.add_option("--eval-every", arguments.eval_every,
                    "Evaluate the held-out views every N steps; 0: only at the end")
-        ->check(CLI::Range(0, kMaxSteps))
+        ->check(in_range(0, kMaxSteps))
+        ->type_name("N")
         ->capture_default_str();
     app.add_option("--save-every", arguments.save_every, "Save splats.ply every N steps; 0: only at the end")
-        ->check(CLI::Range(0, kMaxSteps))
+        ->check(in_range(0, kMaxSteps))
+        ->type_name("N")
         ->capture_default_str();
-    app.add_option(
-        "--config", state->config,
-        "JSON with the names of these options, such as a run's config.json; the command line wins");
+    app.add_option("--config", state->config,
+                   "JSON with the names of these options, such as a run's config.json; the command line wins")
+        ->type_name("FILE");
     add_device_options(app, arguments.device);
     const auto quiet = app.add_flag("--quiet", arguments.quiet, "Print nothing but errors");
     app.add_flag("--verbose", arguments.verbose, "Print the plan: what this scene does not need")

@@ -8,19 +8,7 @@
 #include "core/atomic_file.h"
 
 namespace ewa::cli {
-namespace {
-
 namespace fs = std::filesystem;
-
-Image first_three_channels(const Image& image) {
-    if (image.channels == 3) return image;
-    Image rgb(image.width, image.height, 3);
-    for (int y = 0; y < image.height; ++y)
-        for (int x = 0; x < image.width; ++x) std::copy_n(image.at(x, y), 3, rgb.at(x, y));
-    return rgb;
-}
-
-}  // namespace
 
 std::vector<int> spread_out(const std::vector<int>& frames, size_t count) {
     if (frames.size() <= count) return frames;
@@ -47,7 +35,7 @@ std::vector<report::ReportPicture> draw_report_pictures(const PictureRequest& re
         const Frame& frame = request.dataset.frames[index];
         report::ReportPicture picture;
         picture.name = frame.name;
-        picture.photograph = first_three_channels(load_frame_image(frame));
+        picture.photograph = over_background(load_frame_image(frame), request.options.background);
         picture.rendering = renderer.render(frame.camera).color;
         picture.psnr = psnr(picture.rendering, picture.photograph);
         picture.ssim = ssim(picture.rendering, picture.photograph);
@@ -63,10 +51,12 @@ void write_report(const fs::path& path, const report::ReportData& data) {
     core::write_text_file(path, report::html_report(data));
 }
 
-uint64_t peak_host_bytes() {
+uint64_t peak_host_bytes(const gpu::Device& device) {
     rusage usage{};
     getrusage(RUSAGE_SELF, &usage);
-    return static_cast<uint64_t>(usage.ru_maxrss) * 1024;  // Linux counts in KiB
+    const uint64_t resident = static_cast<uint64_t>(usage.ru_maxrss) * 1024;  // Linux counts in KiB
+    const uint64_t on_device = device_info(device).type == "cpu" ? peak_device_bytes(device) : 0;
+    return resident - std::min(resident, on_device);
 }
 
 }  // namespace ewa::cli

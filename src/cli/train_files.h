@@ -37,7 +37,8 @@ std::vector<report::ReportPicture> draw_report_pictures(const PictureRequest& re
 
 void write_report(const std::filesystem::path& path, const report::ReportData& data);
 
-/// The most memory this process has had, in bytes.
-uint64_t peak_host_bytes();
+/// Most memory the process has held so far, without what peak_device_bytes counts already: a CPU device's
+/// memory is the process's own.
+uint64_t peak_host_bytes(const gpu::Device& device);
 
 }  // namespace ewa::cli

@@ -131,7 +131,7 @@ void TrainRun::describe() const {
     for (const std::string& remark : report_.remarks) say(remark);
     say("device: " + report_.summary.device);
     if (!arguments_.verbose) return;
-    for (const PlanLine& line : report_.plan)
+    for (const report::LeftOut& line : report_.plan)
         say(fmt::format("left out: {} ({}{})", line.what, line.why,
                         line.bytes_saved > 0 ? ", saves " + bytes_text(line.bytes_saved) : ""));
 }
@@ -200,7 +200,8 @@ int TrainRun::finish(const Trainer& trainer) {
         summary.test_ssim = test->ssim;
     }
     if (last_.step > 0) log(last_, test);
-    report_.pass_times = trainer.pass_times();
+    for (const PassTime& time : trainer.pass_times())
+        report_.pass_times.push_back({time.pass, time.milliseconds});
     report_.held_out = !split_.test.empty();
     if (!cut_short) {
         const auto frames = spread_out(report_.held_out ? split_.test : split_.train, kReportPictures);
@@ -218,7 +219,7 @@ int TrainRun::finish(const Trainer& trainer) {
     summary.dropped_updates = last_.dropped_updates;
     summary.interrupted = cut_short;
     summary.peak_device_bytes = peak_device_bytes(*device_);
-    summary.peak_host_bytes = peak_host_bytes();
+    summary.peak_host_bytes = peak_host_bytes(*device_);
     summary.wall_seconds = wall_seconds();
     write_json(folder_ / "summary.json", report::to_json(summary));
     write_report(folder_ / "report.html", report_);
@@ -250,7 +251,10 @@ int TrainRun::run() {
     summary.version = EWA_VERSION;
     summary.command = arguments_.command_line;
     summary.strategy = arguments_.strategy;
-    report_.plan = plan_lines(start_, options_.render, true);
+    for (const PlanLine& line :
+         plan_lines(start_, options_.render,
+                    options_.strategy == Strategy::none ? Purpose::training : Purpose::densifying))
+        report_.plan.push_back({line.what, line.why, line.bytes_saved});
     describe();
 
     watch_for_interrupt();

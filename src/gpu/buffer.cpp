@@ -38,6 +38,12 @@ Buffer::Buffer(Device& device, std::string name, uint64_t bytes, Texel texel, bo
         throw RunError(
             "buffer " + name_ + " needs " + std::to_string(bytes_ >> 20) +
             " MiB, more than this device can fetch texels from; fewer splats or a smaller image need less");
+    // Software drivers report 128 MiB here and bind any size; there the limit is theirs on paper only.
+    if (!device.limits().cpu && bytes_ > device.limits().max_storage_range)
+        throw RunError("buffer " + name_ + " needs " + std::to_string(bytes_ >> 20) +
+                       " MiB, and this device binds at most " +
+                       std::to_string(device.limits().max_storage_range >> 20) +
+                       " MiB at once; fewer splats or a smaller image need less");
     using Usage = vk::BufferUsageFlagBits;
     vk::BufferCreateInfo create;
     create.setSize(bytes_).setUsage(Usage::eStorageBuffer | Usage::eTransferSrc | Usage::eTransferDst);

@@ -1,5 +1,4 @@
 // Pictures on disk, through OpenImageIO.
-#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
 #include <algorithm>
@@ -12,6 +11,7 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/image.h"
+#include "image/encode.h"
 #include "image/integrity.h"
 
 namespace ewa {
@@ -75,24 +75,6 @@ std::vector<float> read_channels(OIIO::ImageInput& input, int channels, const st
     return values;
 }
 
-std::vector<unsigned char> encode(const std::filesystem::path& path, const Image& image, OIIO::TypeDesc type,
-                                  const void* pixels) {
-    std::vector<unsigned char> bytes;
-    OIIO::Filesystem::IOVecOutput memory(bytes);
-    auto output = OIIO::ImageOutput::create(path.filename().string());
-    if (!output) throw RunError(core::one_line(path.string() + ": cannot be written: " + OIIO::geterror()));
-    OIIO::ImageSpec spec(image.width, image.height, image.channels, type);
-    spec.attribute("oiio:UnassociatedAlpha", 1);
-    // Encoded in memory and written by AtomicFile, which sees a full disk where the codecs' own writers may
-    // not.
-    OIIO::Filesystem::IOProxy* proxy = &memory;
-    spec.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);
-    if (!output->open(path.filename().string(), spec) || !output->write_image(type, pixels) ||
-        !output->close())
-        throw RunError(core::one_line(path.string() + ": cannot be encoded: " + output->geterror()));
-    return bytes;
-}
-
 }  // namespace
 
 ImageSize read_image_size(const std::filesystem::path& path) {
@@ -138,16 +120,13 @@ void save_image(const std::filesystem::path& path, const Image& image) {
         throw InputError(core::one_line(path.string() + ": pictures are written as .png or .exr"));
     if (image.width < 1 || image.height < 1 || image.channels < 1)
         throw InputError(core::one_line(path.string() + ": a picture without pixels cannot be written"));
+    // Encoded in memory and written by AtomicFile, which sees a full disk where the codecs' own writers may
+    // not.
     std::vector<unsigned char> bytes;
-    if (extension == ".exr") {
-        bytes = encode(path, image, OIIO::TypeDesc::FLOAT, image.pixels.data());
-    } else {
-        std::vector<uint8_t> rounded(image.pixels.size());
-        // Written so that NaN becomes 0.
-        std::transform(image.pixels.begin(), image.pixels.end(), rounded.begin(), [](float v) {
-            return v > 0.0f ? static_cast<uint8_t>(std::lround(std::min(v, 1.0f) * 255.0f)) : uint8_t(0);
-        });
-        bytes = encode(path, image, OIIO::TypeDesc::UINT8, rounded.data());
+    try {
+        bytes = extension == ".exr" ? image::encode_exr(image) : image::encode_png(image);
+    } catch (const RunError& error) {
+        throw RunError(core::one_line(path.string() + ": " + error.what()));
     }
     core::AtomicFile file(path);
     file.write(bytes.data(), bytes.size());

@@ -54,10 +54,12 @@ std::vector<PlanLine> describe(const Plan& plan, int file_degree, uint64_t splat
 
 }  // namespace pipeline
 
-std::vector<PlanLine> plan_lines(const Gaussians& gaussians, const RenderOptions& options, bool training) {
-    const auto plan =
-        training ? pipeline::plan_training(std::min(gaussians.sh_degree, options.sh_degree), options, true)
-                 : pipeline::plan_picture(gaussians, options, false);
+std::vector<PlanLine> plan_lines(const Gaussians& gaussians, const RenderOptions& options, Purpose purpose) {
+    const int degree = std::min(gaussians.sh_degree, options.sh_degree);
+    const pipeline::Plan plan =
+        purpose == Purpose::picture
+            ? pipeline::plan_picture(gaussians, options, false)
+            : pipeline::plan_training(degree, options, purpose == Purpose::densifying);
     return pipeline::describe(plan, gaussians.sh_degree, gaussians.size());
 }
 

@@ -109,21 +109,21 @@ std::string pictures(const ReportData& data) {
     return html;
 }
 
-std::string passes(const std::vector<PassTime>& times) {
+std::string passes(const std::vector<NamedTime>& times) {
     if (times.empty()) return "";
     double total = 0, longest = 0;
-    for (const PassTime& time : times) {
+    for (const NamedTime& time : times) {
         total += time.milliseconds;
         longest = std::max(longest, time.milliseconds);
     }
     std::string html =
         "<h2>Time of each pass in a step</h2>\n<table><tr><th>pass</th><th class=\"number\">ms</th>"
         "<th class=\"number\">share</th><th></th></tr>\n";
-    for (const PassTime& time : times)
+    for (const NamedTime& time : times)
         html += fmt::format(
             "<tr><td>{}</td><td class=\"number\">{:.3f}</td><td class=\"number\">{:.1f} %</td>"
             "<td class=\"bar\"><i style=\"width:{:.1f}%\"></i></td></tr>\n",
-            escape_html(time.pass), time.milliseconds, total > 0 ? 100 * time.milliseconds / total : 0,
+            escape_html(time.name), time.milliseconds, total > 0 ? 100 * time.milliseconds / total : 0,
             longest > 0 ? 100 * time.milliseconds / longest : 0);
     return html + fmt::format(
                       "<tr><td>all</td><td class=\"number\">{:.3f}</td><td></td><td></td></tr>\n</table>\n"
@@ -131,12 +131,12 @@ std::string passes(const std::vector<PassTime>& times) {
                       total);
 }
 
-std::string plan(const std::vector<PlanLine>& lines) {
+std::string plan(const std::vector<LeftOut>& lines) {
     if (lines.empty()) return "";
     std::string html =
         "<h2>What this scene does not need, left out</h2>\n<table><tr><th>left out</th><th>because</th>"
         "<th class=\"number\">saves</th></tr>\n";
-    for (const PlanLine& line : lines)
+    for (const LeftOut& line : lines)
         html += fmt::format("<tr><td>{}</td><td>{}</td><td class=\"number\">{}</td></tr>\n",
                             escape_html(line.what), escape_html(line.why),
                             line.bytes_saved > 0 ? bytes_text(line.bytes_saved) : "");

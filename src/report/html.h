@@ -1,11 +1,11 @@
 // The report of a training run: one HTML file that needs nothing beside it.
 #pragma once
+#include <cstdint>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "ewa/image.h"
-#include "ewa/renderer.h"
 #include "report/summary.h"
 
 namespace ewa::report {
@@ -16,12 +16,22 @@ struct ReportPicture {
     double psnr = 0, ssim = 0;
 };
 
+struct NamedTime {
+    std::string name;
+    double milliseconds = 0;
+};
+
+struct LeftOut {
+    std::string what, why;
+    uint64_t bytes_saved = 0;
+};
+
 struct ReportData {
     std::string title;  // the dataset's name
     Summary summary;
     std::vector<MetricsLine> metrics;
-    std::vector<PassTime> pass_times;
-    std::vector<PlanLine> plan;
+    std::vector<NamedTime> pass_times;  // of one step, in order
+    std::vector<LeftOut> plan;
     std::vector<std::string> remarks;                           // e.g. "3 images are missing"
     std::vector<std::pair<std::string, std::string>> settings;  // name, value
     std::vector<ReportPicture> pictures;

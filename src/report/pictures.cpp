@@ -7,7 +7,7 @@
 #include <set>
 #include <stdexcept>
 
-#include "image/encode_png.h"
+#include "image/encode.h"
 
 namespace ewa::report {
 namespace {

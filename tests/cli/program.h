@@ -1,9 +1,10 @@
 // Runs the built program as a process, and makes small inputs for it.
 #pragma once
-#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
+
+#include "support/temp_folder.h"
 
 namespace ewa::test {
 
@@ -13,6 +14,7 @@ struct Outcome {
 };
 
 struct Circumstances {
+    std::string program;     // runs instead of ewa
     std::string out_path;    // standard output goes here instead of Outcome::out
     size_t file_limit = 0;   // bytes that no file may exceed, as on a full disk; 0: none
     std::string await_file;  // as soon as this file has a byte, `signal` is sent
@@ -21,17 +23,13 @@ struct Circumstances {
 
 Outcome run_ewa(const std::vector<std::string>& arguments, const Circumstances& circumstances = {});
 
-/// A folder of its own, removed at the end.
+/// A folder of its own, removed at the end; its paths as text, which arguments are.
 class Folder {
   public:
-    Folder();
-    ~Folder();
-    Folder(const Folder&) = delete;
-    Folder& operator=(const Folder&) = delete;
-    std::string operator/(const std::string& name) const { return (path_ / name).string(); }
+    std::string operator/(const std::string& name) const { return (folder_ / name).string(); }
 
   private:
-    std::filesystem::path path_;
+    TempFolder folder_;
 };
 
 /// Pictures of a coloured disc from a circle of cameras: folder/transforms.json and folder/images/<name>.

@@ -141,7 +141,7 @@ TEST(Outputs, Info) {
     const Outcome data = run_ewa({"info", folder / "data", "--json", "--test-every", "2"});
     expect_success(data);
     const auto dataset = nlohmann::json::parse(data.out);
-    EXPECT_EQ(dataset["frames"], 4);
+    EXPECT_EQ(dataset["frames"], 3);
     EXPECT_EQ(dataset["missing_images"], 1);
     EXPECT_EQ(dataset["test"], 2);
     EXPECT_EQ(dataset["cameras"][0]["width"], 48);

@@ -110,7 +110,7 @@ TEST_F(Train, MissingImagesAreTold) {
 
 TEST_F(Train, InterruptKeepsWhatIsThere) {
     for (const int signal : {SIGINT, SIGTERM}) {
-        const std::string out = "o" + std::to_string(signal);
+        const std::string out = signal == SIGINT ? "int" : "term";
         Circumstances interrupt;
         interrupt.signal = signal;
         interrupt.await_file = folder / (out + "/metrics.jsonl");

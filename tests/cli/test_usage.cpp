@@ -24,6 +24,10 @@ struct WrongUse {
     std::string text;
 };
 
+void PrintTo(const WrongUse& use, std::ostream* out) {
+    for (const std::string& argument : use.arguments) *out << argument << ' ';
+}
+
 class WrongUseTest : public testing::TestWithParam<WrongUse> {};
 
 TEST_P(WrongUseTest, IsOneLineAndStatus2) {

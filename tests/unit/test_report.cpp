@@ -38,7 +38,7 @@ TEST(Report, FiguresThatDoNotExistAreNull) {
     const Json json = to_json(summary);
     EXPECT_TRUE(json["test_psnr"].is_null());
     EXPECT_TRUE(json["seconds_per_step"].is_null());
-    EXPECT_NO_THROW(static_cast<void>(Json::parse(json.dump())));
+    EXPECT_EQ(Json::parse(json.dump()), json);
 }
 
 TEST(Report, MetricsHaveTestFiguresOnlyWhereEvaluated) {

@@ -1,0 +1,104 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include "train/initialise.h"
+
+namespace {
+
+using namespace ewa;
+using namespace ewa::train;
+
+/// Cameras on a circle of radius 3 around `center`; towards: looking at it, else away from it.
+Dataset circle(const glm::dvec3& center, bool towards, int count = 12) {
+    Dataset dataset;
+    for (int i = 0; i < count; ++i) {
+        const double angle = 2 * 3.141592653589793 * i / count;
+        const glm::dvec3 offset(3 * std::cos(angle), 3 * std::sin(angle), 0);
+        const glm::dvec3 z = glm::normalize(towards ? -offset : offset), x(0, 0, 1), y = glm::cross(z, x);
+        Frame frame;
+        frame.camera.rotation = glm::transpose(glm::dmat3(x, y, z));
+        frame.camera.translation = -(frame.camera.rotation * (center + offset));
+        dataset.frames.push_back(frame);
+    }
+    return dataset;
+}
+
+std::vector<int> every_frame(const Dataset& dataset) {
+    std::vector<int> frames(dataset.frames.size());
+    for (size_t i = 0; i < frames.size(); ++i) frames[i] = int(i);
+    return frames;
+}
+
+void expect_near(const glm::dvec3& a, const glm::dvec3& b, double tolerance) {
+    EXPECT_LT(glm::length(a - b), tolerance) << a.x << " " << a.y << " " << a.z;
+}
+
+TEST(Initialise, CamerasThatLookInwards) {
+    for (const glm::dvec3 center : {glm::dvec3(0.0), glm::dvec3(1e6, -2e6, 5e5)}) {
+        const Dataset dataset = circle(center, true);
+        const Sphere sphere = viewed_sphere(dataset, every_frame(dataset));
+        expect_near(sphere.center, center, 1e-6);
+        EXPECT_NEAR(sphere.radius, 3, 1e-6);
+    }
+}
+
+TEST(Initialise, CamerasThatLookOutwardsOrAlong) {
+    const Dataset outwards = circle({1, 2, 3}, false);
+    const Sphere around = viewed_sphere(outwards, every_frame(outwards));
+    expect_near(around.center, {1, 2, 3}, 1e-9);
+    EXPECT_NEAR(around.radius, 12, 1e-9);
+
+    Dataset parallel = circle({0, 0, 0}, true);
+    for (Frame& frame : parallel.frames) {
+        const glm::dvec3 position = frame.camera.position();
+        frame.camera.rotation = glm::dmat3(1.0);
+        frame.camera.translation = -position;
+    }
+    EXPECT_NEAR(viewed_sphere(parallel, every_frame(parallel)).radius, 12, 1e-9);
+    EXPECT_EQ(viewed_sphere(parallel, {0}).radius, 1);
+}
+
+TEST(Initialise, RandomSplatsFillTheSphereAndFollowTheSeed) {
+    const Dataset dataset = circle({5, 0, 0}, true);
+    const Gaussians a = random_gaussians(dataset, every_frame(dataset), 4000, 1, 2);
+    ASSERT_EQ(a.size(), 4000u);
+    EXPECT_EQ(a.sh_degree, 2);
+    EXPECT_EQ(sh_degree_present(a), 0);
+    int inner = 0;
+    glm::dvec3 mean(0.0);
+    for (size_t i = 0; i < a.size(); ++i) {
+        const glm::dvec3 p(a.means[3 * i], a.means[3 * i + 1], a.means[3 * i + 2]);
+        const double distance = glm::length(p - glm::dvec3(5, 0, 0));
+        EXPECT_LT(distance, 3.0001);
+        inner += distance < 1.5;
+        mean += p / double(a.size());
+    }
+    EXPECT_NEAR(inner / 4000.0, 1 / 8.0, 0.02);  // evenly by volume; a standard deviation is 0.005
+    expect_near(mean, {5, 0, 0}, 0.12);          // a standard deviation is 0.021 an axis
+
+    const Gaussians same = random_gaussians(dataset, every_frame(dataset), 4000, 1, 2);
+    const Gaussians fewer = random_gaussians(dataset, every_frame(dataset), 100, 1, 2);
+    const Gaussians other = random_gaussians(dataset, every_frame(dataset), 4000, uint64_t(1) << 32, 2);
+    EXPECT_EQ(a.means, same.means);
+    EXPECT_TRUE(std::equal(fewer.means.begin(), fewer.means.end(), a.means.begin()));
+    EXPECT_NE(a.means, other.means);
+}
+
+TEST(Initialise, ShDegreeIsRaisedAndLowered) {
+    Gaussians g;
+    g.sh_degree = 1;
+    g.resize(2);
+    for (size_t i = 0; i < g.sh.size(); ++i) g.sh[i] = float(i + 1);
+    const Gaussians up = with_sh_degree(g, 3);
+    EXPECT_EQ(up.sh.size(), 2 * 48u);
+    EXPECT_EQ(up.sh[48], 13.0f);
+    EXPECT_EQ(up.sh[12], 0.0f);
+    EXPECT_EQ(with_sh_degree(up, 1).sh, g.sh);
+    EXPECT_EQ(with_sh_degree(g, 0).sh, (std::vector<float>{1, 2, 3, 13, 14, 15}));
+}
+
+}  // namespace
