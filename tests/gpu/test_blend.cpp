@@ -119,12 +119,12 @@ TEST_P(BlendPass, PlanesAreTheTwins) {
                 for (int k = 0; k < 3; ++k)
                     color.add(std::abs(plane(uint32_t(k)) - b.color.at(x, y)[k]), 4e-6);
                 color.add(std::abs(plane(shared::PLANE_T) - b.transmittance.at(x, y)[0]), 4e-6);
-                if (mode & 2) depth.add(std::abs(plane(shared::PLANE_DEPTH) - b.depth_sum.at(x, y)[0]), 4e-5);
+                if (mode & 2) depth.add(std::abs(plane(shared::PLANE_DEPTH) - b.depth_sum.at(x, y)[0]), 1e-5);
             }
         const size_t pixels = size_t(c.width) * size_t(c.height);
         if (mode == 3)
             printf("    colour %.1e (%zu over), depth %.1e\n", color.worst, color.over, depth.worst);
-        // A few dozen float32 operations on colours of up to 3: 4e-6; depths are up to ten times that.
+        // A few dozen float32 operations on colours of up to 3: 4e-6; depths of up to 8 are twice that.
         EXPECT_LE(color.over, pixels / 500);
         EXPECT_LE(depth.over, pixels / 500);
         EXPECT_LT(color.worst, 3.0 / 255);  // one contribution at the cut, of colour 3
@@ -190,18 +190,10 @@ TEST_P(BlendBackwardPass, SlotsAreTheTwinsMoments) {
 
 INSTANTIATE_TEST_SUITE_P(All, BlendBackwardPass, kCases, case_name);
 
-/// Ten thousand splats in one tile, of which only the nearest few thousand are seen.
-TEST(BlendEdges, TenThousandSplatsInATile) {
-    Scene scene = random_scene(1700, 10000, SplatKind::ordinary, 8, 8);
-    for (size_t i = 0; i < 10000; ++i) {
-        scene.gaussians.opacity_logits[i] = -5.0f;  // 0.0067
-        for (size_t k = 0; k < 3; ++k) scene.gaussians.log_scales[3 * i + k] = 1.0f;
-    }
+/// A picture of 8 x 8 pixels and its gradient against the twin's. Returns how many slots hold nothing but
+/// zero.
+size_t check_one_tile(const Scene& scene) {
     const Lists lists(scene);
-    ASSERT_GT(lists.count(), 5000u);
-    uint32_t most = 0;
-    for (const uint32_t n : lists.twin.blended.blended) most = std::max(most, n);
-    ASSERT_GT(most, 1000u);
     Rig& r = rig();
     reference::Raster gradient(8, 8, 3);
     for (double& g : gradient.values) g = 1;
@@ -226,19 +218,37 @@ TEST(BlendEdges, TenThousandSplatsInATile) {
                 worst = std::max(worst, std::abs(double(actual[size_t(k) * 64 + size_t(y) * 8 + size_t(x)]) -
                                                  lists.twin.blended.color.at(x, y)[k]));
     printf("    %zu instances, worst %.1e\n", lists.count(), worst);
-    EXPECT_LT(worst, 2e-4);  // a thousand products of T, each rounded
+    EXPECT_LT(worst, 2e-5);  // a thousand products of T, each rounded
     const auto written = slots.read<float>();
     size_t unseen = 0;
     for (size_t k = 0; k < lists.count(); ++k) {
         bool zero = true;
         for (size_t j = 0; j < 9; ++j) {
             const float value = written[shared::SLOT_FLOATS * lists.number(k) + j];
-            ASSERT_TRUE(std::isfinite(value)) << "slot of instance " << k << " was not written";
+            EXPECT_TRUE(std::isfinite(value)) << "slot of instance " << k << " was not written";
+            if (!std::isfinite(value)) return 0;
             zero = zero && value == 0;
         }
         unseen += zero;
     }
-    EXPECT_GT(unseen, 1000u);  // those behind the last open pixel
+    return unseen;
+}
+
+/// Ten thousand splats in one tile, of which only the nearest few thousand are seen.
+TEST(BlendEdges, TenThousandSplatsInATile) {
+    Scene scene = random_scene(1700, 10000, SplatKind::ordinary, 8, 8);
+    for (size_t i = 0; i < 10000; ++i) {
+        scene.gaussians.opacity_logits[i] = -5.0f;  // 0.0067: over a thousand until a pixel closes
+        for (size_t k = 0; k < 3; ++k) scene.gaussians.log_scales[3 * i + k] = 1.0f;
+    }
+    EXPECT_GT(check_one_tile(scene), 1000u);  // those behind the last open pixel
+}
+
+/// Thousands that are seen, and every pixel open to the end: a driver that cuts loops short would show it.
+TEST(BlendEdges, ThousandsOfSplatsThatNeverCloseATile) {
+    Scene scene = random_scene(1701, 40000, SplatKind::sub_pixel, 8, 8);
+    for (float& logit : scene.gaussians.opacity_logits) logit = -5.4f;  // 0.0045, a pixel each
+    EXPECT_LT(check_one_tile(scene), 20000u);
 }
 
 }  // namespace

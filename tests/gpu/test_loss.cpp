@@ -66,7 +66,7 @@ TEST_P(Loss, ValueAndGradientAreTheTwins) {
     const shared::Counts counts = frame.read_counts();
     // A float32 sum in blocks of subgroups; the terms are of order one.
     EXPECT_NEAR(counts.l1, twin.l1, 2e-7 + 1e-6 * twin.l1);
-    EXPECT_NEAR(counts.ssim, twin.ssim, 2e-6);  // each value divides small differences of moments
+    EXPECT_NEAR(counts.ssim, twin.ssim, 5e-7);  // each value divides small differences of moments
     EXPECT_NEAR(pipeline::loss_of(counts), twin.loss, 1e-6);
 
     const auto gradient = frame.image_gradient.download<float>(frame.sizes.image_gradient / 4);
@@ -83,7 +83,7 @@ TEST_P(Loss, ValueAndGradientAreTheTwins) {
             }
     printf("    gradient %.1e of %.1e, ssim %.1e\n", worst, largest, std::abs(counts.ssim - twin.ssim));
     EXPECT_LT(worst_target, 2e-7);
-    EXPECT_LT(worst, 2e-5 * largest);  // variances are float32 differences of moments
+    EXPECT_LT(worst, 1e-5 * largest);  // variances are float32 differences of moments
 }
 
 /// The window's first half: exact up to float32 rounding of eleven products.

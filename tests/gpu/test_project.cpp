@@ -81,10 +81,10 @@ TEST_P(ProjectPass, RecordsAreTheTwins) {
     }
     printf("    mean %.1e, shape %.1e, opacity %.1e, colour %.1e\n", worst_mean, worst_shape, worst_opacity,
            worst_color);
-    EXPECT_LT(worst_mean, 1e-11);    // 48 bits less a few for the dozen operations
+    EXPECT_LT(worst_mean, 3e-12);    // 48 bits less a few for the dozen operations
     EXPECT_LT(worst_shape, 2e-5);    // float32; a needle's determinant takes its worst
-    EXPECT_LT(worst_opacity, 2e-5);  // with antialiasing it follows the determinant
-    EXPECT_LT(worst_color, 4e-6);    // 16 float32 products of a few units
+    EXPECT_LT(worst_opacity, 3e-6);  // with antialiasing it follows the determinant
+    EXPECT_LT(worst_color, 2e-6);    // 16 float32 products of a few units
     EXPECT_EQ(out.totals.skipped_nonfinite, twin.skipped_nonfinite);
 }
 
@@ -104,8 +104,7 @@ TEST_P(ProjectPass, TileCountsNeverMissATile) {
     }
     // The device takes the ellipse's extent over a tile row, not the pixel centres: a tile that the ellipse
     // enters between two centres is listed too. Small splats pay most for that.
-    const double share = c.kind == SplatKind::needles ? 1.25 : 1.06;
-    EXPECT_LE(double(actual), share * double(exact) + 4);
+    EXPECT_LE(double(actual), 1.02 * double(exact) + 4);
     printf("    tiles: exact %zu, listed %zu\n", size_t(exact), size_t(actual));
 }
 
@@ -183,6 +182,20 @@ TEST(ProjectEdges, PoisonIsSkippedAndCounted) {
     }
     EXPECT_GT(out.counts.back(), 0u);  // the sound one among them
     EXPECT_EQ(out.totals.skipped_nonfinite, all.size() - 1);
+}
+
+/// The norm of a quaternion does not matter, though its square leaves float32.
+TEST(ProjectEdges, QuaternionsOfAnyNormTurnTheSame) {
+    Scene scene = random_scene(5, 100, SplatKind::ordinary, 160, 120);
+    const Output expected = run_project(scene);
+    for (const float norm : {0x1p-80f, 0x1p-30f, 0x1p90f}) {  // powers of two: the direction stays exact
+        Scene scaled = scene;
+        for (float& q : scaled.gaussians.quaternions) q *= norm;
+        const Output actual = run_project(scaled);
+        EXPECT_EQ(actual.totals.skipped_nonfinite, 0u);
+        EXPECT_EQ(actual.counts, expected.counts) << norm;
+        EXPECT_EQ(actual.records, expected.records) << norm;
+    }
 }
 
 /// A camera far from the origin sees what it sees at the origin.

@@ -30,8 +30,9 @@ TEST(Shape, TilesAreWholeSubgroupsForEverySubgroupSize) {
     for (const uint32_t subgroup : {1u, 2u, 4u, 8u, 16u, 32u, 64u})
         for (const bool cpu : {false, true}) {
             const passes::Shape shape = shape_of(subgroup, cpu);
-            EXPECT_EQ(shape.tile_width * shape.tile_height, 64u);
-            EXPECT_EQ(64 % subgroup, 0u);
+            const uint32_t pixels = shape.tile_width * shape.tile_height;
+            EXPECT_EQ(pixels % subgroup, 0u);
+            EXPECT_EQ(pixels, 64u);
             EXPECT_EQ(subgroup % shape.tile_width, 0u);  // rows of lanes
             EXPECT_EQ(shape.group % subgroup, 0u);
             EXPECT_EQ(shape.sort_group % (cpu ? subgroup : 1), 0u);
