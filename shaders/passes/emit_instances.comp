@@ -36,23 +36,16 @@ void main() {
     if (begin >= end) return;
 
     uint at = first + count_tiles(f, f.row_begin, begin, size);
-    uint row = begin;
-    uvec2 columns = columns_of(f, row, size);
-    uint column = columns.x;
-    // One flat loop over rows and columns. The count bounds it, so that nothing is written past the splat's own range
-    // even where another compiler rounds the footprint differently.
-    while (row < end) {
-        if (column < columns.y) {
+    for (uint row = begin; row < end; ++row) {
+        const uvec2 columns = columns_of(f, row, size);
+        // The count bounds the writes, so that nothing lands past the splat's own range even where another compiler
+        // rounds the footprint differently.
+        for (uint column = columns.x; column < columns.y; ++column) {
             if (at < first + count) {
                 keys[at] = row * push.tiles[0] + column;
                 splats[at] = splat;
             }
             ++at;
-            ++column;
-        } else {
-            ++row;
-            columns = columns_of(f, row, size);
-            column = columns.x;
         }
     }
     // And what it promised but did not reach stands behind the last tile.

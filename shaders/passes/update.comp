@@ -133,7 +133,8 @@ void main() {
                p2 = texelFetch(params, int(index_of(2, i)));
     const Sums s = sum_slots(drawn ? first_instances[i] : 0u, count);
     const Projection p = project_splat(SplatShape(p0.xyz, p0.w, p1, p2.xyz));
-    const vec3 direction = normalize(p.view.offset);
+    // Where nothing was drawn the mean may be anything: zero times a direction that is not finite were no zero gradient.
+    const vec3 direction = drawn ? normalize(p.view.offset) : vec3(0.0);
     // max(0, .) passes no gradient where the colour stands at zero.
     const vec3 shown = texelFetch(records, int(RECORD_TEXELS * i + 2u)).rgb;
     const vec3 color_gradient = drawn ? s.color * vec3(greaterThan(shown, vec3(0.0))) : vec3(0.0);

@@ -8,19 +8,7 @@
 #include "core/atomic_file.h"
 
 namespace ewa::cli {
-namespace {
-
 namespace fs = std::filesystem;
-
-Image first_three_channels(const Image& image) {
-    if (image.channels == 3) return image;
-    Image rgb(image.width, image.height, 3);
-    for (int y = 0; y < image.height; ++y)
-        for (int x = 0; x < image.width; ++x) std::copy_n(image.at(x, y), 3, rgb.at(x, y));
-    return rgb;
-}
-
-}  // namespace
 
 std::vector<int> spread_out(const std::vector<int>& frames, size_t count) {
     if (frames.size() <= count) return frames;
@@ -47,7 +35,7 @@ std::vector<report::ReportPicture> draw_report_pictures(const PictureRequest& re
         const Frame& frame = request.dataset.frames[index];
         report::ReportPicture picture;
         picture.name = frame.name;
-        picture.photograph = first_three_channels(load_frame_image(frame));
+        picture.photograph = over_background(load_frame_image(frame), request.options.background);
         picture.rendering = renderer.render(frame.camera).color;
         picture.psnr = psnr(picture.rendering, picture.photograph);
         picture.ssim = ssim(picture.rendering, picture.photograph);

@@ -32,11 +32,18 @@ Buffer::Buffer(Device& device, std::string name, uint64_t bytes, Texel texel, bo
     : device_(&device),
       name_(std::move(name)),
       bytes_((std::max<uint64_t>(bytes, 1) + 15) / 16 * 16),
-      texel_(texel) {
+      texel_(texel),
+      uniform_(uniform) {
     if (texel != Texel::none && bytes_ / texel_bytes(texel) > device.limits().max_texels)
         throw RunError(
             "buffer " + name_ + " needs " + std::to_string(bytes_ >> 20) +
             " MiB, more than this device can fetch texels from; fewer splats or a smaller image need less");
+    // Software drivers report 128 MiB here and bind any size; there the limit is theirs on paper only.
+    if (!device.limits().cpu && bytes_ > device.limits().max_storage_range)
+        throw RunError("buffer " + name_ + " needs " + std::to_string(bytes_ >> 20) +
+                       " MiB, and this device binds at most " +
+                       std::to_string(device.limits().max_storage_range >> 20) +
+                       " MiB at once; fewer splats or a smaller image need less");
     using Usage = vk::BufferUsageFlagBits;
     vk::BufferCreateInfo create;
     create.setSize(bytes_).setUsage(Usage::eStorageBuffer | Usage::eTransferSrc | Usage::eTransferDst);
@@ -77,6 +84,7 @@ Buffer& Buffer::operator=(Buffer&& other) noexcept {
     bytes_ = std::exchange(other.bytes_, 0);
     allocated_ = std::exchange(other.allocated_, 0);
     texel_ = other.texel_;
+    uniform_ = other.uniform_;
     view_ = std::move(other.view_);
     buffer_ = std::move(other.buffer_);
     memory_ = std::move(other.memory_);

@@ -28,6 +28,7 @@ class Buffer {
     const std::string& name() const { return name_; }
     uint64_t bytes() const { return bytes_; }
     Texel texel() const { return texel_; }
+    bool uniform() const { return uniform_; }
     vk::Buffer handle() const { return *buffer_; }
     vk::BufferView view() const { return *view_; }
     explicit operator bool() const { return bool(buffer_); }
@@ -57,6 +58,7 @@ class Buffer {
     std::string name_;
     uint64_t bytes_ = 0, allocated_ = 0;
     Texel texel_ = Texel::none;
+    bool uniform_ = false;
     vk::UniqueDeviceMemory memory_;
     vk::UniqueBuffer buffer_;
     vk::UniqueBufferView view_;

@@ -21,6 +21,8 @@ void check_use(const Pipeline& pipeline, const Binding& declared, const Use& use
                            to_string(declared.access) + " by the shader");
     if (declared.kind == BindingKind::texel && use.buffer->texel() == Texel::none)
         fail(pipeline, at + " is fetched as texels, and the buffer has no texel format");
+    if (declared.kind == BindingKind::uniform && !use.buffer->uniform())
+        fail(pipeline, at + " is a uniform block, and the buffer was not made for that");
     if (declared.kind == BindingKind::texel && use.offset != 0)
         fail(pipeline, at + " is a part of a texel buffer");
     if (use.offset + use.bytes > use.buffer->bytes()) fail(pipeline, at + " reaches past the buffer's end");

@@ -55,7 +55,7 @@ Sizes sizes_for(const passes::Shape& shape, const FrameRequest& request) {
     s.depth_sort = radix_cut(shape, request.splats, 32);
     // One number more than there are tiles, for instances that turn out not to exist.
     s.tile_sort = radix_cut(shape, request.instances, uint32_t(std::bit_width(s.tiles)));
-    s.strip_rows = std::min(s.tiles_y, (shape.loop_limit - s.tiles_y) / (s.tiles_x + 1));
+    s.strip_rows = std::min(s.tiles_y, (shape.loop_limit - s.tiles_y) / (s.tiles_x + 2));
     s.image_planes = request.depth ? 5 : 4;
 
     const uint64_t word = 4, texel = 16;

@@ -25,8 +25,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-[[noreturn]] void become_ewa(const std::vector<std::string>& arguments, const std::string& out,
-                             const std::string& err, size_t file_limit) {
+[[noreturn]] void become(const std::string& program, const std::vector<std::string>& arguments,
+                         const std::string& out, const std::string& err, size_t file_limit) {
     dup2(open(out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), STDOUT_FILENO);
     dup2(open(err.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), STDERR_FILENO);
     dup2(open("/dev/null", O_RDONLY), STDIN_FILENO);
@@ -36,10 +36,10 @@ namespace fs = std::filesystem;
         const rlimit limit{file_limit, file_limit};
         setrlimit(RLIMIT_FSIZE, &limit);
     }
-    std::vector<char*> argv{const_cast<char*>(EWA_PROGRAM)};
+    std::vector<char*> argv{const_cast<char*>(program.c_str())};
     for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
     argv.push_back(nullptr);
-    execv(EWA_PROGRAM, argv.data());
+    execv(program.c_str(), argv.data());
     _exit(127);
 }
 
@@ -93,9 +93,10 @@ Outcome run_ewa(const std::vector<std::string>& arguments, const Circumstances& 
     const Folder folder;
     const std::string out = circumstances.out_path.empty() ? folder / "out" : circumstances.out_path;
     const std::string err = folder / "err";
+    const std::string program = circumstances.program.empty() ? EWA_PROGRAM : circumstances.program;
     const pid_t child = fork();
     if (child < 0) throw std::runtime_error("fork failed");
-    if (child == 0) become_ewa(arguments, out, err, circumstances.file_limit);
+    if (child == 0) become(program, arguments, out, err, circumstances.file_limit);
     Outcome outcome;
     outcome.status = wait_for(child, circumstances);
     if (circumstances.out_path.empty()) outcome.out = read_file(out);

@@ -14,6 +14,7 @@ struct Outcome {
 };
 
 struct Circumstances {
+    std::string program;     // runs instead of ewa
     std::string out_path;    // standard output goes here instead of Outcome::out
     size_t file_limit = 0;   // bytes that no file may exceed, as on a full disk; 0: none
     std::string await_file;  // as soon as this file has a byte, `signal` is sent

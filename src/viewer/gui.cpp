@@ -1,0 +1,68 @@
+#include "viewer/gui.h"
+
+#include <backends/imgui_impl_glfw.h>
+#include <backends/imgui_impl_vulkan.h>
+#include <imgui.h>
+
+#include "ewa/error.h"
+
+namespace ewa::viewer {
+namespace {
+
+void check(VkResult result) {
+    if (result < 0) throw RunError("the panel cannot be drawn: " + vk::to_string(vk::Result(result)));
+}
+
+}  // namespace
+
+Gui::Gui(const Window& window, const PresentDevice& device, Presenter& presenter) : device_(device) {
+    const vk::DescriptorPoolSize size(vk::DescriptorType::eCombinedImageSampler, 1);
+    vk::DescriptorPoolCreateInfo create;
+    create.setMaxSets(1).setPoolSizes(size);
+    pool_ = device.handle().createDescriptorPoolUnique(create);
+
+    ImGui::CreateContext();
+    ImGui::GetIO().IniFilename = nullptr;  // looking at a file leaves no other behind
+    ImGui::StyleColorsDark();
+    ImGui::GetStyle().ScaleAllSizes(window.scale());
+    ImFontConfig font;
+    font.SizePixels = 13.0f * window.scale();
+    ImGui::GetIO().Fonts->AddFontDefault(&font);
+
+    ImGui_ImplGlfw_InitForVulkan(window.handle(), true);
+    ImGui_ImplVulkan_InitInfo info{};
+    info.Instance = device.instance();
+    info.PhysicalDevice = device.physical();
+    info.Device = device.handle();
+    info.QueueFamily = device.queue_family();
+    info.Queue = device.queue();
+    info.DescriptorPool = *pool_;
+    info.MinImageCount = presenter.swapchain().least_images();
+    // Vertex buffers go round this many frames; one frame is in flight at a time, so that the least will do.
+    info.ImageCount = info.MinImageCount;
+    info.MSAASamples = VK_SAMPLE_COUNT_1_BIT;
+    info.CheckVkResultFn = check;
+    ImGui_ImplVulkan_Init(&info, presenter.swapchain().overlay_pass());
+    presenter.run_once([](vk::CommandBuffer commands) { ImGui_ImplVulkan_CreateFontsTexture(commands); });
+    ImGui_ImplVulkan_DestroyFontUploadObjects();
+}
+
+Gui::~Gui() {
+    (void)vkDeviceWaitIdle(device_.handle());  // the last frame may still be drawn
+    ImGui_ImplVulkan_Shutdown();
+    ImGui_ImplGlfw_Shutdown();
+    ImGui::DestroyContext();
+}
+
+void Gui::begin_frame() {
+    ImGui_ImplVulkan_NewFrame();
+    ImGui_ImplGlfw_NewFrame();
+    ImGui::NewFrame();
+}
+
+ImDrawData* Gui::end_frame() {
+    ImGui::Render();
+    return ImGui::GetDrawData();
+}
+
+}  // namespace ewa::viewer

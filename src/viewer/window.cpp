@@ -1,0 +1,124 @@
+#include "viewer/window.h"
+
+#define GLFW_INCLUDE_NONE
+#include <GLFW/glfw3.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "ewa/error.h"
+
+namespace ewa::viewer {
+namespace {
+
+std::string glfw_reason() {
+    const char* text = nullptr;
+    glfwGetError(&text);
+    return text ? text : "unknown reason";
+}
+
+}  // namespace
+
+WindowSystem::WindowSystem() {
+    if (!glfwInit())
+        throw RunError("no window can be opened: " + glfw_reason() +
+                       "; ewa-view needs a desktop session, ewa render needs none");
+    if (!glfwVulkanSupported()) {
+        const std::string reason = glfw_reason();
+        glfwTerminate();
+        throw RunError("no window can be opened: " + reason +
+                       "; the Vulkan loader has no driver that can show pictures on this display");
+    }
+}
+
+WindowSystem::~WindowSystem() {
+    glfwTerminate();
+}
+
+Size WindowSystem::room() const {
+    Size size;
+    int x = 0, y = 0;
+    if (GLFWmonitor* monitor = glfwGetPrimaryMonitor())
+        glfwGetMonitorWorkarea(monitor, &x, &y, &size.width, &size.height);
+    return size;
+}
+
+std::vector<const char*> WindowSystem::vulkan_extensions() const {
+    uint32_t count = 0;
+    const char** names = glfwGetRequiredInstanceExtensions(&count);
+    return names ? std::vector<const char*>(names, names + count) : std::vector<const char*>();
+}
+
+void WindowSystem::wake() const {
+    glfwPostEmptyEvent();
+}
+
+Window::Window(const WindowSystem&, const std::string& title, Size size, bool resizable) {
+    glfwWindowHint(GLFW_CLIENT_API, GLFW_NO_API);
+    glfwWindowHint(GLFW_RESIZABLE, resizable ? GLFW_TRUE : GLFW_FALSE);
+    window_ = glfwCreateWindow(size.width, size.height, title.c_str(), nullptr, nullptr);
+    if (!window_) throw RunError("no window can be opened: " + glfw_reason());
+    glfwSetWindowUserPointer(window_, this);
+    watch();
+}
+
+Window::~Window() {
+    glfwDestroyWindow(window_);
+}
+
+Window& Window::of(GLFWwindow* window) {
+    return *static_cast<Window*>(glfwGetWindowUserPointer(window));
+}
+
+void Window::watch() {
+    glfwSetKeyCallback(window_, [](GLFWwindow* window, int key, int, int action, int) {
+        of(window).stirred_ = true;
+        if (action == GLFW_PRESS) of(window).pressed_.push_back(key);
+    });
+    glfwSetCursorPosCallback(window_, [](GLFWwindow* window, double, double) { of(window).stirred_ = true; });
+    glfwSetMouseButtonCallback(window_,
+                               [](GLFWwindow* window, int, int, int) { of(window).stirred_ = true; });
+    glfwSetScrollCallback(window_, [](GLFWwindow* window, double, double) { of(window).stirred_ = true; });
+    glfwSetCharCallback(window_, [](GLFWwindow* window, unsigned) { of(window).stirred_ = true; });
+    glfwSetFramebufferSizeCallback(window_, [](GLFWwindow* window, int, int) { of(window).stirred_ = true; });
+    glfwSetWindowRefreshCallback(window_, [](GLFWwindow* window) { of(window).stirred_ = true; });
+    glfwSetWindowFocusCallback(window_, [](GLFWwindow* window, int) { of(window).stirred_ = true; });
+}
+
+vk::UniqueSurfaceKHR Window::surface(vk::Instance instance) const {
+    VkSurfaceKHR surface = VK_NULL_HANDLE;
+    if (glfwCreateWindowSurface(instance, window_, nullptr, &surface) != VK_SUCCESS)
+        throw RunError("Vulkan cannot show pictures in this window: " + glfw_reason());
+    return vk::UniqueSurfaceKHR(surface, instance);
+}
+
+Size Window::framebuffer() const {
+    Size size;
+    glfwGetFramebufferSize(window_, &size.width, &size.height);
+    return size;
+}
+
+float Window::scale() const {
+    float x = 1, y = 1;
+    glfwGetWindowContentScale(window_, &x, &y);
+    return std::max(1.0f, std::max(x, y));
+}
+
+bool Window::closed() const {
+    return glfwWindowShouldClose(window_);
+}
+
+bool Window::held(int key) const {
+    return glfwGetKey(window_, key) == GLFW_PRESS;
+}
+
+std::vector<int> Window::wait(double seconds) {
+    stirred_ = false;
+    if (seconds > 0)
+        glfwWaitEventsTimeout(seconds);
+    else
+        glfwPollEvents();
+    return std::exchange(pressed_, {});
+}
+
+}  // namespace ewa::viewer

@@ -1,0 +1,255 @@
+// Blending and its gradient alone, on records and tile lists from the twin.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "gpu/guarded.h"
+#include "gpu/twin_inputs.h"
+#include "pipeline/sizes.h"
+
+namespace ewa::test {
+namespace {
+
+/// The twin's picture and its lists as the device's buffers hold them. Instance numbers run against the order
+/// of the lists, so that a number and its place cannot be mistaken for each other.
+struct Lists {
+    Scene scene;
+    reference::Picture twin;
+    pipeline::Sizes sizes;
+    Guarded records, splats, numbers, instance_splats, starts;
+
+    explicit Lists(const Scene& s)
+        : scene(s),
+          twin(reference::render(s.gaussians, s.camera, s.options, twin_tiles(rig().shape()))),
+          sizes(pipeline::sizes_for(rig().shape(), request())),
+          records("records", pack_records(twin.projected), gpu::Texel::rgba32f),
+          splats("splats", words([&](size_t k) { return twin.instances.sorted[k].splat; })),
+          numbers("numbers", words([&](size_t k) { return uint32_t(number(k)); })),
+          instance_splats("instance splats",
+                          words([&](size_t k) { return twin.instances.sorted[number(k)].splat; })),
+          starts("starts", std::vector<uint32_t>(twin.instances.first_of_tile.begin(),
+                                                 twin.instances.first_of_tile.end())) {}
+
+    size_t count() const { return twin.instances.sorted.size(); }
+    size_t number(size_t k) const { return count() - 1 - k; }
+    pipeline::FrameRequest request() const {
+        return {uint32_t(scene.gaussians.size()),
+                uint32_t(scene.camera.width),
+                uint32_t(scene.camera.height),
+                uint32_t(count()),
+                true,
+                true};
+    }
+    shared::BlendPush push() const {
+        const auto steps = passes::tile_steps(rig().shape(), sizes.tiles);
+        const auto& b = scene.options.background;
+        return {{b[0], b[1], b[2]},
+                {uint32_t(scene.camera.width), uint32_t(scene.camera.height)},
+                sizes.stride,
+                sizes.plane_floats,
+                {sizes.tiles_x, sizes.tiles_y},
+                {steps[0], steps[1]},
+                uint32_t(count())};
+    }
+
+  private:
+    template <class Word>
+    std::vector<uint32_t> words(Word word) const {
+        std::vector<uint32_t> out;
+        for (size_t k = 0; k < count(); ++k) out.push_back(word(k));
+        if (out.empty()) out.push_back(0);
+        return out;
+    }
+};
+
+struct Case {
+    SplatKind kind;
+    size_t splats;
+    int width, height;
+};
+std::string case_name(const testing::TestParamInfo<Case>& info) {
+    const Case& c = info.param;
+    return std::string(name_of(c.kind)) + "_" + std::to_string(c.splats) + "_" + std::to_string(c.width) +
+           "x" + std::to_string(c.height);
+}
+const auto kCases =
+    testing::Values(Case{SplatKind::ordinary, 0, 33, 21}, Case{SplatKind::ordinary, 1, 33, 21},
+                    Case{SplatKind::ordinary, 400, 1, 1}, Case{SplatKind::mixed, 400, 17, 3},
+                    Case{SplatKind::mixed, 600, 61, 47}, Case{SplatKind::needles, 300, 61, 47},
+                    Case{SplatKind::opacity_extremes, 900, 40, 40}, Case{SplatKind::mixed, 800, 260, 131});
+
+/// Pixels over a bound, and the largest error of all. In float32 a contribution that lies within rounding of
+/// 1/255, or a transmittance within rounding of the stop, may fall to the other side.
+struct Difference {
+    double worst = 0;
+    size_t over = 0;
+    void add(double error, double bound) {
+        worst = std::isfinite(error) ? std::max(worst, error) : INFINITY;
+        if (!(error <= bound)) ++over;
+    }
+};
+
+class BlendPass : public testing::TestWithParam<Case> {};
+
+TEST_P(BlendPass, PlanesAreTheTwins) {
+    const Case& c = GetParam();
+    const Lists lists(random_scene(1500 + c.splats, c.splats, c.kind, c.width, c.height));
+    Rig& r = rig();
+    for (const uint32_t mode : {0u, 1u, 2u, 3u}) {
+        SCOPED_TRACE("mode " + std::to_string(mode));
+        const uint32_t planes = mode & 2 ? 5 : 4;
+        Guarded out("planes", uint64_t(lists.sizes.plane_floats) * planes * 4);
+        r.run([&](gpu::Recording& recording) {
+            r.kernels.get<passes::Blend>(mode).record(recording, r.shape(),
+                                                      {lists.records, mode & 1 ? lists.numbers : lists.splats,
+                                                       lists.instance_splats, lists.starts, out},
+                                                      lists.push());
+        });
+        EXPECT_TRUE(out.intact());
+        const auto actual = out.read<float>();
+        Difference color, depth;
+        for (int y = 0; y < c.height; ++y)
+            for (int x = 0; x < c.width; ++x) {
+                const auto plane = [&](uint32_t p) {
+                    return double(
+                        actual[p * lists.sizes.plane_floats + size_t(y) * lists.sizes.stride + size_t(x)]);
+                };
+                const reference::Blended& b = lists.twin.blended;
+                for (int k = 0; k < 3; ++k)
+                    color.add(std::abs(plane(uint32_t(k)) - b.color.at(x, y)[k]), 4e-6);
+                color.add(std::abs(plane(shared::PLANE_T) - b.transmittance.at(x, y)[0]), 4e-6);
+                if (mode & 2) depth.add(std::abs(plane(shared::PLANE_DEPTH) - b.depth_sum.at(x, y)[0]), 1e-5);
+            }
+        const size_t pixels = size_t(c.width) * size_t(c.height);
+        if (mode == 3)
+            printf("    colour %.1e (%zu over), depth %.1e\n", color.worst, color.over, depth.worst);
+        // A few dozen float32 operations on colours of up to 3: 4e-6; depths of up to 8 are twice that.
+        EXPECT_LE(color.over, pixels / 500);
+        EXPECT_LE(depth.over, pixels / 500);
+        EXPECT_LT(color.worst, 3.0 / 255);  // one contribution at the cut, of colour 3
+        // What lies between width and stride is nobody's.
+        for (int y = 0; y < c.height; ++y)
+            for (uint32_t x = uint32_t(c.width); x < lists.sizes.stride; ++x)
+                EXPECT_TRUE(std::isnan(actual[size_t(y) * lists.sizes.stride + x]));
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, BlendPass, kCases, case_name);
+
+class BlendBackwardPass : public testing::TestWithParam<Case> {};
+
+TEST_P(BlendBackwardPass, SlotsAreTheTwinsMoments) {
+    const Case& c = GetParam();
+    const Lists lists(random_scene(1600 + c.splats, c.splats, c.kind, c.width, c.height));
+    Rig& r = rig();
+    reference::Raster gradient(c.width, c.height, 3);
+    Random random(c.splats);
+    for (double& g : gradient.values) g = float(random.normal());
+    Guarded planes("planes", pack_planes(lists.twin.blended.color, 4, lists.sizes.stride),
+                   gpu::Texel::rgba32f),
+        incoming("image gradient", pack_planes(gradient, 3, lists.sizes.stride), gpu::Texel::rgba32f),
+        slots("slots", std::max<uint64_t>(lists.count(), 1) * shared::SLOT_FLOATS * 4, gpu::Texel::rgba32f);
+    r.run([&](gpu::Recording& recording) {
+        r.kernels.get<passes::BlendBackward>().record(
+            recording, r.shape(),
+            {lists.records, lists.numbers, lists.instance_splats, lists.starts, planes, incoming, slots},
+            lists.push());
+    });
+    EXPECT_TRUE(slots.intact());
+    const auto expected =
+        reference::blend_backward(lists.twin.projected, lists.twin.instances, lists.twin.blended, gradient);
+    const auto actual = slots.read<float>();
+    // Of each of the nine sums: largest error over the largest value in the picture.
+    std::array<double, 9> largest{}, error{};
+    std::array<size_t, 9> over{};
+    for (size_t k = 0; k < lists.count(); ++k)
+        for (size_t j = 0; j < 9; ++j)
+            largest[j] = std::max(largest[j], std::abs(slot_of(expected.instances[k])[j]));
+    // Sums of one order share their scale: one of them alone may cancel to nothing.
+    for (const auto& [first, last] : {std::pair{1, 2}, {3, 5}, {6, 8}}) {
+        const auto group = largest.begin() + first, end = largest.begin() + last + 1;
+        std::fill(group, end, *std::max_element(group, end));
+    }
+    for (size_t k = 0; k < lists.count(); ++k)
+        for (size_t j = 0; j < 9; ++j) {
+            const double e = std::abs(double(actual[shared::SLOT_FLOATS * lists.number(k) + j]) -
+                                      slot_of(expected.instances[k])[j]);
+            ASSERT_TRUE(std::isfinite(e)) << "instance " << k << " sum " << j;
+            error[j] = std::max(error[j], e / largest[j]);
+            // 64 pixels of float32 terms; rest / (1 - alpha) magnifies rounding a hundredfold at alpha 0.99.
+            if (e > 2e-5 * largest[j]) ++over[j];
+        }
+    for (size_t j = 0; j < 9; ++j) {
+        printf("%s%.1e", j ? " " : "    ", error[j]);
+        EXPECT_LE(over[j], lists.count() / 200) << "sum " << j;
+        EXPECT_LT(error[j], 0.05) << "sum " << j;  // one pixel on the other side of the cut
+    }
+    printf("\n");
+}
+
+INSTANTIATE_TEST_SUITE_P(All, BlendBackwardPass, kCases, case_name);
+
+/// A picture of 8 x 8 pixels and its gradient against the twin's. Returns how many slots hold nothing but
+/// zero.
+size_t check_one_tile(const Scene& scene) {
+    const Lists lists(scene);
+    Rig& r = rig();
+    reference::Raster gradient(8, 8, 3);
+    for (double& g : gradient.values) g = 1;
+    Guarded planes("planes", uint64_t(lists.sizes.plane_floats) * 16, gpu::Texel::rgba32f),
+        incoming("image gradient", pack_planes(gradient, 3, lists.sizes.stride), gpu::Texel::rgba32f),
+        slots("slots", lists.count() * shared::SLOT_FLOATS * 4, gpu::Texel::rgba32f);
+    r.run([&](gpu::Recording& recording) {
+        r.kernels.get<passes::Blend>(1u).record(
+            recording, r.shape(), {lists.records, lists.numbers, lists.instance_splats, lists.starts, planes},
+            lists.push());
+        r.kernels.get<passes::BlendBackward>().record(
+            recording, r.shape(),
+            {lists.records, lists.numbers, lists.instance_splats, lists.starts, planes, incoming, slots},
+            lists.push());
+    });
+    expect_intact({&planes, &slots});
+    const auto actual = planes.read<float>();
+    double worst = 0;
+    for (int y = 0; y < 8; ++y)
+        for (int x = 0; x < 8; ++x)
+            for (int k = 0; k < 3; ++k)
+                worst = std::max(worst, std::abs(double(actual[size_t(k) * 64 + size_t(y) * 8 + size_t(x)]) -
+                                                 lists.twin.blended.color.at(x, y)[k]));
+    printf("    %zu instances, worst %.1e\n", lists.count(), worst);
+    EXPECT_LT(worst, 2e-5);  // a thousand products of T, each rounded
+    const auto written = slots.read<float>();
+    size_t unseen = 0;
+    for (size_t k = 0; k < lists.count(); ++k) {
+        bool zero = true;
+        for (size_t j = 0; j < 9; ++j) {
+            const float value = written[shared::SLOT_FLOATS * lists.number(k) + j];
+            EXPECT_TRUE(std::isfinite(value)) << "slot of instance " << k << " was not written";
+            if (!std::isfinite(value)) return 0;
+            zero = zero && value == 0;
+        }
+        unseen += zero;
+    }
+    return unseen;
+}
+
+/// Ten thousand splats in one tile, of which only the nearest few thousand are seen.
+TEST(BlendEdges, TenThousandSplatsInATile) {
+    Scene scene = random_scene(1700, 10000, SplatKind::ordinary, 8, 8);
+    for (size_t i = 0; i < 10000; ++i) {
+        scene.gaussians.opacity_logits[i] = -5.0f;  // 0.0067: over a thousand until a pixel closes
+        for (size_t k = 0; k < 3; ++k) scene.gaussians.log_scales[3 * i + k] = 1.0f;
+    }
+    EXPECT_GT(check_one_tile(scene), 1000u);  // those behind the last open pixel
+}
+
+/// Thousands that are seen, and every pixel open to the end: a driver that cuts loops short would show it.
+TEST(BlendEdges, ThousandsOfSplatsThatNeverCloseATile) {
+    Scene scene = random_scene(1701, 40000, SplatKind::sub_pixel, 8, 8);
+    for (float& logit : scene.gaussians.opacity_logits) logit = -5.4f;  // 0.0045, a pixel each
+    EXPECT_LT(check_one_tile(scene), 20000u);
+}
+
+}  // namespace
+}  // namespace ewa::test

@@ -1,0 +1,340 @@
+// Whole frames with guard words round every buffer, on scenes at the edges.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+
+#include "ewa/renderer.h"
+#include "gpu/guarded.h"
+#include "gpu/twin_inputs.h"
+#include "pipeline/backward.h"
+#include "pipeline/capacity.h"
+#include "pipeline/photo.h"
+
+namespace ewa::test {
+namespace {
+
+struct Result {
+    shared::Counts counts{};
+    std::vector<float> planes;
+    std::vector<uint32_t> order, keys, values, instance_splats, starts, tile_counts;
+    Gaussians gradient;
+    pipeline::Sizes sizes;
+};
+
+/// A picture, or a picture and the loss's gradient, with room for `capacity` instances.
+Result run_frame(const Scene& scene, uint32_t capacity, bool gradients) {
+    Rig& r = rig();
+    const int width = scene.camera.width, height = scene.camera.height;
+    const pipeline::Model model = pipeline::upload_model(*device(), scene.gaussians, 1, false);
+    const gpu::Buffer camera = camera_buffer(scene.camera, r.shape());
+    const pipeline::CameraUse use{&camera, 0, uint32_t(width), uint32_t(height)};
+    const gpu::Buffer photo = pipeline::upload_photo(*device(), random_target(9, width, height));
+    GuardedFrame guarded(r.shape(), {model.splats, use.width, use.height, capacity, gradients, !gradients});
+    pipeline::Frame& frame = guarded.frame;
+    pipeline::Plan plan = gradients ? pipeline::plan_gradient(scene.gaussians, scene.options)
+                                    : pipeline::plan_picture(scene.gaussians, scene.options, true);
+    plan.sh_degree = scene.gaussians.sh_degree;
+    Result out;
+    pipeline::Sorted sorted;
+    r.run([&](gpu::Recording& recording) {
+        sorted = record_forward(recording, r.kernels, plan, model, frame, use, scene.options.background);
+        if (!gradients) return;
+        record_loss(recording, r.kernels, frame, use, scene.options.background, photo);
+        record_backward(recording, r.kernels, plan, model, frame, use, scene.options.background, sorted, {});
+    });
+    EXPECT_TRUE(guarded.intact());
+    out.counts = frame.read_counts();
+    out.sizes = frame.sizes;
+    out.planes = frame.planes.download<float>(frame.sizes.planes / 4);
+    const uint32_t listed = std::min(out.counts.instances, capacity);
+    const bool second = sorted.values == &frame.instance_values[1];
+    out.keys = frame.instance_keys[second].download<uint32_t>(listed);
+    out.values = sorted.values->download<uint32_t>(listed);
+    out.instance_splats = frame.instance_splats.download<uint32_t>(listed);
+    out.starts = frame.tile_starts.download<uint32_t>(frame.sizes.tiles + 1);
+    out.tile_counts = frame.tile_counts.download<uint32_t>(model.splats);
+    if (gradients) out.gradient = download_model(model, model.moments1);
+    return out;
+}
+
+double worst_color(const Result& result, const reference::Raster& expected) {
+    double worst = 0;
+    for (int c = 0; c < 3; ++c)
+        for (int y = 0; y < expected.height; ++y)
+            for (int x = 0; x < expected.width; ++x) {
+                const float value = result.planes[size_t(c) * result.sizes.plane_floats +
+                                                  size_t(y) * result.sizes.stride + size_t(x)];
+                const double error = std::abs(double(value) - expected.at(x, y)[c]);
+                worst = std::isfinite(error) ? std::max(worst, error) : INFINITY;
+            }
+    return worst;
+}
+
+void expect_finite(const Gaussians& g) {
+    for (const auto* values : {&g.means, &g.quaternions, &g.log_scales, &g.opacity_logits, &g.sh})
+        for (const float value : *values) ASSERT_TRUE(std::isfinite(value));
+}
+
+void expect_background(const Result& result, const Scene& scene) {
+    const reference::Raster empty = reference::render(Gaussians{}, scene.camera, scene.options).blended.color;
+    EXPECT_EQ(worst_color(result, empty), 0);
+}
+
+/// Each tile's list: no tile of the twin's lists is missing, what they share stands in the same order, and
+/// few are more.
+TEST(FrameLists, AreTheTwinsOrALittleMore) {
+    for (const SplatKind kind : {SplatKind::ordinary, SplatKind::mixed}) {
+        const Scene scene = random_scene(3100, 1500, kind, 161, 119);
+        const Result result = run_frame(scene, 200000, kind == SplatKind::mixed);
+        ASSERT_LE(result.counts.instances, 200000u);
+        const auto twin =
+            reference::render(scene.gaussians, scene.camera, scene.options, twin_tiles(rig().shape()));
+        const auto& lists = twin.instances;
+        ASSERT_EQ(lists.grid.count(), result.sizes.tiles);
+        size_t missed = 0;
+        for (uint32_t tile = 0; tile < result.sizes.tiles; ++tile) {
+            uint32_t at = result.starts[tile];
+            const uint32_t end = result.starts[tile + 1];
+            for (size_t k = lists.first_of_tile[tile]; k < lists.first_of_tile[tile + 1]; ++k) {
+                const auto splat_at = [&](uint32_t i) {
+                    const uint32_t value = result.values[i];
+                    return kind == SplatKind::mixed ? result.instance_splats[value] : value;
+                };
+                while (at < end && splat_at(at) != lists.sorted[k].splat) ++at;
+                missed += at == end;
+            }
+        }
+        EXPECT_EQ(missed, 0u);
+        EXPECT_EQ(result.starts[result.sizes.tiles], result.counts.instances);
+        printf("    %zu exact, %u listed\n", lists.sorted.size(), result.counts.instances);
+        EXPECT_LE(double(result.counts.instances), 1.02 * double(lists.sorted.size()));
+    }
+}
+
+TEST(FrameEdges, NoSplatsOneSplatOddSizes) {
+    for (const auto& [width, height] : {std::pair{1, 1}, {17, 3}, {3, 17}, {64, 64}})
+        for (const size_t splats : {0, 1, 2})
+            for (const bool gradients : {false, true}) {
+                Scene scene = random_scene(3200 + splats, splats, SplatKind::ordinary, width, height, 1);
+                scene.gaussians.sh_degree = 1;
+                const Result result = run_frame(scene, 500, gradients);
+                const auto twin = reference::render(scene.gaussians, scene.camera, scene.options);
+                EXPECT_LT(worst_color(result, twin.blended.color), 1e-5);
+                EXPECT_EQ(result.counts.skipped_nonfinite, 0u);
+                if (gradients) expect_finite(result.gradient);
+            }
+}
+
+TEST(FrameEdges, AllBehindTheCamera) {
+    Scene scene = random_scene(3300, 500, SplatKind::ordinary, 61, 47);
+    const glm::dmat3 turn(-1, 0, 0, 0, 1, 0, 0, 0, -1);  // half a turn about y
+    scene.camera.rotation = turn * scene.camera.rotation;
+    scene.camera.translation = turn * scene.camera.translation;
+    const Result result = run_frame(scene, 4096, true);
+    EXPECT_EQ(result.counts.instances, 0u);
+    expect_background(result, scene);
+    for (const auto* values : {&result.gradient.means, &result.gradient.sh, &result.gradient.opacity_logits})
+        for (const float value : *values) ASSERT_EQ(value, 0);
+}
+
+TEST(FrameEdges, ThousandsOfTiles) {
+    Scene scene = random_scene(3400, 40, SplatKind::ordinary, 1003, 707);
+    const Result result = run_frame(scene, 200000, false);
+    ASSERT_LE(result.counts.instances, 200000u);
+    EXPECT_GT(result.sizes.tiles, 10000u);
+    const auto twin = reference::render(scene.gaussians, scene.camera, scene.options);
+    // One contribution at the cut is 1/255 of a colour of at most 3.
+    EXPECT_LT(worst_color(result, twin.blended.color), 3.0 / 255);
+}
+
+TEST(FrameEdges, SplatsThatCoverTheImage) {
+    Scene scene = random_scene(3500, 12, SplatKind::ordinary, 200, 150, 1);
+    for (size_t i = 0; i < 12; ++i) {
+        for (size_t k = 0; k < 3; ++k) scene.gaussians.log_scales[3 * i + k] = i < 6 ? 2.0f : 9.0f;
+        scene.gaussians.opacity_logits[i] = -1;
+        for (size_t k = 0; k < 3; ++k)
+            scene.gaussians.means[3 * i + k] =
+                float((glm::transpose(scene.camera.rotation) *
+                       (glm::dvec3(0, 0, 3 + 0.1 * double(i)) - scene.camera.translation))[int(k)]);
+    }
+    const Result result = run_frame(scene, 20000, true);
+    for (size_t i = 6; i < 12; ++i) EXPECT_EQ(result.tile_counts[i], result.sizes.tiles) << i;
+    const auto twin = reference::render(scene.gaussians, scene.camera, scene.options);
+    EXPECT_LT(worst_color(result, twin.blended.color), 1e-5);
+    expect_finite(result.gradient);
+}
+
+TEST(FrameEdges, WhereInstancesDoNotFitNothingIsDrawnAndTheNumberIsTold) {
+    const Scene scene = random_scene(3600, 800, SplatKind::ordinary, 161, 119);
+    for (const bool gradients : {false, true}) {
+        const Result whole = run_frame(scene, 100000, gradients);
+        const uint32_t needed = whole.counts.instances;
+        ASSERT_GT(needed, 2000u);
+        for (const uint32_t capacity : {1u, needed - 1}) {
+            const Result none = run_frame(scene, capacity, gradients);
+            EXPECT_EQ(none.counts.instances, needed);
+            expect_background(none, scene);
+            for (const float value : none.gradient.means) ASSERT_EQ(value, 0);
+        }
+        EXPECT_EQ(run_frame(scene, needed, gradients).planes, whole.planes);
+    }
+}
+
+TEST(FrameEdges, RoomGrowsUntilTheInstancesFit) {
+    Scene scene = random_scene(3650, 3, SplatKind::ordinary, 700, 600);
+    for (float& scale : scene.gaussians.log_scales) scale = 5;
+    for (size_t i = 0; i < 3; ++i)
+        for (size_t k = 0; k < 3; ++k)
+            scene.gaussians.means[3 * i + k] =
+                float((glm::transpose(scene.camera.rotation) *
+                       (glm::dvec3(0, 0, 5) - scene.camera.translation))[int(k)]);
+    ASSERT_LT(pipeline::first_capacity(3), 3 * 75 * 88u);
+    Renderer renderer(device(), scene.gaussians, scene.options);
+    const Rendering rendering = renderer.render(scene.camera);
+    const auto twin = reference::render(scene.gaussians, scene.camera, scene.options);
+    double worst = 0;
+    for (size_t i = 0; i < rendering.color.pixels.size(); ++i)
+        worst = std::max(worst, std::abs(rendering.color.pixels[i] - twin.blended.color.values[i]));
+    EXPECT_LT(worst, 1e-5);
+}
+
+TEST(FrameEdges, EqualDepthsGoByIndex) {
+    Scene scene = random_scene(3700, 300, SplatKind::ordinary, 61, 47);
+    scene.camera.rotation = glm::dmat3(1.0);
+    scene.camera.translation = glm::dvec3(0.0);
+    Random random(1);
+    for (size_t i = 0; i < 300; ++i) {
+        scene.gaussians.means[3 * i] = float(random.uniform(-1, 1));
+        scene.gaussians.means[3 * i + 1] = float(random.uniform(-1, 1));
+        scene.gaussians.means[3 * i + 2] = i % 2 ? 4.0f : 3.0f;
+    }
+    const Result result = run_frame(scene, 20000, false);
+    for (uint32_t tile = 0; tile < result.sizes.tiles; ++tile)
+        for (uint32_t k = result.starts[tile] + 1; k < result.starts[tile + 1]; ++k) {
+            const uint32_t before = result.values[k - 1], after = result.values[k];
+            EXPECT_TRUE(before % 2 == after % 2 ? before < after : before % 2 == 0)
+                << before << " before " << after << " in tile " << tile;
+        }
+    const auto twin = reference::render(scene.gaussians, scene.camera, scene.options);
+    EXPECT_LT(worst_color(result, twin.blended.color), 3.0 / 255);
+}
+
+TEST(FrameEdges, TenThousandSplatsInOneTile) {
+    Scene scene = random_scene(3800, 10000, SplatKind::ordinary, 8, 8);
+    for (size_t i = 0; i < 10000; ++i) {
+        scene.gaussians.opacity_logits[i] = -5;  // 0.0067: over a thousand until the pixel closes
+        for (size_t k = 0; k < 3; ++k) scene.gaussians.log_scales[3 * i + k] = 1;
+    }
+    const Result result = run_frame(scene, 20000, true);
+    EXPECT_GT(result.counts.instances, 5000u);
+    const auto twin = reference::render(scene.gaussians, scene.camera, scene.options);
+    EXPECT_LT(worst_color(result, twin.blended.color), 2e-4);  // a thousand rounded products of T
+    expect_finite(result.gradient);
+}
+
+/// Splats that are not finite leave the picture and everyone else's gradient as if they were not there.
+TEST(FrameEdges, PoisonLeavesNoTrace) {
+    const float inf = std::numeric_limits<float>::infinity(), nan = std::nanf("");
+    Scene clean = random_scene(3900, 200, SplatKind::ordinary, 61, 47, 1);
+    Scene poisoned = clean;
+    Gaussians& g = poisoned.gaussians;
+    g = Gaussians{};
+    g.sh_degree = 1;
+    g.resize(400);
+    const size_t stride = g.sh_stride();
+    for (size_t i = 0; i < 400; ++i) {
+        const size_t from = i / 2;
+        std::copy_n(&clean.gaussians.means[3 * from], 3, &g.means[3 * i]);
+        std::copy_n(&clean.gaussians.quaternions[4 * from], 4, &g.quaternions[4 * i]);
+        std::copy_n(&clean.gaussians.log_scales[3 * from], 3, &g.log_scales[3 * i]);
+        g.opacity_logits[i] = clean.gaussians.opacity_logits[from];
+        std::copy_n(&clean.gaussians.sh[stride * from], stride, &g.sh[stride * i]);
+        if (i % 2 == 0) continue;
+        const float poison = i % 3 == 0 ? nan : i % 3 == 1 ? inf : -inf;
+        switch (i / 2 % 6) {
+            case 0:
+                g.means[3 * i + i % 3] = poison;
+                break;
+            case 1:
+                g.quaternions[4 * i + i % 4] = poison;
+                break;
+            case 2:
+                std::fill_n(&g.quaternions[4 * i], 4, 0.0f);
+                break;
+            case 3:
+                g.log_scales[3 * i + i % 3] = poison;
+                break;
+            case 4:
+                g.opacity_logits[i] = poison;
+                break;
+            case 5:
+                g.sh[stride * i + i % stride] = poison;
+                break;
+        }
+    }
+    for (const bool gradients : {false, true}) {
+        const Result expected = run_frame(clean, 30000, gradients);
+        const Result actual = run_frame(poisoned, 30000, gradients);
+        EXPECT_EQ(actual.planes, expected.planes);
+        EXPECT_EQ(actual.counts.instances, expected.counts.instances);
+        // A colour that is not finite counts only where the splat is in front.
+        const auto twin = reference::render(g, poisoned.camera, poisoned.options);
+        EXPECT_EQ(actual.counts.skipped_nonfinite, twin.skipped_nonfinite);
+        EXPECT_GT(actual.counts.skipped_nonfinite, 180u);
+        if (!gradients) continue;
+        expect_finite(actual.gradient);
+        for (size_t i = 0; i < 200; ++i) {
+            EXPECT_EQ(actual.gradient.means[6 * i], expected.gradient.means[3 * i]);
+            EXPECT_EQ(actual.gradient.means[6 * i + 3], 0);
+        }
+    }
+}
+
+/// Values at the ends of float32's range: whatever is drawn, nothing that is not finite comes out.
+TEST(FrameEdges, ExtremeValuesMakeNoNaN) {
+    Scene scene = random_scene(4000, 0, SplatKind::ordinary, 61, 47, 1);
+    scene.camera.rotation = glm::dmat3(1.0);
+    scene.camera.translation = glm::dvec3(0.0);
+    const float extremes[] = {0, 1e-45f, 1e-38f, 1e-20f, 1e-4f, 1, 30, 87, 89, 1e4f, 1e19f, 1e30f, 3.4e38f};
+    Random random(4);
+    Gaussians& g = scene.gaussians;
+    g.sh_degree = 1;
+    g.resize(3000);
+    const auto often = [&](float usual, int most) {
+        const float value = extremes[random.integer(0, most)];
+        const bool negative = random.bits() % 2;
+        return random.bits() % 3 ? usual : negative ? -value : value;
+    };
+    for (float& value : g.quaternions) value = often(0.3f, 12);
+    for (float& value : g.log_scales) value = often(-2, 12);
+    for (float& value : g.opacity_logits) value = often(0, 12);
+    for (size_t i = 0; i < g.means.size(); ++i) g.means[i] = often(i % 3 == 2 ? 4 : 0.1f, 12);
+    // Squares of colours beyond 1e19 leave float32: the picture holds them, its loss cannot.
+    for (const bool gradients : {false, true})
+        for (const Kernel kernel : {Kernel::peak, Kernel::antialias, Kernel::unit_mass}) {
+            for (float& value : g.sh) value = often(0.3f, gradients ? 9 : 12);
+            scene.options.kernel = kernel;
+            const Result result = run_frame(scene, 200000, gradients);
+            ASSERT_LE(result.counts.instances, 200000u);
+            EXPECT_GT(result.counts.instances, 1000u);
+            for (const float value : result.planes) ASSERT_TRUE(std::isfinite(value));
+            if (gradients) {
+                EXPECT_TRUE(std::isfinite(result.counts.l1) && std::isfinite(result.counts.ssim));
+            }
+        }
+}
+
+TEST(FrameDeterminism, TheSameFrameTwiceIsTheSameBytes) {
+    const Scene scene = random_scene(4100, 900, SplatKind::mixed, 161, 119, 2);
+    const Result a = run_frame(scene, 100000, true), b = run_frame(scene, 100000, true);
+    EXPECT_EQ(a.planes, b.planes);
+    EXPECT_EQ(a.gradient.means, b.gradient.means);
+    EXPECT_EQ(a.gradient.sh, b.gradient.sh);
+    EXPECT_EQ(a.counts.ssim, b.counts.ssim);
+}
+
+}  // namespace
+}  // namespace ewa::test

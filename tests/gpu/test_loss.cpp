@@ -1,0 +1,222 @@
+// The loss kernels against the twin, and the photograph's unpacking.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "gpu/guarded.h"
+#include "gpu/twin_inputs.h"
+#include "pipeline/backward.h"
+#include "pipeline/photo.h"
+#include "reference/loss.h"
+
+namespace ewa::test {
+namespace {
+
+struct Inputs {
+    Image rendered, photo;            // RGB, beyond [0, 1] in places; RGBA
+    reference::Raster image, target;  // in double, the photograph over the background
+    std::array<float, 3> background{0.2f, 0.5f, 0.8f};
+};
+
+Inputs random_inputs(uint64_t seed, int width, int height) {
+    Random random(seed);
+    Inputs in;
+    in.rendered = random_target(seed, width, height);
+    for (float& value : in.rendered.pixels)
+        if (random.bits() % 8 == 0) value = float(random.uniform(-0.5, 1.5));
+    const Image target = random_target(seed + 1, width, height);
+    in.photo = Image(width, height, 4);
+    in.target = reference::Raster(width, height, 3);
+    for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x) {
+            const float alpha = x % 3 == 0 ? 1.0f : float(random.uniform());
+            in.photo.at(x, y)[3] = alpha;
+            for (int k = 0; k < 3; ++k) {
+                in.photo.at(x, y)[k] = target.at(x, y)[k];
+                const double color = target.at(x, y)[k];
+                in.target.at(x, y)[k] =
+                    color * alpha + double(in.background[size_t(k)]) * (1 - double(alpha));
+            }
+            // Where both are equal |x - y| has no slope.
+            if (x % 6 == 3 && y % 2 == 0)
+                for (int k = 0; k < 3; ++k) in.rendered.at(x, y)[k] = target.at(x, y)[k];
+        }
+    in.image = reference::to_double(in.rendered);
+    return in;
+}
+
+class Loss : public testing::TestWithParam<std::pair<int, int>> {};
+
+TEST_P(Loss, ValueAndGradientAreTheTwins) {
+    const auto [width, height] = GetParam();
+    const Inputs in = random_inputs(uint64_t(width * 1000 + height), width, height);
+    Rig& r = rig();
+    GuardedFrame guarded(r.shape(), {1, uint32_t(width), uint32_t(height), 1, true, false});
+    pipeline::Frame& frame = guarded.frame;
+    const auto planes = pack_planes(in.image, 3, frame.sizes.stride);
+    frame.planes.upload(std::span<const float>(planes));
+    const gpu::Buffer photo = pipeline::upload_photo(*device(), in.photo);
+    const pipeline::CameraUse camera{nullptr, 0, uint32_t(width), uint32_t(height)};
+    r.run([&](gpu::Recording& recording) {
+        record_loss(recording, r.kernels, frame, camera, in.background, photo);
+    });
+    EXPECT_TRUE(guarded.intact());
+
+    const reference::Loss twin = reference::image_loss(in.image, in.target);
+    const shared::Counts counts = frame.read_counts();
+    // A float32 sum in blocks of subgroups; the terms are of order one.
+    EXPECT_NEAR(counts.l1, twin.l1, 2e-7 + 1e-6 * twin.l1);
+    EXPECT_NEAR(counts.ssim, twin.ssim, 5e-7);  // each value divides small differences of moments
+    EXPECT_NEAR(pipeline::loss_of(counts), twin.loss, 1e-6);
+
+    const auto gradient = frame.image_gradient.download<float>(frame.sizes.image_gradient / 4);
+    const auto target = frame.target.download<float>(frame.sizes.target / 4);
+    double worst = 0, largest = 0, worst_target = 0;
+    for (int c = 0; c < 3; ++c)
+        for (int y = 0; y < height; ++y)
+            for (int x = 0; x < width; ++x) {
+                const size_t at =
+                    size_t(c) * frame.sizes.plane_floats + size_t(y) * frame.sizes.stride + size_t(x);
+                worst = std::max(worst, std::abs(gradient[at] - twin.gradient.at(x, y)[c]));
+                largest = std::max(largest, std::abs(twin.gradient.at(x, y)[c]));
+                worst_target = std::max(worst_target, std::abs(target[at] - in.target.at(x, y)[c]));
+            }
+    printf("    gradient %.1e of %.1e, ssim %.1e\n", worst, largest, std::abs(counts.ssim - twin.ssim));
+    EXPECT_LT(worst_target, 2e-7);
+    EXPECT_LT(worst, 1e-5 * largest);  // variances are float32 differences of moments
+}
+
+/// The window's first half: exact up to float32 rounding of eleven products.
+TEST_P(Loss, MomentsAreBlurredDownTheColumns) {
+    const auto [width, height] = GetParam();
+    const Inputs in = random_inputs(uint64_t(width * 77 + height), width, height);
+    Rig& r = rig();
+    const auto sizes = pipeline::sizes_for(r.shape(), {1, uint32_t(width), uint32_t(height), 1, true, false});
+    Guarded image("image", pack_planes(in.image, 3, sizes.stride), gpu::Texel::rgba32f),
+        target("target", pack_planes(in.target, 3, sizes.stride), gpu::Texel::rgba32f),
+        moments("moments", sizes.moments, gpu::Texel::rgba32f),
+        blurred("blurred", sizes.derivatives, gpu::Texel::rgba32f);
+    // Any nine planes do as derivatives: the moments' first nine.
+    r.run([&](gpu::Recording& recording) {
+        const shared::LossPush push{
+            {uint32_t(width), uint32_t(height)}, sizes.stride, sizes.plane_floats, 0, 0};
+        r.kernels.get<passes::LossColumns>().record(recording, r.shape(), {image, target, moments}, push);
+        r.kernels.get<passes::LossBackwardColumns>().record(recording, r.shape(), {moments, blurred}, push);
+    });
+    expect_intact({&image, &target, &moments, &blurred});
+    const std::vector<double> window = reference::ssim_window();
+    const auto down = [&](const auto& value, int y) {
+        double sum = 0;
+        for (int d = -5; d <= 5; ++d)
+            if (y + d >= 0 && y + d < height) sum += window[size_t(d + 5)] * value(y + d);
+        return sum;
+    };
+    const auto actual = moments.read<float>();
+    const auto again = blurred.read<float>();
+    double worst = 0, worst_again = 0;
+    for (int c = 0; c < 3; ++c)
+        for (int q = 0; q < 4; ++q)
+            for (int y = 0; y < height; ++y)
+                for (int x = 0; x < width; ++x) {
+                    const auto moment = [&](int row) {
+                        const double a = in.image.at(x, row)[c], b = float(in.target.at(x, row)[c]);
+                        return q == 0 ? a : q == 1 ? b : q == 2 ? a * a + b * b : a * b;
+                    };
+                    const auto index = [&](int row) {
+                        return size_t(4 * c + q) * sizes.plane_floats + size_t(row) * sizes.stride +
+                               size_t(x);
+                    };
+                    worst = std::max(worst, std::abs(actual[index(y)] - down(moment, y)));
+                    if (4 * c + q >= 9) continue;
+                    const auto value = [&](int row) { return double(actual[index(row)]); };
+                    worst_again = std::max(worst_again, std::abs(again[index(y)] - down(value, y)));
+                }
+    EXPECT_LT(worst, 2e-6);
+    EXPECT_LT(worst_again, 2e-6);
+}
+
+INSTANTIATE_TEST_SUITE_P(Sizes, Loss,
+                         testing::Values(std::pair{1, 1}, std::pair{17, 3}, std::pair{3, 17}, std::pair{4, 4},
+                                         std::pair{61, 47}, std::pair{130, 90}),
+                         [](const auto& tested) {
+                             return std::to_string(tested.param.first) + "x" +
+                                    std::to_string(tested.param.second);
+                         });
+
+TEST(LossEdges, EqualPicturesHaveNoLossAndNoGradient) {
+    const Image picture = random_target(5, 40, 30);
+    Rig& r = rig();
+    GuardedFrame guarded(r.shape(), {1, 40, 30, 1, true, false});
+    pipeline::Frame& frame = guarded.frame;
+    const auto planes = pack_planes(reference::to_double(picture), 3, frame.sizes.stride);
+    frame.planes.upload(std::span<const float>(planes));
+    const gpu::Buffer photo = pipeline::upload_photo(*device(), picture);
+    r.run([&](gpu::Recording& recording) {
+        record_loss(recording, r.kernels, frame, {nullptr, 0, 40, 30}, {1, 1, 1}, photo);
+    });
+    EXPECT_EQ(frame.read_counts().l1, 0);
+    EXPECT_NEAR(frame.read_counts().ssim, 1, 1e-6);
+    // Against an L1 gradient of 0.8 / 3600 = 2e-4 a pixel.
+    for (const float g : frame.image_gradient.download<float>(frame.sizes.image_gradient / 4))
+        ASSERT_NEAR(g, 0, 1e-8);
+}
+
+TEST(Photo, EightBitAndFloatPhotographsUnpackTheSame) {
+    Image picture(9, 5, 4);
+    Random random(6);
+    for (float& value : picture.pixels) value = float(random.integer(0, 255)) / 255.0f;
+    Image wide = picture;
+    wide.pixels[0] = 0.1234567f;
+    Rig& r = rig();
+    const auto unpack = [&](const Image& image, gpu::Texel texel) {
+        const gpu::Buffer photo = pipeline::upload_photo(*device(), image);
+        EXPECT_EQ(int(photo.texel()), int(texel));
+        Guarded planes("planes", 12 * 5 * 3 * 4);
+        r.run([&](gpu::Recording& recording) {
+            r.kernels.get<passes::UnpackTarget>().record(recording, r.shape(), {photo, planes},
+                                                         {{1, 0.5f, 0}, {9, 5}, 12, 60});
+        });
+        expect_intact({&planes});
+        return planes.read<float>();
+    };
+    const auto bytes = unpack(picture, gpu::Texel::rgba8), floats = unpack(wide, gpu::Texel::rgba32f);
+    const float background[3] = {1, 0.5f, 0};
+    for (int y = 0; y < 5; ++y)
+        for (int x = 0; x < 9; ++x)
+            for (int c = 0; c < 3; ++c) {
+                const size_t at = size_t(60 * c + 12 * y + x);
+                const float* p = picture.at(x, y);
+                if (x + y + c > 0) {
+                    EXPECT_NEAR(bytes[at], floats[at], 1.2e-7);  // one rounding of v / 255
+                }
+                EXPECT_NEAR(bytes[at], p[c] * p[3] + background[c] * (1 - p[3]), 2e-7);
+            }
+}
+
+TEST(Reduce, AddsUpInAFixedOrder) {
+    Rig& r = rig();
+    for (const uint32_t items : {1u, 7u, 513u, 20000u}) {
+        Random random(items);
+        std::vector<float> values(items);
+        double sum = 0;
+        for (float& value : values) sum += value = float(random.uniform(-1, 2));
+        const uint32_t block = 512, blocks = (items + block - 1) / block;
+        Guarded source("source", values), sums("sums", blocks * 4), unused("unused", 4),
+            counts = zero_counts();
+        r.run([&](gpu::Recording& recording) {
+            const auto& reduce = r.kernels.get<passes::Reduce>();
+            reduce.record(recording, r.shape(), {source, sums, counts}, {items, block, 0, 1});
+            reduce.record(recording, r.shape(), {sums, unused, counts}, {blocks, blocks, 1, 0.5f});
+            reduce.record(recording, r.shape(), {sums, unused, counts}, {blocks, blocks, 2, 2.0f});
+        });
+        expect_intact({&source, &sums, &unused, &counts});
+        const auto read = counts.read<shared::Counts>()[0];
+        EXPECT_NEAR(read.l1, 0.5 * sum, 1e-6 * items);
+        EXPECT_NEAR(read.ssim, 2 * sum, 4e-6 * items);
+        EXPECT_EQ(unused.read<uint32_t>()[0], kPoison);
+        EXPECT_EQ(read.instances, 0u);
+    }
+}
+
+}  // namespace
+}  // namespace ewa::test

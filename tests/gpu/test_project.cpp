@@ -1,0 +1,225 @@
+// The projection pass alone against the twin.
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include "gpu/guarded.h"
+#include "gpu/twin_inputs.h"
+
+namespace ewa::test {
+namespace {
+
+struct Output {
+    std::vector<float> records;
+    std::vector<uint32_t> keys, counts;
+    shared::Counts totals;
+};
+
+Output run_project(const Scene& scene) {
+    Rig& r = rig();
+    const uint32_t splats = uint32_t(scene.gaussians.size());
+    const pipeline::Model model = pipeline::upload_model(*device(), scene.gaussians, 0, false);
+    const gpu::Buffer camera = camera_buffer(scene.camera, r.shape());
+    const size_t room = std::max(splats, 1u);
+    Guarded records("records", room * 48, gpu::Texel::rgba32f), keys("keys", room * 4),
+        tile_counts("tile counts", room * 4), counts = zero_counts();
+    r.run([&](gpu::Recording& recording) {
+        r.kernels.get<passes::Project>(uint32_t(scene.gaussians.sh_degree), uint32_t(scene.options.kernel))
+            .record(recording, r.shape(), {model.params, camera, 0, records, keys, tile_counts, counts},
+                    {model.splats, model.capacity});
+    });
+    expect_intact({&records, &keys, &tile_counts, &counts});
+    Output out{records.read<float>(), keys.read<uint32_t>(), tile_counts.read<uint32_t>(),
+               counts.read<shared::Counts>()[0]};
+    out.keys.resize(splats);
+    out.counts.resize(splats);
+    return out;
+}
+
+struct Case {
+    SplatKind kind;
+    size_t splats;
+    int width, height, sh_degree;
+    Kernel kernel;
+};
+
+class ProjectPass : public testing::TestWithParam<Case> {};
+
+TEST_P(ProjectPass, RecordsAreTheTwins) {
+    const Case& c = GetParam();
+    const Scene scene = random_scene(900 + uint64_t(c.sh_degree) + c.splats, c.splats, c.kind, c.width,
+                                     c.height, c.sh_degree, c.kernel);
+    const Output out = run_project(scene);
+    const reference::Picture twin =
+        reference::render(scene.gaussians, scene.camera, scene.options, twin_tiles(rig().shape()));
+    double worst_mean = 0, worst_shape = 0, worst_opacity = 0, worst_color = 0;
+    for (size_t i = 0; i < c.splats; ++i) {
+        const reference::Projected& p = twin.projected[i];
+        if (!p.visible) {
+            EXPECT_EQ(out.counts[i], 0u) << i;
+            EXPECT_EQ(out.keys[i], 0xffffffffu) << i;
+            continue;
+        }
+        const float* r = &out.records[12 * i];
+        // The mean is a float pair: its error is that of the pair, relative to how far it lies from the
+        // principal point (a splat beside the camera projects thousands of px away).
+        const double scale = 1 + std::hypot(p.mean2d.x, p.mean2d.y);
+        worst_mean = std::max({worst_mean, std::abs(double(r[0]) + r[2] - p.mean2d.x) / scale,
+                               std::abs(double(r[1]) + r[3] - p.mean2d.y) / scale});
+        const auto [ux, k, vy] = whitening(p);
+        // k shears: what matters is its share of sqrt(det) / c, the shear that moves u by one.
+        worst_shape = std::max({worst_shape, std::abs(r[4] / ux - 1), std::abs(r[6] / vy - 1),
+                                std::abs(r[5] - k) / (std::abs(k) + std::sqrt(p.a / p.c))});
+        worst_opacity = std::max(worst_opacity, std::abs(r[7] / p.opacity - 1));
+        for (int channel = 0; channel < 3; ++channel)
+            worst_color = std::max(worst_color, std::abs(double(r[8 + channel]) - p.color[channel]));
+        // Both round the depth to float32, from values that differ by less than a hundredth of its step.
+        EXPECT_NEAR(double(r[11]), p.z, std::abs(p.z) * std::numeric_limits<float>::epsilon()) << i;
+        EXPECT_EQ(out.keys[i], out.counts[i] ? std::bit_cast<uint32_t>(r[11]) : 0xffffffffu) << i;
+    }
+    printf("    mean %.1e, shape %.1e, opacity %.1e, colour %.1e\n", worst_mean, worst_shape, worst_opacity,
+           worst_color);
+    EXPECT_LT(worst_mean, 3e-12);    // 48 bits less a few for the dozen operations
+    EXPECT_LT(worst_shape, 2e-5);    // float32; a needle's determinant takes its worst
+    EXPECT_LT(worst_opacity, 3e-6);  // with antialiasing it follows the determinant
+    EXPECT_LT(worst_color, 2e-6);    // 16 float32 products of a few units
+    EXPECT_EQ(out.totals.skipped_nonfinite, twin.skipped_nonfinite);
+}
+
+TEST_P(ProjectPass, TileCountsNeverMissATile) {
+    const Case& c = GetParam();
+    const Scene scene =
+        random_scene(950 + c.splats, c.splats, c.kind, c.width, c.height, c.sh_degree, c.kernel);
+    const Output out = run_project(scene);
+    const reference::Picture twin =
+        reference::render(scene.gaussians, scene.camera, scene.options, twin_tiles(rig().shape()));
+    uint64_t exact = 0, actual = 0;
+    for (size_t i = 0; i < c.splats; ++i) {
+        const size_t tiles = reference::covered_tiles(twin.projected[i], twin.instances.grid).size();
+        EXPECT_GE(out.counts[i], tiles) << "splat " << i;
+        exact += tiles;
+        actual += out.counts[i];
+    }
+    // The device takes the ellipse's extent over a tile row, not the pixel centres: a tile that the ellipse
+    // enters between two centres is listed too. Small splats pay most for that.
+    EXPECT_LE(double(actual), 1.02 * double(exact) + 4);
+    printf("    tiles: exact %zu, listed %zu\n", size_t(exact), size_t(actual));
+}
+
+std::string case_name(const testing::TestParamInfo<Case>& info) {
+    const Case& c = info.param;
+    return std::string(name_of(c.kind)) + "_" + std::to_string(c.splats) + "_" + std::to_string(c.width) +
+           "x" + std::to_string(c.height) + "_sh" + std::to_string(c.sh_degree) + "_kernel" +
+           std::to_string(int(c.kernel));
+}
+
+INSTANTIATE_TEST_SUITE_P(All, ProjectPass,
+                         testing::Values(Case{SplatKind::ordinary, 1000, 160, 120, 0, Kernel::peak},
+                                         Case{SplatKind::needles, 1000, 161, 119, 1, Kernel::antialias},
+                                         Case{SplatKind::sub_pixel, 500, 61, 47, 2, Kernel::unit_mass},
+                                         Case{SplatKind::off_screen_and_close, 500, 61, 47, 3, Kernel::peak},
+                                         Case{SplatKind::opacity_extremes, 500, 17, 3, 3, Kernel::antialias},
+                                         Case{SplatKind::mixed, 257, 1, 1, 2, Kernel::peak},
+                                         Case{SplatKind::mixed, 1, 33, 33, 1, Kernel::peak}),
+                         case_name);
+
+TEST(ProjectEdges, NoSplats) {
+    Scene scene = random_scene(1, 0, SplatKind::ordinary, 17, 3);
+    EXPECT_EQ(run_project(scene).totals.skipped_nonfinite, 0u);
+}
+
+TEST(ProjectEdges, BehindTheCameraOrOnTheNearPlaneIsNotDrawn) {
+    Scene scene = random_scene(2, 300, SplatKind::ordinary, 64, 48);
+    scene.camera.rotation = glm::dmat3(1.0);
+    scene.camera.translation = glm::dvec3(0.0);
+    for (size_t i = 0; i < 300; ++i) {
+        scene.gaussians.means[3 * i] = scene.gaussians.means[3 * i + 1] = 0;
+        scene.gaussians.means[3 * i + 2] = i == 0 ? 0.01f : i == 1 ? 0.0f : -float(i);
+    }
+    const Output out = run_project(scene);
+    for (size_t i = 0; i < 300; ++i) EXPECT_EQ(out.counts[i], 0u) << i;
+    EXPECT_EQ(out.totals.skipped_nonfinite, 0u);
+    scene.gaussians.means[2] = 0.0101f;
+    scene.gaussians.opacity_logits[0] = 3;
+    EXPECT_GT(run_project(scene).counts[0], 0u);
+}
+
+/// Every stored value of a splat in turn made not finite, and the quaternion zero.
+TEST(ProjectEdges, PoisonIsSkippedAndCounted) {
+    const int degree = 2;
+    const float inf = std::numeric_limits<float>::infinity(), nan = std::nanf("");
+    Scene scene = random_scene(3, 1, SplatKind::ordinary, 64, 48, degree);
+    scene.camera.rotation = glm::dmat3(1.0);
+    scene.camera.translation = glm::dvec3(0.0);
+    Gaussians one = scene.gaussians;
+    one.means = {0, 0, 4};
+    one.log_scales = {-1, -1, -1};
+    one.opacity_logits = {1};
+    const size_t values = 3 + 1 + 4 + 3 + one.sh_stride();
+    Gaussians& all = scene.gaussians;
+    all.resize(3 * values + 2);
+    const auto part = [&](Gaussians& g, size_t i, size_t v) -> float& {
+        if (v < 3) return g.means[3 * i + v];
+        if (v < 4) return g.opacity_logits[i];
+        if (v < 8) return g.quaternions[4 * i + v - 4];
+        if (v < 11) return g.log_scales[3 * i + v - 8];
+        return g.sh[i * g.sh_stride() + v - 11];
+    };
+    for (size_t i = 0; i < all.size(); ++i)
+        for (size_t v = 0; v < values; ++v) part(all, i, v) = part(one, 0, v);
+    for (size_t v = 0; v < values; ++v) {
+        part(all, 3 * v, v) = nan;
+        part(all, 3 * v + 1, v) = inf;
+        part(all, 3 * v + 2, v) = -inf;
+    }
+    for (size_t v = 4; v < 8; ++v) part(all, 3 * values, v) = 0;
+    const Output out = run_project(scene);
+    for (size_t i = 0; i + 1 < all.size(); ++i) {
+        EXPECT_EQ(out.counts[i], 0u) << "value " << i / 3 << " poison " << i % 3;
+        EXPECT_EQ(out.keys[i], 0xffffffffu) << i;
+    }
+    EXPECT_GT(out.counts.back(), 0u);  // the sound one among them
+    EXPECT_EQ(out.totals.skipped_nonfinite, all.size() - 1);
+}
+
+/// The norm of a quaternion does not matter, though its square leaves float32.
+TEST(ProjectEdges, QuaternionsOfAnyNormTurnTheSame) {
+    Scene scene = random_scene(5, 100, SplatKind::ordinary, 160, 120);
+    const Output expected = run_project(scene);
+    for (const float norm : {0x1p-80f, 0x1p-30f, 0x1p90f}) {  // powers of two: the direction stays exact
+        Scene scaled = scene;
+        for (float& q : scaled.gaussians.quaternions) q *= norm;
+        const Output actual = run_project(scaled);
+        EXPECT_EQ(actual.totals.skipped_nonfinite, 0u);
+        EXPECT_EQ(actual.counts, expected.counts) << norm;
+        EXPECT_EQ(actual.records, expected.records) << norm;
+    }
+}
+
+/// A camera far from the origin sees what it sees at the origin.
+TEST(ProjectEdges, GeoreferencedSceneKeepsItsSharpness) {
+    Scene scene = random_scene(4, 200, SplatKind::ordinary, 160, 120);
+    const glm::dvec3 offset(1 << 20, -(1 << 19), 1 << 18);  // float32 keeps 1/16 there
+    for (size_t i = 0; i < scene.gaussians.means.size(); ++i) {
+        float& mean = scene.gaussians.means[i];
+        mean = float(std::round(mean * 16) / 16 + offset[glm::length_t(i % 3)]);
+    }
+    const glm::dvec3 near = scene.camera.translation;
+    scene.camera.translation = near - scene.camera.rotation * offset;
+    const Output out = run_project(scene);
+    double worst = 0;
+    for (size_t i = 0; i < 200; ++i) {
+        const auto p = reference::project(scene.gaussians, i, scene.camera, scene.options);
+        if (!p.visible) continue;
+        const double scale = 1 + std::hypot(p.mean2d.x, p.mean2d.y);
+        worst = std::max(
+            worst, std::abs(double(out.records[12 * i]) + out.records[12 * i + 2] - p.mean2d.x) / scale);
+    }
+    printf("    worst %.1e\n", worst);
+    EXPECT_LT(worst, 1e-7);  // float32 positions alone would be off by 1e-1
+}
+
+}  // namespace
+}  // namespace ewa::test

@@ -1,0 +1,313 @@
+// The pure functions behind a frame: sizes, plans, camera blocks, workgroup counts.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "ewa/error.h"
+#include "gpu/test_device.h"
+#include "pipeline/camera_block.h"
+#include "pipeline/capacity.h"
+#include "pipeline/model.h"
+#include "pipeline/plan.h"
+#include "pipeline/sizes.h"
+#include "support/random_scene.h"
+#include "support/temp_folder.h"
+
+namespace ewa::test {
+namespace {
+
+using namespace pipeline;
+
+passes::Shape shape_of(uint32_t subgroup, bool cpu = true) {
+    gpu::Limits limits;
+    limits.subgroup_size = subgroup;
+    limits.cpu = cpu;
+    return passes::shape_for(limits);
+}
+
+TEST(Shape, TilesAreWholeSubgroupsForEverySubgroupSize) {
+    for (const uint32_t subgroup : {1u, 2u, 4u, 8u, 16u, 32u, 64u})
+        for (const bool cpu : {false, true}) {
+            const passes::Shape shape = shape_of(subgroup, cpu);
+            const uint32_t pixels = shape.tile_width * shape.tile_height;
+            EXPECT_EQ(pixels % subgroup, 0u);
+            EXPECT_EQ(pixels, 64u);
+            EXPECT_EQ(subgroup % shape.tile_width, 0u);  // rows of lanes
+            EXPECT_EQ(shape.group % subgroup, 0u);
+            EXPECT_EQ(shape.sort_group % (cpu ? subgroup : 1), 0u);
+        }
+    for (const uint32_t subgroup : {0u, 3u, 128u}) EXPECT_THROW(shape_of(subgroup), std::logic_error);
+}
+
+TEST(Shape, GroupsCoverTheItemsWithinTheLimit) {
+    passes::Shape shape = shape_of(8);
+    shape.max_groups = 10;
+    for (const uint64_t items : {uint64_t(0), uint64_t(1), uint64_t(128), uint64_t(129), uint64_t(1280),
+                                 uint64_t(1281), uint64_t(12800)}) {
+        const auto g = passes::element_groups(shape, items, 3);
+        EXPECT_GE(uint64_t(g[0]) * g[1] * shape.group, items);
+        EXPECT_LE(g[0], 10u);
+        EXPECT_LE(g[1], 10u);
+        EXPECT_GE(g[0], 1u);
+        EXPECT_EQ(g[2], 3u);
+        const auto s = passes::subgroup_groups(shape, items / 128);
+        EXPECT_GE(uint64_t(s[0]) * s[1], items / 128);
+        EXPECT_LE(std::max(s[0], s[1]), 10u);
+    }
+}
+
+/// Every tile is some workgroup's, once.
+TEST(Shape, EveryTileHasOneWorkgroup) {
+    for (const bool cpu : {false, true})
+        for (const uint32_t tiles : {1u, 15u, 16u, 17u, 999u, 70000u}) {
+            const passes::Shape shape = shape_of(8, cpu);
+            shared::BlendPush push{};
+            push.tiles[0] = tiles;
+            push.tiles[1] = 1;
+            const auto steps = passes::tile_steps(shape, tiles);
+            push.tile_step[0] = steps[0];
+            push.tile_step[1] = steps[1];
+            const auto groups = passes::tile_groups(shape, push);
+            EXPECT_LE(std::max(groups[0], groups[1]), shape.max_groups);
+            std::vector<int> owners(tiles);
+            for (uint32_t y = 0; y < groups[1]; ++y)
+                for (uint32_t x = 0; x < groups[0]; ++x)
+                    if (const uint32_t tile = x * steps[0] + y * steps[1]; tile < tiles) ++owners[tile];
+            for (uint32_t tile = 0; tile < tiles; ++tile) ASSERT_EQ(owners[tile], 1) << tile;
+        }
+}
+
+TEST(SizesFor, OddImages) {
+    const Sizes one = sizes_for(shape_of(8), {1, 1, 1, 1, true, true});
+    EXPECT_EQ(one.tiles, 1u);
+    EXPECT_EQ(one.stride, 4u);
+    EXPECT_EQ(one.plane_floats, 4u);
+    EXPECT_EQ(one.image_planes, 5u);
+    EXPECT_EQ(one.planes, 80u);
+    EXPECT_EQ(one.tile_starts, 8u);
+    EXPECT_EQ(one.slots, 48u);
+    const Sizes odd = sizes_for(shape_of(8), {1000, 17, 3, 5000, false, false});
+    EXPECT_EQ(odd.tiles_x, 3u);
+    EXPECT_EQ(odd.tiles_y, 1u);
+    EXPECT_EQ(odd.stride, 20u);
+    EXPECT_EQ(odd.plane_floats, 60u);
+    EXPECT_EQ(odd.planes, 60u * 4 * 4);
+    EXPECT_EQ(odd.records, 1000u * 48);
+    EXPECT_EQ(odd.slots, 0u);
+    EXPECT_EQ(odd.scan_block, 512u);
+    EXPECT_EQ(odd.scan_blocks, 2u);
+    EXPECT_EQ(odd.scan_totals, 12u);
+}
+
+TEST(SizesFor, NothingHasNoBytes) {
+    const Sizes s = sizes_for(shape_of(8), {0, 17, 3, 0, true, false});
+    for (const uint64_t bytes : {s.records, s.splat_words, s.instance_words, s.slots, s.counters})
+        EXPECT_GT(bytes, 0u);
+}
+
+TEST(SizesFor, SortsByAsManyBitsAsThereAreTiles) {
+    // tiles is itself a key: what was promised and does not exist.
+    const auto bits = [](uint32_t width, uint32_t height) {
+        const RadixCut cut = sizes_for(shape_of(8), {1, width, height, 1000, false, false}).tile_sort;
+        return cut.passes * cut.bits;
+    };
+    EXPECT_EQ(bits(8, 8), 1u);
+    EXPECT_EQ(bits(24, 8), 2u);
+    EXPECT_EQ(bits(32, 8), 3u);
+    EXPECT_EQ(bits(8 * 255, 8), 8u);
+    EXPECT_EQ(bits(8 * 256, 8), 10u);  // 9, in two passes of 5
+    const RadixCut depth = sizes_for(shape_of(8), {1, 8, 8, 1, false, false}).depth_sort;
+    EXPECT_EQ(depth.passes * depth.bits, 32u);
+}
+
+TEST(SizesFor, LanesAreBetweenASubgroupAndTheMost) {
+    const passes::Shape shape = shape_of(8);
+    const auto lanes = [&](uint32_t splats) {
+        return sizes_for(shape, {splats, 8, 8, 1, false, false}).depth_sort.lanes;
+    };
+    EXPECT_EQ(lanes(0), 8u);
+    EXPECT_EQ(lanes(1), 8u);
+    EXPECT_EQ(lanes(256 * 100), 100u);
+    EXPECT_EQ(lanes(100'000'000), 512u);
+}
+
+TEST(SizesFor, ImagesBeyondTheLimitsAreAnErrorThatNamesThem) {
+    const passes::Shape shape = shape_of(8);
+    const auto size = [&](uint32_t width, uint32_t height) {
+        return [&shape, width, height] { sizes_for(shape, {1, width, height, 1, false, false}); };
+    };
+    expect_error<InputError>(size(0, 5), {"0x5"});
+    expect_error<InputError>(size(5, 0), {"5x0"});
+    expect_error<InputError>(size((1u << 20) + 1, 5), {"1048577x5", "1048576"});
+    expect_error<InputError>(size(5, 0xffffffffu), {"4294967295"});
+    expect_error<InputError>(size(1u << 20, 1u << 20), {"1048576x1048576", "524280", "--downscale"});
+    expect_error<InputError>(size(8 * 725, 8 * 725), {"524280"});  // 525625 tiles
+    EXPECT_NO_THROW(size(8 * 724, 8 * 724)());                     // 524176
+    EXPECT_NO_THROW(size(8 * 60000, 8)());
+}
+
+/// An emitting lane's loop runs over the tiles of its strip, a turn for each tile and each row; before it,
+/// over the rows above.
+TEST(SizesFor, StripsKeepLoopsUnderTheLimit) {
+    const passes::Shape shape = shape_of(8);
+    for (const auto& [width, height] :
+         {std::pair{8u, 8u}, {800u, 600u}, {5792u, 5792u}, {480000u, 8u}, {8u, 480000u}, {64u, 65000u * 8}}) {
+        const Sizes s = sizes_for(shape, {1, width, height, 1, false, false});
+        EXPECT_GE(s.strip_rows, 1u);
+        EXPECT_LE(uint64_t(s.strip_rows) * (s.tiles_x + 1), shape.loop_limit);
+        EXPECT_LE((s.tiles_y + s.strip_rows - 1) / s.strip_rows, shape.max_groups);
+    }
+}
+
+TEST(SizesFor, TotalIsWhatAFrameHolds) {
+    const auto shape = passes::shape_for(device()->limits());
+    for (const bool gradients : {false, true})
+        for (const bool depth : {false, true}) {
+            const FrameRequest request{12345, 61, 47, 54321, gradients, depth};
+            pipeline::Frame frame;
+            frame.reserve(*device(), shape, request);
+            uint64_t held = 0, count = 0;
+            for (const gpu::Buffer* b : {&frame.records,
+                                         &frame.depth_keys[0],
+                                         &frame.depth_keys[1],
+                                         &frame.order[0],
+                                         &frame.order[1],
+                                         &frame.tile_counts,
+                                         &frame.prefix,
+                                         &frame.scan_totals,
+                                         &frame.first_instances,
+                                         &frame.counters,
+                                         &frame.counter_prefix,
+                                         &frame.digit_totals,
+                                         &frame.instance_keys[0],
+                                         &frame.instance_keys[1],
+                                         &frame.instance_values[0],
+                                         &frame.instance_values[1],
+                                         &frame.instance_splats,
+                                         &frame.tile_starts,
+                                         &frame.planes,
+                                         &frame.target,
+                                         &frame.moments,
+                                         &frame.derivatives,
+                                         &frame.blurred,
+                                         &frame.image_gradient,
+                                         &frame.partials,
+                                         &frame.reduced,
+                                         &frame.slots}) {
+                held += b->bytes();
+                ++count;
+            }
+            // Buffers are rounded up to 16 bytes, and a picture keeps 16 as a stand-in.
+            EXPECT_GE(held + 0, frame.sizes.total());
+            EXPECT_LE(held, frame.sizes.total() + 16 * count);
+        }
+}
+
+TEST(FrameReserve, KeepsBuffersThatAreLargeEnough) {
+    const auto shape = passes::shape_for(device()->limits());
+    pipeline::Frame frame;
+    frame.reserve(*device(), shape, {1000, 61, 47, 5000, true, false});
+    const auto records = frame.records.handle();
+    const auto slots = frame.slots.handle();
+    frame.reserve(*device(), shape, {900, 61, 47, 4000, true, false});
+    EXPECT_EQ(frame.records.handle(), records);
+    EXPECT_EQ(frame.slots.handle(), slots);
+    EXPECT_EQ(frame.instance_capacity, 4000u);
+    frame.reserve(*device(), shape, {900, 61, 47, 5001, true, false});
+    EXPECT_GE(frame.slots.bytes(), 5001u * 48);
+}
+
+TEST(Capacity, GrowsPastWhatWasNeeded) {
+    EXPECT_EQ(first_capacity(0), 4096u);
+    EXPECT_EQ(first_capacity(1000), 8000u);
+    EXPECT_EQ(first_capacity(1u << 30), 1u << 24);
+    EXPECT_EQ(grown_capacity(1000), 1250u);
+    EXPECT_GT(grown_capacity(0xe0000000u - 1000), 0xe0000000u - 1000);
+    EXPECT_THROW(grown_capacity(0xf0000000u), RunError);
+}
+
+TEST(Plan, LeavesOutWhatTheSceneDoesNotHave) {
+    Gaussians g = random_gaussians(1, 10, SplatKind::ordinary, random_camera(1, 64, 48), 3);
+    const size_t stride = g.sh_stride();
+    for (size_t i = 0; i < g.sh.size(); ++i)
+        if (i % stride >= 12) g.sh[i] = 0;  // degrees 2 and 3
+    RenderOptions options;
+    options.kernel = Kernel::antialias;
+    const Plan picture = plan_picture(g, options, true);
+    EXPECT_EQ(picture.sh_degree, 1);
+    EXPECT_EQ(picture.stored_degree, 1);
+    EXPECT_TRUE(picture.depth);
+    EXPECT_FALSE(picture.gradients || picture.adam || picture.statistics);
+    EXPECT_EQ(picture.kernel, Kernel::antialias);
+    options.sh_degree = 0;
+    EXPECT_EQ(plan_picture(g, options, false).stored_degree, 0);
+    // A gradient is written for every stored coefficient.
+    const Plan gradient = plan_gradient(g, options);
+    EXPECT_EQ(gradient.sh_degree, 0);
+    EXPECT_EQ(gradient.stored_degree, 3);
+    EXPECT_TRUE(gradient.gradients);
+    EXPECT_FALSE(gradient.adam || gradient.statistics);
+    const Plan training = plan_training(2, options, false);
+    EXPECT_TRUE(training.gradients && training.adam);
+    EXPECT_FALSE(training.statistics);
+    EXPECT_TRUE(plan_training(2, options, true).statistics);
+    EXPECT_EQ(training.stored_degree, 2);
+
+    const auto lines = describe(picture, 3, 10);
+    EXPECT_EQ(lines[0].what, "SH degrees 2 to 3");
+    EXPECT_EQ(lines[0].bytes_saved, (15 - 6) * 10 * 16u);  // planes of 59 and of 23 floats
+    EXPECT_TRUE(describe(plan_training(3, {}, true), 3, 10).size() < lines.size());
+}
+
+TEST(CameraBlock, PairsOfFloatsHoldTheDoubles) {
+    Camera camera = random_camera(2, 161, 119);
+    camera.translation = {1e6 + 0.123456789, -2e6 + 1.0 / 3, 5e5};
+    const shared::CameraBlock block = camera_block(camera, shape_of(4));
+    const auto whole = [](float high, float low) { return double(high) + double(low); };
+    const auto close = [](double actual, double expected) {
+        // Two floats hold 48 bits.
+        EXPECT_NEAR(actual, expected, std::abs(expected) * std::ldexp(1.0, -47));
+    };
+    const glm::dvec3 position = camera.position();
+    for (int i = 0; i < 3; ++i) {
+        close(whole(block.position_hi[i], block.position_lo[i]), position[i]);
+        EXPECT_EQ(block.position_hi[i], float(position[i]));
+        for (int j = 0; j < 3; ++j)  // rows of the matrix
+            close(whole(block.rotation_hi[3 * i + j], block.rotation_lo[3 * i + j]), camera.rotation[j][i]);
+    }
+    close(whole(block.focal_hi[0], block.focal_lo[0]), camera.fx);
+    close(whole(block.focal_hi[1], block.focal_lo[1]), camera.fy);
+    close(whole(block.center_hi[0], block.center_lo[0]), camera.cx);
+    close(whole(block.center_hi[1], block.center_lo[1]), camera.cy);
+    EXPECT_FLOAT_EQ(block.tan_min[0], float(-(camera.cx + 0.15 * 161) / camera.fx));
+    EXPECT_FLOAT_EQ(block.tan_max[0], float((161 - camera.cx + 0.15 * 161) / camera.fx));
+    EXPECT_FLOAT_EQ(block.tan_min[1], float(-(camera.cy + 0.15 * 119) / camera.fy));
+    EXPECT_FLOAT_EQ(block.tan_max[1], float((119 - camera.cy + 0.15 * 119) / camera.fy));
+    EXPECT_EQ(block.size[0], 161u);
+    EXPECT_EQ(block.tiles[0], 41u);  // tiles of 4 x 16
+    EXPECT_EQ(block.tiles[1], 8u);
+}
+
+TEST(CameraBlock, RefusesWhatIsNoCamera) {
+    const Camera good = random_camera(3, 64, 48);
+    const auto refuses = [&](auto change) {
+        Camera camera = good;
+        change(camera);
+        EXPECT_THROW(camera_block(camera, shape_of(8)), InputError);
+    };
+    const double nan = std::nan(""), inf = std::numeric_limits<double>::infinity();
+    refuses([](Camera& c) { c.width = 0; });
+    refuses([](Camera& c) { c.height = -3; });
+    refuses([](Camera& c) { c.fx = 0; });
+    refuses([&](Camera& c) { c.fy = inf; });
+    refuses([&](Camera& c) { c.fx = nan; });
+    refuses([&](Camera& c) { c.cx = nan; });
+    refuses([&](Camera& c) { c.cy = inf; });
+    refuses([&](Camera& c) { c.rotation[1][2] = nan; });
+    refuses([&](Camera& c) { c.translation.z = inf; });
+    EXPECT_NO_THROW(camera_block(good, shape_of(8)));
+}
+
+}  // namespace
+}  // namespace ewa::test

@@ -1,0 +1,304 @@
+// The gradient of the projection and Adam, on slots from the twin.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "gpu/guarded.h"
+#include "gpu/twin_inputs.h"
+#include "pipeline/backward.h"
+#include "reference/adam.h"
+#include "reference/densify.h"
+#include "support/gradient_check.h"
+
+namespace ewa::test {
+namespace {
+
+constexpr uint32_t kGradient = 1, kStatistics = 2;
+
+/// A scene's way back up to the instances by the twin, in the device's buffers.
+struct Slots {
+    Scene scene;
+    reference::LossGradientTwin twin;
+    std::vector<float> slots;
+    std::vector<uint32_t> tile_counts, first;
+
+    explicit Slots(const Scene& s) : scene(s) {
+        const Image target = random_target(31, s.camera.width, s.camera.height);
+        twin = reference::loss_gradient(s.gaussians, s.camera, target, s.options, twin_tiles(rig().shape()));
+        const auto& sorted = twin.picture.instances.sorted;
+        const size_t splats = s.gaussians.size();
+        tile_counts.resize(splats);
+        for (const auto& instance : sorted) ++tile_counts[instance.splat];
+        uint32_t sum = 0;
+        for (const uint32_t n : tile_counts) {
+            first.push_back(sum);
+            sum += n;
+        }
+        slots.resize(std::max<size_t>(sum, 1) * shared::SLOT_FLOATS, std::nanf(""));
+        std::vector<uint32_t> next = first;
+        for (size_t k = 0; k < sorted.size(); ++k) {
+            const auto slot = slot_of(twin.blend.instances[k]);
+            for (size_t j = 0; j < 9; ++j)
+                slots[size_t(next[sorted[k].splat]) * shared::SLOT_FLOATS + j] = float(slot[j]);
+            ++next[sorted[k].splat];
+        }
+    }
+};
+
+/// What the pass reads and writes besides the model.
+struct Bench {
+    gpu::Buffer camera;
+    Guarded records, slots, tile_counts, first, counts, statistics;
+
+    explicit Bench(const Slots& s)
+        : camera(camera_buffer(s.scene.camera, rig().shape())),
+          records("records", pack_records(s.twin.picture.projected), gpu::Texel::rgba32f),
+          slots("slots", s.slots, gpu::Texel::rgba32f),
+          tile_counts("tile counts", s.tile_counts),
+          first("first instances", s.first),
+          counts(zero_counts()),
+          statistics("statistics", std::vector<float>(2 * s.scene.gaussians.size())) {}
+
+    void run(const Scene& scene, const pipeline::Model& model, const gpu::Buffer& moments1,
+             const gpu::Buffer& moments2, uint32_t mode, const shared::UpdatePush& push,
+             int evaluated_degree = -1) {
+        Rig& r = rig();
+        const int degree = evaluated_degree < 0 ? scene.gaussians.sh_degree : evaluated_degree;
+        r.run([&](gpu::Recording& recording) {
+            r.kernels.get<passes::Update>(uint32_t(degree), uint32_t(scene.options.kernel), mode)
+                .record(recording, r.shape(),
+                        {model.params, camera, 0, records, slots, moments1, moments2, tile_counts, first,
+                         counts, model.params, moments1, moments2, statistics},
+                        push);
+        });
+        expect_intact({&records, &slots, &tile_counts, &first, &counts, &statistics});
+    }
+};
+
+shared::UpdatePush push_for(const Scene& scene, uint32_t step) {
+    const uint32_t n = uint32_t(scene.gaussians.size());
+    return {n,
+            n,
+            1000000,
+            1e-3f,
+            2e-2f,
+            3e-3f,
+            4e-3f,
+            5e-3f,
+            6e-4f,
+            float(1 / (1 - std::pow(shared::ADAM_BETA1, step))),
+            float(1 / (1 - std::pow(shared::ADAM_BETA2, step))),
+            {0.5f * float(scene.camera.width), 0.5f * float(scene.camera.height)}};
+}
+
+/// A model whose moment buffers are guarded.
+struct GuardedModel {
+    pipeline::Model model;
+    Guarded moments1, moments2;
+    explicit GuardedModel(const Gaussians& g)
+        : model(pipeline::upload_model(*device(), g, 0, false)),
+          moments1("moments1", zeros(g), gpu::Texel::rgba32f),
+          moments2("moments2", zeros(g), gpu::Texel::rgba32f) {}
+    static std::vector<float> zeros(const Gaussians& g) {
+        return std::vector<float>(pipeline::parameter_bytes(uint32_t(g.size()), g.sh_degree) / 4);
+    }
+    Gaussians read(const gpu::Buffer& buffer) const { return download_model(model, buffer); }
+};
+
+struct Case {
+    SplatKind kind;
+    size_t splats;
+    int sh_degree;
+    Kernel kernel;
+};
+
+class UpdatePass : public testing::TestWithParam<Case> {};
+
+TEST_P(UpdatePass, GradientIsTheTwins) {
+    const Case& c = GetParam();
+    const Slots slots(random_scene(1800 + c.splats, c.splats, c.kind, 61, 47, c.sh_degree, c.kernel));
+    GuardedModel model(slots.scene.gaussians);
+    Bench bench(slots);
+    bench.run(slots.scene, model.model, model.moments1, model.moments2, kGradient, push_for(slots.scene, 1));
+    expect_intact({&model.moments1});
+    const Gaussians actual = model.read(model.moments1);
+    // float32 along one chain of products; a needle's axes differ by 1000, and so do the terms that cancel.
+    GradientTolerance tolerance;
+    tolerance.cosine = 1e-8;
+    tolerance.norm = 5e-5;
+    tolerance.element_relative = 1e-3;
+    tolerance.element_absolute = 2e-5;
+    EXPECT_TRUE(splat_gradients_agree(actual, slots.twin.gradient, tolerance));
+    EXPECT_EQ(bench.counts.read<shared::Counts>()[0].dropped_updates, 0u);
+    for (const float value : bench.statistics.read<float>()) EXPECT_EQ(value, 0);  // not asked for
+    const Gaussians params = model.read(model.model.params);
+    EXPECT_EQ(params.means, slots.scene.gaussians.means);  // a gradient moves nothing
+    EXPECT_EQ(params.sh, slots.scene.gaussians.sh);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, UpdatePass,
+                         testing::Values(Case{SplatKind::ordinary, 200, 0, Kernel::peak},
+                                         Case{SplatKind::ordinary, 201, 3, Kernel::antialias},
+                                         Case{SplatKind::ordinary, 202, 2, Kernel::unit_mass},
+                                         Case{SplatKind::mixed, 300, 1, Kernel::peak},
+                                         Case{SplatKind::mixed, 301, 3, Kernel::antialias},
+                                         Case{SplatKind::needles, 150, 2, Kernel::peak},
+                                         Case{SplatKind::ordinary, 1, 3, Kernel::peak}),
+                         [](const testing::TestParamInfo<Case>& tested) {
+                             const Case& c = tested.param;
+                             return std::string(name_of(c.kind)) + "_" + std::to_string(c.splats) + "_sh" +
+                                    std::to_string(c.sh_degree) + "_kernel" + std::to_string(int(c.kernel));
+                         });
+
+std::vector<double> wide(const std::vector<float>& values) {
+    return {values.begin(), values.end()};
+}
+
+/// One of the groups that a learning rate belongs to, followed through several steps by the twin's Adam.
+struct Followed {
+    const char* name;
+    std::vector<double> values;
+    reference::AdamState state;
+    Followed(const char* n, const std::vector<float>& start)
+        : name(n), values(wide(start)), state(start.size()) {}
+};
+
+TEST(UpdateAdam, FollowsTheTwinsAdamOverSeveralSteps) {
+    const Scene scene = random_scene(1900, 150, SplatKind::mixed, 61, 47, 2);
+    const Slots slots(scene);
+    GuardedModel model(scene.gaussians), gradient(scene.gaussians);
+    Bench bench(slots);
+    const Gaussians& start = scene.gaussians;
+    Followed means("means", start.means), quaternions("quaternions", start.quaternions),
+        scales("log scales", start.log_scales), opacities("opacities", start.opacity_logits),
+        sh("sh", start.sh);
+    for (int step = 1; step <= 6; ++step) {
+        SCOPED_TRACE("step " + std::to_string(step));
+        const auto push = push_for(scene, uint32_t(step));
+        bench.run(scene, model.model, gradient.moments1, gradient.moments2, kGradient, push);
+        const Gaussians g = gradient.read(gradient.moments1);
+        bench.run(scene, model.model, model.moments1, model.moments2, kStatistics, push);
+        const Gaussians now = model.read(model.model.params);
+        const auto compare = [&](Followed& f, const std::vector<float>& by, const std::vector<float>& actual,
+                                 double rate) {
+            adam_step(f.values, wide(by), f.state, rate, step);
+            double worst = 0;
+            for (size_t i = 0; i < actual.size(); ++i) {
+                // A step of Adam is the rate times a quotient of float32 moments; and each step rounds the
+                // value once.
+                const double bound = step * (2e-5 * rate + 1.2e-7 * std::abs(f.values[i]));
+                worst = std::max(worst, std::abs(actual[i] - f.values[i]) / bound);
+            }
+            EXPECT_LT(worst, 1) << f.name;
+        };
+        compare(means, g.means, now.means, push.mean_rate);
+        compare(quaternions, g.quaternions, now.quaternions, push.quaternion_rate);
+        compare(scales, g.log_scales, now.log_scales, push.scale_rate);
+        compare(opacities, g.opacity_logits, now.opacity_logits, push.opacity_rate);
+        // Two rates: the twin takes them one after the other from the same state.
+        const size_t stride = start.sh_stride();
+        reference::AdamState rest_state = sh.state;
+        std::vector<double> rest = sh.values;
+        adam_step(rest, wide(g.sh), rest_state, push.sh_rest_rate, step);
+        adam_step(sh.values, wide(g.sh), sh.state, push.sh0_rate, step);
+        for (size_t i = 0; i < rest.size(); ++i) {
+            if (i % stride >= 3) sh.values[i] = rest[i];
+            const double rate = i % stride >= 3 ? push.sh_rest_rate : push.sh0_rate;
+            EXPECT_NEAR(now.sh[i], sh.values[i], step * (2e-5 * rate + 1.2e-7 * std::abs(sh.values[i])));
+        }
+    }
+    EXPECT_EQ(bench.counts.read<shared::Counts>()[0].dropped_updates, 0u);
+    expect_intact({&model.moments1, &model.moments2});
+
+    // Six steps of statistics from the same slots: six views each for what was drawn.
+    reference::DensifyStatistics expected(start.size());
+    accumulate(expected, slots.twin.blend.splats, slots.twin.in_view, scene.camera);
+    const auto statistics = bench.statistics.read<float>();
+    for (size_t i = 0; i < start.size(); ++i) {
+        EXPECT_EQ(statistics[2 * i + 1], 6 * expected.views[i]) << i;
+        if (expected.views[i] == 0) {
+            EXPECT_EQ(statistics[2 * i], 0);
+        }
+    }
+}
+
+TEST(UpdateStatistics, AreTheTwins) {
+    const Scene scene = random_scene(1901, 200, SplatKind::mixed, 61, 47);
+    const Slots slots(scene);
+    GuardedModel model(scene.gaussians);
+    Bench bench(slots);
+    bench.run(scene, model.model, model.moments1, model.moments2, kGradient | kStatistics,
+              push_for(scene, 1));
+    reference::DensifyStatistics expected(scene.gaussians.size());
+    accumulate(expected, slots.twin.blend.splats, slots.twin.in_view, scene.camera);
+    const auto actual = bench.statistics.read<float>();
+    double largest = 0;
+    for (const double sum : expected.gradient_sum) largest = std::max(largest, sum);
+    for (size_t i = 0; i < scene.gaussians.size(); ++i) {
+        EXPECT_EQ(actual[2 * i + 1], float(expected.views[i])) << i;
+        EXPECT_NEAR(actual[2 * i], expected.gradient_sum[i],
+                    1e-5 * largest + 1e-4 * expected.gradient_sum[i]);
+    }
+}
+
+TEST(UpdateEdges, AnUpdateThatIsNotFiniteIsDroppedAndCounted) {
+    const Scene scene = random_scene(1902, 40, SplatKind::ordinary, 61, 47, 1);
+    Slots slots(scene);
+    size_t poisoned = 0;
+    while (slots.tile_counts[poisoned] == 0) ++poisoned;
+    slots.slots[size_t(slots.first[poisoned]) * shared::SLOT_FLOATS] = std::nanf("");  // sum g
+    GuardedModel model(scene.gaussians);
+    Bench bench(slots);
+    bench.run(scene, model.model, model.moments1, model.moments2, 0, push_for(scene, 1));
+    const Gaussians now = model.read(model.model.params);
+    // The sum g alone reaches the opacity, which shares its texel with the mean.
+    EXPECT_EQ(bench.counts.read<shared::Counts>()[0].dropped_updates, 1u);
+    EXPECT_EQ(now.opacity_logits[poisoned], scene.gaussians.opacity_logits[poisoned]);
+    EXPECT_EQ(now.means[3 * poisoned], scene.gaussians.means[3 * poisoned]);
+    EXPECT_NE(now.log_scales[3 * poisoned], scene.gaussians.log_scales[3 * poisoned]);
+    for (const auto* values : {&now.means, &now.quaternions, &now.log_scales, &now.opacity_logits, &now.sh})
+        for (const float value : *values) EXPECT_TRUE(std::isfinite(value));
+    for (const float value : model.moments1.read<float>()) EXPECT_TRUE(std::isfinite(value));
+}
+
+TEST(UpdateEdges, NothingMovesWhereTheInstancesDidNotFit) {
+    const Scene scene = random_scene(1903, 40, SplatKind::ordinary, 61, 47);
+    const Slots slots(scene);
+    GuardedModel model(scene.gaussians);
+    Bench bench(slots);
+    shared::Counts needed{};
+    needed.instances = 1001;
+    bench.counts = Guarded("counts", std::vector<shared::Counts>{needed});
+    auto push = push_for(scene, 1);
+    push.instance_capacity = 1000;
+    bench.run(scene, model.model, model.moments1, model.moments2, kStatistics, push);
+    EXPECT_EQ(model.read(model.model.params).means, scene.gaussians.means);
+    for (const float value : model.moments2.read<float>()) EXPECT_EQ(value, 0);
+    for (const float value : bench.statistics.read<float>()) EXPECT_EQ(value, 0);
+}
+
+/// A lower degree evaluated than stored: the coefficients above stay as they are.
+TEST(UpdateEdges, CoefficientsAboveTheDegreeInUseStay) {
+    Scene scene = random_scene(1904, 60, SplatKind::ordinary, 61, 47, 3);
+    scene.options.sh_degree = 1;
+    const Slots slots(scene);
+    GuardedModel model(scene.gaussians), gradient(scene.gaussians);
+    Bench bench(slots);
+    bench.run(scene, model.model, gradient.moments1, gradient.moments2, kGradient, push_for(scene, 1), 1);
+    GradientTolerance tolerance{1e-8, 5e-5, 1e-3, 2e-5};  // as above
+    EXPECT_TRUE(splat_gradients_agree(gradient.read(gradient.moments1), slots.twin.gradient, tolerance));
+    bench.run(scene, model.model, model.moments1, model.moments2, 0, push_for(scene, 1), 1);
+    const Gaussians now = model.read(model.model.params);
+    const size_t stride = now.sh_stride();
+    size_t moved = 0;
+    for (size_t i = 0; i < now.sh.size(); ++i) {
+        const bool changed = now.sh[i] != scene.gaussians.sh[i];
+        EXPECT_FALSE(changed && i % stride >= 12) << i;
+        moved += changed;
+    }
+    EXPECT_GT(moved, 100u);
+}
+
+}  // namespace
+}  // namespace ewa::test

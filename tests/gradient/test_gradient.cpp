@@ -1,0 +1,113 @@
+// The device's gradient of the loss against central differences of the twin's loss, a parameter group at a
+// time: neither side knows the other's formulas.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "ewa/renderer.h"
+#include "gpu/test_device.h"
+#include "reference/render.h"
+#include "support/gradient_check.h"
+#include "support/random_scene.h"
+
+namespace ewa::test {
+namespace {
+
+struct Case {
+    SplatKind kind;
+    size_t splats;
+    int width, height, sh_degree;
+    Kernel kernel;
+    uint64_t seed;
+};
+
+class Gradient : public testing::TestWithParam<Case> {};
+
+TEST_P(Gradient, IsTheSlopeOfTheTwinsLoss) {
+    const Case& c = GetParam();
+    SCOPED_TRACE(seed_text(c.seed));
+    const Camera camera = random_camera(c.seed, c.width, c.height);
+    const Gaussians gaussians = random_gaussians(c.seed + 1, c.splats, c.kind, camera, c.sh_degree);
+    const Image target = random_target(c.seed + 2, c.width, c.height);
+    RenderOptions options;
+    options.kernel = c.kernel;
+    options.background = {0.3f, 0.6f, 0.1f};
+    const LossGradient device_gradient = loss_gradient(device(), gaussians, camera, target, options);
+    const reference::LossGradientTwin twin = reference::loss_gradient(gaussians, camera, target, options);
+
+    // The loss jumps where a contribution crosses 1/255; the best of several steps is one that crosses none.
+    reference::Values values = reference::to_double(gaussians);
+    const auto loss = [&] { return reference::loss_gradient(values, camera, target, options).loss; };
+    const auto differences = [&](std::vector<double>& group, const std::vector<double>& claimed) {
+        std::vector<double> out;
+        for (size_t i = 0; i < group.size(); ++i)
+            out.push_back(best_central_difference(loss, group[i], claimed[i], 1e-4, 1e-7));
+        return out;
+    };
+    // float32 against float64: a share of 2e-4 of an element, and 1e-4 of the group's largest, where a pixel
+    // stands on the other side of a threshold or terms cancel.
+    GradientTolerance tolerance;
+    tolerance.cosine = 1e-6;
+    tolerance.norm = 5e-4;
+    tolerance.element_relative = 2e-3;
+    tolerance.element_absolute = 2e-4;
+    const auto check = [&](const char* name, std::vector<double>& group, const std::vector<float>& actual,
+                           const std::vector<double>& claimed) {
+        const std::vector<double> wide(actual.begin(), actual.end());
+        const std::vector<double> slope = differences(group, claimed);
+        EXPECT_TRUE(gradients_agree(wide, slope, tolerance)) << name;
+        double largest = 0;
+        for (const double s : slope) largest = std::max(largest, std::abs(s));
+        EXPECT_GT(largest, 1e-6) << name << " has no gradient to check";
+    };
+    const Gaussians& g = device_gradient.gradient;
+    check("means", values.means, g.means, twin.gradient.means);
+    check("quaternions", values.quaternions, g.quaternions, twin.gradient.quaternions);
+    check("log scales", values.log_scales, g.log_scales, twin.gradient.log_scales);
+    check("opacities", values.opacity_logits, g.opacity_logits, twin.gradient.opacity_logits);
+    check("sh", values.sh, g.sh, twin.gradient.sh);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, Gradient,
+                         testing::Values(Case{SplatKind::ordinary, 5, 24, 17, 0, Kernel::peak, 5001},
+                                         Case{SplatKind::ordinary, 4, 23, 18, 3, Kernel::peak, 5012},
+                                         Case{SplatKind::ordinary, 5, 24, 17, 1, Kernel::antialias, 5023},
+                                         Case{SplatKind::ordinary, 5, 17, 24, 1, Kernel::unit_mass, 5034},
+                                         Case{SplatKind::ordinary, 20, 24, 17, 0, Kernel::peak, 5045}),
+                         [](const testing::TestParamInfo<Case>& tested) {
+                             const Case& c = tested.param;
+                             return std::string(name_of(c.kind)) + "_" + std::to_string(c.splats) + "_sh" +
+                                    std::to_string(c.sh_degree) + "_kernel" + std::to_string(int(c.kernel));
+                         });
+
+/// A slope of the device's own loss, all the way round: the gradient belongs to the picture that is drawn.
+TEST(GradientOfTheDevice, FollowsItsOwnLoss) {
+    const Camera camera = random_camera(5100, 48, 36);
+    const Gaussians gaussians = random_gaussians(5101, 30, SplatKind::ordinary, camera, 1);
+    const Image target = random_target(5102, 48, 36);
+    const RenderOptions options;
+    const LossGradient at = loss_gradient(device(), gaussians, camera, target, options);
+    // Along the gradient, where float32's rounding of the loss is small beside its change.
+    const auto moved = [&](double t) {
+        Gaussians g = gaussians;
+        const auto add = [&](std::vector<float>& values, const std::vector<float>& by) {
+            for (size_t i = 0; i < values.size(); ++i) values[i] += float(t * double(by[i]));
+        };
+        add(g.means, at.gradient.means);
+        add(g.opacity_logits, at.gradient.opacity_logits);
+        add(g.log_scales, at.gradient.log_scales);
+        add(g.sh, at.gradient.sh);
+        return loss_gradient(device(), g, camera, target, options).loss;
+    };
+    double square = 0;
+    for (const auto* group :
+         {&at.gradient.means, &at.gradient.opacity_logits, &at.gradient.log_scales, &at.gradient.sh})
+        for (const float g : *group) square += double(g) * double(g);
+    const double step = 1e-3 / std::sqrt(square);  // a thousandth of a unit
+    const double slope = (moved(step) - moved(-step)) / (2 * step);
+    // A contribution that crosses the cut moves the loss and has no gradient: 1.4 percent here.
+    EXPECT_NEAR(slope, square, 0.03 * square);
+}
+
+}  // namespace
+}  // namespace ewa::test

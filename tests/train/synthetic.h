@@ -1,0 +1,90 @@
+// A dataset made in the test: splats at known places, photographed by the float64 twin.
+#pragma once
+#include <cmath>
+#include <filesystem>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <string>
+
+#include "ewa/dataset.h"
+#include "reference/render.h"
+#include "support/random_scene.h"
+#include "support/temp_folder.h"
+
+namespace ewa::test {
+
+struct Synthetic {
+    TempFolder folder;
+    Gaussians truth;
+    Dataset dataset;
+};
+
+/// `views` cameras on a ring round the origin that look at it, and `splats` splats within a unit of it.
+inline void make_synthetic(Synthetic& out, size_t splats, int views, int width, int height, uint64_t seed) {
+    Random random(seed);
+    out.truth.resize(splats);
+    for (size_t i = 0; i < splats; ++i) {
+        for (size_t k = 0; k < 3; ++k) {
+            out.truth.means[3 * i + k] = float(random.uniform(-1, 1));
+            out.truth.log_scales[3 * i + k] = float(std::log(random.uniform(0.08, 0.3)));
+            out.truth.sh[3 * i + k] = float(random.uniform(-1.7, 1.7));
+        }
+        for (size_t k = 0; k < 4; ++k) out.truth.quaternions[4 * i + k] = float(random.normal());
+        out.truth.opacity_logits[i] = float(random.uniform(0.5, 3));
+    }
+    std::string images, points;
+    for (int view = 0; view < views; ++view) {
+        const double angle = 2 * 3.14159265358979 * view / views;
+        const glm::dvec3 position(4 * std::cos(angle), 0.8 * std::sin(2 * angle), 4 * std::sin(angle));
+        const glm::dvec3 forward = glm::normalize(-position);
+        const glm::dvec3 right = glm::normalize(glm::cross(forward, glm::dvec3(0, 1, 0)));
+        const glm::dvec3 down = glm::cross(forward, right);
+        Camera camera;
+        camera.width = width;
+        camera.height = height;
+        camera.fx = camera.fy = 1.1 * width;
+        camera.cx = 0.5 * width;
+        camera.cy = 0.5 * height;
+        camera.rotation = glm::transpose(glm::dmat3(right, down, forward));
+        camera.translation = -(camera.rotation * position);
+        const auto twin = reference::render(out.truth, camera, {});
+        Image picture(width, height, 3);
+        for (size_t i = 0; i < picture.pixels.size(); ++i)
+            picture.pixels[i] = float(twin.blended.color.values[i]);
+        const std::string name = "view_" + std::to_string(100 + view) + ".png";
+        std::filesystem::create_directories(out.folder / "images");
+        save_image(out.folder / "images" / name, picture);
+        const glm::dquat q = glm::quat_cast(camera.rotation);
+        const auto number = [](double x) {
+            char text[40];
+            std::snprintf(text, sizeof(text), " %.17g", x);
+            return std::string(text);
+        };
+        images += std::to_string(view + 1) + number(q.w) + number(q.x) + number(q.y) + number(q.z) +
+                  number(camera.translation.x) + number(camera.translation.y) + number(camera.translation.z) +
+                  " 1 " + name + "\n\n";
+    }
+    for (size_t i = 0; i < splats; ++i)
+        points += std::to_string(i + 1) + " " + std::to_string(out.truth.means[3 * i]) + " " +
+                  std::to_string(out.truth.means[3 * i + 1]) + " " +
+                  std::to_string(out.truth.means[3 * i + 2]) + " 128 128 128 0.5\n";
+    const std::string size = std::to_string(width) + " " + std::to_string(height);
+    out.folder.write("sparse/0/cameras.txt", "1 PINHOLE " + size + " " + std::to_string(1.1 * width) + " " +
+                                                 std::to_string(1.1 * width) + " " +
+                                                 std::to_string(0.5 * width) + " " +
+                                                 std::to_string(0.5 * height) + "\n");
+    out.folder.write("sparse/0/images.txt", images);
+    out.folder.write("sparse/0/points3D.txt", points);
+    out.dataset = load_dataset(out.folder.path(), {});
+}
+
+/// A start some way from the truth: grey splats at points shaken by `shake` world units.
+inline Gaussians shaken_start(const Synthetic& data, double shake, uint64_t seed, int sh_degree) {
+    Random random(seed);
+    PointCloud points = data.dataset.points;
+    for (glm::dvec3& p : points.positions)
+        for (int k = 0; k < 3; ++k) p[k] += shake * random.normal();
+    return gaussians_from_points(points, sh_degree);
+}
+
+}  // namespace ewa::test

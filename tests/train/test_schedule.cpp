@@ -1,0 +1,103 @@
+// When a run does what: pure functions.
+#include "train/schedule.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "train/photographs.h"
+
+namespace ewa::train {
+namespace {
+
+TEST(FrameOfStep, VisitsEachPhotographOnceAnEpochInAnOrderOfItsOwn) {
+    for (const size_t count : {size_t(1), size_t(2), size_t(7), size_t(48)}) {
+        std::vector<std::vector<size_t>> epochs;
+        for (int epoch = 0; epoch < 5; ++epoch) {
+            std::vector<size_t> order;
+            for (size_t i = 0; i < count; ++i) {
+                order.push_back(frame_of_step(int(size_t(epoch) * count + i) + 1, count, 42));
+                ASSERT_LT(order.back(), count);
+            }
+            EXPECT_EQ(std::set<size_t>(order.begin(), order.end()).size(), count);
+            epochs.push_back(order);
+        }
+        if (count < 7) continue;
+        for (size_t a = 0; a < 5; ++a)
+            for (size_t b = 0; b < a; ++b) EXPECT_NE(epochs[a], epochs[b]);
+    }
+}
+
+TEST(FrameOfStep, IsAFunctionOfTheSeed) {
+    const auto order = [](uint64_t seed) {
+        std::vector<size_t> out;
+        for (int step = 1; step <= 48; ++step) out.push_back(frame_of_step(step, 48, seed));
+        return out;
+    };
+    EXPECT_EQ(order(1), order(1));
+    EXPECT_NE(order(1), order(2));
+    EXPECT_NE(order(1), order(1 + (1ull << 32)));
+}
+
+TEST(Schedule, AFullRunIsThatOf3DGS) {
+    const TrainOptions options;
+    const Schedule s = schedule_for(options);
+    EXPECT_EQ(s.refine_start, 500);
+    EXPECT_EQ(s.refine_stop, 15000);
+    EXPECT_EQ(s.refine_every, 100);
+    EXPECT_EQ(s.opacity_reset_every, 3000);
+    EXPECT_FALSE(s.densifies(500));
+    EXPECT_TRUE(s.densifies(600));
+    EXPECT_FALSE(s.densifies(601));
+    EXPECT_TRUE(s.densifies(14900));
+    EXPECT_FALSE(s.densifies(15000));
+    EXPECT_FALSE(s.resets_opacity(2999));
+    EXPECT_TRUE(s.resets_opacity(3000));
+    EXPECT_TRUE(s.resets_opacity(12000));
+    EXPECT_FALSE(s.resets_opacity(15000));
+    EXPECT_FALSE(s.was_reset(3000));  // it comes after that step
+    EXPECT_TRUE(s.was_reset(3001));
+    EXPECT_EQ(s.degree(1), 0);
+    EXPECT_EQ(s.degree(1000), 0);
+    EXPECT_EQ(s.degree(1001), 1);
+    EXPECT_EQ(s.degree(3001), 3);
+    EXPECT_EQ(s.degree(30000), 3);
+}
+
+TEST(Schedule, AShortRunKeepsTheProportionsDownToItsFloors) {
+    TrainOptions options;
+    options.steps = 3000;
+    const Schedule tenth = schedule_for(options);
+    EXPECT_EQ(tenth.refine_stop, 1500);
+    EXPECT_EQ(tenth.refine_every, 50);
+    EXPECT_EQ(tenth.refine_start, 100);
+    EXPECT_EQ(tenth.opacity_reset_every, 1000);
+    EXPECT_EQ(tenth.sh_degree_every, 100);
+    options.steps = 10;
+    const Schedule tiny = schedule_for(options);
+    for (int step = 1; step <= 10; ++step) {
+        EXPECT_FALSE(tiny.densifies(step));
+        EXPECT_FALSE(tiny.resets_opacity(step));
+    }
+    options.steps = 60000;  // a longer run does not stretch them
+    EXPECT_EQ(schedule_for(options).refine_stop, 15000);
+    options.opacity_reset_every = 0;
+    EXPECT_FALSE(schedule_for(options).resets_opacity(3000));
+    EXPECT_FALSE(schedule_for(options).was_reset(30000));
+    options.sh_degree = 1;
+    EXPECT_EQ(schedule_for(options).degree(30000), 1);
+}
+
+TEST(Schedule, TheRateOfTheMeansDecaysExponentially) {
+    TrainOptions options;
+    options.steps = 1000;
+    const Schedule s = schedule_for(options);
+    EXPECT_NEAR(s.mean_rate(0, 2), 2 * 1.6e-4, 1e-15);
+    EXPECT_NEAR(s.mean_rate(500, 1), 1.6e-5, 1e-15);
+    EXPECT_NEAR(s.mean_rate(1000, 1), 1.6e-6, 1e-15);
+    EXPECT_NEAR(s.mean_rate(2000, 1), 1.6e-6, 1e-15);
+    EXPECT_NEAR(s.mean_rate(300, 1) / s.mean_rate(200, 1), s.mean_rate(900, 1) / s.mean_rate(800, 1), 1e-12);
+}
+
+}  // namespace
+}  // namespace ewa::train

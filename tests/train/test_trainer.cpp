@@ -1,0 +1,180 @@
+// Training as a whole: it learns, it repeats itself byte by byte, and it stays within its bounds.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+
+#include "ewa/error.h"
+#include "ewa/splat_files.h"
+#include "ewa/trainer.h"
+#include "gpu/test_device.h"
+#include "train/synthetic.h"
+
+namespace ewa::test {
+namespace {
+
+std::vector<int> all_frames(const Dataset& dataset) {
+    std::vector<int> frames(dataset.frames.size());
+    std::iota(frames.begin(), frames.end(), 0);
+    return frames;
+}
+
+const Synthetic& data() {
+    static const Synthetic* made = [] {
+        static Synthetic synthetic;
+        make_synthetic(synthetic, 40, 8, 48, 36, 7);
+        return &synthetic;
+    }();
+    return *made;
+}
+
+TrainOptions quick(int steps) {
+    TrainOptions options;
+    options.steps = steps;
+    options.sh_degree = 0;
+    options.strategy = Strategy::none;
+    options.seed = 3;
+    // A run of a few hundred steps has to take longer ones than a run of 30,000.
+    options.means_rate = 3e-3;
+    options.means_rate_final = 2e-4;
+    options.sh0_rate = 0.05;
+    options.opacity_rate = 0.05;
+    options.scale_rate = 0.03;
+    options.quaternion_rate = 0.03;
+    return options;
+}
+
+struct Trained {
+    Gaussians gaussians;
+    StepReport report;
+    double first_loss = 0;
+};
+Trained train(const TrainOptions& options, const Gaussians& start, int steps) {
+    Trainer trainer(device(), data().dataset, all_frames(data().dataset), start, options);
+    Trained run;
+    for (int step = 1; step <= steps; ++step) {
+        run.report = trainer.step();
+        if (step == 1) run.first_loss = run.report.loss;
+        EXPECT_EQ(run.report.step, step);
+        EXPECT_TRUE(std::isfinite(run.report.loss));
+    }
+    EXPECT_EQ(trainer.steps_done(), steps);
+    run.gaussians = trainer.gaussians();
+    EXPECT_EQ(run.gaussians.size(), trainer.splats());
+    return run;
+}
+
+double train_psnr(const Gaussians& gaussians) {
+    return evaluate(device(), gaussians, data().dataset, all_frames(data().dataset), {}).psnr;
+}
+
+TEST(Dataset, IsReadAsItWasMade) {
+    ASSERT_EQ(data().dataset.frames.size(), 8u);
+    ASSERT_EQ(data().dataset.points.positions.size(), 40u);
+    // The photographs are the twin's, rounded to 8 bit and clamped: the truth itself scores about 59 dB.
+    EXPECT_GT(train_psnr(data().truth), 57);
+}
+
+TEST(Trainer, OverfitsASmallScene) {
+    const Gaussians start = shaken_start(data(), 0.05, 1, 0);
+    const double before = train_psnr(start);
+    const Trained run = train(quick(200), start, 200);
+    const double after = train_psnr(run.gaussians);
+    printf("    psnr %.2f -> %.2f dB, loss %.4f -> %.4f, %.2f s\n", before, after, run.first_loss,
+           run.report.loss, run.report.seconds);
+    EXPECT_LT(before, 20);
+    EXPECT_GT(after, 25);  // to be measured
+    EXPECT_LT(run.report.loss, 0.5 * run.first_loss);
+    EXPECT_EQ(run.report.dropped_updates, 0u);
+    EXPECT_EQ(run.report.skipped_nonfinite, 0u);
+}
+
+TEST(Trainer, TheSameSeedWritesTheSameBytesAndAnotherDoesNot) {
+    const Gaussians start = shaken_start(data(), 0.05, 1, 1);
+    const auto bytes = [&](uint64_t seed) {
+        TrainOptions options = quick(160);
+        options.sh_degree = 1;
+        options.strategy = Strategy::adc;
+        options.grow_gradient = 1e-5;
+        options.refine_stop = 30000;
+        options.random_background = true;
+        options.seed = seed;
+        const Trained run = train(options, start, 160);
+        EXPECT_GT(run.gaussians.size(), start.size());  // densification took part
+        const auto path = data().folder / "out.ply";
+        save_splats(path, run.gaussians);
+        return file_bytes(path);
+    };
+    const std::string first = bytes(1);
+    EXPECT_EQ(first, bytes(1));
+    EXPECT_NE(first, bytes(2));
+}
+
+TEST(Trainer, GrowsUpToTheCapAndNotPastIt) {
+    const Gaussians start = shaken_start(data(), 0.05, 1, 0);
+    TrainOptions options = quick(300);
+    options.strategy = Strategy::adc;
+    options.grow_gradient = 1e-6;  // everything in view grows
+    options.refine_stop = 30000;
+    options.max_splats = 130;
+    Trainer trainer(device(), data().dataset, all_frames(data().dataset), start, options);
+    uint32_t most = 0;
+    for (int step = 1; step <= 300; ++step) {
+        const StepReport report = trainer.step();
+        most = std::max(most, report.splats);
+        ASSERT_LE(report.splats, 130u) << "step " << step;
+        EXPECT_TRUE(step > 100 || report.splats == 40) << "grew before the first refinement";
+    }
+    EXPECT_GE(most, 120u);
+    for (const float value : trainer.gaussians().means) EXPECT_TRUE(std::isfinite(value));
+}
+
+TEST(Trainer, WithoutAStrategyTheNumberStays) {
+    const Gaussians start = shaken_start(data(), 0.05, 1, 0);
+    TrainOptions options = quick(160);
+    options.grow_gradient = 1e-6;
+    EXPECT_EQ(train(options, start, 160).report.splats, 40u);
+}
+
+TEST(Trainer, ASplatThatIsNotFiniteStaysOutAndTheRestLearns) {
+    Gaussians start = shaken_start(data(), 0.05, 1, 0);
+    start.means[3 * 5] = std::nanf("");
+    const Trained run = train(quick(60), start, 60);
+    EXPECT_EQ(run.report.skipped_nonfinite, 1u);
+    EXPECT_EQ(run.report.dropped_updates, 0u);  // nothing was tried with it
+    EXPECT_LT(run.report.loss, run.first_loss);
+    for (size_t i = 0; i < run.gaussians.means.size(); ++i)
+        EXPECT_EQ(std::isfinite(run.gaussians.means[i]), i != 3 * 5) << i;
+    for (const float value : run.gaussians.log_scales) EXPECT_TRUE(std::isfinite(value));
+}
+
+TEST(Trainer, RefusesWhatItCannotTrain) {
+    const Gaussians start = shaken_start(data(), 0.05, 1, 0);
+    TrainOptions options = quick(10);
+    const auto make = [&](const std::vector<int>& frames, const Gaussians& from, uint32_t cap) {
+        return [&, frames, from, cap] {
+            options.max_splats = cap;
+            Trainer(device(), data().dataset, frames, from, options);
+        };
+    };
+    expect_error<InputError>(make({}, start, 1000), {"no training photograph"});
+    expect_error<InputError>(make({0}, Gaussians{}, 1000), {"no splat"});
+    expect_error<InputError>(make({0}, start, 39), {"40", "39"});
+}
+
+TEST(Trainer, TimesEveryPass) {
+    Trainer trainer(device(), data().dataset, {0, 1}, shaken_start(data(), 0.05, 1, 0), quick(10));
+    for (int step = 0; step < 3; ++step) trainer.step();
+    double total = 0;
+    bool blends = false;
+    for (const PassTime& time : trainer.pass_times()) {
+        EXPECT_GE(time.milliseconds, 0) << time.pass;
+        total += time.milliseconds;
+        blends = blends || time.pass == "blend_backward";
+    }
+    EXPECT_GT(total, 0);
+    EXPECT_TRUE(blends);
+}
+
+}  // namespace
+}  // namespace ewa::test

@@ -1,0 +1,205 @@
+// The parts of the viewer that know of no window: the camera, the first view, the picture, the pace.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <numbers>
+
+#include "viewer/framing.h"
+#include "viewer/pace.h"
+#include "viewer/picture.h"
+
+namespace ewa::viewer {
+namespace {
+
+/// Looks along +z from (0, 0, -4) at the origin.
+Viewpoint plain_view() {
+    Viewpoint view;
+    view.camera.width = 400;
+    view.camera.height = 300;
+    view.camera.fx = view.camera.fy = 350;
+    view.camera.cx = 210;
+    view.camera.cy = 140;
+    view.camera.translation = {0, 0, 4};
+    view.pivot = {0, 0, 0};
+    view.radius = 2;
+    return view;
+}
+
+glm::dvec2 pixel(const Camera& camera, const glm::dvec3& point) {
+    const glm::dvec3 p = camera.rotation * point + camera.translation;
+    return {camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy};
+}
+
+void expect_rotation(const glm::dmat3& r) {
+    const glm::dmat3 product = r * glm::transpose(r);
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) EXPECT_NEAR(product[i][j], i == j ? 1 : 0, 1e-12);
+    EXPECT_NEAR(glm::determinant(r), 1, 1e-12);
+}
+
+TEST(ViewCamera, TheSameSizeIsTheSameCamera) {
+    const Viewpoint view = plain_view();
+    const Camera camera = ViewCamera(view).camera(400, 300);
+    EXPECT_EQ(camera.fx, view.camera.fx);
+    EXPECT_EQ(camera.cx, view.camera.cx);
+    EXPECT_EQ(camera.translation, view.camera.translation);
+}
+
+TEST(ViewCamera, AWiderWindowKeepsTheWholeViewInTheMiddle) {
+    const Viewpoint view = plain_view();
+    const Camera wide = ViewCamera(view).camera(1000, 600);
+    const glm::dvec3 point(0.3, -0.2, 1);
+    const glm::dvec2 before = pixel(view.camera, point), after = pixel(wide, point);
+    EXPECT_NEAR(after.x, 500 + 2 * (before.x - 200), 1e-9);
+    EXPECT_NEAR(after.y, 2 * before.y, 1e-9);
+}
+
+TEST(ViewCamera, OrbitKeepsThePivotsPixelAndDistance) {
+    const Viewpoint view = plain_view();
+    ViewCamera camera(view);
+    for (int i = 0; i < 1000; ++i) camera.orbit(0.3 * std::sin(i), 0.4 * std::cos(3 * i));
+    EXPECT_NEAR(camera.distance(), 4, 1e-9);
+    const Camera now = camera.camera(400, 300);
+    expect_rotation(now.rotation);
+    EXPECT_NEAR(pixel(now, {0, 0, 0}).x, 210, 1e-6);
+    EXPECT_NEAR(pixel(now, {0, 0, 0}).y, 140, 1e-6);
+    EXPECT_NEAR(now.rotation[1][0], 0, 1e-9) << "the horizon tilts";
+}
+
+TEST(ViewCamera, WhatIsInFrontFollowsTheDrag) {
+    const glm::dvec3 near_point(0, 0, -1);
+    const auto moved = [&](auto&& action) {
+        ViewCamera camera(plain_view());
+        const glm::dvec2 before = pixel(camera.camera(400, 300), near_point);
+        action(camera);
+        return pixel(camera.camera(400, 300), near_point) - before;
+    };
+    EXPECT_GT(moved([](ViewCamera& c) { c.orbit(0.1, 0); }).x, 1);
+    EXPECT_GT(moved([](ViewCamera& c) { c.orbit(0, 0.1); }).y, 1);
+    EXPECT_GT(moved([](ViewCamera& c) { c.look(0.1, 0); }).x, 1);
+    EXPECT_GT(moved([](ViewCamera& c) { c.look(0, 0.1); }).y, 1);
+}
+
+TEST(ViewCamera, OrbitStopsBeforeThePoles) {
+    ViewCamera camera(plain_view());
+    for (int i = 0; i < 100; ++i) camera.orbit(0, 0.2);
+    const Camera top = camera.camera(400, 300);
+    expect_rotation(top.rotation);
+    EXPECT_LT(top.position().y, -3.9);  // y is down: the camera is above
+    EXPECT_GT(top.rotation[0][0], 0.99) << "it has gone over the top";
+}
+
+TEST(ViewCamera, LookStaysWhereItIs) {
+    ViewCamera camera(plain_view());
+    camera.look(0.7, -0.3);
+    EXPECT_NEAR(glm::length(camera.camera(400, 300).position() - glm::dvec3(0, 0, -4)), 0, 1e-12);
+    EXPECT_NEAR(camera.distance(), 4, 1e-12);
+}
+
+TEST(ViewCamera, PanMovesThePivotWithThePointer) {
+    ViewCamera camera(plain_view());
+    camera.pan(30, -20, 400, 300);
+    const glm::dvec2 at = pixel(camera.camera(400, 300), {0, 0, 0});
+    EXPECT_NEAR(at.x, 240, 1e-9);
+    EXPECT_NEAR(at.y, 120, 1e-9);
+}
+
+TEST(ViewCamera, ZoomNeverReachesThePivot) {
+    ViewCamera camera(plain_view());
+    camera.zoom(1);
+    EXPECT_NEAR(camera.distance(), 3.6, 1e-12);
+    camera.zoom(1e6);
+    EXPECT_GT(camera.distance(), 1e-3);
+    camera.zoom(-40);
+    EXPECT_GT(camera.distance(), 0.1);
+}
+
+TEST(ViewCamera, FlyGoesAlongTheCamerasAxesAndResetComesBack) {
+    ViewCamera camera(plain_view());
+    camera.fly({0.5, 0.25, 1});
+    EXPECT_NEAR(glm::length(camera.camera(400, 300).position() - glm::dvec3(2, 1, 0)), 0, 1e-12);
+    camera.reset();
+    EXPECT_EQ(camera.camera(400, 300).translation, glm::dvec3(0, 0, 4));
+}
+
+TEST(Framing, AFewFarSplatsDoNotCount) {
+    Gaussians splats;
+    splats.resize(1000);
+    for (size_t i = 0; i < 1000; ++i)
+        for (size_t k = 0; k < 3; ++k)
+            splats.means[3 * i + k] = float(10 + double((7 * i + 13 * i * k) % 101) / 50 - 1);
+    for (size_t i = 0; i < 20; ++i)
+        splats.means[3 * i] = i < 10 ? 1e9f : std::numeric_limits<float>::quiet_NaN();
+    const SceneBounds bounds = scene_bounds(splats);
+    EXPECT_NEAR(glm::length(bounds.center - glm::dvec3(10)), 0, 0.3);
+    EXPECT_GT(bounds.radius, 1);
+    EXPECT_LT(bounds.radius, 2);
+
+    const Viewpoint view = framing_view(splats, 640, 480);
+    expect_rotation(view.camera.rotation);
+    const glm::dvec2 middle = pixel(view.camera, bounds.center);
+    EXPECT_NEAR(middle.x, 320, 1e-6);
+    EXPECT_NEAR(middle.y, 240, 1e-6);
+}
+
+TEST(Framing, NothingAtAllHasAView) {
+    const Viewpoint view = framing_view(Gaussians(), 640, 480);
+    EXPECT_GT(view.radius, 0);
+    expect_rotation(view.camera.rotation);
+    EXPECT_TRUE(std::isfinite(view.camera.translation.z));
+}
+
+TEST(Framing, ADatasetsViewIsItsCamera) {
+    Dataset dataset;
+    dataset.frames.resize(3);
+    for (Frame& frame : dataset.frames) frame.camera = plain_view().camera;
+    const Viewpoint view = dataset_view(Gaussians(), dataset, 1);
+    EXPECT_EQ(view.camera.translation, plain_view().camera.translation);
+    EXPECT_EQ(view.up, glm::dvec3(0, -1, 0));
+    EXPECT_NEAR(glm::length(view.pivot), 0, 1e-12)
+        << "with no splats, the closest point to the scene's middle";
+}
+
+Rendering two_pixels() {
+    Rendering rendering{Image(2, 1, 3), Image(2, 1, 1), Image(2, 1, 1)};
+    rendering.color.pixels = {0.5f, 2.0f, -1.0f, 0.1f, 0.2f, 0.3f};
+    rendering.alpha.pixels = {1.0f, 0.5f};
+    rendering.depth.pixels = {4.0f, 2.0f};
+    return rendering;
+}
+
+TEST(Picture, RoundsAndClampsColorOverTheBackground) {
+    const Picture picture = picture_of(two_pixels(), Mode::color, {0, 1, 0.5f});
+    EXPECT_EQ(picture.rgba, (std::vector<uint8_t>{128, 255, 0, 255, 26, 179, 140, 255}));
+}
+
+TEST(Picture, DepthAndOpacityAreGrey) {
+    const Picture depth = picture_of(two_pixels(), Mode::depth, {1, 1, 1});
+    EXPECT_EQ(depth.white_depth, 2.0f);  // the 98th percentile of two values is the lower
+    EXPECT_EQ(depth.rgba, (std::vector<uint8_t>{255, 255, 255, 255, 255, 255, 255, 255}));
+    const Picture opacity = picture_of(two_pixels(), Mode::opacity, {1, 1, 1});
+    EXPECT_EQ(opacity.rgba, (std::vector<uint8_t>{255, 255, 255, 255, 128, 128, 128, 255}));
+}
+
+TEST(Picture, EmptyDepthIsBlack) {
+    Rendering nothing{Image(1, 1, 3), Image(1, 1, 1), Image(1, 1, 1)};
+    EXPECT_EQ(picture_of(nothing, Mode::depth, {}).rgba, (std::vector<uint8_t>{0, 0, 0, 255}));
+}
+
+TEST(Pace, GivesUpResolutionUntilPicturesAreFast) {
+    Pace pace;
+    EXPECT_EQ(pace.divisor(), 1);
+    pace.drawn(1, 900);
+    EXPECT_GT(pace.divisor(), 2);
+    for (int i = 0; i < 100; ++i) pace.drawn(pace.divisor(), 900.0 / (pace.divisor() * pace.divisor()));
+    EXPECT_LE(900.0 / (pace.divisor() * pace.divisor()), 50);
+    for (int i = 0; i < 20; ++i) pace.drawn(pace.divisor(), 1);
+    EXPECT_EQ(pace.divisor(), 1);
+    pace.drawn(1, 30);
+    EXPECT_EQ(pace.divisor(), 1);
+}
+
+}  // namespace
+}  // namespace ewa::viewer
