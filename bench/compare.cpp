@@ -8,8 +8,10 @@
 namespace ewa::bench {
 namespace {
 
-constexpr double kSigmas = 3;       // how many standard deviations of the ratio are still noise
-constexpr double kSmallest = 0.02;  // a change under this is noise whatever the spread of a quiet run says
+constexpr double kSigmas = 3;  // how many standard deviations of the ratio are still noise
+// Runs of one program differ by this much between two processes whatever the spread within each says.
+constexpr double kSmallest = 0.05;
+constexpr double kSmallestMilliseconds = 0.1;
 
 const Json* named(const Json& list, const std::string& name) {
     for (const Json& one : list)
@@ -32,7 +34,9 @@ std::string ratio_text(const char* what, const Spread& before, const Spread& aft
     const double ratio = after.median / before.median;
     const double sigma = std::hypot(relative_noise(before), relative_noise(after));
     const double noise = std::max(kSigmas * sigma, kSmallest);
-    const char* mark = std::abs(std::log(ratio)) <= std::log1p(noise) ? "" : ratio < 1 ? "faster" : "SLOWER";
+    const bool within = std::abs(std::log(ratio)) <= std::log1p(noise) ||
+                        std::abs(after.median - before.median) < kSmallestMilliseconds;
+    const char* mark = within ? "" : ratio < 1 ? "faster" : "SLOWER";
     return text_of("  %s %9.3f -> %9.3f  x %.3f +- %.3f %-6s", what, before.median, after.median, ratio,
                    ratio * noise, mark);
 }
