@@ -6,17 +6,25 @@
 #extension GL_KHR_shader_subgroup_shuffle : require
 layout(constant_id = SPEC_SUBGROUP) const uint SUBGROUP = 8;
 
+// Steps of doubling distance up to 64 lanes. Counted up by one and cut by a constant condition: a loop that doubles its
+// counter stays a loop in some compilers, and its turns count towards a driver's limit.
+const uint DOUBLINGS = 6u;
+
 float subgroup_sum(float x) {
-    [[unroll]] for (uint d = 1u; d < SUBGROUP; d *= 2u) x += subgroupShuffleXor(x, d);
+    [[unroll]] for (uint s = 0u; s < DOUBLINGS; ++s) {
+        if ((1u << s) < SUBGROUP) x += subgroupShuffleXor(x, 1u << s);
+    }
     return x;
 }
 
 // Sum over the lanes up to and including this one.
 uint subgroup_inclusive_sum(uint x) {
-    [[unroll]] for (uint d = 1u; d < SUBGROUP; d *= 2u) {
-        const uint lane = gl_SubgroupInvocationID;
-        const uint below = subgroupShuffle(x, lane >= d ? lane - d : lane);
-        x += lane >= d ? below : 0u;
+    const uint lane = gl_SubgroupInvocationID;
+    [[unroll]] for (uint s = 0u; s < DOUBLINGS; ++s) {
+        if ((1u << s) < SUBGROUP) {
+            const uint below = subgroupShuffle(x, lane >= (1u << s) ? lane - (1u << s) : lane);
+            x += lane >= (1u << s) ? below : 0u;
+        }
     }
     return x;
 }

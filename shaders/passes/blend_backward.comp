@@ -32,7 +32,9 @@ float transposing_sum(float v[8]) {
     [[unroll]] for (uint i = 0; i < 2; ++i)
         two[i] = (b1 ? four[2 * i + 1] : four[2 * i]) + subgroupShuffleXor(b1 ? four[2 * i] : four[2 * i + 1], 2u);
     float sum = (b2 ? two[1] : two[0]) + subgroupShuffleXor(b2 ? two[0] : two[1], 4u);
-    [[unroll]] for (uint d = 8u; d < SUBGROUP; d *= 2u) sum += subgroupShuffleXor(sum, d);
+    [[unroll]] for (uint s = 3u; s < DOUBLINGS; ++s) {
+        if ((1u << s) < SUBGROUP) sum += subgroupShuffleXor(sum, 1u << s);
+    }
     return sum;
 }
 

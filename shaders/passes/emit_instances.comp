@@ -1,6 +1,6 @@
 #version 460
 // Writes the (splat, tile) instances in depth order. One invocation owns the splat at one depth rank, and of its tile
-// rows the strip given by the workgroup's y (a strip bounds the loop: a splat may cover more tiles than some drivers
+// rows the strip given by the workgroup's z (a strip bounds the loop: a splat may cover more tiles than some drivers
 // allow iterations). Instances of a splat are contiguous, in rows from top to bottom. SPEC_MODE 1 (gradients): also
 // tells where each splat's instances begin.
 #extension GL_GOOGLE_include_directive : require
@@ -21,7 +21,7 @@ layout(set = 0, binding = 8, scalar) writeonly buffer FirstInstances { uint firs
 layout(push_constant, scalar) uniform Push { EmitPush push; };
 
 void main() {
-    const uint rank = gl_WorkGroupID.x * GROUP_SIZE + gl_LocalInvocationID.x;
+    const uint rank = item_index();
     if (rank >= push.splats || counts.instances > push.capacity) return;
     const uint splat = order[rank];
     const uint count = tile_counts[splat];
@@ -29,7 +29,7 @@ void main() {
     const uvec2 size = uvec2(push.size[0], push.size[1]);
     const Footprint f = footprint_of(texelFetch(records, int(RECORD_TEXELS * splat)),
                                      texelFetch(records, int(RECORD_TEXELS * splat + 1u)), size);
-    const uint strip = gl_WorkGroupID.y;
+    const uint strip = gl_WorkGroupID.z;
     const uint begin = max(f.row_begin, strip * push.strip_rows), end = min(f.row_end, (strip + 1u) * push.strip_rows);
     const uint first = totals[rank / push.scan_block] + prefix[rank];
     if (strip == 0u && MODE == 1u) first_instances[splat] = first;

@@ -1,6 +1,6 @@
 #version 460
 // Exclusive prefix sum of the blocks' totals, in place, by one subgroup; entry `blocks` gets the grand total.
-// Counts receives 0xffffffff where the total does not fit in 32 bits.
+// Instances are also counted in halves that cannot wrap: a total past 32 bits is told as the largest number there is.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"
@@ -11,21 +11,23 @@ layout(set = 0, binding = 1, scalar) writeonly buffer CountsBlock { Counts count
 layout(push_constant, scalar) uniform Push { ScanTotalsPush push; };
 
 void main() {
-    uint carry = 0u;
-    float estimate = 0.0;
+    uint carry = 0u, low = 0u, high = 0u;
     for (uint base = 0u; base < push.blocks; base += SUBGROUP) {
         const uint e = base + gl_SubgroupInvocationID;
         uint value = 0u;
         if (e < push.blocks) value = totals[e];
+        low += value & 0xffffu;
+        high += value >> 16;
         const uint sum = subgroup_inclusive_sum(value);
         if (e < push.blocks) totals[e] = carry + sum - value;
         carry += subgroupShuffle(sum, SUBGROUP - 1u);
-        estimate += subgroup_sum(float(value));
     }
+    low = subgroupShuffle(subgroup_inclusive_sum(low), SUBGROUP - 1u);
+    high = subgroupShuffle(subgroup_inclusive_sum(high), SUBGROUP - 1u);
+    const bool wrapped = high + (low >> 16) > 0xffffu;
     if (gl_SubgroupInvocationID == 0u) {
         totals[push.blocks] = carry;
-        if (estimate > 4.29e9) carry = 0xffffffffu;
-        if (push.write_instances == 1u) counts.instances = carry;
+        if (push.write_instances == 1u) counts.instances = wrapped ? 0xffffffffu : carry;
         if (push.write_instances == 2u) counts.densified = carry;
     }
 }

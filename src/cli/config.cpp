@@ -39,6 +39,8 @@ Json parse(const std::filesystem::path& file) {
         json = Json::parse(core::read_text_file(file));
     } catch (const Json::parse_error& error) {
         throw InputError(file.string() + ": not JSON, at byte " + std::to_string(error.byte));
+    } catch (const Json::exception& error) {  // a number out of range
+        throw InputError(file.string() + ": not JSON: " + error.what());
     }
     if (!json.is_object()) throw InputError(file.string() + ": not a JSON object of options");
     return json;

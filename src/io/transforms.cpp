@@ -198,7 +198,14 @@ json parse(const std::filesystem::path& path) {
     const std::string text = core::read_text_file(path), name = core::one_line(path.string());
     try {
         constexpr bool kThrow = true, kComments = true;
-        return json::parse(text, nullptr, kThrow, kComments);
+        constexpr int kDeepest =
+            64;  // the dialects nest 5 levels; a stranger's file may nest a hundred million
+        const auto shallow = [&](int depth, json::parse_event_t, json&) {
+            if (depth > kDeepest)
+                throw InputError(name + ": nests deeper than " + std::to_string(kDeepest) + " levels");
+            return true;
+        };
+        return json::parse(text, shallow, kThrow, kComments);
     } catch (const json::parse_error& error) {
         throw InputError(name + ": byte " + std::to_string(error.byte) +
                          ": not valid JSON: " + core::one_line(error.what()));

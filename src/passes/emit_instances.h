@@ -36,8 +36,7 @@ struct EmitInstances {
              gpu::writes(6, buffers.keys), gpu::writes(7, buffers.splats),
              gpu::writes(8, buffers.first_instances)},
             push,
-            {push.splats == 0 ? 1 : (push.splats + shape.group - 1) / shape.group,
-             (push.tiles[1] + push.strip_rows - 1) / push.strip_rows, 1});
+            element_groups(shape, push.splats, (push.tiles[1] + push.strip_rows - 1) / push.strip_rows));
     }
 };
 

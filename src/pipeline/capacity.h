@@ -16,8 +16,11 @@ inline uint32_t first_capacity(size_t splats) {
 }
 
 inline uint32_t grown_capacity(uint32_t needed) {
-    if (needed > 0xe0000000u) throw RunError("more than 3.7 billion (splat, tile) pairs in one picture");
-    return uint32_t(std::min<uint64_t>(uint64_t(needed) + needed / 4, 0xffffffffu));
+    constexpr uint32_t kMost = 0xe0000000u;
+    if (needed > kMost)
+        throw RunError(
+            "more than 3.7 billion (splat, tile) pairs in one picture; --downscale makes them fewer");
+    return uint32_t(std::min<uint64_t>(uint64_t(needed) + needed / 4, kMost));
 }
 
 /// Runs a frame until its instances fit. record: fills a recording for the frame as reserved.

@@ -86,6 +86,7 @@ TEST(Usage, ConfigNamesItsMistake) {
                                                          {R"({"steps": {}})", "steps"},
                                                          {R"([1])", "object"},
                                                          {R"({"steps": 3)", "byte"},
+                                                         {R"({"seed": 1e400})", "1e400"},
                                                          {R"({"config": "c.json"})", "config"},
                                                          {R"({"strategy": "mcmc"})", "mcmc"}};
     for (const auto& [text, mistake] : cases) {

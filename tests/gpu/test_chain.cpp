@@ -1,8 +1,10 @@
 // The whole chain on the device against the float64 twin: pictures, and gradients of the loss.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
+#include "ewa/error.h"
 #include "ewa/renderer.h"
 #include "gpu/test_device.h"
 #include "reference/render.h"
@@ -109,7 +111,32 @@ std::vector<Case> cases() {
     for (const auto& [w, h] : {std::pair{1, 1}, {17, 3}, {3, 17}, {200, 150}, {257, 129}})
         all.push_back({SplatKind::mixed, 400, w, h, 2, Kernel::peak, seed++});
     all.push_back({SplatKind::mixed, 3000, 160, 120, 1, Kernel::peak, seed++});
+    for (const size_t splats : {size_t(0), size_t(1)})
+        all.push_back({SplatKind::ordinary, splats, 61, 47, 1, Kernel::peak, seed++});
     return all;
+}
+
+/// Splats that each cover every tile of a picture of 4096 x 4096 pixels, in front of the camera.
+Gaussians covering_splats(size_t count) {
+    Gaussians gaussians;
+    gaussians.sh_degree = 0;
+    gaussians.resize(count);
+    for (size_t i = 0; i < count; ++i) {
+        gaussians.means[3 * i + 2] = 5.0f;
+        gaussians.quaternions[4 * i] = 1.0f;
+        std::fill_n(&gaussians.log_scales[3 * i], 3, 12.0f);
+    }
+    return gaussians;
+}
+
+// 262,144 tiles each: 16,400 splats have 2^32 and 4 million instances, which 32 bits count as 4 million.
+TEST(Instances, MoreThanCanBeCountedAreAnErrorAndNoPicture) {
+    Camera camera;
+    camera.width = camera.height = 4096;
+    camera.fx = camera.fy = 3000;
+    camera.cx = camera.cy = 2048;
+    Renderer renderer(device(), covering_splats(16400), {});
+    EXPECT_THROW(renderer.render(camera), RunError);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Chain, testing::ValuesIn(cases()), case_name);

@@ -53,7 +53,7 @@ TEST_P(Scan, IsTheExclusivePrefixSum) {
 INSTANTIATE_TEST_SUITE_P(Sizes, Scan,
                          testing::Values(std::pair{0u, 64u}, std::pair{1u, 64u}, std::pair{63u, 64u},
                                          std::pair{64u, 64u}, std::pair{65u, 64u}, std::pair{1000u, 7u},
-                                         std::pair{100003u, 512u}, std::pair{30001u, 1u}));
+                                         std::pair{100003u, 512u}, std::pair{70001u, 1u}));
 
 struct Sorted {
     std::vector<uint32_t> values, keys;

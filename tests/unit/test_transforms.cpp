@@ -223,6 +223,13 @@ TEST(Transforms, EveryCutIsAnError) {
     EXPECT_EQ(test::read_every_cut(path, scene.model.dump(), [&] { load_dataset(path, {}); }), 0u);
 }
 
+TEST(Transforms, DeepNestingIsRefusedEarly) {
+    const Scene scene;
+    scene.folder.write("transforms.json", std::string(1000000, '['));
+    expect_error<InputError>([&] { load_dataset(scene.folder.path(), {}); },
+                             {"transforms.json", "64 levels"});
+}
+
 TEST(Transforms, RealScene) {
     const auto data = test::shared_data();
     if (!data) GTEST_SKIP() << "no real inputs here";
