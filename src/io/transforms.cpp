@@ -198,8 +198,8 @@ json parse(const std::filesystem::path& path) {
     const std::string text = core::read_text_file(path), name = core::one_line(path.string());
     try {
         constexpr bool kThrow = true, kComments = true;
-        constexpr int kDeepest =
-            64;  // the dialects nest 5 levels; a stranger's file may nest a hundred million
+        // The dialects nest 5 levels; a stranger's file may nest a hundred million.
+        constexpr int kDeepest = 64;
         const auto shallow = [&](int depth, json::parse_event_t, json&) {
             if (depth > kDeepest)
                 throw InputError(name + ": nests deeper than " + std::to_string(kDeepest) + " levels");
