@@ -40,6 +40,7 @@ struct Dataset {
     PointCloud points;                    // may be empty
     int missing_images = 0;               // entries whose image file is not there
     int dropped_points = 0;               // points with a coordinate that is not finite, left out of `points`
+    std::string first_dropped_point;      // where the first of them stands: file and byte, line or vertex
 };
 
 struct DatasetOptions {

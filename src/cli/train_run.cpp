@@ -42,6 +42,11 @@ Gaussians start_splats(const TrainArguments& arguments, const Dataset& dataset,
     const int degree = arguments.draw.sh_degree;
     Gaussians start;
     if (arguments.init == "sfm") {
+        if (dataset.dropped_points > 0)
+            throw InputError(
+                fmt::format("{}: a coordinate is not finite ({} such points in all); remove them, or start "
+                            "from --init random",
+                            dataset.first_dropped_point, dataset.dropped_points));
         if (dataset.points.positions.empty())
             throw InputError(dataset.root.string() +
                              " has no points to start from; --init random needs none");

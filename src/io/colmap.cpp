@@ -104,8 +104,9 @@ void ColmapBuilder::add_image(const std::array<double, 7>& pose, uint32_t camera
     result_.images.push_back(std::move(image));
 }
 
-void ColmapBuilder::add_point(const glm::dvec3& position, const std::array<uint8_t, 3>& color) {
-    io::add_point(result_.points, result_.dropped_points, position, color);
+void ColmapBuilder::add_point(const glm::dvec3& position, const std::array<uint8_t, 3>& color,
+                              const std::function<std::string()>& where) {
+    io::add_point(result_.points, result_.dropped, position, color, where);
 }
 
 std::optional<std::filesystem::path> find_colmap_model(const std::filesystem::path& root) {

@@ -1,4 +1,5 @@
 #include "core/file_reader.h"
+#include "core/text.h"
 #include "io/colmap_model.h"
 
 namespace ewa::io {
@@ -55,6 +56,7 @@ void read_points(const std::filesystem::path& path, ColmapBuilder& builder) {
     core::FileReader reader(path);
     const uint64_t count = read_count(reader, kPointBytes, "points");
     for (uint64_t i = 0; i < count; ++i) {
+        const uint64_t begin = reader.offset();
         reader.skip(sizeof(uint64_t), "a point");  // its id
         glm::dvec3 position;
         for (int axis = 0; axis < 3; ++axis) position[axis] = reader.read<double>("a point");
@@ -63,7 +65,9 @@ void read_points(const std::filesystem::path& path, ColmapBuilder& builder) {
         reader.skip(sizeof(double), "a point");  // its reprojection error
         const uint64_t track = read_count(reader, kTrackBytes, "entries of a track");
         reader.skip(track * kTrackBytes, "a track");
-        builder.add_point(position, color);
+        builder.add_point(position, color, [&] {
+            return core::one_line(path.string()) + ": the point at byte " + std::to_string(begin);
+        });
     }
 }
 

@@ -35,7 +35,9 @@ class ColmapBuilder {
     /// pose: qw qx qy qz tx ty tz, world to camera.
     void add_image(const std::array<double, 7>& pose, uint32_t camera_id, const std::string& name,
                    const Fail& fail);
-    void add_point(const glm::dvec3& position, const std::array<uint8_t, 3>& color);
+    /// where: asked for the first point that is dropped.
+    void add_point(const glm::dvec3& position, const std::array<uint8_t, 3>& color,
+                   const std::function<std::string()>& where);
     PosedImages take() { return std::move(result_); }
 
   private:

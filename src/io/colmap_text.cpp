@@ -50,9 +50,8 @@ class Lines {
         return *value;
     }
 
-    void fail(const std::string& text) const {
-        throw InputError(reader_.name() + ":" + std::to_string(number_) + ": " + core::one_line(text));
-    }
+    std::string where() const { return reader_.name() + ":" + std::to_string(number_); }
+    void fail(const std::string& text) const { throw InputError(where() + ": " + core::one_line(text)); }
 
   private:
     core::FileReader reader_;
@@ -108,7 +107,7 @@ void read_points(const std::filesystem::path& path, ColmapBuilder& builder) {
         std::array<uint8_t, 3> color;
         for (uint8_t& channel : color) channel = lines.integer<uint8_t>("colour");
         lines.number("reprojection error");
-        builder.add_point(position, color);
+        builder.add_point(position, color, [&] { return lines.where(); });
     }
 }
 

@@ -92,7 +92,8 @@ fs::path images_folder(const fs::path& root, const fs::path& model) {
 void append(io::PosedImages& all, io::PosedImages more) {
     std::move(more.images.begin(), more.images.end(), std::back_inserter(all.images));
     if (all.points.positions.empty()) all.points = std::move(more.points);
-    all.dropped_points += more.dropped_points;
+    if (all.dropped.count == 0) all.dropped.first = std::move(more.dropped.first);
+    all.dropped.count += more.dropped.count;
 }
 
 /// Blender's scenes say by the file's name what its frames are for.
@@ -142,7 +143,8 @@ Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& op
     Dataset dataset;
     dataset.root = is_folder(path) ? path : path.parent_path();
     dataset.points = std::move(model.points);
-    dataset.dropped_points = model.dropped_points;
+    dataset.dropped_points = model.dropped.count;
+    dataset.first_dropped_point = std::move(model.dropped.first);
     std::stable_sort(model.images.begin(), model.images.end(),
                      [](const io::PosedImage& a, const io::PosedImage& b) { return a.name < b.name; });
     for (const io::PosedImage& image : model.images) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/text.h"
 #include "ewa/error.h"
 #include "io/ply_table.h"
 #include "io/posed_images.h"
@@ -30,13 +31,14 @@ PlyPoints read_points_ply(const std::filesystem::path& path) {
     const bool colored = columns.size() == 6;
 
     PlyPoints result;
-    table.read(columns, [&](size_t, const double* row) {
+    table.read(columns, [&](size_t index, const double* row) {
         const auto byte = [&](double v) -> uint8_t {
             return v > 0 ? static_cast<uint8_t>(std::lround(std::min(v * color_scale, 255.0))) : uint8_t(0);
         };
         std::array<uint8_t, 3> color{128, 128, 128};
         if (colored) color = {byte(row[3]), byte(row[4]), byte(row[5])};
-        add_point(result.points, result.dropped_points, {row[0], row[1], row[2]}, color);
+        add_point(result.points, result.dropped, {row[0], row[1], row[2]}, color,
+                  [&] { return core::one_line(path.string()) + ": vertex " + std::to_string(index); });
     });
     return result;
 }

@@ -3,13 +3,13 @@
 #include <filesystem>
 
 #include "ewa/dataset.h"
+#include "io/posed_images.h"
 
 namespace ewa::io {
 
 struct PlyPoints {
     PointCloud points;
-    int dropped_points =
-        0;  // with a coordinate that float32 cannot hold as a finite number, left out of `points`
+    DroppedPoints dropped;
 };
 
 /// Vertices with x y z and, where there are, red green blue (integers 0..255, or floating-point 0..1);

@@ -4,11 +4,11 @@
 
 namespace ewa::io {
 
-void add_point(PointCloud& points, int& dropped, const glm::dvec3& position,
-               const std::array<uint8_t, 3>& color) {
+void add_point(PointCloud& points, DroppedPoints& dropped, const glm::dvec3& position,
+               const std::array<uint8_t, 3>& color, const std::function<std::string()>& where) {
     for (int axis = 0; axis < 3; ++axis)
         if (!std::isfinite(static_cast<float>(position[axis]))) {
-            ++dropped;
+            if (dropped.count++ == 0) dropped.first = where();
             return;
         }
     points.positions.push_back(position);

@@ -2,6 +2,7 @@
 // these.
 #pragma once
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -17,15 +18,20 @@ struct PosedImage {
     int split = 0;  // Frame::split
 };
 
+/// Points left out because float32, which splats are stored in, cannot hold a coordinate as a finite number.
+struct DroppedPoints {
+    int count = 0;
+    std::string first;  // where the first one stands
+};
+
 struct PosedImages {
     std::vector<PosedImage> images;  // in the file's order
     PointCloud points;
-    int dropped_points = 0;
+    DroppedPoints dropped;
 };
 
-/// Adds a point, or counts it as dropped when float32, which splats are stored in, cannot hold it as finite
-/// numbers.
-void add_point(PointCloud& points, int& dropped, const glm::dvec3& position,
-               const std::array<uint8_t, 3>& color);
+/// Adds a point, or counts it as dropped. where: asked for the first dropped one.
+void add_point(PointCloud& points, DroppedPoints& dropped, const glm::dvec3& position,
+               const std::array<uint8_t, 3>& color, const std::function<std::string()>& where);
 
 }  // namespace ewa::io

@@ -239,7 +239,7 @@ PosedImages read_transforms(const std::filesystem::path& path, int split, bool w
     if (with_points && !points_path.empty()) {
         PlyPoints points = read_points_ply(resolve(path.parent_path(), points_path));
         result.points = std::move(points.points);
-        result.dropped_points = points.dropped_points;
+        result.dropped = std::move(points.dropped);
     }
     return result;
 }

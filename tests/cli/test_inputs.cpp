@@ -56,6 +56,16 @@ TEST(Inputs, DatasetWithoutPoints) {
     expect_failure(run_ewa({"train", folder / "data", "-o", folder / "out"}), 2, "--init random");
 }
 
+TEST(Inputs, PointThatIsNotFinite) {
+    const Folder folder;
+    const std::string data = folder / "data", points = data + "/sparse/0/points3D.txt";
+    fs::copy(std::string(EWA_SOURCE_DIR) + "/scenes/still_life", data, fs::copy_options::recursive);
+    const std::string good = read_file(points);
+    write_file(points, good + "999999 1 nan 2 10 20 30 0.1\n");
+    expect_failure(run_ewa({"train", data, "-o", folder / "out", "--steps", "1"}), 2, "points3D.txt:");
+    EXPECT_FALSE(fs::exists(folder / "out"));
+}
+
 TEST(Inputs, EveryFrameHeldOut) {
     const Folder folder;
     make_dataset(folder / "data");

@@ -97,6 +97,7 @@ void expect_the_model(const Dataset& dataset) {
     EXPECT_EQ(a.camera.cx, 2);
     EXPECT_EQ(a.camera.cy, 2.5);
     EXPECT_EQ(dataset.dropped_points, 1);
+    EXPECT_NE(dataset.first_dropped_point.find("points3D"), std::string::npos);
     ASSERT_EQ(dataset.points.positions.size(), 2u);
     EXPECT_EQ(dataset.points.positions[1], glm::dvec3(-1, 0, 1e9));
     EXPECT_EQ(dataset.points.colors[0], (std::array<uint8_t, 3>{4, 5, 6}));

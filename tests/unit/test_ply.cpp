@@ -275,7 +275,7 @@ TEST(PointsPly, ReadsPositionsAndColours) {
                                                   properties({"red", "green", "blue"}, "int")) +
                                   rows);
     const io::PlyPoints read = io::read_points_ply(path);
-    EXPECT_EQ(read.dropped_points, 2);
+    EXPECT_EQ(read.dropped.count, 2);
     ASSERT_EQ(read.points.positions.size(), 2u);
     EXPECT_EQ(read.points.positions[1], glm::dvec3(-1, -2, -3.5));
     EXPECT_EQ(read.points.colors[0], (std::array<uint8_t, 3>{10, 20, 255}));

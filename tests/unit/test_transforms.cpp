@@ -213,21 +213,14 @@ TEST(Transforms, NamesWhatIsWrong) {
     expect_error<InputError>([&] { load_dataset(scene.folder.path(), {}); }, {"transforms.json: byte 16"});
     scene.folder.write("transforms.json", "{\"fl_x\": 1e999}");
     expect_error<InputError>([&] { load_dataset(scene.folder.path(), {}); }, {"transforms.json"});
-    scene.folder.write("transforms.json", std::string(200000, '['));
-    expect_error<InputError>([&] { load_dataset(scene.folder.path(), {}); }, {"transforms.json: byte"});
+    scene.folder.write("transforms.json", std::string(1000000, '['));
+    expect_error<InputError>([&] { load_dataset(scene.folder.path(), {}); }, {"transforms.json", "64 levels"});
 }
 
 TEST(Transforms, EveryCutIsAnError) {
     const Scene scene;
     const auto path = scene.write();
     EXPECT_EQ(test::read_every_cut(path, scene.model.dump(), [&] { load_dataset(path, {}); }), 0u);
-}
-
-TEST(Transforms, DeepNestingIsRefusedEarly) {
-    const Scene scene;
-    scene.folder.write("transforms.json", std::string(1000000, '['));
-    expect_error<InputError>([&] { load_dataset(scene.folder.path(), {}); },
-                             {"transforms.json", "64 levels"});
 }
 
 TEST(Transforms, RealScene) {
