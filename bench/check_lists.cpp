@@ -15,7 +15,7 @@ namespace {
 struct Lists {
     std::vector<float> records;
     std::vector<uint32_t> tile_counts, order, prefix, totals;  // one a splat; totals one a block
-    std::vector<uint32_t> keys, values, splats, tile_starts;   // one an instance; sorted_splats
+    std::vector<uint32_t> keys, numbers, splats, tile_starts;   // one an instance; sorted_splats
     uint32_t scan_block = 1, tiles = 0, instances = 0;
     bool by_instance = false;
 };
@@ -33,7 +33,7 @@ Lists download(const FrameRun& run) {
     lists.totals = frame.scan_totals.download<uint32_t>(size_t(sizes.scan_blocks) + 1);
     lists.instances = run.counts().instances;
     lists.keys = frame.instance_keys[sizes.tile_sort.passes & 1].download<uint32_t>(lists.instances);
-    lists.values = run.sorted().values->download<uint32_t>(lists.instances);
+    if (run.plan().gradients) lists.numbers = run.sorted().numbers->download<uint32_t>(lists.instances);
     lists.splats = run.sorted_splats();
     lists.tile_starts = run.tile_starts();
     lists.scan_block = sizes.scan_block;
@@ -83,7 +83,7 @@ Check check_tile_order(const Lists& lists) {
         }
         ++times[lists.splats[k]];
         if (k == 0 || lists.splats[k - 1] >= n) continue;
-        const bool later = lists.by_instance ? lists.values[k - 1] < lists.values[k]
+        const bool later = lists.by_instance ? lists.numbers[k - 1] < lists.numbers[k]
                                              : rank[lists.splats[k - 1]] < rank[lists.splats[k]];
         wrong += lists.keys[k - 1] > lists.keys[k] || (lists.keys[k - 1] == lists.keys[k] && !later);
     }

@@ -58,7 +58,7 @@ void record_backward(gpu::Recording& recording, Kernels& kernels, const Plan& pl
     const passes::Shape& shape = kernels.shape();
     kernels.get<passes::BlendBackward>().record(
         recording, shape,
-        {frame.records, *sorted.values, frame.instance_splats, frame.tile_starts, frame.planes,
+        {frame.records, *sorted.splats, *sorted.numbers, frame.tile_starts, frame.planes,
          frame.image_gradient, frame.slots},
         blend_push(kernels, frame, camera, background));
 
