@@ -8,6 +8,7 @@
 #extension GL_GOOGLE_include_directive : require
 #define BINDING_CAMERA 1
 #include "lib/prelude.glsl"
+#include "lib/params.glsl"
 #include "lib/projection.glsl"
 #include "lib/sh.glsl"
 
@@ -60,7 +61,7 @@ Sums sum_slots(uint first, uint count) {
     return Sums(s0.x, s0.yz, vec3(s0.w, s1.xy), vec3(s1.zw, s2));
 }
 
-uint index_of(uint plane, uint i) { return plane * push.capacity + i; }
+uint index_of(uint plane, uint i) { return param_texel(push.planes, plane, i); }
 
 // One texel of parameters with its gradient: Adam (Kingma and Ba 2015, algorithm 1).
 void move(uint plane, uint i, vec4 value, vec4 gradient, vec4 rate) {

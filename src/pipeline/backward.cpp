@@ -73,7 +73,7 @@ void record_backward(gpu::Recording& recording, Kernels& kernels, const Plan& pl
                  moments2, frame.tile_counts, frame.first_instances, frame.counts, model.params,
                  model.moments1, moments2, statistics},
                 {model.splats,
-                 model.capacity,
+                 model.planes(),
                  frame.instance_capacity,
                  rates.mean,
                  rates.opacity,

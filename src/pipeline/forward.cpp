@@ -27,7 +27,7 @@ Sorted record_forward(gpu::Recording& recording, Kernels& kernels, const Plan& p
         .record(recording, shape,
                 {model.params, *camera.buffer, camera.offset, frame.records, frame.depth_keys[0],
                  frame.tile_counts, frame.counts},
-                {model.splats, model.capacity});
+                {model.splats, model.planes()});
 
     const uint32_t order_index = record_sort(recording, kernels,
                                              {{&frame.depth_keys[0], &frame.depth_keys[1]},
