@@ -2,7 +2,7 @@
 // Gradients of blending, front to back: with R = (what is blended behind a splat) . dL/dC,
 // dL/d(alpha) = T c . dL/dC - R / (1 - alpha); R starts as C . dL/dC and each splat takes its own share off, so nothing
 // is divided by 1 - alpha splat after splat. One workgroup is one subgroup and owns one tile, and the gradient slots
-// of its instances: each slot is written by exactly one tile, once.
+// of its instances, which stand in the order of the sorted list: each is written once.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"
@@ -11,11 +11,10 @@
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(set = 0, binding = 0) uniform samplerBuffer records;
 layout(set = 0, binding = 1, scalar) readonly buffer Splats { uint splats[]; };
-layout(set = 0, binding = 2, scalar) readonly buffer Numbers { uint numbers[]; };
-layout(set = 0, binding = 3, scalar) readonly buffer TileStarts { uint tile_starts[]; };
-layout(set = 0, binding = 4, scalar) readonly buffer Planes { float planes[]; };
-layout(set = 0, binding = 5, scalar) readonly buffer ImageGradient { float image_gradient[]; };
-layout(set = 0, binding = 6, scalar) writeonly buffer Slots { float slots[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer TileStarts { uint tile_starts[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer Planes { float planes[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer ImageGradient { float image_gradient[]; };
+layout(set = 0, binding = 5, scalar) writeonly buffer Slots { float slots[]; };
 layout(push_constant, scalar) uniform Push { BlendPush push; };
 
 // The middle of a lane's pixels, in pixels of its column.
@@ -117,7 +116,7 @@ void main() {
             }
         }
         if (k + lane < end) {
-            const uint at = SLOT_FLOATS * numbers[k + lane];
+            const uint at = SLOT_FLOATS * (k + lane);
             [[unroll]] for (uint i = 0; i < 9; ++i) slots[at + i] = slot[i];
         }
         bool open = false;
@@ -130,7 +129,7 @@ void main() {
     // Instances behind the last open pixel got nothing.
     for (; k < end; k += SUBGROUP) {
         if (k + lane < end) {
-            const uint at = SLOT_FLOATS * numbers[k + lane];
+            const uint at = SLOT_FLOATS * (k + lane);
             [[unroll]] for (uint i = 0; i < 9; ++i) slots[at + i] = 0.0;
         }
     }

@@ -29,6 +29,7 @@ layout(set = 0, binding = 9, scalar) writeonly buffer ParamsOut { vec4 params_ou
 layout(set = 0, binding = 10, scalar) writeonly buffer Moments1Out { vec4 moments1_out[]; };
 layout(set = 0, binding = 11, scalar) writeonly buffer Moments2Out { vec4 moments2_out[]; };
 layout(set = 0, binding = 12, scalar) buffer Statistics { vec2 statistics[]; };
+layout(set = 0, binding = 13, scalar) readonly buffer Places { uint places[]; };
 layout(push_constant, scalar) uniform Push { UpdatePush push; };
 
 const uint SH_FLOATS = 3 * (SH_DEGREE + 1) * (SH_DEGREE + 1);
@@ -49,7 +50,7 @@ Sums sum_slots(uint first, uint count) {
     for (uint j = 0u; j < count; j += 8u) {
         [[unroll]] for (uint c = 0; c < 8; ++c) {
             const bool there = j + c < count;
-            const int slot = int(SLOT_TEXELS * (there ? first + j + c : first));
+            const int slot = int(SLOT_TEXELS * places[there ? first + j + c : first]);
             const vec4 t0 = texelFetch(slots, slot), t1 = texelFetch(slots, slot + 1), t2 = texelFetch(slots, slot + 2);
             if (there) {
                 s0 += t0;

@@ -55,13 +55,13 @@ Sorted record_forward(gpu::Recording& recording, Kernels& kernels, const Plan& p
                  {camera.width, camera.height},
                  {s.tiles_x, s.tiles_y}});
 
-    // With gradients the instances' own numbers come along, since each owns a slot.
-    const gpu::Buffer* numbers[2] = {plan.gradients ? &frame.instance_numbers[0] : nullptr,
-                                     plan.gradients ? &frame.instance_numbers[1] : nullptr};
+    // With gradients a splat must find its instances again: their slots stand in sorted order.
+    const gpu::Buffer* places[2] = {plan.gradients ? &frame.instance_places[0] : nullptr,
+                                    plan.gradients ? &frame.instance_places[1] : nullptr};
     const uint32_t sorted = record_sort(recording, kernels,
                                         {{&frame.instance_keys[0], &frame.instance_keys[1]},
                                          {&frame.instance_splats[0], &frame.instance_splats[1]},
-                                         {numbers[0], numbers[1]},
+                                         {places[0], places[1]},
                                          false,
                                          frame.counters,
                                          frame.counter_prefix,
@@ -76,7 +76,7 @@ Sorted record_forward(gpu::Recording& recording, Kernels& kernels, const Plan& p
     kernels.get<passes::Blend>(plan.depth).record(recording, shape,
                                                   {frame.records, splats, frame.tile_starts, frame.planes},
                                                   blend_push(kernels, frame, camera, background));
-    return {&splats, numbers[sorted]};
+    return {&splats, places[sorted]};
 }
 
 }  // namespace ewa::pipeline

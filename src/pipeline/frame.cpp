@@ -54,8 +54,8 @@ void Frame::reserve(gpu::Device& device, const passes::Shape& shape, const Frame
         grow(device, image_gradient, "image gradient", sizes.image_gradient, Texel::rgba32f);
         grow(device, partials, "partials", sizes.partial_sums);
         grow(device, reduced, "reduced", sizes.reduced);
-        for (auto& buffer : instance_numbers)
-            grow(device, buffer, "instance numbers", sizes.instance_words, Texel::rgba32ui);
+        for (auto& buffer : instance_places)
+            grow(device, buffer, "instance places", sizes.instance_words, Texel::rgba32ui);
         grow(device, slots, "slots", sizes.slots, Texel::rgba32f);
     }
     // The columns between an image's width and its stride count as black in the loss; no kernel writes them.

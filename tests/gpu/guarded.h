@@ -99,8 +99,8 @@ class GuardedFrame {
             make(frame.image_gradient, "image gradient", s.image_gradient, Texel::rgba32f);
             make(frame.partials, "partials", s.partial_sums);
             make(frame.reduced, "reduced", s.reduced);
-            for (auto& buffer : frame.instance_numbers)
-                make(buffer, "instance numbers", s.instance_words, Texel::rgba32ui);
+            for (auto& buffer : frame.instance_places)
+                make(buffer, "instance places", s.instance_words, Texel::rgba32ui);
             make(frame.slots, "slots", s.slots, Texel::rgba32f);
         }
         frame.reserve(*device(), shape, request);  // zeroes planes and target, guards included

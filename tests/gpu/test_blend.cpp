@@ -11,13 +11,12 @@
 namespace ewa::test {
 namespace {
 
-/// The twin's picture and its lists as the device's buffers hold them. Instance numbers run against the order
-/// of the lists, so that a number and its place cannot be mistaken for each other.
+/// The twin's picture and its lists as the device's buffers hold them.
 struct Lists {
     Scene scene;
     reference::Picture twin;
     pipeline::Sizes sizes;
-    Guarded records, splats, numbers, starts;
+    Guarded records, splats, starts;
 
     explicit Lists(const Scene& s)
         : scene(s),
@@ -25,12 +24,10 @@ struct Lists {
           sizes(pipeline::sizes_for(rig().shape(), request())),
           records("records", pack_records(twin.projected), gpu::Texel::rgba32f),
           splats("splats", words([&](size_t k) { return twin.instances.sorted[k].splat; })),
-          numbers("numbers", words([&](size_t k) { return uint32_t(number(k)); })),
           starts("starts", std::vector<uint32_t>(twin.instances.first_of_tile.begin(),
                                                  twin.instances.first_of_tile.end())) {}
 
     size_t count() const { return twin.instances.sorted.size(); }
-    size_t number(size_t k) const { return count() - 1 - k; }
     pipeline::FrameRequest request() const {
         return {uint32_t(scene.gaussians.size()),
                 uint32_t(scene.camera.width),
@@ -149,7 +146,7 @@ TEST_P(BlendBackwardPass, SlotsAreTheTwinsMoments) {
     r.run([&](gpu::Recording& recording) {
         r.kernels.get<passes::BlendBackward>().record(
             recording, r.shape(),
-            {lists.records, lists.splats, lists.numbers, lists.starts, planes, incoming, slots},
+            {lists.records, lists.splats, lists.starts, planes, incoming, slots},
             lists.push());
     });
     EXPECT_TRUE(slots.intact());
@@ -169,7 +166,7 @@ TEST_P(BlendBackwardPass, SlotsAreTheTwinsMoments) {
     }
     for (size_t k = 0; k < lists.count(); ++k)
         for (size_t j = 0; j < 9; ++j) {
-            const double e = std::abs(double(actual[shared::SLOT_FLOATS * lists.number(k) + j]) -
+            const double e = std::abs(double(actual[shared::SLOT_FLOATS * k + j]) -
                                       slot_of(expected.instances[k])[j]);
             ASSERT_TRUE(std::isfinite(e)) << "instance " << k << " sum " << j;
             error[j] = std::max(error[j], e / largest[j]);
@@ -201,7 +198,7 @@ size_t check_one_tile(const Scene& scene) {
             recording, r.shape(), {lists.records, lists.splats, lists.starts, planes}, lists.push());
         r.kernels.get<passes::BlendBackward>().record(
             recording, r.shape(),
-            {lists.records, lists.splats, lists.numbers, lists.starts, planes, incoming, slots},
+            {lists.records, lists.splats, lists.starts, planes, incoming, slots},
             lists.push());
     });
     expect_intact({&planes, &slots});
@@ -219,7 +216,7 @@ size_t check_one_tile(const Scene& scene) {
     for (size_t k = 0; k < lists.count(); ++k) {
         bool zero = true;
         for (size_t j = 0; j < 9; ++j) {
-            const float value = written[shared::SLOT_FLOATS * lists.number(k) + j];
+            const float value = written[shared::SLOT_FLOATS * k + j];
             EXPECT_TRUE(std::isfinite(value)) << "slot of instance " << k << " was not written";
             if (!std::isfinite(value)) return 0;
             zero = zero && value == 0;
