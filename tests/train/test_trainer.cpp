@@ -143,8 +143,9 @@ TEST(Trainer, ASplatThatIsNotFiniteStaysOutAndTheRestLearns) {
     EXPECT_EQ(run.report.skipped_nonfinite, 1u);
     EXPECT_EQ(run.report.dropped_updates, 0u);  // nothing was tried with it
     EXPECT_LT(run.report.loss, run.first_loss);
+    // A splat without a place stands last on the curve.
     for (size_t i = 0; i < run.gaussians.means.size(); ++i)
-        EXPECT_EQ(std::isfinite(run.gaussians.means[i]), i != 3 * 5) << i;
+        EXPECT_EQ(std::isfinite(run.gaussians.means[i]), i != run.gaussians.means.size() - 3) << i;
     for (const float value : run.gaussians.log_scales) EXPECT_TRUE(std::isfinite(value));
 }
 
