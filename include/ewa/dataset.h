@@ -12,10 +12,25 @@
 
 namespace ewa {
 
-/// Brown-Conrady coefficients in OpenCV's order and sign (OpenCV calib3d, "Detailed Description").
+/// How a lens bends the ray (x, y, 1); src/scene/lens.h has the formulas.
+enum class Lens {
+    brown,       // radial (a quotient of polynomials) and tangential: OpenCV's perspective model
+    fisheye,     // radial in the angle, tangential, thin prism: OpenCV's fisheye and COLMAP's THIN_PRISM_FISHEYE
+    fisheye624,  // six radial terms, then tangential and thin prism of the result: COLMAP's RAD_TAN_THIN_PRISM_FISHEYE
+    fov,         // Devernay and Faugeras 2001; k1 is omega (radians)
+    division,    // Fitzgibbon 2001; k1
+    unified      // enhanced unified camera model, Khomutenko et al. 2016; k1 is alpha, k2 is beta
+};
+
+/// What a lens adds to a pinhole. Names and signs are OpenCV's (calib3d, "Detailed Description"); a lens leaves those it
+/// has no use for at zero.
 struct Distortion {
-    double k1 = 0, k2 = 0, p1 = 0, p2 = 0;
-    bool none() const { return k1 == 0 && k2 == 0 && p1 == 0 && p2 == 0; }
+    double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0, k4 = 0, k5 = 0, k6 = 0;
+    double s1 = 0, s2 = 0, s3 = 0, s4 = 0;  // thin prism: s1 and s3 times the squared radius, s2 and s4 times its square
+    Lens lens = Lens::brown;
+    bool operator==(const Distortion&) const = default;
+    /// A pinhole: nothing to undo.
+    bool none() const { return *this == Distortion{}; }
 };
 
 struct Frame {
@@ -25,6 +40,7 @@ struct Frame {
     Camera camera;                        // the pinhole camera that load_frame_image's picture has
     Camera source;                        // intrinsics of the file itself (differs where it is distorted or scaled)
     Distortion distortion;                // of the file
+    Camera pinhole;                       // of the file's picture once it is undistorted, before it is downscaled
     int downscale = 1;
     int split = 0;                        // 0 by the rule of split_frames; 1 train, 2 test where the dataset says so
 };
@@ -55,8 +71,8 @@ struct DatasetOptions {
 /// model: it is the model's, or the model's resized by one factor, which the intrinsics then follow. Throws InputError.
 Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& options);
 
-/// The frame's picture as the pinhole `frame.camera` sees it: undistorted (bilinear, cropped and stretched to the file's
-/// size so that no pixel is blank, src/scene/undistort.h) and downscaled as the frame says. 3 or 4 channels. Throws
+/// The frame's picture as the pinhole `frame.camera` sees it: undistorted (bilinear; the focal lengths stay and the size
+/// changes so that no pixel is blank, src/scene/undistort.h) and downscaled as the frame says. 3 or 4 channels. Throws
 /// InputError.
 Image load_frame_image(const Frame& frame);
 

@@ -61,7 +61,37 @@ Camera fit_to_file(const io::PosedImage& image) {
     return camera;
 }
 
-Frame make_frame(const io::PosedImage& image, bool exists, const DatasetOptions& options) {
+/// Pinhole cameras of lenses met before: finding one undistorts the whole border of a picture, and most
+/// datasets have only a few lenses.
+class Pinholes {
+  public:
+    Camera of(const Camera& source, const Distortion& distortion) {
+        const auto known = std::find_if(known_.begin(), known_.end(), [&](const Known& k) {
+            const Camera& c = k.source;
+            return k.distortion == distortion && c.width == source.width && c.height == source.height &&
+                   c.fx == source.fx && c.fy == source.fy && c.cx == source.cx && c.cy == source.cy;
+        });
+        if (known == known_.end()) {
+            known_.push_back({source, distortion, scene::undistorted_camera(source, distortion)});
+            return known_.back().pinhole;
+        }
+        Camera camera = known->pinhole;
+        camera.rotation = source.rotation;
+        camera.translation = source.translation;
+        return camera;
+    }
+
+  private:
+    struct Known {
+        Camera source;
+        Distortion distortion;
+        Camera pinhole;
+    };
+    std::vector<Known> known_;
+};
+
+Frame make_frame(const io::PosedImage& image, bool exists, const DatasetOptions& options,
+                 Pinholes& pinholes) {
     Frame frame;
     frame.name = image.name;
     frame.image_path = image.path;
@@ -71,8 +101,8 @@ Frame make_frame(const io::PosedImage& image, bool exists, const DatasetOptions&
     frame.downscale = options.downscale;
     frame.split = image.split;
     try {
-        frame.camera =
-            downscale(scene::undistorted_camera(frame.source, frame.distortion), options.downscale);
+        frame.pinhole = pinholes.of(frame.source, frame.distortion);
+        frame.camera = downscale(frame.pinhole, options.downscale);
     } catch (const InputError& error) {
         throw InputError(core::one_line("frame \"" + image.name + "\": " + error.what()));
     }
@@ -147,11 +177,12 @@ Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& op
     dataset.first_dropped_point = std::move(model.dropped.first);
     std::stable_sort(model.images.begin(), model.images.end(),
                      [](const io::PosedImage& a, const io::PosedImage& b) { return a.name < b.name; });
+    Pinholes pinholes;
     for (const io::PosedImage& image : model.images) {
         const bool exists = is_file(image.path);
         dataset.missing_images += !exists;
         const bool usable = image.camera.width > 0 && (exists || !options.need_images);
-        if (usable) dataset.frames.push_back(make_frame(image, exists, options));
+        if (usable) dataset.frames.push_back(make_frame(image, exists, options, pinholes));
     }
     if (dataset.frames.empty())
         throw InputError(name + ": none of the " + std::to_string(model.images.size()) +

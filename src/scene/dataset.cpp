@@ -34,8 +34,7 @@ Image load_frame_image(const Frame& frame) {
                          std::to_string(image.height) + " pixels, but its camera has " +
                          std::to_string(frame.source.width) + " x " + std::to_string(frame.source.height));
     if (!frame.distortion.none())
-        image = scene::undistort_image(image, frame.source, frame.distortion,
-                                       scene::undistorted_camera(frame.source, frame.distortion));
+        image = scene::undistort_image(image, frame.source, frame.distortion, frame.pinhole);
     return frame.downscale == 1 ? image : downscale(image, frame.downscale);
 }
 
