@@ -37,11 +37,13 @@ struct Frame {
     std::string name;                     // as the dataset names it, e.g. "0001.jpg"
     std::filesystem::path image_path;     // may not exist: see image_exists
     bool image_exists = false;
+    int orientation = 1;                  // EXIF's, of the file: 1 unless the camera belongs to the turned picture
+    bool eight_bit = true;                // the file has no more than 256 levels
     Camera camera;                        // the pinhole camera that load_frame_image's picture has
     Camera source;                        // intrinsics of the file itself (differs where it is distorted or scaled)
     Distortion distortion;                // of the file
     Camera pinhole;                       // of the file's picture once it is undistorted, before it is downscaled
-    int downscale = 1;
+    int downscale = 1;                    // of the file's picture, which may be a smaller copy already
     int split = 0;                        // 0 by the rule of split_frames; 1 train, 2 test where the dataset says so
 };
 
@@ -68,12 +70,15 @@ struct DatasetOptions {
 /// transforms.json or transforms_train.json and transforms_test.json, or one of these files (src/io/transforms.h has the
 /// dialects). World coordinates and camera axes come out in the OpenCV convention; the world frame is the file's own.
 /// With need_images, frames without a file are left out and counted, and every other file's size is checked against the
-/// model: it is the model's, or the model's resized by one factor, which the intrinsics then follow. Throws InputError.
+/// model: it is the model's, or the model's resized by one factor, which the intrinsics then follow. Cameras belong to
+/// the pixels as they are stored, which is how COLMAP reads them; EXIF's orientation is followed only where it asks for a
+/// quarter turn and the turned picture has the model's shape while the stored one has not. With a downscale factor K, a
+/// picture that is in images_K (beside images) is taken from there as it is. Throws InputError.
 Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& options);
 
 /// The frame's picture as the pinhole `frame.camera` sees it: undistorted (bilinear; the focal lengths stay and the size
 /// changes so that no pixel is blank, src/scene/undistort.h) and downscaled as the frame says. 3 or 4 channels. Throws
-/// InputError.
+/// InputError, also where a value of the file is not finite.
 Image load_frame_image(const Frame& frame);
 
 /// Indices of train and test frames: a frame's own split where the dataset has one, else test where its index in

@@ -32,7 +32,9 @@ const ColmapLens* colmap_lens(std::string_view name);
 /// Collects a model. Ids are checked as they come; what is wrong goes to the Fail of the file being read.
 class ColmapBuilder {
   public:
-    explicit ColmapBuilder(std::filesystem::path images) : images_(std::move(images)) {}
+    explicit ColmapBuilder(std::filesystem::path images) : images_(std::move(images)) {
+        result_.folder = images_;
+    }
 
     void add_camera(uint32_t id, const ColmapLens& lens, uint64_t width, uint64_t height,
                     const std::vector<double>& parameters, const Fail& fail);

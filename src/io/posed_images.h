@@ -25,6 +25,7 @@ struct DroppedPoints {
 };
 
 struct PosedImages {
+    std::filesystem::path folder;    // images; smaller copies stand beside it, in images_2 and so on
     std::vector<PosedImage> images;  // in the file's order
     PointCloud points;
     DroppedPoints dropped;

@@ -236,6 +236,7 @@ PosedImages read_transforms(const std::filesystem::path& path, int split, bool w
     const auto frames = top.find("frames");
     if (frames == top.end() || !frames->is_array()) throw InputError(name + ": has no list \"frames\"");
     PosedImages result;
+    result.folder = path.parent_path() / "images";
     for (size_t i = 0; i < frames->size(); ++i) {
         const Entry entry(name, top, (*frames)[i], i);
         if (!(*frames)[i].is_object()) entry.fail("is no JSON object");

@@ -85,6 +85,27 @@ TEST(ImageFiles, GreyAndDeepFiles) {
     EXPECT_EQ(load_image(folder / "deep.png").pixels, (std::vector<float>{1 / 65535.f, 256 / 65535.f, 1}));
 }
 
+TEST(ImageFiles, Orientations) {
+    // The corners of a 3 x 2 picture, upright: 1 2 above, 3 4 below. What each orientation stores instead, by
+    // EXIF's table (tag 274): 1 as is, 2 mirrored, 3 turned by half, 4 upside down, 5 to 8 with rows for
+    // columns.
+    const int corners[8][4] = {{1, 2, 3, 4}, {2, 1, 4, 3}, {4, 3, 2, 1}, {3, 4, 1, 2},
+                               {1, 3, 2, 4}, {2, 4, 1, 3}, {4, 2, 3, 1}, {3, 1, 4, 2}};
+    for (int orientation = 1; orientation <= 8; ++orientation) {
+        const bool swapped = orientation >= 5;
+        Image stored(swapped ? 2 : 3, swapped ? 3 : 2, 3);
+        const auto corner = [](const Image& image, int i) {
+            return image.at(i % 2 == 0 ? 0 : image.width - 1, i < 2 ? 0 : image.height - 1);
+        };
+        for (int i = 0; i < 4; ++i)
+            *const_cast<float*>(corner(stored, i)) = float(corners[orientation - 1][i]);
+        const Image upright = oriented(stored, orientation);
+        ASSERT_EQ(upright.width, 3);
+        ASSERT_EQ(upright.height, 2);
+        for (int i = 0; i < 4; ++i) EXPECT_EQ(*corner(upright, i), i + 1) << orientation;
+    }
+}
+
 TEST(ImageFiles, RefusesWhatItCannotRead) {
     TempFolder folder;
     expect_error<InputError>([&] { load_image(folder / "none.png"); }, {"none.png", "no such file"});
