@@ -33,6 +33,15 @@ struct Distortion {
     bool none() const { return *this == Distortion{}; }
 };
 
+/// What masks are for. A mask is white where its picture counts: a file in masks/ (beside images/) that has the picture's
+/// name, with .png in place of its extension or after it; a frame's mask_path in transforms.json; or a picture's own alpha.
+enum class MaskUse {
+    automatic,  // ignore where the dataset has mask files, else cut
+    ignore,     // pixels under the mask do not count, in the loss and in PSNR and SSIM
+    cut,        // pixels under the mask are the background's colour
+    none        // neither masks nor alpha are looked at
+};
+
 struct Frame {
     std::string name;                     // as the dataset names it, e.g. "0001.jpg"
     std::filesystem::path image_path;     // may not exist: see image_exists
@@ -41,6 +50,8 @@ struct Frame {
     bool eight_bit = true;                // the file has no more than 256 levels
     Camera camera;                        // the pinhole camera that load_frame_image's picture has
     Camera source;                        // intrinsics of the file itself (differs where it is distorted or scaled)
+    std::filesystem::path mask_path;      // empty: none
+    MaskUse masks = MaskUse::cut;         // what alpha is for in load_frame_image's picture; never automatic
     Distortion distortion;                // of the file
     Camera pinhole;                       // of the file's picture once it is undistorted, before it is downscaled
     int downscale = 1;                    // of the file's picture, which may be a smaller copy already
@@ -63,6 +74,7 @@ struct Dataset {
 
 struct DatasetOptions {
     int downscale = 1;                    // >= 1
+    MaskUse masks = MaskUse::automatic;
     bool need_images = true;              // false: cameras alone; frames without a file are kept where the size is known
 };
 
@@ -77,9 +89,17 @@ struct DatasetOptions {
 Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& options);
 
 /// The frame's picture as the pinhole `frame.camera` sees it: undistorted (bilinear; the focal lengths stay and the size
-/// changes so that no pixel is blank, src/scene/undistort.h) and downscaled as the frame says. 3 or 4 channels. Throws
-/// InputError, also where a value of the file is not finite.
+/// changes so that no pixel is blank, src/scene/undistort.h) and downscaled as the frame says. 3 channels, or 4 where the frame
+/// has a mask or the file alpha: their product, for the use that frame.masks says. Throws InputError, also where a value of
+/// the file is not finite.
 Image load_frame_image(const Frame& frame);
+
+/// The same as a rendering is compared with it.
+struct Photograph {
+    Image picture;  // RGB, over the background where it is cut out
+    Image weights;  // one channel, how much a pixel counts; empty where each counts
+};
+Photograph load_photograph(const Frame& frame, const std::array<float, 3>& background);
 
 /// Indices of train and test frames: a frame's own split where the dataset has one, else test where its index in
 /// name order is a multiple of test_every (INRIA's and gsplat's rule); test_every 0: all train.

@@ -50,9 +50,13 @@ Image over_background(const Image& image, const std::array<float, 3>& background
 /// 10 log10(1 / MSE) over RGB, both pictures clamped to [0, 1]; +inf for equal pictures.
 /// Throws InputError when sizes differ.
 double psnr(const Image& a, const Image& b);
+/// Each pixel's share is its weight (one channel of the same size; empty: equal weights). NaN where no pixel counts.
+double psnr(const Image& a, const Image& b, const Image& weights);
 
 /// Mean SSIM over pixels and RGB: 11 x 11 Gaussian window, sigma 1.5, zero padded (Wang et al. 2004), both pictures
 /// clamped to [0, 1], computed in float64. Throws InputError when sizes differ.
 double ssim(const Image& a, const Image& b);
+/// Of a pulled onto b where it weighs less (w a + (1 - w) b), each pixel's share its weight.
+double ssim(const Image& a, const Image& b, const Image& weights);
 
 }  // namespace ewa

@@ -54,7 +54,8 @@ struct Evaluation {
     double seconds = 0;
 };
 
-/// Renders each frame and compares it with its photograph, both clamped to [0, 1].
+/// Renders each frame and compares it with its photograph, both clamped to [0, 1], over the pixels that count. A frame in
+/// which none does is left out.
 Evaluation evaluate(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians, const Dataset& dataset,
                     const std::vector<int>& frames, const RenderOptions& options);
 

@@ -41,6 +41,7 @@ void add_model_options(CLI::App& app, TrainArguments& arguments) {
     arguments.draw.random_allowed = true;
     add_draw_options(app, arguments.draw);
     add_downscale_option(app, arguments.downscale);
+    add_masks_option(app, arguments.masks);
     add_test_every_option(app, arguments.test_every);
 }
 

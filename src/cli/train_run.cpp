@@ -99,7 +99,8 @@ class TrainRun {
 };
 
 void TrainRun::load() {
-    dataset_ = load_dataset(arguments_.dataset, {.downscale = arguments_.downscale});
+    dataset_ =
+        load_dataset(arguments_.dataset, {.downscale = arguments_.downscale, .masks = arguments_.masks});
     split_ = split_frames(dataset_, arguments_.test_every);
     if (split_.train.empty())
         throw InputError(fmt::format("{}: of {} images ({} missing) none is left to train on",
@@ -258,7 +259,8 @@ int TrainRun::run() {
     summary.strategy = arguments_.strategy;
     for (const PlanLine& line :
          plan_lines(start_, options_.render,
-                    options_.strategy == Strategy::none ? Purpose::training : Purpose::densifying))
+                    options_.strategy == Strategy::none ? Purpose::training : Purpose::densifying,
+                    dataset_.frames.front().masks == MaskUse::ignore))
         report_.plan.push_back({line.what, line.why, line.bytes_saved});
     describe();
 
@@ -284,6 +286,7 @@ report::Json to_config(const TrainArguments& a) {
     json["sh-degree"] = a.draw.sh_degree;
     json["init"] = a.init;
     json["downscale"] = a.downscale;
+    json["masks"] = masks_text(a.masks);
     json["test-every"] = a.test_every;
     json["seed"] = a.seed;
     json["background"] = a.draw.background;

@@ -16,6 +16,7 @@ struct TrainArguments {
     uint32_t max_splats = TrainOptions{}.max_splats;
     std::string init = "sfm";  // sfm, random, or a splat file
     int downscale = 1, test_every = 8;
+    MaskUse masks = MaskUse::automatic;
     uint64_t seed = 0;
     DrawArguments draw;
     int eval_every = 0, save_every = 0;  // steps; 0: only at the end

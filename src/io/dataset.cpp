@@ -8,6 +8,7 @@
 #include "ewa/error.h"
 #include "io/colmap.h"
 #include "io/transforms.h"
+#include "scene/shape.h"
 #include "scene/undistort.h"
 
 namespace ewa {
@@ -30,18 +31,6 @@ std::string size_text(int width, int height) {
     return std::to_string(width) + " x " + std::to_string(height);
 }
 
-/// True where a picture of the new size is the old one resized by one factor, each side rounded to a whole
-/// pixel. A factor near 1 has to be exact: a picture a pixel off is another picture (cropped, or of another
-/// camera).
-bool same_shape(int old_width, int old_height, int width, int height) {
-    if (int64_t(width) * old_height == int64_t(height) * old_width) return true;
-    const double x = double(width) / old_width, y = double(height) / old_height;
-    if (x > 0.9 && x < 1.1) return false;
-    const double low = std::max((width - 1.0) / old_width, (height - 1.0) / old_height);
-    const double high = std::min((width + 1.0) / old_width, (height + 1.0) / old_height);
-    return low < high && x > 0 && y > 0;
-}
-
 /// The file of a frame: the model's, or its copy in images_K for a downscale factor K.
 struct Picture {
     fs::path path;
@@ -60,13 +49,38 @@ Picture find_picture(const io::PosedImage& image, const fs::path& folder, int do
     return {image.path, is_file(image.path), downscale};
 }
 
+/// The mask file of a picture, where there is one.
+fs::path find_mask(const io::PosedImage& image, const fs::path& folder) {
+    if (!image.mask.empty() && is_file(image.mask)) return image.mask;
+    const fs::path inside = image.path.lexically_relative(folder);
+    if (inside.empty() || *inside.begin() == "..") return {};
+    const fs::path masks = folder.parent_path() / "masks";
+    fs::path replaced = masks / inside, added = masks / inside;
+    replaced.replace_extension(".png");
+    added += ".png";
+    for (const fs::path& path : {added, replaced, masks / inside})
+        if (is_file(path)) return path;
+    return {};
+}
+
+/// Whether masks are for ignoring or for cutting out is one decision for a dataset.
+void settle_masks(Dataset& dataset, MaskUse wanted) {
+    const bool files = std::any_of(dataset.frames.begin(), dataset.frames.end(),
+                                   [](const Frame& frame) { return !frame.mask_path.empty(); });
+    if (wanted == MaskUse::automatic) wanted = files ? MaskUse::ignore : MaskUse::cut;
+    for (Frame& frame : dataset.frames) {
+        frame.masks = wanted;
+        if (wanted == MaskUse::none) frame.mask_path.clear();
+    }
+}
+
 /// The camera and the orientation of the file's own pixels.
 void fit_to_file(Frame& frame) {
     const ImageSize size = read_image_size(frame.image_path);
     Camera& camera = frame.source;
-    const bool stored = same_shape(camera.width, camera.height, size.width, size.height);
-    const bool turned =
-        !stored && size.orientation >= 5 && same_shape(camera.width, camera.height, size.height, size.width);
+    const bool stored = scene::same_shape(camera.width, camera.height, size.width, size.height);
+    const bool turned = !stored && size.orientation >= 5 &&
+                        scene::same_shape(camera.width, camera.height, size.height, size.width);
     const int width = turned ? size.height : size.width, height = turned ? size.width : size.height;
     frame.orientation = turned ? size.orientation : 1;
     frame.eight_bit = size.eight_bit;
@@ -213,8 +227,11 @@ Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& op
         const Picture picture = find_picture(image, model.folder, options.downscale);
         dataset.missing_images += !picture.exists;
         const bool usable = image.camera.width > 0 && (picture.exists || !options.need_images);
-        if (usable) dataset.frames.push_back(make_frame(image, picture, options, pinholes));
+        if (!usable) continue;
+        dataset.frames.push_back(make_frame(image, picture, options, pinholes));
+        dataset.frames.back().mask_path = find_mask(image, model.folder);
     }
+    settle_masks(dataset, options.masks);
     if (dataset.frames.empty())
         throw InputError(name + ": none of the " + std::to_string(model.images.size()) +
                          " images is there, the first being " +

@@ -244,6 +244,8 @@ PosedImages read_transforms(const std::filesystem::path& path, int split, bool w
         image.split = split;
         image.distortion = read_lens(entry);
         find_picture(entry, path.parent_path(), image);
+        if (const std::string mask = entry.text("mask_path"); !mask.empty())
+            image.mask = resolve(path.parent_path(), mask);
         read_pose(entry, image.camera);
         read_intrinsics(entry, image);
         result.images.push_back(std::move(image));

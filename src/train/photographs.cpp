@@ -11,6 +11,17 @@
 
 namespace ewa::train {
 
+namespace {
+
+bool transparent(const Image& image) {
+    bool found = false;
+    for (size_t i = 3; image.channels == 4 && i < image.pixels.size(); i += 4)
+        found = found || image.pixels[i] < 1;
+    return found;
+}
+
+}  // namespace
+
 Photographs::Photographs(gpu::Device& device, const passes::Shape& shape, const Dataset& dataset,
                          const std::vector<int>& frames) {
     const uint64_t align = std::max<uint64_t>(device.limits().uniform_alignment, 16);
@@ -24,6 +35,7 @@ Photographs::Photographs(gpu::Device& device, const passes::Shape& shape, const 
         const shared::CameraBlock block = pipeline::camera_block(frame.camera, shape);
         std::memcpy(&blocks[i * camera_stride_], &block, sizeof(block));
         photos_.push_back(pipeline::upload_photo(device, image));
+        masked_.push_back(frame.masks == MaskUse::ignore && transparent(image));
         sizes_.push_back({uint32_t(image.width), uint32_t(image.height)});
         max_width_ = std::max(max_width_, sizes_.back().width);
         max_height_ = std::max(max_height_, sizes_.back().height);

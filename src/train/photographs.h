@@ -1,5 +1,6 @@
 // The training photographs and their cameras on the device.
 #pragma once
+#include <algorithm>
 #include <vector>
 
 #include "ewa/dataset.h"
@@ -17,6 +18,9 @@ class Photographs {
 
     size_t count() const { return photos_.size(); }
     const gpu::Buffer& photo(size_t i) const { return photos_[i]; }
+    /// Whether the photograph's alpha says how much each pixel counts, and some count less.
+    bool masked(size_t i) const { return masked_[i]; }
+    bool any_masked() const { return std::find(masked_.begin(), masked_.end(), true) != masked_.end(); }
     pipeline::CameraUse camera(size_t i) const;
     uint32_t max_width() const { return max_width_; }
     uint32_t max_height() const { return max_height_; }
@@ -27,6 +31,7 @@ class Photographs {
     };
     std::vector<gpu::Buffer> photos_;
     std::vector<Size> sizes_;
+    std::vector<bool> masked_;
     gpu::Buffer cameras_;
     uint64_t camera_stride_ = 0;
     uint32_t max_width_ = 0, max_height_ = 0;

@@ -64,6 +64,7 @@ struct Trainer::State {
           model(upload_model(*device, start, 2, plan.statistics)),
           photographs(*device, kernels.shape(), dataset, frames),
           instance_room(first_capacity(start.size())) {
+        plan.masks = photographs.any_masked();
         report.splats = model.splats;
     }
 
@@ -86,11 +87,13 @@ struct Trainer::State {
             options.random_background ? random_background(step, options.seed) : options.render.background;
         plan.sh_degree = std::min(plan.stored_degree, schedule.degree(step));
         const shared::Counts counts = run_until_it_fits(
-            kernels, executor, frame, {model.splats, camera.width, camera.height, instance_room, true, false},
+            kernels, executor, frame,
+            {model.splats, camera.width, camera.height, instance_room, true, false, plan.masks},
             [&](gpu::Recording& recording) {
                 const Sorted sorted =
                     record_forward(recording, kernels, plan, model, frame, camera, background);
-                record_loss(recording, kernels, frame, camera, background, photographs.photo(index));
+                record_loss(recording, kernels, frame, camera, background, photographs.photo(index),
+                            photographs.masked(index));
                 record_backward(recording, kernels, plan, model, frame, camera, background, sorted,
                                 rates(step));
             });

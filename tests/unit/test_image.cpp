@@ -251,6 +251,30 @@ double brute_force_ssim(const Image& a, const Image& b) {
     return total / (a.width * a.height * 3);
 }
 
+TEST(Metrics, WeightsSayWhatCounts) {
+    Image a = noise(20, 16, 3, 11), weights(20, 16, 1);
+    const Image b = noise(20, 16, 3, 12);
+    EXPECT_TRUE(std::isnan(psnr(a, b, weights)));
+    for (float& weight : weights.pixels) weight = 1;
+    EXPECT_EQ(psnr(a, b, weights), psnr(a, b));
+    EXPECT_EQ(ssim(a, b, weights), ssim(a, b));
+    // By hand: two pixels, of which one counts by half.
+    const Image white(2, 1, 3);
+    Image other(2, 1, 3), shares(2, 1, 1);
+    other.pixels = {0.1f, 0.1f, 0.1f, 0.3f, 0.3f, 0.3f};
+    shares.pixels = {1, 0.5f};
+    EXPECT_NEAR(psnr(white, other, shares), -10 * std::log10((0.01 + 0.5 * 0.09) / 1.5), 1e-6);
+    // What stands under the mask does not matter.
+    for (int y = 0; y < 16; ++y)
+        for (int x = 0; x < 7; ++x) *weights.at(x, y) = 0;
+    const double db = psnr(a, b, weights), similarity = ssim(a, b, weights);
+    for (int y = 0; y < 16; ++y)
+        for (int x = 0; x < 7; ++x) a.at(x, y)[1] = 0.77f;
+    EXPECT_EQ(psnr(a, b, weights), db);
+    EXPECT_EQ(ssim(a, b, weights), similarity);
+    expect_error<InputError>([&] { psnr(a, b, shares); }, {"weights"});
+}
+
 TEST(Metrics, SsimAgainstBruteForce) {
     for (const auto& [width, height] : {std::pair(1, 1), {3, 20}, {11, 11}, {31, 27}}) {
         const Image a = noise(width, height, 3, 4, -0.1f, 1.1f), b = noise(width, height, 4, 5, -0.1f, 1.1f);

@@ -144,4 +144,92 @@ TEST(Photographs, DeepAndLinearFilesKeepTheirValues) {
                              {"a.exr", "column 3, row 2", "not finite"});
 }
 
+Image half_white(int width, int height) {
+    Image mask(width, height, 3);
+    for (int y = 0; y < height; ++y)
+        for (int x = width / 2; x < width; ++x)
+            for (int c = 0; c < 3; ++c) mask.at(x, y)[c] = 1;
+    return mask;
+}
+
+Dataset with_masks(const Capture& capture, MaskUse use, int downscale = 1) {
+    DatasetOptions options;
+    options.masks = use;
+    options.downscale = downscale;
+    return load_dataset(capture.folder.path(), options);
+}
+
+TEST(Masks, AreFoundByThePicturesName) {
+    for (const char* name : {"masks/a.png.png", "masks/a.png"}) {
+        const Capture capture;
+        EXPECT_EQ(capture.load().frames[0].masks, MaskUse::cut);
+        std::filesystem::create_directories(capture.folder / "masks");
+        save_image(capture.folder / name, half_white(8, 6));
+        const Dataset dataset = capture.load();
+        EXPECT_EQ(dataset.frames[0].mask_path, capture.folder / name);
+        EXPECT_EQ(dataset.frames[0].masks, MaskUse::ignore);
+        EXPECT_TRUE(dataset.frames[1].mask_path.empty());
+        EXPECT_EQ(dataset.frames[1].masks, MaskUse::ignore);
+
+        const auto [picture, weights] = load_photograph(dataset.frames[0], {1, 1, 1});
+        EXPECT_EQ(picture.pixels, ramp(8, 6).pixels);
+        ASSERT_EQ(weights.pixels.size(), 48u);
+        EXPECT_EQ(*weights.at(3, 2), 0);
+        EXPECT_EQ(*weights.at(4, 2), 1);
+        EXPECT_TRUE(load_photograph(dataset.frames[1], {}).weights.pixels.empty());
+
+        const Frame cut = with_masks(capture, MaskUse::cut).frames[0];
+        const auto over = load_photograph(cut, {0.25f, 0.5f, 1});
+        EXPECT_TRUE(over.weights.pixels.empty());
+        EXPECT_EQ(over.picture.at(0, 0)[1], 0.5f);
+        EXPECT_EQ(over.picture.at(5, 3)[1], ramp(8, 6).at(5, 3)[1]);
+
+        const Frame none = with_masks(capture, MaskUse::none).frames[0];
+        EXPECT_EQ(load_frame_image(none).channels, 3);
+    }
+}
+
+TEST(Masks, MayBeAlphaAndOfAnotherSize) {
+    const Capture capture;
+    Image picture = ramp(8, 6, 4);
+    for (int y = 0; y < 6; ++y)
+        for (int x = 0; x < 8; ++x) picture.at(x, y)[3] = y < 3 ? 1.0f : 0.0f;
+    save_image(capture.folder / "images/a.png", picture);
+    EXPECT_EQ(load_photograph(capture.load().frames[0], {1, 0, 0}).picture.at(2, 4)[0], 1);
+    const auto ignored = load_photograph(with_masks(capture, MaskUse::ignore).frames[0], {1, 0, 0});
+    EXPECT_EQ(*ignored.weights.at(2, 4), 0);
+    EXPECT_EQ(*ignored.weights.at(2, 2), 1);
+    EXPECT_EQ(ignored.picture.at(2, 4)[0], picture.at(2, 4)[0]);
+    EXPECT_EQ(load_frame_image(with_masks(capture, MaskUse::none).frames[0]).channels, 3);
+
+    // The mask of a picture twice as large; what counts is what both let through. It shrinks with the
+    // picture.
+    std::filesystem::create_directories(capture.folder / "masks");
+    save_image(capture.folder / "masks/a.png", half_white(16, 12));
+    const auto both = load_photograph(capture.load().frames[0], {});
+    EXPECT_EQ(*both.weights.at(3, 2), 0);
+    EXPECT_EQ(*both.weights.at(4, 2), 1);
+    EXPECT_EQ(*both.weights.at(4, 3), 0);
+    const auto small = load_photograph(with_masks(capture, MaskUse::automatic, 2).frames[0], {});
+    ASSERT_EQ(small.weights.width, 4);
+    EXPECT_EQ(*small.weights.at(1, 0), 0);
+    EXPECT_EQ(*small.weights.at(2, 0), 1);
+    EXPECT_EQ(*small.weights.at(2, 1), 0.5f);
+    save_image(capture.folder / "masks/a.png", half_white(8, 8));
+    expect_error<InputError>([&] { load_frame_image(capture.load().frames[0]); },
+                             {"masks/a.png", "8 x 8", "8 x 6"});
+}
+
+TEST(Masks, MayBeNamedByTheModel) {
+    TempFolder folder;
+    folder.write("transforms.json", R"({"fl_x": 10, "w": 8, "h": 6, "frames": [{"file_path": "shots/a.png",
+        "mask_path": "cover/a.png", "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]})");
+    for (const char* name : {"shots", "cover"}) std::filesystem::create_directories(folder / name);
+    save_image(folder / "shots/a.png", ramp(8, 6));
+    save_image(folder / "cover/a.png", half_white(8, 6));
+    const Frame frame = load_dataset(folder.path(), {}).frames.at(0);
+    EXPECT_EQ(frame.mask_path, folder / "cover/a.png");
+    EXPECT_EQ(*load_photograph(frame, {}).weights.at(0, 0), 0);
+}
+
 }  // namespace
