@@ -30,8 +30,10 @@ void add_model_options(CLI::App& app, TrainArguments& arguments) {
         ->check(in_range(1u, 1000000000u))
         ->type_name("N")
         ->capture_default_str();
-    app.add_option("--init", arguments.init,
-                   "sfm (the dataset's points), random, or a splat file to go on from")
+    app.add_option(
+           "--init", arguments.init,
+           "sfm (the dataset's points; random where it has none), random (where the cameras look), or a "
+           "splat file to go on from")
         ->type_name("sfm|random|FILE")
         ->capture_default_str();
     app.add_option("--seed", arguments.seed, "Same seed, same device: same bytes")

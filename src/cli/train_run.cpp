@@ -47,14 +47,12 @@ Gaussians start_splats(const TrainArguments& arguments, const Dataset& dataset,
                 fmt::format("{}: a coordinate is not finite ({} such points in all); remove them, or start "
                             "from --init random",
                             dataset.first_dropped_point, dataset.dropped_points));
-        if (dataset.points.positions.empty())
-            throw InputError(dataset.root.string() +
-                             " has no points to start from; --init random needs none");
-        start = gaussians_from_points(dataset.points, degree);
-    } else if (arguments.init == "random") {
+        if (!dataset.points.positions.empty()) start = gaussians_from_points(dataset.points, degree);
+    }
+    if (arguments.init == "random" || (arguments.init == "sfm" && start.size() == 0)) {
         const uint32_t count = std::min(kRandomSplats, arguments.max_splats);
         start = train::random_gaussians(dataset, frames, static_cast<int>(count), arguments.seed, degree);
-    } else {
+    } else if (arguments.init != "sfm") {
         start = train::with_sh_degree(load_splats(arguments.init), degree);
     }
     if (start.size() > arguments.max_splats)
@@ -123,6 +121,8 @@ void TrainRun::load() {
         report_.settings.emplace_back(name, value.is_string() ? value.get<std::string>() : value.dump());
 
     report_.title = dataset_name(arguments_.dataset);
+    if (arguments_.init == "sfm" && dataset_.points.positions.empty())
+        report_.remarks.push_back("there are no points: random splats where the cameras look are the start");
     if (dataset_.missing_images > 0)
         report_.remarks.push_back(fmt::format("{} images are missing and left out", dataset_.missing_images));
     if (dataset_.dropped_points > 0)
