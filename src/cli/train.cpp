@@ -40,6 +40,12 @@ void add_model_options(CLI::App& app, TrainArguments& arguments) {
         ->check(without_sign())
         ->type_name("S")
         ->capture_default_str();
+    app.add_option("--image-cache", arguments.image_cache,
+                   "MiB of decoded photographs held on the device; the others are read again each time")
+        ->check(without_sign())
+        ->check(in_range(uint64_t(0), uint64_t(1) << 40))
+        ->type_name("MiB")
+        ->capture_default_str();
     arguments.draw.random_allowed = true;
     add_draw_options(app, arguments.draw);
     add_downscale_option(app, arguments.downscale);

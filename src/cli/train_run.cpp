@@ -32,6 +32,7 @@ TrainOptions train_options(const TrainArguments& arguments) {
     options.max_splats = arguments.max_splats;
     options.sh_degree = arguments.draw.sh_degree;
     options.seed = arguments.seed;
+    options.image_cache_bytes = arguments.image_cache << 20;
     options.random_background = arguments.draw.random_background();
     options.render = arguments.draw.options();
     return options;
@@ -267,6 +268,9 @@ int TrainRun::run() {
     watch_for_interrupt();
     Trainer trainer(device_, dataset_, split_.train, start_, options_);
     start_ = {};
+    if (trainer.photographs_on_disk() > 0)
+        say(fmt::format("{} photographs do not fit in --image-cache {} and are read again for each step",
+                        trainer.photographs_on_disk(), arguments_.image_cache));
     last_.splats = trainer.splats();
     {
         Progress progress("trained", arguments_.steps, "steps", arguments_.quiet);
@@ -289,6 +293,7 @@ report::Json to_config(const TrainArguments& a) {
     json["masks"] = masks_text(a.masks);
     json["test-every"] = a.test_every;
     json["seed"] = a.seed;
+    json["image-cache"] = a.image_cache;
     json["background"] = a.draw.background;
     json["kernel"] = a.draw.antialias ? "antialias" : a.draw.kernel;
     json["eval-every"] = a.eval_every;

@@ -238,6 +238,16 @@ TEST(Photo, EightBitAndFloatPhotographsUnpackTheSame) {
             }
 }
 
+TEST(Photo, MayBeRoundedToEightBits) {
+    Image picture(2, 1, 3);
+    picture.pixels = {-1, 0.1234567f, 0.5f, 1, 2, 0.999f};
+    const gpu::Buffer photo = pipeline::upload_photo(*device(), picture, true);
+    EXPECT_EQ(int(photo.texel()), int(gpu::Texel::rgba8));
+    EXPECT_LE(pipeline::photo_bytes(2, 1, true), photo.bytes());
+    EXPECT_EQ(photo.download<uint8_t>(8), (std::vector<uint8_t>{0, 31, 128, 255, 255, 255, 255, 255}));
+    EXPECT_EQ(int(pipeline::upload_photo(*device(), picture).texel()), int(gpu::Texel::rgba32f));
+}
+
 TEST(Reduce, AddsUpInAFixedOrder) {
     Rig& r = rig();
     for (const uint32_t items : {1u, 7u, 513u, 20000u}) {

@@ -221,6 +221,41 @@ TEST(Trainer, LearnsNothingFromWhatIsMasked) {
     EXPECT_GT(masked.psnr, evaluate(device(), with, spoilt.unmasked, {0, 3}, {}).psnr + 3);
 }
 
+TEST(Trainer, PhotographsOnDiskChangeNoResult) {
+    const Spoilt spoilt;
+    const Gaussians start = shaken_start(spoilt.data, 0.05, 11, 0);
+    const uint64_t photo = 48 * 36 * 4;
+    Gaussians held;
+    for (const auto& [bytes, on_disk] :
+         {std::pair<uint64_t, size_t>{8 * photo, 0}, {8 * photo - 1, 1}, {3 * photo, 5}, {0, 8}}) {
+        TrainOptions options = quick(20);
+        options.image_cache_bytes = bytes;
+        Trainer trainer(device(), spoilt.masked, all_frames(spoilt.masked), start, options);
+        EXPECT_EQ(trainer.photographs_on_disk(), on_disk);
+        for (int step = 0; step < 20; ++step) trainer.step();
+        const Gaussians learnt = trainer.gaussians();
+        if (on_disk == 0) held = learnt;
+        EXPECT_EQ(learnt.means, held.means) << on_disk;
+        EXPECT_EQ(learnt.opacity_logits, held.opacity_logits) << on_disk;
+        EXPECT_EQ(learnt.sh, held.sh) << on_disk;
+    }
+}
+
+TEST(Trainer, SaysWhichPhotographVanished) {
+    Synthetic capture;
+    make_synthetic(capture, 10, 4, 24, 18, 7);
+    TrainOptions options = quick(20);
+    options.image_cache_bytes = 0;
+    Trainer trainer(device(), capture.dataset, all_frames(capture.dataset), shaken_start(capture, 0, 1, 0),
+                    options);
+    for (const Frame& frame : capture.dataset.frames) std::filesystem::remove(frame.image_path);
+    expect_error<InputError>(
+        [&] {
+            for (int step = 0; step < 4; ++step) trainer.step();
+        },
+        {"view_10"});
+}
+
 TEST(Trainer, TakesPhotographsOfSeveralSizes) {
     Synthetic mixed;
     make_synthetic(mixed, 40, 8, 48, 36, 7);
