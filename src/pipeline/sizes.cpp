@@ -89,8 +89,8 @@ uint64_t Sizes::total() const {
     // depth keys 2, order 2, tile counts, prefix, and in training the first instances
     const uint64_t per_splat = records + splat_words * (gradients ? 7 : 6);
     const uint64_t sorting = scan_totals + 2 * counters + digit_totals;
-    // keys 2, values 2, splats
-    const uint64_t per_instance = 5 * instance_words + slots;
+    // keys 2, splats 2, and in training their places 2
+    const uint64_t per_instance = instance_words * (gradients ? 6 : 4) + slots;
     return per_splat + sorting + per_instance + tile_starts + planes + target + masked + moments +
            2 * derivatives + image_gradient + partial_sums + reduced;
 }
