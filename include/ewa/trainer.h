@@ -81,7 +81,7 @@ class Trainer {
     /// text says how much was needed).
     StepReport step();
 
-    Gaussians gaussians() const;         // read back from the device
+    Gaussians gaussians() const;         // read back from the device; in the trainer's own order, along a curve through space
     uint32_t splats() const;
     int steps_done() const;
     size_t photographs_on_disk() const;  // that the cache has no room for
