@@ -131,6 +131,12 @@ struct UnpackPush {
     uint plane_floats;
 };
 
+struct MaskPush {
+    uint size[2];
+    uint stride;
+    uint plane_floats;
+};
+
 struct LossPush {
     uint size[2];
     uint stride;
