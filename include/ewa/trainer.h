@@ -1,6 +1,7 @@
 // From photographs to splats.
 #pragma once
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -76,6 +77,17 @@ class Trainer {
 
     /// One optimisation step, and densification where the schedule has it. Throws RunError when memory runs out (the
     /// text says how much was needed).
+/// What the steps to come depend on, besides the dataset, its training frames and the options.
+struct TrainerArray {
+    std::string name;                    // at most 15 bytes
+    std::vector<std::byte> bytes;
+};
+struct TrainerState {
+    StepReport report;
+    int sh_degree = 0;                   // stored
+    std::vector<TrainerArray> arrays;    // params, moments1, moments2 and what the strategy gathers, as on the device
+};
+
     StepReport step();
 
     Gaussians gaussians() const;         // read back from the device
@@ -87,5 +99,11 @@ class Trainer {
     struct State;
     std::unique_ptr<State> state_;
 };
+    /// For a later run to go on from: a trainer of the same dataset, frames, options and device that restores the
+    /// state takes the same steps, to the byte, as this one. restore throws InputError where the state is not that
+    /// of such a trainer.
+    TrainerState state() const;
+    void restore(const TrainerState& state);
+
 
 }  // namespace ewa

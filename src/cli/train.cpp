@@ -61,9 +61,10 @@ Action add_train(CLI::App& app, const std::string& command_line) {
     arguments.command_line = command_line;
     app.add_option("DATASET", arguments.dataset, "Photographs with cameras: COLMAP folder or transforms.json")
         ->type_name("");
-    app.add_option("-o,--output", arguments.output,
-                   "Folder for splats.ply, summary.json, metrics.jsonl, report.html and config.json "
-                   "[out/<name of the dataset>]")
+    app.add_option(
+           "-o,--output", arguments.output,
+           "Folder for splats.ply, summary.json, metrics.jsonl, report.html, config.json and checkpoint.ewa "
+           "[out/<name of the dataset>]")
         ->type_name("DIR");
     add_model_options(app, arguments);
     app.add_option("--eval-every", arguments.eval_every,
@@ -71,10 +72,14 @@ Action add_train(CLI::App& app, const std::string& command_line) {
         ->check(in_range(0, kMaxSteps))
         ->type_name("N")
         ->capture_default_str();
-    app.add_option("--save-every", arguments.save_every, "Save splats.ply every N steps; 0: only at the end")
+    app.add_option(
+           "--save-every", arguments.save_every,
+           "Save splats.ply and checkpoint.ewa every N steps; 0: the checkpoint every 30 seconds or more")
         ->check(in_range(0, kMaxSteps))
         ->type_name("N")
         ->capture_default_str();
+    app.add_flag("--resume", arguments.resume,
+                 "Go on from DIR's checkpoint.ewa, or start where there is none");
     app.add_option("--config", state->config,
                    "JSON with the names of these options, such as a run's config.json; the command line wins")
         ->type_name("FILE");

@@ -18,7 +18,9 @@ struct TrainArguments {
     int downscale = 1, test_every = 8;
     uint64_t seed = 0;
     DrawArguments draw;
-    int eval_every = 0, save_every = 0;  // steps; 0: only at the end
+    int eval_every = 0;  // steps; 0: only at the end
+    int save_every = 0;  // steps; 0: by the clock
+    bool resume = false;
     DeviceOptions device;
     bool quiet = false, verbose = false;
     std::string command_line;

@@ -165,6 +165,61 @@ std::vector<PassTime> Trainer::pass_times() const {
             auto& values = samples[timing.name];
             if (values.empty()) result.push_back({timing.name, 0});
             values.push_back(timing.milliseconds);
+namespace {
+
+struct NamedBuffer {
+    const char* name;
+    gpu::Buffer Model::*buffer;
+    uint64_t bytes;
+};
+
+/// What a model of so many splats holds. A strategy without statistics has none of them.
+std::vector<NamedBuffer> buffers_of(uint32_t splats, int sh_degree, bool statistics) {
+    const uint64_t bytes = parameter_bytes(splats, sh_degree);
+    std::vector<NamedBuffer> buffers{{"params", &Model::params, bytes},
+                                     {"moments1", &Model::moments1, bytes},
+                                     {"moments2", &Model::moments2, bytes}};
+    if (statistics) buffers.push_back({"statistics", &Model::statistics, 8ull * splats});
+    return buffers;
+}
+
+}  // namespace
+
+TrainerState Trainer::state() const {
+    const State& s = *state_;
+    TrainerState state{s.report, s.model.sh_degree, {}};
+    for (const NamedBuffer& named : buffers_of(s.model.capacity, s.model.sh_degree, s.plan.statistics))
+        state.arrays.push_back({named.name, (s.model.*named.buffer).download<std::byte>(named.bytes)});
+    return state;
+}
+
+void Trainer::restore(const TrainerState& state) {
+    State& s = *state_;
+    const uint32_t splats = state.report.splats;
+    if (state.sh_degree != s.model.sh_degree || state.report.step > s.options.steps ||
+        splats > s.options.max_splats || splats == 0)
+        throw InputError("the state to go on from is of another SH degree, of more steps or of more splats");
+    const auto buffers = buffers_of(splats, state.sh_degree, s.plan.statistics);
+    if (state.arrays.size() != buffers.size())
+        throw InputError("the state to go on from is of another strategy");
+    for (size_t i = 0; i < buffers.size(); ++i)
+        if (state.arrays[i].name != buffers[i].name || state.arrays[i].bytes.size() != buffers[i].bytes)
+            throw InputError("the state to go on from lacks " + std::string(buffers[i].name) + " of " +
+                             std::to_string(splats) + " splats");
+    s.model = {};  // its memory first
+    s.model.splats = s.model.capacity = splats;
+    s.model.sh_degree = state.sh_degree;
+    for (size_t i = 0; i < buffers.size(); ++i) {
+        const bool texels = buffers[i].buffer != &Model::statistics;
+        gpu::Buffer& buffer = s.model.*buffers[i].buffer;
+        buffer = gpu::Buffer(*s.device, buffers[i].name, buffers[i].bytes,
+                             texels ? gpu::Texel::rgba32f : gpu::Texel::none);
+        buffer.upload(std::span<const std::byte>(state.arrays[i].bytes));
+    }
+    s.report = state.report;
+    s.instance_room = std::max(s.instance_room, first_capacity(splats));
+}
+
         }
     for (PassTime& time : result) {
         auto& values = samples[time.pass];
