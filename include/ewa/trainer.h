@@ -18,7 +18,7 @@
 
 namespace ewa {
 
-enum class Strategy { none, adc };
+enum class Strategy { none, adc, mcmc };
 
 struct TrainOptions {
     int steps = 30000;
@@ -43,6 +43,15 @@ struct TrainOptions {
     double split_scale = 0.01;           // larger than this share of the scene extent: split, else clone
     double prune_opacity = 0.005;
     double prune_scale = 0.1;            // share of the scene extent, once opacity has been reset
+
+    // 3DGS-MCMC (Kheradmand et al. 2024, with the values of its code and gsplat's). It shares refine_start and
+    // refine_every.
+    int relocate_stop = 25000;
+    double growth = 1.05;                // of the number of splats a refinement, up to max_splats
+    double dead_opacity = 0.005;
+    double noise_rate = 5e5;             // times the learning rate of the means
+    double opacity_weight = 0.01;        // of the mean opacity in the loss
+    double scale_weight = 0.01;          // of the mean scale in the loss, in units of the scene extent
 };
 
 struct EvalFrame {
@@ -68,15 +77,6 @@ struct StepReport {
     uint32_t skipped_nonfinite = 0;      // splats skipped in the last step
 };
 
-/// Owns the model on the device and the photographs of the training frames. One step is one submission.
-class Trainer {
-  public:
-    Trainer(std::shared_ptr<gpu::Device> device, const Dataset& dataset, const std::vector<int>& train_frames,
-            const Gaussians& start, const TrainOptions& options);
-    ~Trainer();
-
-    /// One optimisation step, and densification where the schedule has it. Throws RunError when memory runs out (the
-    /// text says how much was needed).
 /// What the steps to come depend on, besides the dataset, its training frames and the options.
 struct TrainerArray {
     std::string name;                    // at most 15 bytes
@@ -88,7 +88,22 @@ struct TrainerState {
     std::vector<TrainerArray> arrays;    // params, moments1, moments2 and what the strategy gathers, as on the device
 };
 
+/// Owns the model on the device and the photographs of the training frames. One step is one submission.
+class Trainer {
+  public:
+    Trainer(std::shared_ptr<gpu::Device> device, const Dataset& dataset, const std::vector<int>& train_frames,
+            const Gaussians& start, const TrainOptions& options);
+    ~Trainer();
+
+    /// One optimisation step, and densification where the schedule has it. Throws RunError when memory runs out (the
+    /// text says how much was needed).
     StepReport step();
+
+    /// For a later run to go on from: a trainer of the same dataset, frames, options and device that restores the
+    /// state takes the same steps, to the byte, as this one. restore throws InputError where the state is not that
+    /// of such a trainer.
+    TrainerState state() const;
+    void restore(const TrainerState& state);
 
     Gaussians gaussians() const;         // read back from the device
     uint32_t splats() const;
@@ -99,11 +114,5 @@ struct TrainerState {
     struct State;
     std::unique_ptr<State> state_;
 };
-    /// For a later run to go on from: a trainer of the same dataset, frames, options and device that restores the
-    /// state takes the same steps, to the byte, as this one. restore throws InputError where the state is not that
-    /// of such a trainer.
-    TrainerState state() const;
-    void restore(const TrainerState& state);
-
 
 }  // namespace ewa

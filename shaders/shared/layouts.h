@@ -145,6 +145,8 @@ struct UpdatePush {
     float mean_rate, opacity_rate, quaternion_rate, scale_rate, sh0_rate, sh_rest_rate;
     float bias1, bias2;            // 1 / (1 - beta^step)
     float half_size[2];            // W / 2, H / 2: px to normalised device coordinates
+    float opacity_pull;            // regularisers: d(loss)/d(opacity), d(loss)/d(scale) of every splat
+    float scale_pull;
 };
 
 struct DensifyPush {
@@ -162,6 +164,26 @@ struct DensifyPush {
 struct ResetPush {
     uint splats, capacity;
     float logit;
+};
+
+struct McmcPush {
+    uint splats, capacity;         // of the old buffers
+    uint new_splats;               // and the capacity of the new ones
+    uint scan_block;
+    uint dead, draws, total;       // splats to relocate; sources to draw; sum of the weights
+    float weight_scale;            // weight of an opacity of 1
+    float dead_logit;              // at or under it a splat is dead
+    float least_opacity;           // of a splat that shares its source's
+    uint seed[2];
+    uint step;
+};
+
+struct PerturbPush {
+    uint splats, capacity;
+    uint instance_capacity;
+    float amplitude;
+    uint seed[2];
+    uint step;
 };
 
 EWA_END_SHARED

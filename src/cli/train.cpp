@@ -22,7 +22,9 @@ void add_model_options(CLI::App& app, TrainArguments& arguments) {
         ->type_name("N")
         ->capture_default_str();
     app.add_option("--strategy", arguments.strategy,
-                   "adc grows and prunes splats (3DGS); none keeps their number")
+                   "adc grows and prunes splats (3DGS); mcmc relocates dead ones and grows to the cap "
+                   "(3DGS-MCMC); none "
+                   "keeps their number")
         ->check(CLI::IsMember({"adc", "mcmc", "none"}))
         ->capture_default_str();
     app.add_option("--max-splats", arguments.max_splats, "Never more splats than this")
@@ -48,8 +50,6 @@ int run(CLI::App& app, CommandState& state) {
     TrainArguments& arguments = state.arguments;
     if (!state.config.empty()) apply_config(app, state.config);
     if (arguments.dataset.empty()) throw InputError("DATASET is required (see ewa train --help)");
-    if (arguments.strategy == "mcmc")
-        throw InputError("--strategy mcmc is not available in this version; use adc");
     return run_train(arguments);
 }
 

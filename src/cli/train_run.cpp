@@ -31,7 +31,9 @@ constexpr size_t kTrainViewsEvaluated = 40;
 TrainOptions train_options(const TrainArguments& arguments) {
     TrainOptions options;
     options.steps = arguments.steps;
-    options.strategy = arguments.strategy == "none" ? Strategy::none : Strategy::adc;
+    options.strategy = arguments.strategy == "none"   ? Strategy::none
+                       : arguments.strategy == "mcmc" ? Strategy::mcmc
+                                                      : Strategy::adc;
     options.max_splats = arguments.max_splats;
     options.sh_degree = arguments.draw.sh_degree;
     options.seed = arguments.seed;
@@ -82,10 +84,10 @@ class TrainRun {
     }
     void load();
     void describe() const;
-    void train(Trainer& trainer, Progress& progress);
-    void log(const StepReport& report, const std::optional<Evaluation>& evaluation);
     void resume(Trainer& trainer);
     void save_checkpoint(const Trainer& trainer);
+    void train(Trainer& trainer, Progress& progress);
+    void log(const StepReport& report, const std::optional<Evaluation>& evaluation);
     Evaluation evaluate_frames(const Gaussians& gaussians, const std::vector<int>& frames) const;
     void save(const Gaussians& gaussians) const;
     int finish(const Trainer& trainer);
@@ -120,16 +122,16 @@ void TrainRun::load() {
 
     folder_ =
         arguments_.output.empty() ? fs::path("out") / dataset_name(arguments_.dataset) : arguments_.output;
-    make_folder(folder_);
-    // The first file written tells before the training whether the folder takes any.
     checkpoint_ = folder_ / "checkpoint.ewa";
-    const report::Json config = to_config(arguments_);
+    make_folder(folder_);
     core::remove_abandoned_files(folder_);
     settings_ = checkpoint_settings(arguments_, train::dataset_fingerprint(dataset_, split_));
     if (arguments_.resume && fs::exists(checkpoint_)) {
         earlier_ = train::read_checkpoint(checkpoint_);
         check_resumable(checkpoint_, earlier_->settings, settings_);
     }
+    // The first file written tells before the training whether the folder takes any.
+    const report::Json config = to_config(arguments_);
     write_json(folder_ / "config.json", config);
     // An earlier run's figures must not stand beside this run's log if it fails.
     std::error_code absent;
@@ -184,8 +186,6 @@ void TrainRun::save(const Gaussians& gaussians) const {
                              options_.render.kernel == Kernel::antialias ? "mip" : "default")});
 }
 
-void TrainRun::train(Trainer& trainer, Progress& progress) {
-    const int report_every = std::max(1, arguments_.steps / 100);
 void TrainRun::resume(Trainer& trainer) {
     settings_["device"] = report_.summary.device;
     if (earlier_) {
@@ -212,6 +212,8 @@ void TrainRun::save_checkpoint(const Trainer& trainer) {
     pace_.saved(std::chrono::duration<double>(Clock::now() - start).count());
 }
 
+void TrainRun::train(Trainer& trainer, Progress& progress) {
+    const int report_every = std::max(1, arguments_.steps / 100);
     auto at = [](int step, int every) { return every > 0 && step % every == 0; };
     while (trainer.steps_done() < arguments_.steps && !interrupted()) {
         last_ = trainer.step();
@@ -227,18 +229,18 @@ void TrainRun::save_checkpoint(const Trainer& trainer) {
                                       evaluation->ssim));
         }
         if (evaluation || step == 1 || at(step, report_every)) log(last_, evaluation);
+        if (pace_.due(step)) save_checkpoint(trainer);
         if (at(step, arguments_.save_every)) save(trainer.gaussians());
     }
-        if (pace_.due(step)) save_checkpoint(trainer);
 }
 
 int TrainRun::finish(const Trainer& trainer) {
     const bool cut_short = interrupted();
     const Gaussians gaussians = trainer.gaussians();
     save(gaussians);
+    save_checkpoint(trainer);  // a kill from here on costs no training
 
     report::Summary& summary = report_.summary;
-    save_checkpoint(trainer);  // a kill from here on costs no training
     std::optional<Evaluation> test;
     if (!cut_short) {
         say("evaluating");
@@ -311,9 +313,9 @@ int TrainRun::run() {
     Trainer trainer(device_, dataset_, split_.train, start_, options_);
     start_ = {};
     last_.splats = trainer.splats();
+    resume(trainer);
     {
         Progress progress("trained", arguments_.steps, "steps", arguments_.quiet);
-    resume(trainer);
         train(trainer, progress);
     }
     return finish(trainer);

@@ -14,6 +14,7 @@
 #include "pipeline/backward.h"
 #include "pipeline/capacity.h"
 #include "pipeline/densify.h"
+#include "pipeline/mcmc.h"
 #include "train/photographs.h"
 #include "train/schedule.h"
 
@@ -64,6 +65,7 @@ struct Trainer::State {
           model(upload_model(*device, start, 2, plan.statistics)),
           photographs(*device, kernels.shape(), dataset, frames),
           instance_room(first_capacity(start.size())) {
+        plan.regularised = o.strategy == Strategy::mcmc;
         report.splats = model.splats;
     }
 
@@ -76,6 +78,10 @@ struct Trainer::State {
         r.sh0 = float(options.sh0_rate);
         r.sh_rest = float(options.sh_rest_rate);
         r.step = uint32_t(step);
+        if (plan.regularised) {
+            r.opacity_pull = float(options.opacity_weight / model.splats);
+            r.scale_pull = float(options.scale_weight / (3.0 * model.splats * extent));
+        }
         return r;
     }
 
@@ -93,6 +99,12 @@ struct Trainer::State {
                 record_loss(recording, kernels, frame, camera, background, photographs.photo(index));
                 record_backward(recording, kernels, plan, model, frame, camera, background, sorted,
                                 rates(step));
+                // Sigma is a square of lengths: over the extent it is a length again, as in a scene of unit
+                // extent.
+                if (options.strategy == Strategy::mcmc)
+                    record_noise(recording, kernels, model, frame,
+                                 float(options.noise_rate * schedule.mean_rate(step, 1) / extent),
+                                 options.seed, uint32_t(step));
             });
         instance_room = frame.instance_capacity;
         report.loss = loss_of(counts);
@@ -103,7 +115,13 @@ struct Trainer::State {
     }
 
     void follow_up(int step) {
-        if (options.strategy != Strategy::adc) return;
+        if (options.strategy == Strategy::adc) control_density(step);
+        if (options.strategy != Strategy::mcmc || !schedule.relocates(step)) return;
+        refine_mcmc(kernels, executor, model, frame,
+                    {options.dead_opacity, options.growth, options.max_splats, options.seed, uint32_t(step)});
+    }
+
+    void control_density(int step) {
         if (schedule.densifies(step)) {
             DensifyRules rules;
             rules.grow_gradient = float(options.grow_gradient);
@@ -147,24 +165,6 @@ StepReport Trainer::step() {
     return s.report;
 }
 
-Gaussians Trainer::gaussians() const {
-    return download_model(state_->model, state_->model.params);
-}
-uint32_t Trainer::splats() const {
-    return state_->model.splats;
-}
-int Trainer::steps_done() const {
-    return state_->report.step;
-}
-
-std::vector<PassTime> Trainer::pass_times() const {
-    std::vector<PassTime> result;
-    std::map<std::string, std::vector<double>> samples;
-    for (const auto& step : state_->timings)
-        for (const gpu::Timing& timing : step) {
-            auto& values = samples[timing.name];
-            if (values.empty()) result.push_back({timing.name, 0});
-            values.push_back(timing.milliseconds);
 namespace {
 
 struct NamedBuffer {
@@ -220,6 +220,24 @@ void Trainer::restore(const TrainerState& state) {
     s.instance_room = std::max(s.instance_room, first_capacity(splats));
 }
 
+Gaussians Trainer::gaussians() const {
+    return download_model(state_->model, state_->model.params);
+}
+uint32_t Trainer::splats() const {
+    return state_->model.splats;
+}
+int Trainer::steps_done() const {
+    return state_->report.step;
+}
+
+std::vector<PassTime> Trainer::pass_times() const {
+    std::vector<PassTime> result;
+    std::map<std::string, std::vector<double>> samples;
+    for (const auto& step : state_->timings)
+        for (const gpu::Timing& timing : step) {
+            auto& values = samples[timing.name];
+            if (values.empty()) result.push_back({timing.name, 0});
+            values.push_back(timing.milliseconds);
         }
     for (PassTime& time : result) {
         auto& values = samples[time.pass];

@@ -66,7 +66,7 @@ TEST_P(Resume, AfterTenKillsEndsWithTheSameBytes) {
     EXPECT_EQ(summary["test_psnr"], read_json(folder / "whole/summary.json")["test_psnr"]);
 }
 
-INSTANTIATE_TEST_SUITE_P(Strategies, Resume, testing::Values("adc", "none"));
+INSTANTIATE_TEST_SUITE_P(Strategies, Resume, testing::Values("adc", "mcmc"));
 
 TEST_F(ResumeEdges, AfterCtrlCGoesOn) {
     Circumstances interrupt;

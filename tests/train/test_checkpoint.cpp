@@ -138,7 +138,7 @@ TEST_P(RestoredTrainer, GoesOnAsIfNothingHadHappened) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Strategies, RestoredTrainer,
-                         testing::Values(Strategy::none, Strategy::adc));
+                         testing::Values(Strategy::none, Strategy::adc, Strategy::mcmc));
 
 TEST(TrainerRestore, RefusesAnotherTrainersState) {
     TrainOptions options;
