@@ -105,7 +105,7 @@ class Trainer {
     TrainerState state() const;
     void restore(const TrainerState& state);
 
-    Gaussians gaussians() const;         // read back from the device
+    Gaussians gaussians() const;         // read back from the device; in the trainer's own order, along a curve through space
     uint32_t splats() const;
     int steps_done() const;
     std::vector<PassTime> pass_times() const;  // medians over the last steps, in recording order

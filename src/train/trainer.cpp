@@ -10,6 +10,7 @@
 
 #include "core/random.h"
 #include "ewa/error.h"
+#include "ewa/splat_edit.h"
 #include "gpu/executor.h"
 #include "pipeline/backward.h"
 #include "pipeline/capacity.h"
@@ -34,6 +35,13 @@ double logit(double p) {
 std::array<float, 3> random_background(int step, uint64_t seed) {
     const auto u = core::uniform4({uint32_t(step), 0x62636b67u, uint32_t(seed), uint32_t(seed >> 32)});
     return {float(u[0]), float(u[1]), float(u[2])};
+}
+
+/// Splats that are neighbours in space become neighbours in memory: what a tile gathers stands together. Later
+/// generations keep it so, since children stand beside their parent.
+Gaussians along_curve(Gaussians start) {
+    select_splats(start, morton_order(start));
+    return start;
 }
 
 }  // namespace
@@ -62,7 +70,7 @@ struct Trainer::State {
           kernels(*device),
           executor(*device),
           plan(plan_training(start.sh_degree, o.render, o.strategy == Strategy::adc)),
-          model(upload_model(*device, start, 2, plan.statistics)),
+          model(upload_model(*device, along_curve(start), 2, plan.statistics)),
           photographs(*device, kernels.shape(), dataset, frames),
           instance_room(first_capacity(start.size())) {
         plan.regularised = o.strategy == Strategy::mcmc;
