@@ -4,6 +4,7 @@
 // start without moments.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
+#include "lib/params.glsl"
 #include "lib/mcmc.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
@@ -30,12 +31,12 @@ void main() {
     if (j >= push.splats) source = sources[push.dead + j - push.splats];
     else if (dead[j] != 0u) source = sources[totals[j / push.scan_block] + prefix[j]];
     const uint copies = hits[source];
-    const float logit = texelFetch(params, int(source)).w;
+    const float logit = texelFetch(params, int(param_texel(PLANES, 0u, source))).w;
     const vec2 part = relocated(logit, min(copies + 1u, 0xffffu));
     const float opacity = clamp(part.x, push.least_opacity, 1.0 - 1e-6);
     [[unroll]] for (uint plane = 0; plane < PLANES; ++plane) {
-        const int from = int(plane * push.capacity + source);
-        const uint to = plane * push.new_splats + j;
+        const int from = int(param_texel(PLANES, plane, source));
+        const uint to = param_texel(PLANES, plane, j);
         vec4 value = texelFetch(params, from);
         if (plane == 0u && copies > 0u) value.w = log(opacity / (1.0 - opacity));
         if (plane == 2u && copies > 0u) value.xyz += log(part.y);

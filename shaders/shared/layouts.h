@@ -177,8 +177,8 @@ struct ResetPush {
 };
 
 struct McmcPush {
-    uint splats, capacity;         // of the old buffers
-    uint new_splats;               // and the capacity of the new ones
+    uint splats, planes;           // before; texel planes stored a splat
+    uint new_splats;
     uint scan_block;
     uint dead, draws, total;       // splats to relocate; sources to draw; sum of the weights
     float weight_scale;            // weight of an opacity of 1
@@ -189,7 +189,7 @@ struct McmcPush {
 };
 
 struct PerturbPush {
-    uint splats, capacity;
+    uint splats, planes;
     uint instance_capacity;
     float amplitude;
     uint seed[2];

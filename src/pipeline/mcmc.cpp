@@ -49,7 +49,7 @@ McmcResult refine_mcmc(Kernels& kernels, gpu::Executor& executor, Model& model, 
     const passes::Shape& shape = kernels.shape();
     shared::McmcPush push{};
     push.splats = model.splats;
-    push.capacity = model.capacity;
+    push.planes = model.planes();
     push.scan_block = frame.sizes.scan_block;
     push.weight_scale = float(std::min(65535u, 0xffffffffu / std::max(model.splats, 1u)));
     push.dead_logit = float(std::log(rules.dead_opacity / (1 - rules.dead_opacity)));
@@ -94,7 +94,7 @@ void record_noise(gpu::Recording& recording, Kernels& kernels, const Model& mode
                   float amplitude, uint64_t seed, uint32_t step) {
     kernels.get<passes::Perturb>().record(recording, kernels.shape(), {model.params, frame.counts},
                                           {model.splats,
-                                           model.capacity,
+                                           model.planes(),
                                            frame.instance_capacity,
                                            amplitude,
                                            {uint32_t(seed), uint32_t(seed >> 32)},

@@ -62,7 +62,8 @@ std::vector<uint32_t> device_weights(const Start& start) {
     const uint32_t n = uint32_t(start.gaussians.size());
     Guarded weights("weights", 4ull * n), dead("dead", 4ull * n);
     shared::McmcPush push{};
-    push.splats = push.capacity = n;
+    push.splats = n;
+    push.planes = start.model.planes();
     push.weight_scale = float(std::min(65535u, 0xffffffffu / n));
     push.dead_logit = float(std::log(0.005 / 0.995));
     r.run([&](gpu::Recording& recording) {
