@@ -1,6 +1,7 @@
 // From photographs to splats.
 #pragma once
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -17,7 +18,7 @@
 
 namespace ewa {
 
-enum class Strategy { none, adc };
+enum class Strategy { none, adc, mcmc };
 
 struct TrainOptions {
     int steps = 30000;
@@ -43,6 +44,15 @@ struct TrainOptions {
     double split_scale = 0.01;           // larger than this share of the scene extent: split, else clone
     double prune_opacity = 0.005;
     double prune_scale = 0.1;            // share of the scene extent, once opacity has been reset
+
+    // 3DGS-MCMC (Kheradmand et al. 2024, with the values of its code and gsplat's). It shares refine_start and
+    // refine_every.
+    int relocate_stop = 25000;
+    double growth = 1.05;                // of the number of splats a refinement, up to max_splats
+    double dead_opacity = 0.005;
+    double noise_rate = 5e5;             // times the learning rate of the means
+    double opacity_weight = 0.01;        // of the mean opacity in the loss
+    double scale_weight = 0.01;          // of the mean scale in the loss, in units of the scene extent
 };
 
 struct EvalFrame {
@@ -69,6 +79,17 @@ struct StepReport {
     uint32_t skipped_nonfinite = 0;      // splats skipped in the last step
 };
 
+/// What the steps to come depend on, besides the dataset, its training frames and the options.
+struct TrainerArray {
+    std::string name;                    // at most 15 bytes
+    std::vector<std::byte> bytes;
+};
+struct TrainerState {
+    StepReport report;
+    int sh_degree = 0;                   // stored
+    std::vector<TrainerArray> arrays;    // params, moments1, moments2 and what the strategy gathers, as on the device
+};
+
 /// Owns the model on the device and the photographs of the training frames, as many as image_cache_bytes holds (a file
 /// with 256 levels takes 4 bytes a pixel, another 16). One step is one submission.
 class Trainer {
@@ -80,6 +101,12 @@ class Trainer {
     /// One optimisation step, and densification where the schedule has it. Throws RunError when memory runs out (the
     /// text says how much was needed).
     StepReport step();
+
+    /// For a later run to go on from: a trainer of the same dataset, frames, options and device that restores the
+    /// state takes the same steps, to the byte, as this one. restore throws InputError where the state is not that
+    /// of such a trainer.
+    TrainerState state() const;
+    void restore(const TrainerState& state);
 
     Gaussians gaussians() const;         // read back from the device; in the trainer's own order, along a curve through space
     uint32_t splats() const;

@@ -4,7 +4,8 @@
 // the projection, and moves its parameters and moments. A splat that was not drawn has gradient zero and still moves by
 // its moments. An update that is not finite is dropped and counted. Nothing happens in a frame whose instances did not
 // fit (the host repeats it). SPEC_MODE bit 0: writes the gradient into moments1 and moves nothing. Bit 1: adds to the
-// densification statistics (norm of dL/d(mean) in normalised device coordinates, number of views drawn in).
+// densification statistics (norm of dL/d(mean) in normalised device coordinates, number of views drawn in). Bit 2: adds
+// the gradient of the regularisers, opacity_pull * opacity + scale_pull * (sum of the scales), drawn or not.
 #extension GL_GOOGLE_include_directive : require
 #define BINDING_CAMERA 1
 #include "lib/prelude.glsl"
@@ -15,7 +16,8 @@
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3;
 layout(constant_id = SPEC_MODE) const uint MODE = 0;
-const bool GRADIENT_ONLY = (MODE & 1u) != 0u, STATISTICS = (MODE & 2u) != 0u;
+const bool GRADIENT_ONLY = (MODE & 1u) != 0u, STATISTICS = (MODE & 2u) != 0u,
+           REGULARISED = (MODE & 4u) != 0u;
 
 layout(set = 0, binding = 0) uniform samplerBuffer params;
 layout(set = 0, binding = 2) uniform samplerBuffer records;
@@ -182,9 +184,13 @@ void main() {
     const float logit_gradient = s.g * (1.0 - p.peak);
 
     const vec4 zero = vec4(0.0);
-    move(2, i, p2, drawn ? vec4(log_scale_gradient, red_gradient) : zero, vec4(vec3(push.scale_rate), push.sh0_rate));
+    const vec4 scale_pull = REGULARISED ? vec4(push.scale_pull * scale, 0.0) : zero;
+    const vec4 opacity_pull = REGULARISED ? vec4(vec3(0.0), push.opacity_pull * p.peak * (1.0 - p.peak)) : zero;
+    move(2, i, p2, (drawn ? vec4(log_scale_gradient, red_gradient) : zero) + scale_pull,
+         vec4(vec3(push.scale_rate), push.sh0_rate));
     move(1, i, p1, drawn ? quaternion_gradient : zero, vec4(push.quaternion_rate));
-    move(0, i, p0, drawn ? vec4(mean_gradient, logit_gradient) : zero, vec4(vec3(push.mean_rate), push.opacity_rate));
+    move(0, i, p0, (drawn ? vec4(mean_gradient, logit_gradient) : zero) + opacity_pull,
+         vec4(vec3(push.mean_rate), push.opacity_rate));
     if (STATISTICS && drawn) {
         const float norm = length(f.mean * vec2(push.half_size[0], push.half_size[1]));
         if (is_finite(norm)) statistics[i] += vec2(norm, 1.0);

@@ -47,6 +47,12 @@ EWA_REAL(ADAM_EPSILON, 1e-15);
 // Adaptive density control (3DGS, section 5.2 and its published code).
 EWA_REAL(SPLIT_SCALE, 1.6);           // a split child's scales are the parent's divided by this
 
+// 3DGS as Markov chain Monte Carlo (Kheradmand et al. 2024, and its published code).
+EWA_REAL(MCMC_GATE_SLOPE, 100.0);     // noise moves a splat by the share sigmoid(-slope (opacity - gate opacity))
+EWA_REAL(MCMC_GATE_OPACITY, 0.005);
+EWA_UINT(MCMC_DRAW_STREAM, 0x64726177u);   // keeps the random numbers of one use apart from those of another
+EWA_UINT(MCMC_NOISE_STREAM, 0x6e6f6973u);
+
 // Kernels: how a splat's opacity depends on its footprint.
 EWA_UINT(KERNEL_PEAK, 0u);            // 3DGS: the opacity is the peak of the footprint
 EWA_UINT(KERNEL_ANTIALIAS, 1u);       // Mip-Splatting (Yu et al. 2024, eq. 9): times sqrt(det before / det after low-pass)

@@ -159,6 +159,8 @@ struct UpdatePush {
     float mean_rate, opacity_rate, quaternion_rate, scale_rate, sh0_rate, sh_rest_rate;
     float bias1, bias2;            // 1 / (1 - beta^step)
     float half_size[2];            // W / 2, H / 2: px to normalised device coordinates
+    float opacity_pull;            // regularisers: d(loss)/d(opacity), d(loss)/d(scale) of every splat
+    float scale_pull;
 };
 
 struct DensifyPush {
@@ -178,6 +180,26 @@ struct ResetPush {
     uint splats;
     uint planes;                   // texel planes stored a splat
     float logit;
+};
+
+struct McmcPush {
+    uint splats, planes;           // before; texel planes stored a splat
+    uint new_splats;
+    uint scan_block;
+    uint dead, draws, total;       // splats to relocate; sources to draw; sum of the weights
+    float weight_scale;            // weight of an opacity of 1
+    float dead_logit;              // at or under it a splat is dead
+    float least_opacity;           // of a splat that shares its source's
+    uint seed[2];
+    uint step;
+};
+
+struct PerturbPush {
+    uint splats, planes;
+    uint instance_capacity;
+    float amplitude;
+    uint seed[2];
+    uint step;
 };
 
 EWA_END_SHARED

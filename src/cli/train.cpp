@@ -22,7 +22,9 @@ void add_model_options(CLI::App& app, TrainArguments& arguments) {
         ->type_name("N")
         ->capture_default_str();
     app.add_option("--strategy", arguments.strategy,
-                   "adc grows and prunes splats (3DGS); none keeps their number")
+                   "adc grows and prunes splats (3DGS); mcmc relocates dead ones and grows to the cap "
+                   "(3DGS-MCMC); none "
+                   "keeps their number")
         ->check(CLI::IsMember({"adc", "mcmc", "none"}))
         ->capture_default_str();
     app.add_option("--max-splats", arguments.max_splats, "Never more splats than this")
@@ -57,8 +59,6 @@ int run(CLI::App& app, CommandState& state) {
     TrainArguments& arguments = state.arguments;
     if (!state.config.empty()) apply_config(app, state.config);
     if (arguments.dataset.empty()) throw InputError("DATASET is required (see ewa train --help)");
-    if (arguments.strategy == "mcmc")
-        throw InputError("--strategy mcmc is not available in this version; use adc");
     return run_train(arguments);
 }
 
@@ -70,9 +70,10 @@ Action add_train(CLI::App& app, const std::string& command_line) {
     arguments.command_line = command_line;
     app.add_option("DATASET", arguments.dataset, "Photographs with cameras: COLMAP folder or transforms.json")
         ->type_name("");
-    app.add_option("-o,--output", arguments.output,
-                   "Folder for splats.ply, summary.json, metrics.jsonl, report.html and config.json "
-                   "[out/<name of the dataset>]")
+    app.add_option(
+           "-o,--output", arguments.output,
+           "Folder for splats.ply, summary.json, metrics.jsonl, report.html, config.json and checkpoint.ewa "
+           "[out/<name of the dataset>]")
         ->type_name("DIR");
     add_model_options(app, arguments);
     app.add_option("--eval-every", arguments.eval_every,
@@ -80,10 +81,14 @@ Action add_train(CLI::App& app, const std::string& command_line) {
         ->check(in_range(0, kMaxSteps))
         ->type_name("N")
         ->capture_default_str();
-    app.add_option("--save-every", arguments.save_every, "Save splats.ply every N steps; 0: only at the end")
+    app.add_option(
+           "--save-every", arguments.save_every,
+           "Save splats.ply and checkpoint.ewa every N steps; 0: the checkpoint every 30 seconds or more")
         ->check(in_range(0, kMaxSteps))
         ->type_name("N")
         ->capture_default_str();
+    app.add_flag("--resume", arguments.resume,
+                 "Go on from DIR's checkpoint.ewa, or start where there is none");
     app.add_option("--config", state->config,
                    "JSON with the names of these options, such as a run's config.json; the command line wins")
         ->type_name("FILE");

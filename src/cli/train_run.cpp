@@ -10,8 +10,11 @@
 #include "cli/progress.h"
 #include "cli/text.h"
 #include "cli/train_files.h"
+#include "cli/train_resume.h"
+#include "core/atomic_file.h"
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
+#include "train/checkpoint.h"
 #include "train/initialise.h"
 
 namespace ewa::cli {
@@ -28,7 +31,9 @@ constexpr size_t kTrainViewsEvaluated = 40;
 TrainOptions train_options(const TrainArguments& arguments) {
     TrainOptions options;
     options.steps = arguments.steps;
-    options.strategy = arguments.strategy == "none" ? Strategy::none : Strategy::adc;
+    options.strategy = arguments.strategy == "none"   ? Strategy::none
+                       : arguments.strategy == "mcmc" ? Strategy::mcmc
+                                                      : Strategy::adc;
     options.max_splats = arguments.max_splats;
     options.sh_degree = arguments.draw.sh_degree;
     options.seed = arguments.seed;
@@ -65,17 +70,21 @@ Gaussians start_splats(const TrainArguments& arguments, const Dataset& dataset,
 class TrainRun {
   public:
     explicit TrainRun(const TrainArguments& arguments)
-        : arguments_(arguments), options_(train_options(arguments)) {}
+        : arguments_(arguments), options_(train_options(arguments)), pace_(arguments.save_every) {}
     int run();
 
   private:
     using Clock = std::chrono::steady_clock;
-    double wall_seconds() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
+    double wall_seconds() const {
+        return earlier_wall_ + std::chrono::duration<double>(Clock::now() - begin_).count();
+    }
     void say(const std::string& line) const {
         if (!arguments_.quiet) fmt::print("{}\n", line);
     }
     void load();
     void describe() const;
+    void resume(Trainer& trainer);
+    void save_checkpoint(const Trainer& trainer);
     void train(Trainer& trainer, Progress& progress);
     void log(const StepReport& report, const std::optional<Evaluation>& evaluation);
     Evaluation evaluate_frames(const Gaussians& gaussians, const std::vector<int>& frames) const;
@@ -86,7 +95,11 @@ class TrainRun {
     const TrainArguments& arguments_;
     TrainOptions options_;
     Clock::time_point begin_ = Clock::now();
-    fs::path folder_;
+    double earlier_wall_ = 0;  // of the run that this one goes on from
+    SavePace pace_;
+    report::Json settings_;  // for the checkpoint
+    std::optional<train::Checkpoint> earlier_;
+    fs::path folder_, checkpoint_;
     Dataset dataset_;
     Split split_;
     Gaussians start_;
@@ -109,7 +122,14 @@ void TrainRun::load() {
 
     folder_ =
         arguments_.output.empty() ? fs::path("out") / dataset_name(arguments_.dataset) : arguments_.output;
+    checkpoint_ = folder_ / "checkpoint.ewa";
     make_folder(folder_);
+    core::remove_abandoned_files(folder_);
+    settings_ = checkpoint_settings(arguments_, train::dataset_fingerprint(dataset_, split_));
+    if (arguments_.resume && fs::exists(checkpoint_)) {
+        earlier_ = train::read_checkpoint(checkpoint_);
+        check_resumable(checkpoint_, earlier_->settings, settings_);
+    }
     // The first file written tells before the training whether the folder takes any.
     const report::Json config = to_config(arguments_);
     write_json(folder_ / "config.json", config);
@@ -117,7 +137,6 @@ void TrainRun::load() {
     std::error_code absent;
     fs::remove(folder_ / "summary.json", absent);
     fs::remove(folder_ / "report.html", absent);
-    log_file_.emplace(folder_ / "metrics.jsonl");
     for (const auto& [name, value] : config.items())
         report_.settings.emplace_back(name, value.is_string() ? value.get<std::string>() : value.dump());
 
@@ -169,6 +188,32 @@ void TrainRun::save(const Gaussians& gaussians) const {
                              options_.render.kernel == Kernel::antialias ? "mip" : "default")});
 }
 
+void TrainRun::resume(Trainer& trainer) {
+    settings_["device"] = report_.summary.device;
+    if (earlier_) {
+        const std::string remark = resume_remark(earlier_->settings, settings_);
+        if (!remark.empty()) {
+            report_.remarks.push_back(remark);
+            say(remark);
+        }
+        trainer.restore(earlier_->state);
+        report_.metrics = report::parse_metrics(earlier_->metrics);
+        earlier_wall_ = earlier_->wall_seconds;
+        last_ = earlier_->state.report;
+        say(fmt::format("resumed after step {} of {}", last_.step, arguments_.steps));
+        earlier_.reset();
+    }
+    log_file_.emplace(folder_ / "metrics.jsonl", report_.metrics);
+}
+
+void TrainRun::save_checkpoint(const Trainer& trainer) {
+    const auto start = Clock::now();
+    train::write_checkpoint(checkpoint_,
+                            {settings_.dump(-1, ' ', false, report::Json::error_handler_t::replace),
+                             report::metrics_text(report_.metrics), wall_seconds(), trainer.state()});
+    pace_.saved(std::chrono::duration<double>(Clock::now() - start).count());
+}
+
 void TrainRun::train(Trainer& trainer, Progress& progress) {
     const int report_every = std::max(1, arguments_.steps / 100);
     auto at = [](int step, int every) { return every > 0 && step % every == 0; };
@@ -186,6 +231,7 @@ void TrainRun::train(Trainer& trainer, Progress& progress) {
                                       evaluation->ssim));
         }
         if (evaluation || step == 1 || at(step, report_every)) log(last_, evaluation);
+        if (pace_.due(step)) save_checkpoint(trainer);
         if (at(step, arguments_.save_every)) save(trainer.gaussians());
     }
 }
@@ -194,6 +240,7 @@ int TrainRun::finish(const Trainer& trainer) {
     const bool cut_short = interrupted();
     const Gaussians gaussians = trainer.gaussians();
     save(gaussians);
+    save_checkpoint(trainer);  // a kill from here on costs no training
 
     report::Summary& summary = report_.summary;
     std::optional<Evaluation> test;
@@ -272,6 +319,7 @@ int TrainRun::run() {
         say(fmt::format("{} photographs do not fit in --image-cache {} and are read again for each step",
                         trainer.photographs_on_disk(), arguments_.image_cache));
     last_.splats = trainer.splats();
+    resume(trainer);
     {
         Progress progress("trained", arguments_.steps, "steps", arguments_.quiet);
         train(trainer, progress);

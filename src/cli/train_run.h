@@ -20,7 +20,9 @@ struct TrainArguments {
     uint64_t seed = 0;
     uint64_t image_cache = TrainOptions{}.image_cache_bytes >> 20;  // MiB
     DrawArguments draw;
-    int eval_every = 0, save_every = 0;  // steps; 0: only at the end
+    int eval_every = 0;  // steps; 0: only at the end
+    int save_every = 0;  // steps; 0: by the clock
+    bool resume = false;
     DeviceOptions device;
     bool quiet = false, verbose = false;
     std::string command_line;

@@ -6,6 +6,8 @@
 
 #include <atomic>
 #include <cerrno>
+#include <csignal>
+#include <cstdio>
 #include <cstring>
 #include <string>
 #include <utility>
@@ -82,6 +84,19 @@ void write_text_file(const std::filesystem::path& path, std::string_view text) {
     AtomicFile file(path);
     file.write(text);
     file.commit();
+}
+
+void remove_abandoned_files(const std::filesystem::path& folder) {
+    std::error_code error;
+    for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+        const std::string name = entry.path().filename().string();
+        int process = 0, used = 0;
+        unsigned number = 0;
+        if (std::sscanf(name.c_str(), ".ewa-%9d-%9u.tmp%n", &process, &number, &used) != 2 ||
+            size_t(used) != name.size() || process <= 0)
+            continue;
+        if (kill(process, 0) != 0 && errno == ESRCH) unlink(entry.path().c_str());
+    }
 }
 
 }  // namespace ewa::core

@@ -34,4 +34,8 @@ class AtomicFile {
 /// The file becomes `text`, or stays as it was and RunError is thrown.
 void write_text_file(const std::filesystem::path& path, std::string_view text);
 
+/// Removes from a folder what processes that were killed while they wrote have left there (names as
+/// AtomicFile gives them, of a process that is no more). What cannot be removed stays.
+void remove_abandoned_files(const std::filesystem::path& folder);
+
 }  // namespace ewa::core

@@ -70,7 +70,7 @@ void record_backward(gpu::Recording& recording, Kernels& kernels, const Plan& pl
     // What a gradient alone does not have stands in for itself: the kernel leaves those bindings alone.
     const gpu::Buffer& moments2 = plan.adam ? model.moments2 : model.moments1;
     const gpu::Buffer& statistics = plan.statistics ? model.statistics : frame.partials;
-    const uint32_t mode = (plan.adam ? 0u : 1u) | (plan.statistics ? 2u : 0u);
+    const uint32_t mode = (plan.adam ? 0u : 1u) | (plan.statistics ? 2u : 0u) | (plan.regularised ? 4u : 0u);
     const double step = rates.step;
     kernels.get<passes::Update>(uint32_t(plan.sh_degree), uint32_t(plan.kernel), mode)
         .record(recording, shape,
@@ -88,7 +88,9 @@ void record_backward(gpu::Recording& recording, Kernels& kernels, const Plan& pl
                  rates.sh_rest,
                  float(1 / (1 - std::pow(shared::ADAM_BETA1, step))),
                  float(1 / (1 - std::pow(shared::ADAM_BETA2, step))),
-                 {0.5f * float(camera.width), 0.5f * float(camera.height)}});
+                 {0.5f * float(camera.width), 0.5f * float(camera.height)},
+                 rates.opacity_pull,
+                 rates.scale_pull});
 }
 
 }  // namespace ewa::pipeline

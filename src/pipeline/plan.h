@@ -17,6 +17,7 @@ struct Plan {
     bool gradients = false;   // loss, backward passes and their buffers
     bool adam = false;        // both moments
     bool statistics = false;  // densification statistics
+    bool regularised = false;  // opacity and scale regularisers in the loss
     bool depth = false;
     bool masks = false;  // photographs in which not every pixel counts
 };

@@ -3,6 +3,7 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
+#include <sstream>
 
 #include "ewa/error.h"
 
@@ -54,8 +55,43 @@ Json to_json(const MetricsLine& line) {
     return json;
 }
 
-MetricsLog::MetricsLog(const std::filesystem::path& path) : path_(path), file_(path, std::ios::trunc) {
+std::vector<MetricsLine> parse_metrics(const std::string& text) {
+    std::vector<MetricsLine> lines;
+    std::istringstream stream(text);
+    std::string line;
+    while (std::getline(stream, line)) {
+        try {
+            const Json json = Json::parse(line);
+            const auto number = [&](const char* name) {
+                const Json& value = json.at(name);
+                return value.is_null() ? std::nan("") : value.get<double>();
+            };
+            MetricsLine& read = lines.emplace_back();
+            read.step = json.at("step").get<int>();
+            read.seconds = number("seconds");
+            read.wall_seconds = number("wall_seconds");
+            read.loss = number("loss");
+            read.splats = json.at("splats").get<uint32_t>();
+            if (json.contains("test_psnr")) read.test_psnr = number("test_psnr");
+            if (json.contains("test_ssim")) read.test_ssim = number("test_ssim");
+        } catch (const Json::exception& error) {
+            throw InputError("line " + std::to_string(lines.size() + 1) +
+                             " of the metrics is not one: " + error.what());
+        }
+    }
+    return lines;
+}
+
+std::string metrics_text(const std::vector<MetricsLine>& lines) {
+    std::string text;
+    for (const MetricsLine& line : lines) text += to_json(line).dump() + '\n';
+    return text;
+}
+
+MetricsLog::MetricsLog(const std::filesystem::path& path, const std::vector<MetricsLine>& earlier)
+    : path_(path), file_(path, std::ios::trunc) {
     if (!file_) throw RunError("cannot create " + path_.string() + ": " + std::strerror(errno));
+    for (const MetricsLine& line : earlier) append(line);
 }
 
 void MetricsLog::append(const MetricsLine& line) {

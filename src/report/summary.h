@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace ewa::report {
 
@@ -39,13 +40,16 @@ struct MetricsLine {
 };
 
 Json to_json(const MetricsLine& line);
+/// The lines of a metrics.jsonl, each as to_json wrote it. Throws InputError that names the line.
+std::vector<MetricsLine> parse_metrics(const std::string& text);
+std::string metrics_text(const std::vector<MetricsLine>& lines);
 
 /// Appends one JSON object a line and hands each to the operating system at once, so that a run can be
-/// watched, and an interrupted one keeps what it had. Starts an empty file.
+/// watched, and an interrupted one keeps what it had. Starts a file of the lines given.
 class MetricsLog {
   public:
     /// Throws RunError when the file cannot be created.
-    explicit MetricsLog(const std::filesystem::path& path);
+    explicit MetricsLog(const std::filesystem::path& path, const std::vector<MetricsLine>& earlier = {});
 
     /// Throws RunError when the line cannot be written.
     void append(const MetricsLine& line);

@@ -7,14 +7,19 @@ namespace ewa::train {
 namespace {
 
 constexpr double kFullRun = 30000;
-constexpr int kLeastRefineEvery = 50;   // steps: about one look at each photograph of a small capture
-constexpr int kLeastResetEvery = 1000;  // steps
-constexpr int kLeastShEvery = 50;       // steps
+constexpr int kLeastRefineEvery = 50;    // steps: about one look at each photograph of a small capture
+constexpr int kLeastRelocateEvery = 25;  // steps: time enough for what was relocated to fade or to stay
+constexpr int kLeastResetEvery = 1000;   // steps
+constexpr int kLeastShEvery = 50;        // steps
 
 }  // namespace
 
 bool Schedule::densifies(int step) const {
     return step > refine_start && step < refine_stop && (step - refine_start) % refine_every == 0;
+}
+
+bool Schedule::relocates(int step) const {
+    return step > refine_start && step < relocate_stop && (step - refine_start) % relocate_every == 0;
 }
 
 bool Schedule::resets_opacity(int step) const {
@@ -44,6 +49,8 @@ Schedule schedule_for(const TrainOptions& options) {
     s.refine_every = scaled(options.refine_every, std::min(options.refine_every, kLeastRefineEvery));
     s.refine_start = scaled(options.refine_start, std::min(options.refine_start, 2 * kLeastRefineEvery));
     s.refine_stop = scaled(options.refine_stop, 1);
+    s.relocate_stop = scaled(options.relocate_stop, 1);
+    s.relocate_every = scaled(options.refine_every, std::min(options.refine_every, kLeastRelocateEvery));
     if (options.opacity_reset_every > 0)
         s.opacity_reset_every =
             scaled(options.opacity_reset_every, std::min(options.opacity_reset_every, kLeastResetEvery));

@@ -13,6 +13,7 @@ namespace ewa::train {
 struct Schedule {
     int steps = 0;
     int refine_start = 0, refine_stop = 0, refine_every = 0;  // steps
+    int relocate_stop = 0, relocate_every = 0;                // steps, of MCMC
     int opacity_reset_every = 0;                              // 0: never
     int sh_degree_every = 0;
     int sh_degree = 0;                            // the highest
@@ -20,6 +21,8 @@ struct Schedule {
 
     /// Densify after this step (steps count from 1)?
     bool densifies(int step) const;
+    /// MCMC: relocate and grow after this step?
+    bool relocates(int step) const;
     bool resets_opacity(int step) const;
     /// Has an opacity reset happened at or before this step? Only then does size prune.
     bool was_reset(int step) const;

@@ -15,6 +15,7 @@
 #include "pipeline/backward.h"
 #include "pipeline/capacity.h"
 #include "pipeline/densify.h"
+#include "pipeline/mcmc.h"
 #include "train/photographs.h"
 #include "train/schedule.h"
 
@@ -73,6 +74,7 @@ struct Trainer::State {
           photographs(*device, kernels.shape(), dataset, frames, o.image_cache_bytes),
           instance_room(first_capacity(start.size())) {
         plan.masks = photographs.any_masked();
+        plan.regularised = o.strategy == Strategy::mcmc;
         report.splats = model.splats;
     }
 
@@ -85,6 +87,10 @@ struct Trainer::State {
         r.sh0 = float(options.sh0_rate);
         r.sh_rest = float(options.sh_rest_rate);
         r.step = uint32_t(step);
+        if (plan.regularised) {
+            r.opacity_pull = float(options.opacity_weight / model.splats);
+            r.scale_pull = float(options.scale_weight / (3.0 * model.splats * extent));
+        }
         return r;
     }
 
@@ -105,6 +111,12 @@ struct Trainer::State {
                 record_loss(recording, kernels, frame, camera, background, photo.texels, photo.masked);
                 record_backward(recording, kernels, plan, model, frame, camera, background, sorted,
                                 rates(step));
+                // Sigma is a square of lengths: over the extent it is a length again, as in a scene of unit
+                // extent.
+                if (options.strategy == Strategy::mcmc)
+                    record_noise(recording, kernels, model, frame,
+                                 float(options.noise_rate * schedule.mean_rate(step, 1) / extent),
+                                 options.seed, uint32_t(step));
             });
         instance_room = frame.instance_capacity;
         report.loss = loss_of(counts);
@@ -115,7 +127,13 @@ struct Trainer::State {
     }
 
     void follow_up(int step) {
-        if (options.strategy != Strategy::adc) return;
+        if (options.strategy == Strategy::adc) control_density(step);
+        if (options.strategy != Strategy::mcmc || !schedule.relocates(step)) return;
+        refine_mcmc(kernels, executor, model, frame,
+                    {options.dead_opacity, options.growth, options.max_splats, options.seed, uint32_t(step)});
+    }
+
+    void control_density(int step) {
         if (schedule.densifies(step)) {
             DensifyRules rules;
             rules.grow_gradient = float(options.grow_gradient);
@@ -157,6 +175,61 @@ StepReport Trainer::step() {
     s.report.splats = s.model.splats;
     s.report.seconds += std::chrono::duration<double>(Clock::now() - start).count();
     return s.report;
+}
+
+namespace {
+
+struct NamedBuffer {
+    const char* name;
+    gpu::Buffer Model::*buffer;
+    uint64_t bytes;
+};
+
+/// What a model of so many splats holds. A strategy without statistics has none of them.
+std::vector<NamedBuffer> buffers_of(uint32_t splats, int sh_degree, bool statistics) {
+    const uint64_t bytes = parameter_bytes(splats, sh_degree);
+    std::vector<NamedBuffer> buffers{{"params", &Model::params, bytes},
+                                     {"moments1", &Model::moments1, bytes},
+                                     {"moments2", &Model::moments2, bytes}};
+    if (statistics) buffers.push_back({"statistics", &Model::statistics, 8ull * splats});
+    return buffers;
+}
+
+}  // namespace
+
+TrainerState Trainer::state() const {
+    const State& s = *state_;
+    TrainerState state{s.report, s.model.sh_degree, {}};
+    for (const NamedBuffer& named : buffers_of(s.model.capacity, s.model.sh_degree, s.plan.statistics))
+        state.arrays.push_back({named.name, (s.model.*named.buffer).download<std::byte>(named.bytes)});
+    return state;
+}
+
+void Trainer::restore(const TrainerState& state) {
+    State& s = *state_;
+    const uint32_t splats = state.report.splats;
+    if (state.sh_degree != s.model.sh_degree || state.report.step > s.options.steps ||
+        splats > s.options.max_splats || splats == 0)
+        throw InputError("the state to go on from is of another SH degree, of more steps or of more splats");
+    const auto buffers = buffers_of(splats, state.sh_degree, s.plan.statistics);
+    if (state.arrays.size() != buffers.size())
+        throw InputError("the state to go on from is of another strategy");
+    for (size_t i = 0; i < buffers.size(); ++i)
+        if (state.arrays[i].name != buffers[i].name || state.arrays[i].bytes.size() != buffers[i].bytes)
+            throw InputError("the state to go on from lacks " + std::string(buffers[i].name) + " of " +
+                             std::to_string(splats) + " splats");
+    s.model = {};  // its memory first
+    s.model.splats = s.model.capacity = splats;
+    s.model.sh_degree = state.sh_degree;
+    for (size_t i = 0; i < buffers.size(); ++i) {
+        const bool texels = buffers[i].buffer != &Model::statistics;
+        gpu::Buffer& buffer = s.model.*buffers[i].buffer;
+        buffer = gpu::Buffer(*s.device, buffers[i].name, buffers[i].bytes,
+                             texels ? gpu::Texel::rgba32f : gpu::Texel::none);
+        buffer.upload(std::span<const std::byte>(state.arrays[i].bytes));
+    }
+    s.report = state.report;
+    s.instance_room = std::max(s.instance_room, first_capacity(splats));
 }
 
 Gaussians Trainer::gaussians() const {

@@ -19,6 +19,7 @@ struct Circumstances {
     size_t file_limit = 0;   // bytes that no file may exceed, as on a full disk; 0: none
     std::string await_file;  // as soon as this file has a byte, `signal` is sent
     int signal = 0;
+    int after_ms = -1;  // where it is not negative, `signal` is sent that long after the start instead
 };
 
 Outcome run_ewa(const std::vector<std::string>& arguments, const Circumstances& circumstances = {});

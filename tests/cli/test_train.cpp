@@ -33,8 +33,8 @@ TEST_F(Train, WritesEverythingItPromises) {
     expect_success(outcome);
     EXPECT_NE(outcome.out.find("held-out PSNR"), std::string::npos) << outcome.out;
     EXPECT_NE(outcome.out.find("report.html"), std::string::npos) << outcome.out;
-    EXPECT_EQ(files_below(folder / "o"), (Names{"config.json", "metrics.jsonl", "report.html", "splats.ply",
-                                                "summary.json", "test/0.png"}));
+    EXPECT_EQ(files_below(folder / "o"), (Names{"checkpoint.ewa", "config.json", "metrics.jsonl",
+                                                "report.html", "splats.ply", "summary.json", "test/0.png"}));
 
     const auto summary = read_json(folder / "o/summary.json");
     EXPECT_EQ(summary["steps"], 20);

@@ -14,7 +14,7 @@
 namespace ewa::test {
 namespace {
 
-constexpr uint32_t kGradient = 1, kStatistics = 2;
+constexpr uint32_t kGradient = 1, kStatistics = 2, kRegularised = 4;
 
 /// A scene's way back up to the instances by the twin, in the device's buffers.
 struct Slots {
@@ -91,7 +91,9 @@ shared::UpdatePush push_for(const Scene& scene, uint32_t step) {
             6e-4f,
             float(1 / (1 - std::pow(shared::ADAM_BETA1, step))),
             float(1 / (1 - std::pow(shared::ADAM_BETA2, step))),
-            {0.5f * float(scene.camera.width), 0.5f * float(scene.camera.height)}};
+            {0.5f * float(scene.camera.width), 0.5f * float(scene.camera.height)},
+            0,
+            0};
 }
 
 /// A model whose moment buffers are guarded.
@@ -242,6 +244,35 @@ TEST(UpdateStatistics, AreTheTwins) {
         EXPECT_NEAR(actual[2 * i], expected.gradient_sum[i],
                     1e-5 * largest + 1e-4 * expected.gradient_sum[i]);
     }
+}
+
+/// d(opacity) / d(logit) and d(scale) / d(log scale), on top of the loss's gradient, for what is not drawn
+/// too.
+TEST(UpdateRegularisers, PullAtEveryOpacityAndScale) {
+    const Scene scene = random_scene(1905, 150, SplatKind::mixed, 61, 47, 1);
+    const Slots slots(scene);
+    GuardedModel plain(scene.gaussians), pulled(scene.gaussians);
+    Bench bench(slots);
+    auto push = push_for(scene, 1);
+    push.opacity_pull = 0.7f;
+    push.scale_pull = 0.3f;
+    bench.run(scene, plain.model, plain.moments1, plain.moments2, kGradient, push);
+    bench.run(scene, pulled.model, pulled.moments1, pulled.moments2, kGradient | kRegularised, push);
+    const Gaussians a = plain.read(plain.moments1), b = pulled.read(pulled.moments1);
+    const auto near = [](double actual, double loss, double pull) {
+        // 1 - opacity has float32's absolute error.
+        EXPECT_NEAR(actual, loss + pull, 2e-6 * (std::abs(loss) + std::abs(pull)) + 1e-7);
+    };
+    for (size_t i = 0; i < scene.gaussians.size(); ++i) {
+        const double o = 1 / (1 + std::exp(-double(scene.gaussians.opacity_logits[i])));
+        near(b.opacity_logits[i], a.opacity_logits[i], push.opacity_pull * o * (1 - o));
+        for (size_t k = 3 * i; k < 3 * i + 3; ++k)
+            near(b.log_scales[k], a.log_scales[k],
+                 push.scale_pull * std::exp(double(scene.gaussians.log_scales[k])));
+    }
+    EXPECT_EQ(a.means, b.means);
+    EXPECT_EQ(a.quaternions, b.quaternions);
+    EXPECT_EQ(a.sh, b.sh);
 }
 
 TEST(UpdateEdges, AnUpdateThatIsNotFiniteIsDroppedAndCounted) {

@@ -1,0 +1,47 @@
+#version 460
+// Writes the splats of the next generation into new buffers. One invocation owns new splat j. A dead splat and one
+// past the old number become copies of their sources; a source and its copies share what it was (lib/mcmc.glsl) and
+// start without moments.
+#extension GL_GOOGLE_include_directive : require
+#include "lib/prelude.glsl"
+#include "lib/params.glsl"
+#include "lib/mcmc.glsl"
+
+layout(local_size_x_id = SPEC_GROUP_SIZE) in;
+layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3; // the degree stored
+layout(set = 0, binding = 0) uniform samplerBuffer params;
+layout(set = 0, binding = 1) uniform samplerBuffer moments1;
+layout(set = 0, binding = 2) uniform samplerBuffer moments2;
+layout(set = 0, binding = 3, scalar) readonly buffer Dead { uint dead[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer Prefix { uint prefix[]; }; // of dead
+layout(set = 0, binding = 5, scalar) readonly buffer Totals { uint totals[]; };
+layout(set = 0, binding = 6, scalar) readonly buffer Sources { uint sources[]; };
+layout(set = 0, binding = 7, scalar) readonly buffer Hits { uint hits[]; };
+layout(set = 0, binding = 8, scalar) writeonly buffer ParamsOut { vec4 params_out[]; };
+layout(set = 0, binding = 9, scalar) writeonly buffer Moments1Out { vec4 moments1_out[]; };
+layout(set = 0, binding = 10, scalar) writeonly buffer Moments2Out { vec4 moments2_out[]; };
+layout(push_constant, scalar) uniform Push { McmcPush push; };
+
+const uint PLANES = (PARAM_SH + 3 * (SH_DEGREE + 1) * (SH_DEGREE + 1) + 3) / 4;
+
+void main() {
+    const uint j = item_index();
+    if (j >= push.new_splats) return;
+    uint source = j;
+    if (j >= push.splats) source = sources[push.dead + j - push.splats];
+    else if (dead[j] != 0u) source = sources[totals[j / push.scan_block] + prefix[j]];
+    const uint copies = hits[source];
+    const float logit = texelFetch(params, int(param_texel(PLANES, 0u, source))).w;
+    const vec2 part = relocated(logit, min(copies + 1u, 0xffffu));
+    const float opacity = clamp(part.x, push.least_opacity, 1.0 - 1e-6);
+    [[unroll]] for (uint plane = 0; plane < PLANES; ++plane) {
+        const int from = int(param_texel(PLANES, plane, source));
+        const uint to = param_texel(PLANES, plane, j);
+        vec4 value = texelFetch(params, from);
+        if (plane == 0u && copies > 0u) value.w = log(opacity / (1.0 - opacity));
+        if (plane == 2u && copies > 0u) value.xyz += log(part.y);
+        params_out[to] = value;
+        moments1_out[to] = copies > 0u ? vec4(0.0) : texelFetch(moments1, from);
+        moments2_out[to] = copies > 0u ? vec4(0.0) : texelFetch(moments2, from);
+    }
+}

@@ -1,0 +1,29 @@
+#version 460
+// Moves every mean by noise of its splat's own shape, the more the more transparent it is (Kheradmand et al. 2024,
+// eq. 8): mean += amplitude sigmoid(-MCMC_GATE_SLOPE (opacity - MCMC_GATE_OPACITY)) Sigma n. One invocation owns
+// splat i. Nothing happens in a frame whose instances did not fit (the host repeats it).
+#extension GL_GOOGLE_include_directive : require
+#include "lib/prelude.glsl"
+#include "lib/params.glsl"
+#include "lib/quaternion.glsl"
+#include "lib/random.glsl"
+
+layout(local_size_x_id = SPEC_GROUP_SIZE) in;
+layout(set = 0, binding = 0, scalar) buffer Params { vec4 params[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer CountsBlock { Counts counts; };
+layout(push_constant, scalar) uniform Push { PerturbPush push; };
+
+void main() {
+    const uint i = item_index();
+    if (i >= push.splats || counts.instances > push.instance_capacity) return;
+    const uint at = param_texel(push.planes, 0u, i);
+    const vec4 p0 = params[at];
+    const vec3 scale = exp(params[param_texel(push.planes, 2u, i)].xyz);
+    const float opacity = 1.0 / (1.0 + exp(-p0.w));
+    const float gate = 1.0 / (1.0 + exp(float(MCMC_GATE_SLOPE) * (opacity - float(MCMC_GATE_OPACITY))));
+    const vec3 normal = normal3(uvec4(i, push.step, push.seed[0], push.seed[1] ^ MCMC_NOISE_STREAM));
+    float norm;
+    const mat3 rotation = rotation_of(normalize_quaternion(params[param_texel(push.planes, 1u, i)], norm));
+    const vec3 moved = p0.xyz + push.amplitude * gate * (rotation * (scale * scale * (normal * rotation)));
+    if (is_finite(moved)) params[at] = vec4(moved, p0.w);
+}

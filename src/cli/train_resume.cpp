@@ -1,0 +1,69 @@
+#include "cli/train_resume.h"
+
+#include <algorithm>
+
+#include "ewa/error.h"
+
+namespace ewa::cli {
+namespace {
+
+using report::Json;
+
+// Options that change when something is written or where it runs, not what comes out.
+constexpr const char* kWithoutInfluence[] = {"dataset", "eval-every", "save-every", "device"};
+constexpr double kLeastPause = 30;      // seconds
+constexpr double kPausePerSaving = 50;  // times what saving took
+
+Json parse_settings(const std::filesystem::path& path, const std::string& stored) {
+    const Json json = Json::parse(stored, nullptr, false);
+    if (!json.is_object() || !json.contains("options") || !json["options"].is_object())
+        throw InputError(path.string() +
+                         ": its settings cannot be read; without --resume the training starts anew");
+    return json;
+}
+
+}  // namespace
+
+Json checkpoint_settings(const TrainArguments& arguments, const std::string& fingerprint) {
+    Json options = to_config(arguments);
+    for (const char* name : kWithoutInfluence) options.erase(name);
+    Json json;
+    json["version"] = EWA_VERSION;
+    json["dataset"] = fingerprint;
+    json["options"] = options;
+    return json;
+}
+
+void check_resumable(const std::filesystem::path& path, const std::string& stored, const Json& now) {
+    const Json then = parse_settings(path, stored);
+    const std::string way_out = "; without --resume the training starts anew, -o takes another folder";
+    if (then.value("dataset", Json()) != now["dataset"])
+        throw InputError(path.string() +
+                         ": is of another dataset, or its photographs or cameras have changed" + way_out);
+    for (const auto& [name, value] : now["options"].items()) {
+        const Json other = then["options"].value(name, Json());
+        if (other != value)
+            throw InputError(path.string() + ": was written with --" + name + " " + other.dump() + ", not " +
+                             value.dump() + way_out);
+    }
+}
+
+std::string resume_remark(const std::string& stored, const Json& now) {
+    const Json then = Json::parse(stored);
+    for (const char* name : {"version", "device"})
+        if (then.value(name, Json()) != now[name])
+            return std::string("resumed with another ") + name + " than it began with";
+    return {};
+}
+
+bool SavePace::due(int step) const {
+    if (every_ > 0) return step % every_ == 0;
+    return std::chrono::duration<double>(Clock::now() - last_).count() >= pause_;
+}
+
+void SavePace::saved(double seconds_taken) {
+    last_ = Clock::now();
+    pause_ = std::max(kLeastPause, kPausePerSaving * seconds_taken);
+}
+
+}  // namespace ewa::cli

@@ -1,0 +1,66 @@
+// What tells datasets apart.
+#include <algorithm>
+#include <cstdio>
+#include <type_traits>
+
+#include "core/file_reader.h"
+#include "train/checkpoint.h"
+
+namespace ewa::train {
+namespace {
+
+/// FNV-1a (Fowler, Noll, Vo) over 64 bits.
+class Hash {
+  public:
+    void add(const void* data, size_t bytes) {
+        const auto* p = static_cast<const unsigned char*>(data);
+        for (size_t i = 0; i < bytes; ++i) value_ = (value_ ^ p[i]) * 0x100000001b3ull;
+    }
+    template <class T>
+    void add(const T& value) {
+        static_assert(std::is_arithmetic_v<T>);
+        add(&value, sizeof(value));
+    }
+    void add(const std::string& text) {
+        add(uint64_t(text.size()));
+        add(text.data(), text.size());
+    }
+    uint64_t value() const { return value_; }
+
+  private:
+    uint64_t value_ = 0xcbf29ce484222325ull;
+};
+
+void add_camera(Hash& hash, const Camera& camera) {
+    hash.add(camera.width);
+    hash.add(camera.height);
+    for (const double x : {camera.fx, camera.fy, camera.cx, camera.cy}) hash.add(x);
+    for (int c = 0; c < 3; ++c) {
+        hash.add(camera.translation[c]);
+        for (int r = 0; r < 3; ++r) hash.add(camera.rotation[c][r]);
+    }
+}
+
+}  // namespace
+
+std::string dataset_fingerprint(const Dataset& dataset, const Split& split) {
+    Hash hash;
+    for (const auto* frames : {&split.train, &split.test}) {
+        hash.add(uint64_t(frames->size()));
+        for (const int index : *frames) {
+            const Frame& frame = dataset.frames[size_t(index)];
+            hash.add(frame.name);
+            add_camera(hash, frame.camera);
+            if (!frame.image_exists) continue;
+            core::FileReader file(frame.image_path);
+            hash.add(file.size());
+            const size_t head = size_t(std::min<uint64_t>(file.size(), 1u << 16));
+            hash.add(file.take(head, "the photograph"), head);
+        }
+    }
+    char text[17];
+    std::snprintf(text, sizeof(text), "%016llx", static_cast<unsigned long long>(hash.value()));
+    return text;
+}
+
+}  // namespace ewa::train

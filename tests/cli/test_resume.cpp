@@ -1,0 +1,133 @@
+// A training that was ended, by Ctrl-C or kill -9, and goes on.
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <sstream>
+
+#include "cli/expect.h"
+#include "support/random_scene.h"
+
+namespace {
+
+using namespace ewa::test;
+namespace fs = std::filesystem;
+using Names = std::vector<std::string>;
+
+class ResumeEdges : public testing::Test {
+  protected:
+    void SetUp() override {
+        make_dataset(folder / "data");
+        make_splats(folder / "s.ply");
+    }
+    Outcome train(const std::string& out, const Names& more, const Circumstances& circumstances = {}) {
+        Names arguments{"train",          folder / "data", "-o",  folder / out, "--init",
+                        folder / "s.ply", "--max-splats",  "400", "--quiet"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return run_ewa(arguments, circumstances);
+    }
+    std::vector<int> logged_steps(const std::string& out) {
+        std::istringstream metrics(read_file(folder / (out + "/metrics.jsonl")));
+        std::vector<int> steps;
+        for (std::string line; std::getline(metrics, line);)
+            steps.push_back(nlohmann::json::parse(line)["step"].get<int>());
+        return steps;
+    }
+    Folder folder;
+};
+
+class Resume : public ResumeEdges, public testing::WithParamInterface<const char*> {};
+
+/// Ten kills at random moments of the run, writing included; what comes out at last is what an undisturbed
+/// run gives.
+TEST_P(Resume, AfterTenKillsEndsWithTheSameBytes) {
+    const Names options{"--steps", "600",    "--strategy", GetParam(),     "--save-every",
+                        "7",       "--seed", "5",          "--background", "random"};
+    expect_success(train("whole", options));
+    const auto seconds = read_json(folder / "whole/summary.json")["wall_seconds"].get<double>();
+    Names again = options;
+    again.push_back("--resume");
+    Random random(uint64_t(std::hash<std::string>{}(GetParam())));
+    int killed = 0;
+    for (int attempt = 0; attempt < 10; ++attempt) {
+        Circumstances kill;
+        kill.signal = SIGKILL;
+        kill.after_ms = int(1000 * seconds * random.uniform(0.02, 0.5));
+        const Outcome outcome = train("cut", again, kill);
+        killed += outcome.status == 128 + SIGKILL;
+        EXPECT_TRUE(outcome.status == 0 || outcome.status == 128 + SIGKILL) << outcome.err;
+    }
+    EXPECT_GT(killed, 2);
+    expect_success(train("cut", again));
+    EXPECT_EQ(read_file(folder / "cut/splats.ply"), read_file(folder / "whole/splats.ply"));
+    EXPECT_EQ(logged_steps("cut"), logged_steps("whole"));
+    EXPECT_EQ(files_below(folder / "cut"), files_below(folder / "whole"));  // nothing half written is left
+    const auto summary = read_json(folder / "cut/summary.json");
+    EXPECT_EQ(summary["steps"], 600);
+    EXPECT_EQ(summary["test_psnr"], read_json(folder / "whole/summary.json")["test_psnr"]);
+}
+
+INSTANTIATE_TEST_SUITE_P(Strategies, Resume, testing::Values("adc", "mcmc"));
+
+TEST_F(ResumeEdges, AfterCtrlCGoesOn) {
+    Circumstances interrupt;
+    interrupt.signal = SIGINT;
+    interrupt.await_file = folder / "o/metrics.jsonl";
+    const Names options{"--steps", "3000", "--strategy", "none"};
+    ASSERT_EQ(train("o", options, interrupt).status, 130);
+    const int done = read_json(folder / "o/summary.json")["steps"];
+    ASSERT_LT(done, 3000);
+    EXPECT_TRUE(fs::exists(folder / "o/checkpoint.ewa"));
+    Names again = options;
+    again.push_back("--resume");
+    expect_success(train("o", again));
+    expect_success(train("whole", options));
+    EXPECT_EQ(read_file(folder / "o/splats.ply"), read_file(folder / "whole/splats.ply"));
+    EXPECT_EQ(logged_steps("o"), logged_steps("whole"));
+    EXPECT_EQ(read_json(folder / "o/summary.json")["interrupted"], false);
+
+    // A finished run has nothing left to do, and ends as it did.
+    expect_success(train("o", again));
+    EXPECT_EQ(read_file(folder / "o/splats.ply"), read_file(folder / "whole/splats.ply"));
+    EXPECT_EQ(logged_steps("o"), logged_steps("whole"));
+}
+
+TEST_F(ResumeEdges, StartsWhereThereIsNoCheckpoint) {
+    expect_success(train("o", {"--steps", "3", "--resume"}));
+    EXPECT_EQ(read_json(folder / "o/summary.json")["steps"], 3);
+}
+
+TEST_F(ResumeEdges, RefusesWhatWouldEndDifferently) {
+    const Names options{"--steps", "6", "--seed", "1", "--resume"};
+    expect_success(train("o", options));
+    const auto refused = [&](const Names& more, const std::string& text) {
+        const std::string before = read_file(folder / "o/splats.ply"),
+                          log = read_file(folder / "o/metrics.jsonl"),
+                          summary = read_file(folder / "o/summary.json");
+        Names changed = options;
+        changed.insert(changed.end(), more.begin(), more.end());
+        expect_failure(train("o", changed), 2, text);
+        EXPECT_EQ(read_file(folder / "o/splats.ply"), before);
+        EXPECT_EQ(read_file(folder / "o/metrics.jsonl"), log);
+        EXPECT_EQ(read_file(folder / "o/summary.json"), summary);
+    };
+    expect_failure(train("o", {"--steps", "7", "--seed", "1", "--resume"}), 2, "--steps 6, not 7");
+    expect_failure(train("o", {"--steps", "6", "--seed", "2", "--resume"}), 2, "--seed 1, not 2");
+    refused({"--antialias"}, "--kernel");
+    refused({"--background", "1,1,1"}, "--background");
+    refused({"--sh-degree", "1"}, "--sh-degree");
+    refused({"--test-every", "2"}, "another dataset");
+    expect_success(
+        train("o", {"--steps", "6", "--seed", "1", "--resume", "--eval-every", "2", "--save-every", "3"}));
+
+    fs::copy_file(folder / "data/images/1.png", folder / "data/images/2.png",
+                  fs::copy_options::overwrite_existing);
+    refused({}, "another dataset");
+    std::string bytes = read_file(folder / "o/checkpoint.ewa");
+    bytes[bytes.size() / 2] ^= 1;
+    write_file(folder / "o/checkpoint.ewa", bytes);
+    refused({}, "checksum");
+    write_file(folder / "o/checkpoint.ewa", "ply");
+    refused({}, "not a checkpoint");
+}
+
+}  // namespace
