@@ -1,5 +1,6 @@
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "io/splat_scene.h"
 #include "io/splat_values.h"
@@ -12,6 +13,9 @@ namespace ewa::io {
 namespace {
 
 using namespace spz;
+
+constexpr uint64_t kMostGzipFolds = 1032;      // a match of 258 bytes in 2 bits
+constexpr uint64_t kMostZstdFolds = 1u << 16;  // a block of 128 KiB in 4 bytes, and its share of the frame
 
 struct Header {
     uint32_t version = 0, count = 0;
@@ -140,12 +144,21 @@ void take_header(const Header& header, const core::FileReader& reader, SplatScen
     scene.gaussians.resize(header.count);
 }
 
+/// Throws where a packing method cannot make the splats' bytes of the file's, before memory is taken for them.
+void require_packed(const core::FileReader& reader, uint64_t count, uint64_t bytes_each, uint64_t most_folds) {
+    if (count * bytes_each > reader.size() * most_folds)
+        reader.fail("the header claims " + std::to_string(count) + " splats of " + std::to_string(bytes_each) +
+                    " bytes, which " + std::to_string(reader.size()) + " packed bytes cannot hold");
+}
+
 SplatScene read_gzipped(core::FileReader& reader) {
     const std::unique_ptr<Unpacker> unpacker = open_gzip(reader);
     std::byte bytes[kHeaderBytes];
     unpacker->read(bytes, sizeof(bytes), "the header");
     const Header header = parse_header(bytes, reader);
     if (header.version > 3) reader.fail("SPZ version 4 is not packed with gzip; the file is damaged");
+    const auto sizes = block_bytes(header.version, header.file_degree);
+    require_packed(reader, header.count, std::accumulate(sizes.begin(), sizes.end(), size_t(0)), kMostGzipFolds);
     SplatScene scene;
     take_header(header, reader, scene);
     for (int block = 0; block < kBlocks; ++block)
@@ -192,6 +205,8 @@ SplatScene read_streams(core::FileReader& reader) {
                         " bytes; the header's splats make " + std::to_string(list[i].unpacked));
         list[i].packed = packed;
     }
+    const uint64_t bytes_each = std::accumulate(sizes.begin(), sizes.end(), size_t(0));
+    require_packed(reader, header.count, bytes_each, kMostZstdFolds);
     take_header(header, reader, scene);
     for (const Stream& stream : list) {
         if (stream.packed > reader.remaining())
