@@ -246,12 +246,18 @@ GltfDocument::Buffer GltfDocument::open_uri(const std::filesystem::path& folder,
         buffer.size = buffer.data.size();
         return buffer;
     }
+    constexpr size_t kLongestName = 1024;
+    if (uri.size() > kLongestName) fail(what + "\"uri\" is longer than a file's name can be");
     const std::filesystem::path relative = percent_decoded(uri);
     buffer.file = folder / relative;
     if (uri.find("://") != std::string::npos || relative.is_absolute() || !is_below(folder, buffer.file))
         fail(what + "\"uri\" " + uri.substr(0, 200) +
              " leaves the file's folder; only files in or below it are read");
-    buffer.size = core::FileReader(buffer.file).size();
+    try {
+        buffer.size = core::FileReader(buffer.file).size();
+    } catch (const InputError& error) {
+        fail(what + "\"uri\": " + error.what());
+    }
     return buffer;
 }
 
