@@ -15,9 +15,8 @@ namespace {
 struct Lists {
     std::vector<float> records;
     std::vector<uint32_t> tile_counts, order, prefix, totals;  // one a splat; totals one a block
-    std::vector<uint32_t> keys, values, splats, tile_starts;   // one an instance; sorted_splats
+    std::vector<uint32_t> keys, places, splats, tile_starts;   // one an instance; sorted_splats
     uint32_t scan_block = 1, tiles = 0, instances = 0;
-    bool by_instance = false;
 };
 
 Lists download(const FrameRun& run) {
@@ -33,12 +32,11 @@ Lists download(const FrameRun& run) {
     lists.totals = frame.scan_totals.download<uint32_t>(size_t(sizes.scan_blocks) + 1);
     lists.instances = run.counts().instances;
     lists.keys = frame.instance_keys[sizes.tile_sort.passes & 1].download<uint32_t>(lists.instances);
-    lists.values = run.sorted().values->download<uint32_t>(lists.instances);
+    if (run.plan().gradients) lists.places = run.sorted().places->download<uint32_t>(lists.instances);
     lists.splats = run.sorted_splats();
     lists.tile_starts = run.tile_starts();
     lists.scan_block = sizes.scan_block;
     lists.tiles = sizes.tiles;
-    lists.by_instance = run.plan().gradients;
     return lists;
 }
 
@@ -69,7 +67,7 @@ Check check_scan(const Lists& lists) {
 }
 
 /// Tiles ascend; within a tile instances stand in the order they were emitted in, which is that of depth; and
-/// every splat is there as often as it was counted.
+/// every splat is there as often as it was counted; with gradients, no two instances share a place.
 Check check_tile_order(const Lists& lists) {
     const size_t n = lists.tile_counts.size();
     std::vector<uint32_t> rank(n), times(n);
@@ -83,11 +81,12 @@ Check check_tile_order(const Lists& lists) {
         }
         ++times[lists.splats[k]];
         if (k == 0 || lists.splats[k - 1] >= n) continue;
-        const bool later = lists.by_instance ? lists.values[k - 1] < lists.values[k]
-                                             : rank[lists.splats[k - 1]] < rank[lists.splats[k]];
+        const bool later = rank[lists.splats[k - 1]] < rank[lists.splats[k]];
         wrong += lists.keys[k - 1] > lists.keys[k] || (lists.keys[k - 1] == lists.keys[k] && !later);
     }
     for (size_t i = 0; i < n; ++i) wrong += times[i] != lists.tile_counts[i];
+    std::vector<uint32_t> taken(lists.places.size());
+    for (const uint32_t place : lists.places) wrong += place >= taken.size() || ++taken[place] != 1;
     return wrong_entries("tile order: wrong entries", wrong);
 }
 

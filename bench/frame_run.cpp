@@ -81,13 +81,7 @@ void FrameRun::run_update() {
 }
 
 std::vector<uint32_t> FrameRun::sorted_splats() const {
-    const uint32_t instances = counts_.instances;
-    auto values = sorted_.values->download<uint32_t>(instances);
-    if (!plan_.gradients) return values;
-    const auto splats = frame_.instance_splats.download<uint32_t>(instances);
-    std::transform(values.begin(), values.end(), values.begin(),
-                   [&](uint32_t instance) { return splats[instance]; });
-    return values;
+    return sorted_.splats->download<uint32_t>(counts_.instances);
 }
 
 std::vector<uint32_t> FrameRun::tile_starts() const {

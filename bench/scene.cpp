@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <numbers>
+#include "ewa/splat_edit.h"
 
 #include "core/random.h"
 #include "shared/constants.h"
@@ -217,6 +218,7 @@ Scene make_scene(const Case& one) {
     const Surfaces surfaces(style, scene.camera, one.splats);
     for (uint32_t i = 0; i < one.splats; ++i)
         write_splat(scene.gaussians, i, surfaces.point(i), style, scene.camera);
+    select_splats(scene.gaussians, morton_order(scene.gaussians));
     if (one.kind == Kind::train || one.kind == Kind::update || one.kind == Kind::first_step)
         scene.photo = make_photo(one.width, one.height);
     return scene;

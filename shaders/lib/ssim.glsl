@@ -1,4 +1,4 @@
-// The SSIM window, and the blur of 4 neighbouring pixels along a row. Images are planes of floats fetched 4 at a time;
+// The SSIM window and its blur. Images are planes of floats fetched 4 at a time;
 // what lies outside the image is zero.
 #ifndef EWA_LIB_SSIM
 #define EWA_LIB_SSIM
@@ -10,15 +10,34 @@ const float W_SUM = 1.0 + 2.0 * (W1 + W2 + W3 + W4 + W5);
 // Weight of the tap at distance d.
 const float WINDOW[6] = {1.0 / W_SUM, W1 / W_SUM, W2 / W_SUM, W3 / W_SUM, W4 / W_SUM, W5 / W_SUM};
 
-// Five texels of a row, 20 pixels from 8 left of the first wanted one, to the blur of the middle four.
-vec4 blur_row(vec4 texels[5]) {
-    vec4 result = vec4(0.0);
+// Rows that a column of LOSS_ROWS outputs looks at, and texels that LOSS_TEXELS outputs of a row look at.
+const int COLUMN_SPAN = int(LOSS_ROWS) + 2 * RADIUS;
+const int ROW_SPAN = int(LOSS_TEXELS) + 4;
+
+// Output o of a column whose first value stands RADIUS rows above the first output.
+vec4 blur_column(vec4 values[COLUMN_SPAN], int o) {
+    vec4 sum = WINDOW[0] * values[o + RADIUS];
+    [[unroll]] for (int d = 1; d <= RADIUS; ++d)
+        sum += WINDOW[d] * (values[o + RADIUS - d] + values[o + RADIUS + d]);
+    return sum;
+}
+
+// Output texel o of a row whose first texel stands two left of the first output.
+vec4 blur_row(vec4 texels[ROW_SPAN], int o) {
+    vec4 result;
     [[unroll]] for (int i = 0; i < 4; ++i) {
-        [[unroll]] for (int d = -RADIUS; d <= RADIUS; ++d) {
-            const int at = 8 + i + d;
-            result[i] += WINDOW[abs(d)] * texels[at / 4][at % 4];
-        }
+        const int at = 4 * o + 8 + i;
+        float sum = WINDOW[0] * texels[at / 4][at % 4];
+        [[unroll]] for (int d = 1; d <= RADIUS; ++d)
+            sum += WINDOW[d] * (texels[(at - d) / 4][(at - d) % 4] + texels[(at + d) / 4][(at + d) % 4]);
+        result[i] = sum;
     }
     return result;
+}
+
+// What a fetch outside the image would bring is zero.
+vec4 fetch_or_zero(samplerBuffer source, bool inside, int at) {
+    const vec4 value = texelFetch(source, inside ? at : 0);
+    return inside ? value : vec4(0.0);
 }
 #endif

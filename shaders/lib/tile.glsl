@@ -8,15 +8,30 @@ layout(constant_id = SPEC_TILE_HEIGHT) const uint TILE_HEIGHT = 8;
 const uint PIXELS = TILE_WIDTH * TILE_HEIGHT / SUBGROUP;
 const uint ROW_STEP = SUBGROUP / TILE_WIDTH;
 
+// A lane's column is evaluated in segments: from pixel SEGMENT_BASE of the segment, whose power is computed, the others
+// follow by two products each, since exp(-(a + b p + c p^2)) is a geometric sequence whose ratio is one.
+// The low-pass bounds how steep a footprint is (|step of (u, v)| <= sqrt(1 / (2 LOW_PASS)) a pixel), so 4 pixels from the
+// base nothing that is visible has overflowed or underflowed. A column of fewer than 4 pixels is evaluated pixel by pixel.
+const uint SEGMENT = PIXELS < 8u / ROW_STEP ? PIXELS : 8u / ROW_STEP;
+const uint SEGMENT_BASE = (SEGMENT - 1u) / 2u;
+const bool BY_RATIO = SEGMENT >= 4u;
+
 // A splat as one lane meets it: u and v at the lane's first pixel, and their steps from pixel to pixel.
 struct LaneSplat {
     float u, u_step, v, v_step;
+    float ratio_step;   // exp(-2 (u_step^2 + v_step^2))
     float opacity;
     vec3 color;
 };
 
+// What a lane holds for the splat it brings to the batch. record1: as projected.
+float ratio_step_of(vec4 record1) {
+    const float u_step = record1.x * record1.y * float(ROW_STEP), v_step = record1.z * float(ROW_STEP);
+    return exp(-2.0 * (u_step * u_step + v_step * v_step));
+}
+
 // Splat j of the batch whose records the lanes hold. pixel: centre of the lane's first pixel.
-LaneSplat lane_splat(vec4 record0, vec4 record1, vec4 record2, uint j, vec2 pixel) {
+LaneSplat lane_splat(vec4 record0, vec4 record1, vec4 record2, float ratio_step, uint j, vec2 pixel) {
     const float dx = (pixel.x - subgroupShuffle(record0.x, j)) - subgroupShuffle(record0.z, j);
     const float dy = (pixel.y - subgroupShuffle(record0.y, j)) - subgroupShuffle(record0.w, j);
     const float ux = subgroupShuffle(record1.x, j);
@@ -27,10 +42,39 @@ LaneSplat lane_splat(vec4 record0, vec4 record1, vec4 record2, uint j, vec2 pixe
     s.u_step = -ux * k * float(ROW_STEP);
     s.v = vy * dy;
     s.v_step = vy * float(ROW_STEP);
+    s.ratio_step = subgroupShuffle(ratio_step, j);
     s.opacity = subgroupShuffle(record1.w, j);
     s.color = vec3(subgroupShuffle(record2.x, j), subgroupShuffle(record2.y, j), subgroupShuffle(record2.z, j));
     return s;
 }
+
+// opacity exp(-(u^2 + v^2)) at each of the lane's pixels.
+void column_alphas(LaneSplat s, out float raw[PIXELS]) {
+    float ratio = 0.0;
+    [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
+        if (!BY_RATIO || p % SEGMENT == SEGMENT_BASE) {
+            const float u = s.u + s.u_step * float(p), v = s.v + s.v_step * float(p);
+            raw[p] = s.opacity * exp(-(u * u + v * v));
+            ratio = exp(-(s.u_step * (2.0 * u + s.u_step) + s.v_step * (2.0 * v + s.v_step)));
+        } else if (p % SEGMENT > SEGMENT_BASE) {
+            raw[p] = raw[p - 1u] * ratio;
+            ratio *= s.ratio_step;
+        }
+    }
+    [[unroll]] for (uint q = 0; q < PIXELS; ++q) {
+        const uint p = PIXELS - 1u - q;
+        if (BY_RATIO && p % SEGMENT == SEGMENT_BASE) {
+            const float u = s.u + s.u_step * float(p), v = s.v + s.v_step * float(p);
+            ratio = exp(s.u_step * (2.0 * u - s.u_step) + s.v_step * (2.0 * v - s.v_step));
+        } else if (BY_RATIO && p % SEGMENT < SEGMENT_BASE) {
+            raw[p] = raw[p + 1u] * ratio;
+            ratio *= s.ratio_step;
+        }
+    }
+}
+
+// Phrased so that a NaN is no contribution.
+float alpha_of(float raw) { return raw >= float(ALPHA_MIN) ? min(float(ALPHA_MAX), raw) : 0.0; }
 
 // Transmittance is kept positive while the pixel is open, and negative from the splat on that would have taken it to
 // TRANSMITTANCE_STOP or under: one float is both the value and the flag.

@@ -1,7 +1,6 @@
 #version 460
 // Blends the splats of a tile front to back into the image planes: C = sum c alpha T + T background. One workgroup is
-// one subgroup and owns one tile. SPEC_MODE bit 0 (gradients): sorted values are instance numbers, and
-// instance_splats gives their splat; else they are splats. Bit 1: writes the depth plane also.
+// one subgroup and owns one tile. SPEC_MODE 1: writes the depth plane also.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"
@@ -9,13 +8,12 @@
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_MODE) const uint MODE = 0;
-const bool BY_INSTANCE = (MODE & 1u) != 0u, WITH_DEPTH = (MODE & 2u) != 0u;
+const bool WITH_DEPTH = MODE == 1u;
 
 layout(set = 0, binding = 0) uniform samplerBuffer records;
-layout(set = 0, binding = 1, scalar) readonly buffer Values { uint values[]; };
-layout(set = 0, binding = 2, scalar) readonly buffer InstanceSplats { uint instance_splats[]; };
-layout(set = 0, binding = 3, scalar) readonly buffer TileStarts { uint tile_starts[]; };
-layout(set = 0, binding = 4, scalar) writeonly buffer Planes { float planes[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer Splats { uint splats[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer TileStarts { uint tile_starts[]; };
+layout(set = 0, binding = 3, scalar) writeonly buffer Planes { float planes[]; };
 layout(push_constant, scalar) uniform Push { BlendPush push; };
 
 void main() {
@@ -36,21 +34,20 @@ void main() {
     }
     const uint end = tile_starts[tile + 1u];
     for (uint k = tile_starts[tile]; k < end; k += SUBGROUP) {
-        const uint value = values[min(k + lane, end - 1u)];
-        const int splat = int(RECORD_TEXELS * (BY_INSTANCE ? instance_splats[value] : value));
+        const int splat = int(RECORD_TEXELS * splats[min(k + lane, end - 1u)]);
         const vec4 record0 = texelFetch(records, splat);
         vec4 record1 = texelFetch(records, splat + 1);
         const vec4 record2 = texelFetch(records, splat + 2);
         record1.w = k + lane < end ? record1.w : 0.0;
+        const float ratio_step = ratio_step_of(record1);
         [[unroll]] for (uint j = 0; j < SUBGROUP; ++j) {
-            const LaneSplat s = lane_splat(record0, record1, record2, j, pixel);
+            const LaneSplat s = lane_splat(record0, record1, record2, ratio_step, j, pixel);
+            float raw[PIXELS];
+            column_alphas(s, raw);
             const float z = WITH_DEPTH ? subgroupShuffle(record2.w, j) : 0.0;
             [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
-                const float u = s.u + s.u_step * float(p), v = s.v + s.v_step * float(p);
-                float alpha = min(float(ALPHA_MAX), s.opacity * exp(-(u * u + v * v)));
-                alpha = alpha >= float(ALPHA_MIN) ? alpha : 0.0;
                 bool blended;
-                const float weight = composite(alpha, T[p], blended);
+                const float weight = composite(alpha_of(raw[p]), T[p], blended);
                 color[p] += weight * s.color;
                 if (WITH_DEPTH) depth[p] += weight * z;
             }

@@ -2,7 +2,7 @@
 // Gradients of blending, front to back: with R = (what is blended behind a splat) . dL/dC,
 // dL/d(alpha) = T c . dL/dC - R / (1 - alpha); R starts as C . dL/dC and each splat takes its own share off, so nothing
 // is divided by 1 - alpha splat after splat. One workgroup is one subgroup and owns one tile, and the gradient slots
-// of its instances: each slot is written by exactly one tile, once.
+// of its instances, which stand in the order of the sorted list: each is written once.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"
@@ -10,47 +10,35 @@
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(set = 0, binding = 0) uniform samplerBuffer records;
-layout(set = 0, binding = 1, scalar) readonly buffer Values { uint values[]; };
-layout(set = 0, binding = 2, scalar) readonly buffer InstanceSplats { uint instance_splats[]; };
-layout(set = 0, binding = 3, scalar) readonly buffer TileStarts { uint tile_starts[]; };
-layout(set = 0, binding = 4, scalar) readonly buffer Planes { float planes[]; };
-layout(set = 0, binding = 5, scalar) readonly buffer ImageGradient { float image_gradient[]; };
-layout(set = 0, binding = 6, scalar) writeonly buffer Slots { float slots[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer Splats { uint splats[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer TileStarts { uint tile_starts[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer Planes { float planes[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer ImageGradient { float image_gradient[]; };
+layout(set = 0, binding = 5, scalar) writeonly buffer Slots { float slots[]; };
 layout(push_constant, scalar) uniform Push { BlendPush push; };
 
 // The middle of a lane's pixels, in pixels of its column.
 #define MIDDLE (0.5 * float(PIXELS - 1u))
 
-// Sums 8 values over the subgroup at once: at each step a lane keeps half of its values and sends the other half
-// away, so that lane l ends with the sum of value l % 8 after 7 shuffles. Lanes 8 apart then add up.
+// Splats whose sums are transposed together.
+const uint BLOCK = SUBGROUP < 8u ? SUBGROUP : 8u;
+
+// Sums BLOCK values over the subgroup at once: at each step a lane keeps half of its values and sends the other half
+// away, so that lane l ends with the sum of value l % BLOCK. Lanes BLOCK apart then add up.
 float transposing_sum(float v[8]) {
     const uint lane = gl_SubgroupInvocationID;
     const bool b0 = (lane & 1u) != 0u, b1 = (lane & 2u) != 0u, b2 = (lane & 4u) != 0u;
     float four[4], two[2];
-    [[unroll]] for (uint i = 0; i < 4; ++i)
+    [[unroll]] for (uint i = 0; i < BLOCK / 2u; ++i)
         four[i] = (b0 ? v[2 * i + 1] : v[2 * i]) + subgroupShuffleXor(b0 ? v[2 * i] : v[2 * i + 1], 1u);
-    [[unroll]] for (uint i = 0; i < 2; ++i)
+    [[unroll]] for (uint i = 0; i < BLOCK / 4u; ++i)
         two[i] = (b1 ? four[2 * i + 1] : four[2 * i]) + subgroupShuffleXor(b1 ? four[2 * i] : four[2 * i + 1], 2u);
+    if (BLOCK == 4u) return two[0];
     float sum = (b2 ? two[1] : two[0]) + subgroupShuffleXor(b2 ? two[0] : two[1], 4u);
     [[unroll]] for (uint s = 3u; s < DOUBLINGS; ++s) {
         if ((1u << s) < SUBGROUP) sum += subgroupShuffleXor(sum, 1u << s);
     }
     return sum;
-}
-
-void store_slot(uint instance, float v[8], float last, bool valid) {
-    const uint lane = gl_SubgroupInvocationID;
-    const uint slot = SLOT_FLOATS * instance;
-    if (SUBGROUP >= 8u) {
-        const float sum = transposing_sum(v), last_sum = subgroup_sum(last);
-        if (valid && lane < 8u) slots[slot + lane] = sum;
-        if (valid && lane == 0u) slots[slot + 8u] = last_sum;
-    } else {
-        [[unroll]] for (uint i = 0; i < 9; ++i) {
-            const float sum = subgroup_sum(i < 8u ? v[i % 8u] : last);
-            if (valid && lane == i % SUBGROUP) slots[slot + i] = sum;
-        }
-    }
 }
 
 void main() {
@@ -78,47 +66,58 @@ void main() {
     const uint end = tile_starts[tile + 1u];
     uint k = tile_starts[tile];
     for (; k < end; k += SUBGROUP) {
-        const uint instance = values[min(k + lane, end - 1u)];
-        const int splat = int(RECORD_TEXELS * instance_splats[instance]);
+        const int splat = int(RECORD_TEXELS * splats[min(k + lane, end - 1u)]);
         const vec4 record0 = texelFetch(records, splat);
         vec4 record1 = texelFetch(records, splat + 1);
         const vec4 record2 = texelFetch(records, splat + 2);
         record1.w = k + lane < end ? record1.w : 0.0;
-        [[unroll]] for (uint j = 0; j < SUBGROUP; ++j) {
-            const LaneSplat s = lane_splat(record0, record1, record2, j, pixel);
-            // u and v are affine along the lane's column, so three sums over it, with the pixel's number counted from
-            // the middle, give all six: products with constants, and a third of the registers.
-            float s0 = 0.0, s1 = 0.0, s2 = 0.0;
-            vec3 color_sum = vec3(0.0);
-            [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
-                const float u = s.u + s.u_step * float(p), v = s.v + s.v_step * float(p);
-                const float raw = s.opacity * exp(-(u * u + v * v));
-                float alpha = min(float(ALPHA_MAX), raw);
-                alpha = alpha >= float(ALPHA_MIN) ? alpha : 0.0;
-                bool blended;
-                const float weight = composite(alpha, T[p], blended);
-                const float own = weight * dot(s.color, gradient[p]);
-                rest[p] -= own;
-                // dL/d(power) = alpha dL/d(alpha); none where the clamp holds alpha.
-                const bool moves = blended && raw <= float(ALPHA_MAX);
-                const float g = moves ? own - rest[p] * (alpha / (1.0 - alpha)) : 0.0;
-                const float step = float(p) - MIDDLE;
-                s0 += g;
-                s1 += g * step;
-                s2 += g * (step * step);
-                color_sum += weight * gradient[p];
+        const float ratio_step = ratio_step_of(record1);
+        float slot[9];
+        [[unroll]] for (uint first = 0; first < SUBGROUP; first += BLOCK) {
+            float sums[9][8];
+            [[unroll]] for (uint j = 0; j < BLOCK; ++j) {
+                const LaneSplat s = lane_splat(record0, record1, record2, ratio_step, first + j, pixel);
+                float raw[PIXELS];
+                column_alphas(s, raw);
+                // u and v are affine along the lane's column, so three sums over it, with the pixel's number counted
+                // from the middle, give all six: products with constants, and a third of the registers.
+                float s0 = 0.0, s1 = 0.0, s2 = 0.0;
+                vec3 color_sum = vec3(0.0);
+                [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
+                    const float alpha = alpha_of(raw[p]);
+                    bool blended;
+                    const float weight = composite(alpha, T[p], blended);
+                    const float own = weight * dot(s.color, gradient[p]);
+                    rest[p] -= own;
+                    // dL/d(power) = alpha dL/d(alpha); none where the clamp holds alpha.
+                    const bool moves = blended && raw[p] <= float(ALPHA_MAX);
+                    const float g = moves ? own - rest[p] * (alpha / (1.0 - alpha)) : 0.0;
+                    const float step = float(p) - MIDDLE;
+                    s0 += g;
+                    s1 += g * step;
+                    s2 += g * (step * step);
+                    color_sum += weight * gradient[p];
+                }
+                const float u = s.u + s.u_step * MIDDLE, v = s.v + s.v_step * MIDDLE;
+                const float us1 = s.u_step * s1, vs1 = s.v_step * s1, us2 = s.u_step * s2;
+                sums[0][j] = s0;
+                sums[1][j] = u * s0 + us1;
+                sums[2][j] = v * s0 + vs1;
+                sums[3][j] = u * (u * s0 + 2.0 * us1) + s.u_step * us2;
+                sums[4][j] = u * (v * s0 + vs1) + v * us1 + s.v_step * us2;
+                sums[5][j] = v * (v * s0 + 2.0 * vs1) + s.v_step * s.v_step * s2;
+                sums[6][j] = color_sum.r;
+                sums[7][j] = color_sum.g;
+                sums[8][j] = color_sum.b;
             }
-            const float u = s.u + s.u_step * MIDDLE, v = s.v + s.v_step * MIDDLE;
-            const float us1 = s.u_step * s1, vs1 = s.v_step * s1, us2 = s.u_step * s2;
-            const float sum[8] = {s0,
-                                  u * s0 + us1,
-                                  v * s0 + vs1,
-                                  u * (u * s0 + 2.0 * us1) + s.u_step * us2,
-                                  u * (v * s0 + vs1) + v * us1 + s.v_step * us2,
-                                  v * (v * s0 + 2.0 * vs1) + s.v_step * s.v_step * s2,
-                                  color_sum.r,
-                                  color_sum.g};
-            store_slot(subgroupShuffle(instance, j), sum, color_sum.b, k + j < end);
+            [[unroll]] for (uint i = 0; i < 9; ++i) {
+                const float sum = transposing_sum(sums[i]);
+                slot[i] = first == 0u || lane / BLOCK == first / BLOCK ? sum : slot[i];
+            }
+        }
+        if (k + lane < end) {
+            const uint at = SLOT_FLOATS * (k + lane);
+            [[unroll]] for (uint i = 0; i < 9; ++i) slots[at + i] = slot[i];
         }
         bool open = false;
         [[unroll]] for (uint p = 0; p < PIXELS; ++p) open = open || T[p] > 0.0;
@@ -130,8 +129,8 @@ void main() {
     // Instances behind the last open pixel got nothing.
     for (; k < end; k += SUBGROUP) {
         if (k + lane < end) {
-            const uint slot = SLOT_FLOATS * values[k + lane];
-            [[unroll]] for (uint i = 0; i < 9; ++i) slots[slot + i] = 0.0;
+            const uint at = SLOT_FLOATS * (k + lane);
+            [[unroll]] for (uint i = 0; i < 9; ++i) slots[at + i] = 0.0;
         }
     }
 }

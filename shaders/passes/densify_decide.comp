@@ -2,6 +2,7 @@
 // Decides how many splats each one becomes: 0, 1 or 2. One invocation owns splat i.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
+#include "lib/params.glsl"
 #include "lib/densify.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
@@ -13,6 +14,8 @@ layout(push_constant, scalar) uniform Push { DensifyPush push; };
 void main() {
     const uint i = item_index();
     if (i >= push.splats) return;
-    outputs[i] = outputs_of(action_of(push, texelFetch(params, int(i)), texelFetch(params, int(push.capacity + i)),
-                                      texelFetch(params, int(2u * push.capacity + i)), statistics[i]));
+    vec4 p[3];
+    [[unroll]] for (uint plane = 0; plane < 3; ++plane)
+        p[plane] = texelFetch(params, int(param_texel(push.planes, plane, i)));
+    outputs[i] = outputs_of(action_of(push, p[0], p[1], p[2], statistics[i]));
 }

@@ -4,6 +4,7 @@
 // with none. Children of a split are drawn from the parent's Gaussian and are SPLIT_SCALE times smaller.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
+#include "lib/params.glsl"
 #include "lib/quaternion.glsl"
 #include "lib/random.glsl"
 #include "lib/densify.glsl"
@@ -26,8 +27,10 @@ const uint PLANES = (PARAM_SH + 3 * (SH_DEGREE + 1) * (SH_DEGREE + 1) + 3) / 4;
 void main() {
     const uint i = item_index();
     if (i >= push.splats) return;
-    const vec4 p0 = texelFetch(params, int(i)), p1 = texelFetch(params, int(push.capacity + i)),
-               p2 = texelFetch(params, int(2u * push.capacity + i));
+    vec4 p[3];
+    [[unroll]] for (uint plane = 0; plane < 3; ++plane)
+        p[plane] = texelFetch(params, int(param_texel(PLANES, plane, i)));
+    const vec4 p0 = p[0], p1 = p[1], p2 = p[2];
     const uint action = action_of(push, p0, p1, p2, statistics[i]);
     const uint first = totals[i / push.scan_block] + prefix[i];
     [[unroll]] for (uint child = 0; child < 2; ++child) {
@@ -42,16 +45,17 @@ void main() {
             log_scale -= log(float(SPLIT_SCALE));
         }
         [[unroll]] for (uint plane = 0; plane < PLANES; ++plane) {
-            const int from = int(plane * push.capacity + i);
+            const int from = int(param_texel(PLANES, plane, i));
             vec4 value = texelFetch(params, from);
             if (plane == 0u) value.xyz = mean;
             if (plane == 2u) value.xyz = log_scale;
             const vec4 m1 = keeps_moments ? texelFetch(moments1, from) : vec4(0.0);
             const vec4 m2 = keeps_moments ? texelFetch(moments2, from) : vec4(0.0);
             if (written) {
-                params_out[plane * push.new_capacity + to] = value;
-                moments1_out[plane * push.new_capacity + to] = m1;
-                moments2_out[plane * push.new_capacity + to] = m2;
+                const uint at = param_texel(PLANES, plane, to);
+                params_out[at] = value;
+                moments1_out[at] = m1;
+                moments2_out[at] = m2;
             }
         }
     }

@@ -1,6 +1,6 @@
 #version 460
 // Carries the derivatives of SSIM back through the window (it is symmetric: the same blur), down the columns. One
-// invocation owns 4 neighbouring pixels of plane workgroup.z.
+// invocation owns LOSS_ROWS rows of one texel of plane workgroup.z.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/ssim.glsl"
@@ -13,14 +13,16 @@ layout(push_constant, scalar) uniform Push { LossPush push; };
 void main() {
     const uint item = item_index();
     const uint row_texels = push.stride / 4u, plane = gl_WorkGroupID.z * (push.plane_floats / 4u);
-    if (item >= row_texels * push.size[1]) return;
-    const int y = int(item / row_texels), column = int(item % row_texels);
-    vec4 sum = vec4(0.0);
-    [[unroll]] for (int d = -RADIUS; d <= RADIUS; ++d) {
-        const int row = y + d;
-        const float weight = row >= 0 && row < int(push.size[1]) ? WINDOW[abs(d)] : 0.0;
-        sum += weight * texelFetch(derivatives,
-                                   int(plane) + clamp(row, 0, int(push.size[1]) - 1) * int(row_texels) + column);
+    if (item >= row_texels * ((push.size[1] + LOSS_ROWS - 1u) / LOSS_ROWS)) return;
+    const int top = int(item / row_texels * LOSS_ROWS), column = int(item % row_texels);
+    vec4 values[COLUMN_SPAN];
+    [[unroll]] for (int r = 0; r < COLUMN_SPAN; ++r) {
+        const int row = top + r - RADIUS;
+        values[r] = fetch_or_zero(derivatives, row >= 0 && row < int(push.size[1]),
+                                  int(plane) + row * int(row_texels) + column);
     }
-    blurred[plane + item] = sum;
+    [[unroll]] for (int o = 0; o < int(LOSS_ROWS); ++o) {
+        const vec4 sum = blur_column(values, o);
+        if (top + o < int(push.size[1])) blurred[plane + uint(top + o) * row_texels + uint(column)] = sum;
+    }
 }

@@ -1,7 +1,7 @@
 #version 460
 // Second half of the way back, along the rows, and the gradient of the whole loss by the rendering:
 // dL/dx = ssim_scale (blur dS/d(mean x) + 2 x blur dS/d(mean x^2) + y blur dS/d(mean x y)) + l1_scale sign(x - y).
-// One invocation owns 4 neighbouring pixels of channel workgroup.z, one subgroup one partial sum of |x - y|.
+// One invocation owns LOSS_TEXELS texels of channel workgroup.z, one subgroup one partial sum of |x - y|.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"
@@ -18,25 +18,30 @@ layout(push_constant, scalar) uniform Push { LossPush push; };
 void main() {
     const uint item = item_index();
     const uint row_texels = push.stride / 4u, plane = push.plane_floats / 4u, channel = gl_WorkGroupID.z;
-    const bool inside = item < row_texels * push.size[1];
-    const int row = int(item / row_texels) * int(row_texels), column = int(item % row_texels);
-    vec4 m[3];
+    const uint row_items = (row_texels + LOSS_TEXELS - 1u) / LOSS_TEXELS;
+    const bool inside = item < row_items * push.size[1];
+    const int row = int(item / row_items) * int(row_texels), first = int(item % row_items * LOSS_TEXELS);
+    vec4 m[DERIVATIVE_PLANES][LOSS_TEXELS];
     [[unroll]] for (uint q = 0; q < DERIVATIVE_PLANES; ++q) {
-        vec4 texels[5];
-        [[unroll]] for (int t = 0; t < 5; ++t) {
-            const int c = column + t - 2;
-            const bool there = inside && c >= 0 && c < int(row_texels);
-            const vec4 value = texelFetch(blurred, there ? int((DERIVATIVE_PLANES * channel + q) * plane) + row + c : 0);
-            texels[t] = there ? value : vec4(0.0);
+        vec4 texels[ROW_SPAN];
+        [[unroll]] for (int t = 0; t < ROW_SPAN; ++t) {
+            const int c = first + t - 2;
+            texels[t] = fetch_or_zero(blurred, inside && c >= 0 && c < int(row_texels),
+                                      int((DERIVATIVE_PLANES * channel + q) * plane) + row + c);
         }
-        m[q] = blur_row(texels);
+        [[unroll]] for (int o = 0; o < int(LOSS_TEXELS); ++o) m[q][o] = blur_row(texels, o);
     }
-    const int at = inside ? int(channel * plane + item) : 0;
-    const vec4 x = texelFetch(image, at), y = texelFetch(target, at);
-    if (inside)
-        image_gradient[at] = push.ssim_scale * (m[0] + 2.0 * x * m[1] + y * m[2]) + push.l1_scale * sign(x - y);
-    const vec4 difference = inside ? abs(x - y) : vec4(0.0);
-    const float sum = subgroup_sum(difference.x + difference.y + difference.z + difference.w);
+    vec4 differences = vec4(0.0);
+    [[unroll]] for (int o = 0; o < int(LOSS_TEXELS); ++o) {
+        const bool there = inside && first + o < int(row_texels);
+        const int at = int(channel * plane) + row + first + o;
+        const vec4 x = fetch_or_zero(image, there, at), y = fetch_or_zero(target, there, at);
+        if (there)
+            image_gradient[at] =
+                push.ssim_scale * (m[0][o] + 2.0 * x * m[1][o] + y * m[2][o]) + push.l1_scale * sign(x - y);
+        differences += abs(x - y);
+    }
+    const float sum = subgroup_sum(differences.x + differences.y + differences.z + differences.w);
     const uint group = (gl_WorkGroupID.z * gl_NumWorkGroups.y + gl_WorkGroupID.y) * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     if (gl_SubgroupInvocationID == 0u) partials[group * (GROUP_SIZE / SUBGROUP) + gl_SubgroupID] = sum;
 }

@@ -1,6 +1,7 @@
 #version 460
 // First half of the SSIM window: blurs the four moments of rendering x and photograph y down the columns (Wang et al.
-// 2004; x^2 and y^2 are only ever needed as a sum). One invocation owns 4 neighbouring pixels of channel workgroup.z.
+// 2004; x^2 and y^2 are only ever needed as a sum). One invocation owns LOSS_ROWS rows of one texel of channel
+// workgroup.z.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/ssim.glsl"
@@ -14,20 +15,24 @@ layout(push_constant, scalar) uniform Push { LossPush push; };
 void main() {
     const uint item = item_index();
     const uint row_texels = push.stride / 4u, plane = push.plane_floats / 4u, channel = gl_WorkGroupID.z;
-    if (item >= row_texels * push.size[1]) return;
-    const int y = int(item / row_texels), column = int(item % row_texels);
-    vec4 m[4] = {vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0)};
-    [[unroll]] for (int d = -RADIUS; d <= RADIUS; ++d) {
-        const int row = y + d;
+    if (item >= row_texels * ((push.size[1] + LOSS_ROWS - 1u) / LOSS_ROWS)) return;
+    const int top = int(item / row_texels * LOSS_ROWS), column = int(item % row_texels);
+    vec4 a[COLUMN_SPAN], b[COLUMN_SPAN];
+    [[unroll]] for (int r = 0; r < COLUMN_SPAN; ++r) {
+        const int row = top + r - RADIUS;
         const bool inside = row >= 0 && row < int(push.size[1]);
-        const int at = int(channel * plane) + clamp(row, 0, int(push.size[1]) - 1) * int(row_texels) + column;
-        const float weight = inside ? WINDOW[abs(d)] : 0.0;
-        const vec4 a = texelFetch(image, at), b = texelFetch(target, at);
-        const vec4 wa = weight * a, wb = weight * b;
-        m[0] += wa;
-        m[1] += wb;
-        m[2] += wa * a + wb * b;
-        m[3] += wa * b;
+        const int at = int(channel * plane) + row * int(row_texels) + column;
+        a[r] = fetch_or_zero(image, inside, at);
+        b[r] = fetch_or_zero(target, inside, at);
     }
-    [[unroll]] for (uint q = 0; q < MOMENT_PLANES; ++q) moments[(MOMENT_PLANES * channel + q) * plane + item] = m[q];
+    [[unroll]] for (uint q = 0; q < MOMENT_PLANES; ++q) {
+        vec4 values[COLUMN_SPAN];
+        [[unroll]] for (int r = 0; r < COLUMN_SPAN; ++r)
+            values[r] = q == 0u ? a[r] : q == 1u ? b[r] : q == 2u ? a[r] * a[r] + b[r] * b[r] : a[r] * b[r];
+        [[unroll]] for (int o = 0; o < int(LOSS_ROWS); ++o) {
+            const vec4 mean = blur_column(values, o);
+            if (top + o < int(push.size[1]))
+                moments[(MOMENT_PLANES * channel + q) * plane + uint(top + o) * row_texels + uint(column)] = mean;
+        }
+    }
 }

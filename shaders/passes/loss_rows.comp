@@ -1,8 +1,8 @@
 #version 460
 // Second half of the SSIM window, along the rows; then SSIM itself and its derivatives by the moments of the rendering:
 // S = A1 A2 / (B1 B2), A1 = 2 mx my + C1, A2 = 2 (mxy - mx my) + C2, B1 = mx^2 + my^2 + C1,
-// B2 = m(x^2 + y^2) - mx^2 - my^2 + C2. One invocation owns 4 neighbouring pixels of channel workgroup.z, one subgroup
-// one partial sum of S.
+// B2 = m(x^2 + y^2) - mx^2 - my^2 + C2. One invocation owns LOSS_TEXELS texels of channel workgroup.z, one subgroup one
+// partial sum of S.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"
@@ -17,35 +17,39 @@ layout(push_constant, scalar) uniform Push { LossPush push; };
 void main() {
     const uint item = item_index();
     const uint row_texels = push.stride / 4u, plane = push.plane_floats / 4u, channel = gl_WorkGroupID.z;
-    const bool inside = item < row_texels * push.size[1];
-    const int row = int(item / row_texels) * int(row_texels), column = int(item % row_texels);
-    vec4 m[4];
+    const uint row_items = (row_texels + LOSS_TEXELS - 1u) / LOSS_TEXELS;
+    const bool inside = item < row_items * push.size[1];
+    const int row = int(item / row_items) * int(row_texels), first = int(item % row_items * LOSS_TEXELS);
+    vec4 m[MOMENT_PLANES][LOSS_TEXELS];
     [[unroll]] for (uint q = 0; q < MOMENT_PLANES; ++q) {
-        vec4 texels[5];
-        [[unroll]] for (int t = 0; t < 5; ++t) {
-            const int c = column + t - 2;
-            const bool there = inside && c >= 0 && c < int(row_texels);
-            const vec4 value = texelFetch(moments, there ? int((MOMENT_PLANES * channel + q) * plane) + row + c : 0);
-            texels[t] = there ? value : vec4(0.0);
+        vec4 texels[ROW_SPAN];
+        [[unroll]] for (int t = 0; t < ROW_SPAN; ++t) {
+            const int c = first + t - 2;
+            texels[t] = fetch_or_zero(moments, inside && c >= 0 && c < int(row_texels),
+                                      int((MOMENT_PLANES * channel + q) * plane) + row + c);
         }
-        m[q] = blur_row(texels);
+        [[unroll]] for (int o = 0; o < int(LOSS_TEXELS); ++o) m[q][o] = blur_row(texels, o);
     }
-    const vec4 mx = m[0], my = m[1];
-    const vec4 a1 = 2.0 * mx * my + float(SSIM_C1), a2 = 2.0 * (m[3] - mx * my) + float(SSIM_C2);
-    const vec4 mean_squares = mx * mx + my * my;
-    const vec4 b1 = mean_squares + float(SSIM_C1), b2 = max(m[2] - mean_squares, 0.0) + float(SSIM_C2);
-    const vec4 inverse = 1.0 / (b1 * b2);
-    // Columns past the image's width stand in the last texel and count for nothing.
-    const uint x = 4u * uint(column);
-    const vec4 mask = inside ? vec4(lessThan(uvec4(x, x + 1u, x + 2u, x + 3u), uvec4(push.size[0]))) : vec4(0.0);
-    const vec4 s = mask * a1 * a2 * inverse;
-    if (inside) {
-        const uint at = DERIVATIVE_PLANES * channel * plane + item;
-        derivatives[at] = mask * (2.0 * my * (a2 - a1) * inverse) - 2.0 * mx * s * (1.0 / b1 - 1.0 / b2);
-        derivatives[at + plane] = -s / b2;
-        derivatives[at + 2u * plane] = mask * 2.0 * a1 * inverse;
+    vec4 sums = vec4(0.0);
+    [[unroll]] for (int o = 0; o < int(LOSS_TEXELS); ++o) {
+        const vec4 mx = m[0][o], my = m[1][o];
+        const vec4 a1 = 2.0 * mx * my + float(SSIM_C1), a2 = 2.0 * (m[3][o] - mx * my) + float(SSIM_C2);
+        const vec4 mean_squares = mx * mx + my * my;
+        const vec4 b1 = mean_squares + float(SSIM_C1), b2 = max(m[2][o] - mean_squares, 0.0) + float(SSIM_C2);
+        const vec4 inverse = 1.0 / (b1 * b2);
+        // Columns past the image's width stand in the last texel and count for nothing.
+        const uint x = 4u * uint(first + o);
+        const vec4 mask = inside ? vec4(lessThan(uvec4(x, x + 1u, x + 2u, x + 3u), uvec4(push.size[0]))) : vec4(0.0);
+        const vec4 s = mask * a1 * a2 * inverse;
+        if (inside && first + o < int(row_texels)) {
+            const uint at = DERIVATIVE_PLANES * channel * plane + uint(row + first + o);
+            derivatives[at] = mask * (2.0 * my * (a2 - a1) * inverse) - 2.0 * mx * s * (1.0 / b1 - 1.0 / b2);
+            derivatives[at + plane] = -s / b2;
+            derivatives[at + 2u * plane] = mask * 2.0 * a1 * inverse;
+        }
+        sums += s;
     }
-    const float sum = subgroup_sum(s.x + s.y + s.z + s.w);
+    const float sum = subgroup_sum(sums.x + sums.y + sums.z + sums.w);
     const uint group = (gl_WorkGroupID.z * gl_NumWorkGroups.y + gl_WorkGroupID.y) * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     if (gl_SubgroupInvocationID == 0u) partials[group * (GROUP_SIZE / SUBGROUP) + gl_SubgroupID] = sum;
 }

@@ -4,6 +4,7 @@
 #extension GL_GOOGLE_include_directive : require
 #define BINDING_CAMERA 1
 #include "lib/prelude.glsl"
+#include "lib/params.glsl"
 #include "lib/projection.glsl"
 #include "lib/footprint.glsl"
 #include "lib/sh.glsl"
@@ -18,7 +19,7 @@ layout(set = 0, binding = 4, scalar) writeonly buffer TileCounts { uint tile_cou
 layout(set = 0, binding = 5, scalar) buffer CountsBlock { Counts counts; };
 layout(push_constant, scalar) uniform Push { ProjectPush push; };
 
-vec4 param(uint plane, uint i) { return texelFetch(params, int(plane * push.capacity + i)); }
+vec4 param(uint plane, uint i) { return texelFetch(params, int(param_texel(push.planes, plane, i))); }
 
 const uint SH_FLOATS = 3 * (SH_DEGREE + 1) * (SH_DEGREE + 1);
 const uint PLANES = (PARAM_SH + SH_FLOATS + 3) / 4;

@@ -2,6 +2,7 @@
 // Lowers every opacity to at most a given one and forgets its moments (3DGS, section 5.2). One invocation owns splat i.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
+#include "lib/params.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(set = 0, binding = 0, scalar) buffer Params { vec4 params[]; };
@@ -12,7 +13,8 @@ layout(push_constant, scalar) uniform Push { ResetPush push; };
 void main() {
     const uint i = item_index();
     if (i >= push.splats) return;
-    params[i].w = min(params[i].w, push.logit);
-    moments1[i].w = 0.0;
-    moments2[i].w = 0.0;
+    const uint at = param_texel(push.planes, PARAM_OPACITY / 4u, i);
+    params[at][PARAM_OPACITY % 4u] = min(params[at][PARAM_OPACITY % 4u], push.logit);
+    moments1[at][PARAM_OPACITY % 4u] = 0.0;
+    moments2[at][PARAM_OPACITY % 4u] = 0.0;
 }

@@ -8,6 +8,7 @@
 #extension GL_GOOGLE_include_directive : require
 #define BINDING_CAMERA 1
 #include "lib/prelude.glsl"
+#include "lib/params.glsl"
 #include "lib/projection.glsl"
 #include "lib/sh.glsl"
 
@@ -28,6 +29,7 @@ layout(set = 0, binding = 9, scalar) writeonly buffer ParamsOut { vec4 params_ou
 layout(set = 0, binding = 10, scalar) writeonly buffer Moments1Out { vec4 moments1_out[]; };
 layout(set = 0, binding = 11, scalar) writeonly buffer Moments2Out { vec4 moments2_out[]; };
 layout(set = 0, binding = 12, scalar) buffer Statistics { vec2 statistics[]; };
+layout(set = 0, binding = 13, scalar) readonly buffer Places { uint places[]; };
 layout(push_constant, scalar) uniform Push { UpdatePush push; };
 
 const uint SH_FLOATS = 3 * (SH_DEGREE + 1) * (SH_DEGREE + 1);
@@ -48,7 +50,7 @@ Sums sum_slots(uint first, uint count) {
     for (uint j = 0u; j < count; j += 8u) {
         [[unroll]] for (uint c = 0; c < 8; ++c) {
             const bool there = j + c < count;
-            const int slot = int(SLOT_TEXELS * (there ? first + j + c : first));
+            const int slot = int(SLOT_TEXELS * places[there ? first + j + c : first]);
             const vec4 t0 = texelFetch(slots, slot), t1 = texelFetch(slots, slot + 1), t2 = texelFetch(slots, slot + 2);
             if (there) {
                 s0 += t0;
@@ -60,7 +62,7 @@ Sums sum_slots(uint first, uint count) {
     return Sums(s0.x, s0.yz, vec3(s0.w, s1.xy), vec3(s1.zw, s2));
 }
 
-uint index_of(uint plane, uint i) { return plane * push.capacity + i; }
+uint index_of(uint plane, uint i) { return param_texel(push.planes, plane, i); }
 
 // One texel of parameters with its gradient: Adam (Kingma and Ba 2015, algorithm 1).
 void move(uint plane, uint i, vec4 value, vec4 gradient, vec4 rate) {

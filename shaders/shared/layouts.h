@@ -14,8 +14,10 @@ EWA_UINT(SPEC_KERNEL, 5u);         // KERNEL_*
 EWA_UINT(SPEC_MODE, 6u);           // per shader, see there
 EWA_UINT(SPEC_RADIX_BITS, 7u);     // bits a radix pass sorts by, 1..8
 
-// ---- A splat's parameters: flat float f stands in component f % 4 of texel plane f / 4; plane p of splat i is texel
-// p * capacity + i. Adam's two moments and gradients have the same layout. ----
+// ---- A splat's parameters: flat float f stands in component f % 4 of texel plane f / 4. Splats are stored in blocks of
+// PARAM_BLOCK, within a block plane after plane: one line of memory holds one plane of a block, and all that a block has
+// stands side by side (see lib/params.glsl). Adam's two moments and gradients have the same layout. ----
+EWA_UINT(PARAM_BLOCK, 8u);
 EWA_UINT(PARAM_MEAN, 0u);          // 3 floats, world units
 EWA_UINT(PARAM_OPACITY, 3u);       // logit
 EWA_UINT(PARAM_QUATERNION, 4u);    // w x y z
@@ -41,6 +43,10 @@ EWA_UINT(PLANE_B, 2u);
 EWA_UINT(PLANE_T, 3u);             // transmittance that reaches the background
 EWA_UINT(PLANE_DEPTH, 4u);         // sum of z alpha T
 
+// ---- Loss: what one invocation owns. A pass down the columns: one texel (4 pixels) wide, LOSS_ROWS rows high; a pass along
+// the rows: LOSS_TEXELS texels of one row. Neighbouring outputs share most of their window. ----
+EWA_UINT(LOSS_ROWS, 4u);
+EWA_UINT(LOSS_TEXELS, 2u);
 // ---- Loss planes per colour channel c ----
 EWA_UINT(MOMENT_PLANES, 4u);       // of 4 c + 0: mean x; 1: mean y; 2: mean x^2 + y^2; 3: mean x y
 EWA_UINT(DERIVATIVE_PLANES, 3u);   // of 3 c + 0: dS/d(mean x); 1: dS/d(mean x^2); 2: dS/d(mean x y)
@@ -73,7 +79,8 @@ struct Counts {
 };
 
 struct ProjectPush {
-    uint splats, capacity;
+    uint splats;
+    uint planes;                   // texel planes stored a splat
 };
 
 struct SortPush {
@@ -140,7 +147,8 @@ struct ReducePush {
 };
 
 struct UpdatePush {
-    uint splats, capacity;
+    uint splats;
+    uint planes;                   // texel planes stored a splat
     uint instance_capacity;
     float mean_rate, opacity_rate, quaternion_rate, scale_rate, sh0_rate, sh_rest_rate;
     float bias1, bias2;            // 1 / (1 - beta^step)
@@ -148,8 +156,9 @@ struct UpdatePush {
 };
 
 struct DensifyPush {
-    uint splats, capacity;         // of the old buffers
-    uint new_capacity;
+    uint splats;                   // of the old buffers
+    uint planes;                   // texel planes stored a splat
+    uint new_capacity;             // splats there is room for in the new buffers
     uint scan_block;
     float grow_gradient;           // threshold of the mean gradient norm
     float split_scale;             // world units; larger than this: split, else clone
@@ -160,7 +169,8 @@ struct DensifyPush {
 };
 
 struct ResetPush {
-    uint splats, capacity;
+    uint splats;
+    uint planes;                   // texel planes stored a splat
     float logit;
 };
 

@@ -1,4 +1,4 @@
-// Blends the splats of every tile into the image planes. mode: see the shader.
+// Blends the splats of every tile into the image planes. with_depth: the depth plane also.
 #pragma once
 #include "gpu/recording.h"
 #include "passes/shader_code.h"
@@ -11,25 +11,23 @@ struct Blend {
 
     struct Buffers {
         const gpu::Buffer& records;
-        const gpu::Buffer& values;
-        const gpu::Buffer& instance_splats;
+        const gpu::Buffer& splats;
         const gpu::Buffer& tile_starts;
         const gpu::Buffer& planes;
     };
 
-    Blend(gpu::Device& device, const Shape& shape, uint32_t mode)
+    Blend(gpu::Device& device, const Shape& shape, bool with_depth)
         : pipeline(
               device, "blend", shader_code("blend"),
               {spec(shared::SPEC_GROUP_SIZE, shape.subgroup), spec(shared::SPEC_SUBGROUP, shape.subgroup),
                spec(shared::SPEC_TILE_WIDTH, shape.tile_width),
-               spec(shared::SPEC_TILE_HEIGHT, shape.tile_height), spec(shared::SPEC_MODE, mode)}) {}
+               spec(shared::SPEC_TILE_HEIGHT, shape.tile_height), spec(shared::SPEC_MODE, with_depth)}) {}
 
     void record(gpu::Recording& recording, const Shape& shape, const Buffers& buffers,
                 const shared::BlendPush& push) const {
         recording.dispatch(pipeline, "blend",
-                           {gpu::reads(0, buffers.records), gpu::reads(1, buffers.values),
-                            gpu::reads(2, buffers.instance_splats), gpu::reads(3, buffers.tile_starts),
-                            gpu::writes(4, buffers.planes)},
+                           {gpu::reads(0, buffers.records), gpu::reads(1, buffers.splats),
+                            gpu::reads(2, buffers.tile_starts), gpu::writes(3, buffers.planes)},
                            push, tile_groups(shape, push));
     }
 };

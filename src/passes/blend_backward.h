@@ -11,8 +11,7 @@ struct BlendBackward {
 
     struct Buffers {
         const gpu::Buffer& records;
-        const gpu::Buffer& values;
-        const gpu::Buffer& instance_splats;
+        const gpu::Buffer& splats;
         const gpu::Buffer& tile_starts;
         const gpu::Buffer& planes;
         const gpu::Buffer& image_gradient;
@@ -29,10 +28,9 @@ struct BlendBackward {
     void record(gpu::Recording& recording, const Shape& shape, const Buffers& buffers,
                 const shared::BlendPush& push) const {
         recording.dispatch(pipeline, "blend_backward",
-                           {gpu::reads(0, buffers.records), gpu::reads(1, buffers.values),
-                            gpu::reads(2, buffers.instance_splats), gpu::reads(3, buffers.tile_starts),
-                            gpu::reads(4, buffers.planes), gpu::reads(5, buffers.image_gradient),
-                            gpu::writes(6, buffers.slots)},
+                           {gpu::reads(0, buffers.records), gpu::reads(1, buffers.splats),
+                            gpu::reads(2, buffers.tile_starts), gpu::reads(3, buffers.planes),
+                            gpu::reads(4, buffers.image_gradient), gpu::writes(5, buffers.slots)},
                            push, tile_groups(shape, push));
     }
 };

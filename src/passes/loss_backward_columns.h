@@ -1,6 +1,7 @@
 // Derivatives of SSIM carried back through the window, down the columns.
 #pragma once
 #include "gpu/recording.h"
+#include "passes/loss_items.h"
 #include "passes/shader_code.h"
 #include "passes/shape.h"
 
@@ -22,7 +23,7 @@ struct LossBackwardColumns {
                 const shared::LossPush& push) const {
         recording.dispatch(pipeline, "loss_backward_columns",
                            {gpu::reads(0, buffers.derivatives), gpu::writes(1, buffers.blurred)}, push,
-                           element_groups(shape, uint64_t(push.stride / 4) * push.size[1], 9));
+                           element_groups(shape, loss_column_items(push.stride, push.size[1]), 9));
     }
 };
 

@@ -1,6 +1,7 @@
 // Gradient of the whole loss by the rendering.
 #pragma once
 #include "gpu/recording.h"
+#include "passes/loss_items.h"
 #include "passes/shader_code.h"
 #include "passes/shape.h"
 
@@ -28,7 +29,7 @@ struct LossBackwardRows {
             pipeline, "loss_backward_rows",
             {gpu::reads(0, buffers.blurred), gpu::reads(1, buffers.image), gpu::reads(2, buffers.target),
              gpu::writes(3, buffers.image_gradient), gpu::writes(4, buffers.partials)},
-            push, element_groups(shape, uint64_t(push.stride / 4) * push.size[1], 3));
+            push, element_groups(shape, loss_row_items(push.stride, push.size[1]), 3));
     }
 };
 

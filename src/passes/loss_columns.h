@@ -1,6 +1,7 @@
 // Moments of rendering and photograph, blurred down the columns.
 #pragma once
 #include "gpu/recording.h"
+#include "passes/loss_items.h"
 #include "passes/shader_code.h"
 #include "passes/shape.h"
 
@@ -24,7 +25,7 @@ struct LossColumns {
         recording.dispatch(
             pipeline, "loss_columns",
             {gpu::reads(0, buffers.image), gpu::reads(1, buffers.target), gpu::writes(2, buffers.moments)},
-            push, element_groups(shape, uint64_t(push.stride / 4) * push.size[1], 3));
+            push, element_groups(shape, loss_column_items(push.stride, push.size[1]), 3));
     }
 };
 

@@ -1,6 +1,7 @@
 // SSIM and its derivatives by the rendering's moments.
 #pragma once
 #include "gpu/recording.h"
+#include "passes/loss_items.h"
 #include "passes/shader_code.h"
 #include "passes/shape.h"
 
@@ -25,7 +26,7 @@ struct LossRows {
         recording.dispatch(pipeline, "loss_rows",
                            {gpu::reads(0, buffers.moments), gpu::writes(1, buffers.derivatives),
                             gpu::writes(2, buffers.partials)},
-                           push, element_groups(shape, uint64_t(push.stride / 4) * push.size[1], 3));
+                           push, element_groups(shape, loss_row_items(push.stride, push.size[1]), 3));
     }
 };
 

@@ -12,11 +12,13 @@ struct RadixScatter {
     struct Buffers {
         const gpu::Buffer& keys;
         const gpu::Buffer& values;
+        const gpu::Buffer& numbers;
         const gpu::Buffer& counters;
         const gpu::Buffer& bases;
         const gpu::Buffer& counts;
         const gpu::Buffer& keys_out;
         const gpu::Buffer& values_out;
+        const gpu::Buffer& numbers_out;
     };
 
     RadixScatter(gpu::Device& device, const Shape& shape, uint32_t bits, uint32_t mode)
@@ -30,7 +32,8 @@ struct RadixScatter {
             pipeline, name,
             {gpu::reads(0, buffers.keys), gpu::reads(1, buffers.values), gpu::updates(2, buffers.counters),
              gpu::reads(3, buffers.bases), gpu::reads(4, buffers.counts), gpu::writes(5, buffers.keys_out),
-             gpu::writes(6, buffers.values_out)},
+             gpu::writes(6, buffers.values_out), gpu::reads(7, buffers.numbers),
+             gpu::writes(8, buffers.numbers_out)},
             push, {(push.lanes + shape.sort_group - 1) / shape.sort_group, 1, 1});
     }
 };

@@ -19,6 +19,7 @@ struct Update {
         const gpu::Buffer& moments2;
         const gpu::Buffer& tile_counts;
         const gpu::Buffer& first_instances;
+        const gpu::Buffer& places;
         const gpu::Buffer& counts;
         const gpu::Buffer& params_out;
         const gpu::Buffer& moments1_out;
@@ -41,7 +42,8 @@ struct Update {
              gpu::reads(5, buffers.moments2), gpu::reads(6, buffers.tile_counts),
              gpu::reads(7, buffers.first_instances), gpu::updates(8, buffers.counts),
              gpu::writes(9, buffers.params_out), gpu::writes(10, buffers.moments1_out),
-             gpu::writes(11, buffers.moments2_out), gpu::updates(12, buffers.statistics)},
+             gpu::writes(11, buffers.moments2_out), gpu::updates(12, buffers.statistics),
+             gpu::reads(13, buffers.places)},
             push, element_groups(shape, push.splats));
     }
 };

@@ -58,8 +58,7 @@ void record_backward(gpu::Recording& recording, Kernels& kernels, const Plan& pl
     const passes::Shape& shape = kernels.shape();
     kernels.get<passes::BlendBackward>().record(
         recording, shape,
-        {frame.records, *sorted.values, frame.instance_splats, frame.tile_starts, frame.planes,
-         frame.image_gradient, frame.slots},
+        {frame.records, *sorted.splats, frame.tile_starts, frame.planes, frame.image_gradient, frame.slots},
         blend_push(kernels, frame, camera, background));
 
     // What a gradient alone does not have stands in for itself: the kernel leaves those bindings alone.
@@ -70,10 +69,10 @@ void record_backward(gpu::Recording& recording, Kernels& kernels, const Plan& pl
     kernels.get<passes::Update>(uint32_t(plan.sh_degree), uint32_t(plan.kernel), mode)
         .record(recording, shape,
                 {model.params, *camera.buffer, camera.offset, frame.records, frame.slots, model.moments1,
-                 moments2, frame.tile_counts, frame.first_instances, frame.counts, model.params,
+                 moments2, frame.tile_counts, frame.first_instances, *sorted.places, frame.counts, model.params,
                  model.moments1, moments2, statistics},
                 {model.splats,
-                 model.capacity,
+                 model.planes(),
                  frame.instance_capacity,
                  rates.mean,
                  rates.opacity,

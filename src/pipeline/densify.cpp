@@ -11,7 +11,7 @@ namespace {
 shared::DensifyPush push_of(const Model& model, const Frame& frame, const DensifyRules& rules,
                             float threshold, uint32_t new_capacity) {
     return {model.splats,
-            model.capacity,
+            model.planes(),
             new_capacity,
             frame.sizes.scan_block,
             threshold,
@@ -87,7 +87,7 @@ DensifyResult densify(Kernels& kernels, gpu::Executor& executor, Model& model, F
 void record_reset_opacity(gpu::Recording& recording, Kernels& kernels, const Model& model, float logit) {
     kernels.get<passes::ResetOpacity>().record(recording, kernels.shape(),
                                                {model.params, model.moments1, model.moments2},
-                                               {model.splats, model.capacity, logit});
+                                               {model.splats, model.planes(), logit});
 }
 
 }  // namespace ewa::pipeline

@@ -27,12 +27,13 @@ Sorted record_forward(gpu::Recording& recording, Kernels& kernels, const Plan& p
         .record(recording, shape,
                 {model.params, *camera.buffer, camera.offset, frame.records, frame.depth_keys[0],
                  frame.tile_counts, frame.counts},
-                {model.splats, model.capacity});
+                {model.splats, model.planes()});
 
     const uint32_t order_index = record_sort(recording, kernels,
                                              {{&frame.depth_keys[0], &frame.depth_keys[1]},
                                               {&frame.order[0], &frame.order[1]},
-                                              nullptr,
+                                              {},
+                                              true,
                                               frame.counters,
                                               frame.counter_prefix,
                                               frame.digit_totals,
@@ -46,7 +47,7 @@ Sorted record_forward(gpu::Recording& recording, Kernels& kernels, const Plan& p
     kernels.get<passes::EmitInstances>(plan.gradients)
         .record(recording, shape,
                 {frame.records, order, frame.tile_counts, frame.prefix, frame.scan_totals, frame.counts,
-                 frame.instance_keys[0], frame.instance_splats, frame.first_instances},
+                 frame.instance_keys[0], frame.instance_splats[0], frame.first_instances},
                 {model.splats,
                  frame.instance_capacity,
                  s.scan_block,
@@ -54,26 +55,28 @@ Sorted record_forward(gpu::Recording& recording, Kernels& kernels, const Plan& p
                  {camera.width, camera.height},
                  {s.tiles_x, s.tiles_y}});
 
-    // With gradients the instances' own numbers are sorted, since each owns a slot; else the splats.
+    // With gradients a splat must find its instances again: their slots stand in sorted order.
+    const gpu::Buffer* places[2] = {plan.gradients ? &frame.instance_places[0] : nullptr,
+                                    plan.gradients ? &frame.instance_places[1] : nullptr};
     const uint32_t sorted = record_sort(recording, kernels,
                                         {{&frame.instance_keys[0], &frame.instance_keys[1]},
-                                         {&frame.instance_values[0], &frame.instance_values[1]},
-                                         plan.gradients ? nullptr : &frame.instance_splats,
+                                         {&frame.instance_splats[0], &frame.instance_splats[1]},
+                                         {places[0], places[1]},
+                                         false,
                                          frame.counters,
                                          frame.counter_prefix,
                                          frame.digit_totals,
                                          frame.counts},
                                         s.tile_sort, 0, frame.instance_capacity, true, "tile order");
-    const gpu::Buffer& values = frame.instance_values[sorted];
+    const gpu::Buffer& splats = frame.instance_splats[sorted];
     kernels.get<passes::TileStarts>().record(recording, shape,
                                              {frame.instance_keys[sorted], frame.counts, frame.tile_starts},
                                              {s.tiles, frame.instance_capacity});
 
-    const uint32_t mode = (plan.gradients ? 1u : 0u) | (plan.depth ? 2u : 0u);
-    kernels.get<passes::Blend>(mode).record(
-        recording, shape, {frame.records, values, frame.instance_splats, frame.tile_starts, frame.planes},
-        blend_push(kernels, frame, camera, background));
-    return {&values};
+    kernels.get<passes::Blend>(plan.depth).record(recording, shape,
+                                                  {frame.records, splats, frame.tile_starts, frame.planes},
+                                                  blend_push(kernels, frame, camera, background));
+    return {&splats, places[sorted]};
 }
 
 }  // namespace ewa::pipeline

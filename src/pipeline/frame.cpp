@@ -38,9 +38,8 @@ void Frame::reserve(gpu::Device& device, const passes::Shape& shape, const Frame
     grow(device, digit_totals, "digit totals", sizes.digit_totals);
     for (auto& buffer : instance_keys)
         grow(device, buffer, "instance keys", sizes.instance_words, Texel::rgba32ui);
-    for (auto& buffer : instance_values)
-        grow(device, buffer, "instance values", sizes.instance_words, Texel::rgba32ui);
-    grow(device, instance_splats, "instance splats", sizes.instance_words, Texel::rgba32ui);
+    for (auto& buffer : instance_splats)
+        grow(device, buffer, "instance splats", sizes.instance_words, Texel::rgba32ui);
     grow(device, tile_starts, "tile starts", sizes.tile_starts);
     // Outside gradients nobody reads where a splat's instances begin, but the kernel's binding wants a
     // buffer.
@@ -55,6 +54,8 @@ void Frame::reserve(gpu::Device& device, const passes::Shape& shape, const Frame
         grow(device, image_gradient, "image gradient", sizes.image_gradient, Texel::rgba32f);
         grow(device, partials, "partials", sizes.partial_sums);
         grow(device, reduced, "reduced", sizes.reduced);
+        for (auto& buffer : instance_places)
+            grow(device, buffer, "instance places", sizes.instance_words, Texel::rgba32ui);
         grow(device, slots, "slots", sizes.slots, Texel::rgba32f);
     }
     // The columns between an image's width and its stride count as black in the loss; no kernel writes them.

@@ -7,25 +7,27 @@
 namespace ewa::pipeline {
 namespace {
 
-/// Flat float f of splat i in the plane layout (shared/layouts.h).
-size_t flat_index(uint32_t capacity, uint32_t f, size_t i) {
-    return (size_t(f / 4) * capacity + i) * 4 + f % 4;
+/// Flat float f of splat i, where `planes` texel planes are stored a splat (shared/layouts.h).
+size_t flat_index(uint32_t planes, uint32_t f, size_t i) {
+    const size_t block = i / shared::PARAM_BLOCK, within = i % shared::PARAM_BLOCK;
+    return ((block * planes + f / 4) * shared::PARAM_BLOCK + within) * 4 + f % 4;
 }
 
 /// Calls visit(position in the buffer, float of the scene) for every stored value.
 template <class Scene, class Visit>
-void for_each_value(Scene& g, uint32_t capacity, Visit visit) {
+void for_each_value(Scene& g, Visit visit) {
+    const uint32_t planes = parameter_planes(g.sh_degree);
     const size_t sh = g.sh_stride();
     for (size_t i = 0; i < g.size(); ++i) {
         for (uint32_t c = 0; c < 3; ++c)
-            visit(flat_index(capacity, shared::PARAM_MEAN + c, i), g.means[3 * i + c]);
-        visit(flat_index(capacity, shared::PARAM_OPACITY, i), g.opacity_logits[i]);
+            visit(flat_index(planes, shared::PARAM_MEAN + c, i), g.means[3 * i + c]);
+        visit(flat_index(planes, shared::PARAM_OPACITY, i), g.opacity_logits[i]);
         for (uint32_t c = 0; c < 4; ++c)
-            visit(flat_index(capacity, shared::PARAM_QUATERNION + c, i), g.quaternions[4 * i + c]);
+            visit(flat_index(planes, shared::PARAM_QUATERNION + c, i), g.quaternions[4 * i + c]);
         for (uint32_t c = 0; c < 3; ++c)
-            visit(flat_index(capacity, shared::PARAM_LOG_SCALE + c, i), g.log_scales[3 * i + c]);
+            visit(flat_index(planes, shared::PARAM_LOG_SCALE + c, i), g.log_scales[3 * i + c]);
         for (uint32_t c = 0; c < sh; ++c)
-            visit(flat_index(capacity, shared::PARAM_SH + c, i), g.sh[sh * i + c]);
+            visit(flat_index(planes, shared::PARAM_SH + c, i), g.sh[sh * i + c]);
     }
 }
 
@@ -48,7 +50,7 @@ Model upload_model(gpu::Device& device, const Gaussians& gaussians, int moments,
     const uint64_t bytes = parameter_bytes(model.capacity, model.sh_degree);
     model.params = gpu::Buffer(device, "params", bytes, gpu::Texel::rgba32f);
     std::vector<float> values(bytes / 4);
-    for_each_value(gaussians, model.capacity, [&](size_t at, float value) { values[at] = value; });
+    for_each_value(gaussians, [&](size_t at, float value) { values[at] = value; });
     model.params.upload(std::span<const float>(values));
     if (moments >= 1) model.moments1 = gpu::Buffer(device, "moments1", bytes, gpu::Texel::rgba32f);
     if (moments >= 2) model.moments2 = gpu::Buffer(device, "moments2", bytes, gpu::Texel::rgba32f);
@@ -64,7 +66,7 @@ Gaussians download_model(const Model& model, const gpu::Buffer& buffer) {
     gaussians.sh_degree = model.sh_degree;
     gaussians.resize(model.splats);
     const auto values = buffer.download<float>(parameter_bytes(model.capacity, model.sh_degree) / 4);
-    for_each_value(gaussians, model.capacity, [&](size_t at, float& value) { value = values[at]; });
+    for_each_value(gaussians, [&](size_t at, float& value) { value = values[at]; });
     return gaussians;
 }
 

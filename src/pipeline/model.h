@@ -14,14 +14,16 @@ constexpr uint32_t parameter_planes(int sh_degree) {
     return (shared::PARAM_SH + 3u * uint32_t(sh_coefficients(sh_degree)) + 3u) / 4u;
 }
 
-/// Bytes of one parameter-sized buffer.
+/// Bytes of one parameter-sized buffer: whole blocks of splats.
 constexpr uint64_t parameter_bytes(uint32_t capacity, int sh_degree) {
-    return uint64_t(parameter_planes(sh_degree)) * (capacity > 0 ? capacity : 1) * 16;
+    const uint64_t blocks = capacity > 0 ? (uint64_t(capacity) + shared::PARAM_BLOCK - 1) / shared::PARAM_BLOCK : 1;
+    return blocks * shared::PARAM_BLOCK * parameter_planes(sh_degree) * 16;
 }
 
 struct Model {
     uint32_t splats = 0, capacity = 0;
     int sh_degree = 0;  // stored
+    uint32_t planes() const { return parameter_planes(sh_degree); }
     gpu::Buffer params;
     gpu::Buffer moments1, moments2;  // only where it is trained, or a gradient is taken (moments1)
     gpu::Buffer statistics;          // vec2 a splat; only where a strategy needs it

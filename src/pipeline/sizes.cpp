@@ -5,6 +5,7 @@
 #include <string>
 
 #include "ewa/error.h"
+#include "passes/loss_items.h"
 #include "shared/layouts.h"
 
 namespace ewa::pipeline {
@@ -68,7 +69,7 @@ Sizes sizes_for(const passes::Shape& shape, const FrameRequest& request) {
     s.tile_starts = (uint64_t(s.tiles) + 1) * word;
     s.planes = uint64_t(s.plane_floats) * s.image_planes * word;
     if (request.gradients) {
-        const auto groups = passes::element_groups(shape, uint64_t(s.stride / 4) * request.height, 3);
+        const auto groups = passes::element_groups(shape, passes::loss_row_items(s.stride, request.height), 3);
         s.partials = groups[0] * groups[1] * groups[2] * (shape.group / shape.subgroup);
         s.reduce_block = 64 * shape.subgroup;
         s.reduce_blocks = divide_up(s.partials, s.reduce_block);
@@ -88,8 +89,8 @@ uint64_t Sizes::total() const {
     // depth keys 2, order 2, tile counts, prefix, and in training the first instances
     const uint64_t per_splat = records + splat_words * (gradients ? 7 : 6);
     const uint64_t sorting = scan_totals + 2 * counters + digit_totals;
-    // keys 2, values 2, splats
-    const uint64_t per_instance = 5 * instance_words + slots;
+    // keys 2, splats 2, and in training their places 2
+    const uint64_t per_instance = instance_words * (gradients ? 6 : 4) + slots;
     return per_splat + sorting + per_instance + tile_starts + planes + target + moments + 2 * derivatives +
            image_gradient + partial_sums + reduced;
 }

@@ -22,12 +22,15 @@ uint32_t record_sort(gpu::Recording& recording, Kernels& kernels, const SortBuff
     uint32_t from = 0;  // which keys and values hold the input of the pass
     for (uint32_t pass = 0; pass < cut.passes; ++pass, from ^= 1) {
         const bool first = pass == 0, last = pass + 1 == cut.passes;
-        const uint32_t mode = (first && !buffers.first_values ? 1u : 0u) | (last && !keys_sorted ? 2u : 0u);
+        const bool numbered = buffers.places[0] != nullptr;
+        const uint32_t mode = (first && buffers.own_numbers ? 1u : 0u) | (last && !keys_sorted ? 2u : 0u) |
+                              (numbered ? 4u | (first ? 8u : 0u) | (last ? 16u : 0u) : 0u);
         const shared::SortPush push{items, capacity, cut.lanes, pass * cut.bits};
         const gpu::Buffer& keys = *buffers.keys[from];
-        const gpu::Buffer& values = !first                 ? *buffers.values[from]
-                                    : buffers.first_values ? *buffers.first_values
-                                                           : keys;
+        const gpu::Buffer& values = mode & 1u ? keys : *buffers.values[from];
+        // What a mode leaves alone stands in for itself.
+        const gpu::Buffer& numbers = numbered && !first ? *buffers.places[from] : values;
+        const gpu::Buffer& values_out = *buffers.values[from ^ 1];
         recording.fill(buffers.counters, 0, 0, uint64_t(counters) * 4);
         kernels.get<passes::RadixCount>(cut.bits).record(
             recording, shape, {keys, buffers.counters, buffers.counts}, push, name);
@@ -36,8 +39,9 @@ uint32_t record_sort(gpu::Recording& recording, Kernels& kernels, const SortBuff
                     counters, cut.lanes, Total::none, name);
         kernels.get<passes::RadixScatter>(cut.bits, mode)
             .record(recording, shape,
-                    {keys, values, buffers.counter_prefix, buffers.digit_totals, buffers.counts,
-                     *buffers.keys[from ^ 1], *buffers.values[from ^ 1]},
+                    {keys, values, numbers, buffers.counter_prefix, buffers.digit_totals, buffers.counts,
+                     *buffers.keys[from ^ 1], values_out,
+                     numbered ? *buffers.places[from ^ 1] : values_out},
                     push, name);
     }
     return from;

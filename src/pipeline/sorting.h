@@ -22,8 +22,9 @@ void record_scan(gpu::Recording& recording, Kernels& kernels, const ScanBuffers&
 
 struct SortBuffers {
     const gpu::Buffer* keys[2];       // keys[0] holds the input
-    const gpu::Buffer* values[2];     // scratch and result
-    const gpu::Buffer* first_values;  // the input values; nullptr: the items' own numbers
+    const gpu::Buffer* values[2];     // values[0] holds the input, unless own_numbers
+    const gpu::Buffer* places[2];     // scratch and result: where each item went. nullptr: nobody asks
+    bool own_numbers;                 // the values are the items' own numbers
     const gpu::Buffer& counters;
     const gpu::Buffer& counter_prefix;
     const gpu::Buffer& digit_totals;
@@ -31,8 +32,8 @@ struct SortBuffers {
 };
 
 /// Stable sort of `items` pairs (0: Counts.instances of them, none where that exceeds `capacity`) by the low
-/// cut.passes * cut.bits bits. Returns the index i of values[i] with the result; keys_sorted: keep the sorted
-/// keys too, in keys[i].
+/// cut.passes * cut.bits bits. Returns the index i of values[i] and places[i] with the result; keys_sorted:
+/// keep the sorted keys too, in keys[i].
 uint32_t record_sort(gpu::Recording& recording, Kernels& kernels, const SortBuffers& buffers,
                      const RadixCut& cut, uint32_t items, uint32_t capacity, bool keys_sorted,
                      const char* name);

@@ -87,9 +87,8 @@ class GuardedFrame {
         make(frame.counters, "counters", s.counters);
         make(frame.counter_prefix, "counter prefix", s.counters);
         make(frame.digit_totals, "digit totals", s.digit_totals);
-        for (auto* pair : {&frame.instance_keys, &frame.instance_values})
+        for (auto* pair : {&frame.instance_keys, &frame.instance_splats})
             for (auto& buffer : *pair) make(buffer, "instance words", s.instance_words, Texel::rgba32ui);
-        make(frame.instance_splats, "instance splats", s.instance_words, Texel::rgba32ui);
         make(frame.tile_starts, "tile starts", s.tile_starts);
         make(frame.planes, "planes", s.planes, Texel::rgba32f);
         if (request.gradients) {
@@ -100,6 +99,8 @@ class GuardedFrame {
             make(frame.image_gradient, "image gradient", s.image_gradient, Texel::rgba32f);
             make(frame.partials, "partials", s.partial_sums);
             make(frame.reduced, "reduced", s.reduced);
+            for (auto& buffer : frame.instance_places)
+                make(buffer, "instance places", s.instance_words, Texel::rgba32ui);
             make(frame.slots, "slots", s.slots, Texel::rgba32f);
         }
         frame.reserve(*device(), shape, request);  // zeroes planes and target, guards included

@@ -11,13 +11,12 @@
 namespace ewa::test {
 namespace {
 
-/// The twin's picture and its lists as the device's buffers hold them. Instance numbers run against the order
-/// of the lists, so that a number and its place cannot be mistaken for each other.
+/// The twin's picture and its lists as the device's buffers hold them.
 struct Lists {
     Scene scene;
     reference::Picture twin;
     pipeline::Sizes sizes;
-    Guarded records, splats, numbers, instance_splats, starts;
+    Guarded records, splats, starts;
 
     explicit Lists(const Scene& s)
         : scene(s),
@@ -25,14 +24,10 @@ struct Lists {
           sizes(pipeline::sizes_for(rig().shape(), request())),
           records("records", pack_records(twin.projected), gpu::Texel::rgba32f),
           splats("splats", words([&](size_t k) { return twin.instances.sorted[k].splat; })),
-          numbers("numbers", words([&](size_t k) { return uint32_t(number(k)); })),
-          instance_splats("instance splats",
-                          words([&](size_t k) { return twin.instances.sorted[number(k)].splat; })),
           starts("starts", std::vector<uint32_t>(twin.instances.first_of_tile.begin(),
                                                  twin.instances.first_of_tile.end())) {}
 
     size_t count() const { return twin.instances.sorted.size(); }
-    size_t number(size_t k) const { return count() - 1 - k; }
     pipeline::FrameRequest request() const {
         return {uint32_t(scene.gaussians.size()),
                 uint32_t(scene.camera.width),
@@ -96,15 +91,13 @@ TEST_P(BlendPass, PlanesAreTheTwins) {
     const Case& c = GetParam();
     const Lists lists(random_scene(1500 + c.splats, c.splats, c.kind, c.width, c.height));
     Rig& r = rig();
-    for (const uint32_t mode : {0u, 1u, 2u, 3u}) {
-        SCOPED_TRACE("mode " + std::to_string(mode));
-        const uint32_t planes = mode & 2 ? 5 : 4;
+    for (const bool with_depth : {false, true}) {
+        SCOPED_TRACE(with_depth ? "with depth" : "without depth");
+        const uint32_t planes = with_depth ? 5 : 4;
         Guarded out("planes", uint64_t(lists.sizes.plane_floats) * planes * 4);
         r.run([&](gpu::Recording& recording) {
-            r.kernels.get<passes::Blend>(mode).record(recording, r.shape(),
-                                                      {lists.records, mode & 1 ? lists.numbers : lists.splats,
-                                                       lists.instance_splats, lists.starts, out},
-                                                      lists.push());
+            r.kernels.get<passes::Blend>(with_depth).record(
+                recording, r.shape(), {lists.records, lists.splats, lists.starts, out}, lists.push());
         });
         EXPECT_TRUE(out.intact());
         const auto actual = out.read<float>();
@@ -119,10 +112,10 @@ TEST_P(BlendPass, PlanesAreTheTwins) {
                 for (int k = 0; k < 3; ++k)
                     color.add(std::abs(plane(uint32_t(k)) - b.color.at(x, y)[k]), 4e-6);
                 color.add(std::abs(plane(shared::PLANE_T) - b.transmittance.at(x, y)[0]), 4e-6);
-                if (mode & 2) depth.add(std::abs(plane(shared::PLANE_DEPTH) - b.depth_sum.at(x, y)[0]), 1e-5);
+                if (with_depth) depth.add(std::abs(plane(shared::PLANE_DEPTH) - b.depth_sum.at(x, y)[0]), 1e-5);
             }
         const size_t pixels = size_t(c.width) * size_t(c.height);
-        if (mode == 3)
+        if (with_depth)
             printf("    colour %.1e (%zu over), depth %.1e\n", color.worst, color.over, depth.worst);
         // A few dozen float32 operations on colours of up to 3: 4e-6; depths of up to 8 are twice that.
         EXPECT_LE(color.over, pixels / 500);
@@ -153,7 +146,7 @@ TEST_P(BlendBackwardPass, SlotsAreTheTwinsMoments) {
     r.run([&](gpu::Recording& recording) {
         r.kernels.get<passes::BlendBackward>().record(
             recording, r.shape(),
-            {lists.records, lists.numbers, lists.instance_splats, lists.starts, planes, incoming, slots},
+            {lists.records, lists.splats, lists.starts, planes, incoming, slots},
             lists.push());
     });
     EXPECT_TRUE(slots.intact());
@@ -173,7 +166,7 @@ TEST_P(BlendBackwardPass, SlotsAreTheTwinsMoments) {
     }
     for (size_t k = 0; k < lists.count(); ++k)
         for (size_t j = 0; j < 9; ++j) {
-            const double e = std::abs(double(actual[shared::SLOT_FLOATS * lists.number(k) + j]) -
+            const double e = std::abs(double(actual[shared::SLOT_FLOATS * k + j]) -
                                       slot_of(expected.instances[k])[j]);
             ASSERT_TRUE(std::isfinite(e)) << "instance " << k << " sum " << j;
             error[j] = std::max(error[j], e / largest[j]);
@@ -201,12 +194,11 @@ size_t check_one_tile(const Scene& scene) {
         incoming("image gradient", pack_planes(gradient, 3, lists.sizes.stride), gpu::Texel::rgba32f),
         slots("slots", lists.count() * shared::SLOT_FLOATS * 4, gpu::Texel::rgba32f);
     r.run([&](gpu::Recording& recording) {
-        r.kernels.get<passes::Blend>(1u).record(
-            recording, r.shape(), {lists.records, lists.numbers, lists.instance_splats, lists.starts, planes},
-            lists.push());
+        r.kernels.get<passes::Blend>(false).record(
+            recording, r.shape(), {lists.records, lists.splats, lists.starts, planes}, lists.push());
         r.kernels.get<passes::BlendBackward>().record(
             recording, r.shape(),
-            {lists.records, lists.numbers, lists.instance_splats, lists.starts, planes, incoming, slots},
+            {lists.records, lists.splats, lists.starts, planes, incoming, slots},
             lists.push());
     });
     expect_intact({&planes, &slots});
@@ -224,7 +216,7 @@ size_t check_one_tile(const Scene& scene) {
     for (size_t k = 0; k < lists.count(); ++k) {
         bool zero = true;
         for (size_t j = 0; j < 9; ++j) {
-            const float value = written[shared::SLOT_FLOATS * lists.number(k) + j];
+            const float value = written[shared::SLOT_FLOATS * k + j];
             EXPECT_TRUE(std::isfinite(value)) << "slot of instance " << k << " was not written";
             if (!std::isfinite(value)) return 0;
             zero = zero && value == 0;

@@ -169,7 +169,7 @@ TEST(DensifyEdges, WritesNothingPastItsRoom) {
     const uint32_t room = 200;
     const auto push = [&](uint32_t new_capacity) {
         return shared::DensifyPush{500,
-                                   500,
+                                   start.model.planes(),
                                    new_capacity,
                                    frame.sizes.scan_block,
                                    rules.grow_gradient,

@@ -19,7 +19,7 @@ namespace {
 struct Result {
     shared::Counts counts{};
     std::vector<float> planes;
-    std::vector<uint32_t> order, keys, values, instance_splats, starts, tile_counts;
+    std::vector<uint32_t> order, keys, splats, places, starts, tile_counts;
     Gaussians gradient;
     pipeline::Sizes sizes;
 };
@@ -50,10 +50,10 @@ Result run_frame(const Scene& scene, uint32_t capacity, bool gradients) {
     out.sizes = frame.sizes;
     out.planes = frame.planes.download<float>(frame.sizes.planes / 4);
     const uint32_t listed = std::min(out.counts.instances, capacity);
-    const bool second = sorted.values == &frame.instance_values[1];
+    const bool second = sorted.splats == &frame.instance_splats[1];
     out.keys = frame.instance_keys[second].download<uint32_t>(listed);
-    out.values = sorted.values->download<uint32_t>(listed);
-    out.instance_splats = frame.instance_splats.download<uint32_t>(listed);
+    out.splats = sorted.splats->download<uint32_t>(listed);
+    if (gradients) out.places = sorted.places->download<uint32_t>(listed);
     out.starts = frame.tile_starts.download<uint32_t>(frame.sizes.tiles + 1);
     out.tile_counts = frame.tile_counts.download<uint32_t>(model.splats);
     if (gradients) out.gradient = download_model(model, model.moments1);
@@ -99,11 +99,7 @@ TEST(FrameLists, AreTheTwinsOrALittleMore) {
             uint32_t at = result.starts[tile];
             const uint32_t end = result.starts[tile + 1];
             for (size_t k = lists.first_of_tile[tile]; k < lists.first_of_tile[tile + 1]; ++k) {
-                const auto splat_at = [&](uint32_t i) {
-                    const uint32_t value = result.values[i];
-                    return kind == SplatKind::mixed ? result.instance_splats[value] : value;
-                };
-                while (at < end && splat_at(at) != lists.sorted[k].splat) ++at;
+                while (at < end && result.splats[at] != lists.sorted[k].splat) ++at;
                 missed += at == end;
             }
         }
@@ -214,7 +210,7 @@ TEST(FrameEdges, EqualDepthsGoByIndex) {
     const Result result = run_frame(scene, 20000, false);
     for (uint32_t tile = 0; tile < result.sizes.tiles; ++tile)
         for (uint32_t k = result.starts[tile] + 1; k < result.starts[tile + 1]; ++k) {
-            const uint32_t before = result.values[k - 1], after = result.values[k];
+            const uint32_t before = result.splats[k - 1], after = result.splats[k];
             EXPECT_TRUE(before % 2 == after % 2 ? before < after : before % 2 == 0)
                 << before << " before " << after << " in tile " << tile;
         }

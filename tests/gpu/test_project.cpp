@@ -28,7 +28,7 @@ Output run_project(const Scene& scene) {
     r.run([&](gpu::Recording& recording) {
         r.kernels.get<passes::Project>(uint32_t(scene.gaussians.sh_degree), uint32_t(scene.options.kernel))
             .record(recording, r.shape(), {model.params, camera, 0, records, keys, tile_counts, counts},
-                    {model.splats, model.capacity});
+                    {model.splats, model.planes()});
     });
     expect_intact({&records, &keys, &tile_counts, &counts});
     Output out{records.read<float>(), keys.read<uint32_t>(), tile_counts.read<uint32_t>(),

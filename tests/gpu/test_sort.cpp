@@ -56,7 +56,7 @@ INSTANTIATE_TEST_SUITE_P(Sizes, Scan,
                                          std::pair{100003u, 512u}, std::pair{70001u, 1u}));
 
 struct Sorted {
-    std::vector<uint32_t> values, keys;
+    std::vector<uint32_t> values, keys, places;
 };
 
 /// device_count: the number of items is left for the device to read from Counts.instances.
@@ -69,8 +69,10 @@ Sorted run_sort(const std::vector<uint32_t>& input, const RadixCut& cut, bool ow
     padded.resize(std::max(items, 1u));
     using gpu::Texel;
     Guarded keys0("keys 0", padded, Texel::rgba32ui), keys1("keys 1", bytes, Texel::rgba32ui),
-        values0("values 0", bytes, Texel::rgba32ui), values1("values 1", bytes, Texel::rgba32ui),
-        first("first values", own_numbers ? padded : first_values, Texel::rgba32ui),
+        values0("values 0", own_numbers ? std::vector<uint32_t>(padded.size(), kPoison) : first_values,
+                Texel::rgba32ui),
+        values1("values 1", bytes, Texel::rgba32ui), places0("places 0", bytes, Texel::rgba32ui),
+        places1("places 1", bytes, Texel::rgba32ui),
         counters("counters", (uint64_t(cut.lanes) << cut.bits) * 4),
         prefix("counter prefix", (uint64_t(cut.lanes) << cut.bits) * 4),
         totals("digit totals", (shared::RADIX_DIGITS_MAX + 1) * 4);
@@ -82,15 +84,18 @@ Sorted run_sort(const std::vector<uint32_t>& input, const RadixCut& cut, bool ow
         result = record_sort(recording, r.kernels,
                              {{&keys0.buffer(), &keys1.buffer()},
                               {&values0.buffer(), &values1.buffer()},
-                              own_numbers ? nullptr : &first.buffer(),
+                              {own_numbers ? nullptr : &places0.buffer(), own_numbers ? nullptr : &places1.buffer()},
+                              own_numbers,
                               counters,
                               prefix,
                               totals,
                               counts},
                              cut, device_count ? 0 : items, capacity, keep_keys, "sort");
     });
-    expect_intact({&keys0, &keys1, &values0, &values1, &first, &counters, &prefix, &totals});
-    Sorted out{(result ? values1 : values0).read<uint32_t>(), (result ? keys1 : keys0).read<uint32_t>()};
+    expect_intact({&keys0, &keys1, &values0, &values1, &places0, &places1, &counters, &prefix, &totals});
+    Sorted out{(result ? values1 : values0).read<uint32_t>(), (result ? keys1 : keys0).read<uint32_t>(),
+               (result ? places1 : places0).read<uint32_t>()};
+    out.places.resize(items);
     out.values.resize(items);
     out.keys.resize(items);
     return out;
@@ -126,16 +131,18 @@ TEST_P(Sort, IsStableForEveryKeyWidth) {
     }
 }
 
-TEST_P(Sort, CarriesValuesAndReadsTheNumberOfItemsOnTheDevice) {
+TEST_P(Sort, CarriesValuesTellsPlacesAndReadsTheNumberOfItemsOnTheDevice) {
     const uint32_t items = GetParam();
     Random random(items + 1);
     std::vector<uint32_t> keys(items), values(std::max(items, 1u));
     for (auto& key : keys) key = uint32_t(random.bits() % 300);
     for (auto& value : values) value = uint32_t(random.bits());
     const Sorted sorted = run_sort(keys, cut_for(items, 9), false, false, true, items, values);
+    const auto order = reference::stable_order<uint32_t>(keys);
     std::vector<uint32_t> expected;
-    for (const uint32_t i : reference::stable_order<uint32_t>(keys)) expected.push_back(values[i]);
+    for (const uint32_t i : order) expected.push_back(values[i]);
     EXPECT_EQ(sorted.values, expected);
+    for (uint32_t place = 0; place < items; ++place) ASSERT_EQ(sorted.places[order[place]], place);
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, Sort, testing::Values(0u, 1u, 7u, 1000u, 100003u));

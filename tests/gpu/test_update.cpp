@@ -21,7 +21,7 @@ struct Slots {
     Scene scene;
     reference::LossGradientTwin twin;
     std::vector<float> slots;
-    std::vector<uint32_t> tile_counts, first;
+    std::vector<uint32_t> tile_counts, first, places;  // places run against the instances
 
     explicit Slots(const Scene& s) : scene(s) {
         const Image target = random_target(31, s.camera.width, s.camera.height);
@@ -35,12 +35,13 @@ struct Slots {
             first.push_back(sum);
             sum += n;
         }
+        for (uint32_t e = 0; e < std::max(sum, 1u); ++e) places.push_back(std::max(sum, 1u) - 1 - e);
         slots.resize(std::max<size_t>(sum, 1) * shared::SLOT_FLOATS, std::nanf(""));
         std::vector<uint32_t> next = first;
         for (size_t k = 0; k < sorted.size(); ++k) {
             const auto slot = slot_of(twin.blend.instances[k]);
             for (size_t j = 0; j < 9; ++j)
-                slots[size_t(next[sorted[k].splat]) * shared::SLOT_FLOATS + j] = float(slot[j]);
+                slots[size_t(places[next[sorted[k].splat]]) * shared::SLOT_FLOATS + j] = float(slot[j]);
             ++next[sorted[k].splat];
         }
     }
@@ -49,7 +50,7 @@ struct Slots {
 /// What the pass reads and writes besides the model.
 struct Bench {
     gpu::Buffer camera;
-    Guarded records, slots, tile_counts, first, counts, statistics;
+    Guarded records, slots, tile_counts, first, places, counts, statistics;
 
     explicit Bench(const Slots& s)
         : camera(camera_buffer(s.scene.camera, rig().shape())),
@@ -57,6 +58,7 @@ struct Bench {
           slots("slots", s.slots, gpu::Texel::rgba32f),
           tile_counts("tile counts", s.tile_counts),
           first("first instances", s.first),
+          places("places", s.places),
           counts(zero_counts()),
           statistics("statistics", std::vector<float>(2 * s.scene.gaussians.size())) {}
 
@@ -69,10 +71,10 @@ struct Bench {
             r.kernels.get<passes::Update>(uint32_t(degree), uint32_t(scene.options.kernel), mode)
                 .record(recording, r.shape(),
                         {model.params, camera, 0, records, slots, moments1, moments2, tile_counts, first,
-                         counts, model.params, moments1, moments2, statistics},
+                         places, counts, model.params, moments1, moments2, statistics},
                         push);
         });
-        expect_intact({&records, &slots, &tile_counts, &first, &counts, &statistics});
+        expect_intact({&records, &slots, &tile_counts, &first, &places, &counts, &statistics});
     }
 };
 
@@ -247,7 +249,7 @@ TEST(UpdateEdges, AnUpdateThatIsNotFiniteIsDroppedAndCounted) {
     Slots slots(scene);
     size_t poisoned = 0;
     while (slots.tile_counts[poisoned] == 0) ++poisoned;
-    slots.slots[size_t(slots.first[poisoned]) * shared::SLOT_FLOATS] = std::nanf("");  // sum g
+    slots.slots[size_t(slots.places[slots.first[poisoned]]) * shared::SLOT_FLOATS] = std::nanf("");  // sum g
     GuardedModel model(scene.gaussians);
     Bench bench(slots);
     bench.run(scene, model.model, model.moments1, model.moments2, 0, push_for(scene, 1));

@@ -1,0 +1,8 @@
+// Where a splat's parameters stand (shared/layouts.h).
+#ifndef EWA_LIB_PARAMS
+#define EWA_LIB_PARAMS
+// Texel of plane `plane` of splat i, where `planes` are stored a splat.
+uint param_texel(uint planes, uint plane, uint i) {
+    return (i / PARAM_BLOCK * planes + plane) * PARAM_BLOCK + i % PARAM_BLOCK;
+}
+#endif
