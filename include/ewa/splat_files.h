@@ -33,9 +33,9 @@ struct SplatScene {
     std::vector<std::string> remarks;  // one line each: what the file holds that is not taken
 };
 
-/// In any of the formats. Memory: at most twice the larger of the file and its unpacked content; a packed file
-/// that claims more than 4 times its size and 48 MiB is refused. A value may be not finite where the
-/// format can hold that. Throws InputError that names the file and the byte or property.
+/// In any of the formats. Memory: at most twice the larger of the file and the scene. A file that claims more than 4
+/// times its size (SPZ, which is packed: 32 times) and 40 MiB is refused. A value may be not finite where the format can
+/// hold that. Throws InputError that names the file and the byte or property.
 SplatScene read_splats(const std::filesystem::path& path);
 
 /// The scene alone. What is not taken of the file is a warning.

@@ -192,6 +192,7 @@ GltfDocument::GltfDocument(const std::filesystem::path& path) : path_(path) {
         top = parse(name_, chunks);
     }
     if (!top.is_object()) fail("the JSON is no object");
+    if (!top.contains("asset")) fail("the JSON has no \"asset\", which every glTF has");
     if (const auto list = top.find("buffers"); list != top.end())
         add_buffers(path.parent_path(), &*list, bin_begin, bin_size);
     const std::string text = needed_sections(top);

@@ -7,15 +7,15 @@
 
 namespace ewa::io {
 
-void require_memory(const std::string& name, uint64_t file_bytes, uint64_t count, int sh_degree) {
-    constexpr uint64_t kTimes = 4, kAlways = uint64_t(40) << 20;
+void require_memory(const std::string& name, uint64_t file_bytes, uint64_t count, int sh_degree,
+                    uint64_t folds) {
+    constexpr uint64_t kAlways = uint64_t(40) << 20;
     const uint64_t each = sizeof(float) * (11 + 3 * uint64_t(sh_coefficients(sh_degree)));
-    if (count <= (kTimes * file_bytes + kAlways) / each) return;
-    throw InputError(
-        name + ": claims " + std::to_string(count) + " splats of SH degree " + std::to_string(sh_degree) +
-        " in " + std::to_string(file_bytes) +
-        " bytes, which would unpack to more than 4 times the file and 40 MiB; it is damaged, or its splats "
-        "repeat each other");
+    if (count <= (folds * file_bytes + kAlways) / each) return;
+    throw InputError(name + ": claims " + std::to_string(count) + " splats of SH degree " +
+                     std::to_string(sh_degree) + " in " + std::to_string(file_bytes) +
+                     " bytes, which would unpack to more than " + std::to_string(folds) +
+                     " times the file and 40 MiB; it is damaged, or its splats repeat each other");
 }
 
 void remark_dropped_sh(const Gaussians& gaussians, std::vector<std::string>& remarks) {

@@ -140,15 +140,18 @@ void take_header(const Header& header, const core::FileReader& reader, SplatScen
     scene.gaussians.sh_degree = std::min(header.file_degree, kMaxShDegree);
     if (header.file_degree > kMaxShDegree)
         scene.remarks.push_back("has SH degree 4; degrees above 3 are left out");
-    require_memory(reader.name(), reader.size(), header.count, scene.gaussians.sh_degree);
+    require_memory(reader.name(), reader.size(), header.count, scene.gaussians.sh_degree, kPackedFolds);
     scene.gaussians.resize(header.count);
 }
 
-/// Throws where a packing method cannot make the splats' bytes of the file's, before memory is taken for them.
-void require_packed(const core::FileReader& reader, uint64_t count, uint64_t bytes_each, uint64_t most_folds) {
+/// Throws where a packing method cannot make the splats' bytes of the file's, before memory is taken for
+/// them.
+void require_packed(const core::FileReader& reader, uint64_t count, uint64_t bytes_each,
+                    uint64_t most_folds) {
     if (count * bytes_each > reader.size() * most_folds)
-        reader.fail("the header claims " + std::to_string(count) + " splats of " + std::to_string(bytes_each) +
-                    " bytes, which " + std::to_string(reader.size()) + " packed bytes cannot hold");
+        reader.fail("the header claims " + std::to_string(count) + " splats of " +
+                    std::to_string(bytes_each) + " bytes, which " + std::to_string(reader.size()) +
+                    " packed bytes cannot hold");
 }
 
 SplatScene read_gzipped(core::FileReader& reader) {
@@ -158,7 +161,8 @@ SplatScene read_gzipped(core::FileReader& reader) {
     const Header header = parse_header(bytes, reader);
     if (header.version > 3) reader.fail("SPZ version 4 is not packed with gzip; the file is damaged");
     const auto sizes = block_bytes(header.version, header.file_degree);
-    require_packed(reader, header.count, std::accumulate(sizes.begin(), sizes.end(), size_t(0)), kMostGzipFolds);
+    require_packed(reader, header.count, std::accumulate(sizes.begin(), sizes.end(), size_t(0)),
+                   kMostGzipFolds);
     SplatScene scene;
     take_header(header, reader, scene);
     for (int block = 0; block < kBlocks; ++block)

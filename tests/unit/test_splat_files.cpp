@@ -251,6 +251,17 @@ TEST(Spz, VersionsOneToThree) {
     }
 }
 
+// Coefficients of zero take next to nothing in the file, and as much as any others in memory.
+TEST(Spz, LargeScenesThatPackWell) {
+    TempFolder folder;
+    Gaussians g = storable_splats(5, 400000, 0);
+    set_sh_degree(g, 3);
+    for (const int version : {3, 4}) {
+        save_splats(folder / "a.spz", g, SaveOptions{.spz_version = version});
+        EXPECT_EQ(load_splats(folder / "a.spz").size(), g.size());
+    }
+}
+
 TEST(Spz, TurnsTheFrame) {
     // (x, y, z) -> (x, -y, -z) is half a turn round x; the stored SH must give the same colour in the turned
     // direction.
