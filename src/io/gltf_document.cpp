@@ -15,6 +15,7 @@ using nlohmann::json;
 
 constexpr uint32_t kMagic = 0x46546c67, kJsonChunk = 0x4e4f534a, kBinChunk = 0x004e4942;
 constexpr int kDeepest = 64;
+constexpr size_t kLongestReason = 300;  // of a library's error, which may quote the file at any length
 constexpr size_t kMostObjects = 1 << 15, kMostValues = 1 << 17;
 
 struct Chunks {
@@ -81,9 +82,10 @@ json parse(const std::string& name, const Chunks& chunks) {
         return json::parse(chunks.json, watch);
     } catch (const json::parse_error& error) {
         throw InputError(name + ": byte " + std::to_string(chunks.json_begin + error.byte) +
-                         ": not valid JSON: " + core::one_line(error.what()));
+                         ": not valid JSON: " + core::one_line(error.what()).substr(0, kLongestReason));
     } catch (const json::exception& error) {
-        throw InputError(name + ": not valid JSON: " + core::one_line(error.what()));
+        throw InputError(name +
+                         ": not valid JSON: " + core::one_line(error.what()).substr(0, kLongestReason));
     }
 }
 
@@ -206,7 +208,7 @@ GltfDocument::GltfDocument(const std::filesystem::path& path) : path_(path) {
     } catch (const std::exception& exception) {
         error = exception.what();
     }
-    if (!loaded || !error.empty()) fail("is no valid glTF: " + error);
+    if (!loaded || !error.empty()) fail("is no valid glTF: " + error.substr(0, kLongestReason));
 }
 
 void GltfDocument::add_buffers(const std::filesystem::path& folder, const void* json_buffers,

@@ -315,6 +315,13 @@ TEST(GltfSplats, ClaimsAreBounded) {
     for (int i = 0; i < 100000; ++i) deep += "[";
     expect_error<InputError>([&] { load_splats(nested.folder().write("deep.gltf", "{\"extras\":" + deep)); },
                              {"deep.gltf", "nests deeper"});
+    // A library's error quotes the file; ours stay readable.
+    try {
+        load_splats(nested.folder().write("long.gltf", "{\"" + std::string(100000, 'x') + "\": nonsense}"));
+        ADD_FAILURE() << "nothing was thrown";
+    } catch (const InputError& error) {
+        EXPECT_LT(std::string(error.what()).size(), 1000u);
+    }
     Gltf instanced(g);
     instanced.top["nodes"] = json::array();
     instanced.top["scenes"][0]["nodes"] = json::array();
