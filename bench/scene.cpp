@@ -6,9 +6,9 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <numbers>
-#include "ewa/splat_edit.h"
 
 #include "core/random.h"
+#include "ewa/splat_edit.h"
 #include "shared/constants.h"
 
 namespace ewa::bench {

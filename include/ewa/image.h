@@ -20,14 +20,20 @@ struct Image {
     const float* at(int x, int y) const { return &pixels[(size_t(y) * width + x) * channels]; }
 };
 
-/// Width and height from the file's header alone. Throws InputError.
+/// What the file's header says. Throws InputError.
 struct ImageSize {
-    int width = 0, height = 0;
+    int width = 0, height = 0;  // as the pixels are stored
+    int orientation = 1;        // EXIF's: how to turn them upright, see oriented
+    bool eight_bit = true;      // no more than 256 levels
 };
 ImageSize read_image_size(const std::filesystem::path& path);
 
+/// The picture turned as EXIF's orientation (1..8) says; 5 to 8 exchange width and height.
+Image oriented(const Image& image, int orientation);
+
 /// Any format OpenImageIO reads, as 3 (RGB) or 4 (RGBA, colour not multiplied by alpha) channels; grey becomes RGB.
-/// 16-bit integers become value / 65535, floating-point files stay as they are. Throws InputError.
+/// 16-bit integers become value / 65535, floating-point files stay as they are. EXIF's orientation is left alone: the
+/// pixels come as they are stored. Throws InputError.
 Image load_image(const std::filesystem::path& path);
 
 /// .png: 8 bit, rounded, clamped to [0, 1], NaN as 0. .exr: float32, not clamped. Colour is not multiplied by alpha.
@@ -44,9 +50,13 @@ Image over_background(const Image& image, const std::array<float, 3>& background
 /// 10 log10(1 / MSE) over RGB, both pictures clamped to [0, 1]; +inf for equal pictures.
 /// Throws InputError when sizes differ.
 double psnr(const Image& a, const Image& b);
+/// Each pixel's share is its weight (one channel of the same size; empty: equal weights). NaN where no pixel counts.
+double psnr(const Image& a, const Image& b, const Image& weights);
 
 /// Mean SSIM over pixels and RGB: 11 x 11 Gaussian window, sigma 1.5, zero padded (Wang et al. 2004), both pictures
 /// clamped to [0, 1], computed in float64. Throws InputError when sizes differ.
 double ssim(const Image& a, const Image& b);
+/// Of a pulled onto b where it weighs less (w a + (1 - w) b), each pixel's share its weight.
+double ssim(const Image& a, const Image& b, const Image& weights);
 
 }  // namespace ewa

@@ -55,13 +55,14 @@ struct LossGradient {
     uint32_t skipped_nonfinite = 0;
 };
 
-/// The training loss of one view and its gradient. target: RGB, or RGBA that is composited over the background; of
-/// the camera's size.
+/// The training loss of one view and its gradient. target: RGB, or RGBA that is composited over the background or, with
+/// alpha_is_weight, in which alpha says how much a pixel counts; of the camera's size.
 LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians, const Camera& camera,
-                           const Image& target, const RenderOptions& options);
+                           const Image& target, const RenderOptions& options, bool alpha_is_weight = false);
 
-/// What is left out for this scene and request.
+/// What is left out for this scene and request. masks: training photographs have pixels that do not count.
 enum class Purpose { picture, training, densifying };  // densifying: training with a strategy that adds splats
-std::vector<PlanLine> plan_lines(const Gaussians& gaussians, const RenderOptions& options, Purpose purpose);
+std::vector<PlanLine> plan_lines(const Gaussians& gaussians, const RenderOptions& options, Purpose purpose,
+                                 bool masks = false);
 
 }  // namespace ewa

@@ -26,6 +26,7 @@ struct TrainOptions {
     int sh_degree = 3;
     uint64_t seed = 0;
     bool random_background = false;
+    uint64_t image_cache_bytes = uint64_t(4) << 30;  // decoded photographs held; the others are read again each time
     RenderOptions render;                // background, kernel
 
     // Learning rates of 3DGS (arguments/__init__.py); means are per unit of scene extent.
@@ -54,7 +55,8 @@ struct Evaluation {
     double seconds = 0;
 };
 
-/// Renders each frame and compares it with its photograph, both clamped to [0, 1].
+/// Renders each frame and compares it with its photograph, both clamped to [0, 1], over the pixels that count. A frame in
+/// which none does is left out.
 Evaluation evaluate(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians, const Dataset& dataset,
                     const std::vector<int>& frames, const RenderOptions& options);
 
@@ -67,7 +69,8 @@ struct StepReport {
     uint32_t skipped_nonfinite = 0;      // splats skipped in the last step
 };
 
-/// Owns the model on the device and the photographs of the training frames. One step is one submission.
+/// Owns the model on the device and the photographs of the training frames, as many as image_cache_bytes holds (a file
+/// with 256 levels takes 4 bytes a pixel, another 16). One step is one submission.
 class Trainer {
   public:
     Trainer(std::shared_ptr<gpu::Device> device, const Dataset& dataset, const std::vector<int>& train_frames,
@@ -78,9 +81,10 @@ class Trainer {
     /// text says how much was needed).
     StepReport step();
 
-    Gaussians gaussians() const;         // read back from the device
+    Gaussians gaussians() const;         // read back from the device; in the trainer's own order, along a curve through space
     uint32_t splats() const;
     int steps_done() const;
+    size_t photographs_on_disk() const;  // that the cache has no room for
     std::vector<PassTime> pass_times() const;  // medians over the last steps, in recording order
 
   private:

@@ -46,7 +46,7 @@ EWA_UINT(PLANE_DEPTH, 4u);         // sum of z alpha T
 // ---- Loss: what one invocation owns. A pass down the columns: one texel (4 pixels) wide, LOSS_ROWS rows high; a pass along
 // the rows: LOSS_TEXELS texels of one row. Neighbouring outputs share most of their window. ----
 EWA_UINT(LOSS_ROWS, 4u);
-EWA_UINT(LOSS_TEXELS, 2u);
+EWA_UINT(LOSS_TEXELS, 4u);
 // ---- Loss planes per colour channel c ----
 EWA_UINT(MOMENT_PLANES, 4u);       // of 4 c + 0: mean x; 1: mean y; 2: mean x^2 + y^2; 3: mean x y
 EWA_UINT(DERIVATIVE_PLANES, 3u);   // of 3 c + 0: dS/d(mean x); 1: dS/d(mean x^2); 2: dS/d(mean x y)
@@ -126,6 +126,12 @@ struct BlendPush {
 
 struct UnpackPush {
     float background[3];
+    uint size[2];
+    uint stride;
+    uint plane_floats;
+};
+
+struct MaskPush {
     uint size[2];
     uint stride;
     uint plane_floats;

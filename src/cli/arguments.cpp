@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <map>
 
 #include "ewa/error.h"
 
@@ -98,6 +99,29 @@ void add_device_options(CLI::App& app, DeviceOptions& options) {
         ->type_name("NAME|N");
     app.add_flag("--validation", options.validation, "Turn the Vulkan validation layer on")
         ->group("For developers");
+}
+
+namespace {
+const std::map<std::string, MaskUse> kMaskUses = {{"auto", MaskUse::automatic},
+                                                  {"ignore", MaskUse::ignore},
+                                                  {"cut", MaskUse::cut},
+                                                  {"none", MaskUse::none}};
+}
+
+void add_masks_option(CLI::App& app, MaskUse& masks) {
+    app.add_option(
+           "--masks", masks,
+           "What masks/ and alpha are for: ignore (pixels do not count), cut (out of the background), none, "
+           "or auto: ignore where there are mask files, else cut")
+        ->transform(CLI::CheckedTransformer(kMaskUses).description(""))
+        ->type_name("USE")
+        ->default_str(masks_text(masks));
+}
+
+std::string masks_text(MaskUse masks) {
+    for (const auto& [name, use] : kMaskUses)
+        if (use == masks) return name;
+    return {};
 }
 
 void add_downscale_option(CLI::App& app, int& downscale) {

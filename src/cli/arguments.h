@@ -38,6 +38,10 @@ CLI::Validator in_range(T low, T high) {
 /// Refuses a sign: CLI11 reads -1 into an unsigned number as its largest value.
 CLI::Validator without_sign();
 
+/// --masks
+void add_masks_option(CLI::App& app, MaskUse& masks);
+std::string masks_text(MaskUse masks);
+
 void add_downscale_option(CLI::App& app, int& downscale);
 void add_test_every_option(CLI::App& app, int& test_every);
 

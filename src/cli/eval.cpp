@@ -16,6 +16,7 @@ struct EvalArguments {
     std::filesystem::path splats, dataset, json;
     std::string split = "test";
     int test_every = 8, downscale = 1;
+    MaskUse masks = MaskUse::automatic;
     DrawArguments draw;
     DeviceOptions device;
 };
@@ -33,7 +34,8 @@ report::Json to_json(const Evaluation& evaluation) {
 int run(const EvalArguments& arguments) {
     const RenderOptions options = arguments.draw.options();
     const Gaussians gaussians = load_splats(arguments.splats);
-    const Dataset dataset = load_dataset(arguments.dataset, {.downscale = arguments.downscale});
+    const Dataset dataset =
+        load_dataset(arguments.dataset, {.downscale = arguments.downscale, .masks = arguments.masks});
     const std::vector<int> frames = select_frames(dataset, arguments.split, arguments.test_every);
 
     const Evaluation evaluation =
@@ -64,6 +66,7 @@ Action add_eval(CLI::App& app) {
     app.add_option("--json", arguments->json, "Write the figures to this file")->type_name("FILE");
     add_draw_options(app, arguments->draw);
     add_downscale_option(app, arguments->downscale);
+    add_masks_option(app, arguments->masks);
     add_device_options(app, arguments->device);
     return [arguments] { return run(*arguments); };
 }

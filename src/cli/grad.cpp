@@ -16,6 +16,7 @@ namespace {
 struct GradArguments {
     std::filesystem::path splats, dataset, output, json;
     int frame = 0, downscale = 1;
+    MaskUse masks = MaskUse::automatic;
     DrawArguments draw;
     DeviceOptions device;
 };
@@ -29,13 +30,15 @@ int run(const GradArguments& arguments) {
         throw InputError("the gradient is written as a PLY: -o " + arguments.output.string() +
                          " does not end in .ply");
     const Gaussians gaussians = load_splats(arguments.splats);
-    const Dataset dataset = load_dataset(arguments.dataset, {.downscale = arguments.downscale});
+    const Dataset dataset =
+        load_dataset(arguments.dataset, {.downscale = arguments.downscale, .masks = arguments.masks});
     const int index = select_frames(dataset, std::to_string(arguments.frame), 0).front();
     const Frame& frame = dataset.frames[index];
     make_folder(arguments.output.parent_path());
 
-    const LossGradient result = loss_gradient(open_device(arguments.device), gaussians, frame.camera,
-                                              load_frame_image(frame), options);
+    const LossGradient result =
+        loss_gradient(open_device(arguments.device), gaussians, frame.camera, load_frame_image(frame),
+                      options, frame.masks == MaskUse::ignore);
     save_splats(arguments.output, result.gradient,
                 {"ewa " EWA_VERSION, fmt::format("gradient of the training loss of frame {}", index)});
     if (!arguments.json.empty())
@@ -76,6 +79,7 @@ Action add_grad(CLI::App& app) {
         ->type_name("FILE");
     add_draw_options(app, arguments->draw);
     add_downscale_option(app, arguments->downscale);
+    add_masks_option(app, arguments->masks);
     add_device_options(app, arguments->device);
     return [arguments] { return run(*arguments); };
 }

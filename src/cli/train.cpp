@@ -30,17 +30,26 @@ void add_model_options(CLI::App& app, TrainArguments& arguments) {
         ->check(in_range(1u, 1000000000u))
         ->type_name("N")
         ->capture_default_str();
-    app.add_option("--init", arguments.init,
-                   "sfm (the dataset's points), random, or a splat file to go on from")
+    app.add_option(
+           "--init", arguments.init,
+           "sfm (the dataset's points; random where it has none), random (where the cameras look), or a "
+           "splat file to go on from")
         ->type_name("sfm|random|FILE")
         ->capture_default_str();
     app.add_option("--seed", arguments.seed, "Same seed, same device: same bytes")
         ->check(without_sign())
         ->type_name("S")
         ->capture_default_str();
+    app.add_option("--image-cache", arguments.image_cache,
+                   "MiB of decoded photographs held on the device; the others are read again each time")
+        ->check(without_sign())
+        ->check(in_range(uint64_t(0), uint64_t(1) << 40))
+        ->type_name("MiB")
+        ->capture_default_str();
     arguments.draw.random_allowed = true;
     add_draw_options(app, arguments.draw);
     add_downscale_option(app, arguments.downscale);
+    add_masks_option(app, arguments.masks);
     add_test_every_option(app, arguments.test_every);
 }
 

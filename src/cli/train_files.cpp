@@ -35,10 +35,11 @@ std::vector<report::ReportPicture> draw_report_pictures(const PictureRequest& re
         const Frame& frame = request.dataset.frames[index];
         report::ReportPicture picture;
         picture.name = frame.name;
-        picture.photograph = over_background(load_frame_image(frame), request.options.background);
+        Photograph photograph = load_photograph(frame, request.options.background);
+        picture.photograph = std::move(photograph.picture);
         picture.rendering = renderer.render(frame.camera).color;
-        picture.psnr = psnr(picture.rendering, picture.photograph);
-        picture.ssim = ssim(picture.rendering, picture.photograph);
+        picture.psnr = psnr(picture.rendering, picture.photograph, photograph.weights);
+        picture.ssim = ssim(picture.rendering, picture.photograph, photograph.weights);
         const fs::path file = folder / (names[index].string() + ".png");
         make_folder(file.parent_path());
         save_image(file, picture.rendering);

@@ -32,6 +32,7 @@ TrainOptions train_options(const TrainArguments& arguments) {
     options.max_splats = arguments.max_splats;
     options.sh_degree = arguments.draw.sh_degree;
     options.seed = arguments.seed;
+    options.image_cache_bytes = arguments.image_cache << 20;
     options.random_background = arguments.draw.random_background();
     options.render = arguments.draw.options();
     return options;
@@ -47,14 +48,12 @@ Gaussians start_splats(const TrainArguments& arguments, const Dataset& dataset,
                 fmt::format("{}: a coordinate is not finite ({} such points in all); remove them, or start "
                             "from --init random",
                             dataset.first_dropped_point, dataset.dropped_points));
-        if (dataset.points.positions.empty())
-            throw InputError(dataset.root.string() +
-                             " has no points to start from; --init random needs none");
-        start = gaussians_from_points(dataset.points, degree);
-    } else if (arguments.init == "random") {
+        if (!dataset.points.positions.empty()) start = gaussians_from_points(dataset.points, degree);
+    }
+    if (arguments.init == "random" || (arguments.init == "sfm" && start.size() == 0)) {
         const uint32_t count = std::min(kRandomSplats, arguments.max_splats);
         start = train::random_gaussians(dataset, frames, static_cast<int>(count), arguments.seed, degree);
-    } else {
+    } else if (arguments.init != "sfm") {
         start = train::with_sh_degree(load_splats(arguments.init), degree);
     }
     if (start.size() > arguments.max_splats)
@@ -99,7 +98,8 @@ class TrainRun {
 };
 
 void TrainRun::load() {
-    dataset_ = load_dataset(arguments_.dataset, {.downscale = arguments_.downscale});
+    dataset_ =
+        load_dataset(arguments_.dataset, {.downscale = arguments_.downscale, .masks = arguments_.masks});
     split_ = split_frames(dataset_, arguments_.test_every);
     if (split_.train.empty())
         throw InputError(fmt::format("{}: of {} images ({} missing) none is left to train on",
@@ -122,6 +122,8 @@ void TrainRun::load() {
         report_.settings.emplace_back(name, value.is_string() ? value.get<std::string>() : value.dump());
 
     report_.title = dataset_name(arguments_.dataset);
+    if (arguments_.init == "sfm" && dataset_.points.positions.empty())
+        report_.remarks.push_back("there are no points: random splats where the cameras look are the start");
     if (dataset_.missing_images > 0)
         report_.remarks.push_back(fmt::format("{} images are missing and left out", dataset_.missing_images));
     if (dataset_.dropped_points > 0)
@@ -258,13 +260,17 @@ int TrainRun::run() {
     summary.strategy = arguments_.strategy;
     for (const PlanLine& line :
          plan_lines(start_, options_.render,
-                    options_.strategy == Strategy::none ? Purpose::training : Purpose::densifying))
+                    options_.strategy == Strategy::none ? Purpose::training : Purpose::densifying,
+                    dataset_.frames.front().masks == MaskUse::ignore))
         report_.plan.push_back({line.what, line.why, line.bytes_saved});
     describe();
 
     watch_for_interrupt();
     Trainer trainer(device_, dataset_, split_.train, start_, options_);
     start_ = {};
+    if (trainer.photographs_on_disk() > 0)
+        say(fmt::format("{} photographs do not fit in --image-cache {} and are read again for each step",
+                        trainer.photographs_on_disk(), arguments_.image_cache));
     last_.splats = trainer.splats();
     {
         Progress progress("trained", arguments_.steps, "steps", arguments_.quiet);
@@ -284,8 +290,10 @@ report::Json to_config(const TrainArguments& a) {
     json["sh-degree"] = a.draw.sh_degree;
     json["init"] = a.init;
     json["downscale"] = a.downscale;
+    json["masks"] = masks_text(a.masks);
     json["test-every"] = a.test_every;
     json["seed"] = a.seed;
+    json["image-cache"] = a.image_cache;
     json["background"] = a.draw.background;
     json["kernel"] = a.draw.antialias ? "antialias" : a.draw.kernel;
     json["eval-every"] = a.eval_every;

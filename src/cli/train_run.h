@@ -16,7 +16,9 @@ struct TrainArguments {
     uint32_t max_splats = TrainOptions{}.max_splats;
     std::string init = "sfm";  // sfm, random, or a splat file
     int downscale = 1, test_every = 8;
+    MaskUse masks = MaskUse::automatic;
     uint64_t seed = 0;
+    uint64_t image_cache = TrainOptions{}.image_cache_bytes >> 20;  // MiB
     DrawArguments draw;
     int eval_every = 0, save_every = 0;  // steps; 0: only at the end
     DeviceOptions device;

@@ -79,15 +79,16 @@ std::vector<float> read_channels(OIIO::ImageInput& input, int channels, const st
 
 ImageSize read_image_size(const std::filesystem::path& path) {
     const auto input = open_image(path, false);
-    return {input->spec().width, input->spec().height};
+    const OIIO::ImageSpec& spec = input->spec();
+    const int orientation = spec.get_int_attribute("Orientation", 1);
+    return {spec.width, spec.height, orientation >= 1 && orientation <= 8 ? orientation : 1,
+            spec.format == OIIO::TypeDesc::UINT8};
 }
 
 Image load_image(const std::filesystem::path& path) try {
     const auto input = open_image(path, true);
     const OIIO::ImageSpec& spec = input->spec();
-    // Grey, grey and alpha, RGB, RGBA; whatever else a file has (depth, ids) is not colour. The EXIF
-    // orientation is left alone, as the reconstruction tools leave it: the cameras belong to the pixels as
-    // they are stored.
+    // Grey, grey and alpha, RGB, RGBA; whatever else a file has (depth, ids) is not colour.
     const bool grey = spec.nchannels < 3;
     const int colors = grey ? 1 : 3;
     const bool alpha = spec.nchannels > colors && spec.alpha_channel == colors;

@@ -69,9 +69,23 @@ void blur_row(const Image& a, const Image& b, int y, int channel, const std::arr
     }
 }
 
-/// Sum of SSIM over the pixels of a channel. Only the rows under the window are held, however tall the
-/// picture.
-double ssim_sum(const Image& a, const Image& b, int channel, const std::array<double, kTaps>& taps) {
+double weight_at(const Image& weights, int x, int y) {
+    return weights.pixels.empty() ? 1.0 : double(*weights.at(x, y));
+}
+
+double weight_sum(const Image& weights, const Image& picture) {
+    if (weights.pixels.empty()) return double(picture.width) * picture.height;
+    if (weights.width != picture.width || weights.height != picture.height || weights.channels != 1)
+        throw InputError("the weights of a picture have another size");
+    double sum = 0;
+    for (const float weight : weights.pixels) sum += double(weight);
+    return sum;
+}
+
+/// Weighted sum of SSIM over the pixels of a channel. Only the rows under the window are held, however tall
+/// the picture.
+double ssim_sum(const Image& a, const Image& b, const Image& weights, int channel,
+                const std::array<double, kTaps>& taps) {
     std::array<std::vector<Moments>, kTaps> rows;
     for (auto& row : rows) row.resize(size_t(a.width));
     double total = 0;
@@ -84,7 +98,7 @@ double ssim_sum(const Image& a, const Image& b, int channel, const std::array<do
             for (int j = std::max(0, y - kRadius); j <= std::min(a.height - 1, y + kRadius); ++j)
                 for (size_t k = 0; k < sums.size(); ++k)
                     sums[k] += taps[size_t(j - y + kRadius)] * rows[size_t(j % kTaps)][size_t(x)][k];
-            total += ssim_of(sums);
+            total += weight_at(weights, x, y) * ssim_of(sums);
         }
     }
     return total;
@@ -93,24 +107,43 @@ double ssim_sum(const Image& a, const Image& b, int channel, const std::array<do
 }  // namespace
 
 double psnr(const Image& a, const Image& b) {
+    return psnr(a, b, {});
+}
+
+double psnr(const Image& a, const Image& b, const Image& weights) {
     const int channels = compared_channels(a, b);
+    const double count = weight_sum(weights, a);
     double sum = 0;
     for (int y = 0; y < a.height; ++y)
         for (int x = 0; x < a.width; ++x)
             for (int c = 0; c < channels; ++c) {
                 const double difference = clamped(a.at(x, y)[c]) - clamped(b.at(x, y)[c]);
-                sum += difference * difference;
+                sum += weight_at(weights, x, y) * difference * difference;
             }
+    if (count == 0) return std::numeric_limits<double>::quiet_NaN();
     if (sum == 0) return std::numeric_limits<double>::infinity();
-    return -10 * std::log10(sum / (double(a.width) * a.height * channels));
+    return -10 * std::log10(sum / (count * channels));
 }
 
 double ssim(const Image& a, const Image& b) {
+    return ssim(a, b, {});
+}
+
+double ssim(const Image& a, const Image& b, const Image& weights) {
     const int channels = compared_channels(a, b);
+    const double count = weight_sum(weights, a);
+    Image pulled = a;
+    if (!weights.pixels.empty())
+        for (int y = 0; y < a.height; ++y)
+            for (int x = 0; x < a.width; ++x)
+                for (int c = 0; c < channels; ++c) {
+                    const float weight = *weights.at(x, y);
+                    pulled.at(x, y)[c] = weight * a.at(x, y)[c] + (1 - weight) * b.at(x, y)[c];
+                }
     const std::array<double, kTaps> taps = window();
     double sum = 0;
-    for (int c = 0; c < channels; ++c) sum += ssim_sum(a, b, c, taps);
-    return sum / (double(a.width) * a.height * channels);
+    for (int c = 0; c < channels; ++c) sum += ssim_sum(pulled, b, weights, c, taps);
+    return sum / (count * channels);
 }
 
 }  // namespace ewa

@@ -12,27 +12,34 @@ namespace ewa::io {
 
 namespace {
 
-// In the order of COLMAP's model ids (src/colmap/sensor/models.h).
-constexpr ColmapLens kLenses[] = {{"SIMPLE_PINHOLE", 3},
-                                  {"PINHOLE", 4},
-                                  {"SIMPLE_RADIAL", 4},
-                                  {"RADIAL", 5},
-                                  {"OPENCV", 8},
-                                  {"OPENCV_FISHEYE", 8},
-                                  {"FULL_OPENCV", 12},
-                                  {"FOV", 5},
-                                  {"SIMPLE_RADIAL_FISHEYE", 4},
-                                  {"RADIAL_FISHEYE", 5},
-                                  {"THIN_PRISM_FISHEYE", 12},
-                                  {"RAD_TAN_THIN_PRISM_FISHEYE", 16}};
+using D = Distortion;
 
-/// Parameters before the distortion: 3 (f cx cy) or 4 (fx fy cx cy); 0 for a lens that is no pinhole at any
-/// distortion.
-size_t pinhole_parameters(std::string_view lens) {
-    if (lens == "SIMPLE_PINHOLE" || lens == "SIMPLE_RADIAL" || lens == "RADIAL") return 3;
-    if (lens == "PINHOLE" || lens == "OPENCV" || lens == "FULL_OPENCV") return 4;
-    return 0;
-}
+// In the order of COLMAP's model ids, each with its parameters after the principal point in the file's order
+// (src/colmap/sensor/models.h).
+constexpr ColmapLens kLenses[] = {
+    {"SIMPLE_PINHOLE", 1, Lens::brown, {}},
+    {"PINHOLE", 2, Lens::brown, {}},
+    {"SIMPLE_RADIAL", 1, Lens::brown, {&D::k1}},
+    {"RADIAL", 1, Lens::brown, {&D::k1, &D::k2}},
+    {"OPENCV", 2, Lens::brown, {&D::k1, &D::k2, &D::p1, &D::p2}},
+    {"OPENCV_FISHEYE", 2, Lens::fisheye, {&D::k1, &D::k2, &D::k3, &D::k4}},
+    {"FULL_OPENCV", 2, Lens::brown, {&D::k1, &D::k2, &D::p1, &D::p2, &D::k3, &D::k4, &D::k5, &D::k6}},
+    {"FOV", 2, Lens::fov, {&D::k1}},
+    {"SIMPLE_RADIAL_FISHEYE", 1, Lens::fisheye, {&D::k1}},
+    {"RADIAL_FISHEYE", 1, Lens::fisheye, {&D::k1, &D::k2}},
+    {"THIN_PRISM_FISHEYE",
+     2,
+     Lens::fisheye,
+     {&D::k1, &D::k2, &D::p1, &D::p2, &D::k3, &D::k4, &D::s1, &D::s3}},
+    {"RAD_TAN_THIN_PRISM_FISHEYE",
+     2,
+     Lens::fisheye624,
+     {&D::k1, &D::k2, &D::k3, &D::k4, &D::k5, &D::k6, &D::p2, &D::p1, &D::s1, &D::s2, &D::s3, &D::s4}},
+    {"SIMPLE_DIVISION", 1, Lens::division, {&D::k1}},
+    {"DIVISION", 2, Lens::division, {&D::k1}},
+    {"SIMPLE_FISHEYE", 1, Lens::fisheye, {}},
+    {"FISHEYE", 2, Lens::fisheye, {}},
+    {"EUCM", 2, Lens::unified, {&D::k1, &D::k2}}};
 
 constexpr uint64_t kMaxSize = 1u << 20;  // px
 
@@ -47,6 +54,11 @@ bool leaves_folder(const std::string& name) {
 
 }  // namespace
 
+size_t ColmapLens::parameters() const {
+    const auto end = std::find(terms.begin(), terms.end(), nullptr);
+    return focal_lengths + 2 + size_t(end - terms.begin());
+}
+
 const ColmapLens* colmap_lens(int64_t id) {
     return id >= 0 && id < int64_t(std::size(kLenses)) ? &kLenses[id] : nullptr;
 }
@@ -60,24 +72,24 @@ const ColmapLens* colmap_lens(std::string_view name) {
 void ColmapBuilder::add_camera(uint32_t id, const ColmapLens& lens, uint64_t width, uint64_t height,
                                const std::vector<double>& parameters, const Fail& fail) {
     const std::string camera_name = "camera " + std::to_string(id);
-    const size_t pinhole = pinhole_parameters(lens.name);
-    const bool distorted = std::any_of(parameters.begin() + std::ptrdiff_t(pinhole), parameters.end(),
-                                       [](double v) { return v != 0; });
-    if (pinhole == 0 || distorted)
-        fail(camera_name + " has the lens model " + std::string(lens.name) +
-             "; undistort the images with `colmap image_undistorter` and use its output");
     if (width < 1 || height < 1 || width > kMaxSize || height > kMaxSize)
         fail(camera_name + " is " + std::to_string(width) + " x " + std::to_string(height) + " pixels large");
     Camera camera;
     camera.width = static_cast<int>(width);
     camera.height = static_cast<int>(height);
     camera.fx = parameters[0];
-    camera.fy = parameters[pinhole - 3];
-    camera.cx = parameters[pinhole - 2];
-    camera.cy = parameters[pinhole - 1];
-    if (!(camera.fx > 0 && camera.fy > 0) || !std::isfinite(camera.fx + camera.fy + camera.cx + camera.cy))
+    camera.fy = parameters[lens.focal_lengths - 1];
+    camera.cx = parameters[lens.focal_lengths];
+    camera.cy = parameters[lens.focal_lengths + 1];
+    Distortion distortion;
+    for (size_t i = lens.focal_lengths + 2; i < parameters.size(); ++i)
+        distortion.*lens.terms[i - lens.focal_lengths - 2] = parameters[i];
+    distortion.lens = lens.lens;
+    const bool finite =
+        std::all_of(parameters.begin(), parameters.end(), [](double v) { return std::isfinite(v); });
+    if (!(camera.fx > 0 && camera.fy > 0) || !finite)
         fail(camera_name + " has a focal length that is not positive, or a parameter that is not finite");
-    if (!cameras_.emplace(id, camera).second) fail(camera_name + " is there twice");
+    if (!cameras_.emplace(id, Taken{camera, distortion}).second) fail(camera_name + " is there twice");
 }
 
 void ColmapBuilder::add_image(const std::array<double, 7>& pose, uint32_t camera_id, const std::string& name,
@@ -98,7 +110,8 @@ void ColmapBuilder::add_image(const std::array<double, 7>& pose, uint32_t camera
     PosedImage image;
     image.name = name;
     image.path = images_ / name;
-    image.camera = camera->second;
+    image.camera = camera->second.camera;
+    image.distortion = camera->second.distortion;
     image.camera.rotation = glm::mat3_cast(q);
     image.camera.translation = {pose[4], pose[5], pose[6]};
     result_.images.push_back(std::move(image));

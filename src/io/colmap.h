@@ -13,9 +13,8 @@ std::optional<std::filesystem::path> find_colmap_model(const std::filesystem::pa
 
 /// The model in a folder, its pictures named relative to `images`. .bin is preferred, as COLMAP does. A
 /// missing points3D file gives no points. World and cameras are as in the file (COLMAP's axes are OpenCV's).
-/// Taken are SIMPLE_PINHOLE and PINHOLE, and any lens model of those COLMAP derives from pinhole by adding
-/// distortion terms that are all zero. Throws InputError that names the file and the byte (.bin) or line
-/// (.txt).
+/// Taken is every lens model of COLMAP but EQUIRECTANGULAR, which is no perspective picture. Throws
+/// InputError that names the file and the byte (.bin) or line (.txt).
 PosedImages read_colmap(const std::filesystem::path& model, const std::filesystem::path& images);
 
 }  // namespace ewa::io

@@ -30,7 +30,7 @@ void read_cameras(const std::filesystem::path& path, ColmapBuilder& builder) {
             reader.fail("camera " + std::to_string(id) + " has the unknown lens model number " +
                         std::to_string(lens_id) +
                         "; undistort the images with `colmap image_undistorter` and use its output");
-        std::vector<double> parameters(lens->parameters);
+        std::vector<double> parameters(lens->parameters());
         for (double& parameter : parameters) parameter = reader.read<double>("a camera");
         builder.add_camera(id, *lens, width, height, parameters, fail);
     }

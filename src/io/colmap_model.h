@@ -15,9 +15,13 @@ namespace ewa::io {
 /// Throws InputError that says where in the file.
 using Fail = std::function<void(const std::string&)>;
 
+/// A camera in the file: f or fx fy, then cx cy, then the terms.
 struct ColmapLens {
     std::string_view name;
-    size_t parameters = 0;
+    size_t focal_lengths = 1;
+    Lens lens = Lens::brown;
+    std::array<double Distortion::*, 12> terms{};  // null after the last
+    size_t parameters() const;                     // in all
 };
 
 /// By COLMAP's number, or null.
@@ -28,7 +32,9 @@ const ColmapLens* colmap_lens(std::string_view name);
 /// Collects a model. Ids are checked as they come; what is wrong goes to the Fail of the file being read.
 class ColmapBuilder {
   public:
-    explicit ColmapBuilder(std::filesystem::path images) : images_(std::move(images)) {}
+    explicit ColmapBuilder(std::filesystem::path images) : images_(std::move(images)) {
+        result_.folder = images_;
+    }
 
     void add_camera(uint32_t id, const ColmapLens& lens, uint64_t width, uint64_t height,
                     const std::vector<double>& parameters, const Fail& fail);
@@ -41,8 +47,12 @@ class ColmapBuilder {
     PosedImages take() { return std::move(result_); }
 
   private:
+    struct Taken {
+        Camera camera;
+        Distortion distortion;
+    };
     std::filesystem::path images_;
-    std::map<uint32_t, Camera> cameras_;
+    std::map<uint32_t, Taken> cameras_;
     PosedImages result_;
 };
 

@@ -75,7 +75,7 @@ void read_cameras(const std::filesystem::path& path, ColmapBuilder& builder) {
             return;
         }
         const auto width = lines.integer<uint64_t>("width"), height = lines.integer<uint64_t>("height");
-        std::vector<double> parameters(lens->parameters);
+        std::vector<double> parameters(lens->parameters());
         for (double& parameter : parameters) parameter = lines.number("camera parameter");
         if (!lines.rest().empty()) lines.fail("a " + std::string(name) + " camera has too many parameters");
         builder.add_camera(id, *lens, width, height, parameters, fail);

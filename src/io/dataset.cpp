@@ -8,6 +8,7 @@
 #include "ewa/error.h"
 #include "io/colmap.h"
 #include "io/transforms.h"
+#include "scene/shape.h"
 #include "scene/undistort.h"
 
 namespace ewa {
@@ -30,49 +31,121 @@ std::string size_text(int width, int height) {
     return std::to_string(width) + " x " + std::to_string(height);
 }
 
-/// True where a picture of the new size is the old one resized by one factor, each side rounded to a whole
-/// pixel. A factor near 1 has to be exact: a picture a pixel off is another picture (cropped, or of another
-/// camera).
-bool same_shape(int old_width, int old_height, int width, int height) {
-    if (int64_t(width) * old_height == int64_t(height) * old_width) return true;
-    const double x = double(width) / old_width, y = double(height) / old_height;
-    if (x > 0.9 && x < 1.1) return false;
-    const double low = std::max((width - 1.0) / old_width, (height - 1.0) / old_height);
-    const double high = std::min((width + 1.0) / old_width, (height + 1.0) / old_height);
-    return low < high && x > 0 && y > 0;
+/// The file of a frame: the model's, or its copy in images_K for a downscale factor K.
+struct Picture {
+    fs::path path;
+    bool exists = false;
+    int downscale = 1;  // what is left to do
+};
+
+Picture find_picture(const io::PosedImage& image, const fs::path& folder, int downscale) {
+    if (downscale > 1) {
+        const fs::path inside = image.path.lexically_relative(folder);
+        const fs::path copies =
+            folder.parent_path() / (folder.filename().string() + "_" + std::to_string(downscale));
+        if (!inside.empty() && *inside.begin() != ".." && is_file(copies / inside))
+            return {copies / inside, true, 1};
+    }
+    return {image.path, is_file(image.path), downscale};
 }
 
-/// The camera of the file's own pixels.
-Camera fit_to_file(const io::PosedImage& image) {
-    const ImageSize size = read_image_size(image.path);
-    Camera camera = image.camera;
-    if (size.width == camera.width && size.height == camera.height) return camera;
-    if (!same_shape(camera.width, camera.height, size.width, size.height))
-        throw InputError(core::one_line(image.path.string() + ": frame \"" + image.name + "\" is " +
+/// The mask file of a picture, where there is one.
+fs::path find_mask(const io::PosedImage& image, const fs::path& folder) {
+    if (!image.mask.empty() && is_file(image.mask)) return image.mask;
+    const fs::path inside = image.path.lexically_relative(folder);
+    if (inside.empty() || *inside.begin() == "..") return {};
+    const fs::path masks = folder.parent_path() / "masks";
+    fs::path replaced = masks / inside, added = masks / inside;
+    replaced.replace_extension(".png");
+    added += ".png";
+    for (const fs::path& path : {added, replaced, masks / inside})
+        if (is_file(path)) return path;
+    return {};
+}
+
+/// Whether masks are for ignoring or for cutting out is one decision for a dataset.
+void settle_masks(Dataset& dataset, MaskUse wanted) {
+    const bool files = std::any_of(dataset.frames.begin(), dataset.frames.end(),
+                                   [](const Frame& frame) { return !frame.mask_path.empty(); });
+    if (wanted == MaskUse::automatic) wanted = files ? MaskUse::ignore : MaskUse::cut;
+    for (Frame& frame : dataset.frames) {
+        frame.masks = wanted;
+        if (wanted == MaskUse::none) frame.mask_path.clear();
+    }
+}
+
+/// The camera and the orientation of the file's own pixels.
+void fit_to_file(Frame& frame) {
+    const ImageSize size = read_image_size(frame.image_path);
+    Camera& camera = frame.source;
+    const bool stored = scene::same_shape(camera.width, camera.height, size.width, size.height);
+    const bool turned = !stored && size.orientation >= 5 &&
+                        scene::same_shape(camera.width, camera.height, size.height, size.width);
+    const int width = turned ? size.height : size.width, height = turned ? size.width : size.height;
+    frame.orientation = turned ? size.orientation : 1;
+    frame.eight_bit = size.eight_bit;
+    if (!stored && !turned)
+        throw InputError(core::one_line(frame.image_path.string() + ": frame \"" + frame.name + "\" is " +
                                         size_text(size.width, size.height) + " pixels, but its camera has " +
                                         size_text(camera.width, camera.height)));
-    const double x = double(size.width) / camera.width, y = double(size.height) / camera.height;
-    camera.width = size.width;
-    camera.height = size.height;
+    const double x = double(width) / camera.width, y = double(height) / camera.height;
+    camera.width = width;
+    camera.height = height;
     camera.fx *= x;
     camera.cx *= x;
     camera.fy *= y;
     camera.cy *= y;
-    return camera;
 }
 
-Frame make_frame(const io::PosedImage& image, bool exists, const DatasetOptions& options) {
+/// Pinhole cameras of lenses met before: finding one undistorts the whole border of a picture, and most
+/// datasets have only a few lenses.
+class Pinholes {
+  public:
+    Camera of(const Camera& source, const Distortion& distortion) {
+        const auto known = std::find_if(known_.begin(), known_.end(), [&](const Known& k) {
+            const Camera& c = k.source;
+            return k.distortion == distortion && c.width == source.width && c.height == source.height &&
+                   c.fx == source.fx && c.fy == source.fy && c.cx == source.cx && c.cy == source.cy;
+        });
+        if (known == known_.end()) {
+            known_.push_back({source, distortion, scene::undistorted_camera(source, distortion)});
+            return known_.back().pinhole;
+        }
+        Camera camera = known->pinhole;
+        camera.rotation = source.rotation;
+        camera.translation = source.translation;
+        return camera;
+    }
+
+  private:
+    struct Known {
+        Camera source;
+        Distortion distortion;
+        Camera pinhole;
+    };
+    std::vector<Known> known_;
+};
+
+Frame make_frame(const io::PosedImage& image, const Picture& picture, const DatasetOptions& options,
+                 Pinholes& pinholes) {
     Frame frame;
     frame.name = image.name;
-    frame.image_path = image.path;
-    frame.image_exists = exists;
-    frame.source = options.need_images ? fit_to_file(image) : image.camera;
+    frame.image_path = picture.path;
+    frame.image_exists = picture.exists;
+    frame.source = image.camera;
+    frame.downscale = picture.downscale;
+    try {
+        if (picture.exists) fit_to_file(frame);
+    } catch (const InputError&) {
+        // Cameras alone were asked for: a picture that does not fit, or is none, leaves the model's word.
+        if (options.need_images) throw;
+        frame.downscale = options.downscale;
+    }
     frame.distortion = image.distortion;
-    frame.downscale = options.downscale;
     frame.split = image.split;
     try {
-        frame.camera =
-            downscale(scene::undistorted_camera(frame.source, frame.distortion), options.downscale);
+        frame.pinhole = pinholes.of(frame.source, frame.distortion);
+        frame.camera = downscale(frame.pinhole, frame.downscale);
     } catch (const InputError& error) {
         throw InputError(core::one_line("frame \"" + image.name + "\": " + error.what()));
     }
@@ -112,13 +185,15 @@ io::PosedImages read_model(const fs::path& path, const DatasetOptions& options) 
     if (!is_folder(path)) throw InputError(name + ": there is no such file or folder");
     if (const std::optional<fs::path> model = io::find_colmap_model(path)) {
         const fs::path images = images_folder(path, *model);
-        if (options.need_images && !is_folder(images))
+        const fs::path copies = images.string() + "_" + std::to_string(options.downscale);
+        if (options.need_images && !is_folder(images) && !is_folder(copies))
             throw InputError(core::one_line(images.string()) + ": the folder of the images is missing");
         return io::read_colmap(*model, images);
     }
     if (is_file(path / "transforms.json"))
         return io::read_transforms(path / "transforms.json", 0, options.need_images);
     io::PosedImages all;
+    all.folder = path / "images";
     bool found = false;
     for (const char* file : {"transforms_train.json", "transforms_test.json"})
         if (is_file(path / file)) {
@@ -147,12 +222,16 @@ Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& op
     dataset.first_dropped_point = std::move(model.dropped.first);
     std::stable_sort(model.images.begin(), model.images.end(),
                      [](const io::PosedImage& a, const io::PosedImage& b) { return a.name < b.name; });
+    Pinholes pinholes;
     for (const io::PosedImage& image : model.images) {
-        const bool exists = is_file(image.path);
-        dataset.missing_images += !exists;
-        const bool usable = image.camera.width > 0 && (exists || !options.need_images);
-        if (usable) dataset.frames.push_back(make_frame(image, exists, options));
+        const Picture picture = find_picture(image, model.folder, options.downscale);
+        dataset.missing_images += !picture.exists;
+        const bool usable = image.camera.width > 0 && (picture.exists || !options.need_images);
+        if (!usable) continue;
+        dataset.frames.push_back(make_frame(image, picture, options, pinholes));
+        dataset.frames.back().mask_path = find_mask(image, model.folder);
     }
+    settle_masks(dataset, options.masks);
     if (dataset.frames.empty())
         throw InputError(name + ": none of the " + std::to_string(model.images.size()) +
                          " images is there, the first being " +

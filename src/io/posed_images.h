@@ -14,6 +14,7 @@ struct PosedImage {
     std::string name;            // Frame::name
     std::filesystem::path path;  // of the picture, which may not exist
     Camera camera;               // OpenCV axes; width and height 0 where neither model nor picture tells
+    std::filesystem::path mask;  // what the model names as its mask; empty: nothing
     Distortion distortion;
     int split = 0;  // Frame::split
 };
@@ -25,6 +26,7 @@ struct DroppedPoints {
 };
 
 struct PosedImages {
+    std::filesystem::path folder;    // images; smaller copies stand beside it, in images_2 and so on
     std::vector<PosedImage> images;  // in the file's order
     PointCloud points;
     DroppedPoints dropped;

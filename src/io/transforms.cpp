@@ -58,19 +58,36 @@ class Entry {
     std::string where_;
 };
 
-void check_lens(const Entry& entry) {
+/// nerfstudio's and instant-ngp's lenses. k4 is a fourth radial term to the one and divides to the other (and
+/// to OpenCV); only a fisheye and a camera that calls itself FULL_OPENCV leave no doubt.
+Distortion read_lens(const Entry& entry) {
+    static constexpr std::string_view kPerspective[] = {
+        "", "PINHOLE", "SIMPLE_PINHOLE", "OPENCV", "SIMPLE_RADIAL", "RADIAL", "FULL_OPENCV"};
+    static constexpr std::string_view kFisheye[] = {"OPENCV_FISHEYE", "SIMPLE_RADIAL_FISHEYE",
+                                                    "RADIAL_FISHEYE"};
+    const auto holds = [](auto& list, const std::string& name) {
+        return std::find(std::begin(list), std::end(list), name) != std::end(list);
+    };
     const std::string model = entry.text("camera_model");
-    static constexpr std::string_view kTaken[] = {"",       "PINHOLE",       "SIMPLE_PINHOLE",
-                                                  "OPENCV", "SIMPLE_RADIAL", "RADIAL"};
-    if (std::find(std::begin(kTaken), std::end(kTaken), model) == std::end(kTaken))
+    const json* flag = entry.find("is_fisheye");
+    const bool fisheye = holds(kFisheye, model) || (flag && *flag != json(false) && *flag != json(0));
+    if (!fisheye && !holds(kPerspective, model))
         entry.fail("the camera model " + model + " is not supported; undistort the images to PINHOLE first");
-    const json* fisheye = entry.find("is_fisheye");
-    if (fisheye && *fisheye != json(false) && *fisheye != json(0))
-        entry.fail("fisheye cameras are not supported; undistort the images to PINHOLE first");
-    for (const char* key : {"k3", "k4", "k5", "k6", "ftheta_p0"})
-        if (entry.number(key).value_or(0) != 0)
+    Distortion d;
+    d.lens = fisheye ? Lens::fisheye : Lens::brown;
+    const std::pair<const char*, double Distortion::*> terms[] = {
+        {"k1", &Distortion::k1}, {"k2", &Distortion::k2}, {"k3", &Distortion::k3}, {"k4", &Distortion::k4},
+        {"k5", &Distortion::k5}, {"k6", &Distortion::k6}, {"p1", &Distortion::p1}, {"p2", &Distortion::p2}};
+    for (const auto& [key, term] : terms) d.*term = entry.number(key).value_or(0);
+    const std::pair<const char*, bool> unsure[] = {{"k4", !fisheye && model != "FULL_OPENCV"},
+                                                   {"k5", model != "FULL_OPENCV"},
+                                                   {"k6", model != "FULL_OPENCV"},
+                                                   {"ftheta_p0", true}};
+    for (const auto& [key, refused] : unsure)
+        if (refused && entry.number(key).value_or(0) != 0)
             entry.fail(std::string("the distortion term ") + key +
                        " is not supported; undistort the images to PINHOLE first");
+    return d;
 }
 
 /// A path as a file wrote it, perhaps on Windows, from the folder of that file.
@@ -142,10 +159,6 @@ void read_intrinsics(const Entry& entry, PosedImage& image) {
     if (!(camera.fx > 0 && camera.fy > 0)) entry.fail("a focal length is not positive");
     camera.cx = entry.number("cx").value_or(0.5 * camera.width);
     camera.cy = entry.number("cy").value_or(0.5 * camera.height);
-    image.distortion.k1 = entry.number("k1").value_or(0);
-    image.distortion.k2 = entry.number("k2").value_or(0);
-    image.distortion.p1 = entry.number("p1").value_or(0);
-    image.distortion.p2 = entry.number("p2").value_or(0);
 }
 
 /// The nearest rotation (the orthogonal factor of the polar decomposition), by Higham's iteration.
@@ -223,13 +236,16 @@ PosedImages read_transforms(const std::filesystem::path& path, int split, bool w
     const auto frames = top.find("frames");
     if (frames == top.end() || !frames->is_array()) throw InputError(name + ": has no list \"frames\"");
     PosedImages result;
+    result.folder = path.parent_path() / "images";
     for (size_t i = 0; i < frames->size(); ++i) {
         const Entry entry(name, top, (*frames)[i], i);
         if (!(*frames)[i].is_object()) entry.fail("is no JSON object");
-        check_lens(entry);
         PosedImage image;
         image.split = split;
+        image.distortion = read_lens(entry);
         find_picture(entry, path.parent_path(), image);
+        if (const std::string mask = entry.text("mask_path"); !mask.empty())
+            image.mask = resolve(path.parent_path(), mask);
         read_pose(entry, image.camera);
         read_intrinsics(entry, image);
         result.images.push_back(std::move(image));

@@ -6,12 +6,13 @@
 
 namespace ewa::io {
 
-/// Intrinsics stand at the top or in each frame: fl_x fl_y cx cy w h k1 k2 p1 p2, or camera_angle_x and _y
-/// (radians). Missing: fl_y as fl_x, the centre in the middle, the size from the picture's header.
-/// transform_matrix is camera to world with OpenGL's camera axes (y up, z back); the axes of the camera are
-/// turned to OpenCV's, the world stays the file's (applied_transform says what nerfstudio did to it before it
-/// wrote the file, and its points have had the same). A rotation with a uniform factor or a little noise is
-/// made orthonormal. ply_file_path gives the points. A file_path without extension gets .png, .jpg or .jpeg,
+/// Intrinsics stand at the top or in each frame: fl_x fl_y cx cy w h k1 k2 k3 p1 p2, or camera_angle_x and _y
+/// (radians). camera_model OPENCV_FISHEYE or is_fisheye: OpenCV's fisheye with k1 to k4; FULL_OPENCV: k1 to
+/// k6. Missing: fl_y as fl_x, the centre in the middle, the size from the picture's header. transform_matrix
+/// is camera to world with OpenGL's camera axes (y up, z back); the axes of the camera are turned to
+/// OpenCV's, the world stays the file's (applied_transform says what nerfstudio did to it before it wrote the
+/// file, and its points have had the same). A rotation with a uniform factor or a little noise is made
+/// orthonormal. ply_file_path gives the points. A file_path without extension gets .png, .jpg or .jpeg,
 /// whichever is there; it is relative to the json's folder. `split` becomes each image's. with_points false:
 /// points are not read. Throws InputError that names the file and the byte or the frame.
 PosedImages read_transforms(const std::filesystem::path& path, int split, bool with_points);

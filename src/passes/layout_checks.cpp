@@ -1,4 +1,5 @@
-// Host and shader see the same bytes: the scalar block layout packs these structs without padding, and so does C++.
+// Host and shader see the same bytes: the scalar block layout packs these structs without padding, and so
+// does C++.
 #include "shared/layouts.h"
 
 namespace ewa::shared {
@@ -10,6 +11,7 @@ static_assert(sizeof(ProjectPush) == 8 && sizeof(SortPush) == 16 && sizeof(ScanP
 static_assert(sizeof(ScanTotalsPush) == 8 && sizeof(EmitPush) == 32 && sizeof(TileStartsPush) == 8);
 static_assert(sizeof(BlendPush) == 48 && offsetof(BlendPush, capacity) == 44);
 static_assert(sizeof(UnpackPush) == 28 && sizeof(LossPush) == 24 && sizeof(ReducePush) == 16);
+static_assert(sizeof(MaskPush) == 16);
 static_assert(sizeof(UpdatePush) == 52 && sizeof(DensifyPush) == 44 && sizeof(ResetPush) == 12);
 
 }  // namespace ewa::shared

@@ -25,7 +25,7 @@ double loss_of(const shared::Counts& counts) {
 }
 
 void record_loss(gpu::Recording& recording, Kernels& kernels, const Frame& frame, const CameraUse& camera,
-                 const std::array<float, 3>& background, const gpu::Buffer& photo) {
+                 const std::array<float, 3>& background, const gpu::Buffer& photo, bool masked) {
     const passes::Shape& shape = kernels.shape();
     const Sizes& s = frame.sizes;
     const double share = 1.0 / (3.0 * camera.width * camera.height);
@@ -34,21 +34,27 @@ void record_loss(gpu::Recording& recording, Kernels& kernels, const Frame& frame
                                 s.plane_floats,
                                 float(-shared::SSIM_WEIGHT * share),
                                 float((1 - shared::SSIM_WEIGHT) * share)};
-    kernels.get<passes::UnpackTarget>().record(recording, shape, {photo, frame.target},
-                                               {{background[0], background[1], background[2]},
-                                                {camera.width, camera.height},
-                                                s.stride,
-                                                s.plane_floats});
-    kernels.get<passes::LossColumns>().record(recording, shape, {frame.planes, frame.target, frame.moments},
-                                              push);
+    const shared::MaskPush mask{{camera.width, camera.height}, s.stride, s.plane_floats};
+    const gpu::Buffer& image = masked ? frame.masked : frame.planes;
+    if (masked)
+        kernels.get<passes::MaskPictures>().record(recording, shape,
+                                                   {photo, frame.planes, frame.target, frame.masked}, mask);
+    else
+        kernels.get<passes::UnpackTarget>().record(recording, shape, {photo, frame.target},
+                                                   {{background[0], background[1], background[2]},
+                                                    {camera.width, camera.height},
+                                                    s.stride,
+                                                    s.plane_floats});
+    kernels.get<passes::LossColumns>().record(recording, shape, {image, frame.target, frame.moments}, push);
     kernels.get<passes::LossRows>().record(recording, shape,
                                            {frame.moments, frame.derivatives, frame.partials}, push);
     record_mean(recording, kernels, frame, 2, float(share));
     kernels.get<passes::LossBackwardColumns>().record(recording, shape, {frame.derivatives, frame.blurred},
                                                       push);
     kernels.get<passes::LossBackwardRows>().record(
-        recording, shape, {frame.blurred, frame.planes, frame.target, frame.image_gradient, frame.partials},
-        push);
+        recording, shape, {frame.blurred, image, frame.target, frame.image_gradient, frame.partials}, push);
+    if (masked)
+        kernels.get<passes::MaskGradient>().record(recording, shape, {photo, frame.image_gradient}, mask);
     record_mean(recording, kernels, frame, 1, float(share));
 }
 

@@ -9,10 +9,11 @@ struct Rates {
     uint32_t step = 1;  // Adam's, from 1
 };
 
-/// photo: width * height texels, RGBA. Leaves the loss's parts in Counts and dL/d(image) in
-/// frame.image_gradient.
+/// photo: width * height texels, RGBA. Its alpha cuts it out of the background or, where `masked`, says how
+/// much each pixel counts (the frame then has to have been asked for with masks). Leaves the loss's parts in
+/// Counts and dL/d(image) in frame.image_gradient.
 void record_loss(gpu::Recording& recording, Kernels& kernels, const Frame& frame, const CameraUse& camera,
-                 const std::array<float, 3>& background, const gpu::Buffer& photo);
+                 const std::array<float, 3>& background, const gpu::Buffer& photo, bool masked = false);
 
 /// Blend backward and projection backward. plan.adam: moves the model; else writes the gradient to
 /// model.moments1.

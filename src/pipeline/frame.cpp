@@ -48,6 +48,7 @@ void Frame::reserve(gpu::Device& device, const passes::Shape& shape, const Frame
     grow(device, planes, "planes", sizes.planes, Texel::rgba32f);
     if (request.gradients) {
         grow(device, target, "target", sizes.target, Texel::rgba32f);
+        grow(device, masked, "masked", sizes.masked, Texel::rgba32f);
         grow(device, moments, "moments", sizes.moments, Texel::rgba32f);
         grow(device, derivatives, "derivatives", sizes.derivatives, Texel::rgba32f);
         grow(device, blurred, "blurred", sizes.derivatives, Texel::rgba32f);
@@ -63,6 +64,7 @@ void Frame::reserve(gpu::Device& device, const passes::Shape& shape, const Frame
         old.image_planes != sizes.image_planes) {
         zero(planes);
         if (target) zero(target);
+        if (masked) zero(masked);
     }
 }
 

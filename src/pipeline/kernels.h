@@ -15,6 +15,8 @@
 #include "passes/loss_backward_rows.h"
 #include "passes/loss_columns.h"
 #include "passes/loss_rows.h"
+#include "passes/mask_gradient.h"
+#include "passes/mask_pictures.h"
 #include "passes/project.h"
 #include "passes/radix_count.h"
 #include "passes/radix_scatter.h"

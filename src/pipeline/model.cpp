@@ -7,12 +7,6 @@
 namespace ewa::pipeline {
 namespace {
 
-/// Flat float f of splat i, where `planes` texel planes are stored a splat (shared/layouts.h).
-size_t flat_index(uint32_t planes, uint32_t f, size_t i) {
-    const size_t block = i / shared::PARAM_BLOCK, within = i % shared::PARAM_BLOCK;
-    return ((block * planes + f / 4) * shared::PARAM_BLOCK + within) * 4 + f % 4;
-}
-
 /// Calls visit(position in the buffer, float of the scene) for every stored value.
 template <class Scene, class Visit>
 void for_each_value(Scene& g, Visit visit) {
@@ -20,14 +14,14 @@ void for_each_value(Scene& g, Visit visit) {
     const size_t sh = g.sh_stride();
     for (size_t i = 0; i < g.size(); ++i) {
         for (uint32_t c = 0; c < 3; ++c)
-            visit(flat_index(planes, shared::PARAM_MEAN + c, i), g.means[3 * i + c]);
-        visit(flat_index(planes, shared::PARAM_OPACITY, i), g.opacity_logits[i]);
+            visit(parameter_index(planes, shared::PARAM_MEAN + c, i), g.means[3 * i + c]);
+        visit(parameter_index(planes, shared::PARAM_OPACITY, i), g.opacity_logits[i]);
         for (uint32_t c = 0; c < 4; ++c)
-            visit(flat_index(planes, shared::PARAM_QUATERNION + c, i), g.quaternions[4 * i + c]);
+            visit(parameter_index(planes, shared::PARAM_QUATERNION + c, i), g.quaternions[4 * i + c]);
         for (uint32_t c = 0; c < 3; ++c)
-            visit(flat_index(planes, shared::PARAM_LOG_SCALE + c, i), g.log_scales[3 * i + c]);
+            visit(parameter_index(planes, shared::PARAM_LOG_SCALE + c, i), g.log_scales[3 * i + c]);
         for (uint32_t c = 0; c < sh; ++c)
-            visit(flat_index(planes, shared::PARAM_SH + c, i), g.sh[sh * i + c]);
+            visit(parameter_index(planes, shared::PARAM_SH + c, i), g.sh[sh * i + c]);
     }
 }
 

@@ -20,6 +20,13 @@ constexpr uint64_t parameter_bytes(uint32_t capacity, int sh_degree) {
     return blocks * shared::PARAM_BLOCK * parameter_planes(sh_degree) * 16;
 }
 
+/// Where flat float f of splat i stands in such a buffer, in floats, where `planes` texel planes are stored a splat
+/// (shared/layouts.h).
+constexpr size_t parameter_index(uint32_t planes, uint32_t f, size_t i) {
+    const size_t block = i / shared::PARAM_BLOCK, within = i % shared::PARAM_BLOCK;
+    return ((block * planes + f / 4) * shared::PARAM_BLOCK + within) * 4 + f % 4;
+}
+
 struct Model {
     uint32_t splats = 0, capacity = 0;
     int sh_degree = 0;  // stored

@@ -1,5 +1,6 @@
 #include "pipeline/photo.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <vector>
@@ -21,15 +22,20 @@ gpu::Buffer upload_texels(gpu::Device& device, const Image& image, gpu::Texel te
 
 }  // namespace
 
-gpu::Buffer upload_photo(gpu::Device& device, const Image& image) {
-    const auto level = [](float value) { return std::round(value * 255.0f); };
+gpu::Buffer upload_photo(gpu::Device& device, const Image& image, bool round_to_8_bit) {
+    const auto level = [](float value) { return std::round(std::clamp(value, 0.0f, 1.0f) * 255.0f); };
     bool eight_bit = true;
-    for (const float value : image.pixels)
-        eight_bit = eight_bit && value >= 0 && value <= 1 && level(value) / 255.0f == value;
+    if (!round_to_8_bit)
+        for (const float value : image.pixels)
+            eight_bit = eight_bit && value >= 0 && value <= 1 && level(value) / 255.0f == value;
     if (eight_bit)
         return upload_texels<uint8_t>(device, image, gpu::Texel::rgba8, 255,
                                       [&](float value) { return uint8_t(level(value)); });
     return upload_texels<float>(device, image, gpu::Texel::rgba32f, 1.0f, [](float value) { return value; });
+}
+
+uint64_t photo_bytes(int width, int height, bool round_to_8_bit) {
+    return uint64_t(width) * uint64_t(height) * 4 * (round_to_8_bit ? sizeof(uint8_t) : sizeof(float));
 }
 
 }  // namespace ewa::pipeline

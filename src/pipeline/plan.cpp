@@ -47,6 +47,8 @@ std::vector<PlanLine> describe(const Plan& plan, int file_degree, uint64_t splat
     if (!plan.adam) lines.push_back({"Adam's moments", "nothing is optimised", 2 * parameters});
     if (!plan.statistics) lines.push_back({"densification statistics", "no strategy reads them", 8 * splats});
     if (!plan.depth) lines.push_back({"depth plane", "colour and opacity alone were asked for", 0});
+    if (plan.gradients && !plan.masks)
+        lines.push_back({"mask passes and the masked picture", "every pixel of every photograph counts", 0});
     if (plan.kernel == Kernel::peak)
         lines.push_back({"footprint factor of the opacity", "the kernel is normalised to its peak", 0});
     return lines;
@@ -54,12 +56,13 @@ std::vector<PlanLine> describe(const Plan& plan, int file_degree, uint64_t splat
 
 }  // namespace pipeline
 
-std::vector<PlanLine> plan_lines(const Gaussians& gaussians, const RenderOptions& options, Purpose purpose) {
+std::vector<PlanLine> plan_lines(const Gaussians& gaussians, const RenderOptions& options, Purpose purpose,
+                                 bool masks) {
     const int degree = std::min(gaussians.sh_degree, options.sh_degree);
-    const pipeline::Plan plan =
-        purpose == Purpose::picture
-            ? pipeline::plan_picture(gaussians, options, false)
-            : pipeline::plan_training(degree, options, purpose == Purpose::densifying);
+    pipeline::Plan plan = purpose == Purpose::picture
+                              ? pipeline::plan_picture(gaussians, options, false)
+                              : pipeline::plan_training(degree, options, purpose == Purpose::densifying);
+    plan.masks = masks;
     return pipeline::describe(plan, gaussians.sh_degree, gaussians.size());
 }
 

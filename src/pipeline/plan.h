@@ -18,6 +18,7 @@ struct Plan {
     bool adam = false;        // both moments
     bool statistics = false;  // densification statistics
     bool depth = false;
+    bool masks = false;  // photographs in which not every pixel counts
 };
 
 /// A picture: nothing of a degree the scene does not have, or that was not asked for, is stored or evaluated.

@@ -112,7 +112,8 @@ std::vector<PassTime> Renderer::pass_times() const {
 }
 
 LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians,
-                           const Camera& camera, const Image& target, const RenderOptions& options) {
+                           const Camera& camera, const Image& target, const RenderOptions& options,
+                           bool alpha_is_weight) {
     if (target.width != camera.width || target.height != camera.height || target.channels < 3)
         throw InputError("the photograph is " + std::to_string(target.width) + "x" +
                          std::to_string(target.height) + " with " + std::to_string(target.channels) +
@@ -120,7 +121,8 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
                          std::to_string(camera.height) + " RGB");
     Kernels kernels(*device);
     gpu::Executor executor(*device);
-    const Plan plan = plan_gradient(gaussians, options);
+    Plan plan = plan_gradient(gaussians, options);
+    plan.masks = alpha_is_weight && target.channels == 4;
     const Model model = upload_model(*device, gaussians, 1, false);
     const gpu::Buffer block = upload_camera(*device, camera, kernels.shape());
     const gpu::Buffer photo = upload_photo(*device, target);
@@ -128,11 +130,11 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
     Frame frame;
     const shared::Counts counts = run_until_it_fits(
         kernels, executor, frame,
-        {model.splats, use.width, use.height, first_capacity(model.splats), true, false},
+        {model.splats, use.width, use.height, first_capacity(model.splats), true, false, plan.masks},
         [&](gpu::Recording& recording) {
             const Sorted sorted =
                 record_forward(recording, kernels, plan, model, frame, use, options.background);
-            record_loss(recording, kernels, frame, use, options.background, photo);
+            record_loss(recording, kernels, frame, use, options.background, photo, plan.masks);
             record_backward(recording, kernels, plan, model, frame, use, options.background, sorted, {});
         });
     LossGradient result;

@@ -74,6 +74,7 @@ Sizes sizes_for(const passes::Shape& shape, const FrameRequest& request) {
         s.reduce_block = 64 * shape.subgroup;
         s.reduce_blocks = divide_up(s.partials, s.reduce_block);
         s.target = uint64_t(s.plane_floats) * 3 * word;
+        s.masked = request.masks ? s.target : 0;
         s.moments = uint64_t(s.plane_floats) * 3 * shared::MOMENT_PLANES * word;
         s.derivatives = uint64_t(s.plane_floats) * 3 * shared::DERIVATIVE_PLANES * word;
         s.image_gradient = s.target;
@@ -91,8 +92,8 @@ uint64_t Sizes::total() const {
     const uint64_t sorting = scan_totals + 2 * counters + digit_totals;
     // keys 2, splats 2, and in training their places 2
     const uint64_t per_instance = instance_words * (gradients ? 6 : 4) + slots;
-    return per_splat + sorting + per_instance + tile_starts + planes + target + moments + 2 * derivatives +
-           image_gradient + partial_sums + reduced;
+    return per_splat + sorting + per_instance + tile_starts + planes + target + masked + moments +
+           2 * derivatives + image_gradient + partial_sums + reduced;
 }
 
 }  // namespace ewa::pipeline

@@ -12,6 +12,7 @@ struct FrameRequest {
     uint32_t instances = 0;          // (splat, tile) pairs to make room for
     bool gradients = false;
     bool depth = false;
+    bool masks = false;  // with gradients: pixels may count in part
 };
 
 struct RadixCut {
@@ -32,7 +33,8 @@ struct Sizes {
     // Bytes.
     uint64_t records = 0, splat_words = 0, scan_totals = 0, counters = 0, digit_totals = 0;
     uint64_t instance_words = 0, tile_starts = 0, planes = 0, target = 0;
-    uint64_t moments = 0, derivatives = 0, image_gradient = 0, partial_sums = 0, reduced = 0, slots = 0;
+    uint64_t masked = 0, moments = 0, derivatives = 0, image_gradient = 0, partial_sums = 0, reduced = 0,
+             slots = 0;
 
     uint64_t total() const;  // of all buffers a frame with this request holds
 };

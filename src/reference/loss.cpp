@@ -113,4 +113,16 @@ Loss image_loss(const Raster& rendered, const Raster& target) {
     return out;
 }
 
+Loss image_loss(const Raster& rendered, const Raster& target, const Raster& weights) {
+    assert(weights.width == rendered.width && weights.height == rendered.height && weights.channels == 1);
+    Raster pulled = rendered;
+    for (size_t i = 0; i < pulled.values.size(); ++i) {
+        const double weight = weights.values[i / 3];
+        pulled.values[i] = weight * rendered.values[i] + (1 - weight) * target.values[i];
+    }
+    Loss out = image_loss(pulled, target);
+    for (size_t i = 0; i < pulled.values.size(); ++i) out.gradient.values[i] *= weights.values[i / 3];
+    return out;
+}
+
 }  // namespace ewa::reference

@@ -9,6 +9,8 @@
 // As w is symmetric, with the partial derivatives taken with mx, E[xx], E[xy] as the variables:
 //   dSSIM/dx = w * (dSSIM/dmx) + 2 x (w * dSSIM/dE[xx]) + y (w * dSSIM/dE[xy])
 // The derivative of |.| at 0 is 0.
+//
+// Where a pixel counts only by a weight m, x' = m x + (1 - m) y takes the place of x: dL/dx = m dL/dx'.
 #pragma once
 #include <vector>
 
@@ -23,6 +25,9 @@ struct Loss {
 
 /// Both RGB of one size.
 Loss image_loss(const Raster& rendered, const Raster& target);
+
+/// The same with weights of [0, 1], one channel of that size.
+Loss image_loss(const Raster& rendered, const Raster& target, const Raster& weights);
 
 /// The window's 2 * SSIM_RADIUS + 1 taps along one axis.
 std::vector<double> ssim_window();

@@ -2,11 +2,74 @@
 #include "ewa/dataset.h"
 
 #include <algorithm>
+#include <cmath>
 
+#include "core/text.h"
 #include "ewa/error.h"
+#include "scene/shape.h"
 #include "scene/undistort.h"
 
 namespace ewa {
+
+namespace {
+
+/// One value that is not finite would make the loss, and every gradient of its view, not finite.
+void check_finite(const Image& image, const std::filesystem::path& path) {
+    const auto bad = std::find_if(image.pixels.begin(), image.pixels.end(),
+                                  [](float value) { return !std::isfinite(value); });
+    if (bad == image.pixels.end()) return;
+    const auto pixel = (bad - image.pixels.begin()) / image.channels;
+    throw InputError(core::one_line(path.string()) + ": the pixel at column " +
+                     std::to_string(pixel % image.width) + ", row " + std::to_string(pixel / image.width) +
+                     " holds a value that is not finite; write it as a number, or leave the picture out");
+}
+
+/// The picture with a mask's red (grey) channel on its alpha. The mask may have another size, of the same
+/// shape.
+Image with_mask(const Image& image, const Image& mask) {
+    Image result(image.width, image.height, 4);
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x) {
+            const float* from = image.at(x, y);
+            const int column = int((2 * int64_t(x) + 1) * mask.width / (2 * int64_t(image.width)));
+            const int row = int((2 * int64_t(y) + 1) * mask.height / (2 * int64_t(image.height)));
+            float* to = result.at(x, y);
+            std::copy_n(from, 3, to);
+            to[3] = *mask.at(column, row) * (image.channels == 4 ? from[3] : 1.0f);
+        }
+    return result;
+}
+
+Image channels_of(const Image& image, int first, int count) {
+    Image result(image.width, image.height, count);
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x) std::copy_n(image.at(x, y) + first, count, result.at(x, y));
+    return result;
+}
+
+Image load_file(const Frame& frame) {
+    Image image = load_image(frame.image_path);
+    check_finite(image, frame.image_path);
+    if (frame.masks == MaskUse::none) return image.channels == 3 ? image : channels_of(image, 0, 3);
+    if (frame.mask_path.empty()) return image;
+    const Image mask = load_image(frame.mask_path);
+    check_finite(mask, frame.mask_path);
+    if (!scene::same_shape(image.width, image.height, mask.width, mask.height))
+        throw InputError(core::one_line(frame.mask_path.string()) + ": the mask is " +
+                         std::to_string(mask.width) + " x " + std::to_string(mask.height) +
+                         " pixels, its picture " + std::to_string(image.width) + " x " +
+                         std::to_string(image.height));
+    return with_mask(image, mask);
+}
+
+}  // namespace
+
+Photograph load_photograph(const Frame& frame, const std::array<float, 3>& background) {
+    const Image image = load_frame_image(frame);
+    if (image.channels == 3 || frame.masks != MaskUse::ignore)
+        return {over_background(image, background), {}};
+    return {channels_of(image, 0, 3), channels_of(image, 3, 1)};
+}
 
 Split split_frames(const Dataset& dataset, int test_every) {
     Split split;
@@ -28,14 +91,14 @@ double scene_extent(const Dataset& dataset, const std::vector<int>& frames) {
 }
 
 Image load_frame_image(const Frame& frame) {
-    Image image = load_image(frame.image_path);
+    Image image = load_file(frame);
+    if (frame.orientation != 1) image = oriented(image, frame.orientation);
     if (image.width != frame.source.width || image.height != frame.source.height)
         throw InputError(frame.image_path.string() + ": is " + std::to_string(image.width) + " x " +
                          std::to_string(image.height) + " pixels, but its camera has " +
                          std::to_string(frame.source.width) + " x " + std::to_string(frame.source.height));
     if (!frame.distortion.none())
-        image = scene::undistort_image(image, frame.source, frame.distortion,
-                                       scene::undistorted_camera(frame.source, frame.distortion));
+        image = scene::undistort_image(image, frame.source, frame.distortion, frame.pinhole);
     return frame.downscale == 1 ? image : downscale(image, frame.downscale);
 }
 

@@ -2,34 +2,24 @@
 
 #include <algorithm>
 #include <cmath>
-#include <glm/mat2x2.hpp>
 #include <limits>
 
 #include "ewa/error.h"
+#include "scene/lens.h"
 
 namespace ewa::scene {
 
 namespace {
 
-/// d distort / d ray; symmetric, first index the row.
-glm::dmat2 jacobian(const Distortion& d, glm::dvec2 p) {
-    const double r2 = p.x * p.x + p.y * p.y;
-    const double radial = 1 + r2 * (d.k1 + r2 * d.k2), slope = 2 * (d.k1 + 2 * r2 * d.k2);
-    const double mixed = p.x * p.y * slope + 2 * (d.p1 * p.x + d.p2 * p.y);
-    return {radial + p.x * p.x * slope + 2 * d.p1 * p.y + 6 * d.p2 * p.x, mixed, mixed,
-            radial + p.y * p.y * slope + 6 * d.p1 * p.y + 2 * d.p2 * p.x};
-}
-
-struct Rectangle {
-    double left = -std::numeric_limits<double>::infinity(), right = std::numeric_limits<double>::infinity();
-    double top = left, bottom = right;
-};
+// COLMAP's bounds of the new size over the old.
+constexpr double kMinScale = 0.2, kMaxScale = 2.0;
+constexpr double kShrink = 0.98;
 
 [[noreturn]] void fail_folded() {
     throw InputError(
-        "the lens distortion folds the picture over itself, so it cannot be undone; check k1, k2, p1, p2 or "
-        "undistort "
-        "the images with another tool");
+        "the lens distortion folds the picture over itself, so it cannot be undone; check the camera's "
+        "distortion "
+        "parameters or undistort the images with another tool");
 }
 
 glm::dvec2 normalized(const Camera& camera, double x, double y) {
@@ -41,77 +31,86 @@ glm::dvec2 source_pixel(const Camera& source, const Distortion& distortion, glm:
     return {source.fx * p.x + source.cx, source.fy * p.y + source.cy};
 }
 
-/// The largest rectangle of rays inside the undistorted border.
-Rectangle inner_rectangle(const Camera& source, const Distortion& distortion) {
-    const auto ray = [&](double x, double y) {
-        const std::optional<glm::dvec2> found = undistort(distortion, normalized(source, x, y));
-        if (!found) fail_folded();
-        return *found;
+/// Of each side's undistorted border, the pixel that comes farthest in, in source pixels.
+struct Inner {
+    double left = -std::numeric_limits<double>::infinity(), right = std::numeric_limits<double>::infinity();
+    double top = left, bottom = right;
+};
+
+Inner inner_border(const Camera& source, const Distortion& distortion) {
+    Inner inner;
+    const auto visit = [&](double x, double y, auto&& use) {
+        if (const auto ray = undistort(distortion, normalized(source, x, y))) use(*ray);
     };
-    Rectangle inner;
     for (int y = 0; y < source.height; ++y) {
-        inner.left = std::max(inner.left, ray(0.5, y + 0.5).x);
-        inner.right = std::min(inner.right, ray(source.width - 0.5, y + 0.5).x);
+        visit(0.5, y + 0.5, [&](glm::dvec2 ray) { inner.left = std::max(inner.left, ray.x); });
+        visit(source.width - 0.5, y + 0.5,
+              [&](glm::dvec2 ray) { inner.right = std::min(inner.right, ray.x); });
     }
     for (int x = 0; x < source.width; ++x) {
-        inner.top = std::max(inner.top, ray(x + 0.5, 0.5).y);
-        inner.bottom = std::min(inner.bottom, ray(x + 0.5, source.height - 0.5).y);
+        visit(x + 0.5, 0.5, [&](glm::dvec2 ray) { inner.top = std::max(inner.top, ray.y); });
+        visit(x + 0.5, source.height - 0.5,
+              [&](glm::dvec2 ray) { inner.bottom = std::min(inner.bottom, ray.y); });
     }
     return inner;
 }
 
-/// Newton's method may end on the far side of a fold: the model must be orientation-preserving over the whole
-/// new picture, and the new picture must lie in the old.
-void check_one_to_one(const Camera& source, const Distortion& distortion, const Camera& camera) {
-    constexpr int kSteps = 32;
+/// New size over old along an axis. low, high: the inner border as tangents, each infinite where no ray in
+/// front reaches it: a fisheye sees to its side and behind, while a perspective lens that does so on both
+/// sides has folded.
+double axis_scale(const Distortion& distortion, double focal, double center, int size, double low,
+                  double high) {
+    const bool none = std::isinf(low) && std::isinf(high);
+    if (!(low < 0 && high > 0) || (none && distortion.lens == Lens::brown)) fail_folded();
+    const double scale = std::min(-low * focal / center, high * focal / (size - 0.5 - center));
+    if (!(scale > 0)) fail_folded();
+    return std::clamp(scale, kMinScale, kMaxScale);
+}
+
+Camera scaled(const Camera& source, double scale_x, double scale_y) {
+    Camera camera = source;
+    camera.width = std::max(1, static_cast<int>(scale_x * source.width));
+    camera.height = std::max(1, static_cast<int>(scale_y * source.height));
+    camera.cx *= double(camera.width) / source.width;
+    camera.cy *= double(camera.height) / source.height;
+    return camera;
+}
+
+/// Whether the source holds the whole new picture, and the model has not folded anywhere in it.
+bool covers(const Camera& source, const Distortion& distortion, const Camera& camera) {
+    constexpr int kSteps = 64;
     for (int j = 0; j <= kSteps; ++j)
         for (int i = 0; i <= kSteps; ++i) {
-            const double x = 0.5 + i * (camera.width - 1.0) / kSteps,
-                         y = 0.5 + j * (camera.height - 1.0) / kSteps;
-            const glm::dvec2 ray = normalized(camera, x, y);
-            if (!(glm::determinant(jacobian(distortion, ray)) > 0)) fail_folded();
+            const glm::dvec2 ray = normalized(camera, 0.5 + i * (camera.width - 1.0) / kSteps,
+                                              0.5 + j * (camera.height - 1.0) / kSteps);
             const glm::dvec2 p = source_pixel(source, distortion, ray);
-            if (!(p.x >= 0 && p.x <= source.width && p.y >= 0 && p.y <= source.height)) fail_folded();
+            const bool inside = p.x >= 0 && p.x <= source.width && p.y >= 0 && p.y <= source.height;
+            if (!inside || !one_to_one(distortion, ray)) return false;
         }
+    return true;
 }
 
 }  // namespace
-
-glm::dvec2 distort(const Distortion& d, glm::dvec2 p) {
-    const double r2 = p.x * p.x + p.y * p.y, radial = 1 + r2 * (d.k1 + r2 * d.k2);
-    return {p.x * radial + 2 * d.p1 * p.x * p.y + d.p2 * (r2 + 2 * p.x * p.x),
-            p.y * radial + d.p1 * (r2 + 2 * p.y * p.y) + 2 * d.p2 * p.x * p.y};
-}
-
-std::optional<glm::dvec2> undistort(const Distortion& distortion, glm::dvec2 point) {
-    glm::dvec2 ray = point;
-    const double tolerance = 1e-13 * (1 + std::abs(point.x) + std::abs(point.y));
-    for (int iteration = 0; iteration < 100; ++iteration) {
-        const glm::dvec2 residual = distort(distortion, ray) - point;
-        if (std::max(std::abs(residual.x), std::abs(residual.y)) <= tolerance) return ray;
-        ray -= glm::inverse(jacobian(distortion, ray)) * residual;
-    }
-    return std::nullopt;
-}
 
 Camera undistorted_camera(const Camera& source, const Distortion& distortion) {
     if (distortion.none()) return source;
     if (source.width < 2 || source.height < 2)
         throw InputError("a distorted picture needs at least 2 x 2 pixels");
-    const Rectangle inner = inner_rectangle(source, distortion);
-    if (!(inner.right > inner.left && inner.bottom > inner.top)) fail_folded();
-    Camera camera = source;
-    camera.fx = (source.width - 1) / (inner.right - inner.left);
-    camera.fy = (source.height - 1) / (inner.bottom - inner.top);
-    camera.cx = 0.5 - camera.fx * inner.left;
-    camera.cy = 0.5 - camera.fy * inner.top;
-    check_one_to_one(source, distortion, camera);
-    return camera;
+    const Inner inner = inner_border(source, distortion);
+    double x = axis_scale(distortion, source.fx, source.cx, source.width, inner.left, inner.right);
+    double y = axis_scale(distortion, source.fy, source.cy, source.height, inner.top, inner.bottom);
+    for (;;) {
+        const Camera camera = scaled(source, x, y);
+        if (covers(source, distortion, camera)) return camera;
+        x *= kShrink;
+        y *= kShrink;
+        if (x < kMinScale * kShrink && y < kMinScale * kShrink) fail_folded();
+    }
 }
 
 Image undistort_image(const Image& image, const Camera& source, const Distortion& distortion,
                       const Camera& camera) {
-    Image result(image.width, image.height, image.channels);
+    Image result(camera.width, camera.height, image.channels);
     for (int y = 0; y < result.height; ++y)
         for (int x = 0; x < result.width; ++x) {
             const glm::dvec2 p = source_pixel(source, distortion, normalized(camera, x + 0.5, y + 0.5));

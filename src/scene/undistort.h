@@ -1,28 +1,22 @@
-// The Brown-Conrady lens model: x right, y down, in units of the focal length (z = 1).
+// The pinhole picture in a lens's picture.
 #pragma once
-#include <glm/vec2.hpp>
-#include <optional>
-
 #include "ewa/camera.h"
 #include "ewa/dataset.h"
 #include "ewa/image.h"
 
 namespace ewa::scene {
 
-/// Where a lens puts the ray (x, y, 1): OpenCV's formulas.
-glm::dvec2 distort(const Distortion& distortion, glm::dvec2 ray);
-
-/// The ray a lens puts there, by Newton's method; none where it does not converge.
-std::optional<glm::dvec2> undistort(const Distortion& distortion, glm::dvec2 point);
-
-/// The pinhole camera of the same pose and size whose picture is the largest axis-parallel rectangle that the
-/// source covers without a blank pixel: the border's pixel centres are undistorted, the innermost of each
-/// side becomes the new border (OpenCV's getOptimalNewCameraMatrix with alpha = 0, with every border pixel in
-/// place of its 9 x 9 grid). Throws InputError where the lens model folds over inside the picture, so that no
-/// such rectangle exists.
+/// The pinhole camera of the same pose and focal lengths whose picture is as large as the source covers
+/// without a blank pixel, as COLMAP's image_undistorter chooses it (blank_pixels 0, sizes between 0.2 and 2
+/// times the source's; COLMAP, src/colmap/image/undistortion.cc): the border's pixel centres are undistorted,
+/// and on each axis the picture shrinks or grows about the principal point, all in one ratio, until the
+/// nearer border fits. Border pixels that no ray in front reaches do not count. Where the rectangle then
+/// still leaves the source at a corner (a fisheye's circle), it shrinks on both axes until it does not. A
+/// camera without distortion comes back as it is. Throws InputError where no such rectangle exists because
+/// the lens model folds over.
 Camera undistorted_camera(const Camera& source, const Distortion& distortion);
 
-/// The picture of `camera`, sampled bilinearly from that of `source`. Both have the image's size.
+/// The picture of `camera`, sampled bilinearly from that of `source`, which has the image's size.
 Image undistort_image(const Image& image, const Camera& source, const Distortion& distortion,
                       const Camera& camera);
 

@@ -1,5 +1,6 @@
 // A scene's pictures against photographs.
 #include <chrono>
+#include <cmath>
 
 #include "ewa/error.h"
 #include "ewa/trainer.h"
@@ -13,13 +14,17 @@ Evaluation evaluate(std::shared_ptr<gpu::Device> device, const Gaussians& gaussi
     Evaluation result;
     for (const int index : frames) {
         const Frame& frame = dataset.frames[size_t(index)];
-        const Image photo = over_background(load_frame_image(frame), options.background);
+        const auto [photo, weights] = load_photograph(frame, options.background);
         const Image picture = renderer.render(frame.camera).color;
         if (photo.width != picture.width || photo.height != picture.height)
             throw InputError("frame " + frame.name + ": the picture's size is not the camera's");
-        result.frames.push_back({frame.name, psnr(picture, photo), ssim(picture, photo)});
-        result.psnr += result.frames.back().psnr / double(frames.size());
-        result.ssim += result.frames.back().ssim / double(frames.size());
+        const double db = psnr(picture, photo, weights);
+        if (std::isnan(db)) continue;  // no pixel counts
+        result.frames.push_back({frame.name, db, ssim(picture, photo, weights)});
+    }
+    for (const EvalFrame& frame : result.frames) {
+        result.psnr += frame.psnr / double(result.frames.size());
+        result.ssim += frame.ssim / double(result.frames.size());
     }
     result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     return result;

@@ -31,6 +31,35 @@ glm::dvec3 point_in_sphere(const Sphere& sphere, const std::array<double, 4>& u)
     return sphere.center + radius * glm::dvec3(flat * std::cos(angle), flat * std::sin(angle), z);
 }
 
+bool sees(const Camera& camera, const glm::dvec3& point) {
+    const glm::dvec3 p = camera.rotation * point + camera.translation;
+    if (!(p.z > 0)) return false;
+    const double x = camera.fx * p.x / p.z + camera.cx, y = camera.fy * p.y / p.z + camera.cy;
+    return x >= 0 && x <= camera.width && y >= 0 && y <= camera.height;
+}
+
+glm::dvec3 point_on_a_ray(const Camera& camera, double depth, const std::array<double, 4>& u) {
+    const glm::dvec3 ray((u[0] * camera.width - camera.cx) / camera.fx,
+                         (u[1] * camera.height - camera.cy) / camera.fy, 1);
+    return camera.position() + glm::transpose(camera.rotation) * (depth * u[2] * glm::normalize(ray));
+}
+
+/// A point of the sphere that a camera sees.
+glm::dvec3 seen_point(const Dataset& dataset, const std::vector<int>& frames, const Sphere& sphere,
+                      uint64_t seed, uint32_t index) {
+    constexpr uint32_t kAttempts =
+        64;  // a forward-facing capture's frustums fill some hundredths of the sphere
+    for (uint32_t attempt = 0; attempt < kAttempts; ++attempt) {
+        const glm::dvec3 point = point_in_sphere(sphere, uniform(seed, index, 2 * attempt));
+        if (std::any_of(frames.begin(), frames.end(),
+                        [&](int i) { return sees(dataset.frames[size_t(i)].camera, point); }))
+            return point;
+    }
+    const auto u = uniform(seed, index, 2 * kAttempts);
+    const auto which = std::min(size_t(u[3] * double(frames.size())), frames.size() - 1);
+    return point_on_a_ray(dataset.frames[size_t(frames[which])].camera, sphere.radius, u);
+}
+
 }  // namespace
 
 Sphere viewed_sphere(const Dataset& dataset, const std::vector<int>& frames) {
@@ -72,7 +101,7 @@ Gaussians random_gaussians(const Dataset& dataset, const std::vector<int>& frame
     PointCloud points;
     for (int i = 0; i < count; ++i) {
         const auto index = static_cast<uint32_t>(i);
-        points.positions.push_back(point_in_sphere(sphere, uniform(seed, index, 0)));
+        points.positions.push_back(seen_point(dataset, frames, sphere, seed, index));
         const auto shade = uniform(seed, index, 1);
         std::array<uint8_t, 3> color;
         for (size_t c = 0; c < 3; ++c) color[c] = static_cast<uint8_t>(96 + 64 * shade[c]);

@@ -19,9 +19,10 @@ struct Sphere {
 };
 Sphere viewed_sphere(const Dataset& dataset, const std::vector<int>& frames);
 
-/// `count` splats spread evenly over viewed_sphere(frames), grey with a little noise, scaled by their
-/// neighbours' distances as gaussians_from_points does. Each is a pure function of seed and index. frames
-/// must not be empty.
+/// `count` splats spread evenly over what the cameras see of viewed_sphere(frames): the part of it that lies
+/// in at least one frustum. Where that part is too small to hit, a splat stands on a random ray of a camera,
+/// at most the sphere's radius away. Grey with a little noise, scaled by their neighbours' distances as
+/// gaussians_from_points does. Each is a pure function of seed and index. frames must not be empty.
 Gaussians random_gaussians(const Dataset& dataset, const std::vector<int>& frames, int count, uint64_t seed,
                            int sh_degree);
 

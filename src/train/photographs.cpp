@@ -11,29 +11,67 @@
 
 namespace ewa::train {
 
+namespace {
+
+bool transparent(const Image& image) {
+    bool found = false;
+    for (size_t i = 3; image.channels == 4 && i < image.pixels.size(); i += 4)
+        found = found || image.pixels[i] < 1;
+    return found;
+}
+
+}  // namespace
+
 Photographs::Photographs(gpu::Device& device, const passes::Shape& shape, const Dataset& dataset,
-                         const std::vector<int>& frames) {
+                         const std::vector<int>& frames, uint64_t cache_bytes)
+    : device_(device), photos_(frames.size()) {
     const uint64_t align = std::max<uint64_t>(device.limits().uniform_alignment, 16);
     camera_stride_ = (sizeof(shared::CameraBlock) + align - 1) / align * align;
     std::vector<std::byte> blocks(camera_stride_ * std::max<size_t>(frames.size(), 1));
+    uint64_t held_bytes = 0;
     for (size_t i = 0; i < frames.size(); ++i) {
-        const Frame& frame = dataset.frames[size_t(frames[i])];
-        const Image image = load_frame_image(frame);
-        if (image.width != frame.camera.width || image.height != frame.camera.height)
-            throw InputError("frame " + frame.name + " changed its size while it was read");
+        const Frame& frame = frames_.emplace_back(dataset.frames[size_t(frames[i])]);
         const shared::CameraBlock block = pipeline::camera_block(frame.camera, shape);
         std::memcpy(&blocks[i * camera_stride_], &block, sizeof(block));
-        photos_.push_back(pipeline::upload_photo(device, image));
-        sizes_.push_back({uint32_t(image.width), uint32_t(image.height)});
-        max_width_ = std::max(max_width_, sizes_.back().width);
-        max_height_ = std::max(max_height_, sizes_.back().height);
+        const uint64_t bytes =
+            pipeline::photo_bytes(frame.camera.width, frame.camera.height, frame.eight_bit);
+        const bool held = held_bytes + bytes <= cache_bytes;
+        on_disk_ += !held;
+        if (held) {
+            held_bytes += bytes;
+            photos_[i] = upload(frame, load_frame_image(frame));
+        }
+        any_masked_ = any_masked_ || photos_[i].masked || (!held && frame.masks == MaskUse::ignore);
     }
     cameras_ = gpu::Buffer(device, "cameras", blocks.size(), gpu::Texel::none, true);
     cameras_.upload(std::span<const std::byte>(blocks));
 }
 
+Photographs::Held Photographs::upload(const Frame& frame, const Image& image) const {
+    if (image.width != frame.camera.width || image.height != frame.camera.height)
+        throw InputError("frame " + frame.name + " changed its size while it was read");
+    return {pipeline::upload_photo(device_, image, frame.eight_bit),
+            frame.masks == MaskUse::ignore && transparent(image)};
+}
+
+Photographs::Photo Photographs::photo(size_t i) {
+    if (photos_[i].texels) return {photos_[i].texels, photos_[i].masked};
+    prepare(i);
+    const Image image = reading_.get();
+    visitor_ = {};  // goes first: there is room for one
+    visitor_ = upload(frames_[i], image);
+    return {visitor_.texels, visitor_.masked};
+}
+
+void Photographs::prepare(size_t i) {
+    if (photos_[i].texels || (reading_.valid() && coming_ == i)) return;
+    coming_ = i;
+    reading_ = std::async(std::launch::async, [&frame = frames_[i]] { return load_frame_image(frame); });
+}
+
 pipeline::CameraUse Photographs::camera(size_t i) const {
-    return {&cameras_, i * camera_stride_, sizes_[i].width, sizes_[i].height};
+    const Camera& camera = frames_[i].camera;
+    return {&cameras_, i * camera_stride_, uint32_t(camera.width), uint32_t(camera.height)};
 }
 
 size_t frame_of_step(int step, size_t count, uint64_t seed) {

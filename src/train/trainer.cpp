@@ -10,6 +10,7 @@
 
 #include "core/random.h"
 #include "ewa/error.h"
+#include "ewa/splat_edit.h"
 #include "gpu/executor.h"
 #include "pipeline/backward.h"
 #include "pipeline/capacity.h"
@@ -33,6 +34,13 @@ double logit(double p) {
 std::array<float, 3> random_background(int step, uint64_t seed) {
     const auto u = core::uniform4({uint32_t(step), 0x62636b67u, uint32_t(seed), uint32_t(seed >> 32)});
     return {float(u[0]), float(u[1]), float(u[2])};
+}
+
+/// Splats that are neighbours in space become neighbours in memory: what a tile gathers stands together. Later
+/// generations keep it so, since children stand beside their parent.
+Gaussians along_curve(Gaussians start) {
+    select_splats(start, morton_order(start));
+    return start;
 }
 
 }  // namespace
@@ -61,9 +69,10 @@ struct Trainer::State {
           kernels(*device),
           executor(*device),
           plan(plan_training(start.sh_degree, o.render, o.strategy == Strategy::adc)),
-          model(upload_model(*device, start, 2, plan.statistics)),
-          photographs(*device, kernels.shape(), dataset, frames),
+          model(upload_model(*device, along_curve(start), 2, plan.statistics)),
+          photographs(*device, kernels.shape(), dataset, frames, o.image_cache_bytes),
           instance_room(first_capacity(start.size())) {
+        plan.masks = photographs.any_masked();
         report.splats = model.splats;
     }
 
@@ -82,15 +91,18 @@ struct Trainer::State {
     void optimise(int step) {
         const size_t index = train::frame_of_step(step, photographs.count(), options.seed);
         const CameraUse camera = photographs.camera(index);
+        const auto photo = photographs.photo(index);
+        photographs.prepare(train::frame_of_step(step + 1, photographs.count(), options.seed));
         const auto background =
             options.random_background ? random_background(step, options.seed) : options.render.background;
         plan.sh_degree = std::min(plan.stored_degree, schedule.degree(step));
         const shared::Counts counts = run_until_it_fits(
-            kernels, executor, frame, {model.splats, camera.width, camera.height, instance_room, true, false},
+            kernels, executor, frame,
+            {model.splats, camera.width, camera.height, instance_room, true, false, plan.masks},
             [&](gpu::Recording& recording) {
                 const Sorted sorted =
                     record_forward(recording, kernels, plan, model, frame, camera, background);
-                record_loss(recording, kernels, frame, camera, background, photographs.photo(index));
+                record_loss(recording, kernels, frame, camera, background, photo.texels, photo.masked);
                 record_backward(recording, kernels, plan, model, frame, camera, background, sorted,
                                 rates(step));
             });
@@ -152,6 +164,9 @@ Gaussians Trainer::gaussians() const {
 }
 uint32_t Trainer::splats() const {
     return state_->model.splats;
+}
+size_t Trainer::photographs_on_disk() const {
+    return state_->photographs.on_disk();
 }
 int Trainer::steps_done() const {
     return state_->report.step;

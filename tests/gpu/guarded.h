@@ -93,6 +93,7 @@ class GuardedFrame {
         make(frame.planes, "planes", s.planes, Texel::rgba32f);
         if (request.gradients) {
             make(frame.target, "target", s.target, Texel::rgba32f);
+            if (request.masks) make(frame.masked, "masked", s.masked, Texel::rgba32f);
             make(frame.moments, "moments", s.moments, Texel::rgba32f);
             make(frame.derivatives, "derivatives", s.derivatives, Texel::rgba32f);
             make(frame.blurred, "blurred", s.derivatives, Texel::rgba32f);

@@ -142,16 +142,16 @@ TEST_P(Densify, WritesTheTwinsNextGeneration) {
 
     // Moments go with what is kept and are zero for what is new, texel by texel.
     const uint32_t planes = pipeline::parameter_planes(degree), n = result.after;
-    const auto moments1 = start.model.moments1.download<float>(size_t(planes) * n * 4);
-    const auto moments2 = start.model.moments2.download<float>(size_t(planes) * n * 4);
-    for (uint32_t plane = 0; plane < planes; ++plane)
-        for (uint32_t i = 0; i < n; ++i)
-            for (uint32_t c = 0; c < 4; ++c) {
-                const size_t to = (size_t(plane) * n + i) * 4 + c;
-                const size_t from = (size_t(plane) * splats + expected.source[i]) * 4 + c;
-                ASSERT_EQ(moments1[to], expected.fresh[i] ? 0 : start.moments1[from]);
-                ASSERT_EQ(moments2[to], expected.fresh[i] ? 0 : start.moments2[from]);
-            }
+    const size_t floats = pipeline::parameter_bytes(n, degree) / 4;
+    const auto moments1 = start.model.moments1.download<float>(floats);
+    const auto moments2 = start.model.moments2.download<float>(floats);
+    for (uint32_t f = 0; f < 4 * planes; ++f)
+        for (uint32_t i = 0; i < n; ++i) {
+            const size_t to = pipeline::parameter_index(planes, f, i);
+            const size_t from = pipeline::parameter_index(planes, f, expected.source[i]);
+            ASSERT_EQ(moments1[to], expected.fresh[i] ? 0 : start.moments1[from]);
+            ASSERT_EQ(moments2[to], expected.fresh[i] ? 0 : start.moments2[from]);
+        }
     for (const float value : start.model.statistics.download<float>(2 * size_t(n))) EXPECT_EQ(value, 0);
 }
 

@@ -86,6 +86,51 @@ TEST_P(Loss, ValueAndGradientAreTheTwins) {
     EXPECT_LT(worst, 1e-5 * largest);  // variances are float32 differences of moments
 }
 
+/// The photograph's alpha as the weight of a pixel.
+TEST_P(Loss, OfMaskedPicturesIsTheTwins) {
+    const auto [width, height] = GetParam();
+    Inputs in = random_inputs(uint64_t(width * 31 + height), width, height);
+    reference::Raster photo(width, height, 3), weights(width, height, 1);
+    for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x) {
+            if (x % 4 == 1) in.photo.at(x, y)[3] = 0;
+            weights.at(x, y)[0] = in.photo.at(x, y)[3];
+            for (int k = 0; k < 3; ++k) photo.at(x, y)[k] = in.photo.at(x, y)[k];
+        }
+    Rig& r = rig();
+    GuardedFrame guarded(r.shape(), {1, uint32_t(width), uint32_t(height), 1, true, false, true});
+    pipeline::Frame& frame = guarded.frame;
+    const auto planes = pack_planes(in.image, 3, frame.sizes.stride);
+    frame.planes.upload(std::span<const float>(planes));
+    const gpu::Buffer texels = pipeline::upload_photo(*device(), in.photo);
+    const pipeline::CameraUse camera{nullptr, 0, uint32_t(width), uint32_t(height)};
+    r.run([&](gpu::Recording& recording) {
+        record_loss(recording, r.kernels, frame, camera, in.background, texels, true);
+    });
+    EXPECT_TRUE(guarded.intact());
+
+    const reference::Loss twin = reference::image_loss(in.image, photo, weights);
+    const shared::Counts counts = frame.read_counts();
+    EXPECT_NEAR(counts.l1, twin.l1, 2e-7 + 1e-6 * twin.l1);
+    EXPECT_NEAR(counts.ssim, twin.ssim, 5e-7);
+    const auto gradient = frame.image_gradient.download<float>(frame.sizes.image_gradient / 4);
+    double worst = 0, largest = 0;
+    for (int c = 0; c < 3; ++c)
+        for (int y = 0; y < height; ++y)
+            for (int x = 0; x < width; ++x) {
+                const float g = gradient[size_t(c) * frame.sizes.plane_floats +
+                                         size_t(y) * frame.sizes.stride + size_t(x)];
+                if (weights.at(x, y)[0] == 0) {
+                    EXPECT_EQ(g, 0);
+                }
+                worst = std::max(worst, std::abs(g - twin.gradient.at(x, y)[c]));
+                largest = std::max(largest, std::abs(twin.gradient.at(x, y)[c]));
+            }
+    EXPECT_LT(worst, 1e-5 * largest);
+    // What was drawn is left alone: the way back through the blend needs it.
+    EXPECT_EQ(frame.planes.download<float>(planes.size()), planes);
+}
+
 /// The window's first half: exact up to float32 rounding of eleven products.
 TEST_P(Loss, MomentsAreBlurredDownTheColumns) {
     const auto [width, height] = GetParam();
@@ -191,6 +236,16 @@ TEST(Photo, EightBitAndFloatPhotographsUnpackTheSame) {
                 }
                 EXPECT_NEAR(bytes[at], p[c] * p[3] + background[c] * (1 - p[3]), 2e-7);
             }
+}
+
+TEST(Photo, MayBeRoundedToEightBits) {
+    Image picture(2, 1, 3);
+    picture.pixels = {-1, 0.1234567f, 0.5f, 1, 2, 0.999f};
+    const gpu::Buffer photo = pipeline::upload_photo(*device(), picture, true);
+    EXPECT_EQ(int(photo.texel()), int(gpu::Texel::rgba8));
+    EXPECT_LE(pipeline::photo_bytes(2, 1, true), photo.bytes());
+    EXPECT_EQ(photo.download<uint8_t>(8), (std::vector<uint8_t>{0, 31, 128, 255, 255, 255, 255, 255}));
+    EXPECT_EQ(int(pipeline::upload_photo(*device(), picture).texel()), int(gpu::Texel::rgba32f));
 }
 
 TEST(Reduce, AddsUpInAFixedOrder) {

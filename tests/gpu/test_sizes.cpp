@@ -164,7 +164,7 @@ TEST(SizesFor, TotalIsWhatAFrameHolds) {
     const auto shape = passes::shape_for(device()->limits());
     for (const bool gradients : {false, true})
         for (const bool depth : {false, true}) {
-            const FrameRequest request{12345, 61, 47, 54321, gradients, depth};
+            const FrameRequest request{12345, 61, 47, 54321, gradients, depth, gradients};
             pipeline::Frame frame;
             frame.reserve(*device(), shape, request);
             uint64_t held = 0, count = 0;
@@ -189,6 +189,7 @@ TEST(SizesFor, TotalIsWhatAFrameHolds) {
                                          &frame.tile_starts,
                                          &frame.planes,
                                          &frame.target,
+                                         &frame.masked,
                                          &frame.moments,
                                          &frame.derivatives,
                                          &frame.blurred,

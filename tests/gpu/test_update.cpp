@@ -81,7 +81,7 @@ struct Bench {
 shared::UpdatePush push_for(const Scene& scene, uint32_t step) {
     const uint32_t n = uint32_t(scene.gaussians.size());
     return {n,
-            n,
+            pipeline::parameter_planes(scene.gaussians.sh_degree),
             1000000,
             1e-3f,
             2e-2f,

@@ -183,16 +183,16 @@ TEST(Colmap, LensModels) {
     const auto cameras = [&](int32_t lens, const std::vector<double>& parameters) {
         model.cameras = list({camera(3, lens, 8, 6, parameters), camera(9, 0, 4, 4, {7, 2, 2.5})});
     };
-    cameras(2, {10, 4, 3, 0.1});
-    model.refuse({"cameras.bin: byte", "SIMPLE_RADIAL", "colmap image_undistorter"});
-    cameras(4, {10, 11, 4, 3, 0, 0, 0, 1e-9});
-    model.refuse({"OPENCV", "colmap image_undistorter"});
-    cameras(5, {10, 11, 4, 3, 0, 0, 0, 0});
-    model.refuse({"OPENCV_FISHEYE", "colmap image_undistorter"});
     cameras(99, {10, 11, 4, 3});
     model.refuse({"99", "colmap image_undistorter"});
     cameras(-1, {10, 11, 4, 3});
     model.refuse({"-1", "colmap image_undistorter"});
+    cameras(17, {8, 6, 0, 0});
+    model.refuse({"17", "colmap image_undistorter"});
+    cameras(4, {10, 11, 4, 3, 0, 0, 0, kNan});
+    model.refuse({"not finite"});
+    cameras(4, {10, 11, 4, 3, -9, 0, 0, 0});
+    model.refuse({"frame \"b.png\"", "folds"});
     cameras(4, {10, 11, 4, 3, 0, 0, 0, 0});
     model.write();
     EXPECT_EQ(model.load().frames[0].camera.fy, 11);
@@ -256,7 +256,8 @@ TEST(Colmap, TextErrorsNameTheLine) {
     refuse("# c\n1 PINHOLE 8 six 10 11 4 3\n", image_line, "", {"cameras.txt:2:", "height", "\"six\""});
     refuse("1 PINHOLE 8 6 10 11 4\n", image_line, "", {"cameras.txt:1:"});
     refuse("1 PINHOLE 8 6 10 11 4 3 0\n", image_line, "", {"cameras.txt:1:", "too many"});
-    refuse("1 RADIAL 8 6 10 4 3 0.1 0\n", image_line, "", {"cameras.txt:1:", "RADIAL", "image_undistorter"});
+    refuse("1 EQUIRECTANGULAR 8 6 8 6\n", image_line, "",
+           {"cameras.txt:1:", "EQUIRECTANGULAR", "image_undistorter"});
     refuse("1 FOO 8 6 10 11 4 3\n", image_line, "", {"cameras.txt:1:", "FOO"});
     refuse(camera_line, image_line + "2 1 0 0 zero 0 0 0 1 c.png\n\n", "", {"images.txt:3:", "\"zero\""});
     refuse(camera_line, "1 1 0 0 0 0 0 0 1\n\n", "", {"images.txt:1:", "no name"});

@@ -85,6 +85,27 @@ TEST(ImageFiles, GreyAndDeepFiles) {
     EXPECT_EQ(load_image(folder / "deep.png").pixels, (std::vector<float>{1 / 65535.f, 256 / 65535.f, 1}));
 }
 
+TEST(ImageFiles, Orientations) {
+    // The corners of a 3 x 2 picture, upright: 1 2 above, 3 4 below. What each orientation stores instead, by
+    // EXIF's table (tag 274): 1 as is, 2 mirrored, 3 turned by half, 4 upside down, 5 to 8 with rows for
+    // columns.
+    const int corners[8][4] = {{1, 2, 3, 4}, {2, 1, 4, 3}, {4, 3, 2, 1}, {3, 4, 1, 2},
+                               {1, 3, 2, 4}, {2, 4, 1, 3}, {4, 2, 3, 1}, {3, 1, 4, 2}};
+    for (int orientation = 1; orientation <= 8; ++orientation) {
+        const bool swapped = orientation >= 5;
+        Image stored(swapped ? 2 : 3, swapped ? 3 : 2, 3);
+        const auto corner = [](const Image& image, int i) {
+            return image.at(i % 2 == 0 ? 0 : image.width - 1, i < 2 ? 0 : image.height - 1);
+        };
+        for (int i = 0; i < 4; ++i)
+            *const_cast<float*>(corner(stored, i)) = float(corners[orientation - 1][i]);
+        const Image upright = oriented(stored, orientation);
+        ASSERT_EQ(upright.width, 3);
+        ASSERT_EQ(upright.height, 2);
+        for (int i = 0; i < 4; ++i) EXPECT_EQ(*corner(upright, i), i + 1) << orientation;
+    }
+}
+
 TEST(ImageFiles, RefusesWhatItCannotRead) {
     TempFolder folder;
     expect_error<InputError>([&] { load_image(folder / "none.png"); }, {"none.png", "no such file"});
@@ -228,6 +249,30 @@ double brute_force_ssim(const Image& a, const Image& b) {
                          ((ma * ma + mb * mb + 1e-4) * (aa - ma * ma + bb - mb * mb + 9e-4));
             }
     return total / (a.width * a.height * 3);
+}
+
+TEST(Metrics, WeightsSayWhatCounts) {
+    Image a = noise(20, 16, 3, 11), weights(20, 16, 1);
+    const Image b = noise(20, 16, 3, 12);
+    EXPECT_TRUE(std::isnan(psnr(a, b, weights)));
+    for (float& weight : weights.pixels) weight = 1;
+    EXPECT_EQ(psnr(a, b, weights), psnr(a, b));
+    EXPECT_EQ(ssim(a, b, weights), ssim(a, b));
+    // By hand: two pixels, of which one counts by half.
+    const Image white(2, 1, 3);
+    Image other(2, 1, 3), shares(2, 1, 1);
+    other.pixels = {0.1f, 0.1f, 0.1f, 0.3f, 0.3f, 0.3f};
+    shares.pixels = {1, 0.5f};
+    EXPECT_NEAR(psnr(white, other, shares), -10 * std::log10((0.01 + 0.5 * 0.09) / 1.5), 1e-6);
+    // What stands under the mask does not matter.
+    for (int y = 0; y < 16; ++y)
+        for (int x = 0; x < 7; ++x) *weights.at(x, y) = 0;
+    const double db = psnr(a, b, weights), similarity = ssim(a, b, weights);
+    for (int y = 0; y < 16; ++y)
+        for (int x = 0; x < 7; ++x) a.at(x, y)[1] = 0.77f;
+    EXPECT_EQ(psnr(a, b, weights), db);
+    EXPECT_EQ(ssim(a, b, weights), similarity);
+    expect_error<InputError>([&] { psnr(a, b, shares); }, {"weights"});
 }
 
 TEST(Metrics, SsimAgainstBruteForce) {

@@ -12,14 +12,18 @@ namespace {
 using namespace ewa;
 using namespace ewa::train;
 
-/// Cameras on a circle of radius 3 around `center`; towards: looking at it, else away from it.
-Dataset circle(const glm::dvec3& center, bool towards, int count = 12) {
+/// Cameras on a circle of radius 3 around `center`; towards: looking at it, else away from it. A focal length
+/// of 10 px sees nearly all that is in front.
+Dataset circle(const glm::dvec3& center, bool towards, int count = 12, double focal = 10) {
     Dataset dataset;
     for (int i = 0; i < count; ++i) {
         const double angle = 2 * 3.141592653589793 * i / count;
         const glm::dvec3 offset(3 * std::cos(angle), 3 * std::sin(angle), 0);
         const glm::dvec3 z = glm::normalize(towards ? -offset : offset), x(0, 0, 1), y = glm::cross(z, x);
         Frame frame;
+        frame.camera.width = frame.camera.height = 200;
+        frame.camera.fx = frame.camera.fy = focal;
+        frame.camera.cx = frame.camera.cy = 100;
         frame.camera.rotation = glm::transpose(glm::dmat3(x, y, z));
         frame.camera.translation = -(frame.camera.rotation * (center + offset));
         dataset.frames.push_back(frame);
@@ -86,6 +90,34 @@ TEST(Initialise, RandomSplatsFillTheSphereAndFollowTheSeed) {
     EXPECT_EQ(a.means, same.means);
     EXPECT_TRUE(std::equal(fewer.means.begin(), fewer.means.end(), a.means.begin()));
     EXPECT_NE(a.means, other.means);
+}
+
+bool in_a_frustum(const Dataset& dataset, const glm::dvec3& point) {
+    for (const Frame& frame : dataset.frames) {
+        const glm::dvec3 p = frame.camera.rotation * point + frame.camera.translation;
+        // A float's rounding may carry a point over the border.
+        const double reach = 100 / frame.camera.fx * p.z + 1e-5;
+        if (p.z > 0 && std::abs(p.x) <= reach && std::abs(p.y) <= reach) return true;
+    }
+    return false;
+}
+
+TEST(Initialise, RandomSplatsStandWhereACameraLooks) {
+    // A band 1.5 wide where the cameras look at the middle; outwards, cones that leave most of the sphere
+    // dark; and frustums so thin that chance does not find them.
+    for (const auto& [towards, focal] : {std::pair(true, 400.0), {false, 300.0}, {false, 1e5}}) {
+        const Dataset dataset = circle({5, 0, 0}, towards, 12, focal);
+        const Sphere sphere = viewed_sphere(dataset, every_frame(dataset));
+        const Gaussians g = random_gaussians(dataset, every_frame(dataset), 2000, 1, 0);
+        double farthest = 0;
+        for (size_t i = 0; i < g.size(); ++i) {
+            const glm::dvec3 p(g.means[3 * i], g.means[3 * i + 1], g.means[3 * i + 2]);
+            ASSERT_TRUE(in_a_frustum(dataset, p)) << focal << ": " << p.x << " " << p.y << " " << p.z;
+            farthest = std::max(farthest, glm::length(p - sphere.center));
+        }
+        EXPECT_GT(farthest, 0.9 * sphere.radius);
+        EXPECT_LT(farthest, 1.3 * sphere.radius);
+    }
 }
 
 TEST(Initialise, ShDegreeIsRaisedAndLowered) {

@@ -87,6 +87,24 @@ TEST(ReferenceLoss, GradientMatchesDifferences) {
     }
 }
 
+TEST(ReferenceLoss, GradientOfMaskedPicturesMatchesDifferences) {
+    Raster a = random_raster(20, 15, 12), weights(15, 12, 1);
+    const Raster b = random_raster(21, 15, 12);
+    for (size_t i = 0; i < weights.values.size(); ++i)
+        weights.values[i] = i % 3 == 0 ? 0 : i % 3 == 1 ? 1 : 0.4;
+    const Loss loss = image_loss(a, b, weights);
+    std::vector<double> differences;
+    for (size_t i = 0; i < a.values.size(); ++i)
+        differences.push_back(test::best_central_difference([&] { return image_loss(a, b, weights).loss; },
+                                                            a.values[i], loss.gradient.values[i], 1e-4,
+                                                            1e-6));
+    EXPECT_TRUE(test::gradients_agree(loss.gradient.values, differences, {1e-10, 1e-6, 1e-5, 1e-6}));
+    for (double& weight : weights.values) weight = 1;
+    EXPECT_EQ(image_loss(a, b, weights).loss, image_loss(a, b).loss);
+    for (double& weight : weights.values) weight = 0;
+    EXPECT_NEAR(image_loss(a, b, weights).loss, 0, 1e-12);
+}
+
 TEST(ReferenceLoss, WindowAddsUpToOneAndIsSymmetric) {
     const std::vector<double> window = ssim_window();
     ASSERT_EQ(window.size(), 11u);

@@ -166,13 +166,33 @@ TEST(Transforms, RotationsAreMadeOrthonormal) {
     refuse("text", "rows");
 }
 
+TEST(Transforms, Lenses) {
+    Scene scene;
+    scene.model.update({{"k1", 0.01}, {"k2", 0.02}, {"k3", 0.03}, {"p1", 0.001}, {"p2", 0.002}});
+    Distortion expected{0.01, 0.02, 0.001, 0.002, 0.03};
+    EXPECT_EQ(scene.load().frames[0].distortion, expected);
+    scene.model["camera_model"] = "FULL_OPENCV";
+    scene.model.update({{"k4", 0.04}, {"k5", 0.05}, {"k6", 0.06}});
+    expected.k4 = 0.04, expected.k5 = 0.05, expected.k6 = 0.06;
+    EXPECT_EQ(scene.load().frames[0].distortion, expected);
+    for (const char* how : {"camera_model", "is_fisheye"}) {
+        Scene fisheye;
+        fisheye.model.update({{"k1", 0.01}, {"k2", 0.02}, {"k3", 0.03}, {"k4", 0.04}});
+        fisheye.model[how] = std::string(how) == "is_fisheye" ? json(true) : json("OPENCV_FISHEYE");
+        const Frame frame = fisheye.load().frames[0];
+        EXPECT_EQ(frame.distortion,
+                  (Distortion{.k1 = 0.01, .k2 = 0.02, .k3 = 0.03, .k4 = 0.04, .lens = Lens::fisheye}));
+        EXPECT_GT(frame.camera.width, frame.source.width - 2);
+    }
+}
+
 TEST(Transforms, OtherLensesAreNamed) {
-    for (const char* model : {"OPENCV_FISHEYE", "EQUIRECTANGULAR"}) {
+    for (const char* model : {"EQUIRECTANGULAR", "ORTHOPHOTO"}) {
         Scene scene;
         scene.model["camera_model"] = model;
         scene.refuse({"frame 0", model, "undistort"});
     }
-    for (const char* key : {"k3", "k4"}) {
+    for (const char* key : {"k4", "k5", "ftheta_p0"}) {
         Scene scene;
         scene.model[key] = 0.0;
         EXPECT_NO_THROW(scene.load());
@@ -180,8 +200,8 @@ TEST(Transforms, OtherLensesAreNamed) {
         scene.refuse({"frame 1", key});
     }
     Scene fisheye;
-    fisheye.model["is_fisheye"] = true;
-    fisheye.refuse({"fisheye"});
+    fisheye.model.update({{"is_fisheye", true}, {"k5", 0.1}});
+    fisheye.refuse({"frame 0", "k5"});
 }
 
 TEST(Transforms, NamesWhatIsWrong) {
@@ -214,7 +234,8 @@ TEST(Transforms, NamesWhatIsWrong) {
     scene.folder.write("transforms.json", "{\"fl_x\": 1e999}");
     expect_error<InputError>([&] { load_dataset(scene.folder.path(), {}); }, {"transforms.json"});
     scene.folder.write("transforms.json", std::string(1000000, '['));
-    expect_error<InputError>([&] { load_dataset(scene.folder.path(), {}); }, {"transforms.json", "64 levels"});
+    expect_error<InputError>([&] { load_dataset(scene.folder.path(), {}); },
+                             {"transforms.json", "64 levels"});
 }
 
 TEST(Transforms, EveryCutIsAnError) {
@@ -231,9 +252,10 @@ TEST(Transforms, RealScene) {
     EXPECT_EQ(dataset.frames.size(), 50u);
     const Frame& frame = dataset.frames[0];
     EXPECT_EQ(frame.distortion.k1, 0.0578421);
-    EXPECT_NEAR(frame.camera.fx, frame.source.fx, 0.1 * frame.source.fx);
-    EXPECT_NE(frame.camera.fx, frame.source.fx);
-    EXPECT_EQ(load_frame_image(frame).width, 270);
+    EXPECT_EQ(frame.camera.fx, frame.source.fx);
+    EXPECT_NEAR(frame.camera.width, 270, 5);
+    EXPECT_NE(frame.camera.cx, frame.source.cx);
+    EXPECT_EQ(load_frame_image(frame).width, frame.camera.width);
 }
 
 }  // namespace
