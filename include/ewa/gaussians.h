@@ -33,4 +33,7 @@ struct Gaussians {
 /// The highest degree that has a coefficient other than zero; what the scene needs, not what the file has room for.
 int sh_degree_present(const Gaussians& gaussians);
 
+/// Whether every stored value of splat i is finite and its quaternion is not zero. Others are never drawn.
+bool drawable(const Gaussians& gaussians, size_t i);
+
 }  // namespace ewa

@@ -15,6 +15,7 @@ Action add_train(CLI::App& app, const std::string& command_line);
 Action add_render(CLI::App& app);
 Action add_eval(CLI::App& app);
 Action add_grad(CLI::App& app);
+Action add_convert(CLI::App& app);
 Action add_info(CLI::App& app);
 Action add_devices(CLI::App& app);
 Action add_bench(CLI::App& app);

@@ -23,6 +23,9 @@ struct GradArguments {
 
 int run(const GradArguments& arguments) {
     const RenderOptions options = arguments.draw.options();
+    if (format_of_name(arguments.output) != SplatFormat::ply)
+        throw InputError("--output " + arguments.output.string() +
+                         ": a gradient is written as .ply; the other formats hold no values but a splat's");
     if (arguments.output.extension() != ".ply")
         throw InputError("the gradient is written as a PLY: -o " + arguments.output.string() +
                          " does not end in .ply");
@@ -56,7 +59,10 @@ int run(const GradArguments& arguments) {
 
 Action add_grad(CLI::App& app) {
     const auto arguments = std::make_shared<GradArguments>();
-    app.add_option("SPLATS", arguments->splats, "The splat scene (.ply)")->required()->type_name("");
+    app.add_option("SPLATS", arguments->splats,
+                   "The splat scene (.ply .compressed.ply .splat .spz .glb .gltf)")
+        ->required()
+        ->type_name("");
     app.add_option("DATASET", arguments->dataset,
                    "Photographs with cameras: COLMAP folder or transforms.json")
         ->required()

@@ -10,6 +10,7 @@
 #include "cli/command.h"
 #include "cli/splat_statistics.h"
 #include "cli/text.h"
+#include "core/text.h"
 #include "ewa/dataset.h"
 #include "ewa/error.h"
 #include "ewa/renderer.h"
@@ -47,25 +48,45 @@ void print_spread(const char* name, const Spread& spread) {
                histogram_text(spread));
 }
 
+void print_file(const fs::path& path, const SplatScene& scene) {
+    fmt::print("{}\nformat          {}{}, {}\n", path.string(), name_of(scene.format),
+               scene.variant.empty() ? "" : " (" + scene.variant + ")", bytes_text(fs::file_size(path)));
+    if (scene.antialiased) fmt::print("anti-aliased    marked so: draw it with --antialias\n");
+    for (const std::string& comment : scene.comments)
+        fmt::print("comment         {}\n", core::one_line(comment));
+    for (const std::string& remark : scene.remarks)
+        fmt::print("note            {}\n", core::one_line(remark));
+}
+
 int info_splats(const fs::path& path, bool json) {
-    const Gaussians gaussians = load_splats(path);
+    const SplatScene scene = read_splats(path);
+    const Gaussians& gaussians = scene.gaussians;
     const SplatStatistics statistics = splat_statistics(gaussians);
     const auto rendering = plan_lines(gaussians, RenderOptions{}, Purpose::picture);
     const auto training = plan_lines(gaussians, RenderOptions{}, Purpose::densifying);
     if (json) {
         const Json out = {{"kind", "splats"},
+                          {"format", name_of(scene.format)},
+                          {"variant", scene.variant},
+                          {"bytes", fs::file_size(path)},
+                          {"antialiased", scene.antialiased},
+                          {"comments", scene.comments},
+                          {"notes", scene.remarks},
                           {"splats", gaussians.size()},
                           {"sh_degree", gaussians.sh_degree},
+                          {"file_sh_degree", scene.file_sh_degree},
                           {"sh_degree_present", sh_degree_present(gaussians)},
                           {"bounds", {{"min", statistics.low}, {"max", statistics.high}}},
                           {"opacity", range_json(statistics.opacity)},
                           {"scale", range_json(statistics.scale)},
                           {"nonfinite", statistics.nonfinite},
                           {"plan", {{"rendering", plan_json(rendering)}, {"training", plan_json(training)}}}};
-        fmt::print("{}\n", out.dump(2));
+        // A file's text may be no UTF-8, which JSON is.
+        fmt::print("{}\n", out.dump(2, ' ', false, Json::error_handler_t::replace));
         return 0;
     }
-    fmt::print("{}\nsplats          {}\n", path.string(), gaussians.size());
+    print_file(path, scene);
+    fmt::print("splats          {}\n", gaussians.size());
     fmt::print("SH degree       {} stored, {} present\n", gaussians.sh_degree, sh_degree_present(gaussians));
     fmt::print("bounds          ({:.6g}, {:.6g}, {:.6g}) .. ({:.6g}, {:.6g}, {:.6g})\n", statistics.low[0],
                statistics.low[1], statistics.low[2], statistics.high[0], statistics.high[1],
@@ -180,7 +201,9 @@ Action add_info(CLI::App& app) {
         bool json = false;
     };
     const auto arguments = std::make_shared<Arguments>();
-    app.add_option("PATH", arguments->path, "A splat file (.ply), a COLMAP folder or a transforms.json")
+    app.add_option(
+           "PATH", arguments->path,
+           "A splat file (.ply .compressed.ply .splat .spz .glb .gltf), a COLMAP folder or a transforms.json")
         ->required();
     add_test_every_option(app, arguments->test_every);
     app.add_flag("--json", arguments->json, "As JSON");

@@ -70,6 +70,7 @@ int main(int argc, char** argv) {
         {app.add_subcommand("render", "Pictures of a splat scene through a dataset's cameras"), {}},
         {app.add_subcommand("eval", "PSNR and SSIM of a splat scene against photographs"), {}},
         {app.add_subcommand("grad", "Gradient of the training loss for one view"), {}},
+        {app.add_subcommand("convert", "From any splat format to any other, joined and edited on the way"), {}},
         {app.add_subcommand("info", "What is in a splat file or a dataset, and what rendering it leaves out"),
          {}},
         {app.add_subcommand("devices", "The Vulkan devices of this machine"), {}},
@@ -79,9 +80,10 @@ int main(int argc, char** argv) {
     commands[1].action = add_render(*commands[1].app);
     commands[2].action = add_eval(*commands[2].app);
     commands[3].action = add_grad(*commands[3].app);
-    commands[4].action = add_info(*commands[4].app);
-    commands[5].action = add_devices(*commands[5].app);
-    commands[6].action = add_bench(*commands[6].app);
+    commands[4].action = add_convert(*commands[4].app);
+    commands[5].action = add_info(*commands[5].app);
+    commands[6].action = add_devices(*commands[6].app);
+    commands[7].action = add_bench(*commands[7].app);
 
     try {
         app.parse(argc, argv);

@@ -28,18 +28,6 @@ Spread make_spread(std::vector<double> values, Shown shown) {
     return spread;
 }
 
-bool all_finite(const float* values, size_t count) {
-    return std::all_of(values, values + count, [](float v) { return std::isfinite(v); });
-}
-
-bool drawable(const Gaussians& g, size_t i) {
-    const float* q = &g.quaternions[4 * i];
-    const bool rotated = q[0] != 0 || q[1] != 0 || q[2] != 0 || q[3] != 0;
-    return rotated && all_finite(q, 4) && all_finite(&g.means[3 * i], 3) &&
-           all_finite(&g.log_scales[3 * i], 3) && std::isfinite(g.opacity_logits[i]) &&
-           all_finite(&g.sh[g.sh_stride() * i], g.sh_stride());
-}
-
 }  // namespace
 
 SplatStatistics splat_statistics(const Gaussians& g) {

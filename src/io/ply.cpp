@@ -1,5 +1,6 @@
 #include "io/ply.h"
 
+#include <algorithm>
 #include <cassert>
 #include <cstring>
 
@@ -7,6 +8,7 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "io/ply_table.h"
+#include "io/splat_scene.h"
 
 namespace ewa::io {
 
@@ -30,9 +32,7 @@ size_t column(const PlyTable& table, const PlyElement& vertex, const std::string
     if (found && !vertex.properties[*found].list_count) return *found;
     std::string text = table.name() + ": the vertices have no property \"" + name + "\"";
     if (found) text = table.name() + ": the property \"" + name + "\" is a list, not a number";
-    if (vertex.find("packed_position"))
-        text += "; this is SuperSplat's compressed layout, export it as an uncompressed PLY";
-    else if (name == "scale_2")
+    if (name == "scale_2")
         text += "; 2D Gaussian splats are not supported";
     else if (name.starts_with("f_dc_") && !vertex.find("opacity"))
         text += "; this is a point cloud, not a splat file";
@@ -57,9 +57,42 @@ std::vector<size_t> splat_columns(const PlyTable& table, const PlyElement& verte
     return columns;
 }
 
-std::string header(const Gaussians& gaussians, const std::vector<std::string>& comments) {
+/// The mark of a scene that was trained anti-aliased, with a name for each program that writes one.
+bool says_antialiased(const std::string& comment) {
+    std::string_view rest = comment;
+    const std::string key = core::lower(core::next_word(rest)), value = core::lower(core::trim(rest));
+    return (key == "splatrendermode:" && value == "mip") || (key == "antialiased" && value == "1");
+}
+
+bool any_antialiased(const std::vector<std::string>& comments) {
+    return std::any_of(comments.begin(), comments.end(), says_antialiased);
+}
+
+/// What the file has besides, for the reader of `ewa info`.
+void remark_ignored(const PlyElement& vertex, const std::vector<size_t>& columns, SplatScene& scene) {
+    std::string ignored;
+    for (size_t i = 0; i < vertex.properties.size(); ++i) {
+        const std::string& name = vertex.properties[i].name;
+        if (std::find(columns.begin(), columns.end(), i) != columns.end() || name.starts_with("f_rest_") ||
+            name == "nx" || name == "ny" || name == "nz")
+            continue;
+        constexpr size_t kLongest = 200;
+        if (ignored.size() > kLongest) {
+            ignored += ", ...";
+            break;
+        }
+        ignored += (ignored.empty() ? "" : ", ") + name;
+    }
+    if (!ignored.empty()) scene.remarks.push_back("properties that are no splat's are left out: " + ignored);
+    if (scene.file_sh_degree > kMaxShDegree)
+        scene.remarks.push_back("has SH degree " + std::to_string(scene.file_sh_degree) + "; degrees above " +
+                                std::to_string(kMaxShDegree) + " are left out");
+}
+
+std::string header(const Gaussians& gaussians, const SaveOptions& options) {
     std::string text = "ply\nformat binary_little_endian 1.0\n";
-    for (const std::string& comment : comments) text += "comment " + core::one_line(comment) + "\n";
+    for (const std::string& comment : options.comments) text += "comment " + core::one_line(comment) + "\n";
+    if (options.antialiased && !any_antialiased(options.comments)) text += "comment SplatRenderMode: mip\n";
     text += "element vertex " + std::to_string(gaussians.size()) + "\n";
     const auto property = [&](const std::string& name) { text += "property float " + name + "\n"; };
     for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) property(name);
@@ -87,16 +120,20 @@ void append_row(const Gaussians& gaussians, size_t i, std::vector<float>& rows) 
 
 }  // namespace
 
-PlySplats read_ply(const std::filesystem::path& path) {
+SplatScene read_ply(const std::filesystem::path& path) {
     PlyTable table(path);
-    PlySplats result;
-    result.comments = table.comments();
+    SplatScene scene;
+    scene.comments = table.comments();
+    scene.variant = table.format_name();
+    scene.antialiased = any_antialiased(scene.comments);
     const PlyElement& vertex = table.go_to("vertex");
-    result.file_sh_degree = degree_of(table, vertex);
-    Gaussians& gaussians = result.gaussians;
-    gaussians.sh_degree = std::min(result.file_sh_degree, kMaxShDegree);
+    scene.file_sh_degree = degree_of(table, vertex);
+    Gaussians& gaussians = scene.gaussians;
+    gaussians.sh_degree = std::min(scene.file_sh_degree, kMaxShDegree);
     const std::vector<size_t> columns =
-        splat_columns(table, vertex, gaussians.sh_degree, result.file_sh_degree);
+        splat_columns(table, vertex, gaussians.sh_degree, scene.file_sh_degree);
+    remark_ignored(vertex, columns, scene);
+    require_memory(table.name(), table.file_bytes(), vertex.count, gaussians.sh_degree);
     gaussians.resize(static_cast<size_t>(vertex.count));
     const size_t stride = gaussians.sh_stride();
     const auto copy = [](const double* from, float* to, size_t n) {
@@ -109,16 +146,16 @@ PlySplats read_ply(const std::filesystem::path& path) {
         copy(row + 7, &gaussians.quaternions[4 * i], 4);
         copy(row + kBeforeSh, &gaussians.sh[stride * i], stride);
     });
-    return result;
+    return scene;
 }
 
-void write_ply(const std::filesystem::path& path, const Gaussians& gaussians,
-               const std::vector<std::string>& comments) {
+std::vector<std::string> write_ply(const std::filesystem::path& path, const Gaussians& gaussians,
+                                   const SaveOptions& options) {
     const size_t n = gaussians.size();
     assert(gaussians.means.size() == 3 * n && gaussians.quaternions.size() == 4 * n);
     assert(gaussians.log_scales.size() == 3 * n && gaussians.sh.size() == gaussians.sh_stride() * n);
     core::AtomicFile file(path);
-    file.write(header(gaussians, comments));
+    file.write(header(gaussians, options));
     constexpr size_t kRowsAtOnce = 4096;
     std::vector<float> rows;
     for (size_t i = 0; i < n; ++i) {
@@ -126,9 +163,11 @@ void write_ply(const std::filesystem::path& path, const Gaussians& gaussians,
         if ((i + 1) % kRowsAtOnce == 0 || i + 1 == n) {
             file.write(rows.data(), rows.size() * sizeof(float));
             rows.clear();
+            if (options.progress) options.progress(i + 1, n);
         }
     }
     file.commit();
+    return {};
 }
 
 }  // namespace ewa::io

@@ -9,27 +9,19 @@
 //   logarithm rot_0..3                               w x y z
 // In memory a splat's SH is coefficient after coefficient, RGB inner, so f_rest is transposed here.
 #pragma once
-#include <filesystem>
-#include <string>
-#include <vector>
-
-#include "ewa/gaussians.h"
+#include "ewa/splat_files.h"
 
 namespace ewa::io {
 
-struct PlySplats {
-    Gaussians gaussians;
-    int file_sh_degree = 0;  // 4 where the file had one more degree than is read: the rest was left out
-    std::vector<std::string> comments;
-};
-
 /// Any property order and scalar type, binary of either byte order or ascii; other properties and elements
-/// are ignored. Values are kept as they are, finite or not. Throws InputError that names the file and the
-/// byte or property.
-PlySplats read_ply(const std::filesystem::path& path);
+/// are ignored. Values are kept as they are, finite or not. A comment "SplatRenderMode: mip" (Brush) or
+/// "antialiased 1" (Postshot) is the anti-aliased mark. Throws InputError that names the file and the byte or
+/// property.
+SplatScene read_ply(const std::filesystem::path& path);
 
-/// binary_little_endian, float32, the properties above in that order. Throws RunError.
-void write_ply(const std::filesystem::path& path, const Gaussians& gaussians,
-               const std::vector<std::string>& comments);
+/// binary_little_endian, float32, the properties above in that order; the anti-aliased mark as Brush writes
+/// it. Throws RunError.
+std::vector<std::string> write_ply(const std::filesystem::path& path, const Gaussians& gaussians,
+                                   const SaveOptions& options);
 
 }  // namespace ewa::io

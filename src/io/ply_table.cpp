@@ -12,7 +12,8 @@ namespace {
 
 constexpr size_t kMaxHeaderLine = size_t(1) << 16;
 constexpr uint64_t kMaxHeaderBytes = uint64_t(1) << 22;
-constexpr size_t kMaxWord = 512;  // longer than any number that a program writes
+constexpr size_t kMaxProperties = 1024;  // of an element; each is compared with all before it
+constexpr size_t kMaxWord = 512;         // longer than any number that a program writes
 
 std::optional<PlyType> type_of(std::string_view name) {
     struct Name {
@@ -122,6 +123,18 @@ void PlyTable::parse_format(std::string_view rest) {
         fail("the format \"" + std::string(format) + "\" is none that PLY knows");
 }
 
+std::string_view PlyTable::format_name() const {
+    switch (format_) {
+        case Format::ascii:
+            return "ascii";
+        case Format::little_endian:
+            return "binary_little_endian";
+        case Format::big_endian:
+            return "binary_big_endian";
+    }
+    return "";
+}
+
 void PlyTable::parse_element(std::string_view rest) {
     PlyElement element;
     element.name = core::next_word(rest);
@@ -154,6 +167,9 @@ void PlyTable::parse_property(std::string_view rest) {
     property.type = next_type();
     property.name = core::next_word(rest);
     if (property.name.empty()) fail("a property has no name");
+    if (element.properties.size() == kMaxProperties)
+        fail("the element \"" + element.name + "\" has more than " + std::to_string(kMaxProperties) +
+             " properties; the file is damaged");
     if (element.find(property.name)) fail("the property \"" + property.name + "\" is declared twice");
     element.properties.push_back(std::move(property));
 }

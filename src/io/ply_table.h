@@ -38,8 +38,11 @@ class PlyTable {
     explicit PlyTable(const std::filesystem::path& path);
 
     const std::string& name() const { return reader_.name(); }
+    uint64_t file_bytes() const { return reader_.size(); }
     const std::vector<PlyElement>& elements() const { return elements_; }
     const std::vector<std::string>& comments() const { return comments_; }
+    /// As the header calls it, e.g. "ascii".
+    std::string_view format_name() const;
 
     /// The element, after checking that the file is long enough for the rows that the header claims: from
     /// here on memory may be taken for count rows. Throws where there is no such element. Elements before it

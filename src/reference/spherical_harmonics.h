@@ -1,15 +1,14 @@
-// Real spherical harmonics of degree 0..3 as polynomials of a unit direction, in INRIA's order and signs
-// (Sloan, "Efficient Spherical Harmonic Evaluation", JCGT 2013; 3DGS, utils/sh_utils.py).
+// The spherical harmonics of scene/sh_basis.h and their derivatives.
 #pragma once
 #include <array>
 #include <glm/vec3.hpp>
 
 #include "reference/values.h"
+#include "scene/sh_basis.h"
 
 namespace ewa::reference {
 
-/// Y_j(direction) for j < (degree + 1)^2; the rest is zero.
-std::array<double, kMaxCoefficients> sh_basis(int degree, const glm::dvec3& direction);
+using scene::sh_basis;
 
 /// dY_j/d(x, y, z) of the polynomials, x, y and z taken as independent. The part along the direction drops
 /// out when the caller goes on through the normalisation.

@@ -30,6 +30,18 @@ int sh_degree_present(const Gaussians& gaussians) {
     return 0;
 }
 
+bool drawable(const Gaussians& gaussians, size_t i) {
+    const auto finite = [](const float* values, size_t count) {
+        return std::all_of(values, values + count, [](float v) { return std::isfinite(v); });
+    };
+    const float* q = &gaussians.quaternions[4 * i];
+    const bool rotated = q[0] != 0 || q[1] != 0 || q[2] != 0 || q[3] != 0;
+    const size_t stride = gaussians.sh_stride();
+    return rotated && finite(q, 4) && finite(&gaussians.means[3 * i], 3) &&
+           finite(&gaussians.log_scales[3 * i], 3) && std::isfinite(gaussians.opacity_logits[i]) &&
+           finite(&gaussians.sh[stride * i], stride);
+}
+
 Gaussians gaussians_from_points(const PointCloud& points, int sh_degree) {
     if (points.positions.empty()) throw InputError("there are no points to start splats from");
     if (points.colors.size() != points.positions.size())

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "core/random.h"
+#include "ewa/splat_edit.h"
 
 namespace ewa::train {
 namespace {
@@ -110,13 +111,8 @@ Gaussians random_gaussians(const Dataset& dataset, const std::vector<int>& frame
 }
 
 Gaussians with_sh_degree(const Gaussians& gaussians, int degree) {
-    if (gaussians.sh_degree == degree) return gaussians;
     Gaussians out = gaussians;
-    out.sh_degree = degree;
-    out.sh.assign(out.size() * out.sh_stride(), 0.0f);
-    const size_t kept = std::min(gaussians.sh_stride(), out.sh_stride());
-    for (size_t i = 0; i < out.size(); ++i)
-        std::copy_n(&gaussians.sh[i * gaussians.sh_stride()], kept, &out.sh[i * out.sh_stride()]);
+    set_sh_degree(out, degree);
     return out;
 }
 

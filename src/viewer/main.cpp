@@ -68,7 +68,7 @@ Opened open(const Arguments& arguments) {
 }
 
 void add_options(CLI::App& app, Arguments& arguments) {
-    app.add_option("FILE", arguments.file, "The splat scene (.ply)")->required();
+    app.add_option("FILE", arguments.file, "The splat scene (.ply .compressed.ply .splat .spz .glb .gltf)")->required();
     app.add_option("--cameras", arguments.cameras, "A dataset whose cameras to look through");
     app.add_option("--frame", arguments.frame, "Which of its cameras to start from, in name order (0)");
     app.add_option("--size", arguments.size,

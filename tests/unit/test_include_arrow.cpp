@@ -34,6 +34,7 @@ const Rooms kLeaves = {"src/cli", "src/viewer"};
 const std::map<std::string, std::string> kOwners = {
     {"image.h", "src/image"},       {"camera.h", "src/scene"},   {"gaussians.h", "src/scene"},
     {"dataset.h", "src/scene"},     {"splat_files.h", "src/io"}, {"device.h", "src/gpu"},
+    {"splat_edit.h", "src/scene"},
     {"renderer.h", "src/pipeline"}, {"trainer.h", "src/train"}};
 
 /// Libraries that only some rooms may know.
@@ -43,6 +44,9 @@ const std::vector<std::pair<std::string, Rooms>> kLibraries = {
     {"GLFW/", {"src/viewer"}},
     {"imgui", {"src/viewer"}},
     {"nanoflann", {"src/scene"}},
+    {"tiny_gltf", {"src/io"}},
+    {"zstd", {"src/io"}},
+    {"zlib", {"src/io", "src/image"}},
     {"nlohmann/", {"src/io", "src/train", "src/report", "src/cli", "src/viewer"}},
     {"CLI/", {"src/cli", "src/viewer"}}};
 

@@ -1,0 +1,285 @@
+#include <array>
+#include <cmath>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/mat4x4.hpp>
+#include <optional>
+
+#include "core/text.h"
+#include "ewa/error.h"
+#include "ewa/splat_edit.h"
+#include "io/gltf_document.h"
+#include "io/gltf_splats.h"
+#include "io/splat_scene.h"
+#include "io/splat_values.h"
+
+namespace ewa::io {
+
+namespace {
+
+const std::string kExtension = "KHR_gaussian_splatting";
+const std::string kPrefix = kExtension + ":";
+constexpr double kLeastOpacity = 1e-30, kMostOpacity = 1 - 0x1p-25;  // half a step below 1 in float32
+constexpr int kMostPlaced = 4096;                                    // each reads its attributes anew
+
+std::string sh_name(int degree, int coefficient) {
+    return kPrefix + "SH_DEGREE_" + std::to_string(degree) + "_COEF_" + std::to_string(coefficient);
+}
+
+/// sRGB's curve (IEC 61966-2-1), odd below zero, and its slope.
+double srgb_of_linear(double v) {
+    const double a = std::abs(v);
+    const double encoded = a <= 0.0031308 ? 12.92 * a : 1.055 * std::pow(a, 1 / 2.4) - 0.055;
+    return std::copysign(encoded, v);
+}
+double srgb_slope(double v) {
+    const double a = std::abs(v);
+    return a <= 0.0031308 ? 12.92 : 1.055 / 2.4 * std::pow(a, 1 / 2.4 - 1);
+}
+
+double opacity_logit(int component_type, double opacity) {
+    switch (component_type) {
+        case TINYGLTF_COMPONENT_TYPE_BYTE:
+            return logit_of_steps(opacity, 127);
+        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
+            return logit_of_steps(opacity, 255);
+        case TINYGLTF_COMPONENT_TYPE_SHORT:
+            return logit_of_steps(opacity, 32767);
+        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
+            return logit_of_steps(opacity, 65535);
+        default:
+            return logit(opacity, kLeastOpacity, kMostOpacity);
+    }
+}
+
+class SplatReader {
+  public:
+    explicit SplatReader(const GltfDocument& document) : document_(document), model_(document.model()) {}
+
+    SplatScene read() {
+        for (const int root : roots()) visit(root);
+        if (primitives_ == 0)
+            document_.fail("the scene's nodes reach no primitive with the extension " + kExtension +
+                           "; it is a mesh scene, or packed with another extension");
+        scene_.file_sh_degree = std::max(scene_.file_sh_degree, scene_.gaussians.sh_degree);
+        scene_.format = document_.binary() ? SplatFormat::glb : SplatFormat::gltf;
+        scene_.variant = std::to_string(primitives_) + (primitives_ == 1 ? " primitive" : " primitives");
+        return std::move(scene_);
+    }
+
+  private:
+    std::vector<int> roots() const {
+        if (model_.scenes.empty())
+            document_.fail("there is no \"scenes\", so nothing is placed in the world");
+        const int index = std::max(model_.defaultScene, 0);
+        if (size_t(index) >= model_.scenes.size())
+            document_.fail("\"scene\" is " + std::to_string(index) + ", and there is none of this number");
+        return model_.scenes[size_t(index)].nodes;
+    }
+
+    /// The node and those below, parents before children. A node that is met again is no tree's.
+    void visit(int root) {
+        // glTF's world, LUF, to PLY's: half a turn round z.
+        glm::dmat4 to_ply(1.0);
+        to_ply[0][0] = to_ply[1][1] = -1;
+        visited_.resize(model_.nodes.size());
+        std::vector<std::pair<int, glm::dmat4>> open = {{root, to_ply}};
+        while (!open.empty()) {
+            const auto [index, parent] = open.back();
+            open.pop_back();
+            if (index < 0 || size_t(index) >= model_.nodes.size())
+                document_.fail("node " + std::to_string(index) + ": there is none of this number");
+            if (visited_[size_t(index)])
+                document_.fail("node " + std::to_string(index) + " has two parents or is its own ancestor");
+            visited_[size_t(index)] = true;
+            const tinygltf::Node& node = model_.nodes[size_t(index)];
+            const glm::dmat4 matrix = parent * local(node, index);
+            if (node.mesh >= 0) add_mesh(node.mesh, matrix, "node " + std::to_string(index));
+            for (size_t i = node.children.size(); i-- > 0;) open.emplace_back(node.children[i], matrix);
+        }
+    }
+
+    glm::dmat4 local(const tinygltf::Node& node, int index) const {
+        const auto size = [&](const std::vector<double>& values, size_t n, const char* property) {
+            if (!values.empty() && values.size() != n)
+                document_.fail("node " + std::to_string(index) + ": \"" + property + "\" has not " +
+                               std::to_string(n) + " numbers");
+            return !values.empty();
+        };
+        glm::dmat4 matrix(1.0);
+        if (size(node.matrix, 16, "matrix")) {
+            for (int i = 0; i < 16; ++i) matrix[i / 4][i % 4] = node.matrix[size_t(i)];
+            return matrix;
+        }
+        if (size(node.rotation, 4, "rotation")) {
+            const glm::dquat q(node.rotation[3], node.rotation[0], node.rotation[1], node.rotation[2]);
+            if (!(glm::length(q) > 0))
+                document_.fail("node " + std::to_string(index) + ": \"rotation\" is zero");
+            matrix = glm::mat4_cast(glm::normalize(q));
+        }
+        if (size(node.scale, 3, "scale"))
+            for (int i = 0; i < 3; ++i) matrix[i] *= node.scale[size_t(i)];
+        if (size(node.translation, 3, "translation"))
+            for (int i = 0; i < 3; ++i) matrix[3][i] = node.translation[size_t(i)];
+        return matrix;
+    }
+
+    void add_mesh(int index, const glm::dmat4& matrix, const std::string& node) {
+        if (size_t(index) >= model_.meshes.size())
+            document_.fail(node + ": \"mesh\" " + std::to_string(index) + ": there is none of this number");
+        const tinygltf::Mesh& mesh = model_.meshes[size_t(index)];
+        for (size_t i = 0; i < mesh.primitives.size(); ++i) {
+            const auto extension = mesh.primitives[i].extensions.find(kExtension);
+            if (extension == mesh.primitives[i].extensions.end()) continue;
+            if (++primitives_ > kMostPlaced)
+                document_.fail(node + ": more than " + std::to_string(kMostPlaced) +
+                               " primitives are placed in the scene");
+            where_ = "mesh " + std::to_string(index) + ", primitive " + std::to_string(i);
+            Gaussians part = read_primitive(mesh.primitives[i], extension->second);
+            try {
+                transform_splats(part, matrix);
+            } catch (const InputError& error) {
+                document_.fail(node + ": " + error.what());
+            }
+            if (primitives_ == 1)
+                scene_.gaussians = std::move(part);
+            else
+                append_splats(scene_.gaussians, part);
+        }
+    }
+
+    Gaussians read_primitive(const tinygltf::Primitive& primitive, const tinygltf::Value& extension) {
+        const std::string kernel = text(extension, "kernel"), space = text(extension, "colorSpace");
+        if (kernel != "ellipse")
+            document_.fail(where_ + ": \"kernel\" is \"" + kernel + "\"; only \"ellipse\" is known");
+        const bool linear = space == "lin_rec709_display";
+        if (!linear && space != "srgb_rec709_display")
+            document_.fail(where_ + ": \"colorSpace\" \"" + space + "\" is not known");
+        if (primitive.mode != TINYGLTF_MODE_POINTS) remark("a primitive's \"mode\" is not 0 (points)");
+
+        const tinygltf::Accessor& position = attribute(primitive, "POSITION", TINYGLTF_TYPE_VEC3);
+        Gaussians g;
+        g.sh_degree = degree_of(primitive);
+        count_ = position.count;
+        require_memory(document_.name(), document_.bytes(), uint64_t(scene_.gaussians.size()) + count_,
+                       std::max(g.sh_degree, scene_.gaussians.sh_degree));
+        // The others are checked before memory is taken for any.
+        const tinygltf::Accessor& rotation = attribute(primitive, kPrefix + "ROTATION", TINYGLTF_TYPE_VEC4);
+        const tinygltf::Accessor& scale = attribute(primitive, kPrefix + "SCALE", TINYGLTF_TYPE_VEC3);
+        const tinygltf::Accessor& opacity = attribute(primitive, kPrefix + "OPACITY", TINYGLTF_TYPE_SCALAR);
+        require_fractions(rotation, "ROTATION");
+        require_fractions(opacity, "OPACITY");
+        g.resize(count_);
+        read_values(position, "POSITION", [&](size_t i, const double* v) {
+            for (size_t k = 0; k < 3; ++k) g.means[3 * i + k] = float(v[k]);
+        });
+        read_values(rotation, "ROTATION", [&](size_t i, const double* v) {
+            for (size_t k = 0; k < 4; ++k) g.quaternions[4 * i + k] = float(v[(k + 3) % 4]);
+        });
+        read_values(scale, "SCALE", [&](size_t i, const double* v) {
+            for (size_t k = 0; k < 3; ++k) g.log_scales[3 * i + k] = log_of_scale(v[k]);
+        });
+        read_values(opacity, "OPACITY", [&](size_t i, const double* v) {
+            g.opacity_logits[i] = float(opacity_logit(opacity.componentType, v[0]));
+        });
+        read_sh(primitive, g);
+        if (linear) to_srgb(g);
+        return g;
+    }
+
+    std::string text(const tinygltf::Value& extension, const char* property) const {
+        if (!extension.IsObject() || !extension.Has(property) || !extension.Get(property).IsString())
+            document_.fail(where_ + ": the extension " + kExtension + " has no \"" + property + "\"");
+        return extension.Get(property).Get<std::string>();
+    }
+
+    const tinygltf::Accessor& attribute(const tinygltf::Primitive& primitive, const std::string& name,
+                                        int type) const {
+        const std::string what = where_ + ", attribute " + name;
+        const auto found = primitive.attributes.find(name);
+        if (found == primitive.attributes.end()) document_.fail(what + ": is missing");
+        const tinygltf::Accessor& accessor = document_.accessor(found->second, what);
+        if (accessor.type != type) document_.fail(what + ": \"type\" is not the one this attribute has");
+        if (name != "POSITION" && accessor.count != count_)
+            document_.fail(what + ": has " + std::to_string(accessor.count) + " elements for " +
+                           std::to_string(count_) + " positions");
+        return accessor;
+    }
+
+    void require_fractions(const tinygltf::Accessor& accessor, const char* name) const {
+        if (accessor.componentType != TINYGLTF_COMPONENT_TYPE_FLOAT && !accessor.normalized)
+            document_.fail(where_ + ", attribute " + kPrefix + name + ": integers must be \"normalized\"");
+    }
+
+    void read_values(const tinygltf::Accessor& accessor, const char* name,
+                     const std::function<void(size_t, const double*)>& element) const {
+        document_.read(accessor, where_ + ", attribute " + name, element);
+    }
+
+    /// All coefficients of a degree or none, and none without those below it.
+    int degree_of(const tinygltf::Primitive& primitive) {
+        int degree = 0;
+        for (int d = 1; d <= kMaxShDegree; ++d) {
+            int present = 0;
+            for (int k = 0; k < 2 * d + 1; ++k) present += int(primitive.attributes.count(sh_name(d, k)));
+            if (present == 0) continue;
+            if (present < 2 * d + 1 || degree != d - 1)
+                document_.fail(where_ + ": of SH degree " + std::to_string(degree == d - 1 ? d : d - 1) +
+                               " there are attributes missing");
+            degree = d;
+        }
+        if (primitive.attributes.count(sh_name(kMaxShDegree + 1, 0)) > 0) {
+            scene_.file_sh_degree = kMaxShDegree + 1;
+            remark("SH degrees above 3 are left out");
+        }
+        return degree;
+    }
+
+    void read_sh(const tinygltf::Primitive& primitive, Gaussians& g) const {
+        size_t first = 0;
+        for (int degree = 0; degree <= g.sh_degree; ++degree)
+            for (int k = 0; k < 2 * degree + 1; ++k, first += 3) {
+                const std::string name = sh_name(degree, k);
+                read_values(attribute(primitive, name, TINYGLTF_TYPE_VEC3), name.c_str(),
+                            [&](size_t i, const double* v) {
+                                float* sh = &g.sh[g.sh_stride() * i + first];
+                                for (size_t channel = 0; channel < 3; ++channel)
+                                    sh[channel] = float(v[channel]);
+                            });
+            }
+    }
+
+    /// The colour without view dependence exactly; what depends on the view by the curve's slope there.
+    void to_srgb(Gaussians& g) {
+        remark("colours are in linear light and become sRGB values; splats that overlap blend in these" +
+               std::string(g.sh_degree > 0 ? ", and view dependence is taken to first order" : ""));
+        for (size_t i = 0; i < g.size(); ++i)
+            for (size_t channel = 0; channel < 3; ++channel) {
+                float* sh = &g.sh[g.sh_stride() * i + channel];
+                const double color = color_of_sh0(sh[0]);
+                sh[0] = float(sh0_of_color(srgb_of_linear(color)));
+                for (size_t k = 3; k < g.sh_stride(); k += 3) sh[k] = float(sh[k] * srgb_slope(color));
+            }
+    }
+
+    void remark(const std::string& text) {
+        if (std::find(scene_.remarks.begin(), scene_.remarks.end(), text) == scene_.remarks.end())
+            scene_.remarks.push_back(text);
+    }
+
+    const GltfDocument& document_;
+    const tinygltf::Model& model_;
+    SplatScene scene_;
+    std::vector<bool> visited_;
+    std::string where_;   // the primitive being read, for errors
+    size_t count_ = 0;    // its splats
+    int primitives_ = 0;  // read so far
+};
+
+}  // namespace
+
+SplatScene read_gltf_splats(const std::filesystem::path& path) {
+    const GltfDocument document(path);
+    return SplatReader(document).read();
+}
+
+}  // namespace ewa::io

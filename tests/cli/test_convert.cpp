@@ -1,0 +1,190 @@
+// ewa convert, and what the other commands make of every splat format.
+#include <gtest/gtest.h>
+
+#include "cli/expect.h"
+#include "ewa/splat_edit.h"
+#include "ewa/splat_files.h"
+
+namespace {
+
+using namespace ewa::test;
+using ewa::Gaussians;
+namespace fs = std::filesystem;
+using Names = std::vector<std::string>;
+
+const Names kFiles = {"a.ply", "a.compressed.ply", "a.splat", "a.spz", "a.glb", "a.gltf"};
+
+TEST(Convert, FromEachFormatToEach) {
+    const Folder folder;
+    make_splats(folder / "s.ply", 300, 2);
+    for (const std::string& first : kFiles) {
+        expect_success(run_ewa({"convert", folder / "s.ply", folder / first}));
+        for (const std::string& second : kFiles) {
+            const Outcome outcome = run_ewa({"convert", folder / first, folder / ("b" + second), "--check"});
+            expect_success(outcome);
+            EXPECT_NE(outcome.out.find("position"), std::string::npos) << outcome.out;
+            EXPECT_EQ(ewa::load_splats(folder / ("b" + second)).size(), 300u) << first << " to " << second;
+        }
+    }
+}
+
+TEST(Convert, SaysWhatIsLostAndMeasuresIt) {
+    const Folder folder;
+    make_splats(folder / "s.ply", 300, 2);
+    const Outcome outcome =
+        run_ewa({"convert", folder / "s.ply", folder / "o.splat", "--check", "--json", folder / "o.json"});
+    expect_success(outcome);
+    EXPECT_NE(outcome.out.find("SH degrees 1 to 2 are dropped"), std::string::npos) << outcome.out;
+    EXPECT_NE(outcome.out.find("8 bits"), std::string::npos) << outcome.out;
+    const auto json = read_json(folder / "o.json");
+    EXPECT_EQ(json["inputs"][0]["format"], "PLY");
+    EXPECT_EQ(json["output"]["splats"], 300);
+    EXPECT_EQ(json["check"]["position"]["largest"], 0);
+    EXPECT_GT(json["check"]["colour"]["largest"].get<double>(), 0);
+    EXPECT_LE(json["check"]["colour"]["largest"].get<double>(), 0.5001 / 255);
+    EXPECT_FALSE(json["remarks"].empty());
+    const Outcome quiet = run_ewa({"convert", folder / "s.ply", folder / "o.splat", "--check", "--quiet"});
+    expect_success(quiet);
+    EXPECT_EQ(quiet.out, "");
+}
+
+TEST(Convert, SpzVersions) {
+    const Folder folder;
+    make_splats(folder / "s.ply", 300, 1);
+    for (const char* version : {"3", "4"}) {
+        expect_success(run_ewa({"convert", folder / "s.ply", folder / "o.spz", "--spz-version", version}));
+        EXPECT_EQ(ewa::read_splats(folder / "o.spz").variant, std::string("version ") + version);
+    }
+    expect_failure(run_ewa({"convert", folder / "s.ply", folder / "o.spz", "--spz-version", "2"}), 2,
+                   "spz-version");
+}
+
+TEST(Convert, EditsOnTheWay) {
+    const Folder folder;
+    Gaussians g;
+    g.sh_degree = 3;
+    g.resize(4);
+    g.means = {0, 0, 0, 1, 2, 3, 5, 5, 5, -1, -2, -3};
+    g.opacity_logits = {4, 4, 4, -4};
+    for (size_t i = 0; i < 4; ++i) g.quaternions[4 * i] = 1;
+    ewa::save_splats(folder / "s.ply", g);
+    const auto converted = [&](const Names& options) {
+        Names arguments = {"convert", folder / "s.ply", folder / "o.ply"};
+        arguments.insert(arguments.end(), options.begin(), options.end());
+        expect_success(run_ewa(arguments));
+        return ewa::load_splats(folder / "o.ply");
+    };
+    EXPECT_EQ(converted({}).means, g.means);
+    EXPECT_EQ(converted({"--max-sh", "1"}).sh_degree, 1);
+    EXPECT_EQ(converted({"--min-opacity", "0.5"}).size(), 3u);
+    EXPECT_EQ(converted({"--crop", "0,0,0,4,4,4"}).means, (std::vector<float>{0, 0, 0, 1, 2, 3}));
+    EXPECT_EQ(converted({"--transform", "move=1,0,0", "--crop", "1.5,0,0,9,9,9"}).size(), 2u);
+    EXPECT_EQ(converted({"--sort", "morton"}).means,
+              (std::vector<float>{-1, -2, -3, 0, 0, 0, 1, 2, 3, 5, 5, 5}));
+    // A quarter turn round z takes x to y; then twice the size, then moved.
+    const Gaussians moved =
+        converted({"--transform", "turn=0,0,1,90", "--transform", "scale=2", "--transform", "move=0,0,10"});
+    EXPECT_EQ(std::vector<float>(moved.means.begin() + 3, moved.means.begin() + 6),
+              (std::vector<float>{-4, 2, 16}));
+    EXPECT_NEAR(moved.log_scales[0], std::log(2), 1e-6);
+    // The same as a matrix.
+    const Gaussians matrix = converted({"--transform", "0,-2,0,0,2,0,0,0,0,0,2,10"});
+    EXPECT_EQ(matrix.means, moved.means);
+    EXPECT_EQ(matrix.quaternions, moved.quaternions);
+}
+
+TEST(Convert, JoinsInputs) {
+    const Folder folder;
+    make_splats(folder / "a.ply", 30, 1);
+    make_splats(folder / "b.ply", 50, 2);
+    ewa::save_splats(folder / "c.ply", ewa::load_splats(folder / "b.ply"), {"by hand"});
+    expect_success(run_ewa({"convert", folder / "a.ply", folder / "c.ply", folder / "o.ply"}));
+    const ewa::SplatScene joined = ewa::read_splats(folder / "o.ply");
+    EXPECT_EQ(joined.gaussians.size(), 80u);
+    EXPECT_EQ(joined.gaussians.sh_degree, 2);
+    EXPECT_EQ(joined.comments, Names{"by hand"});
+}
+
+TEST(Convert, WrongUse) {
+    const Folder folder;
+    make_splats(folder / "s.ply");
+    const auto refuse = [&](const Names& more, const std::string& text) {
+        Names arguments = {"convert", folder / "s.ply", folder / "o.ply"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        expect_failure(run_ewa(arguments), 2, text);
+        EXPECT_FALSE(fs::exists(folder / "o.ply"));
+    };
+    expect_failure(run_ewa({"convert", folder / "s.ply"}), 2, "FILES");
+    expect_failure(run_ewa({"convert", folder / "s.ply", folder / "o.obj"}), 2, "supported: .ply");
+    expect_failure(run_ewa({"convert", folder / "none.ply", folder / "o.ply"}), 2, "none.ply");
+    refuse({"--transform", "spin=1"}, "spin=1");
+    refuse({"--transform", "turn=0,0,0,90"}, "turn=0,0,0,90");
+    refuse({"--transform", "1,2,3"}, "1,2,3");
+    refuse({"--transform", "scale=x"}, "--transform");
+    refuse({"--transform", "scale=0"}, "flattens");
+    refuse({"--crop", "1,2,3"}, "--crop");
+    refuse({"--crop", "1,0,0,0,1,1"}, "lower corner");
+    refuse({"--min-opacity", "2"}, "min-opacity");
+    refuse({"--max-sh", "4"}, "max-sh");
+    refuse({"--sort", "size"}, "sort");
+}
+
+TEST(Convert, FullDiskLeavesNoHalfFile) {
+    const Folder folder;
+    make_splats(folder / "s.ply", 2000, 3);
+    Circumstances full;
+    full.file_limit = 2048;
+    for (const char* name : {"o.ply", "o.compressed.ply", "o.splat", "o.spz", "o.glb", "o.gltf"}) {
+        expect_failure(run_ewa({"convert", folder / "s.ply", folder / name}, full), 1, "o.");
+        EXPECT_EQ(files_below(folder / "."), Names{"s.ply"}) << name;
+    }
+}
+
+TEST(Formats, EveryCommandReadsEveryFormat) {
+    const Folder folder;
+    make_dataset(folder / "data");
+    make_splats(folder / "s.ply");
+    for (const std::string& name : kFiles) {
+        SCOPED_TRACE(name);
+        const std::string file = folder / name;
+        expect_success(run_ewa({"convert", folder / "s.ply", file}));
+        const Outcome info = run_ewa({"info", file, "--json"});
+        expect_success(info);
+        const auto json = nlohmann::json::parse(info.out);
+        EXPECT_EQ(json["splats"], 50);
+        EXPECT_EQ(json["format"], std::string(ewa::name_of(ewa::format_of_name(file))));
+        EXPECT_EQ(json["antialiased"], false);
+        EXPECT_GT(json["bytes"].get<int>(), 0);
+        EXPECT_EQ(json["opacity"]["histogram"].size(), 24u);
+        expect_success(run_ewa({"info", file}));
+        const Outcome outcome =
+            run_ewa({"eval", file, folder / "data", "--split", "all", "--json", folder / "e.json"});
+        expect_success(outcome);
+        EXPECT_GT(read_json(folder / "e.json")["psnr"].get<double>(), 1);
+        expect_success(run_ewa({"render", file, "--cameras", folder / "data", "--frames", "0", "--quiet",
+                                "-o", folder / "pictures"}));
+    }
+    expect_success(run_ewa({"train", folder / "data", "--init", folder / "a.spz", "--steps", "1", "--quiet",
+                            "-o", folder / "out"}));
+    expect_failure(
+        run_ewa({"grad", folder / "a.spz", folder / "data", "--frame", "0", "-o", folder / "g.spz"}), 2,
+        "g.spz");
+}
+
+TEST(Formats, InfoShowsTheMarkAndTheComments) {
+    const Folder folder;
+    make_splats(folder / "s.ply");
+    ewa::save_splats(folder / "m.ply", ewa::load_splats(folder / "s.ply"),
+                     ewa::SaveOptions{.comments = {"from\xff a camera"}, .antialiased = true});
+    const Outcome text = run_ewa({"info", folder / "m.ply"});
+    expect_success(text);
+    EXPECT_NE(text.out.find("anti-aliased"), std::string::npos) << text.out;
+    EXPECT_NE(text.out.find(" a camera"), std::string::npos) << text.out;
+    const Outcome json = run_ewa({"info", folder / "m.ply", "--json"});
+    expect_success(json);
+    EXPECT_EQ(nlohmann::json::parse(json.out)["antialiased"], true);
+    expect_success(run_ewa({"convert", folder / "m.ply", folder / "m.spz"}));
+    EXPECT_TRUE(ewa::read_splats(folder / "m.spz").antialiased);
+}
+
+}  // namespace

@@ -1,0 +1,107 @@
+// Any bytes through one reader: a scene whose arrays fit each other, or an InputError of one line that names
+// a byte or a property, within the memory and the time (a second, under the sanitizers) allowed.
+#include EWA_HEADER
+
+#include <sys/mman.h>
+#include <unistd.h>
+#include <zlib.h>
+
+#include <cctype>
+#include <cstring>
+#include <ctime>
+#include <string>
+
+#include "ewa/error.h"
+#include "memory.h"
+
+namespace {
+
+using namespace ewa;
+
+#define EWA_REQUIRE(condition)                                                    \
+    if (!(condition)) {                                                           \
+        std::fprintf(stderr, "%s does not hold: %s\n", #condition, text.c_str()); \
+        std::abort();                                                             \
+    }
+
+/// A file in memory that the reader opens by name.
+class MemoryFile {
+  public:
+    MemoryFile()
+        : descriptor_(memfd_create("fuzz", 0)), path_("/proc/self/fd/" + std::to_string(descriptor_)) {}
+    const std::string& hold(const uint8_t* data, size_t size) {
+        if (ftruncate(descriptor_, static_cast<off_t>(size)) != 0) std::abort();
+        if (pwrite(descriptor_, data, size, 0) != static_cast<ssize_t>(size)) std::abort();
+        return path_;
+    }
+
+  private:
+    int descriptor_;
+    std::string path_;
+};
+
+/// What would be found in a gzip stream is mutated unpacked: mutations of packed bytes only find its
+/// checksum.
+[[maybe_unused]] std::string packed(const uint8_t* data, size_t size) {
+    z_stream stream{};
+    if (deflateInit2(&stream, 1, Z_DEFLATED, 16 + MAX_WBITS, 8, Z_DEFAULT_STRATEGY) != Z_OK) std::abort();
+    std::string out(deflateBound(&stream, uLong(size)) + 32, '\0');
+    stream.next_in = const_cast<Bytef*>(data);
+    stream.avail_in = uInt(size);
+    stream.next_out = reinterpret_cast<Bytef*>(out.data());
+    stream.avail_out = uInt(out.size());
+    if (deflate(&stream, Z_FINISH) != Z_STREAM_END) std::abort();
+    out.resize(out.size() - stream.avail_out);
+    deflateEnd(&stream);
+    return out;
+}
+
+void check_scene(const SplatScene& scene) {
+    const Gaussians& g = scene.gaussians;
+    const size_t n = g.size();
+    const std::string text = std::to_string(n) + " splats";
+    EWA_REQUIRE(g.sh_degree >= 0 && g.sh_degree <= kMaxShDegree);
+    EWA_REQUIRE(g.means.size() == 3 * n && g.quaternions.size() == 4 * n && g.log_scales.size() == 3 * n);
+    EWA_REQUIRE(g.sh.size() == g.sh_stride() * n);
+}
+
+/// "byte 12", or what a glTF or a PLY calls the place.
+void check_error(const std::string& text) {
+    bool named = false;
+    for (size_t at = text.find("byte "); at != std::string::npos; at = text.find("byte ", at + 1))
+        named = named || std::isdigit(static_cast<unsigned char>(text[at + 5]));
+    for (const char* place : {"\"", "'", "`", "properties f_rest_", "attribute ", "accessor", "node ",
+                              "mesh ", "buffer ", "the JSON ", "claims "})
+        named = named || text.find(place) != std::string::npos;
+    EWA_REQUIRE(named);
+    EWA_REQUIRE(text.find('\n') == std::string::npos && text.size() < 2000);
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+    static MemoryFile file;
+    fuzz::watch_memory();
+    std::string bytes;
+#ifdef EWA_PACK_SPZ
+    if (size > 8 && std::memcmp(data, "NGSP", 4) == 0 && data[4] < 4) {
+        bytes = packed(data, size);
+        data = reinterpret_cast<const uint8_t*>(bytes.data());
+        size = bytes.size();
+    }
+#endif
+    const std::string& path = file.hold(data, size);
+    const std::clock_t start = std::clock();
+    const long long before = fuzz::live;
+    fuzz::peak = before;
+    try {
+        check_scene(EWA_READ(path));
+    } catch (const InputError& error) {
+        check_error(error.what());
+    }
+    fuzz::require_modest(size, before);
+    // Of the processor, so that a busy machine is no finding; libFuzzer's own limit ends what never returns.
+    const std::string text = "time for " + std::to_string(size) + " bytes";
+    EWA_REQUIRE(std::clock() - start < CLOCKS_PER_SEC);
+    return 0;
+}

@@ -1,0 +1,355 @@
+// glTF with KHR_gaussian_splatting: what nodes, quantised values, colour spaces and damage come to.
+#include <glm/gtc/matrix_transform.hpp>
+#include <nlohmann/json.hpp>
+
+#include "ewa/splat_edit.h"
+#include "ewa/splat_files.h"
+#include "support/splat_scenes.h"
+#include "support/temp_folder.h"
+
+namespace {
+
+using namespace ewa;
+using nlohmann::json;
+using test::expect_error;
+using test::Largest;
+using test::largest_differences;
+using test::storable_splats;
+using test::TempFolder;
+
+const std::string kPrefix = "KHR_gaussian_splatting:";
+
+/// A .gltf and its buffer, to be changed and read.
+class Gltf {
+  public:
+    explicit Gltf(const Gaussians& g) {
+        save_splats(folder_ / "a.gltf", g);
+        top = json::parse(test::file_bytes(folder_ / "a.gltf"));
+        buffer = test::file_bytes(folder_ / "a.bin");
+    }
+    json& primitive() { return top["meshes"][0]["primitives"][0]; }
+    json& extension() { return primitive()["extensions"]["KHR_gaussian_splatting"]; }
+    int index(const std::string& name) { return primitive()["attributes"][name]; }
+    json& accessor(const std::string& name) { return top["accessors"][index(name)]; }
+
+    /// Replaces an attribute's values by others of another type, at the buffer's end.
+    void replace(const std::string& name, int component, bool normalized, const std::string& bytes,
+                 int stride = 0) {
+        while (buffer.size() % 4 != 0) buffer += '\0';
+        json view = {{"buffer", 0}, {"byteOffset", buffer.size()}, {"byteLength", bytes.size()}};
+        if (stride > 0) view["byteStride"] = stride;
+        accessor(name)["bufferView"] = top["bufferViews"].size();
+        accessor(name)["componentType"] = component;
+        accessor(name)["normalized"] = normalized;
+        top["bufferViews"].push_back(view);
+        buffer += bytes;
+        top["buffers"][0]["byteLength"] = buffer.size();
+    }
+    SplatScene read() {
+        folder_.write("a.bin", buffer);
+        return read_splats(folder_.write("a.gltf", top.dump()));
+    }
+    void refused(std::initializer_list<std::string> parts) {
+        expect_error<InputError>([&] { read(); }, parts);
+    }
+    const TempFolder& folder() const { return folder_; }
+
+    json top;
+    std::string buffer;
+
+  private:
+    TempFolder folder_;
+};
+
+TEST(GltfSplats, SaysWhatTheExtensionAsks) {
+    Gltf gltf(storable_splats(1, 30, 3));
+    EXPECT_EQ(gltf.top["extensionsUsed"], json::array({"KHR_gaussian_splatting"}));
+    EXPECT_EQ(gltf.primitive()["mode"], 0);
+    EXPECT_EQ(gltf.extension()["kernel"], "ellipse");
+    EXPECT_EQ(gltf.extension()["colorSpace"], "srgb_rec709_display");
+    const std::map<std::string, std::string> types = {{"POSITION", "VEC3"},
+                                                      {"COLOR_0", "VEC4"},
+                                                      {kPrefix + "ROTATION", "VEC4"},
+                                                      {kPrefix + "SCALE", "VEC3"},
+                                                      {kPrefix + "OPACITY", "SCALAR"},
+                                                      {kPrefix + "SH_DEGREE_0_COEF_0", "VEC3"},
+                                                      {kPrefix + "SH_DEGREE_3_COEF_6", "VEC3"}};
+    for (const auto& [name, type] : types) {
+        EXPECT_EQ(gltf.accessor(name)["type"], type) << name;
+        EXPECT_EQ(gltf.accessor(name)["count"], 30) << name;
+    }
+    EXPECT_EQ(gltf.primitive()["attributes"].size(), 5u + 16u);
+    EXPECT_EQ(gltf.accessor("POSITION")["min"].size(), 3u);
+}
+
+TEST(GltfSplats, FallbackColourIsInLinearLight) {
+    Gaussians g = storable_splats(1, 1, 0);
+    g.sh = {0, 100, -100};  // 0.5, above 1, below 0
+    g.opacity_logits = {0};
+    Gltf gltf(g);
+    const size_t at =
+        gltf.top["bufferViews"][gltf.accessor("COLOR_0")["bufferView"].get<size_t>()]["byteOffset"];
+    uint16_t color[4];
+    std::memcpy(color, gltf.buffer.data() + at, sizeof(color));
+    EXPECT_NEAR(color[0] / 65535.0, 0.21404, 1e-4);  // 0.5 of sRGB
+    EXPECT_EQ(color[1], 65535);
+    EXPECT_EQ(color[2], 0);
+    EXPECT_NEAR(color[3] / 65535.0, 0.5, 1e-4);
+}
+
+/// From glTF's world to PLY's.
+glm::dmat4 to_ply() {
+    glm::dmat4 m(1.0);
+    m[0][0] = m[1][1] = -1;
+    return m;
+}
+
+void expect_near(const Gaussians& a, const Gaussians& b, double tolerance = 1e-5) {
+    const Largest d = largest_differences(a, b);
+    EXPECT_LE(std::max({d.mean, d.rotation, d.scale, d.opacity, d.color, d.sh}), tolerance);
+}
+
+TEST(GltfSplats, NodesTransformWithTheirParents) {
+    const Gaussians g = storable_splats(1, 30, 3);
+    Gltf gltf(g);
+    const double c = std::sqrt(0.5);
+    gltf.top["nodes"] = {{{"children", {1}}, {"translation", {1, 2, 3}}, {"rotation", {0, c, 0, c}}},
+                         {{"mesh", 0}, {"matrix", {2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0, 5, 6, 7, 1}}}};
+    glm::dmat4 parent = glm::translate(glm::dmat4(1.0), glm::dvec3(1, 2, 3)) *
+                        glm::rotate(glm::dmat4(1.0), std::acos(0.0), glm::dvec3(0, 1, 0));
+    glm::dmat4 child = glm::scale(glm::translate(glm::dmat4(1.0), glm::dvec3(5, 6, 7)), glm::dvec3(2));
+    Gaussians expected = g;
+    transform_splats(expected, to_ply() * parent * child);
+    expect_near(gltf.read().gaussians, expected);
+
+    // Scales that differ, and a mirror.
+    gltf.top["nodes"] = {{{"mesh", 0}, {"scale", {1, -2, 0.5}}, {"rotation", {0, c, 0, c}}}};
+    expected = g;
+    transform_splats(expected, to_ply() * glm::rotate(glm::dmat4(1.0), std::acos(0.0), glm::dvec3(0, 1, 0)) *
+                                   glm::scale(glm::dmat4(1.0), glm::dvec3(1, -2, 0.5)));
+    expect_near(gltf.read().gaussians, expected);
+    gltf.top["nodes"][0]["scale"] = {1, 0, 1};
+    gltf.refused({"node 0", "flattens"});
+}
+
+TEST(GltfSplats, SeveralNodesAndPrimitives) {
+    const Gaussians g = storable_splats(1, 10, 1);
+    Gltf gltf(g);
+    json plain = gltf.primitive();
+    for (int k = 0; k < 3; ++k) plain["attributes"].erase(kPrefix + "SH_DEGREE_1_COEF_" + std::to_string(k));
+    gltf.top["meshes"][0]["primitives"].push_back(plain);
+    json mesh_only = gltf.primitive();
+    mesh_only.erase("extensions");
+    gltf.top["meshes"][0]["primitives"].push_back(mesh_only);
+    gltf.top["nodes"].push_back({{"mesh", 0}, {"translation", {10, 0, 0}}});
+    gltf.top["scenes"][0]["nodes"] = {0, 1};
+    const SplatScene scene = gltf.read();
+    EXPECT_EQ(scene.variant, "4 primitives");
+    Gaussians expected = g, flat = g, moved = g;
+    set_sh_degree(flat, 0);
+    append_splats(expected, flat);
+    append_splats(moved, flat);
+    transform_splats(moved, glm::translate(to_ply(), glm::dvec3(10, 0, 0)));
+    append_splats(expected, moved);
+    expect_near(scene.gaussians, expected);
+}
+
+template <class T, class Value>
+std::string quantised(size_t count, Value value) {
+    std::string bytes;
+    for (size_t i = 0; i < count; ++i) bytes += test::bytes_of(T(std::lround(value(i))));
+    return bytes;
+}
+
+TEST(GltfSplats, QuantisedAccessors) {
+    Gaussians g = storable_splats(1, 40, 0);
+    for (size_t i = 0; i < 40; ++i) {
+        double length = 0;
+        for (size_t k = 0; k < 4; ++k) length += std::pow(g.quaternions[4 * i + k], 2);
+        for (size_t k = 0; k < 4; ++k) g.quaternions[4 * i + k] /= float(std::sqrt(length));
+        for (size_t k = 0; k < 3; ++k) g.log_scales[3 * i + k] = float(std::log(1 + double(i + k)));
+    }
+    const auto rotation = [&](double range) {
+        return [&g, range](size_t i) { return range * g.quaternions[4 * (i / 4) + (i + 1) % 4]; };
+    };
+    const auto opacity = [&](double range) {
+        return [&g, range](size_t i) { return range / (1 + std::exp(-double(g.opacity_logits[i]))); };
+    };
+    const auto scale = [&](size_t i) { return std::exp(double(g.log_scales[i])); };
+    constexpr int kByte = 5120, kUbyte = 5121, kShort = 5122, kUshort = 5123;
+    Gltf gltf(g);
+    gltf.replace(kPrefix + "ROTATION", kByte, true, quantised<int8_t>(160, rotation(127)));
+    gltf.replace(kPrefix + "OPACITY", kUbyte, true, quantised<uint8_t>(40, opacity(255)));
+    gltf.replace(kPrefix + "SCALE", kUbyte, false, quantised<uint8_t>(120, scale));
+    Largest d = largest_differences(g, gltf.read().gaussians);
+    EXPECT_LE(d.rotation, 0.012);
+    EXPECT_LE(d.opacity, 0.501 / 255);
+    EXPECT_LE(d.scale, 1e-6);
+    EXPECT_EQ(d.mean, 0);
+    gltf.replace(kPrefix + "ROTATION", kShort, true, quantised<int16_t>(160, rotation(32767)));
+    gltf.replace(kPrefix + "OPACITY", kUshort, true, quantised<uint16_t>(40, opacity(65535)));
+    gltf.replace(kPrefix + "SCALE", kUshort, true,
+                 quantised<uint16_t>(120, [&](size_t i) { return scale(i) / 50 * 65535; }));
+    d = largest_differences(g, gltf.read().gaussians);
+    EXPECT_LE(d.rotation, 1e-4);
+    EXPECT_LE(d.opacity, 0.501 / 65535);
+    EXPECT_NEAR(d.scale, std::log(50), 0.001);
+    // With a stride: three bytes and one between.
+    std::string strided;
+    for (size_t i = 0; i < 40; ++i)
+        strided += quantised<uint8_t>(3, [&](size_t k) { return scale(3 * i + k); }) + "\xff";
+    gltf.replace(kPrefix + "SCALE", kUbyte, false, strided, 4);
+    EXPECT_LE(largest_differences(g, gltf.read().gaussians).scale, 1e-6);
+    gltf.replace(kPrefix + "OPACITY", kUbyte, false, quantised<uint8_t>(40, opacity(255)));
+    gltf.refused({"OPACITY", "normalized"});
+}
+
+TEST(GltfSplats, OpacitiesOfZeroAndOneStayFinite) {
+    Gaussians g = storable_splats(1, 2, 0);
+    g.opacity_logits = {-90, 40};
+    Gltf gltf(g);
+    const Gaussians back = gltf.read().gaussians;
+    EXPECT_LT(back.opacity_logits[0], -60);
+    EXPECT_GT(back.opacity_logits[1], 16);
+    EXPECT_TRUE(drawable(back, 0) && drawable(back, 1));
+}
+
+TEST(GltfSplats, LinearColoursBecomeSrgb) {
+    Gaussians g = storable_splats(1, 3, 1);
+    for (size_t i = 0; i < 3; ++i)
+        for (size_t k = 0; k < 3; ++k) g.sh[12 * i + k] = float((0.21404 - 0.5) / 0.28209479177387814);
+    Gltf gltf(g);
+    gltf.extension()["colorSpace"] = "lin_rec709_display";
+    const SplatScene scene = gltf.read();
+    ASSERT_EQ(scene.remarks.size(), 1u);
+    EXPECT_NE(scene.remarks[0].find("linear light"), std::string::npos);
+    EXPECT_NEAR(scene.gaussians.sh[0], 0, 1e-4);  // 0.5
+    // sRGB's slope at 0.21404 by differences: (0.5 - 0.49902) over the linear values of both.
+    EXPECT_NEAR(scene.gaussians.sh[3] / g.sh[3], 1.055 / 2.4 * std::pow(0.21404, 1 / 2.4 - 1), 1e-3);
+}
+
+TEST(GltfSplats, BuffersInsideAndBelowTheFolder) {
+    const Gaussians g = storable_splats(1, 3, 0);
+    Gltf gltf(g);
+    gltf.folder().write("below/some name.bin", gltf.buffer);
+    gltf.top["buffers"][0]["uri"] = "below/some%20name.bin";
+    expect_near(gltf.read().gaussians, g);
+    for (const char* uri :
+         {"../a.bin", "/etc/passwd", "below/../../a.bin", "file:///etc/passwd", "http://a/b"}) {
+        gltf.top["buffers"][0]["uri"] = uri;
+        gltf.refused({"buffer 0", uri, "leaves the file's folder"});
+    }
+    std::filesystem::create_symlink("/etc/passwd", gltf.folder() / "link.bin");
+    gltf.top["buffers"][0]["uri"] = "link.bin";
+    gltf.refused({"link.bin", "leaves the file's folder"});
+    gltf.top["buffers"][0]["uri"] = "none.bin";
+    gltf.refused({"none.bin"});
+    gltf.top["buffers"][0].erase("uri");
+    gltf.refused({"buffer 0", "\"uri\""});
+    gltf.top["buffers"][0]["uri"] = "data:application/octet-stream;base64,AAAA";
+    gltf.refused({"buffer 0", "byteLength", "3 bytes"});
+}
+
+TEST(GltfSplats, DataUri) {
+    Gltf gltf(storable_splats(1, 1, 0));
+    gltf.primitive()["attributes"].erase("COLOR_0");
+    // 56 zero bytes: 75 characters of base64 make 56.25, so 57.
+    gltf.buffer = std::string(57, '\0');
+    gltf.top["bufferViews"] = {{{"buffer", 0}, {"byteLength", 57}}};
+    for (json& accessor : gltf.top["accessors"]) accessor["bufferView"] = 0;
+    gltf.top["buffers"][0] = {{"byteLength", 57},
+                              {"uri", "data:application/octet-stream;base64," + std::string(76, 'A')}};
+    const Gaussians g = gltf.read().gaussians;
+    ASSERT_EQ(g.size(), 1u);
+    EXPECT_EQ(g.means, (std::vector<float>{0, 0, 0}));
+    EXPECT_FALSE(drawable(g, 0));  // the quaternion is zero
+}
+
+TEST(GltfSplats, NamesWhatIsWrong) {
+    const Gaussians g = storable_splats(1, 5, 2);
+    const auto refuse = [&](const std::function<void(Gltf&)>& change,
+                            std::initializer_list<std::string> parts) {
+        SCOPED_TRACE(*(parts.end() - 1));
+        Gltf gltf(g);
+        change(gltf);
+        gltf.refused(parts);
+    };
+    const auto erase = [&](const std::string& name) {
+        return [name](Gltf& f) { f.primitive()["attributes"].erase(name); };
+    };
+    for (const char* name : {"ROTATION", "SCALE", "OPACITY", "SH_DEGREE_0_COEF_0"})
+        refuse(erase(kPrefix + name), {"mesh 0, primitive 0", name, "missing"});
+    refuse(erase("POSITION"), {"POSITION"});
+    refuse(erase(kPrefix + "SH_DEGREE_1_COEF_1"), {"SH degree 1", "missing"});
+    refuse(erase(kPrefix + "SH_DEGREE_2_COEF_4"), {"SH degree 2", "missing"});
+    refuse([](Gltf& f) { f.extension()["kernel"] = "box"; }, {"kernel", "box"});
+    refuse([](Gltf& f) { f.extension().erase("colorSpace"); }, {"colorSpace"});
+    refuse([](Gltf& f) { f.extension()["colorSpace"] = "xyz"; }, {"xyz"});
+    refuse([](Gltf& f) { f.primitive().erase("extensions"); }, {"no primitive with the extension"});
+    refuse([](Gltf& f) { f.accessor("POSITION")["count"] = 6; }, {"POSITION", "6 elements do not fit"});
+    refuse([](Gltf& f) { f.accessor("POSITION")["count"] = 4; }, {"ROTATION", "5 elements for 4 positions"});
+    refuse([](Gltf& f) { f.accessor("POSITION")["type"] = "VEC2"; }, {"POSITION", "type"});
+    refuse([](Gltf& f) { f.accessor("POSITION")["bufferView"] = 99; }, {"POSITION", "bufferView"});
+    refuse([](Gltf& f) { f.accessor("POSITION").erase("bufferView"); }, {"POSITION", "bufferView"});
+    refuse([](Gltf& f) { f.accessor("POSITION")["componentType"] = 5130; }, {"componentType"});
+    refuse([](Gltf& f) { f.top["bufferViews"][0]["byteOffset"] = 1000000000000000; },
+           {"POSITION", "ends behind its buffer"});
+    refuse([](Gltf& f) { f.top["bufferViews"][0]["byteStride"] = 4; }, {"POSITION", "byteStride"});
+    refuse([](Gltf& f) { f.top["buffers"][0]["byteLength"] = 1000000000000000; }, {"buffer 0", "byteLength"});
+    refuse([](Gltf& f) { f.top["nodes"][0]["mesh"] = 5; }, {"node 0", "mesh"});
+    refuse([](Gltf& f) { f.top["nodes"][0]["children"] = {0}; }, {"node 0", "own ancestor"});
+    refuse([](Gltf& f) { f.top["scene"] = 3; }, {"scene", "3"});
+    refuse([](Gltf& f) { f.top.erase("asset"); }, {"asset"});
+    refuse([](Gltf& f) { f.buffer.pop_back(); }, {"buffer 0", "byteLength"});
+    refuse([](Gltf& f) { f.primitive()["attributes"]["POSITION"] = -4; }, {"POSITION", "accessor -4"});
+}
+
+TEST(GltfSplats, ClaimsAreBounded) {
+    const Gaussians g = storable_splats(1, 5, 0);
+    Gltf gltf(g);
+    // Every attribute on the same bytes again and again.
+    for (json& accessor : gltf.top["accessors"]) accessor["count"] = 4000000000u;
+    gltf.refused({"4000000000 elements do not fit"});
+    Gltf nested(g);
+    std::string deep;
+    for (int i = 0; i < 100000; ++i) deep += "[";
+    expect_error<InputError>([&] { load_splats(nested.folder().write("deep.gltf", "{\"extras\":" + deep)); },
+                             {"deep.gltf", "nests deeper"});
+    // A library's error quotes the file; ours stay readable.
+    try {
+        load_splats(nested.folder().write("long.gltf", "{\"" + std::string(100000, 'x') + "\": nonsense}"));
+        ADD_FAILURE() << "nothing was thrown";
+    } catch (const InputError& error) {
+        EXPECT_LT(std::string(error.what()).size(), 1000u);
+    }
+    Gltf instanced(g);
+    instanced.top["nodes"] = json::array();
+    instanced.top["scenes"][0]["nodes"] = json::array();
+    for (int i = 0; i < 5000; ++i) {
+        instanced.top["nodes"].push_back({{"mesh", 0}});
+        instanced.top["scenes"][0]["nodes"].push_back(i);
+    }
+    instanced.refused({"more than 4096 primitives"});
+}
+
+TEST(GltfSplats, GlbChunks) {
+    TempFolder folder;
+    save_splats(folder / "a.glb", storable_splats(1, 5, 0));
+    const std::string good = test::file_bytes(folder / "a.glb");
+    const auto refuse = [&](size_t at, uint32_t value, std::initializer_list<std::string> parts) {
+        std::string bytes = good;
+        bytes.replace(at, 4, test::bytes_of(value));
+        expect_error<InputError>([&] { load_splats(folder.write("b.glb", bytes)); }, parts);
+    };
+    refuse(4, 1, {"b.glb", "byte", "GLB version 1"});
+    refuse(8, 1u << 30, {"byte", "truncated"});
+    refuse(12, 0xffffffff, {"byte", "JSON claims"});
+    refuse(16, 7, {"byte", "not JSON"});
+    uint32_t json_bytes;
+    std::memcpy(&json_bytes, good.data() + 12, 4);
+    refuse(20 + json_bytes, 0x7fffffff, {"byte", "second chunk claims"});
+    refuse(24 + json_bytes, 7, {"byte", "not BIN"});
+    refuse(20, 0x20202020, {"byte", "not valid JSON"});
+}
+
+}  // namespace
