@@ -54,7 +54,6 @@ INSTANTIATE_TEST_SUITE_P(
         WrongUse{{"train", "/nowhere", "--seed", "-1"}, "--seed"},
         WrongUse{{"train", "/nowhere", "--eval-every", "-1"}, "--eval-every"},
         WrongUse{{"train", "/nowhere", "--save-every", "x"}, "--save-every"},
-        WrongUse{{"train", "/nowhere", "--strategy", "mcmc"}, "not available in this version; use adc"},
         WrongUse{{"train", "/nowhere", "--strategy", "luck"}, "--strategy"},
         WrongUse{{"train", "/nowhere", "--kernel", "box"}, "--kernel"},
         WrongUse{{"train", "/nowhere", "--kernel", "ewa", "--antialias"}, "--antialias"},
@@ -62,7 +61,7 @@ INSTANTIATE_TEST_SUITE_P(
         WrongUse{{"train", "/nowhere", "--background", "1,nan,1"}, "--background"},
         WrongUse{{"train", "/nowhere", "--background", "0,0,2"}, "--background"},
         WrongUse{{"train", "/nowhere", "--quiet", "--verbose"}, "--verbose"},
-        WrongUse{{"train", "/nowhere", "--resume"}, "--resume"}, WrongUse{{"train", "/nowhere"}, "/nowhere"},
+        WrongUse{{"train", "/nowhere"}, "/nowhere"},
         WrongUse{{"render", "/nowhere.ply"}, "--cameras"},
         WrongUse{{"render", "/nowhere.ply", "--cameras", "/nowhere"}, "/nowhere.ply"},
         WrongUse{{"render", "/a.ply", "--cameras", "/b", "--background", "random"}, "--background"},
@@ -88,7 +87,7 @@ TEST(Usage, ConfigNamesItsMistake) {
                                                          {R"({"steps": 3)", "byte"},
                                                          {R"({"seed": 1e400})", "1e400"},
                                                          {R"({"config": "c.json"})", "config"},
-                                                         {R"({"strategy": "mcmc"})", "mcmc"}};
+                                                         {R"({"strategy": "magic"})", "magic"}};
     for (const auto& [text, mistake] : cases) {
         write_file(file, text);
         expect_failure(run_ewa({"train", "/nowhere", "--config", file}), 2, mistake);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "core/random.h"
 #include "gpu/guarded.h"
@@ -259,13 +260,16 @@ TEST(ResetOpacity, LowersWhatIsHigherAndForgetsItsMoments) {
     const float logit = float(std::log(0.01 / 0.99));
     r.run([&](gpu::Recording& recording) {
         r.kernels.get<passes::ResetOpacity>().record(recording, r.shape(), {params, moments1, moments2},
-                                                     {129, 129, logit});
+                                                     {129, start.model.planes(), logit});
     });
     expect_intact({&params, &moments1, &moments2});
     const auto after = params.read<float>(), m1 = moments1.read<float>(), m2 = moments2.read<float>();
+    std::set<size_t> opacities;
+    for (size_t i = 0; i < 129; ++i)
+        opacities.insert(pipeline::parameter_index(start.model.planes(), shared::PARAM_OPACITY, i));
     size_t lowered = 0;
     for (size_t f = 0; f < after.size(); ++f) {
-        const bool opacity = f < 4 * 129 && f % 4 == shared::PARAM_OPACITY;
+        const bool opacity = opacities.count(f) > 0;
         EXPECT_EQ(after[f], opacity ? std::min(before[f], logit) : before[f]) << f;
         EXPECT_EQ(m1[f], opacity ? 0 : start.moments1[f]) << f;
         EXPECT_EQ(m2[f], opacity ? 0 : start.moments2[f]) << f;

@@ -46,7 +46,7 @@ const std::vector<std::pair<std::string, Rooms>> kLibraries = {
     {"nanoflann", {"src/scene"}},
     {"tiny_gltf", {"src/io"}},
     {"zstd", {"src/io"}},
-    {"zlib", {"src/io", "src/image"}},
+    {"zlib", {"src/io", "src/image", "src/train"}},
     {"nlohmann/", {"src/io", "src/train", "src/report", "src/cli", "src/viewer"}},
     {"CLI/", {"src/cli", "src/viewer"}}};
 
