@@ -61,7 +61,7 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
                            const Image& target, const RenderOptions& options, bool alpha_is_weight = false);
 
 /// What is left out for this scene and request. masks: training photographs have pixels that do not count.
-enum class Purpose { picture, training, densifying };  // densifying: training with a strategy that adds splats
+enum class Purpose { picture, training, densifying };  // densifying: training with a strategy that gathers statistics (ADC)
 std::vector<PlanLine> plan_lines(const Gaussians& gaussians, const RenderOptions& options, Purpose purpose,
                                  bool masks = false);
 

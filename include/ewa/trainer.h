@@ -108,7 +108,7 @@ class Trainer {
     TrainerState state() const;
     void restore(const TrainerState& state);
 
-    Gaussians gaussians() const;         // read back from the device; in the trainer's own order, along a curve through space
+    Gaussians gaussians() const;         // read back from the device; in the trainer's own order, not the start's
     uint32_t splats() const;
     int steps_done() const;
     size_t photographs_on_disk() const;  // that the cache has no room for

@@ -29,8 +29,10 @@ float transposing_sum(float v[8]) {
     const uint lane = gl_SubgroupInvocationID;
     const bool b0 = (lane & 1u) != 0u, b1 = (lane & 2u) != 0u, b2 = (lane & 4u) != 0u;
     float four[4], two[2];
+    if (BLOCK == 1u) return v[0];
     [[unroll]] for (uint i = 0; i < BLOCK / 2u; ++i)
         four[i] = (b0 ? v[2 * i + 1] : v[2 * i]) + subgroupShuffleXor(b0 ? v[2 * i] : v[2 * i + 1], 1u);
+    if (BLOCK == 2u) return four[0];
     [[unroll]] for (uint i = 0; i < BLOCK / 4u; ++i)
         two[i] = (b1 ? four[2 * i + 1] : four[2 * i]) + subgroupShuffleXor(b1 ? four[2 * i] : four[2 * i + 1], 2u);
     if (BLOCK == 4u) return two[0];

@@ -3,6 +3,7 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "cli/output.h"
 #include "core/atomic_file.h"
@@ -39,6 +40,7 @@ std::vector<report::ReportPicture> draw_report_pictures(const PictureRequest& re
         picture.photograph = std::move(photograph.picture);
         picture.rendering = renderer.render(frame.camera).color;
         picture.psnr = psnr(picture.rendering, picture.photograph, photograph.weights);
+        if (std::isnan(picture.psnr)) continue;  // no pixel counts
         picture.ssim = ssim(picture.rendering, picture.photograph, photograph.weights);
         const fs::path file = folder / (names[index].string() + ".png");
         make_folder(file.parent_path());

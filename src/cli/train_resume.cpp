@@ -9,8 +9,8 @@ namespace {
 
 using report::Json;
 
-// Options that change when something is written or where it runs, not what comes out.
-constexpr const char* kWithoutInfluence[] = {"dataset", "eval-every", "save-every", "device"};
+// Options that change when something is written, where it runs or what is held in memory, not what comes out.
+constexpr const char* kWithoutInfluence[] = {"dataset", "eval-every", "save-every", "device", "image-cache"};
 constexpr double kLeastPause = 30;      // seconds
 constexpr double kPausePerSaving = 50;  // times what saving took
 

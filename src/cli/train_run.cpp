@@ -307,7 +307,7 @@ int TrainRun::run() {
     summary.strategy = arguments_.strategy;
     for (const PlanLine& line :
          plan_lines(start_, options_.render,
-                    options_.strategy == Strategy::none ? Purpose::training : Purpose::densifying,
+                    options_.strategy == Strategy::adc ? Purpose::densifying : Purpose::training,
                     dataset_.frames.front().masks == MaskUse::ignore))
         report_.plan.push_back({line.what, line.why, line.bytes_saved});
     describe();

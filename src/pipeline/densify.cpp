@@ -67,10 +67,9 @@ DensifyResult densify(Kernels& kernels, gpu::Executor& executor, Model& model, F
     Model next;
     next.splats = next.capacity = after;
     next.sh_degree = model.sh_degree;
-    const uint64_t bytes = parameter_bytes(after, model.sh_degree);
-    next.params = gpu::Buffer(device, "params", bytes, gpu::Texel::rgba32f);
-    next.moments1 = gpu::Buffer(device, "moments1", bytes, gpu::Texel::rgba32f);
-    next.moments2 = gpu::Buffer(device, "moments2", bytes, gpu::Texel::rgba32f);
+    next.params = parameter_buffer(device, "params", after, model.sh_degree);
+    next.moments1 = parameter_buffer(device, "moments1", after, model.sh_degree);
+    next.moments2 = parameter_buffer(device, "moments2", after, model.sh_degree);
     gpu::Recording recording(device.limits());
     kernels.get<passes::DensifyWrite>(uint32_t(model.sh_degree))
         .record(recording, kernels.shape(),

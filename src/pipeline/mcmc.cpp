@@ -34,10 +34,9 @@ Model empty_like(gpu::Device& device, const Model& model, uint32_t splats) {
     Model next;
     next.splats = next.capacity = splats;
     next.sh_degree = model.sh_degree;
-    const uint64_t bytes = parameter_bytes(splats, model.sh_degree);
-    next.params = gpu::Buffer(device, "params", bytes, gpu::Texel::rgba32f);
-    next.moments1 = gpu::Buffer(device, "moments1", bytes, gpu::Texel::rgba32f);
-    next.moments2 = gpu::Buffer(device, "moments2", bytes, gpu::Texel::rgba32f);
+    next.params = parameter_buffer(device, "params", splats, model.sh_degree);
+    next.moments1 = parameter_buffer(device, "moments1", splats, model.sh_degree);
+    next.moments2 = parameter_buffer(device, "moments2", splats, model.sh_degree);
     return next;
 }
 

@@ -37,6 +37,14 @@ void zero(gpu::Buffer& buffer) {
         buffer.upload(std::span(zeros).first(std::min<uint64_t>(zeros.size(), buffer.bytes() - at)), at);
 }
 
+gpu::Buffer parameter_buffer(gpu::Device& device, const char* name, uint32_t capacity, int sh_degree) {
+    const uint64_t bytes = parameter_bytes(capacity, sh_degree);
+    gpu::Buffer buffer(device, name, bytes, gpu::Texel::rgba32f);
+    const std::vector<float> block(size_t(parameter_planes(sh_degree)) * shared::PARAM_BLOCK * 4);
+    buffer.upload(std::span<const float>(block), bytes - block.size() * 4);
+    return buffer;
+}
+
 Model upload_model(gpu::Device& device, const Gaussians& gaussians, int moments, bool statistics) {
     Model model;
     model.splats = model.capacity = uint32_t(gaussians.size());

@@ -36,6 +36,10 @@ struct Model {
     gpu::Buffer statistics;          // vec2 a splat; only where a strategy needs it
 };
 
+/// A parameter-sized buffer. Its contents are undefined but for the room behind the last splat, which is zero: nothing
+/// reads it, and a checkpoint of the same splats has the same bytes.
+gpu::Buffer parameter_buffer(gpu::Device& device, const char* name, uint32_t capacity, int sh_degree);
+
 /// moments: 0 none, 1 the first only (a gradient), 2 both, zeroed.
 Model upload_model(gpu::Device& device, const Gaussians& gaussians, int moments, bool statistics);
 

@@ -41,6 +41,19 @@ void add_camera(Hash& hash, const Camera& camera) {
     }
 }
 
+void add_distortion(Hash& hash, const Distortion& d) {
+    hash.add(int(d.lens));
+    for (const double k : {d.k1, d.k2, d.p1, d.p2, d.k3, d.k4, d.k5, d.k6, d.s1, d.s2, d.s3, d.s4}) hash.add(k);
+}
+
+/// Size and beginning.
+void add_file(Hash& hash, const std::filesystem::path& path) {
+    core::FileReader file(path);
+    hash.add(file.size());
+    const size_t head = size_t(std::min<uint64_t>(file.size(), 1u << 16));
+    hash.add(file.take(head, "the picture"), head);
+}
+
 }  // namespace
 
 std::string dataset_fingerprint(const Dataset& dataset, const Split& split) {
@@ -51,11 +64,13 @@ std::string dataset_fingerprint(const Dataset& dataset, const Split& split) {
             const Frame& frame = dataset.frames[size_t(index)];
             hash.add(frame.name);
             add_camera(hash, frame.camera);
-            if (!frame.image_exists) continue;
-            core::FileReader file(frame.image_path);
-            hash.add(file.size());
-            const size_t head = size_t(std::min<uint64_t>(file.size(), 1u << 16));
-            hash.add(file.take(head, "the photograph"), head);
+            add_camera(hash, frame.source);
+            add_distortion(hash, frame.distortion);
+            hash.add(frame.orientation);
+            hash.add(int(frame.masks));
+            hash.add(int(frame.mask_path.empty()));
+            if (frame.image_exists) add_file(hash, frame.image_path);
+            if (!frame.mask_path.empty()) add_file(hash, frame.mask_path);
         }
     }
     char text[17];

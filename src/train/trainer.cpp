@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <deque>
+#include <glm/geometric.hpp>
 #include <map>
 
 #include "core/random.h"
@@ -37,8 +38,26 @@ std::array<float, 3> random_background(int step, uint64_t seed) {
     return {float(u[0]), float(u[1]), float(u[2])};
 }
 
-/// Splats that are neighbours in space become neighbours in memory: what a tile gathers stands together. Later
-/// generations keep it so, since children stand beside their parent.
+/// The length that rates and thresholds are shares of. Cameras that all stand in one place (a panorama, a single
+/// photograph) have no extent; there it is the median distance of what they see.
+double extent_for(const Dataset& dataset, const std::vector<int>& frames, const Gaussians& start) {
+    const double extent = scene_extent(dataset, frames);
+    if (extent > 0) return extent;
+    const glm::dvec3 eye = dataset.frames[size_t(frames.front())].camera.position();
+    std::vector<double> distances;
+    for (size_t i = 0; i < start.size(); ++i) {
+        const glm::dvec3 mean(start.means[3 * i], start.means[3 * i + 1], start.means[3 * i + 2]);
+        const double distance = glm::length(mean - eye);
+        if (std::isfinite(distance) && distance > 0) distances.push_back(distance);
+    }
+    if (distances.empty()) return 1;
+    const auto middle = distances.begin() + std::ptrdiff_t(distances.size() / 2);
+    std::nth_element(distances.begin(), middle, distances.end());
+    return *middle;
+}
+
+/// Splats that are neighbours in space become neighbours in memory: what a tile gathers stands together. ADC's later
+/// generations keep it so, since children stand beside their parent; MCMC's lose it bit by bit.
 Gaussians along_curve(Gaussians start) {
     select_splats(start, morton_order(start));
     return start;
@@ -66,7 +85,7 @@ struct Trainer::State {
         : device(std::move(d)),
           options(o),
           schedule(train::schedule_for(o)),
-          extent(scene_extent(dataset, frames)),
+          extent(extent_for(dataset, frames, start)),
           kernels(*device),
           executor(*device),
           plan(plan_training(start.sh_degree, o.render, o.strategy == Strategy::adc)),

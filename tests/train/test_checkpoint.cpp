@@ -100,6 +100,15 @@ TEST(Fingerprint, TellsDatasetsApart) {
     dataset = data().dataset;
     dataset.frames[0].name = "x";
     EXPECT_NE(own, train::dataset_fingerprint(dataset, split()));
+    dataset = data().dataset;
+    dataset.frames[0].mask_path = dataset.frames[1].image_path;
+    EXPECT_NE(own, train::dataset_fingerprint(dataset, split()));
+    dataset = data().dataset;
+    dataset.frames[0].masks = MaskUse::ignore;
+    EXPECT_NE(own, train::dataset_fingerprint(dataset, split()));
+    dataset = data().dataset;
+    dataset.frames[0].distortion.k1 = 1e-9;
+    EXPECT_NE(own, train::dataset_fingerprint(dataset, split()));
 }
 
 class RestoredTrainer : public testing::TestWithParam<Strategy> {};

@@ -173,6 +173,25 @@ TEST(Trainer, ASplatThatIsNotFiniteStaysOutAndTheRestLearns) {
     for (const float value : run.gaussians.log_scales) EXPECT_TRUE(std::isfinite(value));
 }
 
+TEST(Trainer, CamerasInOnePlaceStillHaveAScale) {
+    Dataset panorama = data().dataset;
+    for (Frame& frame : panorama.frames) frame.camera.translation = glm::dvec3(0.0);
+    const Gaussians start = shaken_start(data(), 0.05, 1, 0);
+    for (const Strategy strategy : {Strategy::adc, Strategy::mcmc}) {
+        TrainOptions options = quick(10);
+        options.strategy = strategy;
+        Trainer trainer(device(), panorama, {0, 1}, start, options);
+        StepReport report;
+        for (int step = 0; step < 3; ++step) report = trainer.step();
+        EXPECT_EQ(report.dropped_updates, 0u);
+        const Gaussians after = trainer.gaussians();
+        EXPECT_NE(std::accumulate(after.log_scales.begin(), after.log_scales.end(), 0.0),
+                  std::accumulate(start.log_scales.begin(), start.log_scales.end(), 0.0));
+        EXPECT_NE(std::accumulate(after.means.begin(), after.means.end(), 0.0),
+                  std::accumulate(start.means.begin(), start.means.end(), 0.0));
+    }
+}
+
 TEST(Trainer, RefusesWhatItCannotTrain) {
     const Gaussians start = shaken_start(data(), 0.05, 1, 0);
     TrainOptions options = quick(10);
