@@ -64,12 +64,7 @@ DensifyResult densify(Kernels& kernels, gpu::Executor& executor, Model& model, F
     const DensifyResult result{model.splats, after};
     if (after == 0) return {model.splats, model.splats};
 
-    Model next;
-    next.splats = next.capacity = after;
-    next.sh_degree = model.sh_degree;
-    next.params = parameter_buffer(device, "params", after, model.sh_degree);
-    next.moments1 = parameter_buffer(device, "moments1", after, model.sh_degree);
-    next.moments2 = parameter_buffer(device, "moments2", after, model.sh_degree);
+    Model next = next_generation(device, model, after);
     gpu::Recording recording(device.limits());
     kernels.get<passes::DensifyWrite>(uint32_t(model.sh_degree))
         .record(recording, kernels.shape(),

@@ -30,16 +30,6 @@ uint32_t grown(uint32_t splats, const McmcRules& rules) {
     return uint32_t(std::max<double>(splats, std::min<double>(target, rules.max_splats)));
 }
 
-Model empty_like(gpu::Device& device, const Model& model, uint32_t splats) {
-    Model next;
-    next.splats = next.capacity = splats;
-    next.sh_degree = model.sh_degree;
-    next.params = parameter_buffer(device, "params", splats, model.sh_degree);
-    next.moments1 = parameter_buffer(device, "moments1", splats, model.sh_degree);
-    next.moments2 = parameter_buffer(device, "moments2", splats, model.sh_degree);
-    return next;
-}
-
 }  // namespace
 
 McmcResult refine_mcmc(Kernels& kernels, gpu::Executor& executor, Model& model, const Frame& frame,
@@ -73,7 +63,7 @@ McmcResult refine_mcmc(Kernels& kernels, gpu::Executor& executor, Model& model, 
     if (push.draws == 0 || push.total == 0) return {model.splats, 0, model.splats};
 
     gpu::Buffer sources(device, "sources", 4ull * push.draws), hits(device, "hits", 4ull * model.splats);
-    Model next = empty_like(device, model, push.new_splats);
+    Model next = next_generation(device, model, push.new_splats);
     gpu::Recording recording(device.limits());
     recording.fill(hits, 0, 0, 4ull * model.splats);
     kernels.get<passes::McmcDraw>().record(recording, shape, {weights.prefix, weights.totals, sources, hits},

@@ -45,6 +45,16 @@ gpu::Buffer parameter_buffer(gpu::Device& device, const char* name, uint32_t cap
     return buffer;
 }
 
+Model next_generation(gpu::Device& device, const Model& model, uint32_t splats) {
+    Model next;
+    next.splats = next.capacity = splats;
+    next.sh_degree = model.sh_degree;
+    next.params = parameter_buffer(device, "params", splats, model.sh_degree);
+    next.moments1 = parameter_buffer(device, "moments1", splats, model.sh_degree);
+    next.moments2 = parameter_buffer(device, "moments2", splats, model.sh_degree);
+    return next;
+}
+
 Model upload_model(gpu::Device& device, const Gaussians& gaussians, int moments, bool statistics) {
     Model model;
     model.splats = model.capacity = uint32_t(gaussians.size());

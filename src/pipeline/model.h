@@ -40,6 +40,9 @@ struct Model {
 /// reads it, and a checkpoint of the same splats has the same bytes.
 gpu::Buffer parameter_buffer(gpu::Device& device, const char* name, uint32_t capacity, int sh_degree);
 
+/// Room for `splats` splats of the same degree with both moments, to be written whole; no statistics.
+Model next_generation(gpu::Device& device, const Model& model, uint32_t splats);
+
 /// moments: 0 none, 1 the first only (a gradient), 2 both, zeroed.
 Model upload_model(gpu::Device& device, const Gaussians& gaussians, int moments, bool statistics);
 
