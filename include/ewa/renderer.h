@@ -1,5 +1,6 @@
 // Pictures and gradients of a fixed splat scene.
 #pragma once
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -57,6 +58,10 @@ class Renderer {
 
     /// The same with other options than the renderer's. SH degrees above those it was made for stay left out.
     Rendering render(const Camera& camera, const DrawOptions& options);
+
+    /// The colour alone, as 8-bit RGBA: rounded and clamped as save_image does it. What a window shows: the floating-point
+    /// planes stay on the device. Drawing::color or ellipsoids. The reference holds until the next picture.
+    const std::vector<uint8_t>& render_bytes(const Camera& camera, const DrawOptions& options);
 
     /// Another scene in place of the present one, with the kernels that there are. Throws as the constructor does; the
     /// renderer then has no splats.

@@ -140,6 +140,10 @@ struct UnpackPush {
     uint plane_floats;
 };
 
+struct PackPush {
+    uint plane_floats;
+};
+
 struct MaskPush {
     uint size[2];
     uint stride;

@@ -23,6 +23,7 @@ struct TrainArguments {
     int eval_every = 0;  // steps; 0: only at the end
     int save_every = 0;  // steps; 0: by the clock
     bool resume = false;
+    std::string serve;  // [ADDRESS:]PORT; empty: nobody looks on
     DeviceOptions device;
     bool quiet = false, verbose = false;
     std::string command_line;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "ewa/error.h"
 #include "gpu/executor.h"
@@ -58,6 +59,8 @@ struct Renderer::State {
     Model model;
     Frame frame;
     shared::Counts counts{};
+    gpu::Buffer packed;  // host visible; only where 8 bits are asked for
+    std::vector<uint8_t> bytes;
 
     State(std::shared_ptr<gpu::Device> d, const Gaussians& gaussians, const RenderOptions& o)
         : device(std::move(d)),
@@ -67,11 +70,16 @@ struct Renderer::State {
           plan(plan_picture(gaussians, o, false)),
           model(upload_model(*device, with_degree(gaussians, plan.stored_degree), 0, false)) {}
 
+    Plan plan_of(const DrawOptions& options) const;
+    /// then: what to record behind the picture.
+    template <class Record>
+    void submit(const Camera& camera, const Plan& picture, const std::array<float, 3>& background, Record then);
     Rendering draw(const Camera& camera, const Plan& picture, const std::array<float, 3>& background);
 };
 
-Rendering Renderer::State::draw(const Camera& camera, const Plan& picture,
-                                const std::array<float, 3>& background) {
+template <class Record>
+void Renderer::State::submit(const Camera& camera, const Plan& picture, const std::array<float, 3>& background,
+                             Record then) {
     const gpu::Buffer block = upload_camera(*device, camera, kernels.shape());
     const CameraUse use{&block, 0, uint32_t(camera.width), uint32_t(camera.height)};
     const uint32_t room = std::max(frame.instance_capacity, first_capacity(model.splats));
@@ -80,8 +88,27 @@ Rendering Renderer::State::draw(const Camera& camera, const Plan& picture,
         {model.splats, use.width, use.height, room, false, picture.depth || picture.count},
         [&](gpu::Recording& recording) {
             record_forward(recording, kernels, picture, model, frame, use, background);
+            then(recording);
         });
+}
 
+Plan Renderer::State::plan_of(const DrawOptions& o) const {
+    if (!(o.splat_scale > 0) || !std::isfinite(o.splat_scale))
+        throw InputError("a splat scale of " + std::to_string(o.splat_scale) + ", not above zero");
+    Plan picture = plan;
+    picture.sh_degree = std::clamp(o.render.sh_degree, 0, plan.stored_degree);
+    picture.kernel = o.render.kernel;
+    picture.depth = o.drawing == Drawing::depth;
+    picture.count = o.drawing == Drawing::count;
+    picture.ellipsoids = o.drawing == Drawing::ellipsoids;
+    picture.inspected = true;
+    picture.log_scale_shift = float(std::log(o.splat_scale));
+    return picture;
+}
+
+Rendering Renderer::State::draw(const Camera& camera, const Plan& picture,
+                                const std::array<float, 3>& background) {
+    submit(camera, picture, background, [](gpu::Recording&) {});
     const Sizes& sizes = frame.sizes;
     const auto planes = frame.planes.download<float>(sizes.planes / 4);
     Rendering result{Image(camera.width, camera.height, 3), Image(camera.width, camera.height, 1), {}, {}};
@@ -115,18 +142,26 @@ Rendering Renderer::render(const Camera& camera, bool with_depth) {
 }
 
 Rendering Renderer::render(const Camera& camera, const DrawOptions& options) {
-    if (!(options.splat_scale > 0) || !std::isfinite(options.splat_scale))
-        throw InputError("a splat scale of " + std::to_string(options.splat_scale) + ", not above zero");
+    return state_->draw(camera, state_->plan_of(options), options.render.background);
+}
+
+const std::vector<uint8_t>& Renderer::render_bytes(const Camera& camera, const DrawOptions& options) {
     State& s = *state_;
-    Plan plan = s.plan;
-    plan.sh_degree = std::clamp(options.render.sh_degree, 0, plan.stored_degree);
-    plan.kernel = options.render.kernel;
-    plan.depth = options.drawing == Drawing::depth;
-    plan.count = options.drawing == Drawing::count;
-    plan.ellipsoids = options.drawing == Drawing::ellipsoids;
-    plan.inspected = true;
-    plan.log_scale_shift = float(std::log(options.splat_scale));
-    return s.draw(camera, plan, options.render.background);
+    s.submit(camera, s.plan_of(options), options.render.background, [&](gpu::Recording& recording) {
+        const Sizes& sizes = s.frame.sizes;
+        const uint64_t needed = uint64_t(sizes.plane_floats) * 4;
+        if (!s.packed || s.packed.bytes() < needed) {
+            s.packed = gpu::Buffer();
+            s.packed = gpu::Buffer(*s.device, "packed", needed, gpu::Texel::none, false, true);
+        }
+        s.kernels.get<passes::Pack>().record(recording, s.kernels.shape(), {s.frame.planes, s.packed},
+                                             {sizes.plane_floats});
+    });
+    const size_t row = size_t(camera.width) * 4, stride = size_t(s.frame.sizes.stride) * 4;
+    s.bytes.resize(row * size_t(camera.height));
+    for (size_t y = 0; y < size_t(camera.height); ++y)
+        std::memcpy(&s.bytes[y * row], s.packed.mapped() + y * stride, row);
+    return s.bytes;
 }
 
 void Renderer::replace(const Gaussians& gaussians) {
