@@ -44,6 +44,8 @@ struct TrainOptions {
     int refine_start = 500, refine_stop = 15000, refine_every = 100;
     int opacity_reset_every = 3000;
     int sh_degree_every = 1000;
+    int halvings = 0;                    // of the resolution at the start, each undone resolution_every steps later
+    int resolution_every = 3000;
     double grow_gradient = 2e-4;         // mean norm of dL/d(mean in normalised device coordinates)
     bool absolute_gradients = false;     // the norm of the pixels' absolute gradients, which do not cancel (AbsGS)
     double grow_gradient_absolute = 8e-4;  // the threshold then (gsplat's)

@@ -44,6 +44,11 @@ void add_model_options(CLI::App& app, TrainArguments& arguments) {
                  "adc: the two halves of a split are together as opaque as it was");
     app.add_flag("--exposure", arguments.exposure,
                  "Learn each photograph's exposure (an affine map of colours), for captures where it changes");
+    app.add_option("--resolution-schedule", arguments.resolution_schedule,
+                   "Start with the photographs' sides halved N times; each tenth of the run doubles them")
+        ->check(in_range(0, 6))
+        ->type_name("N")
+        ->capture_default_str();
     app.add_option("--seed", arguments.seed, "Same seed, same device: same bytes")
         ->check(without_sign())
         ->type_name("S")

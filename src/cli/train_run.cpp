@@ -39,6 +39,7 @@ TrainOptions train_options(const TrainArguments& arguments) {
     options.absolute_gradients = arguments.absgrad;
     options.revised_opacity = arguments.revised_opacity;
     options.exposure = arguments.exposure;
+    options.halvings = arguments.resolution_schedule;
     options.seed = arguments.seed;
     options.image_cache_bytes = arguments.image_cache << 20;
     options.random_background = arguments.draw.random_background();
@@ -367,6 +368,7 @@ report::Json to_config(const TrainArguments& a) {
     json["absgrad"] = a.absgrad;
     json["revised-opacity"] = a.revised_opacity;
     json["exposure"] = a.exposure;
+    json["resolution-schedule"] = a.resolution_schedule;
     json["init"] = a.init;
     json["downscale"] = a.downscale;
     json["masks"] = masks_text(a.masks);

@@ -39,6 +39,10 @@ int Schedule::degree(int step) const {
     return std::min(sh_degree, (step - 1) / sh_degree_every);
 }
 
+int Schedule::halvings_at(int step) const {
+    return std::max(0, halvings - (step - 1) / resolution_every);
+}
+
 double Schedule::mean_rate(int step, double extent) const {
     return extent * decayed(means_rate, means_rate_final, double(step) / steps);
 }
@@ -64,6 +68,8 @@ Schedule schedule_for(const TrainOptions& options) {
             scaled(options.opacity_reset_every, std::min(options.opacity_reset_every, kLeastResetEvery));
     s.sh_degree_every = scaled(options.sh_degree_every, std::min(options.sh_degree_every, kLeastShEvery));
     s.sh_degree = options.sh_degree;
+    s.halvings = options.halvings;
+    s.resolution_every = scaled(options.resolution_every, 1);
     s.means_rate = options.means_rate;
     s.means_rate_final = options.means_rate_final;
     s.exposures_rate = options.exposure_rate;

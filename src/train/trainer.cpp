@@ -76,6 +76,7 @@ struct Trainer::State {
     Model model;
     pipeline::Frame frame;
     train::Photographs photographs;
+    std::vector<train::Photographs> smaller;  // by halvings, from 1; what the schedule is past holds nothing
     Exposures exposures;
     uint32_t instance_room;
     StepReport report;
@@ -93,6 +94,8 @@ struct Trainer::State {
           model(upload_model(*device, along_curve(start), 2, plan.statistics)),
           photographs(*device, kernels.shape(), dataset, frames, o.image_cache_bytes),
           instance_room(first_capacity(start.size())) {
+        for (int halvings = 1; halvings <= o.halvings; ++halvings)
+            smaller.emplace_back(*device, kernels.shape(), dataset, frames, o.image_cache_bytes, 1 << halvings);
         plan.masks = photographs.any_masked();
         plan.exposure = o.exposure;
         if (plan.exposure) exposures = Exposures(*device, photographs.count());
@@ -117,11 +120,20 @@ struct Trainer::State {
         return r;
     }
 
+    /// At the resolution of this step. Resolutions rise: what is larger than this one's is still to come.
+    train::Photographs& photographs_at(int step) {
+        const size_t halvings = size_t(schedule.halvings_at(step));
+        while (smaller.size() > halvings) smaller.pop_back();
+        return halvings == 0 ? photographs : smaller.back();
+    }
+
     void optimise(int step) {
+        train::Photographs& seen = photographs_at(step);
         const size_t index = train::frame_of_step(step, photographs.count(), options.seed);
-        const CameraUse camera = photographs.camera(index);
-        const auto photo = photographs.photo(index);
-        photographs.prepare(train::frame_of_step(step + 1, photographs.count(), options.seed));
+        const CameraUse camera = seen.camera(index);
+        const auto photo = seen.photo(index);
+        if (schedule.halvings_at(step + 1) == schedule.halvings_at(step))
+            seen.prepare(train::frame_of_step(step + 1, photographs.count(), options.seed));
         const ExposureUse exposure{&exposures, uint32_t(index), float(schedule.exposure_rate(step)),
                                    uint32_t(size_t(step - 1) / photographs.count() + 1)};
         const auto background =

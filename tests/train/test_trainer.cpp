@@ -273,6 +273,29 @@ TEST(Trainer, LearnsWhatEachPhotographsExposureWas) {
     EXPECT_GT(with, without + 3);
 }
 
+/// A run on halves and quarters first ends at the whole resolution, and resumes to the byte in the middle of them.
+TEST(Trainer, AResolutionScheduleEndsAtTheWholeResolutionAndResumes) {
+    const Gaussians start = shaken_start(data(), 0.05, 1, 0);
+    TrainOptions options = quick(200);
+    options.halvings = 2;
+    const auto frames = all_frames(data().dataset);
+    Trainer whole(device(), data().dataset, frames, start, options);
+    TrainerState middle;
+    for (int step = 1; step <= 200; ++step) {
+        whole.step();
+        if (step == 30) middle = whole.state();
+    }
+    EXPECT_GT(train_psnr(whole.gaussians()), 25);
+    Trainer resumed(device(), data().dataset, frames, start, options);
+    resumed.restore(middle);
+    while (resumed.steps_done() < 200) resumed.step();
+    EXPECT_EQ(resumed.gaussians().means, whole.gaussians().means);
+    EXPECT_EQ(resumed.gaussians().sh, whole.gaussians().sh);
+    // Half the sides are another picture: the first step tells.
+    const double loss = Trainer(device(), data().dataset, frames, start, quick(200)).step().loss;
+    EXPECT_NE(Trainer(device(), data().dataset, frames, start, options).step().loss, loss);
+}
+
 TEST(Trainer, TheMemoryForecastHoldsForARun) {
     const Gaussians start = shaken_start(data(), 0.05, 1, 1);
     TrainOptions options = quick(160);
