@@ -17,6 +17,7 @@ struct Plan {
     bool gradients = false;   // loss, backward passes and their buffers
     bool adam = false;        // both moments
     bool statistics = false;  // densification statistics
+    bool absolute = false;    // of absolute gradients
     bool regularised = false;  // opacity and scale regularisers in the loss
     bool depth = false;
     bool count = false;       // splats blended a pixel
@@ -24,6 +25,7 @@ struct Plan {
     bool inspected = false;   // scales shifted, and the splats drawn counted
     float log_scale_shift = 0;  // where inspected
     bool masks = false;  // photographs in which not every pixel counts
+    bool exposure = false;  // photographs' exposures are learned
 };
 
 /// A picture: nothing of a degree the scene does not have, or that was not asked for, is stored or evaluated.

@@ -17,7 +17,9 @@ struct Schedule {
     int opacity_reset_every = 0;                              // 0: never
     int sh_degree_every = 0;
     int sh_degree = 0;                            // the highest
+    int halvings = 0, resolution_every = 0;
     double means_rate = 0, means_rate_final = 0;  // per unit of scene extent
+    double exposures_rate = 0, exposures_rate_final = 0;
 
     /// Densify after this step (steps count from 1)?
     bool densifies(int step) const;
@@ -28,9 +30,13 @@ struct Schedule {
     bool was_reset(int step) const;
     /// SH degree evaluated in this step.
     int degree(int step) const;
+    /// How many times the photographs' sides are halved in this step (OpenSplat's resolution schedule).
+    int halvings_at(int step) const;
     /// Learning rate of the means: exponential from means_rate to means_rate_final over the run (Plenoxels'
     /// decay, as 3DGS uses it), times the scene extent.
     double mean_rate(int step, double extent) const;
+    /// Learning rate of the exposures, with the same decay.
+    double exposure_rate(int step) const;
 };
 
 Schedule schedule_for(const TrainOptions& options);
