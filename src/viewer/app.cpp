@@ -169,7 +169,7 @@ void App::run() {
             redraws_ = std::max(redraws_, 1);
         }
         if (!scripted()) {
-            for (const int key : keys) handle_key(key);
+            for (const KeyPress& key : keys) handle_key(key);
             move_by_itself(std::min(seconds, 0.1));
             if (const auto dropped = window_.take_dropped(); !dropped.empty()) open(dropped);
         }
