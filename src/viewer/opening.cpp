@@ -28,8 +28,15 @@ bool is_dataset_file(const fs::path& path) {
     return name.starts_with("transforms") && core::lower(path.extension().string()) == ".json";
 }
 
-std::shared_ptr<const Dataset> load_cameras(const fs::path& path, int downscale = 1) {
-    Dataset dataset = load_dataset(path, {.downscale = downscale, .need_images = false});
+/// points: wanted too, which are read along with the photographs alone.
+std::shared_ptr<const Dataset> load_cameras(const fs::path& path, int downscale, bool points) {
+    Dataset dataset;
+    try {
+        if (points) dataset = load_dataset(path, {.downscale = downscale});
+    } catch (const InputError&) {
+        // A photograph or the points are not as they should be: the cameras may still be seen.
+    }
+    if (dataset.frames.empty()) dataset = load_dataset(path, {.downscale = downscale, .need_images = false});
     // Frames without a file are left out, as training and `ewa render` leave them out, where there are any others.
     const auto missing = [](const Frame& frame) { return !frame.image_exists; };
     if (!std::all_of(dataset.frames.begin(), dataset.frames.end(), missing))
@@ -94,7 +101,7 @@ Scene open_run(const fs::path& run, const fs::path& cameras) {
                            : 1;
     try {
         if (!dataset.empty())
-            scene.dataset = load_cameras(dataset, factor);
+            scene.dataset = load_cameras(dataset, factor, !splats);
         else
             scene.remark = "its dataset is not found; --cameras DATASET shows its cameras";
     } catch (const InputError& problem) {
@@ -108,7 +115,7 @@ Scene open_run(const fs::path& run, const fs::path& cameras) {
 
 Scene open_dataset(const fs::path& path) {
     Scene scene;
-    scene.dataset = load_cameras(path);
+    scene.dataset = load_cameras(path, 1, true);
     scene.gaussians = std::make_shared<const Gaussians>(splats_of_points(scene.dataset->points));
     scene.remark = scene.gaussians->size() > 0 ? "these are the dataset's points; ewa train makes splats of them"
                                                : "this dataset has cameras, but no points and no splats";
@@ -144,7 +151,7 @@ Scene open_scene(const fs::path& path, const fs::path& cameras) {
         if (splats.antialiased) scene.look.kernel = Kernel::antialias;
         if (!splats.remarks.empty()) scene.remark = splats.remarks.front();
         scene.gaussians = std::make_shared<const Gaussians>(std::move(splats.gaussians));
-        if (!cameras.empty()) scene.dataset = load_cameras(cameras);
+        if (!cameras.empty()) scene.dataset = load_cameras(cameras, 1, false);
     }
     scene.title = name_of_path(path);
     return scene;

@@ -78,14 +78,16 @@ class Session {
     Outcome quit() {
         send("key ctrl+q");
         int status = 0;
-        for (int i = 0; i < 600 && waitpid(child_, &status, WNOHANG) == 0; ++i)
-            std::this_thread::sleep_for(std::chrono::milliseconds(100));
-        Outcome outcome;
-        outcome.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+        pid_t ended = 0;
+        for (int i = 0; i < 600 && ended == 0; ++i) {
+            ended = waitpid(child_, &status, WNOHANG);
+            if (ended == 0) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+        }
+        Outcome outcome;  // its status is -1 where it has not ended
+        if (ended == child_) outcome.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
         outcome.out = read_file(folder_ + "/out.txt");
         outcome.err = read_file(folder_ + "/err.txt");
-        kill(child_, SIGKILL);
-        child_ = -1;
+        if (ended == child_) child_ = -1;  // else the destructor ends it
         return outcome;
     }
 

@@ -60,11 +60,12 @@ TEST_F(Training, OfItsOwnGoesOnUntilItsEnd) {
 }
 
 TEST_F(Training, OfItsOwnIsSavedWhenTheWindowIsClosed) {
-    Session session(shots_, {"--train", cameras_, "-o", run_, "--init", splats_, "--steps", "1000000", "--quiet"});
+    Session session(shots_, {"--train", cameras_, "-o", run_, "--init", splats_, "--steps", "20000", "--quiet"});
     ASSERT_TRUE(session.found());
     ASSERT_TRUE(session.awaited(run_ + "/live.json"));
     session.send("sleep 2");
     expect_silent(session.quit());
+    ASSERT_TRUE(std::filesystem::exists(run_ + "/summary.json")) << "nothing was saved";
     EXPECT_TRUE(std::filesystem::exists(run_ + "/checkpoint.ewa"));
     EXPECT_EQ(read_json(run_ + "/summary.json")["interrupted"], true);
 }
