@@ -58,6 +58,8 @@ struct TrainOptions {
     // refine_every.
     int relocate_stop = 25000;
     double growth = 1.05;                // of the number of splats a refinement, up to max_splats
+    double copy_spread = 1;              // standard deviations that copies start apart in a run of no length; none in a
+                                         // full one, where noise has the time to part them (src/train/schedule.h)
     double dead_opacity = 0.005;
     double noise_rate = 5e5;             // times the learning rate of the means
     double opacity_weight = 0.01;        // of the mean opacity in the loss

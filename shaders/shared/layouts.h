@@ -213,6 +213,7 @@ struct McmcPush {
     float weight_scale;            // weight of an opacity of 1
     float dead_logit;              // at or under it a splat is dead
     float least_opacity;           // of a splat that shares its source's
+    float spread;                  // standard deviations of the source that it and its copies move apart
     uint seed[2];
     uint step;
 };

@@ -13,6 +13,6 @@ static_assert(sizeof(BlendPush) == 48 && offsetof(BlendPush, capacity) == 44);
 static_assert(sizeof(UnpackPush) == 28 && sizeof(LossPush) == 24 && sizeof(ReducePush) == 16);
 static_assert(sizeof(MaskPush) == 16 && sizeof(ExposurePush) == 20 && sizeof(ExposureUpdatePush) == 28);
 static_assert(sizeof(UpdatePush) == 60 && sizeof(DensifyPush) == 48 && sizeof(ResetPush) == 12);
-static_assert(sizeof(McmcPush) == 52 && sizeof(PerturbPush) == 28);
+static_assert(sizeof(McmcPush) == 56 && sizeof(PerturbPush) == 28);
 
 }  // namespace ewa::shared

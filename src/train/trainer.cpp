@@ -169,7 +169,8 @@ struct Trainer::State {
         if (options.strategy == Strategy::adc) control_density(step);
         if (options.strategy != Strategy::mcmc || !schedule.relocates(step)) return;
         refine_mcmc(kernels, executor, model, frame,
-                    {options.dead_opacity, options.growth, options.max_splats, options.seed, uint32_t(step)});
+                    {options.dead_opacity, schedule.growth, options.max_splats, schedule.copy_spread,
+                     options.seed, uint32_t(step)});
     }
 
     void control_density(int step) {
