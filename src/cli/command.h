@@ -19,5 +19,6 @@ Action add_convert(CLI::App& app);
 Action add_info(CLI::App& app);
 Action add_devices(CLI::App& app);
 Action add_bench(CLI::App& app);
+Action add_compare(CLI::App& app);
 
 }  // namespace ewa::cli

@@ -75,6 +75,7 @@ int main(int argc, char** argv) {
          {}},
         {app.add_subcommand("devices", "The Vulkan devices of this machine"), {}},
         {app.add_subcommand("bench", "Speed of every pass, and its error against the float64 twin"), {}},
+        {app.add_subcommand("compare", "PSNR, SSIM and largest error of two pictures, or two folders of them"), {}},
     };
     commands[0].action = add_train(*commands[0].app, command_line(argc, argv));
     commands[1].action = add_render(*commands[1].app);
@@ -84,6 +85,7 @@ int main(int argc, char** argv) {
     commands[5].action = add_info(*commands[5].app);
     commands[6].action = add_devices(*commands[6].app);
     commands[7].action = add_bench(*commands[7].app);
+    commands[8].action = add_compare(*commands[8].app);
 
     try {
         app.parse(argc, argv);

@@ -11,7 +11,7 @@ TEST(Usage, HelpAndVersion) {
     const Outcome version = run_ewa({"--version"});
     EXPECT_EQ(version.status, 0);
     EXPECT_EQ(version.out.rfind("ewa ", 0), 0u) << version.out;
-    for (const char* command : {"train", "render", "eval", "grad", "info", "devices"}) {
+    for (const char* command : {"train", "render", "eval", "grad", "info", "devices", "compare"}) {
         const Outcome help = run_ewa({command, "--help"});
         expect_success(help);
         EXPECT_NE(help.out.find("--"), std::string::npos) << command;
