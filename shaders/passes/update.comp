@@ -5,7 +5,8 @@
 // its moments. An update that is not finite is dropped and counted. Nothing happens in a frame whose instances did not
 // fit (the host repeats it). SPEC_MODE bit 0: writes the gradient into moments1 and moves nothing. Bit 1: adds to the
 // densification statistics (norm of dL/d(mean) in normalised device coordinates, number of views drawn in). Bit 2: adds
-// the gradient of the regularisers, opacity_pull * opacity + scale_pull * (sum of the scales), drawn or not.
+// the gradient of the regularisers, opacity_pull * opacity + scale_pull * (sum of the scales), drawn or not. Bit 3: the
+// norm is that of the pixels' absolute gradients (Ye et al. 2024, AbsGS, eq. 7), where pixels do not cancel.
 #extension GL_GOOGLE_include_directive : require
 #define BINDING_CAMERA 1
 #include "lib/prelude.glsl"
@@ -17,7 +18,7 @@ layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3;
 layout(constant_id = SPEC_MODE) const uint MODE = 0;
 const bool GRADIENT_ONLY = (MODE & 1u) != 0u, STATISTICS = (MODE & 2u) != 0u,
-           REGULARISED = (MODE & 4u) != 0u;
+           REGULARISED = (MODE & 4u) != 0u, ABSOLUTE = (MODE & 8u) != 0u;
 
 layout(set = 0, binding = 0) uniform samplerBuffer params;
 layout(set = 0, binding = 2) uniform samplerBuffer records;
@@ -43,12 +44,13 @@ struct Sums {
     vec2 gw;       // sum g u, sum g v
     vec3 gww;      // sum g u^2, g u v, g v^2
     vec3 color;
+    vec2 absolute;
 };
 
 // Some drivers stop a loop after 65,535 turns, so a turn takes 8 slots.
 Sums sum_slots(uint first, uint count) {
     vec4 s0 = vec4(0.0), s1 = vec4(0.0);
-    float s2 = 0.0;
+    vec3 s2 = vec3(0.0);
     for (uint j = 0u; j < count; j += 8u) {
         [[unroll]] for (uint c = 0; c < 8; ++c) {
             const bool there = j + c < count;
@@ -57,11 +59,12 @@ Sums sum_slots(uint first, uint count) {
             if (there) {
                 s0 += t0;
                 s1 += t1;
-                s2 += t2.x;
+                if (ABSOLUTE) s2 += t2.xyz;
+                else s2.x += t2.x;
             }
         }
     }
-    return Sums(s0.x, s0.yz, vec3(s0.w, s1.xy), vec3(s1.zw, s2));
+    return Sums(s0.x, s0.yz, vec3(s0.w, s1.xy), vec3(s1.zw, s2.x), s2.yz);
 }
 
 uint index_of(uint plane, uint i) { return param_texel(push.planes, plane, i); }
@@ -111,6 +114,7 @@ float move_sh(uint i, vec3 color_gradient, vec3 direction, out vec3 direction_gr
 
 struct FootprintGradient {
     vec2 mean;         // dL/d(mean in px)
+    vec2 absolute;     // of each pixel, summed
     vec3 covariance;   // dL/da, dL/db, dL/dc; b is the value of both off-diagonal entries
 };
 
@@ -121,6 +125,7 @@ FootprintGradient footprint_gradient(Sums s, Projection p) {
     const float skew = -k * ux;
     FootprintGradient f;
     f.mean = 2.0 * vec2(ux * s.gw.x, skew * s.gw.x + vy * s.gw.y);
+    f.absolute = 2.0 * vec2(ux * s.absolute.x, s.absolute.y);
     f.covariance = 2.0 * vec3(ux * ux * s.gww.x, 2.0 * ux * (skew * s.gww.x + vy * s.gww.y),
                               skew * skew * s.gww.x + 2.0 * skew * vy * s.gww.y + vy * vy * s.gww.z);
     // The kernel's factor falls with det: d(ln factor)/d(Sigma2) = -Sigma2^-1 / 2.
@@ -192,7 +197,7 @@ void main() {
     move(0, i, p0, (drawn ? vec4(mean_gradient, logit_gradient) : zero) + opacity_pull,
          vec4(vec3(push.mean_rate), push.opacity_rate));
     if (STATISTICS && drawn) {
-        const float norm = length(f.mean * vec2(push.half_size[0], push.half_size[1]));
+        const float norm = length((ABSOLUTE ? f.absolute : f.mean) * vec2(push.half_size[0], push.half_size[1]));
         if (is_finite(norm)) statistics[i] += vec2(norm, 1.0);
     }
 }

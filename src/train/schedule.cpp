@@ -12,6 +12,11 @@ constexpr int kLeastRelocateEvery = 25;  // steps: time enough for what was relo
 constexpr int kLeastResetEvery = 1000;   // steps
 constexpr int kLeastShEvery = 50;        // steps
 
+double decayed(double first, double last, double share) {
+    const double t = std::clamp(share, 0.0, 1.0);
+    return std::exp((1 - t) * std::log(first) + t * std::log(last));
+}
+
 }  // namespace
 
 bool Schedule::densifies(int step) const {
@@ -35,8 +40,11 @@ int Schedule::degree(int step) const {
 }
 
 double Schedule::mean_rate(int step, double extent) const {
-    const double t = std::clamp(double(step) / steps, 0.0, 1.0);
-    return extent * std::exp((1 - t) * std::log(means_rate) + t * std::log(means_rate_final));
+    return extent * decayed(means_rate, means_rate_final, double(step) / steps);
+}
+
+double Schedule::exposure_rate(int step) const {
+    return decayed(exposures_rate, exposures_rate_final, double(step) / steps);
 }
 
 Schedule schedule_for(const TrainOptions& options) {
@@ -58,6 +66,8 @@ Schedule schedule_for(const TrainOptions& options) {
     s.sh_degree = options.sh_degree;
     s.means_rate = options.means_rate;
     s.means_rate_final = options.means_rate_final;
+    s.exposures_rate = options.exposure_rate;
+    s.exposures_rate_final = options.exposure_rate_final;
     return s;
 }
 

@@ -18,6 +18,7 @@ struct Schedule {
     int sh_degree_every = 0;
     int sh_degree = 0;                            // the highest
     double means_rate = 0, means_rate_final = 0;  // per unit of scene extent
+    double exposures_rate = 0, exposures_rate_final = 0;
 
     /// Densify after this step (steps count from 1)?
     bool densifies(int step) const;
@@ -31,6 +32,8 @@ struct Schedule {
     /// Learning rate of the means: exponential from means_rate to means_rate_final over the run (Plenoxels'
     /// decay, as 3DGS uses it), times the scene extent.
     double mean_rate(int step, double extent) const;
+    /// Learning rate of the exposures, with the same decay.
+    double exposure_rate(int step) const;
 };
 
 Schedule schedule_for(const TrainOptions& options);
