@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Compiles shaders/passes/*.comp to SPIR-V and embeds every module in one library.
 # One shader that does not compile fails the build; a changed include rebuilds what includes it (depfiles).
 find_program(GLSLANG glslangValidator REQUIRED)

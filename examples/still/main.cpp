@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A picture of a splat file: still SPLATS OUT.png
 //
 // Looks along +z at the middle of the splats, from as far away as they reach.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pictures in memory, on disk, and their distance from each other.
 #pragma once
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ewa compare: how far apart two pictures are, or two folders of pictures of the same names.
 #include <spdlog/fmt/fmt.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ewa: reads the arguments, runs one command, and turns every failure into one line and an exit status.
 #include <cerrno>
 #include <cstdio>

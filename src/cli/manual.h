@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Manual pages and shell completion, from the option parser itself.
 #pragma once
 #include <CLI/CLI.hpp>

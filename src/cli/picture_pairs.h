@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Which picture is compared with which.
 #pragma once
 #include <filesystem>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Runs the built program as a process, and makes small inputs for it.
 #pragma once
 #include <nlohmann/json.hpp>

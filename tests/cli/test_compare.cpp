@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ewa compare: figures, heat maps, and the exit status that scripts go by.
 #include <gtest/gtest.h>
 

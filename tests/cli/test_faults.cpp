@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Faults met in the middle of a training: one clear line, and what was saved is whole and goes on to the bytes of an
 // undisturbed run. faults/faults.cpp injects them.
 #include <gtest/gtest.h>

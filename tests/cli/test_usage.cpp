@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Wrong use: exit status 2, one line, nothing written.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Loaded in front of the system's libraries (LD_PRELOAD), so that a program meets faults at chosen moments:
 //   EWA_FAULT_ALLOCATIONS=N  from the N-th on, device memory cannot be allocated
 //   EWA_FAULT_SUBMITS=N      the N-th submission and those after it find the device lost

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pictures under test against references that are kept in tests/golden/references.
 //
 // References are 16-bit PNGs of what the float64 twin, or a formula in the test, says; never of what the code under

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Small scenes that each show one thing.
 #pragma once
 #include <ostream>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The twin's pictures are the references; the devices' pictures are compared with them.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Eighty steps of training on the devices against eighty steps of the float64 twin.
 #include <glm/gtc/constants.hpp>
 #include <numeric>

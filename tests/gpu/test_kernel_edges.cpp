@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Values on the very edge of a kernel's comparisons, where a broken one and a whole one part.
 #include <gtest/gtest.h>
 

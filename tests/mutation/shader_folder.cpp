@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The SPIR-V modules of the folder $EWA_SHADER_FOLDER, <name>.spv each, in the place of the embedded ones.
 #include <cstdlib>
 #include <filesystem>
