@@ -20,6 +20,25 @@ TEST(Usage, HelpAndVersion) {
     EXPECT_NE(run_ewa({"train", "--help"}).out.find("--max-splats"), std::string::npos);
 }
 
+TEST(Usage, ManualPagesHaveEveryOptionOfTheHelp) {
+    const Folder folder;
+    expect_success(run_ewa({"manual", folder / "m"}));
+    const std::string train = read_file(folder / "m/man/man1/ewa-train.1");
+    const std::string help = run_ewa({"train", "--help"}).out;
+    size_t options = 0;
+    for (size_t at = help.find("  --"); at != std::string::npos; at = help.find("  --", at + 1)) {
+        std::string name = help.substr(at + 2, help.find_first_of(" ,\n", at + 2) - at - 2), escaped;
+        for (const char c : name) escaped += c == '-' ? std::string("\\-") : std::string(1, c);
+        EXPECT_NE(train.find(escaped), std::string::npos) << name;
+        ++options;
+    }
+    EXPECT_GT(options, 10u);
+    EXPECT_NE(train.find("adc,mcmc,none"), std::string::npos);
+    const auto files = files_below(folder / "m");
+    EXPECT_NE(std::find(files.begin(), files.end(), "man/man1/ewa-compare.1"), files.end());
+    EXPECT_EQ(run_ewa({"--help"}).out.find("manual"), std::string::npos);
+}
+
 struct WrongUse {
     std::vector<std::string> arguments;
     std::string text;
