@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Photographs with their cameras, and the points they were reconstructed from.
 #pragma once
 #include <array>

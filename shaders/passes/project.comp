@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Projects splats into pixels. One invocation owns splat i: it reads its parameters and the camera, and writes its
 // record, its depth key and the number of tiles it reaches. A splat that is not drawn gets count 0 and the last key.
 #extension GL_GOOGLE_include_directive : require

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Every constant of the rendering model, defined once for the shaders, the host and the float64 twin.
 // Values are those of gsplat 1.6 unless a line says otherwise.
 #ifndef EWA_SHARED_CONSTANTS_H

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Every block that host and shaders share, under the scalar block layout. src/passes/layout_checks.cpp asserts sizes.
 #ifndef EWA_SHARED_LAYOUTS_H
 #define EWA_SHARED_LAYOUTS_H

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Options that several commands have, with the same names, ranges and meaning in each.
 #pragma once
 #include <CLI/CLI.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ewa bench: speed per pass, and error against the float64 twin.
 #include "bench/bench.h"
 

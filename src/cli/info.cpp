@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ewa info: what is in a splat file or a dataset.
 #include <spdlog/fmt/fmt.h>
 

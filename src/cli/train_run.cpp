@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "cli/train_run.h"
 
 #include <spdlog/fmt/fmt.h>
@@ -12,6 +13,7 @@
 #include "cli/train_files.h"
 #include "cli/train_resume.h"
 #include "core/atomic_file.h"
+#include "core/folder_lock.h"
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
 #include "train/checkpoint.h"
@@ -106,6 +108,7 @@ class TrainRun {
     report::Json settings_;  // for the checkpoint
     std::optional<train::Checkpoint> earlier_;
     fs::path folder_, checkpoint_;
+    std::optional<core::FolderLock> lock_;
     Dataset dataset_;
     Split split_;
     Gaussians start_;
@@ -130,6 +133,7 @@ void TrainRun::load() {
         arguments_.output.empty() ? fs::path("out") / dataset_name(arguments_.dataset) : arguments_.output;
     checkpoint_ = folder_ / "checkpoint.ewa";
     make_folder(folder_);
+    lock_.emplace(folder_);
     core::remove_abandoned_files(folder_);
     settings_ = checkpoint_settings(arguments_, train::dataset_fingerprint(dataset_, split_));
     if (arguments_.resume && fs::exists(checkpoint_)) {
@@ -351,7 +355,13 @@ int TrainRun::run() {
     resume(trainer);
     {
         Progress progress("trained", arguments_.steps, "steps", arguments_.quiet);
-        train(trainer, progress);
+        try {
+            train(trainer, progress);
+        } catch (const InputError&) {
+            // A photograph that is gone is met before the step begins: what was trained is whole.
+            save_checkpoint(trainer);
+            throw;
+        }
     }
     return finish(trainer);
 }

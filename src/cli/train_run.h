@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One training run: from the arguments to the files in its folder.
 #pragma once
 #include <filesystem>

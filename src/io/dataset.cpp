@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Which kind of dataset a path holds, and what every kind is checked for once its model is read.
 #include "ewa/dataset.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A glTF file's structure (through tinygltf) and the numbers its accessors hold, whatever buffer they stand
 // in.
 #pragma once

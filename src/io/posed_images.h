@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a dataset's model file says, before its pictures are looked at. Each format's reader makes one of
 // these.
 #pragma once

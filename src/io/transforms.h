@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // transforms.json in the dialects of instant-ngp, nerfstudio and Blender's synthetic scenes (NeRF).
 #pragma once
 #include <filesystem>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Blends the splats of every tile into the image planes. with_depth: the depth plane also.
 #pragma once
 #include "gpu/recording.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Host and shader see the same bytes: the scalar block layout packs these structs without padding, and so
 // does C++.
 #include "shared/layouts.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Projects every splat: record, depth key and tile count.
 #pragma once
 #include "gpu/recording.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pictures and gradients of a fixed scene: the public face of the forward and backward frames.
 #include "ewa/renderer.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What tells datasets apart.
 #include <algorithm>
 #include <cstdio>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Puts the last picture and the panel over it into the window.
 #pragma once
 #include "ewa/image.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Any bytes through one reader: a scene whose arrays fit each other, or an InputError of one line that names
 // a byte or a property, within the memory and the time (a second, under the sanitizers) allowed.
 #include EWA_HEADER

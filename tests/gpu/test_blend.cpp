@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Blending and its gradient alone, on records and tile lists from the twin.
 #include <gtest/gtest.h>
 

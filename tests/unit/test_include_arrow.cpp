@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Each room of the house may include only what stands after its arrow (docs/ARCHITECTURE.md, "The house").
 #include <algorithm>
 #include <fstream>
