@@ -2,7 +2,7 @@
 // Gradient of the projection, and Adam in the same breath, so that no gradient buffer of the parameters' size exists.
 // One invocation owns splat i: it adds up the splat's slots in the order of its tiles, carries the sums back through
 // the projection, and moves its parameters and moments. A splat that was not drawn has gradient zero and still moves by
-// its moments. An update that is not finite is dropped and counted. Nothing happens in a frame whose instances did not
+// its moments. A step too long for its splat is shortened and counted, an update that is not finite dropped and counted. Nothing happens in a frame whose instances did not
 // fit (the host repeats it). SPEC_MODE bit 0: writes the gradient into moments1 and moves nothing. Bit 1: adds to the
 // densification statistics (norm of dL/d(mean) in normalised device coordinates, number of views drawn in). Bit 2: adds
 // the gradient of the regularisers, opacity_pull * opacity + scale_pull * (sum of the scales), drawn or not.
@@ -66,17 +66,53 @@ Sums sum_slots(uint first, uint count) {
 
 uint index_of(uint plane, uint i) { return param_texel(push.planes, plane, i); }
 
+// Steps that would take a splat out of every view, or its shape out of float32's range, end short of that: a mean's at
+// STEP_DEPTH_SHARE of its depth, a quaternion's at STEP_NORM_SHARE of its norm, a scale's at the borders of what scales may
+// be. depth: of a splat that is drawn, else infinite. Returns whether it did.
+bool limit_step(uint plane, vec4 value, float depth, inout vec4 moved) {
+    const vec4 step = moved - value;
+    if (plane == 0u) {
+        const float most = float(STEP_DEPTH_SHARE) * depth, longest = max(max(abs(step.x), abs(step.y)), abs(step.z));
+        if (!(longest > most)) return false;
+        moved.xyz = value.xyz + step.xyz * (most / longest);
+        return true;
+    }
+    if (plane == 1u) {
+        const vec4 size = abs(value);
+        const float most = float(STEP_NORM_SHARE) * max(max(size.x, size.y), max(size.z, size.w));
+        const float longest = max(max(abs(step.x), abs(step.y)), max(abs(step.z), abs(step.w)));
+        if (!(longest > most)) return false;
+        moved = value + step * (most / longest);
+        return true;
+    }
+    if (plane == 2u) {
+        // A scale that is outside already may come back, and goes no further.
+        const vec3 low = min(vec3(LOG_SCALE_MIN), value.xyz), high = max(vec3(LOG_SCALE_MAX), value.xyz);
+        const bool outside = any(lessThan(moved.xyz, low)) || any(greaterThan(moved.xyz, high));
+        if (outside) moved.xyz = clamp(moved.xyz, low, high);
+        return outside;
+    }
+    return false;
+}
+
 // One texel of parameters with its gradient: Adam (Kingma and Ba 2015, algorithm 1).
-void move(uint plane, uint i, vec4 value, vec4 gradient, vec4 rate) {
+void move(uint plane, uint i, vec4 value, vec4 raw_gradient, vec4 rate, float depth) {
     const uint at = index_of(plane, i);
     if (GRADIENT_ONLY) {
-        moments1_out[at] = gradient;
+        // What is beyond float32 is its largest number, and what is no number zero, and counted.
+        const bvec4 number = equal(raw_gradient, raw_gradient);
+        moments1_out[at] = mix(vec4(0.0), clamp(raw_gradient, -3.402823466e38, 3.402823466e38), number);
+        if (!all(number)) atomicAdd(counts.dropped_updates, 1u);
         return;
     }
+    const vec4 largest = vec4(GRADIENT_MAX);
+    const vec4 gradient = mix(raw_gradient, clamp(raw_gradient, -largest, largest), greaterThan(abs(raw_gradient), largest));
     const vec4 m = mix(gradient, texelFetch(moments1, int(at)), float(ADAM_BETA1));
     const vec4 v = mix(gradient * gradient, texelFetch(moments2, int(at)), float(ADAM_BETA2));
-    const vec4 moved = value - rate * (m * push.bias1) / (sqrt(v * push.bias2) + float(ADAM_EPSILON));
+    vec4 moved = value - rate * (m * push.bias1) / (sqrt(v * push.bias2) + float(ADAM_EPSILON));
+    const bool limited = limit_step(plane, value, depth, moved);
     if (is_finite(moved) && is_finite(m) && is_finite(v)) {
+        if (limited) atomicAdd(counts.limited_steps, 1u);
         params_out[at] = moved;
         moments1_out[at] = m;
         moments2_out[at] = v;
@@ -104,27 +140,45 @@ float move_sh(uint i, vec3 color_gradient, vec3 direction, out vec3 direction_gr
                 direction_gradient += (value[c] * color_gradient[s % 3]) * slope[s / 3];
             }
         }
-        move(plane, i, value, gradient, rate);
+        move(plane, i, value, gradient, rate, 0.0);
     }
     return basis[0] * color_gradient.r;
 }
 
 struct FootprintGradient {
     vec2 mean;         // dL/d(mean in px)
-    vec3 covariance;   // dL/da, dL/db, dL/dc; b is the value of both off-diagonal entries
+    vec3 dm0, dm1;     // dL/d(rows of M)
+    vec3 log_scale;    // dL/d(logarithms of the scales)
 };
 
-// From the whitened sums to the 2D Gaussian. With power = -(u^2 + v^2): d(power)/d(mean) = 2 (ux u, vy v - k ux u),
-// d(power)/d(Sigma2) = 2 y y^T with y = (ux u, vy v - k ux u).
+// From the whitened sums to the 2D Gaussian and its M. With power = -(u^2 + v^2) and (u, v) = L d, L = [ux, -k ux; 0, vy]:
+// d(power)/d(mean) = 2 L^T (u, v), d(power)/dM = 4 L^T (u, v)(u, v)^T L M. L M is taken first: of a long needle, L^T L and M
+// by themselves have terms that are thousands of times their product.
 FootprintGradient footprint_gradient(Sums s, Projection p) {
-    const float ux = sqrt(0.5 * p.c / p.det), k = p.b / p.c, vy = sqrt(0.5 / p.c);
-    const float skew = -k * ux;
+    const float skew = -p.k * p.ux;
     FootprintGradient f;
-    f.mean = 2.0 * vec2(ux * s.gw.x, skew * s.gw.x + vy * s.gw.y);
-    f.covariance = 2.0 * vec3(ux * ux * s.gww.x, 2.0 * ux * (skew * s.gww.x + vy * s.gww.y),
-                              skew * skew * s.gww.x + 2.0 * skew * vy * s.gww.y + vy * vy * s.gww.z);
-    // The kernel's factor falls with det: d(ln factor)/d(Sigma2) = -Sigma2^-1 / 2.
-    if (KERNEL != KERNEL_PEAK) f.covariance += (-0.5 * s.g / p.det) * vec3(p.c, -2.0 * p.b, p.a);
+    f.mean = 2.0 * vec2(p.ux * s.gw.x, skew * s.gw.x + p.vy * s.gw.y);
+
+    const vec3 m0 = p.unit * p.m0, m1 = p.unit * p.m1, n = p.minors;
+    const float low_pass = p.unit * p.unit * float(LOW_PASS), ux = p.ux / p.unit, vy = p.vy / p.unit;
+    // c m0 - b m1 = LOW_PASS m0 + m1 x (m0 x m1), in which nothing cancels.
+    const vec3 lu = (ux / p.c) * (low_pass * m0 + cross(m1, n)), lv = vy * m1;
+    const vec3 hu = s.gww.x * lu + s.gww.y * lv, hv = s.gww.y * lu + s.gww.z * lv;
+    f.dm0 = 4.0 * p.ux * hu;
+    f.dm1 = 4.0 * (skew * hu + p.vy * hv);
+    f.log_scale = 4.0 * (lu * hu + lv * hv);
+    if (KERNEL != KERNEL_PEAK && p.det0 > 0.0) {
+        // ln(factor) = -ln(1 + q) / 2 with q = (det - det0) / det0, or -ln(det) / 2: in either
+        // d(ln factor) = -(LOW_PASS d(trace) + share d(det0)) / (2 det), d(det0) = 2 (m1 x n . dm0 + n x m0 . dm1).
+        const float share =
+            KERNEL == KERNEL_ANTIALIAS ? -(low_pass * (dot(m0, m0) + dot(m1, m1)) + low_pass * low_pass) / p.det0 : 1.0;
+        const float scale = -s.g / p.det;
+        f.dm0 += (p.unit * scale) * (low_pass * m0 + share * cross(m1, n));
+        f.dm1 += (p.unit * scale) * (low_pass * m1 + share * cross(n, m0));
+        const vec3 squares = n * n;
+        f.log_scale += scale * (low_pass * (m0 * m0 + m1 * m1) +
+                                share * vec3(squares.y + squares.z, squares.z + squares.x, squares.x + squares.y));
+    }
     return f;
 }
 
@@ -146,33 +200,24 @@ void main() {
     const float red_gradient = move_sh(i, color_gradient, direction, direction_gradient);
 
     const FootprintGradient f = footprint_gradient(s, p);
-    const vec3 cov = f.covariance;
-    vec3 dm0 = 2.0 * cov.x * p.m0 + cov.y * p.m1, dm1 = 2.0 * cov.z * p.m1 + cov.y * p.m0;
-    if (KERNEL == KERNEL_ANTIALIAS && p.det0 > 0.0) {
-        // d(ln det0) = 2 (m1 x n . dm0 + n x m0 . dm1) / |n|^2 with n = m0 x m1.
-        const vec3 n = cross(p.m0, p.m1);
-        dm0 += s.g * cross(p.m1, n) / p.det0;
-        dm1 += s.g * cross(n, p.m0) / p.det0;
-    }
     // M's rows are focal/z (row x or y of the axes - tangent * row z).
     const float inverse_z = 1.0 / p.view.z.x;
     const vec3 row_z = vec3(p.axes[0].z, p.axes[1].z, p.axes[2].z);
-    const vec3 dx_axes = p.focal_over_z.x * dm0, dy_axes = p.focal_over_z.y * dm1;
+    const vec3 dx_axes = p.focal_over_z.x * f.dm0, dy_axes = p.focal_over_z.y * f.dm1;
     const vec3 dz_axes = -p.tangent.x * dx_axes - p.tangent.y * dy_axes;
     vec3 view_gradient = vec3(p.focal_over_z * f.mean, 0.0);
     const vec2 tangent = vec2(p.view.x.x, p.view.y.x) * inverse_z;
-    view_gradient.z = -dot(tangent, view_gradient.xy) - inverse_z * (dot(dm0, p.m0) + dot(dm1, p.m1));
+    view_gradient.z = -dot(tangent, view_gradient.xy) -
+                      inverse_z * (f.log_scale.x + f.log_scale.y + f.log_scale.z);
     const vec2 tangent_gradient = vec2(p.tangent_clamped.x ? 0.0 : -dot(dx_axes, row_z),
                                        p.tangent_clamped.y ? 0.0 : -dot(dy_axes, row_z));
     view_gradient += vec3(tangent_gradient, -dot(tangent_gradient, tangent)) * inverse_z;
 
     const mat3 to_world = transpose(camera_rotation());
-    vec3 log_scale_gradient;
     mat3 rotation_gradient;
     const vec3 scale = exp(p2.xyz);
     [[unroll]] for (int k = 0; k < 3; ++k) {
         const vec3 axis_gradient = vec3(dx_axes[k], dy_axes[k], dz_axes[k]);
-        log_scale_gradient[k] = dot(p.axes[k], axis_gradient);
         rotation_gradient[k] = to_world * axis_gradient * scale[k];
     }
     const vec4 unit = p.unit_quaternion;
@@ -181,16 +226,19 @@ void main() {
     const vec3 direction_part =
         (direction_gradient - direction * dot(direction, direction_gradient)) / length(p.view.offset);
     const vec3 mean_gradient = to_world * view_gradient + direction_part;
-    const float logit_gradient = s.g * (1.0 - p.peak);
+    // 1 - opacity, where the opacity is next to 1, has no digits left.
+    const float transparency = sigmoid(-p0.w);
+    const float logit_gradient = s.g * transparency;
+    const float depth = drawn ? p.view.z.x : 1.0 / 0.0;
 
     const vec4 zero = vec4(0.0);
     const vec4 scale_pull = REGULARISED ? vec4(push.scale_pull * scale, 0.0) : zero;
-    const vec4 opacity_pull = REGULARISED ? vec4(vec3(0.0), push.opacity_pull * p.peak * (1.0 - p.peak)) : zero;
-    move(2, i, p2, (drawn ? vec4(log_scale_gradient, red_gradient) : zero) + scale_pull,
-         vec4(vec3(push.scale_rate), push.sh0_rate));
-    move(1, i, p1, drawn ? quaternion_gradient : zero, vec4(push.quaternion_rate));
+    const vec4 opacity_pull = REGULARISED ? vec4(vec3(0.0), push.opacity_pull * p.peak * transparency) : zero;
+    move(2, i, p2, (drawn ? vec4(f.log_scale, red_gradient) : zero) + scale_pull,
+         vec4(vec3(push.scale_rate), push.sh0_rate), depth);
+    move(1, i, p1, drawn ? quaternion_gradient : zero, vec4(push.quaternion_rate), depth);
     move(0, i, p0, (drawn ? vec4(mean_gradient, logit_gradient) : zero) + opacity_pull,
-         vec4(vec3(push.mean_rate), push.opacity_rate));
+         vec4(vec3(push.mean_rate), push.opacity_rate), depth);
     if (STATISTICS && drawn) {
         const float norm = length(f.mean * vec2(push.half_size[0], push.half_size[1]));
         if (is_finite(norm)) statistics[i] += vec2(norm, 1.0);

@@ -271,6 +271,7 @@ int TrainRun::finish(const Trainer& trainer) {
     summary.splats = static_cast<uint32_t>(gaussians.size());
     summary.skipped_nonfinite = last_.skipped_nonfinite;
     summary.dropped_updates = last_.dropped_updates;
+    summary.limited_steps = last_.limited_steps;
     summary.interrupted = cut_short;
     summary.peak_device_bytes = peak_device_bytes(*device_);
     summary.peak_host_bytes = peak_host_bytes(*device_);
@@ -291,6 +292,7 @@ void TrainRun::print_result() const {
     if (s.skipped_nonfinite > 0)
         say(fmt::format("{} splats are not finite and not drawn", s.skipped_nonfinite));
     if (s.dropped_updates > 0) say(fmt::format("{} updates were not finite and dropped", s.dropped_updates));
+    if (s.limited_steps > 0) say(fmt::format("{} steps were too long for their splat and shortened", s.limited_steps));
     say("splats:  " + (folder_ / "splats.ply").string());
     say("report:  " + (folder_ / "report.html").string());
     if (!first_picture_.empty()) say("picture: " + first_picture_.string());

@@ -197,7 +197,7 @@ TEST(Noise, IsTheTwins) {
         frame.counts.upload(std::span<const shared::Counts>(&counts, 1));
         const uint64_t seed = 0xabcdef0123456789ull;
         r.run([&](gpu::Recording& recording) {
-            record_noise(recording, r.kernels, start.model, frame, 5.0f, seed, 12);
+            record_noise(recording, r.kernels, start.model, frame, 5.0f, 1e9f, seed, 12);
         });
         const Gaussians moved = download_model(start.model, start.model.params);
         const reference::Values old = reference::to_double(start.gaussians);
@@ -218,7 +218,7 @@ TEST(Noise, IsTheTwins) {
         counts.instances = 11;  // the frame is going to be repeated
         frame.counts.upload(std::span<const shared::Counts>(&counts, 1));
         r.run([&](gpu::Recording& recording) {
-            record_noise(recording, r.kernels, start.model, frame, 5.0f, seed, 13);
+            record_noise(recording, r.kernels, start.model, frame, 5.0f, 1e9f, seed, 13);
         });
         EXPECT_EQ(download_model(start.model, start.model.params).means, moved.means);
     }
