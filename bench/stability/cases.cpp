@@ -208,6 +208,14 @@ void add_far_from_origin(Table& table) {
         stored.add(s);
     }
     table.add("offset_1e7", "a scene of 5 km, 1e7 from the origin, positions in float32", stored.take(), camera);
+
+    // Held as a georeferenced capture is: positions in float32 relative to an origin in double.
+    Camera near = usual_camera();
+    Gaussians held = usual_scene(near, 60, 3);
+    held.origin = place;
+    near.translation = -(near.rotation * (near.position() + place));
+    table.add("georeferenced_1e7", "a scene of 5 m, 1e7 from the origin, relative to an origin of its own", std::move(held),
+              near);
 }
 
 void add_opacities(Table& table) {
@@ -341,8 +349,7 @@ StabilityCase stability_case_of(const std::string& name, const Gaussians& gaussi
     for (int k = 0; k < 3; ++k) {
         std::vector<double> values;
         for (size_t i = 0; i < gaussians.size(); ++i)
-            if (std::isfinite(gaussians.means[3 * i + size_t(k)]))
-                values.push_back(gaussians.means[3 * i + size_t(k)]);
+            if (std::isfinite(gaussians.means[3 * i + size_t(k)])) values.push_back(gaussians.world_mean(i)[k]);
         if (values.empty()) continue;
         std::sort(values.begin(), values.end());
         low[k] = values[values.size() / 4];

@@ -11,6 +11,8 @@
 #include "lib/prelude.glsl"
 #include "lib/params.glsl"
 #include "lib/projection.glsl"
+#include "lib/footprint_gradient.glsl"
+#include "lib/step_limits.glsl"
 #include "lib/sh.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
@@ -37,14 +39,6 @@ layout(push_constant, scalar) uniform Push { UpdatePush push; };
 const uint SH_FLOATS = 3 * (SH_DEGREE + 1) * (SH_DEGREE + 1);
 const uint PLANES = (PARAM_SH + SH_FLOATS + 3) / 4;
 
-// What the tiles added to a splat, see SLOT_FLOATS.
-struct Sums {
-    float g;
-    vec2 gw;       // sum g u, sum g v
-    vec3 gww;      // sum g u^2, g u v, g v^2
-    vec3 color;
-};
-
 // Some drivers stop a loop after 65,535 turns, so a turn takes 8 slots.
 Sums sum_slots(uint first, uint count) {
     vec4 s0 = vec4(0.0), s1 = vec4(0.0);
@@ -65,35 +59,6 @@ Sums sum_slots(uint first, uint count) {
 }
 
 uint index_of(uint plane, uint i) { return param_texel(push.planes, plane, i); }
-
-// Steps that would take a splat out of every view, or its shape out of float32's range, end short of that: a mean's at
-// STEP_DEPTH_SHARE of its depth, a quaternion's at STEP_NORM_SHARE of its norm, a scale's at the borders of what scales may
-// be. depth: of a splat that is drawn, else infinite. Returns whether it did.
-bool limit_step(uint plane, vec4 value, float depth, inout vec4 moved) {
-    const vec4 step = moved - value;
-    if (plane == 0u) {
-        const float most = float(STEP_DEPTH_SHARE) * depth, longest = max(max(abs(step.x), abs(step.y)), abs(step.z));
-        if (!(longest > most)) return false;
-        moved.xyz = value.xyz + step.xyz * (most / longest);
-        return true;
-    }
-    if (plane == 1u) {
-        const vec4 size = abs(value);
-        const float most = float(STEP_NORM_SHARE) * max(max(size.x, size.y), max(size.z, size.w));
-        const float longest = max(max(abs(step.x), abs(step.y)), max(abs(step.z), abs(step.w)));
-        if (!(longest > most)) return false;
-        moved = value + step * (most / longest);
-        return true;
-    }
-    if (plane == 2u) {
-        // A scale that is outside already may come back, and goes no further.
-        const vec3 low = min(vec3(LOG_SCALE_MIN), value.xyz), high = max(vec3(LOG_SCALE_MAX), value.xyz);
-        const bool outside = any(lessThan(moved.xyz, low)) || any(greaterThan(moved.xyz, high));
-        if (outside) moved.xyz = clamp(moved.xyz, low, high);
-        return outside;
-    }
-    return false;
-}
 
 // One texel of parameters with its gradient: Adam (Kingma and Ba 2015, algorithm 1).
 void move(uint plane, uint i, vec4 value, vec4 raw_gradient, vec4 rate, float depth) {
@@ -143,43 +108,6 @@ float move_sh(uint i, vec3 color_gradient, vec3 direction, out vec3 direction_gr
         move(plane, i, value, gradient, rate, 0.0);
     }
     return basis[0] * color_gradient.r;
-}
-
-struct FootprintGradient {
-    vec2 mean;         // dL/d(mean in px)
-    vec3 dm0, dm1;     // dL/d(rows of M)
-    vec3 log_scale;    // dL/d(logarithms of the scales)
-};
-
-// From the whitened sums to the 2D Gaussian and its M. With power = -(u^2 + v^2) and (u, v) = L d, L = [ux, -k ux; 0, vy]:
-// d(power)/d(mean) = 2 L^T (u, v), d(power)/dM = 4 L^T (u, v)(u, v)^T L M. L M is taken first: of a long needle, L^T L and M
-// by themselves have terms that are thousands of times their product.
-FootprintGradient footprint_gradient(Sums s, Projection p) {
-    const float skew = -p.k * p.ux;
-    FootprintGradient f;
-    f.mean = 2.0 * vec2(p.ux * s.gw.x, skew * s.gw.x + p.vy * s.gw.y);
-
-    const vec3 m0 = p.unit * p.m0, m1 = p.unit * p.m1, n = p.minors;
-    const float low_pass = p.unit * p.unit * float(LOW_PASS), ux = p.ux / p.unit, vy = p.vy / p.unit;
-    // c m0 - b m1 = LOW_PASS m0 + m1 x (m0 x m1), in which nothing cancels.
-    const vec3 lu = (ux / p.c) * (low_pass * m0 + cross(m1, n)), lv = vy * m1;
-    const vec3 hu = s.gww.x * lu + s.gww.y * lv, hv = s.gww.y * lu + s.gww.z * lv;
-    f.dm0 = 4.0 * p.ux * hu;
-    f.dm1 = 4.0 * (skew * hu + p.vy * hv);
-    f.log_scale = 4.0 * (lu * hu + lv * hv);
-    if (KERNEL != KERNEL_PEAK && p.det0 > 0.0) {
-        // ln(factor) = -ln(1 + q) / 2 with q = (det - det0) / det0, or -ln(det) / 2: in either
-        // d(ln factor) = -(LOW_PASS d(trace) + share d(det0)) / (2 det), d(det0) = 2 (m1 x n . dm0 + n x m0 . dm1).
-        const float share =
-            KERNEL == KERNEL_ANTIALIAS ? -(low_pass * (dot(m0, m0) + dot(m1, m1)) + low_pass * low_pass) / p.det0 : 1.0;
-        const float scale = -s.g / p.det;
-        f.dm0 += (p.unit * scale) * (low_pass * m0 + share * cross(m1, n));
-        f.dm1 += (p.unit * scale) * (low_pass * m1 + share * cross(n, m0));
-        const vec3 squares = n * n;
-        f.log_scale += scale * (low_pass * (m0 * m0 + m1 * m1) +
-                                share * vec3(squares.y + squares.z, squares.z + squares.x, squares.x + squares.y));
-    }
-    return f;
 }
 
 void main() {

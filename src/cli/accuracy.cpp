@@ -3,6 +3,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <cstdio>
 
 #include "bench/accuracy.h"
 #include "cli/output.h"
@@ -59,7 +60,10 @@ void print_table(const report::WorkPrecision& diagram) {
 
 report::WorkPrecision rendering_diagram(const std::shared_ptr<gpu::Device>& device, const Gaussians& gaussians,
                                         const Camera& camera, const RenderOptions& options) {
-    const auto say = [](const std::string& line) { fmt::print("{}\n", line); std::fflush(stdout); };
+    const auto say = [](const std::string& line) {
+        fmt::print("{}\n", line);
+        std::fflush(stdout);
+    };
     const bench::Accuracy accuracy = bench::measure_accuracy(device, gaussians, camera, options, say);
     report::WorkPrecision diagram;
     diagram.title = "Rendering: error against run time";

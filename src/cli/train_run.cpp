@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "cli/accuracy.h"
 #include "cli/interrupt.h"
 #include "cli/output.h"
 #include "cli/progress.h"
@@ -264,6 +265,12 @@ int TrainRun::finish(const Trainer& trainer) {
             draw_report_pictures({device_, gaussians, dataset_, frames, options_.render}, subfolder);
         first_picture_ =
             subfolder / (report::picture_names(dataset_.frames)[frames.front()].string() + ".png");
+    }
+
+    if (!cut_short && arguments_.accuracy) {
+        const auto view = report_.held_out ? split_.test.front() : split_.train.front();
+        report_.work_precision.push_back(
+            rendering_diagram(device_, gaussians, dataset_.frames[view].camera, options_.render));
     }
 
     summary.steps = last_.step;

@@ -80,7 +80,7 @@ inline std::array<uint32_t, 2> tile_steps(const Shape& shape, uint32_t tiles) {
 inline gpu::SpecConstant spec(uint32_t id, uint32_t value) {
     return {id, value};
 }
-inline gpu::SpecConstant spec(uint32_t id, float value) {
+inline gpu::SpecConstant spec_float(uint32_t id, float value) {
     return {id, std::bit_cast<uint32_t>(value)};
 }
 

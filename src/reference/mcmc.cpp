@@ -13,7 +13,7 @@ Share share_of(double opacity, int parts) {
     assert(parts >= 1);
     const double x = -std::expm1(std::log1p(-opacity) / parts);
     // The sum cancels beyond float64 too; as an integral (shaders/lib/mcmc.glsl) it does not.
-    if (parts > 51) {
+    if (parts > 20) {
         double integral = 0;
         for (int j = 0; j < 512; ++j) {
             const double t = j / 64.0;

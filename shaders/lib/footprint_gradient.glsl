@@ -1,0 +1,49 @@
+// The way back from what the tiles added up to a splat's M and scales. Needs projection.glsl.
+#ifndef EWA_LIB_FOOTPRINT_GRADIENT
+#define EWA_LIB_FOOTPRINT_GRADIENT
+
+// What the tiles added to a splat, see SLOT_FLOATS.
+struct Sums {
+    float g;
+    vec2 gw;       // sum g u, sum g v
+    vec3 gww;      // sum g u^2, g u v, g v^2
+    vec3 color;
+};
+
+struct FootprintGradient {
+    vec2 mean;         // dL/d(mean in px)
+    vec3 dm0, dm1;     // dL/d(rows of M)
+    vec3 log_scale;    // dL/d(logarithms of the scales)
+};
+
+// From the whitened sums to the 2D Gaussian and its M. With power = -(u^2 + v^2) and (u, v) = L d, L = [ux, -k ux; 0, vy]:
+// d(power)/d(mean) = 2 L^T (u, v), d(power)/dM = 4 L^T (u, v)(u, v)^T L M. L M is taken first: of a long needle, L^T L and M
+// by themselves have terms that are thousands of times their product.
+FootprintGradient footprint_gradient(Sums s, Projection p) {
+    const float skew = -p.k * p.ux;
+    FootprintGradient f;
+    f.mean = 2.0 * vec2(p.ux * s.gw.x, skew * s.gw.x + p.vy * s.gw.y);
+
+    const vec3 m0 = p.unit * p.m0, m1 = p.unit * p.m1, n = p.minors;
+    const float low_pass = p.unit * p.unit * float(LOW_PASS), ux = p.ux / p.unit, vy = p.vy / p.unit;
+    // c m0 - b m1 = LOW_PASS m0 + m1 x (m0 x m1), in which nothing cancels.
+    const vec3 lu = (ux / p.c) * (low_pass * m0 + cross(m1, n)), lv = vy * m1;
+    const vec3 hu = s.gww.x * lu + s.gww.y * lv, hv = s.gww.y * lu + s.gww.z * lv;
+    f.dm0 = 4.0 * p.ux * hu;
+    f.dm1 = 4.0 * (skew * hu + p.vy * hv);
+    f.log_scale = 4.0 * (lu * hu + lv * hv);
+    if (KERNEL != KERNEL_PEAK && p.det0 > 0.0) {
+        // ln(factor) = -ln(1 + q) / 2 with q = (det - det0) / det0, or -ln(det) / 2: in either
+        // d(ln factor) = -(LOW_PASS d(trace) + share d(det0)) / (2 det), d(det0) = 2 (m1 x n . dm0 + n x m0 . dm1).
+        const float share =
+            KERNEL == KERNEL_ANTIALIAS ? -(low_pass * (dot(m0, m0) + dot(m1, m1)) + low_pass * low_pass) / p.det0 : 1.0;
+        const float scale = -s.g / p.det;
+        f.dm0 += (p.unit * scale) * (low_pass * m0 + share * cross(m1, n));
+        f.dm1 += (p.unit * scale) * (low_pass * m1 + share * cross(n, m0));
+        const vec3 squares = n * n;
+        f.log_scale += scale * (low_pass * (m0 * m0 + m1 * m1) +
+                                share * vec3(squares.y + squares.z, squares.z + squares.x, squares.x + squares.y));
+    }
+    return f;
+}
+#endif
