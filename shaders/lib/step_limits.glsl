@@ -4,7 +4,7 @@
 
 // Steps that would take a splat out of every view, or its shape out of float32's range, end short of that: a mean's at
 // STEP_DEPTH_SHARE of its depth, a quaternion's at STEP_NORM_SHARE of its norm, a scale's at the borders of what scales may
-// be. depth: of a splat that is drawn, else infinite. Returns whether it did.
+// be. depth: of a splat that is drawn, else without bound. Returns whether it did.
 bool limit_step(uint plane, vec4 value, float depth, inout vec4 moved) {
     const vec4 step = moved - value;
     if (plane == 0u) {

@@ -127,37 +127,28 @@ void main() {
     vec3 direction_gradient;
     const float red_gradient = move_sh(i, color_gradient, direction, direction_gradient);
 
-    const FootprintGradient f = footprint_gradient(s, p);
+    const FootprintGradient f = footprint_gradient(s, p, p2.xyz);
     // M's rows are focal/z (row x or y of the axes - tangent * row z).
     const float inverse_z = 1.0 / p.view.z.x;
     const vec3 row_z = vec3(p.axes[0].z, p.axes[1].z, p.axes[2].z);
-    const vec3 dx_axes = p.focal_over_z.x * f.dm0, dy_axes = p.focal_over_z.y * f.dm1;
-    const vec3 dz_axes = -p.tangent.x * dx_axes - p.tangent.y * dy_axes;
     vec3 view_gradient = vec3(p.focal_over_z * f.mean, 0.0);
     const vec2 tangent = vec2(p.view.x.x, p.view.y.x) * inverse_z;
     view_gradient.z = -dot(tangent, view_gradient.xy) -
                       inverse_z * (f.log_scale.x + f.log_scale.y + f.log_scale.z);
-    const vec2 tangent_gradient = vec2(p.tangent_clamped.x ? 0.0 : -dot(dx_axes, row_z),
-                                       p.tangent_clamped.y ? 0.0 : -dot(dy_axes, row_z));
+    const vec2 tangent_gradient =
+        -p.focal_over_z * vec2(p.tangent_clamped.x ? 0.0 : dot(f.dm0, row_z), p.tangent_clamped.y ? 0.0 : dot(f.dm1, row_z));
     view_gradient += vec3(tangent_gradient, -dot(tangent_gradient, tangent)) * inverse_z;
 
     const mat3 to_world = transpose(camera_rotation());
-    mat3 rotation_gradient;
     const vec3 scale = exp(p2.xyz);
-    [[unroll]] for (int k = 0; k < 3; ++k) {
-        const vec3 axis_gradient = vec3(dx_axes[k], dy_axes[k], dz_axes[k]);
-        rotation_gradient[k] = to_world * axis_gradient * scale[k];
-    }
-    const vec4 unit = p.unit_quaternion;
-    const vec4 unit_gradient = rotation_backward(unit, rotation_gradient);
-    const vec4 quaternion_gradient = (unit_gradient - unit * dot(unit, unit_gradient)) / p.quaternion_norm;
+    const vec4 quaternion_gradient = torque_on_quaternion(p.unit_quaternion, f.torque) / p.quaternion_norm;
     const vec3 direction_part =
         (direction_gradient - direction * dot(direction, direction_gradient)) / length(p.view.offset);
     const vec3 mean_gradient = to_world * view_gradient + direction_part;
     // 1 - opacity, where the opacity is next to 1, has no digits left.
     const float transparency = sigmoid(-p0.w);
     const float logit_gradient = s.g * transparency;
-    const float depth = drawn ? p.view.z.x : 1.0 / 0.0;
+    const float depth = drawn ? p.view.z.x : 3.4e38;
 
     const vec4 zero = vec4(0.0);
     const vec4 scale_pull = REGULARISED ? vec4(push.scale_pull * scale, 0.0) : zero;
