@@ -63,6 +63,6 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
 /// What is left out for this scene and request. masks: training photographs have pixels that do not count.
 enum class Purpose { picture, training, densifying };  // densifying: training with a strategy that gathers statistics (ADC)
 std::vector<PlanLine> plan_lines(const Gaussians& gaussians, const RenderOptions& options, Purpose purpose,
-                                 bool masks = false);
+                                 bool masks = false, bool exposure = false);
 
 }  // namespace ewa

@@ -12,6 +12,7 @@
 
 #include "ewa/dataset.h"
 #include "ewa/device.h"
+#include "ewa/exposure.h"
 #include "ewa/gaussians.h"
 #include "ewa/render_options.h"
 #include "ewa/renderer.h"
@@ -36,11 +37,19 @@ struct TrainOptions {
     double opacity_rate = 0.025;
     double scale_rate = 5e-3, quaternion_rate = 1e-3;
 
+    bool exposure = false;               // each photograph's exposure is learned too, from the identity
+    double exposure_rate = 0.01, exposure_rate_final = 0.001;
+
     // Adaptive density control, in steps of a 30,000 step run; a shorter run scales them (src/train/schedule.h).
     int refine_start = 500, refine_stop = 15000, refine_every = 100;
     int opacity_reset_every = 3000;
     int sh_degree_every = 1000;
+    int halvings = 0;                    // of the resolution at the start, each undone resolution_every steps later
+    int resolution_every = 3000;
     double grow_gradient = 2e-4;         // mean norm of dL/d(mean in normalised device coordinates)
+    bool absolute_gradients = false;     // the norm of the pixels' absolute gradients, which do not cancel (AbsGS)
+    double grow_gradient_absolute = 8e-4;  // the threshold then (gsplat's)
+    bool revised_opacity = false;        // a split's children are together as opaque as their parent
     double split_scale = 0.01;           // larger than this share of the scene extent: split, else clone
     double prune_opacity = 0.005;
     double prune_scale = 0.1;            // share of the scene extent, once opacity has been reset
@@ -49,6 +58,8 @@ struct TrainOptions {
     // refine_every.
     int relocate_stop = 25000;
     double growth = 1.05;                // of the number of splats a refinement, up to max_splats
+    double copy_spread = 1;              // standard deviations that copies start apart in a run of no length; none in a
+                                         // full one, where noise has the time to part them (src/train/schedule.h)
     double dead_opacity = 0.005;
     double noise_rate = 5e5;             // times the learning rate of the means
     double opacity_weight = 0.01;        // of the mean opacity in the loss
@@ -66,9 +77,21 @@ struct Evaluation {
 };
 
 /// Renders each frame and compares it with its photograph, both clamped to [0, 1], over the pixels that count. A frame in
-/// which none does is left out.
+/// which none does is left out. exposures: of each of the frames, or none.
 Evaluation evaluate(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians, const Dataset& dataset,
-                    const std::vector<int>& frames, const RenderOptions& options);
+                    const std::vector<int>& frames, const RenderOptions& options,
+                    const std::vector<Exposure>& exposures = {});
+
+/// Device memory that a run is going to take at most, in bytes.
+struct MemoryForecast {
+    uint32_t splats = 0;                 // that it is for
+    uint64_t model = 0;                  // parameters, moments, statistics; twice where a new generation is written
+    uint64_t frame = 0;                  // pictures, sorting, gradient slots: at the (splat, tile) pairs of most scenes
+    uint64_t photographs = 0;            // as many as image_cache_bytes holds
+    uint64_t total() const { return model + frame + photographs; }
+};
+MemoryForecast forecast_memory(const gpu::Device& device, const Dataset& dataset, const std::vector<int>& train_frames,
+                               const Gaussians& start, const TrainOptions& options);
 
 struct StepReport {
     int step = 0;                        // steps done
@@ -112,6 +135,7 @@ class Trainer {
     Gaussians gaussians() const;         // read back from the device; in the trainer's own order, not the start's
     uint32_t splats() const;
     int steps_done() const;
+    std::vector<Exposure> exposures() const;  // of the training frames, where they are learned; else none
     size_t photographs_on_disk() const;  // that the cache has no room for
     std::vector<PassTime> pass_times() const;  // medians over the last steps, in recording order
 

@@ -19,4 +19,11 @@ uint action_of(DensifyPush push, vec4 mean_logit, vec4 quaternion, vec4 scale_re
     if (limited && size > push.prune_scale) return ACTION_PRUNE;
     return grow ? ACTION_CLONE : ACTION_KEEP;
 }
+
+// The logit of the opacity that two splats in one place need to let through what one does: 1 - t, with t^2 = 1 - opacity.
+// (1 - t) / t = (1 - t^2) / (t (1 + t)), in logarithms and with opacity = exp(logit) t^2: nothing cancels, nothing overflows.
+float halved_logit(float logit) {
+    const float log_t = -0.5 * (max(logit, 0.0) + log(1.0 + exp(-abs(logit))));
+    return logit + log_t - log(1.0 + exp(log_t));
+}
 #endif

@@ -8,10 +8,12 @@ struct Sums {
     vec2 gw;       // sum g u, sum g v
     vec3 gww;      // sum g u^2, g u v, g v^2
     vec3 color;
+    vec2 absolute;
 };
 
 struct FootprintGradient {
     vec2 mean;         // dL/d(mean in px)
+    vec2 absolute;     // of each pixel, summed
     vec3 dm0, dm1;     // dL/d(rows of M)
     vec3 log_scale;    // dL/d(logarithms of the scales)
     vec3 torque;       // dL/d(rotation about the splat's own axes, radians)
@@ -34,6 +36,7 @@ FootprintGradient footprint_gradient(Sums s, Projection p, vec3 log_scale) {
     const float skew = -p.k * p.ux;
     FootprintGradient f;
     f.mean = 2.0 * vec2(p.ux * s.gw.x, skew * s.gw.x + p.vy * s.gw.y);
+    f.absolute = 2.0 * vec2(p.ux * s.absolute.x, s.absolute.y);
 
     const vec3 m0 = p.unit * p.m0, m1 = p.unit * p.m1, n = p.minors;
     const float low_pass = p.unit * p.unit * float(LOW_PASS), ux = p.ux / p.unit, vy = p.vy / p.unit;

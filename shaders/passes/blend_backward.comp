@@ -2,13 +2,17 @@
 // Gradients of blending, front to back: with R = (what is blended behind a splat) . dL/dC,
 // dL/d(alpha) = T c . dL/dC - R / (1 - alpha); R starts as C . dL/dC and each splat takes its own share off, so nothing
 // is divided by 1 - alpha splat after splat. One workgroup is one subgroup and owns one tile, and the gradient slots
-// of its instances, which stand in the order of the sorted list: each is written once.
+// of its instances, which stand in the order of the sorted list: each is written once. SPEC_MODE 1: sums of absolute
+// gradients by the mean too.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"
 #include "lib/tile.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
+layout(constant_id = SPEC_MODE) const uint MODE = 0;
+const bool ABSOLUTE = (MODE & 1u) != 0u;
+const uint SUMS = ABSOLUTE ? 11u : 9u;
 layout(set = 0, binding = 0) uniform samplerBuffer records;
 layout(set = 0, binding = 1, scalar) readonly buffer Splats { uint splats[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer TileStarts { uint tile_starts[]; };
@@ -74,9 +78,9 @@ void main() {
         const vec4 record2 = texelFetch(records, splat + 2);
         record1.w = k + lane < end ? record1.w : 0.0;
         const float ratio_step = ratio_step_of(record1);
-        float slot[9];
+        float slot[11];
         [[unroll]] for (uint first = 0; first < SUBGROUP; first += BLOCK) {
-            float sums[9][8];
+            float sums[11][8];
             [[unroll]] for (uint j = 0; j < BLOCK; ++j) {
                 const LaneSplat s = lane_splat(record0, record1, record2, ratio_step, first + j, pixel);
                 float raw[PIXELS];
@@ -84,6 +88,7 @@ void main() {
                 // u and v are affine along the lane's column, so three sums over it, with the pixel's number counted
                 // from the middle, give all six: products with constants, and a third of the registers.
                 float s0 = 0.0, s1 = 0.0, s2 = 0.0;
+                vec2 absolute = vec2(0.0);
                 vec3 color_sum = vec3(0.0);
                 [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
                     const float alpha = alpha_of(raw[p]);
@@ -98,6 +103,10 @@ void main() {
                     s0 += g;
                     s1 += g * step;
                     s2 += g * (step * step);
+                    if (ABSOLUTE) {
+                        const float u = s.u + s.u_step * float(p), v = s.v + s.v_step * float(p);
+                        absolute += abs(g * vec2(u, s.u_step * u + s.v_step * v));
+                    }
                     color_sum += weight * gradient[p];
                 }
                 const float u = s.u + s.u_step * MIDDLE, v = s.v + s.v_step * MIDDLE;
@@ -111,15 +120,17 @@ void main() {
                 sums[6][j] = color_sum.r;
                 sums[7][j] = color_sum.g;
                 sums[8][j] = color_sum.b;
+                sums[9][j] = absolute.x;
+                sums[10][j] = absolute.y / float(ROW_STEP);
             }
-            [[unroll]] for (uint i = 0; i < 9; ++i) {
+            [[unroll]] for (uint i = 0; i < SUMS; ++i) {
                 const float sum = transposing_sum(sums[i]);
                 slot[i] = first == 0u || lane / BLOCK == first / BLOCK ? sum : slot[i];
             }
         }
         if (k + lane < end) {
             const uint at = SLOT_FLOATS * (k + lane);
-            [[unroll]] for (uint i = 0; i < 9; ++i) slots[at + i] = slot[i];
+            [[unroll]] for (uint i = 0; i < SUMS; ++i) slots[at + i] = slot[i];
         }
         bool open = false;
         [[unroll]] for (uint p = 0; p < PIXELS; ++p) open = open || T[p] > 0.0;
@@ -135,7 +146,7 @@ void main() {
         for (uint e = end; e < all; e += SUBGROUP) {
             if (e + lane < all) {
                 const uint at = SLOT_FLOATS * (e + lane);
-                [[unroll]] for (uint i = 0; i < 9; ++i) slots[at + i] = 0.0;
+                [[unroll]] for (uint i = 0; i < SUMS; ++i) slots[at + i] = 0.0;
             }
         }
     }
@@ -143,7 +154,7 @@ void main() {
     for (; k < end; k += SUBGROUP) {
         if (k + lane < end) {
             const uint at = SLOT_FLOATS * (k + lane);
-            [[unroll]] for (uint i = 0; i < 9; ++i) slots[at + i] = 0.0;
+            [[unroll]] for (uint i = 0; i < SUMS; ++i) slots[at + i] = 0.0;
         }
     }
 }

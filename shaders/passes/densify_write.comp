@@ -1,7 +1,8 @@
 #version 460
 // Writes the splats of the next generation into new buffers. One invocation owns old splat i and writes what it
 // becomes, side by side in the old order. A kept splat and a clone's original keep their moments; what is new starts
-// with none. Children of a split are drawn from the parent's Gaussian and are SPLIT_SCALE times smaller.
+// with none. Children of a split are drawn from the parent's Gaussian and are SPLIT_SCALE times smaller; with revised
+// opacity, two children in one place are as opaque as the parent: 1 - (1 - o)^(1/2) (Rota Bulo et al. 2024, eq. 9).
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/params.glsl"
@@ -38,16 +39,18 @@ void main() {
         const bool written = child < outputs_of(action) && to < push.new_capacity;
         const bool keeps_moments = child == 0u && action != ACTION_SPLIT;
         vec3 mean = p0.xyz, log_scale = p2.xyz;
+        float logit = p0.w;
         if (action == ACTION_SPLIT) {
             float norm;
             const vec3 normal = normal3(uvec4(i, 2u * push.step + child, push.seed[0], push.seed[1]));
             mean += rotation_of(normalize_quaternion(p1, norm)) * (exp(p2.xyz) * normal);
             log_scale -= log(float(SPLIT_SCALE));
+            if (push.revised_opacity != 0u) logit = halved_logit(logit);
         }
         [[unroll]] for (uint plane = 0; plane < PLANES; ++plane) {
             const int from = int(param_texel(PLANES, plane, i));
             vec4 value = texelFetch(params, from);
-            if (plane == 0u) value.xyz = mean;
+            if (plane == 0u) value = vec4(mean, logit);
             if (plane == 2u) value.xyz = log_scale;
             const vec4 m1 = keeps_moments ? texelFetch(moments1, from) : vec4(0.0);
             const vec4 m2 = keeps_moments ? texelFetch(moments2, from) : vec4(0.0);

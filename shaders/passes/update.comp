@@ -2,10 +2,11 @@
 // Gradient of the projection, and Adam in the same breath, so that no gradient buffer of the parameters' size exists.
 // One invocation owns splat i: it adds up the splat's slots in the order of its tiles, carries the sums back through
 // the projection, and moves its parameters and moments. A splat that was not drawn has gradient zero and still moves by
-// its moments. A step too long for its splat is shortened and counted, an update that is not finite dropped and counted. Nothing happens in a frame whose instances did not
-// fit (the host repeats it). SPEC_MODE bit 0: writes the gradient into moments1 and moves nothing. Bit 1: adds to the
+// its moments. A step too long for its splat is shortened and counted, an update that is not finite dropped and counted.
+// Nothing happens in a frame whose instances did not fit (the host repeats it). SPEC_MODE bit 0: writes the gradient into moments1 and moves nothing. Bit 1: adds to the
 // densification statistics (norm of dL/d(mean) in normalised device coordinates, number of views drawn in). Bit 2: adds
-// the gradient of the regularisers, opacity_pull * opacity + scale_pull * (sum of the scales), drawn or not.
+// the gradient of the regularisers, opacity_pull * opacity + scale_pull * (sum of the scales), drawn or not. Bit 3: the
+// norm is that of the pixels' absolute gradients (Ye et al. 2024, AbsGS, eq. 7), where pixels do not cancel.
 #extension GL_GOOGLE_include_directive : require
 #define BINDING_CAMERA 1
 #include "lib/prelude.glsl"
@@ -19,7 +20,7 @@ layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3;
 layout(constant_id = SPEC_MODE) const uint MODE = 0;
 const bool GRADIENT_ONLY = (MODE & 1u) != 0u, STATISTICS = (MODE & 2u) != 0u,
-           REGULARISED = (MODE & 4u) != 0u;
+           REGULARISED = (MODE & 4u) != 0u, ABSOLUTE = (MODE & 8u) != 0u;
 
 layout(set = 0, binding = 0) uniform samplerBuffer params;
 layout(set = 0, binding = 2) uniform samplerBuffer records;
@@ -42,7 +43,7 @@ const uint PLANES = (PARAM_SH + SH_FLOATS + 3) / 4;
 // Some drivers stop a loop after 65,535 turns, so a turn takes 8 slots.
 Sums sum_slots(uint first, uint count) {
     vec4 s0 = vec4(0.0), s1 = vec4(0.0);
-    float s2 = 0.0;
+    vec3 s2 = vec3(0.0);
     for (uint j = 0u; j < count; j += 8u) {
         [[unroll]] for (uint c = 0; c < 8; ++c) {
             const bool there = j + c < count;
@@ -51,11 +52,12 @@ Sums sum_slots(uint first, uint count) {
             if (there) {
                 s0 += t0;
                 s1 += t1;
-                s2 += t2.x;
+                if (ABSOLUTE) s2 += t2.xyz;
+                else s2.x += t2.x;
             }
         }
     }
-    return Sums(s0.x, s0.yz, vec3(s0.w, s1.xy), vec3(s1.zw, s2));
+    return Sums(s0.x, s0.yz, vec3(s0.w, s1.xy), vec3(s1.zw, s2.x), s2.yz);
 }
 
 uint index_of(uint plane, uint i) { return param_texel(push.planes, plane, i); }
@@ -159,7 +161,7 @@ void main() {
     move(0, i, p0, (drawn ? vec4(mean_gradient, logit_gradient) : zero) + opacity_pull,
          vec4(vec3(push.mean_rate), push.opacity_rate), depth);
     if (STATISTICS && drawn) {
-        const float norm = length(f.mean * vec2(push.half_size[0], push.half_size[1]));
+        const float norm = length((ABSOLUTE ? f.absolute : f.mean) * vec2(push.half_size[0], push.half_size[1]));
         if (is_finite(norm)) statistics[i] += vec2(norm, 1.0);
     }
 }

@@ -64,6 +64,7 @@ EWA_REAL(MCMC_GATE_SLOPE, 100.0);     // noise moves a splat by the share sigmoi
 EWA_REAL(MCMC_GATE_OPACITY, 0.005);
 EWA_UINT(MCMC_DRAW_STREAM, 0x64726177u);   // keeps the random numbers of one use apart from those of another
 EWA_UINT(MCMC_NOISE_STREAM, 0x6e6f6973u);
+EWA_UINT(MCMC_SPREAD_STREAM, 0x73707264u);
 
 // Kernels: how a splat's opacity depends on its footprint.
 EWA_UINT(KERNEL_PEAK, 0u);            // 3DGS: the opacity is the peak of the footprint

@@ -33,7 +33,8 @@ EWA_UINT(PARAM_SH, 11u);           // 3 (degree + 1)^2 floats: coefficient after
 EWA_UINT(RECORD_TEXELS, 3u);
 
 // ---- A gradient slot: what one tile adds to one splat, 12 floats (3 texels) ----
-// g = dL/d(power) of a pixel. 0: sum g; 1 2: sum g u, g v; 3 4 5: sum g u^2, g u v, g v^2; 6 7 8: dL/d(colour)
+// g = dL/d(power) of a pixel. 0: sum g; 1 2: sum g u, g v; 3 4 5: sum g u^2, g u v, g v^2; 6 7 8: dL/d(colour);
+// 9 10, where absolute gradients are asked for: sum |g u|, sum |g (vy v - k ux u)|
 EWA_UINT(SLOT_FLOATS, 12u);
 EWA_UINT(SLOT_TEXELS, 3u);
 
@@ -51,6 +52,11 @@ EWA_UINT(LOSS_TEXELS, 4u);
 // ---- Loss planes per colour channel c ----
 EWA_UINT(MOMENT_PLANES, 4u);       // of 4 c + 0: mean x; 1: mean y; 2: mean x^2 + y^2; 3: mean x y
 EWA_UINT(DERIVATIVE_PLANES, 3u);   // of 3 c + 0: dS/d(mean x); 1: dS/d(mean x^2); 2: dS/d(mean x y)
+
+// ---- Exposure: a photograph's affine map of colours, 3 texels of (row of the matrix, offset) at 3 * photograph ----
+EWA_UINT(EXPOSURE_FLOATS, 12u);
+EWA_UINT(EXPOSURE_TEXELS, 3u);
+EWA_UINT(EXPOSURE_BLOCK, 4096u);   // pixels a subgroup sums its gradient over
 
 EWA_UINT(RADIX_DIGITS_MAX, 256u);
 
@@ -139,6 +145,22 @@ struct MaskPush {
     uint plane_floats;
 };
 
+struct ExposurePush {
+    uint size[2];
+    uint stride;
+    uint plane_floats;
+    uint photo;                    // whose exposure
+};
+
+struct ExposureUpdatePush {
+    uint photo;
+    uint blocks;                   // of partial sums
+    float rate;
+    float pull;                    // d(loss)/d(value) of a value 1 away from that of the identity
+    float bias1, bias2;            // 1 / (1 - beta^visit): a photograph's own number of steps
+    uint instance_capacity;
+};
+
 struct LossPush {
     uint size[2];
     uint stride;
@@ -176,6 +198,7 @@ struct DensifyPush {
     float prune_scale;             // world units; 0: do not prune by scale
     uint seed[2];
     uint step;
+    uint revised_opacity;          // 1: what a split leaves in one place is as opaque as what it replaced
 };
 
 struct ResetPush {
@@ -192,6 +215,7 @@ struct McmcPush {
     float weight_scale;            // weight of an opacity of 1
     float dead_logit;              // at or under it a splat is dead
     float least_opacity;           // of a splat that shares its source's
+    float spread;                  // standard deviations of the source that it and its copies move apart
     uint seed[2];
     uint step;
 };

@@ -38,6 +38,17 @@ void add_model_options(CLI::App& app, TrainArguments& arguments) {
            "splat file to go on from")
         ->type_name("sfm|random|FILE")
         ->capture_default_str();
+    app.add_flag("--absgrad", arguments.absgrad,
+                 "adc: grow where the pixels' absolute gradients are large, which do not cancel (AbsGS)");
+    app.add_flag("--revised-opacity", arguments.revised_opacity,
+                 "adc: the two halves of a split are together as opaque as it was");
+    app.add_flag("--exposure", arguments.exposure,
+                 "Learn each photograph's exposure (an affine map of colours), for captures where it changes");
+    app.add_option("--resolution-schedule", arguments.resolution_schedule,
+                   "Start with the photographs' sides halved N times; each tenth of the run doubles them")
+        ->check(in_range(0, 6))
+        ->type_name("N")
+        ->capture_default_str();
     app.add_option("--seed", arguments.seed, "Same seed, same device: same bytes")
         ->check(without_sign())
         ->type_name("S")

@@ -50,6 +50,19 @@ std::vector<report::ReportPicture> draw_report_pictures(const PictureRequest& re
     return pictures;
 }
 
+report::Json exposures_json(const Dataset& dataset, const std::vector<int>& frames,
+                            const std::vector<Exposure>& exposures) {
+    report::Json json = report::Json::object();
+    for (size_t i = 0; i < exposures.size(); ++i) {
+        report::Json& rows = json[dataset.frames[size_t(frames[i])].name];
+        for (size_t row = 0; row < 3; ++row) {
+            const float* r = &exposures[i][4 * row];
+            rows.push_back({r[0], r[1], r[2], r[3]});
+        }
+    }
+    return json;
+}
+
 void write_report(const fs::path& path, const report::ReportData& data) {
     core::write_text_file(path, report::html_report(data));
 }

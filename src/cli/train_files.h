@@ -7,9 +7,11 @@
 #include <vector>
 
 #include "ewa/dataset.h"
+#include "ewa/exposure.h"
 #include "ewa/renderer.h"
 #include "report/html.h"
 #include "report/pictures.h"
+#include "report/summary.h"
 
 namespace ewa::cli {
 
@@ -34,6 +36,10 @@ struct PictureRequest {
 /// RunError, InputError.
 std::vector<report::ReportPicture> draw_report_pictures(const PictureRequest& request,
                                                         const std::filesystem::path& folder);
+
+/// {name of the photograph: its exposure as three rows of four numbers}; exposures: one for each of the frames.
+report::Json exposures_json(const Dataset& dataset, const std::vector<int>& frames,
+                            const std::vector<Exposure>& exposures);
 
 void write_report(const std::filesystem::path& path, const report::ReportData& data);
 

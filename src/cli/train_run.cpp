@@ -37,6 +37,10 @@ TrainOptions train_options(const TrainArguments& arguments) {
                                                       : Strategy::adc;
     options.max_splats = arguments.max_splats;
     options.sh_degree = arguments.draw.sh_degree;
+    options.absolute_gradients = arguments.absgrad;
+    options.revised_opacity = arguments.revised_opacity;
+    options.exposure = arguments.exposure;
+    options.halvings = arguments.resolution_schedule;
     options.seed = arguments.seed;
     options.image_cache_bytes = arguments.image_cache << 20;
     options.random_background = arguments.draw.random_background();
@@ -88,7 +92,9 @@ class TrainRun {
     void save_checkpoint(const Trainer& trainer);
     void train(Trainer& trainer, Progress& progress);
     void log(const StepReport& report, const std::optional<Evaluation>& evaluation);
-    Evaluation evaluate_frames(const Gaussians& gaussians, const std::vector<int>& frames) const;
+    Evaluation evaluate_frames(const Gaussians& gaussians, const std::vector<int>& frames,
+                               const std::vector<Exposure>& exposures = {}) const;
+    double train_psnr(const Trainer& trainer, const Gaussians& gaussians) const;
     void save(const Gaussians& gaussians) const;
     int finish(const Trainer& trainer);
     void print_result() const;
@@ -157,14 +163,35 @@ void TrainRun::describe() const {
                     split_.train.size(), split_.test.size(), camera.width, camera.height, start_.size()));
     for (const std::string& remark : report_.remarks) say(remark);
     say("device: " + report_.summary.device);
+    const MemoryForecast memory = forecast_memory(*device_, dataset_, split_.train, start_, options_);
+    say(fmt::format("memory: up to {} for {} splats ({} model, {} frame, {} photographs)",
+                    bytes_text(memory.total()), memory.splats, bytes_text(memory.model),
+                    bytes_text(memory.frame), bytes_text(memory.photographs)));
+    const uint64_t there = device_info(*device_).memory_bytes;
+    if (memory.total() > there)
+        say(fmt::format("the device has {}: if memory runs out, a smaller --max-splats, --image-cache or a larger "
+                        "--downscale takes less",
+                        bytes_text(there)));
     if (!arguments_.verbose) return;
     for (const report::LeftOut& line : report_.plan)
         say(fmt::format("left out: {} ({}{})", line.what, line.why,
                         line.bytes_saved > 0 ? ", saves " + bytes_text(line.bytes_saved) : ""));
 }
 
-Evaluation TrainRun::evaluate_frames(const Gaussians& gaussians, const std::vector<int>& frames) const {
-    return evaluate(device_, gaussians, dataset_, frames, options_.render);
+Evaluation TrainRun::evaluate_frames(const Gaussians& gaussians, const std::vector<int>& frames,
+                                     const std::vector<Exposure>& exposures) const {
+    return evaluate(device_, gaussians, dataset_, frames, options_.render, exposures);
+}
+
+/// Of training views spread over the capture, each through its exposure where these were learned.
+double TrainRun::train_psnr(const Trainer& trainer, const Gaussians& gaussians) const {
+    const std::vector<int> frames = spread_out(split_.train, kTrainViewsEvaluated);
+    const std::vector<Exposure> learned = trainer.exposures();
+    std::vector<Exposure> exposures;
+    for (size_t i = 0; i < split_.train.size() && !learned.empty(); ++i)
+        if (std::find(frames.begin(), frames.end(), split_.train[i]) != frames.end())
+            exposures.push_back(learned[i]);
+    return evaluate_frames(gaussians, frames, exposures).psnr;
 }
 
 void TrainRun::log(const StepReport& step, const std::optional<Evaluation>& evaluation) {
@@ -241,6 +268,8 @@ int TrainRun::finish(const Trainer& trainer) {
     const bool cut_short = interrupted();
     const Gaussians gaussians = trainer.gaussians();
     save(gaussians);
+    if (options_.exposure)
+        write_json(folder_ / "exposures.json", exposures_json(dataset_, split_.train, trainer.exposures()));
     save_checkpoint(trainer);  // a kill from here on costs no training
 
     report::Summary& summary = report_.summary;
@@ -248,7 +277,7 @@ int TrainRun::finish(const Trainer& trainer) {
     if (!cut_short) {
         say("evaluating");
         if (!split_.test.empty()) test = evaluate_frames(gaussians, split_.test);
-        summary.train_psnr = evaluate_frames(gaussians, spread_out(split_.train, kTrainViewsEvaluated)).psnr;
+        summary.train_psnr = train_psnr(trainer, gaussians);
     }
     if (test) {
         summary.test_psnr = test->psnr;
@@ -317,7 +346,7 @@ int TrainRun::run() {
     for (const PlanLine& line :
          plan_lines(start_, options_.render,
                     options_.strategy == Strategy::adc ? Purpose::densifying : Purpose::training,
-                    dataset_.frames.front().masks == MaskUse::ignore))
+                    dataset_.frames.front().masks == MaskUse::ignore, options_.exposure))
         report_.plan.push_back({line.what, line.why, line.bytes_saved});
     describe();
 
@@ -345,6 +374,10 @@ report::Json to_config(const TrainArguments& a) {
     json["strategy"] = a.strategy;
     json["max-splats"] = a.max_splats;
     json["sh-degree"] = a.draw.sh_degree;
+    json["absgrad"] = a.absgrad;
+    json["revised-opacity"] = a.revised_opacity;
+    json["exposure"] = a.exposure;
+    json["resolution-schedule"] = a.resolution_schedule;
     json["init"] = a.init;
     json["downscale"] = a.downscale;
     json["masks"] = masks_text(a.masks);

@@ -19,6 +19,8 @@ struct TrainArguments {
     MaskUse masks = MaskUse::automatic;
     uint64_t seed = 0;
     uint64_t image_cache = TrainOptions{}.image_cache_bytes >> 20;  // MiB
+    bool absgrad = false, revised_opacity = false, exposure = false;
+    int resolution_schedule = 0;  // halvings at the start
     DrawArguments draw;
     int eval_every = 0;  // steps; 0: only at the end
     int save_every = 0;  // steps; 0: by the clock

@@ -49,18 +49,26 @@ Picture find_picture(const io::PosedImage& image, const fs::path& folder, int do
     return {image.path, is_file(image.path), downscale};
 }
 
-/// The mask file of a picture, where there is one.
-fs::path find_mask(const io::PosedImage& image, const fs::path& folder) {
-    if (!image.mask.empty() && is_file(image.mask)) return image.mask;
-    const fs::path inside = image.path.lexically_relative(folder);
-    if (inside.empty() || *inside.begin() == "..") return {};
-    const fs::path masks = folder.parent_path() / "masks";
+fs::path find_mask_in(const fs::path& masks, const fs::path& inside) {
     fs::path replaced = masks / inside, added = masks / inside;
     replaced.replace_extension(".png");
     added += ".png";
     for (const fs::path& path : {added, replaced, masks / inside})
         if (is_file(path)) return path;
     return {};
+}
+
+/// The mask file of a picture, where there is one: its copy in masks_K, the model's, or that in masks. A mask may have
+/// any size of its picture's shape.
+fs::path find_mask(const io::PosedImage& image, const fs::path& folder, int downscale) {
+    const fs::path inside = image.path.lexically_relative(folder), root = folder.parent_path();
+    const bool below = !inside.empty() && *inside.begin() != "..";
+    if (below && downscale > 1) {
+        const fs::path small = find_mask_in(root / ("masks_" + std::to_string(downscale)), inside);
+        if (!small.empty()) return small;
+    }
+    if (!image.mask.empty() && is_file(image.mask)) return image.mask;
+    return below ? find_mask_in(root / "masks", inside) : fs::path();
 }
 
 /// Whether masks are for ignoring or for cutting out is one decision for a dataset.
@@ -229,7 +237,7 @@ Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& op
         const bool usable = image.camera.width > 0 && (picture.exists || !options.need_images);
         if (!usable) continue;
         dataset.frames.push_back(make_frame(image, picture, options, pinholes));
-        dataset.frames.back().mask_path = find_mask(image, model.folder);
+        dataset.frames.back().mask_path = find_mask(image, model.folder, options.downscale);
     }
     settle_masks(dataset, options.masks);
     if (dataset.frames.empty())

@@ -25,7 +25,8 @@ double loss_of(const shared::Counts& counts) {
 }
 
 void record_loss(gpu::Recording& recording, Kernels& kernels, const Frame& frame, const CameraUse& camera,
-                 const std::array<float, 3>& background, const gpu::Buffer& photo, bool masked) {
+                 const std::array<float, 3>& background, const gpu::Buffer& photo, bool masked,
+                 const ExposureUse* exposure) {
     const passes::Shape& shape = kernels.shape();
     const Sizes& s = frame.sizes;
     const double share = 1.0 / (3.0 * camera.width * camera.height);
@@ -35,10 +36,12 @@ void record_loss(gpu::Recording& recording, Kernels& kernels, const Frame& frame
                                 float(-shared::SSIM_WEIGHT * share),
                                 float((1 - shared::SSIM_WEIGHT) * share)};
     const shared::MaskPush mask{{camera.width, camera.height}, s.stride, s.plane_floats};
-    const gpu::Buffer& image = masked ? frame.masked : frame.planes;
+    const gpu::Buffer& drawn = exposure ? frame.exposed : frame.planes;
+    const gpu::Buffer& image = masked ? frame.masked : drawn;
+    if (exposure) record_expose(recording, kernels, frame, camera.width, camera.height, *exposure);
     if (masked)
         kernels.get<passes::MaskPictures>().record(recording, shape,
-                                                   {photo, frame.planes, frame.target, frame.masked}, mask);
+                                                   {photo, drawn, frame.target, frame.masked}, mask);
     else
         kernels.get<passes::UnpackTarget>().record(recording, shape, {photo, frame.target},
                                                    {{background[0], background[1], background[2]},
@@ -56,13 +59,14 @@ void record_loss(gpu::Recording& recording, Kernels& kernels, const Frame& frame
     if (masked)
         kernels.get<passes::MaskGradient>().record(recording, shape, {photo, frame.image_gradient}, mask);
     record_mean(recording, kernels, frame, 1, float(share));
+    if (exposure) record_expose_backward(recording, kernels, frame, camera.width, camera.height, *exposure);
 }
 
 void record_backward(gpu::Recording& recording, Kernels& kernels, const Plan& plan, const Model& model,
                      const Frame& frame, const CameraUse& camera, const std::array<float, 3>& background,
                      const Sorted& sorted, const Rates& rates) {
     const passes::Shape& shape = kernels.shape();
-    kernels.get<passes::BlendBackward>().record(
+    kernels.get<passes::BlendBackward>(plan.absolute ? 1u : 0u).record(
         recording, shape,
         {frame.records, *sorted.splats, frame.tile_starts, frame.planes, frame.image_gradient, frame.slots},
         blend_push(kernels, frame, camera, background));
@@ -70,7 +74,8 @@ void record_backward(gpu::Recording& recording, Kernels& kernels, const Plan& pl
     // What a gradient alone does not have stands in for itself: the kernel leaves those bindings alone.
     const gpu::Buffer& moments2 = plan.adam ? model.moments2 : model.moments1;
     const gpu::Buffer& statistics = plan.statistics ? model.statistics : frame.partials;
-    const uint32_t mode = (plan.adam ? 0u : 1u) | (plan.statistics ? 2u : 0u) | (plan.regularised ? 4u : 0u);
+    const uint32_t mode = (plan.adam ? 0u : 1u) | (plan.statistics ? 2u : 0u) | (plan.regularised ? 4u : 0u) |
+                          (plan.absolute ? 8u : 0u);
     const double step = rates.step;
     kernels.get<passes::Update>(uint32_t(plan.sh_degree), uint32_t(plan.kernel), mode)
         .record(recording, shape,

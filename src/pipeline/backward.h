@@ -1,5 +1,6 @@
 // Loss and the way back: from image planes to moved parameters (or to their gradient).
 #pragma once
+#include "pipeline/exposure.h"
 #include "pipeline/forward.h"
 
 namespace ewa::pipeline {
@@ -13,9 +14,11 @@ struct Rates {
 
 /// photo: width * height texels, RGBA. Its alpha cuts it out of the background or, where `masked`, says how
 /// much each pixel counts (the frame then has to have been asked for with masks). Leaves the loss's parts in
-/// Counts and dL/d(image) in frame.image_gradient.
+/// Counts and dL/d(image) in frame.image_gradient. exposure, where there is one: the photograph's, which takes a step
+/// itself (the frame then has to have been asked for with exposure).
 void record_loss(gpu::Recording& recording, Kernels& kernels, const Frame& frame, const CameraUse& camera,
-                 const std::array<float, 3>& background, const gpu::Buffer& photo, bool masked = false);
+                 const std::array<float, 3>& background, const gpu::Buffer& photo, bool masked = false,
+                 const ExposureUse* exposure = nullptr);
 
 /// Blend backward and projection backward. plan.adam: moves the model; else writes the gradient to
 /// model.moments1.

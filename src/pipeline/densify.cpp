@@ -19,7 +19,8 @@ shared::DensifyPush push_of(const Model& model, const Frame& frame, const Densif
             rules.prune_logit,
             rules.prune_scale,
             {uint32_t(rules.seed), uint32_t(rules.seed >> 32)},
-            rules.step};
+            rules.step,
+            rules.revised_opacity ? 1u : 0u};
 }
 
 /// Splats of the next generation at a threshold; leaves their offsets in frame.prefix and frame.scan_totals.

@@ -14,6 +14,7 @@ struct DensifyRules {
     float split_scale = 0;    // world units
     float prune_logit = 0;
     float prune_scale = 0;  // world units; 0: scale does not prune
+    bool revised_opacity = false;  // of a split's children
     uint64_t seed = 0;
     uint32_t step = 0;
     uint32_t max_splats = 0;  // hard cap; the threshold is raised until the next generation fits under it

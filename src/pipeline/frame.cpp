@@ -48,12 +48,14 @@ void Frame::reserve(gpu::Device& device, const passes::Shape& shape, const Frame
     grow(device, planes, "planes", sizes.planes, Texel::rgba32f);
     if (request.gradients) {
         grow(device, target, "target", sizes.target, Texel::rgba32f);
+        grow(device, exposed, "exposed", sizes.exposed, Texel::rgba32f);
         grow(device, masked, "masked", sizes.masked, Texel::rgba32f);
         grow(device, moments, "moments", sizes.moments, Texel::rgba32f);
         grow(device, derivatives, "derivatives", sizes.derivatives, Texel::rgba32f);
         grow(device, blurred, "blurred", sizes.derivatives, Texel::rgba32f);
         grow(device, image_gradient, "image gradient", sizes.image_gradient, Texel::rgba32f);
         grow(device, partials, "partials", sizes.partial_sums);
+        grow(device, exposure_sums, "exposure sums", sizes.exposure_sums);
         grow(device, reduced, "reduced", sizes.reduced);
         for (auto& buffer : instance_places)
             grow(device, buffer, "instance places", sizes.instance_words, Texel::rgba32ui);
@@ -64,6 +66,7 @@ void Frame::reserve(gpu::Device& device, const passes::Shape& shape, const Frame
         old.image_planes != sizes.image_planes) {
         zero(planes);
         if (target) zero(target);
+        if (exposed) zero(exposed);
         if (masked) zero(masked);
     }
 }

@@ -16,8 +16,8 @@ struct Frame {
     gpu::Buffer records, depth_keys[2], order[2], tile_counts, prefix, scan_totals, first_instances;
     gpu::Buffer counters, counter_prefix, digit_totals;
     gpu::Buffer instance_keys[2], instance_splats[2], instance_places[2], tile_starts;
-    gpu::Buffer planes, target, masked, moments, derivatives, blurred, image_gradient, partials, reduced,
-        slots;
+    gpu::Buffer planes, target, exposed, masked, moments, derivatives, blurred, image_gradient, partials,
+        exposure_sums, reduced, slots;
 
     /// Makes room for a request; buffers that are large enough stay. Buffers that held image padding come
     /// back zeroed. Throws what sizes_for and Buffer throw.

@@ -43,6 +43,7 @@ McmcResult refine_mcmc(Kernels& kernels, gpu::Executor& executor, Model& model, 
     push.weight_scale = float(std::min(65535u, 0xffffffffu / std::max(model.splats, 1u)));
     push.dead_logit = float(std::log(rules.dead_opacity / (1 - rules.dead_opacity)));
     push.least_opacity = float(rules.dead_opacity);
+    push.spread = float(rules.spread);
     push.seed[0] = uint32_t(rules.seed);
     push.seed[1] = uint32_t(rules.seed >> 32);
     push.step = rules.step;

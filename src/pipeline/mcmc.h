@@ -14,6 +14,7 @@ struct McmcRules {
     double dead_opacity = 0.005;  // at or under it a splat is dead
     double growth = 1.05;         // the number after a refinement over that before, up to max_splats
     uint32_t max_splats = 0;      // hard cap
+    double spread = 0;            // standard deviations of the source that it and its copies move apart
     uint64_t seed = 0;
     uint32_t step = 0;
 };
@@ -24,7 +25,7 @@ struct McmcResult {
 
 /// Every dead splat, and every one that is added, becomes a copy of a source drawn with probability in
 /// proportion to its opacity (weights of 1 / min(65535, 2^32 / splats)); source and copies share its opacity
-/// and scales by eq. 9 and start without moments. Replaces the model's buffers where anything changes. frame:
+/// and scales by eq. 9 and start without moments, where draws of the source's Gaussian, `spread` times as wide, put them. Replaces the model's buffers where anything changes. frame:
 /// for its sizes and counts. Where every splat is dead nothing does.
 McmcResult refine_mcmc(Kernels& kernels, gpu::Executor& executor, Model& model, const Frame& frame,
                        const McmcRules& rules);

@@ -49,6 +49,8 @@ std::vector<PlanLine> describe(const Plan& plan, int file_degree, uint64_t splat
     if (!plan.depth) lines.push_back({"depth plane", "colour and opacity alone were asked for", 0});
     if (plan.gradients && !plan.masks)
         lines.push_back({"mask passes and the masked picture", "every pixel of every photograph counts", 0});
+    if (plan.gradients && !plan.exposure)
+        lines.push_back({"exposures, their passes and the exposed picture", "not asked for (--exposure)", 0});
     if (plan.kernel == Kernel::peak)
         lines.push_back({"footprint factor of the opacity", "the kernel is normalised to its peak", 0});
     return lines;
@@ -57,12 +59,13 @@ std::vector<PlanLine> describe(const Plan& plan, int file_degree, uint64_t splat
 }  // namespace pipeline
 
 std::vector<PlanLine> plan_lines(const Gaussians& gaussians, const RenderOptions& options, Purpose purpose,
-                                 bool masks) {
+                                 bool masks, bool exposure) {
     const int degree = std::min(gaussians.sh_degree, options.sh_degree);
     pipeline::Plan plan = purpose == Purpose::picture
                               ? pipeline::plan_picture(gaussians, options, false)
                               : pipeline::plan_training(degree, options, purpose == Purpose::densifying);
     plan.masks = masks;
+    plan.exposure = exposure;
     return pipeline::describe(plan, gaussians.sh_degree, gaussians.size());
 }
 

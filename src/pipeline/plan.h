@@ -17,9 +17,11 @@ struct Plan {
     bool gradients = false;   // loss, backward passes and their buffers
     bool adam = false;        // both moments
     bool statistics = false;  // densification statistics
+    bool absolute = false;    // of absolute gradients
     bool regularised = false;  // opacity and scale regularisers in the loss
     bool depth = false;
     bool masks = false;  // photographs in which not every pixel counts
+    bool exposure = false;  // photographs' exposures are learned
 };
 
 /// A picture: nothing of a degree the scene does not have, or that was not asked for, is stored or evaluated.

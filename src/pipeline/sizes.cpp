@@ -75,6 +75,10 @@ Sizes sizes_for(const passes::Shape& shape, const FrameRequest& request) {
         s.reduce_blocks = divide_up(s.partials, s.reduce_block);
         s.target = uint64_t(s.plane_floats) * 3 * word;
         s.masked = request.masks ? s.target : 0;
+        s.exposed = request.exposure ? s.target : 0;
+        s.exposure_blocks = divide_up(request.width * request.height, shared::EXPOSURE_BLOCK);
+        s.exposure_sums =
+            request.exposure ? uint64_t(s.exposure_blocks) * shared::EXPOSURE_FLOATS * word : 0;
         s.moments = uint64_t(s.plane_floats) * 3 * shared::MOMENT_PLANES * word;
         s.derivatives = uint64_t(s.plane_floats) * 3 * shared::DERIVATIVE_PLANES * word;
         s.image_gradient = s.target;
@@ -92,8 +96,8 @@ uint64_t Sizes::total() const {
     const uint64_t sorting = scan_totals + 2 * counters + digit_totals;
     // keys 2, splats 2, and in training their places 2
     const uint64_t per_instance = instance_words * (gradients ? 6 : 4) + slots;
-    return per_splat + sorting + per_instance + tile_starts + planes + target + masked + moments +
-           2 * derivatives + image_gradient + partial_sums + reduced;
+    return per_splat + sorting + per_instance + tile_starts + planes + target + masked + exposed + moments +
+           2 * derivatives + image_gradient + partial_sums + exposure_sums + reduced;
 }
 
 }  // namespace ewa::pipeline

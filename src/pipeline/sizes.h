@@ -12,7 +12,8 @@ struct FrameRequest {
     uint32_t instances = 0;          // (splat, tile) pairs to make room for
     bool gradients = false;
     bool depth = false;
-    bool masks = false;  // with gradients: pixels may count in part
+    bool masks = false;     // with gradients: pixels may count in part
+    bool exposure = false;  // with gradients: the loss sees the picture through a photograph's exposure
 };
 
 struct RadixCut {
@@ -29,12 +30,13 @@ struct Sizes {
     uint32_t image_planes = 0;
     uint32_t partials = 0;  // partial sums of a loss kernel
     uint32_t reduce_block = 0, reduce_blocks = 0;
+    uint32_t exposure_blocks = 0;  // of pixels, for the gradient of the exposure
 
     // Bytes.
     uint64_t records = 0, splat_words = 0, scan_totals = 0, counters = 0, digit_totals = 0;
     uint64_t instance_words = 0, tile_starts = 0, planes = 0, target = 0;
-    uint64_t masked = 0, moments = 0, derivatives = 0, image_gradient = 0, partial_sums = 0, reduced = 0,
-             slots = 0;
+    uint64_t masked = 0, exposed = 0, moments = 0, derivatives = 0, image_gradient = 0, partial_sums = 0,
+             exposure_sums = 0, reduced = 0, slots = 0;
 
     uint64_t total() const;  // of all buffers a frame with this request holds
 };

@@ -1,6 +1,7 @@
 #include "reference/blend_backward.h"
 
 #include <cassert>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 namespace ewa::reference {
@@ -13,6 +14,7 @@ Moments& Moments::operator+=(const Moments& other) {
     suv += other.suv;
     svv += other.svv;
     color += other.color;
+    absolute += other.absolute;
     return *this;
 }
 
@@ -26,6 +28,7 @@ ScreenGradient screen_gradient(const Projected& splat, const Moments& m) {
     out.c = 0.5 * (uy * uy * m.suu + 2 * uy * vy * m.suv + vy * vy * m.svv);
     out.opacity = m.s0 / splat.opacity;
     out.color = m.color;
+    out.absolute = m.absolute;
     return out;
 }
 
@@ -52,8 +55,11 @@ BlendGradients blend_backward(std::span<const Projected> projected, const Instan
                     glm::dot(pixel_gradient, c.transmittance * color - behind / (1 - c.alpha.value));
                 const double g = by_alpha * c.alpha.slope * c.sample.raw;
                 const double u = c.sample.u, v = c.sample.v;
-                out.instances[c.instance] +=
-                    {g, g * u, g * v, g * u * u, g * u * v, g * v * v, weight * pixel_gradient};
+                const auto [ux, uy, vy] = whiteners[c.splat];
+                out.instances[c.instance] += {g,         g * u,     g * v,
+                                              g * u * u, g * u * v, g * v * v,
+                                              weight * pixel_gradient,
+                                              glm::abs(g * glm::dvec2(ux * u, uy * u + vy * v))};
             });
         }
     }

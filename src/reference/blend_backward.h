@@ -24,6 +24,7 @@ namespace ewa::reference {
 struct Moments {
     double s0 = 0, su = 0, sv = 0, suu = 0, suv = 0, svv = 0;  // of g times 1, u, v, uu, uv, vv
     glm::dvec3 color{0};                                       // dL/dcolour
+    glm::dvec2 absolute{0};                                    // |dL/dmean2d| of each pixel, by component
     Moments& operator+=(const Moments& other);
 };
 
@@ -35,6 +36,7 @@ struct ScreenGradient {
     double a = 0, b = 0, c = 0;
     double opacity = 0;
     glm::dvec3 color{0};
+    glm::dvec2 absolute{0};  // |dL/dmean2d| of each pixel, by component, summed (Ye et al. 2024, AbsGS, eq. 7)
 };
 
 ScreenGradient screen_gradient(const Projected& splat, const Moments& moments);

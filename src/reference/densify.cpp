@@ -10,12 +10,12 @@
 namespace ewa::reference {
 
 void accumulate(DensifyStatistics& statistics, std::span<const ScreenGradient> gradients,
-                std::span<const uint8_t> in_view, const Camera& camera) {
+                std::span<const uint8_t> in_view, const Camera& camera, bool absolute) {
     assert(gradients.size() == in_view.size() && statistics.views.size() == in_view.size());
     for (size_t i = 0; i < gradients.size(); ++i) {
         if (!in_view[i]) continue;
-        statistics.gradient_sum[i] +=
-            std::hypot(gradients[i].mean2d.x * camera.width / 2, gradients[i].mean2d.y * camera.height / 2);
+        const glm::dvec2 by_mean = absolute ? gradients[i].absolute : gradients[i].mean2d;
+        statistics.gradient_sum[i] += std::hypot(by_mean.x * camera.width / 2, by_mean.y * camera.height / 2);
         ++statistics.views[i];
     }
 }
@@ -54,7 +54,7 @@ std::vector<Decision> decide(const Values& values, const DensifyStatistics& stat
     return decisions;
 }
 
-Splat split_child(const Splat& parent, const glm::dvec3& normal) {
+Splat split_child(const Splat& parent, const glm::dvec3& normal, bool revised_opacity) {
     const double norm = robust_norm(parent.quaternion);
     std::array<double, 4> unit{};
     for (int k = 0; k < 4; ++k) unit[k] = parent.quaternion[k] / norm;
@@ -65,6 +65,11 @@ Splat split_child(const Splat& parent, const glm::dvec3& normal) {
         child.log_scale[k] = parent.log_scale[k] - std::log(shared::SPLIT_SCALE);
     }
     child.mean += rotation_matrix(unit) * step;
+    if (revised_opacity) {
+        const double rest = 1 / (1 + std::exp(parent.opacity_logit));
+        const double opacity = rest / (1 + std::sqrt(rest)) * std::exp(parent.opacity_logit);  // 1 - sqrt(rest)
+        child.opacity_logit = std::log(opacity) - std::log(std::sqrt(rest));
+    }
     return child;
 }
 

@@ -26,9 +26,9 @@ struct DensifyStatistics {
 };
 
 /// in_view: one flag a splat, whether it had a tile. A pixel is 2/width of the device coordinates: the
-/// gradient is (x * width / 2, y * height / 2).
+/// gradient is (x * width / 2, y * height / 2). absolute: of the pixels' absolute gradients.
 void accumulate(DensifyStatistics& statistics, std::span<const ScreenGradient> gradients,
-                std::span<const uint8_t> in_view, const Camera& camera);
+                std::span<const uint8_t> in_view, const Camera& camera, bool absolute = false);
 
 struct DensifyOptions {
     double extent = 1;  // of the scene, world units
@@ -51,8 +51,9 @@ std::vector<Decision> decide(const Values& values, const DensifyStatistics& stat
                              const DensifyOptions& options);
 
 /// A split's child: mean + R (scale * normal), scales divided by SPLIT_SCALE, all else the parent's. normal:
-/// three independent standard normal numbers.
-Splat split_child(const Splat& parent, const glm::dvec3& normal);
+/// three independent standard normal numbers. revised_opacity: the child's is 1 - (1 - opacity)^(1/2) (Rota Bulo et
+/// al. 2024, "Revising densification", eq. 9).
+Splat split_child(const Splat& parent, const glm::dvec3& normal, bool revised_opacity = false);
 
 struct Densified {
     Values values;  // what stays in index order, then the clones, then the children pair by pair

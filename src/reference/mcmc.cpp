@@ -57,4 +57,13 @@ glm::dvec3 noise(const Splat& splat, const glm::dvec3& normal, double amplitude)
     return amplitude * gate * (rotation * along);
 }
 
+glm::dvec3 apart(const Splat& source, const glm::dvec3& normal, double spread) {
+    const double norm = robust_norm(source.quaternion);
+    std::array<double, 4> unit{};
+    for (size_t k = 0; k < 4; ++k) unit[k] = source.quaternion[k] / norm;
+    glm::dvec3 step(0);
+    for (int k = 0; k < 3; ++k) step[k] = spread * std::exp(source.log_scale[k]) * normal[k];
+    return source.mean + rotation_matrix(unit) * step;
+}
+
 }  // namespace ewa::reference

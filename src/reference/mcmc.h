@@ -21,6 +21,9 @@ Share share_of(double opacity, int parts);
 /// lies.
 std::vector<uint32_t> draw_sources(std::span<const uint32_t> weights, std::span<const uint32_t> random);
 
+/// Where a source or a copy of it stands that moves `spread` of its standard deviations, times a normal draw.
+glm::dvec3 apart(const Splat& source, const glm::dvec3& normal, double spread);
+
 /// Eq. 8: amplitude * sigmoid(-MCMC_GATE_SLOPE (opacity - MCMC_GATE_OPACITY)) * Sigma * normal, world units.
 glm::dvec3 noise(const Splat& splat, const glm::dvec3& normal, double amplitude);
 

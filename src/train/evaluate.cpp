@@ -8,14 +8,16 @@
 namespace ewa {
 
 Evaluation evaluate(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians, const Dataset& dataset,
-                    const std::vector<int>& frames, const RenderOptions& options) {
+                    const std::vector<int>& frames, const RenderOptions& options,
+                    const std::vector<Exposure>& exposures) {
     const auto start = std::chrono::steady_clock::now();
     Renderer renderer(std::move(device), gaussians, options);
     Evaluation result;
-    for (const int index : frames) {
-        const Frame& frame = dataset.frames[size_t(index)];
+    for (size_t i = 0; i < frames.size(); ++i) {
+        const Frame& frame = dataset.frames[size_t(frames[i])];
         const auto [photo, weights] = load_photograph(frame, options.background);
-        const Image picture = renderer.render(frame.camera).color;
+        Image picture = renderer.render(frame.camera).color;
+        if (!exposures.empty()) picture = exposed(std::move(picture), exposures.at(i));
         if (photo.width != picture.width || photo.height != picture.height)
             throw InputError("frame " + frame.name + ": the picture's size is not the camera's");
         const double db = psnr(picture, photo, weights);

@@ -23,14 +23,19 @@ bool transparent(const Image& image) {
 }  // namespace
 
 Photographs::Photographs(gpu::Device& device, const passes::Shape& shape, const Dataset& dataset,
-                         const std::vector<int>& frames, uint64_t cache_bytes, const glm::dvec3& origin)
+                         const std::vector<int>& frames, uint64_t cache_bytes, const glm::dvec3& origin,
+                         int reduction)
     : device_(device), photos_(frames.size()) {
     const uint64_t align = std::max<uint64_t>(device.limits().uniform_alignment, 16);
     camera_stride_ = (sizeof(shared::CameraBlock) + align - 1) / align * align;
     std::vector<std::byte> blocks(camera_stride_ * std::max<size_t>(frames.size(), 1));
     uint64_t held_bytes = 0;
     for (size_t i = 0; i < frames.size(); ++i) {
-        const Frame& frame = frames_.emplace_back(dataset.frames[size_t(frames[i])]);
+        Frame& frame = frames_.emplace_back(dataset.frames[size_t(frames[i])]);
+        if (reduction > 1) {
+            frame.downscale *= reduction;
+            frame.camera = downscale(frame.pinhole, frame.downscale);
+        }
         const shared::CameraBlock block = pipeline::camera_block(frame.camera, shape, origin);
         std::memcpy(&blocks[i * camera_stride_], &block, sizeof(block));
         const uint64_t bytes =

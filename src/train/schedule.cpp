@@ -12,6 +12,11 @@ constexpr int kLeastRelocateEvery = 25;  // steps: time enough for what was relo
 constexpr int kLeastResetEvery = 1000;   // steps
 constexpr int kLeastShEvery = 50;        // steps
 
+double decayed(double first, double last, double share) {
+    const double t = std::clamp(share, 0.0, 1.0);
+    return std::exp((1 - t) * std::log(first) + t * std::log(last));
+}
+
 }  // namespace
 
 bool Schedule::densifies(int step) const {
@@ -34,9 +39,16 @@ int Schedule::degree(int step) const {
     return std::min(sh_degree, (step - 1) / sh_degree_every);
 }
 
+int Schedule::halvings_at(int step) const {
+    return std::max(0, halvings - (step - 1) / resolution_every);
+}
+
 double Schedule::mean_rate(int step, double extent) const {
-    const double t = std::clamp(double(step) / steps, 0.0, 1.0);
-    return extent * std::exp((1 - t) * std::log(means_rate) + t * std::log(means_rate_final));
+    return extent * decayed(means_rate, means_rate_final, double(step) / steps);
+}
+
+double Schedule::exposure_rate(int step) const {
+    return decayed(exposures_rate, exposures_rate_final, double(step) / steps);
 }
 
 Schedule schedule_for(const TrainOptions& options) {
@@ -51,13 +63,19 @@ Schedule schedule_for(const TrainOptions& options) {
     s.refine_stop = scaled(options.refine_stop, 1);
     s.relocate_stop = scaled(options.relocate_stop, 1);
     s.relocate_every = scaled(options.refine_every, std::min(options.refine_every, kLeastRelocateEvery));
+    s.growth = std::pow(options.growth, std::max(1.0, s.relocate_every / (share * options.refine_every)));
+    s.copy_spread = (1 - share) * options.copy_spread;
     if (options.opacity_reset_every > 0)
         s.opacity_reset_every =
             scaled(options.opacity_reset_every, std::min(options.opacity_reset_every, kLeastResetEvery));
     s.sh_degree_every = scaled(options.sh_degree_every, std::min(options.sh_degree_every, kLeastShEvery));
     s.sh_degree = options.sh_degree;
+    s.halvings = options.halvings;
+    s.resolution_every = scaled(options.resolution_every, 1);
     s.means_rate = options.means_rate;
     s.means_rate_final = options.means_rate_final;
+    s.exposures_rate = options.exposure_rate;
+    s.exposures_rate_final = options.exposure_rate_final;
     return s;
 }
 

@@ -87,6 +87,8 @@ struct Trainer::State {
     Model model;
     pipeline::Frame frame;
     train::Photographs photographs;
+    std::vector<train::Photographs> smaller;  // by halvings, from 1; what the schedule is past holds nothing
+    Exposures exposures;
     uint32_t instance_room;
     StepReport report;
     std::deque<std::vector<gpu::Timing>> timings;
@@ -103,8 +105,14 @@ struct Trainer::State {
           model(upload_model(*device, prepared(start), 2, plan.statistics)),
           photographs(*device, kernels.shape(), dataset, frames, o.image_cache_bytes, model.origin),
           instance_room(first_capacity(start.size())) {
+        for (int halvings = 1; halvings <= o.halvings; ++halvings)
+            smaller.emplace_back(*device, kernels.shape(), dataset, frames, o.image_cache_bytes, model.origin,
+                                 1 << halvings);
         plan.masks = photographs.any_masked();
+        plan.exposure = o.exposure;
+        if (plan.exposure) exposures = Exposures(*device, photographs.count());
         plan.regularised = o.strategy == Strategy::mcmc;
+        plan.absolute = plan.statistics && o.absolute_gradients;
         report.splats = model.splats;
     }
 
@@ -124,21 +132,34 @@ struct Trainer::State {
         return r;
     }
 
+    /// At the resolution of this step. Resolutions rise: what is larger than this one's is still to come.
+    train::Photographs& photographs_at(int step) {
+        const size_t halvings = size_t(schedule.halvings_at(step));
+        while (smaller.size() > halvings) smaller.pop_back();
+        return halvings == 0 ? photographs : smaller.back();
+    }
+
     void optimise(int step) {
+        train::Photographs& seen = photographs_at(step);
         const size_t index = train::frame_of_step(step, photographs.count(), options.seed);
-        const CameraUse camera = photographs.camera(index);
-        const auto photo = photographs.photo(index);
-        photographs.prepare(train::frame_of_step(step + 1, photographs.count(), options.seed));
+        const CameraUse camera = seen.camera(index);
+        const auto photo = seen.photo(index);
+        if (schedule.halvings_at(step + 1) == schedule.halvings_at(step))
+            seen.prepare(train::frame_of_step(step + 1, photographs.count(), options.seed));
+        const ExposureUse exposure{&exposures, uint32_t(index), float(schedule.exposure_rate(step)),
+                                   uint32_t(size_t(step - 1) / photographs.count() + 1)};
         const auto background =
             options.random_background ? random_background(step, options.seed) : options.render.background;
         plan.sh_degree = std::min(plan.stored_degree, schedule.degree(step));
         const shared::Counts counts = run_until_it_fits(
             kernels, executor, frame,
-            {model.splats, camera.width, camera.height, instance_room, true, false, plan.masks},
+            {model.splats, camera.width, camera.height, instance_room, true, false, plan.masks,
+             plan.exposure},
             [&](gpu::Recording& recording) {
                 const Sorted sorted =
                     record_forward(recording, kernels, plan, model, frame, camera, background);
-                record_loss(recording, kernels, frame, camera, background, photo.texels, photo.masked);
+                record_loss(recording, kernels, frame, camera, background, photo.texels, photo.masked,
+                            plan.exposure ? &exposure : nullptr);
                 record_backward(recording, kernels, plan, model, frame, camera, background, sorted,
                                 rates(step));
                 // Sigma is a square of lengths: over the extent it is a length again, as in a scene of unit
@@ -161,13 +182,16 @@ struct Trainer::State {
         if (options.strategy == Strategy::adc) control_density(step);
         if (options.strategy != Strategy::mcmc || !schedule.relocates(step)) return;
         refine_mcmc(kernels, executor, model, frame,
-                    {options.dead_opacity, options.growth, options.max_splats, options.seed, uint32_t(step)});
+                    {options.dead_opacity, schedule.growth, options.max_splats, schedule.copy_spread,
+                     options.seed, uint32_t(step)});
     }
 
     void control_density(int step) {
         if (schedule.densifies(step)) {
             DensifyRules rules;
-            rules.grow_gradient = float(options.grow_gradient);
+            rules.grow_gradient =
+                float(plan.absolute ? options.grow_gradient_absolute : options.grow_gradient);
+            rules.revised_opacity = options.revised_opacity;
             rules.split_scale = float(options.split_scale * extent);
             rules.prune_logit = float(logit(options.prune_opacity));
             rules.prune_scale = schedule.was_reset(step) ? float(options.prune_scale * extent) : 0.0f;
@@ -212,27 +236,34 @@ namespace {
 
 struct NamedBuffer {
     const char* name;
-    gpu::Buffer Model::*buffer;
+    gpu::Buffer* buffer;
     uint64_t bytes;
+    gpu::Texel texel;
 };
 
-/// What a model of so many splats holds. A strategy without statistics has none of them.
-std::vector<NamedBuffer> buffers_of(uint32_t splats, int sh_degree, bool statistics) {
-    const uint64_t bytes = parameter_bytes(splats, sh_degree);
-    std::vector<NamedBuffer> buffers{{"params", &Model::params, bytes},
-                                     {"moments1", &Model::moments1, bytes},
-                                     {"moments2", &Model::moments2, bytes}};
-    if (statistics) buffers.push_back({"statistics", &Model::statistics, 8ull * splats});
+/// What a run of so many splats holds from step to step.
+std::vector<NamedBuffer> buffers_of(const Plan& plan, Model& model, Exposures& exposures, uint32_t splats) {
+    const uint64_t bytes = parameter_bytes(splats, model.sh_degree);
+    std::vector<NamedBuffer> buffers{{"params", &model.params, bytes, gpu::Texel::rgba32f},
+                                     {"moments1", &model.moments1, bytes, gpu::Texel::rgba32f},
+                                     {"moments2", &model.moments2, bytes, gpu::Texel::rgba32f}};
+    if (plan.statistics)
+        buffers.push_back({"statistics", &model.statistics, 8ull * splats, gpu::Texel::none});
+    if (plan.exposure)
+        for (const auto& [name, buffer] : {std::pair{"exposures", &exposures.values},
+                                           {"exp_moments1", &exposures.moments1},
+                                           {"exp_moments2", &exposures.moments2}})
+            buffers.push_back({name, buffer, exposures.bytes(), gpu::Texel::none});
     return buffers;
 }
 
 }  // namespace
 
 TrainerState Trainer::state() const {
-    const State& s = *state_;
+    State& s = *state_;
     TrainerState state{s.report, s.model.sh_degree, {}};
-    for (const NamedBuffer& named : buffers_of(s.model.capacity, s.model.sh_degree, s.plan.statistics))
-        state.arrays.push_back({named.name, (s.model.*named.buffer).download<std::byte>(named.bytes)});
+    for (const NamedBuffer& named : buffers_of(s.plan, s.model, s.exposures, s.model.capacity))
+        state.arrays.push_back({named.name, named.buffer->download<std::byte>(named.bytes)});
     const auto origin = std::as_bytes(std::span(&s.model.origin, 1));
     if (s.model.origin != glm::dvec3(0)) state.arrays.push_back({"origin", {origin.begin(), origin.end()}});
     return state;
@@ -244,7 +275,7 @@ void Trainer::restore(const TrainerState& state) {
     if (state.sh_degree != s.model.sh_degree || state.report.step > s.options.steps ||
         splats > s.options.max_splats || splats == 0)
         throw InputError("the state to go on from is of another SH degree, of more steps or of more splats");
-    const auto buffers = buffers_of(splats, state.sh_degree, s.plan.statistics);
+    const auto buffers = buffers_of(s.plan, s.model, s.exposures, splats);
     const bool moved = !state.arrays.empty() && state.arrays.back().name == "origin";
     glm::dvec3 origin(0);
     if (moved && state.arrays.back().bytes.size() == sizeof(origin))
@@ -262,16 +293,16 @@ void Trainer::restore(const TrainerState& state) {
     s.model.sh_degree = state.sh_degree;
     s.model.origin = origin;
     for (size_t i = 0; i < buffers.size(); ++i) {
-        const bool texels = buffers[i].buffer != &Model::statistics;
-        gpu::Buffer& buffer = s.model.*buffers[i].buffer;
-        buffer = gpu::Buffer(*s.device, buffers[i].name, buffers[i].bytes,
-                             texels ? gpu::Texel::rgba32f : gpu::Texel::none);
-        buffer.upload(std::span<const std::byte>(state.arrays[i].bytes));
+        *buffers[i].buffer = gpu::Buffer(*s.device, buffers[i].name, buffers[i].bytes, buffers[i].texel);
+        buffers[i].buffer->upload(std::span<const std::byte>(state.arrays[i].bytes));
     }
     s.report = state.report;
     s.instance_room = std::max(s.instance_room, first_capacity(splats));
 }
 
+std::vector<Exposure> Trainer::exposures() const {
+    return state_->plan.exposure ? state_->exposures.download() : std::vector<Exposure>();
+}
 Gaussians Trainer::gaussians() const {
     return download_model(state_->model, state_->model.params);
 }

@@ -93,6 +93,10 @@ class GuardedFrame {
         make(frame.planes, "planes", s.planes, Texel::rgba32f);
         if (request.gradients) {
             make(frame.target, "target", s.target, Texel::rgba32f);
+            if (request.exposure) {
+                make(frame.exposed, "exposed", s.exposed, Texel::rgba32f);
+                make(frame.exposure_sums, "exposure sums", s.exposure_sums);
+            }
             if (request.masks) make(frame.masked, "masked", s.masked, Texel::rgba32f);
             make(frame.moments, "moments", s.moments, Texel::rgba32f);
             make(frame.derivatives, "derivatives", s.derivatives, Texel::rgba32f);

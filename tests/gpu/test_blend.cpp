@@ -135,6 +135,8 @@ TEST_P(BlendPass, PlanesAreTheTwins) {
 
 INSTANTIATE_TEST_SUITE_P(All, BlendPass, kCases, case_name);
 
+constexpr size_t kSums = 11;  // of a slot
+
 class BlendBackwardPass : public testing::TestWithParam<Case> {};
 
 TEST_P(BlendBackwardPass, SlotsAreTheTwinsMoments) {
@@ -149,7 +151,7 @@ TEST_P(BlendBackwardPass, SlotsAreTheTwinsMoments) {
         incoming("image gradient", pack_planes(gradient, 3, lists.sizes.stride), gpu::Texel::rgba32f),
         slots("slots", std::max<uint64_t>(lists.count(), 1) * shared::SLOT_FLOATS * 4, gpu::Texel::rgba32f);
     r.run([&](gpu::Recording& recording) {
-        r.kernels.get<passes::BlendBackward>().record(
+        r.kernels.get<passes::BlendBackward>(1u).record(
             recording, r.shape(),
             {lists.records, lists.splats, lists.starts, planes, incoming, slots},
             lists.push());
@@ -158,27 +160,30 @@ TEST_P(BlendBackwardPass, SlotsAreTheTwinsMoments) {
     const auto expected =
         reference::blend_backward(lists.twin.projected, lists.twin.instances, lists.twin.blended, gradient);
     const auto actual = slots.read<float>();
-    // Of each of the nine sums: largest error over the largest value in the picture.
-    std::array<double, 9> largest{}, error{};
-    std::array<size_t, 9> over{};
+    const auto splat_of = [&](size_t k) -> const reference::Projected& {
+        return lists.twin.projected[lists.twin.instances.sorted[k].splat];
+    };
+    // Of each of the sums: largest error over the largest value in the picture.
+    std::array<double, kSums> largest{}, error{};
+    std::array<size_t, kSums> over{};
     for (size_t k = 0; k < lists.count(); ++k)
-        for (size_t j = 0; j < 9; ++j)
-            largest[j] = std::max(largest[j], std::abs(slot_of(expected.instances[k])[j]));
+        for (size_t j = 0; j < kSums; ++j)
+            largest[j] = std::max(largest[j], std::abs(slot_of(expected.instances[k], splat_of(k))[j]));
     // Sums of one order share their scale: one of them alone may cancel to nothing.
-    for (const auto& [first, last] : {std::pair{1, 2}, {3, 5}, {6, 8}}) {
+    for (const auto& [first, last] : {std::pair{1, 2}, {3, 5}, {6, 8}, {9, 9}, {10, 10}}) {
         const auto group = largest.begin() + first, end = largest.begin() + last + 1;
         std::fill(group, end, *std::max_element(group, end));
     }
     for (size_t k = 0; k < lists.count(); ++k)
-        for (size_t j = 0; j < 9; ++j) {
+        for (size_t j = 0; j < kSums; ++j) {
             const double e = std::abs(double(actual[shared::SLOT_FLOATS * k + j]) -
-                                      slot_of(expected.instances[k])[j]);
+                                      slot_of(expected.instances[k], splat_of(k))[j]);
             ASSERT_TRUE(std::isfinite(e)) << "instance " << k << " sum " << j;
             error[j] = std::max(error[j], e / largest[j]);
             // 64 pixels of float32 terms; rest / (1 - alpha) magnifies rounding a hundredfold at alpha 0.99.
             if (e > 2e-5 * largest[j]) ++over[j];
         }
-    for (size_t j = 0; j < 9; ++j) {
+    for (size_t j = 0; j < kSums; ++j) {
         printf("%s%.1e", j ? " " : "    ", error[j]);
         EXPECT_LE(over[j], lists.count() / 200) << "sum " << j;
         EXPECT_LT(error[j], 0.05) << "sum " << j;  // one pixel on the other side of the cut
@@ -223,7 +228,7 @@ size_t check_one_tile(const Scene& scene) {
     r.run([&](gpu::Recording& recording) {
         r.kernels.get<passes::Blend>(false).record(
             recording, r.shape(), {lists.records, lists.splats, lists.starts, planes}, lists.push());
-        r.kernels.get<passes::BlendBackward>().record(
+        r.kernels.get<passes::BlendBackward>(1u).record(
             recording, r.shape(),
             {lists.records, lists.splats, lists.starts, planes, incoming, slots},
             lists.push());
@@ -242,7 +247,7 @@ size_t check_one_tile(const Scene& scene) {
     size_t unseen = 0;
     for (size_t k = 0; k < lists.count(); ++k) {
         bool zero = true;
-        for (size_t j = 0; j < 9; ++j) {
+        for (size_t j = 0; j < kSums; ++j) {
             const float value = written[shared::SLOT_FLOATS * k + j];
             EXPECT_TRUE(std::isfinite(value)) << "slot of instance " << k << " was not written";
             if (!std::isfinite(value)) return 0;

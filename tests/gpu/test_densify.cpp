@@ -98,7 +98,7 @@ Expected expected_of(const Start& start, const DensifyRules& rules) {
         for (uint32_t child = 0; decisions[i] == Decision::split && child < 2; ++child) {
             const auto n = core::normal3(
                 {uint32_t(i), 2 * rules.step + child, uint32_t(rules.seed), uint32_t(rules.seed >> 32)});
-            add(split_child(splat, {n[0], n[1], n[2]}), i, true);
+            add(split_child(splat, {n[0], n[1], n[2]}, rules.revised_opacity), i, true);
         }
     }
     out.values.sh_degree = old.sh_degree;
@@ -115,12 +115,18 @@ pipeline::DensifyResult run_densify(pipeline::Model& model, const DensifyRules& 
     return result;
 }
 
-class Densify : public testing::TestWithParam<std::pair<size_t, int>> {};
+struct DensifyCase {
+    size_t splats;
+    int degree;
+    bool revised_opacity = false;
+};
+class Densify : public testing::TestWithParam<DensifyCase> {};
 
 TEST_P(Densify, WritesTheTwinsNextGeneration) {
-    const auto [splats, degree] = GetParam();
+    const auto [splats, degree, revised] = GetParam();
     Start start(2000 + splats, splats, degree);
-    const DensifyRules rules = rules_for(1u << 20);
+    DensifyRules rules = rules_for(1u << 20);
+    rules.revised_opacity = revised;
     const Expected expected = expected_of(start, rules);
     const auto result = run_densify(start.model, rules);
     ASSERT_EQ(result.before, splats);
@@ -138,7 +144,7 @@ TEST_P(Densify, WritesTheTwinsNextGeneration) {
     near(actual.means, expected.values.means, 2e-6);  // of split children: float32 sine and logarithm
     near(actual.log_scales, expected.values.log_scales, 2e-7);  // one subtraction
     near(actual.quaternions, expected.values.quaternions, 0);   // copied
-    near(actual.opacity_logits, expected.values.opacity_logits, 0);
+    near(actual.opacity_logits, expected.values.opacity_logits, revised ? 1e-6 : 0);
     near(actual.sh, expected.values.sh, 0);
 
     // Moments go with what is kept and are zero for what is new, texel by texel.
@@ -157,8 +163,8 @@ TEST_P(Densify, WritesTheTwinsNextGeneration) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, Densify,
-                         testing::Values(std::pair{size_t(3), 0}, std::pair{size_t(1500), 0},
-                                         std::pair{size_t(777), 1}, std::pair{size_t(300), 3}));
+                         testing::Values(DensifyCase{3, 0}, DensifyCase{1500, 0}, DensifyCase{777, 1},
+                                         DensifyCase{300, 3}, DensifyCase{1500, 0, true}));
 
 /// The kernel that writes, on its own: nothing past the room it was given.
 TEST(DensifyEdges, WritesNothingPastItsRoom) {
@@ -178,7 +184,8 @@ TEST(DensifyEdges, WritesNothingPastItsRoom) {
                                    rules.prune_logit,
                                    rules.prune_scale,
                                    {1, 2},
-                                   3};
+                                   3,
+                                   0};
     };
     const uint64_t bytes = pipeline::parameter_bytes(room, 1);
     Guarded params("params", bytes), moments1("moments1", bytes), moments2("moments2", bytes);

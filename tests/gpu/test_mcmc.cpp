@@ -80,12 +80,18 @@ std::vector<uint32_t> device_weights(const Start& start) {
     return result;
 }
 
-class Relocation : public testing::TestWithParam<std::pair<size_t, int>> {};
+struct RelocationCase {
+    size_t splats;
+    int degree;
+    double spread = 0;
+};
+class Relocation : public testing::TestWithParam<RelocationCase> {};
 
 TEST_P(Relocation, WritesTheTwinsNextGeneration) {
-    const auto [splats, degree] = GetParam();
+    const auto [splats, degree, spread] = GetParam();
     Start start(3000 + splats, splats, degree);
-    const McmcRules rules = rules_for(1u << 20);
+    McmcRules rules = rules_for(1u << 20);
+    rules.spread = spread;
     const auto weights = device_weights(start);
     const uint32_t n = uint32_t(splats), after = uint32_t(std::floor(rules.growth * n));
     std::vector<uint32_t> dead;
@@ -113,9 +119,18 @@ TEST_P(Relocation, WritesTheTwinsNextGeneration) {
     const uint32_t planes = pipeline::parameter_planes(degree);
     const auto moments1 = start.model.moments1.download<float>(pipeline::parameter_bytes(after, degree) / 4);
     const size_t sh = old.sh_stride();
+    const reference::Values wide = reference::to_double(old);
     for (uint32_t j = 0; j < after; ++j) {
         const uint32_t s = source[j];
-        for (size_t k = 0; k < 3; ++k) ASSERT_EQ(actual.means[3 * j + k], old.means[3 * s + k]);
+        const auto n3 = core::normal3({j, rules.step, uint32_t(rules.seed),
+                                       uint32_t(rules.seed >> 32) ^ shared::MCMC_SPREAD_STREAM});
+        const glm::dvec3 mean = reference::apart(read_splat(wide, s), {n3[0], n3[1], n3[2]}, spread);
+        for (size_t k = 0; k < 3; ++k) {
+            if (spread == 0 || copies[s] == 0)
+                ASSERT_EQ(actual.means[3 * j + k], old.means[3 * s + k]);
+            else
+                ASSERT_NEAR(actual.means[3 * j + k], mean[int(k)], 2e-6 * (1 + std::abs(mean[int(k)])));
+        }
         for (size_t k = 0; k < 4; ++k) ASSERT_EQ(actual.quaternions[4 * j + k], old.quaternions[4 * s + k]);
         for (size_t k = 0; k < sh; ++k) ASSERT_EQ(actual.sh[sh * j + k], old.sh[sh * s + k]);
         for (uint32_t f = 0; f < 4 * planes; ++f)
@@ -154,8 +169,8 @@ TEST(RelocationOfMany, ThousandsOfCopiesShareOneSplat) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, Relocation,
-                         testing::Values(std::pair{size_t(3), 0}, std::pair{size_t(2000), 0},
-                                         std::pair{size_t(777), 1}, std::pair{size_t(300), 3}));
+                         testing::Values(RelocationCase{3, 0}, RelocationCase{2000, 0}, RelocationCase{777, 1},
+                                         RelocationCase{300, 3}, RelocationCase{1000, 1, 0.8}));
 
 TEST(RelocationEdges, SourcesAreDrawnInProportionToTheirOpacity) {
     Start start(3100, 40, 0, -2);

@@ -14,7 +14,7 @@
 namespace ewa::test {
 namespace {
 
-constexpr uint32_t kGradient = 1, kStatistics = 2, kRegularised = 4;
+constexpr uint32_t kGradient = 1, kStatistics = 2, kRegularised = 4, kAbsolute = 8;
 
 /// A scene's way back up to the instances by the twin, in the device's buffers.
 struct Slots {
@@ -39,8 +39,8 @@ struct Slots {
         slots.resize(std::max<size_t>(sum, 1) * shared::SLOT_FLOATS, std::nanf(""));
         std::vector<uint32_t> next = first;
         for (size_t k = 0; k < sorted.size(); ++k) {
-            const auto slot = slot_of(twin.blend.instances[k]);
-            for (size_t j = 0; j < 9; ++j)
+            const auto slot = slot_of(twin.blend.instances[k], twin.picture.projected[sorted[k].splat]);
+            for (size_t j = 0; j < slot.size(); ++j)
                 slots[size_t(places[next[sorted[k].splat]]) * shared::SLOT_FLOATS + j] = float(slot[j]);
             ++next[sorted[k].splat];
         }
@@ -227,15 +227,17 @@ TEST(UpdateAdam, FollowsTheTwinsAdamOverSeveralSteps) {
     }
 }
 
-TEST(UpdateStatistics, AreTheTwins) {
+class UpdateStatistics : public testing::TestWithParam<bool> {};
+
+TEST_P(UpdateStatistics, AreTheTwins) {
+    const bool absolute = GetParam();
     const Scene scene = random_scene(1901, 200, SplatKind::mixed, 61, 47);
     const Slots slots(scene);
     GuardedModel model(scene.gaussians);
     Bench bench(slots);
-    bench.run(scene, model.model, model.moments1, model.moments2, kGradient | kStatistics,
-              push_for(scene, 1));
+    bench.run(scene, model.model, model.moments1, model.moments2, kGradient | kStatistics | (absolute ? kAbsolute : 0), push_for(scene, 1));
     reference::DensifyStatistics expected(scene.gaussians.size());
-    accumulate(expected, slots.twin.blend.splats, slots.twin.in_view, scene.camera);
+    accumulate(expected, slots.twin.blend.splats, slots.twin.in_view, scene.camera, absolute);
     const auto actual = bench.statistics.read<float>();
     double largest = 0;
     for (const double sum : expected.gradient_sum) largest = std::max(largest, sum);
@@ -245,6 +247,8 @@ TEST(UpdateStatistics, AreTheTwins) {
                     1e-5 * largest + 1e-4 * expected.gradient_sum[i]);
     }
 }
+
+INSTANTIATE_TEST_SUITE_P(SignedAndAbsolute, UpdateStatistics, testing::Bool());
 
 /// d(opacity) / d(logit) and d(scale) / d(log scale), on top of the loss's gradient, for what is not drawn
 /// too.

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <set>
 
 #include "train/photographs.h"
@@ -86,6 +87,44 @@ TEST(Schedule, AShortRunKeepsTheProportionsDownToItsFloors) {
     EXPECT_FALSE(schedule_for(options).was_reset(30000));
     options.sh_degree = 1;
     EXPECT_EQ(schedule_for(options).degree(30000), 1);
+}
+
+TEST(Schedule, RelocationsStopWhereMcmcsCodeStopsThem) {
+    TrainOptions options;
+    const Schedule full = schedule_for(options);
+    EXPECT_FALSE(full.relocates(500));
+    EXPECT_TRUE(full.relocates(600));
+    EXPECT_FALSE(full.relocates(650));
+    EXPECT_TRUE(full.relocates(24900));
+    EXPECT_FALSE(full.relocates(25000));
+    options.steps = 3000;
+    const Schedule tenth = schedule_for(options);
+    EXPECT_EQ(tenth.relocate_every, 25);
+    EXPECT_EQ(full.growth, 1.05);
+    EXPECT_NEAR(tenth.growth, std::pow(1.05, 2.5), 1e-12);  // every 25 steps, not every 10
+    EXPECT_EQ(full.copy_spread, 0);
+    EXPECT_NEAR(tenth.copy_spread, 0.9, 1e-12);
+    EXPECT_TRUE(tenth.relocates(125));
+    EXPECT_FALSE(tenth.relocates(130));
+    EXPECT_TRUE(tenth.relocates(2475));
+    EXPECT_FALSE(tenth.relocates(2500));
+}
+
+TEST(Schedule, TheResolutionDoublesEachTenthOfTheRun) {
+    TrainOptions options;
+    EXPECT_EQ(schedule_for(options).halvings_at(1), 0);
+    options.halvings = 2;
+    options.steps = 2000;
+    const Schedule s = schedule_for(options);
+    EXPECT_EQ(s.halvings_at(1), 2);
+    EXPECT_EQ(s.halvings_at(200), 2);
+    EXPECT_EQ(s.halvings_at(201), 1);
+    EXPECT_EQ(s.halvings_at(400), 1);
+    EXPECT_EQ(s.halvings_at(401), 0);
+    EXPECT_EQ(s.halvings_at(2000), 0);
+    options.steps = 3;  // a step at each
+    EXPECT_EQ(schedule_for(options).halvings_at(1), 2);
+    EXPECT_EQ(schedule_for(options).halvings_at(3), 0);
 }
 
 TEST(Schedule, TheRateOfTheMeansDecaysExponentially) {

@@ -241,6 +241,82 @@ TEST(Trainer, LearnsNothingFromWhatIsMasked) {
     EXPECT_GT(masked.psnr, evaluate(device(), with, spoilt.unmasked, {0, 3}, {}).psnr + 3);
 }
 
+/// The same capture by a camera that exposes each photograph in its own way; the first one as it is.
+Dataset exposed_by_itself(Synthetic& made) {
+    make_synthetic(made, 40, 8, 48, 36, 7);
+    Random random(5);
+    for (size_t i = 1; i < made.dataset.frames.size(); ++i) {
+        Exposure e = kIdentityExposure;
+        for (const size_t k : {0u, 5u, 10u}) e[k] = float(random.uniform(0.5, 1));
+        const Frame& frame = made.dataset.frames[i];
+        save_image(frame.image_path, exposed(load_image(frame.image_path), e));
+    }
+    return load_dataset(made.folder.path(), {});
+}
+
+TEST(Trainer, LearnsWhatEachPhotographsExposureWas) {
+    Synthetic made;
+    const Dataset dataset = exposed_by_itself(made);
+    const Gaussians start = shaken_start(made, 0.05, 11, 0);
+    const auto learn = [&](bool exposure) {
+        TrainOptions options = quick(400);
+        options.exposure = exposure;
+        options.exposure_rate = 0.03;  // a photograph is visited 50 times
+        Trainer trainer(device(), dataset, all_frames(dataset), start, options);
+        for (int step = 0; step < 400; ++step) trainer.step();
+        const auto exposures = trainer.exposures();
+        EXPECT_EQ(exposures.size(), exposure ? 8u : 0u);
+        return evaluate(device(), trainer.gaussians(), dataset, all_frames(dataset), {}, exposures).psnr;
+    };
+    const double with = learn(true), without = learn(false);
+    printf("    %.2f dB with exposures, %.2f dB without\n", with, without);
+    EXPECT_GT(with, without + 3);
+}
+
+/// A run on halves and quarters first ends at the whole resolution, and resumes to the byte in the middle of them.
+TEST(Trainer, AResolutionScheduleEndsAtTheWholeResolutionAndResumes) {
+    const Gaussians start = shaken_start(data(), 0.05, 1, 0);
+    TrainOptions options = quick(200);
+    options.halvings = 2;
+    const auto frames = all_frames(data().dataset);
+    Trainer whole(device(), data().dataset, frames, start, options);
+    TrainerState middle;
+    for (int step = 1; step <= 200; ++step) {
+        whole.step();
+        if (step == 30) middle = whole.state();
+    }
+    EXPECT_GT(train_psnr(whole.gaussians()), 25);
+    Trainer resumed(device(), data().dataset, frames, start, options);
+    resumed.restore(middle);
+    while (resumed.steps_done() < 200) resumed.step();
+    EXPECT_EQ(resumed.gaussians().means, whole.gaussians().means);
+    EXPECT_EQ(resumed.gaussians().sh, whole.gaussians().sh);
+    // Half the sides are another picture: the first step tells.
+    const double loss = Trainer(device(), data().dataset, frames, start, quick(200)).step().loss;
+    EXPECT_NE(Trainer(device(), data().dataset, frames, start, options).step().loss, loss);
+}
+
+TEST(Trainer, TheMemoryForecastHoldsForARun) {
+    const Gaussians start = shaken_start(data(), 0.05, 1, 1);
+    TrainOptions options = quick(160);
+    options.strategy = Strategy::adc;
+    options.grow_gradient = 1e-5;
+    options.refine_stop = 30000;
+    options.max_splats = 60;
+    const MemoryForecast forecast =
+        forecast_memory(*device(), data().dataset, all_frames(data().dataset), start, options);
+    EXPECT_EQ(forecast.splats, 60u);
+    DeviceOptions fresh;  // whose peak is this run's
+    const auto own = open_device(fresh);
+    Trainer trainer(own, data().dataset, all_frames(data().dataset), start, options);
+    for (int step = 0; step < 160; ++step) trainer.step();
+    EXPECT_EQ(trainer.splats(), 60u);
+    const uint64_t peak = peak_device_bytes(*own);
+    printf("    forecast %.0f KiB, peak %.0f KiB\n", forecast.total() / 1024.0, double(peak) / 1024);
+    EXPECT_LT(peak, 1.1 * forecast.total());
+    EXPECT_GT(peak, 0.5 * forecast.total());
+}
+
 TEST(Trainer, PhotographsOnDiskChangeNoResult) {
     const Spoilt spoilt;
     const Gaussians start = shaken_start(spoilt.data, 0.05, 11, 0);

@@ -215,6 +215,11 @@ TEST(Masks, MayBeAlphaAndOfAnotherSize) {
     EXPECT_EQ(*small.weights.at(1, 0), 0);
     EXPECT_EQ(*small.weights.at(2, 0), 1);
     EXPECT_EQ(*small.weights.at(2, 1), 0.5f);
+    // A folder of smaller copies comes first where that size is asked for.
+    std::filesystem::create_directories(capture.folder / "masks_2");
+    save_image(capture.folder / "masks_2/a.png", half_white(8, 6));
+    EXPECT_EQ(with_masks(capture, MaskUse::automatic, 2).frames[0].mask_path, capture.folder / "masks_2/a.png");
+    EXPECT_EQ(with_masks(capture, MaskUse::automatic, 1).frames[0].mask_path, capture.folder / "masks/a.png");
     save_image(capture.folder / "masks/a.png", half_white(8, 8));
     expect_error<InputError>([&] { load_frame_image(capture.load().frames[0]); },
                              {"masks/a.png", "8 x 8", "8 x 6"});

@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 
 #include "reference/order.h"
 #include "support/gradient_check.h"
@@ -149,6 +151,28 @@ TEST(ReferenceBlendBackward, MomentsAddUpWhateverTheTiles) {
         EXPECT_NEAR(whole.splats[splat].b, small.splats[splat].b, 1e-10);
         EXPECT_NEAR(whole.splats[splat].opacity * c.splats[splat].opacity, whole.instances[k].s0, 1e-10);
     }
+}
+
+/// The gradient is linear in the picture's: that of one pixel alone is what its absolute value is taken of.
+TEST(ReferenceBlendBackward, AbsoluteGradientsAddUpPixelByPixel) {
+    Case c = random_case(5, test::SplatKind::ordinary, AlphaCut::hard);
+    const BlendGradients whole = backward(c);
+    const Raster weights = c.weights;
+    std::vector<glm::dvec2> sums(c.splats.size());
+    for (size_t pixel = 0; pixel < weights.values.size() / 3; ++pixel) {
+        std::fill(c.weights.values.begin(), c.weights.values.end(), 0);
+        std::copy_n(weights.values.begin() + std::ptrdiff_t(3 * pixel), 3,
+                    c.weights.values.begin() + std::ptrdiff_t(3 * pixel));
+        const BlendGradients one = backward(c);
+        for (size_t i = 0; i < sums.size(); ++i) sums[i] += glm::abs(one.splats[i].mean2d);
+    }
+    size_t cancelling = 0;
+    for (size_t i = 0; i < sums.size(); ++i) {
+        EXPECT_NEAR(whole.splats[i].absolute.x, sums[i].x, 1e-12 * (1 + sums[i].x)) << i;
+        EXPECT_NEAR(whole.splats[i].absolute.y, sums[i].y, 1e-12 * (1 + sums[i].y)) << i;
+        cancelling += sums[i].x > 2 * std::abs(whole.splats[i].mean2d.x);
+    }
+    EXPECT_GT(cancelling, 3u);
 }
 
 TEST(ReferenceBlendBackward, MomentsOfOnePixelByHand) {

@@ -1,0 +1,43 @@
+// What a run is going to take of the device's memory, before it takes any.
+#include <algorithm>
+
+#include "ewa/trainer.h"
+#include "gpu/device.h"
+#include "passes/shape.h"
+#include "pipeline/capacity.h"
+#include "pipeline/model.h"
+#include "pipeline/photo.h"
+#include "pipeline/sizes.h"
+
+namespace ewa {
+
+MemoryForecast forecast_memory(const gpu::Device& device, const Dataset& dataset,
+                               const std::vector<int>& train_frames, const Gaussians& start,
+                               const TrainOptions& options) {
+    MemoryForecast forecast;
+    const bool grows = options.strategy != Strategy::none;
+    forecast.splats = grows ? std::max(options.max_splats, uint32_t(start.size())) : uint32_t(start.size());
+    const uint64_t statistics = options.strategy == Strategy::adc ? 8ull * forecast.splats : 0;
+    const uint64_t generation = 3 * pipeline::parameter_bytes(forecast.splats, start.sh_degree) + statistics;
+    forecast.model = grows ? 2 * generation : generation;
+
+    const passes::Shape shape = passes::shape_for(device.limits());
+    for (const int index : train_frames) {
+        const Frame& frame = dataset.frames[size_t(index)];
+        const auto width = uint32_t(frame.camera.width), height = uint32_t(frame.camera.height);
+        const pipeline::FrameRequest request{forecast.splats,
+                                             width,
+                                             height,
+                                             pipeline::first_capacity(forecast.splats),
+                                             true,
+                                             false,
+                                             frame.masks == MaskUse::ignore,
+                                             options.exposure};
+        forecast.frame = std::max(forecast.frame, sizes_for(shape, request).total());
+        const uint64_t photo = pipeline::photo_bytes(int(width), int(height), frame.eight_bit);
+        if (forecast.photographs + photo <= options.image_cache_bytes) forecast.photographs += photo;
+    }
+    return forecast;
+}
+
+}  // namespace ewa
