@@ -101,6 +101,7 @@ struct StepReport {
     uint32_t splats = 0;
     uint64_t dropped_updates = 0;        // parameter updates that were not finite, dropped
     uint32_t skipped_nonfinite = 0;      // splats skipped in the last step
+    uint64_t limited_steps = 0;          // steps of a mean, quaternion or scale that were shortened
 };
 
 /// What the steps to come depend on, besides the dataset, its training frames and the options.

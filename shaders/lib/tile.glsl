@@ -75,7 +75,7 @@ void column_alphas(LaneSplat s, out float raw[PIXELS]) {
 }
 
 // Phrased so that a NaN is no contribution.
-float alpha_of(float raw) { return raw >= float(ALPHA_MIN) ? min(float(ALPHA_MAX), raw) : 0.0; }
+float alpha_of(float raw) { return raw >= CUT_OFF ? min(float(ALPHA_MAX), raw) : 0.0; }
 
 // Transmittance is kept positive while the pixel is open, and negative from the splat on that would have taken it to
 // TRANSMITTANCE_STOP or under: one float is both the value and the flag.

@@ -140,6 +140,17 @@ void main() {
             break;
         }
     }
+    // The last tile also answers for the instances that turned out not to exist: every slot of the list is written, so
+    // that none holds what an earlier frame left.
+    if (tile + 1u == push.tiles[0] * push.tiles[1]) {
+        const uint all = tile_starts[tile + 2u];
+        for (uint e = end; e < all; e += SUBGROUP) {
+            if (e + lane < all) {
+                const uint at = SLOT_FLOATS * (e + lane);
+                [[unroll]] for (uint i = 0; i < SUMS; ++i) slots[at + i] = 0.0;
+            }
+        }
+    }
     // Instances behind the last open pixel got nothing.
     for (; k < end; k += SUBGROUP) {
         if (k + lane < end) {

@@ -35,7 +35,7 @@ void main() {
     else if (dead[j] != 0u) source = sources[totals[j / push.scan_block] + prefix[j]];
     const uint copies = hits[source];
     const float logit = texelFetch(params, int(param_texel(PLANES, 0u, source))).w;
-    const vec2 part = relocated(logit, min(copies + 1u, 0xffffu));
+    const vec2 part = relocated(logit, copies + 1u);
     const float opacity = clamp(part.x, push.least_opacity, 1.0 - 1e-6);
     vec3 offset = vec3(0.0);
     if (push.spread > 0.0) {

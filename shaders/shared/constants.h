@@ -9,6 +9,10 @@ EWA_BEGIN_SHARED
 // Projection.
 EWA_REAL(NEAR_PLANE, 0.01);           // a splat is drawn where view z > NEAR_PLANE (world units)
 EWA_REAL(LOW_PASS, 0.3);              // added to both diagonal entries of the 2D covariance (px^2)
+EWA_REAL(VIEW_MAX, 1e18);             // a splat is drawn where its mean is no farther from the camera along any axis (world units),
+EWA_REAL(FOOTPRINT_MAX, 1e18);        // the six entries of its M = J W R S add up to no more (px),
+EWA_REAL(COLOR_MAX, 1e30);            // and no channel of its colour is larger; else it is skipped and counted
+EWA_REAL(QUATERNION_MIN, 1.1754943508222875e-38);  // a quaternion whose components are all smaller counts as zero
 EWA_REAL(JACOBIAN_MARGIN, 0.3);       // x/z in J is clamped to this share of the half image beyond each border
 
 // Compositing.
@@ -37,6 +41,7 @@ EWA_REAL(COLOR_OFFSET, 0.5);          // colour = max(0, SH sum + COLOR_OFFSET)
 EWA_REAL(SSIM_WEIGHT, 0.2);
 EWA_REAL(SSIM_C1, 0.01 * 0.01);
 EWA_REAL(SSIM_C2, 0.03 * 0.03);
+EWA_REAL(SSIM_LIMIT, 16.0);           // SSIM takes what is brighter as this bright: the square of it has digits left for SSIM_C2
 EWA_REAL(SSIM_SIGMA, 1.5);            // standard deviation of the window (px)
 EWA_UINT(SSIM_RADIUS, 5u);            // window of 2 * SSIM_RADIUS + 1 taps, zero padded
 
@@ -44,6 +49,13 @@ EWA_UINT(SSIM_RADIUS, 5u);            // window of 2 * SSIM_RADIUS + 1 taps, zer
 EWA_REAL(ADAM_BETA1, 0.9);
 EWA_REAL(ADAM_BETA2, 0.999);
 EWA_REAL(ADAM_EPSILON, 1e-15);
+EWA_REAL(GRADIENT_MAX, 1e18);         // a larger gradient counts as this large: Adam's step does not depend on its size
+
+// How far one step may go (docs/numerics.md, "Steps").
+EWA_REAL(STEP_DEPTH_SHARE, 0.5);      // a mean moves by at most this share of its depth in the view
+EWA_REAL(STEP_NORM_SHARE, 0.5);       // a quaternion by at most this share of its norm
+EWA_REAL(LOG_SCALE_MIN, -69.0);       // a step leaves the logarithm of a scale between these: 1e-30 to 1e18 world units
+EWA_REAL(LOG_SCALE_MAX, 41.0);
 
 // Adaptive density control (3DGS, section 5.2 and its published code).
 EWA_REAL(SPLIT_SCALE, 1.6);           // a split child's scales are the parent's divided by this

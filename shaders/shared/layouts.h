@@ -14,6 +14,7 @@ EWA_UINT(SPEC_SH_DEGREE, 4u);      // 0..3, the degree evaluated
 EWA_UINT(SPEC_KERNEL, 5u);         // KERNEL_*
 EWA_UINT(SPEC_MODE, 6u);           // per shader, see there
 EWA_UINT(SPEC_RADIX_BITS, 7u);     // bits a radix pass sorts by, 1..8
+EWA_UINT(SPEC_CUT_OFF, 8u);        // ALPHA_MIN, or another least contribution (a float)
 
 // ---- A splat's parameters: flat float f stands in component f % 4 of texel plane f / 4. Splats are stored in blocks of
 // PARAM_BLOCK, within a block plane after plane: one line of memory holds one plane of a block, and all that a block has
@@ -83,6 +84,7 @@ struct Counts {
     uint densified;                // splats after densification
     float l1;                      // mean |x - y|
     float ssim;                    // mean SSIM
+    uint limited_steps;            // steps of a mean, quaternion or scale that were shortened
 };
 
 struct ProjectPush {
@@ -223,6 +225,7 @@ struct PerturbPush {
     uint splats, planes;
     uint instance_capacity;
     float amplitude;
+    float reach;                   // the longest noise (world units)
     uint seed[2];
     uint step;
 };

@@ -93,7 +93,7 @@ void crop(Gaussians& gaussians, const std::string& box) {
     keep_if(gaussians, [&](size_t i) {
         bool inside = true;
         for (size_t axis = 0; axis < 3; ++axis) {
-            const double v = gaussians.means[3 * i + axis];
+            const double v = gaussians.world_mean(i)[int(axis)];
             inside = inside && v >= n[axis] && v <= n[3 + axis];
         }
         return inside;

@@ -99,6 +99,8 @@ Action add_train(CLI::App& app, const std::string& command_line) {
         ->check(in_range(0, kMaxSteps))
         ->type_name("N")
         ->capture_default_str();
+    app.add_flag("--accuracy", arguments.accuracy,
+                 "At the end, draw error against run time for the report, as ewa bench --accuracy does");
     app.add_flag("--resume", arguments.resume,
                  "Go on from DIR's checkpoint.ewa, or start where there is none");
     app.add_option("--config", state->config,

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "cli/accuracy.h"
 #include "cli/interrupt.h"
 #include "cli/output.h"
 #include "cli/progress.h"
@@ -299,11 +300,18 @@ int TrainRun::finish(const Trainer& trainer) {
             subfolder / (report::picture_names(dataset_.frames)[frames.front()].string() + ".png");
     }
 
+    if (!cut_short && arguments_.accuracy) {
+        const auto view = report_.held_out ? split_.test.front() : split_.train.front();
+        report_.work_precision.push_back(
+            rendering_diagram(device_, gaussians, dataset_.frames[view].camera, options_.render));
+    }
+
     summary.steps = last_.step;
     summary.seconds = last_.seconds;
     summary.splats = static_cast<uint32_t>(gaussians.size());
     summary.skipped_nonfinite = last_.skipped_nonfinite;
     summary.dropped_updates = last_.dropped_updates;
+    summary.limited_steps = last_.limited_steps;
     summary.interrupted = cut_short;
     summary.peak_device_bytes = peak_device_bytes(*device_);
     summary.peak_host_bytes = peak_host_bytes(*device_);
@@ -324,6 +332,7 @@ void TrainRun::print_result() const {
     if (s.skipped_nonfinite > 0)
         say(fmt::format("{} splats are not finite and not drawn", s.skipped_nonfinite));
     if (s.dropped_updates > 0) say(fmt::format("{} updates were not finite and dropped", s.dropped_updates));
+    if (s.limited_steps > 0) say(fmt::format("{} steps were too long for their splat and shortened", s.limited_steps));
     say("splats:  " + (folder_ / "splats.ply").string());
     say("report:  " + (folder_ / "report.html").string());
     if (!first_picture_.empty()) say("picture: " + first_picture_.string());

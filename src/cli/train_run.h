@@ -25,6 +25,7 @@ struct TrainArguments {
     DrawArguments draw;
     int eval_every = 0;  // steps; 0: only at the end
     int save_every = 0;  // steps; 0: by the clock
+    bool accuracy = false;  // the report gets the diagram of error against run time
     bool resume = false;
     DeviceOptions device;
     bool quiet = false, verbose = false;

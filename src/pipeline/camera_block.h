@@ -7,6 +7,7 @@
 namespace ewa::pipeline {
 
 /// Throws InputError where a value is not finite, or a size or focal length is not positive.
-shared::CameraBlock camera_block(const Camera& camera, const passes::Shape& shape);
+shared::CameraBlock camera_block(const Camera& camera, const passes::Shape& shape,
+                                 const glm::dvec3& origin = glm::dvec3(0));
 
 }  // namespace ewa::pipeline

@@ -82,12 +82,13 @@ McmcResult refine_mcmc(Kernels& kernels, gpu::Executor& executor, Model& model, 
 }
 
 void record_noise(gpu::Recording& recording, Kernels& kernels, const Model& model, const Frame& frame,
-                  float amplitude, uint64_t seed, uint32_t step) {
+                  float amplitude, float reach, uint64_t seed, uint32_t step) {
     kernels.get<passes::Perturb>().record(recording, kernels.shape(), {model.params, frame.counts},
                                           {model.splats,
                                            model.planes(),
                                            frame.instance_capacity,
                                            amplitude,
+                                           reach,
                                            {uint32_t(seed), uint32_t(seed >> 32)},
                                            step});
 }

@@ -32,8 +32,8 @@ McmcResult refine_mcmc(Kernels& kernels, gpu::Executor& executor, Model& model, 
                        const McmcRules& rules);
 
 /// Noise on the means: amplitude * gate(opacity) * Sigma * a standard normal vector
-/// (shaders/passes/perturb.comp). amplitude: 1 / world units.
+/// (shaders/passes/perturb.comp). amplitude: 1 / world units. reach: the longest (world units).
 void record_noise(gpu::Recording& recording, Kernels& kernels, const Model& model, const Frame& frame,
-                  float amplitude, uint64_t seed, uint32_t step);
+                  float amplitude, float reach, uint64_t seed, uint32_t step);
 
 }  // namespace ewa::pipeline

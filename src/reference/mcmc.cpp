@@ -3,6 +3,7 @@
 
 #include <cassert>
 #include <cmath>
+#include <numbers>
 
 #include "reference/projection.h"
 #include "shared/constants.h"
@@ -10,8 +11,17 @@
 namespace ewa::reference {
 
 Share share_of(double opacity, int parts) {
-    assert(parts >= 1 && parts <= 51);
+    assert(parts >= 1);
     const double x = -std::expm1(std::log1p(-opacity) / parts);
+    // The sum cancels beyond float64 too; as an integral (shaders/lib/mcmc.glsl) it does not.
+    if (parts > 20) {
+        double integral = 0;
+        for (int j = 0; j < 512; ++j) {
+            const double t = j / 64.0;
+            integral -= (j == 0 ? 0.5 : 1) * std::expm1(parts * std::log1p(-x * std::exp(-t * t))) / 64.0;
+        }
+        return {x, opacity / (2 / std::sqrt(std::numbers::pi) * integral)};
+    }
     double sum = 0;
     for (int i = 1; i <= parts; ++i) {
         double binomial = 1;  // C(i - 1, k)

@@ -152,6 +152,23 @@ TEST_P(Relocation, WritesTheTwinsNextGeneration) {
     }
 }
 
+/// One splat alive among 30,000: it and its copies share what it was, each a 30,000th of its optical depth.
+TEST(RelocationOfMany, ThousandsOfCopiesShareOneSplat) {
+    const size_t splats = 30000;
+    Start start(3777, splats, 0);
+    std::fill(start.gaussians.opacity_logits.begin(), start.gaussians.opacity_logits.end(), -9.0f);
+    start.gaussians.opacity_logits[17] = 3.0f;
+    start.model = pipeline::upload_model(*device(), start.gaussians, 2, false);
+    const auto result = run_refine(start.model, rules_for(uint32_t(splats)));
+    ASSERT_EQ(result.relocated, splats - 1);
+    const Gaussians actual = download_model(start.model, start.model.params);
+    const auto share = reference::share_of(sigmoid(3.0), int(splats));
+    for (size_t j = 0; j < splats; j += 500)
+        for (size_t k = 0; k < 3; ++k)
+            ASSERT_NEAR(actual.log_scales[3 * j + k],
+                        start.gaussians.log_scales[3 * 17 + k] + std::log(share.scale_factor), 2e-5);
+}
+
 INSTANTIATE_TEST_SUITE_P(Sizes, Relocation,
                          testing::Values(RelocationCase{3, 0}, RelocationCase{2000, 0}, RelocationCase{777, 1},
                                          RelocationCase{300, 3}, RelocationCase{1000, 1, 0.8}));
@@ -213,7 +230,7 @@ TEST(Noise, IsTheTwins) {
         frame.counts.upload(std::span<const shared::Counts>(&counts, 1));
         const uint64_t seed = 0xabcdef0123456789ull;
         r.run([&](gpu::Recording& recording) {
-            record_noise(recording, r.kernels, start.model, frame, 5.0f, seed, 12);
+            record_noise(recording, r.kernels, start.model, frame, 5.0f, 1e9f, seed, 12);
         });
         const Gaussians moved = download_model(start.model, start.model.params);
         const reference::Values old = reference::to_double(start.gaussians);
@@ -234,7 +251,7 @@ TEST(Noise, IsTheTwins) {
         counts.instances = 11;  // the frame is going to be repeated
         frame.counts.upload(std::span<const shared::Counts>(&counts, 1));
         r.run([&](gpu::Recording& recording) {
-            record_noise(recording, r.kernels, start.model, frame, 5.0f, seed, 13);
+            record_noise(recording, r.kernels, start.model, frame, 5.0f, 1e9f, seed, 13);
         });
         EXPECT_EQ(download_model(start.model, start.model.params).means, moved.means);
     }
