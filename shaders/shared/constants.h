@@ -20,6 +20,11 @@ EWA_REAL(ALPHA_MAX, 0.99);            // alpha = min(ALPHA_MAX, opacity * exp(po
 EWA_REAL(ALPHA_MIN, 1.0 / 255.0);     // a contribution below this is skipped
 EWA_REAL(TRANSMITTANCE_STOP, 1e-4);   // blending stops before T would fall to this or under, that splat excluded
 
+// Splats as solids, to look at a scene's make-up: out to so many standard deviations, those at least so opaque.
+EWA_REAL(ELLIPSOID_REACH, 2.0);
+EWA_REAL(ELLIPSOID_OPACITY, 0.1);
+EWA_REAL(ELLIPSOID_RIM, 0.35);        // shade of the outline, of 1 in the middle
+
 // Real spherical harmonics in INRIA's order and signs (3DGS, utils/sh_utils.py; Sloan 2013).
 EWA_REAL(SH_C0, 0.28209479177387814);
 EWA_REAL(SH_C1, 0.4886025119029199);

@@ -45,6 +45,13 @@ EWA_UINT(PLANE_G, 1u);
 EWA_UINT(PLANE_B, 2u);
 EWA_UINT(PLANE_T, 3u);             // transmittance that reaches the background
 EWA_UINT(PLANE_DEPTH, 4u);         // sum of z alpha T
+EWA_UINT(PLANE_COUNT, 4u);         // splats blended; a picture has one of the two at most
+
+// ---- SPEC_MODE of blend.comp ----
+EWA_UINT(BLEND_COLOR, 0u);
+EWA_UINT(BLEND_DEPTH, 1u);         // writes PLANE_DEPTH also
+EWA_UINT(BLEND_COUNT, 2u);         // writes PLANE_COUNT also
+EWA_UINT(BLEND_ELLIPSOIDS, 3u);    // the nearest splat as a solid, in place of blending
 
 // ---- Loss: what one invocation owns. A pass down the columns: one texel (4 pixels) wide, LOSS_ROWS rows high; a pass along
 // the rows: LOSS_TEXELS texels of one row. Neighbouring outputs share most of their window. ----
@@ -85,11 +92,13 @@ struct Counts {
     float l1;                      // mean |x - y|
     float ssim;                    // mean SSIM
     uint limited_steps;            // steps of a mean, quaternion or scale that were shortened
+    uint drawn;                    // splats that reach a tile; counted where the projection is one for inspection
 };
 
 struct ProjectPush {
     uint splats;
     uint planes;                   // texel planes stored a splat
+    float log_scale_shift;         // inspection: added to every log scale
 };
 
 struct SortPush {
@@ -137,6 +146,10 @@ struct UnpackPush {
     float background[3];
     uint size[2];
     uint stride;
+    uint plane_floats;
+};
+
+struct PackPush {
     uint plane_floats;
 };
 

@@ -101,6 +101,10 @@ Action add_train(CLI::App& app, const std::string& command_line) {
         ->capture_default_str();
     app.add_flag("--accuracy", arguments.accuracy,
                  "At the end, draw error against run time for the report, as ewa bench --accuracy does");
+    app.add_option("--serve", arguments.serve,
+                   "Let ewa-view look on by this port (0: any free one), of this machine alone unless an address stands "
+                   "before it; DIR/live.json has the token that pausing and saving need")
+        ->type_name("[ADDRESS:]PORT");
     app.add_flag("--resume", arguments.resume,
                  "Go on from DIR's checkpoint.ewa, or start where there is none");
     app.add_option("--config", state->config,

@@ -13,6 +13,7 @@
 #include "cli/text.h"
 #include "cli/train_files.h"
 #include "cli/train_resume.h"
+#include "cli/train_serve.h"
 #include "core/atomic_file.h"
 #include "core/folder_lock.h"
 #include "ewa/error.h"
@@ -115,6 +116,7 @@ class TrainRun {
     Gaussians start_;
     std::shared_ptr<gpu::Device> device_;
     std::optional<report::MetricsLog> log_file_;
+    std::optional<TrainServer> server_;
     StepReport last_;
     report::ReportData report_;
     fs::path first_picture_;
@@ -210,6 +212,7 @@ void TrainRun::log(const StepReport& step, const std::optional<Evaluation>& eval
         line.test_ssim = evaluation->ssim;
     }
     log_file_->append(line);
+    server_->add_metrics(line);
     report_.metrics.push_back(line);
 }
 
@@ -236,6 +239,9 @@ void TrainRun::resume(Trainer& trainer) {
         earlier_.reset();
     }
     log_file_.emplace(folder_ / "metrics.jsonl", report_.metrics);
+    server_.emplace(arguments_.serve, folder_, arguments_.steps);
+    for (const report::MetricsLine& line : report_.metrics) server_->add_metrics(line);
+    if (const std::string line = server_->announcement(); !line.empty()) say(line);
 }
 
 void TrainRun::save_checkpoint(const Trainer& trainer) {
@@ -265,6 +271,10 @@ void TrainRun::train(Trainer& trainer, Progress& progress) {
         if (evaluation || step == 1 || at(step, report_every)) log(last_, evaluation);
         if (pace_.due(step)) save_checkpoint(trainer);
         if (at(step, arguments_.save_every)) save(trainer.gaussians());
+        server_->attend(trainer, last_, [&] {
+            save(trainer.gaussians());
+            save_checkpoint(trainer);
+        });
     }
 }
 
@@ -288,6 +298,7 @@ int TrainRun::finish(const Trainer& trainer) {
         summary.test_ssim = test->ssim;
     }
     if (last_.step > 0) log(last_, test);
+    server_->finish(last_, gaussians);
     for (const PassTime& time : trainer.pass_times())
         report_.pass_times.push_back({time.pass, time.milliseconds});
     report_.held_out = !split_.test.empty();

@@ -27,6 +27,7 @@ struct TrainArguments {
     int save_every = 0;  // steps; 0: by the clock
     bool accuracy = false;  // the report gets the diagram of error against run time
     bool resume = false;
+    std::string serve;  // [ADDRESS:]PORT; empty: nobody looks on
     DeviceOptions device;
     bool quiet = false, verbose = false;
     std::string command_line;

@@ -26,6 +26,7 @@ const std::map<std::string, Rooms> kArrows = {
     {"src/pipeline", {"src/passes", "src/scene"}},
     {"src/train", {"src/pipeline", "src/scene", "src/io"}},
     {"src/report", {"src/scene", "src/image"}},
+    {"src/live", {"src/report", "src/io"}},
     {"src/reference", {"src/scene"}},
 };
 const Rooms kLeaves = {"src/cli", "src/viewer"};
@@ -48,7 +49,7 @@ const std::vector<std::pair<std::string, Rooms>> kLibraries = {
     {"tiny_gltf", {"src/io"}},
     {"zstd", {"src/io"}},
     {"zlib", {"src/io", "src/image", "src/train"}},
-    {"nlohmann/", {"src/io", "src/train", "src/report", "src/cli", "src/viewer"}},
+    {"nlohmann/", {"src/io", "src/train", "src/report", "src/live", "src/cli", "src/viewer"}},
     {"CLI/", {"src/cli", "src/viewer"}}};
 
 Rooms reached_from(const std::string& room) {
