@@ -74,6 +74,7 @@ int main(int argc, char** argv) {
         {app.add_subcommand("info", "What is in a splat file or a dataset, and what rendering it leaves out"),
          {}},
         {app.add_subcommand("devices", "The Vulkan devices of this machine"), {}},
+        {app.add_subcommand("dataset", "Photographs a mesh scene (glTF) into a dataset to train on"), {}},
         {app.add_subcommand("bench", "Speed of every pass, and its error against the float64 twin"), {}},
     };
     commands[0].action = add_train(*commands[0].app, command_line(argc, argv));
@@ -83,7 +84,8 @@ int main(int argc, char** argv) {
     commands[4].action = add_convert(*commands[4].app);
     commands[5].action = add_info(*commands[5].app);
     commands[6].action = add_devices(*commands[6].app);
-    commands[7].action = add_bench(*commands[7].app);
+    commands[7].action = add_dataset(*commands[7].app);
+    commands[8].action = add_bench(*commands[8].app);
 
     try {
         app.parse(argc, argv);

@@ -14,5 +14,6 @@ static_assert(sizeof(UnpackPush) == 28 && sizeof(LossPush) == 24 && sizeof(Reduc
 static_assert(sizeof(MaskPush) == 16);
 static_assert(sizeof(UpdatePush) == 60 && sizeof(DensifyPush) == 44 && sizeof(ResetPush) == 12);
 static_assert(sizeof(McmcPush) == 52 && sizeof(PerturbPush) == 28);
+static_assert(sizeof(TraceView) == 4 * (9 + 3 + 2 + 2 + 2 + 9 + 1) && sizeof(TraceCounts) == 8 && sizeof(TracePush) == 24);
 
 }  // namespace ewa::shared
