@@ -77,5 +77,14 @@ EWA_UINT(KERNEL_PEAK, 0u);            // 3DGS: the opacity is the peak of the fo
 EWA_UINT(KERNEL_ANTIALIAS, 1u);       // Mip-Splatting (Yu et al. 2024, eq. 9): times sqrt(det before / det after low-pass)
 EWA_UINT(KERNEL_UNIT_MASS, 2u);       // EWA (Zwicker et al. 2001): times 1 / (2 pi sqrt(det)) per px^2
 
+// Photographs of mesh scenes (docs/photographs.md says what the path tracer models).
+EWA_UINT(TRACE_STACK, 48u);           // deepest hierarchy: far children that wait while a ray goes down
+EWA_UINT(TRACE_LEAF_MAX, 4u);         // triangles a leaf
+EWA_UINT(TRACE_BOUNCES, 5u);          // a path turns at most this often
+EWA_UINT(TRACE_ROULETTE, 2u);         // from this turn on Russian roulette may end it
+EWA_REAL(TRACE_ALPHA_MIN, 0.0025);    // least GGX width (roughness^2): a mirror is this rough
+EWA_REAL(TRACE_SAMPLE_MAX, 8.0);      // a sample brighter than this many times white counts as this bright
+EWA_REAL(DEPTH_ALPHA, 0.5);           // a blended surface of this opacity is what depth sees
+
 EWA_END_SHARED
 #endif

@@ -12,6 +12,7 @@ namespace ewa::cli {
 
 struct TrainArguments {
     std::filesystem::path dataset, output;  // output empty: out/<dataset name>
+    std::filesystem::path scene;            // the glTF that the dataset was photographed from; empty: none
     int steps = TrainOptions{}.steps;
     std::string strategy = "adc";
     uint32_t max_splats = TrainOptions{}.max_splats;
