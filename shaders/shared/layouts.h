@@ -276,7 +276,7 @@ EWA_UINT(LIGHT_DIRECTIONAL, 0u);
 EWA_UINT(LIGHT_POINT, 1u);
 EWA_UINT(LIGHT_SPOT, 2u);
 EWA_UINT(LIGHT_TRIANGLE, 3u);
-EWA_UINT(SPEC_ALPHA_TESTED, 8u);   // 1: some material is masked or blended
+EWA_UINT(SPEC_ALPHA_TESTED, 9u);   // 1: some material is masked or blended
 
 struct TraceView {
     float rotation[9];             // world to camera, rows
