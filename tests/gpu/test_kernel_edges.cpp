@@ -151,7 +151,7 @@ TEST(Noise, StaysFiniteAndMovesWhatJustFitted) {
     frame.counts = gpu::Buffer(*device(), "counts", sizeof(counts));
     frame.counts.upload(std::span<const shared::Counts>(&counts, 1));
     Rig& r = rig();
-    r.run([&](gpu::Recording& recording) { record_noise(recording, r.kernels, model, frame, 5.0f, 1, 12); });
+    r.run([&](gpu::Recording& recording) { record_noise(recording, r.kernels, model, frame, 5.0f, 1e9f, 1, 12); });
     const Gaussians moved = download_model(model, model.params);
     EXPECT_NE(moved.means[0], g.means[0]);
     for (size_t k = 3; k < 6; ++k) EXPECT_EQ(moved.means[k], g.means[k]);
