@@ -81,6 +81,7 @@ int main(int argc, char** argv) {
         {app.add_subcommand("info", "What is in a splat file or a dataset, and what rendering it leaves out"),
          {}},
         {app.add_subcommand("devices", "The Vulkan devices of this machine"), {}},
+        {app.add_subcommand("dataset", "Photographs a mesh scene (glTF) into a dataset to train on"), {}},
         {app.add_subcommand("bench", "Speed of every pass, and its error against the float64 twin"), {}},
         {app.add_subcommand("compare", "PSNR, SSIM and largest error of two pictures, or two folders of them"), {}},
     };
@@ -95,8 +96,9 @@ int main(int argc, char** argv) {
     commands[4].action = add_convert(*commands[4].app);
     commands[5].action = add_info(*commands[5].app);
     commands[6].action = add_devices(*commands[6].app);
-    commands[7].action = add_bench(*commands[7].app);
-    commands[8].action = add_compare(*commands[8].app);
+    commands[7].action = add_dataset(*commands[7].app);
+    commands[8].action = add_bench(*commands[8].app);
+    commands[9].action = add_compare(*commands[9].app);
 
     try {
         app.parse(argc, argv);

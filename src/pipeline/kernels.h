@@ -24,6 +24,7 @@
 #include "passes/mcmc_draw.h"
 #include "passes/mcmc_weigh.h"
 #include "passes/mcmc_write.h"
+#include "passes/pack.h"
 #include "passes/perturb.h"
 #include "passes/project.h"
 #include "passes/radix_count.h"
