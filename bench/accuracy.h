@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Error against run time of rendering: splatting and ray-marching, against the integral that both stand for
 // (reference/volume.h).
 #pragma once

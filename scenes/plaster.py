@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """plaster.gltf: every surface is diffuse (KHR_materials_specular with a factor of 0), so no colour depends on where it is
 seen from, and SH degree 0 holds all there is. No cameras: the dome is used."""
 

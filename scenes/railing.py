@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """railing.gltf: thin things. Bars, wires, spokes, a net, and leaves cut out of a texture by its alpha. Cameras on three
 rings."""
 

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """tea_table.gltf: what looks different from every side. A glossy floor that mirrors what stands on it, brass, glazed
 clay, textures from coarse to fine, a wire basket. 40 cameras on two rings."""
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Stiff and extreme scenes: the one table that the tests and `ewa bench --stability` go through.
 #pragma once
 #include <string>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A case on the device against the float64 twin: how wrong, and how wrong it may be.
 #pragma once
 #include <memory>

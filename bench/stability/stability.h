@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The stability suite as a command: every case against the float64 twin, then training from each.
 #pragma once
 #include <filesystem>

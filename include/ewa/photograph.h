@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Photographs of mesh scenes: from a glTF of triangles to a dataset to train on.
 #pragma once
 #include <cstdint>

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A glTF 2.0 file: STEM.gltf as text, STEM.bin for the meshes, STEM_*.png for the textures."""
 
 import json

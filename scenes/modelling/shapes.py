@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Triangle meshes: positions, normals and texture coordinates per vertex, and vertex indices, three a triangle."""
 
 import numpy as np

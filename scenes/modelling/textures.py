@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pictures for textures, as arrays of sRGB values in 0..1, and the PNG files they go into."""
 
 import struct

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Light that arrives without being met by chance: punctual lights (KHR_lights_punctual) and emitting triangles, one drawn by
 // its share of the power (alias method, Vose 1991). The sky is smooth, so that sampling the surface's own reflection finds
 // it well enough.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pairs of Sobol's first two dimensions, shuffled and Owen-scrambled by hashing (Burley 2020, "Practical Hash-based Owen
 // Scrambling"): every aligned block of 2^m samples is a (0, m, 2)-net, and different seeds are independent. The same in
 // src/core/random.h.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The buffers of a mesh scene (shared/layouts.h has their texels) and what is read from them. The including pass binds
 // them at 0 to 5.
 #ifndef EWA_LIB_MESH

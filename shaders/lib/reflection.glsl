@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How a glTF material scatters light: a Lambert layer under a GGX one, as the specification's appendix B has it, with
 // KHR_materials_specular's F0 and F90. Directions point away from the surface, in a frame whose z is the normal.
 #ifndef EWA_LIB_REFLECTION

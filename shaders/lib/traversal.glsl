@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The nearest triangle on a ray, or whether there is one: two-child nodes, nearer child first, the farther one on a stack
 // that no hierarchy outgrows (mesh/hierarchy.h). The float64 twin is src/reference/tracing.cpp.
 #ifndef EWA_LIB_TRAVERSAL

@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // What the centre of each pixel sees. One invocation owns one pixel and writes the camera's z, the triangle and the weights
 // of its corners 1 and 2, floats by their bits; without a triangle z is 0.
 #extension GL_GOOGLE_include_directive : require

@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Light that reaches a camera, by path tracing. One invocation owns one pixel and adds `samples` paths to its sum of
 // radiance and coverage; when a path ends the next begins in the same turn of the loop, so that lanes of a subgroup wait for
 // each other only at the end. A path meets a surface, asks one light, and goes on in a direction sampled from the

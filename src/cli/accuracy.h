@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ewa bench --accuracy: error against run time, of rendering and of training.
 #pragma once
 #include <filesystem>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ewa dataset: photographs of a mesh scene.
 #include <spdlog/fmt/fmt.h>
 

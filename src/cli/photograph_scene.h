@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Photographing a mesh scene as a command shows it: progress, Ctrl-C, and what there is to say afterwards.
 #pragma once
 #include <filesystem>

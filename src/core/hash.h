@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A number that tells contents apart: not proof against those who want two to agree.
 #pragma once
 #include <cstddef>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pictures from the bytes of a file that stands inside another.
 #pragma once
 #include <string>

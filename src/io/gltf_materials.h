@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Materials, textures, cameras, lights and sky of a glTF file.
 #pragma once
 #include "io/gltf_document.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // glTF 2.0 scenes of triangles, as .glb or .gltf with its buffers and images beside it or inside.
 #pragma once
 #include <filesystem>

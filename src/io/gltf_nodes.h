@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The tree of nodes that a glTF's scene places in the world.
 #pragma once
 #include <functional>

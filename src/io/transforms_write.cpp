@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "io/transforms_write.h"
 
 #include <glm/matrix.hpp>

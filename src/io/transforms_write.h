@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // transforms.json as src/io/transforms.h reads it.
 #pragma once
 #include <filesystem>

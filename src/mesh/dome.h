@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Cameras for a scene that brings none.
 #pragma once
 #include <vector>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A bounding volume hierarchy of two-child nodes, built by the surface area heuristic over bins (Wald 2007).
 #pragma once
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Which light a path asks: a table that draws each by its share of the power.
 #pragma once
 #include <cstdint>

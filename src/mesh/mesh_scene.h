@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A scene of triangles with what colours and lights them, in the world of its file. Values are linear light.
 #pragma once
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A scene as the buffers that lib/mesh.glsl, lib/traversal.glsl and lib/lights.glsl read.
 #pragma once
 #include <array>

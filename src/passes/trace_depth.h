@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the centre of each pixel sees.
 #pragma once
 #include "passes/trace_paths.h"

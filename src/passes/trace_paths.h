@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Light that reaches a camera, by path tracing.
 #pragma once
 #include "gpu/recording.h"

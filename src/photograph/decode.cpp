@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "ewa/error.h"
 #include "image/decode.h"
 #include "photograph/photographer.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // From radiance to the numbers of a photograph.
 #pragma once
 #include <vector>

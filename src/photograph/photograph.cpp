@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The order of the work: read, pack, find the cameras and the exposure, photograph view after view, choose points, and
 // write transforms.json last.
 #include "ewa/photograph.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A packed scene on a device, and pictures of it through pinholes.
 #pragma once
 #include <memory>

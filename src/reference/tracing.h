@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The float64 twin of shaders/lib/traversal.glsl.
 #pragma once
 #include <glm/vec2.hpp>

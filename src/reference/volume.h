@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Splats as what they stand for: a volume of Gaussians that emits and absorbs (Max 1995, "Optical Models for Direct
 // Volume Rendering", eq. 9), without any of splatting's approximations.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Error against run time: the diagram in which methods of different price compare.
 #pragma once
 #include <nlohmann/json.hpp>

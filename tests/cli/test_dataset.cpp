@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ewa dataset, and ewa train on a mesh scene.
 #include <gtest/gtest.h>
 

@@ -2,6 +2,7 @@
 // Values on the very edge of a kernel's comparisons, where a broken one and a whole one part.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -52,6 +53,28 @@ TEST(ProjectEdges, PoisonBehindTheCameraIsCounted) {
     Renderer renderer(device(), g, scene.options);
     renderer.render(scene.camera);
     EXPECT_EQ(renderer.skipped_nonfinite(), 5u);
+}
+
+/// The bytes are the floats, clamped and rounded: what saving the picture would make of them.
+TEST(PackedPicture, IsTheFloatsRounded) {
+    Scene scene = random_scene(46, 200, SplatKind::ordinary, 61, 47);
+    for (float& value : scene.gaussians.sh) value *= 2;  // beyond white too
+    Renderer renderer(device(), scene.gaussians, scene.options);
+    DrawOptions draw;
+    draw.render = scene.options;
+    const Image color = renderer.render(scene.camera, draw).color;
+    const std::vector<uint8_t>& bytes = renderer.render_bytes(scene.camera, draw);
+    ASSERT_EQ(bytes.size(), size_t(61 * 47 * 4));
+    size_t white = 0;
+    for (size_t i = 0; i < size_t(61 * 47); ++i) {
+        for (size_t c = 0; c < 3; ++c) {
+            const float value = color.pixels[3 * i + c];
+            white += value >= 1;
+            ASSERT_EQ(int(bytes[4 * i + c]), int(std::clamp(value, 0.0f, 1.0f) * 255 + 0.5f)) << i;
+        }
+        ASSERT_EQ(bytes[4 * i + 3], 255);
+    }
+    EXPECT_GT(white, 10u);
 }
 
 struct Weighed {
@@ -151,7 +174,7 @@ TEST(Noise, StaysFiniteAndMovesWhatJustFitted) {
     frame.counts = gpu::Buffer(*device(), "counts", sizeof(counts));
     frame.counts.upload(std::span<const shared::Counts>(&counts, 1));
     Rig& r = rig();
-    r.run([&](gpu::Recording& recording) { record_noise(recording, r.kernels, model, frame, 5.0f, 1, 12); });
+    r.run([&](gpu::Recording& recording) { record_noise(recording, r.kernels, model, frame, 5.0f, 1e9f, 1, 12); });
     const Gaussians moved = download_model(model, model.params);
     EXPECT_NE(moved.means[0], g.means[0]);
     for (size_t k = 3; k < 6; ++k) EXPECT_EQ(moved.means[k], g.means[k]);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pictures of mesh scenes whose answer is known in closed form, and rays against the float64 twin.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Mesh scenes whose pictures have a known answer.
 #pragma once
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A georeferenced capture: the same scene 5,000 km from the origin, where float32 has a step of half a metre.
 #include <gtest/gtest.h>
 

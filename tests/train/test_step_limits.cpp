@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Steps that would throw a splat out of every view are shortened and counted; ordinary scenes have none.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // glTF scenes of triangles: indices of every type, strips and fans, nodes, materials, cameras, lights, sky, and damage.
 #include <glm/matrix.hpp>
 #include <gtest/gtest.h>

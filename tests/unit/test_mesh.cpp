@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The hierarchy against brute force, the cameras on the dome, and what the path tracer's tables hold.
 #include <glm/matrix.hpp>
 #include <gtest/gtest.h>
