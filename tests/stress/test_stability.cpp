@@ -35,8 +35,10 @@ TEST_P(Stability, TrainingFromItStaysFinite) {
 INSTANTIATE_TEST_SUITE_P(All, Stability, testing::Range(size_t(0), cases().size()),
                          [](const testing::TestParamInfo<size_t>& tested) {
                              std::string name = cases()[tested.param].name;
-                             for (char& c : name)
+                             for (char& c : name) {
+                                 if (c == '-') c = 'm';
                                  if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
+                             }
                              return name;
                          });
 
