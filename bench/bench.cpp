@@ -115,8 +115,8 @@ void add_options(CLI::App& app, Options& options) {
 int run(const Options& options, const std::vector<std::string>& program) {
     if (options.list) return list_cases(options.stability);
     if (options.stability)
-        return run_stability(open_device({.selector = options.device}),
-                             {options.cases, options.training_steps, options.json, options.scene, options.read_splats});
+        return run_stability({options.cases, options.training_steps, options.device, options.json, options.scene,
+                              options.read_splats});
     if (!options.scene.empty())
         throw InputError(options.scene.string() + ": a file is for --stability, which was not asked for");
     if (options.first_step) return run_first_step(options.device);

@@ -33,8 +33,9 @@ std::vector<StabilityCase> chosen_cases(const StabilityOptions& options) {
 
 }  // namespace
 
-int run_stability(const std::shared_ptr<gpu::Device>& device, const StabilityOptions& options) {
+int run_stability(const StabilityOptions& options) {
     const std::vector<StabilityCase> cases = chosen_cases(options);
+    const auto device = open_device({.selector = options.device});
     print("device: " + device_info(*device).name + "\n" + stability_header());
     std::vector<StabilityResult> results;
     std::vector<StabilityTraining> trainings;
