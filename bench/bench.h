@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The benchmark: speed per pass against what the host's cores can do, and error against the float64 twin.
 // Both `ewa bench` and the stand-alone ewa-bench are this and nothing more.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The fixed set of cases. A case's name says all of it: figures of two machines or two commits are compared
 // by name.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A splat scene in memory: structure of arrays, values exactly as an INRIA PLY stores them.
 #pragma once
 #include <cstddef>

@@ -1,5 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pictures and gradients of a fixed splat scene.
 #pragma once
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -16,6 +18,21 @@ struct Rendering {
     Image color;  // RGB, background blended in, not clamped
     Image alpha;  // one channel, 1 - T
     Image depth;  // one channel, sum of view z * alpha_i * T_i, divided by alpha where alpha > 0; empty unless asked for
+    Image count;  // one channel, splats blended; empty unless asked for
+};
+
+enum class Drawing {
+    color,
+    depth,      // Rendering::depth also
+    count,      // Rendering::count also
+    ellipsoids  // each splat as a solid of ELLIPSOID_REACH standard deviations: the nearest one's colour, shaded
+};
+
+/// What may differ from one picture of a scene to the next.
+struct DrawOptions {
+    RenderOptions render;
+    Drawing drawing = Drawing::color;
+    double splat_scale = 1;  // factor of every splat's scales, above 0
 };
 
 /// What the plan left out, for `ewa info` and `--verbose`: one line each, with the bytes it saves.
@@ -40,8 +57,21 @@ class Renderer {
     /// Throws InputError when the camera's size is not positive or exceeds what the device can address.
     Rendering render(const Camera& camera, bool with_depth = false);
 
+    /// The same with other options than the renderer's. SH degrees above those it was made for stay left out.
+    Rendering render(const Camera& camera, const DrawOptions& options);
+
+    /// The colour alone, as 8-bit RGBA: rounded and clamped as save_image does it. What a window shows: the floating-point
+    /// planes stay on the device. Drawing::color or ellipsoids. The reference holds until the next picture.
+    const std::vector<uint8_t>& render_bytes(const Camera& camera, const DrawOptions& options);
+
+    /// Another scene in place of the present one, with the kernels that there are. Throws as the constructor does; the
+    /// renderer then has no splats.
+    void replace(const Gaussians& gaussians);
+
     /// Splats skipped in the last picture because a stored value is not finite or the quaternion is zero.
     uint32_t skipped_nonfinite() const;
+    /// Splats that reach a pixel's tile in the last picture that was drawn with DrawOptions.
+    uint32_t splats_drawn() const;
     std::vector<PassTime> pass_times() const;
 
   private:

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // From photographs to splats.
 #pragma once
 #include <array>

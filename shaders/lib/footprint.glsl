@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Which tiles a splat's ellipse {alpha >= ALPHA_MIN} reaches, tile row by tile row, in closed form.
 // The answer errs to the large side only, so leaving out the other tiles never changes the picture.
 #ifndef EWA_LIB_FOOTPRINT

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // 3DGS as Markov chain Monte Carlo (Kheradmand et al. 2024, "3D Gaussian Splatting as Markov Chain Monte Carlo").
 #ifndef EWA_LIB_MCMC
 #define EWA_LIB_MCMC

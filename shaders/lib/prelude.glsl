@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What every pass begins with.
 #ifndef EWA_LIB_PRELUDE
 #define EWA_LIB_PRELUDE

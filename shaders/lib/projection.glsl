@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // From a splat's parameters to its 2D Gaussian: Sigma2 = J W Sigma W^T J^T + LOW_PASS I (EWA; Zwicker et al. 2001,
 // eq. 22 to 31), with M = J W R S, so that Sigma2 = M M^T + LOW_PASS I. Shared by the forward and the backward pass.
 // Needs camera.glsl and quaternion.glsl.

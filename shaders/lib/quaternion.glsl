@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Rotation of a quaternion (w, x, y, z) of any non-zero norm.
 #ifndef EWA_LIB_QUATERNION
 #define EWA_LIB_QUATERNION

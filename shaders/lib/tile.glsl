@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One subgroup owns one tile: lane l stands in column l % TILE_WIDTH and has PIXELS pixels of it, ROW_STEP rows apart.
 // A batch of SUBGROUP splats lives in registers, one splat a lane, and goes round by shuffles with constant lanes.
 // Needs subgroup.glsl; the including pass declares `push` (BlendPush), records, values, tile_starts.

@@ -1,6 +1,7 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Blends the splats of a tile front to back into the image planes: C = sum c alpha T + T background. One workgroup is
-// one subgroup and owns one tile. SPEC_MODE 1: writes the depth plane also.
+// one subgroup and owns one tile. SPEC_MODE: BLEND_*.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"
@@ -8,13 +9,24 @@
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_MODE) const uint MODE = 0;
-const bool WITH_DEPTH = MODE == 1u;
+const bool WITH_DEPTH = MODE == BLEND_DEPTH;
+const bool WITH_COUNT = MODE == BLEND_COUNT;
 
 layout(set = 0, binding = 0) uniform samplerBuffer records;
 layout(set = 0, binding = 1, scalar) readonly buffer Splats { uint splats[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer TileStarts { uint tile_starts[]; };
 layout(set = 0, binding = 3, scalar) writeonly buffer Planes { float planes[]; };
 layout(push_constant, scalar) uniform Push { BlendPush push; };
+
+// The splat as a solid: the first one that a pixel meets closes it. Lit from the camera, so darker towards its outline.
+void meet_ellipsoid(LaneSplat s, uint p, inout float T, inout vec3 color) {
+    const float u = s.u + s.u_step * float(p), v = s.v + s.v_step * float(p);
+    const float height = 1.0 - (u * u + v * v) * float(2.0 / (ELLIPSOID_REACH * ELLIPSOID_REACH));
+    const bool hit = T > 0.0 && height >= 0.0 && s.opacity >= float(ELLIPSOID_OPACITY);
+    const float shade = mix(float(ELLIPSOID_RIM), 1.0, sqrt(max(height, 0.0)));
+    color = hit ? shade * s.color : color;
+    T = hit ? 0.0 : T;
+}
 
 void main() {
     const uint tile = gl_WorkGroupID.x * push.tile_step[0] + gl_WorkGroupID.y * push.tile_step[1];
@@ -24,13 +36,13 @@ void main() {
     const uint py = (tile / push.tiles[0]) * TILE_HEIGHT + lane / TILE_WIDTH;
     const vec2 pixel = vec2(px, py) + 0.5;
 
-    float T[PIXELS], depth[PIXELS];
+    float T[PIXELS], depth[PIXELS], count[PIXELS];
     vec3 color[PIXELS];
     [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
         // A pixel outside the image is closed from the start, so that it never keeps the tile going.
         T[p] = px < push.size[0] && py + p * ROW_STEP < push.size[1] ? 1.0 : -1.0;
         color[p] = vec3(0.0);
-        depth[p] = 0.0;
+        depth[p] = count[p] = 0.0;
     }
     const uint end = tile_starts[tile + 1u];
     for (uint k = tile_starts[tile]; k < end; k += SUBGROUP) {
@@ -42,14 +54,20 @@ void main() {
         const float ratio_step = ratio_step_of(record1);
         [[unroll]] for (uint j = 0; j < SUBGROUP; ++j) {
             const LaneSplat s = lane_splat(record0, record1, record2, ratio_step, j, pixel);
+            if (MODE == BLEND_ELLIPSOIDS) {
+                [[unroll]] for (uint p = 0; p < PIXELS; ++p) meet_ellipsoid(s, p, T[p], color[p]);
+                continue;
+            }
             float raw[PIXELS];
             column_alphas(s, raw);
             const float z = WITH_DEPTH ? subgroupShuffle(record2.w, j) : 0.0;
             [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
                 bool blended;
-                const float weight = composite(alpha_of(raw[p]), T[p], blended);
+                const float alpha = alpha_of(raw[p]);
+                const float weight = composite(alpha, T[p], blended);
                 color[p] += weight * s.color;
                 if (WITH_DEPTH) depth[p] += weight * z;
+                if (WITH_COUNT) count[p] += blended && alpha > 0.0 ? 1.0 : 0.0;
             }
         }
         bool open = false;
@@ -67,6 +85,7 @@ void main() {
             planes[PLANE_B * push.plane_floats + at] = color[p].b + left * background.b;
             planes[PLANE_T * push.plane_floats + at] = left;
             if (WITH_DEPTH) planes[PLANE_DEPTH * push.plane_floats + at] = depth[p];
+            if (WITH_COUNT) planes[PLANE_COUNT * push.plane_floats + at] = count[p];
         }
     }
 }

@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Gradients of blending, front to back: with R = (what is blended behind a splat) . dL/dC,
 // dL/d(alpha) = T c . dL/dC - R / (1 - alpha); R starts as C . dL/dC and each splat takes its own share off, so nothing
 // is divided by 1 - alpha splat after splat. One workgroup is one subgroup and owns one tile, and the gradient slots

@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Second half of the way back, along the rows, and the gradient of the whole loss by the rendering:
 // dL/dx = ssim_scale (blur dS/d(mean x) + 2 x blur dS/d(mean x^2) + y blur dS/d(mean x y)) + l1_scale sign(x - y),
 // the first part where |x| is within SSIM_LIMIT.

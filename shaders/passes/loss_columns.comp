@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // First half of the SSIM window: blurs the four moments of rendering x and photograph y down the columns (Wang et al.
 // 2004; x^2 and y^2 are only ever needed as a sum). One invocation owns LOSS_ROWS rows of one texel of channel
 // workgroup.z.

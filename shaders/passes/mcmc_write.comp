@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Writes the splats of the next generation into new buffers. One invocation owns new splat j. A dead splat and one
 // past the old number become copies of their sources; a source and its copies share what it was (lib/mcmc.glsl) and
 // start without moments. With a spread, each of them stands where a normal draw of the source's Gaussian puts it.

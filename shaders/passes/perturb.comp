@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Moves every mean by noise of its splat's own shape, the more the more transparent it is (Kheradmand et al. 2024,
 // eq. 8): mean += amplitude sigmoid(-MCMC_GATE_SLOPE (opacity - MCMC_GATE_OPACITY)) Sigma n, at most `reach` along each
 // axis of the splat. One invocation owns

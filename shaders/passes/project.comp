@@ -1,6 +1,8 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Projects splats into pixels. One invocation owns splat i: it reads its parameters and the camera, and writes its
 // record, its depth key and the number of tiles it reaches. A splat that is not drawn gets count 0 and the last key.
+// SPEC_MODE 1 (inspection): scales are shifted, and the splats that are drawn are counted.
 #extension GL_GOOGLE_include_directive : require
 #define BINDING_CAMERA 1
 #include "lib/prelude.glsl"
@@ -11,6 +13,8 @@
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3;
+layout(constant_id = SPEC_MODE) const uint MODE = 0;
+const bool INSPECTED = MODE == 1u;
 
 layout(set = 0, binding = 0) uniform samplerBuffer params;
 layout(set = 0, binding = 2, scalar) writeonly buffer Records { vec4 records[]; };
@@ -47,7 +51,8 @@ void main() {
     const uint i = item_index();
     if (i >= push.splats) return;
     const vec4 p0 = param(0, i), p1 = param(1, i), p2 = param(2, i);
-    const Projection p = project_splat(SplatShape(p0.xyz, p0.w, p1, p2.xyz));
+    const vec3 log_scale = INSPECTED ? p2.xyz + push.log_scale_shift : p2.xyz;
+    const Projection p = project_splat(SplatShape(p0.xyz, p0.w, p1, log_scale));
     const float z = p.view.z.x;
     bool finite_color;
     const vec3 color = sh_color(i, p2, normalize(p.view.offset), finite_color);
@@ -72,5 +77,6 @@ void main() {
     records[RECORD_TEXELS * i + 2] = vec4(color, z);
     depth_keys[i] = count > 0u ? floatBitsToUint(z) : 0xffffffffu;
     tile_counts[i] = count;
+    if (INSPECTED && count > 0u) atomicAdd(counts.drawn, 1u);
     if (!stored_finite || (in_front && !projected_finite)) atomicAdd(counts.skipped_nonfinite, 1u);
 }

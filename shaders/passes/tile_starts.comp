@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Where each tile's instances begin in the sorted list. One invocation owns tile t of 0..tiles and searches its first
 // instance; entry `tiles` is the end of the last tile's, and one more the end of the list, where instances that turned
 // out not to exist stand.

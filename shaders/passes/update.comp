@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Gradient of the projection, and Adam in the same breath, so that no gradient buffer of the parameters' size exists.
 // One invocation owns splat i: it adds up the splat's slots in the order of its tiles, carries the sums back through
 // the projection, and moves its parameters and moments. A splat that was not drawn has gradient zero and still moves by

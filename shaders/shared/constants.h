@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Every constant of the rendering model, defined once for the shaders, the host and the float64 twin.
 // Values are those of gsplat 1.6 unless a line says otherwise.
 #ifndef EWA_SHARED_CONSTANTS_H
@@ -18,6 +19,11 @@ EWA_REAL(JACOBIAN_MARGIN, 0.3);       // x/z in J is clamped to this share of th
 EWA_REAL(ALPHA_MAX, 0.99);            // alpha = min(ALPHA_MAX, opacity * exp(power))
 EWA_REAL(ALPHA_MIN, 1.0 / 255.0);     // a contribution below this is skipped
 EWA_REAL(TRANSMITTANCE_STOP, 1e-4);   // blending stops before T would fall to this or under, that splat excluded
+
+// Splats as solids, to look at a scene's make-up: out to so many standard deviations, those at least so opaque.
+EWA_REAL(ELLIPSOID_REACH, 2.0);
+EWA_REAL(ELLIPSOID_OPACITY, 0.1);
+EWA_REAL(ELLIPSOID_RIM, 0.35);        // shade of the outline, of 1 in the middle
 
 // Real spherical harmonics in INRIA's order and signs (3DGS, utils/sh_utils.py; Sloan 2013).
 EWA_REAL(SH_C0, 0.28209479177387814);
@@ -70,6 +76,15 @@ EWA_UINT(MCMC_SPREAD_STREAM, 0x73707264u);
 EWA_UINT(KERNEL_PEAK, 0u);            // 3DGS: the opacity is the peak of the footprint
 EWA_UINT(KERNEL_ANTIALIAS, 1u);       // Mip-Splatting (Yu et al. 2024, eq. 9): times sqrt(det before / det after low-pass)
 EWA_UINT(KERNEL_UNIT_MASS, 2u);       // EWA (Zwicker et al. 2001): times 1 / (2 pi sqrt(det)) per px^2
+
+// Photographs of mesh scenes (docs/photographs.md says what the path tracer models).
+EWA_UINT(TRACE_STACK, 48u);           // deepest hierarchy: far children that wait while a ray goes down
+EWA_UINT(TRACE_LEAF_MAX, 4u);         // triangles a leaf
+EWA_UINT(TRACE_BOUNCES, 5u);          // a path turns at most this often
+EWA_UINT(TRACE_ROULETTE, 2u);         // from this turn on Russian roulette may end it
+EWA_REAL(TRACE_ALPHA_MIN, 0.0025);    // least GGX width (roughness^2): a mirror is this rough
+EWA_REAL(TRACE_SAMPLE_MAX, 8.0);      // a sample brighter than this many times white counts as this bright
+EWA_REAL(DEPTH_ALPHA, 0.5);           // a blended surface of this opacity is what depth sees
 
 EWA_END_SHARED
 #endif

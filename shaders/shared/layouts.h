@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Every block that host and shaders share, under the scalar block layout. src/passes/layout_checks.cpp asserts sizes.
 #ifndef EWA_SHARED_LAYOUTS_H
 #define EWA_SHARED_LAYOUTS_H
@@ -44,6 +45,13 @@ EWA_UINT(PLANE_G, 1u);
 EWA_UINT(PLANE_B, 2u);
 EWA_UINT(PLANE_T, 3u);             // transmittance that reaches the background
 EWA_UINT(PLANE_DEPTH, 4u);         // sum of z alpha T
+EWA_UINT(PLANE_COUNT, 4u);         // splats blended; a picture has one of the two at most
+
+// ---- SPEC_MODE of blend.comp ----
+EWA_UINT(BLEND_COLOR, 0u);
+EWA_UINT(BLEND_DEPTH, 1u);         // writes PLANE_DEPTH also
+EWA_UINT(BLEND_COUNT, 2u);         // writes PLANE_COUNT also
+EWA_UINT(BLEND_ELLIPSOIDS, 3u);    // the nearest splat as a solid, in place of blending
 
 // ---- Loss: what one invocation owns. A pass down the columns: one texel (4 pixels) wide, LOSS_ROWS rows high; a pass along
 // the rows: LOSS_TEXELS texels of one row. Neighbouring outputs share most of their window. ----
@@ -84,11 +92,13 @@ struct Counts {
     float l1;                      // mean |x - y|
     float ssim;                    // mean SSIM
     uint limited_steps;            // steps of a mean, quaternion or scale that were shortened
+    uint drawn;                    // splats that reach a tile; counted where the projection is one for inspection
 };
 
 struct ProjectPush {
     uint splats;
     uint planes;                   // texel planes stored a splat
+    float log_scale_shift;         // inspection: added to every log scale
 };
 
 struct SortPush {
@@ -136,6 +146,10 @@ struct UnpackPush {
     float background[3];
     uint size[2];
     uint stride;
+    uint plane_floats;
+};
+
+struct PackPush {
     uint plane_floats;
 };
 
@@ -227,6 +241,64 @@ struct PerturbPush {
     float reach;                   // the longest noise (world units)
     uint seed[2];
     uint step;
+};
+
+// ---- A mesh scene as rays meet it: buffers of rgba32ui texels that hold floats by their bits ----
+// Positions are relative to an origin that the host subtracts in float64 first.
+// Node: of each of two children low x y z, reference; high x y z, 0. A reference is a node's number, or a leaf's LEAF_FLAG,
+// triangles - 1 in LEAF_COUNT_BITS bits and its first triangle. A child that is none has low above high.
+EWA_UINT(NODE_TEXELS, 4u);
+EWA_UINT(LEAF_FLAG, 0x80000000u);
+EWA_UINT(LEAF_COUNT_SHIFT, 28u);
+EWA_UINT(LEAF_FIRST_MASK, 0x0fffffffu);
+// Triangle: corner 0 x y z, material; corner 1 - corner 0, 0; corner 2 - corner 0, 1 where cameras see its back.
+EWA_UINT(TRIANGLE_TEXELS, 3u);
+// Surface: three normals (octahedral, 2 x snorm16), colour 0; uv 0, uv 1; uv 2, colour 1, colour 2 (RGBA, 4 x unorm8).
+EWA_UINT(SURFACE_TEXELS, 3u);
+// Material: base r g b, opacity; metallic, roughness, F0 of the dielectric, F90 of it; emitted r g b, cut-off or 0;
+// textures of base, metal and roughness, emission (NO_TEXTURE: none), MATERIAL_* flags; density of light sampling (per
+// area) on its triangles, 0 0 0.
+EWA_UINT(MATERIAL_TEXELS, 5u);
+EWA_UINT(NO_TEXTURE, 0xffffffffu);
+EWA_UINT(MATERIAL_TWO_SIDED, 1u);  // emits on both sides, and cameras see its back
+EWA_UINT(MATERIAL_MASKED, 2u);     // is there where its opacity reaches the cut-off
+EWA_UINT(MATERIAL_BLENDED, 4u);    // stops a ray with the probability of its opacity
+// Texture: first texel, width, height, TEXTURE_* flags.
+EWA_UINT(WRAP_REPEAT, 0u);
+EWA_UINT(WRAP_CLAMP, 1u);
+EWA_UINT(WRAP_MIRROR, 2u);
+EWA_UINT(TEXTURE_WRAP_T_SHIFT, 2u);
+EWA_UINT(TEXTURE_NEAREST, 16u);
+// Light: position (directional: direction to it; triangle: 0), LIGHT_* kind; r g b, probability to be drawn; spot's
+// direction, range or 0 (triangle: its number); spot's scale and offset, alias threshold, alias.
+EWA_UINT(LIGHT_TEXELS, 4u);
+EWA_UINT(LIGHT_DIRECTIONAL, 0u);
+EWA_UINT(LIGHT_POINT, 1u);
+EWA_UINT(LIGHT_SPOT, 2u);
+EWA_UINT(LIGHT_TRIANGLE, 3u);
+EWA_UINT(SPEC_ALPHA_TESTED, 8u);   // 1: some material is masked or blended
+
+struct TraceView {
+    float rotation[9];             // world to camera, rows
+    float position[3];             // relative to the origin of the triangles
+    float focal[2];                // px
+    float center[2];               // px
+    uint size[2];                  // px
+    float zenith[3], horizon[3], ground[3];  // radiance of the sky straight up, level and straight down
+    float sample_max;              // radiance
+};
+
+// Integer sums, the same in any order.
+struct TraceCounts {
+    uint unfinished_rays;          // ended by the limit on steps
+    uint dropped_samples;          // not finite
+};
+
+struct TracePush {
+    uint first_sample, samples;    // of a pixel, in this dispatch
+    uint max_steps;                // of one ray
+    uint lights;
+    uint seed[2];
 };
 
 EWA_END_SHARED

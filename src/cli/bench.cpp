@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ewa bench: speed per pass, error against the float64 twin, and error against run time.
 #include "bench/bench.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ewa convert: from any splat format to any other, edited on the way.
 #include <spdlog/fmt/fmt.h>
 

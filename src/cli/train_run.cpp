@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "cli/train_run.h"
 
 #include <spdlog/fmt/fmt.h>
@@ -8,13 +9,18 @@
 #include "cli/accuracy.h"
 #include "cli/interrupt.h"
 #include "cli/output.h"
+#include "cli/photograph_scene.h"
 #include "cli/progress.h"
 #include "cli/text.h"
 #include "cli/train_files.h"
 #include "cli/train_resume.h"
+#include "cli/train_serve.h"
 #include "core/atomic_file.h"
+#include "core/folder_lock.h"
+#include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
+#include "pipeline/model.h"
 #include "train/checkpoint.h"
 #include "train/initialise.h"
 
@@ -72,14 +78,20 @@ Gaussians start_splats(const TrainArguments& arguments, const Dataset& dataset,
     return start;
 }
 
+using Clock = std::chrono::steady_clock;
+
+/// What the run is called: the scene's file, else the dataset's folder.
+std::string run_name(const TrainArguments& arguments) {
+    return arguments.scene.empty() ? dataset_name(arguments.dataset) : arguments.scene.stem().string();
+}
+
 class TrainRun {
   public:
-    explicit TrainRun(const TrainArguments& arguments)
-        : arguments_(arguments), options_(train_options(arguments)), pace_(arguments.save_every) {}
+    TrainRun(const TrainArguments& arguments, Clock::time_point begin)
+        : arguments_(arguments), begin_(begin), pace_(arguments.save_every) {}
     int run();
 
   private:
-    using Clock = std::chrono::steady_clock;
     double wall_seconds() const {
         return earlier_wall_ + std::chrono::duration<double>(Clock::now() - begin_).count();
     }
@@ -87,6 +99,7 @@ class TrainRun {
         if (!arguments_.quiet) fmt::print("{}\n", line);
     }
     void load();
+    void settle_degree();
     void describe() const;
     void resume(Trainer& trainer);
     void save_checkpoint(const Trainer& trainer);
@@ -99,19 +112,21 @@ class TrainRun {
     int finish(const Trainer& trainer);
     void print_result() const;
 
-    const TrainArguments& arguments_;
+    TrainArguments arguments_;
     TrainOptions options_;
-    Clock::time_point begin_ = Clock::now();
+    Clock::time_point begin_;
     double earlier_wall_ = 0;  // of the run that this one goes on from
     SavePace pace_;
     report::Json settings_;  // for the checkpoint
     std::optional<train::Checkpoint> earlier_;
     fs::path folder_, checkpoint_;
+    std::optional<core::FolderLock> lock_;
     Dataset dataset_;
     Split split_;
     Gaussians start_;
     std::shared_ptr<gpu::Device> device_;
     std::optional<report::MetricsLog> log_file_;
+    std::optional<TrainServer> server_;
     StepReport last_;
     report::ReportData report_;
     fs::path first_picture_;
@@ -125,12 +140,13 @@ void TrainRun::load() {
         throw InputError(fmt::format("{}: of {} images ({} missing) none is left to train on",
                                      arguments_.dataset.string(), dataset_.frames.size(),
                                      dataset_.missing_images));
+    settle_degree();
     start_ = start_splats(arguments_, dataset_, split_.train);
 
-    folder_ =
-        arguments_.output.empty() ? fs::path("out") / dataset_name(arguments_.dataset) : arguments_.output;
+    folder_ = arguments_.output.empty() ? fs::path("out") / run_name(arguments_) : arguments_.output;
     checkpoint_ = folder_ / "checkpoint.ewa";
     make_folder(folder_);
+    lock_.emplace(folder_);
     core::remove_abandoned_files(folder_);
     settings_ = checkpoint_settings(arguments_, train::dataset_fingerprint(dataset_, split_));
     if (arguments_.resume && fs::exists(checkpoint_)) {
@@ -147,7 +163,7 @@ void TrainRun::load() {
     for (const auto& [name, value] : config.items())
         report_.settings.emplace_back(name, value.is_string() ? value.get<std::string>() : value.dump());
 
-    report_.title = dataset_name(arguments_.dataset);
+    report_.title = run_name(arguments_);
     if (arguments_.init == "sfm" && dataset_.points.positions.empty())
         report_.remarks.push_back("there are no points: random splats where the cameras look are the start");
     if (dataset_.missing_images > 0)
@@ -155,6 +171,15 @@ void TrainRun::load() {
     if (dataset_.dropped_points > 0)
         report_.remarks.push_back(fmt::format(
             "{} points have a coordinate that is not finite and are left out", dataset_.dropped_points));
+}
+
+/// What "auto" comes to.
+void TrainRun::settle_degree() {
+    int& degree = arguments_.draw.sh_degree;
+    if (degree < 0) degree = dataset_.color_depends_on_view ? kMaxShDegree : 0;
+    options_ = train_options(arguments_);
+    if (degree == 0 && !dataset_.color_depends_on_view)
+        report_.remarks.push_back("no colour depends on the view, says the dataset: SH degree 0");
 }
 
 void TrainRun::describe() const {
@@ -206,6 +231,7 @@ void TrainRun::log(const StepReport& step, const std::optional<Evaluation>& eval
         line.test_ssim = evaluation->ssim;
     }
     log_file_->append(line);
+    server_->add_metrics(line);
     report_.metrics.push_back(line);
 }
 
@@ -232,6 +258,9 @@ void TrainRun::resume(Trainer& trainer) {
         earlier_.reset();
     }
     log_file_.emplace(folder_ / "metrics.jsonl", report_.metrics);
+    server_.emplace(arguments_.serve, folder_, arguments_.steps);
+    for (const report::MetricsLine& line : report_.metrics) server_->add_metrics(line);
+    if (const std::string line = server_->announcement(); !line.empty()) say(line);
 }
 
 void TrainRun::save_checkpoint(const Trainer& trainer) {
@@ -261,6 +290,10 @@ void TrainRun::train(Trainer& trainer, Progress& progress) {
         if (evaluation || step == 1 || at(step, report_every)) log(last_, evaluation);
         if (pace_.due(step)) save_checkpoint(trainer);
         if (at(step, arguments_.save_every)) save(trainer.gaussians());
+        server_->attend(trainer, last_, [&] {
+            save(trainer.gaussians());
+            save_checkpoint(trainer);
+        });
     }
 }
 
@@ -284,6 +317,7 @@ int TrainRun::finish(const Trainer& trainer) {
         summary.test_ssim = test->ssim;
     }
     if (last_.step > 0) log(last_, test);
+    server_->finish(last_, gaussians);
     for (const PassTime& time : trainer.pass_times())
         report_.pass_times.push_back({time.pass, time.milliseconds});
     report_.held_out = !split_.test.empty();
@@ -348,6 +382,13 @@ int TrainRun::run() {
                     options_.strategy == Strategy::adc ? Purpose::densifying : Purpose::training,
                     dataset_.frames.front().masks == MaskUse::ignore, options_.exposure))
         report_.plan.push_back({line.what, line.why, line.bytes_saved});
+    if (arguments_.draw.sh_degree == 0 && !dataset_.color_depends_on_view) {
+        // Parameters and both of Adam's moments.
+        const auto splats = uint32_t(start_.size());
+        report_.plan.push_back(
+            {fmt::format("SH degrees 1 to {}", kMaxShDegree), "the dataset says that no colour depends on the view",
+             3 * (pipeline::parameter_bytes(splats, kMaxShDegree) - pipeline::parameter_bytes(splats, 0))});
+    }
     describe();
 
     watch_for_interrupt();
@@ -360,7 +401,13 @@ int TrainRun::run() {
     resume(trainer);
     {
         Progress progress("trained", arguments_.steps, "steps", arguments_.quiet);
-        train(trainer, progress);
+        try {
+            train(trainer, progress);
+        } catch (const InputError&) {
+            // A photograph that is gone is met before the step begins: what was trained is whole.
+            save_checkpoint(trainer);
+            throw;
+        }
     }
     return finish(trainer);
 }
@@ -369,7 +416,7 @@ int TrainRun::run() {
 
 report::Json to_config(const TrainArguments& a) {
     report::Json json;
-    json["dataset"] = a.dataset.string();
+    json["dataset"] = (a.scene.empty() ? a.dataset : a.scene).string();
     json["steps"] = a.steps;
     json["strategy"] = a.strategy;
     json["max-splats"] = a.max_splats;
@@ -392,8 +439,20 @@ report::Json to_config(const TrainArguments& a) {
     return json;
 }
 
-int run_train(const TrainArguments& arguments) {
-    return TrainRun(arguments).run();
+int run_train(const TrainArguments& given) {
+    const Clock::time_point begin = Clock::now();
+    TrainArguments arguments = given;
+    const std::string extension = core::lower(arguments.dataset.extension().string());
+    if (extension == ".gltf" || extension == ".glb") {
+        train_options(arguments);  // what is wrong with them is said before the work, not after
+        arguments.scene = arguments.dataset;
+        if (arguments.output.empty()) arguments.output = fs::path("out") / run_name(arguments);
+        arguments.dataset = arguments.output / "dataset";
+        const Photographs made =
+            photograph_with_progress(arguments.device, arguments.scene, arguments.dataset, {}, arguments.quiet);
+        if (made.interrupted) return kInterruptedStatus;
+    }
+    return TrainRun(arguments, begin).run();
 }
 
 }  // namespace ewa::cli

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Splats in INRIA's PLY layout (3D Gaussian Splatting, scene/gaussian_model.py save_ply).
 //
 // Element "vertex", one row a splat, properties found by name:

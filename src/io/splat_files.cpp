@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Every splat format, by what a file begins with or what it is to be called.
 #include "ewa/splat_files.h"
 

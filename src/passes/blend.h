@@ -1,4 +1,5 @@
-// Blends the splats of every tile into the image planes. with_depth: the depth plane also.
+// SPDX-License-Identifier: Apache-2.0
+// Blends the splats of every tile into the image planes. mode: shared::BLEND_*.
 #pragma once
 #include "gpu/recording.h"
 #include "passes/shader_code.h"
@@ -16,12 +17,12 @@ struct Blend {
         const gpu::Buffer& planes;
     };
 
-    Blend(gpu::Device& device, const Shape& shape, bool with_depth)
+    Blend(gpu::Device& device, const Shape& shape, uint32_t mode)
         : pipeline(
               device, "blend", shader_code("blend"),
               {spec_float(shared::SPEC_CUT_OFF, shape.cut_off), spec(shared::SPEC_GROUP_SIZE, shape.subgroup), spec(shared::SPEC_SUBGROUP, shape.subgroup),
                spec(shared::SPEC_TILE_WIDTH, shape.tile_width),
-               spec(shared::SPEC_TILE_HEIGHT, shape.tile_height), spec(shared::SPEC_MODE, with_depth)}) {}
+               spec(shared::SPEC_TILE_HEIGHT, shape.tile_height), spec(shared::SPEC_MODE, mode)}) {}
 
     void record(gpu::Recording& recording, const Shape& shape, const Buffers& buffers,
                 const shared::BlendPush& push) const {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Gradient of blending into the slot of every (splat, tile) instance.
 #pragma once
 #include "gpu/recording.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Writes the (splat, tile) instances in depth order. with_first: also where each splat's begin.
 #pragma once
 #include "gpu/recording.h"

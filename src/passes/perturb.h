@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Moves the means by noise of the splats' shapes.
 #pragma once
 #include "gpu/recording.h"

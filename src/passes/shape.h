@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How kernels are cut for a device. Every such choice is made here, from the device's properties alone.
 #pragma once
 #include <array>

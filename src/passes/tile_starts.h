@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Finds where each tile's instances begin in the sorted list.
 #pragma once
 #include "gpu/recording.h"

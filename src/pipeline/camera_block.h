@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A camera as the shaders read it: float64 values in two floats each.
 #pragma once
 #include "ewa/camera.h"

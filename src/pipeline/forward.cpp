@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/forward.h"
 
 #include "pipeline/sorting.h"
@@ -17,17 +18,27 @@ shared::BlendPush blend_push(const Kernels& kernels, const Frame& frame, const C
             frame.instance_capacity};
 }
 
+namespace {
+
+uint32_t blend_mode(const Plan& plan) {
+    if (plan.ellipsoids) return shared::BLEND_ELLIPSOIDS;
+    if (plan.count) return shared::BLEND_COUNT;
+    return plan.depth ? shared::BLEND_DEPTH : shared::BLEND_COLOR;
+}
+
+}  // namespace
+
 Sorted record_forward(gpu::Recording& recording, Kernels& kernels, const Plan& plan, const Model& model,
                       const Frame& frame, const CameraUse& camera, const std::array<float, 3>& background) {
     const passes::Shape& shape = kernels.shape();
     const Sizes& s = frame.sizes;
     recording.fill(frame.counts, 0, 0, sizeof(shared::Counts));
 
-    kernels.get<passes::Project>(uint32_t(plan.sh_degree), uint32_t(plan.kernel))
+    kernels.get<passes::Project>(uint32_t(plan.sh_degree), uint32_t(plan.kernel), uint32_t(plan.inspected))
         .record(recording, shape,
                 {model.params, *camera.buffer, camera.offset, frame.records, frame.depth_keys[0],
                  frame.tile_counts, frame.counts},
-                {model.splats, model.planes()});
+                {model.splats, model.planes(), plan.log_scale_shift});
 
     const uint32_t order_index = record_sort(recording, kernels,
                                              {{&frame.depth_keys[0], &frame.depth_keys[1]},
@@ -73,7 +84,7 @@ Sorted record_forward(gpu::Recording& recording, Kernels& kernels, const Plan& p
                                              {frame.instance_keys[sorted], frame.counts, frame.tile_starts},
                                              {s.tiles, frame.instance_capacity});
 
-    kernels.get<passes::Blend>(plan.depth).record(recording, shape,
+    kernels.get<passes::Blend>(blend_mode(plan)).record(recording, shape,
                                                   {frame.records, splats, frame.tile_starts, frame.planes},
                                                   blend_push(kernels, frame, camera, background));
     return {&splats, places[sorted]};

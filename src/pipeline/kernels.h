@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The compiled kernels of a device, each made when it is first asked for.
 #pragma once
 #include <map>
@@ -23,6 +24,7 @@
 #include "passes/mcmc_draw.h"
 #include "passes/mcmc_weigh.h"
 #include "passes/mcmc_write.h"
+#include "passes/pack.h"
 #include "passes/perturb.h"
 #include "passes/project.h"
 #include "passes/radix_count.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // 3DGS as Markov chain Monte Carlo (Kheradmand et al. 2024) on the device: dead splats move to living ones,
 // the number grows by a share, and noise keeps the transparent ones exploring.
 #pragma once

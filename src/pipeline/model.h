@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A splat scene on the device: parameters, and in training Adam's moments. The only thing that a step
 // changes.
 #pragma once

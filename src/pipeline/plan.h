@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a scene and a request need: which kernels run, with which constants, and which buffers exist. A pure
 // function.
 #pragma once
@@ -20,6 +21,10 @@ struct Plan {
     bool absolute = false;    // of absolute gradients
     bool regularised = false;  // opacity and scale regularisers in the loss
     bool depth = false;
+    bool count = false;       // splats blended a pixel
+    bool ellipsoids = false;  // splats as solids, in place of blending
+    bool inspected = false;   // scales shifted, and the splats drawn counted
+    float log_scale_shift = 0;  // where inspected
     bool masks = false;  // photographs in which not every pixel counts
     bool exposure = false;  // photographs' exposures are learned
 };

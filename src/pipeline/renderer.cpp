@@ -1,8 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pictures and gradients of a fixed scene: the public face of the forward and backward frames.
 #include "ewa/renderer.h"
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "ewa/error.h"
 #include "gpu/executor.h"
@@ -40,10 +42,12 @@ gpu::Buffer upload_camera(gpu::Device& device, const Camera& camera, const passe
 /// One plane of an image, spread over channel c of a picture.
 void copy_plane(const std::vector<float>& planes, const Sizes& sizes, uint32_t plane, Image& image,
                 int channel) {
-    for (int y = 0; y < image.height; ++y)
-        for (int x = 0; x < image.width; ++x)
-            image.at(x, y)[channel] =
-                planes[size_t(plane) * sizes.plane_floats + size_t(y) * sizes.stride + size_t(x)];
+    const size_t step = size_t(image.channels);
+    for (int y = 0; y < image.height; ++y) {
+        const float* from = &planes[size_t(plane) * sizes.plane_floats + size_t(y) * sizes.stride];
+        float* to = image.at(0, y) + channel;
+        for (size_t x = 0; x < size_t(image.width); ++x) to[x * step] = from[x];
+    }
 }
 
 }  // namespace
@@ -56,7 +60,9 @@ struct Renderer::State {
     Plan plan;
     Model model;
     Frame frame;
-    uint32_t skipped = 0;
+    shared::Counts counts{};
+    gpu::Buffer packed;  // host visible; only where 8 bits are asked for
+    std::vector<uint8_t> bytes;
 
     State(std::shared_ptr<gpu::Device> d, const Gaussians& gaussians, const RenderOptions& o)
         : device(std::move(d)),
@@ -65,7 +71,64 @@ struct Renderer::State {
           options(o),
           plan(plan_picture(gaussians, o, false)),
           model(upload_model(*device, with_degree(gaussians, plan.stored_degree), 0, false)) {}
+
+    Plan plan_of(const DrawOptions& options) const;
+    /// then: what to record behind the picture.
+    template <class Record>
+    void submit(const Camera& camera, const Plan& picture, const std::array<float, 3>& background, Record then);
+    Rendering draw(const Camera& camera, const Plan& picture, const std::array<float, 3>& background);
 };
+
+template <class Record>
+void Renderer::State::submit(const Camera& camera, const Plan& picture, const std::array<float, 3>& background,
+                             Record then) {
+    const gpu::Buffer block = upload_camera(*device, camera, kernels.shape(), model.origin);
+    const CameraUse use{&block, 0, uint32_t(camera.width), uint32_t(camera.height)};
+    const uint32_t room = std::max(frame.instance_capacity, first_capacity(model.splats));
+    counts = run_until_it_fits(
+        kernels, executor, frame,
+        {model.splats, use.width, use.height, room, false, picture.depth || picture.count},
+        [&](gpu::Recording& recording) {
+            record_forward(recording, kernels, picture, model, frame, use, background);
+            then(recording);
+        });
+}
+
+Plan Renderer::State::plan_of(const DrawOptions& o) const {
+    if (!(o.splat_scale > 0) || !std::isfinite(o.splat_scale))
+        throw InputError("a splat scale of " + std::to_string(o.splat_scale) + ", not above zero");
+    Plan picture = plan;
+    picture.sh_degree = std::clamp(o.render.sh_degree, 0, plan.stored_degree);
+    picture.kernel = o.render.kernel;
+    picture.depth = o.drawing == Drawing::depth;
+    picture.count = o.drawing == Drawing::count;
+    picture.ellipsoids = o.drawing == Drawing::ellipsoids;
+    picture.inspected = true;
+    picture.log_scale_shift = float(std::log(o.splat_scale));
+    return picture;
+}
+
+Rendering Renderer::State::draw(const Camera& camera, const Plan& picture,
+                                const std::array<float, 3>& background) {
+    submit(camera, picture, background, [](gpu::Recording&) {});
+    const Sizes& sizes = frame.sizes;
+    const auto planes = frame.planes.download<float>(sizes.planes / 4);
+    Rendering result{Image(camera.width, camera.height, 3), Image(camera.width, camera.height, 1), {}, {}};
+    for (int c = 0; c < 3; ++c) copy_plane(planes, sizes, shared::PLANE_R + uint32_t(c), result.color, c);
+    copy_plane(planes, sizes, shared::PLANE_T, result.alpha, 0);
+    for (float& value : result.alpha.pixels) value = 1.0f - value;
+    if (picture.count) {
+        result.count = Image(camera.width, camera.height, 1);
+        copy_plane(planes, sizes, shared::PLANE_COUNT, result.count, 0);
+    }
+    if (picture.depth) {
+        result.depth = Image(camera.width, camera.height, 1);
+        copy_plane(planes, sizes, shared::PLANE_DEPTH, result.depth, 0);
+        for (size_t i = 0; i < result.depth.pixels.size(); ++i)
+            if (result.alpha.pixels[i] > 0) result.depth.pixels[i] /= result.alpha.pixels[i];
+    }
+    return result;
+}
 
 Renderer::Renderer(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians,
                    const RenderOptions& options)
@@ -75,34 +138,47 @@ Renderer::Renderer(Renderer&&) noexcept = default;
 
 Rendering Renderer::render(const Camera& camera, bool with_depth) {
     State& s = *state_;
-    s.plan.depth = with_depth;
-    const gpu::Buffer block = upload_camera(*s.device, camera, s.kernels.shape(), s.model.origin);
-    const CameraUse use{&block, 0, uint32_t(camera.width), uint32_t(camera.height)};
-    const uint32_t room = std::max(s.frame.instance_capacity, first_capacity(s.model.splats));
-    const shared::Counts counts = run_until_it_fits(
-        s.kernels, s.executor, s.frame, {s.model.splats, use.width, use.height, room, false, with_depth},
-        [&](gpu::Recording& recording) {
-            record_forward(recording, s.kernels, s.plan, s.model, s.frame, use, s.options.background);
-        });
-    s.skipped = counts.skipped_nonfinite;
+    Plan plan = s.plan;
+    plan.depth = with_depth;
+    return s.draw(camera, plan, s.options.background);
+}
 
-    const Sizes& sizes = s.frame.sizes;
-    const auto planes = s.frame.planes.download<float>(sizes.planes / 4);
-    Rendering result{Image(camera.width, camera.height, 3), Image(camera.width, camera.height, 1), Image()};
-    for (int c = 0; c < 3; ++c) copy_plane(planes, sizes, shared::PLANE_R + uint32_t(c), result.color, c);
-    copy_plane(planes, sizes, shared::PLANE_T, result.alpha, 0);
-    for (float& value : result.alpha.pixels) value = 1.0f - value;
-    if (with_depth) {
-        result.depth = Image(camera.width, camera.height, 1);
-        copy_plane(planes, sizes, shared::PLANE_DEPTH, result.depth, 0);
-        for (size_t i = 0; i < result.depth.pixels.size(); ++i)
-            if (result.alpha.pixels[i] > 0) result.depth.pixels[i] /= result.alpha.pixels[i];
-    }
-    return result;
+Rendering Renderer::render(const Camera& camera, const DrawOptions& options) {
+    return state_->draw(camera, state_->plan_of(options), options.render.background);
+}
+
+const std::vector<uint8_t>& Renderer::render_bytes(const Camera& camera, const DrawOptions& options) {
+    State& s = *state_;
+    s.submit(camera, s.plan_of(options), options.render.background, [&](gpu::Recording& recording) {
+        const Sizes& sizes = s.frame.sizes;
+        const uint64_t needed = uint64_t(sizes.plane_floats) * 4;
+        if (!s.packed || s.packed.bytes() < needed) {
+            s.packed = gpu::Buffer();
+            s.packed = gpu::Buffer(*s.device, "packed", needed, gpu::Texel::none, false, true);
+        }
+        s.kernels.get<passes::Pack>().record(recording, s.kernels.shape(), {s.frame.planes, s.packed},
+                                             {sizes.plane_floats});
+    });
+    const size_t row = size_t(camera.width) * 4, stride = size_t(s.frame.sizes.stride) * 4;
+    s.bytes.resize(row * size_t(camera.height));
+    for (size_t y = 0; y < size_t(camera.height); ++y)
+        std::memcpy(&s.bytes[y * row], s.packed.mapped() + y * stride, row);
+    return s.bytes;
+}
+
+void Renderer::replace(const Gaussians& gaussians) {
+    State& s = *state_;
+    s.model = {};  // its memory first
+    s.plan = plan_picture(gaussians, s.options, false);
+    s.model = upload_model(*s.device, with_degree(gaussians, s.plan.stored_degree), 0, false);
 }
 
 uint32_t Renderer::skipped_nonfinite() const {
-    return state_->skipped;
+    return state_->counts.skipped_nonfinite;
+}
+
+uint32_t Renderer::splats_drawn() const {
+    return state_->counts.drawn;
 }
 
 std::vector<PassTime> Renderer::pass_times() const {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The size of every buffer of a frame and the cut of every dispatch over it: one pure function.
 #pragma once
 #include <cstdint>
@@ -11,7 +12,7 @@ struct FrameRequest {
     uint32_t width = 0, height = 0;  // px
     uint32_t instances = 0;          // (splat, tile) pairs to make room for
     bool gradients = false;
-    bool depth = false;
+    bool depth = false;     // a fifth image plane: depth or count
     bool masks = false;     // with gradients: pixels may count in part
     bool exposure = false;  // with gradients: the loss sees the picture through a photograph's exposure
 };

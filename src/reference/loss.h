@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The training loss of a picture and its gradient.
 //
 //   L    = (1 - SSIM_WEIGHT) mean|x - y| + SSIM_WEIGHT (1 - mean SSIM)       means over pixels and RGB

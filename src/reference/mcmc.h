@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // 3DGS as Markov chain Monte Carlo (Kheradmand et al. 2024): what a splat becomes that is shared by several,
 // which splats are drawn as sources, and the noise on the means.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One splat seen by one camera: where it lies in the picture, how far it reaches, how opaque and what colour
 // it is.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The report of a training run: one HTML file that needs nothing beside it.
 #pragma once
 #include <cstdint>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a training run leaves in numbers: summary.json and the lines of metrics.jsonl.
 #pragma once
 #include <cstdint>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Selecting, ordering and joining splats.
 #include "ewa/splat_edit.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Moving, turning, scaling and mirroring splats.
 #include <algorithm>
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // checkpoint.ewa: a training run laid down so that it can go on. All numbers little endian.
 //
 //   header    8 bytes "EWACKPT\n", u32 version (1), u32 number of sections

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The training photographs and their cameras, for the device.
 #pragma once
 #include <future>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // When a run does what: pure functions of the step and the options.
 //
 // The intervals of TrainOptions are those of a 30,000 step run. A shorter run keeps their proportions as far

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The training loop's one step: which photograph, which rates, one submission, and what follows it on
 // schedule.
 #include "ewa/trainer.h"

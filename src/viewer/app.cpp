@@ -1,8 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "viewer/app.h"
 
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
-#include <imgui.h>
 
 #include <algorithm>
 #include <cmath>
@@ -14,44 +14,38 @@ namespace ewa::viewer {
 namespace {
 
 constexpr double kRestSeconds = 0.2;  // without a change, until the full picture is asked for
-constexpr double kRadiansPerPixel = 0.005;
-constexpr double kFlySpeed = 0.8;  // distances to the pivot, a second
+constexpr double kHintSeconds = 15;
 constexpr int kRedraws = 3;
 constexpr Size kUsualSize{1280, 800};
 
 /// The window's size where none is asked for: the camera's, made smaller in proportion where the desktop has
-/// less room. With a picture to write the camera's size is kept, since that is the picture's.
-Size window_size(const Opened& opened, const WindowSystem& system) {
-    if (opened.size) return *opened.size;
+/// less room. With a picture to write the camera's size is kept, since that is the picture's. A window to look at is not
+/// smaller than the panel needs.
+Size window_size(const Startup& startup, const WindowSystem& system) {
+    if (startup.size) return *startup.size;
     Size size = kUsualSize;
-    if (opened.dataset) {
-        const Camera& camera = opened.dataset->frames[size_t(opened.frame)].camera;
+    if (startup.scene.dataset) {
+        const Camera& camera = startup.scene.dataset->frames[size_t(startup.frame.value_or(0))].camera;
         size = {camera.width, camera.height};
     }
+    if (startup.picture) return size;
     const Size room = system.room();
-    if (opened.picture || room.width <= 0 || room.height <= 0) return size;
-    const double scale = std::min({1.0, double(room.width) / size.width, double(room.height) / size.height});
-    return {std::max(1, int(size.width * scale)), std::max(1, int(size.height * scale))};
+    if (room.width <= 0 || room.height <= 0) return size;
+    const double grow = std::max(1.0, std::min(double(kUsualSize.width) / size.width,
+                                               double(kUsualSize.height) / size.height));
+    const double scale = std::min({grow, double(room.width) / size.width, double(room.height) / size.height});
+    return {std::max(1, int(std::lround(size.width * scale))), std::max(1, int(std::lround(size.height * scale)))};
 }
 
-Viewpoint start_view(const Opened& opened, int frame) {
-    if (opened.dataset) return dataset_view(opened.gaussians, *opened.dataset, frame);
-    const Size size = opened.size.value_or(kUsualSize);
-    return framing_view(opened.gaussians, size.width, size.height);
+Viewpoint start_view(const Scene& scene, std::optional<int> frame, Size size) {
+    if (scene.dataset) return dataset_view(*scene.gaussians, *scene.dataset, frame.value_or(0));
+    return framing_view(*scene.gaussians, size.width, size.height);
 }
 
 bool same_view(const PictureRequest& a, const PictureRequest& b) {
     const Camera &p = a.camera, &q = b.camera;
     return a.look == b.look && p.width == q.width && p.height == q.height && p.fx == q.fx && p.fy == q.fy &&
            p.cx == q.cx && p.cy == q.cy && p.rotation == q.rotation && p.translation == q.translation;
-}
-
-/// The first of ewa-view-1.png, ewa-view-2.png … that is not there yet.
-std::filesystem::path free_name() {
-    for (int i = 1;; ++i) {
-        const std::filesystem::path path = "ewa-view-" + std::to_string(i) + ".png";
-        if (!std::filesystem::exists(path)) return path;
-    }
 }
 
 std::string reason(const std::exception_ptr& failure) {
@@ -64,21 +58,104 @@ std::string reason(const std::exception_ptr& failure) {
 
 }  // namespace
 
-App::App(const Opened& opened)
-    : opened_(opened),
-      window_(system_, opened.file.filename().string() + " - ewa", window_size(opened, system_),
-              !opened.picture),
-      present_device_(system_, window_, device_info(*opened.device).name),
-      presenter_(present_device_),
-      gui_(window_, present_device_, presenter_),
-      view_(start_view(opened, opened.frame)),
-      scene_sh_degree_(sh_degree_present(opened.gaussians)),
-      frame_(opened.frame),
-      capture_(opened.picture.has_value()),
+std::filesystem::path free_name(const std::string& stem, const std::string& extension) {
+    for (int i = 1;; ++i) {
+        const std::filesystem::path path = stem + "-" + std::to_string(i) + extension;
+        if (!std::filesystem::exists(path)) return path;
+    }
+}
+
+App::App(const Startup& startup)
+    : startup_(startup),
+      window_(system_, startup.scene.title + " - ewa", window_size(startup, system_), !startup.picture),
+      screen_(std::make_unique<Screen>(system_, window_, startup.device_name)),
+      view_(start_view(startup.scene, startup.frame, startup.size.value_or(kUsualSize))),
+      settings_(startup.settings),
+      views_(startup.views),
+      device_name_(startup.device_name),
+      capture_(startup.picture.has_value()),
       redraws_(kRedraws),
-      thread_(opened.device, opened.gaussians, [this] { system_.wake(); }) {
-    look_.sh_degree = scene_sh_degree_;
+      photos_([this] { system_.wake(); }),
+      thread_(startup.open_device, [this] { system_.wake(); }) {
     last_frame_ = Clock::now();
+    hint_until_ = last_frame_ + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(kHintSeconds));
+    adopt(startup.scene, startup.frame);
+    settings_.look = startup.settings.look;
+    if (startup.film) start_film();
+    if (startup.watch) watch(*startup.watch);
+}
+
+void App::watch(const live::WhatToWatch& what) {
+    watcher_.reset();  // the old one first: it may say nothing any more
+    run_ = {};
+    watcher_ = std::make_unique<live::Watcher>(what, [this] { system_.wake(); });
+}
+
+/// News of the run. Its splats take the place of those that are shown.
+void App::take_live() {
+    if (startup_.trainer && run_.status.state != live::State::done) {
+        if (const auto status = startup_.trainer->status(); status && *status != 0 && note_.empty())
+            say("the training has ended with status " + std::to_string(*status) + "; the terminal has its reason");
+    }
+    if (!watcher_ || watcher_->number() == run_.number) return;
+    const auto before = run_.splats;
+    run_ = watcher_->update();
+    redraws_ = std::max(redraws_, 1);
+    if (run_.splats == before || !run_.splats || run_.splats->size() == 0) return;
+    scene_.gaussians = run_.splats;
+    scene_number_ = thread_.set_scene(scene_.gaussians);
+    const int degree = sh_degree_present(*scene_.gaussians);
+    if (settings_.look.sh_degree == scene_sh_degree_) settings_.look.sh_degree = degree;
+    scene_sh_degree_ = degree;
+    plan_ = plan_lines(*scene_.gaussians, {}, Purpose::picture);
+    if (!viewed_ && !scene_.dataset) view_.restart(start_view(scene_, {}, window_.framebuffer()));
+    viewed_ = true;
+}
+
+void App::adopt(Scene scene, std::optional<int> frame) {
+    scene_ = std::move(scene);
+    scene_number_ = thread_.set_scene(scene_.gaussians);
+    scene_sh_degree_ = sh_degree_present(*scene_.gaussians);
+    plan_ = plan_lines(*scene_.gaussians, {}, Purpose::picture);
+    settings_.look.kernel = scene_.look.kernel;
+    settings_.look.background = scene_.look.background;
+    settings_.look.sh_degree = scene_sh_degree_;
+    note_ = scene_.remark;
+    viewed_ = scene_.gaussians->size() > 0;
+    photo_asked_ = -1;
+    stands_at_.reset();
+    start_frame_.reset();
+    if (scene_.dataset) {
+        camera_size_ = camera_size(*scene_.dataset, view_.radius());
+        start_frame_ = stands_at_ = frame.value_or(0);
+    }
+    redraws_ = kRedraws;
+}
+
+void App::open(const std::filesystem::path& path) {
+    if (opening_.valid()) return say("another file is being opened");
+    say("opening " + path.string());
+    opening_ = std::async(std::launch::async, [this, path] {
+        struct Wake {
+            const WindowSystem& system;
+            ~Wake() { system.wake(); }
+        } wake{system_};
+        return open_scene(path, {});
+    });
+}
+
+void App::take_opened() {
+    if (!opening_.valid() || opening_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
+    try {
+        Scene scene = opening_.get();
+        view_.restart(start_view(scene, {}, window_.framebuffer()));
+        window_.set_title(scene.title + " - ewa");
+        adopt(std::move(scene), {});
+        watcher_.reset();
+        if (!scene_.run.empty()) watch({scene_.run, {}, {}, scene_.splats_time});
+    } catch (const std::exception& error) {
+        say(error.what());
+    }
 }
 
 void App::run() {
@@ -88,172 +165,97 @@ void App::run() {
         const double seconds = std::chrono::duration<double>(now - last_frame_).count();
         last_frame_ = now;
         if (window_.stirred()) redraws_ = kRedraws;
-        for (const int key : keys) handle_key(key);
-        fly(std::min(seconds, 0.1));
+        if (hint_until_ != Clock::time_point{} && now >= hint_until_) {
+            hint_until_ = {};
+            redraws_ = std::max(redraws_, 1);
+        }
+        if (!scripted()) {
+            for (const int key : keys) handle_key(key);
+            move_by_itself(std::min(seconds, 0.1));
+            if (const auto dropped = window_.take_dropped(); !dropped.empty()) open(dropped);
+        }
+        take_opened();
         take_news();
+        take_live();
+        if (film_) film();
         if (redraws_ > 0) draw();
         ask();
     }
-    if (opened_.picture && !done_)
-        throw RunError("the window was closed before " + opened_.picture->string() + " was written");
+    if (scripted() && !done_)
+        throw RunError("the window was closed before " + startup_.picture.value_or(startup_.film.value_or("")).string() +
+                       " was written");
 }
 
 /// How long to wait for input, in seconds.
 double App::patience() const {
-    if (redraws_ > 0 || flying()) return 1.0 / 60;
-    return asked_.divisor > 1 ? kRestSeconds / 4 : 1.0;
+    if (redraws_ > 0 || flying() || settings_.turntable) return 1.0 / 60;
+    return asked_.divisor > 1 || opening_.valid() ? kRestSeconds / 4 : 1.0;
 }
 
-void App::handle_key(int key) {
-    if (ImGui::GetIO().WantTextInput) return;
-    switch (key) {
-        case GLFW_KEY_R:
-            view_.reset();
-            break;
-        case GLFW_KEY_1:
-        case GLFW_KEY_2:
-        case GLFW_KEY_3:
-            look_.mode = Mode(key - GLFW_KEY_1);
-            break;
-        case GLFW_KEY_F1:
-            show_help_ = !show_help_;
-            break;
-        case GLFW_KEY_F2:
-            show_panel_ = !show_panel_;
-            break;
-        case GLFW_KEY_F12:
-            capture_ = true;
-            break;
-        default:
-            break;
-    }
+void App::say(const std::string& note) {
+    note_ = note;
+    redraws_ = std::max(redraws_, kRedraws);
 }
 
-bool App::flying() const {
-    if (ImGui::GetIO().WantTextInput) return false;
-    const auto keys = {GLFW_KEY_W, GLFW_KEY_A, GLFW_KEY_S, GLFW_KEY_D, GLFW_KEY_Q, GLFW_KEY_E};
-    return std::any_of(keys.begin(), keys.end(), [&](int key) { return window_.held(key); });
-}
-
-void App::fly(double seconds) {
-    if (!flying()) return;
-    const auto either = [&](int minus, int plus) {
-        return double(window_.held(plus)) - double(window_.held(minus));
-    };
-    const bool fast = window_.held(GLFW_KEY_LEFT_SHIFT) || window_.held(GLFW_KEY_RIGHT_SHIFT);
-    const glm::dvec3 way(either(GLFW_KEY_A, GLFW_KEY_D), either(GLFW_KEY_E, GLFW_KEY_Q),
-                         either(GLFW_KEY_S, GLFW_KEY_W));
-    view_.fly(way * (seconds * kFlySpeed * (fast ? 4 : 1)));
-}
-
-void App::handle_mouse() {
-    const ImGuiIO& io = ImGui::GetIO();
-    if (io.WantCaptureMouse) return;
-    const double right = io.MouseDelta.x, down = io.MouseDelta.y;
-    const Size size = window_.framebuffer();
-    if (right != 0 || down != 0) {
-        if (ImGui::IsMouseDown(ImGuiMouseButton_Left) && io.KeyCtrl)
-            view_.look(right * kRadiansPerPixel, down * kRadiansPerPixel);
-        else if (ImGui::IsMouseDown(ImGuiMouseButton_Left))
-            view_.orbit(right * kRadiansPerPixel, down * kRadiansPerPixel);
-        else if (ImGui::IsMouseDown(ImGuiMouseButton_Right) || ImGui::IsMouseDown(ImGuiMouseButton_Middle))
-            view_.pan(right * io.DisplayFramebufferScale.x, down * io.DisplayFramebufferScale.y, size.width,
-                      size.height);
-    }
-    if (io.MouseWheel != 0) view_.zoom(io.MouseWheel);
+PictureRequest App::wanted() const {
+    const Rectangle place = arrangement().rendering;
+    return {view_.camera(place.width, place.height), settings_.look, 1, asked_.serial + 1, {}};
 }
 
 void App::ask() {
     const Size size = window_.framebuffer();
-    if (size.width == 0 || size.height == 0) return;
-    PictureRequest wanted{view_.camera(size.width, size.height), look_, 1, asked_.serial + 1};
+    if (size.width == 0 || size.height == 0 || film_) return;
+    PictureRequest request = wanted();
     const auto now = Clock::now();
-    const bool first = asked_.serial == 0;
-    if (first || !same_view(wanted, asked_)) {
+    const bool first = asked_.serial == 0, other_scene = asked_scene_ != scene_number_;
+    if (first || other_scene || !same_view(request, asked_)) {
         changed_ = now;
-        wanted.divisor = first || opened_.picture ? 1 : pace_.divisor();
+        request.divisor = first || startup_.picture ? 1 : pace_.divisor();
     } else if (asked_.divisor == 1 || now - changed_ < std::chrono::duration<double>(kRestSeconds)) {
         return;
     }
-    asked_ = wanted;
+    // A full picture in the making is not what a moving camera should wait behind; it is not asked for anew either.
+    asked_ = request;
+    asked_scene_ = scene_number_;
     thread_.ask(asked_);
 }
 
 void App::take_news() {
-    const RenderThread::News news = thread_.news();
+    const RenderThread::News news = thread_.take_news();
+    if (news.device) device_name_ = *news.device;
     if (news.failure) {
-        if (opened_.picture || !shown_) std::rethrow_exception(news.failure);
-        if (note_ != reason(news.failure)) {
-            note_ = reason(news.failure);
-            redraws_ = std::max(redraws_, 1);
+        if (scripted() || !shown_) std::rethrow_exception(news.failure);
+        film_.reset();
+        if (note_ != reason(news.failure)) say(reason(news.failure));
+    }
+    if (news.points > points_) {
+        points_ = news.points;
+        if (news.point) {
+            view_.focus(*news.point);
+            leave_camera();
+        } else {
+            say("there is nothing to look at");
         }
+        redraws_ = kRedraws;
+    }
+    for (const auto& file : news.written)
+        if (!film_) say("wrote " + std::filesystem::absolute(file).string());
+    if (const auto photo = photos_.photo(); photo != photo_) {
+        photo_ = photo;
+        if (photo_->failure.empty()) screen_->presenter.set_picture(Layer::photograph, photo_->picture);
+        compare();
+        redraws_ = kRedraws;
     }
     if (news.picture == shown_) return;
     shown_ = news.picture;
-    presenter_.set_picture(shown_->picture);
     pace_.drawn(shown_->request.divisor, shown_->milliseconds);
+    compare();
     redraws_ = std::max(redraws_, 2);  // a panel that has more to say takes its new size a frame later
 }
 
 bool App::settled() const {
-    return shown_ && shown_->request.serial == asked_.serial && shown_->request.divisor == 1;
-}
-
-void App::panel() {
-    PanelFacts facts;
-    facts.file = opened_.file.filename().string();
-    facts.device = device_info(*opened_.device).name;
-    facts.splats = opened_.gaussians.size();
-    facts.scene_sh_degree = scene_sh_degree_;
-    facts.dataset = opened_.dataset ? &*opened_.dataset : nullptr;
-    facts.picture = shown_.get();
-    facts.drawing = !settled();
-    facts.note = note_;
-    facts.up = view_.up();
-    const PanelActions actions = draw_panel(facts, look_, frame_);
-    if (actions.screenshot) capture_ = true;
-    if (actions.reset) view_.reset();
-    if (actions.frame) view_.restart(start_view(opened_, *actions.frame));
-    if (actions.up) view_.set_up(*actions.up);
-}
-
-void App::draw() {
-    --redraws_;
-    gui_.begin_frame();
-    if (show_panel_ && !opened_.picture) panel();
-    if (show_help_) draw_help(show_help_);
-    handle_mouse();
-    ImDrawData* drawn = gui_.end_frame();
-
-    const Size size = window_.framebuffer();
-    Size shown_as = size;
-    if (shown_) shown_as = {shown_->request.camera.width, shown_->request.camera.height};
-    const bool capture = capture_ && settled() && shown_as == size;
-    Image image;
-    if (!presenter_.draw(size, shown_as, drawn, capture ? &image : nullptr)) {
-        // Nothing can be shown while minimised; otherwise the window is just changing, and the next try is
-        // soon.
-        if (size.width > 0 && size.height > 0) redraws_ = std::max(redraws_, 1);
-        return;
-    }
-    if (capture) save(image);
-}
-
-void App::save(const Image& image) {
-    capture_ = false;
-    if (opened_.picture) {
-        save_image(*opened_.picture, image);
-        done_ = true;
-        return;
-    }
-    try {
-        const std::filesystem::path path = free_name();
-        save_image(path, image);
-        note_ = "wrote " + std::filesystem::absolute(path).string();
-    } catch (const std::exception& error) {
-        note_ = error.what();
-    }
-    redraws_ = kRedraws;
+    return shown_ && shown_->request.serial == asked_.serial && shown_->request.divisor == 1 &&
+           shown_->scene == scene_number_ && points_ == points_asked_;
 }
 
 }  // namespace ewa::viewer

@@ -1,31 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
 // The viewer: from input to requests, from finished pictures to the window.
 #pragma once
 #include <chrono>
 #include <filesystem>
+#include <future>
+#include <memory>
 #include <optional>
 #include <string>
 
+#include "viewer/film.h"
 #include "viewer/gui.h"
+#include "viewer/opening.h"
 #include "viewer/pace.h"
 #include "viewer/panel.h"
+#include "viewer/photo_loader.h"
+#include "viewer/training.h"
 #include "viewer/view_camera.h"
 
 namespace ewa::viewer {
 
-struct Opened {
-    std::filesystem::path file;
-    Gaussians gaussians;
-    std::optional<Dataset> dataset;
-    int frame = 0;                                 // of the dataset
+struct Startup {
+    Scene scene;
+    std::optional<int> frame;                      // of the dataset
     std::optional<Size> size;                      // of the window
     std::optional<std::filesystem::path> picture;  // write it and be done
-    std::shared_ptr<gpu::Device> device;
+    std::optional<std::filesystem::path> film;     // write one through the views here and be done
+    std::vector<io::NamedView> views;
+    PanelSettings settings;
+    OpenDevice open_device;
+    std::string device_name;
+    std::optional<live::WhatToWatch> watch;        // a run
+    TrainProcess* trainer = nullptr;               // of this viewer, outlives it
+    int lose_device_at = 0;  // window frames until the device that shows them plays lost; 0: it does not
+};
+
+/// What shows pictures in the window. Made anew where its device is lost.
+struct Screen {
+    Screen(const WindowSystem& system, Window& window, const std::string& device_name)
+        : device(system, window, device_name), presenter(device), gui(window, device, presenter) {}
+    PresentDevice device;
+    Presenter presenter;
+    Gui gui;
 };
 
 class App {
   public:
     /// Opens the window. Throws RunError.
-    explicit App(const Opened& opened);
+    explicit App(const Startup& startup);
 
     /// Until the window is closed, or the one picture is written. Throws RunError, InputError.
     void run();
@@ -33,39 +54,97 @@ class App {
   private:
     using Clock = std::chrono::steady_clock;
 
-    void handle_key(int key);
-    void handle_mouse();
-    void fly(double seconds);
-    bool flying() const;
+    // app.cpp: the loop.
+    void adopt(Scene scene, std::optional<int> frame);
+    void open(const std::filesystem::path& path);
+    void take_opened();
     void ask();
+    PictureRequest wanted() const;
     void take_news();
     bool settled() const;  // what is shown is the full picture of what is wanted
-    void draw();
-    void panel();
-    void save(const Image& image);
+    bool scripted() const { return startup_.picture || startup_.film; }
     double patience() const;
+    void say(const std::string& note);
 
-    const Opened& opened_;
+    void watch(const live::WhatToWatch& what);
+    void take_live();
+
+    // app_input.cpp: keys and the mouse.
+    void handle_key(int key);
+    void handle_number(int number);
+    void handle_mouse();
+    void handle_drag(double right, double down);
+    void move_by_itself(double seconds);
+    bool flying() const;
+
+    // app_cameras.cpp: the dataset's cameras, their photographs, saved views.
+    void go_to_camera(int frame);
+    void go_to_nearest_camera();
+    void step_camera(int step);
+    void leave_camera() { stands_at_.reset(); }
+    void change_comparison();
+    bool comparing() const;
+    Arrangement arrangement() const;
+    void ask_for_photo();
+    void compare();
+    void save_view(size_t number);
+    void go_to_view(size_t number);
+    void start_film();
+    void film();
+
+    // app_draw.cpp: a frame of the window.
+    void draw();
+    bool present(ImDrawData* drawn, Image* capture);
+    void panel();
+    void obey(const PanelActions& actions);
+    void overlays();
+    void save(const Image& image);
+    void save_exr();
+
+    const Startup& startup_;
     WindowSystem system_;
     Window window_;
-    PresentDevice present_device_;
-    Presenter presenter_;
-    Gui gui_;
-    ViewCamera view_;
-    Look look_;
+    std::unique_ptr<Screen> screen_;
+    Scene scene_;
+    uint64_t scene_number_ = 0;
     int scene_sh_degree_ = 0;
-    int frame_ = 0;
+    std::vector<PlanLine> plan_;
+    double camera_size_ = 1;
+    ViewCamera view_;
+    PanelSettings settings_;
+    std::optional<int> start_frame_, stands_at_;  // frames of the dataset
+    std::vector<io::NamedView> views_;
+    std::optional<Film> film_;
+    live::Update run_;
+    bool viewed_ = false;  // the view has been chosen for splats that there are
     Pace pace_;
+    std::string device_name_;
+
     std::shared_ptr<const FinishedPicture> shown_;
+    std::shared_ptr<const Photo> photo_;
+    int photo_asked_ = -1;
+    std::optional<double> psnr_;
+    bool difference_shown_ = false;
     PictureRequest asked_;
+    uint64_t asked_scene_ = 0;
     Clock::time_point changed_;  // when what is wanted last changed
-    Clock::time_point last_frame_;
-    bool show_panel_ = true, show_help_ = false;
+    Clock::time_point last_frame_, hint_until_;
+    bool show_panel_ = true, show_help_ = false, dragging_wipe_ = false;
     bool capture_ = false;  // write the picture as soon as it is the full one
-    int redraws_ = 0;       // frames still to draw: ImGui answers input over a few
+    std::optional<int> pointed_camera_;
+    uint64_t points_ = 0, points_asked_ = 0;  // answers to double clicks that were acted on; double clicks
+    int redraws_ = 0;      // frames still to draw: ImGui answers input over a few
+    int frames_drawn_ = 0, devices_lost_ = 0;
     std::string note_;
     bool done_ = false;
-    RenderThread thread_;  // last: it is gone before what it wakes
+    std::future<Scene> opening_;
+    // Last: they are gone before what they wake.
+    PhotoLoader photos_;
+    RenderThread thread_;
+    std::unique_ptr<live::Watcher> watcher_;
 };
+
+/// The first of <stem>-1<extension>, <stem>-2<extension> … that is not there yet.
+std::filesystem::path free_name(const std::string& stem, const std::string& extension);
 
 }  // namespace ewa::viewer

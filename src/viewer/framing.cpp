@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "viewer/framing.h"
 
 #include <algorithm>
@@ -99,6 +100,28 @@ Viewpoint framing_view(const Gaussians& gaussians, int width, int height) {
     const glm::dvec3 position = bounds.center - forward * (bounds.radius / std::sin(kFieldOfView / 2));
     camera.translation = -(camera.rotation * position);
     return view;
+}
+
+int nearest_frame(const Dataset& dataset, const Camera& camera, double radius) {
+    int nearest = -1;
+    double least = std::numeric_limits<double>::infinity();
+    for (size_t i = 0; i < dataset.frames.size(); ++i) {
+        const Camera& other = dataset.frames[i].camera;
+        const double turn = 1 - glm::dot(forward_of(camera), forward_of(other));
+        const double distance = glm::length(camera.position() - other.position()) + radius * turn;
+        if (!(distance < least)) continue;
+        least = distance;
+        nearest = int(i);
+    }
+    return nearest;
+}
+
+double camera_size(const Dataset& dataset, double radius) {
+    std::vector<double> steps;
+    for (size_t i = 1; i < dataset.frames.size(); ++i)
+        steps.push_back(glm::length(dataset.frames[i].camera.position() - dataset.frames[i - 1].camera.position()));
+    const double step = steps.empty() ? 0 : quantile(steps, 0.5);
+    return step > 0 && std::isfinite(step) ? 0.3 * step : 0.05 * radius;
 }
 
 Viewpoint dataset_view(const Gaussians& gaussians, const Dataset& dataset, int frame) {

@@ -1,12 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
 // ewa-view: reads the arguments, opens the scene in a window, and turns every failure into one line and an
 // exit status.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
+#include <future>
+#include <map>
 #include <new>
+#include <utility>
 
 #include "core/text.h"
 #include "ewa/error.h"
-#include "ewa/splat_files.h"
 #include "viewer/app.h"
 
 namespace {
@@ -18,11 +22,27 @@ enum ExitStatus { kDone = 0, kFailed = 1, kWrongUse = 2 };
 constexpr int kLargestSide = 16384;  // px
 
 struct Arguments {
-    std::filesystem::path file, cameras, picture;
+    std::filesystem::path path, cameras, picture, views, film, output;
+    std::string connect, token;
+    bool train = false;
+    std::vector<std::string> train_options;
     std::optional<int> frame;
-    std::string size;
+    std::string size, background;
+    PanelSettings settings;
+    bool antialias = false;
     DeviceOptions device;
+    int lose_device_at = 0;
 };
+
+const std::map<std::string, Mode> kModes = {{"color", Mode::color},
+                                            {"depth", Mode::depth},
+                                            {"alpha", Mode::opacity},
+                                            {"count", Mode::count},
+                                            {"ellipsoids", Mode::ellipsoids}};
+const std::map<std::string, Comparison> kComparisons = {{"none", Comparison::none},
+                                                        {"beside", Comparison::beside},
+                                                        {"wipe", Comparison::wipe},
+                                                        {"difference", Comparison::difference}};
 
 int fail(const std::string& what, int status) {
     std::fprintf(stderr, "ewa-view: %s\n", core::one_line(what).c_str());
@@ -42,48 +62,177 @@ Size parse_size(const std::string& text) {
     return size;
 }
 
-Opened open(const Arguments& arguments) {
-    Opened opened;
-    opened.file = arguments.file;
-    if (!arguments.size.empty()) opened.size = parse_size(arguments.size);
+std::array<float, 3> parse_background(const std::string& text) {
+    std::string words = text;
+    std::replace(words.begin(), words.end(), ',', ' ');
+    std::string_view rest = words;
+    std::array<float, 3> color{};
+    bool good = true;
+    for (float& value : color) {
+        const double number = core::parse_number(core::next_word(rest)).value_or(-1);
+        good = good && number >= 0 && number <= 1;
+        value = float(number);
+    }
+    if (!good || !core::trim(rest).empty())
+        throw InputError("--background: '" + text + "' is not r,g,b with each in 0..1, such as 1,1,1");
+    return color;
+}
+
+void check_frame(const Startup& startup) {
+    if (startup.frame && !startup.scene.dataset)
+        throw InputError("--frame needs --cameras DATASET, whose frame it is");
+    if (!startup.scene.dataset) return;
+    const int count = int(startup.scene.dataset->frames.size());
+    if (startup.frame.value_or(0) < 0 || startup.frame.value_or(0) >= count)
+        throw InputError("there is no frame " + std::to_string(*startup.frame) + ": " +
+                         startup.scene.dataset->root.string() + " has " + std::to_string(count) +
+                         " frames, numbered from 0 in name order");
+}
+
+/// Where `ewa train` would put it.
+std::filesystem::path output_of(const Arguments& arguments) {
+    if (!arguments.output.empty()) return arguments.output;
+    std::error_code error;
+    std::filesystem::path path = std::filesystem::weakly_canonical(arguments.path, error);
+    if (path.has_extension() && !std::filesystem::is_directory(path, error)) path = path.parent_path();
+    return std::filesystem::path("out") / (path.filename().empty() ? "dataset" : path.filename());
+}
+
+Scene open_what(const Arguments& arguments, Startup& startup) {
+    if (!arguments.connect.empty()) {
+        startup.watch = live::WhatToWatch{};
+        startup.watch->address = live::parse_address(arguments.connect);
+        startup.watch->token = arguments.token;
+        Scene scene = arguments.path.empty() ? Scene() : open_scene(arguments.path, arguments.cameras);
+        if (!scene.gaussians) scene.gaussians = std::make_shared<const Gaussians>();
+        scene.title = arguments.connect;
+        return scene;
+    }
+    if (arguments.path.empty()) throw InputError("PATH is required: splats, a dataset, or a run's folder (see ewa-view --help)");
+    Scene scene = open_scene(arguments.path, arguments.cameras);
+    if (arguments.train) {
+        if (!scene.dataset || !scene.run.empty())
+            throw InputError("--train needs a dataset, and " + arguments.path.string() + " is none");
+        scene.remark.clear();
+        startup.watch = live::WhatToWatch{};
+        startup.watch->folder = output_of(arguments);
+        startup.watch->splats_after = startup.watch->metrics_after = std::filesystem::file_time_type::clock::now();
+    } else if (!scene.run.empty() && arguments.picture.empty() && arguments.film.empty()) {
+        startup.watch = live::WhatToWatch{};
+        startup.watch->folder = scene.run;
+        startup.watch->splats_after = scene.splats_time;
+    }
+    return scene;
+}
+
+Startup open(const Arguments& arguments) {
+    Startup startup;
+    startup.frame = arguments.frame;
+    startup.lose_device_at = arguments.lose_device_at;
+    if (!arguments.size.empty()) startup.size = parse_size(arguments.size);
     if (!arguments.picture.empty()) {
         if (core::lower(arguments.picture.extension().string()) != ".png")
             throw InputError("--screenshot " + arguments.picture.string() + ": the name must end in .png");
-        opened.picture = arguments.picture;
+        startup.picture = arguments.picture;
     }
-    if (arguments.frame && arguments.cameras.empty())
-        throw InputError("--frame needs --cameras DATASET, whose frame it is");
-    opened.gaussians = load_splats(arguments.file);
-    if (!arguments.cameras.empty()) {
-        opened.dataset = load_dataset(arguments.cameras, {.need_images = false});
-        const int count = int(opened.dataset->frames.size());
-        opened.frame = arguments.frame.value_or(0);
-        if (count == 0) throw InputError(arguments.cameras.string() + " has no frames");
-        if (opened.frame < 0 || opened.frame >= count)
-            throw InputError("there is no frame " + std::to_string(opened.frame) + ": " +
-                             arguments.cameras.string() + " has " + std::to_string(count) +
-                             " frames, numbered from 0 in name order");
+    if (!arguments.views.empty()) startup.views = io::read_views(arguments.views);
+    if (!arguments.film.empty()) {
+        if (startup.views.empty()) throw InputError("--film needs --views FILE, with the views to go through");
+        startup.film = arguments.film;
     }
-    return opened;
+    startup.scene = open_what(arguments, startup);
+    check_frame(startup);
+    startup.settings = arguments.settings;
+    startup.settings.cameras = startup.scene.gaussians->size() == 0;
+    Look& look = startup.settings.look;
+    look.kernel = arguments.antialias ? Kernel::antialias : startup.scene.look.kernel;
+    look.background = arguments.background.empty() ? startup.scene.look.background
+                                                   : parse_background(arguments.background);
+    return startup;
 }
 
 void add_options(CLI::App& app, Arguments& arguments) {
-    app.add_option("FILE", arguments.file, "The splat scene (.ply .compressed.ply .splat .spz .glb .gltf)")->required();
-    app.add_option("--cameras", arguments.cameras, "A dataset whose cameras to look through");
-    app.add_option("--frame", arguments.frame, "Which of its cameras to start from, in name order (0)");
+    app.add_option("PATH", arguments.path,
+                   "Splats (.ply .compressed.ply .splat .spz .glb .gltf), a dataset, or the folder of a training run")
+        ->type_name("");
+    CLI::Option* train =
+        app.add_flag("--train", arguments.train,
+                     "Train on the dataset and look on; further options are those of ewa train, such as --steps");
+    app.add_option("-o,--output", arguments.output, "With --train: the run's folder [out/<name of the dataset>]")
+        ->needs(train)
+        ->type_name("DIR");
+    app.add_option("--connect", arguments.connect, "Look on at a training that was started with --serve")
+        ->excludes(train)
+        ->type_name("HOST:PORT");
+    app.add_option("--token", arguments.token, "With --connect: lets you pause and save; the run's live.json has it")
+        ->type_name("TEXT");
+    app.add_option("--cameras", arguments.cameras, "A dataset whose cameras to look through")->type_name("DATASET");
+    app.add_option("--frame", arguments.frame, "Which of its cameras to start from, in name order (0)")
+        ->type_name("I");
+    app.add_option("--mode", arguments.settings.look.mode, "color, depth, alpha, count (splats per pixel) or ellipsoids")
+        ->transform(CLI::CheckedTransformer(kModes).description(""))
+        ->type_name("MODE");
+    app.add_option("--compare", arguments.settings.comparison,
+                   "The photograph of the camera: none, beside, wipe or difference")
+        ->transform(CLI::CheckedTransformer(kComparisons).description(""))
+        ->type_name("HOW");
+    app.add_option("--background", arguments.background, "Colour behind the splats: r,g,b in 0..1")
+        ->type_name("COLOUR");
+    app.add_flag("--antialias", arguments.antialias, "Draw with Mip-Splatting's filter");
     app.add_option("--size", arguments.size,
-                   "Of the window, WxH in px; otherwise the camera's, or what there is room for");
+                   "Of the window, in px; otherwise in the camera's shape, as there is room")
+        ->type_name("WxH");
     app.add_option("--screenshot", arguments.picture,
-                   "Write what the window shows as a PNG, without the panel, and end");
+                   "Write what the window shows as a PNG, without the panel, and end")
+        ->type_name("FILE");
+    app.add_option("--views", arguments.views, "Saved views, as the window writes them")->type_name("FILE");
+    app.add_option("--film", arguments.film, "Write a film through the saved views, a PNG a frame, and end")
+        ->type_name("DIR");
+    app.add_option("--film-seconds", arguments.settings.film_seconds, "From view to view (2)")
+        ->check(CLI::Range(0.04f, 3600.0f).description(""))
+        ->type_name("S");
     app.add_option("--device", arguments.device.selector,
-                   "Number or part of the name of the device that draws (see ewa devices)");
+                   "Number or part of the name of the device that draws (see ewa devices)")
+        ->type_name("NAME|N");
+    app.add_option("--lose-device-at", arguments.lose_device_at, "Frame at which the window's device plays lost")
+        ->type_name("N")
+        ->group("For developers");
 }
+
+/// Opens the device while the scene is being read. OpenDevice gives that one first, and then opens it anew.
+class DeviceOpener {
+  public:
+    explicit DeviceOpener(const DeviceOptions& options)
+        : options_(options), opening_(std::async(std::launch::async, [options] { return open_device(options); })) {}
+    std::string name() {
+        *first_ = opening_.get();
+        return device_info(**first_).name;
+    }
+    OpenDevice function() const {
+        return [options = options_, first = first_] {
+            return *first ? std::exchange(*first, nullptr) : open_device(options);
+        };
+    }
+
+  private:
+    DeviceOptions options_;
+    std::future<std::shared_ptr<gpu::Device>> opening_;
+    std::shared_ptr<std::shared_ptr<gpu::Device>> first_ = std::make_shared<std::shared_ptr<gpu::Device>>();
+};
 
 int run(const Arguments& arguments) {
     try {
-        Opened opened = open(arguments);
-        opened.device = open_device(arguments.device);
-        App(opened).run();
+        DeviceOpener opener(arguments.device);
+        Startup startup = open(arguments);
+        std::optional<TrainProcess> trainer;
+        if (arguments.train) {
+            std::vector<std::string> options{arguments.path.string()};
+            options.insert(options.end(), arguments.train_options.begin(), arguments.train_options.end());
+            startup.trainer = &trainer.emplace(options, startup.watch->folder);
+        }
+        startup.device_name = opener.name();
+        startup.open_device = opener.function();
+        App(startup).run();
         return kDone;
     } catch (const InputError& error) {
         return fail(error.what(), kWrongUse);
@@ -107,8 +256,12 @@ int main(int argc, char** argv) {
     app.get_formatter()->column_width(34);
     Arguments arguments;
     add_options(app, arguments);
+    app.allow_extras();
     try {
         app.parse(argc, argv);
+        arguments.train_options = app.remaining();
+        if (!arguments.train && !arguments.train_options.empty())
+            throw CLI::ExtrasError(arguments.train_options);
     } catch (const CLI::ParseError& error) {
         if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) return app.exit(error);
         return fail(std::string(error.what()) + " (see ewa-view --help)", kWrongUse);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "viewer/panel.h"
 
 #include <imgui.h>
@@ -6,55 +7,138 @@
 #include <array>
 #include <cmath>
 
+#include "viewer/training.h"
+
 namespace ewa::viewer {
 namespace {
 
+struct Axis {
+    const char* name;
+    glm::dvec3 axis;
+};
+const std::array kAxes{Axis{"-y", {0, -1, 0}}, Axis{"+y", {0, 1, 0}}, Axis{"+z", {0, 0, 1}},
+                       Axis{"-z", {0, 0, -1}}, Axis{"+x", {1, 0, 0}}, Axis{"-x", {-1, 0, 0}}};
+
 void show_facts(const PanelFacts& facts) {
-    ImGui::TextUnformatted(facts.file.c_str());
-    ImGui::Text("%zu splats", facts.splats);
-    if (!facts.picture) return;
+    ImGui::TextUnformatted(facts.title.c_str());
+    if (!facts.picture) {
+        ImGui::Text("%zu splats", facts.splats);
+        return;
+    }
     const FinishedPicture& shown = *facts.picture;
-    ImGui::Text("%d x %d px%s", shown.picture.width, shown.picture.height, facts.drawing ? "  ..." : "");
-    ImGui::Text("%.1f ms, of it on the device:", shown.milliseconds);
-    for (const PassTime& time : shown.pass_times)
-        if (time.milliseconds >= 0.005) ImGui::Text("  %-18s %8.2f", time.pass.c_str(), time.milliseconds);
-    ImGui::TextDisabled("%s", facts.device.c_str());
+    ImGui::Text("%zu splats, %u drawn", facts.splats, shown.splats_drawn);
+    ImGui::Text("%d x %d px in %.1f ms%s", shown.picture.width, shown.picture.height, shown.milliseconds,
+                facts.drawing ? "  ..." : "");
     if (shown.skipped_nonfinite > 0)
         ImGui::Text("%u splats are not finite and not drawn", shown.skipped_nonfinite);
 }
 
 void edit_look(const PanelFacts& facts, Look& look) {
     int mode = int(look.mode);
-    if (ImGui::Combo("mode", &mode, "colour\0depth\0opacity\0")) look.mode = Mode(mode);
-    if (look.mode == Mode::depth && facts.picture && facts.picture->request.look.mode == Mode::depth)
-        ImGui::Text("white is depth %.4g", double(facts.picture->picture.white_depth));
-    if (look.mode == Mode::color) ImGui::ColorEdit3("background", look.background.data());
-    if (facts.scene_sh_degree > 0) ImGui::SliderInt("SH degree", &look.sh_degree, 0, facts.scene_sh_degree);
+    if (ImGui::Combo("mode", &mode, "colour\0depth\0opacity\0splats per pixel\0ellipsoids\0"))
+        look.mode = Mode(mode);
+    if (facts.picture && facts.picture->request.look.mode == look.mode) {
+        if (look.mode == Mode::depth) ImGui::Text("white is depth %.4g", double(facts.picture->picture.white));
+        if (look.mode == Mode::count)
+            ImGui::Text("red, yellow, white: up to %.0f splats", double(facts.picture->picture.white));
+    }
+    if (look.mode == Mode::color || look.mode == Mode::ellipsoids)
+        ImGui::ColorEdit3("background", look.background.data(), ImGuiColorEditFlags_NoInputs);
+    ImGui::SliderFloat("splat scale", &look.splat_scale, 0.05f, 2.0f, "%.2f", ImGuiSliderFlags_AlwaysClamp);
+    if (facts.scene_sh_degree > 0) {
+        look.sh_degree = std::min(look.sh_degree, facts.scene_sh_degree);
+        ImGui::SliderInt("SH degree", &look.sh_degree, 0, facts.scene_sh_degree, "%d",
+                         ImGuiSliderFlags_AlwaysClamp);
+    }
     int kernel = int(look.kernel);
     if (ImGui::Combo("kernel", &kernel, "peak (3DGS)\0antialias\0unit mass (EWA)\0"))
         look.kernel = Kernel(kernel);
 }
 
 void choose_up(const PanelFacts& facts, PanelActions& actions) {
-    struct Choice {
-        const char* name;
-        glm::dvec3 axis;
-    };
-    static const std::array choices{Choice{"-y", {0, -1, 0}}, Choice{"+y", {0, 1, 0}},
-                                    Choice{"+z", {0, 0, 1}},  Choice{"-z", {0, 0, -1}},
-                                    Choice{"+x", {1, 0, 0}},  Choice{"-x", {-1, 0, 0}}};
     const char* present = "as the cameras";
-    for (const Choice& choice : choices)
+    for (const Axis& choice : kAxes)
         if (choice.axis == facts.up) present = choice.name;
     if (!ImGui::BeginCombo("up", present)) return;
-    for (const Choice& choice : choices)
+    for (const Axis& choice : kAxes)
         if (ImGui::Selectable(choice.name, choice.name == present)) actions.up = choice.axis;
     ImGui::EndCombo();
 }
 
+void edit_cameras(const PanelFacts& facts, PanelSettings& settings, PanelActions& actions) {
+    const int last = int(facts.dataset->frames.size()) - 1;
+    int frame = facts.stands_at.value_or(0);
+    if (ImGui::SliderInt("camera", &frame, 0, last, facts.stands_at ? "%d" : "-", ImGuiSliderFlags_AlwaysClamp))
+        actions.frame = frame;
+    if (facts.stands_at)
+        ImGui::TextDisabled("%s", facts.dataset->frames[size_t(*facts.stands_at)].name.c_str());
+    ImGui::Checkbox("show the cameras", &settings.cameras);
+    int comparison = int(settings.comparison);
+    if (ImGui::Combo("photograph", &comparison, "none\0beside\0wipe\0difference\0"))
+        settings.comparison = Comparison(comparison);
+    if (settings.comparison == Comparison::wipe)
+        ImGui::SliderFloat("wipe", &settings.wipe, 0, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp);
+    if (settings.comparison == Comparison::difference)
+        ImGui::SliderFloat("times", &settings.gain, 1, 16, "%.0f", ImGuiSliderFlags_AlwaysClamp);
+    if (settings.comparison == Comparison::none) return;
+    if (!facts.photo_failure.empty())
+        ImGui::TextWrapped("%s", facts.photo_failure.c_str());
+    else if (!facts.stands_at)
+        ImGui::TextDisabled("G: to the nearest camera");
+    else if (facts.psnr && std::isfinite(*facts.psnr))
+        ImGui::Text("PSNR of this view %.2f dB", *facts.psnr);
+}
+
+void edit_views(const PanelFacts& facts, PanelSettings& settings, PanelActions& actions) {
+    if (ImGui::Button("Save this view")) actions.save_view = true;
+    for (size_t i = 0; i < facts.views->size(); ++i) {
+        ImGui::PushID(int(i));
+        if (ImGui::Button((*facts.views)[i].name.c_str())) actions.view = i;
+        ImGui::SameLine();
+        if (ImGui::SmallButton("x")) actions.forget = i;
+        ImGui::PopID();
+    }
+    if (facts.views->empty()) return;
+    if (ImGui::Button("Write to a file")) actions.write_views = true;
+    if (facts.views->size() < 2) return;
+    ImGui::SliderFloat("s a view", &settings.film_seconds, 0.2f, 10, "%.1f", ImGuiSliderFlags_AlwaysClamp);
+    if (facts.film_frame >= 0) {
+        ImGui::ProgressBar(float(facts.film_frame) / float(std::max(1, facts.film_frames)));
+        actions.stop_film = ImGui::Button("Stop");
+    } else {
+        actions.film = ImGui::Button("Film through them");
+    }
+}
+
+void show_details(const PanelFacts& facts) {
+    if (facts.picture && ImGui::CollapsingHeader("Time")) {
+        for (const PassTime& time : facts.picture->pass_times)
+            if (time.milliseconds >= 0.005)
+                ImGui::Text("%-18s %8.2f ms", time.pass.c_str(), time.milliseconds);
+        ImGui::Text("%-18s %8.2f ms", "from asked to shown", facts.picture->milliseconds);
+    }
+    if (facts.plan && ImGui::CollapsingHeader("Left out")) {
+        for (const PlanLine& line : *facts.plan) {
+            ImGui::BulletText("%s", line.what.c_str());
+            if (line.bytes_saved > 0)
+                ImGui::TextDisabled("    saves %.1f MiB", double(line.bytes_saved) / (1 << 20));
+        }
+    }
+    if (facts.picture && ImGui::CollapsingHeader("Memory and device")) {
+        ImGui::Text("%.1f MiB on the device", double(facts.picture->device_bytes) / (1 << 20));
+        ImGui::TextWrapped("%s", facts.device.c_str());
+    }
+}
+
 }  // namespace
 
-PanelActions draw_panel(const PanelFacts& facts, Look& look, int& frame) {
+glm::dvec3 next_up(const glm::dvec3& up) {
+    for (size_t i = 0; i < kAxes.size(); ++i)
+        if (kAxes[i].axis == up) return kAxes[(i + 1) % kAxes.size()].axis;
+    return kAxes[0].axis;
+}
+
+PanelActions draw_panel(const PanelFacts& facts, PanelSettings& settings) {
     PanelActions actions;
     const float line = ImGui::GetTextLineHeight();
     ImGui::SetNextWindowPos(ImVec2(line * 0.6f, line * 0.6f), ImGuiCond_FirstUseEver);
@@ -65,48 +149,64 @@ PanelActions draw_panel(const PanelFacts& facts, Look& look, int& frame) {
         if (at.x < 0 || at.y < 0) ImGui::SetWindowPos(ImVec2(std::max(at.x, 0.0f), std::max(at.y, 0.0f)));
         show_facts(facts);
         ImGui::Separator();
-        ImGui::PushItemWidth(line * 13);
-        edit_look(facts, look);
+        ImGui::PushItemWidth(line * 10);
+        edit_look(facts, settings.look);
         choose_up(facts, actions);
-        if (facts.dataset && !facts.dataset->frames.empty()) {
-            const int last = int(facts.dataset->frames.size()) - 1;
-            if (ImGui::SliderInt("camera", &frame, 0, last, "%d", ImGuiSliderFlags_AlwaysClamp))
-                actions.frame = frame;
-            ImGui::TextDisabled("%s", facts.dataset->frames[size_t(frame)].name.c_str());
-        }
+        ImGui::Checkbox("turntable", &settings.turntable);
+        if (facts.run && ImGui::CollapsingHeader("Training", ImGuiTreeNodeFlags_DefaultOpen))
+            actions.command = draw_training(*facts.run);
+        if (facts.dataset && ImGui::CollapsingHeader("Cameras", ImGuiTreeNodeFlags_DefaultOpen))
+            edit_cameras(facts, settings, actions);
+        if (facts.views && ImGui::CollapsingHeader("Views and film")) edit_views(facts, settings, actions);
+        show_details(facts);
         ImGui::PopItemWidth();
         actions.screenshot = ImGui::Button("Screenshot");
         ImGui::SameLine();
+        actions.exr = ImGui::Button("EXR");
+        ImGui::SameLine();
         actions.reset = ImGui::Button("Reset view");
         if (!facts.note.empty()) {
-            ImGui::PushTextWrapPos(line * 20);
+            ImGui::PushTextWrapPos(line * 18);
             ImGui::TextUnformatted(facts.note.c_str());
             ImGui::PopTextWrapPos();
         }
-        ImGui::TextDisabled("F1: keys");
+        ImGui::TextDisabled("F1: keys   F2: hides this panel");
     }
     ImGui::End();
     return actions;
 }
 
 void draw_help(bool& open) {
-    static const std::array<std::array<const char*, 2>, 13> rows{{{"left drag", "orbit"},
-                                                                  {"Ctrl + left drag", "look around"},
-                                                                  {"right or middle drag", "pan"},
-                                                                  {"wheel", "closer, farther"},
-                                                                  {"W S", "fly forward, back"},
-                                                                  {"A D", "fly left, right"},
-                                                                  {"Q E", "fly down, up"},
-                                                                  {"Shift", "four times as fast"},
-                                                                  {"1 2 3", "colour, depth, opacity"},
-                                                                  {"R", "back to the start"},
-                                                                  {"F1", "these keys"},
-                                                                  {"F2", "the panel"},
-                                                                  {"F12", "screenshot"}}};
+    static const std::array<std::array<const char*, 2>, 25> rows{
+        {{"left drag", "turn around the scene"},
+         {"Ctrl + left drag", "look around"},
+         {"right or middle drag", "move sideways"},
+         {"wheel", "closer, farther"},
+         {"double click", "look at this point and turn around it"},
+         {"W S  A D  Q E", "fly: forward back, left right, down up"},
+         {"Shift", "four times as fast"},
+         {"T", "turntable"},
+         {"U", "another axis is up"},
+         {"R", "back to the start"},
+         {"", ""},
+         {"1 2 3 4 5", "colour, depth, opacity, splats per pixel, ellipsoids"},
+         {"- +", "smaller, larger splats"},
+         {"C", "show the cameras; a click goes to one"},
+         {"left right", "the camera before, after"},
+         {"G", "the nearest camera"},
+         {"V", "photograph: beside, wipe, difference"},
+         {"", ""},
+         {"Ctrl + 1 to 9", "keep this view under a number"},
+         {"Shift + 1 to 9", "go to the view of a number"},
+         {"F12", "screenshot (PNG); with Shift: EXR"},
+         {"F1", "these keys"},
+         {"F2", "the panel"},
+         {"Ctrl + Q", "end"},
+         {"drop a file", "opens it: splats, a dataset, a run's folder"}}};
     const ImVec2 size = ImGui::GetIO().DisplaySize;
     ImGui::SetNextWindowPos(ImVec2(size.x / 2, size.y / 2), ImGuiCond_Appearing, ImVec2(0.5f, 0.5f));
     if (ImGui::Begin("Keys", &open, ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse) &&
-        ImGui::BeginTable("keys", 2)) {
+        ImGui::BeginTable("keys", 2, ImGuiTableFlags_SizingFixedFit)) {
         for (const auto& row : rows)
             for (const char* text : row) {
                 ImGui::TableNextColumn();

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "viewer/picture.h"
 
 #include <algorithm>
@@ -6,38 +7,88 @@
 namespace ewa::viewer {
 namespace {
 
+/// save_image's rounding, and zero for NaN.
 uint8_t to_byte(float v) {
-    return v > 0.0f ? uint8_t(std::lround(std::min(v, 1.0f) * 255.0f)) : uint8_t(0);
+    return v > 0.0f ? uint8_t(std::min(v, 1.0f) * 255.0f + 0.5f) : uint8_t(0);
+}
+
+float quantile(std::vector<float>& values, double share) {
+    if (values.empty()) return 0;
+    const auto at = values.begin() + std::ptrdiff_t(share * double(values.size() - 1));
+    std::nth_element(values.begin(), at, values.end());
+    return *at;
 }
 
 float white_depth_of(const Rendering& rendering) {
     std::vector<float> depths;
     for (size_t i = 0; i < rendering.depth.pixels.size(); ++i)
         if (rendering.alpha.pixels[i] >= 0.5f) depths.push_back(rendering.depth.pixels[i]);
-    if (depths.empty()) return 0;
-    const auto at = depths.begin() + std::ptrdiff_t(0.98 * double(depths.size() - 1));
-    std::nth_element(depths.begin(), at, depths.end());
-    return *at;
+    return quantile(depths, 0.98);
+}
+
+float white_count_of(const Rendering& rendering) {
+    std::vector<float> counts;
+    for (const float count : rendering.count.pixels)
+        if (count > 0) counts.push_back(count);
+    return quantile(counts, 0.99);
+}
+
+/// rgb(i) gives the three values of pixel i.
+template <class Values>
+void fill(Picture& picture, Values rgb) {
+    for (size_t i = 0; i < picture.rgba.size() / 4; ++i) {
+        const std::array<float, 3> values = rgb(i);
+        for (size_t c = 0; c < 3; ++c) picture.rgba[4 * i + c] = to_byte(values[c]);
+        picture.rgba[4 * i + 3] = 255;
+    }
+}
+
+Picture empty_picture(int width, int height) {
+    return {width, height, std::vector<uint8_t>(size_t(width) * size_t(height) * 4), 0};
 }
 
 }  // namespace
 
-Picture picture_of(const Rendering& rendering, Mode mode, const std::array<float, 3>& background) {
-    const Image& color = rendering.color;
-    Picture picture{color.width, color.height, std::vector<uint8_t>(size_t(color.width) * color.height * 4)};
-    if (mode == Mode::depth) picture.white_depth = white_depth_of(rendering);
-    const float depth_scale = picture.white_depth > 0 ? 1.0f / picture.white_depth : 0.0f;
-    for (size_t i = 0; i < picture.rgba.size() / 4; ++i) {
-        uint8_t* out = &picture.rgba[4 * i];
-        const float alpha = rendering.alpha.pixels[i];
-        for (size_t c = 0; c < 3; ++c) {
-            float value = alpha;
-            if (mode == Mode::color) value = color.pixels[3 * i + c] + (1.0f - alpha) * background[c];
-            if (mode == Mode::depth) value = rendering.depth.pixels[i] * depth_scale;
-            out[c] = to_byte(value);
-        }
-        out[3] = 255;
+Drawing drawing_for(Mode mode) {
+    if (mode == Mode::depth) return Drawing::depth;
+    if (mode == Mode::count) return Drawing::count;
+    return mode == Mode::ellipsoids ? Drawing::ellipsoids : Drawing::color;
+}
+
+std::array<float, 3> heat(float share) {
+    return {std::clamp(3 * share, 0.0f, 1.0f), std::clamp(3 * share - 1, 0.0f, 1.0f),
+            std::clamp(3 * share - 2, 0.0f, 1.0f)};
+}
+
+Picture picture_of(const Rendering& rendering, Mode mode) {
+    Picture picture = empty_picture(rendering.color.width, rendering.color.height);
+    const auto grey = [](float v) { return std::array<float, 3>{v, v, v}; };
+    if (mode == Mode::depth) {
+        picture.white = white_depth_of(rendering);
+        const float scale = picture.white > 0 ? 1.0f / picture.white : 0.0f;
+        fill(picture, [&](size_t i) { return grey(rendering.depth.pixels[i] * scale); });
+    } else if (mode == Mode::count) {
+        picture.white = white_count_of(rendering);
+        const float scale = picture.white > 0 ? 1.0f / picture.white : 0.0f;
+        fill(picture, [&](size_t i) { return heat(rendering.count.pixels[i] * scale); });
+    } else if (mode == Mode::opacity) {
+        fill(picture, [&](size_t i) { return grey(rendering.alpha.pixels[i]); });
+    } else {
+        const float* values = rendering.color.pixels.data();
+        fill(picture, [&](size_t i) {
+            return std::array<float, 3>{values[3 * i], values[3 * i + 1], values[3 * i + 2]};
+        });
     }
+    return picture;
+}
+
+Picture picture_of(const Image& image, const std::array<float, 3>& background) {
+    const Image opaque = over_background(image, background);
+    Picture picture = empty_picture(opaque.width, opaque.height);
+    fill(picture, [&](size_t i) {
+        const float* values = &opaque.pixels[3 * i];
+        return std::array<float, 3>{values[0], values[1], values[2]};
+    });
     return picture;
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A rendering as the window shows it: 8 bit RGBA.
 #pragma once
 #include <array>
@@ -8,17 +9,26 @@
 
 namespace ewa::viewer {
 
-enum class Mode { color, depth, opacity };
+enum class Mode { color, depth, opacity, count, ellipsoids };
+
+/// What is to be drawn for a mode.
+Drawing drawing_for(Mode mode);
 
 struct Picture {
     int width = 0, height = 0;
     std::vector<uint8_t> rgba;
-    float white_depth = 0;  // in depth mode: the view z that is shown white, world units
+    float white = 0;  // what white stands for: a view z (world units) in depth mode, a number of splats in count mode
 };
 
-/// `rendering` is in front of black, and has a depth when the mode is depth. Rounded and clamped as
-/// save_image does for a PNG. Depth is divided by its 98th percentile over what is at least half opaque, so
-/// that a few far splats do not turn everything else black; it is black where nothing is.
-Picture picture_of(const Rendering& rendering, Mode mode, const std::array<float, 3>& background);
+/// Rounded and clamped as save_image does for a PNG. Depth is divided by its 98th percentile over what is at least half
+/// opaque, so that a few far splats do not turn everything else black; it is black where nothing is. The count goes from
+/// black over red and yellow to white at its 99th percentile.
+Picture picture_of(const Rendering& rendering, Mode mode);
+
+/// RGB, or RGBA whose alpha is blended over the background.
+Picture picture_of(const Image& image, const std::array<float, 3>& background);
+
+/// Black over red and yellow to white, for 0 to 1.
+std::array<float, 3> heat(float share);
 
 }  // namespace ewa::viewer

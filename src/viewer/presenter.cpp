@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "viewer/presenter.h"
 
 #include <backends/imgui_impl_vulkan.h>
@@ -46,16 +47,11 @@ const Use kDrawnOn{Stage::eColorAttachmentOutput,
                    Access::eColorAttachmentRead | Access::eColorAttachmentWrite,
                    Layout::eColorAttachmentOptimal};
 
-/// The largest rectangle of the shape of `shape` in the middle of `room`: two corners.
-std::array<vk::Offset3D, 2> fitted_rectangle(Size shape, Size room) {
-    Size size = room;
-    if (shape != room) {
-        const double scale = std::min(double(room.width) / shape.width, double(room.height) / shape.height);
-        size.width = std::clamp(int(std::lround(shape.width * scale)), 1, room.width);
-        size.height = std::clamp(int(std::lround(shape.height * scale)), 1, room.height);
-    }
-    const int x = (room.width - size.width) / 2, y = (room.height - size.height) / 2;
-    return {vk::Offset3D(x, y, 0), vk::Offset3D(x + size.width, y + size.height, 1)};
+/// Inside the window, so that a blit never leaves the image.
+Rectangle clipped(const Rectangle& rectangle, Size room) {
+    const int left = std::clamp(rectangle.x, 0, room.width), top = std::clamp(rectangle.y, 0, room.height);
+    return {left, top, std::clamp(rectangle.x + rectangle.width, left, room.width) - left,
+            std::clamp(rectangle.y + rectangle.height, top, room.height) - top};
 }
 
 }  // namespace
@@ -97,54 +93,56 @@ void Presenter::submit(const vk::Semaphore* after, const vk::Semaphore* then) {
     pending_ = true;
 }
 
-void Presenter::set_picture(const Picture& picture) {
+void Presenter::set_picture(Layer::Slot slot, const Picture& picture) {
     wait();  // the submission before may still read the staging buffer
-    if (staging_.bytes < picture.rgba.size()) {
-        staging_ = {};
-        staging_ = device_.host_buffer(picture.rgba.size(), vk::BufferUsageFlagBits::eTransferSrc);
+    Held& held = pictures_[slot];
+    if (held.staging.bytes < picture.rgba.size()) {
+        held.staging = {};
+        held.staging = device_.host_buffer(picture.rgba.size(), vk::BufferUsageFlagBits::eTransferSrc);
     }
-    std::memcpy(staging_.mapped, picture.rgba.data(), picture.rgba.size());
+    std::memcpy(held.staging.mapped, picture.rgba.data(), picture.rgba.size());
     const Size size{picture.width, picture.height};
-    if (picture_.size != size) {
+    if (held.image.size != size) {
         // Where the window's format encodes to sRGB, the picture's decodes from it: its values come out as
         // they went in.
         const vk::Format format = swapchain_.srgb() ? vk::Format::eR8G8B8A8Srgb : vk::Format::eR8G8B8A8Unorm;
-        picture_ = {};
-        picture_ = device_.image(size, format, Usage::eTransferDst | Usage::eTransferSrc);
+        held.image = {};
+        held.image = device_.image(size, format, Usage::eTransferDst | Usage::eTransferSrc);
     }
-    fresh_ = true;
+    held.fresh = true;
 }
 
-void Presenter::record_upload() {
-    change(*commands_, *picture_.image, kNothingYet, kWritten);
+void Presenter::record_upload(Held& held) {
+    change(*commands_, *held.image.image, kNothingYet, kWritten);
     vk::BufferImageCopy copy;
     copy.setImageSubresource(kLayer).setImageExtent(
-        {uint32_t(picture_.size.width), uint32_t(picture_.size.height), 1});
-    commands_->copyBufferToImage(*staging_.buffer, *picture_.image, Layout::eTransferDstOptimal, copy);
-    change(*commands_, *picture_.image, kWritten, kRead);
-    fresh_ = false;
+        {uint32_t(held.image.size.width), uint32_t(held.image.size.height), 1});
+    commands_->copyBufferToImage(*held.staging.buffer, *held.image.image, Layout::eTransferDstOptimal, copy);
+    change(*commands_, *held.image.image, kWritten, kRead);
+    held.fresh = false;
 }
 
-void Presenter::record_picture(vk::Image target, Size shown_as) {
+void Presenter::record_layers(vk::Image target, std::span<const Layer> layers) {
     change(*commands_, target, kNothingYet, kWritten);
-    const Size room = swapchain_.size();
-    const auto corners = fitted_rectangle(shown_as, room);
-    const bool covers = picture_.image && corners[1].x - corners[0].x == room.width &&
-                        corners[1].y - corners[0].y == room.height;
-    if (!covers) {
-        const vk::ClearColorValue black(std::array<float, 4>{0, 0, 0, 1});
-        commands_->clearColorImage(target, Layout::eTransferDstOptimal, black, kWhole);
+    const vk::ClearColorValue black(std::array<float, 4>{0, 0, 0, 1});
+    commands_->clearColorImage(target, Layout::eTransferDstOptimal, black, kWhole);
+    for (const Layer& layer : layers) {
+        const DeviceImage& picture = pictures_[layer.slot].image;
+        const Rectangle to = clipped(layer.target, swapchain_.size());
+        if (!picture.image || to.width == 0 || to.height == 0) continue;
+        const int width = picture.size.width, height = picture.size.height;
+        const int left = std::clamp(int(std::lround(layer.left * width)), 0, width - 1);
+        const int right = std::clamp(int(std::lround(layer.right * width)), left + 1, width);
+        change(*commands_, target, kWritten, kWritten);
+        vk::ImageBlit blit;
+        blit.setSrcSubresource(kLayer)
+            .setDstSubresource(kLayer)
+            .setSrcOffsets({vk::Offset3D(left, 0, 0), vk::Offset3D(right, height, 1)})
+            .setDstOffsets({vk::Offset3D(to.x, to.y, 0), vk::Offset3D(to.x + to.width, to.y + to.height, 1)});
+        const bool as_it_is = to.width == right - left && to.height == height;
+        commands_->blitImage(*picture.image, Layout::eTransferSrcOptimal, target, Layout::eTransferDstOptimal,
+                             blit, as_it_is ? vk::Filter::eNearest : vk::Filter::eLinear);
     }
-    if (!picture_.image) return;
-    if (!covers) change(*commands_, target, kWritten, kWritten);
-    vk::ImageBlit blit;
-    blit.setSrcSubresource(kLayer)
-        .setDstSubresource(kLayer)
-        .setSrcOffsets({vk::Offset3D(0, 0, 0), vk::Offset3D(picture_.size.width, picture_.size.height, 1)})
-        .setDstOffsets(corners);
-    const vk::Filter filter = covers && picture_.size == room ? vk::Filter::eNearest : vk::Filter::eLinear;
-    commands_->blitImage(*picture_.image, Layout::eTransferSrcOptimal, target, Layout::eTransferDstOptimal,
-                         blit, filter);
 }
 
 void Presenter::record_capture(vk::Image target) {
@@ -182,7 +180,7 @@ Image Presenter::captured() const {
     return image;
 }
 
-bool Presenter::draw(Size window, Size shown_as, ImDrawData* panel, Image* capture) {
+bool Presenter::draw(Size window, std::span<const Layer> layers, ImDrawData* panel, Image* capture) {
     if (window.width == 0 || window.height == 0) return false;
     if (capture && !swapchain_.readable())
         throw RunError("this display does not let a window's picture be read back");
@@ -199,8 +197,9 @@ bool Presenter::draw(Size window, Size shown_as, ImDrawData* panel, Image* captu
     }
     const vk::Image target = swapchain_.image(*index);
     begin();
-    if (fresh_) record_upload();
-    record_picture(target, shown_as);
+    for (Held& held : pictures_)
+        if (held.fresh) record_upload(held);
+    record_layers(target, layers);
     if (capture) {
         change(*commands_, target, kWritten, kRead);
         record_capture(target);

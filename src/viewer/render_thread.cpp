@@ -1,16 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "viewer/render_thread.h"
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <utility>
 
-namespace ewa::viewer {
+#include "ewa/error.h"
 
-RenderThread::RenderThread(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians,
-                           std::function<void()> on_news)
-    : device_(std::move(device)),
-      gaussians_(gaussians),
-      on_news_(std::move(on_news)),
-      thread_([this] { work(); }) {}
+namespace ewa::viewer {
+namespace {
+
+constexpr int kProbeSide = 256;  // px of the picture that a depth is taken from
+
+RenderOptions options_of(const Look& look) {
+    return {look.background, look.kernel, look.sh_degree};
+}
+
+/// As `ewa render` writes it: EXR with alpha and as it is, PNG as it is shown.
+void save(const std::filesystem::path& file, const Rendering& rendering, const Picture& picture, Mode mode) {
+    const bool exr = file.extension() == ".exr";
+    if (exr && mode == Mode::depth) return save_image(file, rendering.depth);
+    if (exr && mode == Mode::count) return save_image(file, rendering.count);
+    if (exr && mode == Mode::opacity) return save_image(file, rendering.alpha);
+    Image image(picture.width, picture.height, exr ? 4 : 3);
+    const size_t channels = size_t(image.channels);
+    for (size_t i = 0; i < image.pixels.size() / channels; ++i) {
+        for (size_t c = 0; c < 3; ++c)
+            image.pixels[channels * i + c] =
+                exr ? rendering.color.pixels[3 * i + c] : float(picture.rgba[4 * i + c]) / 255.0f;
+        if (exr) image.pixels[4 * i + 3] = rendering.alpha.pixels[i];
+    }
+    save_image(file, image);
+}
+
+}  // namespace
+
+RenderThread::RenderThread(OpenDevice open, std::function<void()> on_news)
+    : open_(std::move(open)), on_news_(std::move(on_news)), thread_([this] { work(); }) {}
 
 RenderThread::~RenderThread() {
     {
@@ -21,64 +48,159 @@ RenderThread::~RenderThread() {
     thread_.join();
 }
 
+uint64_t RenderThread::set_scene(std::shared_ptr<const Gaussians> gaussians) {
+    const std::lock_guard lock(mutex_);
+    next_scene_ = std::move(gaussians);
+    wake_.notify_one();
+    return ++scene_number_;
+}
+
 void RenderThread::ask(const PictureRequest& request) {
-    {
-        const std::lock_guard lock(mutex_);
-        waiting_ = request;
-    }
+    const std::lock_guard lock(mutex_);
+    if (!waiting_.empty() && waiting_.back().file.empty()) waiting_.pop_back();
+    waiting_.push_back(request);
     wake_.notify_one();
 }
 
-RenderThread::News RenderThread::news() const {
+uint64_t RenderThread::ask_point(const Camera& camera, const glm::dvec2& pixel) {
     const std::lock_guard lock(mutex_);
-    return news_;
+    probe_ = Probe{camera, pixel, ++probes_};
+    wake_.notify_one();
+    return probes_;
 }
 
-std::shared_ptr<const FinishedPicture> RenderThread::draw(const PictureRequest& request) {
-    const auto start = std::chrono::steady_clock::now();
-    // The background is added on the host: a renderer keeps its own, and a new renderer means a new upload.
-    const RenderOptions options{{0, 0, 0}, request.look.kernel, request.look.sh_degree};
-    if (!renderer_ || options.kernel != renderer_options_.kernel ||
-        options.sh_degree != renderer_options_.sh_degree) {
-        renderer_.reset();  // first, so that the scene is never on the device twice
-        renderer_.emplace(device_, gaussians_, options);
-        renderer_options_ = options;
-    }
-    const bool with_depth = request.look.mode == Mode::depth;
-    const Rendering rendering = renderer_->render(downscale(request.camera, request.divisor), with_depth);
+RenderThread::News RenderThread::take_news() {
+    const std::lock_guard lock(mutex_);
+    News news = news_;
+    news_.written.clear();
+    return news;
+}
 
+void RenderThread::report(const std::function<void(News&)>& change) {
+    {
+        const std::lock_guard lock(mutex_);
+        change(news_);
+    }
+    on_news_();
+}
+
+bool RenderThread::next(Work& work) {
+    std::unique_lock lock(mutex_);
+    wake_.wait(lock, [this] { return stop_ || probe_ || !waiting_.empty() || next_scene_; });
+    if (stop_) return false;
+    work.scene = std::exchange(next_scene_, nullptr);
+    work.scene_number = scene_number_;
+    work.probe = std::exchange(probe_, std::nullopt);
+    if (!waiting_.empty()) {
+        work.request = waiting_.front();
+        waiting_.erase(waiting_.begin());
+    }
+    return true;
+}
+
+void RenderThread::prepare(const Work& work) {
+    if (work.scene) {
+        scene_ = work.scene;
+        scene_is_up_ = false;
+    }
+    if (!device_) {
+        renderer_.reset();
+        device_ = open_();
+        report([&](News& news) { news.device = device_info(*device_).name; });
+    }
+    if (!scene_ || scene_is_up_) return;
+    if (renderer_)
+        renderer_->replace(*scene_);
+    else
+        renderer_.emplace(device_, *scene_, RenderOptions{});
+    scene_is_up_ = true;
+}
+
+void RenderThread::carry_out(const Work& work) {
+    prepare(work);
+    if (!renderer_) return;
+    if (work.probe) {
+        const std::optional<glm::dvec3> point = point_at(*work.probe);
+        report([&](News& news) {
+            news.point = point;
+            news.points = work.probe->number;
+        });
+    }
+    if (!work.request) return;
+    const auto finished = draw(*work.request, work.scene_number);
+    report([&](News& news) {
+        news.picture = finished;
+        news.failure = nullptr;
+        if (!work.request->file.empty()) news.written.push_back(work.request->file);
+    });
+}
+
+std::shared_ptr<const FinishedPicture> RenderThread::draw(const PictureRequest& request, uint64_t scene) {
+    const auto start = std::chrono::steady_clock::now();
+    const Look& look = request.look;
+    const Camera camera = downscale(request.camera, request.divisor);
+    const DrawOptions options{options_of(look), drawing_for(look.mode), double(look.splat_scale)};
     auto finished = std::make_shared<FinishedPicture>();
     finished->request = request;
-    finished->picture = picture_of(rendering, request.look.mode, request.look.background);
+    finished->scene = scene;
+    const bool bytes_do = request.file.empty() && (look.mode == Mode::color || look.mode == Mode::ellipsoids);
+    if (bytes_do) {
+        finished->picture = {camera.width, camera.height, renderer_->render_bytes(camera, options), 0};
+    } else {
+        const Rendering rendering = renderer_->render(camera, options);
+        finished->picture = picture_of(rendering, look.mode);
+        if (!request.file.empty()) save(request.file, rendering, finished->picture, look.mode);
+    }
     finished->pass_times = renderer_->pass_times();
     finished->skipped_nonfinite = renderer_->skipped_nonfinite();
+    finished->splats_drawn = renderer_->splats_drawn();
+    finished->device_bytes = device_bytes(*device_);
     finished->milliseconds =
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     return finished;
 }
 
+std::optional<glm::dvec3> RenderThread::point_at(const Probe& probe) {
+    const Camera& full = probe.camera;
+    const int divisor = std::max(1, std::min(full.width, full.height) / kProbeSide);
+    const Camera camera = downscale(full, divisor);
+    const Rendering rendering = renderer_->render(camera, DrawOptions{{}, Drawing::depth, 1});
+    const int x = std::clamp(int(probe.pixel.x * camera.width / full.width), 0, camera.width - 1);
+    const int y = std::clamp(int(probe.pixel.y * camera.height / full.height), 0, camera.height - 1);
+    if (!(*rendering.alpha.at(x, y) >= 0.5f)) return std::nullopt;
+    const double z = *rendering.depth.at(x, y);
+    const glm::dvec3 view((x + 0.5 - camera.cx) / camera.fx * z, (y + 0.5 - camera.cy) / camera.fy * z, z);
+    return camera.position() + glm::transpose(camera.rotation) * view;
+}
+
+/// Of the exception that is being handled.
+void RenderThread::fail(const Work& work) {
+    report([&](News& news) {
+        news.failure = std::current_exception();
+        news.point.reset();
+        if (work.probe) news.points = work.probe->number;
+    });
+}
+
 void RenderThread::work() {
     for (;;) {
-        PictureRequest request;
-        {
-            std::unique_lock lock(mutex_);
-            wake_.wait(lock, [this] { return stop_ || waiting_; });
-            if (stop_) return;
-            request = *std::exchange(waiting_, std::nullopt);
+        Work work;
+        if (!next(work)) return;
+        for (const bool again : {true, false}) {
+            try {
+                carry_out(work);
+                break;
+            } catch (const InputError&) {
+                fail(work);
+                break;
+            } catch (...) {
+                // The device may be lost, or its memory full of what is no longer needed: both go with it.
+                renderer_.reset();
+                device_.reset();
+                scene_is_up_ = false;
+                if (!again) fail(work);
+            }
         }
-        std::shared_ptr<const FinishedPicture> finished;
-        std::exception_ptr failure;
-        try {
-            finished = draw(request);
-        } catch (...) {
-            failure = std::current_exception();
-        }
-        {
-            const std::lock_guard lock(mutex_);
-            if (finished) news_.picture = finished;
-            news_.failure = failure;
-        }
-        on_news_();
     }
 }
 

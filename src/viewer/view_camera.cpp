@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "viewer/view_camera.h"
 
 #include <algorithm>
@@ -98,10 +99,25 @@ void ViewCamera::fly(const glm::dvec3& amount) {
     place(camera_.rotation, camera_.position() + moved);
 }
 
+void ViewCamera::focus(const glm::dvec3& point) {
+    const glm::dvec3 position = camera_.position(), way = point - position;
+    const double length = glm::length(way);
+    if (!(length > 0) || !std::isfinite(length)) return;
+    pivot_ = point;
+    const glm::dvec3 forward = way / length;
+    glm::dvec3 right = glm::cross(forward, up_);
+    right = glm::length(right) > 1e-3 ? glm::normalize(right) : axis(0);
+    place(orthonormal(glm::transpose(glm::dmat3(right, glm::cross(forward, right), forward))), position);
+}
+
+void ViewCamera::stand(const Viewpoint& place) {
+    camera_ = place.camera;
+    pivot_ = place.pivot;
+    up_ = place.up;
+}
+
 void ViewCamera::reset() {
-    camera_ = start_.camera;
-    pivot_ = start_.pivot;
-    up_ = start_.up;
+    stand(start_);
 }
 
 void ViewCamera::restart(const Viewpoint& start) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The camera that mouse and keys move: around a pivot, towards it, or freely. Knows nothing of windows.
 #pragma once
 #include <glm/vec3.hpp>
@@ -31,11 +32,17 @@ class ViewCamera {
     void zoom(double steps);
     /// Camera axes (x right, y down, z forward), in distances to the pivot.
     void fly(const glm::dvec3& amount);
+    /// Turns to a point, which becomes the pivot.
+    void focus(const glm::dvec3& point);
     void reset();
     void restart(const Viewpoint& start);
     void set_up(const glm::dvec3& up);
 
+    /// Another place to stand; what reset() comes back to stays.
+    void stand(const Viewpoint& place);
+    Viewpoint place() const { return {camera_, pivot_, up_, start_.radius}; }
     const glm::dvec3& up() const { return up_; }
+    double radius() const { return start_.radius; }
     double distance() const;
     Camera camera(int width, int height) const { return fitted(camera_, width, height); }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "viewer/window.h"
 
 #define GLFW_INCLUDE_NONE
@@ -80,6 +81,10 @@ void Window::watch() {
                                [](GLFWwindow* window, int, int, int) { of(window).stirred_ = true; });
     glfwSetScrollCallback(window_, [](GLFWwindow* window, double, double) { of(window).stirred_ = true; });
     glfwSetCharCallback(window_, [](GLFWwindow* window, unsigned) { of(window).stirred_ = true; });
+    glfwSetDropCallback(window_, [](GLFWwindow* window, int count, const char** paths) {
+        of(window).stirred_ = true;
+        if (count > 0) of(window).dropped_ = paths[0];
+    });
     glfwSetFramebufferSizeCallback(window_, [](GLFWwindow* window, int, int) { of(window).stirred_ = true; });
     glfwSetWindowRefreshCallback(window_, [](GLFWwindow* window) { of(window).stirred_ = true; });
     glfwSetWindowFocusCallback(window_, [](GLFWwindow* window, int) { of(window).stirred_ = true; });
@@ -98,6 +103,10 @@ Size Window::framebuffer() const {
     return size;
 }
 
+void Window::set_title(const std::string& title) {
+    glfwSetWindowTitle(window_, title.c_str());
+}
+
 float Window::scale() const {
     float x = 1, y = 1;
     glfwGetWindowContentScale(window_, &x, &y);
@@ -106,6 +115,10 @@ float Window::scale() const {
 
 bool Window::closed() const {
     return glfwWindowShouldClose(window_);
+}
+
+void Window::close() {
+    glfwSetWindowShouldClose(window_, GLFW_TRUE);
 }
 
 bool Window::held(int key) const {

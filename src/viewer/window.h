@@ -1,19 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
 // One GLFW window: its life, and the keys.
 #pragma once
+#include <filesystem>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "gpu/vulkan.h"
+#include "viewer/size.h"
 
 struct GLFWwindow;
 
 namespace ewa::viewer {
-
-struct Size {
-    int width = 0, height = 0;
-    bool operator==(const Size&) const = default;
-};
 
 /// GLFW itself, initialised while one of these lives. Throws RunError where there is no display.
 class WindowSystem {
@@ -43,12 +42,16 @@ class Window {
     Size framebuffer() const;  // px; zero while minimised
     float scale() const;       // of text, on dense displays
     bool closed() const;
+    void close();
     bool held(int key) const;
 
     /// Waits for input, at most this long (0: takes what is there), and returns the keys pressed since.
     std::vector<int> wait(double seconds);
     /// Input or a change of the window came with the last wait().
     bool stirred() const { return stirred_; }
+    /// What was dropped on the window since the last call; empty: nothing.
+    std::filesystem::path take_dropped() { return std::exchange(dropped_, {}); }
+    void set_title(const std::string& title);
 
   private:
     static Window& of(GLFWwindow* window);
@@ -56,6 +59,7 @@ class Window {
 
     GLFWwindow* window_ = nullptr;
     std::vector<int> pressed_;
+    std::filesystem::path dropped_;
     bool stirred_ = false;
 };
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The stand-alone benchmark as a process.
 #include <gtest/gtest.h>
 #include <sys/wait.h>

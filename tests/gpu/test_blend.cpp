@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Blending and its gradient alone, on records and tile lists from the twin.
 #include <gtest/gtest.h>
 
@@ -7,6 +8,7 @@
 #include "gpu/guarded.h"
 #include "gpu/twin_inputs.h"
 #include "pipeline/sizes.h"
+#include "reference/ellipsoids.h"
 
 namespace ewa::test {
 namespace {
@@ -131,6 +133,53 @@ TEST_P(BlendPass, PlanesAreTheTwins) {
             for (uint32_t x = uint32_t(c.width); x < lists.sizes.stride; ++x)
                 EXPECT_TRUE(std::isnan(actual[size_t(y) * lists.sizes.stride + x]));
     }
+}
+
+TEST_P(BlendPass, CountsAreTheTwins) {
+    const Case& c = GetParam();
+    const Lists lists(random_scene(1500 + c.splats, c.splats, c.kind, c.width, c.height));
+    Rig& r = rig();
+    Guarded out("planes", uint64_t(lists.sizes.plane_floats) * 5 * 4);
+    r.run([&](gpu::Recording& recording) {
+        r.kernels.get<passes::Blend>(shared::BLEND_COUNT)
+            .record(recording, r.shape(), {lists.records, lists.splats, lists.starts, out}, lists.push());
+    });
+    EXPECT_TRUE(out.intact());
+    const auto actual = out.read<float>();
+    size_t different = 0;
+    for (int y = 0; y < c.height; ++y)
+        for (int x = 0; x < c.width; ++x) {
+            const float count = actual[shared::PLANE_COUNT * lists.sizes.plane_floats +
+                                       size_t(y) * lists.sizes.stride + size_t(x)];
+            different += count != float(lists.twin.blended.blended[size_t(y) * size_t(c.width) + size_t(x)]);
+        }
+    // Contributions that lie within rounding of the cut or of the stop.
+    EXPECT_LE(different, size_t(c.width) * size_t(c.height) / 50);
+}
+
+TEST_P(BlendPass, EllipsoidsAreTheTwins) {
+    const Case& c = GetParam();
+    const Lists lists(random_scene(1500 + c.splats, c.splats, c.kind, c.width, c.height));
+    Rig& r = rig();
+    Guarded out("planes", uint64_t(lists.sizes.plane_floats) * 4 * 4);
+    r.run([&](gpu::Recording& recording) {
+        r.kernels.get<passes::Blend>(shared::BLEND_ELLIPSOIDS)
+            .record(recording, r.shape(), {lists.records, lists.splats, lists.starts, out}, lists.push());
+    });
+    EXPECT_TRUE(out.intact());
+    const reference::Raster expected =
+        reference::ellipsoids(lists.twin.projected, lists.twin.instances, lists.scene.options.background);
+    const auto actual = out.read<float>();
+    Difference difference;
+    for (int y = 0; y < c.height; ++y)
+        for (int x = 0; x < c.width; ++x)
+            for (int k = 0; k < 3; ++k)
+                difference.add(std::abs(actual[size_t(k) * lists.sizes.plane_floats +
+                                               size_t(y) * lists.sizes.stride + size_t(x)] -
+                                        expected.at(x, y)[k]),
+                               2e-3);  // the shade's slope has no bound at the outline
+    // Pixels whose centre lies within rounding of an outline.
+    EXPECT_LE(difference.over, size_t(c.width) * size_t(c.height) / 50);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, BlendPass, kCases, case_name);

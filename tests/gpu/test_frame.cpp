@@ -1,11 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
 // Whole frames with guard words round every buffer, on scenes at the edges.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <set>
 
+#include "ewa/error.h"
 #include "ewa/renderer.h"
 #include "gpu/guarded.h"
 #include "gpu/twin_inputs.h"
@@ -71,6 +74,51 @@ double worst_color(const Result& result, const reference::Raster& expected) {
                 worst = std::isfinite(error) ? std::max(worst, error) : INFINITY;
             }
     return worst;
+}
+
+TEST(DrawOptions, BytesAreTheRoundedColours) {
+    const Scene scene = random_scene(77, 500, SplatKind::mixed, 61, 47, 1);
+    Renderer renderer(device(), scene.gaussians, {});
+    DrawOptions options;
+    options.render.background = {0.2f, 2.0f, -1.0f};
+    for (const Drawing drawing : {Drawing::color, Drawing::ellipsoids}) {
+        options.drawing = drawing;
+        const std::vector<uint8_t> bytes = renderer.render_bytes(scene.camera, options);
+        const Rendering rendering = renderer.render(scene.camera, options);
+        ASSERT_EQ(bytes.size(), 61u * 47 * 4);
+        for (size_t i = 0; i < bytes.size() / 4; ++i) {
+            for (size_t c = 0; c < 3; ++c) {
+                const float v = rendering.color.pixels[3 * i + c];
+                ASSERT_EQ(bytes[4 * i + c], v > 0 ? uint8_t(std::min(v, 1.0f) * 255.0f + 0.5f) : 0) << i;
+            }
+            ASSERT_EQ(bytes[4 * i + 3], 255);
+        }
+    }
+}
+
+TEST(DrawOptions, AreThoseOfARendererMadeForThem) {
+    const Scene scene = random_scene(78, 400, SplatKind::mixed, 40, 33, 2);
+    RenderOptions other;
+    other.background = {0.1f, 0.2f, 0.3f};
+    other.kernel = Kernel::antialias;
+    other.sh_degree = 1;
+    Renderer renderer(device(), scene.gaussians, {}), made_for(device(), scene.gaussians, other);
+    const Rendering a = renderer.render(scene.camera, DrawOptions{other, Drawing::depth, 1});
+    const Rendering b = made_for.render(scene.camera, true);
+    EXPECT_EQ(a.color.pixels, b.color.pixels);
+    EXPECT_EQ(a.depth.pixels, b.depth.pixels);
+    EXPECT_GT(renderer.splats_drawn(), 20u);
+    EXPECT_LE(renderer.splats_drawn(), 400u);
+    const Rendering count = renderer.render(scene.camera, DrawOptions{other, Drawing::count, 1});
+    EXPECT_EQ(count.color.pixels, b.color.pixels);
+    EXPECT_GT(*std::max_element(count.count.pixels.begin(), count.count.pixels.end()), 1);
+    EXPECT_NE(renderer.render(scene.camera, DrawOptions{other, Drawing::color, 0.5}).color.pixels, b.color.pixels);
+    EXPECT_THROW(renderer.render(scene.camera, DrawOptions{other, Drawing::color, 0}), InputError);
+
+    const Scene second = random_scene(79, 900, SplatKind::ordinary, 40, 33, 0);
+    renderer.replace(second.gaussians);
+    EXPECT_EQ(renderer.render(scene.camera, DrawOptions{{}, Drawing::color, 1}).color.pixels,
+              Renderer(device(), second.gaussians, {}).render(scene.camera).color.pixels);
 }
 
 void expect_finite(const Gaussians& g) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Emission of (splat, tile) instances, and where each tile's begin, on inputs from the twin.
 #include <gtest/gtest.h>
 

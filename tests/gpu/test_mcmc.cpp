@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // 3DGS-MCMC on the device against the twin: relocation, growth, noise, regularisers.
 #include <gtest/gtest.h>
 

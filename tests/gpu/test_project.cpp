@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The projection pass alone against the twin.
 #include <gtest/gtest.h>
 
@@ -17,7 +18,7 @@ struct Output {
     shared::Counts totals;
 };
 
-Output run_project(const Scene& scene) {
+Output run_project(const Scene& scene, bool inspected = false, float log_scale_shift = 0) {
     Rig& r = rig();
     const uint32_t splats = uint32_t(scene.gaussians.size());
     const pipeline::Model model = pipeline::upload_model(*device(), scene.gaussians, 0, false);
@@ -26,9 +27,11 @@ Output run_project(const Scene& scene) {
     Guarded records("records", room * 48, gpu::Texel::rgba32f), keys("keys", room * 4),
         tile_counts("tile counts", room * 4), counts = zero_counts();
     r.run([&](gpu::Recording& recording) {
-        r.kernels.get<passes::Project>(uint32_t(scene.gaussians.sh_degree), uint32_t(scene.options.kernel))
+        r.kernels
+            .get<passes::Project>(uint32_t(scene.gaussians.sh_degree), uint32_t(scene.options.kernel),
+                                  uint32_t(inspected))
             .record(recording, r.shape(), {model.params, camera, 0, records, keys, tile_counts, counts},
-                    {model.splats, model.planes()});
+                    {model.splats, model.planes(), log_scale_shift});
     });
     expect_intact({&records, &keys, &tile_counts, &counts});
     Output out{records.read<float>(), keys.read<uint32_t>(), tile_counts.read<uint32_t>(),
@@ -113,6 +116,21 @@ std::string case_name(const testing::TestParamInfo<Case>& info) {
     return std::string(name_of(c.kind)) + "_" + std::to_string(c.splats) + "_" + std::to_string(c.width) +
            "x" + std::to_string(c.height) + "_sh" + std::to_string(c.sh_degree) + "_kernel" +
            std::to_string(int(c.kernel));
+}
+
+TEST(ProjectInspection, ScalesAreShiftedAndTheDrawnCounted) {
+    Scene scene = random_scene(910, 500, SplatKind::mixed, 61, 47, 1);
+    const Output shifted = run_project(scene, true, std::log(0.5f)), plain = run_project(scene, false, 3);
+    EXPECT_EQ(plain.totals.drawn, 0u);
+    EXPECT_EQ(plain.records, run_project(scene).records) << "without inspection the shift means nothing";
+    for (float& scale : scene.gaussians.log_scales) scale += std::log(0.5f);
+    const Output smaller = run_project(scene, true);
+    EXPECT_EQ(shifted.records, smaller.records);
+    EXPECT_EQ(shifted.counts, smaller.counts);
+    size_t drawn = 0;
+    for (const uint32_t count : shifted.counts) drawn += count > 0;
+    EXPECT_GT(drawn, 50u);
+    EXPECT_EQ(shifted.totals.drawn, drawn);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, ProjectPass,

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Recordings: which commands a barrier separates, and declarations that are wrong. Nothing runs on the
 // device.
 #include <gtest/gtest.h>

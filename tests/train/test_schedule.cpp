@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // When a run does what: pure functions.
 #include "train/schedule.h"
 

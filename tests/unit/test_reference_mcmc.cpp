@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The twin of 3DGS-MCMC against what its formulas promise.
 #include "reference/mcmc.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The parts of the viewer that know of no window: the camera, the first view, the picture, the pace.
 #include <gtest/gtest.h>
 
@@ -6,6 +7,7 @@
 #include <limits>
 #include <numbers>
 
+#include "viewer/compare.h"
 #include "viewer/framing.h"
 #include "viewer/pace.h"
 #include "viewer/picture.h"
@@ -124,6 +126,47 @@ TEST(ViewCamera, FlyGoesAlongTheCamerasAxesAndResetComesBack) {
     EXPECT_EQ(camera.camera(400, 300).translation, glm::dvec3(0, 0, 4));
 }
 
+TEST(ViewCamera, FocusTurnsToThePointAndAboutIt) {
+    ViewCamera camera(plain_view());
+    const glm::dvec3 point(1, 0.5, 1);
+    camera.focus(point);
+    const Camera now = camera.camera(400, 300);
+    expect_rotation(now.rotation);
+    EXPECT_NEAR(glm::length(now.position() - glm::dvec3(0, 0, -4)), 0, 1e-12) << "it stays where it is";
+    EXPECT_NEAR(pixel(now, point).x, 210, 1e-9);
+    EXPECT_NEAR(pixel(now, point).y, 140, 1e-9);
+    EXPECT_NEAR(now.rotation[1][0], 0, 1e-12) << "the horizon tilts";
+    camera.orbit(0.5, 0.2);
+    EXPECT_NEAR(pixel(camera.camera(400, 300), point).x, 210, 1e-6);
+    camera.focus(camera.camera(400, 300).position());  // nowhere to turn to
+    expect_rotation(camera.camera(400, 300).rotation);
+}
+
+TEST(ViewCamera, ResetComesBackFromAnotherPlace) {
+    ViewCamera camera(plain_view());
+    Viewpoint other = plain_view();
+    other.camera.translation = {1, 2, 9};
+    camera.stand(other);
+    EXPECT_EQ(camera.camera(400, 300).translation, glm::dvec3(1, 2, 9));
+    camera.reset();
+    EXPECT_EQ(camera.camera(400, 300).translation, glm::dvec3(0, 0, 4));
+}
+
+TEST(Framing, TheNearestCameraStandsAndLooksAlike) {
+    Dataset dataset;
+    EXPECT_EQ(nearest_frame(dataset, plain_view().camera, 1), -1);
+    dataset.frames.resize(3);
+    for (Frame& frame : dataset.frames) frame.camera = plain_view().camera;
+    dataset.frames[0].camera.rotation = glm::dmat3(-1, 0, 0, 0, 1, 0, 0, 0, -1);  // the same place, from behind
+    dataset.frames[0].camera.translation = {0, 0, -4};
+    dataset.frames[1].camera.translation = {0, 0, 9};
+    dataset.frames[2].camera.translation = {0.5, 0, 4};
+    EXPECT_EQ(nearest_frame(dataset, plain_view().camera, 1), 2);
+    EXPECT_NEAR(camera_size(dataset, 1), 0.3 * 5, 1e-9);
+    dataset.frames.resize(1);
+    EXPECT_NEAR(camera_size(dataset, 2), 0.1, 1e-12);
+}
+
 TEST(Framing, AFewFarSplatsDoNotCount) {
     Gaussians splats;
     splats.resize(1000);
@@ -163,29 +206,92 @@ TEST(Framing, ADatasetsViewIsItsCamera) {
 }
 
 Rendering two_pixels() {
-    Rendering rendering{Image(2, 1, 3), Image(2, 1, 1), Image(2, 1, 1)};
-    rendering.color.pixels = {0.5f, 2.0f, -1.0f, 0.1f, 0.2f, 0.3f};
+    Rendering rendering{Image(2, 1, 3), Image(2, 1, 1), Image(2, 1, 1), Image(2, 1, 1)};
+    rendering.color.pixels = {0.5f, 2.0f, -1.0f, 0.1f, NAN, 0.3f};
     rendering.alpha.pixels = {1.0f, 0.5f};
     rendering.depth.pixels = {4.0f, 2.0f};
+    rendering.count.pixels = {0.0f, 30.0f};
     return rendering;
 }
 
-TEST(Picture, RoundsAndClampsColorOverTheBackground) {
-    const Picture picture = picture_of(two_pixels(), Mode::color, {0, 1, 0.5f});
-    EXPECT_EQ(picture.rgba, (std::vector<uint8_t>{128, 255, 0, 255, 26, 179, 140, 255}));
+TEST(Picture, RoundsAndClampsColor) {
+    const Picture picture = picture_of(two_pixels(), Mode::color);
+    EXPECT_EQ(picture.rgba, (std::vector<uint8_t>{128, 255, 0, 255, 26, 0, 77, 255}));
+    EXPECT_EQ(picture_of(two_pixels(), Mode::ellipsoids).rgba, picture.rgba);
 }
 
 TEST(Picture, DepthAndOpacityAreGrey) {
-    const Picture depth = picture_of(two_pixels(), Mode::depth, {1, 1, 1});
-    EXPECT_EQ(depth.white_depth, 2.0f);  // the 98th percentile of two values is the lower
+    const Picture depth = picture_of(two_pixels(), Mode::depth);
+    EXPECT_EQ(depth.white, 2.0f);  // the 98th percentile of two values is the lower
     EXPECT_EQ(depth.rgba, (std::vector<uint8_t>{255, 255, 255, 255, 255, 255, 255, 255}));
-    const Picture opacity = picture_of(two_pixels(), Mode::opacity, {1, 1, 1});
+    const Picture opacity = picture_of(two_pixels(), Mode::opacity);
     EXPECT_EQ(opacity.rgba, (std::vector<uint8_t>{255, 255, 255, 255, 128, 128, 128, 255}));
 }
 
+TEST(Picture, CountsAreHeat) {
+    const Picture count = picture_of(two_pixels(), Mode::count);
+    EXPECT_EQ(count.white, 30.0f);
+    EXPECT_EQ(count.rgba, (std::vector<uint8_t>{0, 0, 0, 255, 255, 255, 255, 255}));
+    EXPECT_EQ(heat(1 / 3.0f)[0], 1.0f);
+    EXPECT_EQ(heat(1 / 3.0f)[1], 0.0f);
+}
+
 TEST(Picture, EmptyDepthIsBlack) {
-    Rendering nothing{Image(1, 1, 3), Image(1, 1, 1), Image(1, 1, 1)};
-    EXPECT_EQ(picture_of(nothing, Mode::depth, {}).rgba, (std::vector<uint8_t>{0, 0, 0, 255}));
+    Rendering nothing{Image(1, 1, 3), Image(1, 1, 1), Image(1, 1, 1), Image(1, 1, 1)};
+    EXPECT_EQ(picture_of(nothing, Mode::depth).rgba, (std::vector<uint8_t>{0, 0, 0, 255}));
+    EXPECT_EQ(picture_of(nothing, Mode::count).rgba, (std::vector<uint8_t>{0, 0, 0, 255}));
+}
+
+TEST(Picture, ATransparentPhotographLiesOverTheBackground) {
+    Image photo(1, 1, 4);
+    photo.pixels = {1, 0, 0, 0.5f};
+    EXPECT_EQ(picture_of(photo, {0, 1, 1}).rgba, (std::vector<uint8_t>{128, 128, 128, 255}));
+}
+
+Picture flat(int width, int height, uint8_t value) {
+    return {width, height, std::vector<uint8_t>(size_t(width) * size_t(height) * 4, value), 0};
+}
+
+TEST(Compare, TheDifferenceOfEqualSizesIsPixelByPixel) {
+    Picture rendering = flat(4, 2, 100);
+    const Picture photo = flat(4, 2, 90);
+    rendering.rgba[4] = 30;  // the second pixel's red
+    Picture result = difference(rendering, photo, {0, 0, 4, 2});
+    EXPECT_EQ(result.rgba[0], 10);
+    EXPECT_EQ(result.rgba[4], 60);
+    EXPECT_EQ(result.rgba[3], 255);
+    const double mse = (23 * 100 + 3600) / 24.0 / 255 / 255;
+    EXPECT_NEAR(psnr_of_difference(result, {0, 0, 4, 2}), -10 * std::log10(mse), 1e-9);
+    amplify(result, 5);
+    EXPECT_EQ(result.rgba[0], 50);
+    EXPECT_EQ(result.rgba[4], 255);
+    EXPECT_EQ(result.rgba[3], 255);
+}
+
+TEST(Compare, BeyondThePhotographIsBlack) {
+    const Picture result = difference(flat(6, 4, 100), flat(2, 4, 0), {2, 0, 2, 4});
+    EXPECT_EQ(result.rgba[4 * 1], 0);
+    EXPECT_EQ(result.rgba[4 * 2], 100);
+    EXPECT_EQ(result.rgba[4 * 4], 0);
+    EXPECT_TRUE(std::isnan(psnr_of_difference(result, {9, 9, 0, 0})));
+}
+
+TEST(Compare, APhotographOfAnotherSizeIsSampled) {
+    Picture photo = flat(2, 1, 0);
+    for (size_t c = 0; c < 3; ++c) photo.rgba[4 + c] = 200;
+    const Picture result = difference(flat(4, 2, 0), photo, {0, 0, 4, 2});
+    EXPECT_EQ(result.rgba[0], 0);         // at 0.25 of the first pixel: the border goes on
+    EXPECT_EQ(result.rgba[4], 50);        // a quarter of the way to the second pixel's centre
+    EXPECT_EQ(result.rgba[4 * 3], 200);
+}
+
+TEST(Compare, PlacesKeepThePhotographsShape) {
+    const Arrangement beside = arrange(Comparison::beside, {801, 300}, {200, 100});
+    EXPECT_EQ(beside.rendering, (Rectangle{0, 0, 400, 300}));
+    EXPECT_EQ(beside.photograph, (Rectangle{400, 49, 401, 201}));
+    const Arrangement wipe = arrange(Comparison::wipe, {800, 300}, {200, 100});
+    EXPECT_EQ(wipe.rendering, (Rectangle{0, 0, 800, 300}));
+    EXPECT_EQ(wipe.photograph, (Rectangle{100, 0, 600, 300}));
 }
 
 TEST(Pace, GivesUpResolutionUntilPicturesAreFast) {

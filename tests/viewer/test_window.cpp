@@ -1,73 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
 // ewa-view as a process, in a real window on a virtual display.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-
-#include "cli/expect.h"
-#include "ewa/image.h"
-#include "viewer/virtual_display.h"
+#include "viewer/window_test.h"
 
 namespace ewa::test {
 namespace {
 
-Outcome run_view(const std::vector<std::string>& arguments) {
-    Circumstances circumstances;
-    circumstances.program = EWA_VIEW_PROGRAM;
-    return run_ewa(arguments, circumstances);
-}
-
-float largest_difference(const Image& a, const Image& b) {
-    EXPECT_EQ(a.pixels.size(), b.pixels.size());
-    float largest = 0;
-    for (size_t i = 0; i < std::min(a.pixels.size(), b.pixels.size()); ++i)
-        largest = std::max(largest, std::abs(a.pixels[i] - b.pixels[i]));
-    return largest;
-}
-
-class Window : public testing::Test {
-  protected:
-    void SetUp() override {
-        unsetenv("WAYLAND_DISPLAY");
-        if (display_.name().empty())
-            GTEST_SKIP() << "no X server can be started here (Debian: xvfb); the window is not tested";
-        setenv("DISPLAY", display_.name().c_str(), 1);
-        // Its messages come on standard output, which expect_silent() wants empty.
-        setenv("VK_INSTANCE_LAYERS", "VK_LAYER_KHRONOS_validation", 1);
-        make_splats(splats_, 400, 2);
-        make_dataset(cameras_);
-    }
-    void TearDown() override { unsetenv("VK_INSTANCE_LAYERS"); }
-
-    void expect_silent(const Outcome& outcome) {
-        expect_success(outcome);
-        EXPECT_EQ(outcome.out, "");
-    }
-
-    VirtualDisplay display_;
-    Folder folder_;
-    const std::string splats_ = folder_ / "splats.ply", cameras_ = folder_ / "views";
-};
+using Window = WindowTest;
 
 TEST_F(Window, ShowsWhatRenderWrites) {
-    expect_silent(
-        run_view({splats_, "--cameras", cameras_, "--frame", "2", "--screenshot", folder_ / "shown.png"}));
-    expect_silent(run_ewa(
-        {"render", splats_, "--cameras", cameras_, "--frames", "2", "-o", folder_ / "rendered", "--quiet"}));
-    const Image shown = load_image(folder_ / "shown.png"), rendered = load_image(folder_ / "rendered/2.png");
-    ASSERT_EQ(shown.width, rendered.width);
-    ASSERT_EQ(shown.height, rendered.height);
-    EXPECT_LE(largest_difference(shown, rendered), 1.001f / 255);
-    const auto [darkest, brightest] = std::minmax_element(shown.pixels.begin(), shown.pixels.end());
-    EXPECT_GT(*brightest - *darkest, 0.3f) << "there is nothing in the picture";
+    const Image picture = shown({"--frame", "2"});
+    EXPECT_LE(largest_difference(picture, rendered("2")), kRounding);
+    EXPECT_GT(range_of(picture), 0.3f) << "there is nothing in the picture";
+}
+
+TEST_F(Window, ShowsWhatRenderWritesWithItsOptions) {
+    EXPECT_LE(largest_difference(shown({"--frame", "1", "--background", "1,0.5,0", "--antialias"}),
+                                 rendered("1", {"--background", "1,0.5,0", "--antialias"})),
+              kRounding);
+    EXPECT_LE(largest_difference(shown({"--frame", "1", "--mode", "alpha"}), rendered("1", {"--mode", "alpha"})),
+              kRounding);
+}
+
+TEST_F(Window, EveryModeShowsSomethingElse) {
+    std::vector<Image> pictures;
+    for (const char* mode : {"color", "depth", "alpha", "count", "ellipsoids"}) {
+        pictures.push_back(shown({"--mode", mode}));
+        EXPECT_GT(range_of(pictures.back()), 0.3f) << mode;
+        for (size_t i = 0; i + 1 < pictures.size(); ++i)
+            EXPECT_GT(largest_difference(pictures[i], pictures.back()), 0.1f) << mode << " is as mode " << i;
+    }
+}
+
+TEST_F(Window, ThePhotographStandsWhereItsCameraSawIt) {
+    const Image photo = load_image(cameras_ + "/images/1.png"), splats = rendered("1");
+    const Image beside = shown({"--frame", "1", "--size", "96x32", "--compare", "beside"});
+    const Image wipe = shown({"--frame", "1", "--compare", "wipe"});
+    const Image difference = shown({"--frame", "1", "--compare", "difference"});
+    for (int y = 0; y < 32; ++y)
+        for (int x = 0; x < 48; ++x)
+            for (int c = 0; c < 3; ++c) {
+                EXPECT_NEAR(beside.at(x, y)[c], splats.at(x, y)[c], kRounding);
+                EXPECT_NEAR(beside.at(48 + x, y)[c], photo.at(x, y)[c], kRounding);
+                EXPECT_NEAR(wipe.at(x, y)[c], x < 24 ? photo.at(x, y)[c] : splats.at(x, y)[c], kRounding);
+                const float error = std::min(1.0f, 4 * std::abs(splats.at(x, y)[c] - photo.at(x, y)[c]));
+                EXPECT_NEAR(difference.at(x, y)[c], error, 5 * kRounding);
+            }
 }
 
 TEST_F(Window, HasTheSizeAskedForWithoutADataset) {
     expect_silent(run_view({splats_, "--size", "301x203", "--screenshot", folder_ / "shown.png"}));
-    const Image shown = load_image(folder_ / "shown.png");
-    EXPECT_EQ(shown.width, 301);
-    EXPECT_EQ(shown.height, 203);
-    EXPECT_GT(*std::max_element(shown.pixels.begin(), shown.pixels.end()), 0.3f)
+    const Image picture = load_image(folder_ / "shown.png");
+    EXPECT_EQ(picture.width, 301);
+    EXPECT_EQ(picture.height, 203);
+    EXPECT_GT(*std::max_element(picture.pixels.begin(), picture.pixels.end()), 0.3f)
         << "the scene is not in view";
+}
+
+TEST_F(Window, ADatasetShowsItsPoints) {
+    write_file(cameras_ + "/points.ply",
+               "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+               "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n"
+               "0 0 0 255 0 0\n0 0.3 0 0 255 0\n0 0 0.3 0 0 255\n");
+    auto json = read_json(cameras_ + "/transforms.json");
+    json["ply_file_path"] = "points.ply";
+    write_file(cameras_ + "/transforms.json", json.dump());
+    for (const std::string& path : {cameras_, cameras_ + "/transforms.json"}) {
+        expect_silent(run_view({path, "--frame", "3", "--screenshot", folder_ / "shown.png"}));
+        EXPECT_GT(range_of(load_image(folder_ / "shown.png")), 0.3f);
+    }
+}
+
+TEST_F(Window, ARunIsShownWithItsDatasetAndItsOptions) {
+    expect_success(run_ewa({"train", cameras_, "-o", folder_ / "run", "--steps", "3", "--init", splats_, "--background",
+                            "1,1,1", "--antialias", "--quiet"}));
+    expect_silent(run_view({folder_ / "run", "--frame", "1", "--screenshot", folder_ / "shown.png"}));
+    expect_silent(run_ewa({"render", folder_ / "run/splats.ply", "--cameras", cameras_, "--frames", "1", "-o",
+                           folder_ / "rendered", "--background", "1,1,1", "--antialias", "--quiet"}));
+    EXPECT_LE(largest_difference(load_image(folder_ / "shown.png"), load_image(folder_ / "rendered/1.png")),
+              kRounding);
+}
+
+TEST_F(Window, AFilmGoesThroughTheSavedViews) {
+    const char* view = R"({"name": "%", "width": 48, "height": 32, "fx": 50, "fy": 50, "cx": 24, "cy": 16,
+        "rotation": [1, 0, 0, 0, 1, 0, 0, 0, 1], "translation": [%, 0, 4], "pivot": [0, 0, 0]})";
+    std::string text = "{\"views\": [";
+    for (const char* x : {"-1", "1"}) {
+        std::string entry = view;
+        for (size_t at; (at = entry.find('%')) != std::string::npos;) entry.replace(at, 1, x);
+        text += (text.back() == '[' ? "" : ",") + entry;
+    }
+    write_file(folder_ / "views.json", text + "]}");
+    expect_silent(run_view({splats_, "--size", "48x32", "--views", folder_ / "views.json", "--film",
+                            folder_ / "film", "--film-seconds", "0.1"}));
+    const std::vector<std::string> files = files_below(folder_ / "film");
+    EXPECT_EQ(files, (std::vector<std::string>{"00000.png", "00001.png", "00002.png", "00003.png"}));
+    const Image first = load_image(folder_ / "film/00000.png"), last = load_image(folder_ / "film/00003.png");
+    EXPECT_EQ(first.width, 48);
+    EXPECT_GT(range_of(first), 0.3f);
+    EXPECT_GT(largest_difference(first, last), 0.1f);
+    expect_failure(run_view({splats_, "--film", folder_ / "film"}), 2, "--views");
+    write_file(folder_ / "views.json", "{\"views\": [{\"name\": \"a\", \"width\": 48}]}");
+    expect_failure(run_view({splats_, "--views", folder_ / "views.json"}), 2, "view 0");
+}
+
+TEST_F(Window, ALostDeviceIsOpenedAgain) {
+    expect_silent(run_view({splats_, "--cameras", cameras_, "--frame", "2", "--lose-device-at", "1", "--screenshot",
+                            folder_ / "shown.png"}));
+    EXPECT_LE(largest_difference(load_image(folder_ / "shown.png"), rendered("2")), kRounding);
 }
 
 TEST_F(Window, APictureThatCannotBeWrittenIsAFailure) {
@@ -87,7 +126,7 @@ TEST(WithoutWindow, WrongUseIsOneLine) {
     make_splats(folder / "splats.ply");
     make_dataset(folder / "views");
     const std::string splats = folder / "splats.ply";
-    expect_failure(run_view({}), 2, "FILE");
+    expect_failure(run_view({}), 2, "PATH");
     expect_failure(run_view({folder / "none.ply"}), 2, "none.ply");
     expect_failure(run_view({splats, "--size", "640"}), 2, "--size");
     expect_failure(run_view({splats, "--size", "0x480"}), 2, "--size");

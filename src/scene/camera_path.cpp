@@ -1,0 +1,52 @@
+#include "scene/camera_path.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/ext/quaternion_double.hpp>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <stdexcept>
+
+namespace ewa {
+namespace {
+
+glm::dvec3 catmull_rom(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, const glm::dvec3& d,
+                       double t) {
+    return 0.5 * (2.0 * b + (c - a) * t + (2.0 * a - 5.0 * b + 4.0 * c - d) * (t * t) +
+                  (3.0 * b - a - 3.0 * c + d) * (t * t * t));
+}
+
+glm::dmat3 between(const glm::dmat3& a, const glm::dmat3& b, double t) {
+    const glm::dquat p(a), q(b);
+    return glm::dmat3(glm::normalize(glm::slerp(p, q, t)));
+}
+
+}  // namespace
+
+Camera along_path(std::span<const Camera> keys, double time) {
+    if (keys.empty()) throw std::logic_error("a path without cameras");
+    const double last = double(keys.size() - 1);
+    time = std::clamp(time, 0.0, last);
+    const size_t index = std::min(size_t(time), keys.size() >= 2 ? keys.size() - 2 : 0);
+    const double t = time - double(index);
+    const Camera& from = keys[index];
+    const Camera& to = keys[std::min(index + 1, keys.size() - 1)];
+
+    Camera camera = keys.front();
+    const double share = double(camera.width) / from.width, share_to = double(camera.width) / to.width;
+    camera.fx = std::pow(from.fx * share, 1 - t) * std::pow(to.fx * share_to, t);
+    camera.fy = std::pow(from.fy * share, 1 - t) * std::pow(to.fy * share_to, t);
+    if (t == 0) {
+        camera.rotation = from.rotation;
+        camera.translation = from.translation;
+        return camera;
+    }
+    const glm::dvec3 b = from.position(), c = to.position();
+    const glm::dvec3 a = index > 0 ? keys[index - 1].position() : b + (b - c);
+    const glm::dvec3 d = index + 2 < keys.size() ? keys[index + 2].position() : c + (c - b);
+    camera.rotation = between(from.rotation, to.rotation, t);
+    camera.translation = -(camera.rotation * catmull_rom(a, b, c, d, t));
+    return camera;
+}
+
+}  // namespace ewa

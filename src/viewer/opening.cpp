@@ -1,0 +1,153 @@
+#include "viewer/opening.h"
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "core/text.h"
+#include "ewa/error.h"
+#include "ewa/splat_files.h"
+
+namespace ewa::viewer {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr float kPointOpacity = 3;           // logit
+constexpr float kPointShrink = 1.2f;         // taken off the logarithm of a point's size
+constexpr size_t kLargestConfig = 1u << 20;  // bytes
+
+std::string name_of_path(const fs::path& path) {
+    const fs::path clean = path.lexically_normal();
+    const std::string name = (clean.has_filename() ? clean : clean.parent_path()).filename().string();
+    return name.empty() || name == "." ? path.string() : name;
+}
+
+bool is_dataset_file(const fs::path& path) {
+    const std::string name = path.filename().string();
+    return name.starts_with("transforms") && core::lower(path.extension().string()) == ".json";
+}
+
+std::shared_ptr<const Dataset> load_cameras(const fs::path& path, int downscale = 1) {
+    Dataset dataset = load_dataset(path, {.downscale = downscale, .need_images = false});
+    // Frames without a file are left out, as training and `ewa render` leave them out, where there are any others.
+    const auto missing = [](const Frame& frame) { return !frame.image_exists; };
+    if (!std::all_of(dataset.frames.begin(), dataset.frames.end(), missing))
+        std::erase_if(dataset.frames, missing);
+    if (dataset.frames.empty()) throw InputError(path.string() + " has no frames");
+    return std::make_shared<const Dataset>(std::move(dataset));
+}
+
+nlohmann::json read_config(const fs::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    std::string text(kLargestConfig, '\0');
+    file.read(text.data(), std::streamsize(text.size()));
+    text.resize(size_t(std::max<std::streamsize>(0, file.gcount())));
+    nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
+    return json.is_object() ? json : nlohmann::json::object();
+}
+
+std::string text_of(const nlohmann::json& config, const char* name) {
+    const auto found = config.find(name);
+    return found != config.end() && found->is_string() ? found->get<std::string>() : std::string();
+}
+
+Look look_of(const nlohmann::json& config) {
+    Look look;
+    const std::string kernel = text_of(config, "kernel");
+    if (kernel == "antialias") look.kernel = Kernel::antialias;
+    if (kernel == "ewa") look.kernel = Kernel::unit_mass;
+    std::string colour = text_of(config, "background");
+    std::replace(colour.begin(), colour.end(), ',', ' ');
+    std::string_view rest = colour;
+    for (float& value : look.background)
+        value = float(std::clamp(core::parse_number(core::next_word(rest)).value_or(0), 0.0, 1.0));
+    return look;
+}
+
+/// The dataset of a run, as its config.json names it: relative to where the training was started, which may be here or any
+/// folder above the run's.
+fs::path dataset_of(const fs::path& run, const nlohmann::json& config) {
+    const fs::path named = text_of(config, "dataset");
+    if (named.empty()) return {};
+    std::error_code error;
+    if (fs::exists(named, error)) return named;
+    if (named.is_absolute()) return {};
+    for (fs::path folder = fs::absolute(run, error); folder.has_relative_path(); folder = folder.parent_path())
+        if (fs::exists(folder / named, error)) return folder / named;
+    return {};
+}
+
+Scene open_run(const fs::path& run, const fs::path& cameras) {
+    Scene scene;
+    scene.run = run;
+    const nlohmann::json config = read_config(run / "config.json");
+    scene.look = look_of(config);
+    std::error_code error;
+    const bool splats = fs::exists(run / "splats.ply", error);
+    if (splats) scene.splats_time = fs::last_write_time(run / "splats.ply", error);
+    scene.gaussians = std::make_shared<const Gaussians>(splats ? load_splats(run / "splats.ply") : Gaussians());
+    const fs::path dataset = cameras.empty() ? dataset_of(run, config) : cameras;
+    const auto downscale = config.find("downscale");
+    const int factor = downscale != config.end() && downscale->is_number_integer()
+                           ? std::clamp(downscale->get<int>(), 1, 1024)
+                           : 1;
+    try {
+        if (!dataset.empty())
+            scene.dataset = load_cameras(dataset, factor);
+        else
+            scene.remark = "its dataset is not found; --cameras DATASET shows its cameras";
+    } catch (const InputError& problem) {
+        if (!cameras.empty()) throw;
+        scene.remark = problem.what();
+    }
+    if (!splats && scene.dataset)
+        scene.gaussians = std::make_shared<const Gaussians>(splats_of_points(scene.dataset->points));
+    return scene;
+}
+
+Scene open_dataset(const fs::path& path) {
+    Scene scene;
+    scene.dataset = load_cameras(path);
+    scene.gaussians = std::make_shared<const Gaussians>(splats_of_points(scene.dataset->points));
+    scene.remark = scene.gaussians->size() > 0 ? "these are the dataset's points; ewa train makes splats of them"
+                                               : "this dataset has cameras, but no points and no splats";
+    return scene;
+}
+
+}  // namespace
+
+bool is_run(const fs::path& path) {
+    std::error_code error;
+    for (const char* name : {"config.json", "splats.ply", "metrics.jsonl"})
+        if (fs::is_regular_file(path / name, error)) return true;
+    return false;
+}
+
+Gaussians splats_of_points(const PointCloud& points) {
+    if (points.positions.empty()) return {};
+    Gaussians splats = gaussians_from_points(points, 0);
+    for (float& logit : splats.opacity_logits) logit = kPointOpacity;
+    for (float& scale : splats.log_scales) scale -= kPointShrink;
+    return splats;
+}
+
+Scene open_scene(const fs::path& path, const fs::path& cameras) {
+    std::error_code error;
+    Scene scene;
+    if (fs::is_directory(path, error)) {
+        scene = is_run(path) ? open_run(path, cameras) : open_dataset(path);
+    } else if (is_dataset_file(path)) {
+        scene = open_dataset(path);
+    } else {
+        SplatScene splats = read_splats(path);
+        if (splats.antialiased) scene.look.kernel = Kernel::antialias;
+        if (!splats.remarks.empty()) scene.remark = splats.remarks.front();
+        scene.gaussians = std::make_shared<const Gaussians>(std::move(splats.gaussians));
+        if (!cameras.empty()) scene.dataset = load_cameras(cameras);
+    }
+    scene.title = name_of_path(path);
+    return scene;
+}
+
+}  // namespace ewa::viewer

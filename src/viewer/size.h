@@ -1,0 +1,11 @@
+// Width and height in px.
+#pragma once
+
+namespace ewa::viewer {
+
+struct Size {
+    int width = 0, height = 0;
+    bool operator==(const Size&) const = default;
+};
+
+}  // namespace ewa::viewer

@@ -1,0 +1,251 @@
+// Watching a training run: protocol, server and client over the loopback, and a run's folder.
+#include <gtest/gtest.h>
+
+#include <sys/stat.h>
+
+#include <chrono>
+#include <cmath>
+#include <thread>
+
+#include "ewa/error.h"
+#include "ewa/splat_files.h"
+#include "live/client.h"
+#include "live/server.h"
+#include "live/watcher.h"
+#include "support/temp_folder.h"
+
+namespace ewa::live {
+namespace {
+
+using test::TempFolder;
+
+Gaussians some_splats(size_t count, int degree = 1) {
+    Gaussians splats;
+    splats.sh_degree = degree;
+    splats.resize(count);
+    float value = 0.5f;
+    for (auto* values : {&splats.means, &splats.quaternions, &splats.log_scales, &splats.opacity_logits, &splats.sh})
+        for (float& v : *values) v = value += 0.25f;
+    return splats;
+}
+
+report::MetricsLine line_of(int step) {
+    report::MetricsLine line;
+    line.step = step;
+    line.loss = 1.0 / step;
+    line.splats = 10;
+    if (step % 2 == 0) line.test_psnr = 20 + step;
+    return line;
+}
+
+Client client_of(const Server& server, const std::string& token = "") {
+    return Client({"127.0.0.1", server.port()}, token);
+}
+
+/// Until it holds, at most ten seconds.
+template <class Holds>
+bool soon(Holds holds) {
+    for (int i = 0; i < 1000; ++i) {
+        if (holds()) return true;
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return false;
+}
+
+TEST(LiveProtocol, StatusAndSplatsComeBack) {
+    Status status{7, 100, 12, std::nan(""), 3.5, State::paused, true, {line_of(1), line_of(2)}};
+    const Status read = decode_status(encode(status));
+    EXPECT_EQ(read.step, 7);
+    EXPECT_EQ(read.steps, 100);
+    EXPECT_TRUE(std::isnan(read.loss));
+    EXPECT_EQ(read.state, State::paused);
+    EXPECT_TRUE(read.commands);
+    ASSERT_EQ(read.metrics.size(), 2u);
+    EXPECT_EQ(read.metrics[1].test_psnr, 22);
+
+    const Snapshot snapshot{41, some_splats(5, 2)};
+    const Snapshot back = decode_snapshot(encode(snapshot));
+    EXPECT_EQ(back.step, 41);
+    EXPECT_EQ(back.gaussians.sh, snapshot.gaussians.sh);
+    EXPECT_EQ(back.gaussians.means, snapshot.gaussians.means);
+    EXPECT_EQ(decode_snapshot(encode(Snapshot{})).gaussians.size(), 0u);
+}
+
+TEST(LiveProtocol, DamagedBytesAreRefused) {
+    const std::vector<std::byte> good = encode(Snapshot{1, some_splats(3)});
+    for (size_t size = 0; size < good.size(); ++size)
+        EXPECT_THROW(decode_snapshot({good.begin(), good.begin() + std::ptrdiff_t(size)}), InputError);
+    for (size_t at = 0; at < 12; ++at) {  // mark, count and degree
+        std::vector<std::byte> bad = good;
+        bad[at] = std::byte(0xff);
+        EXPECT_THROW(decode_snapshot(bad), InputError) << at;
+    }
+    EXPECT_THROW(decode_status("{}"), InputError);
+    EXPECT_THROW(decode_status("[1"), InputError);
+    EXPECT_EQ(payload_of("ok 12"), 12u);
+    for (const char* line : {"", "ok", "ok -1", "ok 1 2", "ok 99999999999", "no reason", "HTTP/1.1 400 Bad"})
+        EXPECT_THROW(payload_of(line), InputError) << line;
+}
+
+TEST(LiveProtocol, Addresses) {
+    EXPECT_EQ(parse_address("10.0.0.7:81").host, "10.0.0.7");
+    EXPECT_EQ(parse_address("[::1]:81").host, "::1");
+    EXPECT_EQ(parse_address(":81").host, "localhost");
+    EXPECT_EQ(parse_address(":81").port, 81);
+    for (const char* text : {"", "localhost", "a:", "a:0", "a:70000", "a:1x"})
+        EXPECT_THROW(parse_address(text), InputError) << text;
+}
+
+TEST(LiveServer, ShowsWhatTheTrainerLeaves) {
+    Server server("127.0.0.1", 0, "secret");
+    Client client = client_of(server);
+    EXPECT_FALSE(server.wants_splats(3)) << "nobody has asked";
+    server.report({3, 10, 5, 0.25, 1.5, State::running, true, {}});
+    server.add_metrics(line_of(1));
+    server.add_metrics(line_of(2));
+    const Status status = client.status(1);
+    EXPECT_EQ(status.step, 3);
+    EXPECT_FALSE(status.commands) << "it has not shown the token";
+    ASSERT_EQ(status.metrics.size(), 1u);
+    EXPECT_EQ(status.metrics[0].step, 2);
+
+    EXPECT_FALSE(client.splats(-1));
+    EXPECT_TRUE(server.wants_splats(3));
+    server.offer({3, some_splats(4)}, 0.001);
+    EXPECT_FALSE(server.wants_splats(3)) << "nobody has asked since";
+    const auto splats = client.splats(-1);
+    ASSERT_TRUE(splats);
+    EXPECT_EQ(splats->step, 3);
+    EXPECT_EQ(splats->gaussians.size(), 4u);
+    EXPECT_FALSE(client.splats(3)) << "nothing later";
+    EXPECT_FALSE(server.wants_splats(3)) << "the same step again";
+    EXPECT_TRUE(soon([&] { return server.wants_splats(4); })) << "after a pause";
+    server.offer({4, some_splats(4)}, 100);
+    client.splats(-1);
+    EXPECT_FALSE(server.wants_splats(5)) << "taking them was slow";
+}
+
+TEST(LiveServer, TakesCommandsFromWhoHasTheToken) {
+    Server server("127.0.0.1", 0, "secret");
+    Client stranger = client_of(server);
+    for (const char* command : {"pause", "go", "save"}) EXPECT_THROW(stranger.command(command), InputError);
+    EXPECT_FALSE(server.paused());
+    EXPECT_FALSE(server.take_save());
+    EXPECT_THROW(client_of(server, "secreT"), InputError);
+    EXPECT_THROW(client_of(server, "secret1"), InputError);
+    {
+        Client owner = client_of(server, "secret");
+        EXPECT_TRUE(owner.status(0).commands);
+        owner.command("pause");
+        EXPECT_TRUE(server.paused());
+        EXPECT_EQ(owner.status(0).state, State::paused);
+        owner.command("go");
+        EXPECT_FALSE(server.paused());
+        owner.command("save");
+        EXPECT_TRUE(server.take_save());
+        EXPECT_FALSE(server.take_save());
+        owner.command("pause");
+    }
+    EXPECT_TRUE(soon([&] { return !server.paused(); })) << "a pause ends with its connection";
+    Server open("127.0.0.1", 0, "");
+    EXPECT_THROW(client_of(open, "x"), InputError) << "without a token there are no commands";
+}
+
+TEST(LiveServer, StrangersAreTurnedAway) {
+    Server server("127.0.0.1", 0, "secret");
+    {
+        const Socket socket = connect_to("127.0.0.1", server.port(), 5);
+        socket.send(std::string(100000, 'x'), 5);
+        EXPECT_FALSE(socket.receive_line(100, 5)) << "a line too long ends the connection";
+    }
+    {
+        const Socket socket = connect_to("127.0.0.1", server.port(), 5);
+        for (const char* request : {"", "GET / HTTP/1.1", "status", "status -1", "status x", "splats", "splats 99999999999"}) {
+            ASSERT_TRUE(socket.send(std::string(request) + "\n", 5));
+            const auto line = socket.receive_line(200, 5);
+            ASSERT_TRUE(line) << request;
+            EXPECT_EQ(line->rfind("no ", 0), 0u) << request;
+        }
+    }
+    EXPECT_TRUE(soon([&] {
+        try {
+            client_of(server).status(0);
+            return true;
+        } catch (const std::exception&) {
+            return false;
+        }
+    }));
+    std::vector<Socket> many;
+    for (int i = 0; i < kMostClients; ++i) many.push_back(connect_to("127.0.0.1", server.port(), 5));
+    for (const Socket& socket : many) socket.send(std::string(kHello) + "\n", 5);
+    EXPECT_TRUE(soon([&] {
+        const Socket socket = connect_to("127.0.0.1", server.port(), 5);
+        const auto line = socket.receive_line(200, 5);
+        return line && line->rfind("no there are", 0) == 0;
+    }));
+}
+
+TEST(LiveServer, EndsWhileSomebodyLooksOn) {
+    auto server = std::make_unique<Server>("127.0.0.1", 0, "secret");
+    Client client = client_of(*server);
+    server.reset();
+    EXPECT_THROW(client.status(0), RunError);
+    EXPECT_THROW(connect_to("127.0.0.1", 1, 2), RunError);
+}
+
+TEST(LiveFiles, TheTokenIsTheOwnersAlone) {
+    const TempFolder folder;
+    EXPECT_FALSE(read_live_file(folder.path()));
+    write_live_file(folder.path(), {7001, "abc"});
+    struct stat facts {};
+    ASSERT_EQ(stat((folder.path() / kLiveFile).c_str(), &facts), 0);
+    EXPECT_EQ(facts.st_mode & 0777, 0600u);
+    const auto live = read_live_file(folder.path());
+    ASSERT_TRUE(live);
+    EXPECT_EQ(live->port, 7001);
+    EXPECT_EQ(live->token, "abc");
+    for (const char* text : {"", "{", "{\"port\": 70000, \"token\": \"\"}", "{\"port\": 1}", "[]"}) {
+        folder.write(kLiveFile, text);
+        EXPECT_FALSE(read_live_file(folder.path())) << text;
+    }
+}
+
+TEST(LiveWatcher, FollowsARunByItsFiles) {
+    const TempFolder folder;
+    folder.write("config.json", "{\"steps\": 50}");
+    folder.write("metrics.jsonl", report::metrics_text({line_of(1)}) + "{\"step\": 2, \"los");
+    Watcher watcher({folder.path(), {}, {}}, [] {});
+    ASSERT_TRUE(soon([&] { return watcher.update().status.step == 1; }));
+    EXPECT_EQ(watcher.update().status.steps, 50);
+    EXPECT_FALSE(watcher.update().splats);
+    save_splats(folder.path() / "splats.ply", some_splats(6));
+    folder.write("metrics.jsonl", report::metrics_text({line_of(1), line_of(2)}));
+    ASSERT_TRUE(soon([&] { return watcher.update().splats && watcher.update().status.step == 2; }));
+    EXPECT_EQ(watcher.update().splats->size(), 6u);
+    EXPECT_EQ(watcher.update().status.state, State::running);
+    EXPECT_FALSE(watcher.update().connected);
+    watcher.command("pause");
+    EXPECT_TRUE(soon([&] { return watcher.update().problem.find("--serve") != std::string::npos; }));
+    folder.write("metrics.jsonl", "nonsense\n");
+    EXPECT_TRUE(soon([&] { return watcher.update().problem.find("line 1") != std::string::npos; }));
+}
+
+TEST(LiveWatcher, FollowsARunByItsConnection) {
+    const TempFolder folder;
+    Watcher watcher({folder.path(), {}, {}}, [] {});
+    Server server("127.0.0.1", 0, "secret");
+    server.report({3, 10, 5, 0.25, 1.5, State::running, false, {}});
+    server.add_metrics(line_of(1));
+    write_live_file(folder.path(), {server.port(), "secret"});
+    ASSERT_TRUE(soon([&] { return watcher.update().connected && watcher.update().status.commands; }));
+    ASSERT_TRUE(soon([&] { return server.wants_splats(3); }));
+    server.offer({3, some_splats(2)}, 0);
+    server.add_metrics(line_of(2));
+    ASSERT_TRUE(soon([&] { return watcher.update().splats && watcher.update().status.metrics.size() == 2; }));
+    EXPECT_EQ(watcher.update().splats_step, 3);
+    watcher.command("pause");
+    EXPECT_TRUE(soon([&] { return server.paused(); }));
+}
+
+}  // namespace
+}  // namespace ewa::live

@@ -1,0 +1,80 @@
+// Saved views on disk.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "io/view_list.h"
+#include "support/temp_folder.h"
+
+namespace ewa::io {
+namespace {
+
+using test::TempFolder;
+
+NamedView some_view() {
+    NamedView view;
+    view.name = "from \"above\"";
+    view.camera.width = 640;
+    view.camera.height = 480;
+    view.camera.fx = 500.1;
+    view.camera.fy = 1.0 / 3;
+    view.camera.cx = -12;
+    view.camera.cy = 1e-300;
+    const double c = std::cos(0.3), s = std::sin(0.3);
+    view.camera.rotation = glm::dmat3(c, s, 0, -s, c, 0, 0, 0, 1);
+    view.camera.translation = {0.1, -2e6, 3};
+    view.pivot = {1, 2, 0.7};
+    return view;
+}
+
+TEST(ViewList, EveryNumberComesBack) {
+    const TempFolder folder;
+    const NamedView view = some_view();
+    write_views(folder / "views.json", {view, NamedView{"", view.camera, {}}});
+    const auto views = read_views(folder / "views.json");
+    ASSERT_EQ(views.size(), 2u);
+    EXPECT_EQ(views[0].name, view.name);
+    EXPECT_EQ(views[0].camera.fy, view.camera.fy);
+    EXPECT_EQ(views[0].camera.cy, view.camera.cy);
+    EXPECT_EQ(views[0].camera.rotation, view.camera.rotation);
+    EXPECT_EQ(views[0].camera.translation, view.camera.translation);
+    EXPECT_EQ(views[0].pivot, view.pivot);
+    EXPECT_EQ(views[1].name, "");
+}
+
+TEST(ViewList, DamageIsRefusedWithItsPlace) {
+    const TempFolder folder;
+    write_views(folder / "good.json", {some_view(), some_view()});
+    std::ifstream file(folder / "good.json");
+    const std::string good((std::istreambuf_iterator<char>(file)), {});
+    const auto refused = [&](const std::string& text, const std::string& part) {
+        folder.write("bad.json", text);
+        try {
+            read_views(folder / "bad.json");
+            ADD_FAILURE() << "taken: " << text.substr(0, 60);
+        } catch (const InputError& error) {
+            EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
+        }
+    };
+    const auto with = [&](const std::string& from, const std::string& to) {
+        std::string text = good;
+        const size_t at = text.rfind(from);
+        EXPECT_NE(at, std::string::npos) << from;
+        return text.replace(at, from.size(), to);
+    };
+    EXPECT_THROW(read_views(folder / "none.json"), InputError);
+    refused("", "no list");
+    refused("{\"views\": 3}", "no list");
+    refused(good.substr(0, good.size() / 2), "no list");
+    refused("{\"views\": [3]}", "view 0");
+    refused(with("\"width\": 640", "\"width\": 0"), "view 1: width");
+    refused(with("\"width\": 640", "\"width\": 1e9"), "view 1: width");
+    refused(with("\"fx\": 500.1", "\"fx\": -1"), "view 1: a focal length");
+    refused(with("\"fx\": 500.1", "\"fx\": 1e999"), "no list");
+    refused(with("\"fx\"", "\"gx\""), "view 1");
+    refused(with("\"pivot\": [", "\"pivot\": [1,"), "pivot has not 3");
+    refused(with("\"rotation\": [", "\"rotation\": [0,0,0, 0,0,0, 0,0,0], \"other\": ["), "rotation is none");
+}
+
+}  // namespace
+}  // namespace ewa::io

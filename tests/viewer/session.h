@@ -1,0 +1,99 @@
+// ewa-view in a window that is driven by the X server's own key and mouse events (xdotool, by XTEST).
+#pragma once
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "cli/program.h"
+
+namespace ewa::test {
+
+inline bool have_xdotool() {
+    return std::system("command -v xdotool > /dev/null 2>&1") == 0;
+}
+
+class Session {
+  public:
+    /// Starts it in `folder`, where it leaves its screenshots, and waits for its window.
+    Session(const std::string& folder, std::vector<std::string> arguments) : folder_(folder) {
+        child_ = fork();
+        if (child_ == 0) {
+            if (chdir(folder.c_str()) != 0) _exit(127);
+            dup2(open("out.txt", O_WRONLY | O_CREAT | O_TRUNC, 0600), STDOUT_FILENO);
+            dup2(open("err.txt", O_WRONLY | O_CREAT | O_TRUNC, 0600), STDERR_FILENO);
+            arguments.insert(arguments.begin(), EWA_VIEW_PROGRAM);
+            std::vector<char*> argv;
+            for (std::string& argument : arguments) argv.push_back(argument.data());
+            argv.push_back(nullptr);
+            execv(EWA_VIEW_PROGRAM, argv.data());
+            _exit(127);
+        }
+        found_ = send("search --sync --onlyvisible --name ewa$ windowmove 0 0");
+        send("mousemove 20 20");
+    }
+    ~Session() {
+        if (child_ <= 0) return;
+        kill(child_, SIGKILL);
+        waitpid(child_, nullptr, 0);
+    }
+    Session(const Session&) = delete;
+    Session& operator=(const Session&) = delete;
+
+    bool found() const { return found_; }
+
+    /// Commands of xdotool, such as "key F1 mousemove 10 20 click 1".
+    bool send(const std::string& commands) {
+        return std::system(("timeout 60 xdotool " + commands + " > /dev/null 2>&1").c_str()) == 0;
+    }
+    /// From a file of such commands, one a line.
+    bool send_file(const std::string& path) {
+        return std::system(("timeout 300 xdotool " + path + " > /dev/null 2>&1").c_str()) == 0;
+    }
+
+    /// Asks for a screenshot, and the path of what was written; empty after 60 seconds.
+    std::string screenshot(const std::string& extension = ".png") {
+        const std::string path =
+            folder_ + "/ewa-view-" + std::to_string(extension == ".png" ? ++png_ : ++exr_) + extension;
+        send(extension == ".png" ? "key F12" : "key shift+F12");
+        return awaited(path) ? path : "";
+    }
+    bool awaited(const std::string& path) const {
+        for (int i = 0; i < 1200; ++i) {
+            if (std::filesystem::exists(path)) return true;  // files are whole when they have their name
+            if (kill(child_, 0) != 0) return false;
+            std::this_thread::sleep_for(std::chrono::milliseconds(50));
+        }
+        return false;
+    }
+
+    /// Ctrl-Q; its exit status, and what it has said.
+    Outcome quit() {
+        send("key ctrl+q");
+        int status = 0;
+        for (int i = 0; i < 600 && waitpid(child_, &status, WNOHANG) == 0; ++i)
+            std::this_thread::sleep_for(std::chrono::milliseconds(100));
+        Outcome outcome;
+        outcome.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+        outcome.out = read_file(folder_ + "/out.txt");
+        outcome.err = read_file(folder_ + "/err.txt");
+        kill(child_, SIGKILL);
+        child_ = -1;
+        return outcome;
+    }
+
+  private:
+    std::string folder_;
+    pid_t child_ = -1;
+    bool found_ = false;
+    int png_ = 0, exr_ = 0;
+};
+
+}  // namespace ewa::test

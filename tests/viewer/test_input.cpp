@@ -1,0 +1,147 @@
+// The window under real key and mouse events.
+#include <fstream>
+#include <random>
+
+#include "viewer/session.h"
+#include "viewer/window_test.h"
+
+namespace ewa::test {
+namespace {
+
+class Input : public WindowTest {
+  protected:
+    void SetUp() override {
+        WindowTest::SetUp();
+        if (!IsSkipped() && !have_xdotool())
+            GTEST_SKIP() << "there is no xdotool (Debian: xdotool) to press keys with; the input is not tested";
+        std::filesystem::create_directories(shots_);
+    }
+    Image screenshot(Session& session) {
+        const std::string path = session.screenshot();
+        EXPECT_NE(path, "") << "no screenshot was written";
+        return path.empty() ? Image(1, 1, 3) : load_image(path);
+    }
+    const std::string shots_ = folder_ / "shots";
+};
+
+TEST_F(Input, KeysChooseModesCamerasAndViews) {
+    Session session(shots_, {splats_, "--cameras", cameras_, "--size", "48x32"});
+    ASSERT_TRUE(session.found());
+    session.send("key F2");
+    const Image first = screenshot(session);
+    EXPECT_LE(largest_difference(first, rendered("0")), kRounding);
+    session.send("key Right");
+    EXPECT_LE(largest_difference(screenshot(session), rendered("1")), kRounding);
+    session.send("key Left key Left");
+    EXPECT_LE(largest_difference(screenshot(session), rendered("3")), kRounding);
+    session.send("key ctrl+7 key 4");
+    const Image count = screenshot(session);
+    EXPECT_GT(largest_difference(count, rendered("3")), 0.1f);
+    session.send("key 1 key r");
+    EXPECT_EQ(largest_difference(screenshot(session), first), 0);
+    session.send("key shift+7");
+    EXPECT_LE(largest_difference(screenshot(session), rendered("3")), kRounding) << "the saved view";
+    session.send("key minus key minus key minus");
+    EXPECT_GT(largest_difference(screenshot(session), rendered("3")), 0.05f) << "smaller splats";
+    expect_silent(session.quit());
+}
+
+TEST_F(Input, TheMouseTurnsMovesAndZooms) {
+    Session session(shots_, {splats_, "--cameras", cameras_, "--size", "320x240"});
+    ASSERT_TRUE(session.found());
+    session.send("key F2");
+    const Image first = screenshot(session);
+    Image before = first;
+    const char* actions[] = {"mousemove 160 200 mousedown 1 sleep 0.2 mousemove 200 200 sleep 0.2 mousemove 240 190 sleep 0.2 mouseup 1",
+                             "mousemove 160 200 mousedown 3 sleep 0.2 mousemove 180 200 sleep 0.2 mousemove 200 190 sleep 0.2 mouseup 3",
+                             "mousemove 160 120 click 4 click 4", "keydown w sleep 0.3 keyup w",
+                             "key r mousemove 175 105 sleep 0.5 click 1 sleep 0.1 click 1 sleep 0.5"};
+    for (const char* action : actions) {
+        session.send(action);
+        const Image after = screenshot(session);
+        EXPECT_GT(largest_difference(before, after), 0.02f) << action;
+        before = after;
+    }
+    session.send("key r");
+    EXPECT_EQ(largest_difference(screenshot(session), first), 0) << "back to the start";
+    expect_silent(session.quit());
+}
+
+TEST_F(Input, ComparesWithThePhotographByKey) {
+    Session session(shots_, {splats_, "--cameras", cameras_, "--frame", "1", "--size", "96x32"});
+    ASSERT_TRUE(session.found());
+    session.send("key F2 key v sleep 1");
+    const Image beside = screenshot(session), photo = load_image(cameras_ + "/images/1.png");
+    for (int x = 0; x < 48; ++x) EXPECT_NEAR(beside.at(48 + x, 16)[1], photo.at(x, 16)[1], kRounding);
+    // A turn leaves the camera, and with it the photograph; G comes back.
+    session.send("mousemove 20 20 mousedown 1 sleep 0.2 mousemove 30 20 sleep 0.2 mousemove 40 20 sleep 0.2 mouseup 1");
+    EXPECT_GT(largest_difference(screenshot(session), beside), 0.1f);
+    session.send("key g sleep 1");
+    EXPECT_LE(largest_difference(screenshot(session), beside), kRounding);
+    expect_silent(session.quit());
+}
+
+TEST_F(Input, TheWindowChangesItsSizeAndGoesAway) {
+    Session session(shots_, {splats_, "--size", "200x150"});
+    ASSERT_TRUE(session.found());
+    session.send("search --name ewa$ windowsize --sync 333 222");
+    Image picture = screenshot(session);
+    EXPECT_EQ(picture.width, 333);
+    EXPECT_EQ(picture.height, 222);
+    session.send("search --name ewa$ windowunmap --sync windowmap --sync windowsize --sync 1 1 windowsize --sync 150 90");
+    session.send("mousemove 20 20");
+    picture = screenshot(session);
+    EXPECT_EQ(picture.width, 150);
+    EXPECT_GT(range_of(picture), 0.3f);
+    expect_silent(session.quit());
+}
+
+TEST_F(Input, AnExrHasTheRenderingsValues) {
+    Session session(shots_, {splats_, "--cameras", cameras_, "--frame", "2", "--size", "48x32"});
+    ASSERT_TRUE(session.found());
+    const std::string path = session.screenshot(".exr");
+    ASSERT_NE(path, "");
+    expect_silent(run_ewa({"render", splats_, "--cameras", cameras_, "--frames", "2", "-o", folder_ / "exr", "--format",
+                           "exr", "--quiet"}));
+    EXPECT_LE(largest_difference(load_image(path), load_image(folder_ / "exr/2.exr")), 1e-6f);
+    expect_silent(session.quit());
+}
+
+/// EWA_TEST_EVENTS: how many.
+TEST_F(Input, AThousandRandomEventsAreSilent) {
+    const char* wanted = std::getenv("EWA_TEST_EVENTS");
+    const int events = wanted ? std::atoi(wanted) : 1000;
+    const unsigned seed = std::random_device()();
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    const auto below = [&](int n) { return std::to_string(std::uniform_int_distribution<int>(0, n - 1)(random)); };
+    const std::vector<std::string> keys{"w", "a", "s", "d", "e", "1", "2", "3", "4", "5", "r", "t", "u", "c", "g", "v",
+                                        "Left", "Right", "F1", "F2", "minus", "equal", "ctrl+1", "ctrl+2", "shift+1",
+                                        "shift+2", "Tab", "space", "Return", "Escape"};
+    std::ofstream script(folder_ / "events");
+    for (int i = 0; i < events; ++i) {
+        switch (std::uniform_int_distribution<int>(0, 6)(random)) {
+            case 0: case 1:
+                script << "key " << keys[std::uniform_int_distribution<size_t>(0, keys.size() - 1)(random)] << "\n";
+                break;
+            case 2: script << "click " << 1 + std::stoi(below(5)) << "\n"; break;
+            case 3: script << "mousedown " << 1 + std::stoi(below(3)) << "\n"; break;
+            case 4: script << "mouseup " << 1 + std::stoi(below(3)) << "\n"; break;
+            default: script << "mousemove " << below(400) << " " << below(300) << "\n";
+        }
+        if (i % 100 == 99)
+            script << "search --name ewa$ windowsize " << 50 + std::stoi(below(400)) << " " << 50 + std::stoi(below(300))
+                   << "\n";
+    }
+    script << "mouseup 1\nmouseup 2\nmouseup 3\n";
+    script.close();
+    Session session(shots_, {splats_, "--cameras", cameras_, "--size", "400x300"});
+    ASSERT_TRUE(session.found());
+    EXPECT_TRUE(session.send_file(folder_ / "events"));
+    session.send("search --name ewa$ windowsize --sync 400 300 mousemove 200 280 key F12");
+    EXPECT_TRUE(session.awaited(shots_ + "/ewa-view-1.png")) << "it does not answer any more";
+    expect_silent(session.quit());
+}
+
+}  // namespace
+}  // namespace ewa::test

@@ -1,0 +1,81 @@
+// The window on a training that goes on.
+#include "viewer/session.h"
+#include "viewer/window_test.h"
+
+namespace ewa::test {
+namespace {
+
+class Training : public WindowTest {
+  protected:
+    void SetUp() override {
+        WindowTest::SetUp();
+        if (!IsSkipped() && !have_xdotool())
+            GTEST_SKIP() << "there is no xdotool (Debian: xdotool) to press keys with; the input is not tested";
+        std::filesystem::create_directories(shots_);
+    }
+    /// Until the pictures of the same camera change: 30 seconds at most.
+    bool changes(Session& session) {
+        const Image first = load_image(session.screenshot());
+        for (int i = 0; i < 30; ++i) {
+            session.send("sleep 1");
+            if (largest_difference(load_image(session.screenshot()), first) > 0.02f) return true;
+        }
+        return false;
+    }
+    const std::string shots_ = folder_ / "shots", run_ = folder_ / "run";
+};
+
+TEST_F(Training, OfAnotherProcessIsSeenAsItGoes) {
+    const pid_t trainer = fork();
+    if (trainer == 0) {
+        execl(EWA_PROGRAM, EWA_PROGRAM, "train", cameras_.c_str(), "-o", run_.c_str(), "--init", splats_.c_str(),
+              "--steps", "1000000", "--strategy", "none", "--serve", "0", "--quiet", nullptr);
+        _exit(127);
+    }
+    for (int i = 0; i < 600 && !std::filesystem::exists(run_ + "/live.json"); ++i)
+        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    Session session(shots_, {run_, "--size", "96x64"});
+    ASSERT_TRUE(session.found());
+    session.send("key F2");
+    EXPECT_TRUE(changes(session)) << "the picture stays as it is";
+    kill(trainer, SIGINT);
+    int status = 0;
+    waitpid(trainer, &status, 0);
+    EXPECT_EQ(WEXITSTATUS(status), 130);
+    EXPECT_FALSE(std::filesystem::exists(run_ + "/live.json"));
+    session.send("key 2 sleep 1 key 1");
+    EXPECT_NE(session.screenshot(), "") << "it does not answer once the training has gone";
+    expect_silent(session.quit());
+}
+
+TEST_F(Training, OfItsOwnGoesOnUntilItsEnd) {
+    Session session(shots_, {"--train", cameras_, "-o", run_, "--init", splats_, "--steps", "30", "--quiet", "--size",
+                             "96x64"});
+    ASSERT_TRUE(session.found());
+    ASSERT_TRUE(session.awaited(run_ + "/summary.json")) << "the training has not ended";
+    EXPECT_EQ(read_json(run_ + "/summary.json")["steps"], 30);
+    session.send("sleep 1");
+    EXPECT_GT(range_of(load_image(session.screenshot())), 0.2f);
+    expect_silent(session.quit());
+}
+
+TEST_F(Training, OfItsOwnIsSavedWhenTheWindowIsClosed) {
+    Session session(shots_, {"--train", cameras_, "-o", run_, "--init", splats_, "--steps", "1000000", "--quiet"});
+    ASSERT_TRUE(session.found());
+    ASSERT_TRUE(session.awaited(run_ + "/live.json"));
+    session.send("sleep 2");
+    expect_silent(session.quit());
+    EXPECT_TRUE(std::filesystem::exists(run_ + "/checkpoint.ewa"));
+    EXPECT_EQ(read_json(run_ + "/summary.json")["interrupted"], true);
+}
+
+TEST(WithoutWindow, WrongWaysToATrainingAreOneLine) {
+    const Folder folder;
+    make_splats(folder / "splats.ply");
+    expect_failure(run_view({"--train", folder / "splats.ply"}), 2, "--train needs a dataset");
+    expect_failure(run_view({folder / "splats.ply", "--steps", "7"}), 2, "--steps");
+    expect_failure(run_view({"--connect", "nowhere"}), 2, "localhost:7000");
+}
+
+}  // namespace
+}  // namespace ewa::test
