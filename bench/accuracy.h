@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Error against run time of rendering: splatting and ray-marching, against the integral that both stand for
 // (reference/volume.h).
 #pragma once
@@ -25,13 +26,14 @@ struct AccuracySeries {
 };
 struct Accuracy {
     std::vector<AccuracySeries> series;
-    int pixels = 0;              // at which the error is taken, evenly spread
-    double exact_seconds = 0;    // that their integrals took
-    unsigned threads = 0;        // of the host
+    int pixels = 0;            // at which the error is taken, evenly spread
+    double exact_seconds = 0;  // that their integrals took
+    unsigned threads = 0;      // of the host
 };
 
 /// say: a line for the user before each longer part.
-Accuracy measure_accuracy(const std::shared_ptr<gpu::Device>& device, const Gaussians& gaussians, const Camera& camera,
-                          const RenderOptions& options, const std::function<void(const std::string&)>& say);
+Accuracy measure_accuracy(const std::shared_ptr<gpu::Device>& device, const Gaussians& gaussians,
+                          const Camera& camera, const RenderOptions& options,
+                          const std::function<void(const std::string&)>& say);
 
 }  // namespace ewa::bench

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The table of a stability run as text and JSON.
 #pragma once
 #include <nlohmann/json.hpp>

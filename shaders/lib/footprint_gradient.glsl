@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The way back from what the tiles added up to a splat's M and scales. Needs projection.glsl.
 #ifndef EWA_LIB_FOOTPRINT_GRADIENT
 #define EWA_LIB_FOOTPRINT_GRADIENT

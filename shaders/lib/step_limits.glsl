@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How far one step of the optimiser may go (docs/numerics.md, "Steps").
 #ifndef EWA_LIB_STEP_LIMITS
 #define EWA_LIB_STEP_LIMITS

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ewa bench --accuracy: error against run time, of rendering and of training.
 #pragma once
 #include <filesystem>
@@ -19,8 +20,9 @@ struct AccuracyArguments {
 };
 
 /// The diagram of rendering a scene from a camera.
-report::WorkPrecision rendering_diagram(const std::shared_ptr<gpu::Device>& device, const Gaussians& gaussians,
-                                        const Camera& camera, const RenderOptions& options);
+report::WorkPrecision rendering_diagram(const std::shared_ptr<gpu::Device>& device,
+                                        const Gaussians& gaussians, const Camera& camera,
+                                        const RenderOptions& options);
 
 /// Prints tables and writes the files. Returns the exit status.
 int run_accuracy(const AccuracyArguments& arguments);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The integral along a ray against what it is in closed form.
 #include "reference/volume.h"
 
@@ -77,8 +78,9 @@ TEST(Volume, SplatsInOnePlaceMix) {
 }
 
 TEST(Volume, MarchingComesNearerWithMoreSamples) {
-    const Volume volume(balls({{3, 0.2, 0.7, {1, 0, 0}}, {3.2, 0.3, 0.6, {0, 1, 0}}, {5, 0.2, 0.8, {0, 0, 1}}}),
-                        camera(), on_grey());
+    const Volume volume(
+        balls({{3, 0.2, 0.7, {1, 0, 0}}, {3.2, 0.3, 0.6, {0, 1, 0}}, {5, 0.2, 0.8, {0, 0, 1}}}), camera(),
+        on_grey());
     const glm::dvec3 exact = volume.exact(17, 15);
     double last = 1;
     for (const int samples : {8, 32, 128, 512}) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The diagram of error against run time.
 #include "report/work_precision.h"
 
