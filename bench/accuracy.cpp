@@ -54,7 +54,8 @@ double evaluate_pixels(const std::vector<Pixel>& pixels, std::vector<glm::dvec3>
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-void take_error(const std::vector<glm::dvec3>& exact, const std::vector<glm::dvec3>& actual, AccuracyPoint& point) {
+void take_error(const std::vector<glm::dvec3>& exact, const std::vector<glm::dvec3>& actual,
+                AccuracyPoint& point) {
     double sum = 0;
     for (size_t i = 0; i < exact.size(); ++i)
         for (int c = 0; c < 3; ++c) {
@@ -74,9 +75,9 @@ struct SplattingChoice {
 };
 
 /// Draws the frame several times; the picture's pixels and the median time.
-AccuracyPoint splat(const std::shared_ptr<gpu::Device>& device, const Gaussians& gaussians, const Camera& camera,
-                    const RenderOptions& options, const SplattingChoice& choice, const std::vector<Pixel>& pixels,
-                    const std::vector<glm::dvec3>& exact) {
+AccuracyPoint splat(const std::shared_ptr<gpu::Device>& device, const Gaussians& gaussians,
+                    const Camera& camera, const RenderOptions& options, const SplattingChoice& choice,
+                    const std::vector<Pixel>& pixels, const std::vector<glm::dvec3>& exact) {
     RenderOptions own = options;
     own.kernel = choice.kernel;
     own.sh_degree = choice.sh_degree;
@@ -95,7 +96,8 @@ AccuracyPoint splat(const std::shared_ptr<gpu::Device>& device, const Gaussians&
     frame.instance_capacity = pipeline::first_capacity(model.splats);
     const auto draw = [&] {
         pipeline::run_until_it_fits(
-            kernels, executor, frame, {model.splats, use.width, use.height, frame.instance_capacity, false, false},
+            kernels, executor, frame,
+            {model.splats, use.width, use.height, frame.instance_capacity, false, false},
             [&](gpu::Recording& recording) {
                 pipeline::record_forward(recording, kernels, plan, model, frame, use, own.background);
             });
@@ -117,13 +119,15 @@ std::vector<SplattingChoice> splatting_choices(const Gaussians& gaussians, const
     const int degree = sh_degree_present(gaussians);
     std::vector<SplattingChoice> choices;
     for (const int per : {16, 64, 255, 1024, 4096})
-        choices.push_back({"splatting, cut-off", "1/" + std::to_string(per), Kernel::peak, degree, 1.0 / per, 0});
+        choices.push_back(
+            {"splatting, cut-off", "1/" + std::to_string(per), Kernel::peak, degree, 1.0 / per, 0});
     for (int d = 0; d <= degree; ++d)
         choices.push_back({"splatting, SH degree", std::to_string(d), Kernel::peak, d, shared::ALPHA_MIN, 0});
     const passes::Shape shape = passes::shape_for(limits);
-    for (const uint32_t height : {shape.tile_height / 2, shape.tile_height, 2 * shape.tile_height, 4 * shape.tile_height})
-        choices.push_back({"splatting, tile", text_of("%ux%u", shape.tile_width, height), Kernel::peak, degree,
-                           shared::ALPHA_MIN, height});
+    for (const uint32_t height :
+         {shape.tile_height / 2, shape.tile_height, 2 * shape.tile_height, 4 * shape.tile_height})
+        choices.push_back({"splatting, tile", text_of("%ux%u", shape.tile_width, height), Kernel::peak,
+                           degree, shared::ALPHA_MIN, height});
     choices.push_back({"splatting, kernel", "peak", Kernel::peak, degree, shared::ALPHA_MIN, 0});
     choices.push_back({"splatting, kernel", "antialias", Kernel::antialias, degree, shared::ALPHA_MIN, 0});
     choices.push_back({"splatting, kernel", "unit mass", Kernel::unit_mass, degree, shared::ALPHA_MIN, 0});
@@ -132,8 +136,9 @@ std::vector<SplattingChoice> splatting_choices(const Gaussians& gaussians, const
 
 }  // namespace
 
-Accuracy measure_accuracy(const std::shared_ptr<gpu::Device>& device, const Gaussians& gaussians, const Camera& camera,
-                          const RenderOptions& options, const std::function<void(const std::string&)>& say) {
+Accuracy measure_accuracy(const std::shared_ptr<gpu::Device>& device, const Gaussians& gaussians,
+                          const Camera& camera, const RenderOptions& options,
+                          const std::function<void(const std::string&)>& say) {
     Accuracy result;
     result.threads = host_threads();
     const std::vector<Pixel> pixels = spread_pixels(camera);
@@ -143,13 +148,15 @@ Accuracy measure_accuracy(const std::shared_ptr<gpu::Device>& device, const Gaus
     whole.sh_degree = kMaxShDegree;
     const reference::Volume volume(reference::to_double(gaussians), camera, whole);
     std::vector<glm::dvec3> exact, actual;
-    result.exact_seconds = evaluate_pixels(pixels, exact, [&](double x, double y) { return volume.exact(x, y); });
+    result.exact_seconds =
+        evaluate_pixels(pixels, exact, [&](double x, double y) { return volume.exact(x, y); });
 
     say("splatting on the device");
     for (const SplattingChoice& choice : splatting_choices(gaussians, device->limits())) {
         if (result.series.empty() || result.series.back().name != choice.series)
             result.series.push_back({choice.series, choice.series == "splatting, cut-off", {}});
-        result.series.back().points.push_back(splat(device, gaussians, camera, options, choice, pixels, exact));
+        result.series.back().points.push_back(
+            splat(device, gaussians, camera, options, choice, pixels, exact));
     }
     say("ray-marching on the host");
     AccuracySeries marcher{"ray-marcher (host)", true, {}};

@@ -26,13 +26,14 @@ struct AccuracySeries {
 };
 struct Accuracy {
     std::vector<AccuracySeries> series;
-    int pixels = 0;              // at which the error is taken, evenly spread
-    double exact_seconds = 0;    // that their integrals took
-    unsigned threads = 0;        // of the host
+    int pixels = 0;            // at which the error is taken, evenly spread
+    double exact_seconds = 0;  // that their integrals took
+    unsigned threads = 0;      // of the host
 };
 
 /// say: a line for the user before each longer part.
-Accuracy measure_accuracy(const std::shared_ptr<gpu::Device>& device, const Gaussians& gaussians, const Camera& camera,
-                          const RenderOptions& options, const std::function<void(const std::string&)>& say);
+Accuracy measure_accuracy(const std::shared_ptr<gpu::Device>& device, const Gaussians& gaussians,
+                          const Camera& camera, const RenderOptions& options,
+                          const std::function<void(const std::string&)>& say);
 
 }  // namespace ewa::bench

@@ -102,11 +102,13 @@ void add_options(CLI::App& app, Options& options) {
     app.add_option("--results", options.results, "With --compare: take the new results from this file")
         ->type_name("NEW.json");
     app.add_flag("--stability", options.stability,
-                 "Stiff and extreme scenes against the float64 twin, and training from each; exit status 1 where a bound is "
+                 "Stiff and extreme scenes against the float64 twin, and training from each; exit status 1 "
+                 "where a bound is "
                  "broken");
     app.add_option("FILE", options.scene, "With --stability: this splat file in place of the built-in scenes")
         ->type_name("");
-    app.add_option("--training-steps", options.training_steps, "With --stability: steps from each scene, 0 for none")
+    app.add_option("--training-steps", options.training_steps,
+                   "With --stability: steps from each scene, 0 for none")
         ->check(CLI::Range(0, 100000).description(""))
         ->type_name("N");
     app.add_flag("--first-step", options.first_step, "What the case first_step starts as a new process")
@@ -116,8 +118,8 @@ void add_options(CLI::App& app, Options& options) {
 int run(const Options& options, const std::vector<std::string>& program) {
     if (options.list) return list_cases(options.stability);
     if (options.stability)
-        return run_stability(open_device({.selector = options.device}),
-                             {options.cases, options.training_steps, options.json, options.scene, options.read_splats});
+        return run_stability({options.cases, options.training_steps, options.device, options.json,
+                              options.scene, options.read_splats});
     if (!options.scene.empty())
         throw InputError(options.scene.string() + ": a file is for --stability, which was not asked for");
     if (options.first_step) return run_first_step(options.device);

@@ -26,7 +26,8 @@ double between(double u, double low, double high) {
 }
 
 glm::dmat3 turned(double angle_x, double angle_y) {
-    const double cx = std::cos(angle_x), sx = std::sin(angle_x), cy = std::cos(angle_y), sy = std::sin(angle_y);
+    const double cx = std::cos(angle_x), sx = std::sin(angle_x), cy = std::cos(angle_y),
+                 sy = std::sin(angle_y);
     return glm::dmat3(1, 0, 0, 0, cx, sx, 0, -sx, cx) * glm::dmat3(cy, 0, -sy, 0, 1, 0, sy, 0, cy);
 }
 
@@ -72,7 +73,9 @@ double usual_depth(uint32_t i) {
 
 class Builder {
   public:
-    explicit Builder(const Camera& camera, int sh_degree = 1) : camera_(camera) { out_.sh_degree = sh_degree; }
+    explicit Builder(const Camera& camera, int sh_degree = 1) : camera_(camera) {
+        out_.sh_degree = sh_degree;
+    }
 
     void add(const Sketch& sketch) {
         const uint32_t i = uint32_t(out_.size());
@@ -168,8 +171,8 @@ void add_scales(Table& table) {
 
 void add_depths(Table& table) {
     const Camera camera = usual_camera();
-    const double around[] = {-1,       -0.01,    -1e-6,    0,      1e-6,   0.005,  0.0099,
-                             0.009999, 0.010001, 0.0101,   0.011,  0.02,   0.05};
+    const double around[] = {-1,       -0.01,    -1e-6,  0,     1e-6, 0.005, 0.0099,
+                             0.009999, 0.010001, 0.0101, 0.011, 0.02, 0.05};
     for (const bool large : {false, true}) {
         Builder builder(camera);
         for (uint32_t i = 0; i < 4 * std::size(around); ++i) {
@@ -187,8 +190,7 @@ void add_depths(Table& table) {
     }
     for (const double distance : {1e-6, 1e-3, 0.02, 1e4, 1e8}) {
         Builder at(camera);
-        for (uint32_t i = 0; i < 40; ++i)
-            at.add(usual_sketch(i, camera, distance * usual_depth(i) / 5));
+        for (uint32_t i = 0; i < 40; ++i) at.add(usual_sketch(i, camera, distance * usual_depth(i) / 5));
         table.add(text_of("distance_%.0e", distance), "so far from the camera", at.take());
     }
     Camera straight = camera;
@@ -208,15 +210,16 @@ void add_far_from_origin(Table& table) {
         Sketch s = usual_sketch(i, camera, 1000 * usual_depth(i));
         stored.add(s);
     }
-    table.add("offset_1e7", "a scene of 5 km, 1e7 from the origin, positions in float32", stored.take(), camera);
+    table.add("offset_1e7", "a scene of 5 km, 1e7 from the origin, positions in float32", stored.take(),
+              camera);
 
     // Held as a georeferenced capture is: positions in float32 relative to an origin in double.
     Camera near = usual_camera();
     Gaussians held = usual_scene(near, 60, 3);
     held.origin = place;
     near.translation = -(near.rotation * (near.position() + place));
-    table.add("georeferenced_1e7", "a scene of 5 m, 1e7 from the origin, relative to an origin of its own", std::move(held),
-              near);
+    table.add("georeferenced_1e7", "a scene of 5 m, 1e7 from the origin, relative to an origin of its own",
+              std::move(held), near);
 }
 
 void add_opacities(Table& table) {
@@ -315,9 +318,12 @@ float& stored_value(Gaussians& g, size_t splat, size_t value) {
 /// Splat i has its value i replaced, so that each value of a splat is at some time the bad one.
 void add_replaced(Table& table) {
     constexpr float inf = std::numeric_limits<float>::infinity();
-    const std::pair<const char*, float> bad[] = {
-        {"nan", std::numeric_limits<float>::quiet_NaN()}, {"inf", inf},          {"minus_inf", -inf},
-        {"denormal", 1e-40f},                             {"largest", FLT_MAX}, {"minus_largest", -FLT_MAX}};
+    const std::pair<const char*, float> bad[] = {{"nan", std::numeric_limits<float>::quiet_NaN()},
+                                                 {"inf", inf},
+                                                 {"minus_inf", -inf},
+                                                 {"denormal", 1e-40f},
+                                                 {"largest", FLT_MAX},
+                                                 {"minus_largest", -FLT_MAX}};
     for (const auto& [name, value] : bad) {
         Gaussians g = usual_scene(usual_camera(), 59, 3);
         for (size_t i = 0; i < g.size(); ++i) stored_value(g, i, i) = value;
@@ -350,7 +356,8 @@ StabilityCase stability_case_of(const std::string& name, const Gaussians& gaussi
     for (int k = 0; k < 3; ++k) {
         std::vector<double> values;
         for (size_t i = 0; i < gaussians.size(); ++i)
-            if (std::isfinite(gaussians.means[3 * i + size_t(k)])) values.push_back(gaussians.world_mean(i)[k]);
+            if (std::isfinite(gaussians.means[3 * i + size_t(k)]))
+                values.push_back(gaussians.world_mean(i)[k]);
         if (values.empty()) continue;
         std::sort(values.begin(), values.end());
         low[k] = values[values.size() / 4];
@@ -367,7 +374,8 @@ StabilityCase stability_case_of(const std::string& name, const Gaussians& gaussi
     one.camera.cx = 160;
     one.camera.cy = 120;
     one.camera.rotation = turned(0.3, 0.5);
-    const glm::dvec3 eye = 0.5 * (low + high) - glm::transpose(one.camera.rotation) * glm::dvec3(0, 0, 3 * radius);
+    const glm::dvec3 eye =
+        0.5 * (low + high) - glm::transpose(one.camera.rotation) * glm::dvec3(0, 0, 3 * radius);
     one.camera.translation = -(one.camera.rotation * eye);
     return one;
 }
@@ -378,8 +386,8 @@ Image stability_photo(int width, int height) {
         for (int x = 0; x < width; ++x) {
             const auto noise = uniform(uint32_t(x), 1000 + uint32_t(y));
             for (int c = 0; c < 3; ++c)
-                photo.at(x, y)[c] = float(0.5 + 0.3 * std::sin(0.21 * x + 0.13 * y + 2 * c) +
-                                          0.2 * (noise[size_t(c)] - 0.5));
+                photo.at(x, y)[c] =
+                    float(0.5 + 0.3 * std::sin(0.21 * x + 0.13 * y + 2 * c) + 0.2 * (noise[size_t(c)] - 0.5));
         }
     return photo;
 }

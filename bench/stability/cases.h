@@ -19,8 +19,8 @@ struct StabilityCase {
     RenderOptions options;
 };
 
-/// Every case, in the order of the families. Pure: the same scenes on every machine up to the last bits of exp and
-/// log.
+/// Every case, in the order of the families. Pure: the same scenes on every machine up to the last bits of
+/// exp and log.
 std::vector<StabilityCase> stability_cases();
 
 /// A scene of a user's, seen from a distance at which it fills the picture.

@@ -20,11 +20,11 @@ using reference::Picture;
 using reference::Raster;
 using reference::Values;
 
-constexpr double kUnit = 0x1p-24;             // half a float32 step, relative
-constexpr double kPictureFloor = 5e-6;        // of a scene whose condition is ordinary
+constexpr double kUnit = 0x1p-24;       // half a float32 step, relative
+constexpr double kPictureFloor = 5e-6;  // of a scene whose condition is ordinary
 constexpr double kGradientFloor = 1e-4;
-constexpr double kRoundings = 32;             // of a chain of float32 operations on each stored value
-constexpr double kAtThreshold = 2e-4;         // relative distance at which float32 may decide otherwise
+constexpr double kRoundings = 32;      // of a chain of float32 operations on each stored value
+constexpr double kAtThreshold = 2e-4;  // relative distance at which float32 may decide otherwise
 constexpr double kPerturbation = 1e-10;
 constexpr int kPerturbations = 3;
 constexpr double kLargest = FLT_MAX;
@@ -33,7 +33,9 @@ constexpr double kLargest = FLT_MAX;
 Values perturbed(const Values& values, const glm::dvec3& eye, uint32_t draw) {
     Values out = values;
     uint32_t counter = 0;
-    const auto sign = [&] { return core::pcg4d({counter++, draw, 0x636f6e64u, 0})[0] & 1 ? kPerturbation : -kPerturbation; };
+    const auto sign = [&] {
+        return core::pcg4d({counter++, draw, 0x636f6e64u, 0})[0] & 1 ? kPerturbation : -kPerturbation;
+    };
     const auto relative = [&](std::vector<double>& group) {
         for (double& v : group) v += v * sign();
     };
@@ -67,8 +69,9 @@ std::vector<uint8_t> pixels_at_threshold(const Picture& picture) {
             bool hangs = false;
             for (size_t k = lists.first_of_tile[tile]; k < lists.first_of_tile[tile + 1]; ++k) {
                 const uint32_t splat = lists.sorted[k].splat;
-                const double raw =
-                    reference::sample(picture.projected[splat], whiteners[splat], reference::pixel_centre(x, y)).raw;
+                const double raw = reference::sample(picture.projected[splat], whiteners[splat],
+                                                     reference::pixel_centre(x, y))
+                                       .raw;
                 const double alpha = raw >= shared::ALPHA_MIN ? std::min(raw, shared::ALPHA_MAX) : 0;
                 const double next = transmittance * (1 - alpha);
                 // Exactly (1 - ALPHA_MAX)^2 is a decision both sides take alike.
@@ -90,7 +93,8 @@ struct Difference {
 
 /// Of the pixels that are not left out; over scale.
 template <class Pixel>
-Difference picture_difference(const Raster& expected, const std::vector<uint8_t>& left_out, double scale, Pixel actual) {
+Difference picture_difference(const Raster& expected, const std::vector<uint8_t>& left_out, double scale,
+                              Pixel actual) {
     Difference d;
     for (int y = 0; y < expected.height; ++y)
         for (int x = 0; x < expected.width; ++x)
@@ -118,8 +122,9 @@ double norm_of(const std::vector<double>& v) {
     return largest * std::sqrt(sum);
 }
 
-/// A rotation changes a splat as much as a stretch does, but for one that is round: there the gradient by the quaternion is
-/// zero and no measure of an error. What takes its place is this share of the gradient by the scales.
+/// A rotation changes a splat as much as a stretch does, but for one that is round: there the gradient by the
+/// quaternion is zero and no measure of an error. What takes its place is this share of the gradient by the
+/// scales.
 double least_quaternion_norm(const StabilityCase& one, const Values& gradient) {
     constexpr double kShare = 1e-3;
     const Values values = reference::to_double(one.gaussians);
@@ -163,12 +168,14 @@ bool all_finite(const Gaussians& g) {
     const auto finite = [](const std::vector<float>& v) {
         return std::all_of(v.begin(), v.end(), [](float x) { return std::isfinite(x); });
     };
-    return finite(g.means) && finite(g.quaternions) && finite(g.log_scales) && finite(g.opacity_logits) && finite(g.sh);
+    return finite(g.means) && finite(g.quaternions) && finite(g.log_scales) && finite(g.opacity_logits) &&
+           finite(g.sh);
 }
 
-/// The twin's picture with each determinant as float32's a c - b^2 makes it: what the sum of the minors is for.
-double plain_determinant_error(const Picture& picture, const RenderOptions& options, const std::vector<uint8_t>& left_out,
-                               double scale) {
+/// The twin's picture with each determinant as float32's a c - b^2 makes it: what the sum of the minors is
+/// for.
+double plain_determinant_error(const Picture& picture, const RenderOptions& options,
+                               const std::vector<uint8_t>& left_out, double scale) {
     std::vector<reference::Projected> plain = picture.projected;
     for (reference::Projected& p : plain) {
         const float a = float(p.a), b = float(p.b), c = float(p.c);
@@ -178,9 +185,9 @@ double plain_determinant_error(const Picture& picture, const RenderOptions& opti
     const auto order = reference::depth_order(plain);
     const auto lists = reference::make_instances(plain, order, picture.instances.grid);
     const auto blended = reference::blend(plain, lists, options.background);
-    return picture_difference(picture.blended.color, left_out, scale, [&](int x, int y, int c) {
-               return blended.color.at(x, y)[c];
-           }).largest;
+    return picture_difference(picture.blended.color, left_out, scale,
+                              [&](int x, int y, int c) { return blended.color.at(x, y)[c]; })
+        .largest;
 }
 
 /// For each group of the gradient, the norm that an error of it is taken relative to at least.
@@ -193,20 +200,23 @@ struct Conditions {
     double groups[5] = {};
 };
 
-/// The twin's error under a change of every stored value, over the size of the change: the largest of several.
+/// The twin's error under a change of every stored value, over the size of the change: the largest of
+/// several.
 Conditions conditions_of(const StabilityCase& one, const Image& photo, const LossGradientTwin& twin,
                          const std::vector<uint8_t>& left_out, double scale) {
     const Values values = reference::to_double(one.gaussians);
     const std::vector<double> least = least_norms(one, twin.gradient);
     Conditions k;
     for (uint32_t draw = 0; draw < kPerturbations; ++draw) {
-        const LossGradientTwin moved = reference::loss_gradient(perturbed(values, one.camera.position(), draw),
-                                                                one.camera, photo, one.options);
-        const double picture = picture_difference(twin.picture.blended.color, left_out, scale, [&](int x, int y, int c) {
-                                   return moved.picture.blended.color.at(x, y)[c];
-                               }).largest;
+        const LossGradientTwin moved = reference::loss_gradient(
+            perturbed(values, one.camera.position(), draw), one.camera, photo, one.options);
+        const double picture =
+            picture_difference(twin.picture.blended.color, left_out, scale, [&](int x, int y, int c) {
+                return moved.picture.blended.color.at(x, y)[c];
+            }).largest;
         k.picture = std::max(k.picture, picture / kPerturbation);
-        k.loss = std::max(k.loss, std::abs(moved.loss - twin.loss) / std::max(1.0, twin.loss) / kPerturbation);
+        k.loss =
+            std::max(k.loss, std::abs(moved.loss - twin.loss) / std::max(1.0, twin.loss) / kPerturbation);
         int group = 0;
         for_each_group(moved.gradient, twin.gradient, [&](const char*, const auto& a, const auto& b) {
             k.groups[group] = std::max(k.groups[group], distance(a, b, least[size_t(group)]) / kPerturbation);
@@ -246,10 +256,11 @@ StabilityResult compare_with_twin(const std::shared_ptr<gpu::Device>& device, co
     Renderer renderer(device, one.gaussians, one.options);
     const Rendering rendering = renderer.render(one.camera);
     result.skipped = renderer.skipped_nonfinite();
-    const Difference picture = picture_difference(twin.picture.blended.color, at_threshold, scale, [&](int x, int y, int c) {
-        return double(rendering.color.at(x, y)[c]);
-    });
-    result.comparisons.push_back({"picture", picture.largest, bound(kPictureFloor, condition.picture), condition.picture});
+    const Difference picture =
+        picture_difference(twin.picture.blended.color, at_threshold, scale,
+                           [&](int x, int y, int c) { return double(rendering.color.at(x, y)[c]); });
+    result.comparisons.push_back(
+        {"picture", picture.largest, bound(kPictureFloor, condition.picture), condition.picture});
 
     const LossGradient gradient = loss_gradient(device, one.gaussians, one.camera, photo, one.options);
     result.loss = gradient.loss;
@@ -260,7 +271,8 @@ StabilityResult compare_with_twin(const std::shared_ptr<gpu::Device>& device, co
     int group = 0;
     for_each_group(gradient.gradient, twin.gradient, [&](const char* name, const auto& a, const auto& b) {
         const double k = condition.groups[group];
-        result.comparisons.push_back({name, distance(a, b, least[size_t(group)]), bound(kGradientFloor, k), k});
+        result.comparisons.push_back(
+            {name, distance(a, b, least[size_t(group)]), bound(kGradientFloor, k), k});
         ++group;
     });
     return result;

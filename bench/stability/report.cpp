@@ -21,15 +21,17 @@ const Comparison& tightest(const StabilityResult& result) {
 }  // namespace
 
 std::string stability_header() {
-    return text_of("%-24s %6s %6s %5s | %8s %8s %9s %9s | %-14s %8s %8s %9s\n", "case", "splats", "drawn", "skip",
-                   "picture", "bound", "condition", "plain det", "worst of rest", "error", "bound", "condition");
+    return text_of("%-24s %6s %6s %5s | %8s %8s %9s %9s | %-14s %8s %8s %9s\n", "case", "splats", "drawn",
+                   "skip", "picture", "bound", "condition", "plain det", "worst of rest", "error", "bound",
+                   "condition");
 }
 
 std::string stability_line(const StabilityResult& r) {
     const Comparison &picture = r.comparisons.front(), &worst = tightest(r);
-    std::string line = text_of("%-24s %6u %6u %5u | %8.1e %8.1e %9.1e %9.1e | %-14s %8.1e %8.1e %9.1e", r.name.c_str(), r.splats,
-                               r.drawn, r.skipped, picture.error, picture.bound, picture.condition, r.plain_determinant,
-                               worst.of.c_str(), worst.error, worst.bound, worst.condition);
+    std::string line =
+        text_of("%-24s %6u %6u %5u | %8.1e %8.1e %9.1e %9.1e | %-14s %8.1e %8.1e %9.1e", r.name.c_str(),
+                r.splats, r.drawn, r.skipped, picture.error, picture.bound, picture.condition,
+                r.plain_determinant, worst.of.c_str(), worst.error, worst.bound, worst.condition);
     if (!r.finite) line += "  NOT FINITE";
     if (r.skipped != r.skipped_by_twin) line += text_of("  SKIPPED, the twin %u", r.skipped_by_twin);
     for (const Comparison& c : r.comparisons)
@@ -38,17 +40,18 @@ std::string stability_line(const StabilityResult& r) {
 }
 
 std::string stability_training_header() {
-    return text_of("\n%-24s %6s %10s %10s %8s %8s %8s\n", "training from", "steps", "loss", "to", "skipped", "dropped",
-                   "limited");
+    return text_of("\n%-24s %6s %10s %10s %8s %8s %8s\n", "training from", "steps", "loss", "to", "skipped",
+                   "dropped", "limited");
 }
 
 std::string stability_training_line(const StabilityTraining& t) {
-    return text_of("%-24s %6d %10.3g %10.3g %8u %8llu %8llu%s\n", t.name.c_str(), t.steps, t.first_loss, t.last_loss,
-                   t.skipped, static_cast<unsigned long long>(t.dropped_updates),
+    return text_of("%-24s %6d %10.3g %10.3g %8u %8llu %8llu%s\n", t.name.c_str(), t.steps, t.first_loss,
+                   t.last_loss, t.skipped, static_cast<unsigned long long>(t.dropped_updates),
                    static_cast<unsigned long long>(t.limited_steps), t.finite ? "" : "  NOT FINITE");
 }
 
-Json stability_json(const std::vector<StabilityResult>& results, const std::vector<StabilityTraining>& trainings) {
+Json stability_json(const std::vector<StabilityResult>& results,
+                    const std::vector<StabilityTraining>& trainings) {
     Json json{{"schema", "ewa-stability-1"}, {"cases", Json::array()}, {"training", Json::array()}};
     for (const StabilityResult& r : results) {
         Json one{{"name", r.name},
@@ -63,8 +66,11 @@ Json stability_json(const std::vector<StabilityResult>& results, const std::vect
                  {"good", r.good()},
                  {"comparisons", Json::array()}};
         for (const Comparison& c : r.comparisons)
-            one["comparisons"].push_back(
-                {{"of", c.of}, {"error", c.error}, {"bound", c.bound}, {"condition", c.condition}, {"good", c.good()}});
+            one["comparisons"].push_back({{"of", c.of},
+                                          {"error", c.error},
+                                          {"bound", c.bound},
+                                          {"condition", c.condition},
+                                          {"good", c.good()}});
         json["cases"].push_back(std::move(one));
     }
     for (const StabilityTraining& t : trainings)

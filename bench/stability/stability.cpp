@@ -22,7 +22,8 @@ void print(const std::string& text) {
 std::vector<StabilityCase> chosen_cases(const StabilityOptions& options) {
     if (!options.file.empty()) {
         if (!options.read)
-            throw InputError(options.file.string() + ": this program reads no splat files; ewa bench --stability does");
+            throw InputError(options.file.string() +
+                             ": this program reads no splat files; ewa bench --stability does");
         return {stability_case_of(options.file.filename().string(), options.read(options.file))};
     }
     std::vector<StabilityCase> chosen;
@@ -34,8 +35,9 @@ std::vector<StabilityCase> chosen_cases(const StabilityOptions& options) {
 
 }  // namespace
 
-int run_stability(const std::shared_ptr<gpu::Device>& device, const StabilityOptions& options) {
+int run_stability(const StabilityOptions& options) {
     const std::vector<StabilityCase> cases = chosen_cases(options);
+    const auto device = open_device({.selector = options.device});
     print("device: " + device_info(*device).name + "\n" + stability_header());
     std::vector<StabilityResult> results;
     std::vector<StabilityTraining> trainings;
@@ -49,7 +51,8 @@ int run_stability(const std::shared_ptr<gpu::Device>& device, const StabilityOpt
         trainings.push_back(train_from(device, one, options.training_steps));
         print(stability_training_line(trainings.back()));
     }
-    if (!options.json.empty()) core::write_text_file(options.json, stability_json(results, trainings).dump(2) + "\n");
+    if (!options.json.empty())
+        core::write_text_file(options.json, stability_json(results, trainings).dump(2) + "\n");
     const bool good = std::all_of(results.begin(), results.end(), [](const auto& r) { return r.good(); }) &&
                       std::all_of(trainings.begin(), trainings.end(), [](const auto& t) { return t.good(); });
     return good ? 0 : 1;

@@ -30,12 +30,14 @@ bool stayed_finite(const std::vector<float>& before, const std::vector<float>& a
 
 }  // namespace
 
-StabilityTraining train_from(const std::shared_ptr<gpu::Device>& device, const StabilityCase& one, int steps) {
+StabilityTraining train_from(const std::shared_ptr<gpu::Device>& device, const StabilityCase& one,
+                             int steps) {
     StabilityTraining result;
     result.name = one.name;
     result.steps = steps;
     // The first run moves nothing: its rates are zero.
-    FrameRun run(device, {one.gaussians, one.camera, stability_photo(one.camera.width, one.camera.height)}, true);
+    FrameRun run(device, {one.gaussians, one.camera, stability_photo(one.camera.width, one.camera.height)},
+                 true);
     result.first_loss = pipeline::loss_of(run.counts());
     for (int step = 1; step <= steps; ++step) {
         run.set_rates(rates(step));
@@ -49,10 +51,12 @@ StabilityTraining train_from(const std::shared_ptr<gpu::Device>& device, const S
     const Gaussians end = pipeline::download_model(run.model(), run.model().params);
     const Gaussians& g = one.gaussians;
     result.finite = result.finite && stayed_finite(g.means, end.means) &&
-                    stayed_finite(g.quaternions, end.quaternions) && stayed_finite(g.log_scales, end.log_scales) &&
+                    stayed_finite(g.quaternions, end.quaternions) &&
+                    stayed_finite(g.log_scales, end.log_scales) &&
                     stayed_finite(g.opacity_logits, end.opacity_logits) && stayed_finite(g.sh, end.sh);
     const auto planes = run.frame().planes.download<float>(run.frame().sizes.planes / 4);
-    result.finite = result.finite && std::all_of(planes.begin(), planes.end(), [](float v) { return std::isfinite(v); });
+    result.finite =
+        result.finite && std::all_of(planes.begin(), planes.end(), [](float v) { return std::isfinite(v); });
     return result;
 }
 

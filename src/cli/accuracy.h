@@ -20,8 +20,9 @@ struct AccuracyArguments {
 };
 
 /// The diagram of rendering a scene from a camera.
-report::WorkPrecision rendering_diagram(const std::shared_ptr<gpu::Device>& device, const Gaussians& gaussians,
-                                        const Camera& camera, const RenderOptions& options);
+report::WorkPrecision rendering_diagram(const std::shared_ptr<gpu::Device>& device,
+                                        const Gaussians& gaussians, const Camera& camera,
+                                        const RenderOptions& options);
 
 /// Prints tables and writes the files. Returns the exit status.
 int run_accuracy(const AccuracyArguments& arguments);

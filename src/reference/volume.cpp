@@ -25,8 +25,9 @@ double depth_between(const RayGaussian& g, double from, double to) {
 
 double density(const RayGaussian& g, double t) {
     const double u = (t - g.middle) / g.sigma;
-    return std::abs(u) > kReach ? 0
-                                : g.depth * std::exp(-0.5 * u * u) / (g.sigma * std::sqrt(2 * std::numbers::pi));
+    return std::abs(u) > kReach
+               ? 0
+               : g.depth * std::exp(-0.5 * u * u) / (g.sigma * std::sqrt(2 * std::numbers::pi));
 }
 
 /// Where the integrand changes its shape: at whole standard deviations of every splat.
@@ -61,12 +62,14 @@ Volume::Volume(const Values& values, const Camera& camera, const RenderOptions& 
             for (int j = 0; j < 3; ++j) m.whitener[j][k] /= steps.scale[k];  // row k over scale k
         m.color = projected.color;
         members_.push_back(m);
-        list(uint32_t(members_.size() - 1), projected, std::max({steps.scale.x, steps.scale.y, steps.scale.z}));
+        list(uint32_t(members_.size() - 1), projected,
+             std::max({steps.scale.x, steps.scale.y, steps.scale.z}));
     }
 }
 
 void Volume::list(uint32_t member, const Projected& p, double size) {
-    // Where perspective bends a splat's outline its linear footprint says too little: such a one is in every tile.
+    // Where perspective bends a splat's outline its linear footprint says too little: such a one is in every
+    // tile.
     const bool bent = kReach * size > 0.25 * p.z;
     const double x = 1.35 * kReach * std::sqrt(p.a) + 1, y = 1.35 * kReach * std::sqrt(p.c) + 1;
     const auto tile = [](double px, int count) {
@@ -75,8 +78,10 @@ void Volume::list(uint32_t member, const Projected& p, double size) {
     if (!bent && (p.mean2d.x + x < 0 || p.mean2d.y + y < 0 || p.mean2d.x - x > camera_.width ||
                   p.mean2d.y - y > camera_.height))
         return;
-    const int left = bent ? 0 : tile(p.mean2d.x - x, columns_), right = bent ? columns_ - 1 : tile(p.mean2d.x + x, columns_);
-    const int top = bent ? 0 : tile(p.mean2d.y - y, rows_), bottom = bent ? rows_ - 1 : tile(p.mean2d.y + y, rows_);
+    const int left = bent ? 0 : tile(p.mean2d.x - x, columns_),
+              right = bent ? columns_ - 1 : tile(p.mean2d.x + x, columns_);
+    const int top = bent ? 0 : tile(p.mean2d.y - y, rows_),
+              bottom = bent ? rows_ - 1 : tile(p.mean2d.y + y, rows_);
     for (int row = top; row <= bottom; ++row)
         for (int column = left; column <= right; ++column)
             tiles_[size_t(row) * size_t(columns_) + size_t(column)].push_back(member);

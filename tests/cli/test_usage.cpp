@@ -60,6 +60,9 @@ INSTANTIATE_TEST_SUITE_P(
     Usage, WrongUseTest,
     testing::Values(
         WrongUse{{}, "subcommand"}, WrongUse{{"fly"}, "fly"}, WrongUse{{"train"}, "DATASET"},
+        WrongUse{{"bench", "--accuracy"}, "DATASET"}, WrongUse{{"bench", "/nowhere.ply"}, "--stability"},
+        WrongUse{{"bench", "--stability", "/nowhere.ply"}, "/nowhere.ply"},
+        WrongUse{{"bench", "--stability", "--cases", "nosuchcase"}, "nosuchcase"},
         WrongUse{{"train", "/nowhere", "--wings"}, "--wings"},
         WrongUse{{"train", "/nowhere", "--steps", "0"}, "--steps"},
         WrongUse{{"train", "/nowhere", "--steps", "-3"}, "--steps"},

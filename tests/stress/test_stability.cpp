@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every stiff and extreme scene of the table that `ewa bench --stability` goes through, on the device against the twin
-// and as the start of a training, under the validation layer.
+// Every stiff and extreme scene of the table that `ewa bench --stability` goes through, on the device against
+// the twin and as the start of a training, under the validation layer.
 #include <gtest/gtest.h>
 
 #include <cctype>
@@ -24,20 +24,24 @@ TEST_P(Stability, PictureAndGradientAreWithinTheirBounds) {
     EXPECT_TRUE(result.finite);
     EXPECT_EQ(result.skipped, result.skipped_by_twin);
     for (const bench::Comparison& c : result.comparisons)
-        EXPECT_TRUE(c.good()) << c.of << ": " << c.error << ", at most " << c.bound << " (condition " << c.condition << ")";
+        EXPECT_TRUE(c.good()) << c.of << ": " << c.error << ", at most " << c.bound << " (condition "
+                              << c.condition << ")";
 }
 
 TEST_P(Stability, TrainingFromItStaysFinite) {
     const bench::StabilityCase& one = cases()[GetParam()];
-    const bench::StabilityTraining training = bench::train_from(device(), one, one.gaussians.size() > 10000 ? 5 : 40);
+    const bench::StabilityTraining training =
+        bench::train_from(device(), one, one.gaussians.size() > 10000 ? 5 : 40);
     EXPECT_TRUE(training.finite);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Stability, testing::Range(size_t(0), cases().size()),
                          [](const testing::TestParamInfo<size_t>& tested) {
                              std::string name = cases()[tested.param].name;
-                             for (char& c : name)
+                             for (char& c : name) {
+                                 if (c == '-') c = 'm';
                                  if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
+                             }
                              return name;
                          });
 

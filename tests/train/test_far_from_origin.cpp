@@ -5,8 +5,8 @@
 #include <cmath>
 #include <numeric>
 
-#include "ewa/splat_files.h"
 #include "ewa/splat_edit.h"
+#include "ewa/splat_files.h"
 #include "ewa/trainer.h"
 #include "gpu/test_device.h"
 #include "train/synthetic.h"
@@ -109,10 +109,12 @@ TEST(FarFromTheOrigin, MovingASceneBackLeavesNoOrigin) {
 
 TEST(FarFromTheOrigin, JoiningScenesKeepsBothInPlace) {
     Gaussians joined = gaussians_from_points(moved(data().dataset, kPlace).points, 0);
-    const Gaussians other = gaussians_from_points(moved(data().dataset, kPlace + glm::dvec3(100, 0, 0)).points, 0);
+    const Gaussians other =
+        gaussians_from_points(moved(data().dataset, kPlace + glm::dvec3(100, 0, 0)).points, 0);
     const size_t n = joined.size();
     append_splats(joined, other);
-    for (size_t i = 0; i < n; ++i) EXPECT_LT(glm::length(joined.world_mean(n + i) - other.world_mean(i)), 1e-4);
+    for (size_t i = 0; i < n; ++i)
+        EXPECT_LT(glm::length(joined.world_mean(n + i) - other.world_mean(i)), 1e-4);
 }
 
 /// Formats without room for double positions say what they cost.
@@ -121,7 +123,8 @@ TEST(FarFromTheOrigin, AnotherFormatSaysWhatItRounds) {
     const TempFolder folder;
     const auto remarks = save_splats(folder / "far.splat", g, SaveOptions{});
     bool said = false;
-    for (const std::string& remark : remarks) said = said || remark.find("rounded to 0.5 units") != std::string::npos;
+    for (const std::string& remark : remarks)
+        said = said || remark.find("rounded to 0.5 units") != std::string::npos;
     EXPECT_TRUE(said);
 }
 

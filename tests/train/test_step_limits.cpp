@@ -58,7 +58,8 @@ TEST(StepLimits, AMeanMovesByHalfItsDepthAtMost) {
     EXPECT_GT(ran.report.limited_steps, 0u);
     // The cameras stand 4 units off and see at most 6.
     for (size_t i = 0; i < ran.gaussians.size(); ++i)
-        EXPECT_LT(glm::length(ran.gaussians.world_mean(i)), 2 + 6 * shared::STEP_DEPTH_SHARE * std::sqrt(3.0)) << i;
+        EXPECT_LT(glm::length(ran.gaussians.world_mean(i)), 2 + 6 * shared::STEP_DEPTH_SHARE * std::sqrt(3.0))
+            << i;
 }
 
 TEST(StepLimits, AScaleStaysWithinWhatCanBeDrawn) {
@@ -86,7 +87,8 @@ TEST(StepLimits, AQuaternionOfAnyNormTurnsAsOneOfNormOne) {
     }
 }
 
-/// A splat much larger than the scene would be thrown across it by MCMC's noise, which grows with its scales squared.
+/// A splat much larger than the scene would be thrown across it by MCMC's noise, which grows with its scales
+/// squared.
 TEST(StepLimits, NoiseIsNoLongerThanTheScene) {
     Gaussians start = gaussians_from_points(data().dataset.points, 0);
     for (float& s : start.log_scales) s = 12;
