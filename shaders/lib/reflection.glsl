@@ -4,6 +4,7 @@
 #define EWA_LIB_REFLECTION
 
 const float PI = 3.14159265358979;
+const float LAMBERT_BLUR = 0.35;  // least GGX width of a mirror that is met after a Lambert reflection
 
 struct Reflector {
     vec3 diffuse;    // albedo of the Lambert layer without Fresnel's share

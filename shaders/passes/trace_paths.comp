@@ -105,7 +105,7 @@ bool meet(inout Path path, uint pixel, uint sample_index) {
     const uint purpose = 4u * path.turn;
     const float choice = pair(pixel, sample_index, purpose - 3u).x;
     const vec3 in_dir = sample_reflection(r, out_dir, choice, pair(pixel, sample_index, purpose - 1u));
-    path.blur = max(path.blur, choice < r.mirror_share ? r.width : TRACE_BLUR);
+    path.blur = max(path.blur, choice < r.mirror_share ? r.width : LAMBERT_BLUR);
     float density;
     const vec3 reflected = evaluate_reflection(r, out_dir, in_dir, density);
     path.direction = frame * in_dir;

@@ -64,7 +64,6 @@ EWA_UINT(TRACE_LEAF_MAX, 4u);         // triangles a leaf
 EWA_UINT(TRACE_BOUNCES, 5u);          // a path turns at most this often
 EWA_UINT(TRACE_ROULETTE, 2u);         // from this turn on Russian roulette may end it
 EWA_REAL(TRACE_ALPHA_MIN, 0.0025);    // least GGX width (roughness^2): a mirror is this rough
-EWA_REAL(TRACE_BLUR, 0.35);           // GGX width that a mirror has at least once the path was scattered by a Lambert layer
 EWA_REAL(TRACE_SAMPLE_MAX, 8.0);      // a sample brighter than this many times white counts as this bright
 EWA_REAL(DEPTH_ALPHA, 0.5);           // a blended surface of this opacity is what depth sees
 
