@@ -5,6 +5,7 @@
 #define EWA_LIB_REFLECTION
 
 const float PI = 3.14159265358979;
+const float LAMBERT_BLUR = 0.35;  // least GGX width of a mirror that is met after a Lambert reflection
 
 struct Reflector {
     vec3 diffuse;    // albedo of the Lambert layer without Fresnel's share
@@ -21,7 +22,8 @@ vec3 fresnel(vec3 f0, vec3 f90, float cosine) {
 
 float brightest(vec3 v) { return max(v.x, max(v.y, v.z)); }
 
-Reflector reflector_of(Material m, float cosine) {
+// blur: least GGX width.
+Reflector reflector_of(Material m, float cosine, float blur) {
     Reflector r;
     r.metallic = clamp(m.metallic, 0.0, 1.0);
     r.diffuse = m.base * (1.0 - r.metallic);
@@ -30,7 +32,7 @@ Reflector reflector_of(Material m, float cosine) {
     r.f0 = mix(vec3(m.f0), m.base, r.metallic);
     r.f90 = vec3(mix(m.f90, 1.0, r.metallic));
     const float roughness = clamp(m.roughness, 0.0, 1.0);
-    r.width = max(roughness * roughness, TRACE_ALPHA_MIN);
+    r.width = max(max(roughness * roughness, TRACE_ALPHA_MIN), blur);
     const float mirrored = brightest(fresnel(r.f0, r.f90, cosine)), scattered = brightest(r.diffuse) * (1.0 - m.f0);
     r.mirror_share = mirrored <= 0.0 ? 0.0 : scattered <= 0.0 ? 1.0 : clamp(mirrored / (mirrored + scattered), 0.1, 0.9);
     return r;

@@ -21,6 +21,8 @@ struct Path {
     vec3 origin, direction, throughput, radiance;
     float density;  // of the last direction; 0: the camera's
     float coverage;
+    float blur;     // of the widest reflection so far: sharper mirrors are seen as wide, so that no single path finds the
+                    // sun in one (Kaplanyan and Dachsbacher 2013, "Path Space Regularization")
     uint turn;
 };
 
@@ -40,7 +42,7 @@ Path start(uint pixel, uint sample_index) {
     const vec3 row1 = vec3(view.rotation[3], view.rotation[4], view.rotation[5]);
     const vec3 row2 = vec3(view.rotation[6], view.rotation[7], view.rotation[8]);
     return Path(vec3(view.position[0], view.position[1], view.position[2]), normalize(d.x * row0 + d.y * row1 + row2),
-                vec3(1.0), vec3(0.0), 0.0, 0.0, 0u);
+                vec3(1.0), vec3(0.0), 0.0, 0.0, 0.0, 0u);
 }
 
 Hit search(vec3 origin, vec3 direction, float reach, bool from_camera, bool any_will_do, uint chance) {
@@ -97,13 +99,14 @@ bool meet(inout Path path, uint pixel, uint sample_index) {
     normal = size2 > 1e-12 && dot(normal, path.direction) < 0.0 ? normal * inversesqrt(size2) : side;
     const mat3 frame = frame_of(normal);
     const vec3 out_dir = -path.direction * frame;
-    const Reflector r = reflector_of(material, out_dir.z);
+    const Reflector r = reflector_of(material, out_dir.z, path.blur);
     path.radiance += lit(path, pixel, sample_index, r, frame, point, side, chance.y);
 
     if (++path.turn > TRACE_BOUNCES) return false;
     const uint purpose = 4u * path.turn;
-    const vec3 in_dir = sample_reflection(r, out_dir, pair(pixel, sample_index, purpose - 3u).x,
-                                          pair(pixel, sample_index, purpose - 1u));
+    const float choice = pair(pixel, sample_index, purpose - 3u).x;
+    const vec3 in_dir = sample_reflection(r, out_dir, choice, pair(pixel, sample_index, purpose - 1u));
+    path.blur = max(path.blur, choice < r.mirror_share ? r.width : LAMBERT_BLUR);
     float density;
     const vec3 reflected = evaluate_reflection(r, out_dir, in_dir, density);
     path.direction = frame * in_dir;

@@ -59,7 +59,7 @@ Photographs photograph_with_progress(const DeviceOptions& device, const fs::path
     std::unique_ptr<Progress> progress;
     const Photographs made = photograph_scene(open_device(device), scene, folder, options, [&](int done, int total) {
         if (!progress) progress = std::make_unique<Progress>("photographed", total, "views", quiet);
-        progress->update(done);
+        if (done > 0) progress->update(done);
         return !interrupted();
     });
     progress.reset();

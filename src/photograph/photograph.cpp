@@ -116,13 +116,13 @@ class Run {
 
     Photographs run(const std::function<bool(int, int)>& progress) {
         prepare_folder();
-        for (size_t i = 0; i < cameras_.size(); ++i) {
+        result_.interrupted = !progress(0, int(cameras_.size()));
+        for (size_t i = 0; i < cameras_.size() && !result_.interrupted; ++i) {
             if (done(i))
                 ++result_.kept;
             else
                 photograph(i);
             result_.interrupted = !progress(int(i) + 1, int(cameras_.size()));
-            if (result_.interrupted) break;
         }
         if (!result_.interrupted) finish();
         result_.unfinished_rays = photographer_.unfinished_rays();
