@@ -125,7 +125,8 @@ TEST_F(Faults, ASecondTrainerInTheSameFolder) {
 TEST_F(Faults, SignalsThatAskToEnd) {
     const Names more{"--steps", "3000"};
     for (const int signal : {SIGTERM, SIGHUP, SIGINT}) {
-        const std::string out = "o" + std::to_string(signal);
+        std::string out = "o";
+        out += std::to_string(signal);
         SCOPED_TRACE(out);
         Circumstances asked;
         asked.signal = signal;

@@ -255,7 +255,7 @@ TEST(BlendBackwardSlots, BehindTheLastTileAreZero) {
     r.run([&](gpu::Recording& recording) {
         r.kernels.get<passes::Blend>(false).record(
             recording, r.shape(), {lists.records, lists.splats, lists.starts, planes}, lists.push());
-        r.kernels.get<passes::BlendBackward>().record(
+        r.kernels.get<passes::BlendBackward>(0u).record(
             recording, r.shape(), {lists.records, lists.splats, lists.starts, planes, incoming, slots}, lists.push());
     });
     expect_intact({&slots});
