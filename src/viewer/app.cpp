@@ -15,6 +15,7 @@ namespace {
 
 constexpr double kRestSeconds = 0.2;  // without a change, until the full picture is asked for
 constexpr double kHintSeconds = 15;
+constexpr int kFirstDivisor = 2;  // something to see at once, then all of it
 constexpr int kRedraws = 3;
 constexpr Size kUsualSize{1280, 800};
 
@@ -170,7 +171,7 @@ void App::run() {
             redraws_ = std::max(redraws_, 1);
         }
         if (!scripted()) {
-            for (const int key : keys) handle_key(key);
+            for (const KeyPress& key : keys) handle_key(key);
             move_by_itself(std::min(seconds, 0.1));
             if (const auto dropped = window_.take_dropped(); !dropped.empty()) open(dropped);
         }
@@ -210,7 +211,7 @@ void App::ask() {
     const bool first = asked_.serial == 0, other_scene = asked_scene_ != scene_number_;
     if (first || other_scene || !same_view(request, asked_)) {
         changed_ = now;
-        request.divisor = first || startup_.picture ? 1 : pace_.divisor();
+        request.divisor = scripted() ? 1 : first ? kFirstDivisor : pace_.divisor();
     } else if (asked_.divisor == 1 || now - changed_ < std::chrono::duration<double>(kRestSeconds)) {
         return;
     }

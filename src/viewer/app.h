@@ -70,8 +70,8 @@ class App {
     void take_live();
 
     // app_input.cpp: keys and the mouse.
-    void handle_key(int key);
-    void handle_number(int number);
+    void handle_key(const KeyPress& press);
+    void handle_number(int number, const KeyPress& press);
     void handle_mouse();
     void handle_drag(double right, double down);
     void move_by_itself(double seconds);

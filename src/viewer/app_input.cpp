@@ -20,21 +20,20 @@ constexpr float kStillPixels = 4;  // less of a drag is a click
 
 }  // namespace
 
-void App::handle_number(int number) {
-    if (window_.held(GLFW_KEY_LEFT_CONTROL) || window_.held(GLFW_KEY_RIGHT_CONTROL))
+void App::handle_number(int number, const KeyPress& press) {
+    if (press.control)
         save_view(size_t(number));
-    else if (window_.held(GLFW_KEY_LEFT_SHIFT) || window_.held(GLFW_KEY_RIGHT_SHIFT))
+    else if (press.shift)
         go_to_view(size_t(number));
     else if (number <= 5)
         settings_.look.mode = Mode(number - 1);
 }
 
-void App::handle_key(int key) {
+void App::handle_key(const KeyPress& press) {
     if (ImGui::GetIO().WantTextInput) return;
-    const bool shift = window_.held(GLFW_KEY_LEFT_SHIFT) || window_.held(GLFW_KEY_RIGHT_SHIFT);
-    const bool control = window_.held(GLFW_KEY_LEFT_CONTROL) || window_.held(GLFW_KEY_RIGHT_CONTROL);
-    if (key == GLFW_KEY_Q && control) return window_.close();
-    if (key >= GLFW_KEY_1 && key <= GLFW_KEY_9) return handle_number(key - GLFW_KEY_1 + 1);
+    const int key = press.key;
+    if (key == GLFW_KEY_Q && press.control) return window_.close();
+    if (key >= GLFW_KEY_1 && key <= GLFW_KEY_9) return handle_number(key - GLFW_KEY_1 + 1, press);
     float& scale = settings_.look.splat_scale;
     switch (key) {
         case GLFW_KEY_R:
@@ -75,7 +74,7 @@ void App::handle_key(int key) {
             show_panel_ = !show_panel_;
             return;
         case GLFW_KEY_F12:
-            return shift ? save_exr() : void(capture_ = true);
+            return press.shift ? save_exr() : void(capture_ = true);
         default:
             return;
     }

@@ -103,7 +103,8 @@ Scene open_what(const Arguments& arguments, Startup& startup) {
         startup.watch = live::WhatToWatch{};
         startup.watch->address = live::parse_address(arguments.connect);
         startup.watch->token = arguments.token;
-        Scene scene = arguments.path.empty() ? Scene() : open_scene(arguments.path, arguments.cameras);
+        const std::filesystem::path& what = arguments.path.empty() ? arguments.cameras : arguments.path;
+        Scene scene = what.empty() ? Scene() : open_scene(what, {});
         if (!scene.gaussians) scene.gaussians = std::make_shared<const Gaussians>();
         scene.title = arguments.connect;
         return scene;

@@ -72,9 +72,10 @@ Window& Window::of(GLFWwindow* window) {
 }
 
 void Window::watch() {
-    glfwSetKeyCallback(window_, [](GLFWwindow* window, int key, int, int action, int) {
+    glfwSetKeyCallback(window_, [](GLFWwindow* window, int key, int, int action, int mods) {
         of(window).stirred_ = true;
-        if (action == GLFW_PRESS) of(window).pressed_.push_back(key);
+        if (action == GLFW_PRESS)
+            of(window).pressed_.push_back({key, (mods & GLFW_MOD_SHIFT) != 0, (mods & GLFW_MOD_CONTROL) != 0});
     });
     glfwSetCursorPosCallback(window_, [](GLFWwindow* window, double, double) { of(window).stirred_ = true; });
     glfwSetMouseButtonCallback(window_,
@@ -125,7 +126,7 @@ bool Window::held(int key) const {
     return glfwGetKey(window_, key) == GLFW_PRESS;
 }
 
-std::vector<int> Window::wait(double seconds) {
+std::vector<KeyPress> Window::wait(double seconds) {
     stirred_ = false;
     if (seconds > 0)
         glfwWaitEventsTimeout(seconds);

@@ -29,6 +29,12 @@ class WindowSystem {
     void wake() const;
 };
 
+/// A key as it was pressed: by the time it is looked at, the others may be released.
+struct KeyPress {
+    int key = 0;
+    bool shift = false, control = false;
+};
+
 class Window {
   public:
     /// Throws RunError. resizable: also asks window managers to keep the size where it is false.
@@ -46,7 +52,7 @@ class Window {
     bool held(int key) const;
 
     /// Waits for input, at most this long (0: takes what is there), and returns the keys pressed since.
-    std::vector<int> wait(double seconds);
+    std::vector<KeyPress> wait(double seconds);
     /// Input or a change of the window came with the last wait().
     bool stirred() const { return stirred_; }
     /// What was dropped on the window since the last call; empty: nothing.
@@ -58,7 +64,7 @@ class Window {
     void watch();
 
     GLFWwindow* window_ = nullptr;
-    std::vector<int> pressed_;
+    std::vector<KeyPress> pressed_;
     std::filesystem::path dropped_;
     bool stirred_ = false;
 };

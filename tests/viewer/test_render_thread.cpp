@@ -1,0 +1,91 @@
+// The thread that draws, without a window.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <thread>
+
+#include "ewa/error.h"
+#include "viewer/opening.h"
+#include "viewer/render_thread.h"
+
+namespace ewa::viewer {
+namespace {
+
+PictureRequest request(uint64_t serial) {
+    PictureRequest request;
+    Camera& camera = request.camera;
+    camera.width = 40;
+    camera.height = 30;
+    camera.fx = camera.fy = 40;
+    camera.cx = 20;
+    camera.cy = 15;
+    camera.translation = {0, 0, 4};
+    request.serial = serial;
+    return request;
+}
+
+/// One red splat at the origin.
+std::shared_ptr<const Gaussians> red_splat() {
+    PointCloud points;
+    points.positions = {{0, 0, 0}};
+    points.colors = {{255, 0, 0}};
+    return std::make_shared<const Gaussians>(splats_of_points(points));
+}
+
+template <class Holds>
+bool soon(Holds holds) {
+    for (int i = 0; i < 3000; ++i) {
+        if (holds()) return true;
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return false;
+}
+
+TEST(RenderThread, DrawsTheSceneItWasGivenLast) {
+    RenderThread thread([] { return open_device({}); }, [] {});
+    EXPECT_EQ(thread.set_scene(std::make_shared<const Gaussians>()), 1u);
+    thread.ask(request(1));
+    ASSERT_TRUE(soon([&] { return thread.take_news().picture != nullptr; }));
+    const size_t middle = 4 * (15 * 40 + 20);
+    EXPECT_EQ(thread.take_news().picture->picture.rgba[middle], 0) << "no splats, no picture";
+    EXPECT_EQ(thread.set_scene(red_splat()), 2u);
+    thread.ask(request(2));
+    ASSERT_TRUE(soon([&] { return thread.take_news().picture->request.serial == 2; }));
+    const auto picture = thread.take_news().picture;
+    EXPECT_EQ(picture->scene, 2u);
+    EXPECT_EQ(picture->splats_drawn, 1u);
+    EXPECT_GT(picture->device_bytes, 0u);
+    EXPECT_GT(picture->picture.rgba[middle], 200);
+    EXPECT_LT(picture->picture.rgba[middle + 1], 30);
+
+    EXPECT_EQ(thread.ask_point(request(0).camera, {20.5, 15.5}), 1u);
+    ASSERT_TRUE(soon([&] { return thread.take_news().points == 1; }));
+    ASSERT_TRUE(thread.take_news().point);
+    EXPECT_NEAR(thread.take_news().point->z, 0, 1e-3);
+    EXPECT_EQ(thread.ask_point(request(0).camera, {1, 1}), 2u);
+    ASSERT_TRUE(soon([&] { return thread.take_news().points == 2; }));
+    EXPECT_FALSE(thread.take_news().point) << "there is nothing in the corner";
+}
+
+TEST(RenderThread, OpensItsDeviceAgainWhereItFails) {
+    std::atomic<int> opened = 0;
+    RenderThread thread(
+        [&]() -> std::shared_ptr<gpu::Device> {
+            if (++opened <= 3) throw RunError("lost");
+            return open_device({});
+        },
+        [] {});
+    thread.set_scene(red_splat());
+    thread.ask(request(1));  // twice
+    ASSERT_TRUE(soon([&] { return thread.take_news().failure != nullptr; }));
+    EXPECT_EQ(opened, 2);
+    thread.ask(request(2));
+    ASSERT_TRUE(soon([&] { return thread.take_news().picture != nullptr; }));
+    EXPECT_EQ(opened, 4);
+    EXPECT_EQ(thread.take_news().failure, nullptr);
+    EXPECT_EQ(thread.take_news().picture->request.serial, 2u);
+}
+
+}  // namespace
+}  // namespace ewa::viewer
