@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "bench/bench.h"
 
 #include <CLI/CLI.hpp>
@@ -7,6 +8,8 @@
 #include "bench/ceiling/ceiling.h"
 #include "bench/measure.h"
 #include "bench/report.h"
+#include "bench/stability/cases.h"
+#include "bench/stability/stability.h"
 #include "core/atomic_file.h"
 #include "core/file_reader.h"
 #include "ewa/device.h"
@@ -36,8 +39,11 @@ Json read_json(const std::filesystem::path& path) {
     }
 }
 
-int list_cases() {
-    for (const Case& one : all_cases())
+int list_cases(bool stability) {
+    if (stability)
+        for (const StabilityCase& one : stability_cases())
+            std::printf("%-24s %s\n", one.name.c_str(), one.what.c_str());
+    for (const Case& one : stability ? std::vector<Case>() : all_cases())
         std::printf("%s%s\n", one.name.c_str(), one.large ? "  (--large)" : "");
     return 0;
 }
@@ -95,12 +101,27 @@ void add_options(CLI::App& app, Options& options) {
         ->type_name("OLD.json");
     app.add_option("--results", options.results, "With --compare: take the new results from this file")
         ->type_name("NEW.json");
+    app.add_flag("--stability", options.stability,
+                 "Stiff and extreme scenes against the float64 twin, and training from each; exit status 1 "
+                 "where a bound is "
+                 "broken");
+    app.add_option("FILE", options.scene, "With --stability: this splat file in place of the built-in scenes")
+        ->type_name("");
+    app.add_option("--training-steps", options.training_steps,
+                   "With --stability: steps from each scene, 0 for none")
+        ->check(CLI::Range(0, 100000).description(""))
+        ->type_name("N");
     app.add_flag("--first-step", options.first_step, "What the case first_step starts as a new process")
         ->group("");
 }
 
 int run(const Options& options, const std::vector<std::string>& program) {
-    if (options.list) return list_cases();
+    if (options.list) return list_cases(options.stability);
+    if (options.stability)
+        return run_stability({options.cases, options.training_steps, options.device, options.json,
+                              options.scene, options.read_splats});
+    if (!options.scene.empty())
+        throw InputError(options.scene.string() + ": a file is for --stability, which was not asked for");
     if (options.first_step) return run_first_step(options.device);
     if (!options.results.empty() && options.compare.empty())
         throw InputError("--results is for --compare, which says what they are compared with");

@@ -1,10 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
 // The benchmark: speed per pass against what the host's cores can do, and error against the float64 twin.
 // Both `ewa bench` and the stand-alone ewa-bench are this and nothing more.
 #pragma once
 #include <CLI/App.hpp>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
+
+#include "ewa/gaussians.h"
 
 namespace ewa::bench {
 
@@ -16,6 +20,11 @@ struct Options {
     std::filesystem::path json;
     std::filesystem::path compare;  // results to compare with
     std::filesystem::path results;  // taken in place of measuring
+    bool stability = false;         // the stability suite in place of timings
+    std::filesystem::path scene;    // of that: a splat file in place of the built-in cases
+    int training_steps = 500;       // of that
+    /// Reads a splat file, where the program can.
+    std::function<Gaussians(const std::filesystem::path&)> read_splats;
 };
 
 void add_options(CLI::App& app, Options& options);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "bench/cases.h"
 
 #include <fnmatch.h>
@@ -68,17 +69,18 @@ std::vector<Case> all_cases() {
     return cases;
 }
 
-std::vector<Case> select_cases(const std::string& patterns, bool large) {
-    std::vector<std::string> wanted;
+bool name_matches(const std::string& name, const std::string& patterns) {
     std::istringstream words(patterns);
     for (std::string word; std::getline(words, word, ',');)
-        if (!word.empty()) wanted.push_back(word);
+        if (!word.empty() && matches(name, word)) return true;
+    return false;
+}
+
+std::vector<Case> select_cases(const std::string& patterns, bool large) {
+    const bool all = patterns.find_first_not_of(',') == std::string::npos;
     std::vector<Case> selected;
-    for (const Case& one : all_cases()) {
-        bool take = wanted.empty() && (large || !one.large);
-        for (const std::string& pattern : wanted) take = take || matches(one.name, pattern);
-        if (take) selected.push_back(one);
-    }
+    for (const Case& one : all_cases())
+        if (all ? large || !one.large : name_matches(one.name, patterns)) selected.push_back(one);
     if (selected.empty()) throw InputError("no case matches '" + patterns + "'; --list names them all");
     return selected;
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The fixed set of cases. A case's name says all of it: figures of two machines or two commits are compared
 // by name.
 #pragma once
@@ -33,6 +34,9 @@ struct Case {
 };
 
 std::vector<Case> all_cases();
+
+/// Whether a name is meant by patterns as select_cases takes them.
+bool name_matches(const std::string& name, const std::string& patterns);
 
 /// Patterns separated by commas; one that holds * or ? must match the whole name, another any part of it.
 /// Empty: all but the large ones, unless `large`. A pattern names large cases too. Throws InputError where

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The device's results against the float64 twin and against the rules that sorts and scans follow.
 #pragma once
 #include <vector>

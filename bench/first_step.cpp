@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How long a new process takes until its first training step is done. Shader caches live in the driver, so
 // only new processes can tell.
 #include <fcntl.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "bench/frame_run.h"
 
 #include <algorithm>
@@ -29,7 +30,7 @@ FrameRun::FrameRun(std::shared_ptr<gpu::Device> device, const Scene& scene, bool
       model_(upload_model(*device_, scene.gaussians, train ? 2 : 0, false)),
       camera_(scene.camera),
       train_(train) {
-    const shared::CameraBlock block = camera_block(camera_, kernels_.shape());
+    const shared::CameraBlock block = camera_block(camera_, kernels_.shape(), model_.origin);
     camera_buffer_ = gpu::Buffer(*device_, "camera", sizeof(block), gpu::Texel::none, true);
     camera_buffer_.upload(std::span<const shared::CameraBlock>(&block, 1));
     camera_use_ = {&camera_buffer_, 0, uint32_t(camera_.width), uint32_t(camera_.height)};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One frame or training step of a scene on the device, again and again.
 #pragma once
 #include <functional>

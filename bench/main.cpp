@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ewa-bench: the benchmark as a program of its own, for a machine that has a device and nothing else.
 #include <CLI/CLI.hpp>
 #include <cstdio>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Runs a case and writes down what it took.
 #pragma once
 #include <memory>

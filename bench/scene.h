@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Synthetic scenes: pure functions of a case, the same on every machine up to the last bits of log, cos and
 // exp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Several timings of one thing, as a median and how far they lie from it.
 #pragma once
 #include <functional>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // printf into a string. The stand-alone program links no formatting library.
 #pragma once
 #include <string>

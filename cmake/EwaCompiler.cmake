@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # What every translation unit is compiled with.
 add_library(ewa_compiler INTERFACE)
 target_compile_features(ewa_compiler INTERFACE cxx_std_20)

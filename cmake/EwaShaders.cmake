@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Compiles shaders/passes/*.comp to SPIR-V and embeds every module in one library.
 # One shader that does not compile fails the build; a changed include rebuilds what includes it (depfiles).
 find_program(GLSLANG glslangValidator REQUIRED)
@@ -55,4 +56,5 @@ if(ewa_shaders)
     add_library(ewa_shader_code STATIC ${ewa_shader_table_cpp} ${ewa_spirv})
     target_include_directories(ewa_shader_code PRIVATE ${ewa_spirv_dir} ${PROJECT_SOURCE_DIR}/src)
     target_link_libraries(ewa_shader_code PUBLIC ewa_compiler)
+    set_target_properties(ewa_shader_code PROPERTIES POSITION_INDEPENDENT_CODE ON)
 endif()

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # OpenImageIO by header and library. Debian's own CMake package also demands the command line tools and the headers of
 # OpenCV, which nothing here uses.
 find_path(OpenImageIO_INCLUDE_DIR OpenImageIO/imageio.h)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Compiled with -mavx2 -mfma: 8 pixels a vector.
 #define EWA_BENCH_LANES 8
 #include "bench/ceiling/blend_loop.inc"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Compiled with -mavx512f -mfma: 16 pixels a vector.
 #define EWA_BENCH_LANES 16
 #include "bench/ceiling/blend_loop.inc"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Blending in plain C++: the loop of shaders/passes/blend.comp on vectors of the CPU, the ceiling its speed
 // is held against. It takes the device's own records and sorted lists, so that both do the same work.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Compiled for the oldest CPU the program runs on, and without fused multiply-add. Also counts the pairs.
 #define EWA_BENCH_LANES 8
 #include "bench/ceiling/blend_loop.inc"

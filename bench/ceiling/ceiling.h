@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the host's cores do with the same work in plain C++: the ceiling that passes are held against.
 #pragma once
 #include <cstdint>

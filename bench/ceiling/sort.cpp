@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A stable radix sort of pairs on all threads, least significant digit first.
 #include <algorithm>
 #include <barrier>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A pinhole camera in the OpenCV convention: x right, y down, z forward, pixel centres at +0.5.
 #pragma once
 #include <glm/mat3x3.hpp>

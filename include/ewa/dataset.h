@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Photographs with their cameras, and the points they were reconstructed from.
 #pragma once
 #include <array>
@@ -70,6 +71,7 @@ struct Dataset {
     int missing_images = 0;               // entries whose image file is not there
     int dropped_points = 0;               // points with a coordinate that is not finite, left out of `points`
     std::string first_dropped_point;      // where the first of them stands: file and byte, line or vertex
+    bool color_depends_on_view = true;    // false where the dataset says that SH degree 0 suffices: "view_dependent": false
 };
 
 struct DatasetOptions {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Vulkan devices: what is there, and opening one.
 #pragma once
 #include <cstdint>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The two ways an ewa function fails. Anything else that throws is a bug.
 #pragma once
 #include <stdexcept>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A photograph's exposure.
 #pragma once
 #include <array>

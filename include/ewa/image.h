@@ -1,7 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pictures in memory, on disk, and their distance from each other.
 #pragma once
-#include <cstddef>
 #include <array>
+#include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <vector>
 
@@ -58,5 +60,18 @@ double psnr(const Image& a, const Image& b, const Image& weights);
 double ssim(const Image& a, const Image& b);
 /// Of a pulled onto b where it weighs less (w a + (1 - w) b), each pixel's share its weight.
 double ssim(const Image& a, const Image& b, const Image& weights);
+
+/// How far apart two pictures are.
+struct ImageDifference {
+    double psnr = 0, ssim = 0;              // as above: RGB, clamped to [0, 1]
+    double max_error = 0;                   // of one value, not clamped; +inf where only one of the two is finite
+    int max_x = 0, max_y = 0, max_channel = 0;  // where it is; px from the top left corner
+    double mean_error = 0, rms_error = 0;   // over all values, not clamped
+    uint64_t over = 0;                      // pixels with a value further apart than the tolerance
+};
+
+/// OpenImageIO's comparison over the channels that both pictures have, and PSNR and SSIM. tolerance >= 0.
+/// Throws InputError when sizes differ.
+ImageDifference compare_images(const Image& a, const Image& b, double tolerance = 0);
 
 }  // namespace ewa

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a picture depends on besides the splats and the camera.
 #pragma once
 #include <array>

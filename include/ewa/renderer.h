@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pictures and gradients of a fixed splat scene.
 #pragma once
 #include <cstdint>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Changing a splat scene as a whole.
 #pragma once
 #include <cstdint>

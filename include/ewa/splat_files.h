@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Splat scenes on disk.
 #pragma once
 #include <filesystem>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // From photographs to splats.
 #pragma once
 #include <array>
@@ -58,6 +59,8 @@ struct TrainOptions {
     // refine_every.
     int relocate_stop = 25000;
     double growth = 1.05;                // of the number of splats a refinement, up to max_splats
+    double copy_spread = 1;              // standard deviations that copies start apart in a run of no length; none in a
+                                         // full one, where noise has the time to part them (src/train/schedule.h)
     double dead_opacity = 0.005;
     double noise_rate = 5e5;             // times the learning rate of the means
     double opacity_weight = 0.01;        // of the mean opacity in the loss
@@ -98,6 +101,7 @@ struct StepReport {
     uint32_t splats = 0;
     uint64_t dropped_updates = 0;        // parameter updates that were not finite, dropped
     uint32_t skipped_nonfinite = 0;      // splats skipped in the last step
+    uint64_t limited_steps = 0;          // steps of a mean, quaternion or scale that were shortened
 };
 
 /// What the steps to come depend on, besides the dataset, its training frames and the options.

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """What undistortion costs: trains on the still life seen through three lenses, and on its pinhole twin.
 
     python3 lenses.py OUT [--ewa build/release/ewa] [--steps 1500]

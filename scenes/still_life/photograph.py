@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """Photographs the still life: renders the views, and writes their poses and a sparse point cloud.
 
     python3 photograph.py                 writes images/, sparse/0/ and transforms.json beside this file

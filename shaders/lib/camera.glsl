@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The camera's uniform block, and points seen from it. The including pass defines BINDING_CAMERA.
 #ifndef EWA_LIB_CAMERA
 #define EWA_LIB_CAMERA

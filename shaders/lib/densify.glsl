@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What adaptive density control does with one splat (3DGS, section 5.2 and densify_and_prune of its code): a splat
 // whose mean gradient is above the threshold is cloned where it is small and split where it is large; one that has
 // become transparent, or too large once that is asked for, goes. A split's children are judged by their own size.

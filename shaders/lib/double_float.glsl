@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Sums and products of float pairs (hi, lo), about 48 bits: Dekker 1971, Knuth TAOCP 4.2.2. `precise` keeps the
 // compiler from contracting or reordering the error terms away. Nothing here relies on a fused multiply-add.
 #ifndef EWA_LIB_DOUBLE_FLOAT

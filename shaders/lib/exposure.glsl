@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A photograph's exposure: an affine map of colours, three rows of (matrix row, offset), 12 floats.
 #ifndef EWA_LIB_EXPOSURE
 #define EWA_LIB_EXPOSURE

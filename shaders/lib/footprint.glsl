@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Which tiles a splat's ellipse {alpha >= ALPHA_MIN} reaches, tile row by tile row, in closed form.
 // The answer errs to the large side only, so leaving out the other tiles never changes the picture.
 #ifndef EWA_LIB_FOOTPRINT
@@ -16,9 +17,11 @@ struct Footprint {
 // Slack for the rounding of what follows, in units of u and v; 3.3 is the largest reach an ordinary splat has.
 const float REACH_SLACK = 1e-3;
 
-// First and one-past-last tile that holds a pixel centre in [low, high] (px), of `tiles` tiles over `size` pixels.
-uvec2 tiles_between(float low, float high, uint tile, uint size) {
-    const float slack = 1e-3 + 4e-7 * (abs(low) + abs(high));
+// First and one-past-last tile that holds a pixel centre in mean + [left, right] (px), of `size` pixels. The slack covers the
+// rounding of the terms, which may be far larger than their sum.
+uvec2 tiles_between(float mean, float left, float right, uint tile, uint size) {
+    const float slack = 1e-3 + 4e-7 * (abs(mean) + abs(left) + abs(right));
+    const float low = mean + left, high = mean + right;
     const float first = ceil(clamp(low - slack - 0.5, -1.0, float(size)));
     const float last = floor(clamp(high + slack - 0.5, -1.0, float(size)));
     const int begin = max(int(first), 0), end = min(int(last), int(size) - 1);
@@ -32,12 +35,12 @@ Footprint footprint_of(vec4 record0, vec4 record1, uvec2 size) {
     f.ux = record1.x;
     f.k = record1.y;
     f.vy = record1.z;
-    const float ratio = record1.w / float(ALPHA_MIN);
+    const float ratio = record1.w / CUT_OFF;
     f.reach = sqrt(max(0.0, log(max(ratio, 1.0)) * 1.00001 + 1e-5)) + REACH_SLACK;
     f.row_begin = f.row_end = 0u;
     if (ratio >= 1.0) {
         const float half_height = f.reach / f.vy;
-        const uvec2 rows = tiles_between(f.mean.y - half_height, f.mean.y + half_height, TILE_HEIGHT, size.y);
+        const uvec2 rows = tiles_between(f.mean.y, -half_height, half_height, TILE_HEIGHT, size.y);
         f.row_begin = rows.x;
         f.row_end = rows.y;
     }
@@ -62,7 +65,7 @@ uvec2 columns_of(Footprint f, uint row, uvec2 size) {
     const float peak = half_height * t / sqrt(1.0 + t * t);
     const float right = border(f, clamp(peak, low, high));
     const float left = -border(f, -clamp(-peak, low, high));
-    return tiles_between(f.mean.x + left, f.mean.x + right, TILE_WIDTH, size.x);
+    return tiles_between(f.mean.x, left, right, TILE_WIDTH, size.x);
 }
 
 // Pairs (splat, tile) in tile rows [begin, end).

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // 3DGS as Markov chain Monte Carlo (Kheradmand et al. 2024, "3D Gaussian Splatting as Markov Chain Monte Carlo").
 #ifndef EWA_LIB_MCMC
 #define EWA_LIB_MCMC
@@ -7,20 +8,28 @@
 //   sum_{i=1..N} sum_{k=0..i-1} C(i-1, k) (-1)^k x^(k+1) / sqrt(k + 1)  with x the new opacity,
 // cancels beyond float32 for large N. With 1 / sqrt(k) = 2 / sqrt(pi) integral exp(-k t^2) dt it is
 //   2 / sqrt(pi) integral_0^inf 1 - (1 - x exp(-t^2))^N dt,
-// where nothing cancels and the trapezoidal rule converges exponentially.
+// where nothing cancels and the trapezoidal rule converges exponentially. ln(1 + x) and exp(x) - 1 are needed near zero,
+// where a share of thousands lies, and where drivers' log and exp have few digits left.
+float log_1p(float x) {   // x > -1
+    const float s = x / (2.0 + x), q = s * s;
+    const float series = 2.0 * s * (1.0 + q * (1.0 / 3.0 + q * (0.2 + q * (1.0 / 7.0 + q * (1.0 / 9.0 + q / 11.0)))));
+    return abs(x) < 0.5 ? series : log(1.0 + x);
+}
+float exp_m1(float x) {   // x <= 0
+    const float series =
+        x * (1.0 + x / 2.0 * (1.0 + x / 3.0 * (1.0 + x / 4.0 * (1.0 + x / 5.0 * (1.0 + x / 6.0 * (1.0 + x / 7.0))))));
+    return x > -0.5 ? series : exp(x) - 1.0;
+}
+
 vec2 relocated(float logit, uint parts) {
     const float step = 0.1;
-    const float optical = logit > 20.0 ? logit : log(1.0 + exp(logit)); // -ln(1 - opacity)
-    const float opacity = 1.0 - exp(-optical / float(parts));
+    const float optical = logit > 20.0 ? logit : log_1p(exp(logit)); // -ln(1 - opacity)
+    const float opacity = -exp_m1(-optical / float(parts));
     float sum = 0.0;
     [[dont_unroll]] for (uint j = 0u; j < 42u; ++j) {
         const float t = step * float(j);
-        float base = 1.0 - opacity * exp(-t * t), power = 1.0;
-        [[unroll]] for (uint bit = 0u; bit < 16u; ++bit) {
-            if ((parts >> bit & 1u) != 0u) power *= base;
-            base *= base;
-        }
-        sum += j == 0u ? 0.5 * (1.0 - power) : 1.0 - power;
+        const float height = -exp_m1(float(parts) * log_1p(-opacity * exp(-t * t)));
+        sum += j == 0u ? 0.5 * height : height;
     }
     return vec2(opacity, (1.0 / (1.0 + exp(-logit))) / (1.1283791670955126 * step * sum));
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Where a splat's parameters stand (shared/layouts.h).
 #ifndef EWA_LIB_PARAMS
 #define EWA_LIB_PARAMS

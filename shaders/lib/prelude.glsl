@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What every pass begins with.
 #ifndef EWA_LIB_PRELUDE
 #define EWA_LIB_PRELUDE
@@ -7,6 +8,7 @@
 #include "shared/layouts.h"
 
 layout(constant_id = SPEC_GROUP_SIZE) const uint GROUP_SIZE = 64;
+layout(constant_id = SPEC_CUT_OFF) const float CUT_OFF = float(ALPHA_MIN);
 
 // The item of this invocation in a dispatch over more items than one row of workgroups holds.
 uint item_index() {

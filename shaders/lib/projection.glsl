@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // From a splat's parameters to its 2D Gaussian: Sigma2 = J W Sigma W^T J^T + LOW_PASS I (EWA; Zwicker et al. 2001,
 // eq. 22 to 31), with M = J W R S, so that Sigma2 = M M^T + LOW_PASS I. Shared by the forward and the backward pass.
 // Needs camera.glsl and quaternion.glsl.
@@ -25,19 +26,17 @@ struct Projection {
     bvec2 tangent_clamped;
     vec2 focal_over_z;
     vec3 m0, m1;           // rows of M (px)
-    float a, b, c, det;    // Sigma2 = [a b; b c] (px^2)
+    bool in_range;         // the quaternion, the mean and the footprint can be computed with
+    float unit;            // 1, or less where the footprint's squares would overflow: px to the units of the next line
+    float a, b, c, det;    // Sigma2 = [a b; b c]
+    vec3 minors;           // m0 x m1
     float det0;            // det(M M^T), without the low-pass
+    float ux, k, vy;       // as in the record (px)
     float peak;            // opacity before the kernel's factor
     float factor;          // the kernel's factor
 };
 
 float sigmoid(float x) { return 1.0 / (1.0 + exp(-x)); }
-
-// det(M M^T) as the sum of the squared 2x2 minors (Cauchy-Binet): nothing cancels, however thin the splat.
-float gram_determinant(vec3 m0, vec3 m1) {
-    const vec3 minors = cross(m0, m1);
-    return dot(minors, minors);
-}
 
 Projection project_splat(SplatShape splat) {
     Projection p;
@@ -46,8 +45,8 @@ Projection project_splat(SplatShape splat) {
     p.unit_quaternion = normalize_quaternion(splat.quaternion, p.quaternion_norm);
     p.rotation = rotation_of(p.unit_quaternion);
     const vec3 scale = exp(splat.log_scale);
-    p.axes = camera_rotation() * p.rotation;
-    [[unroll]] for (int k = 0; k < 3; ++k) p.axes[k] *= scale[k];
+    const mat3 directions = camera_rotation() * p.rotation;
+    [[unroll]] for (int k = 0; k < 3; ++k) p.axes[k] = directions[k] * scale[k];
 
     const vec2 tangent = vec2(p.view.x.x, p.view.y.x) / z;
     const vec2 low = vec2(camera.tan_min[0], camera.tan_min[1]);
@@ -60,18 +59,33 @@ Projection project_splat(SplatShape splat) {
     p.m1 = p.focal_over_z.y * vec3(p.axes[0].y - p.tangent.y * p.axes[0].z, p.axes[1].y - p.tangent.y * p.axes[1].z,
                                    p.axes[2].y - p.tangent.y * p.axes[2].z);
 
-    const float aa = dot(p.m0, p.m0), cc = dot(p.m1, p.m1);
-    const float low_pass = float(LOW_PASS);
+    const vec3 far = abs(p.view.offset), wide = abs(p.m0) + abs(p.m1);
+    const float footprint = wide.x + wide.y + wide.z;
+    // Phrased so that NaN fails it.
+    p.in_range = far.x <= float(VIEW_MAX) && far.y <= float(VIEW_MAX) && far.z <= float(VIEW_MAX) &&
+                 footprint <= float(FOOTPRINT_MAX) && p.quaternion_norm >= float(QUATERNION_MIN);
+    // A power of two, so that it rounds nothing.
+    p.unit = footprint > 1073741824.0 ? 9.094947017729282e-13 : 1.0;
+    const vec3 m0 = p.unit * p.m0, m1 = p.unit * p.m1;
+    const float aa = dot(m0, m0), cc = dot(m1, m1);
+    const float low_pass = p.unit * p.unit * float(LOW_PASS);
     p.a = aa + low_pass;
-    p.b = dot(p.m0, p.m1);
+    p.b = dot(m0, m1);
     p.c = cc + low_pass;
-    p.det0 = gram_determinant(p.m0, p.m1);
+    // det(M M^T) is the sum of the squared 2x2 minors of M (Cauchy-Binet). A minor is in turn a product: two scales and how
+    // far the third axis points at the camera. Nothing cancels, however thin the splat and however wide the view.
+    const vec3 x_scale = p.unit * p.focal_over_z.x * scale, y_scale = p.unit * p.focal_over_z.y * scale;
+    p.minors = (vec3(p.tangent, 1.0) * directions) * x_scale.yzx * y_scale.zxy;
+    p.det0 = dot(p.minors, p.minors);
     p.det = p.det0 + low_pass * (aa + cc) + low_pass * low_pass;
+    p.ux = p.unit * sqrt(0.5 * p.c / p.det);
+    p.k = p.b / p.c;
+    p.vy = p.unit * sqrt(0.5 / p.c);
 
     p.peak = sigmoid(splat.logit);
     p.factor = 1.0;
     if (KERNEL == KERNEL_ANTIALIAS) p.factor = sqrt(max(0.0, p.det0 / p.det));
-    if (KERNEL == KERNEL_UNIT_MASS) p.factor = 0.15915494309189535 / sqrt(p.det);
+    if (KERNEL == KERNEL_UNIT_MASS) p.factor = 0.15915494309189535 * p.unit * p.unit / sqrt(p.det);
     return p;
 }
 #endif

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Rotation of a quaternion (w, x, y, z) of any non-zero norm.
 #ifndef EWA_LIB_QUATERNION
 #define EWA_LIB_QUATERNION
@@ -18,15 +19,9 @@ mat3 rotation_of(vec4 q) {
                 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y));
 }
 
-// dL/dq of the unit quaternion, from dL/dR (columns as in rotation_of).
-vec4 rotation_backward(vec4 q, mat3 g) {
-    const float w = q.x, x = q.y, y = q.z, z = q.w;
-    return 2.0 * vec4(x * (g[1][2] - g[2][1]) + y * (g[2][0] - g[0][2]) + z * (g[0][1] - g[1][0]),
-                      -2.0 * x * (g[1][1] + g[2][2]) + y * (g[1][0] + g[0][1]) + z * (g[2][0] + g[0][2]) +
-                          w * (g[1][2] - g[2][1]),
-                      x * (g[1][0] + g[0][1]) - 2.0 * y * (g[0][0] + g[2][2]) + z * (g[2][1] + g[1][2]) +
-                          w * (g[2][0] - g[0][2]),
-                      x * (g[2][0] + g[0][2]) + y * (g[2][1] + g[1][2]) - 2.0 * z * (g[0][0] + g[1][1]) +
-                          w * (g[0][1] - g[1][0]));
+// dL/dq of the unit quaternion, from dL/d(rotation about its own axes): a turn by the small angles w is q (1, w / 2), so the
+// gradient is 2 q (0, torque), at right angles to q.
+vec4 torque_on_quaternion(vec4 q, vec3 torque) {
+    return 2.0 * vec4(-dot(q.yzw, torque), q.x * torque + cross(q.yzw, torque));
 }
 #endif

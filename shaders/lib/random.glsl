@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Counter-based random numbers: a pure function of its counter, the same in src/core/random.h.
 // pcg4d of Jarzynski and Olano 2020, "Hash Functions for GPU Rendering".
 #ifndef EWA_LIB_RANDOM

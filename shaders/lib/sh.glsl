@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Real spherical harmonics to degree 3 in INRIA's order, and their derivatives by the unit direction.
 #ifndef EWA_LIB_SH
 #define EWA_LIB_SH

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How the lanes of the radix sort share the items: contiguous chunks of whole texels (4 items).
 #ifndef EWA_LIB_SORTING
 #define EWA_LIB_SORTING

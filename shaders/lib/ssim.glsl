@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The SSIM window and its blur. Images are planes of floats fetched 4 at a time;
 // what lies outside the image is zero.
 #ifndef EWA_LIB_SSIM

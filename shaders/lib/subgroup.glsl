@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Sums over a subgroup by shuffles with constant distances, which cost next to nothing where subgroup arithmetic does not.
 #ifndef EWA_LIB_SUBGROUP
 #define EWA_LIB_SUBGROUP

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One subgroup owns one tile: lane l stands in column l % TILE_WIDTH and has PIXELS pixels of it, ROW_STEP rows apart.
 // A batch of SUBGROUP splats lives in registers, one splat a lane, and goes round by shuffles with constant lanes.
 // Needs subgroup.glsl; the including pass declares `push` (BlendPush), records, values, tile_starts.
@@ -74,7 +75,7 @@ void column_alphas(LaneSplat s, out float raw[PIXELS]) {
 }
 
 // Phrased so that a NaN is no contribution.
-float alpha_of(float raw) { return raw >= float(ALPHA_MIN) ? min(float(ALPHA_MAX), raw) : 0.0; }
+float alpha_of(float raw) { return raw >= CUT_OFF ? min(float(ALPHA_MAX), raw) : 0.0; }
 
 // Transmittance is kept positive while the pixel is open, and negative from the splat on that would have taken it to
 // TRANSMITTANCE_STOP or under: one float is both the value and the flag.

@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Blends the splats of a tile front to back into the image planes: C = sum c alpha T + T background. One workgroup is
 // one subgroup and owns one tile. SPEC_MODE: BLEND_*.
 #extension GL_GOOGLE_include_directive : require

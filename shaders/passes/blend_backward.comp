@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Gradients of blending, front to back: with R = (what is blended behind a splat) . dL/dC,
 // dL/d(alpha) = T c . dL/dC - R / (1 - alpha); R starts as C . dL/dC and each splat takes its own share off, so nothing
 // is divided by 1 - alpha splat after splat. One workgroup is one subgroup and owns one tile, and the gradient slots
@@ -137,6 +138,17 @@ void main() {
         if (subgroupAll(!open)) {
             k += SUBGROUP;
             break;
+        }
+    }
+    // The last tile also answers for the instances that turned out not to exist: every slot of the list is written, so
+    // that none holds what an earlier frame left.
+    if (tile + 1u == push.tiles[0] * push.tiles[1]) {
+        const uint all = tile_starts[tile + 2u];
+        for (uint e = end; e < all; e += SUBGROUP) {
+            if (e + lane < all) {
+                const uint at = SLOT_FLOATS * (e + lane);
+                [[unroll]] for (uint i = 0; i < SUMS; ++i) slots[at + i] = 0.0;
+            }
         }
     }
     // Instances behind the last open pixel got nothing.

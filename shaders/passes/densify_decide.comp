@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Decides how many splats each one becomes: 0, 1 or 2. One invocation owns splat i.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"

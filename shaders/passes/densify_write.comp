@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Writes the splats of the next generation into new buffers. One invocation owns old splat i and writes what it
 // becomes, side by side in the old order. A kept splat and a clone's original keep their moments; what is new starts
 // with none. Children of a split are drawn from the parent's Gaussian and are SPLIT_SCALE times smaller; with revised

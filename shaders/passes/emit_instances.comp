@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Writes the (splat, tile) instances in depth order. One invocation owns the splat at one depth rank, and of its tile
 // rows the strip given by the workgroup's z (a strip bounds the loop: a splat may cover more tiles than some drivers
 // allow iterations). Instances of a splat are contiguous, in rows from top to bottom. SPEC_MODE 1 (gradients): also

@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // The picture through a photograph's exposure, which the loss compares with the photograph. One invocation owns one pixel.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"

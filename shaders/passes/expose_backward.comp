@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // The way back through expose: the gradient by the picture is the transposed matrix times that by the exposed one, and the
 // gradient by the exposure is summed over pixels. One workgroup is one subgroup and owns EXPOSURE_BLOCK pixels.
 #extension GL_GOOGLE_include_directive : require

@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Adam's step of one photograph's exposure: adds up its gradient's partial sums in a fixed order, and a weak pull towards
 // the identity, without which all exposures together could drift and the splats against them. One workgroup of one
 // subgroup. An update that is not finite is dropped and counted. Nothing happens in a frame whose instances did not fit

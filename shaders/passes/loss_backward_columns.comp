@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Carries the derivatives of SSIM back through the window (it is symmetric: the same blur), down the columns. One
 // invocation owns LOSS_ROWS rows of one texel of plane workgroup.z.
 #extension GL_GOOGLE_include_directive : require

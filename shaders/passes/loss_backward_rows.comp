@@ -1,6 +1,8 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Second half of the way back, along the rows, and the gradient of the whole loss by the rendering:
-// dL/dx = ssim_scale (blur dS/d(mean x) + 2 x blur dS/d(mean x^2) + y blur dS/d(mean x y)) + l1_scale sign(x - y).
+// dL/dx = ssim_scale (blur dS/d(mean x) + 2 x blur dS/d(mean x^2) + y blur dS/d(mean x y)) + l1_scale sign(x - y),
+// the first part where |x| is within SSIM_LIMIT.
 // One invocation owns LOSS_TEXELS texels of channel workgroup.z, one subgroup one partial sum of |x - y|.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
@@ -36,9 +38,11 @@ void main() {
         const bool there = inside && first + o < int(row_texels);
         const int at = int(channel * plane) + row + first + o;
         const vec4 x = fetch_or_zero(image, there, at), y = fetch_or_zero(target, there, at);
+        const vec4 limit = vec4(SSIM_LIMIT), seen = vec4(lessThanEqual(abs(x), limit));
         if (there)
-            image_gradient[at] =
-                push.ssim_scale * (m[0][o] + 2.0 * x * m[1][o] + y * m[2][o]) + push.l1_scale * sign(x - y);
+            image_gradient[at] = push.ssim_scale * seen * (m[0][o] + 2.0 * clamp(x, -limit, limit) * m[1][o] +
+                                                           clamp(y, -limit, limit) * m[2][o]) +
+                                 push.l1_scale * sign(x - y);
         differences += abs(x - y);
     }
     const float sum = subgroup_sum(differences.x + differences.y + differences.z + differences.w);

@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // First half of the SSIM window: blurs the four moments of rendering x and photograph y down the columns (Wang et al.
 // 2004; x^2 and y^2 are only ever needed as a sum). One invocation owns LOSS_ROWS rows of one texel of channel
 // workgroup.z.
@@ -22,8 +23,8 @@ void main() {
         const int row = top + r - RADIUS;
         const bool inside = row >= 0 && row < int(push.size[1]);
         const int at = int(channel * plane) + row * int(row_texels) + column;
-        a[r] = fetch_or_zero(image, inside, at);
-        b[r] = fetch_or_zero(target, inside, at);
+        a[r] = clamp(fetch_or_zero(image, inside, at), -float(SSIM_LIMIT), float(SSIM_LIMIT));
+        b[r] = clamp(fetch_or_zero(target, inside, at), -float(SSIM_LIMIT), float(SSIM_LIMIT));
     }
     [[unroll]] for (uint q = 0; q < MOMENT_PLANES; ++q) {
         vec4 values[COLUMN_SPAN];

@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Second half of the SSIM window, along the rows; then SSIM itself and its derivatives by the moments of the rendering:
 // S = A1 A2 / (B1 B2), A1 = 2 mx my + C1, A2 = 2 (mxy - mx my) + C2, B1 = mx^2 + my^2 + C1,
 // B2 = m(x^2 + y^2) - mx^2 - my^2 + C2. One invocation owns LOSS_TEXELS texels of channel workgroup.z, one subgroup one

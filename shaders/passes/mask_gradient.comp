@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // The way back through mask_pictures: the gradient by the rendering, times how much the pixel counts. One invocation owns
 // one pixel.
 #extension GL_GOOGLE_include_directive : require

@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // What the loss compares where a photograph's alpha says how much a pixel counts: spreads the photograph into planes, as it
 // is, and pulls the rendering onto it where it counts less. One invocation owns one pixel.
 #extension GL_GOOGLE_include_directive : require

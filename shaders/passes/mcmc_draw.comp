@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Draws the sources of the splats that are relocated or added: source e with probability weight[e] / total. One
 // invocation owns draw d; it looks the random number up in the prefix sums, and counts the hit. The counts are integer
 // sums, the same in any order.

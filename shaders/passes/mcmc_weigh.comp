@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // How likely a splat is to be the source of another, and whether it is dead itself: too transparent to be seen, or
 // not finite. Weights are opacities as integers, so that their sum does not depend on its order. One invocation owns
 // splat i.

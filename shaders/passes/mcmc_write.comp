@@ -1,11 +1,14 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Writes the splats of the next generation into new buffers. One invocation owns new splat j. A dead splat and one
 // past the old number become copies of their sources; a source and its copies share what it was (lib/mcmc.glsl) and
-// start without moments.
+// start without moments. With a spread, each of them stands where a normal draw of the source's Gaussian puts it.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/params.glsl"
 #include "lib/mcmc.glsl"
+#include "lib/quaternion.glsl"
+#include "lib/random.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3; // the degree stored
@@ -32,13 +35,21 @@ void main() {
     else if (dead[j] != 0u) source = sources[totals[j / push.scan_block] + prefix[j]];
     const uint copies = hits[source];
     const float logit = texelFetch(params, int(param_texel(PLANES, 0u, source))).w;
-    const vec2 part = relocated(logit, min(copies + 1u, 0xffffu));
+    const vec2 part = relocated(logit, copies + 1u);
     const float opacity = clamp(part.x, push.least_opacity, 1.0 - 1e-6);
+    vec3 offset = vec3(0.0);
+    if (push.spread > 0.0) {
+        float norm;
+        const vec3 normal = normal3(uvec4(j, push.step, push.seed[0], push.seed[1] ^ MCMC_SPREAD_STREAM));
+        const vec3 scale = exp(texelFetch(params, int(param_texel(PLANES, 2u, source))).xyz);
+        const mat3 rotation = rotation_of(normalize_quaternion(texelFetch(params, int(param_texel(PLANES, 1u, source))), norm));
+        offset = push.spread * (rotation * (scale * normal));
+    }
     [[unroll]] for (uint plane = 0; plane < PLANES; ++plane) {
         const int from = int(param_texel(PLANES, plane, source));
         const uint to = param_texel(PLANES, plane, j);
         vec4 value = texelFetch(params, from);
-        if (plane == 0u && copies > 0u) value.w = log(opacity / (1.0 - opacity));
+        if (plane == 0u && copies > 0u) value = vec4(value.xyz + offset, log(opacity / (1.0 - opacity)));
         if (plane == 2u && copies > 0u) value.xyz += log(part.y);
         params_out[to] = value;
         moments1_out[to] = copies > 0u ? vec4(0.0) : texelFetch(moments1, from);

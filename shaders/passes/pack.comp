@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Turns the colour planes into 8-bit RGBA, a word a pixel in rows of `stride`, rounded and clamped as save_image does it.
 // One invocation owns a texel of each plane, that is 4 pixels of a row.
 #extension GL_GOOGLE_include_directive : require

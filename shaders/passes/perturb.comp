@@ -1,6 +1,8 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Moves every mean by noise of its splat's own shape, the more the more transparent it is (Kheradmand et al. 2024,
-// eq. 8): mean += amplitude sigmoid(-MCMC_GATE_SLOPE (opacity - MCMC_GATE_OPACITY)) Sigma n. One invocation owns
+// eq. 8): mean += amplitude sigmoid(-MCMC_GATE_SLOPE (opacity - MCMC_GATE_OPACITY)) Sigma n, at most `reach` along each
+// axis of the splat. One invocation owns
 // splat i. Nothing happens in a frame whose instances did not fit (the host repeats it).
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
@@ -10,7 +12,7 @@
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(set = 0, binding = 0, scalar) buffer Params { vec4 params[]; };
-layout(set = 0, binding = 1, scalar) readonly buffer CountsBlock { Counts counts; };
+layout(set = 0, binding = 1, scalar) buffer CountsBlock { Counts counts; };
 layout(push_constant, scalar) uniform Push { PerturbPush push; };
 
 void main() {
@@ -24,6 +26,13 @@ void main() {
     const vec3 normal = normal3(uvec4(i, push.step, push.seed[0], push.seed[1] ^ MCMC_NOISE_STREAM));
     float norm;
     const mat3 rotation = rotation_of(normalize_quaternion(params[param_texel(push.planes, 1u, i)], norm));
-    const vec3 moved = p0.xyz + push.amplitude * gate * (rotation * (scale * scale * (normal * rotation)));
-    if (is_finite(moved)) params[at] = vec4(moved, p0.w);
+    // The noise is made shorter than the scene where a splat larger than it asks for more.
+    const vec3 along = push.amplitude * gate * (scale * scale * (normal * rotation));
+    const float longest = max(max(abs(along.x), abs(along.y)), abs(along.z));
+    const bool limited = longest > push.reach;
+    const vec3 moved = p0.xyz + rotation * (limited ? along * (push.reach / longest) : along);
+    if (is_finite(moved)) {
+        params[at] = vec4(moved, p0.w);
+        if (limited) atomicAdd(counts.limited_steps, 1u);
+    }
 }

@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Projects splats into pixels. One invocation owns splat i: it reads its parameters and the camera, and writes its
 // record, its depth key and the number of tiles it reaches. A splat that is not drawn gets count 0 and the last key.
 // SPEC_MODE 1 (inspection): scales are shifted, and the splats that are drawn are counted.
@@ -27,7 +28,7 @@ vec4 param(uint plane, uint i) { return texelFetch(params, int(param_texel(push.
 const uint SH_FLOATS = 3 * (SH_DEGREE + 1) * (SH_DEGREE + 1);
 const uint PLANES = (PARAM_SH + SH_FLOATS + 3) / 4;
 
-// Colour seen along a direction; finite: whether every coefficient was.
+// Colour seen along a direction; finite: whether it can be computed with.
 vec3 sh_color(uint i, vec4 plane2, vec3 direction, out bool finite) {
     float basis[16];
     sh_basis(SH_DEGREE, direction, basis);
@@ -40,7 +41,9 @@ vec3 sh_color(uint i, vec4 plane2, vec3 direction, out bool finite) {
                 sum[(f - PARAM_SH) % 3] += basis[(f - PARAM_SH) / 3] * value[c];
         }
     }
-    finite = is_finite(sum);
+    // Phrased so that NaN fails it.
+    const vec3 size = abs(sum);
+    finite = size.r <= float(COLOR_MAX) && size.g <= float(COLOR_MAX) && size.b <= float(COLOR_MAX);
     return max(vec3(0.0), sum + float(COLOR_OFFSET));
 }
 
@@ -56,13 +59,12 @@ void main() {
 
     const float opacity = p.peak * p.factor;
     const vec2 x = pixel_position(p.view.x, p.view.z, 0), y = pixel_position(p.view.y, p.view.z, 1);
-    const float ux = sqrt(0.5 * p.c / p.det), k = p.b / p.c, vy = sqrt(0.5 / p.c);
-    const vec4 record0 = vec4(x.x, y.x, x.y, y.y), record1 = vec4(ux, k, vy, opacity);
+    const vec4 record0 = vec4(x.x, y.x, x.y, y.y), record1 = vec4(p.ux, p.k, p.vy, opacity);
     const uvec2 size = uvec2(camera.size[0], camera.size[1]);
 
-    const bool stored_finite = is_finite(p0) && is_finite(p1) && is_finite(p2.xyz) && p.quaternion_norm > 0.0;
+    const bool stored_finite = is_finite(p0) && is_finite(p1) && is_finite(p2.xyz) && p.in_range;
     const bool in_front = z > float(NEAR_PLANE);
-    const bool projected_finite = finite_color && is_finite(record0) && is_finite(record1) && ux > 0.0 && vy > 0.0;
+    const bool projected_finite = finite_color && is_finite(record0) && is_finite(record1) && p.ux > 0.0 && p.vy > 0.0;
     const bool drawn = stored_finite && in_front && projected_finite;
 
     uint count = 0u;

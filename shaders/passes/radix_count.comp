@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Counts the digits of a radix pass. One invocation owns a contiguous chunk of the keys and a private row of counters,
 // counters[digit * lanes + lane], which stand at zero before. No atomics: the order of equal keys is kept.
 #extension GL_GOOGLE_include_directive : require

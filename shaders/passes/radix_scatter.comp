@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Moves the pairs of a radix pass. One invocation owns the same chunk as in radix_count, and walks it in order; its
 // counters now hold the position of its next item of each digit within that digit, and bases[digit] where the digit
 // begins. Stable. SPEC_MODE bit 0: the values are the items' own numbers; bit 1: nobody reads the keys again (last

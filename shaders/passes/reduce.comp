@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Adds up floats in a fixed order. One workgroup is one subgroup and owns one block of them.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"

@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Lowers every opacity to at most a given one and forgets its moments (3DGS, section 5.2). One invocation owns splat i.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"

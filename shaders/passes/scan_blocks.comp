@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Exclusive prefix sums within blocks. One workgroup is one subgroup and owns block b of `block` entries; it writes the
 // sum of the entries before each one in the block, and the block's total. SPEC_MODE 1: entry e is source[order[e]].
 #extension GL_GOOGLE_include_directive : require

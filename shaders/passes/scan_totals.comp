@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Exclusive prefix sum of the blocks' totals, in place, by one subgroup; entry `blocks` gets the grand total.
 // Instances are also counted in halves that cannot wrap: a total past 32 bits is told as the largest number there is.
 #extension GL_GOOGLE_include_directive : require

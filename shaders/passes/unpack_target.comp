@@ -1,4 +1,5 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Spreads a photograph's RGBA texels into planes, over the background where it is transparent. One invocation owns one pixel.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"

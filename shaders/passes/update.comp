@@ -1,9 +1,10 @@
 #version 460
+// SPDX-License-Identifier: Apache-2.0
 // Gradient of the projection, and Adam in the same breath, so that no gradient buffer of the parameters' size exists.
 // One invocation owns splat i: it adds up the splat's slots in the order of its tiles, carries the sums back through
 // the projection, and moves its parameters and moments. A splat that was not drawn has gradient zero and still moves by
-// its moments. An update that is not finite is dropped and counted. Nothing happens in a frame whose instances did not
-// fit (the host repeats it). SPEC_MODE bit 0: writes the gradient into moments1 and moves nothing. Bit 1: adds to the
+// its moments. A step too long for its splat is shortened and counted, an update that is not finite dropped and counted.
+// Nothing happens in a frame whose instances did not fit (the host repeats it). SPEC_MODE bit 0: writes the gradient into moments1 and moves nothing. Bit 1: adds to the
 // densification statistics (norm of dL/d(mean) in normalised device coordinates, number of views drawn in). Bit 2: adds
 // the gradient of the regularisers, opacity_pull * opacity + scale_pull * (sum of the scales), drawn or not. Bit 3: the
 // norm is that of the pixels' absolute gradients (Ye et al. 2024, AbsGS, eq. 7), where pixels do not cancel.
@@ -12,6 +13,8 @@
 #include "lib/prelude.glsl"
 #include "lib/params.glsl"
 #include "lib/projection.glsl"
+#include "lib/footprint_gradient.glsl"
+#include "lib/step_limits.glsl"
 #include "lib/sh.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
@@ -38,15 +41,6 @@ layout(push_constant, scalar) uniform Push { UpdatePush push; };
 const uint SH_FLOATS = 3 * (SH_DEGREE + 1) * (SH_DEGREE + 1);
 const uint PLANES = (PARAM_SH + SH_FLOATS + 3) / 4;
 
-// What the tiles added to a splat, see SLOT_FLOATS.
-struct Sums {
-    float g;
-    vec2 gw;       // sum g u, sum g v
-    vec3 gww;      // sum g u^2, g u v, g v^2
-    vec3 color;
-    vec2 absolute;
-};
-
 // Some drivers stop a loop after 65,535 turns, so a turn takes 8 slots.
 Sums sum_slots(uint first, uint count) {
     vec4 s0 = vec4(0.0), s1 = vec4(0.0);
@@ -70,16 +64,23 @@ Sums sum_slots(uint first, uint count) {
 uint index_of(uint plane, uint i) { return param_texel(push.planes, plane, i); }
 
 // One texel of parameters with its gradient: Adam (Kingma and Ba 2015, algorithm 1).
-void move(uint plane, uint i, vec4 value, vec4 gradient, vec4 rate) {
+void move(uint plane, uint i, vec4 value, vec4 raw_gradient, vec4 rate, float depth) {
     const uint at = index_of(plane, i);
     if (GRADIENT_ONLY) {
-        moments1_out[at] = gradient;
+        // What is beyond float32 is its largest number, and what is no number zero, and counted.
+        const bvec4 number = equal(raw_gradient, raw_gradient);
+        moments1_out[at] = mix(vec4(0.0), clamp(raw_gradient, -3.402823466e38, 3.402823466e38), number);
+        if (!all(number)) atomicAdd(counts.dropped_updates, 1u);
         return;
     }
+    const vec4 largest = vec4(GRADIENT_MAX);
+    const vec4 gradient = mix(raw_gradient, clamp(raw_gradient, -largest, largest), greaterThan(abs(raw_gradient), largest));
     const vec4 m = mix(gradient, texelFetch(moments1, int(at)), float(ADAM_BETA1));
     const vec4 v = mix(gradient * gradient, texelFetch(moments2, int(at)), float(ADAM_BETA2));
-    const vec4 moved = value - rate * (m * push.bias1) / (sqrt(v * push.bias2) + float(ADAM_EPSILON));
+    vec4 moved = value - rate * (m * push.bias1) / (sqrt(v * push.bias2) + float(ADAM_EPSILON));
+    const bool limited = limit_step(plane, value, depth, moved);
     if (is_finite(moved) && is_finite(m) && is_finite(v)) {
+        if (limited) atomicAdd(counts.limited_steps, 1u);
         params_out[at] = moved;
         moments1_out[at] = m;
         moments2_out[at] = v;
@@ -107,30 +108,9 @@ float move_sh(uint i, vec3 color_gradient, vec3 direction, out vec3 direction_gr
                 direction_gradient += (value[c] * color_gradient[s % 3]) * slope[s / 3];
             }
         }
-        move(plane, i, value, gradient, rate);
+        move(plane, i, value, gradient, rate, 0.0);
     }
     return basis[0] * color_gradient.r;
-}
-
-struct FootprintGradient {
-    vec2 mean;         // dL/d(mean in px)
-    vec2 absolute;     // of each pixel, summed
-    vec3 covariance;   // dL/da, dL/db, dL/dc; b is the value of both off-diagonal entries
-};
-
-// From the whitened sums to the 2D Gaussian. With power = -(u^2 + v^2): d(power)/d(mean) = 2 (ux u, vy v - k ux u),
-// d(power)/d(Sigma2) = 2 y y^T with y = (ux u, vy v - k ux u).
-FootprintGradient footprint_gradient(Sums s, Projection p) {
-    const float ux = sqrt(0.5 * p.c / p.det), k = p.b / p.c, vy = sqrt(0.5 / p.c);
-    const float skew = -k * ux;
-    FootprintGradient f;
-    f.mean = 2.0 * vec2(ux * s.gw.x, skew * s.gw.x + vy * s.gw.y);
-    f.absolute = 2.0 * vec2(ux * s.absolute.x, s.absolute.y);
-    f.covariance = 2.0 * vec3(ux * ux * s.gww.x, 2.0 * ux * (skew * s.gww.x + vy * s.gww.y),
-                              skew * skew * s.gww.x + 2.0 * skew * vy * s.gww.y + vy * vy * s.gww.z);
-    // The kernel's factor falls with det: d(ln factor)/d(Sigma2) = -Sigma2^-1 / 2.
-    if (KERNEL != KERNEL_PEAK) f.covariance += (-0.5 * s.g / p.det) * vec3(p.c, -2.0 * p.b, p.a);
-    return f;
 }
 
 void main() {
@@ -150,52 +130,37 @@ void main() {
     vec3 direction_gradient;
     const float red_gradient = move_sh(i, color_gradient, direction, direction_gradient);
 
-    const FootprintGradient f = footprint_gradient(s, p);
-    const vec3 cov = f.covariance;
-    vec3 dm0 = 2.0 * cov.x * p.m0 + cov.y * p.m1, dm1 = 2.0 * cov.z * p.m1 + cov.y * p.m0;
-    if (KERNEL == KERNEL_ANTIALIAS && p.det0 > 0.0) {
-        // d(ln det0) = 2 (m1 x n . dm0 + n x m0 . dm1) / |n|^2 with n = m0 x m1.
-        const vec3 n = cross(p.m0, p.m1);
-        dm0 += s.g * cross(p.m1, n) / p.det0;
-        dm1 += s.g * cross(n, p.m0) / p.det0;
-    }
+    const FootprintGradient f = footprint_gradient(s, p, p2.xyz);
     // M's rows are focal/z (row x or y of the axes - tangent * row z).
     const float inverse_z = 1.0 / p.view.z.x;
     const vec3 row_z = vec3(p.axes[0].z, p.axes[1].z, p.axes[2].z);
-    const vec3 dx_axes = p.focal_over_z.x * dm0, dy_axes = p.focal_over_z.y * dm1;
-    const vec3 dz_axes = -p.tangent.x * dx_axes - p.tangent.y * dy_axes;
     vec3 view_gradient = vec3(p.focal_over_z * f.mean, 0.0);
     const vec2 tangent = vec2(p.view.x.x, p.view.y.x) * inverse_z;
-    view_gradient.z = -dot(tangent, view_gradient.xy) - inverse_z * (dot(dm0, p.m0) + dot(dm1, p.m1));
-    const vec2 tangent_gradient = vec2(p.tangent_clamped.x ? 0.0 : -dot(dx_axes, row_z),
-                                       p.tangent_clamped.y ? 0.0 : -dot(dy_axes, row_z));
+    view_gradient.z = -dot(tangent, view_gradient.xy) -
+                      inverse_z * (f.log_scale.x + f.log_scale.y + f.log_scale.z);
+    const vec2 tangent_gradient =
+        -p.focal_over_z * vec2(p.tangent_clamped.x ? 0.0 : dot(f.dm0, row_z), p.tangent_clamped.y ? 0.0 : dot(f.dm1, row_z));
     view_gradient += vec3(tangent_gradient, -dot(tangent_gradient, tangent)) * inverse_z;
 
     const mat3 to_world = transpose(camera_rotation());
-    vec3 log_scale_gradient;
-    mat3 rotation_gradient;
     const vec3 scale = exp(p2.xyz);
-    [[unroll]] for (int k = 0; k < 3; ++k) {
-        const vec3 axis_gradient = vec3(dx_axes[k], dy_axes[k], dz_axes[k]);
-        log_scale_gradient[k] = dot(p.axes[k], axis_gradient);
-        rotation_gradient[k] = to_world * axis_gradient * scale[k];
-    }
-    const vec4 unit = p.unit_quaternion;
-    const vec4 unit_gradient = rotation_backward(unit, rotation_gradient);
-    const vec4 quaternion_gradient = (unit_gradient - unit * dot(unit, unit_gradient)) / p.quaternion_norm;
+    const vec4 quaternion_gradient = torque_on_quaternion(p.unit_quaternion, f.torque) / p.quaternion_norm;
     const vec3 direction_part =
         (direction_gradient - direction * dot(direction, direction_gradient)) / length(p.view.offset);
     const vec3 mean_gradient = to_world * view_gradient + direction_part;
-    const float logit_gradient = s.g * (1.0 - p.peak);
+    // 1 - opacity, where the opacity is next to 1, has no digits left.
+    const float transparency = sigmoid(-p0.w);
+    const float logit_gradient = s.g * transparency;
+    const float depth = drawn ? p.view.z.x : 3.4e38;
 
     const vec4 zero = vec4(0.0);
     const vec4 scale_pull = REGULARISED ? vec4(push.scale_pull * scale, 0.0) : zero;
-    const vec4 opacity_pull = REGULARISED ? vec4(vec3(0.0), push.opacity_pull * p.peak * (1.0 - p.peak)) : zero;
-    move(2, i, p2, (drawn ? vec4(log_scale_gradient, red_gradient) : zero) + scale_pull,
-         vec4(vec3(push.scale_rate), push.sh0_rate));
-    move(1, i, p1, drawn ? quaternion_gradient : zero, vec4(push.quaternion_rate));
+    const vec4 opacity_pull = REGULARISED ? vec4(vec3(0.0), push.opacity_pull * p.peak * transparency) : zero;
+    move(2, i, p2, (drawn ? vec4(f.log_scale, red_gradient) : zero) + scale_pull,
+         vec4(vec3(push.scale_rate), push.sh0_rate), depth);
+    move(1, i, p1, drawn ? quaternion_gradient : zero, vec4(push.quaternion_rate), depth);
     move(0, i, p0, (drawn ? vec4(mean_gradient, logit_gradient) : zero) + opacity_pull,
-         vec4(vec3(push.mean_rate), push.opacity_rate));
+         vec4(vec3(push.mean_rate), push.opacity_rate), depth);
     if (STATISTICS && drawn) {
         const float norm = length((ABSOLUTE ? f.absolute : f.mean) * vec2(push.half_size[0], push.half_size[1]));
         if (is_finite(norm)) statistics[i] += vec2(norm, 1.0);

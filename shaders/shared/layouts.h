@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Every block that host and shaders share, under the scalar block layout. src/passes/layout_checks.cpp asserts sizes.
 #ifndef EWA_SHARED_LAYOUTS_H
 #define EWA_SHARED_LAYOUTS_H
@@ -13,6 +14,7 @@ EWA_UINT(SPEC_SH_DEGREE, 4u);      // 0..3, the degree evaluated
 EWA_UINT(SPEC_KERNEL, 5u);         // KERNEL_*
 EWA_UINT(SPEC_MODE, 6u);           // per shader, see there
 EWA_UINT(SPEC_RADIX_BITS, 7u);     // bits a radix pass sorts by, 1..8
+EWA_UINT(SPEC_CUT_OFF, 8u);        // ALPHA_MIN, or another least contribution (a float)
 
 // ---- A splat's parameters: flat float f stands in component f % 4 of texel plane f / 4. Splats are stored in blocks of
 // PARAM_BLOCK, within a block plane after plane: one line of memory holds one plane of a block, and all that a block has
@@ -89,6 +91,7 @@ struct Counts {
     uint densified;                // splats after densification
     float l1;                      // mean |x - y|
     float ssim;                    // mean SSIM
+    uint limited_steps;            // steps of a mean, quaternion or scale that were shortened
     uint drawn;                    // splats that reach a tile; counted where the projection is one for inspection
 };
 
@@ -226,6 +229,7 @@ struct McmcPush {
     float weight_scale;            // weight of an opacity of 1
     float dead_logit;              // at or under it a splat is dead
     float least_opacity;           // of a splat that shares its source's
+    float spread;                  // standard deviations of the source that it and its copies move apart
     uint seed[2];
     uint step;
 };
@@ -234,8 +238,67 @@ struct PerturbPush {
     uint splats, planes;
     uint instance_capacity;
     float amplitude;
+    float reach;                   // the longest noise (world units)
     uint seed[2];
     uint step;
+};
+
+// ---- A mesh scene as rays meet it: buffers of rgba32ui texels that hold floats by their bits ----
+// Positions are relative to an origin that the host subtracts in float64 first.
+// Node: of each of two children low x y z, reference; high x y z, 0. A reference is a node's number, or a leaf's LEAF_FLAG,
+// triangles - 1 in LEAF_COUNT_BITS bits and its first triangle. A child that is none has low above high.
+EWA_UINT(NODE_TEXELS, 4u);
+EWA_UINT(LEAF_FLAG, 0x80000000u);
+EWA_UINT(LEAF_COUNT_SHIFT, 28u);
+EWA_UINT(LEAF_FIRST_MASK, 0x0fffffffu);
+// Triangle: corner 0 x y z, material; corner 1 - corner 0, 0; corner 2 - corner 0, 1 where cameras see its back.
+EWA_UINT(TRIANGLE_TEXELS, 3u);
+// Surface: three normals (octahedral, 2 x snorm16), colour 0; uv 0, uv 1; uv 2, colour 1, colour 2 (RGBA, 4 x unorm8).
+EWA_UINT(SURFACE_TEXELS, 3u);
+// Material: base r g b, opacity; metallic, roughness, F0 of the dielectric, F90 of it; emitted r g b, cut-off or 0;
+// textures of base, metal and roughness, emission (NO_TEXTURE: none), MATERIAL_* flags; density of light sampling (per
+// area) on its triangles, 0 0 0.
+EWA_UINT(MATERIAL_TEXELS, 5u);
+EWA_UINT(NO_TEXTURE, 0xffffffffu);
+EWA_UINT(MATERIAL_TWO_SIDED, 1u);  // emits on both sides, and cameras see its back
+EWA_UINT(MATERIAL_MASKED, 2u);     // is there where its opacity reaches the cut-off
+EWA_UINT(MATERIAL_BLENDED, 4u);    // stops a ray with the probability of its opacity
+// Texture: first texel, width, height, TEXTURE_* flags.
+EWA_UINT(WRAP_REPEAT, 0u);
+EWA_UINT(WRAP_CLAMP, 1u);
+EWA_UINT(WRAP_MIRROR, 2u);
+EWA_UINT(TEXTURE_WRAP_T_SHIFT, 2u);
+EWA_UINT(TEXTURE_NEAREST, 16u);
+// Light: position (directional: direction to it; triangle: 0), LIGHT_* kind; r g b, probability to be drawn; spot's
+// direction, range or 0 (triangle: its number); spot's scale and offset, alias threshold, alias.
+EWA_UINT(LIGHT_TEXELS, 4u);
+EWA_UINT(LIGHT_DIRECTIONAL, 0u);
+EWA_UINT(LIGHT_POINT, 1u);
+EWA_UINT(LIGHT_SPOT, 2u);
+EWA_UINT(LIGHT_TRIANGLE, 3u);
+EWA_UINT(SPEC_ALPHA_TESTED, 9u);   // 1: some material is masked or blended
+
+struct TraceView {
+    float rotation[9];             // world to camera, rows
+    float position[3];             // relative to the origin of the triangles
+    float focal[2];                // px
+    float center[2];               // px
+    uint size[2];                  // px
+    float zenith[3], horizon[3], ground[3];  // radiance of the sky straight up, level and straight down
+    float sample_max;              // radiance
+};
+
+// Integer sums, the same in any order.
+struct TraceCounts {
+    uint unfinished_rays;          // ended by the limit on steps
+    uint dropped_samples;          // not finite
+};
+
+struct TracePush {
+    uint first_sample, samples;    // of a pixel, in this dispatch
+    uint max_steps;                // of one ray
+    uint lights;
+    uint seed[2];
 };
 
 EWA_END_SHARED

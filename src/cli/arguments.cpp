@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "cli/arguments.h"
 
 #include <spdlog/fmt/fmt.h>
@@ -78,10 +79,26 @@ void add_draw_options(CLI::App& app, DrawArguments& arguments) {
         ->check(CLI::IsMember({"peak", "antialias", "ewa"}))
         ->capture_default_str();
     app.add_flag("--antialias", arguments.antialias, "The same as --kernel antialias");
-    app.add_option("--sh-degree", arguments.sh_degree, "Highest degree of view-dependent colour")
-        ->check(in_range(0, kMaxShDegree))
-        ->type_name("0..3")
-        ->capture_default_str();
+    if (!arguments.degree_by_dataset) {
+        app.add_option("--sh-degree", arguments.sh_degree, "Highest degree of view-dependent colour")
+            ->check(in_range(0, kMaxShDegree))
+            ->type_name("0..3")
+            ->capture_default_str();
+        return;
+    }
+    arguments.sh_degree = -1;
+    app.add_option("--sh-degree", arguments.sh_degree,
+                   "Highest degree of view-dependent colour; auto: 3, or 0 where the dataset says that no colour depends on "
+                   "the view")
+        ->transform(CLI::Validator(
+            [](std::string& text) {
+                if (text != "auto") return CLI::Range(0, kMaxShDegree)(text);
+                text = "-1";
+                return std::string();
+            },
+            ""))
+        ->type_name("auto|0..3")
+        ->default_str("auto");
 }
 
 CLI::Validator without_sign() {

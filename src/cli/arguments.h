@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Options that several commands have, with the same names, ranges and meaning in each.
 #pragma once
 #include <CLI/CLI.hpp>
@@ -15,9 +16,11 @@ struct DrawArguments {
     std::string background = "0,0,0";
     std::string kernel = "peak";
     bool antialias = false;  // the short form of --kernel antialias
-    int sh_degree = kMaxShDegree;
+    int sh_degree = kMaxShDegree;  // -1, in training: as the dataset needs
 
     bool random_allowed = false;  // whether the background may be random, as in training
+
+    bool degree_by_dataset = false;  // whether sh_degree may be left to the dataset, as in training
 
     bool random_background() const { return random_allowed && background == "random"; }
     /// Throws InputError for a background that is not three numbers of [0, 1]. A random background is black

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The commands of the program, one file each.
 #pragma once
 #include <CLI/CLI.hpp>
@@ -17,7 +18,9 @@ Action add_eval(CLI::App& app);
 Action add_grad(CLI::App& app);
 Action add_convert(CLI::App& app);
 Action add_info(CLI::App& app);
+Action add_dataset(CLI::App& app);
 Action add_devices(CLI::App& app);
 Action add_bench(CLI::App& app);
+Action add_compare(CLI::App& app);
 
 }  // namespace ewa::cli

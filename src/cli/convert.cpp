@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ewa convert: from any splat format to any other, edited on the way.
 #include <spdlog/fmt/fmt.h>
 
@@ -92,7 +93,7 @@ void crop(Gaussians& gaussians, const std::string& box) {
     keep_if(gaussians, [&](size_t i) {
         bool inside = true;
         for (size_t axis = 0; axis < 3; ++axis) {
-            const double v = gaussians.means[3 * i + axis];
+            const double v = gaussians.world_mean(i)[int(axis)];
             inside = inside && v >= n[axis] && v <= n[3 + axis];
         }
         return inside;

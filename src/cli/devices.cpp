@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ewa devices: what --device can name.
 #include <spdlog/fmt/fmt.h>
 

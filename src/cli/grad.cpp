@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ewa grad: the training loss of one view, and its gradient with respect to every stored value.
 #include <spdlog/fmt/fmt.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ewa info: what is in a splat file or a dataset.
 #include <spdlog/fmt/fmt.h>
 
@@ -144,6 +145,7 @@ Json dataset_json(const Dataset& dataset, const char* kind, const Split& split, 
             {"cameras", cameras},
             {"points", dataset.points.positions.size()},
             {"dropped_points", dataset.dropped_points},
+            {"color_depends_on_view", dataset.color_depends_on_view},
             {"extent", extent},
             {"train", split.train.size()},
             {"test", split.test.size()}};
@@ -181,6 +183,8 @@ int info_dataset(const fs::path& path, int test_every, bool json) {
     print_cameras(dataset);
     fmt::print("points          {} ({} dropped: a coordinate is not finite)\n",
                dataset.points.positions.size(), dataset.dropped_points);
+    if (!dataset.color_depends_on_view)
+        fmt::print("colour          does not depend on the view: training leaves SH degrees 1 to {} out\n", kMaxShDegree);
     fmt::print("extent          {:.6g} (1.1 times the farthest camera from the cameras' mean)\n", extent);
     return 0;
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Ctrl-C and termination asked for politely: long work looks here between its steps.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ewa: reads the arguments, runs one command, and turns every failure into one line and an exit status.
 #include <cerrno>
 #include <cstdio>
@@ -5,6 +6,7 @@
 #include <new>
 
 #include "cli/command.h"
+#include "cli/manual.h"
 #include "cli/text.h"
 #include "core/text.h"
 #include "ewa/error.h"
@@ -65,6 +67,11 @@ int main(int argc, char** argv) {
     app.require_subcommand(1);
     app.get_formatter()->column_width(34);
 
+    // Without a group it stands in no help: the build calls it.
+    CLI::App* manual = app.add_subcommand("manual", "Writes the manual pages and shell completions below DIR");
+    std::string manual_folder;
+    manual->group("");
+    manual->add_option("DIR", manual_folder)->required();
     Command commands[] = {
         {app.add_subcommand("train", "From photographs with cameras to splats"), {}},
         {app.add_subcommand("render", "Pictures of a splat scene through a dataset's cameras"), {}},
@@ -74,8 +81,14 @@ int main(int argc, char** argv) {
         {app.add_subcommand("info", "What is in a splat file or a dataset, and what rendering it leaves out"),
          {}},
         {app.add_subcommand("devices", "The Vulkan devices of this machine"), {}},
+        {app.add_subcommand("dataset", "Photographs a mesh scene (glTF) into a dataset to train on"), {}},
         {app.add_subcommand("bench", "Speed of every pass, and its error against the float64 twin"), {}},
+        {app.add_subcommand("compare", "PSNR, SSIM and largest error of two pictures, or two folders of them"), {}},
     };
+    const Command write_pages{manual, [&] {
+                                  write_manual(app, manual_folder);
+                                  return 0;
+                              }};
     commands[0].action = add_train(*commands[0].app, command_line(argc, argv));
     commands[1].action = add_render(*commands[1].app);
     commands[2].action = add_eval(*commands[2].app);
@@ -83,7 +96,9 @@ int main(int argc, char** argv) {
     commands[4].action = add_convert(*commands[4].app);
     commands[5].action = add_info(*commands[5].app);
     commands[6].action = add_devices(*commands[6].app);
-    commands[7].action = add_bench(*commands[7].app);
+    commands[7].action = add_dataset(*commands[7].app);
+    commands[8].action = add_bench(*commands[8].app);
+    commands[9].action = add_compare(*commands[9].app);
 
     try {
         app.parse(argc, argv);
@@ -100,5 +115,5 @@ int main(int argc, char** argv) {
     }
     for (const Command& command : commands)
         if (command.app->parsed()) return run(command);
-    return kWrongUse;
+    return run(write_pages);
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Writing what the user asked for.
 #pragma once
 #include <filesystem>

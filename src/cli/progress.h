@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How far a long work is: a line that is redrawn on a terminal, a line for every tenth elsewhere.
 #pragma once
 #include <chrono>

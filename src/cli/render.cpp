@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ewa render: pictures of a splat scene through a dataset's cameras. The photographs themselves are not
 // needed.
 #include <spdlog/fmt/fmt.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "cli/splat_difference.h"
 
 #include <algorithm>
@@ -58,7 +59,7 @@ std::array<Difference, 6> differences(const Gaussians& a, const Gaussians& b) {
     const size_t strides[] = {a.sh_stride(), b.sh_stride()};
     for (size_t i = 0; i < a.size(); ++i) {
         for (size_t k = 0; k < 3; ++k) {
-            means.add(a.means[3 * i + k], b.means[3 * i + k]);
+            means.add(a.world_mean(i)[int(k)], b.world_mean(i)[int(k)]);
             scales.add(a.log_scales[3 * i + k], b.log_scales[3 * i + k]);
             colors.add(a.sh[strides[0] * i + k] * shared::SH_C0, b.sh[strides[1] * i + k] * shared::SH_C0);
         }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How far two splat scenes of the same length and order are apart.
 #pragma once
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "cli/splat_statistics.h"
 
 #include <algorithm>
@@ -38,7 +39,7 @@ SplatStatistics splat_statistics(const Gaussians& g) {
     for (size_t i = 0; i < g.size(); ++i) {
         if (!drawable(g, i)) ++statistics.nonfinite;
         for (size_t axis = 0; axis < 3; ++axis) {
-            const double v = g.means[3 * i + axis];
+            const double v = g.world_mean(i)[int(axis)];
             if (!std::isfinite(v)) continue;
             statistics.low[axis] = std::min(statistics.low[axis], v);
             statistics.high[axis] = std::max(statistics.high[axis], v);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Figures that describe a splat scene at a glance.
 #pragma once
 #include <array>

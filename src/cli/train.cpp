@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ewa train: its options.
 #include <memory>
 
@@ -59,7 +60,7 @@ void add_model_options(CLI::App& app, TrainArguments& arguments) {
         ->check(in_range(uint64_t(0), uint64_t(1) << 40))
         ->type_name("MiB")
         ->capture_default_str();
-    arguments.draw.random_allowed = true;
+    arguments.draw.random_allowed = arguments.draw.degree_by_dataset = true;
     add_draw_options(app, arguments.draw);
     add_downscale_option(app, arguments.downscale);
     add_masks_option(app, arguments.masks);
@@ -79,7 +80,9 @@ Action add_train(CLI::App& app, const std::string& command_line) {
     const auto state = std::make_shared<CommandState>();
     TrainArguments& arguments = state->arguments;
     arguments.command_line = command_line;
-    app.add_option("DATASET", arguments.dataset, "Photographs with cameras: COLMAP folder or transforms.json")
+    app.add_option("DATASET", arguments.dataset,
+                   "Photographs with cameras: COLMAP folder or transforms.json; or a glTF with meshes, which is "
+                   "photographed into DIR/dataset first")
         ->type_name("");
     app.add_option(
            "-o,--output", arguments.output,
@@ -98,6 +101,8 @@ Action add_train(CLI::App& app, const std::string& command_line) {
         ->check(in_range(0, kMaxSteps))
         ->type_name("N")
         ->capture_default_str();
+    app.add_flag("--accuracy", arguments.accuracy,
+                 "At the end, draw error against run time for the report, as ewa bench --accuracy does");
     app.add_option("--serve", arguments.serve,
                    "Let ewa-view look on by this port (0: any free one), of this machine alone unless an address stands "
                    "before it; DIR/live.json has the token that pausing and saving need")

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a training run leaves besides the splats, and what it needs to know for it.
 #pragma once
 #include <cstdint>

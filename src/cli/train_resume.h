@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Going on where an earlier run of the same options in the same folder was ended.
 #pragma once
 #include <chrono>

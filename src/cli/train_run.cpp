@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "cli/train_run.h"
 
 #include <spdlog/fmt/fmt.h>
@@ -5,16 +6,21 @@
 #include <algorithm>
 #include <chrono>
 
+#include "cli/accuracy.h"
 #include "cli/interrupt.h"
 #include "cli/output.h"
+#include "cli/photograph_scene.h"
 #include "cli/progress.h"
 #include "cli/text.h"
 #include "cli/train_files.h"
 #include "cli/train_resume.h"
 #include "cli/train_serve.h"
 #include "core/atomic_file.h"
+#include "core/folder_lock.h"
+#include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
+#include "pipeline/model.h"
 #include "train/checkpoint.h"
 #include "train/initialise.h"
 
@@ -72,14 +78,20 @@ Gaussians start_splats(const TrainArguments& arguments, const Dataset& dataset,
     return start;
 }
 
+using Clock = std::chrono::steady_clock;
+
+/// What the run is called: the scene's file, else the dataset's folder.
+std::string run_name(const TrainArguments& arguments) {
+    return arguments.scene.empty() ? dataset_name(arguments.dataset) : arguments.scene.stem().string();
+}
+
 class TrainRun {
   public:
-    explicit TrainRun(const TrainArguments& arguments)
-        : arguments_(arguments), options_(train_options(arguments)), pace_(arguments.save_every) {}
+    TrainRun(const TrainArguments& arguments, Clock::time_point begin)
+        : arguments_(arguments), begin_(begin), pace_(arguments.save_every) {}
     int run();
 
   private:
-    using Clock = std::chrono::steady_clock;
     double wall_seconds() const {
         return earlier_wall_ + std::chrono::duration<double>(Clock::now() - begin_).count();
     }
@@ -87,6 +99,7 @@ class TrainRun {
         if (!arguments_.quiet) fmt::print("{}\n", line);
     }
     void load();
+    void settle_degree();
     void describe() const;
     void resume(Trainer& trainer);
     void save_checkpoint(const Trainer& trainer);
@@ -99,14 +112,15 @@ class TrainRun {
     int finish(const Trainer& trainer);
     void print_result() const;
 
-    const TrainArguments& arguments_;
+    TrainArguments arguments_;
     TrainOptions options_;
-    Clock::time_point begin_ = Clock::now();
+    Clock::time_point begin_;
     double earlier_wall_ = 0;  // of the run that this one goes on from
     SavePace pace_;
     report::Json settings_;  // for the checkpoint
     std::optional<train::Checkpoint> earlier_;
     fs::path folder_, checkpoint_;
+    std::optional<core::FolderLock> lock_;
     Dataset dataset_;
     Split split_;
     Gaussians start_;
@@ -126,12 +140,13 @@ void TrainRun::load() {
         throw InputError(fmt::format("{}: of {} images ({} missing) none is left to train on",
                                      arguments_.dataset.string(), dataset_.frames.size(),
                                      dataset_.missing_images));
+    settle_degree();
     start_ = start_splats(arguments_, dataset_, split_.train);
 
-    folder_ =
-        arguments_.output.empty() ? fs::path("out") / dataset_name(arguments_.dataset) : arguments_.output;
+    folder_ = arguments_.output.empty() ? fs::path("out") / run_name(arguments_) : arguments_.output;
     checkpoint_ = folder_ / "checkpoint.ewa";
     make_folder(folder_);
+    lock_.emplace(folder_);
     core::remove_abandoned_files(folder_);
     settings_ = checkpoint_settings(arguments_, train::dataset_fingerprint(dataset_, split_));
     if (arguments_.resume && fs::exists(checkpoint_)) {
@@ -148,7 +163,7 @@ void TrainRun::load() {
     for (const auto& [name, value] : config.items())
         report_.settings.emplace_back(name, value.is_string() ? value.get<std::string>() : value.dump());
 
-    report_.title = dataset_name(arguments_.dataset);
+    report_.title = run_name(arguments_);
     if (arguments_.init == "sfm" && dataset_.points.positions.empty())
         report_.remarks.push_back("there are no points: random splats where the cameras look are the start");
     if (dataset_.missing_images > 0)
@@ -156,6 +171,15 @@ void TrainRun::load() {
     if (dataset_.dropped_points > 0)
         report_.remarks.push_back(fmt::format(
             "{} points have a coordinate that is not finite and are left out", dataset_.dropped_points));
+}
+
+/// What "auto" comes to.
+void TrainRun::settle_degree() {
+    int& degree = arguments_.draw.sh_degree;
+    if (degree < 0) degree = dataset_.color_depends_on_view ? kMaxShDegree : 0;
+    options_ = train_options(arguments_);
+    if (degree == 0 && !dataset_.color_depends_on_view)
+        report_.remarks.push_back("no colour depends on the view, says the dataset: SH degree 0");
 }
 
 void TrainRun::describe() const {
@@ -306,11 +330,18 @@ int TrainRun::finish(const Trainer& trainer) {
             subfolder / (report::picture_names(dataset_.frames)[frames.front()].string() + ".png");
     }
 
+    if (!cut_short && arguments_.accuracy) {
+        const auto view = report_.held_out ? split_.test.front() : split_.train.front();
+        report_.work_precision.push_back(
+            rendering_diagram(device_, gaussians, dataset_.frames[view].camera, options_.render));
+    }
+
     summary.steps = last_.step;
     summary.seconds = last_.seconds;
     summary.splats = static_cast<uint32_t>(gaussians.size());
     summary.skipped_nonfinite = last_.skipped_nonfinite;
     summary.dropped_updates = last_.dropped_updates;
+    summary.limited_steps = last_.limited_steps;
     summary.interrupted = cut_short;
     summary.peak_device_bytes = peak_device_bytes(*device_);
     summary.peak_host_bytes = peak_host_bytes(*device_);
@@ -331,6 +362,7 @@ void TrainRun::print_result() const {
     if (s.skipped_nonfinite > 0)
         say(fmt::format("{} splats are not finite and not drawn", s.skipped_nonfinite));
     if (s.dropped_updates > 0) say(fmt::format("{} updates were not finite and dropped", s.dropped_updates));
+    if (s.limited_steps > 0) say(fmt::format("{} steps were too long for their splat and shortened", s.limited_steps));
     say("splats:  " + (folder_ / "splats.ply").string());
     say("report:  " + (folder_ / "report.html").string());
     if (!first_picture_.empty()) say("picture: " + first_picture_.string());
@@ -350,6 +382,13 @@ int TrainRun::run() {
                     options_.strategy == Strategy::adc ? Purpose::densifying : Purpose::training,
                     dataset_.frames.front().masks == MaskUse::ignore, options_.exposure))
         report_.plan.push_back({line.what, line.why, line.bytes_saved});
+    if (arguments_.draw.sh_degree == 0 && !dataset_.color_depends_on_view) {
+        // Parameters and both of Adam's moments.
+        const auto splats = uint32_t(start_.size());
+        report_.plan.push_back(
+            {fmt::format("SH degrees 1 to {}", kMaxShDegree), "the dataset says that no colour depends on the view",
+             3 * (pipeline::parameter_bytes(splats, kMaxShDegree) - pipeline::parameter_bytes(splats, 0))});
+    }
     describe();
 
     watch_for_interrupt();
@@ -362,7 +401,13 @@ int TrainRun::run() {
     resume(trainer);
     {
         Progress progress("trained", arguments_.steps, "steps", arguments_.quiet);
-        train(trainer, progress);
+        try {
+            train(trainer, progress);
+        } catch (const InputError&) {
+            // A photograph that is gone is met before the step begins: what was trained is whole.
+            save_checkpoint(trainer);
+            throw;
+        }
     }
     return finish(trainer);
 }
@@ -371,7 +416,7 @@ int TrainRun::run() {
 
 report::Json to_config(const TrainArguments& a) {
     report::Json json;
-    json["dataset"] = a.dataset.string();
+    json["dataset"] = (a.scene.empty() ? a.dataset : a.scene).string();
     json["steps"] = a.steps;
     json["strategy"] = a.strategy;
     json["max-splats"] = a.max_splats;
@@ -394,8 +439,20 @@ report::Json to_config(const TrainArguments& a) {
     return json;
 }
 
-int run_train(const TrainArguments& arguments) {
-    return TrainRun(arguments).run();
+int run_train(const TrainArguments& given) {
+    const Clock::time_point begin = Clock::now();
+    TrainArguments arguments = given;
+    const std::string extension = core::lower(arguments.dataset.extension().string());
+    if (extension == ".gltf" || extension == ".glb") {
+        train_options(arguments);  // what is wrong with them is said before the work, not after
+        arguments.scene = arguments.dataset;
+        if (arguments.output.empty()) arguments.output = fs::path("out") / run_name(arguments);
+        arguments.dataset = arguments.output / "dataset";
+        const Photographs made =
+            photograph_with_progress(arguments.device, arguments.scene, arguments.dataset, {}, arguments.quiet);
+        if (made.interrupted) return kInterruptedStatus;
+    }
+    return TrainRun(arguments, begin).run();
 }
 
 }  // namespace ewa::cli

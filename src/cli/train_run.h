@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One training run: from the arguments to the files in its folder.
 #pragma once
 #include <filesystem>
@@ -11,6 +12,7 @@ namespace ewa::cli {
 
 struct TrainArguments {
     std::filesystem::path dataset, output;  // output empty: out/<dataset name>
+    std::filesystem::path scene;            // the glTF that the dataset was photographed from; empty: none
     int steps = TrainOptions{}.steps;
     std::string strategy = "adc";
     uint32_t max_splats = TrainOptions{}.max_splats;
@@ -24,6 +26,7 @@ struct TrainArguments {
     DrawArguments draw;
     int eval_every = 0;  // steps; 0: only at the end
     int save_every = 0;  // steps; 0: by the clock
+    bool accuracy = false;  // the report gets the diagram of error against run time
     bool resume = false;
     std::string serve;  // [ADDRESS:]PORT; empty: nobody looks on
     DeviceOptions device;

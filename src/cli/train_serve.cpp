@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "cli/train_serve.h"
 
 #include <spdlog/fmt/fmt.h>

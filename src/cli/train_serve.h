@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ewa train --serve: what those who look on are given, and what they may ask for.
 #pragma once
 #include <filesystem>

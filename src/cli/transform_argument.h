@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The option --transform.
 #pragma once
 #include <glm/mat4x4.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A file read from front to back with every byte accounted for.
 #pragma once
 #include <bit>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Warnings on standard error. Standard output stays free for what a program prints as its result.
 #pragma once
 #include <string>

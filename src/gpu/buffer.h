@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A buffer in device memory. It knows nothing of what it holds.
 #pragma once
 #include <cstddef>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One logical device with one compute queue, its memory accounting and the properties kernels are shaped by.
 #pragma once
 #include <cstdint>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Turns recordings into submissions, and times every command by its name.
 #pragma once
 #include <cstdint>

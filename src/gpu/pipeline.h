@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One compute shader with its specialisation constants, ready to be dispatched.
 #pragma once
 #include <cstdint>

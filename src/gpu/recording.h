@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A list of device commands with what each reads and writes. It is plain data: it can be built, printed and
 // tested with no device at work. Barriers follow from the declarations; nobody places one by hand.
 #pragma once

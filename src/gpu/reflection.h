@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a SPIR-V module declares about its bindings: the truth that a pass's own declaration is held against.
 #pragma once
 #include <cstdint>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "image/encode.h"
 
 #include <OpenImageIO/filesystem.h>
@@ -6,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <string_view>
 
 #include "ewa/error.h"
 
@@ -22,6 +24,8 @@ std::vector<unsigned char> encode(const Image& image, const char* format, OIIO::
     OIIO::ImageSpec spec(image.width, image.height, image.channels, type);
     // Colour stays as it is; OpenImageIO would divide it by alpha.
     spec.attribute("oiio:UnassociatedAlpha", 1);
+    // OpenImageIO would put the time of day in: the same picture is to be the same bytes.
+    if (std::string_view(format) == "exr") spec.attribute("DateTime", "1970:01:01 00:00:00");
     OIIO::Filesystem::IOProxy* proxy = &memory;
     spec.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);
     if (!output->open(name, spec) || !output->write_image(type, pixels) || !output->close())

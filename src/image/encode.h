@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pictures as the bytes of a file, in memory: for saving in one piece and for embedding.
 #pragma once
 #include <vector>

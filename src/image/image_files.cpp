@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pictures on disk, through OpenImageIO.
 #include <OpenImageIO/imageio.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Whether a PNG or JPEG file is whole. The codecs either print their complaints on standard error (libpng) or
 // fill what is missing with grey (libjpeg); a photograph that is cut off has to be an error, and only one
 // line of it.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // COLMAP's sparse model: cameras, images, points3D as .bin or .txt (colmap.github.io/format.html).
 #pragma once
 #include <filesystem>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the binary and the text reader of COLMAP models have in common: the checks.
 #pragma once
 #include <array>

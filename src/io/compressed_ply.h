@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // SuperSplat's compressed PLY (playcanvas/splat-transform, write-compressed-ply.ts): a PLY container with
 //   element chunk    a box for every 256 splats: float min_x..z max_x..z, min_scale_x..z max_scale_x..z
 //   (logarithms),

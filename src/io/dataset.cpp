@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Which kind of dataset a path holds, and what every kind is checked for once its model is read.
 #include "ewa/dataset.h"
 
@@ -175,6 +176,7 @@ void append(io::PosedImages& all, io::PosedImages more) {
     if (all.points.positions.empty()) all.points = std::move(more.points);
     if (all.dropped.count == 0) all.dropped.first = std::move(more.dropped.first);
     all.dropped.count += more.dropped.count;
+    all.color_depends_on_view = all.color_depends_on_view || more.color_depends_on_view;
 }
 
 /// Blender's scenes say by the file's name what its frames are for.
@@ -202,6 +204,7 @@ io::PosedImages read_model(const fs::path& path, const DatasetOptions& options) 
         return io::read_transforms(path / "transforms.json", 0, options.need_images);
     io::PosedImages all;
     all.folder = path / "images";
+    all.color_depends_on_view = false;  // unless a file says so, or says nothing
     bool found = false;
     for (const char* file : {"transforms_train.json", "transforms_test.json"})
         if (is_file(path / file)) {
@@ -226,6 +229,7 @@ Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& op
     Dataset dataset;
     dataset.root = is_folder(path) ? path : path.parent_path();
     dataset.points = std::move(model.points);
+    dataset.color_depends_on_view = model.color_depends_on_view;
     dataset.dropped_points = model.dropped.count;
     dataset.first_dropped_point = std::move(model.dropped.first);
     std::stable_sort(model.images.begin(), model.images.end(),

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "io/gltf_document.h"
 
 #include <algorithm>
@@ -16,7 +17,9 @@ using nlohmann::json;
 constexpr uint32_t kMagic = 0x46546c67, kJsonChunk = 0x4e4f534a, kBinChunk = 0x004e4942;
 constexpr int kDeepest = 64;
 constexpr size_t kLongestReason = 300;  // of a library's error, which may quote the file at any length
-constexpr size_t kMostObjects = 1 << 15, kMostValues = 1 << 17;
+constexpr size_t kMostObjects = 1 << 15, kMostValues = 1 << 17;  // of splats; meshes have more nodes
+constexpr size_t kMeshFolds = 2;
+constexpr uint64_t kMostImageBytes = uint64_t(64) << 20;
 
 struct Chunks {
     std::string json;
@@ -65,18 +68,21 @@ Chunks read_chunks(core::FileReader& reader) {
     return chunks;
 }
 
-json parse(const std::string& name, const Chunks& chunks) {
+json parse(const std::string& name, const Chunks& chunks, GltfContent content) {
     size_t objects = 0, values = 0;
+    const bool splats = content == GltfContent::splats;
+    const size_t most_objects = kMostObjects * (splats ? 1 : kMeshFolds);
+    const size_t most_values = kMostValues * (splats ? 1 : kMeshFolds);
     const auto watch = [&](int depth, json::parse_event_t event, json& parsed) {
         if (depth > kDeepest)
             throw InputError(name + ": the JSON nests deeper than " + std::to_string(kDeepest) + " levels");
         objects += event == json::parse_event_t::object_start;
         values += event == json::parse_event_t::value;
-        if (objects > kMostObjects || values > kMostValues)
-            throw InputError(name + ": the JSON has more than " + std::to_string(kMostObjects) +
-                             " objects or " + std::to_string(kMostValues) +
-                             " values, which is no splat scene");
-        return !(event == json::parse_event_t::key && parsed == "extras");
+        if (objects > most_objects || values > most_values)
+            throw InputError(name + ": the JSON has more than " + std::to_string(most_objects) +
+                             " objects or " + std::to_string(most_values) + " values, which is no " +
+                             (splats ? "splat" : "mesh") + " scene");
+        return !(splats && event == json::parse_event_t::key && parsed == "extras");
     };
     try {
         return json::parse(chunks.json, watch);
@@ -89,12 +95,17 @@ json parse(const std::string& name, const Chunks& chunks) {
     }
 }
 
-/// The sections that a splat scene needs, as text.
-std::string needed_sections(const json& top) {
+/// The sections that the content needs, as text. Images are not among them: tinygltf would open them.
+std::string needed_sections(const json& top, GltfContent content) {
     json kept = json::object();
-    for (const char* key : {"asset", "scene", "scenes", "nodes", "meshes", "accessors", "bufferViews",
-                            "extensionsUsed", "extensionsRequired"})
-        if (const auto found = top.find(key); found != top.end()) kept[key] = *found;
+    const auto keep = [&](std::initializer_list<const char*> keys) {
+        for (const char* key : keys)
+            if (const auto found = top.find(key); found != top.end()) kept[key] = *found;
+    };
+    keep({"asset", "scene", "scenes", "nodes", "meshes", "accessors", "bufferViews", "extensionsUsed",
+          "extensionsRequired"});
+    if (content == GltfContent::meshes)
+        keep({"materials", "textures", "samplers", "cameras", "extensions"});
     // The strings of a file may hold bytes that are no UTF-8; they are names here and are replaced.
     return kept.dump(-1, ' ', false, json::error_handler_t::replace);
 }
@@ -136,6 +147,7 @@ size_t component_bytes(int type) {
         case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
             return 2;
         case TINYGLTF_COMPONENT_TYPE_FLOAT:
+        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
             return 4;
         default:
             return 0;
@@ -169,6 +181,8 @@ double decode(int type, bool normalized, const std::byte* bytes) {
             return value_of<int16_t>(bytes, normalized);
         case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
             return value_of<uint16_t>(bytes, normalized);
+        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
+            return value_of<uint32_t>(bytes, normalized);
         default:
             return value_of<float>(bytes, false);
     }
@@ -180,7 +194,7 @@ void GltfDocument::fail(const std::string& text) const {
     throw InputError(name_ + ": " + core::one_line(text));
 }
 
-GltfDocument::GltfDocument(const std::filesystem::path& path) : path_(path) {
+GltfDocument::GltfDocument(const std::filesystem::path& path, GltfContent content) : path_(path) {
     json top;
     uint64_t bin_begin = 0, bin_size = 0;
     {
@@ -191,13 +205,14 @@ GltfDocument::GltfDocument(const std::filesystem::path& path) : path_(path) {
         binary_ = chunks.binary;
         bin_begin = chunks.bin_begin;
         bin_size = chunks.bin_size;
-        top = parse(name_, chunks);
+        top = parse(name_, chunks, content);
     }
     if (!top.is_object()) fail("the JSON is no object");
     if (!top.contains("asset")) fail("the JSON has no \"asset\", which every glTF has");
     if (const auto list = top.find("buffers"); list != top.end())
         add_buffers(path.parent_path(), &*list, bin_begin, bin_size);
-    const std::string text = needed_sections(top);
+    if (const auto list = top.find("images"); list != top.end() && content == GltfContent::meshes) add_images(&*list);
+    const std::string text = needed_sections(top, content);
     top = nullptr;
     tinygltf::TinyGLTF loader;
     std::string error, warning;
@@ -225,7 +240,7 @@ void GltfDocument::add_buffers(const std::filesystem::path& folder, const void* 
         if (uri != list[i].end() && !uri->is_string()) fail(what + "\"uri\" is no text");
         Buffer buffer;
         if (uri != list[i].end())
-            buffer = open_uri(folder, uri->get_ref<const std::string&>(), i);
+            buffer = open_uri(folder, uri->get_ref<const std::string&>(), what);
         else if (binary_ && i == 0)
             buffer = {path_, chunk_begin, chunk_size, {}};
         else
@@ -238,14 +253,63 @@ void GltfDocument::add_buffers(const std::filesystem::path& folder, const void* 
     }
 }
 
+void GltfDocument::add_images(const void* json_images) {
+    const json& list = *static_cast<const json*>(json_images);
+    if (!list.is_array()) fail("\"images\" is no list");
+    for (size_t i = 0; i < list.size(); ++i) {
+        const std::string what = "image " + std::to_string(i) + ": ";
+        if (!list[i].is_object()) fail(what + "is no object");
+        ImageSource source;
+        if (const auto uri = list[i].find("uri"); uri != list[i].end()) {
+            if (!uri->is_string()) fail(what + "\"uri\" is no text");
+            source.uri = uri->get<std::string>();
+        } else if (const auto view = list[i].find("bufferView"); view != list[i].end()) {
+            if (!view->is_number_unsigned() || view->get<uint64_t>() > uint64_t(std::numeric_limits<int>::max()))
+                fail(what + "\"bufferView\" is no whole number of 0 or more");
+            source.view = view->get<int>();
+        }
+        images_.push_back(std::move(source));
+    }
+}
+
+GltfDocument::Buffer GltfDocument::open_view(int index, const std::string& what) const {
+    if (index < 0 || size_t(index) >= model_.bufferViews.size())
+        fail(what + "\"bufferView\" is missing or there is none of this number");
+    const tinygltf::BufferView& view = model_.bufferViews[size_t(index)];
+    if (view.buffer < 0 || size_t(view.buffer) >= buffers_.size())
+        fail(what + "its buffer view's \"buffer\" is none of the file's");
+    const Buffer& buffer = buffers_[size_t(view.buffer)];
+    if (view.byteOffset > buffer.size || view.byteLength > buffer.size - view.byteOffset)
+        fail(what + "its buffer view ends behind its buffer, which has " + std::to_string(buffer.size) + " bytes");
+    Buffer part{buffer.file, buffer.begin + view.byteOffset, view.byteLength, {}};
+    if (buffer.file.empty())
+        part.data.assign(buffer.data.begin() + std::ptrdiff_t(view.byteOffset),
+                         buffer.data.begin() + std::ptrdiff_t(view.byteOffset + view.byteLength));
+    return part;
+}
+
+std::vector<unsigned char> GltfDocument::image_bytes(size_t index) const {
+    const ImageSource& source = images_[index];
+    const std::string what = "image " + std::to_string(index) + ": ";
+    Buffer buffer =
+        source.uri.empty() ? open_view(source.view, what) : open_uri(path_.parent_path(), source.uri, what);
+    if (buffer.size > kMostImageBytes)
+        fail(what + "claims " + std::to_string(buffer.size) + " bytes, more than " + std::to_string(kMostImageBytes));
+    if (buffer.file.empty()) return std::move(buffer.data);
+    core::FileReader reader(buffer.file);
+    reader.skip(buffer.begin, what);
+    const std::byte* bytes = reader.take(size_t(buffer.size), what);
+    const auto* begin = reinterpret_cast<const unsigned char*>(bytes);
+    return {begin, begin + buffer.size};
+}
+
 GltfDocument::Buffer GltfDocument::open_uri(const std::filesystem::path& folder, const std::string& uri,
-                                            size_t index) const {
-    const std::string what = "buffer " + std::to_string(index) + ": ";
+                                            const std::string& what) const {
     Buffer buffer;
     if (uri.starts_with("data:")) {
         std::string mime;
         if (!tinygltf::IsDataURI(uri) || !tinygltf::DecodeDataURI(&buffer.data, mime, uri, 0, false))
-            fail(what + "the data \"uri\" is not base64 that a buffer can have");
+            fail(what + "the data \"uri\" is not base64 of a kind that glTF has");
         buffer.size = buffer.data.size();
         return buffer;
     }
@@ -276,7 +340,7 @@ uint64_t GltfDocument::bytes() const {
     return sum;
 }
 
-const tinygltf::Accessor& GltfDocument::accessor(int index, const std::string& what) const {
+const tinygltf::Accessor& GltfDocument::accessor(int index, const std::string& what, bool indices) const {
     const auto refuse = [&](const std::string& text) {
         fail(what + ": accessor " + std::to_string(index) + ": " + text);
     };
@@ -284,7 +348,8 @@ const tinygltf::Accessor& GltfDocument::accessor(int index, const std::string& w
     const tinygltf::Accessor& a = model_.accessors[size_t(index)];
     if (a.sparse.isSparse) refuse("\"sparse\" is not supported");
     const uint64_t element = component_bytes(a.componentType) * components(a);
-    if (element == 0) refuse("\"componentType\" or \"type\" is none that a splat's attribute has");
+    if (element == 0 || (a.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT && !indices))
+        refuse("\"componentType\" or \"type\" is none that such an attribute has");
     if (a.bufferView < 0 || size_t(a.bufferView) >= model_.bufferViews.size())
         refuse("\"bufferView\" is missing or there is none of this number");
     const tinygltf::BufferView& view = model_.bufferViews[size_t(a.bufferView)];

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A glTF file's structure (through tinygltf) and the numbers its accessors hold, whatever buffer they stand
 // in.
 #pragma once
@@ -10,13 +11,18 @@
 
 namespace ewa::io {
 
-/// Only what a splat scene needs is parsed: scenes, nodes, meshes, accessors, buffer views. Images, materials
-/// and "extras" are left out, and a file nested or branched beyond any splat scene is refused before memory
-/// is taken.
+/// What a reader wants of the file.
+enum class GltfContent {
+    splats,  // scenes, nodes, meshes, accessors, buffer views; neither materials nor "extras"
+    meshes   // also materials, textures, samplers, cameras, lights, "extras"; images stay as they are encoded
+};
+
+/// Only what the content needs is parsed, and a file nested or branched beyond any such scene is refused before
+/// memory is taken.
 class GltfDocument {
   public:
     /// Throws InputError that names the file and the byte or the property.
-    explicit GltfDocument(const std::filesystem::path& path);
+    explicit GltfDocument(const std::filesystem::path& path, GltfContent content = GltfContent::splats);
 
     const std::string& name() const { return name_; }
     const tinygltf::Model& model() const { return model_; }
@@ -26,8 +32,14 @@ class GltfDocument {
     /// Throws InputError "name: text".
     [[noreturn]] void fail(const std::string& text) const;
 
-    /// The accessor, after checking that its buffer holds every element. `what` names it in the error.
-    const tinygltf::Accessor& accessor(int index, const std::string& what) const;
+    /// The accessor, after checking that its buffer holds every element. `what` names it in the error. indices:
+    /// 32-bit integers are allowed, which no attribute has.
+    const tinygltf::Accessor& accessor(int index, const std::string& what, bool indices = false) const;
+
+    /// Of a document of meshes: how many images there are, and the bytes of one as the file, a buffer or a data URI
+    /// has them. Throws InputError, also for more than 64 MiB.
+    size_t images() const { return images_.size(); }
+    std::vector<unsigned char> image_bytes(size_t index) const;
 
     /// Its elements in order: element(index, values), integers that are normalised as 0..1 or -1..1.
     void read(const tinygltf::Accessor& accessor, const std::string& what,
@@ -39,9 +51,15 @@ class GltfDocument {
         uint64_t begin = 0, size = 0;
         std::vector<unsigned char> data;
     };
+    struct ImageSource {
+        std::string uri;  // empty: in the buffer view
+        int view = -1;
+    };
     void add_buffers(const std::filesystem::path& folder, const void* json_buffers, uint64_t chunk_begin,
                      uint64_t chunk_size);
-    Buffer open_uri(const std::filesystem::path& folder, const std::string& uri, size_t index) const;
+    void add_images(const void* json_images);
+    Buffer open_uri(const std::filesystem::path& folder, const std::string& uri, const std::string& what) const;
+    Buffer open_view(int index, const std::string& what) const;
 
     std::string name_;
     std::filesystem::path path_;
@@ -49,6 +67,7 @@ class GltfDocument {
     bool binary_ = false;
     tinygltf::Model model_;
     std::vector<Buffer> buffers_;
+    std::vector<ImageSource> images_;
 };
 
 }  // namespace ewa::io

@@ -1,6 +1,6 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <array>
 #include <cmath>
-#include <glm/gtc/quaternion.hpp>
 #include <glm/mat4x4.hpp>
 #include <optional>
 
@@ -8,6 +8,7 @@
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
 #include "io/gltf_document.h"
+#include "io/gltf_nodes.h"
 #include "io/gltf_splats.h"
 #include "io/splat_scene.h"
 #include "io/splat_values.h"
@@ -56,7 +57,13 @@ class SplatReader {
     explicit SplatReader(const GltfDocument& document) : document_(document), model_(document.model()) {}
 
     SplatScene read() {
-        for (const int root : roots()) visit(root);
+        // glTF's world, LUF, to PLY's: half a turn round z.
+        glm::dmat4 to_ply(1.0);
+        to_ply[0][0] = to_ply[1][1] = -1;
+        visit_nodes(document_, to_ply, [&](int index, const glm::dmat4& matrix) {
+            const int mesh = model_.nodes[size_t(index)].mesh;
+            if (mesh >= 0) add_mesh(mesh, matrix, "node " + std::to_string(index));
+        });
         if (primitives_ == 0)
             document_.fail("the scene's nodes reach no primitive with the extension " + kExtension +
                            "; it is a mesh scene, or packed with another extension");
@@ -67,62 +74,6 @@ class SplatReader {
     }
 
   private:
-    std::vector<int> roots() const {
-        if (model_.scenes.empty())
-            document_.fail("there is no \"scenes\", so nothing is placed in the world");
-        const int index = std::max(model_.defaultScene, 0);
-        if (size_t(index) >= model_.scenes.size())
-            document_.fail("\"scene\" is " + std::to_string(index) + ", and there is none of this number");
-        return model_.scenes[size_t(index)].nodes;
-    }
-
-    /// The node and those below, parents before children. A node that is met again is no tree's.
-    void visit(int root) {
-        // glTF's world, LUF, to PLY's: half a turn round z.
-        glm::dmat4 to_ply(1.0);
-        to_ply[0][0] = to_ply[1][1] = -1;
-        visited_.resize(model_.nodes.size());
-        std::vector<std::pair<int, glm::dmat4>> open = {{root, to_ply}};
-        while (!open.empty()) {
-            const auto [index, parent] = open.back();
-            open.pop_back();
-            if (index < 0 || size_t(index) >= model_.nodes.size())
-                document_.fail("node " + std::to_string(index) + ": there is none of this number");
-            if (visited_[size_t(index)])
-                document_.fail("node " + std::to_string(index) + " has two parents or is its own ancestor");
-            visited_[size_t(index)] = true;
-            const tinygltf::Node& node = model_.nodes[size_t(index)];
-            const glm::dmat4 matrix = parent * local(node, index);
-            if (node.mesh >= 0) add_mesh(node.mesh, matrix, "node " + std::to_string(index));
-            for (size_t i = node.children.size(); i-- > 0;) open.emplace_back(node.children[i], matrix);
-        }
-    }
-
-    glm::dmat4 local(const tinygltf::Node& node, int index) const {
-        const auto size = [&](const std::vector<double>& values, size_t n, const char* property) {
-            if (!values.empty() && values.size() != n)
-                document_.fail("node " + std::to_string(index) + ": \"" + property + "\" has not " +
-                               std::to_string(n) + " numbers");
-            return !values.empty();
-        };
-        glm::dmat4 matrix(1.0);
-        if (size(node.matrix, 16, "matrix")) {
-            for (int i = 0; i < 16; ++i) matrix[i / 4][i % 4] = node.matrix[size_t(i)];
-            return matrix;
-        }
-        if (size(node.rotation, 4, "rotation")) {
-            const glm::dquat q(node.rotation[3], node.rotation[0], node.rotation[1], node.rotation[2]);
-            if (!(glm::length(q) > 0))
-                document_.fail("node " + std::to_string(index) + ": \"rotation\" is zero");
-            matrix = glm::mat4_cast(glm::normalize(q));
-        }
-        if (size(node.scale, 3, "scale"))
-            for (int i = 0; i < 3; ++i) matrix[i] *= node.scale[size_t(i)];
-        if (size(node.translation, 3, "translation"))
-            for (int i = 0; i < 3; ++i) matrix[3][i] = node.translation[size_t(i)];
-        return matrix;
-    }
-
     void add_mesh(int index, const glm::dmat4& matrix, const std::string& node) {
         if (size_t(index) >= model_.meshes.size())
             document_.fail(node + ": \"mesh\" " + std::to_string(index) + ": there is none of this number");
@@ -269,7 +220,6 @@ class SplatReader {
     const GltfDocument& document_;
     const tinygltf::Model& model_;
     SplatScene scene_;
-    std::vector<bool> visited_;
     std::string where_;   // the primitive being read, for errors
     size_t count_ = 0;    // its splats
     int primitives_ = 0;  // read so far

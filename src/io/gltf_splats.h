@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // glTF 2.0 with KHR_gaussian_splatting (Khronos; release candidate of 2026), as .glb or .gltf with a .bin
 // beside.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The JSON is a few kB whose layout is known beforehand, so that the values go from the scene to the file
 // without a copy of them in a buffer.
 #include <algorithm>

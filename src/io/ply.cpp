@@ -1,6 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "io/ply.h"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cstring>
 
@@ -89,13 +91,20 @@ void remark_ignored(const PlyElement& vertex, const std::vector<size_t>& columns
                                 std::to_string(kMaxShDegree) + " are left out");
 }
 
+/// Positions that float32 would round are written as double.
+bool in_double(const Gaussians& gaussians) {
+    return gaussians.origin != glm::dvec3(0);
+}
+
 std::string header(const Gaussians& gaussians, const SaveOptions& options) {
     std::string text = "ply\nformat binary_little_endian 1.0\n";
     for (const std::string& comment : options.comments) text += "comment " + core::one_line(comment) + "\n";
     if (options.antialiased && !any_antialiased(options.comments)) text += "comment SplatRenderMode: mip\n";
     text += "element vertex " + std::to_string(gaussians.size()) + "\n";
     const auto property = [&](const std::string& name) { text += "property float " + name + "\n"; };
-    for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) property(name);
+    for (const char* name : {"x", "y", "z"})
+        text += std::string("property ") + (in_double(gaussians) ? "double " : "float ") + name + "\n";
+    for (const char* name : {"nx", "ny", "nz"}) property(name);
     for (int i = 0; i < 3; ++i) property("f_dc_" + std::to_string(i));
     for (int i = 0; i < 3 * (sh_coefficients(gaussians.sh_degree) - 1); ++i)
         property("f_rest_" + std::to_string(i));
@@ -108,7 +117,14 @@ std::string header(const Gaussians& gaussians, const SaveOptions& options) {
 void append_row(const Gaussians& gaussians, size_t i, std::vector<float>& rows) {
     const size_t stride = gaussians.sh_stride();
     const auto append = [&](const float* values, size_t n) { rows.insert(rows.end(), values, values + n); };
-    append(&gaussians.means[3 * i], 3);
+    if (in_double(gaussians)) {
+        const glm::dvec3 mean = gaussians.world_mean(i);
+        std::array<float, 6> bytes;
+        std::memcpy(bytes.data(), &mean[0], sizeof(bytes));
+        append(bytes.data(), bytes.size());
+    } else {
+        append(&gaussians.means[3 * i], 3);
+    }
     rows.insert(rows.end(), 3, 0.0f);
     append(&gaussians.sh[stride * i], 3);
     for (size_t channel = 0; channel < 3; ++channel)
@@ -139,13 +155,19 @@ SplatScene read_ply(const std::filesystem::path& path) {
     const auto copy = [](const double* from, float* to, size_t n) {
         for (size_t k = 0; k < n; ++k) to[k] = static_cast<float>(from[k]);
     };
+    const bool wide = vertex.properties[columns[0]].type == PlyType::float64;
+    std::vector<glm::dvec3> positions(wide ? gaussians.size() : 0);
     table.read(columns, [&](size_t i, const double* row) {
-        copy(row, &gaussians.means[3 * i], 3);
+        if (wide)
+            positions[i] = {row[0], row[1], row[2]};
+        else
+            copy(row, &gaussians.means[3 * i], 3);
         gaussians.opacity_logits[i] = static_cast<float>(row[3]);
         copy(row + 4, &gaussians.log_scales[3 * i], 3);
         copy(row + 7, &gaussians.quaternions[4 * i], 4);
         copy(row + kBeforeSh, &gaussians.sh[stride * i], stride);
     });
+    if (wide) set_world_means(gaussians, positions);
     return scene;
 }
 

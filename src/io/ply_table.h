@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The PLY container (Turk 1994): a text header that declares elements and their properties, then their rows.
 // What the properties mean is the business of ply.h and points_ply.h.
 #pragma once

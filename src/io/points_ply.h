@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Coloured point clouds in PLY files.
 #pragma once
 #include <filesystem>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a dataset's model file says, before its pictures are looked at. Each format's reader makes one of
 // these.
 #pragma once
@@ -30,6 +31,7 @@ struct PosedImages {
     std::vector<PosedImage> images;  // in the file's order
     PointCloud points;
     DroppedPoints dropped;
+    bool color_depends_on_view = true;  // Dataset::color_depends_on_view
 };
 
 /// Adds a point, or counts it as dropped. where: asked for the first dropped one.

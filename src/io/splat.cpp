@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "io/splat.h"
 
 #include "core/atomic_file.h"

@@ -1,5 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 // Every splat format, by what a file begins with or what it is to be called.
 #include "ewa/splat_files.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
 
 #include "core/log.h"
 #include "core/text.h"
@@ -93,6 +98,31 @@ std::vector<std::string> write(const std::filesystem::path& path, SplatFormat fo
 
 }  // namespace
 
+namespace {
+
+/// The scene with world positions for its means, as float32 rounds them.
+Gaussians in_float_positions(Gaussians gaussians) {
+    for (size_t i = 0; i < gaussians.size(); ++i) {
+        const glm::dvec3 mean = gaussians.world_mean(i);
+        for (int axis = 0; axis < 3; ++axis) gaussians.means[3 * i + size_t(axis)] = float(mean[axis]);
+    }
+    gaussians.origin = glm::dvec3(0);
+    return gaussians;
+}
+
+std::string rounding_remark(const glm::dvec3& origin) {
+    const double farthest = std::max({std::abs(origin.x), std::abs(origin.y), std::abs(origin.z)});
+    const float step = std::nextafter(float(farthest), INFINITY) - float(farthest);
+    char text[160];
+    std::snprintf(text, sizeof(text),
+                  "positions are rounded to %.3g units, float32's step so far from the origin; .ply keeps them, or "
+                  "--transform move= brings them near it",
+                  double(step));
+    return text;
+}
+
+}  // namespace
+
 std::string_view name_of(SplatFormat format) {
     for (const Kind& kind : kKinds)
         if (kind.format == format) return kind.name;
@@ -151,6 +181,11 @@ std::vector<std::string> save_splats(const std::filesystem::path& path, const Ga
     const SplatFormat format = format_of_name(path);
     std::vector<std::string> remarks, more;
     const bool ply = format == SplatFormat::ply;
+    if (!ply && gaussians.origin != glm::dvec3(0)) {
+        remarks = save_splats(path, in_float_positions(gaussians), options);
+        remarks.push_back(rounding_remark(gaussians.origin));
+        return remarks;
+    }
     bool whole = true;
     for (size_t i = 0; i < gaussians.size() && whole && !ply; ++i) whole = drawable(gaussians, i);
     if (whole)

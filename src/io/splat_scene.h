@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What readers and writers of the splat formats have in common.
 #pragma once
 #include <cstdint>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the splat formats store in other units than a Gaussians holds, and bytes made of real numbers.
 #pragma once
 #include <algorithm>

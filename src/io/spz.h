@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // SPZ (nianticlabs/spz): one block an attribute, structure of arrays, quantised, then packed.
 //   versions 1 to 3: all in one gzip stream: header of 16 bytes, then the blocks
 //   version 4: header of 32 bytes, extension records, table of (packed, unpacked) sizes, a Zstandard frame a

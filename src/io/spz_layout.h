@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the reader and the writer of SPZ share.
 #pragma once
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "io/transforms.h"
 
 #include <algorithm>
@@ -249,6 +250,10 @@ PosedImages read_transforms(const std::filesystem::path& path, int split, bool w
         read_pose(entry, image.camera);
         read_intrinsics(entry, image);
         result.images.push_back(std::move(image));
+    }
+    if (const auto view = top.find("view_dependent"); view != top.end() && !view->is_null()) {
+        if (!view->is_boolean()) throw InputError(name + ": \"view_dependent\" is neither true nor false");
+        result.color_depends_on_view = view->get<bool>();
     }
     const json empty = json::object();
     const std::string points_path = Entry(name, top, empty, 0).text("ply_file_path");

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Bytes that a file holds packed, unpacked as they are read, and packed as they are written.
 #pragma once
 #include <cstddef>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Named cameras in a JSON file: {"views": [{"name": "...", "width": px, "height": px, "fx": px, "fy": px, "cx": px,
 // "cy": px, "rotation": [9 numbers, world to camera, row after row], "translation": [3], "pivot": [3]}, ...]}.
 #pragma once

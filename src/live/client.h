@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The watcher's side of protocol.h.
 #pragma once
 #include <string>

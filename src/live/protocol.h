@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Watching a training run over a socket. One client, one connection, one request at a time.
 //
 // A request is one line of text of at most kMostRequest bytes, words separated by a blank, ended by "\n". An answer is one

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The trainer's side: lets others look on (protocol.h). The training loop leaves here what there is to see, and never waits
 // for whoever sees it.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // TCP, as far as watching a run needs it: every wait has an end.
 #pragma once
 #include <cstddef>

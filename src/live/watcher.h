@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A training run as it goes: by its connection where there is one, else by the files that it writes.
 #pragma once
 #include <condition_variable>

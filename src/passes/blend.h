@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Blends the splats of every tile into the image planes. mode: shared::BLEND_*.
 #pragma once
 #include "gpu/recording.h"
@@ -19,7 +20,7 @@ struct Blend {
     Blend(gpu::Device& device, const Shape& shape, uint32_t mode)
         : pipeline(
               device, "blend", shader_code("blend"),
-              {spec(shared::SPEC_GROUP_SIZE, shape.subgroup), spec(shared::SPEC_SUBGROUP, shape.subgroup),
+              {spec_float(shared::SPEC_CUT_OFF, shape.cut_off), spec(shared::SPEC_GROUP_SIZE, shape.subgroup), spec(shared::SPEC_SUBGROUP, shape.subgroup),
                spec(shared::SPEC_TILE_WIDTH, shape.tile_width),
                spec(shared::SPEC_TILE_HEIGHT, shape.tile_height), spec(shared::SPEC_MODE, mode)}) {}
 

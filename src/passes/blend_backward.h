@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Gradient of blending into the slot of every (splat, tile) instance.
 #pragma once
 #include "gpu/recording.h"
@@ -22,7 +23,7 @@ struct BlendBackward {
     BlendBackward(gpu::Device& device, const Shape& shape, uint32_t mode)
         : pipeline(
               device, "blend_backward", shader_code("blend_backward"),
-              {spec(shared::SPEC_GROUP_SIZE, shape.subgroup), spec(shared::SPEC_SUBGROUP, shape.subgroup),
+              {spec_float(shared::SPEC_CUT_OFF, shape.cut_off), spec(shared::SPEC_GROUP_SIZE, shape.subgroup), spec(shared::SPEC_SUBGROUP, shape.subgroup),
                spec(shared::SPEC_TILE_WIDTH, shape.tile_width),
                spec(shared::SPEC_TILE_HEIGHT, shape.tile_height), spec(shared::SPEC_MODE, mode)}) {}
 

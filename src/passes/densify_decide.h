@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How many splats each splat becomes.
 #pragma once
 #include "gpu/recording.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Writes the next generation of splats.
 #pragma once
 #include "gpu/recording.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Writes the (splat, tile) instances in depth order. with_first: also where each splat's begin.
 #pragma once
 #include "gpu/recording.h"
@@ -24,7 +25,7 @@ struct EmitInstances {
     EmitInstances(gpu::Device& device, const Shape& shape, bool with_first)
         : pipeline(
               device, "emit_instances", shader_code("emit_instances"),
-              {spec(shared::SPEC_GROUP_SIZE, shape.group), spec(shared::SPEC_TILE_WIDTH, shape.tile_width),
+              {spec_float(shared::SPEC_CUT_OFF, shape.cut_off), spec(shared::SPEC_GROUP_SIZE, shape.group), spec(shared::SPEC_TILE_WIDTH, shape.tile_width),
                spec(shared::SPEC_TILE_HEIGHT, shape.tile_height), spec(shared::SPEC_MODE, with_first)}) {}
 
     void record(gpu::Recording& recording, const Shape& shape, const Buffers& buffers,

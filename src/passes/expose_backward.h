@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The gradient by the picture, in place, and partial sums of that by the exposure.
 #pragma once
 #include "gpu/recording.h"

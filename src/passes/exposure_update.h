@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Adam's step of one photograph's exposure.
 #pragma once
 #include "gpu/recording.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Derivatives of SSIM carried back through the window, down the columns.
 #pragma once
 #include "gpu/recording.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Gradient of the whole loss by the rendering.
 #pragma once
 #include "gpu/recording.h"

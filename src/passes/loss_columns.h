@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Moments of rendering and photograph, blurred down the columns.
 #pragma once
 #include "gpu/recording.h"

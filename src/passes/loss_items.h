@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Invocations that the passes of the loss take a plane.
 #pragma once
 #include <cstdint>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // SSIM and its derivatives by the rendering's moments.
 #pragma once
 #include "gpu/recording.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The gradient by the rendering, from that by the masked rendering.
 #pragma once
 #include "gpu/recording.h"

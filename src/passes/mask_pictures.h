@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Photograph and rendering as the loss compares them where pixels are masked.
 #pragma once
 #include "gpu/recording.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Draws sources by their weights, and counts how often each was drawn.
 #pragma once
 #include "gpu/recording.h"

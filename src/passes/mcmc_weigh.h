@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Weights of the splats as sources of others, and which are dead.
 #pragma once
 #include "gpu/recording.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Turns the colour planes into 8-bit RGBA.
 #pragma once
 #include "gpu/recording.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Moves the means by noise of the splats' shapes.
 #pragma once
 #include "gpu/recording.h"
@@ -20,7 +21,7 @@ struct Perturb {
     void record(gpu::Recording& recording, const Shape& shape, const Buffers& buffers,
                 const shared::PerturbPush& push) const {
         recording.dispatch(pipeline, "perturb",
-                           {gpu::updates(0, buffers.params), gpu::reads(1, buffers.counts)}, push,
+                           {gpu::updates(0, buffers.params), gpu::updates(1, buffers.counts)}, push,
                            element_groups(shape, push.splats));
     }
 };

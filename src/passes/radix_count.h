@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Counts the digits of one radix pass; the counters stand at zero before.
 #pragma once
 #include "gpu/recording.h"

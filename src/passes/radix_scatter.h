@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Moves the pairs of one radix pass to their places. mode: see the shader.
 #pragma once
 #include "gpu/recording.h"

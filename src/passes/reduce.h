@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Adds up floats in a fixed order.
 #pragma once
 #include "gpu/recording.h"

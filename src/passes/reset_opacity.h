@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Lowers every opacity and forgets its moments.
 #pragma once
 #include "gpu/recording.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Exclusive prefix sums within blocks. gathered: entry e is source[order[e]].
 #pragma once
 #include "gpu/recording.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Exclusive prefix sum of the blocks' totals, in place, with the grand total behind them.
 #pragma once
 #include "gpu/recording.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The SPIR-V modules embedded at build time, by the file name of their GLSL source without extension.
 #pragma once
 #include <cstdint>

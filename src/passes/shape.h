@@ -1,6 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
 // How kernels are cut for a device. Every such choice is made here, from the device's properties alone.
 #pragma once
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <stdexcept>
 #include <string>
@@ -8,6 +10,7 @@
 #include "gpu/device.h"
 
 #include "gpu/pipeline.h"
+#include "shared/constants.h"
 #include "shared/layouts.h"
 
 namespace ewa::passes {
@@ -22,6 +25,7 @@ struct Shape {
     uint32_t tile_interleave = 1;              // neighbouring workgroups take tiles this far apart
     uint32_t max_groups = 65535;
     uint32_t loop_limit = 65535;  // turns a loop may take in one invocation
+    float cut_off = float(shared::ALPHA_MIN);  // contributions under this are skipped; another is for comparisons
 };
 
 inline Shape shape_for(const gpu::Limits& limits) {
@@ -76,6 +80,9 @@ inline std::array<uint32_t, 2> tile_steps(const Shape& shape, uint32_t tiles) {
 
 inline gpu::SpecConstant spec(uint32_t id, uint32_t value) {
     return {id, value};
+}
+inline gpu::SpecConstant spec_float(uint32_t id, float value) {
+    return {id, std::bit_cast<uint32_t>(value)};
 }
 
 }  // namespace ewa::passes

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Finds where each tile's instances begin in the sorted list.
 #pragma once
 #include "gpu/recording.h"
@@ -24,7 +25,7 @@ struct TileStarts {
         recording.dispatch(
             pipeline, "tile_starts",
             {gpu::reads(0, buffers.keys), gpu::reads(1, buffers.counts), gpu::writes(2, buffers.tile_starts)},
-            push, element_groups(shape, uint64_t(push.tiles) + 1));
+            push, element_groups(shape, uint64_t(push.tiles) + 2));
     }
 };
 

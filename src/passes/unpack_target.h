@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Spreads a photograph into planes.
 #pragma once
 #include "gpu/recording.h"

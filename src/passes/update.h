@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Gradient of the projection, fused with Adam. mode: see the shader.
 #pragma once
 #include "gpu/recording.h"

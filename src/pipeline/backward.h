@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Loss and the way back: from image planes to moved parameters (or to their gradient).
 #pragma once
 #include "pipeline/exposure.h"

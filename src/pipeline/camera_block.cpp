@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/camera_block.h"
 
 #include <cmath>
@@ -28,14 +29,14 @@ void check(const Camera& camera) {
 
 }  // namespace
 
-shared::CameraBlock camera_block(const Camera& camera, const passes::Shape& shape) {
+shared::CameraBlock camera_block(const Camera& camera, const passes::Shape& shape, const glm::dvec3& origin) {
     check(camera);
     shared::CameraBlock block{};
     for (int row = 0; row < 3; ++row)
         for (int column = 0; column < 3; ++column)
             split(camera.rotation[column][row], block.rotation_hi[3 * row + column],
                   block.rotation_lo[3 * row + column]);
-    const glm::dvec3 position = camera.position();
+    const glm::dvec3 position = camera.position() - origin;
     for (int i = 0; i < 3; ++i) split(position[i], block.position_hi[i], block.position_lo[i]);
     const double focal[2] = {camera.fx, camera.fy}, center[2] = {camera.cx, camera.cy};
     const int size[2] = {camera.width, camera.height};

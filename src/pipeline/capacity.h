@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Room for (splat, tile) instances: how much is taken at first, and what happens when a frame needs more.
 #pragma once
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Adaptive density control on the device: counts first, then writes the next generation into new buffers.
 #pragma once
 #include <cstdint>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What each photograph's exposure makes of a picture: an affine map of colours, learned beside the splats (as the
 // published code of 3DGS does for captures with automatic exposure; see include/ewa/exposure.h).
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The forward frame: from parameters to image planes. The order of its passes is written here and nowhere
 // else.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Everything on the device that belongs to one frame in the making, not to the model.
 #pragma once
 #include "gpu/buffer.h"

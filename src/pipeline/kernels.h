@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The compiled kernels of a device, each made when it is first asked for.
 #pragma once
 #include <map>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/mcmc.h"
 
 #include <algorithm>
@@ -43,6 +44,7 @@ McmcResult refine_mcmc(Kernels& kernels, gpu::Executor& executor, Model& model, 
     push.weight_scale = float(std::min(65535u, 0xffffffffu / std::max(model.splats, 1u)));
     push.dead_logit = float(std::log(rules.dead_opacity / (1 - rules.dead_opacity)));
     push.least_opacity = float(rules.dead_opacity);
+    push.spread = float(rules.spread);
     push.seed[0] = uint32_t(rules.seed);
     push.seed[1] = uint32_t(rules.seed >> 32);
     push.step = rules.step;
@@ -80,12 +82,13 @@ McmcResult refine_mcmc(Kernels& kernels, gpu::Executor& executor, Model& model, 
 }
 
 void record_noise(gpu::Recording& recording, Kernels& kernels, const Model& model, const Frame& frame,
-                  float amplitude, uint64_t seed, uint32_t step) {
+                  float amplitude, float reach, uint64_t seed, uint32_t step) {
     kernels.get<passes::Perturb>().record(recording, kernels.shape(), {model.params, frame.counts},
                                           {model.splats,
                                            model.planes(),
                                            frame.instance_capacity,
                                            amplitude,
+                                           reach,
                                            {uint32_t(seed), uint32_t(seed >> 32)},
                                            step});
 }

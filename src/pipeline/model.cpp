@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/model.h"
 
 #include <algorithm>
@@ -49,6 +50,7 @@ Model next_generation(gpu::Device& device, const Model& model, uint32_t splats) 
     Model next;
     next.splats = next.capacity = splats;
     next.sh_degree = model.sh_degree;
+    next.origin = model.origin;
     next.params = parameter_buffer(device, "params", splats, model.sh_degree);
     next.moments1 = parameter_buffer(device, "moments1", splats, model.sh_degree);
     next.moments2 = parameter_buffer(device, "moments2", splats, model.sh_degree);
@@ -59,6 +61,7 @@ Model upload_model(gpu::Device& device, const Gaussians& gaussians, int moments,
     Model model;
     model.splats = model.capacity = uint32_t(gaussians.size());
     model.sh_degree = gaussians.sh_degree;
+    model.origin = gaussians.origin;
     const uint64_t bytes = parameter_bytes(model.capacity, model.sh_degree);
     model.params = gpu::Buffer(device, "params", bytes, gpu::Texel::rgba32f);
     std::vector<float> values(bytes / 4);
@@ -76,6 +79,7 @@ Model upload_model(gpu::Device& device, const Gaussians& gaussians, int moments,
 Gaussians download_model(const Model& model, const gpu::Buffer& buffer) {
     Gaussians gaussians;
     gaussians.sh_degree = model.sh_degree;
+    gaussians.origin = model.origin;
     gaussians.resize(model.splats);
     const auto values = buffer.download<float>(parameter_bytes(model.capacity, model.sh_degree) / 4);
     for_each_value(gaussians, [&](size_t at, float& value) { value = values[at]; });

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A splat scene on the device: parameters, and in training Adam's moments. The only thing that a step
 // changes.
 #pragma once
@@ -30,6 +31,7 @@ constexpr size_t parameter_index(uint32_t planes, uint32_t f, size_t i) {
 struct Model {
     uint32_t splats = 0, capacity = 0;
     int sh_degree = 0;  // stored
+    glm::dvec3 origin{0.0};  // of the means, see Gaussians; a camera's position is taken relative to it
     uint32_t planes() const { return parameter_planes(sh_degree); }
     gpu::Buffer params;
     gpu::Buffer moments1, moments2;  // only where it is trained, or a gradient is taken (moments1)

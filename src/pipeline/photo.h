@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A photograph as the loss reads it.
 #pragma once
 #include <cstdint>

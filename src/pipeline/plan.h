@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a scene and a request need: which kernels run, with which constants, and which buffers exist. A pure
 // function.
 #pragma once

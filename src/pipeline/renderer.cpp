@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pictures and gradients of a fixed scene: the public face of the forward and backward frames.
 #include "ewa/renderer.h"
 
@@ -30,8 +31,9 @@ Gaussians with_degree(const Gaussians& gaussians, int degree) {
     return result;
 }
 
-gpu::Buffer upload_camera(gpu::Device& device, const Camera& camera, const passes::Shape& shape) {
-    const shared::CameraBlock block = camera_block(camera, shape);
+gpu::Buffer upload_camera(gpu::Device& device, const Camera& camera, const passes::Shape& shape,
+                          const glm::dvec3& origin) {
+    const shared::CameraBlock block = camera_block(camera, shape, origin);
     gpu::Buffer buffer(device, "camera", sizeof(block), gpu::Texel::none, true);
     buffer.upload(std::span<const shared::CameraBlock>(&block, 1));
     return buffer;
@@ -80,7 +82,7 @@ struct Renderer::State {
 template <class Record>
 void Renderer::State::submit(const Camera& camera, const Plan& picture, const std::array<float, 3>& background,
                              Record then) {
-    const gpu::Buffer block = upload_camera(*device, camera, kernels.shape());
+    const gpu::Buffer block = upload_camera(*device, camera, kernels.shape(), model.origin);
     const CameraUse use{&block, 0, uint32_t(camera.width), uint32_t(camera.height)};
     const uint32_t room = std::max(frame.instance_capacity, first_capacity(model.splats));
     counts = run_until_it_fits(
@@ -199,7 +201,7 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
     Plan plan = plan_gradient(gaussians, options);
     plan.masks = alpha_is_weight && target.channels == 4;
     const Model model = upload_model(*device, gaussians, 1, false);
-    const gpu::Buffer block = upload_camera(*device, camera, kernels.shape());
+    const gpu::Buffer block = upload_camera(*device, camera, kernels.shape(), model.origin);
     const gpu::Buffer photo = upload_photo(*device, target);
     const CameraUse use{&block, 0, uint32_t(camera.width), uint32_t(camera.height)};
     Frame frame;
@@ -217,6 +219,7 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
     result.ssim = counts.ssim;
     result.loss = loss_of(counts);
     result.gradient = download_model(model, model.moments1);
+    result.gradient.origin = glm::dvec3(0);  // a gradient stands nowhere
     result.skipped_nonfinite = counts.skipped_nonfinite;
     return result;
 }

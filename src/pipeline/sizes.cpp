@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "pipeline/sizes.h"
 
 #include <algorithm>
@@ -66,7 +67,7 @@ Sizes sizes_for(const passes::Shape& shape, const FrameRequest& request) {
     s.counters = std::max(counter_words(s.depth_sort), counter_words(s.tile_sort)) * word;
     s.digit_totals = (shared::RADIX_DIGITS_MAX + 1) * word;
     s.instance_words = std::max<uint64_t>(request.instances, 1) * word;
-    s.tile_starts = (uint64_t(s.tiles) + 1) * word;
+    s.tile_starts = (uint64_t(s.tiles) + 2) * word;
     s.planes = uint64_t(s.plane_floats) * s.image_planes * word;
     if (request.gradients) {
         const auto groups = passes::element_groups(shape, passes::loss_row_items(s.stride, request.height), 3);

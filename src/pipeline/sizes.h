@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The size of every buffer of a frame and the cut of every dispatch over it: one pure function.
 #pragma once
 #include <cstdint>

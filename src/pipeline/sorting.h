@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The device-wide building blocks of a frame: prefix sum, and stable radix sort of (key, value) pairs.
 #pragma once
 #include "gpu/recording.h"

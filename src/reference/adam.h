@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Adam (Kingma and Ba 2015, algorithm 1), as PyTorch arranges it and 3DGS uses it:
 //   m <- BETA1 m + (1 - BETA1) g,  v <- BETA2 v + (1 - BETA2) g^2
 //   x <- x - rate (m / (1 - BETA1^t)) / (sqrt(v / (1 - BETA2^t)) + EPSILON),  t = 1, 2, ...

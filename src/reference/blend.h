@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Front-to-back compositing of each pixel over its tile's list (Kerbl et al. 2023, eq. 3):
 //   colour = sum_i c_i alpha_i T_i + T background,  T_i = prod_{j < i} (1 - alpha_j)
 //   depth  = sum_i z_i alpha_i T_i

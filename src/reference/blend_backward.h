@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The way back through compositing: from dL/d(picture) to each splat's footprint and colour.
 //
 // With S the colour behind splat i (background included), S = C - sum_{j <= i} c_j alpha_j T_j:

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Adaptive density control (Kerbl et al. 2023, section 5.2, and its published code, scene/gaussian_model.py:
 // add_densification_stats, densify_and_clone, densify_and_split, densify_and_prune, reset_opacity).
 //

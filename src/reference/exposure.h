@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A photograph's exposure (include/ewa/exposure.h), and the gradient through it:
 //   c' = M c + b:   dL/dc = M^T dL/dc',   dL/dM = sum over pixels of dL/dc' c^T,   dL/db = sum of dL/dc'
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What one splat does to one pixel.
 //
 //   d = pixel centre - mean2d

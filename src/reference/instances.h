@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Which splats each tile of the picture blends, front to back.
 //
 // A splat is listed for exactly the tiles in which at least one pixel centre has a raw alpha of ALPHA_MIN or

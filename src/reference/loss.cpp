@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "reference/loss.h"
 
 #include <algorithm>
@@ -59,9 +60,15 @@ Plane channel(const Raster& raster, int k) {
     return out;
 }
 
+Plane limited(Plane plane) {
+    for (double& v : plane) v = std::clamp(v, -SSIM_LIMIT, SSIM_LIMIT);
+    return plane;
+}
+
 /// Returns the sum of SSIM over the plane; gradient is that sum's.
-double ssim_sum(const Plane& x, const Plane& y, int width, int height, Plane& gradient) {
+double ssim_sum(const Plane& rendered, const Plane& target, int width, int height, Plane& gradient) {
     const std::vector<double> window = ssim_window();
+    const Plane x = limited(rendered), y = limited(target);
     const Plane mx = blur(window, x, width, height), my = blur(window, y, width, height);
     const Plane xx = blur(window, product(x, x), width, height),
                 yy = blur(window, product(y, y), width, height);
@@ -84,7 +91,9 @@ double ssim_sum(const Plane& x, const Plane& y, int width, int height, Plane& gr
     const Plane from_xx = blur(window, by_xx, width, height), from_xy = blur(window, by_xy, width, height);
     gradient.resize(x.size());
     for (size_t i = 0; i < x.size(); ++i)
-        gradient[i] = from_mx[i] + 2 * x[i] * from_xx[i] + y[i] * from_xy[i];
+        gradient[i] = std::abs(rendered[i]) <= SSIM_LIMIT
+                          ? from_mx[i] + 2 * x[i] * from_xx[i] + y[i] * from_xy[i]
+                          : 0;
     return sum;
 }
 

@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 // The training loss of a picture and its gradient.
 //
 //   L    = (1 - SSIM_WEIGHT) mean|x - y| + SSIM_WEIGHT (1 - mean SSIM)       means over pixels and RGB
 //   SSIM = (2 mx my + C1)(2 sxy + C2) / ((mx^2 + my^2 + C1)(sxx + syy + C2)) Wang et al. 2004, eq. 13
 // with mx = w * x, sxx = w * x^2 - mx^2, sxy = w * xy - mx my and so on; w is a Gaussian window whose weights
 // add up to 1, zero padded at the border (3DGS, utils/loss_utils.py), where the sums are therefore smaller.
-// The rendering x is not clamped.
+// The rendering x is not clamped to [0, 1]; SSIM takes both pictures within SSIM_LIMIT of zero.
 //
 // As w is symmetric, with the partial derivatives taken with mx, E[xx], E[xy] as the variables:
 //   dSSIM/dx = w * (dSSIM/dmx) + 2 x (w * dSSIM/dE[xx]) + y (w * dSSIM/dE[xy])

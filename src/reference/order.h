@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Front to back: by view depth, ties by splat index.
 //
 // The key is z rounded to float32, as the device's is: two splats whose depths differ by less than a float32

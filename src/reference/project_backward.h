@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The way back through projection: from a splat's footprint and colour to its stored values.
 //
 // With G = dL/dSigma as a symmetric matrix (formulas of the forward direction in projection.h):

@@ -1,11 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "reference/projection.h"
 
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
-#include <initializer_list>
-#include <limits>
 #include <numbers>
 
 #include "reference/spherical_harmonics.h"
@@ -39,13 +38,17 @@ bool stored_values_usable(const Splat& splat) {
         if (!std::isfinite(splat.mean[k]) || !std::isfinite(splat.log_scale[k])) return false;
     for (double v : splat.quaternion)
         if (!std::isfinite(v)) return false;
-    return std::isfinite(splat.opacity_logit) && robust_norm(splat.quaternion) > 0;
+    return std::isfinite(splat.opacity_logit) && robust_norm(splat.quaternion) >= QUATERNION_MIN;
 }
 
 /// Phrased so that NaN fails it.
-bool within_float(std::initializer_list<double> values) {
-    return std::all_of(values.begin(), values.end(),
-                       [](double v) { return std::abs(v) <= double(std::numeric_limits<float>::max()); });
+bool within(double most, const glm::dvec3& v) {
+    return std::abs(v.x) <= most && std::abs(v.y) <= most && std::abs(v.z) <= most;
+}
+
+double sum_of_sizes(const Rows& m) {
+    const glm::dvec3 sizes = glm::abs(m.x) + glm::abs(m.y);
+    return sizes.x + sizes.y + sizes.z;
 }
 
 /// x/z (or y/z) moved into the picture's span plus a margin of JACOBIAN_MARGIN half pictures on either side,
@@ -106,12 +109,21 @@ Projected project(const Splat& splat, const Camera& camera, const RenderOptions&
     }
     ProjectionSteps s;
     s.offset = splat.mean - camera.position();
+    if (!within(VIEW_MAX, s.offset)) {
+        out.skipped_nonfinite = true;
+        return out;
+    }
     s.view = camera.rotation * s.offset;
     out.z = s.view.z;
     if (!(out.z > NEAR_PLANE)) return out;
 
     out.mean2d = {camera.fx * s.view.x / out.z + camera.cx, camera.fy * s.view.y / out.z + camera.cy};
     project_shape(splat, camera, s);
+    evaluate_color(splat, options, s);
+    if (!(sum_of_sizes(s.m) <= FOOTPRINT_MAX) || !within(COLOR_MAX, s.raw_color - COLOR_OFFSET)) {
+        out.skipped_nonfinite = true;
+        return out;
+    }
     out.a = glm::dot(s.m.x, s.m.x) + LOW_PASS;
     out.b = glm::dot(s.m.x, s.m.y);
     out.c = glm::dot(s.m.y, s.m.y) + LOW_PASS;
@@ -123,17 +135,7 @@ Projected project(const Splat& splat, const Camera& camera, const RenderOptions&
     s.sigmoid = 1 / (1 + std::exp(-splat.opacity_logit));
     s.kernel_factor = kernel_factor(options.kernel, s.det0, out.det);
     out.opacity = s.sigmoid * s.kernel_factor;
-    if (!within_float({out.z, out.mean2d.x, out.mean2d.y, out.a, out.b, out.c, out.det, out.opacity})) {
-        out.skipped_nonfinite = true;
-        return out;
-    }
     if (!(out.opacity >= ALPHA_MIN)) return out;
-
-    evaluate_color(splat, options, s);
-    if (!within_float({s.raw_color.x, s.raw_color.y, s.raw_color.z})) {
-        out.skipped_nonfinite = true;
-        return out;
-    }
     out.color = glm::max(s.raw_color, glm::dvec3(0));
     out.visible = true;
     if (steps) *steps = s;

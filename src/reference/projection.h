@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One splat seen by one camera: where it lies in the picture, how far it reaches, how opaque and what colour
 // it is.
 //
@@ -29,9 +30,9 @@ namespace ewa::reference {
 /// splat's other members hold anything.
 struct Projected {
     bool visible = false;
-    /// A mean, quaternion, log scale or opacity that is not finite, or a zero quaternion, wherever the splat
-    /// is. Also a splat that would be visible and whose derived values leave float32's range, in which the
-    /// device holds them.
+    /// A mean, quaternion, log scale or opacity that is not finite, a quaternion under QUATERNION_MIN, or a
+    /// mean beyond VIEW_MAX, wherever the splat is. Also one in front of the camera whose footprint is beyond
+    /// FOOTPRINT_MAX or whose colour is beyond COLOR_MAX or not finite.
     bool skipped_nonfinite = false;
     double z = 0;                // view depth, world units
     glm::dvec2 mean2d{0};        // px from the picture's top left corner

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The whole chain over a picture: project, order, list, blend; then loss and the way back.
 #pragma once
 #include <cstdint>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Exclusive prefix sum: out[i] = in[0] + ... + in[i - 1], with the total as one more element at the end.
 #pragma once
 #include <cstdint>

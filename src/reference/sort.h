@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Stable sort by key: what a least-significant-digit radix sort does in several passes.
 #pragma once
 #include <algorithm>

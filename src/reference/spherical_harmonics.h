@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The spherical harmonics of scene/sh_basis.h and their derivatives.
 #pragma once
 #include <array>

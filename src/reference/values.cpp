@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "reference/values.h"
 
 #include <cassert>
@@ -16,6 +17,7 @@ Values to_double(const Gaussians& gaussians) {
     Values values;
     values.sh_degree = gaussians.sh_degree;
     values.means.assign(gaussians.means.begin(), gaussians.means.end());
+    for (size_t i = 0; i < values.means.size(); ++i) values.means[i] += gaussians.origin[int(i % 3)];
     values.quaternions.assign(gaussians.quaternions.begin(), gaussians.quaternions.end());
     values.log_scales.assign(gaussians.log_scales.begin(), gaussians.log_scales.end());
     values.opacity_logits.assign(gaussians.opacity_logits.begin(), gaussians.opacity_logits.end());
@@ -49,7 +51,9 @@ Splat read(const Scene& scene, size_t i) {
 }  // namespace
 
 Splat read_splat(const Gaussians& gaussians, size_t i) {
-    return read(gaussians, i);
+    Splat splat = read(gaussians, i);
+    splat.mean += gaussians.origin;
+    return splat;
 }
 Splat read_splat(const Values& values, size_t i) {
     return read(values, i);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Splats in float64: the scene as the twin reads it, and gradients with respect to it.
 #pragma once
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Line charts as inline SVG, drawn in the colours of the page that holds them.
 #pragma once
 #include <string>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "report/html.h"
 
 #include <spdlog/fmt/fmt.h>
@@ -52,6 +53,9 @@ std::string headline(const ReportData& data) {
         html += fmt::format(
             "<p class=\"warn\">{} splats have a value that is not finite and are not drawn.</p>\n",
             s.skipped_nonfinite);
+    if (s.limited_steps > 0)
+        html += fmt::format("<p class=\"warn\">{} steps were too long for their splat and were shortened.</p>\n",
+                            s.limited_steps);
     if (s.dropped_updates > 0)
         html += fmt::format("<p class=\"warn\">{} parameter updates were not finite and were dropped.</p>\n",
                             s.dropped_updates);
@@ -131,6 +135,12 @@ std::string passes(const std::vector<NamedTime>& times) {
                       total);
 }
 
+std::string work_precision(const std::vector<WorkPrecision>& diagrams) {
+    std::string html;
+    for (const WorkPrecision& diagram : diagrams) html += work_precision_html(diagram);
+    return html;
+}
+
 std::string plan(const std::vector<LeftOut>& lines) {
     if (lines.empty()) return "";
     std::string html =
@@ -166,7 +176,7 @@ std::string html_report(const ReportData& data) {
            "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" +
            escape_html(data.title) + " – ewa</title>\n<style>" + kStyle + "</style></head>\n<body><main>\n" +
            headline(data) + pictures(data) + charts(data.metrics) + passes(data.pass_times) +
-           plan(data.plan) + settings(data) + "</main></body></html>\n";
+           work_precision(data.work_precision) + plan(data.plan) + settings(data) + "</main></body></html>\n";
 }
 
 }  // namespace ewa::report

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The report of a training run: one HTML file that needs nothing beside it.
 #pragma once
 #include <cstdint>
@@ -7,6 +8,7 @@
 
 #include "ewa/image.h"
 #include "report/summary.h"
+#include "report/work_precision.h"
 
 namespace ewa::report {
 
@@ -35,6 +37,7 @@ struct ReportData {
     std::vector<std::string> remarks;                           // e.g. "3 images are missing"
     std::vector<std::pair<std::string, std::string>> settings;  // name, value
     std::vector<ReportPicture> pictures;
+    std::vector<WorkPrecision> work_precision;
     bool held_out = true;  // the pictures were not trained on
 };
 

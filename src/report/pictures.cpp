@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "report/pictures.h"
 
 #include <algorithm>
@@ -93,6 +94,7 @@ Image error_map(const Image& a, const Image& b, double full_scale) {
                 error +=
                     std::abs(std::clamp(a.at(x, y)[c], 0.0f, 1.0f) - std::clamp(b.at(x, y)[c], 0.0f, 1.0f)) /
                     3.0;
+            if (!(error <= full_scale)) error = full_scale;  // NaN too
             const auto color = heat(error / full_scale);
             std::copy(color.begin(), color.end(), map.at(x, y));
         }

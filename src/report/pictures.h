@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a report shows of the pictures: file names, the error map, and data URIs.
 #pragma once
 #include <filesystem>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The report's style sheet: follows the reader's light or dark setting, and prints.
 #pragma once
 

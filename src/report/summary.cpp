@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "report/summary.h"
 
 #include <cerrno>
@@ -36,6 +37,7 @@ Json to_json(const Summary& s) {
     json["seed"] = s.seed;
     json["skipped_nonfinite"] = s.skipped_nonfinite;
     json["dropped_updates"] = s.dropped_updates;
+    json["limited_steps"] = s.limited_steps;
     json["strategy"] = s.strategy;
     json["interrupted"] = s.interrupted;
     json["version"] = s.version;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a training run leaves in numbers: summary.json and the lines of metrics.jsonl.
 #pragma once
 #include <cstdint>
@@ -26,6 +27,7 @@ struct Summary {
     uint64_t seed = 0;
     uint32_t skipped_nonfinite = 0;
     uint64_t dropped_updates = 0;
+    uint64_t limited_steps = 0;
     std::string version, command, strategy;
     bool interrupted = false;
 };

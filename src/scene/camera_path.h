@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A way through a few cameras.
 #pragma once
 #include <span>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What is asked of a dataset once it is loaded. Loading it is src/io/dataset.cpp.
 #include "ewa/dataset.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A camera as something to look at: the pyramid of what it sees, and lines of the world in a picture.
 #pragma once
 #include <array>

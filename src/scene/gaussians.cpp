@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "ewa/gaussians.h"
 
 #include <algorithm>
@@ -42,6 +43,49 @@ bool drawable(const Gaussians& gaussians, size_t i) {
            finite(&gaussians.sh[stride * i], stride);
 }
 
+namespace {
+
+/// Whole units near the middle of the bulk of the positions where that lies far out, else zero.
+glm::dvec3 origin_for(const std::vector<glm::dvec3>& positions) {
+    constexpr double kFar = 64, kLeast = 1000, kOutermost = 0.05;
+    glm::dvec3 middle(0);
+    double size = 0, distance = 0;
+    std::vector<double> values;
+    for (int axis = 0; axis < 3; ++axis) {
+        values.clear();
+        for (const glm::dvec3& p : positions)
+            if (std::isfinite(p[axis])) values.push_back(p[axis]);
+        if (values.empty()) return glm::dvec3(0);
+        const auto quantile = [&](double share) {
+            const auto at = values.begin() + std::ptrdiff_t(share * double(values.size() - 1));
+            std::nth_element(values.begin(), at, values.end());
+            return *at;
+        };
+        const double low = quantile(kOutermost), high = quantile(1 - kOutermost);
+        middle[axis] = low / 2 + high / 2;
+        size = std::max(size, high - low);
+        distance = std::max(distance, std::abs(middle[axis]));
+    }
+    if (!(distance > kLeast && distance > kFar * size && distance < 1e15)) return glm::dvec3(0);
+    return {std::round(middle.x), std::round(middle.y), std::round(middle.z)};
+}
+
+}  // namespace
+
+void set_world_means(Gaussians& gaussians, const std::vector<glm::dvec3>& positions) {
+    gaussians.origin = origin_for(positions);
+    gaussians.means.resize(3 * positions.size());
+    for (size_t i = 0; i < positions.size(); ++i)
+        for (int axis = 0; axis < 3; ++axis)
+            gaussians.means[3 * i + size_t(axis)] = float(positions[i][axis] - gaussians.origin[axis]);
+}
+
+void settle_origin(Gaussians& gaussians) {
+    std::vector<glm::dvec3> positions(gaussians.size());
+    for (size_t i = 0; i < positions.size(); ++i) positions[i] = gaussians.world_mean(i);
+    set_world_means(gaussians, positions);
+}
+
 Gaussians gaussians_from_points(const PointCloud& points, int sh_degree) {
     if (points.positions.empty()) throw InputError("there are no points to start splats from");
     if (points.colors.size() != points.positions.size())
@@ -57,11 +101,11 @@ Gaussians gaussians_from_points(const PointCloud& points, int sh_degree) {
     Gaussians gaussians;
     gaussians.sh_degree = sh_degree;
     gaussians.resize(n);
+    set_world_means(gaussians, points.positions);
     for (size_t i = 0; i < n; ++i) {
         const double scale =
             squared[i] < 0 ? kLonelyScale : std::sqrt(std::max(squared[i], kMinSquaredDistance));
         for (int axis = 0; axis < 3; ++axis) {
-            gaussians.means[3 * i + size_t(axis)] = static_cast<float>(points.positions[i][axis]);
             gaussians.log_scales[3 * i + size_t(axis)] = static_cast<float>(std::log(scale));
             gaussians.sh[gaussians.sh_stride() * i + size_t(axis)] = static_cast<float>(
                 (points.colors[i][size_t(axis)] / 255.0 - shared::COLOR_OFFSET) / shared::SH_C0);

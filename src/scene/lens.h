@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Lens models: x right, y down, in units of the focal length (z = 1).
 //
 // Each takes a ray (x, y, 1) to a plane, q = (x, y) or for a fisheye q = angle * (x, y) / |(x, y)|, and bends

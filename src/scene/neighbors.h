@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Distances in a point cloud.
 #pragma once
 #include <glm/vec3.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Real spherical harmonics of degree 0..3 as polynomials of a unit direction, in INRIA's order and signs
 // (Sloan, "Efficient Spherical Harmonic Evaluation", JCGT 2013; 3DGS, utils/sh_utils.py).
 #pragma once

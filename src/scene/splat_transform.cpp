@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Moving, turning, scaling and mirroring splats.
 #include <algorithm>
 #include <array>
@@ -129,11 +130,10 @@ void turn_sh(Gaussians& gaussians, const glm::dmat3& orthogonal) {
 }
 
 void move_means(Gaussians& gaussians, const glm::dmat4& matrix) {
-    for (size_t i = 0; i < gaussians.size(); ++i) {
-        float* p = &gaussians.means[3 * i];
-        const glm::dvec4 moved = matrix * glm::dvec4(p[0], p[1], p[2], 1);
-        for (int axis = 0; axis < 3; ++axis) p[axis] = float(moved[axis]);
-    }
+    std::vector<glm::dvec3> positions(gaussians.size());
+    for (size_t i = 0; i < positions.size(); ++i)
+        positions[i] = glm::dvec3(matrix * glm::dvec4(gaussians.world_mean(i), 1));
+    set_world_means(gaussians, positions);
 }
 
 /// For M = scale * rotation.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The pinhole picture in a lens's picture.
 #pragma once
 #include "ewa/camera.h"

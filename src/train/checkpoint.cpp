@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "train/checkpoint.h"
 
 #include <zlib.h>
@@ -25,7 +26,7 @@ struct StateBlock {
     int64_t step;
     double seconds, wall_seconds, loss;
     uint64_t dropped_updates;
-    uint32_t splats, skipped_nonfinite, sh_degree, zero;
+    uint32_t splats, skipped_nonfinite, sh_degree, limited_steps;
 };
 static_assert(sizeof(StateBlock) == 56 && std::is_trivially_copyable_v<StateBlock>);
 
@@ -83,7 +84,8 @@ void write_checkpoint(const std::filesystem::path& path, const Checkpoint& check
     const StepReport& r = state.report;
     const StateBlock block{
         r.step,   r.seconds,           checkpoint.wall_seconds,   r.loss, r.dropped_updates,
-        r.splats, r.skipped_nonfinite, uint32_t(state.sh_degree), 0};
+        r.splats, r.skipped_nonfinite, uint32_t(state.sh_degree),
+        uint32_t(std::min<uint64_t>(r.limited_steps, 0xffffffffu))};
     core::AtomicFile file(path);
     file.write(kMagic);
     const uint32_t counts[] = {kVersion, uint32_t(std::size(kFixed) + state.arrays.size())};
@@ -123,7 +125,7 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
         file.fail("the section \"state\" has a step or an SH degree out of range");
     state.sh_degree = int(block.sh_degree);
     state.report = {int(block.step), block.seconds,         block.loss,
-                    block.splats,    block.dropped_updates, block.skipped_nonfinite};
+                    block.splats,    block.dropped_updates, block.skipped_nonfinite, block.limited_steps};
     for (uint32_t i = uint32_t(fixed.size()); i < sections; ++i) state.arrays.push_back(read_section(file));
     if (file.remaining() > 0) file.fail("there is something behind the last section");
     return checkpoint;

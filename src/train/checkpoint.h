@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // checkpoint.ewa: a training run laid down so that it can go on. All numbers little endian.
 //
 //   header    8 bytes "EWACKPT\n", u32 version (1), u32 number of sections
@@ -8,7 +9,7 @@
 //   settings  JSON: what the run was asked for and the dataset's fingerprint; the writer's to define
 //   metrics   the lines of metrics.jsonl so far
 //   state     i64 step; f64 seconds, wall seconds, loss; u64 dropped updates; u32 splats, skipped, SH degree,
-//   0
+//   steps shortened (at most 2^32 - 1)
 // and what follows are TrainerState's arrays under their names, in the device's layout
 // (shaders/shared/layouts.h).
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A scene's pictures against photographs.
 #include <chrono>
 #include <cmath>

@@ -1,35 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
 // What tells datasets apart.
 #include <algorithm>
 #include <cstdio>
-#include <type_traits>
 
 #include "core/file_reader.h"
+#include "core/hash.h"
 #include "train/checkpoint.h"
 
 namespace ewa::train {
 namespace {
 
-/// FNV-1a (Fowler, Noll, Vo) over 64 bits.
-class Hash {
-  public:
-    void add(const void* data, size_t bytes) {
-        const auto* p = static_cast<const unsigned char*>(data);
-        for (size_t i = 0; i < bytes; ++i) value_ = (value_ ^ p[i]) * 0x100000001b3ull;
-    }
-    template <class T>
-    void add(const T& value) {
-        static_assert(std::is_arithmetic_v<T>);
-        add(&value, sizeof(value));
-    }
-    void add(const std::string& text) {
-        add(uint64_t(text.size()));
-        add(text.data(), text.size());
-    }
-    uint64_t value() const { return value_; }
-
-  private:
-    uint64_t value_ = 0xcbf29ce484222325ull;
-};
+using core::Hash;
 
 void add_camera(Hash& hash, const Camera& camera) {
     hash.add(camera.width);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a run is going to take of the device's memory, before it takes any.
 #include <algorithm>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Splats to start from where there are no points, and a start of another SH degree.
 #pragma once
 #include <cstdint>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "train/photographs.h"
 
 #include <algorithm>
@@ -23,7 +24,8 @@ bool transparent(const Image& image) {
 }  // namespace
 
 Photographs::Photographs(gpu::Device& device, const passes::Shape& shape, const Dataset& dataset,
-                         const std::vector<int>& frames, uint64_t cache_bytes, int reduction)
+                         const std::vector<int>& frames, uint64_t cache_bytes, const glm::dvec3& origin,
+                         int reduction)
     : device_(device), photos_(frames.size()) {
     const uint64_t align = std::max<uint64_t>(device.limits().uniform_alignment, 16);
     camera_stride_ = (sizeof(shared::CameraBlock) + align - 1) / align * align;
@@ -35,7 +37,7 @@ Photographs::Photographs(gpu::Device& device, const passes::Shape& shape, const 
             frame.downscale *= reduction;
             frame.camera = downscale(frame.pinhole, frame.downscale);
         }
-        const shared::CameraBlock block = pipeline::camera_block(frame.camera, shape);
+        const shared::CameraBlock block = pipeline::camera_block(frame.camera, shape, origin);
         std::memcpy(&blocks[i * camera_stride_], &block, sizeof(block));
         const uint64_t bytes =
             pipeline::photo_bytes(frame.camera.width, frame.camera.height, frame.eight_bit);

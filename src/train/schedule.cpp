@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "train/schedule.h"
 
 #include <algorithm>
@@ -63,6 +64,8 @@ Schedule schedule_for(const TrainOptions& options) {
     s.refine_stop = scaled(options.refine_stop, 1);
     s.relocate_stop = scaled(options.relocate_stop, 1);
     s.relocate_every = scaled(options.refine_every, std::min(options.refine_every, kLeastRelocateEvery));
+    s.growth = std::pow(options.growth, std::max(1.0, s.relocate_every / (share * options.refine_every)));
+    s.copy_spread = (1 - share) * options.copy_spread;
     if (options.opacity_reset_every > 0)
         s.opacity_reset_every =
             scaled(options.opacity_reset_every, std::min(options.opacity_reset_every, kLeastResetEvery));

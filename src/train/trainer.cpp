@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The training loop's one step: which photograph, which rates, one submission, and what follows it on
 // schedule.
 #include "ewa/trainer.h"
@@ -5,9 +6,11 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstring>
 #include <deque>
 #include <glm/geometric.hpp>
 #include <map>
+#include <span>
 
 #include "core/random.h"
 #include "ewa/error.h"
@@ -46,8 +49,7 @@ double extent_for(const Dataset& dataset, const std::vector<int>& frames, const 
     const glm::dvec3 eye = dataset.frames[size_t(frames.front())].camera.position();
     std::vector<double> distances;
     for (size_t i = 0; i < start.size(); ++i) {
-        const glm::dvec3 mean(start.means[3 * i], start.means[3 * i + 1], start.means[3 * i + 2]);
-        const double distance = glm::length(mean - eye);
+        const double distance = glm::length(start.world_mean(i) - eye);
         if (std::isfinite(distance) && distance > 0) distances.push_back(distance);
     }
     if (distances.empty()) return 1;
@@ -57,9 +59,19 @@ double extent_for(const Dataset& dataset, const std::vector<int>& frames, const 
 }
 
 /// Splats that are neighbours in space become neighbours in memory: what a tile gathers stands together. ADC's later
-/// generations keep it so, since children stand beside their parent; MCMC's lose it bit by bit.
-Gaussians along_curve(Gaussians start) {
+/// generations keep it so, since children stand beside their parent; MCMC's lose it bit by bit. Means are held relative to
+/// an origin near them, and quaternions of another length than about 1 are brought to it: the learning rate is for those.
+Gaussians prepared(Gaussians start) {
     select_splats(start, morton_order(start));
+    settle_origin(start);
+    for (size_t i = 0; i < start.size(); ++i) {
+        float* q = &start.quaternions[4 * i];
+        const double largest = std::max({std::abs(q[0]), std::abs(q[1]), std::abs(q[2]), std::abs(q[3])});
+        if (!(largest > 0 && std::isfinite(largest)) || (largest > 0.1 && largest < 10)) continue;
+        double sum = 0;
+        for (int k = 0; k < 4; ++k) sum += (q[k] / largest) * (q[k] / largest);
+        for (int k = 0; k < 4; ++k) q[k] = float(q[k] / largest / std::sqrt(sum));
+    }
     return start;
 }
 
@@ -91,11 +103,12 @@ struct Trainer::State {
           kernels(*device),
           executor(*device),
           plan(plan_training(start.sh_degree, o.render, o.strategy == Strategy::adc)),
-          model(upload_model(*device, along_curve(start), 2, plan.statistics)),
-          photographs(*device, kernels.shape(), dataset, frames, o.image_cache_bytes),
+          model(upload_model(*device, prepared(start), 2, plan.statistics)),
+          photographs(*device, kernels.shape(), dataset, frames, o.image_cache_bytes, model.origin),
           instance_room(first_capacity(start.size())) {
         for (int halvings = 1; halvings <= o.halvings; ++halvings)
-            smaller.emplace_back(*device, kernels.shape(), dataset, frames, o.image_cache_bytes, 1 << halvings);
+            smaller.emplace_back(*device, kernels.shape(), dataset, frames, o.image_cache_bytes, model.origin,
+                                 1 << halvings);
         plan.masks = photographs.any_masked();
         plan.exposure = o.exposure;
         if (plan.exposure) exposures = Exposures(*device, photographs.count());
@@ -154,13 +167,14 @@ struct Trainer::State {
                 // extent.
                 if (options.strategy == Strategy::mcmc)
                     record_noise(recording, kernels, model, frame,
-                                 float(options.noise_rate * schedule.mean_rate(step, 1) / extent),
+                                 float(options.noise_rate * schedule.mean_rate(step, 1) / extent), float(extent),
                                  options.seed, uint32_t(step));
             });
         instance_room = frame.instance_capacity;
         report.loss = loss_of(counts);
         report.skipped_nonfinite = counts.skipped_nonfinite;
         report.dropped_updates += counts.dropped_updates;
+        report.limited_steps += counts.limited_steps;
         timings.push_back(executor.timings());
         if (timings.size() > kTimedSteps) timings.pop_front();
     }
@@ -169,7 +183,8 @@ struct Trainer::State {
         if (options.strategy == Strategy::adc) control_density(step);
         if (options.strategy != Strategy::mcmc || !schedule.relocates(step)) return;
         refine_mcmc(kernels, executor, model, frame,
-                    {options.dead_opacity, options.growth, options.max_splats, options.seed, uint32_t(step)});
+                    {options.dead_opacity, schedule.growth, options.max_splats, schedule.copy_spread,
+                     options.seed, uint32_t(step)});
     }
 
     void control_density(int step) {
@@ -250,6 +265,8 @@ TrainerState Trainer::state() const {
     TrainerState state{s.report, s.model.sh_degree, {}};
     for (const NamedBuffer& named : buffers_of(s.plan, s.model, s.exposures, s.model.capacity))
         state.arrays.push_back({named.name, named.buffer->download<std::byte>(named.bytes)});
+    const auto origin = std::as_bytes(std::span(&s.model.origin, 1));
+    if (s.model.origin != glm::dvec3(0)) state.arrays.push_back({"origin", {origin.begin(), origin.end()}});
     return state;
 }
 
@@ -260,7 +277,13 @@ void Trainer::restore(const TrainerState& state) {
         splats > s.options.max_splats || splats == 0)
         throw InputError("the state to go on from is of another SH degree, of more steps or of more splats");
     const auto buffers = buffers_of(s.plan, s.model, s.exposures, splats);
-    if (state.arrays.size() != buffers.size())
+    const bool moved = !state.arrays.empty() && state.arrays.back().name == "origin";
+    glm::dvec3 origin(0);
+    if (moved && state.arrays.back().bytes.size() == sizeof(origin))
+        std::memcpy(&origin, state.arrays.back().bytes.data(), sizeof(origin));
+    if (origin != s.model.origin)
+        throw InputError("the state to go on from has its means relative to another origin");
+    if (state.arrays.size() != buffers.size() + moved)
         throw InputError("the state to go on from is of another strategy");
     for (size_t i = 0; i < buffers.size(); ++i)
         if (state.arrays[i].name != buffers[i].name || state.arrays[i].bytes.size() != buffers[i].bytes)
@@ -269,6 +292,7 @@ void Trainer::restore(const TrainerState& state) {
     s.model = {};  // its memory first
     s.model.splats = s.model.capacity = splats;
     s.model.sh_degree = state.sh_degree;
+    s.model.origin = origin;
     for (size_t i = 0; i < buffers.size(); ++i) {
         *buffers[i].buffer = gpu::Buffer(*s.device, buffers[i].name, buffers[i].bytes, buffers[i].texel);
         buffers[i].buffer->upload(std::span<const std::byte>(state.arrays[i].bytes));

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The viewer: from input to requests, from finished pictures to the window.
 #pragma once
 #include <chrono>

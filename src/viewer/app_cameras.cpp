@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The dataset's cameras and their photographs, saved views, and the film through them.
 #include <algorithm>
 

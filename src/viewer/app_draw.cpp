@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A frame of the window.
 #include <imgui.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Keys and the mouse.
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>

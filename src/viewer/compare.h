@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The photograph of a camera against the splats seen through it. Knows nothing of windows.
 #pragma once
 #include "viewer/picture.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A film in the making: pictures along a path through saved views, each written as a file.
 #pragma once
 #include <cstdint>

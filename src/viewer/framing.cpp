@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "viewer/framing.h"
 
 #include <algorithm>
@@ -16,10 +17,10 @@ std::vector<glm::dvec3> sampled_means(const Gaussians& gaussians, float least_lo
     std::vector<glm::dvec3> means;
     const size_t stride = std::max<size_t>(1, gaussians.size() / kSamples);
     for (size_t i = 0; i < gaussians.size(); i += stride) {
-        const float* mean = &gaussians.means[3 * i];
+        const glm::dvec3 mean = gaussians.world_mean(i);
         if (!(gaussians.opacity_logits[i] >= least_logit)) continue;
         if (std::isfinite(mean[0]) && std::isfinite(mean[1]) && std::isfinite(mean[2]))
-            means.emplace_back(mean[0], mean[1], mean[2]);
+            means.push_back(mean);
     }
     return means;
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Where to look from, when a scene opens.
 #pragma once
 #include "ewa/dataset.h"

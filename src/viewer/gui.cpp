@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "viewer/gui.h"
 
 #include <backends/imgui_impl_glfw.h>

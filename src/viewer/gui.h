@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Dear ImGui on one window: its life, and a frame of it.
 #pragma once
 #include "viewer/presenter.h"

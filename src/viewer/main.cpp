@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ewa-view: reads the arguments, opens the scene in a window, and turns every failure into one line and an
 // exit status.
 #include <CLI/CLI.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What is to be seen: a splat file, a dataset, or the folder of a training run.
 #pragma once
 #include <filesystem>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How much resolution a moving camera can have.
 #pragma once
 #include <algorithm>

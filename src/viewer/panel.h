@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The panel over the picture, and the list of keys. Draws with Dear ImGui; changes only what it is given.
 #pragma once
 #include <optional>

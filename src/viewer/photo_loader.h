@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Reads photographs beside the window's own thread.
 #pragma once
 #include <condition_variable>

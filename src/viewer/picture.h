@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A rendering as the window shows it: 8 bit RGBA.
 #pragma once
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The Vulkan device that shows pictures in a window. Not the one that computes them: that one knows of no
 // window.
 #pragma once

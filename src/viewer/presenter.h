@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Puts pictures and the panel over them into the window.
 #pragma once
 #include <array>

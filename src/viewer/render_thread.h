@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Draws pictures beside the window's own thread, so that a slow one never holds up the input.
 #pragma once
 #include <condition_variable>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The pictures that the window cycles through, made anew whenever the window changes.
 #pragma once
 #include <optional>

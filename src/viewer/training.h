@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The panel of a training run, and the trainer as a process of the viewer's own.
 #pragma once
 #include <sys/types.h>

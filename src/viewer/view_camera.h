@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The camera that mouse and keys move: around a pivot, towards it, or freely. Knows nothing of windows.
 #pragma once
 #include <glm/vec3.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One GLFW window: its life, and the keys.
 #pragma once
 #include <filesystem>

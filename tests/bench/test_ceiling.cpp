@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The host's loops do what they are the ceiling of.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The stand-alone benchmark as a process.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -94,6 +95,24 @@ TEST(BenchProgram, WrongUseIsToldInOneLine) {
         EXPECT_EQ(ended.status, 2) << arguments << ": " << ended.output;
         EXPECT_EQ(std::count(ended.output.begin(), ended.output.end(), '\n'), 1) << ended.output;
     }
+}
+
+TEST(BenchProgram, StabilityIsMeasuredAndWritten) {
+    const TempFolder folder;
+    const std::string json = (folder.path() / "stability.json").string();
+    const Ended ended =
+        run(kProgram + " --stability --cases ordinary,value_nan --training-steps 3 --json " + json);
+    ASSERT_EQ(ended.status, 0) << ended.output;
+    const nlohmann::json results = read_json(json);
+    ASSERT_EQ(results.at("cases").size(), 4u);  // three kernels and the one of NaNs
+    for (const auto& one : results.at("cases")) {
+        EXPECT_EQ(one.at("good"), true) << one;
+        EXPECT_EQ(one.at("finite"), true);
+        EXPECT_EQ(one.at("comparisons").size(), 7u);
+    }
+    EXPECT_EQ(results.at("cases")[3].at("skipped"), 59);
+    EXPECT_EQ(results.at("training").size(), 4u);
+    EXPECT_EQ(run(kProgram + " --stability /nowhere.ply").status, 2);
 }
 
 TEST(BenchProgram, ListsItsCases) {

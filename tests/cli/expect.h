@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What every failure of the program looks like.
 #pragma once
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "cli/program.h"
 
 #include <fcntl.h>
@@ -26,7 +27,9 @@ namespace {
 namespace fs = std::filesystem;
 
 [[noreturn]] void become(const std::string& program, const std::vector<std::string>& arguments,
-                         const std::string& out, const std::string& err, size_t file_limit) {
+                         const std::string& out, const std::string& err, const Circumstances& circumstances) {
+    const size_t file_limit = circumstances.file_limit;
+    for (const auto& [name, value] : circumstances.environment) setenv(name.c_str(), value.c_str(), 1);
     dup2(open(out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), STDOUT_FILENO);
     dup2(open(err.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), STDERR_FILENO);
     dup2(open("/dev/null", O_RDONLY), STDIN_FILENO);
@@ -50,7 +53,7 @@ bool has_bytes(const std::string& path) {
 }
 
 int wait_for(pid_t child, const Circumstances& circumstances) {
-    bool signalled = circumstances.signal == 0;
+    bool signalled = circumstances.signal == 0 && !circumstances.then;
     const auto start = std::chrono::steady_clock::now();
     const auto due = [&] {
         if (circumstances.after_ms < 0) return has_bytes(circumstances.await_file);
@@ -61,7 +64,8 @@ int wait_for(pid_t child, const Circumstances& circumstances) {
         const pid_t ended = waitpid(child, &status, signalled ? 0 : WNOHANG);
         if (ended == child) break;
         if (!signalled && due()) {
-            kill(child, circumstances.signal);
+            if (circumstances.signal != 0) kill(child, circumstances.signal);
+            if (circumstances.then) circumstances.then();
             signalled = true;
         }
         std::this_thread::sleep_for(std::chrono::milliseconds(2));
@@ -101,7 +105,7 @@ Outcome run_ewa(const std::vector<std::string>& arguments, const Circumstances& 
     const std::string program = circumstances.program.empty() ? EWA_PROGRAM : circumstances.program;
     const pid_t child = fork();
     if (child < 0) throw std::runtime_error("fork failed");
-    if (child == 0) become(program, arguments, out, err, circumstances.file_limit);
+    if (child == 0) become(program, arguments, out, err, circumstances);
     Outcome outcome;
     outcome.status = wait_for(child, circumstances);
     if (circumstances.out_path.empty()) outcome.out = read_file(out);

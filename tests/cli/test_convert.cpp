@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ewa convert, and what the other commands make of every splat format.
 #include <gtest/gtest.h>
 

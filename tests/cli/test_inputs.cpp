@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Damaged and hostile inputs: exit status 2 and one line that names the file.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the headless program is linked to: no window library, by itself.
 #include <gtest/gtest.h>
 

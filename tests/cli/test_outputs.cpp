@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the commands write, and what happens where they cannot.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A training that was ended, by Ctrl-C or kill -9, and goes on.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ewa train as a whole, on four small pictures.
 #include <gtest/gtest.h>
 

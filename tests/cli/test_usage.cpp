@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Wrong use: exit status 2, one line, nothing written.
 #include <gtest/gtest.h>
 
@@ -11,12 +12,31 @@ TEST(Usage, HelpAndVersion) {
     const Outcome version = run_ewa({"--version"});
     EXPECT_EQ(version.status, 0);
     EXPECT_EQ(version.out.rfind("ewa ", 0), 0u) << version.out;
-    for (const char* command : {"train", "render", "eval", "grad", "info", "devices"}) {
+    for (const char* command : {"train", "render", "eval", "grad", "info", "devices", "compare"}) {
         const Outcome help = run_ewa({command, "--help"});
         expect_success(help);
         EXPECT_NE(help.out.find("--"), std::string::npos) << command;
     }
     EXPECT_NE(run_ewa({"train", "--help"}).out.find("--max-splats"), std::string::npos);
+}
+
+TEST(Usage, ManualPagesHaveEveryOptionOfTheHelp) {
+    const Folder folder;
+    expect_success(run_ewa({"manual", folder / "m"}));
+    const std::string train = read_file(folder / "m/man/man1/ewa-train.1");
+    const std::string help = run_ewa({"train", "--help"}).out;
+    size_t options = 0;
+    for (size_t at = help.find("  --"); at != std::string::npos; at = help.find("  --", at + 1)) {
+        std::string name = help.substr(at + 2, help.find_first_of(" ,\n", at + 2) - at - 2), escaped;
+        for (const char c : name) escaped += c == '-' ? std::string("\\-") : std::string(1, c);
+        EXPECT_NE(train.find(escaped), std::string::npos) << name;
+        ++options;
+    }
+    EXPECT_GT(options, 10u);
+    EXPECT_NE(train.find("adc,mcmc,none"), std::string::npos);
+    const auto files = files_below(folder / "m");
+    EXPECT_NE(std::find(files.begin(), files.end(), "man/man1/ewa-compare.1"), files.end());
+    EXPECT_EQ(run_ewa({"--help"}).out.find("manual"), std::string::npos);
 }
 
 struct WrongUse {
@@ -40,6 +60,9 @@ INSTANTIATE_TEST_SUITE_P(
     Usage, WrongUseTest,
     testing::Values(
         WrongUse{{}, "subcommand"}, WrongUse{{"fly"}, "fly"}, WrongUse{{"train"}, "DATASET"},
+        WrongUse{{"bench", "--accuracy"}, "DATASET"}, WrongUse{{"bench", "/nowhere.ply"}, "--stability"},
+        WrongUse{{"bench", "--stability", "/nowhere.ply"}, "/nowhere.ply"},
+        WrongUse{{"bench", "--stability", "--cases", "nosuchcase"}, "nosuchcase"},
         WrongUse{{"train", "/nowhere", "--wings"}, "--wings"},
         WrongUse{{"train", "/nowhere", "--steps", "0"}, "--steps"},
         WrongUse{{"train", "/nowhere", "--steps", "-3"}, "--steps"},

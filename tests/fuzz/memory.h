@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The bytes that are allocated at a time, while one input is read.
 #pragma once
 #include <sanitizer/allocator_interface.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Any bytes through one reader: a scene whose arrays fit each other, or an InputError of one line that names
 // a byte or a property, within the memory and the time (a second, under the sanitizers) allowed.
 #include EWA_HEADER
@@ -7,6 +8,7 @@
 #include <zlib.h>
 
 #include <cctype>
+#include <cmath>
 #include <cstring>
 #include <ctime>
 #include <string>
@@ -56,6 +58,30 @@ class MemoryFile {
     return out;
 }
 
+#ifdef EWA_READ_MESH
+void check_scene(const mesh::Scene& scene) {
+    const std::string text = std::to_string(scene.triangles.size()) + " triangles";
+    EWA_REQUIRE(!scene.triangles.empty() && !scene.materials.empty());
+    for (const mesh::Triangle& t : scene.triangles) {
+        EWA_REQUIRE(t.material < scene.materials.size());
+        for (size_t k = 0; k < 3; ++k) {
+            EWA_REQUIRE(std::isfinite(float(t.corners[k].x)) && std::isfinite(float(t.corners[k].y)) &&
+                        std::isfinite(float(t.corners[k].z)));
+            EWA_REQUIRE(std::isfinite(t.uvs[k].x) && std::isfinite(t.uvs[k].y));
+        }
+    }
+    const auto within = [](int index, size_t size) { return index >= -1 && index < static_cast<int>(size); };
+    for (const mesh::Material& m : scene.materials) {
+        EWA_REQUIRE(within(m.base_texture, scene.textures.size()) && within(m.metal_texture, scene.textures.size()));
+        EWA_REQUIRE(within(m.emitted_texture, scene.textures.size()));
+        EWA_REQUIRE(m.opacity >= 0 && m.opacity <= 1 && m.emitted.x >= 0 && m.emitted.x < 1e30f);
+    }
+    for (const mesh::Texture& t : scene.textures)
+        EWA_REQUIRE(t.image >= 0 && within(t.image, scene.images.size()));
+    for (const mesh::Light& light : scene.lights)
+        EWA_REQUIRE(std::isfinite(light.direction.x) && light.intensity.x >= 0 && light.range >= 0);
+}
+#else
 void check_scene(const SplatScene& scene) {
     const Gaussians& g = scene.gaussians;
     const size_t n = g.size();
@@ -64,6 +90,7 @@ void check_scene(const SplatScene& scene) {
     EWA_REQUIRE(g.means.size() == 3 * n && g.quaternions.size() == 4 * n && g.log_scales.size() == 3 * n);
     EWA_REQUIRE(g.sh.size() == g.sh_stride() * n);
 }
+#endif
 
 /// "byte 12", or what a glTF or a PLY calls the place.
 void check_error(const std::string& text) {
@@ -71,7 +98,7 @@ void check_error(const std::string& text) {
     for (size_t at = text.find("byte "); at != std::string::npos; at = text.find("byte ", at + 1))
         named = named || std::isdigit(static_cast<unsigned char>(text[at + 5]));
     for (const char* place : {"\"", "'", "`", "properties f_rest_", "attribute ", "accessor", "node ",
-                              "mesh ", "buffer ", "the JSON ", "claims "})
+                              "mesh ", "buffer ", "image ", "material ", "texture ", "the JSON ", "claims "})
         named = named || text.find(place) != std::string::npos;
     EWA_REQUIRE(named);
     EWA_REQUIRE(text.find('\n') == std::string::npos && text.size() < 2000);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Any values through one writer: what it wrote is read back as as many splats as are drawable, all of them
 // drawable.
 #include <unistd.h>

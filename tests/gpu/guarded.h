@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Buffers with guard words behind the last byte a pass may touch, and poison in front of them: a write past
 // the end leaves a trace even where the result is right, and a value no pass wrote is a NaN.
 #pragma once

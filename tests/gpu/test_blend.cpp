@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Blending and its gradient alone, on records and tile lists from the twin.
 #include <gtest/gtest.h>
 
@@ -19,14 +20,13 @@ struct Lists {
     pipeline::Sizes sizes;
     Guarded records, splats, starts;
 
-    explicit Lists(const Scene& s)
+    explicit Lists(const Scene& s, size_t promised = 0)
         : scene(s),
           twin(reference::render(s.gaussians, s.camera, s.options, twin_tiles(rig().shape()))),
           sizes(pipeline::sizes_for(rig().shape(), request())),
           records("records", pack_records(twin.projected), gpu::Texel::rgba32f),
           splats("splats", words([&](size_t k) { return twin.instances.sorted[k].splat; })),
-          starts("starts", std::vector<uint32_t>(twin.instances.first_of_tile.begin(),
-                                                 twin.instances.first_of_tile.end())) {}
+          starts("starts", bounds(twin.instances, promised)) {}
 
     size_t count() const { return twin.instances.sorted.size(); }
     pipeline::FrameRequest request() const {
@@ -50,6 +50,12 @@ struct Lists {
     }
 
   private:
+    /// The tiles' bounds, and the end of the list with `promised` instances more that stand behind the last tile.
+    static std::vector<uint32_t> bounds(const reference::Instances& instances, size_t promised) {
+        std::vector<uint32_t> out(instances.first_of_tile.begin(), instances.first_of_tile.end());
+        out.push_back(uint32_t(out.back() + promised));
+        return out;
+    }
     template <class Word>
     std::vector<uint32_t> words(Word word) const {
         std::vector<uint32_t> out;
@@ -235,6 +241,28 @@ TEST_P(BlendBackwardPass, SlotsAreTheTwinsMoments) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, BlendBackwardPass, kCases, case_name);
+
+/// Instances that projection promised and no tile has keep nothing of what stood in their slots before.
+TEST(BlendBackwardSlots, BehindTheLastTileAreZero) {
+    const Scene scene = random_scene(1702, 60, SplatKind::ordinary, 33, 21);
+    const size_t promised = 37;
+    const Lists lists(scene, promised);
+    Rig& r = rig();
+    const std::vector<float> stale((lists.count() + promised) * shared::SLOT_FLOATS, 7.0f);
+    Guarded planes("planes", uint64_t(lists.sizes.plane_floats) * 16, gpu::Texel::rgba32f),
+        incoming("image gradient", std::vector<float>(size_t(lists.sizes.plane_floats) * 3, 1.0f), gpu::Texel::rgba32f),
+        slots("slots", stale, gpu::Texel::rgba32f);
+    r.run([&](gpu::Recording& recording) {
+        r.kernels.get<passes::Blend>(false).record(
+            recording, r.shape(), {lists.records, lists.splats, lists.starts, planes}, lists.push());
+        r.kernels.get<passes::BlendBackward>(0u).record(
+            recording, r.shape(), {lists.records, lists.splats, lists.starts, planes, incoming, slots}, lists.push());
+    });
+    expect_intact({&slots});
+    const auto written = slots.read<float>();
+    for (size_t k = lists.count(); k < lists.count() + promised; ++k)
+        for (size_t j = 0; j < 9; ++j) EXPECT_EQ(written[shared::SLOT_FLOATS * k + j], 0.0f) << k << ' ' << j;
+}
 
 /// A picture of 8 x 8 pixels and its gradient against the twin's. Returns how many slots hold nothing but
 /// zero.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The whole chain on the device against the float64 twin: pictures, and gradients of the loss.
 #include <gtest/gtest.h>
 

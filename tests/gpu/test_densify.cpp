@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Adaptive density control and the opacity reset on the device against the twin.
 #include <gtest/gtest.h>
 

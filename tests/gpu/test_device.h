@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The device of the GPU tests: opened once, with the validation layer listening, so that every test also
 // fails on what the layer says. EWA_TEST_DEVICE chooses another than the default.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Exposures on the device against the twin: the picture the loss sees, the way back, and Adam's step.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Whole frames with guard words round every buffer, on scenes at the edges.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Emission of (splat, tile) instances, and where each tile's begin, on inputs from the twin.
 #include <gtest/gtest.h>
 
@@ -158,7 +159,7 @@ TEST_P(Starts, AreTheLowerBounds) {
     // Up to `tiles` itself: the number of instances that do not exist.
     for (auto& key : sorted) key = uint32_t(random.bits() % (tiles + 1));
     std::sort(sorted.begin(), sorted.end());
-    Guarded keys("keys", sorted), starts("tile starts", (tiles + 1) * 4);
+    Guarded keys("keys", sorted), starts("tile starts", (tiles + 2) * 4);
     for (const bool fits : {true, false}) {
         shared::Counts needed{};
         needed.instances = items;
@@ -169,7 +170,7 @@ TEST_P(Starts, AreTheLowerBounds) {
         });
         if (!fits && items == 0) break;
         const auto actual = starts.read<uint32_t>();
-        for (uint32_t tile = 0; tile <= tiles; ++tile) {
+        for (uint32_t tile = 0; tile <= tiles + 1; ++tile) {
             const auto bound = std::lower_bound(sorted.begin(), sorted.begin() + items, tile);
             ASSERT_EQ(actual[tile], fits ? uint32_t(bound - sorted.begin()) : 0u) << tile;
         }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A picture with more tiles than some drivers allow turns of a loop (65,535, silently), and splats that cover
 // all of it: no kernel may walk a splat's tiles, or a tile's splats, in one loop that long.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The loss kernels against the twin, and the photograph's unpacking.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // 3DGS-MCMC on the device against the twin: relocation, growth, noise, regularisers.
 #include <gtest/gtest.h>
 
@@ -80,12 +81,18 @@ std::vector<uint32_t> device_weights(const Start& start) {
     return result;
 }
 
-class Relocation : public testing::TestWithParam<std::pair<size_t, int>> {};
+struct RelocationCase {
+    size_t splats;
+    int degree;
+    double spread = 0;
+};
+class Relocation : public testing::TestWithParam<RelocationCase> {};
 
 TEST_P(Relocation, WritesTheTwinsNextGeneration) {
-    const auto [splats, degree] = GetParam();
+    const auto [splats, degree, spread] = GetParam();
     Start start(3000 + splats, splats, degree);
-    const McmcRules rules = rules_for(1u << 20);
+    McmcRules rules = rules_for(1u << 20);
+    rules.spread = spread;
     const auto weights = device_weights(start);
     const uint32_t n = uint32_t(splats), after = uint32_t(std::floor(rules.growth * n));
     std::vector<uint32_t> dead;
@@ -113,9 +120,18 @@ TEST_P(Relocation, WritesTheTwinsNextGeneration) {
     const uint32_t planes = pipeline::parameter_planes(degree);
     const auto moments1 = start.model.moments1.download<float>(pipeline::parameter_bytes(after, degree) / 4);
     const size_t sh = old.sh_stride();
+    const reference::Values wide = reference::to_double(old);
     for (uint32_t j = 0; j < after; ++j) {
         const uint32_t s = source[j];
-        for (size_t k = 0; k < 3; ++k) ASSERT_EQ(actual.means[3 * j + k], old.means[3 * s + k]);
+        const auto n3 = core::normal3({j, rules.step, uint32_t(rules.seed),
+                                       uint32_t(rules.seed >> 32) ^ shared::MCMC_SPREAD_STREAM});
+        const glm::dvec3 mean = reference::apart(read_splat(wide, s), {n3[0], n3[1], n3[2]}, spread);
+        for (size_t k = 0; k < 3; ++k) {
+            if (spread == 0 || copies[s] == 0)
+                ASSERT_EQ(actual.means[3 * j + k], old.means[3 * s + k]);
+            else
+                ASSERT_NEAR(actual.means[3 * j + k], mean[int(k)], 2e-6 * (1 + std::abs(mean[int(k)])));
+        }
         for (size_t k = 0; k < 4; ++k) ASSERT_EQ(actual.quaternions[4 * j + k], old.quaternions[4 * s + k]);
         for (size_t k = 0; k < sh; ++k) ASSERT_EQ(actual.sh[sh * j + k], old.sh[sh * s + k]);
         for (uint32_t f = 0; f < 4 * planes; ++f)
@@ -136,9 +152,26 @@ TEST_P(Relocation, WritesTheTwinsNextGeneration) {
     }
 }
 
+/// One splat alive among 30,000: it and its copies share what it was, each a 30,000th of its optical depth.
+TEST(RelocationOfMany, ThousandsOfCopiesShareOneSplat) {
+    const size_t splats = 30000;
+    Start start(3777, splats, 0);
+    std::fill(start.gaussians.opacity_logits.begin(), start.gaussians.opacity_logits.end(), -9.0f);
+    start.gaussians.opacity_logits[17] = 3.0f;
+    start.model = pipeline::upload_model(*device(), start.gaussians, 2, false);
+    const auto result = run_refine(start.model, rules_for(uint32_t(splats)));
+    ASSERT_EQ(result.relocated, splats - 1);
+    const Gaussians actual = download_model(start.model, start.model.params);
+    const auto share = reference::share_of(sigmoid(3.0), int(splats));
+    for (size_t j = 0; j < splats; j += 500)
+        for (size_t k = 0; k < 3; ++k)
+            ASSERT_NEAR(actual.log_scales[3 * j + k],
+                        start.gaussians.log_scales[3 * 17 + k] + std::log(share.scale_factor), 2e-5);
+}
+
 INSTANTIATE_TEST_SUITE_P(Sizes, Relocation,
-                         testing::Values(std::pair{size_t(3), 0}, std::pair{size_t(2000), 0},
-                                         std::pair{size_t(777), 1}, std::pair{size_t(300), 3}));
+                         testing::Values(RelocationCase{3, 0}, RelocationCase{2000, 0}, RelocationCase{777, 1},
+                                         RelocationCase{300, 3}, RelocationCase{1000, 1, 0.8}));
 
 TEST(RelocationEdges, SourcesAreDrawnInProportionToTheirOpacity) {
     Start start(3100, 40, 0, -2);
@@ -197,7 +230,7 @@ TEST(Noise, IsTheTwins) {
         frame.counts.upload(std::span<const shared::Counts>(&counts, 1));
         const uint64_t seed = 0xabcdef0123456789ull;
         r.run([&](gpu::Recording& recording) {
-            record_noise(recording, r.kernels, start.model, frame, 5.0f, seed, 12);
+            record_noise(recording, r.kernels, start.model, frame, 5.0f, 1e9f, seed, 12);
         });
         const Gaussians moved = download_model(start.model, start.model.params);
         const reference::Values old = reference::to_double(start.gaussians);
@@ -218,7 +251,7 @@ TEST(Noise, IsTheTwins) {
         counts.instances = 11;  // the frame is going to be repeated
         frame.counts.upload(std::span<const shared::Counts>(&counts, 1));
         r.run([&](gpu::Recording& recording) {
-            record_noise(recording, r.kernels, start.model, frame, 5.0f, seed, 13);
+            record_noise(recording, r.kernels, start.model, frame, 5.0f, 1e9f, seed, 13);
         });
         EXPECT_EQ(download_model(start.model, start.model.params).means, moved.means);
     }

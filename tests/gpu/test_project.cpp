@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The projection pass alone against the twin.
 #include <gtest/gtest.h>
 

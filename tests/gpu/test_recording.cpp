@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Recordings: which commands a barrier separates, and declarations that are wrong. Nothing runs on the
 // device.
 #include <gtest/gtest.h>
@@ -297,7 +298,7 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     record_loss(step, r.kernels, frame, use, {0, 0, 0}, photo);
     record_backward(step, r.kernels, plan, model, frame, use, {0, 0, 0}, sorted, {});
     record_reset_opacity(step, r.kernels, model, 0);
-    record_noise(step, r.kernels, model, frame, 0.1f, 1, 1);
+    record_noise(step, r.kernels, model, frame, 0.1f, 1.0f, 1, 1);
     out.push_back(step.commands());
 
     gpu::Recording picture = r.recording();

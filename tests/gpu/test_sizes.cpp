@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The pure functions behind a frame: sizes, plans, camera blocks, workgroup counts.
 #include <gtest/gtest.h>
 

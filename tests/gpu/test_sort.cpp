@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Prefix sums and the radix sort on the device: both are exact.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The gradient of the projection and Adam, on slots from the twin.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The twin's results in the device's layouts: inputs for a pass that runs alone.
 #pragma once
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The device's gradient of the loss against central differences of the twin's loss, a parameter group at a
 // time: neither side knows the other's formulas.
 #include <gtest/gtest.h>

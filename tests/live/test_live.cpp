@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Watching a training run: protocol, server and client over the loopback, and a run's folder.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Assertions about gradients: is it the right direction, the right length, right in each element, and is
 // there one at all. One number cannot tell: a relative error hides a wrong small element, an element
 // tolerance a wrong sign near zero.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Seeded scenes, cameras and pictures for tests. A pure function of the seed on every platform: no std
 // distribution.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Scenes for tests of the splat formats, and how far two are apart.
 #pragma once
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Files for tests, and what is expected of readers that meet broken ones.
 #pragma once
 #include <gtest/gtest.h>

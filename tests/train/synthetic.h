@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A dataset made in the test: splats at known places, photographed by the float64 twin.
 #pragma once
 #include <cmath>

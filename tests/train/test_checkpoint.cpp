@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The checkpoint's file, and a trainer that goes on from another's state.
 #include "train/checkpoint.h"
 

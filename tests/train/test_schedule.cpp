@@ -1,8 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 // When a run does what: pure functions.
 #include "train/schedule.h"
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <set>
 
 #include "train/photographs.h"
@@ -99,6 +101,10 @@ TEST(Schedule, RelocationsStopWhereMcmcsCodeStopsThem) {
     options.steps = 3000;
     const Schedule tenth = schedule_for(options);
     EXPECT_EQ(tenth.relocate_every, 25);
+    EXPECT_EQ(full.growth, 1.05);
+    EXPECT_NEAR(tenth.growth, std::pow(1.05, 2.5), 1e-12);  // every 25 steps, not every 10
+    EXPECT_EQ(full.copy_spread, 0);
+    EXPECT_NEAR(tenth.copy_spread, 0.9, 1e-12);
     EXPECT_TRUE(tenth.relocates(125));
     EXPECT_FALSE(tenth.relocates(130));
     EXPECT_TRUE(tenth.relocates(2475));

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Training as a whole: it learns, it repeats itself byte by byte, and it stays within its bounds.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Frustums and paths: what a viewer draws of cameras.
 #include <gtest/gtest.h>
 

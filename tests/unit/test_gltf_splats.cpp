@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // glTF with KHR_gaussian_splatting: what nodes, quantised values, colour spaces and damage come to.
 #include <glm/gtc/matrix_transform.hpp>
 #include <nlohmann/json.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The helpers that judge gradients must themselves fail on wrong input.
 #include "support/gradient_check.h"
 

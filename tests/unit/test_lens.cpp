@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Lens models against figures of another implementation, and the inversion of them.
 #include <cmath>
 #include <sstream>

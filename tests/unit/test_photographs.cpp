@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Photographs as captures have them: turned, of several sizes, deep, with smaller copies beside them.
 #include <OpenImageIO/imageio.h>
 

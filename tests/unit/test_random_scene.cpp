@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The generators make what they say, and the same for the same seed.
 #include "support/random_scene.h"
 

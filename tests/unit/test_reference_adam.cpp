@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Adam against the recurrence written out for one number.
 #include "reference/adam.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Lists and compositing: scenes whose answer is known, and a plain loop over all splats.
 #include "reference/blend.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // dL/d(footprint, colour) against central differences of the blend, on pictures without jumps.
 #include "reference/blend_backward.h"
 

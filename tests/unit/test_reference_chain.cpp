@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The whole chain, splats to loss and back, against central differences of the loss.
 #include <gtest/gtest.h>
 

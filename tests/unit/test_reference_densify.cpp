@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Adaptive density control: each decision at its threshold, and what comes of it.
 #include "reference/densify.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The exposure's gradient against differences.
 #include "reference/exposure.h"
 

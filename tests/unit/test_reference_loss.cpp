@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The loss against a direct double loop, and its gradient against differences.
 #include "reference/loss.h"
 

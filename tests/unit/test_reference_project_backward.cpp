@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The way back through projection against central differences of projection alone.
 #include "reference/project_backward.h"
 

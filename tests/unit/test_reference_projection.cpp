@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Projection against closed forms, long double and the limits it must hold.
 #include "reference/projection.h"
 

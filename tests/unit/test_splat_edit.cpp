@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Moving, turning, selecting and ordering splats.
 #include <gtest/gtest.h>
 

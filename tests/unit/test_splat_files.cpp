@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Every splat format: what comes back, what the bytes are, and what is refused.
 #include <zlib.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ewa-view in a window that is driven by the X server's own key and mouse events (xdotool, by XTEST).
 #pragma once
 #include <fcntl.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The window under real key and mouse events.
 #include <fstream>
 #include <random>

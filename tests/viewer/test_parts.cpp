@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The parts of the viewer that know of no window: the camera, the first view, the picture, the pace.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The window on a training that goes on.
 #include "viewer/session.h"
 #include "viewer/window_test.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ewa-view as a process, in a real window on a virtual display.
 #include "viewer/window_test.h"
 

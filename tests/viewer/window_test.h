@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the tests of the window share: a display, small inputs, and the validation layer listening.
 #pragma once
 #include <gtest/gtest.h>

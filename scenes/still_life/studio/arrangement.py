@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The still life: what stands on the table, what it is made of, and how it is lit. Lengths in units of about 60 cm."""
 import numpy as np
 

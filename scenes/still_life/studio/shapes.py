@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The shapes that rays can hit.
 
 Every shape has `centre` and `radius`, a sphere that holds it (None: unbounded), `intersect`, which returns the distance

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Procedural colour: noise, wood, cloth, lettering. Colours are linear RGB; functions take points of shape (3, n)."""
 import numpy as np
 

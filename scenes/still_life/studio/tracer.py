@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Light transport: an area light, the light of a closed room, one bounce of colour, and reflections."""
 from dataclasses import dataclass
 from typing import Callable, Optional

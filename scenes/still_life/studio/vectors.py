@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Helpers for arrays of vectors. A batch of n vectors is an array of shape (3, n)."""
 import numpy as np
 

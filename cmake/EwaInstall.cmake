@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+# What `cmake --install` puts where, and the package that find_package(ewa) reads.
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+
+# libewa: the rooms of the house without its leaves, in one shared object, so that who links it needs none of what stands
+# behind it. The programs link the rooms themselves and run without it.
+set(ewa_library_rooms core image scene mesh io gpu passes pipeline photograph train)
+set(ewa_objects $<TARGET_OBJECTS:ewa_shader_code>)
+foreach(room ${ewa_library_rooms})
+    if(TARGET ewa_${room})
+        list(APPEND ewa_objects $<TARGET_OBJECTS:ewa_${room}>)
+    endif()
+endforeach()
+add_library(ewa_library SHARED ${ewa_objects})
+set_target_properties(ewa_library PROPERTIES OUTPUT_NAME ewa EXPORT_NAME ewa LINKER_LANGUAGE CXX
+    VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR}
+    LINK_DEPENDS ${PROJECT_SOURCE_DIR}/cmake/libewa.map)
+target_link_options(ewa_library PRIVATE -Wl,--version-script=${PROJECT_SOURCE_DIR}/cmake/libewa.map -Wl,--as-needed
+                                        -Wl,--no-undefined)
+target_link_libraries(ewa_library PRIVATE Vulkan::Vulkan OpenImageIO::OpenImageIO spdlog::spdlog ZLIB::ZLIB
+                                          zstd::libzstd_shared)
+target_compile_features(ewa_library INTERFACE cxx_std_20)
+target_include_directories(ewa_library INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+if(EWA_SANITIZE)
+    target_link_options(ewa_library PRIVATE -fsanitize=address,undefined)
+endif()
+
+# Manual pages and completions, written by the program from its own options.
+set(ewa_manual ${PROJECT_BINARY_DIR}/manual)
+add_custom_command(OUTPUT ${ewa_manual}/man/man1/ewa.1 COMMAND ewa manual ${ewa_manual} DEPENDS ewa
+                   COMMENT "Writing manual pages" VERBATIM)
+add_custom_target(manual ALL DEPENDS ${ewa_manual}/man/man1/ewa.1)
+
+set(ewa_programs ewa)
+foreach(program ewa-view ewa-bench)
+    if(TARGET ${program})
+        list(APPEND ewa_programs ${program})
+    endif()
+endforeach()
+install(TARGETS ${ewa_programs} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+install(TARGETS ewa_library EXPORT ewaTargets LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(DIRECTORY include/ewa DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
+install(DIRECTORY ${ewa_manual}/ DESTINATION ${CMAKE_INSTALL_DATADIR})
+install(FILES README.md CHANGELOG.md LICENSE docs/training.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(DIRECTORY examples DESTINATION ${CMAKE_INSTALL_DOCDIR})
+
+set(ewa_package ${CMAKE_INSTALL_LIBDIR}/cmake/ewa)
+install(EXPORT ewaTargets NAMESPACE ewa:: DESTINATION ${ewa_package})
+file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/ewaConfig.cmake @ONLY CONTENT [[
+# The public headers speak of GLM's vectors and of nothing else that is not the standard's.
+include(CMakeFindDependencyMacro)
+find_dependency(glm)
+include(${CMAKE_CURRENT_LIST_DIR}/ewaTargets.cmake)
+set_property(TARGET ewa::ewa APPEND PROPERTY INTERFACE_LINK_LIBRARIES glm::glm)
+]])
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/ewaConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/ewaConfig.cmake ${PROJECT_BINARY_DIR}/ewaConfigVersion.cmake
+        DESTINATION ${ewa_package})
+
+# cpack --config build/release/CPackConfig.cmake: a .deb whose dependencies are read from what was linked.
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_NAME ewa)
+set(CPACK_PACKAGE_CONTACT "The authors of ewa <ewa@localhost>")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "trains, renders and inspects 3D Gaussian splats on any Vulkan device")
+set(CPACK_PACKAGE_DESCRIPTION "Programs ewa, ewa-view and ewa-bench, and libewa with its headers. Photographs with cameras
+become a 3D Gaussian splat scene, on any Vulkan device, a plain CPU included.")
+set(CPACK_STRIP_FILES ON)
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_SECTION graphics)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PACKAGE_RECOMMENDS mesa-vulkan-drivers)
+set(CPACK_DEBIAN_PACKAGE_SUGGESTS "libglm-dev, vulkan-validationlayers")
+include(CPack)

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+// The way back from what the tiles added up to a splat's M and scales. Needs projection.glsl.
+#ifndef EWA_LIB_FOOTPRINT_GRADIENT
+#define EWA_LIB_FOOTPRINT_GRADIENT
+
+// What the tiles added to a splat, see SLOT_FLOATS.
+struct Sums {
+    float g;
+    vec2 gw;       // sum g u, sum g v
+    vec3 gww;      // sum g u^2, g u v, g v^2
+    vec3 color;
+    vec2 absolute;
+};
+
+struct FootprintGradient {
+    vec2 mean;         // dL/d(mean in px)
+    vec2 absolute;     // of each pixel, summed
+    vec3 dm0, dm1;     // dL/d(rows of M)
+    vec3 log_scale;    // dL/d(logarithms of the scales)
+    vec3 torque;       // dL/d(rotation about the splat's own axes, radians)
+};
+
+// exp(x) - exp(-x), to the last digits near zero also: the splat that is nearly round.
+vec3 twice_sinh(vec3 x) {
+    const vec3 q = x * x, e = exp(clamp(x, -80.0, 80.0));
+    const vec3 series = 2.0 * x * (1.0 + q / 6.0 * (1.0 + q / 20.0 * (1.0 + q / 42.0)));
+    return mix(e - 1.0 / e, series, lessThan(abs(x), vec3(0.5)));
+}
+
+// From the whitened sums to the 2D Gaussian and its M. With power = -(u^2 + v^2) and (u, v) = L d, L = [ux, -k ux; 0, vy]:
+// d(power)/d(mean) = 2 L^T (u, v), d(power)/dM = 4 L^T (u, v)(u, v)^T L M. L M is taken first: of a long needle, L^T L and M
+// by themselves have terms that are thousands of times their product.
+//
+// P = M^T dL/dM is symmetric, being that product's square. Its diagonal is the gradient by the logarithms of the scales; an
+// entry beside it, times s_i / s_j - s_j / s_i, the torque about the third axis.
+FootprintGradient footprint_gradient(Sums s, Projection p, vec3 log_scale) {
+    const float skew = -p.k * p.ux;
+    FootprintGradient f;
+    f.mean = 2.0 * vec2(p.ux * s.gw.x, skew * s.gw.x + p.vy * s.gw.y);
+    f.absolute = 2.0 * vec2(p.ux * s.absolute.x, s.absolute.y);
+
+    const vec3 m0 = p.unit * p.m0, m1 = p.unit * p.m1, n = p.minors;
+    const float low_pass = p.unit * p.unit * float(LOW_PASS), ux = p.ux / p.unit, vy = p.vy / p.unit;
+    // c m0 - b m1 = LOW_PASS m0 + m1 x (m0 x m1), in which nothing cancels.
+    const vec3 lu = (ux / p.c) * (low_pass * m0 + cross(m1, n)), lv = vy * m1;
+    const vec3 hu = s.gww.x * lu + s.gww.y * lv, hv = s.gww.y * lu + s.gww.z * lv;
+    f.dm0 = 4.0 * p.ux * hu;
+    f.dm1 = 4.0 * (skew * hu + p.vy * hv);
+    f.log_scale = 4.0 * (lu * hu + lv * hv);
+    vec3 beside = 4.0 * (lu.yzx * hu.zxy + lv.yzx * hv.zxy);   // P of yz, zx, xy
+    if (KERNEL != KERNEL_PEAK && p.det0 > 0.0) {
+        // ln(factor) = -ln(1 + q) / 2 with q = (det - det0) / det0, or -ln(det) / 2: in either
+        // d(ln factor) = -(LOW_PASS d(trace) + share d(det0)) / (2 det), d(det0) = 2 (m1 x n . dm0 + n x m0 . dm1).
+        const float share =
+            KERNEL == KERNEL_ANTIALIAS ? -(low_pass * (dot(m0, m0) + dot(m1, m1)) + low_pass * low_pass) / p.det0 : 1.0;
+        const float scale = -s.g / p.det;
+        f.dm0 += (p.unit * scale) * (low_pass * m0 + share * cross(m1, n));
+        f.dm1 += (p.unit * scale) * (low_pass * m1 + share * cross(n, m0));
+        const vec3 squares = n * n;
+        f.log_scale += scale * (low_pass * (m0 * m0 + m1 * m1) +
+                                share * vec3(squares.y + squares.z, squares.z + squares.x, squares.x + squares.y));
+        beside += scale * (low_pass * (m0.yzx * m0.zxy + m1.yzx * m1.zxy) - share * n.yzx * n.zxy);
+    }
+    f.torque = beside * twice_sinh(log_scale.yzx - log_scale.zxy);
+    return f;
+}
+#endif

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/accuracy.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cstdio>
+
+#include "bench/accuracy.h"
+#include "cli/output.h"
+#include "core/atomic_file.h"
+#include "ewa/error.h"
+#include "ewa/splat_files.h"
+#include "ewa/trainer.h"
+
+namespace ewa::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr uint32_t kMaxSplats = 40000;
+constexpr int kEvaluations = 6;
+
+struct Trained {
+    report::WorkSeries curve;
+    Gaussians gaussians;
+};
+
+/// One strategy from the dataset's points, evaluated on the held-out views now and then; that is not counted
+/// as time.
+Trained train(const std::shared_ptr<gpu::Device>& device, const Dataset& dataset, const Split& split,
+              const std::string& name, Strategy strategy, int steps) {
+    TrainOptions options;
+    options.steps = steps;
+    options.strategy = strategy;
+    options.max_splats = kMaxSplats;
+    Gaussians start = gaussians_from_points(dataset.points, options.sh_degree);
+    Trainer trainer(device, dataset, split.train, start, options);
+    Trained result{{name, true, {}}, {}};
+    const int every = std::max(1, steps / kEvaluations);
+    while (trainer.steps_done() < steps) {
+        const StepReport report = trainer.step();
+        if (report.step % every != 0 && report.step != steps) continue;
+        result.gaussians = trainer.gaussians();
+        const double psnr = evaluate(device, result.gaussians, dataset, split.test, options.render).psnr;
+        result.curve.points.push_back({fmt::format("step {}", report.step), report.seconds, psnr, 0});
+    }
+    const report::WorkPoint& last = result.curve.points.back();
+    fmt::print("{:<24} {:<14} {:8.2f} s  {:.2f} dB held out, {} splats\n", "training", name, last.time,
+               last.error, result.gaussians.size());
+    return result;
+}
+
+void print_table(const report::WorkPrecision& diagram) {
+    for (const report::WorkSeries& series : diagram.series)
+        for (const report::WorkPoint& p : series.points)
+            fmt::print("{:<24} {:<14} {:10.2f} ms  RMS error {:.2e}, worst {:.2e}\n", series.name, p.name,
+                       p.time, p.error, p.worst);
+}
+
+}  // namespace
+
+report::WorkPrecision rendering_diagram(const std::shared_ptr<gpu::Device>& device,
+                                        const Gaussians& gaussians, const Camera& camera,
+                                        const RenderOptions& options) {
+    const auto say = [](const std::string& line) {
+        fmt::print("{}\n", line);
+        std::fflush(stdout);
+    };
+    const bench::Accuracy accuracy = bench::measure_accuracy(device, gaussians, camera, options, say);
+    report::WorkPrecision diagram;
+    diagram.title = "Rendering: error against run time";
+    for (const bench::AccuracySeries& series : accuracy.series) {
+        report::WorkSeries out{series.name, series.line, {}};
+        for (const bench::AccuracyPoint& p : series.points)
+            out.points.push_back({p.name, p.milliseconds, p.rms, p.worst});
+        diagram.series.push_back(std::move(out));
+    }
+    diagram.notes.push_back(
+        fmt::format("{} splats, {}x{}, on {}. The error is taken at {} pixels against the "
+                    "emission-absorption integral of the splats "
+                    "as 3D Gaussians, in float64 along each ray ({:.1f} s).",
+                    gaussians.size(), camera.width, camera.height, device_info(*device).name, accuracy.pixels,
+                    accuracy.exact_seconds));
+    diagram.notes.push_back(fmt::format(
+        "The ray-marcher is C++ in float64 on {} threads of the host, its time that of those pixels times "
+        "their share of "
+        "the picture; splatting is the whole frame on the device, recording and waiting included.",
+        accuracy.threads));
+    return diagram;
+}
+
+int run_accuracy(const AccuracyArguments& arguments) {
+    if (arguments.splats.empty() && arguments.steps == 0)
+        throw InputError(
+            "--accuracy: with --training-steps 0 there is nothing to draw; --splats names a file");
+    const Dataset dataset = load_dataset(arguments.dataset, {});
+    const Split split = split_frames(dataset, 8);
+    if (split.test.empty() || split.train.empty())
+        throw InputError(arguments.dataset.string() + ": too few photographs to hold one out");
+    const auto device = open_device(arguments.device);
+    fmt::print("device: {}\n", device_info(*device).name);
+
+    report::WorkPrecision training{
+        "Training: held-out PSNR against run time", "seconds of training", "PSNR, dB", true, {}, {}};
+    Gaussians gaussians;
+    if (arguments.steps > 0 && dataset.points.positions.empty())
+        throw InputError(arguments.dataset.string() + ": has no points to start training from");
+    const std::pair<const char*, Strategy> strategies[] = {
+        {"none", Strategy::none}, {"mcmc", Strategy::mcmc}, {"adc", Strategy::adc}};
+    for (const auto& [name, strategy] : strategies) {
+        if (arguments.steps == 0) break;
+        Trained trained = train(device, dataset, split, name, strategy, arguments.steps);
+        training.series.push_back(std::move(trained.curve));
+        gaussians = std::move(trained.gaussians);
+    }
+    training.notes.push_back(
+        fmt::format("{} steps of each strategy, at most {} splats, on {}; evaluation is not counted.",
+                    arguments.steps, kMaxSplats, device_info(*device).name));
+    if (!arguments.splats.empty()) gaussians = load_splats(arguments.splats);
+    const report::WorkPrecision rendering =
+        rendering_diagram(device, gaussians, dataset.frames[size_t(split.test.front())].camera, {});
+    print_table(rendering);
+    if (!arguments.json.empty())
+        write_json(arguments.json, {{"rendering", report::work_precision_json(rendering)},
+                                    {"training", report::work_precision_json(training)}});
+    if (!arguments.svg.empty()) {
+        core::write_text_file(arguments.svg, report::work_precision_svg(rendering));
+        fs::path beside = arguments.svg;
+        beside.replace_filename(arguments.svg.stem().string() + "_training.svg");
+        if (arguments.steps > 0) core::write_text_file(beside, report::work_precision_svg(training));
+    }
+    return 0;
+}
+
+}  // namespace ewa::cli

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// ewa bench --accuracy: error against run time, of rendering and of training.
+#pragma once
+#include <filesystem>
+#include <memory>
+
+#include "ewa/camera.h"
+#include "ewa/device.h"
+#include "ewa/gaussians.h"
+#include "ewa/render_options.h"
+#include "report/work_precision.h"
+
+namespace ewa::cli {
+
+struct AccuracyArguments {
+    std::filesystem::path dataset, splats;  // splats empty: those that the training here ends with
+    std::filesystem::path json, svg;        // empty: none; beside svg stands NAME_training.svg
+    int steps = 600;                        // of each training, 0: none
+    DeviceOptions device;
+};
+
+/// The diagram of rendering a scene from a camera.
+report::WorkPrecision rendering_diagram(const std::shared_ptr<gpu::Device>& device,
+                                        const Gaussians& gaussians, const Camera& camera,
+                                        const RenderOptions& options);
+
+/// Prints tables and writes the files. Returns the exit status.
+int run_accuracy(const AccuracyArguments& arguments);
+
+}  // namespace ewa::cli

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+// Manual pages and shell completion, from the option parser itself.
+#pragma once
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+namespace ewa::cli {
+
+/// A manual page in the macros of man(7), as troff reads it: of the program where `command` is null, else of a command.
+std::string manual_page(const CLI::App& program, const CLI::App* command);
+
+/// Completion of commands, options and values out of a set; sourced by bash, zsh (after bashcompinit) or fish.
+std::string bash_completion(const CLI::App& program);
+std::string fish_completion(const CLI::App& program);
+
+/// Commands that a user sees.
+std::vector<const CLI::App*> shown_commands(const CLI::App& program);
+
+/// The hidden command `manual DIR` writes all of them below DIR, where an installation has them below share/.
+void write_manual(const CLI::App& program, const std::string& folder);
+
+}  // namespace ewa::cli

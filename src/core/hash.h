@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// A number that tells contents apart: not proof against those who want two to agree.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <type_traits>
+
+namespace ewa::core {
+
+/// FNV-1a (Fowler, Noll, Vo) over 64 bits.
+class Hash {
+  public:
+    void add(const void* data, size_t bytes) {
+        const auto* p = static_cast<const unsigned char*>(data);
+        for (size_t i = 0; i < bytes; ++i) value_ = (value_ ^ p[i]) * 0x100000001b3ull;
+    }
+    template <class T>
+    void add(const T& value) {
+        static_assert(std::is_arithmetic_v<T>);
+        add(&value, sizeof(value));
+    }
+    void add(const std::string& text) {
+        add(uint64_t(text.size()));
+        add(text.data(), text.size());
+    }
+    uint64_t value() const { return value_; }
+
+  private:
+    uint64_t value_ = 0xcbf29ce484222325ull;
+};
+
+}  // namespace ewa::core

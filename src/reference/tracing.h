@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// The float64 twin of shaders/lib/traversal.glsl.
+#pragma once
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <optional>
+#include <span>
+
+#include "mesh/packing.h"
+
+namespace ewa::reference {
+
+struct Ray {
+    glm::dvec3 origin, direction;  // of any length, in which distances are measured
+    double reach = 1e300;
+};
+
+struct Hit {
+    uint32_t triangle = 0;
+    double distance = 0;
+    glm::dvec2 barycentric{0.0};  // weights of corners 1 and 2
+};
+
+/// Where the ray meets the triangle (Moeller and Trumbore 1997), from either side; edges belong to it.
+std::optional<Hit> meet(const Ray& ray, const mesh::DeviceTriangle& triangle);
+
+/// The nearest of all triangles, by asking each.
+std::optional<Hit> nearest_of_all(const Ray& ray, std::span<const mesh::DeviceTriangle> triangles);
+
+/// The same through the hierarchy, in the shader's order; deepest: the most children that waited on the stack.
+std::optional<Hit> trace(const Ray& ray, std::span<const mesh::Node> nodes,
+                         std::span<const mesh::DeviceTriangle> triangles, size_t* deepest = nullptr);
+
+}  // namespace ewa::reference

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+// ewa dataset, and ewa train on a mesh scene.
+#include <gtest/gtest.h>
+
+#include "cli/expect.h"
+#include "ewa/dataset.h"
+
+namespace {
+
+using namespace ewa::test;
+namespace fs = std::filesystem;
+
+const std::string kScenes = std::string(EWA_SOURCE_DIR) + "/scenes/";
+
+std::vector<std::string> small(const std::string& scene, const std::string& folder) {
+    return {"dataset", kScenes + scene, "-o", folder, "--views", "4", "--size", "24x16", "--samples", "2", "--points", "200"};
+}
+
+TEST(Dataset, IsReadBackByOurOwnReader) {
+    const Folder folder;
+    const Outcome made = run_ewa(small("tea_table.gltf", folder / "d"));
+    ASSERT_EQ(made.status, 0) << made.err;
+    EXPECT_NE(made.out.find("4 views"), std::string::npos) << made.out;
+    const ewa::Dataset dataset = ewa::load_dataset(folder / "d", {});
+    ASSERT_EQ(dataset.frames.size(), 4u);
+    EXPECT_TRUE(dataset.color_depends_on_view);
+    EXPECT_GT(dataset.points.positions.size(), 30u);
+    const nlohmann::json top = read_json(folder / "d/transforms.json");
+    EXPECT_FALSE(top.contains("view_dependent"));
+    for (const ewa::Frame& frame : dataset.frames) {
+        EXPECT_EQ(frame.camera.width, 24);
+        EXPECT_EQ(frame.camera.height, 16);
+        EXPECT_GT(frame.camera.position().y, 0.0) << "the world stays the glTF's: y is up";
+    }
+    // Depth and points agree: each point lies on what some picture sees.
+    const ewa::Image depth = ewa::load_image(folder / ("d/" + top["frames"][0]["depth_file_path"].get<std::string>()));
+    const ewa::Camera& camera = dataset.frames[0].camera;
+    int seen = 0;
+    for (const glm::dvec3& point : dataset.points.positions) {
+        const glm::dvec3 p = camera.rotation * point + camera.translation;
+        const double x = camera.fx * p.x / p.z + camera.cx, y = camera.fy * p.y / p.z + camera.cy;
+        if (!(x >= 0 && x < 24 && y >= 0 && y < 16)) continue;
+        const double error = std::abs(x - std::floor(x) - 0.5) + std::abs(y - std::floor(y) - 0.5);
+        if (error < 1e-3 && std::abs(double(*depth.at(int(x), int(y))) - p.z) < 1e-4 * p.z) ++seen;
+    }
+    EXPECT_GE(seen, 10);
+    const Outcome info = run_ewa({"info", folder / "d"});
+    EXPECT_EQ(info.status, 0) << info.err;
+    EXPECT_EQ(info.out.find("does not depend on the view"), std::string::npos);
+}
+
+TEST(Dataset, GoesOnWhereItWasEnded) {
+    const Folder folder;
+    ASSERT_EQ(run_ewa(small("railing.gltf", folder / "d")).status, 0);
+    const std::string picture = read_file(folder / "d/images/view_002.png"), depth = read_file(folder / "d/depth/view_002.exr");
+    const std::string transforms = read_file(folder / "d/transforms.json");
+    fs::remove(folder / "d/images/view_002.png");
+    fs::remove(folder / "d/transforms.json");
+    const Outcome again = run_ewa(small("railing.gltf", folder / "d"));
+    EXPECT_EQ(again.status, 0) << again.err;
+    EXPECT_NE(again.out.find("3 were there already"), std::string::npos) << again.out;
+    EXPECT_TRUE(read_file(folder / "d/images/view_002.png") == picture);
+    EXPECT_TRUE(read_file(folder / "d/depth/view_002.exr") == depth);
+    EXPECT_TRUE(read_file(folder / "d/transforms.json") == transforms);
+    // Another scene in the same folder: nothing of the first stays.
+    auto other = small("plaster.gltf", folder / "d");
+    other[5] = "3";
+    EXPECT_EQ(run_ewa(other).status, 0);
+    EXPECT_EQ(ewa::load_dataset(folder / "d", {}).frames.size(), 3u);
+    EXPECT_FALSE(fs::exists(folder / "d/images/view_003.png"));
+}
+
+TEST(Dataset, OtherPeoplesFoldersAndWrongUseAreRefused) {
+    const Folder folder;
+    make_dataset(folder / "photos");
+    expect_failure(run_ewa(small("plaster.gltf", folder / "photos")), 2, "photos");
+    EXPECT_TRUE(fs::exists(folder / "photos/images/0.png"));
+    auto wrong = small("plaster.gltf", folder / "d");
+    wrong[7] = "24by16";
+    expect_failure(run_ewa(wrong), 2, "--size");
+    wrong[7] = "0x16";
+    expect_failure(run_ewa(wrong), 2, "--size");
+    write_file(folder / "a.gltf", "{\"asset\":{\"version\":\"2.0\"},\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{}]}");
+    expect_failure(run_ewa({"dataset", folder / "a.gltf", "-o", folder / "d"}), 2, "a.gltf");
+    expect_failure(run_ewa({"dataset", folder / "none.gltf", "-o", folder / "d"}), 2, "none.gltf");
+    EXPECT_FALSE(fs::exists(folder / "d"));
+}
+
+TEST(Dataset, ADiffuseSceneTrainsWithoutShAndThePlanSaysSo) {
+    const Folder folder;
+    ASSERT_EQ(run_ewa(small("plaster.gltf", folder / "d")).status, 0);
+    EXPECT_EQ(read_json(folder / "d/transforms.json")["view_dependent"], false);
+    EXPECT_NE(run_ewa({"info", folder / "d"}).out.find("does not depend on the view"), std::string::npos);
+    const Outcome trained = run_ewa({"train", folder / "d", "-o", folder / "out", "--steps", "2", "--verbose"});
+    ASSERT_EQ(trained.status, 0) << trained.err;
+    EXPECT_NE(trained.out.find("left out: SH degrees 1 to 3 (the dataset says that no colour depends on the view, saves"),
+              std::string::npos)
+        << trained.out;
+    EXPECT_EQ(read_json(folder / "out/config.json")["sh-degree"], 0);
+    EXPECT_NE(read_file(folder / "out/splats.ply").find("property"), std::string::npos);
+    EXPECT_EQ(read_file(folder / "out/splats.ply").find("f_rest_0"), std::string::npos);
+    const Outcome asked =
+        run_ewa({"train", folder / "d", "-o", folder / "out2", "--steps", "2", "--verbose", "--sh-degree", "2"});
+    ASSERT_EQ(asked.status, 0) << asked.err;
+    EXPECT_EQ(asked.out.find("no colour depends on the view"), std::string::npos);
+    EXPECT_EQ(read_json(folder / "out2/config.json")["sh-degree"], 2);
+}
+
+TEST(Dataset, TrainPhotographsAMeshSceneFirst) {
+    const Folder folder;
+    // One triangle, and 8 cameras in a row: enough for the dome to be left out.
+    nlohmann::json scene = {{"asset", {{"version", "2.0"}}}, {"scene", 0}};
+    scene["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 0.8}, {"znear", 0.1}}}}};
+    scene["nodes"] = {{{"mesh", 0}}};
+    scene["scenes"] = {{{"nodes", {0}}}};
+    for (int i = 1; i <= 8; ++i) {
+        scene["nodes"].push_back({{"camera", 0}, {"translation", {0.1 * i, 0.5, 2}}});
+        scene["scenes"][0]["nodes"].push_back(i);
+    }
+    scene["meshes"] = {{{"primitives", {{{"attributes", {{"POSITION", 0}}}}}}}};
+    scene["accessors"] = {{{"bufferView", 0}, {"componentType", 5126}, {"type", "VEC3"}, {"count", 3}}};
+    scene["bufferViews"] = {{{"buffer", 0}, {"byteLength", 36}}};
+    scene["buffers"] = {{{"byteLength", 36},
+                         {"uri", "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}}};
+    write_file(folder / "leaf.gltf", scene.dump());
+    const Outcome outcome = run_ewa({"train", folder / "leaf.gltf", "-o", folder / "out", "--steps", "2"});
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_NE(outcome.out.find("leaf: 7 views to train on, 1 held out, 256x256"), std::string::npos) << outcome.out;
+    EXPECT_TRUE(fs::exists(folder / "out/dataset/transforms.json"));
+    EXPECT_TRUE(fs::exists(folder / "out/splats.ply"));
+    EXPECT_EQ(read_json(folder / "out/config.json")["dataset"], folder / "leaf.gltf");
+    const Outcome again = run_ewa({"train", folder / "leaf.gltf", "-o", folder / "out", "--steps", "2", "--resume"});
+    EXPECT_EQ(again.status, 0) << again.err;
+    EXPECT_NE(again.out.find("8 were there already"), std::string::npos) << again.out;
+    expect_failure(run_ewa({"train", folder / "none.glb", "-o", folder / "out3"}), 2, "none.glb");
+    EXPECT_FALSE(fs::exists(folder / "out3"));
+}
+
+}  // namespace

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+// Loaded in front of the system's libraries (LD_PRELOAD), so that a program meets faults at chosen moments:
+//   EWA_FAULT_ALLOCATIONS=N  from the N-th on, device memory cannot be allocated
+//   EWA_FAULT_SUBMITS=N      the N-th submission and those after it find the device lost
+//   EWA_FAULT_WAITS=N        the same of waiting for one
+//   EWA_FAULT_BYTES=N        the disk is full once N bytes have been written to regular files
+//   EWA_FAULT_READ_ONLY=DIR  nothing below DIR can be created, changed or removed
+#include <dlfcn.h>
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <vulkan/vulkan.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstdarg>
+#include <cstdlib>
+#include <cstring>
+#include <string>
+
+namespace {
+
+template <class Function>
+Function next(const char* name) {
+    return reinterpret_cast<Function>(dlsym(RTLD_NEXT, name));
+}
+
+/// Whether this call of those that `variable` counts is to fail.
+bool due(const char* variable, std::atomic<long>& calls) {
+    const char* from = std::getenv(variable);
+    return from && ++calls >= std::atol(from);
+}
+
+bool read_only(const char* path) {
+    const char* folder = std::getenv("EWA_FAULT_READ_ONLY");
+    if (!folder || !path) return false;
+    const size_t length = std::strlen(folder);
+    return std::strncmp(path, folder, length) == 0 && (path[length] == '/' || path[length] == 0);
+}
+
+int refuse() {
+    errno = EROFS;
+    return -1;
+}
+
+}  // namespace
+
+extern "C" {
+
+VkResult vkAllocateMemory(VkDevice device, const VkMemoryAllocateInfo* info, const VkAllocationCallbacks* callbacks,
+                          VkDeviceMemory* memory) {
+    static std::atomic<long> calls{0};
+    if (due("EWA_FAULT_ALLOCATIONS", calls)) return VK_ERROR_OUT_OF_DEVICE_MEMORY;
+    return next<PFN_vkAllocateMemory>("vkAllocateMemory")(device, info, callbacks, memory);
+}
+
+VkResult vkQueueSubmit(VkQueue queue, uint32_t count, const VkSubmitInfo* submits, VkFence fence) {
+    static std::atomic<long> calls{0};
+    if (due("EWA_FAULT_SUBMITS", calls)) return VK_ERROR_DEVICE_LOST;
+    return next<PFN_vkQueueSubmit>("vkQueueSubmit")(queue, count, submits, fence);
+}
+
+VkResult vkWaitForFences(VkDevice device, uint32_t count, const VkFence* fences, VkBool32 all, uint64_t timeout) {
+    static std::atomic<long> calls{0};
+    if (due("EWA_FAULT_WAITS", calls)) return VK_ERROR_DEVICE_LOST;
+    return next<PFN_vkWaitForFences>("vkWaitForFences")(device, count, fences, all, timeout);
+}
+
+ssize_t write(int file, const void* bytes, size_t count) {
+    static std::atomic<long> written{0};
+    const auto real = next<ssize_t (*)(int, const void*, size_t)>("write");
+    const char* room = std::getenv("EWA_FAULT_BYTES");
+    struct stat status {};
+    if (!room || fstat(file, &status) != 0 || !S_ISREG(status.st_mode) || file <= 2) return real(file, bytes, count);
+    const long left = std::atol(room) - written;
+    if (left <= 0) {
+        errno = ENOSPC;
+        return -1;
+    }
+    const ssize_t done = real(file, bytes, count < size_t(left) ? count : size_t(left));
+    if (done > 0) written += done;
+    return done;
+}
+
+int open(const char* path, int flags, ...) {
+    va_list arguments;
+    va_start(arguments, flags);
+    const mode_t mode = flags & O_CREAT ? va_arg(arguments, mode_t) : 0;
+    va_end(arguments);
+    if ((flags & (O_WRONLY | O_RDWR | O_CREAT)) && read_only(path)) return refuse();
+    return next<int (*)(const char*, int, ...)>("open")(path, flags, mode);
+}
+
+int rename(const char* from, const char* to) {
+    if (read_only(from) || read_only(to)) return refuse();
+    return next<int (*)(const char*, const char*)>("rename")(from, to);
+}
+
+int unlink(const char* path) {
+    if (read_only(path)) return refuse();
+    return next<int (*)(const char*)>("unlink")(path);
+}
+}

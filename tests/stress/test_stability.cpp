@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every stiff and extreme scene of the table that `ewa bench --stability` goes through, on the device against
+// the twin and as the start of a training, under the validation layer.
+#include <gtest/gtest.h>
+
+#include <cctype>
+#include <cmath>
+
+#include "bench/stability/compare.h"
+#include "gpu/test_device.h"
+
+namespace ewa::test {
+namespace {
+
+const std::vector<bench::StabilityCase>& cases() {
+    static const std::vector<bench::StabilityCase> all = bench::stability_cases();
+    return all;
+}
+
+class Stability : public testing::TestWithParam<size_t> {};
+
+TEST_P(Stability, PictureAndGradientAreWithinTheirBounds) {
+    const bench::StabilityResult result = bench::compare_with_twin(device(), cases()[GetParam()]);
+    EXPECT_TRUE(result.finite);
+    EXPECT_EQ(result.skipped, result.skipped_by_twin);
+    for (const bench::Comparison& c : result.comparisons)
+        EXPECT_TRUE(c.good()) << c.of << ": " << c.error << ", at most " << c.bound << " (condition "
+                              << c.condition << ")";
+}
+
+TEST_P(Stability, TrainingFromItStaysFinite) {
+    const bench::StabilityCase& one = cases()[GetParam()];
+    const bench::StabilityTraining training =
+        bench::train_from(device(), one, one.gaussians.size() > 10000 ? 5 : 40);
+    EXPECT_TRUE(training.finite);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, Stability, testing::Range(size_t(0), cases().size()),
+                         [](const testing::TestParamInfo<size_t>& tested) {
+                             std::string name = cases()[tested.param].name;
+                             for (char& c : name) {
+                                 if (c == '-') c = 'm';
+                                 if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
+                             }
+                             return name;
+                         });
+
+bench::StabilityCase named(const std::string& name) {
+    for (const bench::StabilityCase& one : cases())
+        if (one.name == name) return one;
+    ADD_FAILURE() << "no case " << name;
+    return {};
+}
+
+TEST(StabilityOrdinary, IsWithinTheTightBounds) {
+    for (const char* name : {"ordinary", "ordinary_antialias", "ordinary_unit_mass"}) {
+        const bench::StabilityResult result = bench::compare_with_twin(device(), named(name));
+        for (const bench::Comparison& c : result.comparisons)
+            EXPECT_LE(c.error, c.of == "picture" || c.of == "loss" ? 5e-6 : 1e-4) << name << ' ' << c.of;
+    }
+}
+
+TEST(StabilityNeedles, KeepTheirDigitsWhereAPlainDeterminantLosesThem) {
+    for (const char* name : {"long_axes_1:1e+04", "long_axes_1:1e+07"}) {
+        const bench::StabilityResult result = bench::compare_with_twin(device(), named(name));
+        for (const bench::Comparison& c : result.comparisons) EXPECT_LE(c.error, 1e-3) << name << ' ' << c.of;
+        EXPECT_GT(result.plain_determinant, 20 * result.comparisons.front().error) << name;
+    }
+}
+
+/// The suite itself must be able to fail: a picture of other splats is not within the bounds.
+TEST(StabilityComparison, FindsAWrongScene) {
+    bench::StabilityCase one = named("ordinary");
+    bench::StabilityResult result = bench::compare_with_twin(device(), one);
+    ASSERT_TRUE(result.good());
+    result.comparisons.front().error = NAN;
+    EXPECT_FALSE(result.good());
+    result.comparisons.front().error = 0;
+    result.skipped = 1;
+    EXPECT_FALSE(result.good());
+}
+
+}  // namespace
+}  // namespace ewa::test
