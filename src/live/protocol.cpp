@@ -16,7 +16,7 @@ using report::Json;
 static_assert(std::endian::native == std::endian::little, "snapshots are written as they stand in memory");
 
 constexpr char kMagic[4] = {'E', 'W', 'A', 'S'};
-constexpr size_t kHeader = 16;  // bytes
+constexpr size_t kHeader = 40;  // bytes
 constexpr const char* kStates[] = {"running", "paused", "done"};
 
 Json figure(double value) {
@@ -77,6 +77,8 @@ std::vector<std::byte> encode(const Snapshot& snapshot) {
     const uint32_t header[3] = {uint32_t(g.size()), uint32_t(g.sh_degree), uint32_t(snapshot.step)};
     std::memcpy(bytes.data(), kMagic, 4);
     std::memcpy(bytes.data() + 4, header, sizeof(header));
+    const double origin[3] = {g.origin.x, g.origin.y, g.origin.z};
+    std::memcpy(bytes.data() + 16, origin, sizeof(origin));
     size_t at = kHeader;
     for_each_array(g, [&](const std::vector<float>& values) {
         if (!values.empty()) std::memcpy(bytes.data() + at, values.data(), 4 * values.size());
@@ -99,6 +101,12 @@ Snapshot decode_snapshot(const std::vector<std::byte>& bytes) {
     if (bytes.size() != kHeader + 4 * floats)  // before memory is taken
         throw InputError("the trainer's " + std::to_string(header[0]) + " splats are " + std::to_string(bytes.size()) +
                          " bytes, not " + std::to_string(kHeader + 4 * floats));
+    double origin[3] = {};
+    std::memcpy(origin, bytes.data() + 16, sizeof(origin));
+    for (int i = 0; i < 3; ++i) {
+        if (!std::isfinite(origin[i])) throw InputError("the trainer's splats have an origin that is not finite");
+        snapshot.gaussians.origin[i] = origin[i];
+    }
     snapshot.gaussians.resize(header[0]);
     size_t at = kHeader;
     for_each_array(snapshot.gaussians, [&](std::vector<float>& values) {

@@ -51,7 +51,7 @@ std::string encode(const Status& status);
 /// Throws InputError.
 Status decode_status(const std::string& text);
 
-/// 16 bytes: "EWAS", number of splats and SH degree as little-endian uint32, step as int32; then means, quaternions, log scales,
+/// 40 bytes: "EWAS", number of splats and SH degree as little-endian uint32, step as int32, origin as three float64; then means, quaternions, log scales,
 /// opacity logits and SH as Gaussians has them, little-endian float32.
 struct Snapshot {
     int step = 0;

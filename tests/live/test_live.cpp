@@ -64,11 +64,13 @@ TEST(LiveProtocol, StatusAndSplatsComeBack) {
     ASSERT_EQ(read.metrics.size(), 2u);
     EXPECT_EQ(read.metrics[1].test_psnr, 22);
 
-    const Snapshot snapshot{41, some_splats(5, 2)};
+    Snapshot snapshot{41, some_splats(5, 2)};
+    snapshot.gaussians.origin = {5e6, -3, 0.25};
     const Snapshot back = decode_snapshot(encode(snapshot));
     EXPECT_EQ(back.step, 41);
     EXPECT_EQ(back.gaussians.sh, snapshot.gaussians.sh);
     EXPECT_EQ(back.gaussians.means, snapshot.gaussians.means);
+    EXPECT_EQ(back.gaussians.origin, snapshot.gaussians.origin);
     EXPECT_EQ(decode_snapshot(encode(Snapshot{})).gaussians.size(), 0u);
 }
 
@@ -81,6 +83,9 @@ TEST(LiveProtocol, DamagedBytesAreRefused) {
         bad[at] = std::byte(0xff);
         EXPECT_THROW(decode_snapshot(bad), InputError) << at;
     }
+    std::vector<std::byte> nowhere = good;
+    for (size_t at = 16; at < 24; ++at) nowhere[at] = std::byte(0xff);
+    EXPECT_THROW(decode_snapshot(nowhere), InputError);
     EXPECT_THROW(decode_status("{}"), InputError);
     EXPECT_THROW(decode_status("[1"), InputError);
     EXPECT_EQ(payload_of("ok 12"), 12u);
