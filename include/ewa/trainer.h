@@ -22,9 +22,12 @@ namespace ewa {
 
 enum class Strategy { none, adc, mcmc };
 
+/// Which of adc and mcmc makes the better pictures in so many steps (docs/training.md has the measurements).
+Strategy strategy_for(int steps);
+
 struct TrainOptions {
     int steps = 30000;
-    Strategy strategy = Strategy::adc;
+    Strategy strategy = Strategy::mcmc;
     uint32_t max_splats = 1000000;       // hard cap
     int sh_degree = 3;
     uint64_t seed = 0;

@@ -61,7 +61,8 @@ FootprintGradient footprint_gradient(Sums s, Projection p, vec3 log_scale) {
                                 share * vec3(squares.y + squares.z, squares.z + squares.x, squares.x + squares.y));
         beside += scale * (low_pass * (m0.yzx * m0.zxy + m1.yzx * m1.zxy) - share * n.yzx * n.zxy);
     }
-    f.torque = beside * twice_sinh(log_scale.yzx - log_scale.zxy);
+    const vec3 l = computable_log_scale(log_scale);
+    f.torque = beside * twice_sinh(l.yzx - l.zxy);
     return f;
 }
 #endif

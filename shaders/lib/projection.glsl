@@ -26,7 +26,8 @@ struct Projection {
     bvec2 tangent_clamped;
     vec2 focal_over_z;
     vec3 m0, m1;           // rows of M (px)
-    bool in_range;         // the quaternion, the mean and the footprint can be computed with
+    bool in_range;         // the quaternion and the mean can be computed with,
+    bool footprint_in_range; // and the footprint of a splat before the camera
     float unit;            // 1, or less where the footprint's squares would overflow: px to the units of the next line
     float a, b, c, det;    // Sigma2 = [a b; b c]
     vec3 minors;           // m0 x m1
@@ -38,13 +39,16 @@ struct Projection {
 
 float sigmoid(float x) { return 1.0 / (1.0 + exp(-x)); }
 
+// A scale under exp(LOG_SCALE_MIN) shows no more than that one, and the ratio of two of them can be computed with.
+vec3 computable_log_scale(vec3 log_scale) { return max(log_scale, vec3(float(LOG_SCALE_MIN))); }
+
 Projection project_splat(SplatShape splat) {
     Projection p;
     p.view = view_point(splat.mean);
     const float z = p.view.z.x;
     p.unit_quaternion = normalize_quaternion(splat.quaternion, p.quaternion_norm);
     p.rotation = rotation_of(p.unit_quaternion);
-    const vec3 scale = exp(splat.log_scale);
+    const vec3 scale = exp(computable_log_scale(splat.log_scale));
     const mat3 directions = camera_rotation() * p.rotation;
     [[unroll]] for (int k = 0; k < 3; ++k) p.axes[k] = directions[k] * scale[k];
 
@@ -63,7 +67,8 @@ Projection project_splat(SplatShape splat) {
     const float footprint = wide.x + wide.y + wide.z;
     // Phrased so that NaN fails it.
     p.in_range = far.x <= float(VIEW_MAX) && far.y <= float(VIEW_MAX) && far.z <= float(VIEW_MAX) &&
-                 footprint <= float(FOOTPRINT_MAX) && p.quaternion_norm >= float(QUATERNION_MIN);
+                 p.quaternion_norm >= float(QUATERNION_MIN);
+    p.footprint_in_range = footprint <= float(FOOTPRINT_MAX);
     // A power of two, so that it rounds nothing.
     p.unit = footprint > 1073741824.0 ? 9.094947017729282e-13 : 1.0;
     const vec3 m0 = p.unit * p.m0, m1 = p.unit * p.m1;

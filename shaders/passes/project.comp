@@ -64,7 +64,7 @@ void main() {
 
     const bool stored_finite = is_finite(p0) && is_finite(p1) && is_finite(p2.xyz) && p.in_range;
     const bool in_front = z > float(NEAR_PLANE);
-    const bool projected_finite = finite_color && is_finite(record0) && is_finite(record1) && p.ux > 0.0 && p.vy > 0.0;
+    const bool projected_finite = p.footprint_in_range && finite_color && is_finite(record0) && is_finite(record1) && p.ux > 0.0 && p.vy > 0.0;
     const bool drawn = stored_finite && in_front && projected_finite;
 
     uint count = 0u;

@@ -24,9 +24,8 @@ void add_model_options(CLI::App& app, TrainArguments& arguments) {
         ->capture_default_str();
     app.add_option("--strategy", arguments.strategy,
                    "adc grows and prunes splats (3DGS); mcmc relocates dead ones and grows to the cap "
-                   "(3DGS-MCMC); none "
-                   "keeps their number")
-        ->check(CLI::IsMember({"adc", "mcmc", "none"}))
+                   "(3DGS-MCMC); none keeps their number; auto is mcmc from 5000 steps on, else adc")
+        ->check(CLI::IsMember({"auto", "adc", "mcmc", "none"}))
         ->capture_default_str();
     app.add_option("--max-splats", arguments.max_splats, "Never more splats than this")
         ->check(without_sign())

@@ -4,6 +4,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 
 #include "cli/accuracy.h"
@@ -35,12 +36,28 @@ constexpr uint32_t kRandomSplats = 50000;
 // training.
 constexpr size_t kTrainViewsEvaluated = 40;
 
+constexpr std::array<std::pair<const char*, Strategy>, 3> kStrategies{
+    {{"none", Strategy::none}, {"adc", Strategy::adc}, {"mcmc", Strategy::mcmc}}};
+
+/// What `auto` stands for: the options of adc ask for adc.
+Strategy strategy_of(const TrainArguments& arguments) {
+    for (const auto& [name, strategy] : kStrategies)
+        if (arguments.strategy == name) return strategy;
+    return arguments.absgrad || arguments.revised_opacity ? Strategy::adc : strategy_for(arguments.steps);
+}
+
+std::string strategy_name(const TrainArguments& arguments) {
+    for (const auto& [name, strategy] : kStrategies)
+        if (strategy_of(arguments) == strategy) return name;
+    return {};
+}
+
 TrainOptions train_options(const TrainArguments& arguments) {
     TrainOptions options;
     options.steps = arguments.steps;
-    options.strategy = arguments.strategy == "none"   ? Strategy::none
-                       : arguments.strategy == "mcmc" ? Strategy::mcmc
-                                                      : Strategy::adc;
+    options.strategy = strategy_of(arguments);
+    if (options.strategy != Strategy::adc && (arguments.absgrad || arguments.revised_opacity))
+        throw InputError("--absgrad and --revised-opacity are options of --strategy adc");
     options.max_splats = arguments.max_splats;
     options.sh_degree = arguments.draw.sh_degree;
     options.absolute_gradients = arguments.absgrad;
@@ -376,7 +393,7 @@ int TrainRun::run() {
     summary.seed = arguments_.seed;
     summary.version = EWA_VERSION;
     summary.command = arguments_.command_line;
-    summary.strategy = arguments_.strategy;
+    summary.strategy = strategy_name(arguments_);
     for (const PlanLine& line :
          plan_lines(start_, options_.render,
                     options_.strategy == Strategy::adc ? Purpose::densifying : Purpose::training,
@@ -418,7 +435,7 @@ report::Json to_config(const TrainArguments& a) {
     report::Json json;
     json["dataset"] = (a.scene.empty() ? a.dataset : a.scene).string();
     json["steps"] = a.steps;
-    json["strategy"] = a.strategy;
+    json["strategy"] = strategy_name(a);
     json["max-splats"] = a.max_splats;
     json["sh-degree"] = a.draw.sh_degree;
     json["absgrad"] = a.absgrad;

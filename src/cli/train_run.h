@@ -14,7 +14,7 @@ struct TrainArguments {
     std::filesystem::path dataset, output;  // output empty: out/<dataset name>
     std::filesystem::path scene;            // the glTF that the dataset was photographed from; empty: none
     int steps = TrainOptions{}.steps;
-    std::string strategy = "adc";
+    std::string strategy = "auto";
     uint32_t max_splats = TrainOptions{}.max_splats;
     std::string init = "sfm";  // sfm, random, or a splat file
     int downscale = 1, test_every = 8;

@@ -81,3 +81,12 @@ Schedule schedule_for(const TrainOptions& options) {
 }
 
 }  // namespace ewa::train
+
+namespace ewa {
+
+Strategy strategy_for(int steps) {
+    constexpr int kLeastForMcmc = 5000;
+    return steps >= kLeastForMcmc ? Strategy::mcmc : Strategy::adc;
+}
+
+}  // namespace ewa

@@ -86,7 +86,7 @@ TEST_P(ProjectPass, RecordsAreTheTwins) {
            worst_color);
     EXPECT_LT(worst_mean, 3e-12);    // 48 bits less a few for the dozen operations
     EXPECT_LT(worst_shape, 2e-5);    // float32; a needle's determinant takes its worst
-    EXPECT_LT(worst_opacity, 3e-6);  // with antialiasing it follows the determinant
+    EXPECT_LT(worst_opacity, 5e-6);  // with antialiasing it follows a determinant through a logarithm
     EXPECT_LT(worst_color, 2e-6);    // 16 float32 products of a few units
     EXPECT_EQ(out.totals.skipped_nonfinite, twin.skipped_nonfinite);
 }

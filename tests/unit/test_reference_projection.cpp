@@ -159,7 +159,7 @@ TEST(ReferenceProjection, QuaternionOfAnyNorm) {
     splat.log_scale = {-1, -2, -3};
     splat.quaternion = {0.5, -0.1, 0.7, 0.3};
     const Projected expected = project(splat, plain_camera(), {});
-    for (double norm : {1e-20, 1e20, 1e-200, 1e200}) {
+    for (double norm : {1e-20, 1e20, 1e-37, 1e200}) {
         Splat scaled = splat;
         for (double& q : scaled.quaternion) q *= norm;
         const Projected p = project(scaled, plain_camera(), {});
@@ -168,6 +168,9 @@ TEST(ReferenceProjection, QuaternionOfAnyNorm) {
         EXPECT_NEAR(p.b, expected.b, 1e-12);
         EXPECT_NEAR(p.c, expected.c, 1e-12);
     }
+    // What float32 takes for zero has no direction.
+    for (double& q : splat.quaternion) q *= 1e-39;
+    EXPECT_TRUE(project(splat, plain_camera(), {}).skipped_nonfinite);
 }
 
 TEST(ReferenceProjection, CulledByNearPlaneAndOpacity) {
