@@ -459,9 +459,9 @@ report::Json to_config(const TrainArguments& a) {
 int run_train(const TrainArguments& given) {
     const Clock::time_point begin = Clock::now();
     TrainArguments arguments = given;
+    train_options(arguments);  // what is wrong with them is said before any work
     const std::string extension = core::lower(arguments.dataset.extension().string());
     if (extension == ".gltf" || extension == ".glb") {
-        train_options(arguments);  // what is wrong with them is said before the work, not after
         arguments.scene = arguments.dataset;
         if (arguments.output.empty()) arguments.output = fs::path("out") / run_name(arguments);
         arguments.dataset = arguments.output / "dataset";
