@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The thread that draws, without a window.
 #include <gtest/gtest.h>
 
