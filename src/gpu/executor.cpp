@@ -124,6 +124,9 @@ void Executor::run(const Recording& recording, bool timed) {
         if (device_.handle().waitForFences(*fence_, true, kForever) != vk::Result::eSuccess)
             throw RunError("the device did not finish");
         if (timed) read_timings(recording);
+    } catch (const vk::DeviceLostError&) {
+        throw RunError("device " + device_.info().name +
+                       " was lost: its driver has reset it, or it is gone; a training goes on with --resume");
     } catch (const vk::SystemError& error) {
         throw RunError("device " + device_.info().name + ": " + error.what());
     }
