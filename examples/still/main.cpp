@@ -2,12 +2,12 @@
 // A picture of a splat file: still SPLATS OUT.png
 //
 // Looks along +z at the middle of the splats, from as far away as they reach.
-#include <algorithm>
-#include <cstdio>
 #include <ewa/device.h>
 #include <ewa/error.h>
 #include <ewa/renderer.h>
 #include <ewa/splat_files.h>
+#include <algorithm>
+#include <cstdio>
 #include <glm/vec3.hpp>
 
 namespace {

@@ -23,17 +23,19 @@ struct DeviceInfo {
     std::string unusable;        // empty, or what it lacks
 };
 
-/// Every Vulkan device of this machine, in the loader's order. Throws RunError when there is no Vulkan loader/driver.
+/// Every Vulkan device of this machine, in the loader's order. Throws RunError when there is no Vulkan
+/// loader/driver.
 std::vector<DeviceInfo> list_devices();
 
 struct DeviceOptions {
-    std::string selector;        // empty: the first usable discrete, integrated, virtual, then CPU device;
-                                 // a number: that index; else a case-insensitive part of the name
-    bool validation = false;     // turn the Khronos validation layer on; its messages become RunError at the next submit
+    std::string selector;  // empty: the first usable discrete, integrated, virtual, then CPU device;
+                           // a number: that index; else a case-insensitive part of the name
+    bool validation =
+        false;  // turn the Khronos validation layer on; its messages become RunError at the next submit
 };
 
-/// Throws InputError when the selector names no usable device (the text lists those there are), RunError when the
-/// driver fails.
+/// Throws InputError when the selector names no usable device (the text lists those there are), RunError when
+/// the driver fails.
 std::shared_ptr<gpu::Device> open_device(const DeviceOptions& options);
 DeviceInfo device_info(const gpu::Device& device);
 

@@ -6,8 +6,8 @@
 
 namespace ewa {
 
-/// Wrong use or unreadable input. The command line ends with exit status 2. The text is one line that says what,
-/// where (file, line or byte, frame or splat index) and what would help.
+/// Wrong use or unreadable input. The command line ends with exit status 2. The text is one line that says
+/// what, where (file, line or byte, frame or splat index) and what would help.
 class InputError : public std::runtime_error {
   public:
     using std::runtime_error::runtime_error;

@@ -9,8 +9,8 @@
 
 namespace ewa {
 
-/// Row-major, interleaved, first row at the top. 8-bit sRGB files become value / 255 with no linearisation; that is
-/// the space splats are trained and blended in.
+/// Row-major, interleaved, first row at the top. 8-bit sRGB files become value / 255 with no linearisation;
+/// that is the space splats are trained and blended in.
 struct Image {
     int width = 0, height = 0, channels = 0;
     std::vector<float> pixels;  // width * height * channels
@@ -33,17 +33,18 @@ ImageSize read_image_size(const std::filesystem::path& path);
 /// The picture turned as EXIF's orientation (1..8) says; 5 to 8 exchange width and height.
 Image oriented(const Image& image, int orientation);
 
-/// Any format OpenImageIO reads, as 3 (RGB) or 4 (RGBA, colour not multiplied by alpha) channels; grey becomes RGB.
-/// 16-bit integers become value / 65535, floating-point files stay as they are. EXIF's orientation is left alone: the
-/// pixels come as they are stored. Throws InputError.
+/// Any format OpenImageIO reads, as 3 (RGB) or 4 (RGBA, colour not multiplied by alpha) channels; grey
+/// becomes RGB. 16-bit integers become value / 65535, floating-point files stay as they are. EXIF's
+/// orientation is left alone: the pixels come as they are stored. Throws InputError.
 Image load_image(const std::filesystem::path& path);
 
-/// .png: 8 bit, rounded, clamped to [0, 1], NaN as 0. .exr: float32, not clamped. Colour is not multiplied by alpha.
-/// Written beside and renamed. Throws RunError (disk), InputError (extension, no pixels).
+/// .png: 8 bit, rounded, clamped to [0, 1], NaN as 0. .exr: float32, not clamped. Colour is not multiplied by
+/// alpha. Written beside and renamed. Throws RunError (disk), InputError (extension, no pixels).
 void save_image(const std::filesystem::path& path, const Image& image);
 
-/// The size divided by factor, rounded down, at least 1; each new pixel is the mean over the area it covers: factor x
-/// factor blocks where the size is a multiple, else blocks of the exact size ratio, borders weighted. factor >= 1.
+/// The size divided by factor, rounded down, at least 1; each new pixel is the mean over the area it covers:
+/// factor x factor blocks where the size is a multiple, else blocks of the exact size ratio, borders
+/// weighted. factor >= 1.
 Image downscale(const Image& image, int factor);
 
 /// RGB of a picture, where it is transparent over a background. RGB pictures come back as they are.
@@ -52,22 +53,23 @@ Image over_background(const Image& image, const std::array<float, 3>& background
 /// 10 log10(1 / MSE) over RGB, both pictures clamped to [0, 1]; +inf for equal pictures.
 /// Throws InputError when sizes differ.
 double psnr(const Image& a, const Image& b);
-/// Each pixel's share is its weight (one channel of the same size; empty: equal weights). NaN where no pixel counts.
+/// Each pixel's share is its weight (one channel of the same size; empty: equal weights). NaN where no pixel
+/// counts.
 double psnr(const Image& a, const Image& b, const Image& weights);
 
-/// Mean SSIM over pixels and RGB: 11 x 11 Gaussian window, sigma 1.5, zero padded (Wang et al. 2004), both pictures
-/// clamped to [0, 1], computed in float64. Throws InputError when sizes differ.
+/// Mean SSIM over pixels and RGB: 11 x 11 Gaussian window, sigma 1.5, zero padded (Wang et al. 2004), both
+/// pictures clamped to [0, 1], computed in float64. Throws InputError when sizes differ.
 double ssim(const Image& a, const Image& b);
 /// Of a pulled onto b where it weighs less (w a + (1 - w) b), each pixel's share its weight.
 double ssim(const Image& a, const Image& b, const Image& weights);
 
 /// How far apart two pictures are.
 struct ImageDifference {
-    double psnr = 0, ssim = 0;              // as above: RGB, clamped to [0, 1]
-    double max_error = 0;                   // of one value, not clamped; +inf where only one of the two is finite
+    double psnr = 0, ssim = 0;  // as above: RGB, clamped to [0, 1]
+    double max_error = 0;       // of one value, not clamped; +inf where only one of the two is finite
     int max_x = 0, max_y = 0, max_channel = 0;  // where it is; px from the top left corner
-    double mean_error = 0, rms_error = 0;   // over all values, not clamped
-    uint64_t over = 0;                      // pixels with a value further apart than the tolerance
+    double mean_error = 0, rms_error = 0;       // over all values, not clamped
+    uint64_t over = 0;                          // pixels with a value further apart than the tolerance
 };
 
 /// OpenImageIO's comparison over the channels that both pictures have, and PSNR and SSIM. tolerance >= 0.

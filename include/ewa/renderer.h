@@ -17,7 +17,8 @@ namespace ewa {
 struct Rendering {
     Image color;  // RGB, background blended in, not clamped
     Image alpha;  // one channel, 1 - T
-    Image depth;  // one channel, sum of view z * alpha_i * T_i, divided by alpha where alpha > 0; empty unless asked for
+    Image depth;  // one channel, sum of view z * alpha_i * T_i, divided by alpha where alpha > 0; empty
+                  // unless asked for
     Image count;  // one channel, splats blended; empty unless asked for
 };
 
@@ -25,7 +26,8 @@ enum class Drawing {
     color,
     depth,      // Rendering::depth also
     count,      // Rendering::count also
-    ellipsoids  // each splat as a solid of ELLIPSOID_REACH standard deviations: the nearest one's colour, shaded
+    ellipsoids  // each splat as a solid of ELLIPSOID_REACH standard deviations: the nearest one's colour,
+                // shaded
 };
 
 /// What may differ from one picture of a scene to the next.
@@ -49,7 +51,8 @@ struct PassTime {
 
 class Renderer {
   public:
-    /// Uploads the scene. Throws RunError when it does not fit in the device's memory (the text says how much it needs).
+    /// Uploads the scene. Throws RunError when it does not fit in the device's memory (the text says how much
+    /// it needs).
     Renderer(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians, const RenderOptions& options);
     ~Renderer();
     Renderer(Renderer&&) noexcept;
@@ -60,12 +63,13 @@ class Renderer {
     /// The same with other options than the renderer's. SH degrees above those it was made for stay left out.
     Rendering render(const Camera& camera, const DrawOptions& options);
 
-    /// The colour alone, as 8-bit RGBA: rounded and clamped as save_image does it. What a window shows: the floating-point
-    /// planes stay on the device. Drawing::color or ellipsoids. The reference holds until the next picture.
+    /// The colour alone, as 8-bit RGBA: rounded and clamped as save_image does it. What a window shows: the
+    /// floating-point planes stay on the device. Drawing::color or ellipsoids. The reference holds until the
+    /// next picture.
     const std::vector<uint8_t>& render_bytes(const Camera& camera, const DrawOptions& options);
 
-    /// Another scene in place of the present one, with the kernels that there are. Throws as the constructor does; the
-    /// renderer then has no splats.
+    /// Another scene in place of the present one, with the kernels that there are. Throws as the constructor
+    /// does; the renderer then has no splats.
     void replace(const Gaussians& gaussians);
 
     /// Splats skipped in the last picture because a stored value is not finite or the quaternion is zero.
@@ -85,13 +89,18 @@ struct LossGradient {
     uint32_t skipped_nonfinite = 0;
 };
 
-/// The training loss of one view and its gradient. target: RGB, or RGBA that is composited over the background or, with
-/// alpha_is_weight, in which alpha says how much a pixel counts; of the camera's size.
-LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians, const Camera& camera,
-                           const Image& target, const RenderOptions& options, bool alpha_is_weight = false);
+/// The training loss of one view and its gradient. target: RGB, or RGBA that is composited over the
+/// background or, with alpha_is_weight, in which alpha says how much a pixel counts; of the camera's size.
+LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians,
+                           const Camera& camera, const Image& target, const RenderOptions& options,
+                           bool alpha_is_weight = false);
 
 /// What is left out for this scene and request. masks: training photographs have pixels that do not count.
-enum class Purpose { picture, training, densifying };  // densifying: training with a strategy that gathers statistics (ADC)
+enum class Purpose {
+    picture,
+    training,
+    densifying
+};  // densifying: training with a strategy that gathers statistics (ADC)
 std::vector<PlanLine> plan_lines(const Gaussians& gaussians, const RenderOptions& options, Purpose purpose,
                                  bool masks = false, bool exposure = false);
 

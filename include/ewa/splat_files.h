@@ -17,7 +17,8 @@ enum class SplatFormat { ply, compressed_ply, splat, spz, glb, gltf };
 /// As the messages call it, e.g. "SPZ".
 std::string_view name_of(SplatFormat format);
 
-/// By extension: .ply .compressed.ply .splat .spz .glb .gltf, in upper or lower case. Throws InputError for any other.
+/// By extension: .ply .compressed.ply .splat .spz .glb .gltf, in upper or lower case. Throws InputError for
+/// any other.
 SplatFormat format_of_name(const std::filesystem::path& path);
 
 /// By what the file begins with; where that does not tell, as for .splat, by extension. Throws InputError.
@@ -34,9 +35,9 @@ struct SplatScene {
     std::vector<std::string> remarks;  // one line each: what the file holds that is not taken
 };
 
-/// In any of the formats. Memory: at most twice the larger of the file and the scene. A file that claims more than 4
-/// times its size (SPZ, which is packed: 32 times) and 40 MiB is refused. A value may be not finite where the format can
-/// hold that. Throws InputError that names the file and the byte or property.
+/// In any of the formats. Memory: at most twice the larger of the file and the scene. A file that claims more
+/// than 4 times its size (SPZ, which is packed: 32 times) and 40 MiB is refused. A value may be not finite
+/// where the format can hold that. Throws InputError that names the file and the byte or property.
 SplatScene read_splats(const std::filesystem::path& path);
 
 /// The scene alone. What is not taken of the file is a warning.
@@ -45,14 +46,14 @@ Gaussians load_splats(const std::filesystem::path& path);
 struct SaveOptions {
     std::vector<std::string> comments = {};  // one line each, where the format has room for them
     bool antialiased = false;
-    int spz_version = 3;                                       // 3 or 4
+    int spz_version = 3;                                    // 3 or 4
     std::function<void(uint64_t, uint64_t)> progress = {};  // splats written, splats in all
 };
 
-/// By extension. Written beside and renamed, so the path never holds half a file. Any format but .ply leaves out the
-/// splats that are not drawable. Returns one line for each thing that the format cannot hold: what is dropped, and the
-/// number of bits of what is quantised. Throws RunError (disk), InputError (extension, or values that the format has no
-/// room for).
+/// By extension. Written beside and renamed, so the path never holds half a file. Any format but .ply leaves
+/// out the splats that are not drawable. Returns one line for each thing that the format cannot hold: what is
+/// dropped, and the number of bits of what is quantised. Throws RunError (disk), InputError (extension, or
+/// values that the format has no room for).
 std::vector<std::string> save_splats(const std::filesystem::path& path, const Gaussians& gaussians,
                                      const SaveOptions& options);
 

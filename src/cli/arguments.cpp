@@ -88,7 +88,8 @@ void add_draw_options(CLI::App& app, DrawArguments& arguments) {
     }
     arguments.sh_degree = -1;
     app.add_option("--sh-degree", arguments.sh_degree,
-                   "Highest degree of view-dependent colour; auto: 3, or 0 where the dataset says that no colour depends on "
+                   "Highest degree of view-dependent colour; auto: 3, or 0 where the dataset says that no "
+                   "colour depends on "
                    "the view")
         ->transform(CLI::Validator(
             [](std::string& text) {

@@ -15,7 +15,7 @@ namespace ewa::cli {
 struct DrawArguments {
     std::string background = "0,0,0";
     std::string kernel = "peak";
-    bool antialias = false;  // the short form of --kernel antialias
+    bool antialias = false;        // the short form of --kernel antialias
     int sh_degree = kMaxShDegree;  // -1, in training: as the dataset needs
 
     bool random_allowed = false;  // whether the background may be random, as in training

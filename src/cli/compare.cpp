@@ -70,7 +70,8 @@ Compared compare(const PicturePair& pair, const CompareArguments& arguments) {
     // Written so that a PSNR that is not a number, of pictures that hold NaN, does not pass.
     if (arguments.threshold) out.passed = out.difference.psnr >= *arguments.threshold;
     if (!arguments.heat_map.empty()) {
-        const fs::path file = pair.name.empty() ? arguments.heat_map : arguments.heat_map / (pair.name + ".png");
+        const fs::path file =
+            pair.name.empty() ? arguments.heat_map : arguments.heat_map / (pair.name + ".png");
         make_folder(file.parent_path());
         save_image(file, report::error_map(color_of(a), color_of(b), arguments.heat_scale));
     }
@@ -101,8 +102,8 @@ void print(const std::vector<Compared>& all, const Totals& totals, const Compare
         fmt::print("{}{}{}{}\n", one.name, one.name.empty() ? "" : "  ", figures(one.difference),
                    one.passed ? "" : fmt::format("  under {:g} dB", *arguments.threshold));
     if (all.size() > 1)
-        fmt::print("mean of {} pictures  PSNR {:.3f} dB  SSIM {:.5f}  max error {:.6g}; worst: {}\n", all.size(),
-                   totals.psnr, totals.ssim, totals.max_error, totals.worst->name);
+        fmt::print("mean of {} pictures  PSNR {:.3f} dB  SSIM {:.5f}  max error {:.6g}; worst: {}\n",
+                   all.size(), totals.psnr, totals.ssim, totals.max_error, totals.worst->name);
 }
 
 int run(const CompareArguments& arguments) {

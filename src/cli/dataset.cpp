@@ -44,32 +44,37 @@ int run(const DatasetArguments& arguments) {
     if (arguments.views >= 0) options.views = arguments.views;
     if (arguments.exposure != "auto") {
         options.exposure = core::parse_number(arguments.exposure);
-        if (!options.exposure) throw InputError("--exposure: '" + arguments.exposure + "' is neither auto nor a number of stops");
+        if (!options.exposure)
+            throw InputError("--exposure: '" + arguments.exposure +
+                             "' is neither auto nor a number of stops");
     }
-    const Photographs made =
-        photograph_with_progress(arguments.device, arguments.scene, arguments.output, options, arguments.quiet);
+    const Photographs made = photograph_with_progress(arguments.device, arguments.scene, arguments.output,
+                                                      options, arguments.quiet);
     return made.interrupted ? kInterruptedStatus : 0;
 }
 
 }  // namespace
 
-Photographs photograph_with_progress(const DeviceOptions& device, const fs::path& scene, const fs::path& folder,
-                                     const PhotographOptions& options, bool quiet) {
+Photographs photograph_with_progress(const DeviceOptions& device, const fs::path& scene,
+                                     const fs::path& folder, const PhotographOptions& options, bool quiet) {
     watch_for_interrupt();
     std::unique_ptr<Progress> progress;
-    const Photographs made = photograph_scene(open_device(device), scene, folder, options, [&](int done, int total) {
-        if (!progress) progress = std::make_unique<Progress>("photographed", total, "views", quiet);
-        if (done > 0) progress->update(done);
-        return !interrupted();
-    });
+    const Photographs made =
+        photograph_scene(open_device(device), scene, folder, options, [&](int done, int total) {
+            if (!progress) progress = std::make_unique<Progress>("photographed", total, "views", quiet);
+            if (done > 0) progress->update(done);
+            return !interrupted();
+        });
     progress.reset();
     if (quiet) return made;
     for (const std::string& remark : made.remarks) fmt::print("note: {}\n", core::one_line(remark));
     if (made.dropped_triangles > 0)
-        fmt::print("{} triangles have a corner that is not finite and are left out\n", made.dropped_triangles);
+        fmt::print("{} triangles have a corner that is not finite and are left out\n",
+                   made.dropped_triangles);
     if (made.unfinished_rays > 0)
         fmt::print("{} rays took more steps than one invocation may and see nothing\n", made.unfinished_rays);
-    if (made.dropped_samples > 0) fmt::print("{} paths were not finite and count as black\n", made.dropped_samples);
+    if (made.dropped_samples > 0)
+        fmt::print("{} paths were not finite and count as black\n", made.dropped_samples);
     if (made.interrupted)
         fmt::print("interrupted; the same command goes on\n");
     else
@@ -88,11 +93,14 @@ Action add_dataset(CLI::App& app) {
                    "Folder for images/, depth/, points.ply and transforms.json; an ended run goes on there")
         ->required()
         ->type_name("DIR");
-    app.add_option("--views", arguments->views,
-                   "Cameras on a dome over the scene; 0: the file's own [the file's where it has 8 or more, else 48]")
+    app.add_option(
+           "--views", arguments->views,
+           "Cameras on a dome over the scene; 0: the file's own [the file's where it has 8 or more, else 48]")
         ->check(in_range(0, 100000))
         ->type_name("N");
-    app.add_option("--size", arguments->size, "Width and height in pixels")->type_name("WxH")->capture_default_str();
+    app.add_option("--size", arguments->size, "Width and height in pixels")
+        ->type_name("WxH")
+        ->capture_default_str();
     app.add_option("--samples", options.samples, "Paths a pixel")
         ->check(in_range(1, 65536))
         ->type_name("N")

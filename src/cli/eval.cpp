@@ -55,7 +55,10 @@ int run(const EvalArguments& arguments) {
 
 Action add_eval(CLI::App& app) {
     const auto arguments = std::make_shared<EvalArguments>();
-    app.add_option("SPLATS", arguments->splats, "The splat scene (.ply .compressed.ply .splat .spz .glb .gltf)")->required()->type_name("");
+    app.add_option("SPLATS", arguments->splats,
+                   "The splat scene (.ply .compressed.ply .splat .spz .glb .gltf)")
+        ->required()
+        ->type_name("");
     app.add_option("DATASET", arguments->dataset,
                    "Photographs with cameras: COLMAP folder or transforms.json")
         ->required()

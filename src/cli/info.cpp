@@ -184,7 +184,8 @@ int info_dataset(const fs::path& path, int test_every, bool json) {
     fmt::print("points          {} ({} dropped: a coordinate is not finite)\n",
                dataset.points.positions.size(), dataset.dropped_points);
     if (!dataset.color_depends_on_view)
-        fmt::print("colour          does not depend on the view: training leaves SH degrees 1 to {} out\n", kMaxShDegree);
+        fmt::print("colour          does not depend on the view: training leaves SH degrees 1 to {} out\n",
+                   kMaxShDegree);
     fmt::print("extent          {:.6g} (1.1 times the farthest camera from the cameras' mean)\n", extent);
     return 0;
 }

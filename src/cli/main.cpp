@@ -68,7 +68,8 @@ int main(int argc, char** argv) {
     app.get_formatter()->column_width(34);
 
     // Without a group it stands in no help: the build calls it.
-    CLI::App* manual = app.add_subcommand("manual", "Writes the manual pages and shell completions below DIR");
+    CLI::App* manual =
+        app.add_subcommand("manual", "Writes the manual pages and shell completions below DIR");
     std::string manual_folder;
     manual->group("");
     manual->add_option("DIR", manual_folder)->required();
@@ -77,13 +78,16 @@ int main(int argc, char** argv) {
         {app.add_subcommand("render", "Pictures of a splat scene through a dataset's cameras"), {}},
         {app.add_subcommand("eval", "PSNR and SSIM of a splat scene against photographs"), {}},
         {app.add_subcommand("grad", "Gradient of the training loss for one view"), {}},
-        {app.add_subcommand("convert", "From any splat format to any other, joined and edited on the way"), {}},
+        {app.add_subcommand("convert", "From any splat format to any other, joined and edited on the way"),
+         {}},
         {app.add_subcommand("info", "What is in a splat file or a dataset, and what rendering it leaves out"),
          {}},
         {app.add_subcommand("devices", "The Vulkan devices of this machine"), {}},
         {app.add_subcommand("dataset", "Photographs a mesh scene (glTF) into a dataset to train on"), {}},
         {app.add_subcommand("bench", "Speed of every pass, and its error against the float64 twin"), {}},
-        {app.add_subcommand("compare", "PSNR, SSIM and largest error of two pictures, or two folders of them"), {}},
+        {app.add_subcommand("compare",
+                            "PSNR, SSIM and largest error of two pictures, or two folders of them"),
+         {}},
     };
     const Command write_pages{manual, [&] {
                                   write_manual(app, manual_folder);

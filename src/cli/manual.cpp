@@ -155,7 +155,8 @@ std::string bash_completion(const CLI::App& program) {
                 names.push_back(name);
                 const std::vector<std::string> choice = values_of(*option);
                 if (!choice.empty() && seen.insert(command->get_name() + name).second)
-                    values += fmt::format("        '{} {}') words='{}' ;;\n", command->get_name(), name, joined(choice));
+                    values += fmt::format("        '{} {}') words='{}' ;;\n", command->get_name(), name,
+                                          joined(choice));
             }
         }
         cases += fmt::format("        {}) words='{}' ;;\n", command->get_name(), joined(names));
@@ -193,8 +194,10 @@ std::string fish_completion(const CLI::App& program) {
             for (const std::string& name : option->get_snames()) out += " -s " + name;
             for (const std::string& name : option->get_lnames()) out += " -l " + name;
             const std::vector<std::string> choice = values_of(*option);
-            if (!choice.empty()) out += " -x -a " + quoted(joined(choice));
-            else if (takes_value(*option)) out += " -r";
+            if (!choice.empty())
+                out += " -x -a " + quoted(joined(choice));
+            else if (takes_value(*option))
+                out += " -r";
             out += " -d " + quoted(option->get_description()) + "\n";
         }
     }

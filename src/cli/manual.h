@@ -7,10 +7,12 @@
 
 namespace ewa::cli {
 
-/// A manual page in the macros of man(7), as troff reads it: of the program where `command` is null, else of a command.
+/// A manual page in the macros of man(7), as troff reads it: of the program where `command` is null, else of
+/// a command.
 std::string manual_page(const CLI::App& program, const CLI::App* command);
 
-/// Completion of commands, options and values out of a set; sourced by bash, zsh (after bashcompinit) or fish.
+/// Completion of commands, options and values out of a set; sourced by bash, zsh (after bashcompinit) or
+/// fish.
 std::string bash_completion(const CLI::App& program);
 std::string fish_completion(const CLI::App& program);
 

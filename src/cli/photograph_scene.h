@@ -9,6 +9,7 @@ namespace ewa::cli {
 
 /// Photographs::interrupted says that Ctrl-C ended it.
 Photographs photograph_with_progress(const DeviceOptions& device, const std::filesystem::path& scene,
-                                     const std::filesystem::path& folder, const PhotographOptions& options, bool quiet);
+                                     const std::filesystem::path& folder, const PhotographOptions& options,
+                                     bool quiet);
 
 }  // namespace ewa::cli

@@ -17,7 +17,8 @@ fs::path without_extension(fs::path path) {
     return path.replace_extension();
 }
 
-/// Takes out of both what has the same key in both; where several of a folder share a key, none of them is taken.
+/// Takes out of both what has the same key in both; where several of a folder share a key, none of them is
+/// taken.
 template <class Key>
 void match(std::set<fs::path>& a, std::set<fs::path>& b, const Key& key,
            std::vector<std::pair<fs::path, fs::path>>& matched) {
@@ -37,7 +38,8 @@ PicturePairs pair_folders(const fs::path& a, const fs::path& b) {
     const std::vector<fs::path> listed_a = image::pictures_below(a), listed_b = image::pictures_below(b);
     std::set<fs::path> left_a(listed_a.begin(), listed_a.end()), left_b(listed_b.begin(), listed_b.end());
     std::vector<std::pair<fs::path, fs::path>> matched;
-    match(left_a, left_b, [](const fs::path& path) { return path; }, matched);
+    match(
+        left_a, left_b, [](const fs::path& path) { return path; }, matched);
     match(left_a, left_b, without_extension, matched);
     std::sort(matched.begin(), matched.end());
 

@@ -17,8 +17,9 @@ struct PicturePairs {
     std::vector<std::filesystem::path> unpaired;  // of either folder
 };
 
-/// Two files, or the files of two folders: those of one name, then those of one name but for the extension (what ewa
-/// render writes is named like the photographs). Throws InputError where there is nothing to compare.
+/// Two files, or the files of two folders: those of one name, then those of one name but for the extension
+/// (what ewa render writes is named like the photographs). Throws InputError where there is nothing to
+/// compare.
 PicturePairs pair_pictures(const std::filesystem::path& a, const std::filesystem::path& b);
 
 }  // namespace ewa::cli

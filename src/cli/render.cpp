@@ -94,7 +94,10 @@ int run(const RenderArguments& arguments) {
 
 Action add_render(CLI::App& app) {
     const auto arguments = std::make_shared<RenderArguments>();
-    app.add_option("SPLATS", arguments->splats, "The splat scene (.ply .compressed.ply .splat .spz .glb .gltf)")->required()->type_name("");
+    app.add_option("SPLATS", arguments->splats,
+                   "The splat scene (.ply .compressed.ply .splat .spz .glb .gltf)")
+        ->required()
+        ->type_name("");
     app.add_option("--cameras", arguments->cameras, "The dataset whose cameras to look through")
         ->required()
         ->type_name("DATASET");

@@ -42,8 +42,9 @@ void add_model_options(CLI::App& app, TrainArguments& arguments) {
                  "adc: grow where the pixels' absolute gradients are large, which do not cancel (AbsGS)");
     app.add_flag("--revised-opacity", arguments.revised_opacity,
                  "adc: the two halves of a split are together as opaque as it was");
-    app.add_flag("--exposure", arguments.exposure,
-                 "Learn each photograph's exposure (an affine map of colours), for captures where it changes");
+    app.add_flag(
+        "--exposure", arguments.exposure,
+        "Learn each photograph's exposure (an affine map of colours), for captures where it changes");
     app.add_option("--resolution-schedule", arguments.resolution_schedule,
                    "Start with the photographs' sides halved N times; each tenth of the run doubles them")
         ->check(in_range(0, 6))
@@ -79,9 +80,10 @@ Action add_train(CLI::App& app, const std::string& command_line) {
     const auto state = std::make_shared<CommandState>();
     TrainArguments& arguments = state->arguments;
     arguments.command_line = command_line;
-    app.add_option("DATASET", arguments.dataset,
-                   "Photographs with cameras: COLMAP folder or transforms.json; or a glTF with meshes, which is "
-                   "photographed into DIR/dataset first")
+    app.add_option(
+           "DATASET", arguments.dataset,
+           "Photographs with cameras: COLMAP folder or transforms.json; or a glTF with meshes, which is "
+           "photographed into DIR/dataset first")
         ->type_name("");
     app.add_option(
            "-o,--output", arguments.output,
@@ -103,7 +105,8 @@ Action add_train(CLI::App& app, const std::string& command_line) {
     app.add_flag("--accuracy", arguments.accuracy,
                  "At the end, draw error against run time for the report, as ewa bench --accuracy does");
     app.add_option("--serve", arguments.serve,
-                   "Let ewa-view look on by this port (0: any free one), of this machine alone unless an address stands "
+                   "Let ewa-view look on by this port (0: any free one), of this machine alone unless an "
+                   "address stands "
                    "before it; DIR/live.json has the token that pausing and saving need")
         ->type_name("[ADDRESS:]PORT");
     app.add_flag("--resume", arguments.resume,

@@ -38,7 +38,8 @@ struct PictureRequest {
 std::vector<report::ReportPicture> draw_report_pictures(const PictureRequest& request,
                                                         const std::filesystem::path& folder);
 
-/// {name of the photograph: its exposure as three rows of four numbers}; exposures: one for each of the frames.
+/// {name of the photograph: its exposure as three rows of four numbers}; exposures: one for each of the
+/// frames.
 report::Json exposures_json(const Dataset& dataset, const std::vector<int>& frames,
                             const std::vector<Exposure>& exposures);
 

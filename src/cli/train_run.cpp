@@ -211,9 +211,10 @@ void TrainRun::describe() const {
                     bytes_text(memory.frame), bytes_text(memory.photographs)));
     const uint64_t there = device_info(*device_).memory_bytes;
     if (memory.total() > there)
-        say(fmt::format("the device has {}: if memory runs out, a smaller --max-splats, --image-cache or a larger "
-                        "--downscale takes less",
-                        bytes_text(there)));
+        say(fmt::format(
+            "the device has {}: if memory runs out, a smaller --max-splats, --image-cache or a larger "
+            "--downscale takes less",
+            bytes_text(there)));
     if (!arguments_.verbose) return;
     for (const report::LeftOut& line : report_.plan)
         say(fmt::format("left out: {} ({}{})", line.what, line.why,
@@ -379,7 +380,8 @@ void TrainRun::print_result() const {
     if (s.skipped_nonfinite > 0)
         say(fmt::format("{} splats are not finite and not drawn", s.skipped_nonfinite));
     if (s.dropped_updates > 0) say(fmt::format("{} updates were not finite and dropped", s.dropped_updates));
-    if (s.limited_steps > 0) say(fmt::format("{} steps were too long for their splat and shortened", s.limited_steps));
+    if (s.limited_steps > 0)
+        say(fmt::format("{} steps were too long for their splat and shortened", s.limited_steps));
     say("splats:  " + (folder_ / "splats.ply").string());
     say("report:  " + (folder_ / "report.html").string());
     if (!first_picture_.empty()) say("picture: " + first_picture_.string());
@@ -403,7 +405,8 @@ int TrainRun::run() {
         // Parameters and both of Adam's moments.
         const auto splats = uint32_t(start_.size());
         report_.plan.push_back(
-            {fmt::format("SH degrees 1 to {}", kMaxShDegree), "the dataset says that no colour depends on the view",
+            {fmt::format("SH degrees 1 to {}", kMaxShDegree),
+             "the dataset says that no colour depends on the view",
              3 * (pipeline::parameter_bytes(splats, kMaxShDegree) - pipeline::parameter_bytes(splats, 0))});
     }
     describe();
@@ -465,8 +468,8 @@ int run_train(const TrainArguments& given) {
         arguments.scene = arguments.dataset;
         if (arguments.output.empty()) arguments.output = fs::path("out") / run_name(arguments);
         arguments.dataset = arguments.output / "dataset";
-        const Photographs made =
-            photograph_with_progress(arguments.device, arguments.scene, arguments.dataset, {}, arguments.quiet);
+        const Photographs made = photograph_with_progress(arguments.device, arguments.scene,
+                                                          arguments.dataset, {}, arguments.quiet);
         if (made.interrupted) return kInterruptedStatus;
     }
     return TrainRun(arguments, begin).run();

@@ -24,8 +24,8 @@ struct TrainArguments {
     bool absgrad = false, revised_opacity = false, exposure = false;
     int resolution_schedule = 0;  // halvings at the start
     DrawArguments draw;
-    int eval_every = 0;  // steps; 0: only at the end
-    int save_every = 0;  // steps; 0: by the clock
+    int eval_every = 0;     // steps; 0: only at the end
+    int save_every = 0;     // steps; 0: by the clock
     bool accuracy = false;  // the report gets the diagram of error against run time
     bool resume = false;
     std::string serve;  // [ADDRESS:]PORT; empty: nobody looks on

@@ -27,7 +27,8 @@ TrainServer::TrainServer(const std::string& where, const std::filesystem::path& 
     if (address_.size() > 2 && address_.front() == '[') address_ = address_.substr(1, address_.size() - 2);
     const auto port = core::parse_integer<uint16_t>(
         std::string_view(where).substr(colon == std::string::npos ? 0 : colon + 1));
-    if (!port.has_value()) throw InputError("--serve: '" + where + "' is not a port, or address:port; 0 takes any free port");
+    if (!port.has_value())
+        throw InputError("--serve: '" + where + "' is not a port, or address:port; 0 takes any free port");
     const std::string token = live::random_token();
     server_ = std::make_unique<live::Server>(address_, *port, token);
     live::write_live_file(folder_, {server_->port(), token});

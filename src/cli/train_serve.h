@@ -13,16 +13,16 @@ namespace ewa::cli {
 
 class TrainServer {
   public:
-    /// where: [ADDRESS:]PORT, or "" for nobody. The token goes to folder/live.json, which is gone when this is. Throws
-    /// InputError, RunError.
+    /// where: [ADDRESS:]PORT, or "" for nobody. The token goes to folder/live.json, which is gone when this
+    /// is. Throws InputError, RunError.
     TrainServer(const std::string& where, const std::filesystem::path& folder, int steps);
     ~TrainServer();
 
     /// One line for the terminal; empty where nobody can look on.
     std::string announcement() const;
     void add_metrics(const report::MetricsLine& line);
-    /// After a step: gives what is asked for, and while the training is to pause comes back only when it is to go on or
-    /// was interrupted. save: splats and checkpoint.
+    /// After a step: gives what is asked for, and while the training is to pause comes back only when it is
+    /// to go on or was interrupted. save: splats and checkpoint.
     void attend(const Trainer& trainer, const StepReport& report, const std::function<void()>& save);
     /// The last splats: nothing more will come.
     void finish(const StepReport& report, const Gaussians& gaussians);

@@ -5,8 +5,8 @@
 
 namespace ewa::core {
 
-/// Holds the folder until it is destroyed or the process ends, however it ends; nothing is left on disk. Throws RunError
-/// where another process holds it. A file system that knows no locks locks nothing.
+/// Holds the folder until it is destroyed or the process ends, however it ends; nothing is left on disk.
+/// Throws RunError where another process holds it. A file system that knows no locks locks nothing.
 class FolderLock {
   public:
     explicit FolderLock(const std::filesystem::path& folder);

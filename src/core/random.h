@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Counter-based random numbers: a pure function of its counter, the same as shaders/lib/random.glsl bit for bit in the
-// integers. pcg4d of Jarzynski and Olano 2020, "Hash Functions for GPU Rendering".
+// Counter-based random numbers: a pure function of its counter, the same as shaders/lib/random.glsl bit for
+// bit in the integers. pcg4d of Jarzynski and Olano 2020, "Hash Functions for GPU Rendering".
 #pragma once
 #include <array>
 #include <cmath>
@@ -39,8 +39,8 @@ inline std::array<double, 3> normal3(std::array<uint32_t, 4> counter) {
     return {r0 * std::cos(turn * u[1]), r0 * std::sin(turn * u[1]), r1 * std::cos(turn * u[3])};
 }
 
-/// A pair of Sobol's first two dimensions, shuffled and Owen-scrambled by hashing (Burley 2020): every aligned block of
-/// 2^m indices is a (0, m, 2)-net. The same as shaders/lib/low_discrepancy.glsl.
+/// A pair of Sobol's first two dimensions, shuffled and Owen-scrambled by hashing (Burley 2020): every
+/// aligned block of 2^m indices is a (0, m, 2)-net. The same as shaders/lib/low_discrepancy.glsl.
 inline std::array<double, 2> sobol_pair(uint32_t index, std::array<uint32_t, 3> seed) {
     const auto reversed = [](uint32_t x) {
         x = (x >> 16) | (x << 16);

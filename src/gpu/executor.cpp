@@ -10,7 +10,8 @@ namespace ewa::gpu {
 
 Executor::Executor(Device& device) : device_(device) {
     vk::CommandPoolCreateInfo pool;
-    pool.setQueueFamilyIndex(device.queue_family()).setFlags(vk::CommandPoolCreateFlagBits::eResetCommandBuffer);
+    pool.setQueueFamilyIndex(device.queue_family())
+        .setFlags(vk::CommandPoolCreateFlagBits::eResetCommandBuffer);
     command_pool_ = device.handle().createCommandPoolUnique(pool);
     vk::CommandBufferAllocateInfo allocate;
     allocate.setCommandPool(*command_pool_).setCommandBufferCount(1);

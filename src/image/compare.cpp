@@ -24,8 +24,7 @@ ImageDifference compare_images(const Image& a, const Image& b, double tolerance)
     out.ssim = ssim(a, b);
     const OIIO::ROI both(0, a.width, 0, a.height, 0, 1, 0, std::min(a.channels, b.channels));
     const float limit = float(tolerance);
-    const auto found =
-        OIIO::ImageBufAlgo::compare(view_of(a), view_of(b), limit, limit, 0.0f, 0.0f, both, 1);
+    const auto found = OIIO::ImageBufAlgo::compare(view_of(a), view_of(b), limit, limit, 0.0f, 0.0f, both, 1);
     out.max_error = found.maxerror;
     out.max_x = found.maxx;
     out.max_y = found.maxy;

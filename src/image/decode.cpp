@@ -35,7 +35,8 @@ class Folder {
 
 const char* extension_of(const std::vector<unsigned char>& bytes) {
     const auto begins = [&](std::string_view signature) {
-        return bytes.size() >= signature.size() && std::memcmp(bytes.data(), signature.data(), signature.size()) == 0;
+        return bytes.size() >= signature.size() &&
+               std::memcmp(bytes.data(), signature.data(), signature.size()) == 0;
     };
     return begins("\x89PNG\r\n\x1a\n") ? ".png" : begins("\xff\xd8\xff") ? ".jpg" : nullptr;
 }

@@ -37,7 +37,8 @@ std::vector<fs::path> pictures_below(const fs::path& folder) try {
     std::sort(found.begin(), found.end());
     return found;
 } catch (const fs::filesystem_error& error) {
-    throw InputError(core::one_line(folder.string() + ": the folder cannot be read: " + error.code().message()));
+    throw InputError(
+        core::one_line(folder.string() + ": the folder cannot be read: " + error.code().message()));
 }
 
 }  // namespace ewa::image

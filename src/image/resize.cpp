@@ -62,7 +62,8 @@ Image over_background(const Image& image, const std::array<float, 3>& background
     for (int y = 0; y < image.height; ++y)
         for (int x = 0; x < image.width; ++x) {
             const float* from = image.at(x, y);
-            for (size_t c = 0; c < 3; ++c) result.at(x, y)[c] = from[c] * from[3] + background[c] * (1 - from[3]);
+            for (size_t c = 0; c < 3; ++c)
+                result.at(x, y)[c] = from[c] * from[3] + background[c] * (1 - from[3]);
         }
     return result;
 }

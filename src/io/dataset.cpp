@@ -59,8 +59,8 @@ fs::path find_mask_in(const fs::path& masks, const fs::path& inside) {
     return {};
 }
 
-/// The mask file of a picture, where there is one: its copy in masks_K, the model's, or that in masks. A mask may have
-/// any size of its picture's shape.
+/// The mask file of a picture, where there is one: its copy in masks_K, the model's, or that in masks. A mask
+/// may have any size of its picture's shape.
 fs::path find_mask(const io::PosedImage& image, const fs::path& folder, int downscale) {
     const fs::path inside = image.path.lexically_relative(folder), root = folder.parent_path();
     const bool below = !inside.empty() && *inside.begin() != "..";

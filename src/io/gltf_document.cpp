@@ -104,8 +104,7 @@ std::string needed_sections(const json& top, GltfContent content) {
     };
     keep({"asset", "scene", "scenes", "nodes", "meshes", "accessors", "bufferViews", "extensionsUsed",
           "extensionsRequired"});
-    if (content == GltfContent::meshes)
-        keep({"materials", "textures", "samplers", "cameras", "extensions"});
+    if (content == GltfContent::meshes) keep({"materials", "textures", "samplers", "cameras", "extensions"});
     // The strings of a file may hold bytes that are no UTF-8; they are names here and are replaced.
     return kept.dump(-1, ' ', false, json::error_handler_t::replace);
 }
@@ -211,7 +210,8 @@ GltfDocument::GltfDocument(const std::filesystem::path& path, GltfContent conten
     if (!top.contains("asset")) fail("the JSON has no \"asset\", which every glTF has");
     if (const auto list = top.find("buffers"); list != top.end())
         add_buffers(path.parent_path(), &*list, bin_begin, bin_size);
-    if (const auto list = top.find("images"); list != top.end() && content == GltfContent::meshes) add_images(&*list);
+    if (const auto list = top.find("images"); list != top.end() && content == GltfContent::meshes)
+        add_images(&*list);
     const std::string text = needed_sections(top, content);
     top = nullptr;
     tinygltf::TinyGLTF loader;
@@ -264,7 +264,8 @@ void GltfDocument::add_images(const void* json_images) {
             if (!uri->is_string()) fail(what + "\"uri\" is no text");
             source.uri = uri->get<std::string>();
         } else if (const auto view = list[i].find("bufferView"); view != list[i].end()) {
-            if (!view->is_number_unsigned() || view->get<uint64_t>() > uint64_t(std::numeric_limits<int>::max()))
+            if (!view->is_number_unsigned() ||
+                view->get<uint64_t>() > uint64_t(std::numeric_limits<int>::max()))
                 fail(what + "\"bufferView\" is no whole number of 0 or more");
             source.view = view->get<int>();
         }
@@ -280,7 +281,8 @@ GltfDocument::Buffer GltfDocument::open_view(int index, const std::string& what)
         fail(what + "its buffer view's \"buffer\" is none of the file's");
     const Buffer& buffer = buffers_[size_t(view.buffer)];
     if (view.byteOffset > buffer.size || view.byteLength > buffer.size - view.byteOffset)
-        fail(what + "its buffer view ends behind its buffer, which has " + std::to_string(buffer.size) + " bytes");
+        fail(what + "its buffer view ends behind its buffer, which has " + std::to_string(buffer.size) +
+             " bytes");
     Buffer part{buffer.file, buffer.begin + view.byteOffset, view.byteLength, {}};
     if (buffer.file.empty())
         part.data.assign(buffer.data.begin() + std::ptrdiff_t(view.byteOffset),
@@ -294,7 +296,8 @@ std::vector<unsigned char> GltfDocument::image_bytes(size_t index) const {
     Buffer buffer =
         source.uri.empty() ? open_view(source.view, what) : open_uri(path_.parent_path(), source.uri, what);
     if (buffer.size > kMostImageBytes)
-        fail(what + "claims " + std::to_string(buffer.size) + " bytes, more than " + std::to_string(kMostImageBytes));
+        fail(what + "claims " + std::to_string(buffer.size) + " bytes, more than " +
+             std::to_string(kMostImageBytes));
     if (buffer.file.empty()) return std::move(buffer.data);
     core::FileReader reader(buffer.file);
     reader.skip(buffer.begin, what);

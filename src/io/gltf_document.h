@@ -17,8 +17,8 @@ enum class GltfContent {
     meshes   // also materials, textures, samplers, cameras, lights, "extras"; images stay as they are encoded
 };
 
-/// Only what the content needs is parsed, and a file nested or branched beyond any such scene is refused before
-/// memory is taken.
+/// Only what the content needs is parsed, and a file nested or branched beyond any such scene is refused
+/// before memory is taken.
 class GltfDocument {
   public:
     /// Throws InputError that names the file and the byte or the property.
@@ -32,12 +32,12 @@ class GltfDocument {
     /// Throws InputError "name: text".
     [[noreturn]] void fail(const std::string& text) const;
 
-    /// The accessor, after checking that its buffer holds every element. `what` names it in the error. indices:
-    /// 32-bit integers are allowed, which no attribute has.
+    /// The accessor, after checking that its buffer holds every element. `what` names it in the error.
+    /// indices: 32-bit integers are allowed, which no attribute has.
     const tinygltf::Accessor& accessor(int index, const std::string& what, bool indices = false) const;
 
-    /// Of a document of meshes: how many images there are, and the bytes of one as the file, a buffer or a data URI
-    /// has them. Throws InputError, also for more than 64 MiB.
+    /// Of a document of meshes: how many images there are, and the bytes of one as the file, a buffer or a
+    /// data URI has them. Throws InputError, also for more than 64 MiB.
     size_t images() const { return images_.size(); }
     std::vector<unsigned char> image_bytes(size_t index) const;
 
@@ -58,7 +58,8 @@ class GltfDocument {
     void add_buffers(const std::filesystem::path& folder, const void* json_buffers, uint64_t chunk_begin,
                      uint64_t chunk_size);
     void add_images(const void* json_images);
-    Buffer open_uri(const std::filesystem::path& folder, const std::string& uri, const std::string& what) const;
+    Buffer open_uri(const std::filesystem::path& folder, const std::string& uri,
+                    const std::string& what) const;
     Buffer open_view(int index, const std::string& what) const;
 
     std::string name_;

@@ -23,7 +23,8 @@ double finite(const GltfDocument& document, double value, double low, double hig
     return value;
 }
 
-glm::dvec3 color(const GltfDocument& document, const std::vector<double>& values, double high, const std::string& what) {
+glm::dvec3 color(const GltfDocument& document, const std::vector<double>& values, double high,
+                 const std::string& what) {
     if (values.size() < 3) document.fail(what + " has not 3 numbers");
     glm::dvec3 result;
     for (int i = 0; i < 3; ++i) result[i] = finite(document, values[size_t(i)], 0, high, what);
@@ -71,7 +72,8 @@ class MaterialReader {
         mesh::Material m;
         const std::string base = where_ + ": \"baseColorFactor\"";
         m.base = color(document_, pbr.baseColorFactor, 1e6, base);
-        if (pbr.baseColorFactor.size() > 3) m.opacity = float(finite(document_, pbr.baseColorFactor[3], 0, 1, base));
+        if (pbr.baseColorFactor.size() > 3)
+            m.opacity = float(finite(document_, pbr.baseColorFactor[3], 0, 1, base));
         m.metallic = float(finite(document_, pbr.metallicFactor, 0, 1, where_ + ": \"metallicFactor\""));
         m.roughness = float(finite(document_, pbr.roughnessFactor, 0, 1, where_ + ": \"roughnessFactor\""));
         m.emitted = color(document_, source.emissiveFactor, 1e6, where_ + ": \"emissiveFactor\"");
@@ -91,11 +93,12 @@ class MaterialReader {
         const double strength =
             number(extension(source.extensions, "KHR_materials_emissive_strength"), "emissiveStrength", 1);
         m.emitted *= float(finite(document_, strength, 0, 1e9, where_ + ": \"emissiveStrength\""));
-        const double ior = finite(document_, number(extension(source.extensions, "KHR_materials_ior"), "ior", 1.5), 0,
-                                  1e6, where_ + ": \"ior\"");
-        const double specular =
-            finite(document_, number(extension(source.extensions, "KHR_materials_specular"), "specularFactor", 1), 0, 1,
-                   where_ + ": \"specularFactor\"");
+        const double ior =
+            finite(document_, number(extension(source.extensions, "KHR_materials_ior"), "ior", 1.5), 0, 1e6,
+                   where_ + ": \"ior\"");
+        const double specular = finite(
+            document_, number(extension(source.extensions, "KHR_materials_specular"), "specularFactor", 1), 0,
+            1, where_ + ": \"specularFactor\"");
         const double edge = ior > 0 ? (ior - 1) / (ior + 1) : 1;  // an index of 0 stands for an infinite one
         m.f0 = float(edge * edge * specular);
         m.f90 = float(specular);
@@ -105,9 +108,9 @@ class MaterialReader {
             m.base = glm::vec3(0);
             m.metallic = m.f0 = m.f90 = 0;
         }
-        for (const char* name :
-             {"KHR_materials_transmission", "KHR_materials_clearcoat", "KHR_materials_sheen", "KHR_materials_volume",
-              "KHR_materials_iridescence", "KHR_materials_anisotropy", "KHR_materials_pbrSpecularGlossiness"})
+        for (const char* name : {"KHR_materials_transmission", "KHR_materials_clearcoat",
+                                 "KHR_materials_sheen", "KHR_materials_volume", "KHR_materials_iridescence",
+                                 "KHR_materials_anisotropy", "KHR_materials_pbrSpecularGlossiness"})
             if (extension(source.extensions, name)) remark(scene_, std::string(name) + " is left out");
     }
 
@@ -115,11 +118,13 @@ class MaterialReader {
     int texture(const Info& info) {
         if (info.index < 0) return -1;
         if (info.index >= int(document_.model().textures.size()))
-            document_.fail(where_ + ": texture " + std::to_string(info.index) + ": there is none of this \"index\"");
+            document_.fail(where_ + ": texture " + std::to_string(info.index) +
+                           ": there is none of this \"index\"");
         if (info.texCoord < 0 || (set_ >= 0 && set_ != info.texCoord))
             document_.fail(where_ + ": its textures use different \"texCoord\" sets, which is not supported");
         set_ = info.texCoord;
-        if (extension(info.extensions, "KHR_texture_transform")) remark(scene_, "KHR_texture_transform is left out");
+        if (extension(info.extensions, "KHR_texture_transform"))
+            remark(scene_, "KHR_texture_transform is left out");
         const auto [place, fresh] = textures_.try_emplace(info.index, int(scene_.textures.size()));
         if (fresh) add_texture(document_.model().textures[size_t(info.index)], info.index);
         return place->second;
@@ -144,7 +149,8 @@ class MaterialReader {
                                      document_.image_bytes(size_t(source.source))};
             image_bytes_ += image.bytes.size();
             if (image_bytes_ > kMostImageBytes)
-                document_.fail(what + ": the images claim more than " + std::to_string(kMostImageBytes) + " bytes together");
+                document_.fail(what + ": the images claim more than " + std::to_string(kMostImageBytes) +
+                               " bytes together");
             scene_.images.push_back(std::move(image));
         }
         texture.image = place->second;
@@ -165,7 +171,8 @@ glm::dmat3 axes_of(const GltfDocument& document, const glm::dmat4& matrix, const
     for (int i = 0; i < 3; ++i) {
         const glm::dvec3 column(matrix[i]);
         const double length = glm::length(column);
-        if (!(length > 0) || !std::isfinite(length)) document.fail(what + ": its \"scale\" is zero or not finite");
+        if (!(length > 0) || !std::isfinite(length))
+            document.fail(what + ": its \"scale\" is zero or not finite");
         axes[i] = column / length;
     }
     return axes;
@@ -181,7 +188,8 @@ glm::dvec3 place_of(const GltfDocument& document, const glm::dmat4& matrix, cons
 }  // namespace
 
 void remark(mesh::Scene& scene, const std::string& text) {
-    if (std::find(scene.remarks.begin(), scene.remarks.end(), text) == scene.remarks.end()) scene.remarks.push_back(text);
+    if (std::find(scene.remarks.begin(), scene.remarks.end(), text) == scene.remarks.end())
+        scene.remarks.push_back(text);
 }
 
 void read_materials(const GltfDocument& document, mesh::Scene& scene, std::vector<int>& texture_sets) {
@@ -229,8 +237,10 @@ void add_light(const GltfDocument& document, int node, const glm::dmat4& matrix,
     if (!source.color.empty()) light.intensity *= color(document, source.color, 1e6, what + ": \"color\"");
     light.range = finite(document, source.range, 0, 1e30, what + ": \"range\"");
     if (light.kind == shared::LIGHT_SPOT) {
-        light.outer = finite(document, source.spot.outerConeAngle, 0, std::numbers::pi / 2, what + ": \"outerConeAngle\"");
-        light.inner = finite(document, source.spot.innerConeAngle, 0, light.outer, what + ": \"innerConeAngle\"");
+        light.outer = finite(document, source.spot.outerConeAngle, 0, std::numbers::pi / 2,
+                             what + ": \"outerConeAngle\"");
+        light.inner =
+            finite(document, source.spot.innerConeAngle, 0, light.outer, what + ": \"innerConeAngle\"");
     }
     light.position = place_of(document, matrix, what);
     light.direction = -axes_of(document, matrix, what)[2];

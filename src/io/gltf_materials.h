@@ -6,8 +6,9 @@
 
 namespace ewa::io {
 
-/// Fills materials (the last is the default one, of primitives that name none), textures and images. texture_sets: per
-/// material the TEXCOORD set that its textures use. Throws InputError that names the material or texture.
+/// Fills materials (the last is the default one, of primitives that name none), textures and images.
+/// texture_sets: per material the TEXCOORD set that its textures use. Throws InputError that names the
+/// material or texture.
 void read_materials(const GltfDocument& document, mesh::Scene& scene, std::vector<int>& texture_sets);
 
 /// One remark of each kind.

@@ -57,17 +57,19 @@ class MeshReader {
 
   private:
     void check_extensions() {
-        static const char* const kKnown[] = {"KHR_lights_punctual", "KHR_materials_specular", "KHR_materials_ior",
-                                             "KHR_materials_unlit", "KHR_materials_emissive_strength",
-                                             "KHR_mesh_quantization"};
+        static const char* const kKnown[] = {
+            "KHR_lights_punctual", "KHR_materials_specular",          "KHR_materials_ior",
+            "KHR_materials_unlit", "KHR_materials_emissive_strength", "KHR_mesh_quantization"};
         for (const std::string& name : model_.extensionsRequired)
             if (std::find(std::begin(kKnown), std::end(kKnown), name) == std::end(kKnown))
-                document_.fail("\"extensionsRequired\" names " + name.substr(0, 100) + ", which is not supported");
+                document_.fail("\"extensionsRequired\" names " + name.substr(0, 100) +
+                               ", which is not supported");
     }
 
     [[noreturn]] void refuse_empty() const {
         if (splats_)
-            document_.fail("the scene's nodes reach splats (" + kSplats + ") and no \"mesh\" of triangles to photograph");
+            document_.fail("the scene's nodes reach splats (" + kSplats +
+                           ") and no \"mesh\" of triangles to photograph");
         if (scene_.dropped_triangles > 0)
             document_.fail("none of the \"mesh\"es has a triangle whose corners are all finite");
         document_.fail("the scene's nodes reach no \"mesh\" of triangles to photograph");
@@ -85,14 +87,16 @@ class MeshReader {
                 continue;
             }
             if (++placed_ > kMostPlaced)
-                document_.fail(where_ + ": more than " + std::to_string(kMostPlaced) + " primitives are placed in the scene");
+                document_.fail(where_ + ": more than " + std::to_string(kMostPlaced) +
+                               " primitives are placed in the scene");
             where_primitive_ = "mesh " + std::to_string(index) + ", primitive " + std::to_string(i);
             if (!primitive.targets.empty()) remark(scene_, "morph targets are left out");
             place(source_of(primitive), matrix);
         }
     }
 
-    /// The accessor's vectors, read once. components: of which types; null where the primitive has no such attribute.
+    /// The accessor's vectors, read once. components: of which types; null where the primitive has no such
+    /// attribute.
     const Vectors* attribute(const tinygltf::Primitive& primitive, const std::string& name,
                              std::initializer_list<int> types, size_t count) {
         const auto found = primitive.attributes.find(name);
@@ -102,8 +106,8 @@ class MeshReader {
         if (std::find(types.begin(), types.end(), accessor.type) == types.end())
             document_.fail(what + ": \"type\" is not the one this attribute has");
         if (name != "POSITION" && accessor.count != count)
-            document_.fail(what + ": has " + std::to_string(accessor.count) + " elements for " + std::to_string(count) +
-                           " positions");
+            document_.fail(what + ": has " + std::to_string(accessor.count) + " elements for " +
+                           std::to_string(count) + " positions");
         const auto [place, fresh] = vectors_.try_emplace(found->second);
         if (fresh) {
             place->second.resize(accessor.count);
@@ -121,7 +125,8 @@ class MeshReader {
         const size_t count = source.positions->size();
         const int material = primitive.material;
         if (material >= int(model_.materials.size()))
-            document_.fail(where_primitive_ + ": \"material\" " + std::to_string(material) + ": there is none of this number");
+            document_.fail(where_primitive_ + ": \"material\" " + std::to_string(material) +
+                           ": there is none of this number");
         source.material = uint32_t(material < 0 ? model_.materials.size() : size_t(material));
         source.normals = attribute(primitive, "NORMAL", {TINYGLTF_TYPE_VEC3}, count);
         source.uvs = attribute(primitive, "TEXCOORD_" + std::to_string(texture_sets_[source.material]),
@@ -152,8 +157,9 @@ class MeshReader {
         list.resize(accessor.count);
         document_.read(accessor, what, [&](size_t i, const double* v) {
             if (!(v[0] < double(count)))
-                document_.fail(what + ": index " + std::to_string(i) + " is \"" + std::to_string(uint64_t(v[0])) +
-                               "\", but there are " + std::to_string(count) + " positions");
+                document_.fail(what + ": index " + std::to_string(i) + " is \"" +
+                               std::to_string(uint64_t(v[0])) + "\", but there are " + std::to_string(count) +
+                               " positions");
             list[i] = uint32_t(v[0]);
         });
         return list;
@@ -173,19 +179,23 @@ class MeshReader {
         return list;
     }
 
-    /// Throws before a scene grows beyond what the file accounts for. corners: at most this many triangles come.
+    /// Throws before a scene grows beyond what the file accounts for. corners: at most this many triangles
+    /// come.
     void require_room(size_t corners) const {
         if (corners > 3 * mesh::kMostTriangles + 3)
-            document_.fail(where_primitive_ + ": claims " + std::to_string(corners) + " corners, more than \"" +
-                           std::to_string(mesh::kMostTriangles) + "\" triangles have");
+            document_.fail(where_primitive_ + ": claims " + std::to_string(corners) +
+                           " corners, more than \"" + std::to_string(mesh::kMostTriangles) +
+                           "\" triangles have");
     }
     void require_triangles(size_t more) const {
         const uint64_t all = scene_.triangles.size() + more;
         if (all > mesh::kMostTriangles)
-            document_.fail(where_ + ": the scene claims more than " + std::to_string(mesh::kMostTriangles) + " triangles");
+            document_.fail(where_ + ": the scene claims more than " + std::to_string(mesh::kMostTriangles) +
+                           " triangles");
         if (all * sizeof(mesh::Triangle) > kFolds * document_.bytes() + kAlways)
-            document_.fail(where_ + ": the scene claims " + std::to_string(all) + " triangles, which take more than " +
-                           std::to_string(kFolds) + " times the file and 20 MiB; its instances are too many");
+            document_.fail(where_ + ": the scene claims " + std::to_string(all) +
+                           " triangles, which take more than " + std::to_string(kFolds) +
+                           " times the file and 20 MiB; its instances are too many");
     }
 
     void place(const Source& source, const glm::dmat4& matrix) {
@@ -203,7 +213,8 @@ class MeshReader {
             for (size_t k = 0; k < 3; ++k) {
                 const size_t corner = mirrored ? 2 - k : k;
                 const uint32_t vertex = source.indices[3 * i + k];
-                t.corners[corner] = glm::dvec3(matrix * glm::dvec4(glm::dvec3((*source.positions)[vertex]), 1.0));
+                t.corners[corner] =
+                    glm::dvec3(matrix * glm::dvec4(glm::dvec3((*source.positions)[vertex]), 1.0));
                 for (int axis = 0; axis < 3; ++axis)
                     finite = finite && std::isfinite(float(t.corners[corner][axis]));
                 if (source.normals)
@@ -211,7 +222,8 @@ class MeshReader {
                                                           (mirrored ? -1.0 : 1.0));
                 if (source.uvs)
                     for (int axis = 0; axis < 2; ++axis)
-                        if (const float v = float((*source.uvs)[vertex][axis]); std::isfinite(v)) t.uvs[corner][axis] = v;
+                        if (const float v = float((*source.uvs)[vertex][axis]); std::isfinite(v))
+                            t.uvs[corner][axis] = v;
                 if (source.colors) t.colors[corner] = packed_color((*source.colors)[vertex]);
             }
             if (finite)

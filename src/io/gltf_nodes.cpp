@@ -19,8 +19,8 @@ const std::vector<int>& roots(const GltfDocument& document) {
 glm::dmat4 local(const GltfDocument& document, const tinygltf::Node& node, int index) {
     const auto size = [&](const std::vector<double>& values, size_t n, const char* property) {
         if (!values.empty() && values.size() != n)
-            document.fail("node " + std::to_string(index) + ": \"" + property + "\" has not " + std::to_string(n) +
-                          " numbers");
+            document.fail("node " + std::to_string(index) + ": \"" + property + "\" has not " +
+                          std::to_string(n) + " numbers");
         return !values.empty();
     };
     glm::dmat4 matrix(1.0);

@@ -15,14 +15,13 @@
 namespace ewa::io {
 
 /// Any property order and scalar type, binary of either byte order or ascii; other properties and elements
-/// are ignored. Values are kept as they are, finite or not; positions in double far from the world's origin become means
-/// relative to one of their own. A comment "SplatRenderMode: mip" (Brush) or
-/// "antialiased 1" (Postshot) is the anti-aliased mark. Throws InputError that names the file and the byte or
-/// property.
+/// are ignored. Values are kept as they are, finite or not; positions in double far from the world's origin
+/// become means relative to one of their own. A comment "SplatRenderMode: mip" (Brush) or "antialiased 1"
+/// (Postshot) is the anti-aliased mark. Throws InputError that names the file and the byte or property.
 SplatScene read_ply(const std::filesystem::path& path);
 
-/// binary_little_endian, float32 (x y z double where the scene has an origin, which makes them world positions), the properties above in that order; the anti-aliased mark as Brush writes
-/// it. Throws RunError.
+/// binary_little_endian, float32 (x y z double where the scene has an origin, which makes them world
+/// positions), the properties above in that order; the anti-aliased mark as Brush writes it. Throws RunError.
 std::vector<std::string> write_ply(const std::filesystem::path& path, const Gaussians& gaussians,
                                    const SaveOptions& options);
 

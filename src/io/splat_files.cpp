@@ -114,10 +114,11 @@ std::string rounding_remark(const glm::dvec3& origin) {
     const double farthest = std::max({std::abs(origin.x), std::abs(origin.y), std::abs(origin.z)});
     const float step = std::nextafter(float(farthest), INFINITY) - float(farthest);
     char text[160];
-    std::snprintf(text, sizeof(text),
-                  "positions are rounded to %.3g units, float32's step so far from the origin; .ply keeps them, or "
-                  "--transform move= brings them near it",
-                  double(step));
+    std::snprintf(
+        text, sizeof(text),
+        "positions are rounded to %.3g units, float32's step so far from the origin; .ply keeps them, or "
+        "--transform move= brings them near it",
+        double(step));
     return text;
 }
 

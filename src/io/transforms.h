@@ -15,8 +15,9 @@ namespace ewa::io {
 /// file, and its points have had the same). A rotation with a uniform factor or a little noise is made
 /// orthonormal. ply_file_path gives the points. A file_path without extension gets .png, .jpg or .jpeg,
 /// whichever is there; it is relative to the json's folder. "view_dependent": false at the top says that no
-/// colour depends on where it is seen from (`ewa dataset` writes it where every material is diffuse). `split` becomes each image's. with_points false:
-/// points are not read. Throws InputError that names the file and the byte or the frame.
+/// colour depends on where it is seen from (`ewa dataset` writes it where every material is diffuse). `split`
+/// becomes each image's. with_points false: points are not read. Throws InputError that names the file and
+/// the byte or the frame.
 PosedImages read_transforms(const std::filesystem::path& path, int split, bool with_points);
 
 }  // namespace ewa::io

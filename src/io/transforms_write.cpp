@@ -18,7 +18,8 @@ Json matrix_of(const Camera& camera) {
     axes[2] = -axes[2];
     const glm::dvec3 position = camera.position();
     Json rows = Json::array();
-    for (int row = 0; row < 3; ++row) rows.push_back({axes[0][row], axes[1][row], axes[2][row], position[row]});
+    for (int row = 0; row < 3; ++row)
+        rows.push_back({axes[0][row], axes[1][row], axes[2][row], position[row]});
     rows.push_back({0.0, 0.0, 0.0, 1.0});
     return rows;
 }
@@ -33,8 +34,9 @@ void write_transforms(const std::filesystem::path& path, const TransformsFile& f
     top["frames"] = Json::array();
     for (const TransformsFrame& frame : file.frames) {
         const Camera& camera = frame.camera;
-        Json entry = {{"file_path", frame.image}, {"w", camera.width},   {"h", camera.height},
-                      {"fl_x", camera.fx},        {"fl_y", camera.fy},   {"cx", camera.cx},
+        Json entry = {{"file_path", frame.image}, {"w", camera.width},
+                      {"h", camera.height},       {"fl_x", camera.fx},
+                      {"fl_y", camera.fy},        {"cx", camera.cx},
                       {"cy", camera.cy},          {"transform_matrix", matrix_of(camera)}};
         if (!frame.depth.empty()) entry["depth_file_path"] = frame.depth;
         top["frames"].push_back(std::move(entry));
@@ -43,9 +45,10 @@ void write_transforms(const std::filesystem::path& path, const TransformsFile& f
 }
 
 void write_points_ply(const std::filesystem::path& path, const PointCloud& points) {
-    std::string text = "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(points.positions.size()) +
-                       "\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar "
-                       "green\nproperty uchar blue\nend_header\n";
+    std::string text =
+        "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(points.positions.size()) +
+        "\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar "
+        "green\nproperty uchar blue\nend_header\n";
     for (size_t i = 0; i < points.positions.size(); ++i) {
         for (int axis = 0; axis < 3; ++axis) {
             const float value = float(points.positions[i][axis]);

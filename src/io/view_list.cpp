@@ -20,8 +20,10 @@ constexpr double kRotationTolerance = 1e-6;
 
 std::vector<double> numbers(const Json& json, const char* name, size_t count) {
     const Json& list = json.at(name);
-    std::vector<double> values = list.is_array() ? list.get<std::vector<double>>() : std::vector{list.get<double>()};
-    if (values.size() != count) throw InputError(std::string(name) + " has not " + std::to_string(count) + " numbers");
+    std::vector<double> values =
+        list.is_array() ? list.get<std::vector<double>>() : std::vector{list.get<double>()};
+    if (values.size() != count)
+        throw InputError(std::string(name) + " has not " + std::to_string(count) + " numbers");
     for (const double value : values)
         if (!std::isfinite(value)) throw InputError(std::string(name) + " is not finite");
     return values;
@@ -108,7 +110,8 @@ std::vector<NamedView> read_views(const std::filesystem::path& path) {
 void write_views(const std::filesystem::path& path, const std::vector<NamedView>& views) {
     Json list = Json::array();
     for (const NamedView& view : views) list.push_back(to_json(view));
-    core::write_text_file(path, Json{{"views", list}}.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
+    core::write_text_file(path,
+                          Json{{"views", list}}.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
 }  // namespace ewa::io

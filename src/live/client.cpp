@@ -9,8 +9,8 @@ namespace ewa::live {
 namespace {
 
 constexpr int kConnectSeconds = 10;
-constexpr size_t kMostAnswer = 512;     // bytes of an answer's first line
-constexpr size_t kChunk = 16u << 20;    // bytes that memory is taken for before they have come
+constexpr size_t kMostAnswer = 512;   // bytes of an answer's first line
+constexpr size_t kChunk = 16u << 20;  // bytes that memory is taken for before they have come
 
 }  // namespace
 

@@ -10,7 +10,8 @@ namespace ewa::live {
 
 class Client {
   public:
-    /// Connects, and makes sure that a training of ewa answers. token: empty for looking on only. Throws RunError, InputError.
+    /// Connects, and makes sure that a training of ewa answers. token: empty for looking on only. Throws
+    /// RunError, InputError.
     Client(const Address& address, const std::string& token);
 
     // Each throws InputError for a refusal or an answer that is none, RunError where the connection is gone.

@@ -99,12 +99,14 @@ Snapshot decode_snapshot(const std::vector<std::byte>& bytes) {
     snapshot.gaussians.sh_degree = int(header[1]);
     const uint64_t floats = uint64_t(header[0]) * (11 + snapshot.gaussians.sh_stride());
     if (bytes.size() != kHeader + 4 * floats)  // before memory is taken
-        throw InputError("the trainer's " + std::to_string(header[0]) + " splats are " + std::to_string(bytes.size()) +
-                         " bytes, not " + std::to_string(kHeader + 4 * floats));
+        throw InputError("the trainer's " + std::to_string(header[0]) + " splats are " +
+                         std::to_string(bytes.size()) + " bytes, not " +
+                         std::to_string(kHeader + 4 * floats));
     double origin[3] = {};
     std::memcpy(origin, bytes.data() + 16, sizeof(origin));
     for (int i = 0; i < 3; ++i) {
-        if (!std::isfinite(origin[i])) throw InputError("the trainer's splats have an origin that is not finite");
+        if (!std::isfinite(origin[i]))
+            throw InputError("the trainer's splats have an origin that is not finite");
         snapshot.gaussians.origin[i] = origin[i];
     }
     snapshot.gaussians.resize(header[0]);
@@ -122,7 +124,8 @@ uint64_t payload_of(const std::string& line) {
     if (word == "no") throw InputError("the trainer refuses: " + core::one_line(core::trim(rest)));
     const auto bytes = core::parse_integer<uint64_t>(core::trim(rest));
     if (word != "ok" || !bytes) throw InputError("what answers there is no training of ewa");
-    if (*bytes > kMostPayload) throw InputError("an answer of " + std::to_string(*bytes) + " bytes is too large");
+    if (*bytes > kMostPayload)
+        throw InputError("an answer of " + std::to_string(*bytes) + " bytes is too large");
     return *bytes;
 }
 

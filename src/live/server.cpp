@@ -116,7 +116,8 @@ void Server::serve(Client& client) {
 }
 
 bool Server::give(const Socket& socket, std::span<const std::byte> payload) const {
-    return socket.send("ok " + std::to_string(payload.size()) + "\n", kPatience) && socket.send(payload, kPatience);
+    return socket.send("ok " + std::to_string(payload.size()) + "\n", kPatience) &&
+           socket.send(payload, kPatience);
 }
 
 bool Server::give(const Socket& socket, const std::string& payload) const {
@@ -127,9 +128,11 @@ std::string Server::status_from(size_t line, bool trusted) const {
     Status status;
     {
         const std::lock_guard lock(mutex_);
-        status = {status_.step, status_.steps, status_.splats, status_.loss, status_.seconds, status_.state, trusted, {}};
+        status = {status_.step,    status_.steps, status_.splats, status_.loss,
+                  status_.seconds, status_.state, trusted,        {}};
         const auto& lines = status_.metrics;
-        for (size_t i = line; i < lines.size() && i - line < kMostLines; ++i) status.metrics.push_back(lines[i]);
+        for (size_t i = line; i < lines.size() && i - line < kMostLines; ++i)
+            status.metrics.push_back(lines[i]);
     }
     if (status.state == State::running && paused_) status.state = State::paused;
     return encode(status);
@@ -149,7 +152,8 @@ bool Server::answer(Client& client, const std::string& request, Rights& rights) 
     if (request == kHello) return give(socket, std::string());
     if (word == "status") {
         const auto line = core::parse_integer<uint32_t>(argument);
-        return line ? give(socket, status_from(*line, rights.trusted)) : socket.send("no status wants a number\n", 1);
+        return line ? give(socket, status_from(*line, rights.trusted))
+                    : socket.send("no status wants a number\n", 1);
     }
     if (word == "splats") {
         const auto step = core::parse_integer<int>(argument);
@@ -163,7 +167,8 @@ bool Server::answer(Client& client, const std::string& request, Rights& rights) 
         socket.send("no another token\n", 1);
         return false;
     }
-    if (word != "pause" && word != "go" && word != "save") return socket.send("no there is no such request\n", 1);
+    if (word != "pause" && word != "go" && word != "save")
+        return socket.send("no there is no such request\n", 1);
     if (!rights.trusted) return socket.send("no this needs the token\n", 1);
     if (word == "save")
         save_ = true;

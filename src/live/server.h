@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The trainer's side: lets others look on (protocol.h). The training loop leaves here what there is to see, and never waits
-// for whoever sees it.
+// The trainer's side: lets others look on (protocol.h). The training loop leaves here what there is to see,
+// and never waits for whoever sees it.
 #pragma once
 #include <atomic>
 #include <chrono>
@@ -17,7 +17,8 @@ namespace ewa::live {
 
 class Server {
   public:
-    /// token: what commands are taken for; empty: from nobody. Throws RunError where the address cannot be listened on.
+    /// token: what commands are taken for; empty: from nobody. Throws RunError where the address cannot be
+    /// listened on.
     Server(const std::string& address, uint16_t port, std::string token);
     ~Server();
     Server(const Server&) = delete;
@@ -30,8 +31,8 @@ class Server {
     /// What status answers with; its metrics and commands are not looked at.
     void report(const Status& status);
     void add_metrics(const report::MetricsLine& line);
-    /// Whether splats of this step should be taken: somebody asked since the last ones, and taking them costs at most a
-    /// twentieth of the time.
+    /// Whether splats of this step should be taken: somebody asked since the last ones, and taking them costs
+    /// at most a twentieth of the time.
     bool wants_splats(int step) const;
     /// Splats, and how long taking them took.
     void offer(Snapshot&& snapshot, double seconds);
@@ -47,7 +48,8 @@ class Server {
         std::atomic<bool> done = false;
     };
     struct Rights {
-        bool trusted = false, paused = false;  // whether it has shown the token; whether it holds the training
+        bool trusted = false,
+             paused = false;  // whether it has shown the token; whether it holds the training
     };
     void listen();
     void serve(Client& client);

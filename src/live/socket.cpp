@@ -141,7 +141,8 @@ Listener::Listener(const std::string& address, uint16_t port) {
     if (!socket_ || ::bind(socket_.descriptor(), at.ai_addr, at.ai_addrlen) != 0 ||
         ::listen(socket_.descriptor(), 4) != 0 ||
         getsockname(socket_.descriptor(), reinterpret_cast<sockaddr*>(&own), &size) != 0)
-        throw RunError("cannot listen on " + address + ":" + std::to_string(port) + ": " + std::strerror(errno));
+        throw RunError("cannot listen on " + address + ":" + std::to_string(port) + ": " +
+                       std::strerror(errno));
     port_ = ntohs(own.ss_family == AF_INET6 ? reinterpret_cast<sockaddr_in6&>(own).sin6_port
                                             : reinterpret_cast<sockaddr_in&>(own).sin_port);
 }
@@ -156,7 +157,8 @@ Socket Listener::accept(int seconds) const {
 
 Address parse_address(const std::string& text) {
     const size_t colon = text.rfind(':');
-    const std::string_view digits = colon == std::string::npos ? "" : std::string_view(text).substr(colon + 1);
+    const std::string_view digits =
+        colon == std::string::npos ? "" : std::string_view(text).substr(colon + 1);
     const uint16_t port = core::parse_integer<uint16_t>(digits).value_or(0);
     std::string host = text.substr(0, colon == std::string::npos ? 0 : colon);
     if (host.size() >= 2 && host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);

@@ -26,8 +26,8 @@ class Socket {
     bool send(const std::string& text, int seconds) const;
     /// Exactly these bytes; false as above.
     bool receive(std::span<std::byte> bytes, int seconds) const;
-    /// Up to "\n", which is not among what comes back. Nothing where the other side has gone, took longer than `seconds`
-    /// from the first byte to the last, or the line is longer than `most`.
+    /// Up to "\n", which is not among what comes back. Nothing where the other side has gone, took longer
+    /// than `seconds` from the first byte to the last, or the line is longer than `most`.
     std::optional<std::string> receive_line(size_t most, int seconds) const;
     /// Wakes whoever waits in it; they find the connection at its end.
     void shut() const;

@@ -20,10 +20,10 @@ namespace {
 namespace fs = std::filesystem;
 using report::Json;
 
-constexpr auto kPause = std::chrono::milliseconds(250);     // between looks
-constexpr std::uintmax_t kLargestMetrics = 256u << 20;      // bytes
-constexpr size_t kLargestLiveFile = 4096;                   // bytes
-constexpr std::uintmax_t kLargestConfig = 1u << 20;         // bytes
+constexpr auto kPause = std::chrono::milliseconds(250);  // between looks
+constexpr std::uintmax_t kLargestMetrics = 256u << 20;   // bytes
+constexpr size_t kLargestLiveFile = 4096;                // bytes
+constexpr std::uintmax_t kLargestConfig = 1u << 20;      // bytes
 
 std::string start_of(const fs::path& path, size_t most) {
     std::ifstream file(path, std::ios::binary);
@@ -44,8 +44,8 @@ int steps_of(const fs::path& folder) {
 
 std::optional<LiveFile> read_live_file(const fs::path& folder) {
     const Json json = Json::parse(start_of(folder / kLiveFile, kLargestLiveFile), nullptr, false);
-    if (!json.is_object() || !json.contains("port") || !json["port"].is_number_unsigned() || !json.contains("token") ||
-        !json["token"].is_string())
+    if (!json.is_object() || !json.contains("port") || !json["port"].is_number_unsigned() ||
+        !json.contains("token") || !json["token"].is_string())
         return std::nullopt;
     const auto port = json["port"].get<uint64_t>();
     if (port == 0 || port > 65535) return std::nullopt;
@@ -55,7 +55,8 @@ std::optional<LiveFile> read_live_file(const fs::path& folder) {
 void write_live_file(const fs::path& folder, const LiveFile& live) {
     const std::string text = Json{{"port", live.port}, {"token", live.token}}.dump() + "\n";
     const fs::path path = folder / kLiveFile, beside = folder / (std::string(kLiveFile) + ".new");
-    const int descriptor = ::open(beside.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0600);
+    const int descriptor =
+        ::open(beside.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0600);
     const bool written = descriptor >= 0 && ::fchmod(descriptor, 0600) == 0 &&
                          ::write(descriptor, text.data(), text.size()) == ssize_t(text.size());
     const int reason = errno;
@@ -63,7 +64,8 @@ void write_live_file(const fs::path& folder, const LiveFile& live) {
     std::error_code error;
     if (written) fs::rename(beside, path, error);
     if (!written || error)
-        throw RunError("cannot write " + path.string() + ": " + (error ? error.message() : std::strerror(reason)));
+        throw RunError("cannot write " + path.string() + ": " +
+                       (error ? error.message() : std::strerror(reason)));
 }
 
 Watcher::Watcher(WhatToWatch what, std::function<void()> on_news)
@@ -176,7 +178,8 @@ void Watcher::read_metrics() {
     if (error || bytes == metrics_read_ || fs::last_write_time(path, error) <= what_.metrics_after) return;
     if (bytes > kLargestMetrics) throw InputError(path.string() + ": too large");
     std::string text = start_of(path, size_t(bytes));
-    text.resize(text.rfind('\n') == std::string::npos ? 0 : text.rfind('\n') + 1);  // a line may be half written
+    text.resize(text.rfind('\n') == std::string::npos ? 0
+                                                      : text.rfind('\n') + 1);  // a line may be half written
     std::vector<report::MetricsLine> lines = report::parse_metrics(text);
     metrics_read_ = bytes;
     if (lines.empty()) return;
@@ -188,7 +191,8 @@ void Watcher::read_metrics() {
         update.status.loss = last.loss;
         update.status.seconds = last.seconds;
         std::error_code absent;
-        update.status.state = fs::exists(what_.folder / "summary.json", absent) ? State::done : State::running;
+        update.status.state =
+            fs::exists(what_.folder / "summary.json", absent) ? State::done : State::running;
         update.status.commands = false;
         update.status.metrics = std::move(lines);
     });

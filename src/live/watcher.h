@@ -35,12 +35,12 @@ struct WhatToWatch {
 };
 
 struct Update {
-    Status status;                                // its metrics: all there are
-    std::shared_ptr<const Gaussians> splats;      // the last ones; null where there are none yet
+    Status status;                            // its metrics: all there are
+    std::shared_ptr<const Gaussians> splats;  // the last ones; null where there are none yet
     int splats_step = -1;
-    uint64_t number = 0;                          // grows with every change
-    bool connected = false;                       // to the trainer itself
-    std::string problem;                          // why nothing new comes; one line
+    uint64_t number = 0;     // grows with every change
+    bool connected = false;  // to the trainer itself
+    std::string problem;     // why nothing new comes; one line
 };
 
 class Watcher {

@@ -55,7 +55,8 @@ std::vector<Camera> dome_cameras(const Box& box, int count, int width, int heigh
 }
 
 Camera pinhole_of(const FileCamera& camera, int width, int height) {
-    return camera_at(camera.position, camera.axes, 0.5 * height / std::tan(0.5 * camera.vertical_angle), width, height);
+    return camera_at(camera.position, camera.axes, 0.5 * height / std::tan(0.5 * camera.vertical_angle),
+                     width, height);
 }
 
 }  // namespace ewa::mesh

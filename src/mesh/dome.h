@@ -8,10 +8,11 @@
 
 namespace ewa::mesh {
 
-/// `count` pinholes on a dome over the box's centre that look at it, y up, heights above the horizon between 8 and 65
-/// degrees by equal area, turned by the golden angle from one to the next (so every k-th of them covers the dome too). The
-/// angle of view is 45 degrees in the smaller direction, and each stands as near as the box's corners all lie in its picture.
-/// count, width, height >= 1; a box of no extent is looked at from one unit away.
+/// `count` pinholes on a dome over the box's centre that look at it, y up, heights above the horizon between
+/// 8 and 65 degrees by equal area, turned by the golden angle from one to the next (so every k-th of them
+/// covers the dome too). The angle of view is 45 degrees in the smaller direction, and each stands as near as
+/// the box's corners all lie in its picture. count, width, height >= 1; a box of no extent is looked at from
+/// one unit away.
 std::vector<Camera> dome_cameras(const Box& box, int count, int width, int height);
 
 /// The pinhole of a file's camera in a picture of this size: its vertical angle, square pixels.

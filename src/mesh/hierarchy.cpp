@@ -47,7 +47,8 @@ class Builder {
             int depth;
         };
         std::vector<Task> open;
-        const auto attach = [&](uint32_t node, int child, uint32_t first, uint32_t count, int depth, bool leaf) {
+        const auto attach = [&](uint32_t node, int child, uint32_t first, uint32_t count, int depth,
+                                bool leaf) {
             if (count == 0) return;
             uint32_t reference = 0;
             if (leaf) {
@@ -163,7 +164,8 @@ class Builder {
             if (box.high[i] - box.low[i] > box.high[axis] - box.low[axis]) axis = i;
         const auto middle = begin + count / 2;
         std::nth_element(begin, middle, end, [&](uint32_t a, uint32_t b) {
-            const float x = boxes_[a].low[axis] + boxes_[a].high[axis], y = boxes_[b].low[axis] + boxes_[b].high[axis];
+            const float x = boxes_[a].low[axis] + boxes_[a].high[axis],
+                        y = boxes_[b].low[axis] + boxes_[b].high[axis];
             return x < y || (x == y && a < b);
         });
         return count / 2;

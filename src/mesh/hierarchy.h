@@ -17,8 +17,8 @@ struct FloatBox {
 };
 
 struct Node {
-    std::array<FloatBox, 2> boxes;               // of a child that is none: low above high
-    std::array<uint32_t, 2> references{0, 0};    // as layouts.h describes them
+    std::array<FloatBox, 2> boxes;             // of a child that is none: low above high
+    std::array<uint32_t, 2> references{0, 0};  // as layouts.h describes them
 };
 
 struct Hierarchy {
@@ -26,8 +26,9 @@ struct Hierarchy {
     std::vector<uint32_t> order;  // leaves count triangles in this order: order[i] is the i-th's number
 };
 
-/// Boxes of finite numbers, one a triangle, at most 2^28 of them. No leaf has more than TRACE_LEAF_MAX, and no way down
-/// more than TRACE_STACK nodes: where the heuristic would grow deeper, the halves are equal in number instead.
+/// Boxes of finite numbers, one a triangle, at most 2^28 of them. No leaf has more than TRACE_LEAF_MAX, and
+/// no way down more than TRACE_STACK nodes: where the heuristic would grow deeper, the halves are equal in
+/// number instead.
 Hierarchy build_hierarchy(std::span<const FloatBox> boxes);
 
 }  // namespace ewa::mesh

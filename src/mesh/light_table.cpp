@@ -75,8 +75,8 @@ AliasTable alias_table(const std::vector<double>& probabilities) {
     return table;
 }
 
-LightTable light_table(const Scene& scene, const glm::dvec3& origin, double unit, const std::vector<uint32_t>& order,
-                       const std::vector<double>& emission) {
+LightTable light_table(const Scene& scene, const glm::dvec3& origin, double unit,
+                       const std::vector<uint32_t>& order, const std::vector<double>& emission) {
     const double radius = bounds_of(scene).radius() / unit;
     std::vector<Entry> entries;
     for (const Light& light : scene.lights)
@@ -87,7 +87,8 @@ LightTable light_table(const Scene& scene, const glm::dvec3& origin, double unit
         const double radiance = emission[t.material];
         if (!(radiance > 0)) continue;
         const double area =
-            0.5 * glm::length(glm::cross(t.corners[1] - t.corners[0], t.corners[2] - t.corners[0])) / (unit * unit);
+            0.5 * glm::length(glm::cross(t.corners[1] - t.corners[0], t.corners[2] - t.corners[0])) /
+            (unit * unit);
         if (!(area > 0)) continue;
         Entry entry;
         entry.words[3] = shared::LIGHT_TRIANGLE;

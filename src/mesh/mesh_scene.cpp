@@ -14,7 +14,9 @@ uint32_t pack_normal(const glm::dvec3& normal) {
     glm::dvec2 e(normal.x / sum, normal.y / sum);
     if (normal.z < 0)
         e = glm::dvec2((1 - std::abs(e.y)) * (e.x >= 0 ? 1 : -1), (1 - std::abs(e.x)) * (e.y >= 0 ? 1 : -1));
-    const auto word = [](double v) { return uint32_t(int32_t(std::lround(std::clamp(v, -1.0, 1.0) * 32767))) & 0xffffu; };
+    const auto word = [](double v) {
+        return uint32_t(int32_t(std::lround(std::clamp(v, -1.0, 1.0) * 32767))) & 0xffffu;
+    };
     return word(e.x) | (word(e.y) << 16);
 }
 

@@ -22,8 +22,9 @@ inline constexpr uint32_t kNoNormal = 0x80008000u;
 
 struct Triangle {
     std::array<glm::dvec3, 3> corners;  // world units; seen from the front they go round counter-clockwise
-    std::array<uint32_t, 3> normals{kNoNormal, kNoNormal, kNoNormal};     // see pack_normal
-    std::array<uint32_t, 3> colors{0xffffffffu, 0xffffffffu, 0xffffffffu};  // RGBA, linear, 8 bits each, R lowest
+    std::array<uint32_t, 3> normals{kNoNormal, kNoNormal, kNoNormal};  // see pack_normal
+    std::array<uint32_t, 3> colors{0xffffffffu, 0xffffffffu,
+                                   0xffffffffu};  // RGBA, linear, 8 bits each, R lowest
     std::array<glm::vec2, 3> uvs{};
     uint32_t material = 0;
 };
@@ -84,11 +85,12 @@ struct Scene {
     std::vector<Light> lights;
     std::vector<FileCamera> cameras;
     Sky sky;
-    size_t dropped_triangles = 0;  // with a corner that is not finite
+    size_t dropped_triangles = 0;      // with a corner that is not finite
     std::vector<std::string> remarks;  // what the file has and a photograph does not show
 };
 
-/// Whether some surface of the scene looks different from different sides. Where none does, SH degree 0 suffices.
+/// Whether some surface of the scene looks different from different sides. Where none does, SH degree 0
+/// suffices.
 bool color_depends_on_view(const Scene& scene);
 
 struct Box {

@@ -23,7 +23,8 @@ void append(std::vector<uint32_t>& words, const glm::vec3& v, uint32_t last) {
     words.insert(words.end(), {word(v.x), word(v.y), word(v.z), last});
 }
 
-/// An edge is a difference rounded to float32: the corner it ends at may lie this much outside the box of the corners.
+/// An edge is a difference rounded to float32: the corner it ends at may lie this much outside the box of the
+/// corners.
 constexpr float kRounding = 4e-7f;
 
 FloatBox box_of(const DeviceTriangle& t) {
@@ -46,7 +47,8 @@ class Packer {
         place();
         pack_triangles();
         pack_textures();
-        const LightTable lights = light_table(scene_, packed_.origin, packed_.unit, packed_.order, emission());
+        const LightTable lights =
+            light_table(scene_, packed_.origin, packed_.unit, packed_.order, emission());
         pack_materials(lights.triangle_density);
         packed_.lights = lights.words;
         packed_.light_count = lights.count;
@@ -60,8 +62,8 @@ class Packer {
     void place() {
         if (scene_.triangles.empty()) throw InputError("the scene has no triangles to photograph");
         if (scene_.triangles.size() > kMostTriangles)
-            throw InputError("the scene has " + std::to_string(scene_.triangles.size()) + " triangles, more than " +
-                             std::to_string(kMostTriangles));
+            throw InputError("the scene has " + std::to_string(scene_.triangles.size()) +
+                             " triangles, more than " + std::to_string(kMostTriangles));
         const Box box = bounds_of(scene_);
         packed_.origin = box.center();
         const double radius = box.radius();
@@ -109,13 +111,15 @@ class Packer {
             const Image& image = images_[i];
             first[i] = uint32_t(packed_.texels.size());
             if (packed_.texels.size() + uint64_t(image.width) * uint64_t(image.height) > kMostTexels)
-                throw InputError("the textures have more than " + std::to_string(kMostTexels) + " texels together");
+                throw InputError("the textures have more than " + std::to_string(kMostTexels) +
+                                 " texels together");
             for (int y = 0; y < image.height; ++y)
                 for (int x = 0; x < image.width; ++x) {
                     uint32_t rgba = 0xff000000u;
                     for (int c = 0; c < image.channels; ++c)
                         rgba = (rgba & ~(0xffu << (8 * c))) |
-                               (uint32_t(std::lround(std::clamp(image.at(x, y)[c], 0.0f, 1.0f) * 255)) << (8 * c));
+                               (uint32_t(std::lround(std::clamp(image.at(x, y)[c], 0.0f, 1.0f) * 255))
+                                << (8 * c));
                     packed_.texels.push_back(rgba);
                 }
             if (image.width == 0) packed_.texels.push_back(0xffffffffu);
@@ -136,7 +140,8 @@ class Packer {
         for (const Material& material : scene_.materials) {
             glm::dvec3 factor(material.emitted);
             if (material.emitted_texture >= 0 && factor != glm::dvec3(0))
-                factor *= mean_color(images_[size_t(scene_.textures[size_t(material.emitted_texture)].image)]);
+                factor *=
+                    mean_color(images_[size_t(scene_.textures[size_t(material.emitted_texture)].image)]);
             result.push_back((factor.r + factor.g + factor.b) / 3);
         }
         return result;
@@ -166,8 +171,9 @@ class Packer {
             packed_.materials.insert(packed_.materials.end(),
                                      {word(m.metallic), word(m.roughness), word(m.f0), word(m.f90)});
             append(packed_.materials, m.emitted, word(m.cutoff));
-            packed_.materials.insert(packed_.materials.end(), {texture(m.base_texture), texture(m.metal_texture),
-                                                               texture(m.emitted_texture), flags});
+            packed_.materials.insert(
+                packed_.materials.end(),
+                {texture(m.base_texture), texture(m.metal_texture), texture(m.emitted_texture), flags});
             packed_.materials.insert(packed_.materials.end(), {word(float(triangle_density[i])), 0, 0, 0});
         }
     }

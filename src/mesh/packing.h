@@ -17,10 +17,12 @@ namespace ewa::mesh {
 /// Texels of all textures together: 256 MiB.
 inline constexpr uint64_t kMostTexels = uint64_t(1) << 26;
 
-/// Device coordinates are (world - origin) / unit: the scene's middle, and a power of two that makes its radius 8 to 16.
+/// Device coordinates are (world - origin) / unit: the scene's middle, and a power of two that makes its
+/// radius 8 to 16.
 struct PackedScene {
-    std::vector<uint32_t> nodes, triangles, surfaces, materials, textures, lights;  // whole rgba32ui texels, one at least
-    std::vector<uint32_t> texels;                                                   // RGBA, 8 bits each
+    std::vector<uint32_t> nodes, triangles, surfaces, materials, textures,
+        lights;                    // whole rgba32ui texels, one at least
+    std::vector<uint32_t> texels;  // RGBA, 8 bits each
     uint32_t light_count = 0;
     bool alpha_tested = false;
     glm::dvec3 origin{0.0};
@@ -28,8 +30,8 @@ struct PackedScene {
     std::vector<uint32_t> order;  // the scene's triangle that stands at each place
 };
 
-/// images: those of the scene, decoded, 3 or 4 channels; an empty one stands for white. Throws InputError for a scene
-/// without triangles, or more than kMostTriangles or kMostTexels.
+/// images: those of the scene, decoded, 3 or 4 channels; an empty one stands for white. Throws InputError for
+/// a scene without triangles, or more than kMostTriangles or kMostTexels.
 PackedScene pack(const Scene& scene, const std::vector<Image>& images);
 
 /// The corners as the device has them, in the order of PackedScene::order, for the twin.

@@ -23,8 +23,8 @@ struct BlendBackward {
     BlendBackward(gpu::Device& device, const Shape& shape, uint32_t mode)
         : pipeline(
               device, "blend_backward", shader_code("blend_backward"),
-              {spec_float(shared::SPEC_CUT_OFF, shape.cut_off), spec(shared::SPEC_GROUP_SIZE, shape.subgroup), spec(shared::SPEC_SUBGROUP, shape.subgroup),
-               spec(shared::SPEC_TILE_WIDTH, shape.tile_width),
+              {spec_float(shared::SPEC_CUT_OFF, shape.cut_off), spec(shared::SPEC_GROUP_SIZE, shape.subgroup),
+               spec(shared::SPEC_SUBGROUP, shape.subgroup), spec(shared::SPEC_TILE_WIDTH, shape.tile_width),
                spec(shared::SPEC_TILE_HEIGHT, shape.tile_height), spec(shared::SPEC_MODE, mode)}) {}
 
     void record(gpu::Recording& recording, const Shape& shape, const Buffers& buffers,

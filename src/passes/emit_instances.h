@@ -25,7 +25,8 @@ struct EmitInstances {
     EmitInstances(gpu::Device& device, const Shape& shape, bool with_first)
         : pipeline(
               device, "emit_instances", shader_code("emit_instances"),
-              {spec_float(shared::SPEC_CUT_OFF, shape.cut_off), spec(shared::SPEC_GROUP_SIZE, shape.group), spec(shared::SPEC_TILE_WIDTH, shape.tile_width),
+              {spec_float(shared::SPEC_CUT_OFF, shape.cut_off), spec(shared::SPEC_GROUP_SIZE, shape.group),
+               spec(shared::SPEC_TILE_WIDTH, shape.tile_width),
                spec(shared::SPEC_TILE_HEIGHT, shape.tile_height), spec(shared::SPEC_MODE, with_first)}) {}
 
     void record(gpu::Recording& recording, const Shape& shape, const Buffers& buffers,

@@ -21,10 +21,10 @@ struct Expose {
 
     void record(gpu::Recording& recording, const Shape& shape, const Buffers& buffers,
                 const shared::ExposurePush& push) const {
-        recording.dispatch(pipeline, "expose",
-                           {gpu::reads(0, buffers.image), gpu::reads(1, buffers.exposures),
-                            gpu::writes(2, buffers.exposed)},
-                           push, element_groups(shape, uint64_t(push.size[0]) * push.size[1]));
+        recording.dispatch(
+            pipeline, "expose",
+            {gpu::reads(0, buffers.image), gpu::reads(1, buffers.exposures), gpu::writes(2, buffers.exposed)},
+            push, element_groups(shape, uint64_t(push.size[0]) * push.size[1]));
     }
 };
 

@@ -20,8 +20,8 @@ struct Pack {
 
     void record(gpu::Recording& recording, const Shape& shape, const Buffers& buffers,
                 const shared::PackPush& push) const {
-        recording.dispatch(pipeline, "pack", {gpu::reads(0, buffers.planes), gpu::writes(1, buffers.packed)}, push,
-                           element_groups(shape, push.plane_floats / 4));
+        recording.dispatch(pipeline, "pack", {gpu::reads(0, buffers.planes), gpu::writes(1, buffers.packed)},
+                           push, element_groups(shape, push.plane_floats / 4));
     }
 };
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Projects every splat: record, depth key and tile count. inspected 1: scales are shifted, the drawn are counted.
+// Projects every splat: record, depth key and tile count. inspected 1: scales are shifted, the drawn are
+// counted.
 #pragma once
 #include "gpu/recording.h"
 #include "passes/shader_code.h"
@@ -20,10 +21,12 @@ struct Project {
         const gpu::Buffer& counts;
     };
 
-    Project(gpu::Device& device, const Shape& shape, uint32_t sh_degree, uint32_t kernel, uint32_t inspected = 0)
+    Project(gpu::Device& device, const Shape& shape, uint32_t sh_degree, uint32_t kernel,
+            uint32_t inspected = 0)
         : pipeline(
               device, "project", shader_code("project"),
-              {spec_float(shared::SPEC_CUT_OFF, shape.cut_off), spec(shared::SPEC_GROUP_SIZE, shape.group), spec(shared::SPEC_TILE_WIDTH, shape.tile_width),
+              {spec_float(shared::SPEC_CUT_OFF, shape.cut_off), spec(shared::SPEC_GROUP_SIZE, shape.group),
+               spec(shared::SPEC_TILE_WIDTH, shape.tile_width),
                spec(shared::SPEC_TILE_HEIGHT, shape.tile_height), spec(shared::SPEC_SH_DEGREE, sh_degree),
                spec(shared::SPEC_KERNEL, kernel), spec(shared::SPEC_MODE, inspected)}) {}
 

@@ -25,7 +25,8 @@ struct Shape {
     uint32_t tile_interleave = 1;              // neighbouring workgroups take tiles this far apart
     uint32_t max_groups = 65535;
     uint32_t loop_limit = 65535;  // turns a loop may take in one invocation
-    float cut_off = float(shared::ALPHA_MIN);  // contributions under this are skipped; another is for comparisons
+    float cut_off =
+        float(shared::ALPHA_MIN);  // contributions under this are skipped; another is for comparisons
 };
 
 inline Shape shape_for(const gpu::Limits& limits) {

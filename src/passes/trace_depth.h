@@ -26,8 +26,8 @@ struct TraceDepth {
             pipeline, "trace_depth",
             {gpu::reads(0, buffers.mesh.nodes), gpu::reads(1, buffers.mesh.triangles),
              gpu::reads(2, buffers.mesh.surfaces), gpu::reads(3, buffers.mesh.materials),
-             gpu::reads(4, buffers.mesh.textures), gpu::reads(5, buffers.mesh.texels), gpu::reads(6, buffers.view),
-             gpu::writes(7, buffers.seen), gpu::updates(8, buffers.counts)},
+             gpu::reads(4, buffers.mesh.textures), gpu::reads(5, buffers.mesh.texels),
+             gpu::reads(6, buffers.view), gpu::writes(7, buffers.seen), gpu::updates(8, buffers.counts)},
             push, element_groups(shape, pixels));
     }
 };

@@ -35,14 +35,13 @@ struct TracePaths {
 
     void record(gpu::Recording& recording, const Shape& shape, const Buffers& buffers, uint64_t pixels,
                 const shared::TracePush& push) const {
-        recording.dispatch(
-            pipeline, "trace_paths",
-            {gpu::reads(0, buffers.mesh.nodes), gpu::reads(1, buffers.mesh.triangles),
-             gpu::reads(2, buffers.mesh.surfaces), gpu::reads(3, buffers.mesh.materials),
-             gpu::reads(4, buffers.mesh.textures), gpu::reads(5, buffers.mesh.texels),
-             gpu::reads(6, buffers.lights), gpu::reads(7, buffers.view), gpu::updates(8, buffers.sums),
-             gpu::updates(9, buffers.counts)},
-            push, element_groups(shape, pixels));
+        recording.dispatch(pipeline, "trace_paths",
+                           {gpu::reads(0, buffers.mesh.nodes), gpu::reads(1, buffers.mesh.triangles),
+                            gpu::reads(2, buffers.mesh.surfaces), gpu::reads(3, buffers.mesh.materials),
+                            gpu::reads(4, buffers.mesh.textures), gpu::reads(5, buffers.mesh.texels),
+                            gpu::reads(6, buffers.lights), gpu::reads(7, buffers.view),
+                            gpu::updates(8, buffers.sums), gpu::updates(9, buffers.counts)},
+                           push, element_groups(shape, pixels));
     }
 };
 

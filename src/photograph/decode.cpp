@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ewa/error.h"
 #include "image/decode.h"
+#include "ewa/error.h"
 #include "photograph/photographer.h"
 
 namespace ewa::photograph {

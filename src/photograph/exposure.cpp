@@ -19,7 +19,8 @@ Image develop(const Image& radiance, double factor) {
     for (size_t i = 0; i < radiance.pixels.size() / 4; ++i) {
         const float* from = &radiance.pixels[4 * i];
         float* to = &image.pixels[size_t(image.channels) * i];
-        for (int c = 0; c < 3; ++c) to[c] = from[3] > 0 ? developed(double(from[c]) / double(from[3]) * factor) : 0.0f;
+        for (int c = 0; c < 3; ++c)
+            to[c] = from[3] > 0 ? developed(double(from[c]) / double(from[3]) * factor) : 0.0f;
         if (!whole) to[3] = from[3];
     }
     return image;

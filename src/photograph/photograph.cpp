@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The order of the work: read, pack, find the cameras and the exposure, photograph view after view, choose points, and
-// write transforms.json last.
+// The order of the work: read, pack, find the cameras and the exposure, photograph view after view, choose
+// points, and write transforms.json last.
 #include "ewa/photograph.h"
 
 #include <algorithm>
@@ -35,8 +35,8 @@ constexpr const char* kRecord = "photographs.json";
 void check(const PhotographOptions& o) {
     const auto within = [](const char* what, int64_t value, int64_t low, int64_t high) {
         if (value < low || value > high)
-            throw InputError(std::string(what) + ": " + std::to_string(value) + " is not in " + std::to_string(low) +
-                             " .. " + std::to_string(high));
+            throw InputError(std::string(what) + ": " + std::to_string(value) + " is not in " +
+                             std::to_string(low) + " .. " + std::to_string(high));
     };
     within("views", o.views.value_or(0), 0, kMostViews);
     within("width", o.width, 1, 16384);
@@ -53,11 +53,14 @@ void make_folder(const fs::path& folder) {
         throw RunError(core::one_line(folder.string() + ": the folder cannot be made: " + error.message()));
 }
 
-std::vector<Camera> cameras_for(const mesh::Scene& scene, const PhotographOptions& o, const std::string& name) {
+std::vector<Camera> cameras_for(const mesh::Scene& scene, const PhotographOptions& o,
+                                const std::string& name) {
     const size_t in_file = scene.cameras.size();
     const bool from_file = o.views ? *o.views == 0 : in_file >= kEnoughCameras;
-    if (!from_file) return mesh::dome_cameras(mesh::bounds_of(scene), o.views.value_or(kDomeViews), o.width, o.height);
-    if (in_file == 0) throw InputError(name + ": has no perspective cameras; --views N puts N on a dome over the scene");
+    if (!from_file)
+        return mesh::dome_cameras(mesh::bounds_of(scene), o.views.value_or(kDomeViews), o.width, o.height);
+    if (in_file == 0)
+        throw InputError(name + ": has no perspective cameras; --views N puts N on a dome over the scene");
     std::vector<Camera> cameras;
     for (const mesh::FileCamera& camera : scene.cameras)
         cameras.push_back(mesh::pinhole_of(camera, o.width, o.height));
@@ -65,19 +68,20 @@ std::vector<Camera> cameras_for(const mesh::Scene& scene, const PhotographOption
 }
 
 /// What the pictures depend on.
-std::string fingerprint(const mesh::PackedScene& packed, const mesh::Sky& sky, const std::vector<Camera>& cameras,
-                        const PhotographOptions& o) {
+std::string fingerprint(const mesh::PackedScene& packed, const mesh::Sky& sky,
+                        const std::vector<Camera>& cameras, const PhotographOptions& o) {
     core::Hash hash;
     hash.add(std::string("photographs of ewa " EWA_VERSION));
-    for (const auto* words : {&packed.nodes, &packed.triangles, &packed.surfaces, &packed.materials, &packed.textures,
-                              &packed.lights, &packed.texels})
+    for (const auto* words : {&packed.nodes, &packed.triangles, &packed.surfaces, &packed.materials,
+                              &packed.textures, &packed.lights, &packed.texels})
         hash.add(words->data(), words->size() * sizeof(uint32_t));
     for (const glm::vec3& v : {sky.zenith, sky.horizon, sky.ground})
         for (int i = 0; i < 3; ++i) hash.add(v[i]);
     for (int i = 0; i < 3; ++i) hash.add(packed.origin[i]);
     hash.add(packed.unit);
     for (const Camera& camera : cameras) {
-        for (const double x : {double(camera.width), double(camera.height), camera.fx, camera.fy, camera.cx, camera.cy})
+        for (const double x :
+             {double(camera.width), double(camera.height), camera.fx, camera.fy, camera.cx, camera.cy})
             hash.add(x);
         for (int i = 0; i < 3; ++i) {
             hash.add(camera.translation[i]);
@@ -139,7 +143,9 @@ class Run {
     std::string image_name(size_t i) const { return "images/" + stem(i) + ".png"; }
     std::string depth_name(size_t i) const { return "depth/" + stem(i) + ".exr"; }
     /// The depth is written last.
-    bool done(size_t i) const { return fs::exists(folder_ / image_name(i)) && fs::exists(folder_ / depth_name(i)); }
+    bool done(size_t i) const {
+        return fs::exists(folder_ / image_name(i)) && fs::exists(folder_ / depth_name(i));
+    }
 
     /// What an earlier run recorded, where its pictures are the same; else the folder is cleared of them.
     void prepare_folder() {
@@ -147,8 +153,9 @@ class Run {
         const bool recorded = fs::exists(folder_ / kRecord);
         for (const char* name : {"transforms.json", "images", "depth", "sparse"})
             if (!recorded && fs::exists(folder_ / name))
-                throw InputError(core::one_line(folder_.string() + ": holds \"" + name +
-                                                "\" that are no photographs of a mesh scene; name another folder"));
+                throw InputError(
+                    core::one_line(folder_.string() + ": holds \"" + name +
+                                   "\" that are no photographs of a mesh scene; name another folder"));
         core::remove_abandoned_files(folder_);
         using Json = nlohmann::json;
         Json earlier;
@@ -166,7 +173,9 @@ class Run {
         make_folder(folder_ / "depth");
         core::remove_abandoned_files(folder_ / "images");
         core::remove_abandoned_files(folder_ / "depth");
-        result_.exposure = same ? earlier["exposure"].get<double>() : options_.exposure ? *options_.exposure : measured();
+        result_.exposure = same                ? earlier["exposure"].get<double>()
+                           : options_.exposure ? *options_.exposure
+                                               : measured();
         record_["exposure"] = result_.exposure;
         core::write_text_file(folder_ / kRecord, record_.dump(1) + "\n");
     }
@@ -178,15 +187,17 @@ class Run {
         std::vector<Image> radiances;
         const size_t count = std::min(kPictures, cameras_.size());
         for (size_t i = 0; i < count; ++i)
-            radiances.push_back(photographer_.radiance(downscale(cameras_[i * cameras_.size() / count], kSmaller), kSamples,
-                                                       options_.seed, std::numeric_limits<double>::infinity()));
+            radiances.push_back(
+                photographer_.radiance(downscale(cameras_[i * cameras_.size() / count], kSmaller), kSamples,
+                                       options_.seed, std::numeric_limits<double>::infinity()));
         return photograph::automatic_exposure(radiances);
     }
 
     void photograph(size_t i) {
         const double factor = std::exp2(result_.exposure);
         // Each view has numbers of its own.
-        const auto words = core::pcg4d({uint32_t(i), 0, uint32_t(options_.seed), uint32_t(options_.seed >> 32)});
+        const auto words =
+            core::pcg4d({uint32_t(i), 0, uint32_t(options_.seed), uint32_t(options_.seed >> 32)});
         const uint64_t seed = uint64_t(words[0]) << 32 | words[1];
         const Image radiance =
             photographer_.radiance(cameras_[i], options_.samples, seed, shared::TRACE_SAMPLE_MAX / factor);
@@ -201,16 +212,19 @@ class Run {
         const auto each = uint32_t((size_t(options_.points) + cameras_.size() - 1) / cameras_.size());
         for (size_t view = 0; view < cameras_.size(); ++view) {
             const Camera& camera = cameras_[view];
-            const Image image = load_image(folder_ / image_name(view)), depth = load_image(folder_ / depth_name(view));
+            const Image image = load_image(folder_ / image_name(view)),
+                        depth = load_image(folder_ / depth_name(view));
             for (uint32_t i = 0; i < each && cloud.positions.size() < size_t(options_.points); ++i) {
                 const auto u = core::uniform4({i, uint32_t(view), uint32_t(options_.seed), 0x706f696eu});
                 const int x = int(u[0] * camera.width), y = int(u[1] * camera.height);
                 const double z = double(depth.at(x, y)[0]);
                 if (!(z > 0) || (image.channels == 4 && image.at(x, y)[3] < 0.5f)) continue;
-                const glm::dvec3 seen((x + 0.5 - camera.cx) / camera.fx * z, (y + 0.5 - camera.cy) / camera.fy * z, z);
+                const glm::dvec3 seen((x + 0.5 - camera.cx) / camera.fx * z,
+                                      (y + 0.5 - camera.cy) / camera.fy * z, z);
                 cloud.positions.push_back(glm::transpose(camera.rotation) * (seen - camera.translation));
                 std::array<uint8_t, 3> color;
-                for (size_t c = 0; c < 3; ++c) color[c] = uint8_t(std::lround(double(image.at(x, y)[c]) * 255));
+                for (size_t c = 0; c < 3; ++c)
+                    color[c] = uint8_t(std::lround(double(image.at(x, y)[c]) * 255));
                 cloud.colors.push_back(color);
             }
         }
@@ -222,8 +236,9 @@ class Run {
         file.color_depends_on_view = result_.color_depends_on_view;
         char exposure[32];
         std::snprintf(exposure, sizeof(exposure), "%.4g", result_.exposure);
-        file.remarks = {{"scene", record_["scene"].get<std::string>()},
-                        {"tone_mapping", std::string("sRGB curve over min(1, radiance * 2^") + exposure + ")"}};
+        file.remarks = {
+            {"scene", record_["scene"].get<std::string>()},
+            {"tone_mapping", std::string("sRGB curve over min(1, radiance * 2^") + exposure + ")"}};
         if (const PointCloud cloud = points(); !cloud.positions.empty()) {
             io::write_points_ply(folder_ / "points.ply", cloud);
             file.points = "points.ply";
@@ -249,8 +264,9 @@ bool is_mesh_scene(const fs::path& path) {
     return io::is_gltf_mesh(path);
 }
 
-Photographs photograph_scene(const std::shared_ptr<gpu::Device>& device, const fs::path& scene, const fs::path& folder,
-                             const PhotographOptions& options, const std::function<bool(int, int)>& progress) {
+Photographs photograph_scene(const std::shared_ptr<gpu::Device>& device, const fs::path& scene,
+                             const fs::path& folder, const PhotographOptions& options,
+                             const std::function<bool(int, int)>& progress) {
     check(options);
     return Run(device, scene, folder, options).run(progress);
 }

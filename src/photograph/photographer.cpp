@@ -10,8 +10,8 @@ namespace ewa::photograph {
 
 namespace {
 
-/// Steps one ray may take so that an invocation stays under the device's limit on turns of its loops: per path a ray and
-/// a question to a light for each bounce, and the bounces' own loop.
+/// Steps one ray may take so that an invocation stays under the device's limit on turns of its loops: per
+/// path a ray and a question to a light for each bounce, and the bounces' own loop.
 uint32_t steps_for(const passes::Shape& shape, int samples) {
     const uint32_t surfaces = uint32_t(samples) * (shared::TRACE_BOUNCES + 1);
     return (shape.loop_limit - surfaces - 1) / (2 * surfaces);
@@ -19,7 +19,8 @@ uint32_t steps_for(const passes::Shape& shape, int samples) {
 
 }  // namespace
 
-Photographer::Photographer(std::shared_ptr<gpu::Device> device, const mesh::PackedScene& scene, const mesh::Sky& sky)
+Photographer::Photographer(std::shared_ptr<gpu::Device> device, const mesh::PackedScene& scene,
+                           const mesh::Sky& sky)
     : device_(std::move(device)),
       shape_(passes::shape_for(device_->limits())),
       executor_(*device_),
@@ -69,7 +70,8 @@ gpu::Buffer Photographer::view_of(const Camera& camera, double brightest) {
     return buffer;
 }
 
-shared::TraceCounts Photographer::trace_paths(const gpu::Buffer& view, uint64_t pixels, int samples, uint64_t seed) {
+shared::TraceCounts Photographer::trace_paths(const gpu::Buffer& view, uint64_t pixels, int samples,
+                                              uint64_t seed) {
     shared::TracePush push{};
     push.max_steps = steps_for(shape_, samples_at_once_);
     push.lights = light_count_;

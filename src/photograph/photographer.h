@@ -20,13 +20,14 @@ class Photographer {
     /// Throws RunError where the scene does not fit the device.
     Photographer(std::shared_ptr<gpu::Device> device, const mesh::PackedScene& scene, const mesh::Sky& sky);
 
-    /// RGBA: mean radiance of the surfaces each pixel sees (times its coverage) and the share of it that they cover. samples
-    /// >= 1 paths a pixel, a function of camera, samples and seed alone. A path brighter than `brightest` in a channel counts
-    /// as that bright.
+    /// RGBA: mean radiance of the surfaces each pixel sees (times its coverage) and the share of it that they
+    /// cover. samples
+    /// >= 1 paths a pixel, a function of camera, samples and seed alone. A path brighter than `brightest` in
+    /// a channel counts as that bright.
     Image radiance(const Camera& camera, int samples, uint64_t seed, double brightest);
 
     struct Seen {
-        Image depth;                      // one channel: camera z of the pixel's centre in world units, 0: nothing
+        Image depth;  // one channel: camera z of the pixel's centre in world units, 0: nothing
         std::vector<uint32_t> triangles;  // place in PackedScene::order, 0xffffffff: none
     };
     Seen seen(const Camera& camera);
@@ -39,7 +40,9 @@ class Photographer {
     gpu::Buffer upload(const char* name, const std::vector<uint32_t>& words, gpu::Texel texel);
     gpu::Buffer view_of(const Camera& camera, double brightest);
     shared::TraceCounts trace_paths(const gpu::Buffer& view, uint64_t pixels, int samples, uint64_t seed);
-    passes::MeshBuffers mesh() const { return {nodes_, triangles_, surfaces_, materials_, textures_, texels_}; }
+    passes::MeshBuffers mesh() const {
+        return {nodes_, triangles_, surfaces_, materials_, textures_, texels_};
+    }
 
     std::shared_ptr<gpu::Device> device_;
     passes::Shape shape_;
@@ -55,8 +58,8 @@ class Photographer {
     uint64_t unfinished_ = 0, dropped_ = 0;
 };
 
-/// The pictures that the scene's textures are of; those that cannot be decoded are an InputError that names them. PNG and
-/// JPEG, as glTF has them, of at most 8192 x 8192 pixels.
+/// The pictures that the scene's textures are of; those that cannot be decoded are an InputError that names
+/// them. PNG and JPEG, as glTF has them, of at most 8192 x 8192 pixels.
 std::vector<Image> decode_images(const mesh::Scene& scene);
 
 }  // namespace ewa::photograph

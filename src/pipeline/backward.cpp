@@ -67,10 +67,11 @@ void record_backward(gpu::Recording& recording, Kernels& kernels, const Plan& pl
                      const Frame& frame, const CameraUse& camera, const std::array<float, 3>& background,
                      const Sorted& sorted, const Rates& rates) {
     const passes::Shape& shape = kernels.shape();
-    kernels.get<passes::BlendBackward>(plan.absolute ? 1u : 0u).record(
-        recording, shape,
-        {frame.records, *sorted.splats, frame.tile_starts, frame.planes, frame.image_gradient, frame.slots},
-        blend_push(kernels, frame, camera, background));
+    kernels.get<passes::BlendBackward>(plan.absolute ? 1u : 0u)
+        .record(recording, shape,
+                {frame.records, *sorted.splats, frame.tile_starts, frame.planes, frame.image_gradient,
+                 frame.slots},
+                blend_push(kernels, frame, camera, background));
 
     // What a gradient alone does not have stands in for itself: the kernel leaves those bindings alone.
     const gpu::Buffer& moments2 = plan.adam ? model.moments2 : model.moments1;
@@ -81,8 +82,8 @@ void record_backward(gpu::Recording& recording, Kernels& kernels, const Plan& pl
     kernels.get<passes::Update>(uint32_t(plan.sh_degree), uint32_t(plan.kernel), mode)
         .record(recording, shape,
                 {model.params, *camera.buffer, camera.offset, frame.records, frame.slots, model.moments1,
-                 moments2, frame.tile_counts, frame.first_instances, *sorted.places, frame.counts, model.params,
-                 model.moments1, moments2, statistics},
+                 moments2, frame.tile_counts, frame.first_instances, *sorted.places, frame.counts,
+                 model.params, model.moments1, moments2, statistics},
                 {model.splats,
                  model.planes(),
                  frame.instance_capacity,

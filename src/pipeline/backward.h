@@ -15,8 +15,8 @@ struct Rates {
 
 /// photo: width * height texels, RGBA. Its alpha cuts it out of the background or, where `masked`, says how
 /// much each pixel counts (the frame then has to have been asked for with masks). Leaves the loss's parts in
-/// Counts and dL/d(image) in frame.image_gradient. exposure, where there is one: the photograph's, which takes a step
-/// itself (the frame then has to have been asked for with exposure).
+/// Counts and dL/d(image) in frame.image_gradient. exposure, where there is one: the photograph's, which
+/// takes a step itself (the frame then has to have been asked for with exposure).
 void record_loss(gpu::Recording& recording, Kernels& kernels, const Frame& frame, const CameraUse& camera,
                  const std::array<float, 3>& background, const gpu::Buffer& photo, bool masked = false,
                  const ExposureUse* exposure = nullptr);

@@ -14,7 +14,7 @@ struct DensifyRules {
     float grow_gradient = 0;  // threshold of the mean gradient norm
     float split_scale = 0;    // world units
     float prune_logit = 0;
-    float prune_scale = 0;  // world units; 0: scale does not prune
+    float prune_scale = 0;         // world units; 0: scale does not prune
     bool revised_opacity = false;  // of a split's children
     uint64_t seed = 0;
     uint32_t step = 0;

@@ -9,8 +9,8 @@
 namespace ewa::pipeline {
 namespace {
 
-// Gradients of the loss by an exposure are of the order of 0.1: this decides nothing but the direction in which the
-// loss is flat, all exposures moving one way and the splats the other.
+// Gradients of the loss by an exposure are of the order of 0.1: this decides nothing but the direction in
+// which the loss is flat, all exposures moving one way and the splats the other.
 constexpr float kPull = 1e-3f;
 
 shared::ExposurePush push_of(const Frame& frame, uint32_t width, uint32_t height, const ExposureUse& use) {

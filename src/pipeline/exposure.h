@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What each photograph's exposure makes of a picture: an affine map of colours, learned beside the splats (as the
-// published code of 3DGS does for captures with automatic exposure; see include/ewa/exposure.h).
+// What each photograph's exposure makes of a picture: an affine map of colours, learned beside the splats (as
+// the published code of 3DGS does for captures with automatic exposure; see include/ewa/exposure.h).
 #pragma once
 #include <vector>
 
@@ -35,7 +35,8 @@ struct ExposureUse {
 void record_expose(gpu::Recording& recording, Kernels& kernels, const Frame& frame, uint32_t width,
                    uint32_t height, const ExposureUse& use);
 
-/// frame.image_gradient by the exposed picture becomes that by the picture; the exposure takes a step of Adam.
+/// frame.image_gradient by the exposed picture becomes that by the picture; the exposure takes a step of
+/// Adam.
 void record_expose_backward(gpu::Recording& recording, Kernels& kernels, const Frame& frame, uint32_t width,
                             uint32_t height, const ExposureUse& use);
 

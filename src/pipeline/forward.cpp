@@ -84,9 +84,9 @@ Sorted record_forward(gpu::Recording& recording, Kernels& kernels, const Plan& p
                                              {frame.instance_keys[sorted], frame.counts, frame.tile_starts},
                                              {s.tiles, frame.instance_capacity});
 
-    kernels.get<passes::Blend>(blend_mode(plan)).record(recording, shape,
-                                                  {frame.records, splats, frame.tile_starts, frame.planes},
-                                                  blend_push(kernels, frame, camera, background));
+    kernels.get<passes::Blend>(blend_mode(plan))
+        .record(recording, shape, {frame.records, splats, frame.tile_starts, frame.planes},
+                blend_push(kernels, frame, camera, background));
     return {&splats, places[sorted]};
 }
 

@@ -20,7 +20,8 @@ struct CameraUse {
 /// Which of the ping-pong buffers hold the sorted instances after the forward frame.
 struct Sorted {
     const gpu::Buffer* splats = nullptr;  // each instance's splat
-    const gpu::Buffer* places = nullptr;  // with gradients: where each instance stands among the sorted, and its slot
+    const gpu::Buffer* places =
+        nullptr;  // with gradients: where each instance stands among the sorted, and its slot
 };
 
 /// Records: project, depth order, instances, tile order, tile starts, blend. Frame must have been reserved

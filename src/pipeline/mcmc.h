@@ -26,8 +26,9 @@ struct McmcResult {
 
 /// Every dead splat, and every one that is added, becomes a copy of a source drawn with probability in
 /// proportion to its opacity (weights of 1 / min(65535, 2^32 / splats)); source and copies share its opacity
-/// and scales by eq. 9 and start without moments, where draws of the source's Gaussian, `spread` times as wide, put them. Replaces the model's buffers where anything changes. frame:
-/// for its sizes and counts. Where every splat is dead nothing does.
+/// and scales by eq. 9 and start without moments, where draws of the source's Gaussian, `spread` times as
+/// wide, put them. Replaces the model's buffers where anything changes. frame: for its sizes and counts.
+/// Where every splat is dead nothing does.
 McmcResult refine_mcmc(Kernels& kernels, gpu::Executor& executor, Model& model, const Frame& frame,
                        const McmcRules& rules);
 

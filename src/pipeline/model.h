@@ -17,12 +17,13 @@ constexpr uint32_t parameter_planes(int sh_degree) {
 
 /// Bytes of one parameter-sized buffer: whole blocks of splats.
 constexpr uint64_t parameter_bytes(uint32_t capacity, int sh_degree) {
-    const uint64_t blocks = capacity > 0 ? (uint64_t(capacity) + shared::PARAM_BLOCK - 1) / shared::PARAM_BLOCK : 1;
+    const uint64_t blocks =
+        capacity > 0 ? (uint64_t(capacity) + shared::PARAM_BLOCK - 1) / shared::PARAM_BLOCK : 1;
     return blocks * shared::PARAM_BLOCK * parameter_planes(sh_degree) * 16;
 }
 
-/// Where flat float f of splat i stands in such a buffer, in floats, where `planes` texel planes are stored a splat
-/// (shared/layouts.h).
+/// Where flat float f of splat i stands in such a buffer, in floats, where `planes` texel planes are stored a
+/// splat (shared/layouts.h).
 constexpr size_t parameter_index(uint32_t planes, uint32_t f, size_t i) {
     const size_t block = i / shared::PARAM_BLOCK, within = i % shared::PARAM_BLOCK;
     return ((block * planes + f / 4) * shared::PARAM_BLOCK + within) * 4 + f % 4;
@@ -30,7 +31,7 @@ constexpr size_t parameter_index(uint32_t planes, uint32_t f, size_t i) {
 
 struct Model {
     uint32_t splats = 0, capacity = 0;
-    int sh_degree = 0;  // stored
+    int sh_degree = 0;       // stored
     glm::dvec3 origin{0.0};  // of the means, see Gaussians; a camera's position is taken relative to it
     uint32_t planes() const { return parameter_planes(sh_degree); }
     gpu::Buffer params;
@@ -38,8 +39,8 @@ struct Model {
     gpu::Buffer statistics;          // vec2 a splat; only where a strategy needs it
 };
 
-/// A parameter-sized buffer. Its contents are undefined but for the room behind the last splat, which is zero: nothing
-/// reads it, and a checkpoint of the same splats has the same bytes.
+/// A parameter-sized buffer. Its contents are undefined but for the room behind the last splat, which is
+/// zero: nothing reads it, and a checkpoint of the same splats has the same bytes.
 gpu::Buffer parameter_buffer(gpu::Device& device, const char* name, uint32_t capacity, int sh_degree);
 
 /// Room for `splats` splats of the same degree with both moments, to be written whole; no statistics.

@@ -15,18 +15,18 @@ struct Plan {
     int sh_degree = 0;      // evaluated
     int stored_degree = 0;  // kept on the device
     Kernel kernel = Kernel::peak;
-    bool gradients = false;   // loss, backward passes and their buffers
-    bool adam = false;        // both moments
-    bool statistics = false;  // densification statistics
-    bool absolute = false;    // of absolute gradients
+    bool gradients = false;    // loss, backward passes and their buffers
+    bool adam = false;         // both moments
+    bool statistics = false;   // densification statistics
+    bool absolute = false;     // of absolute gradients
     bool regularised = false;  // opacity and scale regularisers in the loss
     bool depth = false;
-    bool count = false;       // splats blended a pixel
-    bool ellipsoids = false;  // splats as solids, in place of blending
-    bool inspected = false;   // scales shifted, and the splats drawn counted
+    bool count = false;         // splats blended a pixel
+    bool ellipsoids = false;    // splats as solids, in place of blending
+    bool inspected = false;     // scales shifted, and the splats drawn counted
     float log_scale_shift = 0;  // where inspected
-    bool masks = false;  // photographs in which not every pixel counts
-    bool exposure = false;  // photographs' exposures are learned
+    bool masks = false;         // photographs in which not every pixel counts
+    bool exposure = false;      // photographs' exposures are learned
 };
 
 /// A picture: nothing of a degree the scene does not have, or that was not asked for, is stored or evaluated.

@@ -75,23 +75,24 @@ struct Renderer::State {
     Plan plan_of(const DrawOptions& options) const;
     /// then: what to record behind the picture.
     template <class Record>
-    void submit(const Camera& camera, const Plan& picture, const std::array<float, 3>& background, Record then);
+    void submit(const Camera& camera, const Plan& picture, const std::array<float, 3>& background,
+                Record then);
     Rendering draw(const Camera& camera, const Plan& picture, const std::array<float, 3>& background);
 };
 
 template <class Record>
-void Renderer::State::submit(const Camera& camera, const Plan& picture, const std::array<float, 3>& background,
-                             Record then) {
+void Renderer::State::submit(const Camera& camera, const Plan& picture,
+                             const std::array<float, 3>& background, Record then) {
     const gpu::Buffer block = upload_camera(*device, camera, kernels.shape(), model.origin);
     const CameraUse use{&block, 0, uint32_t(camera.width), uint32_t(camera.height)};
     const uint32_t room = std::max(frame.instance_capacity, first_capacity(model.splats));
-    counts = run_until_it_fits(
-        kernels, executor, frame,
-        {model.splats, use.width, use.height, room, false, picture.depth || picture.count},
-        [&](gpu::Recording& recording) {
-            record_forward(recording, kernels, picture, model, frame, use, background);
-            then(recording);
-        });
+    counts =
+        run_until_it_fits(kernels, executor, frame,
+                          {model.splats, use.width, use.height, room, false, picture.depth || picture.count},
+                          [&](gpu::Recording& recording) {
+                              record_forward(recording, kernels, picture, model, frame, use, background);
+                              then(recording);
+                          });
 }
 
 Plan Renderer::State::plan_of(const DrawOptions& o) const {

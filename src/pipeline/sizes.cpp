@@ -70,7 +70,8 @@ Sizes sizes_for(const passes::Shape& shape, const FrameRequest& request) {
     s.tile_starts = (uint64_t(s.tiles) + 2) * word;
     s.planes = uint64_t(s.plane_floats) * s.image_planes * word;
     if (request.gradients) {
-        const auto groups = passes::element_groups(shape, passes::loss_row_items(s.stride, request.height), 3);
+        const auto groups =
+            passes::element_groups(shape, passes::loss_row_items(s.stride, request.height), 3);
         s.partials = groups[0] * groups[1] * groups[2] * (shape.group / shape.subgroup);
         s.reduce_block = 64 * shape.subgroup;
         s.reduce_blocks = divide_up(s.partials, s.reduce_block);
@@ -78,8 +79,7 @@ Sizes sizes_for(const passes::Shape& shape, const FrameRequest& request) {
         s.masked = request.masks ? s.target : 0;
         s.exposed = request.exposure ? s.target : 0;
         s.exposure_blocks = divide_up(request.width * request.height, shared::EXPOSURE_BLOCK);
-        s.exposure_sums =
-            request.exposure ? uint64_t(s.exposure_blocks) * shared::EXPOSURE_FLOATS * word : 0;
+        s.exposure_sums = request.exposure ? uint64_t(s.exposure_blocks) * shared::EXPOSURE_FLOATS * word : 0;
         s.moments = uint64_t(s.plane_floats) * 3 * shared::MOMENT_PLANES * word;
         s.derivatives = uint64_t(s.plane_floats) * 3 * shared::DERIVATIVE_PLANES * word;
         s.image_gradient = s.target;

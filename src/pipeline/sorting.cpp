@@ -41,8 +41,7 @@ uint32_t record_sort(gpu::Recording& recording, Kernels& kernels, const SortBuff
         kernels.get<passes::RadixScatter>(cut.bits, mode)
             .record(recording, shape,
                     {keys, values, numbers, buffers.counter_prefix, buffers.digit_totals, buffers.counts,
-                     *buffers.keys[from ^ 1], values_out,
-                     numbered ? *buffers.places[from ^ 1] : values_out},
+                     *buffers.keys[from ^ 1], values_out, numbered ? *buffers.places[from ^ 1] : values_out},
                     push, name);
     }
     return from;

@@ -22,10 +22,10 @@ void record_scan(gpu::Recording& recording, Kernels& kernels, const ScanBuffers&
                  uint32_t block, Total total, const char* name);
 
 struct SortBuffers {
-    const gpu::Buffer* keys[2];       // keys[0] holds the input
-    const gpu::Buffer* values[2];     // values[0] holds the input, unless own_numbers
-    const gpu::Buffer* places[2];     // scratch and result: where each item went. nullptr: nobody asks
-    bool own_numbers;                 // the values are the items' own numbers
+    const gpu::Buffer* keys[2];    // keys[0] holds the input
+    const gpu::Buffer* values[2];  // values[0] holds the input, unless own_numbers
+    const gpu::Buffer* places[2];  // scratch and result: where each item went. nullptr: nobody asks
+    bool own_numbers;              // the values are the items' own numbers
     const gpu::Buffer& counters;
     const gpu::Buffer& counter_prefix;
     const gpu::Buffer& digit_totals;

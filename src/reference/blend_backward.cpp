@@ -57,8 +57,12 @@ BlendGradients blend_backward(std::span<const Projected> projected, const Instan
                 const double g = by_alpha * c.alpha.slope * c.sample.raw;
                 const double u = c.sample.u, v = c.sample.v;
                 const auto [ux, uy, vy] = whiteners[c.splat];
-                out.instances[c.instance] += {g,         g * u,     g * v,
-                                              g * u * u, g * u * v, g * v * v,
+                out.instances[c.instance] += {g,
+                                              g * u,
+                                              g * v,
+                                              g * u * u,
+                                              g * u * v,
+                                              g * v * v,
                                               weight * pixel_gradient,
                                               glm::abs(g * glm::dvec2(ux * u, uy * u + vy * v))};
             });

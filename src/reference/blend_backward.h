@@ -37,7 +37,8 @@ struct ScreenGradient {
     double a = 0, b = 0, c = 0;
     double opacity = 0;
     glm::dvec3 color{0};
-    glm::dvec2 absolute{0};  // |dL/dmean2d| of each pixel, by component, summed (Ye et al. 2024, AbsGS, eq. 7)
+    glm::dvec2 absolute{
+        0};  // |dL/dmean2d| of each pixel, by component, summed (Ye et al. 2024, AbsGS, eq. 7)
 };
 
 ScreenGradient screen_gradient(const Projected& splat, const Moments& moments);

@@ -68,7 +68,8 @@ Splat split_child(const Splat& parent, const glm::dvec3& normal, bool revised_op
     child.mean += rotation_matrix(unit) * step;
     if (revised_opacity) {
         const double rest = 1 / (1 + std::exp(parent.opacity_logit));
-        const double opacity = rest / (1 + std::sqrt(rest)) * std::exp(parent.opacity_logit);  // 1 - sqrt(rest)
+        const double opacity =
+            rest / (1 + std::sqrt(rest)) * std::exp(parent.opacity_logit);  // 1 - sqrt(rest)
         child.opacity_logit = std::log(opacity) - std::log(std::sqrt(rest));
     }
     return child;

@@ -52,8 +52,8 @@ std::vector<Decision> decide(const Values& values, const DensifyStatistics& stat
                              const DensifyOptions& options);
 
 /// A split's child: mean + R (scale * normal), scales divided by SPLIT_SCALE, all else the parent's. normal:
-/// three independent standard normal numbers. revised_opacity: the child's is 1 - (1 - opacity)^(1/2) (Rota Bulo et
-/// al. 2024, "Revising densification", eq. 9).
+/// three independent standard normal numbers. revised_opacity: the child's is 1 - (1 - opacity)^(1/2) (Rota
+/// Bulo et al. 2024, "Revising densification", eq. 9).
 Splat split_child(const Splat& parent, const glm::dvec3& normal, bool revised_opacity = false);
 
 struct Densified {

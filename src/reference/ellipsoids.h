@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Splats as solids: each pixel shows the nearest splat (by its mean's depth) whose ellipse of ELLIPSOID_REACH standard
-// deviations, low-pass included, it lies in, and whose opacity is at least ELLIPSOID_OPACITY. With d the distance in
-// standard deviations: colour (ELLIPSOID_RIM + (1 - ELLIPSOID_RIM) sqrt(1 - (d / reach)^2)), a sphere lit from the eye.
+// Splats as solids: each pixel shows the nearest splat (by its mean's depth) whose ellipse of ELLIPSOID_REACH
+// standard deviations, low-pass included, it lies in, and whose opacity is at least ELLIPSOID_OPACITY. With d
+// the distance in standard deviations: colour (ELLIPSOID_RIM + (1 - ELLIPSOID_RIM) sqrt(1 - (d / reach)^2)),
+// a sphere lit from the eye.
 #pragma once
 #include <array>
 #include <span>

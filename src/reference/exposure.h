@@ -15,8 +15,8 @@ using Exposure = std::array<double, 12>;
 Raster exposed(const Raster& picture, const Exposure& exposure);
 
 struct ExposureGradient {
-    Raster picture;         // dL/d(picture)
-    Exposure exposure{};    // dL/d(exposure)
+    Raster picture;       // dL/d(picture)
+    Exposure exposure{};  // dL/d(exposure)
 };
 /// picture: as it was before the exposure; gradient: dL/d(exposed picture).
 ExposureGradient exposed_backward(const Raster& picture, const Exposure& exposure, const Raster& gradient);

@@ -91,9 +91,8 @@ double ssim_sum(const Plane& rendered, const Plane& target, int width, int heigh
     const Plane from_xx = blur(window, by_xx, width, height), from_xy = blur(window, by_xy, width, height);
     gradient.resize(x.size());
     for (size_t i = 0; i < x.size(); ++i)
-        gradient[i] = std::abs(rendered[i]) <= SSIM_LIMIT
-                          ? from_mx[i] + 2 * x[i] * from_xx[i] + y[i] * from_xy[i]
-                          : 0;
+        gradient[i] =
+            std::abs(rendered[i]) <= SSIM_LIMIT ? from_mx[i] + 2 * x[i] * from_xx[i] + y[i] * from_xy[i] : 0;
     return sum;
 }
 

@@ -12,7 +12,8 @@
 namespace ewa::reference {
 
 /// Eq. 9: opacity 1 - (1 - o)^(1/N) and the factor of the scales of each of N splats in the place of one of
-/// opacity o. Written as the paper's double sum, whose terms cancel, up to N = 20 (to 1e-9), and as an integral beyond.
+/// opacity o. Written as the paper's double sum, whose terms cancel, up to N = 20 (to 1e-9), and as an
+/// integral beyond.
 struct Share {
     double opacity = 0, scale_factor = 1;
 };

@@ -73,7 +73,8 @@ std::optional<Hit> trace(const Ray& ray, std::span<const mesh::Node> nodes,
             continue;
         }
         const mesh::Node& node = nodes[reference];
-        const auto t0 = enter(ray, node.boxes[0], shorter.reach), t1 = enter(ray, node.boxes[1], shorter.reach);
+        const auto t0 = enter(ray, node.boxes[0], shorter.reach),
+                   t1 = enter(ray, node.boxes[1], shorter.reach);
         const bool first = !t1 || (t0 && *t0 <= *t1);
         if (t0 && t1) {
             waiting.push_back(node.references[first ? 1 : 0]);

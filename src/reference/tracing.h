@@ -27,7 +27,8 @@ std::optional<Hit> meet(const Ray& ray, const mesh::DeviceTriangle& triangle);
 /// The nearest of all triangles, by asking each.
 std::optional<Hit> nearest_of_all(const Ray& ray, std::span<const mesh::DeviceTriangle> triangles);
 
-/// The same through the hierarchy, in the shader's order; deepest: the most children that waited on the stack.
+/// The same through the hierarchy, in the shader's order; deepest: the most children that waited on the
+/// stack.
 std::optional<Hit> trace(const Ray& ray, std::span<const mesh::Node> nodes,
                          std::span<const mesh::DeviceTriangle> triangles, size_t* deepest = nullptr);
 

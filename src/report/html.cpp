@@ -54,8 +54,9 @@ std::string headline(const ReportData& data) {
             "<p class=\"warn\">{} splats have a value that is not finite and are not drawn.</p>\n",
             s.skipped_nonfinite);
     if (s.limited_steps > 0)
-        html += fmt::format("<p class=\"warn\">{} steps were too long for their splat and were shortened.</p>\n",
-                            s.limited_steps);
+        html +=
+            fmt::format("<p class=\"warn\">{} steps were too long for their splat and were shortened.</p>\n",
+                        s.limited_steps);
     if (s.dropped_updates > 0)
         html += fmt::format("<p class=\"warn\">{} parameter updates were not finite and were dropped.</p>\n",
                             s.dropped_updates);

@@ -22,7 +22,8 @@ glm::dvec2 pixel_of(const glm::dvec3& view, const Camera& camera) {
 std::array<Segment, 10> frustum_segments(const Camera& camera, double depth) {
     const glm::dvec3 eye = camera.position();
     const auto world = [&](double x, double y) {
-        const glm::dvec3 view((x - camera.cx) / camera.fx * depth, (y - camera.cy) / camera.fy * depth, depth);
+        const glm::dvec3 view((x - camera.cx) / camera.fx * depth, (y - camera.cy) / camera.fy * depth,
+                              depth);
         return eye + glm::transpose(camera.rotation) * view;
     };
     const double w = camera.width, h = camera.height;

@@ -15,8 +15,9 @@ struct Segment {
     glm::dvec3 from{0}, to{0};
 };
 
-/// The four edges from the camera's centre to its picture's corners at view z = depth, the picture's four sides (top,
-/// right, bottom, left), and two sides of a roof over the top one, which tell where up is. depth > 0.
+/// The four edges from the camera's centre to its picture's corners at view z = depth, the picture's four
+/// sides (top, right, bottom, left), and two sides of a roof over the top one, which tell where up is. depth
+/// > 0.
 std::array<Segment, 10> frustum_segments(const Camera& camera, double depth);
 
 /// The part of a segment in front of the camera's near plane in pixels; nothing where there is none.

@@ -85,7 +85,8 @@ void append_splats(Gaussians& gaussians, const Gaussians& more) {
     if (gaussians.size() == 0) gaussians.origin = more.origin;
     const glm::dvec3 apart = more.origin - gaussians.origin;
     for (size_t i = 0; i < more.means.size(); ++i)
-        gaussians.means.push_back(apart == glm::dvec3(0) ? more.means[i] : float(more.means[i] + apart[int(i % 3)]));
+        gaussians.means.push_back(apart == glm::dvec3(0) ? more.means[i]
+                                                         : float(more.means[i] + apart[int(i % 3)]));
     append(gaussians.quaternions, more.quaternions);
     append(gaussians.log_scales, more.log_scales);
     append(gaussians.opacity_logits, more.opacity_logits);

@@ -82,10 +82,15 @@ std::string text_of(const std::vector<std::byte>& bytes) {
 void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint) {
     const TrainerState& state = checkpoint.state;
     const StepReport& r = state.report;
-    const StateBlock block{
-        r.step,   r.seconds,           checkpoint.wall_seconds,   r.loss, r.dropped_updates,
-        r.splats, r.skipped_nonfinite, uint32_t(state.sh_degree),
-        uint32_t(std::min<uint64_t>(r.limited_steps, 0xffffffffu))};
+    const StateBlock block{r.step,
+                           r.seconds,
+                           checkpoint.wall_seconds,
+                           r.loss,
+                           r.dropped_updates,
+                           r.splats,
+                           r.skipped_nonfinite,
+                           uint32_t(state.sh_degree),
+                           uint32_t(std::min<uint64_t>(r.limited_steps, 0xffffffffu))};
     core::AtomicFile file(path);
     file.write(kMagic);
     const uint32_t counts[] = {kVersion, uint32_t(std::size(kFixed) + state.arrays.size())};
@@ -124,8 +129,8 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
     if (block.step < 0 || block.step > INT32_MAX || block.sh_degree > uint32_t(kMaxShDegree))
         file.fail("the section \"state\" has a step or an SH degree out of range");
     state.sh_degree = int(block.sh_degree);
-    state.report = {int(block.step), block.seconds,         block.loss,
-                    block.splats,    block.dropped_updates, block.skipped_nonfinite, block.limited_steps};
+    state.report = {int(block.step),       block.seconds,           block.loss,         block.splats,
+                    block.dropped_updates, block.skipped_nonfinite, block.limited_steps};
     for (uint32_t i = uint32_t(fixed.size()); i < sections; ++i) state.arrays.push_back(read_section(file));
     if (file.remaining() > 0) file.fail("there is something behind the last section");
     return checkpoint;

@@ -24,7 +24,8 @@ void add_camera(Hash& hash, const Camera& camera) {
 
 void add_distortion(Hash& hash, const Distortion& d) {
     hash.add(int(d.lens));
-    for (const double k : {d.k1, d.k2, d.p1, d.p2, d.k3, d.k4, d.k5, d.k6, d.s1, d.s2, d.s3, d.s4}) hash.add(k);
+    for (const double k : {d.k1, d.k2, d.p1, d.p2, d.k3, d.k4, d.k5, d.k6, d.s1, d.s2, d.s3, d.s4})
+        hash.add(k);
 }
 
 /// Size and beginning.

@@ -16,10 +16,11 @@ namespace ewa::train {
 /// is one photograph on the device and one being read.
 class Photographs {
   public:
-    /// Loads and uploads the pictures that are held, their sides divided by `reduction`. origin: of the model that the
-    /// cameras look at. Throws InputError that names the frame.
+    /// Loads and uploads the pictures that are held, their sides divided by `reduction`. origin: of the model
+    /// that the cameras look at. Throws InputError that names the frame.
     Photographs(gpu::Device& device, const passes::Shape& shape, const Dataset& dataset,
-                const std::vector<int>& frames, uint64_t cache_bytes, const glm::dvec3& origin, int reduction = 1);
+                const std::vector<int>& frames, uint64_t cache_bytes, const glm::dvec3& origin,
+                int reduction = 1);
 
     size_t count() const { return photos_.size(); }
     size_t on_disk() const { return on_disk_; }

@@ -5,9 +5,9 @@
 // as sense allows: a densification needs statistics over many views, and an opacity reset needs a few hundred
 // steps to heal, so both have a floor below which they do not shrink.
 //
-// 3DGS-MCMC puts copies onto their source and leaves it to the noise to part them. That takes thousands of steps: two
-// copies that are more opaque than the noise's gate feel the same gradient and stay one. A shorter run therefore starts
-// copies apart, the more the shorter it is.
+// 3DGS-MCMC puts copies onto their source and leaves it to the noise to part them. That takes thousands of
+// steps: two copies that are more opaque than the noise's gate feel the same gradient and stay one. A shorter
+// run therefore starts copies apart, the more the shorter it is.
 #pragma once
 #include <cstdint>
 
@@ -19,11 +19,11 @@ struct Schedule {
     int steps = 0;
     int refine_start = 0, refine_stop = 0, refine_every = 0;  // steps
     int relocate_stop = 0, relocate_every = 0;                // steps, of MCMC
-    double growth = 1;       // of MCMC, a refinement: as fast, by the share of the run, as in a full run
-    double copy_spread = 0;  // of MCMC
-    int opacity_reset_every = 0;                              // 0: never
+    double growth = 1;            // of MCMC, a refinement: as fast, by the share of the run, as in a full run
+    double copy_spread = 0;       // of MCMC
+    int opacity_reset_every = 0;  // 0: never
     int sh_degree_every = 0;
-    int sh_degree = 0;                            // the highest
+    int sh_degree = 0;  // the highest
     int halvings = 0, resolution_every = 0;
     double means_rate = 0, means_rate_final = 0;  // per unit of scene extent
     double exposures_rate = 0, exposures_rate_final = 0;

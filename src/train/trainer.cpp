@@ -41,8 +41,8 @@ std::array<float, 3> random_background(int step, uint64_t seed) {
     return {float(u[0]), float(u[1]), float(u[2])};
 }
 
-/// The length that rates and thresholds are shares of. Cameras that all stand in one place (a panorama, a single
-/// photograph) have no extent; there it is the median distance of what they see.
+/// The length that rates and thresholds are shares of. Cameras that all stand in one place (a panorama, a
+/// single photograph) have no extent; there it is the median distance of what they see.
 double extent_for(const Dataset& dataset, const std::vector<int>& frames, const Gaussians& start) {
     const double extent = scene_extent(dataset, frames);
     if (extent > 0) return extent;
@@ -58,9 +58,10 @@ double extent_for(const Dataset& dataset, const std::vector<int>& frames, const 
     return *middle;
 }
 
-/// Splats that are neighbours in space become neighbours in memory: what a tile gathers stands together. ADC's later
-/// generations keep it so, since children stand beside their parent; MCMC's lose it bit by bit. Means are held relative to
-/// an origin near them, and quaternions of another length than about 1 are brought to it: the learning rate is for those.
+/// Splats that are neighbours in space become neighbours in memory: what a tile gathers stands together.
+/// ADC's later generations keep it so, since children stand beside their parent; MCMC's lose it bit by bit.
+/// Means are held relative to an origin near them, and quaternions of another length than about 1 are brought
+/// to it: the learning rate is for those.
 Gaussians prepared(Gaussians start) {
     select_splats(start, morton_order(start));
     settle_origin(start);
@@ -167,8 +168,8 @@ struct Trainer::State {
                 // extent.
                 if (options.strategy == Strategy::mcmc)
                     record_noise(recording, kernels, model, frame,
-                                 float(options.noise_rate * schedule.mean_rate(step, 1) / extent), float(extent),
-                                 options.seed, uint32_t(step));
+                                 float(options.noise_rate * schedule.mean_rate(step, 1) / extent),
+                                 float(extent), options.seed, uint32_t(step));
             });
         instance_room = frame.instance_capacity;
         report.loss = loss_of(counts);

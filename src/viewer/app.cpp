@@ -20,8 +20,8 @@ constexpr int kRedraws = 3;
 constexpr Size kUsualSize{1280, 800};
 
 /// The window's size where none is asked for: the camera's, made smaller in proportion where the desktop has
-/// less room. With a picture to write the camera's size is kept, since that is the picture's. A window to look at is not
-/// smaller than the panel needs.
+/// less room. With a picture to write the camera's size is kept, since that is the picture's. A window to
+/// look at is not smaller than the panel needs.
 Size window_size(const Startup& startup, const WindowSystem& system) {
     if (startup.size) return *startup.size;
     Size size = kUsualSize;
@@ -32,10 +32,11 @@ Size window_size(const Startup& startup, const WindowSystem& system) {
     if (startup.picture) return size;
     const Size room = system.room();
     if (room.width <= 0 || room.height <= 0) return size;
-    const double grow = std::max(1.0, std::min(double(kUsualSize.width) / size.width,
-                                               double(kUsualSize.height) / size.height));
+    const double grow = std::max(
+        1.0, std::min(double(kUsualSize.width) / size.width, double(kUsualSize.height) / size.height));
     const double scale = std::min({grow, double(room.width) / size.width, double(room.height) / size.height});
-    return {std::max(1, int(std::lround(size.width * scale))), std::max(1, int(std::lround(size.height * scale)))};
+    return {std::max(1, int(std::lround(size.width * scale))),
+            std::max(1, int(std::lround(size.height * scale)))};
 }
 
 Viewpoint start_view(const Scene& scene, std::optional<int> frame, Size size) {
@@ -79,7 +80,8 @@ App::App(const Startup& startup)
       photos_([this] { system_.wake(); }),
       thread_(startup.open_device, [this] { system_.wake(); }) {
     last_frame_ = Clock::now();
-    hint_until_ = last_frame_ + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(kHintSeconds));
+    hint_until_ = last_frame_ +
+                  std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(kHintSeconds));
     adopt(startup.scene, startup.frame);
     settings_.look = startup.settings.look;
     if (startup.film) start_film();
@@ -96,7 +98,8 @@ void App::watch(const live::WhatToWatch& what) {
 void App::take_live() {
     if (startup_.trainer && run_.status.state != live::State::done) {
         if (const auto status = startup_.trainer->status(); status && *status != 0 && note_.empty())
-            say("the training has ended with status " + std::to_string(*status) + "; the terminal has its reason");
+            say("the training has ended with status " + std::to_string(*status) +
+                "; the terminal has its reason");
     }
     if (!watcher_ || watcher_->number() == run_.number) return;
     const auto before = run_.splats;
@@ -183,8 +186,8 @@ void App::run() {
         ask();
     }
     if (scripted() && !done_)
-        throw RunError("the window was closed before " + startup_.picture.value_or(startup_.film.value_or("")).string() +
-                       " was written");
+        throw RunError("the window was closed before " +
+                       startup_.picture.value_or(startup_.film.value_or("")).string() + " was written");
 }
 
 /// How long to wait for input, in seconds.
@@ -215,7 +218,8 @@ void App::ask() {
     } else if (asked_.divisor == 1 || now - changed_ < std::chrono::duration<double>(kRestSeconds)) {
         return;
     }
-    // A full picture in the making is not what a moving camera should wait behind; it is not asked for anew either.
+    // A full picture in the making is not what a moving camera should wait behind; it is not asked for anew
+    // either.
     asked_ = request;
     asked_scene_ = scene_number_;
     thread_.ask(asked_);

@@ -29,8 +29,8 @@ struct Startup {
     PanelSettings settings;
     OpenDevice open_device;
     std::string device_name;
-    std::optional<live::WhatToWatch> watch;        // a run
-    TrainProcess* trainer = nullptr;               // of this viewer, outlives it
+    std::optional<live::WhatToWatch> watch;  // a run
+    TrainProcess* trainer = nullptr;         // of this viewer, outlives it
     int lose_device_at = 0;  // window frames until the device that shows them plays lost; 0: it does not
 };
 
@@ -133,7 +133,7 @@ class App {
     bool capture_ = false;  // write the picture as soon as it is the full one
     std::optional<int> pointed_camera_;
     uint64_t points_ = 0, points_asked_ = 0;  // answers to double clicks that were acted on; double clicks
-    int redraws_ = 0;      // frames still to draw: ImGui answers input over a few
+    int redraws_ = 0;                         // frames still to draw: ImGui answers input over a few
     int frames_drawn_ = 0, devices_lost_ = 0;
     std::string note_;
     bool done_ = false;

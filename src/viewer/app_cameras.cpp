@@ -83,8 +83,8 @@ void App::compare() {
 void App::save_view(size_t number) {
     const Size size = window_.framebuffer();
     const Viewpoint place = view_.place();
-    io::NamedView view{std::to_string(number), view_.camera(std::max(1, size.width), std::max(1, size.height)),
-                       place.pivot};
+    io::NamedView view{std::to_string(number),
+                       view_.camera(std::max(1, size.width), std::max(1, size.height)), place.pivot};
     const auto same = std::find_if(views_.begin(), views_.end(),
                                    [&](const io::NamedView& other) { return other.name == view.name; });
     if (same != views_.end())
@@ -99,7 +99,8 @@ void App::go_to_view(size_t number) {
         return view.name == std::to_string(number);
     });
     if (found == views_.end())
-        return say("there is no view " + std::to_string(number) + "; Ctrl + " + std::to_string(number) + " keeps one");
+        return say("there is no view " + std::to_string(number) + "; Ctrl + " + std::to_string(number) +
+                   " keeps one");
     view_.stand({found->camera, found->pivot, view_.up(), view_.radius()});
     leave_camera();
 }

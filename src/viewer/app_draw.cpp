@@ -97,8 +97,9 @@ void App::draw() {
     if (show_help_) draw_help(show_help_);
     handle_mouse();
     ImDrawData* drawn = screen_->gui.end_frame();
-    const bool other_difference = before.gain != settings_.gain ||
-                                  difference_shown_ != (comparing() && settings_.comparison == Comparison::difference);
+    const bool other_difference =
+        before.gain != settings_.gain ||
+        difference_shown_ != (comparing() && settings_.comparison == Comparison::difference);
     if (other_difference && settled()) compare();
     if (settings_.comparison != before.comparison) redraws_ = std::max(redraws_, kRedraws);
 
@@ -120,7 +121,8 @@ bool App::present(ImDrawData* drawn, Image* capture) {
     const Arrangement places = arrangement();
     std::vector<Layer> layers;
     if (shown_) {
-        // The last picture may have been made for another size: it keeps its shape until the next one is there.
+        // The last picture may have been made for another size: it keeps its shape until the next one is
+        // there.
         const Camera& camera = shown_->request.camera;
         layers.push_back({Layer::rendering, fitted({camera.width, camera.height}, places.rendering)});
     }

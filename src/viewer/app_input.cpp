@@ -81,7 +81,8 @@ void App::handle_key(const KeyPress& press) {
 }
 
 bool App::flying() const {
-    if (ImGui::GetIO().WantTextInput || window_.held(GLFW_KEY_LEFT_CONTROL) || window_.held(GLFW_KEY_RIGHT_CONTROL))
+    if (ImGui::GetIO().WantTextInput || window_.held(GLFW_KEY_LEFT_CONTROL) ||
+        window_.held(GLFW_KEY_RIGHT_CONTROL))
         return false;
     const auto keys = {GLFW_KEY_W, GLFW_KEY_A, GLFW_KEY_S, GLFW_KEY_D, GLFW_KEY_Q, GLFW_KEY_E};
     return std::any_of(keys.begin(), keys.end(), [&](int key) { return window_.held(key); });
@@ -150,7 +151,7 @@ void App::handle_mouse() {
         return;
     }
     if (pointed_camera_ && ImGui::IsMouseReleased(ImGuiMouseButton_Left) &&
-             io.MouseDragMaxDistanceSqr[ImGuiMouseButton_Left] < kStillPixels * kStillPixels)
+        io.MouseDragMaxDistanceSqr[ImGuiMouseButton_Left] < kStillPixels * kStillPixels)
         go_to_camera(*pointed_camera_);
 }
 

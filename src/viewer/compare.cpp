@@ -27,8 +27,7 @@ Rectangle fitted(Size shape, const Rectangle& room) {
     Rectangle result = room;
     if (shape.width <= 0 || shape.height <= 0) return result;
     if (shape != Size{room.width, room.height}) {
-        const double scale =
-            std::min(double(room.width) / shape.width, double(room.height) / shape.height);
+        const double scale = std::min(double(room.width) / shape.width, double(room.height) / shape.height);
         result.width = std::clamp(int(std::lround(shape.width * scale)), 1, std::max(1, room.width));
         result.height = std::clamp(int(std::lround(shape.height * scale)), 1, std::max(1, room.height));
     }

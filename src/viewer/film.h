@@ -16,7 +16,7 @@ struct Film {
     std::filesystem::path folder;
     std::vector<Camera> keys;  // at least one
     int frames = 0, next = 0;
-    uint64_t waits_for = 0;    // serial of the picture that is being written; 0: none
+    uint64_t waits_for = 0;  // serial of the picture that is being written; 0: none
 
     bool finished() const { return next >= frames; }
     /// Keys are kFilmRate * seconds frames apart; the first and the last are among the frames.

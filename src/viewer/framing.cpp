@@ -19,8 +19,7 @@ std::vector<glm::dvec3> sampled_means(const Gaussians& gaussians, float least_lo
     for (size_t i = 0; i < gaussians.size(); i += stride) {
         const glm::dvec3 mean = gaussians.world_mean(i);
         if (!(gaussians.opacity_logits[i] >= least_logit)) continue;
-        if (std::isfinite(mean[0]) && std::isfinite(mean[1]) && std::isfinite(mean[2]))
-            means.push_back(mean);
+        if (std::isfinite(mean[0]) && std::isfinite(mean[1]) && std::isfinite(mean[2])) means.push_back(mean);
     }
     return means;
 }
@@ -119,7 +118,8 @@ int nearest_frame(const Dataset& dataset, const Camera& camera, double radius) {
 double camera_size(const Dataset& dataset, double radius) {
     std::vector<double> steps;
     for (size_t i = 1; i < dataset.frames.size(); ++i)
-        steps.push_back(glm::length(dataset.frames[i].camera.position() - dataset.frames[i - 1].camera.position()));
+        steps.push_back(
+            glm::length(dataset.frames[i].camera.position() - dataset.frames[i - 1].camera.position()));
     const double step = steps.empty() ? 0 : quantile(steps, 0.5);
     return step > 0 && std::isfinite(step) ? 0.3 * step : 0.05 * radius;
 }

@@ -19,12 +19,12 @@ SceneBounds scene_bounds(const Gaussians& gaussians);
 /// captures.
 Viewpoint framing_view(const Gaussians& gaussians, int width, int height);
 
-/// The frame whose camera stands and looks most like this one; -1 without frames. A turn of 90 degrees counts as much as
-/// `radius` (world units) between them.
+/// The frame whose camera stands and looks most like this one; -1 without frames. A turn of 90 degrees counts
+/// as much as `radius` (world units) between them.
 int nearest_frame(const Dataset& dataset, const Camera& camera, double radius);
 
-/// How large to draw the cameras: a share of the median distance from each to the next in name order, and of the scene's
-/// radius where they stand in one place. World units, above zero.
+/// How large to draw the cameras: a share of the median distance from each to the next in name order, and of
+/// the scene's radius where they stand in one place. World units, above zero.
 double camera_size(const Dataset& dataset, double radius);
 
 /// A frame's own camera. Up is the mean of what is up in the dataset's pictures; the pivot is where most

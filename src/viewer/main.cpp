@@ -109,7 +109,8 @@ Scene open_what(const Arguments& arguments, Startup& startup) {
         scene.title = arguments.connect;
         return scene;
     }
-    if (arguments.path.empty()) throw InputError("PATH is required: splats, a dataset, or a run's folder (see ewa-view --help)");
+    if (arguments.path.empty())
+        throw InputError("PATH is required: splats, a dataset, or a run's folder (see ewa-view --help)");
     Scene scene = open_scene(arguments.path, arguments.cameras);
     if (arguments.train) {
         if (!scene.dataset || !scene.run.empty())
@@ -117,7 +118,8 @@ Scene open_what(const Arguments& arguments, Startup& startup) {
         scene.remark.clear();
         startup.watch = live::WhatToWatch{};
         startup.watch->folder = output_of(arguments);
-        startup.watch->splats_after = startup.watch->metrics_after = std::filesystem::file_time_type::clock::now();
+        startup.watch->splats_after = startup.watch->metrics_after =
+            std::filesystem::file_time_type::clock::now();
     } else if (!scene.run.empty() && arguments.picture.empty() && arguments.film.empty()) {
         startup.watch = live::WhatToWatch{};
         startup.watch->folder = scene.run;
@@ -138,7 +140,8 @@ Startup open(const Arguments& arguments) {
     }
     if (!arguments.views.empty()) startup.views = io::read_views(arguments.views);
     if (!arguments.film.empty()) {
-        if (startup.views.empty()) throw InputError("--film needs --views FILE, with the views to go through");
+        if (startup.views.empty())
+            throw InputError("--film needs --views FILE, with the views to go through");
         startup.film = arguments.film;
     }
     startup.scene = open_what(arguments, startup);
@@ -147,30 +150,35 @@ Startup open(const Arguments& arguments) {
     startup.settings.cameras = startup.scene.gaussians->size() == 0;
     Look& look = startup.settings.look;
     look.kernel = arguments.antialias ? Kernel::antialias : startup.scene.look.kernel;
-    look.background = arguments.background.empty() ? startup.scene.look.background
-                                                   : parse_background(arguments.background);
+    look.background =
+        arguments.background.empty() ? startup.scene.look.background : parse_background(arguments.background);
     return startup;
 }
 
 void add_options(CLI::App& app, Arguments& arguments) {
-    app.add_option("PATH", arguments.path,
-                   "Splats (.ply .compressed.ply .splat .spz .glb .gltf), a dataset, or the folder of a training run")
+    app.add_option(
+           "PATH", arguments.path,
+           "Splats (.ply .compressed.ply .splat .spz .glb .gltf), a dataset, or the folder of a training run")
         ->type_name("");
-    CLI::Option* train =
-        app.add_flag("--train", arguments.train,
-                     "Train on the dataset and look on; further options are those of ewa train, such as --steps");
-    app.add_option("-o,--output", arguments.output, "With --train: the run's folder [out/<name of the dataset>]")
+    CLI::Option* train = app.add_flag(
+        "--train", arguments.train,
+        "Train on the dataset and look on; further options are those of ewa train, such as --steps");
+    app.add_option("-o,--output", arguments.output,
+                   "With --train: the run's folder [out/<name of the dataset>]")
         ->needs(train)
         ->type_name("DIR");
     app.add_option("--connect", arguments.connect, "Look on at a training that was started with --serve")
         ->excludes(train)
         ->type_name("HOST:PORT");
-    app.add_option("--token", arguments.token, "With --connect: lets you pause and save; the run's live.json has it")
+    app.add_option("--token", arguments.token,
+                   "With --connect: lets you pause and save; the run's live.json has it")
         ->type_name("TEXT");
-    app.add_option("--cameras", arguments.cameras, "A dataset whose cameras to look through")->type_name("DATASET");
+    app.add_option("--cameras", arguments.cameras, "A dataset whose cameras to look through")
+        ->type_name("DATASET");
     app.add_option("--frame", arguments.frame, "Which of its cameras to start from, in name order (0)")
         ->type_name("I");
-    app.add_option("--mode", arguments.settings.look.mode, "color, depth, alpha, count (splats per pixel) or ellipsoids")
+    app.add_option("--mode", arguments.settings.look.mode,
+                   "color, depth, alpha, count (splats per pixel) or ellipsoids")
         ->transform(CLI::CheckedTransformer(kModes).description(""))
         ->type_name("MODE");
     app.add_option("--compare", arguments.settings.comparison,
@@ -195,7 +203,8 @@ void add_options(CLI::App& app, Arguments& arguments) {
     app.add_option("--device", arguments.device.selector,
                    "Number or part of the name of the device that draws (see ewa devices)")
         ->type_name("NAME|N");
-    app.add_option("--lose-device-at", arguments.lose_device_at, "Frame at which the window's device plays lost")
+    app.add_option("--lose-device-at", arguments.lose_device_at,
+                   "Frame at which the window's device plays lost")
         ->type_name("N")
         ->group("For developers");
 }
@@ -204,7 +213,8 @@ void add_options(CLI::App& app, Arguments& arguments) {
 class DeviceOpener {
   public:
     explicit DeviceOpener(const DeviceOptions& options)
-        : options_(options), opening_(std::async(std::launch::async, [options] { return open_device(options); })) {}
+        : options_(options),
+          opening_(std::async(std::launch::async, [options] { return open_device(options); })) {}
     std::string name() {
         *first_ = opening_.get();
         return device_info(**first_).name;

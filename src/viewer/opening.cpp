@@ -38,7 +38,8 @@ std::shared_ptr<const Dataset> load_cameras(const fs::path& path, int downscale,
         // A photograph or the points are not as they should be: the cameras may still be seen.
     }
     if (dataset.frames.empty()) dataset = load_dataset(path, {.downscale = downscale, .need_images = false});
-    // Frames without a file are left out, as training and `ewa render` leave them out, where there are any others.
+    // Frames without a file are left out, as training and `ewa render` leave them out, where there are any
+    // others.
     const auto missing = [](const Frame& frame) { return !frame.image_exists; };
     if (!std::all_of(dataset.frames.begin(), dataset.frames.end(), missing))
         std::erase_if(dataset.frames, missing);
@@ -73,15 +74,16 @@ Look look_of(const nlohmann::json& config) {
     return look;
 }
 
-/// The dataset of a run, as its config.json names it: relative to where the training was started, which may be here or any
-/// folder above the run's.
+/// The dataset of a run, as its config.json names it: relative to where the training was started, which may
+/// be here or any folder above the run's.
 fs::path dataset_of(const fs::path& run, const nlohmann::json& config) {
     const fs::path named = text_of(config, "dataset");
     if (named.empty()) return {};
     std::error_code error;
     if (fs::exists(named, error)) return named;
     if (named.is_absolute()) return {};
-    for (fs::path folder = fs::absolute(run, error); folder.has_relative_path(); folder = folder.parent_path())
+    for (fs::path folder = fs::absolute(run, error); folder.has_relative_path();
+         folder = folder.parent_path())
         if (fs::exists(folder / named, error)) return folder / named;
     return {};
 }
@@ -94,7 +96,8 @@ Scene open_run(const fs::path& run, const fs::path& cameras) {
     std::error_code error;
     const bool splats = fs::exists(run / "splats.ply", error);
     if (splats) scene.splats_time = fs::last_write_time(run / "splats.ply", error);
-    scene.gaussians = std::make_shared<const Gaussians>(splats ? load_splats(run / "splats.ply") : Gaussians());
+    scene.gaussians =
+        std::make_shared<const Gaussians>(splats ? load_splats(run / "splats.ply") : Gaussians());
     const fs::path dataset = cameras.empty() ? dataset_of(run, config) : cameras;
     const auto downscale = config.find("downscale");
     const int factor = downscale != config.end() && downscale->is_number_integer()
@@ -118,8 +121,9 @@ Scene open_dataset(const fs::path& path) {
     Scene scene;
     scene.dataset = load_cameras(path, 1, true);
     scene.gaussians = std::make_shared<const Gaussians>(splats_of_points(scene.dataset->points));
-    scene.remark = scene.gaussians->size() > 0 ? "these are the dataset's points; ewa train makes splats of them"
-                                               : "this dataset has cameras, but no points and no splats";
+    scene.remark = scene.gaussians->size() > 0
+                       ? "these are the dataset's points; ewa train makes splats of them"
+                       : "this dataset has cameras, but no points and no splats";
     return scene;
 }
 

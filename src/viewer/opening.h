@@ -15,13 +15,15 @@ struct Scene {
     std::shared_ptr<const Gaussians> gaussians;  // never null; empty where a run has none yet
     std::shared_ptr<const Dataset> dataset;      // cameras; null: none
     std::filesystem::path run;                   // the run's folder; empty where it is none
-    std::filesystem::file_time_type splats_time = std::filesystem::file_time_type::min();  // of the run's, when they were read
+    std::filesystem::file_time_type splats_time =
+        std::filesystem::file_time_type::min();  // of the run's, when they were read
     Look look;                                   // how its file or its run says it is to be drawn
     std::string remark;                          // one line; what could not be had
 };
 
-/// A file with splats; a dataset, shown by its points; or a run's folder (config.json, splats.ply, metrics.jsonl), with the
-/// cameras of its dataset where that is found. `cameras`: the dataset to use instead, or empty. Throws InputError.
+/// A file with splats; a dataset, shown by its points; or a run's folder (config.json, splats.ply,
+/// metrics.jsonl), with the cameras of its dataset where that is found. `cameras`: the dataset to use
+/// instead, or empty. Throws InputError.
 Scene open_scene(const std::filesystem::path& path, const std::filesystem::path& cameras);
 
 /// Whether it is the folder of a training run, one that has just begun included.

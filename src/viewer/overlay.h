@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is drawn over the picture besides the panel: cameras, the wipe's border, labels, the first hint. With Dear ImGui;
-// changes nothing.
+// What is drawn over the picture besides the panel: cameras, the wipe's border, labels, the first hint. With
+// Dear ImGui; changes nothing.
 #pragma once
 #include <optional>
 #include <string>

@@ -38,7 +38,8 @@ void edit_look(const PanelFacts& facts, Look& look) {
     if (ImGui::Combo("mode", &mode, "colour\0depth\0opacity\0splats per pixel\0ellipsoids\0"))
         look.mode = Mode(mode);
     if (facts.picture && facts.picture->request.look.mode == look.mode) {
-        if (look.mode == Mode::depth) ImGui::Text("white is depth %.4g", double(facts.picture->picture.white));
+        if (look.mode == Mode::depth)
+            ImGui::Text("white is depth %.4g", double(facts.picture->picture.white));
         if (look.mode == Mode::count)
             ImGui::Text("red, yellow, white: up to %.0f splats", double(facts.picture->picture.white));
     }
@@ -68,7 +69,8 @@ void choose_up(const PanelFacts& facts, PanelActions& actions) {
 void edit_cameras(const PanelFacts& facts, PanelSettings& settings, PanelActions& actions) {
     const int last = int(facts.dataset->frames.size()) - 1;
     int frame = facts.stands_at.value_or(0);
-    if (ImGui::SliderInt("camera", &frame, 0, last, facts.stands_at ? "%d" : "-", ImGuiSliderFlags_AlwaysClamp))
+    if (ImGui::SliderInt("camera", &frame, 0, last, facts.stands_at ? "%d" : "-",
+                         ImGuiSliderFlags_AlwaysClamp))
         actions.frame = frame;
     if (facts.stands_at)
         ImGui::TextDisabled("%s", facts.dataset->frames[size_t(*facts.stands_at)].name.c_str());

@@ -22,11 +22,11 @@ struct PanelFacts {
     const FinishedPicture* picture = nullptr;
     const std::vector<PlanLine>* plan = nullptr;  // what is left out
     const std::vector<io::NamedView>* views = nullptr;
-    const live::Update* run = nullptr;  // null: nothing is being trained
-    bool drawing = false;       // a better picture is on its way
-    std::string note;           // of the last screenshot, or what failed
-    std::string photo_failure;  // why the photograph cannot be had
-    std::optional<double> psnr;  // of this view, as shown
+    const live::Update* run = nullptr;     // null: nothing is being trained
+    bool drawing = false;                  // a better picture is on its way
+    std::string note;                      // of the last screenshot, or what failed
+    std::string photo_failure;             // why the photograph cannot be had
+    std::optional<double> psnr;            // of this view, as shown
     int film_frame = -1, film_frames = 0;  // where one is being written
     glm::dvec3 up{0};
     std::optional<int> stands_at;  // the camera that is looked through

@@ -17,8 +17,9 @@ namespace ewa::viewer {
 
 struct Photo {
     int frame = -1;
-    Picture picture;      // as its camera sees it, a whole factor smaller where that still covers twice the size asked for
-    Size size;            // of the frame's camera
+    Picture picture;  // as its camera sees it, a whole factor smaller where that still covers twice the size
+                      // asked for
+    Size size;        // of the frame's camera
     std::string failure;  // one line, where there is no picture
 };
 
@@ -28,8 +29,8 @@ class PhotoLoader {
     explicit PhotoLoader(std::function<void()> on_news);
     ~PhotoLoader();
 
-    /// The frame's photograph, for a place of this size; where it is transparent, over the background. The last one asked
-    /// for replaces those that wait.
+    /// The frame's photograph, for a place of this size; where it is transparent, over the background. The
+    /// last one asked for replaces those that wait.
     void ask(int index, const Frame& frame, Size size, const std::array<float, 3>& background);
     /// The last one read, or null.
     std::shared_ptr<const Photo> photo() const;

@@ -15,8 +15,8 @@ namespace ewa::viewer {
 /// Part of a picture, and where in the window it goes.
 struct Layer {
     enum Slot { rendering, photograph } slot = rendering;
-    Rectangle target;                    // inside the window
-    double left = 0, right = 1;          // of the picture's width; the whole height
+    Rectangle target;            // inside the window
+    double left = 0, right = 1;  // of the picture's width; the whole height
 };
 
 class Presenter {
@@ -27,9 +27,9 @@ class Presenter {
     /// What a layer of this slot shows from the next draw() on.
     void set_picture(Layer::Slot slot, const Picture& picture);
 
-    /// One frame: the layers one over the other on black, those without a picture left out, then the panel. capture, if
-    /// not null, receives what the window shows without the panel. False when nothing was drawn: the window
-    /// is minimised or is just changing.
+    /// One frame: the layers one over the other on black, those without a picture left out, then the panel.
+    /// capture, if not null, receives what the window shows without the panel. False when nothing was drawn:
+    /// the window is minimised or is just changing.
     bool draw(Size window, std::span<const Layer> layers, ImDrawData* panel, Image* capture);
 
     const Swapchain& swapchain() const { return swapchain_; }

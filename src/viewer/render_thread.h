@@ -28,9 +28,9 @@ struct Look {
 struct PictureRequest {
     Camera camera;  // of the size that the picture will be shown at
     Look look;
-    int divisor = 1;               // the picture has 1/divisor of that size
+    int divisor = 1;  // the picture has 1/divisor of that size
     uint64_t serial = 0;
-    std::filesystem::path file;    // write it there too: what `ewa render` writes under that extension
+    std::filesystem::path file;  // write it there too: what `ewa render` writes under that extension
 };
 
 struct FinishedPicture {
@@ -48,8 +48,8 @@ using OpenDevice = std::function<std::shared_ptr<gpu::Device>()>;
 
 class RenderThread {
   public:
-    /// on_news is called on the thread whenever news() has something new. A device that is lost is opened again, once for
-    /// each picture that fails.
+    /// on_news is called on the thread whenever news() has something new. A device that is lost is opened
+    /// again, once for each picture that fails.
     RenderThread(OpenDevice open, std::function<void()> on_news);
     ~RenderThread();
 
@@ -57,8 +57,8 @@ class RenderThread {
     uint64_t set_scene(std::shared_ptr<const Gaussians> gaussians);
     /// Takes the place of a request that waits and has no file; the picture in the making is finished first.
     void ask(const PictureRequest& request);
-    /// What is at a pixel of the camera's picture: News::point, once News::points is the number returned. Of several that
-    /// wait only the last is answered.
+    /// What is at a pixel of the camera's picture: News::point, once News::points is the number returned. Of
+    /// several that wait only the last is answered.
     uint64_t ask_point(const Camera& camera, const glm::dvec2& pixel);
 
     struct News {

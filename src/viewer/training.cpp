@@ -67,9 +67,11 @@ std::optional<std::string> draw_training(const live::Update& run) {
         ImGui::TextUnformatted("waiting for the first step ...");
         return command;
     }
-    ImGui::Text("%s: step %d of %d, %.0f s", name_of(status.state), status.step, status.steps, status.seconds);
+    ImGui::Text("%s: step %d of %d, %.0f s", name_of(status.state), status.step, status.steps,
+                status.seconds);
     if (status.steps > 0)
-        ImGui::ProgressBar(float(status.step) / float(status.steps), ImVec2(ImGui::GetTextLineHeight() * 17, 0));
+        ImGui::ProgressBar(float(status.step) / float(status.steps),
+                           ImVec2(ImGui::GetTextLineHeight() * 17, 0));
     if (run.splats_step >= 0 && status.state != live::State::done)
         ImGui::Text("the splats shown are of step %d", run.splats_step);
     std::vector<float> loss, psnr;

@@ -75,7 +75,8 @@ void Window::watch() {
     glfwSetKeyCallback(window_, [](GLFWwindow* window, int key, int, int action, int mods) {
         of(window).stirred_ = true;
         if (action == GLFW_PRESS)
-            of(window).pressed_.push_back({key, (mods & GLFW_MOD_SHIFT) != 0, (mods & GLFW_MOD_CONTROL) != 0});
+            of(window).pressed_.push_back(
+                {key, (mods & GLFW_MOD_SHIFT) != 0, (mods & GLFW_MOD_CONTROL) != 0});
     });
     glfwSetCursorPosCallback(window_, [](GLFWwindow* window, double, double) { of(window).stirred_ = true; });
     glfwSetMouseButtonCallback(window_,

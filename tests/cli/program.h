@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Runs the built program as a process, and makes small inputs for it.
 #pragma once
-#include <nlohmann/json.hpp>
 #include <functional>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,12 +17,12 @@ struct Outcome {
 };
 
 struct Circumstances {
-    std::string program;     // runs instead of ewa
-    std::string out_path;    // standard output goes here instead of Outcome::out
-    size_t file_limit = 0;   // bytes that no file may exceed, as on a full disk; 0: none
-    std::string await_file;  // as soon as this file has a byte, `signal` is sent
-    int signal = 0;                    // 0: none
-    std::function<void()> then;        // called in the place of sending a signal, or after it
+    std::string program;         // runs instead of ewa
+    std::string out_path;        // standard output goes here instead of Outcome::out
+    size_t file_limit = 0;       // bytes that no file may exceed, as on a full disk; 0: none
+    std::string await_file;      // as soon as this file has a byte, `signal` is sent
+    int signal = 0;              // 0: none
+    std::function<void()> then;  // called in the place of sending a signal, or after it
     std::vector<std::pair<std::string, std::string>> environment;
     int after_ms = -1;  // where it is not negative, `signal` is sent that long after the start instead
 };

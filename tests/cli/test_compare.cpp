@@ -76,8 +76,8 @@ TEST(Compare, FoldersPairByName) {
     save(folder / "b/one.exr", plain(0.5f));  // another extension: paired by its stem
     save(folder / "b/deep/two.png", plain(0.6f));
     write_file(folder / "b/notes.md", "no picture");
-    const Names command{"compare",  folder / "a", folder / "b", "--json", folder / "j.json", "--heat-map",
-                        folder / "maps"};
+    const Names command{"compare",         folder / "a", folder / "b",   "--json",
+                        folder / "j.json", "--heat-map", folder / "maps"};
     const Outcome outcome = run_ewa(command);
     expect_success(outcome);
     EXPECT_NE(outcome.out.find("mean of 2 pictures"), std::string::npos) << outcome.out;

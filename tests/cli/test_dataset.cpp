@@ -13,7 +13,8 @@ namespace fs = std::filesystem;
 const std::string kScenes = std::string(EWA_SOURCE_DIR) + "/scenes/";
 
 std::vector<std::string> small(const std::string& scene, const std::string& folder) {
-    return {"dataset", kScenes + scene, "-o", folder, "--views", "4", "--size", "24x16", "--samples", "2", "--points", "200"};
+    return {"dataset", kScenes + scene, "-o",        folder, "--views",  "4",
+            "--size",  "24x16",         "--samples", "2",    "--points", "200"};
 }
 
 TEST(Dataset, IsReadBackByOurOwnReader) {
@@ -33,7 +34,8 @@ TEST(Dataset, IsReadBackByOurOwnReader) {
         EXPECT_GT(frame.camera.position().y, 0.0) << "the world stays the glTF's: y is up";
     }
     // Depth and points agree: each point lies on what some picture sees.
-    const ewa::Image depth = ewa::load_image(folder / ("d/" + top["frames"][0]["depth_file_path"].get<std::string>()));
+    const ewa::Image depth =
+        ewa::load_image(folder / ("d/" + top["frames"][0]["depth_file_path"].get<std::string>()));
     const ewa::Camera& camera = dataset.frames[0].camera;
     int seen = 0;
     for (const glm::dvec3& point : dataset.points.positions) {
@@ -52,7 +54,8 @@ TEST(Dataset, IsReadBackByOurOwnReader) {
 TEST(Dataset, GoesOnWhereItWasEnded) {
     const Folder folder;
     ASSERT_EQ(run_ewa(small("railing.gltf", folder / "d")).status, 0);
-    const std::string picture = read_file(folder / "d/images/view_002.png"), depth = read_file(folder / "d/depth/view_002.exr");
+    const std::string picture = read_file(folder / "d/images/view_002.png"),
+                      depth = read_file(folder / "d/depth/view_002.exr");
     const std::string transforms = read_file(folder / "d/transforms.json");
     fs::remove(folder / "d/images/view_002.png");
     fs::remove(folder / "d/transforms.json");
@@ -80,7 +83,8 @@ TEST(Dataset, OtherPeoplesFoldersAndWrongUseAreRefused) {
     expect_failure(run_ewa(wrong), 2, "--size");
     wrong[7] = "0x16";
     expect_failure(run_ewa(wrong), 2, "--size");
-    write_file(folder / "a.gltf", "{\"asset\":{\"version\":\"2.0\"},\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{}]}");
+    write_file(folder / "a.gltf",
+               "{\"asset\":{\"version\":\"2.0\"},\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{}]}");
     expect_failure(run_ewa({"dataset", folder / "a.gltf", "-o", folder / "d"}), 2, "a.gltf");
     expect_failure(run_ewa({"dataset", folder / "none.gltf", "-o", folder / "d"}), 2, "none.gltf");
     EXPECT_FALSE(fs::exists(folder / "d"));
@@ -91,16 +95,18 @@ TEST(Dataset, ADiffuseSceneTrainsWithoutShAndThePlanSaysSo) {
     ASSERT_EQ(run_ewa(small("plaster.gltf", folder / "d")).status, 0);
     EXPECT_EQ(read_json(folder / "d/transforms.json")["view_dependent"], false);
     EXPECT_NE(run_ewa({"info", folder / "d"}).out.find("does not depend on the view"), std::string::npos);
-    const Outcome trained = run_ewa({"train", folder / "d", "-o", folder / "out", "--steps", "2", "--verbose"});
+    const Outcome trained =
+        run_ewa({"train", folder / "d", "-o", folder / "out", "--steps", "2", "--verbose"});
     ASSERT_EQ(trained.status, 0) << trained.err;
-    EXPECT_NE(trained.out.find("left out: SH degrees 1 to 3 (the dataset says that no colour depends on the view, saves"),
+    EXPECT_NE(trained.out.find(
+                  "left out: SH degrees 1 to 3 (the dataset says that no colour depends on the view, saves"),
               std::string::npos)
         << trained.out;
     EXPECT_EQ(read_json(folder / "out/config.json")["sh-degree"], 0);
     EXPECT_NE(read_file(folder / "out/splats.ply").find("property"), std::string::npos);
     EXPECT_EQ(read_file(folder / "out/splats.ply").find("f_rest_0"), std::string::npos);
-    const Outcome asked =
-        run_ewa({"train", folder / "d", "-o", folder / "out2", "--steps", "2", "--verbose", "--sh-degree", "2"});
+    const Outcome asked = run_ewa(
+        {"train", folder / "d", "-o", folder / "out2", "--steps", "2", "--verbose", "--sh-degree", "2"});
     ASSERT_EQ(asked.status, 0) << asked.err;
     EXPECT_EQ(asked.out.find("no colour depends on the view"), std::string::npos);
     EXPECT_EQ(read_json(folder / "out2/config.json")["sh-degree"], 2);
@@ -120,16 +126,19 @@ TEST(Dataset, TrainPhotographsAMeshSceneFirst) {
     scene["meshes"] = {{{"primitives", {{{"attributes", {{"POSITION", 0}}}}}}}};
     scene["accessors"] = {{{"bufferView", 0}, {"componentType", 5126}, {"type", "VEC3"}, {"count", 3}}};
     scene["bufferViews"] = {{{"buffer", 0}, {"byteLength", 36}}};
-    scene["buffers"] = {{{"byteLength", 36},
-                         {"uri", "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}}};
+    scene["buffers"] = {
+        {{"byteLength", 36},
+         {"uri", "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}}};
     write_file(folder / "leaf.gltf", scene.dump());
     const Outcome outcome = run_ewa({"train", folder / "leaf.gltf", "-o", folder / "out", "--steps", "2"});
     ASSERT_EQ(outcome.status, 0) << outcome.err;
-    EXPECT_NE(outcome.out.find("leaf: 7 views to train on, 1 held out, 256x256"), std::string::npos) << outcome.out;
+    EXPECT_NE(outcome.out.find("leaf: 7 views to train on, 1 held out, 256x256"), std::string::npos)
+        << outcome.out;
     EXPECT_TRUE(fs::exists(folder / "out/dataset/transforms.json"));
     EXPECT_TRUE(fs::exists(folder / "out/splats.ply"));
     EXPECT_EQ(read_json(folder / "out/config.json")["dataset"], folder / "leaf.gltf");
-    const Outcome again = run_ewa({"train", folder / "leaf.gltf", "-o", folder / "out", "--steps", "2", "--resume"});
+    const Outcome again =
+        run_ewa({"train", folder / "leaf.gltf", "-o", folder / "out", "--steps", "2", "--resume"});
     EXPECT_EQ(again.status, 0) << again.err;
     EXPECT_NE(again.out.find("8 were there already"), std::string::npos) << again.out;
     expect_failure(run_ewa({"train", folder / "none.glb", "-o", folder / "out3"}), 2, "none.glb");

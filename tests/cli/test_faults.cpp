@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Faults met in the middle of a training: one clear line, and what was saved is whole and goes on to the bytes of an
-// undisturbed run. faults/faults.cpp injects them.
+// Faults met in the middle of a training: one clear line, and what was saved is whole and goes on to the
+// bytes of an undisturbed run. faults/faults.cpp injects them.
 #include <gtest/gtest.h>
 
 #include <csignal>
@@ -20,7 +20,8 @@ class Faults : public testing::Test {
         make_splats(folder / "s.ply");
     }
     Outcome train(const std::string& out, const Names& more = {}, const Circumstances& circumstances = {}) {
-        Names arguments{"train", folder / "data", "-o", folder / out, "--init", folder / "s.ply", "--quiet", "--resume"};
+        Names arguments{"train",  folder / "data",  "-o",      folder / out,
+                        "--init", folder / "s.ply", "--quiet", "--resume"};
         const Names defaults{"--steps", "60", "--seed", "4", "--strategy", "none", "--save-every", "5"};
         for (size_t i = 0; i < defaults.size(); i += 2)
             if (std::find(more.begin(), more.end(), defaults[i]) == more.end())
@@ -73,7 +74,8 @@ TEST_F(Faults, DeviceLost) {
     }
     const std::string splats = folder / "s.ply", data = folder / "data";
     const Circumstances lost = with("EWA_FAULT_SUBMITS", "1");
-    expect_failure(run_ewa({"render", splats, "--cameras", data, "-o", folder / "r", "--quiet"}, lost), 1, "lost");
+    expect_failure(run_ewa({"render", splats, "--cameras", data, "-o", folder / "r", "--quiet"}, lost), 1,
+                   "lost");
     expect_failure(run_ewa({"eval", splats, data, "--split", "all"}, lost), 1, "lost");
     expect_failure(run_ewa({"grad", splats, data, "--frame", "0", "-o", folder / "g.ply"}, lost), 1, "lost");
     EXPECT_FALSE(fs::exists(folder / "g.ply"));
@@ -86,7 +88,8 @@ TEST_F(Faults, FullDisk) {
         if (outcome.status == 0) continue;
         expect_failure(outcome, 1, "No space left");
         EXPECT_NE(outcome.err.find("/o/"), std::string::npos) << outcome.err;
-        for (const std::string& file : files_below(folder / "o")) EXPECT_EQ(file.find(".tmp"), std::string::npos) << file;
+        for (const std::string& file : files_below(folder / "o"))
+            EXPECT_EQ(file.find(".tmp"), std::string::npos) << file;
     }
     expect_failure(train("p", {}, with("EWA_FAULT_BYTES", "100")), 1, "No space left");
     expect_goes_on("o");
@@ -99,10 +102,11 @@ TEST_F(Faults, ReadOnlyFolder) {
     expect_failure(train("o", {}, closed), 1, "Read-only");
     EXPECT_EQ(read_file(folder / "o/splats.ply"), before);
     const std::string splats = folder / "s.ply", data = folder / "data";
-    expect_failure(run_ewa({"render", splats, "--cameras", data, "-o", folder / "o", "--quiet"}, closed), 1, "Read-only");
+    expect_failure(run_ewa({"render", splats, "--cameras", data, "-o", folder / "o", "--quiet"}, closed), 1,
+                   "Read-only");
     expect_failure(run_ewa({"convert", splats, folder / "o/s.spz"}, closed), 1, "Read-only");
-    expect_failure(run_ewa({"compare", folder / "data/images/0.png", folder / "data/images/1.png", "--heat-map",
-                            folder / "o/m.png"},
+    expect_failure(run_ewa({"compare", folder / "data/images/0.png", folder / "data/images/1.png",
+                            "--heat-map", folder / "o/m.png"},
                            closed),
                    1, "Read-only");
 }

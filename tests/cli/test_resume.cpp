@@ -117,9 +117,8 @@ TEST_F(ResumeEdges, RefusesWhatWouldEndDifferently) {
     refused({"--background", "1,1,1"}, "--background");
     refused({"--sh-degree", "1"}, "--sh-degree");
     refused({"--test-every", "2"}, "another dataset");
-    expect_success(
-        train("o", {"--steps", "6", "--seed", "1", "--resume", "--eval-every", "2", "--save-every", "3",
-                    "--image-cache", "1"}));
+    expect_success(train("o", {"--steps", "6", "--seed", "1", "--resume", "--eval-every", "2", "--save-every",
+                               "3", "--image-cache", "1"}));
 
     fs::copy_file(folder / "data/images/1.png", folder / "data/images/2.png",
                   fs::copy_options::overwrite_existing);

@@ -47,8 +47,8 @@ int refuse() {
 
 extern "C" {
 
-VkResult vkAllocateMemory(VkDevice device, const VkMemoryAllocateInfo* info, const VkAllocationCallbacks* callbacks,
-                          VkDeviceMemory* memory) {
+VkResult vkAllocateMemory(VkDevice device, const VkMemoryAllocateInfo* info,
+                          const VkAllocationCallbacks* callbacks, VkDeviceMemory* memory) {
     static std::atomic<long> calls{0};
     if (due("EWA_FAULT_ALLOCATIONS", calls)) return VK_ERROR_OUT_OF_DEVICE_MEMORY;
     return next<PFN_vkAllocateMemory>("vkAllocateMemory")(device, info, callbacks, memory);
@@ -60,7 +60,8 @@ VkResult vkQueueSubmit(VkQueue queue, uint32_t count, const VkSubmitInfo* submit
     return next<PFN_vkQueueSubmit>("vkQueueSubmit")(queue, count, submits, fence);
 }
 
-VkResult vkWaitForFences(VkDevice device, uint32_t count, const VkFence* fences, VkBool32 all, uint64_t timeout) {
+VkResult vkWaitForFences(VkDevice device, uint32_t count, const VkFence* fences, VkBool32 all,
+                         uint64_t timeout) {
     static std::atomic<long> calls{0};
     // The driver here is not lost in truth, and works on: what it works with may go only once it has ended.
     const VkResult result = next<PFN_vkWaitForFences>("vkWaitForFences")(device, count, fences, all, timeout);
@@ -72,7 +73,8 @@ ssize_t write(int file, const void* bytes, size_t count) {
     const auto real = next<ssize_t (*)(int, const void*, size_t)>("write");
     const char* room = std::getenv("EWA_FAULT_BYTES");
     struct stat status {};
-    if (!room || fstat(file, &status) != 0 || !S_ISREG(status.st_mode) || file <= 2) return real(file, bytes, count);
+    if (!room || fstat(file, &status) != 0 || !S_ISREG(status.st_mode) || file <= 2)
+        return real(file, bytes, count);
     const long left = std::atol(room) - written;
     if (left <= 0) {
         errno = ENOSPC;

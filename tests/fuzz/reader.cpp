@@ -72,7 +72,8 @@ void check_scene(const mesh::Scene& scene) {
     }
     const auto within = [](int index, size_t size) { return index >= -1 && index < static_cast<int>(size); };
     for (const mesh::Material& m : scene.materials) {
-        EWA_REQUIRE(within(m.base_texture, scene.textures.size()) && within(m.metal_texture, scene.textures.size()));
+        EWA_REQUIRE(within(m.base_texture, scene.textures.size()) &&
+                    within(m.metal_texture, scene.textures.size()));
         EWA_REQUIRE(within(m.emitted_texture, scene.textures.size()));
         EWA_REQUIRE(m.opacity >= 0 && m.opacity <= 1 && m.emitted.x >= 0 && m.emitted.x < 1e30f);
     }

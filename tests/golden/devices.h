@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every Vulkan device that ewa can use, each opened once with the validation layer listening. EWA_TEST_DEVICE names one.
+// Every Vulkan device that ewa can use, each opened once with the validation layer listening. EWA_TEST_DEVICE
+// names one.
 #pragma once
 #include <cstdlib>
 #include <memory>

@@ -34,9 +34,8 @@ Image as_rgb(const Image& image) {
 
 void write_png16(const fs::path& path, const Image& image) {
     std::vector<uint16_t> words(image.pixels.size());
-    std::transform(image.pixels.begin(), image.pixels.end(), words.begin(), [](float v) {
-        return uint16_t(std::lround(65535 * std::clamp(double(v), 0.0, 1.0)));
-    });
+    std::transform(image.pixels.begin(), image.pixels.end(), words.begin(),
+                   [](float v) { return uint16_t(std::lround(65535 * std::clamp(double(v), 0.0, 1.0))); });
     const auto output = OIIO::ImageOutput::create("png");
     OIIO::ImageSpec spec(image.width, image.height, image.channels, OIIO::TypeDesc::UINT16);
     spec.attribute("png:compressionLevel", 9);
@@ -61,19 +60,23 @@ void write_page(const fs::path& folder) {
     for (const auto& entry : fs::directory_iterator(folder))
         if (fs::exists(entry.path() / "told.txt")) cases.push_back(entry.path().filename());
     std::sort(cases.begin(), cases.end());
-    std::string html = "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Golden images</title>\n<style>" +
-                       std::string(report::kStyle) +
-                       ".trio img { image-rendering: pixelated; }</style></head>\n<body><main><h1>Golden images</h1>\n";
+    std::string html =
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Golden "
+        "images</title>\n<style>" +
+        std::string(report::kStyle) +
+        ".trio img { image-rendering: pixelated; }</style></head>\n<body><main><h1>Golden images</h1>\n";
     html += cases.empty() ? "<p>All pass.</p>\n" : fmt::format("<p class=\"soft\">{}</p>\n", kHowToAccept);
     for (const fs::path& name : cases) {
         std::ifstream file(folder / name / "told.txt");
         std::ostringstream told;
         told << file.rdbuf();
-        html += fmt::format("<figure class=\"view\"><figcaption><b>{}</b> <span class=\"soft\">{}</span></figcaption>"
-                            "<div class=\"trio\">\n",
-                            report::escape_html(name.string()), report::escape_html(told.str()));
+        html += fmt::format(
+            "<figure class=\"view\"><figcaption><b>{}</b> <span class=\"soft\">{}</span></figcaption>"
+            "<div class=\"trio\">\n",
+            report::escape_html(name.string()), report::escape_html(told.str()));
         for (const char* picture : {"reference", "candidate", "difference"})
-            html += fmt::format("<div><img alt=\"{0}\" src=\"{1}/{0}.png\">{0}</div>\n", picture, name.string());
+            html +=
+                fmt::format("<div><img alt=\"{0}\" src=\"{1}/{0}.png\">{0}</div>\n", picture, name.string());
         html += "</div></figure>\n";
     }
     core::write_text_file(folder / "index.html", html + "</main></body></html>\n");
@@ -102,8 +105,9 @@ testing::AssertionResult matches_golden(const std::string& name, const Image& ca
     const Image picture = as_rgb(candidate);
     const auto fail = [&](const Image* reference, double scale, const std::string& told) {
         leave_pictures(left, picture, reference, scale, told);
-        return testing::AssertionFailure() << name << " on " << maker << ": " << told << "; see "
-                                           << (folders.failures / "index.html").string() << "; " << kHowToAccept;
+        return testing::AssertionFailure()
+               << name << " on " << maker << ": " << told << "; see "
+               << (folders.failures / "index.html").string() << "; " << kHowToAccept;
     };
     if (!fs::exists(reference_path)) return fail(nullptr, 1, "there is no reference");
     const Image reference = load_image(reference_path);
@@ -113,8 +117,9 @@ testing::AssertionResult matches_golden(const std::string& name, const Image& ca
                                 reference.width, reference.height));
     const ImageDifference d = compare_images(picture, reference, tolerance.typical);
     const std::string told = fmt::format(
-        "max error {:.3g} (allowed {:.3g}) at {},{}; {} px over {:.3g} (allowed {}); PSNR {:.1f} dB", d.max_error,
-        tolerance.max_error, d.max_x, d.max_y, d.over, tolerance.typical, tolerance.over, d.psnr);
+        "max error {:.3g} (allowed {:.3g}) at {},{}; {} px over {:.3g} (allowed {}); PSNR {:.1f} dB",
+        d.max_error, tolerance.max_error, d.max_x, d.max_y, d.over, tolerance.typical, tolerance.over,
+        d.psnr);
     if (std::getenv("EWA_GOLDEN_TELL")) fmt::print("    {}: {}\n", name, told);
     if (d.max_error <= tolerance.max_error && d.over <= tolerance.over) {
         if (fs::remove_all(left) > 0) write_page(folders.failures);
@@ -123,8 +128,10 @@ testing::AssertionResult matches_golden(const std::string& name, const Image& ca
     return fail(&reference, std::max(4 * tolerance.max_error, 1e-3), told);
 }
 
-testing::AssertionResult is_reference(const std::string& name, const Image& truth, const GoldenFolders& folders) {
-    if (!in_range(truth)) return testing::AssertionFailure() << name << ": values outside 0..1 cannot be kept";
+testing::AssertionResult is_reference(const std::string& name, const Image& truth,
+                                      const GoldenFolders& folders) {
+    if (!in_range(truth))
+        return testing::AssertionFailure() << name << ": values outside 0..1 cannot be kept";
     const fs::path path = folders.references / (name + ".png");
     if (std::getenv("EWA_GOLDEN_ACCEPT")) {
         fs::create_directories(folders.references);

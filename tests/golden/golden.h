@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pictures under test against references that are kept in tests/golden/references.
 //
-// References are 16-bit PNGs of what the float64 twin, or a formula in the test, says; never of what the code under
-// test made. scripts/golden-accept writes
-// new ones. What fails leaves candidate, reference and difference in
-// build/release/golden, and index.html there shows them side by side.
+// References are 16-bit PNGs of what the float64 twin, or a formula in the test, says; never of what the code
+// under test made. scripts/golden-accept writes new ones. What fails leaves candidate, reference and
+// difference in build/release/golden, and index.html there shows them side by side.
 #pragma once
 #include <gtest/gtest.h>
 
@@ -16,8 +15,8 @@
 
 namespace ewa::test {
 
-/// A candidate passes where no value is further from the reference than max_error, and at most `over` pixels have one
-/// that is further than `typical`. Both include the reference's rounding, 8e-6.
+/// A candidate passes where no value is further from the reference than max_error, and at most `over` pixels
+/// have one that is further than `typical`. Both include the reference's rounding, 8e-6.
 struct Tolerance {
     double max_error = 0;
     double typical = 0;

@@ -46,7 +46,8 @@ void add(Gaussians& g, const glm::dvec3& mean, const glm::dvec3& scale, double o
     for (int k = 0; k < 3; ++k) {
         g.means[3 * i + size_t(k)] = float(mean[k]);
         g.log_scales[3 * i + size_t(k)] = float(std::log(scale[k]));
-        g.sh[g.sh_stride() * i + size_t(k)] = float((color[size_t(k)] - shared::COLOR_OFFSET) / shared::SH_C0);
+        g.sh[g.sh_stride() * i + size_t(k)] =
+            float((color[size_t(k)] - shared::COLOR_OFFSET) / shared::SH_C0);
     }
     const double wxyz[] = {turn.w, turn.x, turn.y, turn.z};
     for (size_t k = 0; k < 4; ++k) g.quaternions[4 * i + k] = float(wxyz[k]);
@@ -67,8 +68,8 @@ GoldenScene one_splat() {
     return s;
 }
 
-/// A wall of splats all round the camera, each of which has the same coefficients of one degree: the picture is those
-/// spherical harmonics over the directions. channel[j] has the coefficient j of the degree.
+/// A wall of splats all round the camera, each of which has the same coefficients of one degree: the picture
+/// is those spherical harmonics over the directions. channel[j] has the coefficient j of the degree.
 GoldenScene sh_lobes(const std::string& name, int degree, const std::vector<int>& channel) {
     GoldenScene s{name, {}, plain_camera(30), {}, Shown::color, 0.5, kEdges};
     const glm::dquat turn = about({0.3, 1, 0.2}, 50);
@@ -88,7 +89,8 @@ GoldenScene sh_lobes(const std::string& name, int degree, const std::vector<int>
     return s;
 }
 
-/// Discs one before another, their order in depth not that of the file; below, discs of equal depth, which go by index.
+/// Discs one before another, their order in depth not that of the file; below, discs of equal depth, which go
+/// by index.
 GoldenScene overlap_order() {
     GoldenScene s{"overlap_order", {}, plain_camera(), {}, Shown::color, 1, kEdges};
     const glm::dvec3 size(0.45, 0.45, 0.01);
@@ -131,7 +133,8 @@ GoldenScene opaque_stop() {
     s.options.background = {1, 1, 1};
     const Color colors[] = {{0, 0, 0}, {0, 0, 1}, {0, 1, 0}, {1, 0, 0}};
     for (int i = 0; i < 4; ++i)
-        add(s.gaussians, {0.45 * (i - 1.5), 0, 4.0 + i}, glm::dvec3(4.0 + i, 4.0 + i, 0.01), 0.9999, colors[i]);
+        add(s.gaussians, {0.45 * (i - 1.5), 0, 4.0 + i}, glm::dvec3(4.0 + i, 4.0 + i, 0.01), 0.9999,
+            colors[i]);
     return s;
 }
 
@@ -140,7 +143,8 @@ GoldenScene faint() {
     GoldenScene s{"faint", {}, plain_camera(), {}, Shown::color, 20, {0.09, 2e-5, 6}};
     const double opacities[] = {0.0038, 0.00393, 0.006, 0.012, 0.03};
     for (int i = 0; i < 5; ++i)
-        add(s.gaussians, {0.75 * (i - 2), 0.2 * (i % 2), 4}, glm::dvec3(0.3), opacities[i], {1, 1 - 0.2 * i, 0.5});
+        add(s.gaussians, {0.75 * (i - 2), 0.2 * (i % 2), 4}, glm::dvec3(0.3), opacities[i],
+            {1, 1 - 0.2 * i, 0.5});
     return s;
 }
 
@@ -154,14 +158,14 @@ GoldenScene far_from_origin() {
     Random random(71);
     for (int i = 0; i < 40; ++i) {
         const glm::dvec3 view(random.uniform(-7, 7), random.uniform(-5, 5), random.uniform(10, 20));
-        add(s.gaussians, eye + turn * view, glm::dvec3(random.uniform(0.4, 1), random.uniform(0.2, 0.6), 0.3), 0.8,
-            {random.uniform(), random.uniform(), random.uniform()}, about({0, 0, 1}, 20.0 * i));
+        add(s.gaussians, eye + turn * view, glm::dvec3(random.uniform(0.4, 1), random.uniform(0.2, 0.6), 0.3),
+            0.8, {random.uniform(), random.uniform(), random.uniform()}, about({0, 0, 1}, 20.0 * i));
     }
     return s;
 }
 
-/// Unequal focal lengths, a principal point in a corner, and splats beyond the borders that reach in: there the
-/// projection's slope is held.
+/// Unequal focal lengths, a principal point in a corner, and splats beyond the borders that reach in: there
+/// the projection's slope is held.
 GoldenScene off_centre() {
     GoldenScene s{"off_centre", {}, plain_camera(), {}, Shown::color, 1, kEdges};
     s.camera.fx = 70;
@@ -207,8 +211,13 @@ GoldenScene poisoned() {
 GoldenScene still_life() {
     const Dataset dataset =
         load_dataset(std::filesystem::path(EWA_SOURCE_DIR) / "scenes/still_life", {.downscale = 4});
-    GoldenScene s{"still_life_points", gaussians_from_points(dataset.points, 0), dataset.frames.at(5).camera, {},
-                  Shown::color, 1, kEdges};
+    GoldenScene s{"still_life_points",
+                  gaussians_from_points(dataset.points, 0),
+                  dataset.frames.at(5).camera,
+                  {},
+                  Shown::color,
+                  1,
+                  kEdges};
     for (float& value : s.gaussians.opacity_logits) value = float(logit(0.7));
     return s;
 }
@@ -223,7 +232,8 @@ GoldenScene sub_pixel_scene(Kernel kernel) {
         const double z = random.uniform(3, 6), px = z / s.camera.fx;
         add(s.gaussians, {random.uniform(-30, 30) * px, random.uniform(-22, 22) * px, z},
             {random.uniform(0.02, 0.7) * px, random.uniform(0.02, 0.4) * px, 0.1 * px}, 0.95,
-            {random.uniform(0.3, 1), random.uniform(0.3, 1), random.uniform(0.3, 1)}, about({0, 0, 1}, 37.0 * i));
+            {random.uniform(0.3, 1), random.uniform(0.3, 1), random.uniform(0.3, 1)},
+            about({0, 0, 1}, 37.0 * i));
     }
     return s;
 }

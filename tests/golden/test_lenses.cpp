@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A pattern photographed through each kind of lens, and undistorted: what comes out is the pattern itself, as the pinhole
-// camera sees it. The photograph is made by inverting the lens's formula, written out here once more.
+// A pattern photographed through each kind of lens, and undistorted: what comes out is the pattern itself, as
+// the pinhole camera sees it. The photograph is made by inverting the lens's formula, written out here once
+// more.
 #include <cmath>
 #include <functional>
 #include <glm/geometric.hpp>
@@ -51,8 +52,8 @@ std::vector<LensCase> lens_cases() {
     const auto rad_tan = [](Vec ray) {
         const Vec q = fisheye_plane(ray);
         const double r2 = glm::dot(q, q);
-        const Vec p = q * (1 + 0.03 * r2 - 0.01 * r2 * r2 + 0.004 * std::pow(r2, 3) - 0.002 * std::pow(r2, 4) +
-                           0.001 * std::pow(r2, 5) - 0.0003 * std::pow(r2, 6));
+        const Vec p = q * (1 + 0.03 * r2 - 0.01 * r2 * r2 + 0.004 * std::pow(r2, 3) -
+                           0.002 * std::pow(r2, 4) + 0.001 * std::pow(r2, 5) - 0.0003 * std::pow(r2, 6));
         const double p2 = glm::dot(p, p);
         // This model's first tangential parameter is the one along x.
         return p + tangential(p, -0.03, 0.02) + p2 * Vec(0.02 - 0.01 * p2, 0.015 + 0.005 * p2);
@@ -63,15 +64,22 @@ std::vector<LensCase> lens_cases() {
     };
     const auto division = [](Vec q) { return q * (2 / (1 + std::sqrt(1 + 4 * 0.2 * glm::dot(q, q)))); };
     const auto unified = [](Vec q) { return q / (0.6 * std::sqrt(1.1 * glm::dot(q, q) + 1) + 0.4); };
-    return {{"lens_brown", "FULL_OPENCV", {53, 51, 33, 23, 0.3, 0.1, 0.01, -0.02, 0.02, 0.4, 0.1, 0.01}, full_opencv},
-            {"lens_fisheye", "THIN_PRISM_FISHEYE",
-             {40, 39, 33, 23, 0.03, -0.01, 0.02, -0.03, 0.004, -0.001, 0.03, -0.02}, thin_prism},
-            {"lens_fisheye624", "RAD_TAN_THIN_PRISM_FISHEYE",
-             {40, 39, 33, 23, 0.03, -0.01, 0.004, -0.002, 0.001, -0.0003, 0.02, -0.03, 0.02, -0.01, 0.015, 0.005},
-             rad_tan},
-            {"lens_fov", "FOV", {53, 51, 33, 23, 0.9}, fov},
-            {"lens_division", "SIMPLE_DIVISION", {53, 33, 23, -0.2}, division},
-            {"lens_unified", "EUCM", {44, 43, 33, 23, 0.6, 1.1}, unified}};
+    return {
+        {"lens_brown",
+         "FULL_OPENCV",
+         {53, 51, 33, 23, 0.3, 0.1, 0.01, -0.02, 0.02, 0.4, 0.1, 0.01},
+         full_opencv},
+        {"lens_fisheye",
+         "THIN_PRISM_FISHEYE",
+         {40, 39, 33, 23, 0.03, -0.01, 0.02, -0.03, 0.004, -0.001, 0.03, -0.02},
+         thin_prism},
+        {"lens_fisheye624",
+         "RAD_TAN_THIN_PRISM_FISHEYE",
+         {40, 39, 33, 23, 0.03, -0.01, 0.004, -0.002, 0.001, -0.0003, 0.02, -0.03, 0.02, -0.01, 0.015, 0.005},
+         rad_tan},
+        {"lens_fov", "FOV", {53, 51, 33, 23, 0.9}, fov},
+        {"lens_division", "SIMPLE_DIVISION", {53, 33, 23, -0.2}, division},
+        {"lens_unified", "EUCM", {44, 43, 33, 23, 0.6, 1.1}, unified}};
 }
 
 /// Smooth over the directions, without symmetry, of another rhythm in each colour.

@@ -2,7 +2,6 @@
 // The twin's pictures are the references; the devices' pictures are compared with them.
 #include <algorithm>
 #include <cmath>
-#include <algorithm>
 #include <set>
 
 #include "ewa/renderer.h"
@@ -57,8 +56,8 @@ TEST_P(GoldenSceneTest, DevicesAgree) {
 INSTANTIATE_TEST_SUITE_P(Golden, GoldenSceneTest, testing::ValuesIn(golden_scenes()),
                          [](const auto& test) { return test.param.name; });
 
-/// On the axis a ball of radius s at depth z is a round footprint of variance (f s / z)^2 + LOW_PASS: no twin is needed
-/// to know the picture.
+/// On the axis a ball of radius s at depth z is a round footprint of variance (f s / z)^2 + LOW_PASS: no twin
+/// is needed to know the picture.
 TEST(GoldenOneSplat, ReferenceIsTheClosedForm) {
     const int width = 64, height = 48;
     const double variance = std::pow(60 * 0.6 / 4, 2) + 0.3, color[] = {0.9, 0.6, 0.2};
@@ -75,13 +74,15 @@ TEST(GoldenOneSplat, ReferenceIsTheClosedForm) {
     EXPECT_TRUE(matches_golden("one_splat", expected, {1e-5, 1e-5, 0}, "closed form"));
 }
 
-/// What --antialias is for: the mean over many rays through each pixel. The peak kernel draws sub-pixel splats too large.
+/// What --antialias is for: the mean over many rays through each pixel. The peak kernel draws sub-pixel
+/// splats too large.
 TEST(GoldenAntialias, IsNearerToSupersampling) {
     constexpr int kFactor = 8;
     GoldenScene fine = sub_pixel_scene(Kernel::peak);
     fine.camera.width *= kFactor;
     fine.camera.height *= kFactor;
-    for (double* length : {&fine.camera.fx, &fine.camera.fy, &fine.camera.cx, &fine.camera.cy}) *length *= kFactor;
+    for (double* length : {&fine.camera.fx, &fine.camera.fy, &fine.camera.cx, &fine.camera.cy})
+        *length *= kFactor;
     for (const auto& device : all_devices()) {
         const Image truth = downscale(device_picture(device, fine), kFactor);
         const double antialiased = psnr(device_picture(device, sub_pixel_scene(Kernel::antialias)), truth);
@@ -124,7 +125,8 @@ TEST(GoldenComparer, FailsAndLeavesPicturesAndAPage) {
     const auto page = [&] { return file_bytes(folder / "failures/index.html"); };
     EXPECT_FALSE(matches_golden("s", wrong, tolerance, "d", folders));
     for (const char* picture : {"candidate", "reference", "difference"}) {
-        EXPECT_TRUE(std::filesystem::exists(folder / "failures/s@d" / (std::string(picture) + ".png"))) << picture;
+        EXPECT_TRUE(std::filesystem::exists(folder / "failures/s@d" / (std::string(picture) + ".png")))
+            << picture;
         EXPECT_NE(page().find("s@d/" + std::string(picture)), std::string::npos) << picture;
     }
     // Once it passes, its pictures are gone.
@@ -142,7 +144,8 @@ TEST(GoldenReferences, AreSmallAndAllUsed) {
         const std::string name = entry.path().stem().string();
         if (expected.erase(name) == 0) {
             ++others;
-            EXPECT_TRUE(name.starts_with("lens_") || name.starts_with("training_")) << name << " is no scene's";
+            EXPECT_TRUE(name.starts_with("lens_") || name.starts_with("training_"))
+                << name << " is no scene's";
         }
         // A picture of one colour would show nothing.
         const Image image = load_image(entry.path());

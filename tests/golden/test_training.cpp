@@ -36,7 +36,8 @@ TrainOptions training_options() {
     return options;
 }
 
-/// The truth, moved a little and of another colour: not round, since the gradient of a ball's rotation is rounding alone.
+/// The truth, moved a little and of another colour: not round, since the gradient of a ball's rotation is
+/// rounding alone.
 Gaussians training_start(const Synthetic& data) {
     Gaussians start;
     start.sh_degree = 1;
@@ -56,7 +57,8 @@ Gaussians training_start(const Synthetic& data) {
 
 Camera held_out_camera(const Synthetic& data) {
     Camera camera = data.dataset.frames[0].camera;
-    const glm::dmat3 turn(0.8, 0, -0.6, 0, 1, 0, 0.6, 0, 0.8);  // about y; the cameras of the ring stand at other angles
+    const glm::dmat3 turn(0.8, 0, -0.6, 0, 1, 0, 0.6, 0,
+                          0.8);  // about y; the cameras of the ring stand at other angles
     camera.rotation = camera.rotation * turn;
     return camera;
 }

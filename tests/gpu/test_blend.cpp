@@ -50,7 +50,8 @@ struct Lists {
     }
 
   private:
-    /// The tiles' bounds, and the end of the list with `promised` instances more that stand behind the last tile.
+    /// The tiles' bounds, and the end of the list with `promised` instances more that stand behind the last
+    /// tile.
     static std::vector<uint32_t> bounds(const reference::Instances& instances, size_t promised) {
         std::vector<uint32_t> out(instances.first_of_tile.begin(), instances.first_of_tile.end());
         out.push_back(uint32_t(out.back() + promised));
@@ -103,8 +104,8 @@ TEST_P(BlendPass, PlanesAreTheTwins) {
         const uint32_t planes = with_depth ? 5 : 4;
         Guarded out("planes", uint64_t(lists.sizes.plane_floats) * planes * 4);
         r.run([&](gpu::Recording& recording) {
-            r.kernels.get<passes::Blend>(with_depth).record(
-                recording, r.shape(), {lists.records, lists.splats, lists.starts, out}, lists.push());
+            r.kernels.get<passes::Blend>(with_depth)
+                .record(recording, r.shape(), {lists.records, lists.splats, lists.starts, out}, lists.push());
         });
         EXPECT_TRUE(out.intact());
         const auto actual = out.read<float>();
@@ -119,7 +120,8 @@ TEST_P(BlendPass, PlanesAreTheTwins) {
                 for (int k = 0; k < 3; ++k)
                     color.add(std::abs(plane(uint32_t(k)) - b.color.at(x, y)[k]), 4e-6);
                 color.add(std::abs(plane(shared::PLANE_T) - b.transmittance.at(x, y)[0]), 4e-6);
-                if (with_depth) depth.add(std::abs(plane(shared::PLANE_DEPTH) - b.depth_sum.at(x, y)[0]), 1e-5);
+                if (with_depth)
+                    depth.add(std::abs(plane(shared::PLANE_DEPTH) - b.depth_sum.at(x, y)[0]), 1e-5);
             }
         const size_t pixels = size_t(c.width) * size_t(c.height);
         if (with_depth)
@@ -201,8 +203,7 @@ TEST_P(BlendBackwardPass, SlotsAreTheTwinsMoments) {
         slots("slots", std::max<uint64_t>(lists.count(), 1) * shared::SLOT_FLOATS * 4, gpu::Texel::rgba32f);
     r.run([&](gpu::Recording& recording) {
         r.kernels.get<passes::BlendBackward>(1u).record(
-            recording, r.shape(),
-            {lists.records, lists.splats, lists.starts, planes, incoming, slots},
+            recording, r.shape(), {lists.records, lists.splats, lists.starts, planes, incoming, slots},
             lists.push());
     });
     EXPECT_TRUE(slots.intact());
@@ -250,13 +251,15 @@ TEST(BlendBackwardSlots, BehindTheLastTileAreZero) {
     Rig& r = rig();
     const std::vector<float> stale((lists.count() + promised) * shared::SLOT_FLOATS, 7.0f);
     Guarded planes("planes", uint64_t(lists.sizes.plane_floats) * 16, gpu::Texel::rgba32f),
-        incoming("image gradient", std::vector<float>(size_t(lists.sizes.plane_floats) * 3, 1.0f), gpu::Texel::rgba32f),
+        incoming("image gradient", std::vector<float>(size_t(lists.sizes.plane_floats) * 3, 1.0f),
+                 gpu::Texel::rgba32f),
         slots("slots", stale, gpu::Texel::rgba32f);
     r.run([&](gpu::Recording& recording) {
         r.kernels.get<passes::Blend>(false).record(
             recording, r.shape(), {lists.records, lists.splats, lists.starts, planes}, lists.push());
         r.kernels.get<passes::BlendBackward>(0u).record(
-            recording, r.shape(), {lists.records, lists.splats, lists.starts, planes, incoming, slots}, lists.push());
+            recording, r.shape(), {lists.records, lists.splats, lists.starts, planes, incoming, slots},
+            lists.push());
     });
     expect_intact({&slots});
     const auto written = slots.read<float>();
@@ -278,8 +281,7 @@ size_t check_one_tile(const Scene& scene) {
         r.kernels.get<passes::Blend>(false).record(
             recording, r.shape(), {lists.records, lists.splats, lists.starts, planes}, lists.push());
         r.kernels.get<passes::BlendBackward>(1u).record(
-            recording, r.shape(),
-            {lists.records, lists.splats, lists.starts, planes, incoming, slots},
+            recording, r.shape(), {lists.records, lists.splats, lists.starts, planes, incoming, slots},
             lists.push());
     });
     expect_intact({&planes, &slots});

@@ -20,8 +20,8 @@ inline std::shared_ptr<gpu::Device> device() {
     return opened;
 }
 
-/// The same without the layer, for sizes that a software driver binds and the layer, by the driver's own numbers,
-/// objects to.
+/// The same without the layer, for sizes that a software driver binds and the layer, by the driver's own
+/// numbers, objects to.
 inline std::shared_ptr<gpu::Device> unchecked_device() {
     static const std::shared_ptr<gpu::Device> opened = [] {
         DeviceOptions options;

@@ -69,8 +69,7 @@ class ExposedLoss : public testing::TestWithParam<std::pair<int, int>> {};
 TEST_P(ExposedLoss, GradientsAndAdamsStepAreTheTwins) {
     const auto [width, height] = GetParam();
     Inputs s(width, height);
-    GuardedFrame guarded(rig().shape(),
-                         {1, uint32_t(width), uint32_t(height), 1, true, false, false, true});
+    GuardedFrame guarded(rig().shape(), {1, uint32_t(width), uint32_t(height), 1, true, false, false, true});
     pipeline::Frame& frame = guarded.frame;
 
     reference::Exposure exposure = wide(s.start[kPhoto]);
@@ -132,8 +131,8 @@ TEST(Exposure, LearnsNothingFromWhatIsMasked) {
     guarded.frame.planes.upload(std::span<const float>(planes));
     const gpu::Buffer texels = pipeline::upload_photo(*device(), masked);
     const pipeline::CameraUse camera{nullptr, 0, 40, 30};
-    s.exposures.values.upload(std::span<const Exposure>(
-        std::vector<Exposure>(kPhotos, kIdentityExposure)));  // where nothing pulls
+    s.exposures.values.upload(
+        std::span<const Exposure>(std::vector<Exposure>(kPhotos, kIdentityExposure)));  // where nothing pulls
     const pipeline::ExposureUse use{&s.exposures, kPhoto, kRate, 1};
     Rig& r = rig();
     r.run([&](gpu::Recording& recording) {

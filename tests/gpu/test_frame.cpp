@@ -112,7 +112,8 @@ TEST(DrawOptions, AreThoseOfARendererMadeForThem) {
     const Rendering count = renderer.render(scene.camera, DrawOptions{other, Drawing::count, 1});
     EXPECT_EQ(count.color.pixels, b.color.pixels);
     EXPECT_GT(*std::max_element(count.count.pixels.begin(), count.count.pixels.end()), 1);
-    EXPECT_NE(renderer.render(scene.camera, DrawOptions{other, Drawing::color, 0.5}).color.pixels, b.color.pixels);
+    EXPECT_NE(renderer.render(scene.camera, DrawOptions{other, Drawing::color, 0.5}).color.pixels,
+              b.color.pixels);
     EXPECT_THROW(renderer.render(scene.camera, DrawOptions{other, Drawing::color, 0}), InputError);
 
     const Scene second = random_scene(79, 900, SplatKind::ordinary, 40, 33, 0);

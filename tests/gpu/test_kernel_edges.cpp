@@ -17,7 +17,8 @@
 namespace ewa::test {
 namespace {
 
-/// A grand total past 32 bits is told as the largest number, also where only the low halves' carry takes it there.
+/// A grand total past 32 bits is told as the largest number, also where only the low halves' carry takes it
+/// there.
 TEST(ScanEdges, ATotalPast32BitsIsTheLargestNumber) {
     const auto instances = [](std::vector<uint32_t> totals) {
         const uint32_t blocks = uint32_t(totals.size());
@@ -25,12 +26,13 @@ TEST(ScanEdges, ATotalPast32BitsIsTheLargestNumber) {
         Rig& r = rig();
         Guarded sums("totals", totals), counts = zero_counts();
         r.run([&](gpu::Recording& recording) {
-            r.kernels.get<passes::ScanTotals>().record(recording, r.shape(), {sums, counts}, {blocks, 1}, "scan");
+            r.kernels.get<passes::ScanTotals>().record(recording, r.shape(), {sums, counts}, {blocks, 1},
+                                                       "scan");
         });
         expect_intact({&sums, &counts});
         return counts.read<shared::Counts>()[0].instances;
     };
-    EXPECT_EQ(instances({0xffff0000u, 0xffffu}), 0xffffffffu);      // just fits
+    EXPECT_EQ(instances({0xffff0000u, 0xffffu}), 0xffffffffu);  // just fits
     EXPECT_EQ(instances({0xffff0000u, 0xfffeu}), 0xfffffffeu);
     EXPECT_EQ(instances({0xffff0000u, 0xffffu, 1u}), 0xffffffffu);  // by the carry of the low halves
     EXPECT_EQ(instances({0x80000000u, 0x80000000u, 7u}), 0xffffffffu);
@@ -108,7 +110,8 @@ TEST(RelocationEdges, AtTheThresholdAndWithoutARotationASplatIsDead) {
     EXPECT_EQ(out.weights[3], 0u);
 }
 
-/// Where weights are small, a draw often falls on the very border between two of them; it belongs to the later one.
+/// Where weights are small, a draw often falls on the very border between two of them; it belongs to the
+/// later one.
 TEST(RelocationEdges, ADrawOnABorderIsTheLaterSplats) {
     constexpr uint32_t kSplats = 300, kBlock = 16, kDraws = 4000;
     std::vector<uint32_t> weights(kSplats), prefix(kSplats), totals(kSplats / kBlock + 2);
@@ -130,11 +133,13 @@ TEST(RelocationEdges, ADrawOnABorderIsTheLaterSplats) {
     push.seed[0] = 77;
     push.step = 5;
     r.run([&](gpu::Recording& recording) {
-        r.kernels.get<passes::McmcDraw>().record(recording, r.shape(), {prefixes, bases, sources, hits}, push);
+        r.kernels.get<passes::McmcDraw>().record(recording, r.shape(), {prefixes, bases, sources, hits},
+                                                 push);
     });
     expect_intact({&prefixes, &bases, &sources, &hits});
     std::vector<uint32_t> random;
-    for (uint32_t d = 0; d < kDraws; ++d) random.push_back(core::pcg4d({d, 5, 77, shared::MCMC_DRAW_STREAM})[0]);
+    for (uint32_t d = 0; d < kDraws; ++d)
+        random.push_back(core::pcg4d({d, 5, 77, shared::MCMC_DRAW_STREAM})[0]);
     EXPECT_EQ(sources.read<uint32_t>(), reference::draw_sources(weights, random));
 }
 
@@ -174,7 +179,9 @@ TEST(Noise, StaysFiniteAndMovesWhatJustFitted) {
     frame.counts = gpu::Buffer(*device(), "counts", sizeof(counts));
     frame.counts.upload(std::span<const shared::Counts>(&counts, 1));
     Rig& r = rig();
-    r.run([&](gpu::Recording& recording) { record_noise(recording, r.kernels, model, frame, 5.0f, 1e9f, 1, 12); });
+    r.run([&](gpu::Recording& recording) {
+        record_noise(recording, r.kernels, model, frame, 5.0f, 1e9f, 1, 12);
+    });
     const Gaussians moved = download_model(model, model.params);
     EXPECT_NE(moved.means[0], g.means[0]);
     for (size_t k = 3; k < 6; ++k) EXPECT_EQ(moved.means[k], g.means[k]);

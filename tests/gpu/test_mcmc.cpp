@@ -123,8 +123,8 @@ TEST_P(Relocation, WritesTheTwinsNextGeneration) {
     const reference::Values wide = reference::to_double(old);
     for (uint32_t j = 0; j < after; ++j) {
         const uint32_t s = source[j];
-        const auto n3 = core::normal3({j, rules.step, uint32_t(rules.seed),
-                                       uint32_t(rules.seed >> 32) ^ shared::MCMC_SPREAD_STREAM});
+        const auto n3 = core::normal3(
+            {j, rules.step, uint32_t(rules.seed), uint32_t(rules.seed >> 32) ^ shared::MCMC_SPREAD_STREAM});
         const glm::dvec3 mean = reference::apart(read_splat(wide, s), {n3[0], n3[1], n3[2]}, spread);
         for (size_t k = 0; k < 3; ++k) {
             if (spread == 0 || copies[s] == 0)
@@ -170,8 +170,9 @@ TEST(RelocationOfMany, ThousandsOfCopiesShareOneSplat) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, Relocation,
-                         testing::Values(RelocationCase{3, 0}, RelocationCase{2000, 0}, RelocationCase{777, 1},
-                                         RelocationCase{300, 3}, RelocationCase{1000, 1, 0.8}));
+                         testing::Values(RelocationCase{3, 0}, RelocationCase{2000, 0},
+                                         RelocationCase{777, 1}, RelocationCase{300, 3},
+                                         RelocationCase{1000, 1, 0.8}));
 
 TEST(RelocationEdges, SourcesAreDrawnInProportionToTheirOpacity) {
     Start start(3100, 40, 0, -2);

@@ -57,8 +57,8 @@ TEST(Photographer, AFurnaceHidesABallOfItsAlbedo) {
 }
 
 TEST(Photographer, AMirrorsAlbedoIsGgxs) {
-    // What a white metal ball reflects of an even sky, averaged over its disc: GGX with height-correlated Smith shadowing,
-    // one bounce, integrated numerically apart from this program.
+    // What a white metal ball reflects of an even sky, averaged over its disc: GGX with height-correlated
+    // Smith shadowing, one bounce, integrated numerically apart from this program.
     const std::pair<float, double> known[] = {{0.0f, 1.0}, {0.2f, 0.9943}, {0.5f, 0.8822}};
     for (const auto& [roughness, albedo] : known) {
         mesh::Scene scene;
@@ -128,15 +128,16 @@ TEST(Photographer, ASpotsConeAndALightsRange) {
     const Shot shot = shoot(scene, test::camera_down_z({0, 0, 5}, 61, 61, 100), 16);
     for (const int column : {30, 36, 44, 52, 58}) {
         const double x = (column - 30) / 20.0, d = std::hypot(x, 2.0), cosine = 2 / d;
-        const double cone =
-            std::clamp((cosine - std::cos(0.6)) / (std::cos(0.2) - std::cos(0.6)), 0.0, 1.0);
+        const double cone = std::clamp((cosine - std::cos(0.6)) / (std::cos(0.2) - std::cos(0.6)), 0.0, 1.0);
         const double window = 1 - std::pow(d / 4, 4);
-        EXPECT_NEAR(double(shot.radiance.at(column, 30)[0]), cone * cone * window * cosine / (d * d), 2e-3) << column;
+        EXPECT_NEAR(double(shot.radiance.at(column, 30)[0]), cone * cone * window * cosine / (d * d), 2e-3)
+            << column;
     }
 }
 
 TEST(Photographer, ASquareThatShines) {
-    // The form factor of a square over the point under its middle (Siegel and Howell, configuration C-11, four times).
+    // The form factor of a square over the point under its middle (Siegel and Howell, configuration C-11,
+    // four times).
     mesh::Scene scene = floor_scene(glm::vec3(0.6f));
     mesh::Material shining = test::diffuse(glm::vec3(0.0f));
     shining.emitted = glm::vec3(3, 0, 0);
@@ -160,8 +161,8 @@ TEST(Photographer, DepthOfATiltedPlane) {
         scene.materials.push_back(test::diffuse(glm::vec3(1.0f)));
         const glm::dvec3 at(shift, -shift, shift);
         // z = -4 + x / 2
-        test::add_quad(scene, at + glm::dvec3(-20, -20, -14), at + glm::dvec3(20, -20, 6), at + glm::dvec3(20, 20, 6),
-                       at + glm::dvec3(-20, 20, -14));
+        test::add_quad(scene, at + glm::dvec3(-20, -20, -14), at + glm::dvec3(20, -20, 6),
+                       at + glm::dvec3(20, 20, 6), at + glm::dvec3(-20, 20, -14));
         Photographer photographer(test::device(), mesh::pack(scene, {}), scene.sky);
         const Camera camera = test::camera_down_z(at, 32, 24, 40);
         const Image depth = photographer.seen(camera).depth;
@@ -191,12 +192,15 @@ TEST(Photographer, ATextureSeenFaceOnGivesItsTexels) {
     for (int y = 0; y < 32; ++y)
         for (int x = 0; x < 32; ++x)
             for (int c = 0; c < 3; ++c)
-                EXPECT_EQ(std::lround(developed.at(x, y)[c] * 255), std::lround(image.at(x / 4, y / 4)[c] * 255))
+                EXPECT_EQ(std::lround(developed.at(x, y)[c] * 255),
+                          std::lround(image.at(x / 4, y / 4)[c] * 255))
                     << x << " " << y;
     // Smoothly: at the middle of a texel its own value, half way the mean of two.
     scene.textures[0].nearest = false;
     const Shot smooth = shoot(scene, test::camera_down_z({0, 0, 2}, 256, 256, 256), 4, {image});
-    const auto linear = [](float v) { return v <= 0.04045f ? v / 12.92 : std::pow((double(v) + 0.055) / 1.055, 2.4); };
+    const auto linear = [](float v) {
+        return v <= 0.04045f ? v / 12.92 : std::pow((double(v) + 0.055) / 1.055, 2.4);
+    };
     const double left = linear(image.at(3, 2)[0]), right = linear(image.at(4, 2)[0]);
     EXPECT_NEAR(double(smooth.radiance.at(3 * 32 + 15, 2 * 32 + 15)[0]), left, 0.04);
     EXPECT_NEAR(double(smooth.radiance.at(4 * 32, 2 * 32 + 15)[0]), (left + right) / 2, 0.04);
@@ -260,7 +264,8 @@ TEST(Photographer, RaysAgreeWithTheTwin) {
     for (int y = 0; y < 48; ++y)
         for (int x = 0; x < 64; ++x) {
             const glm::dvec3 d((x + 0.5 - 32) / 60, -(y + 0.5 - 24) / 60, -1);
-            const auto hit = reference::trace({(camera.position() - packed.origin) / packed.unit, d}, nodes, triangles);
+            const auto hit =
+                reference::trace({(camera.position() - packed.origin) / packed.unit, d}, nodes, triangles);
             const uint32_t found = seen.triangles[size_t(y) * 64 + size_t(x)];
             same += found == (hit ? hit->triangle : 0xffffffffu);
             if (!hit || found != hit->triangle) continue;
@@ -277,7 +282,8 @@ TEST(Photographer, RaysThatTakeTooManyStepsAreCounted) {
         mesh::Scene scene;
         scene.sky = test::even_sky(1);
         scene.materials.push_back(test::diffuse(glm::vec3(0.5f)));
-        for (size_t i = 0; i < count; ++i) test::add_quad(scene, {-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0});
+        for (size_t i = 0; i < count; ++i)
+            test::add_quad(scene, {-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0});
         return scene;
     };
     const Camera camera = test::camera_down_z({0, 0, 4}, 8, 8, 8);

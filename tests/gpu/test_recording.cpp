@@ -327,7 +327,8 @@ TEST(FrameHazards, EveryPairHasABarrierBetween) {
         const auto pair = unordered_pair(commands);
         EXPECT_FALSE(pair.has_value()) << *pair;
     }
-    // All shaders but those of densification, which runs between frames, of a window's pictures, and of meshes.
+    // All shaders but those of densification, which runs between frames, of a window's pictures, and of
+    // meshes.
     for (const std::string_view name : passes::shader_names())
         EXPECT_TRUE(name.substr(0, 7) == "densify" || name.substr(0, 5) == "mcmc_" || name == "pack" ||
                     name.substr(0, 6) == "trace_" ||

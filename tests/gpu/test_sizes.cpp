@@ -259,7 +259,8 @@ TEST(Plan, LeavesOutWhatTheSceneDoesNotHave) {
 
     const auto lines = describe(picture, 3, 10);
     EXPECT_EQ(lines[0].what, "SH degrees 2 to 3");
-    EXPECT_EQ(lines[0].bytes_saved, (15 - 6) * 16 * 16u);  // planes of 59 and of 23 floats, two blocks of 8 splats
+    EXPECT_EQ(lines[0].bytes_saved,
+              (15 - 6) * 16 * 16u);  // planes of 59 and of 23 floats, two blocks of 8 splats
     Plan everything = plan_training(3, {}, true);
     everything.masks = everything.exposure = true;
     EXPECT_TRUE(describe(everything, 3, 10).size() < lines.size());

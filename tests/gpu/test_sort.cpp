@@ -82,16 +82,17 @@ Sorted run_sort(const std::vector<uint32_t>& input, const RadixCut& cut, bool ow
     Guarded counts("counts", std::vector<shared::Counts>{start});
     uint32_t result = 0;
     r.run([&](gpu::Recording& recording) {
-        result = record_sort(recording, r.kernels,
-                             {{&keys0.buffer(), &keys1.buffer()},
-                              {&values0.buffer(), &values1.buffer()},
-                              {own_numbers ? nullptr : &places0.buffer(), own_numbers ? nullptr : &places1.buffer()},
-                              own_numbers,
-                              counters,
-                              prefix,
-                              totals,
-                              counts},
-                             cut, device_count ? 0 : items, capacity, keep_keys, "sort");
+        result = record_sort(
+            recording, r.kernels,
+            {{&keys0.buffer(), &keys1.buffer()},
+             {&values0.buffer(), &values1.buffer()},
+             {own_numbers ? nullptr : &places0.buffer(), own_numbers ? nullptr : &places1.buffer()},
+             own_numbers,
+             counters,
+             prefix,
+             totals,
+             counts},
+            cut, device_count ? 0 : items, capacity, keep_keys, "sort");
     });
     expect_intact({&keys0, &keys1, &values0, &values1, &places0, &places1, &counters, &prefix, &totals});
     Sorted out{(result ? values1 : values0).read<uint32_t>(), (result ? keys1 : keys0).read<uint32_t>(),

@@ -236,7 +236,8 @@ TEST_P(UpdateStatistics, AreTheTwins) {
     const Slots slots(scene);
     GuardedModel model(scene.gaussians);
     Bench bench(slots);
-    bench.run(scene, model.model, model.moments1, model.moments2, kGradient | kStatistics | (absolute ? kAbsolute : 0), push_for(scene, 1));
+    bench.run(scene, model.model, model.moments1, model.moments2,
+              kGradient | kStatistics | (absolute ? kAbsolute : 0), push_for(scene, 1));
     reference::DensifyStatistics expected(scene.gaussians.size());
     accumulate(expected, slots.twin.blend.splats, slots.twin.in_view, scene.camera, absolute);
     const auto actual = bench.statistics.read<float>();

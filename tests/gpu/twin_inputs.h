@@ -92,8 +92,17 @@ inline std::vector<float> pack_planes(const reference::Raster& raster, uint32_t 
 inline std::array<double, 11> slot_of(const reference::Moments& m, const reference::Projected& splat) {
     const double r = std::sqrt(0.5);
     const double ux = r * reference::whitener(splat).ux;
-    return {m.s0,      r * m.su,  r * m.sv,  m.suu / 2,  m.suv / 2,
-            m.svv / 2, m.color.x, m.color.y, m.color.z, m.absolute.x / (2 * ux), m.absolute.y / 2};
+    return {m.s0,
+            r * m.su,
+            r * m.sv,
+            m.suu / 2,
+            m.suv / 2,
+            m.svv / 2,
+            m.color.x,
+            m.color.y,
+            m.color.z,
+            m.absolute.x / (2 * ux),
+            m.absolute.y / 2};
 }
 
 inline gpu::Buffer camera_buffer(const Camera& camera, const passes::Shape& shape) {

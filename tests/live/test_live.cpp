@@ -25,7 +25,8 @@ Gaussians some_splats(size_t count, int degree = 1) {
     splats.sh_degree = degree;
     splats.resize(count);
     float value = 0.5f;
-    for (auto* values : {&splats.means, &splats.quaternions, &splats.log_scales, &splats.opacity_logits, &splats.sh})
+    for (auto* values :
+         {&splats.means, &splats.quaternions, &splats.log_scales, &splats.opacity_logits, &splats.sh})
         for (float& v : *values) v = value += 0.25f;
     return splats;
 }
@@ -166,7 +167,8 @@ TEST(LiveServer, StrangersAreTurnedAway) {
     }
     {
         const Socket socket = connect_to("127.0.0.1", server.port(), 5);
-        for (const char* request : {"", "GET / HTTP/1.1", "status", "status -1", "status x", "splats", "splats 99999999999"}) {
+        for (const char* request :
+             {"", "GET / HTTP/1.1", "status", "status -1", "status x", "splats", "splats 99999999999"}) {
             ASSERT_TRUE(socket.send(std::string(request) + "\n", 5));
             const auto line = socket.receive_line(200, 5);
             ASSERT_TRUE(line) << request;

@@ -40,12 +40,15 @@ inline void add_quad(mesh::Scene& scene, const glm::dvec3& a, const glm::dvec3& 
 /// A ball of flat triangles round the origin.
 inline void add_ball(mesh::Scene& scene, double radius, int rings, uint32_t material = 0) {
     const auto at = [&](int ring, int side) {
-        const double up = std::numbers::pi * (double(ring) / rings - 0.5), turn = std::numbers::pi * side / rings;
-        return radius * glm::dvec3(std::cos(up) * std::sin(turn), std::sin(up), std::cos(up) * std::cos(turn));
+        const double up = std::numbers::pi * (double(ring) / rings - 0.5),
+                     turn = std::numbers::pi * side / rings;
+        return radius *
+               glm::dvec3(std::cos(up) * std::sin(turn), std::sin(up), std::cos(up) * std::cos(turn));
     };
     for (int ring = 0; ring < rings; ++ring)
         for (int side = 0; side < 2 * rings; ++side)
-            add_quad(scene, at(ring, side), at(ring, side + 1), at(ring + 1, side + 1), at(ring + 1, side), material);
+            add_quad(scene, at(ring, side), at(ring, side + 1), at(ring + 1, side + 1), at(ring + 1, side),
+                     material);
 }
 
 /// Triangles of all sizes anywhere in a cube, some of them needles and some without area.
@@ -57,7 +60,8 @@ inline mesh::Scene random_triangles(uint32_t seed, size_t count) {
     for (size_t i = 0; i < count; ++i) {
         mesh::Triangle t;
         const glm::dvec3 center(place(random), place(random), place(random));
-        for (glm::dvec3& corner : t.corners) corner = center + glm::dvec3(size(random), size(random), size(random));
+        for (glm::dvec3& corner : t.corners)
+            corner = center + glm::dvec3(size(random), size(random), size(random));
         if (i % 17 == 0) t.corners[2] = t.corners[1] + 1e-4 * (t.corners[1] - t.corners[0]);
         if (i % 53 == 0) t.corners[2] = t.corners[1];
         scene.triangles.push_back(t);

@@ -274,7 +274,8 @@ TEST(Trainer, LearnsWhatEachPhotographsExposureWas) {
     EXPECT_GT(with, without + 3);
 }
 
-/// A run on halves and quarters first ends at the whole resolution, and resumes to the byte in the middle of them.
+/// A run on halves and quarters first ends at the whole resolution, and resumes to the byte in the middle of
+/// them.
 TEST(Trainer, AResolutionScheduleEndsAtTheWholeResolutionAndResumes) {
     const Gaussians start = shaken_start(data(), 0.05, 1, 0);
     TrainOptions options = quick(200);

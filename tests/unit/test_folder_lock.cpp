@@ -14,7 +14,8 @@ using test::expect_error;
 TEST(FolderLock, OneAtATime) {
     const test::TempFolder folder, other;
     std::optional<core::FolderLock> first(folder.path());
-    expect_error<RunError>([&] { core::FolderLock second(folder.path()); }, {folder.path().string(), "another process"});
+    expect_error<RunError>([&] { core::FolderLock second(folder.path()); },
+                           {folder.path().string(), "another process"});
     const core::FolderLock elsewhere(other.path());
     first.reset();
     const core::FolderLock third(folder.path());

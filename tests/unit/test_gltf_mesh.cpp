@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// glTF scenes of triangles: indices of every type, strips and fans, nodes, materials, cameras, lights, sky, and damage.
-#include <glm/matrix.hpp>
+// glTF scenes of triangles: indices of every type, strips and fans, nodes, materials, cameras, lights, sky,
+// and damage.
 #include <gtest/gtest.h>
+#include <glm/matrix.hpp>
 #include <nlohmann/json.hpp>
 
 #include "ewa/photograph.h"
@@ -41,7 +42,8 @@ class Gltf {
     /// The accessor's number.
     int add(const std::string& bytes, int component, const char* type, int count) {
         buffer.resize((buffer.size() + 3) / 4 * 4);
-        top["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", buffer.size()}, {"byteLength", bytes.size()}});
+        top["bufferViews"].push_back(
+            {{"buffer", 0}, {"byteOffset", buffer.size()}, {"byteLength", bytes.size()}});
         top["accessors"].push_back({{"bufferView", top["bufferViews"].size() - 1},
                                     {"componentType", component},
                                     {"type", type},
@@ -105,9 +107,10 @@ TEST(GltfMesh, IndicesOfEveryTypeStripsAndFans) {
 TEST(GltfMesh, NodesPlaceTurnScaleAndMirror) {
     Gltf gltf;
     gltf.top["scenes"][0]["nodes"] = {1, 2};
-    gltf.top["nodes"] = {{{"mesh", 0}, {"translation", {10, 0, 0}}},
-                         {{"children", {0}}, {"rotation", {0, 0, std::sqrt(0.5), std::sqrt(0.5)}}, {"scale", {2, 2, 2}}},
-                         {{"mesh", 0}, {"scale", {-1, 1, 1}}}};
+    gltf.top["nodes"] = {
+        {{"mesh", 0}, {"translation", {10, 0, 0}}},
+        {{"children", {0}}, {"rotation", {0, 0, std::sqrt(0.5), std::sqrt(0.5)}}, {"scale", {2, 2, 2}}},
+        {{"mesh", 0}, {"scale", {-1, 1, 1}}}};
     gltf.primitive()["attributes"]["NORMAL"] =
         gltf.add(bytes_of_list<float>({0, 0, 1, 0, 0, 1, 0, 0, 1}), 5126, "VEC3", 3);
     const mesh::Scene scene = gltf.read();
@@ -162,13 +165,15 @@ TEST(GltfMesh, TexturesFromFilesViewsAndUris) {
     Gltf gltf;
     gltf.folder.write("pictures/a b.png", text);
     const int view = gltf.add(text, 5121, "SCALAR", int(text.size()));
-    gltf.top["images"] = {{{"uri", "pictures/a%20b.png"}},
-                          {{"bufferView", gltf.top["accessors"][size_t(view)]["bufferView"]}, {"mimeType", "image/png"}}};
+    gltf.top["images"] = {
+        {{"uri", "pictures/a%20b.png"}},
+        {{"bufferView", gltf.top["accessors"][size_t(view)]["bufferView"]}, {"mimeType", "image/png"}}};
     gltf.top["samplers"] = {{{"wrapS", 33071}, {"wrapT", 33648}, {"magFilter", 9728}}};
     gltf.top["textures"] = {{{"source", 0}, {"sampler", 0}}, {{"source", 1}}};
-    gltf.top["materials"] = {{{"pbrMetallicRoughness",
-                               {{"baseColorTexture", {{"index", 0}}}, {"metallicRoughnessTexture", {{"index", 1}}}}},
-                              {"emissiveTexture", {{"index", 0}}}}};
+    gltf.top["materials"] = {
+        {{"pbrMetallicRoughness",
+          {{"baseColorTexture", {{"index", 0}}}, {"metallicRoughnessTexture", {{"index", 1}}}}},
+         {"emissiveTexture", {{"index", 0}}}}};
     gltf.primitive()["material"] = 0;
     gltf.primitive()["attributes"]["TEXCOORD_0"] =
         gltf.add(bytes_of_list<float>({0, 0, 1, 0, NAN, 1}), 5126, "VEC2", 3);
@@ -191,16 +196,19 @@ TEST(GltfMesh, TexturesFromFilesViewsAndUris) {
     gltf.folder.write("none.png", text.substr(0, 30));
     expect_error<InputError>([&] { photograph::decode_images(gltf.read()); }, {"a.gltf: image 0: ", "PNG"});
     gltf.folder.write("none.png", "GIF89a");
-    expect_error<InputError>([&] { photograph::decode_images(gltf.read()); }, {"image 0", "neither PNG nor JPEG"});
+    expect_error<InputError>([&] { photograph::decode_images(gltf.read()); },
+                             {"image 0", "neither PNG nor JPEG"});
     gltf.top["textures"][0]["source"] = 5;
     gltf.refused({"texture 0", "\"source\""});
 }
 
 TEST(GltfMesh, AKnownVertexLandsOnItsPixel) {
-    // Corner (0, 2, 0) through a camera at (0, 2, 5) + turned 90 degrees about y: it looks along -x from (5, 2, 0).
+    // Corner (0, 2, 0) through a camera at (0, 2, 5) + turned 90 degrees about y: it looks along -x from (5,
+    // 2, 0).
     Gltf gltf;
-    gltf.top["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 0.8}, {"znear", 0.1}, {"aspectRatio", 2}}}},
-                           {{"type", "orthographic"}, {"orthographic", {{"xmag", 1}, {"ymag", 1}, {"zfar", 9}, {"znear", 1}}}}};
+    gltf.top["cameras"] = {
+        {{"type", "perspective"}, {"perspective", {{"yfov", 0.8}, {"znear", 0.1}, {"aspectRatio", 2}}}},
+        {{"type", "orthographic"}, {"orthographic", {{"xmag", 1}, {"ymag", 1}, {"zfar", 9}, {"znear", 1}}}}};
     gltf.top["nodes"].push_back({{"camera", 0},
                                  {"name", "side"},
                                  {"translation", {5, 1, -1}},
@@ -224,8 +232,11 @@ TEST(GltfMesh, AKnownVertexLandsOnItsPixel) {
 
 TEST(GltfMesh, LightsAndSky) {
     Gltf gltf;
-    gltf.top["extensions"]["KHR_lights_punctual"]["lights"] = {
-        {{"type", "spot"}, {"intensity", 10}, {"color", {1, 0.5, 0}}, {"range", 7}, {"spot", {{"outerConeAngle", 0.5}}}}};
+    gltf.top["extensions"]["KHR_lights_punctual"]["lights"] = {{{"type", "spot"},
+                                                                {"intensity", 10},
+                                                                {"color", {1, 0.5, 0}},
+                                                                {"range", 7},
+                                                                {"spot", {{"outerConeAngle", 0.5}}}}};
     gltf.top["extensionsRequired"] = {"KHR_lights_punctual"};
     gltf.node()["extensions"]["KHR_lights_punctual"]["light"] = 0;
     gltf.node()["translation"] = {1, 2, 3};
@@ -282,9 +293,10 @@ TEST(GltfMesh, DamageIsNamed) {
 
 TEST(GltfMesh, TrianglesThatAreNotFiniteAreCounted) {
     Gltf gltf;
-    gltf.primitive()["attributes"]["POSITION"] = gltf.add(
-        bytes_of_list<float>({0, 0, 0, 1, 0, 0, 0, 1, 0, NAN, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, INFINITY, 1, 0, 0, 0, 1, 0}), 5126,
-        "VEC3", 9);
+    gltf.primitive()["attributes"]["POSITION"] =
+        gltf.add(bytes_of_list<float>({0, 0, 0, 1, 0, 0, 0,        1, 0, NAN, 0, 0, 1, 0,
+                                       0, 0, 1, 0, 0, 0, INFINITY, 1, 0, 0,   0, 1, 0}),
+                 5126, "VEC3", 9);
     const mesh::Scene scene = gltf.read();
     EXPECT_EQ(scene.triangles.size(), 1u);
     EXPECT_EQ(scene.dropped_triangles, 2u);

@@ -36,10 +36,9 @@ const Rooms kLeaves = {"src/cli", "src/viewer"};
 /// The room whose promises a public header declares; those not named here are plain values that any room may
 /// use.
 const std::map<std::string, std::string> kOwners = {
-    {"image.h", "src/image"},       {"camera.h", "src/scene"},   {"gaussians.h", "src/scene"},
-    {"dataset.h", "src/scene"},     {"splat_files.h", "src/io"}, {"device.h", "src/gpu"},
-    {"splat_edit.h", "src/scene"},
-    {"renderer.h", "src/pipeline"}, {"trainer.h", "src/train"},
+    {"image.h", "src/image"},          {"camera.h", "src/scene"},      {"gaussians.h", "src/scene"},
+    {"dataset.h", "src/scene"},        {"splat_files.h", "src/io"},    {"device.h", "src/gpu"},
+    {"splat_edit.h", "src/scene"},     {"renderer.h", "src/pipeline"}, {"trainer.h", "src/train"},
     {"photograph.h", "src/photograph"}};
 
 /// Libraries that only some rooms may know.
@@ -52,7 +51,8 @@ const std::vector<std::pair<std::string, Rooms>> kLibraries = {
     {"tiny_gltf", {"src/io"}},
     {"zstd", {"src/io"}},
     {"zlib", {"src/io", "src/image", "src/train"}},
-    {"nlohmann/", {"src/io", "src/photograph", "src/train", "src/report", "src/live", "src/cli", "src/viewer"}},
+    {"nlohmann/",
+     {"src/io", "src/photograph", "src/train", "src/report", "src/live", "src/cli", "src/viewer"}},
     {"CLI/", {"src/cli", "src/viewer"}}};
 
 Rooms reached_from(const std::string& room) {

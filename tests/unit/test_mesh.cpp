@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The hierarchy against brute force, the cameras on the dome, and what the path tracer's tables hold.
-#include <glm/matrix.hpp>
 #include <gtest/gtest.h>
+#include <glm/matrix.hpp>
 
 #include <random>
 #include <set>
@@ -23,7 +23,8 @@ mesh::FloatBox cube(float at, float size) {
     return {glm::vec3(at), glm::vec3(at + size)};
 }
 
-/// Every triangle stands in exactly one leaf, and in every box on the way to it. Returns the most nodes on a way.
+/// Every triangle stands in exactly one leaf, and in every box on the way to it. Returns the most nodes on a
+/// way.
 int check_hierarchy(const mesh::Hierarchy& hierarchy, const std::vector<mesh::FloatBox>& boxes) {
     std::vector<int> met(boxes.size());
     int deepest = 0;
@@ -44,7 +45,8 @@ int check_hierarchy(const mesh::Hierarchy& hierarchy, const std::vector<mesh::Fl
                 ++met[hierarchy.order[i]];
                 const mesh::FloatBox& box = boxes[hierarchy.order[i]];
                 for (int axis = 0; axis < 3; ++axis)
-                    EXPECT_TRUE(box.low[axis] >= place.box.low[axis] && box.high[axis] <= place.box.high[axis]);
+                    EXPECT_TRUE(box.low[axis] >= place.box.low[axis] &&
+                                box.high[axis] <= place.box.high[axis]);
             }
             continue;
         }
@@ -72,7 +74,8 @@ TEST(Hierarchy, NeverOutgrowsTheStack) {
     // Boxes that double in size and distance: the heuristic cuts one off at a time.
     std::vector<mesh::FloatBox> boxes;
     for (int i = -110; i < 110; ++i)
-        for (int k = 0; k < 20; ++k) boxes.push_back(cube(std::exp2(float(i)) * (1 + 0.01f * float(k)), std::exp2(float(i - 9))));
+        for (int k = 0; k < 20; ++k)
+            boxes.push_back(cube(std::exp2(float(i)) * (1 + 0.01f * float(k)), std::exp2(float(i - 9))));
     const int deepest = check_hierarchy(mesh::build_hierarchy(boxes), boxes);
     EXPECT_LE(deepest, int(shared::TRACE_STACK));
     EXPECT_GT(deepest, 40) << "the case does not reach the limit it is meant for";
@@ -128,7 +131,11 @@ TEST(Packing, NormalsSurviveTheirPacking) {
 TEST(Packing, EmptyScenesAndTooManyTexelsAreRefused) {
     test::expect_error<InputError>([] { mesh::pack({}, {}); }, {"no triangles"});
     mesh::Scene scene = test::random_triangles(1, 1);
-    test::expect_error<InputError>([&] { mesh::pack(scene, {Image(8192, 4096, 3), Image(8192, 4097, 3)}); }, {"texels"});
+    test::expect_error<InputError>(
+        [&] {
+            mesh::pack(scene, {Image(8192, 4096, 3), Image(8192, 4097, 3)});
+        },
+        {"texels"});
 }
 
 TEST(LightTable, DrawsByPower) {
@@ -157,7 +164,8 @@ TEST(Dome, LooksAtTheSceneFromAllSides) {
             const glm::dvec3 at((corner & 1 ? box.low : box.high).x, (corner & 2 ? box.low : box.high).y,
                                 (corner & 4 ? box.low : box.high).z);
             const glm::dvec3 p = camera.rotation * at + camera.translation;
-            farthest = std::max({farthest, std::abs(camera.fx * p.x / p.z) / 160, std::abs(camera.fy * p.y / p.z) / 100});
+            farthest = std::max(
+                {farthest, std::abs(camera.fx * p.x / p.z) / 160, std::abs(camera.fy * p.y / p.z) / 100});
         }
         EXPECT_NEAR(farthest, 1, 1e-9);
         EXPECT_LT((camera.rotation * glm::dvec3(0, 1, 0)).y, 0) << "up in the world is up in the picture";

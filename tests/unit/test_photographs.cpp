@@ -219,7 +219,8 @@ TEST(Masks, MayBeAlphaAndOfAnotherSize) {
     // A folder of smaller copies comes first where that size is asked for.
     std::filesystem::create_directories(capture.folder / "masks_2");
     save_image(capture.folder / "masks_2/a.png", half_white(8, 6));
-    EXPECT_EQ(with_masks(capture, MaskUse::automatic, 2).frames[0].mask_path, capture.folder / "masks_2/a.png");
+    EXPECT_EQ(with_masks(capture, MaskUse::automatic, 2).frames[0].mask_path,
+              capture.folder / "masks_2/a.png");
     EXPECT_EQ(with_masks(capture, MaskUse::automatic, 1).frames[0].mask_path, capture.folder / "masks/a.png");
     save_image(capture.folder / "masks/a.png", half_white(8, 8));
     expect_error<InputError>([&] { load_frame_image(capture.load().frames[0]); },

@@ -186,8 +186,8 @@ TEST(Ply, CommentsMarksAndExtraProperties) {
     TempFolder folder;
     std::vector<std::string> names = kNames;
     names.push_back("confidence");
-    std::string text = header("ascii", "comment SplatRenderMode: mip\ncomment by hand\nelement vertex 1\n" +
-                                           properties(names));
+    std::string text = header(
+        "ascii", "comment SplatRenderMode: mip\ncomment by hand\nelement vertex 1\n" + properties(names));
     for (size_t i = 1; i <= names.size(); ++i) text += std::to_string(i) + " ";
     const SplatScene scene = read_splats(folder.write("a.ply", text));
     EXPECT_TRUE(scene.antialiased);

@@ -78,7 +78,8 @@ TEST(Volume, SplatsInOnePlaceMix) {
     const glm::dvec3 red(1, 0, 0), blue(0, 0, 1);
     const Volume volume(balls({{3, 0.1, 0.5, blue}, {3, 0.1, 0.75, red}}), camera(), on_grey());
     // Optical depths ln 2 and 2 ln 2: together 1/8 passes, and a third of what is emitted is blue.
-    expect_color(volume.exact(16, 16), 7.0 / 8 * (red * 2.0 / 3.0 + blue / 3.0) + glm::dvec3(0.25 / 8), kQuadrature);
+    expect_color(volume.exact(16, 16), 7.0 / 8 * (red * 2.0 / 3.0 + blue / 3.0) + glm::dvec3(0.25 / 8),
+                 kQuadrature);
 }
 
 TEST(Volume, MarchingComesNearerWithMoreSamples) {

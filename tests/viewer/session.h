@@ -85,7 +85,8 @@ class Session {
             if (ended == 0) std::this_thread::sleep_for(std::chrono::milliseconds(100));
         }
         Outcome outcome;  // its status is -1 where it has not ended
-        if (ended == child_) outcome.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+        if (ended == child_)
+            outcome.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
         outcome.out = read_file(folder_ + "/out.txt");
         outcome.err = read_file(folder_ + "/err.txt");
         if (ended == child_) child_ = -1;  // else the destructor ends it

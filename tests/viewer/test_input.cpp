@@ -14,7 +14,8 @@ class Input : public WindowTest {
     void SetUp() override {
         WindowTest::SetUp();
         if (!IsSkipped() && !have_xdotool())
-            GTEST_SKIP() << "there is no xdotool (Debian: xdotool) to press keys with; the input is not tested";
+            GTEST_SKIP()
+                << "there is no xdotool (Debian: xdotool) to press keys with; the input is not tested";
         std::filesystem::create_directories(shots_);
     }
     Image screenshot(Session& session) {
@@ -53,10 +54,13 @@ TEST_F(Input, TheMouseTurnsMovesAndZooms) {
     session.send("key F2");
     const Image first = screenshot(session);
     Image before = first;
-    const char* actions[] = {"mousemove 160 200 mousedown 1 sleep 0.2 mousemove 200 200 sleep 0.2 mousemove 240 190 sleep 0.2 mouseup 1",
-                             "mousemove 160 200 mousedown 3 sleep 0.2 mousemove 180 200 sleep 0.2 mousemove 200 190 sleep 0.2 mouseup 3",
-                             "mousemove 160 120 click 4 click 4", "keydown w sleep 0.3 keyup w",
-                             "key r mousemove 175 105 sleep 0.5 click 1 sleep 0.1 click 1 sleep 0.5"};
+    const char* actions[] = {
+        "mousemove 160 200 mousedown 1 sleep 0.2 mousemove 200 200 sleep 0.2 mousemove 240 190 sleep 0.2 "
+        "mouseup 1",
+        "mousemove 160 200 mousedown 3 sleep 0.2 mousemove 180 200 sleep 0.2 mousemove 200 190 sleep 0.2 "
+        "mouseup 3",
+        "mousemove 160 120 click 4 click 4", "keydown w sleep 0.3 keyup w",
+        "key r mousemove 175 105 sleep 0.5 click 1 sleep 0.1 click 1 sleep 0.5"};
     for (const char* action : actions) {
         session.send(action);
         const Image after = screenshot(session);
@@ -75,7 +79,9 @@ TEST_F(Input, ComparesWithThePhotographByKey) {
     const Image beside = screenshot(session), photo = load_image(cameras_ + "/images/1.png");
     for (int x = 0; x < 48; ++x) EXPECT_NEAR(beside.at(48 + x, 16)[1], photo.at(x, 16)[1], kRounding);
     // A turn leaves the camera, and with it the photograph; G comes back.
-    session.send("mousemove 20 20 mousedown 1 sleep 0.2 mousemove 30 20 sleep 0.2 mousemove 40 20 sleep 0.2 mouseup 1");
+    session.send(
+        "mousemove 20 20 mousedown 1 sleep 0.2 mousemove 30 20 sleep 0.2 mousemove 40 20 sleep 0.2 mouseup "
+        "1");
     EXPECT_GT(largest_difference(screenshot(session), beside), 0.1f);
     session.send("key g sleep 1");
     EXPECT_LE(largest_difference(screenshot(session), beside), kRounding);
@@ -89,7 +95,9 @@ TEST_F(Input, TheWindowChangesItsSizeAndGoesAway) {
     Image picture = screenshot(session);
     EXPECT_EQ(picture.width, 333);
     EXPECT_EQ(picture.height, 222);
-    session.send("search --name ewa$ windowunmap --sync windowmap --sync windowsize --sync 1 1 windowsize --sync 150 90");
+    session.send(
+        "search --name ewa$ windowunmap --sync windowmap --sync windowsize --sync 1 1 windowsize --sync 150 "
+        "90");
     session.send("mousemove 20 20");
     picture = screenshot(session);
     EXPECT_EQ(picture.width, 150);
@@ -102,8 +110,8 @@ TEST_F(Input, AnExrHasTheRenderingsValues) {
     ASSERT_TRUE(session.found());
     const std::string path = session.screenshot(".exr");
     ASSERT_NE(path, "");
-    expect_silent(run_ewa({"render", splats_, "--cameras", cameras_, "--frames", "2", "-o", folder_ / "exr", "--format",
-                           "exr", "--quiet"}));
+    expect_silent(run_ewa({"render", splats_, "--cameras", cameras_, "--frames", "2", "-o", folder_ / "exr",
+                           "--format", "exr", "--quiet"}));
     EXPECT_LE(largest_difference(load_image(path), load_image(folder_ / "exr/2.exr")), 1e-6f);
     expect_silent(session.quit());
 }
@@ -115,24 +123,36 @@ TEST_F(Input, AThousandRandomEventsAreSilent) {
     const unsigned seed = std::random_device()();
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937 random(seed);
-    const auto below = [&](int n) { return std::to_string(std::uniform_int_distribution<int>(0, n - 1)(random)); };
-    const std::vector<std::string> keys{"w", "a", "s", "d", "e", "1", "2", "3", "4", "5", "r", "t", "u", "c", "g", "v",
-                                        "Left", "Right", "F1", "F2", "minus", "equal", "ctrl+1", "ctrl+2", "shift+1",
-                                        "shift+2", "Tab", "space", "Return", "Escape"};
+    const auto below = [&](int n) {
+        return std::to_string(std::uniform_int_distribution<int>(0, n - 1)(random));
+    };
+    const std::vector<std::string> keys{
+        "w",     "a",     "s",      "d",      "e",       "1",       "2",    "3",     "4",      "5",
+        "r",     "t",     "u",      "c",      "g",       "v",       "Left", "Right", "F1",     "F2",
+        "minus", "equal", "ctrl+1", "ctrl+2", "shift+1", "shift+2", "Tab",  "space", "Return", "Escape"};
     std::ofstream script(folder_ / "events");
     for (int i = 0; i < events; ++i) {
         switch (std::uniform_int_distribution<int>(0, 6)(random)) {
-            case 0: case 1:
-                script << "key " << keys[std::uniform_int_distribution<size_t>(0, keys.size() - 1)(random)] << "\n";
+            case 0:
+            case 1:
+                script << "key " << keys[std::uniform_int_distribution<size_t>(0, keys.size() - 1)(random)]
+                       << "\n";
                 break;
-            case 2: script << "click " << 1 + std::stoi(below(5)) << "\n"; break;
-            case 3: script << "mousedown " << 1 + std::stoi(below(3)) << "\n"; break;
-            case 4: script << "mouseup " << 1 + std::stoi(below(3)) << "\n"; break;
-            default: script << "mousemove " << below(400) << " " << below(300) << "\n";
+            case 2:
+                script << "click " << 1 + std::stoi(below(5)) << "\n";
+                break;
+            case 3:
+                script << "mousedown " << 1 + std::stoi(below(3)) << "\n";
+                break;
+            case 4:
+                script << "mouseup " << 1 + std::stoi(below(3)) << "\n";
+                break;
+            default:
+                script << "mousemove " << below(400) << " " << below(300) << "\n";
         }
         if (i % 100 == 99)
-            script << "search --name ewa$ windowsize " << 50 + std::stoi(below(400)) << " " << 50 + std::stoi(below(300))
-                   << "\n";
+            script << "search --name ewa$ windowsize " << 50 + std::stoi(below(400)) << " "
+                   << 50 + std::stoi(below(300)) << "\n";
     }
     script << "mouseup 1\nmouseup 2\nmouseup 3\n";
     script.close();

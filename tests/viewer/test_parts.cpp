@@ -157,7 +157,8 @@ TEST(Framing, TheNearestCameraStandsAndLooksAlike) {
     EXPECT_EQ(nearest_frame(dataset, plain_view().camera, 1), -1);
     dataset.frames.resize(3);
     for (Frame& frame : dataset.frames) frame.camera = plain_view().camera;
-    dataset.frames[0].camera.rotation = glm::dmat3(-1, 0, 0, 0, 1, 0, 0, 0, -1);  // the same place, from behind
+    dataset.frames[0].camera.rotation =
+        glm::dmat3(-1, 0, 0, 0, 1, 0, 0, 0, -1);  // the same place, from behind
     dataset.frames[0].camera.translation = {0, 0, -4};
     dataset.frames[1].camera.translation = {0, 0, 9};
     dataset.frames[2].camera.translation = {0.5, 0, 4};
@@ -280,8 +281,8 @@ TEST(Compare, APhotographOfAnotherSizeIsSampled) {
     Picture photo = flat(2, 1, 0);
     for (size_t c = 0; c < 3; ++c) photo.rgba[4 + c] = 200;
     const Picture result = difference(flat(4, 2, 0), photo, {0, 0, 4, 2});
-    EXPECT_EQ(result.rgba[0], 0);         // at 0.25 of the first pixel: the border goes on
-    EXPECT_EQ(result.rgba[4], 50);        // a quarter of the way to the second pixel's centre
+    EXPECT_EQ(result.rgba[0], 0);   // at 0.25 of the first pixel: the border goes on
+    EXPECT_EQ(result.rgba[4], 50);  // a quarter of the way to the second pixel's centre
     EXPECT_EQ(result.rgba[4 * 3], 200);
 }
 

@@ -11,7 +11,8 @@ class Training : public WindowTest {
     void SetUp() override {
         WindowTest::SetUp();
         if (!IsSkipped() && !have_xdotool())
-            GTEST_SKIP() << "there is no xdotool (Debian: xdotool) to press keys with; the input is not tested";
+            GTEST_SKIP()
+                << "there is no xdotool (Debian: xdotool) to press keys with; the input is not tested";
         std::filesystem::create_directories(shots_);
     }
     /// Until the pictures of the same camera change: 30 seconds at most.
@@ -29,8 +30,9 @@ class Training : public WindowTest {
 TEST_F(Training, OfAnotherProcessIsSeenAsItGoes) {
     const pid_t trainer = fork();
     if (trainer == 0) {
-        execl(EWA_PROGRAM, EWA_PROGRAM, "train", cameras_.c_str(), "-o", run_.c_str(), "--init", splats_.c_str(),
-              "--steps", "1000000", "--strategy", "none", "--serve", "0", "--quiet", nullptr);
+        execl(EWA_PROGRAM, EWA_PROGRAM, "train", cameras_.c_str(), "-o", run_.c_str(), "--init",
+              splats_.c_str(), "--steps", "1000000", "--strategy", "none", "--serve", "0", "--quiet",
+              nullptr);
         _exit(127);
     }
     for (int i = 0; i < 600 && !std::filesystem::exists(run_ + "/live.json"); ++i)
@@ -50,8 +52,8 @@ TEST_F(Training, OfAnotherProcessIsSeenAsItGoes) {
 }
 
 TEST_F(Training, OfItsOwnGoesOnUntilItsEnd) {
-    Session session(shots_, {"--train", cameras_, "-o", run_, "--init", splats_, "--steps", "30", "--quiet", "--size",
-                             "96x64"});
+    Session session(shots_, {"--train", cameras_, "-o", run_, "--init", splats_, "--steps", "30", "--quiet",
+                             "--size", "96x64"});
     ASSERT_TRUE(session.found());
     ASSERT_TRUE(session.awaited(run_ + "/summary.json")) << "the training has not ended";
     EXPECT_EQ(read_json(run_ + "/summary.json")["steps"], 30);
@@ -61,7 +63,8 @@ TEST_F(Training, OfItsOwnGoesOnUntilItsEnd) {
 }
 
 TEST_F(Training, OfItsOwnIsSavedWhenTheWindowIsClosed) {
-    Session session(shots_, {"--train", cameras_, "-o", run_, "--init", splats_, "--steps", "20000", "--quiet"});
+    Session session(shots_,
+                    {"--train", cameras_, "-o", run_, "--init", splats_, "--steps", "20000", "--quiet"});
     ASSERT_TRUE(session.found());
     ASSERT_TRUE(session.awaited(run_ + "/live.json"));
     session.send("sleep 2");

@@ -17,8 +17,9 @@ TEST_F(Window, ShowsWhatRenderWritesWithItsOptions) {
     EXPECT_LE(largest_difference(shown({"--frame", "1", "--background", "1,0.5,0", "--antialias"}),
                                  rendered("1", {"--background", "1,0.5,0", "--antialias"})),
               kRounding);
-    EXPECT_LE(largest_difference(shown({"--frame", "1", "--mode", "alpha"}), rendered("1", {"--mode", "alpha"})),
-              kRounding);
+    EXPECT_LE(
+        largest_difference(shown({"--frame", "1", "--mode", "alpha"}), rendered("1", {"--mode", "alpha"})),
+        kRounding);
 }
 
 TEST_F(Window, EveryModeShowsSomethingElse) {
@@ -57,10 +58,11 @@ TEST_F(Window, HasTheSizeAskedForWithoutADataset) {
 }
 
 TEST_F(Window, ADatasetShowsItsPoints) {
-    write_file(cameras_ + "/points.ply",
-               "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
-               "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n"
-               "0 0 0 255 0 0\n0 0.3 0 0 255 0\n0 0 0.3 0 0 255\n");
+    write_file(
+        cameras_ + "/points.ply",
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+        "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n"
+        "0 0 0 255 0 0\n0 0.3 0 0 255 0\n0 0 0.3 0 0 255\n");
     auto json = read_json(cameras_ + "/transforms.json");
     json["ply_file_path"] = "points.ply";
     write_file(cameras_ + "/transforms.json", json.dump());
@@ -71,8 +73,8 @@ TEST_F(Window, ADatasetShowsItsPoints) {
 }
 
 TEST_F(Window, ARunIsShownWithItsDatasetAndItsOptions) {
-    expect_success(run_ewa({"train", cameras_, "-o", folder_ / "run", "--steps", "3", "--init", splats_, "--background",
-                            "1,1,1", "--antialias", "--quiet"}));
+    expect_success(run_ewa({"train", cameras_, "-o", folder_ / "run", "--steps", "3", "--init", splats_,
+                            "--background", "1,1,1", "--antialias", "--quiet"}));
     expect_silent(run_view({folder_ / "run", "--frame", "1", "--screenshot", folder_ / "shown.png"}));
     expect_silent(run_ewa({"render", folder_ / "run/splats.ply", "--cameras", cameras_, "--frames", "1", "-o",
                            folder_ / "rendered", "--background", "1,1,1", "--antialias", "--quiet"}));
@@ -104,8 +106,8 @@ TEST_F(Window, AFilmGoesThroughTheSavedViews) {
 }
 
 TEST_F(Window, ALostDeviceIsOpenedAgain) {
-    expect_silent(run_view({splats_, "--cameras", cameras_, "--frame", "2", "--lose-device-at", "1", "--screenshot",
-                            folder_ / "shown.png"}));
+    expect_silent(run_view({splats_, "--cameras", cameras_, "--frame", "2", "--lose-device-at", "1",
+                            "--screenshot", folder_ / "shown.png"}));
     EXPECT_LE(largest_difference(load_image(folder_ / "shown.png"), rendered("2")), kRounding);
 }
 

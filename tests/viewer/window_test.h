@@ -52,14 +52,15 @@ class WindowTest : public testing::Test {
         return *brightest - *darkest;
     }
     Image rendered(const std::string& frame, const std::vector<std::string>& more = {}) {
-        std::vector<std::string> arguments{"render", splats_, "--cameras", cameras_, "--frames", frame,
-                                           "-o", folder_ / "rendered", "--quiet"};
+        std::vector<std::string> arguments{"render", splats_, "--cameras",          cameras_, "--frames",
+                                           frame,    "-o",    folder_ / "rendered", "--quiet"};
         arguments.insert(arguments.end(), more.begin(), more.end());
         expect_silent(run_ewa(arguments));
         return load_image(folder_ / "rendered/" + frame + ".png");
     }
     Image shown(const std::vector<std::string>& more) {
-        std::vector<std::string> arguments{splats_, "--cameras", cameras_, "--screenshot", folder_ / "shown.png"};
+        std::vector<std::string> arguments{splats_, "--cameras", cameras_, "--screenshot",
+                                           folder_ / "shown.png"};
         arguments.insert(arguments.end(), more.begin(), more.end());
         expect_silent(run_view(arguments));
         return load_image(folder_ / "shown.png");
