@@ -106,6 +106,7 @@ Material material_at(uint index, Surface s) {
         m.metallic *= texel.b;
     }
     if (d.z != NO_TEXTURE) m.emitted *= sample_texture(d.z, s.uv, true).rgb;
+    if ((m.flags & MATERIAL_UNLIT) != 0u) m.emitted *= s.color.rgb;
     return m;
 }
 

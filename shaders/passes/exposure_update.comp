@@ -30,13 +30,13 @@ void main() {
         const vec4 m = mix(gradient, moments1[at], float(ADAM_BETA1));
         const vec4 v = mix(gradient * gradient, moments2[at], float(ADAM_BETA2));
         const vec4 moved = value - push.rate * (m * push.bias1) / (sqrt(v * push.bias2) + float(ADAM_EPSILON));
-        if (gl_SubgroupInvocationID != 0u) continue;
-        if (is_finite(moved) && is_finite(m) && is_finite(v)) {
+        const bool finite = is_finite(moved) && is_finite(m) && is_finite(v);
+        // No lane leaves the loop: the next row's sum wants them all.
+        if (gl_SubgroupInvocationID == 0u && finite) {
             exposures[at] = moved;
             moments1[at] = m;
             moments2[at] = v;
-        } else {
-            atomicAdd(counts.dropped_updates, 1u);
         }
+        if (gl_SubgroupInvocationID == 0u && !finite) atomicAdd(counts.dropped_updates, 1u);
     }
 }

@@ -272,6 +272,7 @@ EWA_UINT(NO_TEXTURE, 0xffffffffu);
 EWA_UINT(MATERIAL_TWO_SIDED, 1u);  // emits on both sides, and cameras see its back
 EWA_UINT(MATERIAL_MASKED, 2u);     // is there where its opacity reaches the cut-off
 EWA_UINT(MATERIAL_BLENDED, 4u);    // stops a ray with the probability of its opacity
+EWA_UINT(MATERIAL_UNLIT, 8u);      // emits its base colour, vertex colours included
 // Texture: first texel, width, height, TEXTURE_* flags.
 EWA_UINT(WRAP_REPEAT, 0u);
 EWA_UINT(WRAP_CLAMP, 1u);

@@ -104,8 +104,8 @@ std::string run_name(const TrainArguments& arguments) {
 
 class TrainRun {
   public:
-    TrainRun(const TrainArguments& arguments, Clock::time_point begin)
-        : arguments_(arguments), begin_(begin), pace_(arguments.save_every) {}
+    TrainRun(const TrainArguments& arguments, Clock::time_point begin, std::unique_ptr<core::FolderLock> lock)
+        : arguments_(arguments), begin_(begin), pace_(arguments.save_every), lock_(std::move(lock)) {}
     int run();
 
   private:
@@ -137,7 +137,7 @@ class TrainRun {
     report::Json settings_;  // for the checkpoint
     std::optional<train::Checkpoint> earlier_;
     fs::path folder_, checkpoint_;
-    std::optional<core::FolderLock> lock_;
+    std::unique_ptr<core::FolderLock> lock_;
     Dataset dataset_;
     Split split_;
     Gaussians start_;
@@ -163,7 +163,7 @@ void TrainRun::load() {
     folder_ = arguments_.output.empty() ? fs::path("out") / run_name(arguments_) : arguments_.output;
     checkpoint_ = folder_ / "checkpoint.ewa";
     make_folder(folder_);
-    lock_.emplace(folder_);
+    if (!lock_) lock_ = std::make_unique<core::FolderLock>(folder_);
     core::remove_abandoned_files(folder_);
     settings_ = checkpoint_settings(arguments_, train::dataset_fingerprint(dataset_, split_));
     if (arguments_.resume && fs::exists(checkpoint_)) {
@@ -177,6 +177,7 @@ void TrainRun::load() {
     std::error_code absent;
     fs::remove(folder_ / "summary.json", absent);
     fs::remove(folder_ / "report.html", absent);
+    fs::remove(folder_ / "exposures.json", absent);
     for (const auto& [name, value] : config.items())
         report_.settings.emplace_back(name, value.is_string() ? value.get<std::string>() : value.dump());
 
@@ -463,16 +464,20 @@ int run_train(const TrainArguments& given) {
     const Clock::time_point begin = Clock::now();
     TrainArguments arguments = given;
     train_options(arguments);  // what is wrong with them is said before any work
+    std::unique_ptr<core::FolderLock> lock;
     const std::string extension = core::lower(arguments.dataset.extension().string());
     if (extension == ".gltf" || extension == ".glb") {
         arguments.scene = arguments.dataset;
         if (arguments.output.empty()) arguments.output = fs::path("out") / run_name(arguments);
         arguments.dataset = arguments.output / "dataset";
+        make_folder(arguments.output);
+        lock =
+            std::make_unique<core::FolderLock>(arguments.output);  // whose photographs another may be reading
         const Photographs made = photograph_with_progress(arguments.device, arguments.scene,
                                                           arguments.dataset, {}, arguments.quiet);
         if (made.interrupted) return kInterruptedStatus;
     }
-    return TrainRun(arguments, begin).run();
+    return TrainRun(arguments, begin, std::move(lock)).run();
 }
 
 }  // namespace ewa::cli

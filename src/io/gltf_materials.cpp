@@ -103,6 +103,7 @@ class MaterialReader {
         m.f0 = float(edge * edge * specular);
         m.f90 = float(specular);
         if (extension(source.extensions, "KHR_materials_unlit")) {
+            m.unlit = true;
             m.emitted = m.base;
             m.emitted_texture = m.base_texture;
             m.base = glm::vec3(0);

@@ -81,14 +81,14 @@ class MeshReader {
         const tinygltf::Mesh& mesh = model_.meshes[size_t(index)];
         for (size_t i = 0; i < mesh.primitives.size(); ++i) {
             const tinygltf::Primitive& primitive = mesh.primitives[i];
+            if (++placed_ > kMostPlaced)
+                document_.fail(where_ + ": more than " + std::to_string(kMostPlaced) +
+                               " primitives are placed in the scene");
             if (!is_triangles(primitive)) {
                 splats_ = splats_ || primitive.extensions.count(kSplats) > 0;
                 remark(scene_, "points, lines and splats are left out");
                 continue;
             }
-            if (++placed_ > kMostPlaced)
-                document_.fail(where_ + ": more than " + std::to_string(kMostPlaced) +
-                               " primitives are placed in the scene");
             where_primitive_ = "mesh " + std::to_string(index) + ", primitive " + std::to_string(i);
             if (!primitive.targets.empty()) remark(scene_, "morph targets are left out");
             place(source_of(primitive), matrix);
@@ -108,14 +108,15 @@ class MeshReader {
         if (name != "POSITION" && accessor.count != count)
             document_.fail(what + ": has " + std::to_string(accessor.count) + " elements for " +
                            std::to_string(count) + " positions");
-        const auto [place, fresh] = vectors_.try_emplace(found->second);
+        const bool fresh = vectors_.count(found->second) == 0;
+        Vectors& read = vectors_[found->second];
         if (fresh) {
-            place->second.resize(accessor.count);
+            read.resize(accessor.count);
             document_.read(accessor, what, [&](size_t i, const double* v) {
-                place->second[i] = {v[0], v[1], v[2], accessor.type == TINYGLTF_TYPE_VEC4 ? v[3] : 1.0};
+                read[i] = {v[0], v[1], v[2], accessor.type == TINYGLTF_TYPE_VEC4 ? v[3] : 1.0};
             });
         }
-        return &place->second;
+        return &read;
     }
 
     Source source_of(const tinygltf::Primitive& primitive) {
@@ -188,7 +189,7 @@ class MeshReader {
                            "\" triangles have");
     }
     void require_triangles(size_t more) const {
-        const uint64_t all = scene_.triangles.size() + more;
+        const uint64_t all = scene_.triangles.size() + scene_.dropped_triangles + more;
         if (all > mesh::kMostTriangles)
             document_.fail(where_ + ": the scene claims more than " + std::to_string(mesh::kMostTriangles) +
                            " triangles");

@@ -45,7 +45,7 @@ struct Material {
     float f0 = 0.04f, f90 = 1;  // of the dielectric, at right angles and grazing
     float cutoff = 0.5f;
     int base_texture = -1, metal_texture = -1, emitted_texture = -1;  // of Scene::textures
-    bool two_sided = false, masked = false, blended = false;
+    bool two_sided = false, masked = false, blended = false, unlit = false;
 
     /// Whether what it reflects depends on where it is seen from.
     bool glossy() const { return f0 > 0 || f90 > 0 || metallic > 0; }

@@ -164,9 +164,9 @@ class Packer {
         const auto texture = [](int index) { return index < 0 ? shared::NO_TEXTURE : uint32_t(index); };
         for (size_t i = 0; i < scene_.materials.size(); ++i) {
             const Material& m = scene_.materials[i];
-            const uint32_t flags = (m.two_sided ? shared::MATERIAL_TWO_SIDED : 0u) |
-                                   (m.masked ? shared::MATERIAL_MASKED : 0u) |
-                                   (m.blended ? shared::MATERIAL_BLENDED : 0u);
+            const uint32_t flags =
+                (m.two_sided ? shared::MATERIAL_TWO_SIDED : 0u) | (m.masked ? shared::MATERIAL_MASKED : 0u) |
+                (m.blended ? shared::MATERIAL_BLENDED : 0u) | (m.unlit ? shared::MATERIAL_UNLIT : 0u);
             append(packed_.materials, m.base, word(m.opacity));
             packed_.materials.insert(packed_.materials.end(),
                                      {word(m.metallic), word(m.roughness), word(m.f0), word(m.f90)});

@@ -147,28 +147,42 @@ class Run {
         return fs::exists(folder_ / image_name(i)) && fs::exists(folder_ / depth_name(i));
     }
 
+    /// The files an earlier run wrote, and no others.
+    void remove_views() {
+        std::vector<fs::path> old{folder_ / "transforms.json"};
+        for (const char* name : {"images", "depth"}) {
+            std::error_code absent;
+            for (const fs::directory_entry& entry : fs::directory_iterator(folder_ / name, absent))
+                if (entry.path().filename().string().rfind("view_", 0) == 0) old.push_back(entry.path());
+        }
+        for (const fs::path& path : old) {
+            std::error_code error;
+            fs::remove(path, error);
+            if (error)
+                throw RunError(core::one_line(path.string()) + ": cannot be removed: " + error.message());
+        }
+    }
+
     /// What an earlier run recorded, where its pictures are the same; else the folder is cleared of them.
     void prepare_folder() {
         make_folder(folder_);
-        const bool recorded = fs::exists(folder_ / kRecord);
-        for (const char* name : {"transforms.json", "images", "depth", "sparse"})
+        using Json = nlohmann::json;
+        Json earlier;
+        if (fs::exists(folder_ / kRecord))
+            earlier = Json::parse(core::read_text_file(folder_ / kRecord), nullptr, false);
+        const bool recorded =
+            earlier.is_object() && earlier.contains("fingerprint") && earlier["fingerprint"].is_string();
+        for (const char* name : {kRecord, "transforms.json", "points.ply", "images", "depth", "sparse"})
             if (!recorded && fs::exists(folder_ / name))
                 throw InputError(
                     core::one_line(folder_.string() + ": holds \"" + name +
                                    "\" that are no photographs of a mesh scene; name another folder"));
         core::remove_abandoned_files(folder_);
-        using Json = nlohmann::json;
-        Json earlier;
-        if (recorded) earlier = Json::parse(core::read_text_file(folder_ / kRecord), nullptr, false);
-        const bool same = earlier.is_object() && earlier.contains("fingerprint") &&
-                          earlier["fingerprint"] == record_["fingerprint"] && earlier.contains("exposure") &&
-                          earlier["exposure"].is_number();
-        if (!same) {
-            std::error_code ignored;
-            fs::remove(folder_ / "transforms.json", ignored);
-            fs::remove_all(folder_ / "images", ignored);
-            fs::remove_all(folder_ / "depth", ignored);
-        }
+        const bool same =
+            recorded &&
+            earlier["fingerprint"].get<std::string>() == record_["fingerprint"].get<std::string>() &&
+            earlier.contains("exposure") && earlier["exposure"].is_number();
+        if (!same) remove_views();
         make_folder(folder_ / "images");
         make_folder(folder_ / "depth");
         core::remove_abandoned_files(folder_ / "images");

@@ -9,8 +9,11 @@
 #include "pipeline/model.h"
 #include "pipeline/photo.h"
 #include "pipeline/sizes.h"
+#include "train/schedule.h"
 
 namespace ewa {
+
+using train::cache_share;
 
 MemoryForecast forecast_memory(const gpu::Device& device, const Dataset& dataset,
                                const std::vector<int>& train_frames, const Gaussians& start,
@@ -22,22 +25,28 @@ MemoryForecast forecast_memory(const gpu::Device& device, const Dataset& dataset
     const uint64_t generation = 3 * pipeline::parameter_bytes(forecast.splats, start.sh_degree) + statistics;
     forecast.model = grows ? 2 * generation : generation;
 
+    std::vector<uint64_t> held_at(size_t(options.halvings) + 1);
     const passes::Shape shape = passes::shape_for(device.limits());
     for (const int index : train_frames) {
         const Frame& frame = dataset.frames[size_t(index)];
         const auto width = uint32_t(frame.camera.width), height = uint32_t(frame.camera.height);
-        const pipeline::FrameRequest request{forecast.splats,
-                                             width,
-                                             height,
-                                             pipeline::first_capacity(forecast.splats),
-                                             true,
-                                             false,
-                                             frame.masks == MaskUse::ignore,
-                                             options.exposure};
+        const pipeline::FrameRequest request{
+            forecast.splats,
+            width,
+            height,
+            uint32_t(std::min<uint64_t>(8ull * forecast.splats, 0xe0000000u)),
+            true,
+            false,
+            frame.masks == MaskUse::ignore,
+            options.exposure};
         forecast.frame = std::max(forecast.frame, sizes_for(shape, request).total());
         const uint64_t photo = pipeline::photo_bytes(int(width), int(height), frame.eight_bit);
-        if (forecast.photographs + photo <= options.image_cache_bytes) forecast.photographs += photo;
+        for (int h = 0; h <= options.halvings; ++h) {
+            uint64_t& held = held_at[size_t(h)];
+            if (held + (photo >> 2 * h) <= cache_share(options, h)) held += photo >> 2 * h;
+        }
     }
+    for (const uint64_t held : held_at) forecast.photographs += held;
     return forecast;
 }
 

@@ -52,6 +52,14 @@ double Schedule::exposure_rate(int step) const {
     return decayed(exposures_rate, exposures_rate_final, double(step) / steps);
 }
 
+uint64_t cache_share(const TrainOptions& options, int halvings) {
+    const uint64_t all = options.image_cache_bytes;
+    if (halvings > 0) return all >> 2 * halvings;
+    uint64_t smaller = 0;
+    for (int h = 1; h <= options.halvings; ++h) smaller += all >> 2 * h;
+    return all - smaller;
+}
+
 Schedule schedule_for(const TrainOptions& options) {
     const double share = std::min(1.0, options.steps / kFullRun);
     const auto scaled = [&](int steps, int least) {

@@ -46,6 +46,10 @@ struct Schedule {
     double exposure_rate(int step) const;
 };
 
+/// Bytes of the photographs' cache that those of so many halvings may take: what is left of it by the smaller
+/// ones, each of which gets a quarter of the next larger one's share.
+uint64_t cache_share(const TrainOptions& options, int halvings);
+
 Schedule schedule_for(const TrainOptions& options);
 
 }  // namespace ewa::train

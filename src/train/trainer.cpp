@@ -105,11 +105,11 @@ struct Trainer::State {
           executor(*device),
           plan(plan_training(start.sh_degree, o.render, o.strategy == Strategy::adc)),
           model(upload_model(*device, prepared(start), 2, plan.statistics)),
-          photographs(*device, kernels.shape(), dataset, frames, o.image_cache_bytes, model.origin),
+          photographs(*device, kernels.shape(), dataset, frames, train::cache_share(o, 0), model.origin),
           instance_room(first_capacity(start.size())) {
         for (int halvings = 1; halvings <= o.halvings; ++halvings)
-            smaller.emplace_back(*device, kernels.shape(), dataset, frames, o.image_cache_bytes, model.origin,
-                                 1 << halvings);
+            smaller.emplace_back(*device, kernels.shape(), dataset, frames, train::cache_share(o, halvings),
+                                 model.origin, 1 << halvings);
         plan.masks = photographs.any_masked();
         plan.exposure = o.exposure;
         if (plan.exposure) exposures = Exposures(*device, photographs.count());

@@ -123,6 +123,10 @@ TEST_P(RestoredTrainer, GoesOnAsIfNothingHadHappened) {
     options.max_splats = 300;
     options.sh_degree = 1;
     options.random_background = true;
+    options.exposure = true;
+    options.halvings = 1;
+    options.absolute_gradients = options.revised_opacity = true;  // of adc
+    options.grow_gradient_absolute = 1e-5;
     const Gaussians start = shaken_start(data(), 0.05, 1, 1);
     const auto frames = split().train;
     Trainer whole(device(), data().dataset, frames, start, options);
