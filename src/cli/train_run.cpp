@@ -470,9 +470,8 @@ int run_train(const TrainArguments& given) {
         arguments.scene = arguments.dataset;
         if (arguments.output.empty()) arguments.output = fs::path("out") / run_name(arguments);
         arguments.dataset = arguments.output / "dataset";
-        make_folder(arguments.output);
-        lock =
-            std::make_unique<core::FolderLock>(arguments.output);  // whose photographs another may be reading
+        // Another training may be reading the photographs that are there.
+        if (fs::is_directory(arguments.output)) lock = std::make_unique<core::FolderLock>(arguments.output);
         const Photographs made = photograph_with_progress(arguments.device, arguments.scene,
                                                           arguments.dataset, {}, arguments.quiet);
         if (made.interrupted) return kInterruptedStatus;

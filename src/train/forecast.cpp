@@ -30,14 +30,10 @@ MemoryForecast forecast_memory(const gpu::Device& device, const Dataset& dataset
     for (const int index : train_frames) {
         const Frame& frame = dataset.frames[size_t(index)];
         const auto width = uint32_t(frame.camera.width), height = uint32_t(frame.camera.height);
+        const auto pairs = std::max(pipeline::first_capacity(forecast.splats),
+                                    uint32_t(std::min<uint64_t>(8ull * forecast.splats, 0xe0000000u)));
         const pipeline::FrameRequest request{
-            forecast.splats,
-            width,
-            height,
-            uint32_t(std::min<uint64_t>(8ull * forecast.splats, 0xe0000000u)),
-            true,
-            false,
-            frame.masks == MaskUse::ignore,
+            forecast.splats, width, height, pairs, true, false, frame.masks == MaskUse::ignore,
             options.exposure};
         forecast.frame = std::max(forecast.frame, sizes_for(shape, request).total());
         const uint64_t photo = pipeline::photo_bytes(int(width), int(height), frame.eight_bit);

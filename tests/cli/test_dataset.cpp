@@ -78,6 +78,16 @@ TEST(Dataset, OtherPeoplesFoldersAndWrongUseAreRefused) {
     make_dataset(folder / "photos");
     expect_failure(run_ewa(small("plaster.gltf", folder / "photos")), 2, "photos");
     EXPECT_TRUE(fs::exists(folder / "photos/images/0.png"));
+    // A record that is none of ours speaks for no folder; of ours, only what we wrote goes.
+    fs::create_directories(folder / "list/images");
+    write_file(folder / "list/photographs.json", "[]");
+    write_file(folder / "list/images/mine.txt", "mine");
+    expect_failure(run_ewa(small("plaster.gltf", folder / "list")), 2, "list");
+    EXPECT_EQ(read_file(folder / "list/images/mine.txt"), "mine");
+    ASSERT_EQ(run_ewa(small("plaster.gltf", folder / "ours")).status, 0);
+    write_file(folder / "ours/images/mine.txt", "mine");
+    ASSERT_EQ(run_ewa(small("railing.gltf", folder / "ours")).status, 0);
+    EXPECT_EQ(read_file(folder / "ours/images/mine.txt"), "mine");
     auto wrong = small("plaster.gltf", folder / "d");
     wrong[7] = "24by16";
     expect_failure(run_ewa(wrong), 2, "--size");

@@ -206,6 +206,21 @@ TEST(Photographer, ATextureSeenFaceOnGivesItsTexels) {
     EXPECT_NEAR(double(smooth.radiance.at(4 * 32, 2 * 32 + 15)[0]), (left + right) / 2, 0.04);
 }
 
+TEST(Photographer, WhatIsUnlitShowsItsVertexColours) {
+    mesh::Scene scene = floor_scene(glm::vec3(0.0f));
+    scene.materials[0].emitted = glm::vec3(0.5f, 0.25f, 1.0f);
+    scene.materials[0].unlit = true;
+    for (mesh::Triangle& t : scene.triangles) t.colors.fill(0xff0000ffu);  // red alone
+    const auto middle = [&] {
+        const float* pixel = shoot(scene, test::camera_down_z({0, 0, 5}, 9, 9, 10), 4).radiance.at(4, 4);
+        return glm::vec3(pixel[0], pixel[1], pixel[2]);
+    };
+    EXPECT_NEAR(middle().r, 0.5f, 1e-3f);
+    EXPECT_EQ(middle().g, 0.0f);
+    scene.materials[0].unlit = false;  // a lamp's colour is its own
+    EXPECT_NEAR(middle().g, 0.25f, 1e-3f);
+}
+
 TEST(Photographer, SidesMasksAndBlends) {
     Image opacity(2, 1, 4);
     opacity.pixels = {1, 1, 1, 1, 1, 1, 1, 0.2f};  // opaque on the left, 20 percent on the right
