@@ -20,7 +20,7 @@ struct PhotographOptions {
     std::optional<int> views;
     int width = 256, height = 256;  // px, 1..16384
     int samples = 32;               // paths a pixel, 1..65536; powers of two are spread best
-    int points = 15000;             // on visible surfaces, for the first splats; 0: none
+    int points = 40000;             // on visible surfaces, for the first splats; 0: none
     uint64_t seed = 0;
     /// Stops (a factor of 2^exposure) between radiance and the picture, where 1 is white. Nothing said: such
     /// that 95 of 100 surface pixels stay under 0.8, in tenths of a stop.

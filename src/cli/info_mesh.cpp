@@ -31,7 +31,8 @@ void info_mesh(const std::filesystem::path& path, int test_every, bool json) {
             {"images", scene.images.size()},
             {"lights", scene.lights.size()},
             {"cameras", scene.cameras.size()},
-            {"bounds", {{"min", {box.low.x, box.low.y, box.low.z}}, {"max", {box.high.x, box.high.y, box.high.z}}}},
+            {"bounds",
+             {{"min", {box.low.x, box.low.y, box.low.z}}, {"max", {box.high.x, box.high.y, box.high.z}}}},
             {"views", views.frames.size()},
             {"train", split.train.size()},
             {"test", split.test.size()},
@@ -53,9 +54,10 @@ void info_mesh(const std::filesystem::path& path, int test_every, bool json) {
     fmt::print("views           {} of {} ({} train, {} test with --test-every {})\n", views.frames.size(),
                views.frames.size() == scene.cameras.size() ? "the file's cameras" : "a dome over it",
                split.train.size(), split.test.size(), test_every);
-    fmt::print("colour          {}\n", views.color_depends_on_view
-                                           ? "depends on the view"
-                                           : "every material is diffuse: training leaves SH degrees 1 to 3 out");
+    fmt::print("colour          {}\n",
+               views.color_depends_on_view
+                   ? "depends on the view"
+                   : "every material is diffuse: training leaves SH degrees 1 to 3 out");
 }
 
 }  // namespace ewa::cli
