@@ -9,6 +9,7 @@
 #include <new>
 #include <utility>
 
+#include "cli/manual.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "viewer/app.h"
@@ -32,6 +33,7 @@ struct Arguments {
     bool antialias = false;
     DeviceOptions device;
     int lose_device_at = 0;
+    std::string manual;
 };
 
 const std::map<std::string, Mode> kModes = {{"color", Mode::color},
@@ -207,6 +209,9 @@ void add_options(CLI::App& app, Arguments& arguments) {
                    "Frame at which the window's device plays lost")
         ->type_name("N")
         ->group("For developers");
+    // Without a group it stands in no help: the build calls it.
+    app.add_option("--manual", arguments.manual, "Write the manual page and shell completions below DIR")
+        ->group("");
 }
 
 /// Opens the device while the scene is being read. OpenDevice gives that one first, and then opens it anew.
@@ -231,8 +236,12 @@ class DeviceOpener {
     std::shared_ptr<std::shared_ptr<gpu::Device>> first_ = std::make_shared<std::shared_ptr<gpu::Device>>();
 };
 
-int run(const Arguments& arguments) {
+int run(const CLI::App& app, const Arguments& arguments) {
     try {
+        if (!arguments.manual.empty()) {
+            cli::write_manual(app, arguments.manual);
+            return kDone;
+        }
         DeviceOpener opener(arguments.device);
         Startup startup = open(arguments);
         std::optional<TrainProcess> trainer;
@@ -277,5 +286,5 @@ int main(int argc, char** argv) {
         if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) return app.exit(error);
         return fail(std::string(error.what()) + " (see ewa-view --help)", kWrongUse);
     }
-    return run(arguments);
+    return run(app, arguments);
 }
