@@ -31,7 +31,7 @@ struct Arguments {
     PanelSettings settings;
     bool antialias = false;
     DeviceOptions device;
-    int lose_device_at = 0;
+    bool verbose = false;
 };
 
 const std::map<std::string, Mode> kModes = {{"color", Mode::color},
@@ -131,7 +131,7 @@ Scene open_what(const Arguments& arguments, Startup& startup) {
 Startup open(const Arguments& arguments) {
     Startup startup;
     startup.frame = arguments.frame;
-    startup.lose_device_at = arguments.lose_device_at;
+    startup.verbose = arguments.verbose;
     if (!arguments.size.empty()) startup.size = parse_size(arguments.size);
     if (!arguments.picture.empty()) {
         if (core::lower(arguments.picture.extension().string()) != ".png")
@@ -203,10 +203,8 @@ void add_options(CLI::App& app, Arguments& arguments) {
     app.add_option("--device", arguments.device.selector,
                    "Number or part of the name of the device that draws (see ewa devices)")
         ->type_name("NAME|N");
-    app.add_option("--lose-device-at", arguments.lose_device_at,
-                   "Frame at which the window's device plays lost")
-        ->type_name("N")
-        ->group("For developers");
+    app.add_flag("--verbose", arguments.verbose,
+                 "At the end: when the first picture was there, how many came while the camera moved");
 }
 
 /// Opens the device while the scene is being read. OpenDevice gives that one first, and then opens it anew.
@@ -232,9 +230,11 @@ class DeviceOpener {
 };
 
 int run(const Arguments& arguments) {
+    const auto started = std::chrono::steady_clock::now();
     try {
         DeviceOpener opener(arguments.device);
         Startup startup = open(arguments);
+        startup.started = started;
         std::optional<TrainProcess> trainer;
         if (arguments.train) {
             std::vector<std::string> options{arguments.path.string()};
@@ -249,6 +249,10 @@ int run(const Arguments& arguments) {
         return fail(error.what(), kWrongUse);
     } catch (const RunError& error) {
         return fail(error.what(), kFailed);
+    } catch (const vk::DeviceLostError& error) {
+        return fail(
+            std::string("the device that shows the window was lost, again and again: ") + error.what(),
+            kFailed);
     } catch (const vk::SystemError& error) {
         return fail(std::string("the device that shows the window failed: ") + error.what(), kFailed);
     } catch (const std::bad_alloc&) {
