@@ -96,6 +96,7 @@ App::App(const Startup& startup)
     settings_.look = startup.settings.look;
     if (startup.film) start_film();
     if (startup.watch) watch(*startup.watch);
+    window_after_ = std::chrono::duration<double>(Clock::now() - startup.started).count();
 }
 
 void App::watch(const live::WhatToWatch& what) {
@@ -288,7 +289,10 @@ void App::count_picture() {
 }
 
 void App::tell_times() const {
-    if (first_picture_) std::fprintf(stderr, "first picture after %.0f ms\n", 1000 * *first_picture_);
+    if (first_picture_)
+        std::fprintf(stderr, "first picture after %.0f ms: scene read %.0f, device open %.0f, window %.0f\n",
+                     1000 * *first_picture_, 1000 * startup_.read_after, 1000 * startup_.device_after,
+                     1000 * window_after_);
     if (shown_)
         std::fprintf(stderr, "last picture: %d x %d px in %.1f ms\n", shown_->picture.width,
                      shown_->picture.height, shown_->milliseconds);

@@ -34,6 +34,7 @@ struct Startup {
     TrainProcess* trainer = nullptr;         // of this viewer, outlives it
     bool verbose = false;                    // times on standard error
     std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
+    double read_after = 0, device_after = 0;  // seconds: the scene was read, the device open
 };
 
 /// What shows pictures in the window. Made anew where its device is lost.
@@ -125,7 +126,8 @@ class App {
     bool viewed_ = false;  // the view has been chosen for splats that there are
     Pace pace_;
     Fluency fluency_;
-    std::optional<double> first_picture_;  // seconds after the start that it was shown
+    double window_after_ = 0;              // seconds after the start
+    std::optional<double> first_picture_;  // the same, that it was shown
     std::string device_name_;
 
     std::shared_ptr<const FinishedPicture> shown_, counted_;  // the last one; the last that fluency_ knows of

@@ -235,6 +235,10 @@ int run(const Arguments& arguments) {
         DeviceOpener opener(arguments.device);
         Startup startup = open(arguments);
         startup.started = started;
+        const auto elapsed = [&] {
+            return std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+        };
+        startup.read_after = elapsed();
         std::optional<TrainProcess> trainer;
         if (arguments.train) {
             std::vector<std::string> options{arguments.path.string()};
@@ -242,6 +246,7 @@ int run(const Arguments& arguments) {
             startup.trainer = &trainer.emplace(options, startup.watch->folder);
         }
         startup.device_name = opener.name();
+        startup.device_after = elapsed();
         startup.open_device = opener.function();
         App(startup).run();
         return kDone;

@@ -60,7 +60,7 @@ TEST(Compare, PlacesKeepThePhotographsShape) {
     EXPECT_EQ(beside.photograph, (Rectangle{400, 49, 401, 201}));
     const Arrangement covered = arrange(Comparison::beside, {801, 300}, {200, 100}, 101);
     EXPECT_EQ(covered.rendering, (Rectangle{101, 0, 350, 300}));
-    EXPECT_EQ(covered.photograph, (Rectangle{451, 63, 350, 175}));
+    EXPECT_EQ(covered.photograph, (Rectangle{451, 62, 350, 175}));
     EXPECT_EQ(arrange(Comparison::beside, {801, 300}, {200, 100}, 300).rendering, beside.rendering);
     const Arrangement wipe = arrange(Comparison::wipe, {800, 300}, {200, 100});
     EXPECT_EQ(wipe.rendering, (Rectangle{0, 0, 800, 300}));

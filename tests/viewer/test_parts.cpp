@@ -261,6 +261,24 @@ TEST(Pace, GivesUpResolutionUntilPicturesAreFast) {
     EXPECT_EQ(pace.divisor(), 1);
 }
 
+/// Where the splats cost what the pixels do not, a coarse picture is hardly faster than a fine one.
+TEST(Pace, GivesUpNoResolutionForNothing) {
+    const auto settled = [](double fixed, double by_pixels) {
+        Pace pace;
+        for (int i = 0; i < 100; ++i) {
+            const int divisor = i % 10 == 0 ? 1 : pace.divisor();  // it rests now and then
+            const double noise = 1 + 0.1 * std::sin(i * i);
+            pace.drawn(divisor, noise * (fixed + by_pixels / (divisor * divisor)));
+        }
+        return pace.divisor();
+    };
+    EXPECT_EQ(settled(200, 10), 1);
+    EXPECT_LE(settled(45, 80), 4);
+    EXPECT_GE(settled(45, 80), 2);
+    EXPECT_GE(settled(5, 900), 4);
+    EXPECT_EQ(settled(1, 20), 1);
+}
+
 TEST(Fluency, CountsPicturesOfAMovingCamera) {
     Fluency fluency;
     double time = 0;

@@ -179,7 +179,7 @@ bool XClient::drop(uint32_t window, const std::string& uris) const {
     }
     s.tell(window, "XdndDrop", {0, XCB_CURRENT_TIME, 0, 0});
     const auto finished = s.heard("XdndFinished", uris);
-    return finished && (*finished & 1);
+    return finished && *finished != 0;  // of GLFW: the number of bytes, where the specification has a flag
 }
 
 std::string uri_of(const std::string& path) {
