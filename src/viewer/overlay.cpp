@@ -132,7 +132,7 @@ void draw_note(const std::string& note) {
     const float line = ImGui::GetTextLineHeight();
     float width = std::min(size.x - 2 * line, 40 * line);
     width = std::min(std::max(width, line), ImGui::CalcTextSize(note.c_str()).x + 2);
-    begin_message("note", size.y - 5 * line);
+    begin_message("note", size.y - 7 * line);
     ImGui::PushTextWrapPos(ImGui::GetCursorPosX() + width);
     ImGui::TextUnformatted(note.c_str());
     ImGui::PopTextWrapPos();
@@ -140,7 +140,8 @@ void draw_note(const std::string& note) {
 }
 
 void draw_hint(bool photographs) {
-    begin_message("hint", ImGui::GetIO().DisplaySize.y - ImGui::GetTextLineHeight());
+    // Above the names of what is compared.
+    begin_message("hint", ImGui::GetIO().DisplaySize.y - 3 * ImGui::GetTextLineHeight());
     ImGui::TextUnformatted("drag: turn    right drag: move    wheel: closer    double click: look at");
     ImGui::TextUnformatted(photographs ? "2: depth    V: compare with the photographs    F1: all keys"
                                        : "2: depth    W A S D: fly    F1: all keys");
