@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """tea_table.gltf: what looks different from every side. A glossy floor that mirrors what stands on it, brass, glazed
-clay, textures from coarse to fine, a wire basket. 40 cameras on two rings."""
+clay, textures from coarse to fine, a wire basket. 44 cameras on two rings."""
 
 import pathlib
 
@@ -61,14 +61,14 @@ def basket():
     around = np.linspace(0, 2 * np.pi, 32, endpoint=False)
     for height, radius in ((0.0, 0.20), (0.11, 0.25), (0.22, 0.28), (0.30, 0.29)):
         wires.append(tube(np.stack([radius * np.sin(around), 0 * around + height, radius * np.cos(around)], axis=-1),
-                          0.006 if height else 0.009, 5, closed=True))
+                          0.008 if height else 0.011, 5, closed=True))
     for a in np.linspace(0, 2 * np.pi, 20, endpoint=False):
         lean = 0.25
         path = [(r * np.sin(a + lean * h), h, r * np.cos(a + lean * h))
                 for h, r in ((0.0, 0.20), (0.11, 0.25), (0.22, 0.28), (0.30, 0.29))]
-        wires.append(tube(path, 0.005, 4))
+        wires.append(tube(path, 0.007, 4))
     handle = np.linspace(0, np.pi, 13)
-    wires.append(tube(np.stack([0.29 * np.cos(handle), 0.30 + 0.24 * np.sin(handle), 0 * handle], axis=-1), 0.008, 5))
+    wires.append(tube(np.stack([0.29 * np.cos(handle), 0.30 + 0.24 * np.sin(handle), 0 * handle], axis=-1), 0.01, 5))
     return joined(wires)
 
 
@@ -86,7 +86,7 @@ def plant():
 
 def build():
     g = Gltf(sky=((0.50, 0.60, 0.80), (0.75, 0.75, 0.72), (0.25, 0.23, 0.20)))
-    floor = g.material(roughness=0.22, texture=g.texture("floor", textures.png(floor_texture())))
+    floor = g.material(roughness=0.3, texture=g.texture("floor", textures.png(floor_texture())))
     cloth = g.material(roughness=0.9, texture=g.texture("cloth", textures.png(cloth_texture())), two_sided=True)
     crate = g.material(roughness=0.7, texture=g.texture("crate", textures.png(crate_texture())))
     glaze = g.material(roughness=0.12, texture=g.texture("glaze", textures.png(glaze_texture())))
@@ -119,7 +119,7 @@ def build():
     g.place(g.mesh([(pot, clay)]), (0.62, 0, -0.55))
     g.place(g.mesh([(stalk, green), (leaves, green)]), (0.62, 0.2, -0.55))
     g.sun((0.55, -1.0, -0.35), (2.6, 2.4, 2.1))
-    g.rings_of_cameras((0, 0.22, 0), ((20, 3.1, 22), (20, 3.0, 48)), 45)
+    g.rings_of_cameras((0, 0.22, 0), ((22, 3.3, 24), (22, 3.2, 48)), 45)
     return g
 
 

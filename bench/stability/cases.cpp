@@ -315,7 +315,8 @@ float& stored_value(Gaussians& g, size_t splat, size_t value) {
     return g.sh[g.sh_stride() * splat + value - 11];
 }
 
-/// Splat i has its value i replaced, so that each value of a splat is at some time the bad one.
+/// Splat 2 i has its value i replaced, so that each value of a splat is at some time the bad one, and those
+/// between are as they should be: what is bad must not reach them.
 void add_replaced(Table& table) {
     constexpr float inf = std::numeric_limits<float>::infinity();
     const std::pair<const char*, float> bad[] = {{"nan", std::numeric_limits<float>::quiet_NaN()},
@@ -325,9 +326,11 @@ void add_replaced(Table& table) {
                                                  {"largest", FLT_MAX},
                                                  {"minus_largest", -FLT_MAX}};
     for (const auto& [name, value] : bad) {
-        Gaussians g = usual_scene(usual_camera(), 59, 3);
-        for (size_t i = 0; i < g.size(); ++i) stored_value(g, i, i) = value;
-        table.add(std::string("value_") + name, "each stored value in turn replaced by this", std::move(g));
+        constexpr size_t kValues = 59;
+        Gaussians g = usual_scene(usual_camera(), 2 * kValues, 3);
+        for (size_t i = 0; i < kValues; ++i) stored_value(g, 2 * i, i) = value;
+        table.add(std::string("value_") + name,
+                  "every other splat has one value replaced by this, each in turn", std::move(g));
     }
 }
 

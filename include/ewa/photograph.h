@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "ewa/dataset.h"
 #include "ewa/device.h"
 
 namespace ewa {
@@ -19,7 +20,7 @@ struct PhotographOptions {
     std::optional<int> views;
     int width = 256, height = 256;  // px, 1..16384
     int samples = 32;               // paths a pixel, 1..65536; powers of two are spread best
-    int points = 15000;             // on visible surfaces, for the first splats; 0: none
+    int points = 40000;             // on visible surfaces, for the first splats; 0: none
     uint64_t seed = 0;
     /// Stops (a factor of 2^exposure) between radiance and the picture, where 1 is white. Nothing said: such
     /// that 95 of 100 surface pixels stay under 0.8, in tenths of a stop.
@@ -51,5 +52,14 @@ bool is_mesh_scene(const std::filesystem::path& path);
 Photographs photograph_scene(const std::shared_ptr<gpu::Device>& device, const std::filesystem::path& scene,
                              const std::filesystem::path& folder, const PhotographOptions& options,
                              const std::function<bool(int, int)>& progress);
+
+/// Whether the folder holds every photograph that photograph_scene would take, with the same options. Throws
+/// InputError as that does.
+bool is_photographed(const std::filesystem::path& scene, const std::filesystem::path& folder,
+                     const PhotographOptions& options);
+
+/// The views that photograph_scene would take, as a dataset without pictures or points: frames are named as
+/// there, and have no image_path. Throws InputError as that does.
+Dataset scene_cameras(const std::filesystem::path& scene, const PhotographOptions& options);
 
 }  // namespace ewa

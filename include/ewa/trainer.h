@@ -41,6 +41,9 @@ struct TrainOptions {
     double sh0_rate = 2.5e-3, sh_rest_rate = 1.25e-4;
     double opacity_rate = 0.025;
     double scale_rate = 5e-3, quaternion_rate = 1e-3;
+    /// What the rates of means and of SH above degree 0 are multiplied with in a run of no length; in a full
+    /// one they are as above (src/train/schedule.h). Not with mcmc, whose noise goes by the means' rate.
+    double short_run_gain = 2;
 
     bool exposure = false;  // each photograph's exposure is learned too, from the identity
     double exposure_rate = 0.01, exposure_rate_final = 0.001;

@@ -7,6 +7,8 @@
 #include <cstdio>
 
 #include "bench/accuracy.h"
+#include "cli/dataset_argument.h"
+#include "cli/interrupt.h"
 #include "cli/output.h"
 #include "core/atomic_file.h"
 #include "ewa/error.h"
@@ -94,7 +96,9 @@ int run_accuracy(const AccuracyArguments& arguments) {
     if (arguments.splats.empty() && arguments.steps == 0)
         throw InputError(
             "--accuracy: with --training-steps 0 there is nothing to draw; --splats names a file");
-    const Dataset dataset = load_dataset(arguments.dataset, {});
+    const auto photographed = load_photographed(arguments.dataset, arguments.splats, {}, arguments.device);
+    if (!photographed) return kInterruptedStatus;
+    const Dataset& dataset = photographed->dataset;
     const Split split = split_frames(dataset, 8);
     if (split.test.empty() || split.train.empty())
         throw InputError(arguments.dataset.string() + ": too few photographs to hold one out");

@@ -156,15 +156,6 @@ void add_test_every_option(CLI::App& app, int& test_every) {
         ->capture_default_str();
 }
 
-Dataset load_cameras_as_trained(const std::filesystem::path& path, int downscale) {
-    Dataset dataset = load_dataset(path, {.downscale = downscale, .need_images = false});
-    auto missing = [](const Frame& frame) { return !frame.image_exists; };
-    const auto count = std::count_if(dataset.frames.begin(), dataset.frames.end(), missing);
-    dataset.missing_images = static_cast<int>(count);
-    if (count < std::ssize(dataset.frames)) std::erase_if(dataset.frames, missing);
-    return dataset;
-}
-
 std::vector<int> select_frames(const Dataset& dataset, const std::string& which, int test_every) {
     if (dataset.frames.empty()) throw InputError(dataset.root.string() + " has no frames");
     if (which != "all" && which != "train" && which != "test") return listed_frames(dataset, which);

@@ -48,11 +48,6 @@ std::string masks_text(MaskUse masks);
 void add_downscale_option(CLI::App& app, int& downscale);
 void add_test_every_option(CLI::App& app, int& test_every);
 
-/// The cameras of a dataset whose photographs need not be there. Where some are, frames without one are left
-/// out, as training leaves them out: otherwise they would shift which frames are held out.
-/// Dataset::missing_images counts them.
-Dataset load_cameras_as_trained(const std::filesystem::path& path, int downscale);
-
 /// Indices of frames for "all", "train", "test" or a list like "0,3,7" in name order. Throws InputError, also
 /// when there are none.
 std::vector<int> select_frames(const Dataset& dataset, const std::string& which, int test_every);

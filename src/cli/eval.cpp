@@ -6,6 +6,8 @@
 
 #include "cli/arguments.h"
 #include "cli/command.h"
+#include "cli/dataset_argument.h"
+#include "cli/interrupt.h"
 #include "cli/output.h"
 #include "ewa/splat_files.h"
 #include "ewa/trainer.h"
@@ -35,8 +37,11 @@ report::Json to_json(const Evaluation& evaluation) {
 int run(const EvalArguments& arguments) {
     const RenderOptions options = arguments.draw.options();
     const Gaussians gaussians = load_splats(arguments.splats);
-    const Dataset dataset =
-        load_dataset(arguments.dataset, {.downscale = arguments.downscale, .masks = arguments.masks});
+    const auto photographed =
+        load_photographed(arguments.dataset, arguments.splats,
+                          {.downscale = arguments.downscale, .masks = arguments.masks}, arguments.device);
+    if (!photographed) return kInterruptedStatus;
+    const Dataset& dataset = photographed->dataset;
     const std::vector<int> frames = select_frames(dataset, arguments.split, arguments.test_every);
 
     const Evaluation evaluation =
@@ -59,8 +64,10 @@ Action add_eval(CLI::App& app) {
                    "The splat scene (.ply .compressed.ply .splat .spz .glb .gltf)")
         ->required()
         ->type_name("");
-    app.add_option("DATASET", arguments->dataset,
-                   "Photographs with cameras: COLMAP folder or transforms.json")
+    app.add_option(
+           "DATASET", arguments->dataset,
+           "Photographs with cameras: COLMAP folder or transforms.json; or a glTF with meshes, which is "
+           "photographed as ewa train does")
         ->required()
         ->type_name("");
     app.add_option("--split", arguments->split, "test, train or all")

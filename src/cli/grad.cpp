@@ -6,6 +6,8 @@
 
 #include "cli/arguments.h"
 #include "cli/command.h"
+#include "cli/dataset_argument.h"
+#include "cli/interrupt.h"
 #include "cli/output.h"
 #include "ewa/error.h"
 #include "ewa/renderer.h"
@@ -31,8 +33,11 @@ int run(const GradArguments& arguments) {
         throw InputError("the gradient is written as a PLY: -o " + arguments.output.string() +
                          " does not end in .ply");
     const Gaussians gaussians = load_splats(arguments.splats);
-    const Dataset dataset =
-        load_dataset(arguments.dataset, {.downscale = arguments.downscale, .masks = arguments.masks});
+    const auto photographed =
+        load_photographed(arguments.dataset, arguments.splats,
+                          {.downscale = arguments.downscale, .masks = arguments.masks}, arguments.device);
+    if (!photographed) return kInterruptedStatus;
+    const Dataset& dataset = photographed->dataset;
     const int index = select_frames(dataset, std::to_string(arguments.frame), 0).front();
     const Frame& frame = dataset.frames[index];
     make_folder(arguments.output.parent_path());
@@ -64,8 +69,10 @@ Action add_grad(CLI::App& app) {
                    "The splat scene (.ply .compressed.ply .splat .spz .glb .gltf)")
         ->required()
         ->type_name("");
-    app.add_option("DATASET", arguments->dataset,
-                   "Photographs with cameras: COLMAP folder or transforms.json")
+    app.add_option(
+           "DATASET", arguments->dataset,
+           "Photographs with cameras: COLMAP folder or transforms.json; or a glTF with meshes, which is "
+           "photographed as ewa train does")
         ->required()
         ->type_name("");
     app.add_option("--frame", arguments->frame, "Which view: index in name order over all frames, from 0")

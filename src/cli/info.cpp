@@ -9,11 +9,14 @@
 
 #include "cli/arguments.h"
 #include "cli/command.h"
+#include "cli/dataset_argument.h"
+#include "cli/info_mesh.h"
 #include "cli/splat_statistics.h"
 #include "cli/text.h"
 #include "core/text.h"
 #include "ewa/dataset.h"
 #include "ewa/error.h"
+#include "ewa/photograph.h"
 #include "ewa/renderer.h"
 #include "ewa/splat_files.h"
 #include "report/summary.h"
@@ -194,6 +197,10 @@ int run(const fs::path& path, int test_every, bool json) {
     std::error_code error;
     if (!fs::exists(path, error)) throw InputError(path.string() + ": there is no such file or folder");
     if (fs::is_directory(path) || path.extension() == ".json") return info_dataset(path, test_every, json);
+    if (is_mesh_scene(path)) {
+        info_mesh(path, test_every, json);
+        return 0;
+    }
     return info_splats(path, json);
 }
 
@@ -206,9 +213,10 @@ Action add_info(CLI::App& app) {
         bool json = false;
     };
     const auto arguments = std::make_shared<Arguments>();
-    app.add_option(
-           "PATH", arguments->path,
-           "A splat file (.ply .compressed.ply .splat .spz .glb .gltf), a COLMAP folder or a transforms.json")
+    app.add_option("PATH", arguments->path,
+                   "A splat file (.ply .compressed.ply .splat .spz .glb .gltf), a COLMAP folder, a "
+                   "transforms.json, or a "
+                   "glTF of meshes")
         ->required();
     add_test_every_option(app, arguments->test_every);
     app.add_flag("--json", arguments->json, "As JSON");

@@ -8,6 +8,7 @@
 
 #include "cli/arguments.h"
 #include "cli/command.h"
+#include "cli/dataset_argument.h"
 #include "cli/interrupt.h"
 #include "cli/output.h"
 #include "cli/progress.h"

@@ -1,37 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "image/decode.h"
 
-#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <string_view>
 
+#include "core/temporary_folder.h"
 #include "core/text.h"
 #include "ewa/error.h"
 
 namespace ewa::image {
 
 namespace {
-
-/// A folder of its own, removed with everything in it.
-class Folder {
-  public:
-    Folder() {
-        std::string name = (std::filesystem::temp_directory_path() / "ewa-image-XXXXXX").string();
-        if (!mkdtemp(name.data())) throw RunError(name + ": cannot be made: " + std::strerror(errno));
-        path_ = name;
-    }
-    ~Folder() {
-        std::error_code ignored;
-        std::filesystem::remove_all(path_, ignored);
-    }
-    Folder(const Folder&) = delete;
-    Folder& operator=(const Folder&) = delete;
-    const std::filesystem::path& path() const { return path_; }
-
-  private:
-    std::filesystem::path path_;
-};
 
 const char* extension_of(const std::vector<unsigned char>& bytes) {
     const auto begins = [&](std::string_view signature) {
@@ -47,7 +27,7 @@ Image decode(const std::vector<unsigned char>& bytes, const std::string& what, i
     const char* extension = extension_of(bytes);
     if (!extension) throw InputError(core::one_line(what + ": is neither PNG nor JPEG"));
     // Through a file, so that it is looked at as closely as a photograph is.
-    const Folder folder;
+    const core::TemporaryFolder folder("ewa-image-");
     const std::filesystem::path path = folder.path() / (std::string("image") + extension);
     std::ofstream file(path, std::ios::binary);
     file.write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));

@@ -187,6 +187,16 @@ double decode(int type, bool normalized, const std::byte* bytes) {
     }
 }
 
+/// tinygltf says of these in words what is missing, and not by its name.
+std::string missing_property(const std::string& error) {
+    for (const auto& [words, property] : {std::pair{"Spot light", "spot"},
+                                          {"Orthographic camera", "orthographic"},
+                                          {"Perspective camera", "perspective"}})
+        if (error.find(std::string(words) + " description not found") != std::string::npos)
+            return std::string(" (\"") + property + "\")";
+    return {};
+}
+
 }  // namespace
 
 void GltfDocument::fail(const std::string& text) const {
@@ -212,6 +222,7 @@ GltfDocument::GltfDocument(const std::filesystem::path& path, GltfContent conten
         add_buffers(path.parent_path(), &*list, bin_begin, bin_size);
     if (const auto list = top.find("images"); list != top.end() && content == GltfContent::meshes)
         add_images(&*list);
+    if (const auto list = top.find("animations"); list != top.end()) animated_ = !list->empty();
     const std::string text = needed_sections(top, content);
     top = nullptr;
     tinygltf::TinyGLTF loader;
@@ -223,7 +234,8 @@ GltfDocument::GltfDocument(const std::filesystem::path& path, GltfContent conten
     } catch (const std::exception& exception) {
         error = exception.what();
     }
-    if (!loaded || !error.empty()) fail("is no valid glTF: " + error.substr(0, kLongestReason));
+    if (!loaded || !error.empty())
+        fail("is no valid glTF: " + error.substr(0, kLongestReason) + missing_property(error));
 }
 
 void GltfDocument::add_buffers(const std::filesystem::path& folder, const void* json_buffers,

@@ -27,6 +27,7 @@ class GltfDocument {
     const std::string& name() const { return name_; }
     const tinygltf::Model& model() const { return model_; }
     bool binary() const { return binary_; }
+    bool animated() const { return animated_; }
     uint64_t bytes() const;  // of the file and the buffers outside it
 
     /// Throws InputError "name: text".
@@ -65,7 +66,7 @@ class GltfDocument {
     std::string name_;
     std::filesystem::path path_;
     uint64_t file_bytes_ = 0;
-    bool binary_ = false;
+    bool binary_ = false, animated_ = false;
     tinygltf::Model model_;
     std::vector<Buffer> buffers_;
     std::vector<ImageSource> images_;

@@ -85,6 +85,8 @@ class MaterialReader {
         m.metal_texture = texture(pbr.metallicRoughnessTexture);
         m.emitted_texture = texture(source.emissiveTexture);
         if (source.normalTexture.index >= 0) remark(scene_, "normal textures are left out");
+        if (source.occlusionTexture.index >= 0)
+            remark(scene_, "occlusion textures are left out: paths meet what occludes");
         extend(source, m);
         return m;
     }
@@ -109,10 +111,10 @@ class MaterialReader {
             m.base = glm::vec3(0);
             m.metallic = m.f0 = m.f90 = 0;
         }
-        for (const char* name : {"KHR_materials_transmission", "KHR_materials_clearcoat",
-                                 "KHR_materials_sheen", "KHR_materials_volume", "KHR_materials_iridescence",
-                                 "KHR_materials_anisotropy", "KHR_materials_pbrSpecularGlossiness"})
-            if (extension(source.extensions, name)) remark(scene_, std::string(name) + " is left out");
+        if (const tinygltf::Value* fine = extension(source.extensions, "KHR_materials_specular"))
+            for (const char* key : {"specularTexture", "specularColorTexture", "specularColorFactor"})
+                if (fine->IsObject() && fine->Has(key))
+                    remark(scene_, std::string("KHR_materials_specular: ") + key + " is left out");
     }
 
     template <class Info>

@@ -19,6 +19,7 @@ namespace {
 
 const std::string kSplats = "KHR_gaussian_splatting";
 constexpr int kMostPlaced = 65536;
+constexpr size_t kMostNamed = 32;  // extensions in remarks
 constexpr uint64_t kFolds = 16, kAlways = uint64_t(20) << 20;
 
 bool is_triangles(const tinygltf::Primitive& primitive) {
@@ -60,10 +61,19 @@ class MeshReader {
         static const char* const kKnown[] = {
             "KHR_lights_punctual", "KHR_materials_specular",          "KHR_materials_ior",
             "KHR_materials_unlit", "KHR_materials_emissive_strength", "KHR_mesh_quantization"};
+        const auto known = [](const std::string& name) {
+            return std::find(std::begin(kKnown), std::end(kKnown), name) != std::end(kKnown);
+        };
         for (const std::string& name : model_.extensionsRequired)
-            if (std::find(std::begin(kKnown), std::end(kKnown), name) == std::end(kKnown))
+            if (!known(name))
                 document_.fail("\"extensionsRequired\" names " + name.substr(0, 100) +
                                ", which is not supported");
+        size_t named = 0;
+        for (const std::string& name : model_.extensionsUsed)
+            if (!known(name) && name != kSplats && ++named <= kMostNamed)
+                remark(scene_, name.substr(0, 100) + " is left out");
+        if (document_.animated())
+            remark(scene_, "animations are left out: the pose is the one the file stores");
     }
 
     [[noreturn]] void refuse_empty() const {

@@ -66,7 +66,7 @@ class SplatReader {
         });
         if (primitives_ == 0)
             document_.fail("the scene's nodes reach no primitive with the extension " + kExtension +
-                           "; it is a mesh scene, or packed with another extension");
+                           "; a mesh scene is photographed by ewa train and ewa dataset");
         scene_.file_sh_degree = std::max(scene_.file_sh_degree, scene_.gaussians.sh_degree);
         scene_.format = document_.binary() ? SplatFormat::glb : SplatFormat::gltf;
         scene_.variant = std::to_string(primitives_) + (primitives_ == 1 ? " primitive" : " primitives");

@@ -10,16 +10,13 @@
 #include <nlohmann/json.hpp>
 
 #include "core/atomic_file.h"
-#include "core/file_reader.h"
-#include "core/hash.h"
 #include "core/random.h"
 #include "core/text.h"
 #include "ewa/error.h"
-#include "io/gltf_mesh.h"
 #include "io/transforms_write.h"
-#include "mesh/dome.h"
 #include "photograph/exposure.h"
 #include "photograph/photographer.h"
+#include "photograph/subject.h"
 #include "shared/constants.h"
 
 namespace ewa {
@@ -29,23 +26,6 @@ namespace {
 namespace fs = std::filesystem;
 using photograph::Photographer;
 
-constexpr int kDomeViews = 48, kEnoughCameras = 8, kMostViews = 100000;
-constexpr const char* kRecord = "photographs.json";
-
-void check(const PhotographOptions& o) {
-    const auto within = [](const char* what, int64_t value, int64_t low, int64_t high) {
-        if (value < low || value > high)
-            throw InputError(std::string(what) + ": " + std::to_string(value) + " is not in " +
-                             std::to_string(low) + " .. " + std::to_string(high));
-    };
-    within("views", o.views.value_or(0), 0, kMostViews);
-    within("width", o.width, 1, 16384);
-    within("height", o.height, 1, 16384);
-    within("samples", o.samples, 1, 65536);
-    within("points", o.points, 0, 10000000);
-    if (o.exposure && !(std::abs(*o.exposure) <= 60)) throw InputError("exposure: is not in -60 .. 60 stops");
-}
-
 void make_folder(const fs::path& folder) {
     std::error_code error;
     fs::create_directories(folder, error);
@@ -53,76 +33,28 @@ void make_folder(const fs::path& folder) {
         throw RunError(core::one_line(folder.string() + ": the folder cannot be made: " + error.message()));
 }
 
-std::vector<Camera> cameras_for(const mesh::Scene& scene, const PhotographOptions& o,
-                                const std::string& name) {
-    const size_t in_file = scene.cameras.size();
-    const bool from_file = o.views ? *o.views == 0 : in_file >= kEnoughCameras;
-    if (!from_file)
-        return mesh::dome_cameras(mesh::bounds_of(scene), o.views.value_or(kDomeViews), o.width, o.height);
-    if (in_file == 0)
-        throw InputError(name + ": has no perspective cameras; --views N puts N on a dome over the scene");
-    std::vector<Camera> cameras;
-    for (const mesh::FileCamera& camera : scene.cameras)
-        cameras.push_back(mesh::pinhole_of(camera, o.width, o.height));
-    return cameras;
-}
-
-/// What the pictures depend on.
-std::string fingerprint(const mesh::PackedScene& packed, const mesh::Sky& sky,
-                        const std::vector<Camera>& cameras, const PhotographOptions& o) {
-    core::Hash hash;
-    hash.add(std::string("photographs of ewa " EWA_VERSION));
-    for (const auto* words : {&packed.nodes, &packed.triangles, &packed.surfaces, &packed.materials,
-                              &packed.textures, &packed.lights, &packed.texels})
-        hash.add(words->data(), words->size() * sizeof(uint32_t));
-    for (const glm::vec3& v : {sky.zenith, sky.horizon, sky.ground})
-        for (int i = 0; i < 3; ++i) hash.add(v[i]);
-    for (int i = 0; i < 3; ++i) hash.add(packed.origin[i]);
-    hash.add(packed.unit);
-    for (const Camera& camera : cameras) {
-        for (const double x :
-             {double(camera.width), double(camera.height), camera.fx, camera.fy, camera.cx, camera.cy})
-            hash.add(x);
-        for (int i = 0; i < 3; ++i) {
-            hash.add(camera.translation[i]);
-            for (int j = 0; j < 3; ++j) hash.add(camera.rotation[i][j]);
-        }
-    }
-    hash.add(o.samples);
-    hash.add(o.points);
-    hash.add(o.seed);
-    hash.add(o.exposure.value_or(1e9));
-    char text[17];
-    std::snprintf(text, sizeof(text), "%016llx", static_cast<unsigned long long>(hash.value()));
-    return text;
-}
-
 class Run {
   public:
-    Run(const std::shared_ptr<gpu::Device>& device, const fs::path& scene, const fs::path& folder,
-        const PhotographOptions& options)
-        : options_(options),
+    Run(const std::shared_ptr<gpu::Device>& device, photograph::Subject subject, const fs::path& folder)
+        : subject_(std::move(subject)),
           folder_(folder),
-          scene_(io::read_gltf_mesh(scene)),
-          packed_(mesh::pack(scene_, photograph::decode_images(scene_))),
-          cameras_(cameras_for(scene_, options, core::one_line(scene.string()))),
-          photographer_(device, packed_, scene_.sky) {
-        record_ = {{"scene", scene.filename().string()},
+          photographer_(device, subject_.packed, subject_.scene.sky) {
+        record_ = {{"scene", subject_.name},
                    {"views", cameras_.size()},
-                   {"samples", options.samples},
-                   {"seed", options.seed},
-                   {"fingerprint", fingerprint(packed_, scene_.sky, cameras_, options)}};
+                   {"samples", options_.samples},
+                   {"seed", options_.seed},
+                   {"fingerprint", subject_.fingerprint()}};
         result_.views = int(cameras_.size());
-        result_.color_depends_on_view = mesh::color_depends_on_view(scene_);
-        result_.dropped_triangles = scene_.dropped_triangles;
-        result_.remarks = scene_.remarks;
+        result_.color_depends_on_view = mesh::color_depends_on_view(subject_.scene);
+        result_.dropped_triangles = subject_.scene.dropped_triangles;
+        result_.remarks = subject_.scene.remarks;
     }
 
     Photographs run(const std::function<bool(int, int)>& progress) {
         prepare_folder();
         result_.interrupted = !progress(0, int(cameras_.size()));
         for (size_t i = 0; i < cameras_.size() && !result_.interrupted; ++i) {
-            if (done(i))
+            if (subject_.taken(folder_, i))
                 ++result_.kept;
             else
                 photograph(i);
@@ -135,18 +67,6 @@ class Run {
     }
 
   private:
-    std::string stem(size_t i) const {
-        const std::string number = std::to_string(i);
-        const size_t width = std::max<size_t>(3, std::to_string(cameras_.size() - 1).size());
-        return "view_" + std::string(width - number.size(), '0') + number;
-    }
-    std::string image_name(size_t i) const { return "images/" + stem(i) + ".png"; }
-    std::string depth_name(size_t i) const { return "depth/" + stem(i) + ".exr"; }
-    /// The depth is written last.
-    bool done(size_t i) const {
-        return fs::exists(folder_ / image_name(i)) && fs::exists(folder_ / depth_name(i));
-    }
-
     /// The files an earlier run wrote, and no others.
     void remove_views() {
         std::vector<fs::path> old{folder_ / "transforms.json"};
@@ -166,32 +86,24 @@ class Run {
     /// What an earlier run recorded, where its pictures are the same; else the folder is cleared of them.
     void prepare_folder() {
         make_folder(folder_);
-        using Json = nlohmann::json;
-        Json earlier;
-        if (fs::exists(folder_ / kRecord))
-            earlier = Json::parse(core::read_text_file(folder_ / kRecord), nullptr, false);
-        const bool recorded =
-            earlier.is_object() && earlier.contains("fingerprint") && earlier["fingerprint"].is_string();
-        for (const char* name : {kRecord, "transforms.json", "points.ply", "images", "depth", "sparse"})
-            if (!recorded && fs::exists(folder_ / name))
+        const auto earlier = photograph::read_record(folder_);
+        for (const char* name :
+             {photograph::kRecord, "transforms.json", "points.ply", "images", "depth", "sparse"})
+            if (!earlier && fs::exists(folder_ / name))
                 throw InputError(
                     core::one_line(folder_.string() + ": holds \"" + name +
                                    "\" that are no photographs of a mesh scene; name another folder"));
         core::remove_abandoned_files(folder_);
         const bool same =
-            recorded &&
-            earlier["fingerprint"].get<std::string>() == record_["fingerprint"].get<std::string>() &&
-            earlier.contains("exposure") && earlier["exposure"].is_number();
+            earlier && earlier->exposure && earlier->fingerprint == record_["fingerprint"].get<std::string>();
         if (!same) remove_views();
         make_folder(folder_ / "images");
         make_folder(folder_ / "depth");
         core::remove_abandoned_files(folder_ / "images");
         core::remove_abandoned_files(folder_ / "depth");
-        result_.exposure = same                ? earlier["exposure"].get<double>()
-                           : options_.exposure ? *options_.exposure
-                                               : measured();
+        result_.exposure = same ? *earlier->exposure : options_.exposure ? *options_.exposure : measured();
         record_["exposure"] = result_.exposure;
-        core::write_text_file(folder_ / kRecord, record_.dump(1) + "\n");
+        core::write_text_file(folder_ / photograph::kRecord, record_.dump(1) + "\n");
     }
 
     /// From a few small pictures.
@@ -215,8 +127,8 @@ class Run {
         const uint64_t seed = uint64_t(words[0]) << 32 | words[1];
         const Image radiance =
             photographer_.radiance(cameras_[i], options_.samples, seed, shared::TRACE_SAMPLE_MAX / factor);
-        save_image(folder_ / image_name(i), photograph::develop(radiance, factor));
-        save_image(folder_ / depth_name(i), photographer_.seen(cameras_[i]).depth);
+        save_image(folder_ / subject_.image_name(i), photograph::develop(radiance, factor));
+        save_image(folder_ / subject_.depth_name(i), photographer_.seen(cameras_[i]).depth);
     }
 
     /// As many from each view, at pixels drawn by counting; those that see nothing give none.
@@ -226,8 +138,8 @@ class Run {
         const auto each = uint32_t((size_t(options_.points) + cameras_.size() - 1) / cameras_.size());
         for (size_t view = 0; view < cameras_.size(); ++view) {
             const Camera& camera = cameras_[view];
-            const Image image = load_image(folder_ / image_name(view)),
-                        depth = load_image(folder_ / depth_name(view));
+            const Image image = load_image(folder_ / subject_.image_name(view)),
+                        depth = load_image(folder_ / subject_.depth_name(view));
             for (uint32_t i = 0; i < each && cloud.positions.size() < size_t(options_.points); ++i) {
                 const auto u = core::uniform4({i, uint32_t(view), uint32_t(options_.seed), 0x706f696eu});
                 const int x = int(u[0] * camera.width), y = int(u[1] * camera.height);
@@ -258,15 +170,14 @@ class Run {
             file.points = "points.ply";
         }
         for (size_t i = 0; i < cameras_.size(); ++i)
-            file.frames.push_back({image_name(i), depth_name(i), cameras_[i]});
+            file.frames.push_back({subject_.image_name(i), subject_.depth_name(i), cameras_[i]});
         io::write_transforms(folder_ / "transforms.json", file);
     }
 
-    PhotographOptions options_;
+    photograph::Subject subject_;
+    const PhotographOptions& options_ = subject_.options;
+    const std::vector<Camera>& cameras_ = subject_.cameras;
     fs::path folder_;
-    mesh::Scene scene_;
-    mesh::PackedScene packed_;
-    std::vector<Camera> cameras_;
     Photographer photographer_;
     nlohmann::ordered_json record_;
     Photographs result_;
@@ -274,15 +185,10 @@ class Run {
 
 }  // namespace
 
-bool is_mesh_scene(const fs::path& path) {
-    return io::is_gltf_mesh(path);
-}
-
 Photographs photograph_scene(const std::shared_ptr<gpu::Device>& device, const fs::path& scene,
                              const fs::path& folder, const PhotographOptions& options,
                              const std::function<bool(int, int)>& progress) {
-    check(options);
-    return Run(device, scene, folder, options).run(progress);
+    return Run(device, photograph::read_subject(scene, options), folder).run(progress);
 }
 
 }  // namespace ewa

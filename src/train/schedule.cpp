@@ -81,8 +81,10 @@ Schedule schedule_for(const TrainOptions& options) {
     s.sh_degree = options.sh_degree;
     s.halvings = options.halvings;
     s.resolution_every = scaled(options.resolution_every, 1);
-    s.means_rate = options.means_rate;
-    s.means_rate_final = options.means_rate_final;
+    const double gain = options.strategy == Strategy::mcmc ? 1 : share + (1 - share) * options.short_run_gain;
+    s.means_rate = gain * options.means_rate;
+    s.means_rate_final = gain * options.means_rate_final;
+    s.sh_rest_rate = gain * options.sh_rest_rate;
     s.exposures_rate = options.exposure_rate;
     s.exposures_rate_final = options.exposure_rate_final;
     return s;

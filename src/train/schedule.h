@@ -8,6 +8,9 @@
 // 3DGS-MCMC puts copies onto their source and leaves it to the noise to part them. That takes thousands of
 // steps: two copies that are more opaque than the noise's gate feel the same gradient and stay one. A shorter
 // run therefore starts copies apart, the more the shorter it is.
+//
+// The learning rates of 3DGS are those of 30,000 steps. In a short run means do not reach their places and
+// view-dependent colour does not unfold, so both learn faster there, the more the shorter the run is.
 #pragma once
 #include <cstdint>
 
@@ -26,6 +29,7 @@ struct Schedule {
     int sh_degree = 0;  // the highest
     int halvings = 0, resolution_every = 0;
     double means_rate = 0, means_rate_final = 0;  // per unit of scene extent
+    double sh_rest_rate = 0;                      // of SH above degree 0
     double exposures_rate = 0, exposures_rate_final = 0;
 
     /// Densify after this step (steps count from 1)?

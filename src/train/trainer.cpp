@@ -125,7 +125,7 @@ struct Trainer::State {
         r.quaternion = float(options.quaternion_rate);
         r.scale = float(options.scale_rate);
         r.sh0 = float(options.sh0_rate);
-        r.sh_rest = float(options.sh_rest_rate);
+        r.sh_rest = float(schedule.sh_rest_rate);
         r.step = uint32_t(step);
         if (plan.regularised) {
             r.opacity_pull = float(options.opacity_weight / model.splats);

@@ -7,6 +7,7 @@
 
 #include "core/text.h"
 #include "ewa/error.h"
+#include "ewa/photograph.h"
 #include "ewa/splat_files.h"
 
 namespace ewa::viewer {
@@ -32,8 +33,9 @@ bool is_dataset_file(const fs::path& path) {
 /// points: wanted too, which are read along with the photographs alone.
 std::shared_ptr<const Dataset> load_cameras(const fs::path& path, int downscale, bool points) {
     Dataset dataset;
+    if (is_mesh_scene(path)) dataset = scene_cameras(path, {});
     try {
-        if (points) dataset = load_dataset(path, {.downscale = downscale});
+        if (points && dataset.frames.empty()) dataset = load_dataset(path, {.downscale = downscale});
     } catch (const InputError&) {
         // A photograph or the points are not as they should be: the cameras may still be seen.
     }
@@ -75,11 +77,14 @@ Look look_of(const nlohmann::json& config) {
 }
 
 /// The dataset of a run, as its config.json names it: relative to where the training was started, which may
-/// be here or any folder above the run's.
+/// be here or any folder above the run's. Of a mesh scene, the photographs that the training made of it.
 fs::path dataset_of(const fs::path& run, const nlohmann::json& config) {
     const fs::path named = text_of(config, "dataset");
     if (named.empty()) return {};
     std::error_code error;
+    const std::string extension = core::lower(named.extension().string());
+    const bool mesh = extension == ".gltf" || extension == ".glb";
+    if (mesh && fs::exists(run / "dataset/transforms.json", error)) return run / "dataset";
     if (fs::exists(named, error)) return named;
     if (named.is_absolute()) return {};
     for (fs::path folder = fs::absolute(run, error); folder.has_relative_path();
@@ -121,9 +126,10 @@ Scene open_dataset(const fs::path& path) {
     Scene scene;
     scene.dataset = load_cameras(path, 1, true);
     scene.gaussians = std::make_shared<const Gaussians>(splats_of_points(scene.dataset->points));
-    scene.remark = scene.gaussians->size() > 0
-                       ? "these are the dataset's points; ewa train makes splats of them"
-                       : "this dataset has cameras, but no points and no splats";
+    scene.remark =
+        is_mesh_scene(path) ? "these are the views of a mesh scene; ewa train photographs it and makes splats"
+        : scene.gaussians->size() > 0 ? "these are the dataset's points; ewa train makes splats of them"
+                                      : "this dataset has cameras, but no points and no splats";
     return scene;
 }
 
@@ -147,9 +153,10 @@ Gaussians splats_of_points(const PointCloud& points) {
 Scene open_scene(const fs::path& path, const fs::path& cameras) {
     std::error_code error;
     Scene scene;
+    if (!fs::exists(path, error)) throw InputError(path.string() + ": there is no such file or folder");
     if (fs::is_directory(path, error)) {
         scene = is_run(path) ? open_run(path, cameras) : open_dataset(path);
-    } else if (is_dataset_file(path)) {
+    } else if (is_dataset_file(path) || is_mesh_scene(path)) {
         scene = open_dataset(path);
     } else {
         SplatScene splats = read_splats(path);

@@ -122,9 +122,8 @@ TEST(Dataset, ADiffuseSceneTrainsWithoutShAndThePlanSaysSo) {
     EXPECT_EQ(read_json(folder / "out2/config.json")["sh-degree"], 2);
 }
 
-TEST(Dataset, TrainPhotographsAMeshSceneFirst) {
-    const Folder folder;
-    // One triangle, and 8 cameras in a row: enough for the dome to be left out.
+/// One triangle, and 8 cameras in a row: enough for the dome to be left out.
+std::string leaf() {
     nlohmann::json scene = {{"asset", {{"version", "2.0"}}}, {"scene", 0}};
     scene["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 0.8}, {"znear", 0.1}}}}};
     scene["nodes"] = {{{"mesh", 0}}};
@@ -139,7 +138,12 @@ TEST(Dataset, TrainPhotographsAMeshSceneFirst) {
     scene["buffers"] = {
         {{"byteLength", 36},
          {"uri", "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}}};
-    write_file(folder / "leaf.gltf", scene.dump());
+    return scene.dump();
+}
+
+TEST(Dataset, TrainPhotographsAMeshSceneFirst) {
+    const Folder folder;
+    write_file(folder / "leaf.gltf", leaf());
     const Outcome outcome = run_ewa({"train", folder / "leaf.gltf", "-o", folder / "out", "--steps", "2"});
     ASSERT_EQ(outcome.status, 0) << outcome.err;
     EXPECT_NE(outcome.out.find("leaf: 7 views to train on, 1 held out, 256x256"), std::string::npos)
@@ -153,6 +157,48 @@ TEST(Dataset, TrainPhotographsAMeshSceneFirst) {
     EXPECT_NE(again.out.find("8 were there already"), std::string::npos) << again.out;
     expect_failure(run_ewa({"train", folder / "none.glb", "-o", folder / "out3"}), 2, "none.glb");
     EXPECT_FALSE(fs::exists(folder / "out3"));
+}
+
+TEST(Dataset, EveryCommandTakesAMeshScene) {
+    const Folder folder;
+    const std::string scene = folder / "leaf.gltf", splats = folder / "out/splats.ply";
+    write_file(scene, leaf());
+    const Outcome info = run_ewa({"info", scene});
+    EXPECT_EQ(info.status, 0) << info.err;
+    for (const char* line :
+         {"triangles       1 (0 more", "views           8 of the file's cameras (7 train, 1 test"})
+        EXPECT_NE(info.out.find(line), std::string::npos) << info.out;
+    const auto json = nlohmann::json::parse(run_ewa({"info", scene, "--json"}).out);
+    EXPECT_EQ(json["triangles"], 1);
+    EXPECT_EQ(json["bounds"]["max"], (std::vector<double>{1, 1, 0}));
+    EXPECT_EQ(
+        run_ewa({"info", kScenes + "plaster.gltf", "--json"}).out.find("\"color_depends_on_view\": true"),
+        std::string::npos);
+
+    ASSERT_EQ(run_ewa({"train", scene, "-o", folder / "out", "--steps", "2"}).status, 0);
+    const std::vector<std::string> eval{"eval", splats, scene, "--json", folder / "scene.json"};
+    const Outcome beside = run_ewa(eval);
+    ASSERT_EQ(beside.status, 0) << beside.err;
+    EXPECT_EQ(beside.out.find("photographed"), std::string::npos) << "they lie beside the splats";
+    ASSERT_EQ(run_ewa({"eval", splats, folder / "out/dataset", "--json", folder / "dataset.json"}).status, 0);
+    const auto of_scene = read_json(folder / "scene.json");
+    EXPECT_EQ(of_scene["psnr"], read_json(folder / "dataset.json")["psnr"]);
+    EXPECT_EQ(of_scene["frames"], read_json(folder / "dataset.json")["frames"]);
+
+    // As others would find them: without the photographs that the training made.
+    fs::remove(folder / "out/dataset/depth/view_003.exr");
+    const Outcome anew = run_ewa(eval);
+    ASSERT_EQ(anew.status, 0) << anew.err;
+    EXPECT_NE(anew.out.find("photographed 8/8 views"), std::string::npos) << anew.out;
+    EXPECT_EQ(read_json(folder / "scene.json")["frames"], of_scene["frames"]);
+    EXPECT_FALSE(fs::exists(folder / "out/dataset/depth/view_003.exr")) << "reading leaves a run as it is";
+    EXPECT_EQ(run_ewa({"grad", splats, scene, "--frame", "2", "-o", folder / "g.ply"}).status, 0);
+
+    for (const std::string& cameras : {scene, folder / "out/dataset"})
+        ASSERT_EQ(run_ewa({"render", splats, "--cameras", cameras, "-o", cameras + ".pictures"}).status, 0);
+    for (const char* name : {"view_000.png", "view_007.png"})
+        EXPECT_TRUE(read_file(scene + ".pictures/" + name) ==
+                    read_file(folder / ("out/dataset.pictures/" + std::string(name))));
 }
 
 }  // namespace

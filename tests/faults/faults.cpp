@@ -3,6 +3,8 @@
 //   EWA_FAULT_ALLOCATIONS=N  from the N-th on, device memory cannot be allocated
 //   EWA_FAULT_SUBMITS=N      the N-th submission and those after it find the device lost
 //   EWA_FAULT_WAITS=N        the same of waiting for one
+//   EWA_FAULT_ACQUIRE=N,R    the N-th picture of a window cannot be had: the VkResult R
+//   EWA_FAULT_PRESENT=N,R    the N-th picture of a window is shown with the VkResult R
 //   EWA_FAULT_BYTES=N        the disk is full once N bytes have been written to regular files
 //   EWA_FAULT_READ_ONLY=DIR  nothing below DIR can be created, changed or removed
 //   EWA_FAULT_KILL=N         the program is killed at the N-th submission, file opened for writing, write
@@ -36,6 +38,14 @@ Function next(const char* name) {
 bool due(const char* variable, std::atomic<long>& calls) {
     const char* from = std::getenv(variable);
     return from && ++calls >= std::atol(from);
+}
+
+/// The result that this call of those that `variable` counts is to have, or the one it has.
+VkResult instead(const char* variable, std::atomic<long>& calls, VkResult result) {
+    const char* from = std::getenv(variable);
+    if (!from || ++calls != std::atol(from)) return result;
+    const char* comma = std::strchr(from, ',');
+    return comma ? VkResult(std::atol(comma + 1)) : result;
 }
 
 bool read_only(const char* path) {
@@ -99,6 +109,21 @@ VkResult vkWaitForFences(VkDevice device, uint32_t count, const VkFence* fences,
     // The driver here is not lost in truth, and works on: what it works with may go only once it has ended.
     const VkResult result = next<PFN_vkWaitForFences>("vkWaitForFences")(device, count, fences, all, timeout);
     return due("EWA_FAULT_WAITS", calls) ? VK_ERROR_DEVICE_LOST : result;
+}
+
+VkResult vkAcquireNextImageKHR(VkDevice device, VkSwapchainKHR swapchain, uint64_t timeout,
+                               VkSemaphore semaphore, VkFence fence, uint32_t* index) {
+    static std::atomic<long> calls{0};
+    // Nothing is acquired where it fails.
+    const VkResult result = instead("EWA_FAULT_ACQUIRE", calls, VK_SUCCESS);
+    if (result != VK_SUCCESS) return result;
+    return next<PFN_vkAcquireNextImageKHR>("vkAcquireNextImageKHR")(device, swapchain, timeout, semaphore,
+                                                                    fence, index);
+}
+
+VkResult vkQueuePresentKHR(VkQueue queue, const VkPresentInfoKHR* info) {
+    static std::atomic<long> calls{0};
+    return instead("EWA_FAULT_PRESENT", calls, next<PFN_vkQueuePresentKHR>("vkQueuePresentKHR")(queue, info));
 }
 
 ssize_t write(int file, const void* bytes, size_t count) {

@@ -255,5 +255,43 @@ TEST(LiveWatcher, FollowsARunByItsConnection) {
     EXPECT_TRUE(soon([&] { return server.paused(); }));
 }
 
+TEST(LiveWatcher, ATrainingThatGoesAwayAndOneBegunAnew) {
+    auto server = std::make_unique<Server>("127.0.0.1", 0, "");
+    const uint16_t port = server->port();
+    Watcher watcher({{}, Address{"127.0.0.1", port}, {}}, [] {});
+    const auto known = [&](size_t lines, int step) {
+        return watcher.update().status.metrics.size() == lines && watcher.update().splats_step == step;
+    };
+    server->report({500, 1000, 5, 0.25, 1.5, State::running, false, {}});
+    for (int i = 1; i <= 3; ++i) server->add_metrics(line_of(i));
+    ASSERT_TRUE(soon([&] { return server->wants_splats(500); }));
+    server->offer({500, some_splats(2)}, 0);
+    ASSERT_TRUE(soon([&] { return known(3, 500); }));
+
+    server.reset();
+    ASSERT_TRUE(soon([&] { return !watcher.update().connected && !watcher.update().problem.empty(); }));
+    EXPECT_TRUE(known(3, 500)) << "what was there stays to be seen";
+
+    server = std::make_unique<Server>("127.0.0.1", port, "");
+    server->report({2, 1000, 5, 0.25, 1.5, State::running, false, {}});
+    server->add_metrics(line_of(1));
+    ASSERT_TRUE(soon([&] { return server->wants_splats(2); }));
+    server->offer({2, some_splats(2)}, 0);
+    EXPECT_TRUE(soon([&] { return known(1, 2); })) << "the old run's curves, or its step, are kept";
+    EXPECT_TRUE(watcher.update().connected);
+    EXPECT_EQ(watcher.update().problem, "");
+}
+
+/// One that accepts and is silent: closing the window does not wait for it.
+TEST(LiveWatcher, EndsAtOnceWhereNobodyAnswers) {
+    const Listener silent("127.0.0.1", 0);
+    const auto start = std::chrono::steady_clock::now();
+    {
+        const Watcher watcher({{}, Address{"127.0.0.1", silent.port()}, {}}, [] {});
+        std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    }
+    EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(5));
+}
+
 }  // namespace
 }  // namespace ewa::live

@@ -111,6 +111,20 @@ TEST(Schedule, RelocationsStopWhereMcmcsCodeStopsThem) {
     EXPECT_FALSE(tenth.relocates(2500));
 }
 
+TEST(Schedule, ShortRunsLearnMeansAndViewDependenceFaster) {
+    TrainOptions options;
+    options.strategy = Strategy::adc;
+    EXPECT_EQ(schedule_for(options).sh_rest_rate, options.sh_rest_rate);
+    EXPECT_DOUBLE_EQ(schedule_for(options).mean_rate(30000, 2), 2 * options.means_rate_final);
+    options.steps = 3000;
+    EXPECT_DOUBLE_EQ(schedule_for(options).sh_rest_rate, 1.9 * options.sh_rest_rate);
+    EXPECT_DOUBLE_EQ(schedule_for(options).mean_rate(3000, 2), 1.9 * 2 * options.means_rate_final);
+    EXPECT_NEAR(schedule_for(options).mean_rate(0, 1), 1.9 * options.means_rate, 1e-12);
+    options.strategy = Strategy::mcmc;
+    EXPECT_EQ(schedule_for(options).sh_rest_rate, options.sh_rest_rate);
+    EXPECT_DOUBLE_EQ(schedule_for(options).means_rate, options.means_rate);
+}
+
 TEST(Schedule, TheResolutionDoublesEachTenthOfTheRun) {
     TrainOptions options;
     EXPECT_EQ(schedule_for(options).halvings_at(1), 0);

@@ -255,7 +255,40 @@ TEST(GltfMesh, LightsAndSky) {
     gltf.refused({"\"sky\"", "\"zenith\""});
 }
 
+TEST(GltfMesh, WhatAPhotographDoesNotShowIsRemarked) {
+    Gltf gltf;
+    EXPECT_TRUE(gltf.read().remarks.empty());
+    gltf.top["materials"] = {
+        {{"extensions",
+          {{"KHR_materials_specular", {{"specularColorFactor", {1, 0.5, 0.5}}, {"specularFactor", 0.5}}},
+           {"KHR_materials_clearcoat", {{"clearcoatFactor", 1}}},
+           {"KHR_materials_ior", {{"ior", 1.4}}}}}}};
+    gltf.primitive()["material"] = 0;
+    gltf.top["extensionsUsed"] = {"KHR_materials_specular", "KHR_materials_clearcoat", "KHR_materials_ior",
+                                  "EXT_mesh_gpu_instancing"};
+    const auto pose = gltf.add(bytes_of_list<float>({0, 1}), 5126, "SCALAR", 2);
+    const auto turns = gltf.add(bytes_of_list<float>({0, 0, 0, 1, 1, 1}), 5126, "VEC3", 2);
+    gltf.top["animations"] = {
+        {{"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "translation"}}}}}},
+         {"samplers", {{{"input", pose}, {"output", turns}}}}}};
+    EXPECT_EQ(gltf.read().remarks,
+              (std::vector<std::string>{"KHR_materials_clearcoat is left out",
+                                        "EXT_mesh_gpu_instancing is left out",
+                                        "animations are left out: the pose is the one the file stores",
+                                        "KHR_materials_specular: specularColorFactor is left out"}));
+}
+
 TEST(GltfMesh, DamageIsNamed) {
+    {
+        Gltf gltf;
+        gltf.top["extensions"]["KHR_lights_punctual"]["lights"] = {{{"type", "spot"}}};
+        gltf.refused({"\"spot\""});
+        gltf.top["extensions"] = json::object();
+        gltf.top["cameras"] = {{{"type", "perspective"}}};
+        gltf.refused({"\"perspective\""});
+        gltf.top["cameras"] = {{{"type", "orthographic"}}};
+        gltf.refused({"\"orthographic\""});
+    }
     {
         Gltf gltf;
         gltf.primitive()["indices"] = gltf.add(bytes_of_list<uint16_t>({0, 1, 3}), 5123, "SCALAR", 3);
