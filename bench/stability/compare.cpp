@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cfloat>
 #include <cmath>
-#include <span>
 
+#include "bench/gradient_distance.h"
 #include "core/random.h"
 #include "ewa/renderer.h"
 #include "reference/order.h"
@@ -136,34 +136,6 @@ double least_quaternion_norm(const StabilityCase& one, const Values& gradient) {
     return largest > 0 ? kShare * norm_of(gradient.log_scales) / largest : 0;
 }
 
-/// |a - b| / max(|b|, least), both within float32's range; without overflow of the squares.
-template <class A>
-double distance(const std::vector<A>& a, const std::vector<double>& b, double least = 0) {
-    double largest = 0, apart = 0, length = 0;
-    const auto limited = [](double v) { return std::clamp(v, -kLargest, kLargest); };
-    for (const double v : b) largest = std::max(largest, std::abs(limited(v)));
-    if (largest == 0) {
-        for (const A v : a)
-            if (!(v == A(0))) return INFINITY;
-        return 0;
-    }
-    for (size_t i = 0; i < b.size(); ++i) {
-        apart += std::pow((limited(double(a[i])) - limited(b[i])) / largest, 2);
-        length += std::pow(limited(b[i]) / largest, 2);
-        if (std::isnan(double(a[i]))) return NAN;
-    }
-    return std::sqrt(apart) / std::max(std::sqrt(length), least / largest);
-}
-
-template <class A, class B, class Visit>
-void for_each_group(const A& a, const B& b, Visit visit) {
-    visit("means", a.means, b.means);
-    visit("quaternions", a.quaternions, b.quaternions);
-    visit("log scales", a.log_scales, b.log_scales);
-    visit("opacity logits", a.opacity_logits, b.opacity_logits);
-    visit("SH", a.sh, b.sh);
-}
-
 bool all_finite(const Gaussians& g) {
     const auto finite = [](const std::vector<float>& v) {
         return std::all_of(v.begin(), v.end(), [](float x) { return std::isfinite(x); });
@@ -219,7 +191,8 @@ Conditions conditions_of(const StabilityCase& one, const Image& photo, const Los
             std::max(k.loss, std::abs(moved.loss - twin.loss) / std::max(1.0, twin.loss) / kPerturbation);
         int group = 0;
         for_each_group(moved.gradient, twin.gradient, [&](const char*, const auto& a, const auto& b) {
-            k.groups[group] = std::max(k.groups[group], distance(a, b, least[size_t(group)]) / kPerturbation);
+            k.groups[group] =
+                std::max(k.groups[group], relative_distance(a, b, least[size_t(group)]) / kPerturbation);
             ++group;
         });
     }
@@ -272,7 +245,7 @@ StabilityResult compare_with_twin(const std::shared_ptr<gpu::Device>& device, co
     for_each_group(gradient.gradient, twin.gradient, [&](const char* name, const auto& a, const auto& b) {
         const double k = condition.groups[group];
         result.comparisons.push_back(
-            {name, distance(a, b, least[size_t(group)]), bound(kGradientFloor, k), k});
+            {name, relative_distance(a, b, least[size_t(group)]), bound(kGradientFloor, k), k});
         ++group;
     });
     return result;

@@ -9,6 +9,7 @@
 #include <new>
 #include <utility>
 
+#include "cli/manual.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "viewer/app.h"
@@ -31,6 +32,7 @@ struct Arguments {
     PanelSettings settings;
     bool antialias = false;
     DeviceOptions device;
+    std::string manual;
     bool verbose = false;
 };
 
@@ -205,6 +207,9 @@ void add_options(CLI::App& app, Arguments& arguments) {
         ->type_name("NAME|N");
     app.add_flag("--verbose", arguments.verbose,
                  "At the end: when the first picture was there, how many came while the camera moved");
+    // Without a group it stands in no help: the build calls it.
+    app.add_option("--manual", arguments.manual, "Write the manual page and shell completions below DIR")
+        ->group("");
 }
 
 /// Opens the device while the scene is being read. OpenDevice gives that one first, and then opens it anew.
@@ -229,9 +234,13 @@ class DeviceOpener {
     std::shared_ptr<std::shared_ptr<gpu::Device>> first_ = std::make_shared<std::shared_ptr<gpu::Device>>();
 };
 
-int run(const Arguments& arguments) {
+int run(const CLI::App& app, const Arguments& arguments) {
     const auto started = std::chrono::steady_clock::now();
     try {
+        if (!arguments.manual.empty()) {
+            cli::write_manual(app, arguments.manual);
+            return kDone;
+        }
         DeviceOpener opener(arguments.device);
         Startup startup = open(arguments);
         startup.started = started;
@@ -286,5 +295,5 @@ int main(int argc, char** argv) {
         if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) return app.exit(error);
         return fail(std::string(error.what()) + " (see ewa-view --help)", kWrongUse);
     }
-    return run(arguments);
+    return run(app, arguments);
 }

@@ -111,6 +111,9 @@ std::vector<Case> cases() {
         all.push_back({SplatKind::mixed, 300, 53, 39, 3, kernel, seed++});
     for (const auto& [w, h] : {std::pair{1, 1}, {17, 3}, {3, 17}, {200, 150}, {257, 129}})
         all.push_back({SplatKind::mixed, 400, w, h, 2, Kernel::peak, seed++});
+    // Where a pixel's position has few digits left behind the point.
+    for (const auto& [w, h] : {std::pair{8192, 4}, {4, 8192}})
+        all.push_back({SplatKind::sub_pixel, 600, w, h, 0, Kernel::peak, seed++});
     all.push_back({SplatKind::mixed, 3000, 160, 120, 1, Kernel::peak, seed++});
     for (const size_t splats : {size_t(0), size_t(1)})
         all.push_back({SplatKind::ordinary, splats, 61, 47, 1, Kernel::peak, seed++});

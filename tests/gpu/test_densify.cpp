@@ -258,6 +258,22 @@ TEST(DensifyEdges, TheSeedAndTheStepChooseTheChildren) {
     EXPECT_NE(means(1, 5), means(1 + (1ull << 32), 5));
 }
 
+TEST(DensifyEdges, NoBoundOnTheScaleKeepsTheLargest) {
+    Start start(2600, 200, 0);
+    for (size_t i = 0; i < 200; ++i) {
+        start.gaussians.opacity_logits[i] = i < 20 ? -9.0f : 1.0f;
+        for (size_t k = 0; k < 3; ++k) start.gaussians.log_scales[3 * i + k] = float(i % 10);
+    }
+    pipeline::Model model = pipeline::upload_model(*device(), start.gaussians, 2, true);
+    DensifyRules rules = rules_for(1u << 20);
+    rules.grow_gradient = 1e9f;
+    rules.prune_scale = 0;
+    EXPECT_EQ(run_densify(model, rules).after, 180u);
+    model = pipeline::upload_model(*device(), start.gaussians, 2, true);
+    rules.prune_scale = 100;  // between e^4 and e^5
+    EXPECT_EQ(run_densify(model, rules).after, 90u);
+}
+
 TEST(ResetOpacity, LowersWhatIsHigherAndForgetsItsMoments) {
     Start start(2500, 129, 1);
     Rig& r = rig();
@@ -285,6 +301,27 @@ TEST(ResetOpacity, LowersWhatIsHigherAndForgetsItsMoments) {
     }
     EXPECT_GT(lowered, 50u);
     EXPECT_LT(lowered, 129u);
+}
+
+/// More workgroups than one row of a dispatch may hold.
+TEST(ResetOpacity, ReachesEverySplatOverSeveralRowsOfWorkgroups) {
+    Rig& r = rig();
+    passes::Shape narrow = r.shape();
+    narrow.max_groups = 3;
+    const uint32_t splats = 7 * narrow.group + 5;
+    Start start(2501, splats, 0);
+    Guarded params("params", start.model.params.download<float>(start.moments1.size()), gpu::Texel::rgba32f),
+        moments1("moments1", start.moments1, gpu::Texel::rgba32f),
+        moments2("moments2", start.moments2, gpu::Texel::rgba32f);
+    r.run([&](gpu::Recording& recording) {
+        r.kernels.get<passes::ResetOpacity>().record(recording, narrow, {params, moments1, moments2},
+                                                     {splats, start.model.planes(), -20.0f});
+    });
+    expect_intact({&params, &moments1, &moments2});
+    const auto after = params.read<float>();
+    for (size_t i = 0; i < splats; ++i)
+        EXPECT_EQ(after[pipeline::parameter_index(start.model.planes(), shared::PARAM_OPACITY, i)], -20.0f)
+            << i;
 }
 
 }  // namespace

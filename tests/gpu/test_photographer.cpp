@@ -76,6 +76,44 @@ TEST(Photographer, AMirrorsAlbedoIsGgxs) {
     }
 }
 
+TEST(Photographer, AMirrorShowsTheSkyFromZenithToGround) {
+    mesh::Scene scene = floor_scene(glm::vec3(1));
+    scene.materials[0] = {};
+    scene.materials[0].roughness = 0;  // of a metal of base 1
+    scene.sky = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    const Shot shot = shoot(scene, test::camera_down_z({0, 0, 5}, 41, 41, 50), 16);
+    for (const int y : {3, 20, 37}) {
+        // Up is y: the mirror turns z alone.
+        const double slope = (20.5 - (y + 0.5)) / 50, height = slope / std::sqrt(1 + slope * slope);
+        const float* pixel = shot.radiance.at(20, y);
+        EXPECT_NEAR(double(pixel[0]), std::max(height, 0.0), 0.01) << y;
+        EXPECT_NEAR(double(pixel[1]), 1 - std::abs(height), 0.01) << y;
+        EXPECT_NEAR(double(pixel[2]), std::max(-height, 0.0), 0.01) << y;
+    }
+}
+
+/// Inside a closed box that shines and reflects: a geometric series, cut after the last bounce.
+TEST(Photographer, ARouletteTakesNothingAway) {
+    mesh::Scene scene;
+    scene.sky = test::even_sky(0);
+    const double albedo = 0.6;
+    scene.materials.push_back(test::diffuse(glm::vec3(float(albedo))));
+    scene.materials[0].emitted = glm::vec3(1.0f);
+    const auto corner = [](int bits) {
+        return glm::dvec3(bits & 1 ? 1 : -1, bits & 2 ? 1 : -1, bits & 4 ? 1 : -1);
+    };
+    const int faces[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4},
+                             {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
+    for (const auto& f : faces)  // seen from inside
+        test::add_quad(scene, corner(f[3]), corner(f[2]), corner(f[1]), corner(f[0]));
+    const Shot shot = shoot(scene, test::camera_down_z({0, 0, 0.5}, 16, 16, 10), 1024);
+    double sum = 0;
+    for (size_t i = 0; i < shot.radiance.pixels.size(); i += 4) sum += double(shot.radiance.pixels[i]);
+    double expected = 0;
+    for (int k = 0; k <= int(shared::TRACE_BOUNCES); ++k) expected += std::pow(albedo, k);
+    EXPECT_NEAR(sum / 256, expected, 0.01 * expected);
+}
+
 TEST(Photographer, APointLightOnALambertPlane) {
     for (const double size : {1.0, 1e-3, 1e4}) {  // the unit of length changes nothing
         mesh::Scene scene = floor_scene({0.5f, 0.25f, 1.0f}, 10 * size);

@@ -239,5 +239,33 @@ TEST(ProjectEdges, GeoreferencedSceneKeepsItsSharpness) {
     EXPECT_LT(worst, 1e-7);  // float32 positions alone would be off by 1e-1
 }
 
+/// Up to 1e18 px; beyond that, and beyond VIEW_MAX along any axis, a splat is skipped.
+TEST(ProjectEdges, SplatsOfAllSizesAndDistances) {
+    Scene scene = random_scene(6, 12, SplatKind::ordinary, 64, 48, 0, Kernel::antialias);
+    scene.camera.rotation = glm::dmat3(1.0);
+    scene.camera.translation = glm::dvec3(0.0);
+    Gaussians& g = scene.gaussians;
+    const float sizes[] = {1, 1e6f, 1e9f, 1e12f, 1e15f, 1e18f};
+    for (size_t i = 0; i < 12; ++i) {
+        for (size_t k = 0; k < 3; ++k) {
+            g.means[3 * i + k] = k == 2 ? 4.0f : 0.0f;
+            g.log_scales[3 * i + k] = std::log(sizes[i % 6] / (1 + float(k)));
+        }
+        g.opacity_logits[i] = 2;
+    }
+    for (size_t k = 0; k < 3; ++k) g.means[3 * (6 + k) + k] = 1e19f;
+    for (size_t k = 0; k < 4; ++k) g.quaternions[4 * 9 + k] = 1e-39f;  // some devices take it for zero
+    const Output out = run_project(scene);
+    uint32_t skipped = 0;
+    for (size_t i = 0; i < 12; ++i) {
+        const auto p = reference::project(g, i, scene.camera, scene.options);
+        EXPECT_EQ(out.counts[i] > 0, p.visible) << i;
+        EXPECT_EQ(p.visible, i < 5 || i == 10) << i;
+        skipped += p.skipped_nonfinite;
+    }
+    EXPECT_EQ(out.totals.skipped_nonfinite, skipped);
+    EXPECT_EQ(skipped, 6u);
+}
+
 }  // namespace
 }  // namespace ewa::test

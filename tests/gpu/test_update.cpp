@@ -2,8 +2,10 @@
 // The gradient of the projection and Adam, on slots from the twin.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "gpu/guarded.h"
 #include "gpu/twin_inputs.h"
@@ -337,6 +339,101 @@ TEST(UpdateEdges, CoefficientsAboveTheDegreeInUseStay) {
         moved += changed;
     }
     EXPECT_GT(moved, 100u);
+}
+
+/// What the twin's Adam and the rule of docs/numerics.md ("Steps") make of one value's texel.
+struct Limited {
+    std::array<double, 4> value{};
+    bool limited = false;
+};
+Limited limited_step(const std::array<double, 4>& from, const std::array<double, 4>& to, int used,
+                     double most) {
+    double longest = 0;
+    for (size_t k = 0; k < size_t(used); ++k) longest = std::max(longest, std::abs(to[k] - from[k]));
+    if (!(longest > most)) return {to, false};
+    Limited result{from, true};
+    for (size_t k = 0; k < size_t(used); ++k) result.value[k] += (to[k] - from[k]) * most / longest;
+    return result;
+}
+
+/// Steps of all sizes about the bound: half a splat's depth for its mean, half a quaternion's norm.
+TEST(UpdateLimits, StepsEndWhereTheRuleSays) {
+    const Scene scene = random_scene(1905, 120, SplatKind::ordinary, 61, 47);
+    const Slots slots(scene);
+    const Gaussians& start = scene.gaussians;
+    GuardedModel model(start), gradient(start);
+    Bench bench(slots);
+    auto push = push_for(scene, 1);
+    push.mean_rate = 2.0f;  // depths are about 4: some steps are within half of them, some not
+    push.quaternion_rate = 0.4f;
+    bench.run(scene, model.model, gradient.moments1, gradient.moments2, kGradient, push);
+    const Gaussians g = gradient.read(gradient.moments1);
+    bench.run(scene, model.model, model.moments1, model.moments2, 0, push);
+    const Gaussians now = model.read(model.model.params);
+    reference::AdamState of_means(start.means.size()), of_quaternions(start.quaternions.size());
+    std::vector<double> means = wide(start.means), quaternions = wide(start.quaternions);
+    adam_step(means, wide(g.means), of_means, push.mean_rate, 1);
+    adam_step(quaternions, wide(g.quaternions), of_quaternions, push.quaternion_rate, 1);
+    uint32_t limited = 0, free = 0;
+    for (size_t i = 0; i < start.size(); ++i) {
+        if (slots.tile_counts[i] == 0) continue;
+        std::array<double, 4> from{}, to{}, turned{}, turned_to{};
+        double largest = 0;
+        for (size_t k = 0; k < 3; ++k) from[k] = start.means[3 * i + k], to[k] = means[3 * i + k];
+        for (size_t k = 0; k < 4; ++k) {
+            turned[k] = start.quaternions[4 * i + k];
+            turned_to[k] = quaternions[4 * i + k];
+            largest = std::max(largest, std::abs(turned[k]));
+        }
+        const double depth = slots.twin.picture.projected[i].z;
+        const Limited mean = limited_step(from, to, 3, 0.5 * depth),
+                      quaternion = limited_step(turned, turned_to, 4, 0.5 * largest);
+        limited += mean.limited + quaternion.limited;
+        free += !mean.limited + !quaternion.limited;
+        for (size_t k = 0; k < 3; ++k) EXPECT_NEAR(now.means[3 * i + k], mean.value[k], 1e-4 * depth) << i;
+        for (size_t k = 0; k < 4; ++k)
+            EXPECT_NEAR(now.quaternions[4 * i + k], quaternion.value[k], 1e-4 * largest) << i;
+    }
+    EXPECT_EQ(bench.counts.read<shared::Counts>()[0].limited_steps, limited);
+    EXPECT_GT(limited, 20u);
+    EXPECT_GT(free, 20u);
+}
+
+/// A scale ends at the borders; one that is outside already goes no further, and is not brought in.
+TEST(UpdateLimits, ScalesStayWithinTheirBorders) {
+    Scene scene = random_scene(1906, 120, SplatKind::ordinary, 61, 47);
+    for (size_t k = 0; k < 3; ++k) scene.gaussians.log_scales[k] = -80;
+    const Slots slots(scene);
+    const Gaussians& start = scene.gaussians;
+    GuardedModel model(start);
+    Bench bench(slots);
+    auto push = push_for(scene, 1);
+    push.scale_rate = 200;
+    bench.run(scene, model.model, model.moments1, model.moments2, 0, push);
+    const Gaussians now = model.read(model.model.params);
+    std::set<float> ends;
+    for (size_t i = 1; i < start.size(); ++i)
+        for (size_t k = 0; k < 3; ++k)
+            if (const float s = now.log_scales[3 * i + k]; s != start.log_scales[3 * i + k]) ends.insert(s);
+    EXPECT_EQ(ends, (std::set<float>{float(shared::LOG_SCALE_MIN), float(shared::LOG_SCALE_MAX)}));
+    for (size_t k = 0; k < 3; ++k) EXPECT_EQ(now.log_scales[k], -80);
+    uint32_t limited = 0;
+    for (size_t i = 1; i < start.size(); ++i) limited += slots.tile_counts[i] > 0;
+    EXPECT_EQ(bench.counts.read<shared::Counts>()[0].limited_steps, limited);
+
+    // Each border alone.
+    Scene one_way = scene;
+    for (const float sign : {1.0f, -1.0f}) {
+        GuardedModel pulled(start);
+        Bench again(slots);
+        push.scale_pull = sign * 1e9f;  // down, or up
+        again.run(one_way, pulled.model, pulled.moments1, pulled.moments2, kRegularised, push);
+        const Gaussians after = pulled.read(pulled.model.params);
+        for (size_t i = 3; i < after.log_scales.size(); ++i)
+            EXPECT_EQ(after.log_scales[i],
+                      sign > 0 ? float(shared::LOG_SCALE_MIN) : float(shared::LOG_SCALE_MAX))
+                << i;
+    }
 }
 
 }  // namespace
