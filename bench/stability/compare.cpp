@@ -28,6 +28,7 @@ constexpr double kAtThreshold = 2e-4;  // relative distance at which float32 may
 constexpr double kPerturbation = 1e-10;
 constexpr int kPerturbations = 3;
 constexpr double kLargest = FLT_MAX;
+constexpr uint64_t kFewPixels = 4, kPixelsEach = 200;  // that may stand on a threshold
 
 /// Every stored value moved by a relative kPerturbation, up or down.
 Values perturbed(const Values& values, const glm::dvec3& eye, uint32_t draw) {
@@ -199,7 +200,9 @@ Conditions conditions_of(const StabilityCase& one, const Image& photo, const Los
     return k;
 }
 
+/// A problem without a condition number has no bound of its own.
 double bound(double floor, double condition) {
+    if (!std::isfinite(condition)) return floor;
     return std::max(floor, kRoundings * condition * kUnit);
 }
 
@@ -207,10 +210,12 @@ double bound(double floor, double condition) {
 
 bool StabilityResult::good() const {
     return finite && skipped == skipped_by_twin &&
+           pixels_at_threshold <= std::max(kFewPixels, pixels / kPixelsEach) &&
            std::all_of(comparisons.begin(), comparisons.end(), [](const Comparison& c) { return c.good(); });
 }
 
-StabilityResult compare_with_twin(const std::shared_ptr<gpu::Device>& device, const StabilityCase& one) {
+StabilityResult compare_with_twin(const std::shared_ptr<gpu::Device>& device, const StabilityCase& one,
+                                  const Gaussians& drawn) {
     const Image photo = stability_photo(one.camera.width, one.camera.height);
     const LossGradientTwin twin = reference::loss_gradient(one.gaussians, one.camera, photo, one.options);
     const std::vector<uint8_t> at_threshold = pixels_at_threshold(twin.picture);
@@ -223,10 +228,11 @@ StabilityResult compare_with_twin(const std::shared_ptr<gpu::Device>& device, co
     result.splats = uint32_t(one.gaussians.size());
     result.drawn = uint32_t(twin.picture.order.size());
     result.skipped_by_twin = twin.picture.skipped_nonfinite;
+    result.pixels = at_threshold.size();
     result.pixels_at_threshold = uint64_t(std::count(at_threshold.begin(), at_threshold.end(), 1));
     result.plain_determinant = plain_determinant_error(twin.picture, one.options, at_threshold, scale);
 
-    Renderer renderer(device, one.gaussians, one.options);
+    Renderer renderer(device, drawn, one.options);
     const Rendering rendering = renderer.render(one.camera);
     result.skipped = renderer.skipped_nonfinite();
     const Difference picture =
@@ -235,7 +241,7 @@ StabilityResult compare_with_twin(const std::shared_ptr<gpu::Device>& device, co
     result.comparisons.push_back(
         {"picture", picture.largest, bound(kPictureFloor, condition.picture), condition.picture});
 
-    const LossGradient gradient = loss_gradient(device, one.gaussians, one.camera, photo, one.options);
+    const LossGradient gradient = loss_gradient(device, drawn, one.camera, photo, one.options);
     result.loss = gradient.loss;
     result.finite = picture.finite && std::isfinite(gradient.loss) && all_finite(gradient.gradient);
     result.comparisons.push_back({"loss", std::abs(gradient.loss - twin.loss) / std::max(1.0, twin.loss),

@@ -27,17 +27,6 @@ class Drop : public SessionTest {
         window(title + " - ewa");
         return screenshot(session);
     }
-    /// Nothing moves any more: what stands on the display.
-    Image at_rest() {
-        Image last = x_->pixels(window());
-        for (int i = 0, equal = 0; i < 100 && equal < 8; ++i) {
-            std::this_thread::sleep_for(std::chrono::milliseconds(50));
-            const Image now = x_->pixels(window());
-            equal = now.pixels == last.pixels ? equal + 1 : 0;
-            last = now;
-        }
-        return last;
-    }
     std::unique_ptr<XClient> x_;
 };
 
@@ -90,9 +79,9 @@ TEST_F(Drop, WhatCannotBeReadIsSaid) {
     for (const bool panel : {true, false}) {
         if (!panel) session.send("key F2");
         for (const char* name : {"notes.txt", "broken.ply", "absent.ply"}) {
-            const Image before = at_rest();
+            const Image before = x_->pixels_at_rest(window());
             EXPECT_TRUE(x_->drop(window(), uri_of(folder_ / name)));
-            const Image after = at_rest();
+            const Image after = x_->pixels_at_rest(window());
             EXPECT_GT(largest_difference(before, after), 0.3f) << name << " is not spoken of";
             EXPECT_TRUE(x_->window_titled("splats.ply - ewa", 1)) << name;
             EXPECT_EQ(largest_difference(screenshot(session), picture), 0) << name;

@@ -12,6 +12,7 @@
 #include <stdexcept>
 #include <string_view>
 #include <thread>
+#include <utility>
 #include <vector>
 
 namespace ewa::test {
@@ -151,6 +152,17 @@ Image XClient::pixels(uint32_t window) const {
     for (size_t i = 0; i < count; ++i)
         for (size_t c = 0; c < 3; ++c) image.pixels[3 * i + c] = float(bgrx[4 * i + 2 - c]) / 255.0f;
     return image;
+}
+
+Image XClient::pixels_at_rest(uint32_t window) const {
+    Image last = pixels(window);
+    for (int i = 0, equal = 0; i < 200 && equal < 10; ++i) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(50));
+        Image now = pixels(window);
+        equal = now.pixels == last.pixels ? equal + 1 : 0;
+        last = std::move(now);
+    }
+    return last;
 }
 
 void XClient::set_resources(const std::string& text) const {
