@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <utility>
 
 #include "bench/accuracy.h"
 #include "cli/dataset_argument.h"

@@ -109,24 +109,18 @@ Edits parse_edits(const ConvertArguments& arguments) {
     return edits;
 }
 
-/// How many splats the format can hold such that they are drawn.
-size_t drawable_in(SplatFormat format, const Gaussians& gaussians) {
+size_t drawable_count(const Gaussians& gaussians) {
     size_t count = 0;
-    for (size_t i = 0; i < gaussians.size(); ++i) {
-        const glm::dvec3 mean = gaussians.world_mean(i);
-        const bool in_float = std::isfinite(float(mean.x)) && std::isfinite(float(mean.y)) &&
-                              std::isfinite(float(mean.z));
-        count += drawable(gaussians, i) && (in_float || format == SplatFormat::ply);
-    }
+    for (size_t i = 0; i < gaussians.size(); ++i) count += drawable(gaussians, i);
     return count;
 }
 
 /// Refuses what would leave less to see.
-void transform(Gaussians& gaussians, SplatFormat format, const glm::dmat4& matrix) {
+void transform(Gaussians& gaussians, const glm::dmat4& matrix) {
     if (matrix == glm::dmat4(1.0)) return;
-    const size_t before = drawable_in(format, gaussians);
+    const size_t before = drawable_count(gaussians);
     transform_splats(gaussians, matrix);
-    const size_t after = drawable_in(format, gaussians);
+    const size_t after = drawable_count(gaussians);
     if (after < before)
         throw InputError(
             fmt::format("--transform: {} of {} splats could not be drawn afterwards: a position or another "
@@ -149,7 +143,7 @@ void crop(Gaussians& gaussians, const Box& n) {
 /// What the user asked for, then what the format needs, so that the scene is what the file will hold.
 void edit(const ConvertArguments& arguments, const Edits& edits, SplatFormat format, Work& work) {
     Gaussians& gaussians = work.gaussians;
-    transform(gaussians, format, edits.transform);
+    transform(gaussians, edits.transform);
     if (edits.crop) crop(gaussians, *edits.crop);
     if (arguments.min_opacity > 0)
         keep_if(gaussians, [&](size_t i) {
@@ -239,7 +233,8 @@ int run(const ConvertArguments& arguments) {
     if (!arguments.quiet) {
         fmt::print("{}\n", described(out, format, "", work.gaussians));
         if (const fs::path values = values_path(arguments); !values.empty())
-            fmt::print("{}: the values of that glTF, {}\n", values.string(), bytes_text(fs::file_size(values)));
+            fmt::print("{}: the values of that glTF, {}\n", values.string(),
+                       bytes_text(fs::file_size(values)));
         for (const std::string& remark : remarks) fmt::print("  {}\n", remark);
     }
     Json json = {{"inputs", work.inputs},

@@ -126,7 +126,7 @@ TEST(Convert, WrongUse) {
     expect_failure(run_ewa({"convert", folder / "none.ply", folder / "none/o.ply"}), 1, "none/o.ply");
     expect_failure(
         run_ewa({"convert", folder / "none.ply", folder / "o.ply", "--json", folder / "s.ply/o.json"}), 1,
-        "the folder " + (folder / "s.ply"));
+        "s.ply/o.json");
     refuse({"--transform", "spin=1"}, "spin=1");
     refuse({"--transform", "turn=0,0,0,90"}, "turn=0,0,0,90");
     refuse({"--transform", "1,2,3"}, "1,2,3");
@@ -153,11 +153,6 @@ TEST(Convert, RefusesATransformAfterWhichNothingIsDrawn) {
         EXPECT_FALSE(fs::exists(out));
         expect_success(run_ewa({"convert", folder / "s.ply", out, "--quiet", "--transform", "scale=1e9"}));
     }
-    // A PLY has an origin of its own in double; the others have not.
-    const std::vector<std::string> far = {"--quiet", "--transform", "move=1e40,0,0"};
-    expect_success(run_ewa({"convert", folder / "s.ply", folder / "o.ply", far[0], far[1], far[2]}));
-    expect_failure(run_ewa({"convert", folder / "s.ply", folder / "o.spz", far[0], far[1], far[2]}), 2,
-                   "49 of 49 splats could not be drawn");
 }
 
 TEST(Convert, NoFileTakesAnothersPlace) {
@@ -201,7 +196,7 @@ TEST(Convert, NamesTheBinOfAGltfAndLeavesOthersAlone) {
         expect_success(outcome);
         const auto bytes = fs::file_size(folder / "g.bin");
         EXPECT_EQ(bytes, 50u * (12 + 8 + 16 + 12 + 4 + 4 * 12));
-        EXPECT_NE(outcome.out.find((folder / "g.bin") + ": the values of that glTF, 5.0 kB"),
+        EXPECT_NE(outcome.out.find((folder / "g.bin") + ": the values of that glTF, 5 kB"),
                   std::string::npos)
             << outcome.out;
         EXPECT_EQ(read_json(folder / "g.json")["output"]["values"]["bytes"], bytes);

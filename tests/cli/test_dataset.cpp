@@ -226,8 +226,7 @@ TEST(Dataset, FramesThatAreNotThereAreMissedBeforePhotographing) {
     make_splats(folder / "s.ply");
     const std::string scene = folder / "leaf.gltf", splats = folder / "s.ply";
     write_file(scene, leaf());
-    const Outcome grad =
-        run_ewa({"grad", splats, scene, "--frame", "99999", "-o", folder / "g.ply"});
+    const Outcome grad = run_ewa({"grad", splats, scene, "--frame", "99999", "-o", folder / "g.ply"});
     expect_failure(grad, 2, "frame 99999");
     EXPECT_EQ(grad.out, "");
     const Outcome eval = run_ewa({"eval", splats, scene, "--test-every", "0"});
@@ -239,7 +238,8 @@ TEST(Dataset, AccuracyTrainsADiffuseSceneWithoutSh) {
     const Folder folder;
     ASSERT_EQ(run_ewa(small("plaster.gltf", folder / "d")).status, 0);
     ASSERT_EQ(run_ewa(small("tea_table.gltf", folder / "e")).status, 0);
-    const std::pair<const char*, const char*> cases[] = {{"d", "of SH degree 0\n"}, {"e", "of SH degree 3\n"}};
+    const std::pair<const char*, const char*> cases[] = {{"d", "of SH degree 0\n"},
+                                                         {"e", "of SH degree 3\n"}};
     for (const auto& [name, text] : cases) {
         const Outcome outcome = run_ewa({"bench", "--accuracy", folder / name, "--training-steps", "1"});
         ASSERT_EQ(outcome.status, 0) << outcome.err;
