@@ -5,6 +5,7 @@
 #include <span>
 
 #include "bench/check.h"
+#include "bench/gradient_distance.h"
 #include "ewa/renderer.h"
 #include "reference/adam.h"
 #include "reference/render.h"
@@ -17,26 +18,6 @@ constexpr double kPixelBound = 1e-5;     // of all pixels but a few
 constexpr double kPixelShare = 1e-3;     // that may exceed it
 constexpr double kGradientBound = 1e-3;  // |actual - expected| / |expected|
 constexpr double kAdamBound = 1e-3;      // of the learning rate
-
-double relative_distance(std::span<const float> actual, std::span<const double> expected) {
-    double apart = 0, length = 0;
-    for (size_t i = 0; i < actual.size(); ++i) {
-        apart += std::pow(double(actual[i]) - expected[i], 2);
-        length += expected[i] * expected[i];
-    }
-    if (length == 0) return apart == 0 ? 0 : INFINITY;
-    return std::sqrt(apart / length);
-}
-
-/// visit(name, member of a, of b, of c) for each of the five arrays of parameters.
-template <class A, class B, class Visit>
-void for_each_group(const A& a, const B& b, Visit visit) {
-    visit("means", a.means, b.means);
-    visit("quaternions", a.quaternions, b.quaternions);
-    visit("log scales", a.log_scales, b.log_scales);
-    visit("opacity logits", a.opacity_logits, b.opacity_logits);
-    visit("SH", a.sh, b.sh);
-}
 
 }  // namespace
 

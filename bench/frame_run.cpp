@@ -20,11 +20,12 @@ RenderOptions black_background(int sh_degree) {
 
 }  // namespace
 
-FrameRun::FrameRun(std::shared_ptr<gpu::Device> device, const Scene& scene, bool train)
+FrameRun::FrameRun(std::shared_ptr<gpu::Device> device, const Scene& scene, bool train,
+                   const std::optional<RenderOptions>& options)
     : device_(std::move(device)),
       kernels_(*device_),
       executor_(*device_),
-      options_(black_background(scene.gaussians.sh_degree)),
+      options_(options.value_or(black_background(scene.gaussians.sh_degree))),
       plan_(train ? plan_training(scene.gaussians.sh_degree, options_, false)
                   : plan_picture(scene.gaussians, options_, false)),
       model_(upload_model(*device_, scene.gaussians, train ? 2 : 0, false)),

@@ -3,6 +3,7 @@
 #pragma once
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "bench/scene.h"
@@ -16,8 +17,9 @@ namespace ewa::bench {
 class FrameRun {
   public:
     /// Uploads the scene and runs once, which settles how much room the instances need and compiles the
-    /// kernels.
-    FrameRun(std::shared_ptr<gpu::Device> device, const Scene& scene, bool train);
+    /// kernels. Without options: before black, of the scene's SH degree.
+    FrameRun(std::shared_ptr<gpu::Device> device, const Scene& scene, bool train,
+             const std::optional<RenderOptions>& options = {});
 
     /// One more. Records, submits and waits.
     void run();

@@ -15,6 +15,11 @@ if(EWA_SANITIZE)
     target_compile_options(ewa_compiler INTERFACE -fsanitize=address,undefined -fno-omit-frame-pointer)
     target_link_options(ewa_compiler INTERFACE -fsanitize=address,undefined)
 endif()
+if(EWA_COVERAGE)
+    # Counters by thread would lose what they count together.
+    target_compile_options(ewa_compiler INTERFACE --coverage -fprofile-update=atomic)
+    target_link_options(ewa_compiler INTERFACE --coverage)
+endif()
 if(EWA_FUZZ)
     target_compile_options(ewa_compiler INTERFACE -fsanitize=address,undefined,fuzzer-no-link -fno-omit-frame-pointer
                                                   -fno-sanitize-recover=all)

@@ -25,12 +25,22 @@ target_include_directories(ewa_library INTERFACE $<INSTALL_INTERFACE:${CMAKE_INS
 if(EWA_SANITIZE)
     target_link_options(ewa_library PRIVATE -fsanitize=address,undefined)
 endif()
+if(EWA_COVERAGE)
+    target_link_options(ewa_library PRIVATE --coverage)
+endif()
 
-# Manual pages and completions, written by the program from its own options.
-set(ewa_manual ${PROJECT_BINARY_DIR}/manual)
-add_custom_command(OUTPUT ${ewa_manual}/man/man1/ewa.1 COMMAND ewa manual ${ewa_manual} DEPENDS ewa
+# Manual pages and completions, written by the programs from their own options.
+set(ewa_manual_folder ${PROJECT_BINARY_DIR}/manual)
+add_custom_command(OUTPUT ${ewa_manual_folder}/man/man1/ewa.1 COMMAND ewa manual ${ewa_manual_folder} DEPENDS ewa
                    COMMENT "Writing manual pages" VERBATIM)
-add_custom_target(manual ALL DEPENDS ${ewa_manual}/man/man1/ewa.1)
+set(ewa_manual_pages ${ewa_manual_folder}/man/man1/ewa.1)
+if(TARGET ewa-view)
+    add_custom_command(OUTPUT ${ewa_manual_folder}/man/man1/ewa-view.1
+                       COMMAND ewa-view --manual ${ewa_manual_folder} DEPENDS ewa-view
+                       COMMENT "Writing ewa-view's manual page" VERBATIM)
+    list(APPEND ewa_manual_pages ${ewa_manual_folder}/man/man1/ewa-view.1)
+endif()
+add_custom_target(manual ALL DEPENDS ${ewa_manual_pages})
 
 set(ewa_programs ewa)
 foreach(program ewa-view ewa-bench)
@@ -41,7 +51,7 @@ endforeach()
 install(TARGETS ${ewa_programs} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(TARGETS ewa_library EXPORT ewaTargets LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(DIRECTORY include/ewa DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
-install(DIRECTORY ${ewa_manual}/ DESTINATION ${CMAKE_INSTALL_DATADIR})
+install(DIRECTORY ${ewa_manual_folder}/ DESTINATION ${CMAKE_INSTALL_DATADIR})
 install(FILES README.md CHANGELOG.md LICENSE docs/training.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(DIRECTORY examples DESTINATION ${CMAKE_INSTALL_DOCDIR})
 

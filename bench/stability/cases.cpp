@@ -164,6 +164,10 @@ void add_scales(Table& table) {
                 if (factor > 1) s.logit = between(uniform(i, 6)[0], -3, -1);  // seen through
                 builder.add(s);
             }
+            // Where none of them can be seen there are others, which must not notice.
+            const bool unseen =
+                kernel == Kernel::antialias ? factor < 1 : kernel == Kernel::unit_mass && factor > 1;
+            for (uint32_t i = 0; unseen && i < 20; ++i) builder.add(usual_sketch(i, camera, usual_depth(i)));
             table.add(text_of("scale_%.0e%s", factor, suffix), "scales times this", builder.take(), camera,
                       kernel);
         }
@@ -191,6 +195,8 @@ void add_depths(Table& table) {
     for (const double distance : {1e-6, 1e-3, 0.02, 1e4, 1e8}) {
         Builder at(camera);
         for (uint32_t i = 0; i < 40; ++i) at.add(usual_sketch(i, camera, distance * usual_depth(i) / 5));
+        // Behind the near plane there is nothing to see but what stands elsewhere.
+        for (uint32_t i = 0; distance < 0.01 && i < 20; ++i) at.add(usual_sketch(i, camera, usual_depth(i)));
         table.add(text_of("distance_%.0e", distance), "so far from the camera", at.take());
     }
     Camera straight = camera;
@@ -302,7 +308,9 @@ void add_quaternions(Table& table) {
 void add_colors(Table& table) {
     for (const double factor : {1e3, 1e6, 1e19, 1e28, 1e36}) {
         Gaussians g = usual_scene(usual_camera(), 50, 3);
-        for (float& v : g.sh) v = float(v * factor);
+        // Beyond what a colour may be a splat is skipped; those before it stay.
+        const size_t spared = factor > 1e30 ? 20 * g.sh_stride() : 0;
+        for (size_t i = spared; i < g.sh.size(); ++i) g.sh[i] = float(g.sh[i] * factor);
         table.add(text_of("sh_%.0e", factor), "SH coefficients times this", std::move(g));
     }
 }

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cfloat>
 #include <cmath>
-#include <span>
 
+#include "bench/gradient_distance.h"
 #include "core/random.h"
 #include "ewa/renderer.h"
 #include "reference/order.h"
@@ -28,6 +28,7 @@ constexpr double kAtThreshold = 2e-4;  // relative distance at which float32 may
 constexpr double kPerturbation = 1e-10;
 constexpr int kPerturbations = 3;
 constexpr double kLargest = FLT_MAX;
+constexpr uint64_t kFewPixels = 4, kPixelsEach = 200;  // that may stand on a threshold
 
 /// Every stored value moved by a relative kPerturbation, up or down.
 Values perturbed(const Values& values, const glm::dvec3& eye, uint32_t draw) {
@@ -136,34 +137,6 @@ double least_quaternion_norm(const StabilityCase& one, const Values& gradient) {
     return largest > 0 ? kShare * norm_of(gradient.log_scales) / largest : 0;
 }
 
-/// |a - b| / max(|b|, least), both within float32's range; without overflow of the squares.
-template <class A>
-double distance(const std::vector<A>& a, const std::vector<double>& b, double least = 0) {
-    double largest = 0, apart = 0, length = 0;
-    const auto limited = [](double v) { return std::clamp(v, -kLargest, kLargest); };
-    for (const double v : b) largest = std::max(largest, std::abs(limited(v)));
-    if (largest == 0) {
-        for (const A v : a)
-            if (!(v == A(0))) return INFINITY;
-        return 0;
-    }
-    for (size_t i = 0; i < b.size(); ++i) {
-        apart += std::pow((limited(double(a[i])) - limited(b[i])) / largest, 2);
-        length += std::pow(limited(b[i]) / largest, 2);
-        if (std::isnan(double(a[i]))) return NAN;
-    }
-    return std::sqrt(apart) / std::max(std::sqrt(length), least / largest);
-}
-
-template <class A, class B, class Visit>
-void for_each_group(const A& a, const B& b, Visit visit) {
-    visit("means", a.means, b.means);
-    visit("quaternions", a.quaternions, b.quaternions);
-    visit("log scales", a.log_scales, b.log_scales);
-    visit("opacity logits", a.opacity_logits, b.opacity_logits);
-    visit("SH", a.sh, b.sh);
-}
-
 bool all_finite(const Gaussians& g) {
     const auto finite = [](const std::vector<float>& v) {
         return std::all_of(v.begin(), v.end(), [](float x) { return std::isfinite(x); });
@@ -219,14 +192,17 @@ Conditions conditions_of(const StabilityCase& one, const Image& photo, const Los
             std::max(k.loss, std::abs(moved.loss - twin.loss) / std::max(1.0, twin.loss) / kPerturbation);
         int group = 0;
         for_each_group(moved.gradient, twin.gradient, [&](const char*, const auto& a, const auto& b) {
-            k.groups[group] = std::max(k.groups[group], distance(a, b, least[size_t(group)]) / kPerturbation);
+            k.groups[group] =
+                std::max(k.groups[group], relative_distance(a, b, least[size_t(group)]) / kPerturbation);
             ++group;
         });
     }
     return k;
 }
 
+/// A problem without a condition number has no bound of its own.
 double bound(double floor, double condition) {
+    if (!std::isfinite(condition)) return floor;
     return std::max(floor, kRoundings * condition * kUnit);
 }
 
@@ -234,10 +210,12 @@ double bound(double floor, double condition) {
 
 bool StabilityResult::good() const {
     return finite && skipped == skipped_by_twin &&
+           pixels_at_threshold <= std::max(kFewPixels, pixels / kPixelsEach) &&
            std::all_of(comparisons.begin(), comparisons.end(), [](const Comparison& c) { return c.good(); });
 }
 
-StabilityResult compare_with_twin(const std::shared_ptr<gpu::Device>& device, const StabilityCase& one) {
+StabilityResult compare_with_twin(const std::shared_ptr<gpu::Device>& device, const StabilityCase& one,
+                                  const Gaussians& drawn) {
     const Image photo = stability_photo(one.camera.width, one.camera.height);
     const LossGradientTwin twin = reference::loss_gradient(one.gaussians, one.camera, photo, one.options);
     const std::vector<uint8_t> at_threshold = pixels_at_threshold(twin.picture);
@@ -250,10 +228,11 @@ StabilityResult compare_with_twin(const std::shared_ptr<gpu::Device>& device, co
     result.splats = uint32_t(one.gaussians.size());
     result.drawn = uint32_t(twin.picture.order.size());
     result.skipped_by_twin = twin.picture.skipped_nonfinite;
+    result.pixels = at_threshold.size();
     result.pixels_at_threshold = uint64_t(std::count(at_threshold.begin(), at_threshold.end(), 1));
     result.plain_determinant = plain_determinant_error(twin.picture, one.options, at_threshold, scale);
 
-    Renderer renderer(device, one.gaussians, one.options);
+    Renderer renderer(device, drawn, one.options);
     const Rendering rendering = renderer.render(one.camera);
     result.skipped = renderer.skipped_nonfinite();
     const Difference picture =
@@ -262,7 +241,7 @@ StabilityResult compare_with_twin(const std::shared_ptr<gpu::Device>& device, co
     result.comparisons.push_back(
         {"picture", picture.largest, bound(kPictureFloor, condition.picture), condition.picture});
 
-    const LossGradient gradient = loss_gradient(device, one.gaussians, one.camera, photo, one.options);
+    const LossGradient gradient = loss_gradient(device, drawn, one.camera, photo, one.options);
     result.loss = gradient.loss;
     result.finite = picture.finite && std::isfinite(gradient.loss) && all_finite(gradient.gradient);
     result.comparisons.push_back({"loss", std::abs(gradient.loss - twin.loss) / std::max(1.0, twin.loss),
@@ -272,7 +251,7 @@ StabilityResult compare_with_twin(const std::shared_ptr<gpu::Device>& device, co
     for_each_group(gradient.gradient, twin.gradient, [&](const char* name, const auto& a, const auto& b) {
         const double k = condition.groups[group];
         result.comparisons.push_back(
-            {name, distance(a, b, least[size_t(group)]), bound(kGradientFloor, k), k});
+            {name, relative_distance(a, b, least[size_t(group)]), bound(kGradientFloor, k), k});
         ++group;
     });
     return result;

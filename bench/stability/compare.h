@@ -12,8 +12,8 @@ namespace ewa::bench {
 
 /// Errors are relative: the picture's largest over max(1, its largest value), a gradient's norm over the
 /// twin's. condition: the same error of the twin itself, over the relative size of a change of every stored
-/// value (quaternions, SH and distance relative, logarithms of the scales and logits absolute). bound: what
-/// docs/numerics.md derives.
+/// value (quaternions, SH and distance relative, logarithms of the scales and logits absolute), estimated
+/// from a few random ones. bound: what docs/numerics.md says.
 struct Comparison {
     std::string of;
     double error = 0, bound = 0, condition = 0;
@@ -24,15 +24,23 @@ struct StabilityResult {
     std::string name, what;
     uint32_t splats = 0, drawn = 0;             // drawn: by the twin
     uint32_t skipped = 0, skipped_by_twin = 0;  // counted as not drawable
-    uint64_t pixels_at_threshold = 0;           // where a contribution stands on a threshold of the model
-    bool finite = true;                         // picture, loss and gradient
-    std::vector<Comparison> comparisons;        // picture, loss, and each group of the gradient
-    double plain_determinant = 0;  // picture of the twin with a c - b^2 in float32 for its determinant
+    uint64_t pixels = 0;
+    uint64_t pixels_at_threshold = 0;     // where a contribution stands on a threshold of the model
+    bool finite = true;                   // picture, loss and gradient
+    std::vector<Comparison> comparisons;  // picture, loss, and each group of the gradient
+    double plain_determinant = 0;         // picture of the twin with a c - b^2 in float32 for its determinant
     double loss = 0;
+    /// Also: no more than one pixel in 200 is left out for standing on a threshold, or four.
     bool good() const;
 };
 
-StabilityResult compare_with_twin(const std::shared_ptr<gpu::Device>& device, const StabilityCase& one);
+/// The device draws `drawn`, the twin the case: other splats break the bounds.
+StabilityResult compare_with_twin(const std::shared_ptr<gpu::Device>& device, const StabilityCase& one,
+                                  const Gaussians& drawn);
+inline StabilityResult compare_with_twin(const std::shared_ptr<gpu::Device>& device,
+                                         const StabilityCase& one) {
+    return compare_with_twin(device, one, one.gaussians);
+}
 
 struct StabilityTraining {
     std::string name;

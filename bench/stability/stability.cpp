@@ -24,7 +24,9 @@ std::vector<StabilityCase> chosen_cases(const StabilityOptions& options) {
         if (!options.read)
             throw InputError(options.file.string() +
                              ": this program reads no splat files; ewa bench --stability does");
-        return {stability_case_of(options.file.filename().string(), options.read(options.file))};
+        const Gaussians gaussians = options.read(options.file);
+        if (gaussians.size() == 0) throw InputError(options.file.string() + ": has no splats");
+        return {stability_case_of(options.file.filename().string(), gaussians)};
     }
     std::vector<StabilityCase> chosen;
     for (StabilityCase& one : stability_cases())

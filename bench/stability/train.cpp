@@ -37,7 +37,7 @@ StabilityTraining train_from(const std::shared_ptr<gpu::Device>& device, const S
     result.steps = steps;
     // The first run moves nothing: its rates are zero.
     FrameRun run(device, {one.gaussians, one.camera, stability_photo(one.camera.width, one.camera.height)},
-                 true);
+                 true, one.options);
     result.first_loss = pipeline::loss_of(run.counts());
     for (int step = 1; step <= steps; ++step) {
         run.set_rates(rates(step));

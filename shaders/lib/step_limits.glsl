@@ -6,20 +6,24 @@
 // Steps that would take a splat out of every view, or its shape out of float32's range, end short of that: a mean's at
 // STEP_DEPTH_SHARE of its depth, a quaternion's at STEP_NORM_SHARE of its norm, a scale's at the borders of what scales may
 // be. depth: of a splat that is drawn, else without bound. Returns whether it did.
+// The length of a step whose largest component is `longest`; squares of what is beyond 1e19 would overflow.
+float step_length(vec4 step, float longest) { return longest * length(step / longest); }
+
 bool limit_step(uint plane, vec4 value, float depth, inout vec4 moved) {
     const vec4 step = moved - value;
     if (plane == 0u) {
-        const float most = float(STEP_DEPTH_SHARE) * depth, longest = max(max(abs(step.x), abs(step.y)), abs(step.z));
-        if (!(longest > most)) return false;
-        moved.xyz = value.xyz + step.xyz * (most / longest);
+        const float most = float(STEP_DEPTH_SHARE) * depth;
+        const float size = step_length(vec4(step.xyz, 0.0), max(max(abs(step.x), abs(step.y)), abs(step.z)));
+        if (!(size > most)) return false;
+        moved.xyz = value.xyz + step.xyz * (most / size);
         return true;
     }
     if (plane == 1u) {
-        const vec4 size = abs(value);
-        const float most = float(STEP_NORM_SHARE) * max(max(size.x, size.y), max(size.z, size.w));
-        const float longest = max(max(abs(step.x), abs(step.y)), max(abs(step.z), abs(step.w)));
-        if (!(longest > most)) return false;
-        moved = value + step * (most / longest);
+        const vec4 old = abs(value), by = abs(step);
+        const float most = float(STEP_NORM_SHARE) * max(max(old.x, old.y), max(old.z, old.w));
+        const float size = step_length(step, max(max(by.x, by.y), max(by.z, by.w)));
+        if (!(size > most)) return false;
+        moved = value + step * (most / size);
         return true;
     }
     if (plane == 2u) {

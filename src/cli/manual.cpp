@@ -3,8 +3,8 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <algorithm>
 #include <filesystem>
-#include <set>
 
 #include "cli/output.h"
 #include "core/atomic_file.h"
@@ -95,9 +95,9 @@ std::string synopsis(const std::string& who, const CLI::App& app) {
     return line + "[\\fIoptions\\fR]\n";
 }
 
-const char* const kExitStatus =
+constexpr const char* kExitStatus =
     ".SH EXIT STATUS\n"
-    "0 done; 1 it failed while running; 2 wrong use or unreadable input; 130 interrupted.\n"
+    "0 done; 1 it failed while running; 2 wrong use or unreadable input{}.\n"
     "An error is one line on standard error.\n";
 
 std::string quoted(const std::string& text) {
@@ -112,6 +112,41 @@ std::string joined(const std::vector<std::string>& words) {
     return out;
 }
 
+/// What completes the options of `app`: their names, and for those that take one of a set an entry of a
+/// `case` whose patterns begin with `before`.
+struct BashWords {
+    std::string names, values;
+};
+
+BashWords bash_words(const CLI::App& app, const std::string& before) {
+    BashWords words;
+    for (const CLI::Option* option : options_of(app)) {
+        const std::vector<std::string> choice = values_of(*option);
+        for (const std::string& name : names_of(*option)) {
+            words.names += (words.names.empty() ? "" : " ") + name;
+            if (!choice.empty())
+                words.values += fmt::format("        '{}{}') words='{}' ;;\n", before, name, joined(choice));
+        }
+    }
+    return words;
+}
+
+std::string fish_options(const CLI::App& app, const std::string& begin) {
+    std::string out;
+    for (const CLI::Option* option : options_of(app)) {
+        out += begin;
+        for (const std::string& name : option->get_snames()) out += " -s " + name;
+        for (const std::string& name : option->get_lnames()) out += " -l " + name;
+        const std::vector<std::string> choice = values_of(*option);
+        if (!choice.empty())
+            out += " -x -a " + quoted(joined(choice));
+        else if (takes_value(*option))
+            out += " -r";
+        out += " -d " + quoted(option->get_description()) + "\n";
+    }
+    return out;
+}
+
 }  // namespace
 
 std::vector<const CLI::App*> shown_commands(const CLI::App& program) {
@@ -123,84 +158,81 @@ std::vector<const CLI::App*> shown_commands(const CLI::App& program) {
 
 std::string manual_page(const CLI::App& program, const CLI::App* command) {
     const CLI::App& app = command ? *command : program;
-    const std::string dashed = command ? "ewa-" + command->get_name() : "ewa";
-    const std::string who = command ? "ewa " + command->get_name() : "ewa";
+    const std::string name = program.get_name();
+    const std::string dashed = command ? name + "-" + command->get_name() : name;
+    const std::string who = command ? name + " " + command->get_name() : name;
+    const std::vector<const CLI::App*> commands =
+        command ? std::vector<const CLI::App*>() : shown_commands(program);
     std::string page = fmt::format(".TH {} 1 \"\" \"ewa {}\"\n.SH NAME\n{} \\- {}\n.SH SYNOPSIS\n", dashed,
                                    EWA_VERSION, troff(dashed), troff(app.get_description()));
-    page += command ? synopsis(who, app) : ".B ewa\n\\fIcommand\\fR [\\fIarguments\\fR]\n";
-    if (!command) {
-        page += ".SH COMMANDS\n";
-        for (const CLI::App* one : shown_commands(program))
-            page += ".TP\n.BR ewa\\-" + one->get_name() + " (1)\n" + troff(one->get_description()) + "\n";
-    }
+    page += commands.empty() ? synopsis(who, app) : ".B " + name + "\n\\fIcommand\\fR [\\fIarguments\\fR]\n";
+    if (!commands.empty()) page += ".SH COMMANDS\n";
+    for (const CLI::App* one : commands)
+        page += ".TP\n.BR " + troff(name + "-" + one->get_name()) + " (1)\n" + troff(one->get_description()) +
+                "\n";
     if (!positionals_of(app).empty()) page += ".SH ARGUMENTS\n";
     for (const CLI::Option* option : positionals_of(app))
         page += ".TP\n.I " + troff(option->get_name(true)) + "\n" + troff(option->get_description()) + "\n";
     page += ".SH OPTIONS\n";
     for (const CLI::Option* option : options_of(app)) page += option_entry(*option);
-    page += kExitStatus;
-    if (command) page += ".SH SEE ALSO\n.BR ewa (1)\n";
+    page += fmt::format(kExitStatus, command || !commands.empty() ? "; 130 interrupted" : "");
+    if (commands.empty()) page += ".SH SEE ALSO\n.BR ewa (1)\n";
     return page;
 }
 
 std::string bash_completion(const CLI::App& program) {
-    std::string commands;
-    for (const CLI::App* command : shown_commands(program)) commands += " " + command->get_name();
-    std::string cases, values;
-    std::set<std::string> seen;
+    const std::string name = program.get_name();
+    std::string function = "_" + name;
+    std::replace(function.begin(), function.end(), '-', '_');
+    std::string commands, cases, values, before_values = "${COMP_WORDS[COMP_CWORD-1]}";
     for (const CLI::App* command : shown_commands(program)) {
-        std::vector<std::string> names;
-        for (const CLI::Option* option : options_of(*command)) {
-            for (const std::string& name : names_of(*option)) {
-                names.push_back(name);
-                const std::vector<std::string> choice = values_of(*option);
-                if (!choice.empty() && seen.insert(command->get_name() + name).second)
-                    values += fmt::format("        '{} {}') words='{}' ;;\n", command->get_name(), name,
-                                          joined(choice));
-            }
-        }
-        cases += fmt::format("        {}) words='{}' ;;\n", command->get_name(), joined(names));
+        const BashWords words = bash_words(*command, command->get_name() + " ");
+        commands += command->get_name() + " ";
+        values += words.values;
+        cases += fmt::format("            {}) words='{}' ;;\n", command->get_name(), words.names);
     }
-    return "# Completion of ewa for bash; zsh reads it after `autoload -U bashcompinit && bashcompinit`.\n"
-           "_ewa() {\n"
+    std::string first, options;
+    if (commands.empty()) {
+        const BashWords words = bash_words(program, "");
+        values = words.values;
+        options = fmt::format("        words='{}'\n", words.names);
+    } else {
+        first =
+            "    if ((COMP_CWORD == 1)); then\n"
+            "        COMPREPLY=($(compgen -W '" +
+            commands +
+            "--help --version' -- \"$word\"))\n"
+            "        return\n"
+            "    fi\n";
+        options = "        case ${COMP_WORDS[1]} in\n" + cases + "        esac\n";
+        before_values = "${COMP_WORDS[1]} " + before_values;
+    }
+    return "# Completion of " + name +
+           " for bash; zsh reads it after `autoload -U bashcompinit && bashcompinit`.\n" + function +
+           "() {\n"
            "    local word=${COMP_WORDS[COMP_CWORD]} words=\n"
-           "    COMPREPLY=()\n"
-           "    if ((COMP_CWORD == 1)); then\n"
-           "        COMPREPLY=($(compgen -W '" +
-           commands.substr(1) +
-           " --help --version' -- \"$word\"))\n"
-           "        return\n"
-           "    fi\n"
-           "    case \"${COMP_WORDS[1]} ${COMP_WORDS[COMP_CWORD-1]}\" in\n" +
-           values +
+           "    COMPREPLY=()\n" +
+           first + "    case \"" + before_values + "\" in\n" + values +
            "    esac\n"
-           "    if [[ -z $words && $word == -* ]]; then\n"
-           "        case ${COMP_WORDS[1]} in\n" +
-           cases +
-           "        esac\n"
+           "    if [[ -z $words && $word == -* ]]; then\n" +
+           options +
            "    fi\n"
            "    COMPREPLY=($(compgen -W \"$words\" -- \"$word\"))\n"
            "}\n"
-           "complete -o default -F _ewa ewa\n";
+           "complete -o default -F " +
+           function + " " + name + "\n";
 }
 
 std::string fish_completion(const CLI::App& program) {
-    std::string out = "# Completion of ewa for fish.\n";
+    const std::string complete = "complete -c " + program.get_name();
+    std::string out = "# Completion of " + program.get_name() + " for fish.\n";
     for (const CLI::App* command : shown_commands(program)) {
-        out += fmt::format("complete -c ewa -n __fish_use_subcommand -a {} -d {}\n", command->get_name(),
+        const std::string& name = command->get_name();
+        out += fmt::format("{} -n __fish_use_subcommand -a {} -d {}\n", complete, name,
                            quoted(command->get_description()));
-        for (const CLI::Option* option : options_of(*command)) {
-            out += fmt::format("complete -c ewa -n '__fish_seen_subcommand_from {}'", command->get_name());
-            for (const std::string& name : option->get_snames()) out += " -s " + name;
-            for (const std::string& name : option->get_lnames()) out += " -l " + name;
-            const std::vector<std::string> choice = values_of(*option);
-            if (!choice.empty())
-                out += " -x -a " + quoted(joined(choice));
-            else if (takes_value(*option))
-                out += " -r";
-            out += " -d " + quoted(option->get_description()) + "\n";
-        }
+        out += fish_options(*command, fmt::format("{} -n '__fish_seen_subcommand_from {}'", complete, name));
     }
+    if (shown_commands(program).empty()) out += fish_options(program, complete);
     return out;
 }
 
@@ -210,11 +242,12 @@ void write_manual(const CLI::App& program, const std::string& folder) {
         make_folder(path.parent_path());
         core::write_text_file(path, text);
     };
-    write("man/man1/ewa.1", manual_page(program, nullptr));
+    const std::string name = program.get_name();
+    write("man/man1/" + name + ".1", manual_page(program, nullptr));
     for (const CLI::App* command : shown_commands(program))
-        write("man/man1/ewa-" + command->get_name() + ".1", manual_page(program, command));
-    write("bash-completion/completions/ewa", bash_completion(program));
-    write("fish/vendor_completions.d/ewa.fish", fish_completion(program));
+        write("man/man1/" + name + "-" + command->get_name() + ".1", manual_page(program, command));
+    write("bash-completion/completions/" + name, bash_completion(program));
+    write("fish/vendor_completions.d/" + name + ".fish", fish_completion(program));
 }
 
 }  // namespace ewa::cli

@@ -14,8 +14,8 @@ constexpr size_t kChunk = 16u << 20;  // bytes that memory is taken for before t
 
 }  // namespace
 
-Client::Client(const Address& address, const std::string& token)
-    : socket_(connect_to(address.host, address.port, kConnectSeconds)),
+Client::Client(const Address& address, const std::string& token, const std::atomic<bool>* stop)
+    : socket_(connect_to(address.host, address.port, kConnectSeconds, stop)),
       who_(address.host + ":" + std::to_string(address.port)) {
     if (!ask(std::string(kHello)).empty()) throw InputError(who_ + " is no training of ewa");
     if (!token.empty()) ask("token " + token);

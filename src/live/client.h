@@ -10,9 +10,9 @@ namespace ewa::live {
 
 class Client {
   public:
-    /// Connects, and makes sure that a training of ewa answers. token: empty for looking on only. Throws
-    /// RunError, InputError.
-    Client(const Address& address, const std::string& token);
+    /// Connects, and makes sure that a training of ewa answers. token: empty for looking on only. stop: as
+    /// Socket has it. Throws RunError, InputError.
+    Client(const Address& address, const std::string& token, const std::atomic<bool>* stop = nullptr);
 
     // Each throws InputError for a refusal or an answer that is none, RunError where the connection is gone.
     Status status(size_t first_line);

@@ -8,6 +8,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
@@ -22,14 +23,19 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Whether the descriptor is ready before `due`.
-bool ready(int descriptor, short events, Clock::time_point due) {
+constexpr long long kNap = 100;  // ms between looks at `stop`
+
+/// Whether the descriptor is ready before `due` and before it is to stop.
+bool ready(int descriptor, short events, Clock::time_point due, const std::atomic<bool>* stop) {
     for (;;) {
+        if (stop && *stop) return false;
         const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(due - Clock::now()).count();
+        const long long nap = std::max<long long>(0, stop ? std::min<long long>(left, kNap) : left);
         pollfd waiting{descriptor, events, 0};
-        const int result = poll(&waiting, 1, int(std::max<long long>(0, left)));
+        const int result = poll(&waiting, 1, int(nap));
         if (result > 0) return (waiting.revents & POLLNVAL) == 0;
-        if (result == 0 || errno != EINTR) return false;
+        if (result < 0 && errno != EINTR) return false;
+        if (result == 0 && left <= nap) return false;
     }
 }
 
@@ -55,10 +61,12 @@ Socket::~Socket() {
     if (descriptor_ >= 0) ::close(descriptor_);
 }
 
-Socket::Socket(Socket&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
+Socket::Socket(Socket&& other) noexcept
+    : descriptor_(std::exchange(other.descriptor_, -1)), stop_(other.stop_) {}
 
 Socket& Socket::operator=(Socket&& other) noexcept {
     std::swap(descriptor_, other.descriptor_);
+    std::swap(stop_, other.stop_);
     return *this;
 }
 
@@ -68,7 +76,7 @@ void Socket::shut() const {
 
 bool Socket::send(std::span<const std::byte> bytes, int seconds) const {
     while (!bytes.empty()) {
-        if (!ready(descriptor_, POLLOUT, after(seconds))) return false;
+        if (!ready(descriptor_, POLLOUT, after(seconds), stop_)) return false;
         const ssize_t sent = ::send(descriptor_, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
         if (sent < 0 && (errno == EINTR || errno == EAGAIN)) continue;
         if (sent <= 0) return false;
@@ -83,7 +91,7 @@ bool Socket::send(const std::string& text, int seconds) const {
 
 bool Socket::receive(std::span<std::byte> bytes, int seconds) const {
     while (!bytes.empty()) {
-        if (!ready(descriptor_, POLLIN, after(seconds))) return false;
+        if (!ready(descriptor_, POLLIN, after(seconds), stop_)) return false;
         const ssize_t got = ::recv(descriptor_, bytes.data(), bytes.size(), MSG_DONTWAIT);
         if (got < 0 && (errno == EINTR || errno == EAGAIN)) continue;
         if (got <= 0) return false;
@@ -97,7 +105,7 @@ std::optional<std::string> Socket::receive_line(size_t most, int seconds) const 
     std::string line;
     while (line.size() < most) {
         char c = 0;
-        if (!ready(descriptor_, POLLIN, due)) return std::nullopt;
+        if (!ready(descriptor_, POLLIN, due, stop_)) return std::nullopt;
         const ssize_t got = ::recv(descriptor_, &c, 1, MSG_DONTWAIT);
         if (got < 0 && (errno == EINTR || errno == EAGAIN)) continue;
         if (got <= 0) return std::nullopt;
@@ -107,14 +115,14 @@ std::optional<std::string> Socket::receive_line(size_t most, int seconds) const 
     return std::nullopt;
 }
 
-Socket connect_to(const std::string& host, uint16_t port, int seconds) {
+Socket connect_to(const std::string& host, uint16_t port, int seconds, const std::atomic<bool>* stop) {
     const Addresses addresses = look_up(host.empty() ? "localhost" : host, port, false);
     std::string reason = "no address";
     for (const addrinfo* at = addresses.get(); at; at = at->ai_next) {
-        Socket socket(::socket(at->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+        Socket socket(::socket(at->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0), stop);
         int status = ::connect(socket.descriptor(), at->ai_addr, at->ai_addrlen);
         if (status != 0 && errno == EINPROGRESS) {
-            if (!ready(socket.descriptor(), POLLOUT, after(seconds))) {
+            if (!ready(socket.descriptor(), POLLOUT, after(seconds), stop)) {
                 reason = "no answer";
                 continue;
             }
@@ -148,7 +156,7 @@ Listener::Listener(const std::string& address, uint16_t port) {
 }
 
 Socket Listener::accept(int seconds) const {
-    if (!ready(socket_.descriptor(), POLLIN, after(seconds))) return {};
+    if (!ready(socket_.descriptor(), POLLIN, after(seconds), nullptr)) return {};
     Socket socket(::accept4(socket_.descriptor(), nullptr, nullptr, SOCK_CLOEXEC));
     const int yes = 1;
     if (socket) setsockopt(socket.descriptor(), IPPROTO_TCP, TCP_NODELAY, &yes, sizeof(yes));

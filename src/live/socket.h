@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // TCP, as far as watching a run needs it: every wait has an end.
 #pragma once
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -13,7 +14,10 @@ namespace ewa::live {
 class Socket {
   public:
     Socket() = default;
-    explicit Socket(int descriptor) : descriptor_(descriptor) {}
+    /// stop: every wait ends as if the other side had gone once it is true; null: none does. Outlives the
+    /// socket.
+    explicit Socket(int descriptor, const std::atomic<bool>* stop = nullptr)
+        : descriptor_(descriptor), stop_(stop) {}
     ~Socket();
     Socket(Socket&& other) noexcept;
     Socket& operator=(Socket&& other) noexcept;
@@ -34,10 +38,13 @@ class Socket {
 
   private:
     int descriptor_ = -1;
+    const std::atomic<bool>* stop_ = nullptr;
 };
 
-/// host: a name or a number, e.g. "localhost", "10.0.0.7", "::1". Throws RunError with the reason.
-Socket connect_to(const std::string& host, uint16_t port, int seconds);
+/// host: a name or a number, e.g. "localhost", "10.0.0.7", "::1". stop: as Socket has it. Throws RunError
+/// with the reason.
+Socket connect_to(const std::string& host, uint16_t port, int seconds,
+                  const std::atomic<bool>* stop = nullptr);
 
 class Listener {
   public:

@@ -137,11 +137,15 @@ void Watcher::work() {
 }
 
 void Watcher::look() {
-    if (!client_ && what_.address) client_ = std::make_unique<Client>(*what_.address, what_.token);
+    const auto connect = [this](const Address& address, const std::string& token) {
+        client_ = std::make_unique<Client>(address, token, &stop_);
+        fresh_ = true;
+    };
+    if (!client_ && what_.address) connect(*what_.address, what_.token);
     if (!client_ && !what_.folder.empty()) {
         try {
             const auto live = read_live_file(what_.folder);
-            if (live) client_ = std::make_unique<Client>(Address{"127.0.0.1", live->port}, live->token);
+            if (live) connect({"127.0.0.1", live->port}, live->token);
         } catch (const std::exception&) {
             // The trainer that wrote it is no more, or is another user's: its files remain.
         }
@@ -153,13 +157,21 @@ void Watcher::look() {
 
 void Watcher::look_by_connection() {
     while (const auto name = next_command()) client_->command(*name);
+    // Behind a new connection there may be another run, begun anew in the same place: nothing of what is
+    // known holds.
+    const bool fresh = fresh_;
     const Update before = update();
-    Status status = client_->status(before.status.metrics.size());
-    const std::optional<Snapshot> splats = client_->splats(before.splats_step);
+    Status status = client_->status(fresh ? 0 : before.status.metrics.size());
+    const std::optional<Snapshot> splats = client_->splats(fresh ? -1 : before.splats_step);
+    fresh_ = false;
     const bool same = !splats && status.metrics.empty() && status.step == before.status.step &&
                       status.state == before.status.state && before.connected;
     if (same) return;
     change([&](Update& update) {
+        if (fresh) {
+            update.status.metrics.clear();
+            update.splats_step = -1;
+        }
         auto metrics = std::move(update.status.metrics);
         metrics.insert(metrics.end(), status.metrics.begin(), status.metrics.end());
         update.status = std::move(status);

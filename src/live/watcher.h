@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A training run as it goes: by its connection where there is one, else by the files that it writes.
 #pragma once
+#include <atomic>
 #include <condition_variable>
 #include <filesystem>
 #include <functional>
@@ -67,6 +68,7 @@ class Watcher {
     std::function<void()> on_news_;
     // Touched by the thread alone.
     std::unique_ptr<Client> client_;
+    bool fresh_ = false;  // the client has not been asked yet
     std::filesystem::file_time_type splats_time_;
     std::uintmax_t metrics_read_ = 0;
 
@@ -74,7 +76,7 @@ class Watcher {
     std::condition_variable wake_;
     Update update_;
     std::vector<std::string> commands_;
-    bool stop_ = false;
+    std::atomic<bool> stop_ = false;
     std::thread thread_;
 };
 

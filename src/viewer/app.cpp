@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "ewa/error.h"
 #include "viewer/framing.h"
@@ -14,7 +15,7 @@ namespace ewa::viewer {
 namespace {
 
 constexpr double kRestSeconds = 0.2;  // without a change, until the full picture is asked for
-constexpr double kHintSeconds = 15;
+constexpr double kHintSeconds = 15, kNoteSeconds = 10;
 constexpr int kFirstDivisor = 2;  // something to see at once, then all of it
 constexpr int kRedraws = 3;
 constexpr Size kUsualSize{1280, 800};
@@ -44,10 +45,19 @@ Viewpoint start_view(const Scene& scene, std::optional<int> frame, Size size) {
     return framing_view(*scene.gaussians, size.width, size.height);
 }
 
+bool same_place(const Camera& a, const Camera& b) {
+    return a.rotation == b.rotation && a.translation == b.translation;
+}
+
 bool same_view(const PictureRequest& a, const PictureRequest& b) {
     const Camera &p = a.camera, &q = b.camera;
     return a.look == b.look && p.width == q.width && p.height == q.height && p.fx == q.fx && p.fy == q.fy &&
-           p.cx == q.cx && p.cy == q.cy && p.rotation == q.rotation && p.translation == q.translation;
+           p.cx == q.cx && p.cy == q.cy && same_place(p, q);
+}
+
+std::chrono::steady_clock::time_point in(double seconds) {
+    using Clock = std::chrono::steady_clock;
+    return Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
 }
 
 std::string reason(const std::exception_ptr& failure) {
@@ -77,15 +87,16 @@ App::App(const Startup& startup)
       device_name_(startup.device_name),
       capture_(startup.picture.has_value()),
       redraws_(kRedraws),
-      photos_([this] { system_.wake(); }),
+      photos_(load_photo, [this] { system_.wake(); }),
+      comparisons_(compare_with_photo, [this] { system_.wake(); }),
       thread_(startup.open_device, [this] { system_.wake(); }) {
     last_frame_ = Clock::now();
-    hint_until_ = last_frame_ +
-                  std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(kHintSeconds));
+    hint_until_ = in(kHintSeconds);
     adopt(startup.scene, startup.frame);
     settings_.look = startup.settings.look;
     if (startup.film) start_film();
     if (startup.watch) watch(*startup.watch);
+    window_after_ = std::chrono::duration<double>(Clock::now() - startup.started).count();
 }
 
 void App::watch(const live::WhatToWatch& what) {
@@ -112,7 +123,9 @@ void App::take_live() {
     if (settings_.look.sh_degree == scene_sh_degree_) settings_.look.sh_degree = degree;
     scene_sh_degree_ = degree;
     plan_ = plan_lines(*scene_.gaussians, {}, Purpose::picture);
-    if (!viewed_ && !scene_.dataset) view_.restart(start_view(scene_, {}, window_.framebuffer()));
+    // With the first splats it is known what there is to turn about; a camera that the user has chosen stays.
+    if (!viewed_ && (!scene_.dataset || stands_at_ == start_frame_))
+        view_.restart(start_view(scene_, start_frame_, window_.framebuffer()));
     viewed_ = true;
 }
 
@@ -124,9 +137,12 @@ void App::adopt(Scene scene, std::optional<int> frame) {
     settings_.look.kernel = scene_.look.kernel;
     settings_.look.background = scene_.look.background;
     settings_.look.sh_degree = scene_sh_degree_;
-    note_ = scene_.remark;
+    note_.clear();
+    if (!scene_.remark.empty()) say(scene_.remark);
     viewed_ = scene_.gaussians->size() > 0;
-    photo_asked_ = -1;
+    ++opened_;
+    photo_.reset();  // frames are numbers, and those of another dataset are other pictures
+    photo_asked_.reset();
     stands_at_.reset();
     start_frame_.reset();
     if (scene_.dataset) {
@@ -140,10 +156,7 @@ void App::open(const std::filesystem::path& path) {
     if (opening_.valid()) return say("another file is being opened");
     say("opening " + path.string());
     opening_ = std::async(std::launch::async, [this, path] {
-        struct Wake {
-            const WindowSystem& system;
-            ~Wake() { system.wake(); }
-        } wake{system_};
+        const Wake wake{system_};
         return open_scene(path, {});
     });
 }
@@ -169,8 +182,9 @@ void App::run() {
         const double seconds = std::chrono::duration<double>(now - last_frame_).count();
         last_frame_ = now;
         if (window_.stirred()) redraws_ = kRedraws;
-        if (hint_until_ != Clock::time_point{} && now >= hint_until_) {
-            hint_until_ = {};
+        for (Clock::time_point* until : {&hint_until_, &note_until_}) {
+            if (*until == Clock::time_point{} || now < *until) continue;
+            *until = {};
             redraws_ = std::max(redraws_, 1);
         }
         if (!scripted()) {
@@ -185,6 +199,7 @@ void App::run() {
         if (redraws_ > 0) draw();
         ask();
     }
+    if (startup_.verbose) tell_times();
     if (scripted() && !done_)
         throw RunError("the window was closed before " +
                        startup_.picture.value_or(startup_.film.value_or("")).string() + " was written");
@@ -193,11 +208,12 @@ void App::run() {
 /// How long to wait for input, in seconds.
 double App::patience() const {
     if (redraws_ > 0 || flying() || settings_.turntable) return 1.0 / 60;
-    return asked_.divisor > 1 || opening_.valid() ? kRestSeconds / 4 : 1.0;
+    return asked_.divisor > 1 || opening_.valid() || saving_.valid() ? kRestSeconds / 4 : 1.0;
 }
 
 void App::say(const std::string& note) {
     note_ = note;
+    note_until_ = in(kNoteSeconds);
     redraws_ = std::max(redraws_, kRedraws);
 }
 
@@ -245,17 +261,48 @@ void App::take_news() {
     }
     for (const auto& file : news.written)
         if (!film_) say("wrote " + std::filesystem::absolute(file).string());
-    if (const auto photo = photos_.photo(); photo != photo_) {
+    if (const auto photo = photos_.result(); photo != photo_ && photo && photo->scene == opened_) {
         photo_ = photo;
         if (photo_->failure.empty()) screen_->presenter.set_picture(Layer::photograph, photo_->picture);
-        compare();
         redraws_ = kRedraws;
     }
+    if (const auto compared = comparisons_.result(); compared != compared_) {
+        compared_ = compared;
+        redraws_ = std::max(redraws_, 2);
+    }
+    if (saving_.valid() && saving_.wait_for(std::chrono::seconds(0)) == std::future_status::ready)
+        say(saving_.get());
     if (news.picture == shown_) return;
     shown_ = news.picture;
     pace_.drawn(shown_->request.divisor, shown_->milliseconds);
-    compare();
     redraws_ = std::max(redraws_, 2);  // a panel that has more to say takes its new size a frame later
+}
+
+/// Of what is on the screen since the last picture was.
+void App::count_picture() {
+    if (!shown_ || shown_ == counted_) return;
+    const std::chrono::duration<double> now = Clock::now() - startup_.started;
+    if (!first_picture_) first_picture_ = now.count();
+    const bool moved = counted_ && !same_place(shown_->request.camera, counted_->request.camera);
+    fluency_.shown(now.count(), moved, shown_->request.divisor);
+    counted_ = shown_;
+}
+
+void App::tell_times() const {
+    if (first_picture_)
+        std::fprintf(stderr, "first picture after %.0f ms: scene read %.0f, device open %.0f, window %.0f\n",
+                     1000 * *first_picture_, 1000 * startup_.read_after, 1000 * startup_.device_after,
+                     1000 * window_after_);
+    if (shown_)
+        std::fprintf(stderr, "last picture: %d x %d px in %.1f ms\n", shown_->picture.width,
+                     shown_->picture.height, shown_->milliseconds);
+    if (fluency_.count() == 0) return;
+    std::fprintf(stderr, "moving: %llu pictures in %.1f s, %.1f a second;",
+                 static_cast<unsigned long long>(fluency_.count()), fluency_.seconds(),
+                 double(fluency_.count()) / fluency_.seconds());
+    for (const auto& [divisor, count] : fluency_.by_divisor())
+        std::fprintf(stderr, " %llu at 1/%d", static_cast<unsigned long long>(count), divisor);
+    std::fprintf(stderr, "\n");
 }
 
 bool App::settled() const {

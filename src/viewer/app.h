@@ -10,10 +10,11 @@
 
 #include "viewer/film.h"
 #include "viewer/gui.h"
+#include "viewer/latest.h"
 #include "viewer/opening.h"
 #include "viewer/pace.h"
 #include "viewer/panel.h"
-#include "viewer/photo_loader.h"
+#include "viewer/photo.h"
 #include "viewer/training.h"
 #include "viewer/view_camera.h"
 
@@ -31,7 +32,9 @@ struct Startup {
     std::string device_name;
     std::optional<live::WhatToWatch> watch;  // a run
     TrainProcess* trainer = nullptr;         // of this viewer, outlives it
-    int lose_device_at = 0;  // window frames until the device that shows them plays lost; 0: it does not
+    bool verbose = false;                    // times on standard error
+    std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
+    double read_after = 0, device_after = 0;  // seconds: the scene was read, the device open
 };
 
 /// What shows pictures in the window. Made anew where its device is lost.
@@ -65,6 +68,7 @@ class App {
     bool scripted() const { return startup_.picture || startup_.film; }
     double patience() const;
     void say(const std::string& note);
+    void tell_times() const;  // on standard error
 
     void watch(const live::WhatToWatch& what);
     void take_live();
@@ -86,7 +90,9 @@ class App {
     bool comparing() const;
     Arrangement arrangement() const;
     void ask_for_photo();
-    void compare();
+    std::optional<ComparisonRequest> comparison_wanted() const;
+    bool compared() const;  // what comparison_wanted() was is there
+    void choose_picture();
     void save_view(size_t number);
     void go_to_view(size_t number);
     void start_film();
@@ -98,7 +104,8 @@ class App {
     void panel();
     void obey(const PanelActions& actions);
     void overlays();
-    void save(const Image& image);
+    void save(Image&& image);
+    void count_picture();
     void save_exr();
 
     const Startup& startup_;
@@ -118,28 +125,37 @@ class App {
     live::Update run_;
     bool viewed_ = false;  // the view has been chosen for splats that there are
     Pace pace_;
+    Fluency fluency_;
+    double window_after_ = 0;              // seconds after the start
+    std::optional<double> first_picture_;  // the same, that it was shown
     std::string device_name_;
 
-    std::shared_ptr<const FinishedPicture> shown_;
+    std::shared_ptr<const FinishedPicture> shown_, counted_;  // the last one; the last that fluency_ knows of
+    uint64_t opened_ = 0;                                     // scenes so far
     std::shared_ptr<const Photo> photo_;
-    int photo_asked_ = -1;
-    std::optional<double> psnr_;
-    bool difference_shown_ = false;
+    std::optional<PhotoRequest> photo_asked_;
+    std::optional<ComparisonRequest> comparison_asked_;
+    std::shared_ptr<const Compared> compared_;
+    std::shared_ptr<const Picture> on_screen_;  // as the rendering: what the presenter has
+    bool difference_on_screen_ = false;
     PictureRequest asked_;
     uint64_t asked_scene_ = 0;
     Clock::time_point changed_;  // when what is wanted last changed
-    Clock::time_point last_frame_, hint_until_;
+    Clock::time_point last_frame_, hint_until_, note_until_;
+    int panel_right_ = 0;  // px of the window that it covers from the left
     bool show_panel_ = true, show_help_ = false, dragging_wipe_ = false;
     bool capture_ = false;  // write the picture as soon as it is the full one
     std::optional<int> pointed_camera_;
     uint64_t points_ = 0, points_asked_ = 0;  // answers to double clicks that were acted on; double clicks
     int redraws_ = 0;                         // frames still to draw: ImGui answers input over a few
-    int frames_drawn_ = 0, devices_lost_ = 0;
+    int devices_lost_ = 0;
     std::string note_;
     bool done_ = false;
     std::future<Scene> opening_;
+    std::future<std::string> saving_;  // a screenshot; what there is to say of it
     // Last: they are gone before what they wake.
-    PhotoLoader photos_;
+    Latest<PhotoRequest, Photo> photos_;
+    Latest<ComparisonRequest, Compared> comparisons_;
     RenderThread thread_;
     std::unique_ptr<live::Watcher> watcher_;
 };

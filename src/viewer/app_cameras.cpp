@@ -35,7 +35,7 @@ void App::change_comparison() {
 
 bool App::comparing() const {
     return settings_.comparison != Comparison::none && stands_at_ && photo_ && photo_->frame == *stands_at_ &&
-           photo_asked_ == *stands_at_ && photo_->failure.empty();
+           photo_->failure.empty();
 }
 
 Arrangement App::arrangement() const {
@@ -46,38 +46,56 @@ Arrangement App::arrangement() const {
         photo = {camera.width, camera.height};
     }
     const Size window = window_.framebuffer();
-    return arrange(comparison, {std::max(1, window.width), std::max(1, window.height)}, photo);
+    return arrange(comparison, {std::max(1, window.width), std::max(1, window.height)}, photo, panel_right_);
 }
 
+/// Anew where the place has outgrown what was read for it, or transparent parts show another background.
 void App::ask_for_photo() {
-    if (settings_.comparison == Comparison::none || !stands_at_ || photo_asked_ == *stands_at_) return;
+    if (settings_.comparison == Comparison::none || !stands_at_) return;
     const Rectangle place = arrangement().photograph;
-    photo_asked_ = *stands_at_;
-    photos_.ask(*stands_at_, scene_.dataset->frames[size_t(*stands_at_)], {place.width, place.height},
-                settings_.look.background);
+    if (photo_asked_ && photo_asked_->index == *stands_at_ && place.width <= 2 * photo_asked_->size.width &&
+        photo_asked_->background == settings_.look.background)
+        return;
+    photo_asked_ = PhotoRequest{opened_, *stands_at_, scene_.dataset->frames[size_t(*stands_at_)],
+                                Size{place.width, place.height}, settings_.look.background};
+    photos_.ask(*photo_asked_);
 }
 
-/// What the window shows of the rendering: itself, or its difference to the photograph.
-void App::compare() {
-    psnr_.reset();
-    if (!shown_) return;
+/// Of the full picture, from where the photograph was taken.
+std::optional<ComparisonRequest> App::comparison_wanted() const {
+    if (!comparing() || !settled() || shown_->request.look.mode != Mode::color) return std::nullopt;
     const Rectangle rendering = arrangement().rendering, photograph = arrangement().photograph;
-    const bool full = settled() && shown_->picture.width == rendering.width &&
-                      shown_->picture.height == rendering.height && shown_->request.look.mode == Mode::color;
-    difference_shown_ = false;
-    if (comparing() && full) {
-        const Size shape{photograph.width, photograph.height};
-        const Rectangle place = fitted(shape, {0, 0, rendering.width, rendering.height});
-        Picture compared = difference(shown_->picture, photo_->picture, place);
-        psnr_ = psnr_of_difference(compared, place);
-        if (settings_.comparison == Comparison::difference) {
-            amplify(compared, settings_.gain);
-            screen_->presenter.set_picture(Layer::rendering, compared);
-            difference_shown_ = true;
+    if (shown_->picture.width != rendering.width || shown_->picture.height != rendering.height)
+        return std::nullopt;
+    const bool difference = settings_.comparison == Comparison::difference;
+    return ComparisonRequest{
+        shown_, photo_,
+        fitted({photograph.width, photograph.height}, {0, 0, rendering.width, rendering.height}),
+        difference ? settings_.gain : 0};
+}
+
+bool App::compared() const {
+    return compared_ && comparison_asked_ && compared_->of == *comparison_asked_;
+}
+
+/// What the window shows of the rendering: itself, or its difference to the photograph. The last difference
+/// stays until the next one is there.
+void App::choose_picture() {
+    if (!shown_) return;
+    const auto wanted = comparison_wanted();
+    if (wanted && comparison_asked_ != wanted) comparisons_.ask(*wanted);
+    comparison_asked_ = wanted;
+    std::shared_ptr<const Picture> picture(shown_, &shown_->picture);
+    if (wanted && wanted->gain > 0) {
+        if (compared())
+            picture = std::shared_ptr<const Picture>(compared_, &compared_->difference);
+        else if (difference_on_screen_)
             return;
-        }
     }
-    screen_->presenter.set_picture(Layer::rendering, shown_->picture);
+    difference_on_screen_ = picture.get() != &shown_->picture;
+    if (picture == on_screen_) return;
+    on_screen_ = picture;
+    screen_->presenter.set_picture(Layer::rendering, *picture);
 }
 
 void App::save_view(size_t number) {
@@ -109,6 +127,8 @@ void App::start_film() {
     Film film;
     for (const io::NamedView& view : views_) film.keys.push_back(view.camera);
     film.folder = startup_.film.value_or(free_name("ewa-film", ""));
+    const Size window = window_.framebuffer();
+    film.size = {std::max(1, window.width), std::max(1, window.height)};
     film.frames = Film::frames_for(film.keys.size(), double(settings_.film_seconds));
     std::error_code error;
     std::filesystem::create_directories(film.folder, error);
@@ -124,8 +144,6 @@ void App::start_film() {
 
 /// One picture at a time is asked for; the thread draws and writes it.
 void App::film() {
-    const Size size = window_.framebuffer();
-    if (size.width == 0 || size.height == 0) return;
     if (film_->waits_for != 0) {
         if (!shown_ || shown_->request.serial < film_->waits_for) return;
         ++film_->next;
@@ -139,7 +157,8 @@ void App::film() {
         return;
     }
     view_.stand({film_->camera(), view_.place().pivot, view_.up(), view_.radius()});
-    asked_ = {view_.camera(size.width, size.height), settings_.look, 1, asked_.serial + 1, film_->file()};
+    asked_ = {view_.camera(film_->size.width, film_->size.height), settings_.look, 1, asked_.serial + 1,
+              film_->file()};
     asked_scene_ = scene_number_;
     film_->waits_for = asked_.serial;
     thread_.ask(asked_);

@@ -3,6 +3,7 @@
 #include <imgui.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "ewa/error.h"
 #include "viewer/app.h"
@@ -29,7 +30,10 @@ void App::panel() {
     facts.drawing = !settled();
     facts.note = note_;
     if (photo_ && stands_at_ && photo_->frame == *stands_at_) facts.photo_failure = photo_->failure;
-    if (comparing()) facts.psnr = psnr_;
+    if (comparing() && compared()) facts.psnr = compared_->psnr;
+    const std::chrono::duration<double> now = Clock::now() - startup_.started;
+    facts.pictures_a_second = fluency_.rate(now.count());
+    facts.first_picture = first_picture_;
     if (film_) {
         facts.film_frame = film_->next;
         facts.film_frames = film_->frames;
@@ -37,7 +41,9 @@ void App::panel() {
     if (watcher_) facts.run = &run_;
     facts.up = view_.up();
     facts.stands_at = stands_at_;
-    obey(draw_panel(facts, settings_));
+    const PanelActions actions = draw_panel(facts, settings_);
+    panel_right_ = int(actions.right * ImGui::GetIO().DisplayFramebufferScale.x);
+    obey(actions);
 }
 
 void App::obey(const PanelActions& actions) {
@@ -90,22 +96,24 @@ void App::overlays() {
 void App::draw() {
     --redraws_;
     ask_for_photo();
-    const PanelSettings before = settings_;
+    const Comparison before = settings_.comparison;
     screen_->gui.begin_frame();
     if (!scripted()) overlays();
+    const int covered = std::exchange(panel_right_, 0);
     if (show_panel_ && !scripted()) panel();
+    if (panel_right_ != covered) redraws_ = std::max(redraws_, 1);
     if (show_help_) draw_help(show_help_);
+    if (!scripted() && Clock::now() < note_until_) draw_note(note_);
     handle_mouse();
     ImDrawData* drawn = screen_->gui.end_frame();
-    const bool other_difference =
-        before.gain != settings_.gain ||
-        difference_shown_ != (comparing() && settings_.comparison == Comparison::difference);
-    if (other_difference && settled()) compare();
-    if (settings_.comparison != before.comparison) redraws_ = std::max(redraws_, kRedraws);
+    if (settings_.comparison != before) redraws_ = std::max(redraws_, kRedraws);
+    choose_picture();
 
-    const bool photo_ready = !startup_.picture || settings_.comparison == Comparison::none || comparing() ||
-                             (photo_ && !photo_->failure.empty());
-    const bool capture = capture_ && settled() && photo_ready && !film_;
+    const bool photo_ready = settings_.comparison == Comparison::none || !stands_at_ || comparing() ||
+                             (photo_ && photo_->frame == *stands_at_);
+    const bool difference_ready = !comparison_asked_ || comparison_asked_->gain == 0 || compared();
+    const bool capture =
+        capture_ && settled() && photo_ready && difference_ready && !film_ && !saving_.valid();
     Image image;
     if (!present(drawn, capture ? &image : nullptr)) {
         // Nothing can be shown while minimised; otherwise the window is just changing, and the next try is
@@ -114,7 +122,8 @@ void App::draw() {
         if (size.width > 0 && size.height > 0) redraws_ = std::max(redraws_, 1);
         return;
     }
-    if (capture) save(image);
+    count_picture();
+    if (capture) save(std::move(image));
 }
 
 bool App::present(ImDrawData* drawn, Image* capture) {
@@ -134,33 +143,38 @@ bool App::present(ImDrawData* drawn, Image* capture) {
         layers.push_back({Layer::photograph, part, 0, double(part.width) / places.photograph.width});
     }
     try {
-        if (++frames_drawn_ == startup_.lose_device_at) throw vk::DeviceLostError("as asked for");
         return screen_->presenter.draw(window_.framebuffer(), layers, drawn, capture);
     } catch (const vk::DeviceLostError&) {
+        if (++devices_lost_ > kMostDevicesLost) throw;
+    } catch (const vk::SurfaceLostKHRError&) {
         if (++devices_lost_ > kMostDevicesLost) throw;
     }
     screen_.reset();
     screen_ = std::make_unique<Screen>(system_, window_, device_name_);
     if (photo_ && photo_->failure.empty()) screen_->presenter.set_picture(Layer::photograph, photo_->picture);
-    compare();
-    say("the device that shows the window was lost and has been opened again");
+    on_screen_.reset();
+    choose_picture();
+    say("the device that shows the window, or its place on the screen, was lost and has been opened again");
     return false;
 }
 
-void App::save(const Image& image) {
+void App::save(Image&& image) {
     capture_ = false;
     if (startup_.picture) {
         save_image(*startup_.picture, image);
         done_ = true;
         return;
     }
-    try {
-        const std::filesystem::path path = free_name("ewa-view", ".png");
-        save_image(path, image);
-        say("wrote " + std::filesystem::absolute(path).string());
-    } catch (const std::exception& error) {
-        say(error.what());
-    }
+    saving_ = std::async(std::launch::async, [this, image = std::move(image)]() -> std::string {
+        const Wake wake{system_};
+        try {
+            const std::filesystem::path path = free_name("ewa-view", ".png");
+            save_image(path, image);
+            return "wrote " + std::filesystem::absolute(path).string();
+        } catch (const std::exception& error) {
+            return error.what();
+        }
+    });
 }
 
 /// The rendering alone, in floating point, drawn and written by the thread.

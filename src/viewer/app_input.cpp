@@ -134,6 +134,8 @@ void App::handle_mouse() {
     if (ImGui::IsMouseClicked(ImGuiMouseButton_Left))
         dragging_wipe_ = wiping && over_wipe(places.photograph, settings_.wipe);
     if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) dragging_wipe_ = false;
+    if (dragging_wipe_ || (wiping && over_wipe(places.photograph, settings_.wipe)))
+        ImGui::SetMouseCursor(ImGuiMouseCursor_ResizeEW);
     const double x = io.MousePos.x * double(io.DisplayFramebufferScale.x);
     const double y = io.MousePos.y * double(io.DisplayFramebufferScale.y);
     if (dragging_wipe_) {

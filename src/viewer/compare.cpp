@@ -36,12 +36,13 @@ Rectangle fitted(Size shape, const Rectangle& room) {
     return result;
 }
 
-Arrangement arrange(Comparison comparison, Size window, Size photograph) {
+Arrangement arrange(Comparison comparison, Size window, Size photograph, int covered) {
     const Rectangle whole{0, 0, window.width, window.height};
     if (comparison != Comparison::beside) return {whole, fitted(photograph, whole)};
-    const int left = std::max(1, window.width / 2);
-    const Rectangle right{left, 0, std::max(1, window.width - left), window.height};
-    return {{0, 0, left, window.height}, fitted(photograph, right)};
+    const int from = covered <= window.width / 3 ? covered : 0;
+    const int half = std::max(1, (window.width - from) / 2);
+    const Rectangle right{from + half, 0, std::max(1, window.width - from - half), window.height};
+    return {{from, 0, half, window.height}, fitted(photograph, right)};
 }
 
 Picture difference(const Picture& rendering, const Picture& photograph, const Rectangle& place) {

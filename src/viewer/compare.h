@@ -17,12 +17,13 @@ struct Rectangle {
 /// The largest rectangle of the shape of `shape` in the middle of `room`.
 Rectangle fitted(Size shape, const Rectangle& room);
 
-/// Where the rendering and the photograph stand in the window. Beside each other: a half each. Otherwise the
-/// rendering has all of it, and the photograph the part that its camera saw.
+/// Where the rendering and the photograph stand in the window. Beside each other: a half each of what is
+/// right of `covered` px, of all of it where they are more than a third. Otherwise the rendering has all of
+/// it, and the photograph the part that its camera saw.
 struct Arrangement {
     Rectangle rendering, photograph;
 };
-Arrangement arrange(Comparison comparison, Size window, Size photograph);
+Arrangement arrange(Comparison comparison, Size window, Size photograph, int covered = 0);
 
 /// |rendering - photograph| per channel, in the size of the rendering; the photograph stands in `place` (px
 /// of the rendering) and is sampled bilinearly, beyond it the result is black.

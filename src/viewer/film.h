@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "scene/camera_path.h"
+#include "viewer/size.h"
 
 namespace ewa::viewer {
 
@@ -15,6 +16,7 @@ inline constexpr int kFilmRate = 30;  // pictures a second
 struct Film {
     std::filesystem::path folder;
     std::vector<Camera> keys;  // at least one
+    Size size;                 // of every picture, whatever the window does meanwhile
     int frames = 0, next = 0;
     uint64_t waits_for = 0;  // serial of the picture that is being written; 0: none
 

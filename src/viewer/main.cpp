@@ -9,6 +9,7 @@
 #include <new>
 #include <utility>
 
+#include "cli/manual.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "viewer/app.h"
@@ -31,7 +32,8 @@ struct Arguments {
     PanelSettings settings;
     bool antialias = false;
     DeviceOptions device;
-    int lose_device_at = 0;
+    std::string manual;
+    bool verbose = false;
 };
 
 const std::map<std::string, Mode> kModes = {{"color", Mode::color},
@@ -131,7 +133,7 @@ Scene open_what(const Arguments& arguments, Startup& startup) {
 Startup open(const Arguments& arguments) {
     Startup startup;
     startup.frame = arguments.frame;
-    startup.lose_device_at = arguments.lose_device_at;
+    startup.verbose = arguments.verbose;
     if (!arguments.size.empty()) startup.size = parse_size(arguments.size);
     if (!arguments.picture.empty()) {
         if (core::lower(arguments.picture.extension().string()) != ".png")
@@ -203,10 +205,11 @@ void add_options(CLI::App& app, Arguments& arguments) {
     app.add_option("--device", arguments.device.selector,
                    "Number or part of the name of the device that draws (see ewa devices)")
         ->type_name("NAME|N");
-    app.add_option("--lose-device-at", arguments.lose_device_at,
-                   "Frame at which the window's device plays lost")
-        ->type_name("N")
-        ->group("For developers");
+    app.add_flag("--verbose", arguments.verbose,
+                 "At the end: when the first picture was there, how many came while the camera moved");
+    // Without a group it stands in no help: the build calls it.
+    app.add_option("--manual", arguments.manual, "Write the manual page and shell completions below DIR")
+        ->group("");
 }
 
 /// Opens the device while the scene is being read. OpenDevice gives that one first, and then opens it anew.
@@ -231,10 +234,20 @@ class DeviceOpener {
     std::shared_ptr<std::shared_ptr<gpu::Device>> first_ = std::make_shared<std::shared_ptr<gpu::Device>>();
 };
 
-int run(const Arguments& arguments) {
+int run(const CLI::App& app, const Arguments& arguments) {
+    const auto started = std::chrono::steady_clock::now();
     try {
+        if (!arguments.manual.empty()) {
+            cli::write_manual(app, arguments.manual);
+            return kDone;
+        }
         DeviceOpener opener(arguments.device);
         Startup startup = open(arguments);
+        startup.started = started;
+        const auto elapsed = [&] {
+            return std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+        };
+        startup.read_after = elapsed();
         std::optional<TrainProcess> trainer;
         if (arguments.train) {
             std::vector<std::string> options{arguments.path.string()};
@@ -242,6 +255,7 @@ int run(const Arguments& arguments) {
             startup.trainer = &trainer.emplace(options, startup.watch->folder);
         }
         startup.device_name = opener.name();
+        startup.device_after = elapsed();
         startup.open_device = opener.function();
         App(startup).run();
         return kDone;
@@ -249,6 +263,10 @@ int run(const Arguments& arguments) {
         return fail(error.what(), kWrongUse);
     } catch (const RunError& error) {
         return fail(error.what(), kFailed);
+    } catch (const vk::DeviceLostError& error) {
+        return fail(
+            std::string("the device that shows the window was lost, again and again: ") + error.what(),
+            kFailed);
     } catch (const vk::SystemError& error) {
         return fail(std::string("the device that shows the window failed: ") + error.what(), kFailed);
     } catch (const std::bad_alloc&) {
@@ -277,5 +295,5 @@ int main(int argc, char** argv) {
         if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) return app.exit(error);
         return fail(std::string(error.what()) + " (see ewa-view --help)", kWrongUse);
     }
-    return run(arguments);
+    return run(app, arguments);
 }

@@ -153,6 +153,7 @@ Gaussians splats_of_points(const PointCloud& points) {
 Scene open_scene(const fs::path& path, const fs::path& cameras) {
     std::error_code error;
     Scene scene;
+    if (!fs::exists(path, error)) throw InputError(path.string() + ": there is no such file or folder");
     if (fs::is_directory(path, error)) {
         scene = is_run(path) ? open_run(path, cameras) : open_dataset(path);
     } else if (is_dataset_file(path) || is_mesh_scene(path)) {

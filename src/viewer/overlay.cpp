@@ -29,6 +29,17 @@ void label(ImDrawList& list, const ImVec2& at, const char* text) {
     list.AddText(at, kTextColor, text);
 }
 
+/// A knob with an arrow to each side.
+void grip(ImDrawList& list, const ImVec2& at, float radius) {
+    list.AddCircleFilled(at, radius, kShadowColor);
+    list.AddCircle(at, radius, kTextColor, 0, 1.5f);
+    for (const float side : {-1.0f, 1.0f}) {
+        const float tip = at.x + side * 0.75f * radius, foot = at.x + side * 0.3f * radius;
+        list.AddTriangleFilled({tip, at.y}, {foot, at.y - 0.35f * radius}, {foot, at.y + 0.35f * radius},
+                               kTextColor);
+    }
+}
+
 std::optional<int> pointed_at(const CamerasShown& cameras) {
     if (ImGui::GetIO().WantCaptureMouse) return std::nullopt;
     const ImVec2 mouse = ImGui::GetIO().MousePos;
@@ -49,6 +60,17 @@ std::optional<int> pointed_at(const CamerasShown& cameras) {
 
 float wipe_position(const Rectangle& photograph, float wipe) {
     return gui_point(photograph.x + double(wipe) * photograph.width, 0).x;
+}
+
+/// A window that takes no input, in the middle, its foot at y. Goes on until ImGui::End().
+void begin_message(const char* name, float y) {
+    ImGui::SetNextWindowPos(ImVec2(ImGui::GetIO().DisplaySize.x / 2, y), ImGuiCond_Always,
+                            ImVec2(0.5f, 1.0f));
+    ImGui::SetNextWindowBgAlpha(0.75f);
+    constexpr auto kFlags = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize |
+                            ImGuiWindowFlags_NoInputs | ImGuiWindowFlags_NoFocusOnAppearing |
+                            ImGuiWindowFlags_NoNav;
+    ImGui::Begin(name, nullptr, kFlags);
 }
 
 }  // namespace
@@ -93,6 +115,7 @@ void draw_comparison(Comparison comparison, const Arrangement& arrangement, floa
         const float x = wipe_position(photo, wipe);
         list.AddLine({x, gui_point(0, photo.y).y}, {x, gui_point(0, photo.y + photo.height).y},
                      IM_COL32(255, 255, 255, 220), 2);
+        grip(list, {x, gui_point(0, photo.y + photo.height / 2.0).y}, line);
         if (wipe > 0.15f) foot(photo, "photograph", wipe / 2);
         if (wipe < 0.85f) foot(photo, "splats", (1 + wipe) / 2);
     } else if (comparison == Comparison::difference) {
@@ -104,19 +127,24 @@ bool over_wipe(const Rectangle& photograph, float wipe) {
     return std::abs(ImGui::GetIO().MousePos.x - wipe_position(photograph, wipe)) < kGrab;
 }
 
-void draw_hint(bool photographs) {
+void draw_note(const std::string& note) {
     const ImVec2 size = ImGui::GetIO().DisplaySize;
-    ImGui::SetNextWindowPos(ImVec2(size.x / 2, size.y - ImGui::GetTextLineHeight()), ImGuiCond_Always,
-                            ImVec2(0.5f, 1.0f));
-    ImGui::SetNextWindowBgAlpha(0.75f);
-    constexpr auto kFlags = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize |
-                            ImGuiWindowFlags_NoInputs | ImGuiWindowFlags_NoFocusOnAppearing |
-                            ImGuiWindowFlags_NoNav;
-    if (ImGui::Begin("hint", nullptr, kFlags)) {
-        ImGui::TextUnformatted("drag: turn    right drag: move    wheel: closer    double click: look at");
-        ImGui::TextUnformatted(photographs ? "2: depth    V: compare with the photographs    F1: all keys"
-                                           : "2: depth    W A S D: fly    F1: all keys");
-    }
+    const float line = ImGui::GetTextLineHeight();
+    float width = std::min(size.x - 2 * line, 40 * line);
+    width = std::min(std::max(width, line), ImGui::CalcTextSize(note.c_str()).x + 2);
+    begin_message("note", size.y - 7 * line);
+    ImGui::PushTextWrapPos(ImGui::GetCursorPosX() + width);
+    ImGui::TextUnformatted(note.c_str());
+    ImGui::PopTextWrapPos();
+    ImGui::End();
+}
+
+void draw_hint(bool photographs) {
+    // Above the names of what is compared.
+    begin_message("hint", ImGui::GetIO().DisplaySize.y - 3 * ImGui::GetTextLineHeight());
+    ImGui::TextUnformatted("drag: turn    right drag: move    wheel: closer    double click: look at");
+    ImGui::TextUnformatted(photographs ? "2: depth    V: compare with the photographs    F1: all keys"
+                                       : "2: depth    W A S D: fly    F1: all keys");
     ImGui::End();
 }
 

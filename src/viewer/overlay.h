@@ -26,6 +26,9 @@ void draw_comparison(Comparison comparison, const Arrangement& arrangement, floa
 /// Whether the pointer is at the wipe's border.
 bool over_wipe(const Rectangle& photograph, float wipe);
 
+/// What has happened, above the hint.
+void draw_note(const std::string& note);
+
 /// What to begin with, at the window's lower border. photographs: there are some to compare with.
 void draw_hint(bool photographs);
 

@@ -118,6 +118,10 @@ void show_details(const PanelFacts& facts) {
             if (time.milliseconds >= 0.005)
                 ImGui::Text("%-18s %8.2f ms", time.pass.c_str(), time.milliseconds);
         ImGui::Text("%-18s %8.2f ms", "from asked to shown", facts.picture->milliseconds);
+        if (facts.pictures_a_second > 0)
+            ImGui::Text("%-18s %8.1f", "moving, a second", facts.pictures_a_second);
+        if (facts.first_picture)
+            ImGui::Text("%-18s %8.0f ms", "first after start", 1000 * *facts.first_picture);
     }
     if (facts.plan && ImGui::CollapsingHeader("Left out")) {
         for (const PlanLine& line : *facts.plan) {
@@ -149,6 +153,7 @@ PanelActions draw_panel(const PanelFacts& facts, PanelSettings& settings) {
         // A window that was tiny for a moment has pushed the panel out of it.
         const ImVec2 at = ImGui::GetWindowPos();
         if (at.x < 0 || at.y < 0) ImGui::SetWindowPos(ImVec2(std::max(at.x, 0.0f), std::max(at.y, 0.0f)));
+        actions.right = ImGui::GetWindowPos().x + ImGui::GetWindowSize().x;
         show_facts(facts);
         ImGui::Separator();
         ImGui::PushItemWidth(line * 10);

@@ -27,6 +27,8 @@ struct PanelFacts {
     std::string note;                      // of the last screenshot, or what failed
     std::string photo_failure;             // why the photograph cannot be had
     std::optional<double> psnr;            // of this view, as shown
+    double pictures_a_second = 0;          // while the camera moves; else 0
+    std::optional<double> first_picture;   // seconds after the start
     int film_frame = -1, film_frames = 0;  // where one is being written
     glm::dvec3 up{0};
     std::optional<int> stands_at;  // the camera that is looked through
@@ -50,6 +52,7 @@ struct PanelActions {
     std::optional<size_t> view, forget;
     std::optional<glm::dvec3> up;
     std::optional<std::string> command;  // for the trainer
+    float right = 0;                     // of what the panel covers, in ImGui's coordinates
 };
 
 PanelActions draw_panel(const PanelFacts& facts, PanelSettings& settings);

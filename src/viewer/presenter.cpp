@@ -190,9 +190,9 @@ bool Presenter::draw(Size window, std::span<const Layer> layers, ImDrawData* pan
         made_for_ = window;
         outdated_ = false;
     }
-    const std::optional<uint32_t> index = swapchain_.acquire();
+    const auto [index, outdated] = swapchain_.acquire();
     if (!index) {
-        outdated_ = true;
+        outdated_ = outdated;
         return false;
     }
     const vk::Image target = swapchain_.image(*index);

@@ -11,6 +11,16 @@ namespace {
 
 using Usage = vk::ImageUsageFlagBits;
 
+// ns. A window that lies hidden may be given no image for as long as it does, and has to answer nevertheless.
+constexpr uint64_t kPatience = 100'000'000;
+
+[[noreturn]] void fail(VkResult result) {
+    const std::string what = "the window can show no more pictures: " + vk::to_string(vk::Result(result));
+    if (result == VK_ERROR_DEVICE_LOST) throw vk::DeviceLostError(what);
+    if (result == VK_ERROR_SURFACE_LOST_KHR) throw vk::SurfaceLostKHRError(what);
+    throw RunError(what);
+}
+
 vk::CompositeAlphaFlagBitsKHR composite_of(const vk::SurfaceCapabilitiesKHR& surface) {
     using Alpha = vk::CompositeAlphaFlagBitsKHR;
     for (const Alpha alpha : {Alpha::eOpaque, Alpha::eInherit, Alpha::ePreMultiplied})
@@ -127,14 +137,15 @@ void Swapchain::create_targets() {
     }
 }
 
-std::optional<uint32_t> Swapchain::acquire() {
+Swapchain::Acquired Swapchain::acquire() {
     // The plain function: a changed window is no exception here, and Vulkan-Hpp would throw it.
     uint32_t index = 0;
-    const VkResult result = vkAcquireNextImageKHR(device_.handle(), *swapchain_, ~uint64_t(0), *acquired_,
-                                                  VK_NULL_HANDLE, &index);
-    if (result == VK_SUCCESS || result == VK_SUBOPTIMAL_KHR) return index;
-    if (result == VK_ERROR_OUT_OF_DATE_KHR) return std::nullopt;
-    throw RunError("the window can show no more pictures: " + vk::to_string(vk::Result(result)));
+    const VkResult result =
+        vkAcquireNextImageKHR(device_.handle(), *swapchain_, kPatience, *acquired_, VK_NULL_HANDLE, &index);
+    if (result == VK_SUCCESS || result == VK_SUBOPTIMAL_KHR) return {index, false};
+    if (result == VK_TIMEOUT || result == VK_NOT_READY) return {std::nullopt, false};
+    if (result == VK_ERROR_OUT_OF_DATE_KHR) return {std::nullopt, true};
+    fail(result);
 }
 
 bool Swapchain::present(uint32_t index) {
@@ -150,7 +161,7 @@ bool Swapchain::present(uint32_t index) {
     const VkResult result = vkQueuePresentKHR(device_.queue(), &present);
     if (result == VK_SUCCESS) return true;
     if (result == VK_SUBOPTIMAL_KHR || result == VK_ERROR_OUT_OF_DATE_KHR) return false;
-    throw RunError("the window can show no more pictures: " + vk::to_string(vk::Result(result)));
+    fail(result);
 }
 
 }  // namespace ewa::viewer

@@ -14,9 +14,14 @@ class Swapchain {
     /// False when the window has no size now. Afterwards nothing of the old images is in use.
     bool recreate(Size window);
 
-    /// The index of the image to draw next, whose `acquired` semaphore will be signalled; nothing when the
-    /// window has changed and recreate() must come first.
-    std::optional<uint32_t> acquire();
+    /// The index of the image to draw next, whose `acquired` semaphore will be signalled. Nothing when the
+    /// window has changed and recreate() must come first, or when it has no image to spare just now. Throws
+    /// vk::SurfaceLostKHRError, vk::DeviceLostError, RunError; so does present().
+    struct Acquired {
+        std::optional<uint32_t> index;
+        bool outdated = false;
+    };
+    Acquired acquire();
     /// False when recreate() must come before the next acquire().
     bool present(uint32_t index);
 

@@ -35,6 +35,12 @@ struct KeyPress {
     bool shift = false, control = false;
 };
 
+/// Wakes it at the end of its life.
+struct Wake {
+    const WindowSystem& system;
+    ~Wake() { system.wake(); }
+};
+
 class Window {
   public:
     /// Throws RunError. resizable: also asks window managers to keep the size where it is false.

@@ -54,16 +54,11 @@ bool has_bytes(const std::string& path) {
 
 int wait_for(pid_t child, const Circumstances& circumstances) {
     bool signalled = circumstances.signal == 0 && !circumstances.then;
-    const auto start = std::chrono::steady_clock::now();
-    const auto due = [&] {
-        if (circumstances.after_ms < 0) return has_bytes(circumstances.await_file);
-        return std::chrono::steady_clock::now() - start >= std::chrono::milliseconds(circumstances.after_ms);
-    };
     int status = 0;
     while (true) {
         const pid_t ended = waitpid(child, &status, signalled ? 0 : WNOHANG);
         if (ended == child) break;
-        if (!signalled && due()) {
+        if (!signalled && has_bytes(circumstances.await_file)) {
             if (circumstances.signal != 0) kill(child, circumstances.signal);
             if (circumstances.then) circumstances.then();
             signalled = true;

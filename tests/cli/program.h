@@ -24,7 +24,6 @@ struct Circumstances {
     int signal = 0;              // 0: none
     std::function<void()> then;  // called in the place of sending a signal, or after it
     std::vector<std::pair<std::string, std::string>> environment;
-    int after_ms = -1;  // where it is not negative, `signal` is sent that long after the start instead
 };
 
 Outcome run_ewa(const std::vector<std::string>& arguments, const Circumstances& circumstances = {});

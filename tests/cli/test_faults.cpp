@@ -6,6 +6,7 @@
 #include <csignal>
 
 #include "cli/expect.h"
+#include "cli/faulty.h"
 
 namespace {
 
@@ -29,11 +30,6 @@ class Faults : public testing::Test {
         arguments.insert(arguments.end(), more.begin(), more.end());
         return run_ewa(arguments, circumstances);
     }
-    Circumstances with(const std::string& variable, const std::string& value) {
-        Circumstances circumstances;
-        circumstances.environment = {{"LD_PRELOAD", EWA_FAULTS_LIBRARY}, {variable, value}};
-        return circumstances;
-    }
     /// Once the fault is gone the run goes on, and ends as one that met none.
     void expect_goes_on(const std::string& out, const Names& more = {}) {
         expect_success(train(out, more));
@@ -45,10 +41,10 @@ class Faults : public testing::Test {
 };
 
 TEST_F(Faults, OutOfDeviceMemory) {
-    expect_failure(train("first", {}, with("EWA_FAULT_ALLOCATIONS", "1")), 1, "out of device memory");
+    expect_failure(train("first", {}, with_fault("EWA_FAULT_ALLOCATIONS", "1")), 1, "out of device memory");
     int failed = 0;
     for (const int at : {4, 9, 15, 22, 30, 40, 55, 75, 100}) {
-        const Outcome outcome = train("o", {}, with("EWA_FAULT_ALLOCATIONS", std::to_string(at)));
+        const Outcome outcome = train("o", {}, with_fault("EWA_FAULT_ALLOCATIONS", std::to_string(at)));
         if (outcome.status == 0) break;
         ++failed;
         expect_failure(outcome, 1, "out of device memory");
@@ -64,7 +60,7 @@ TEST_F(Faults, DeviceLost) {
         const std::string out = std::string("o") + variable;
         int failed = 0;
         for (const int at : {1, 2, 7, 23, 45}) {
-            const Outcome outcome = train(out, {}, with(variable, std::to_string(at)));
+            const Outcome outcome = train(out, {}, with_fault(variable, std::to_string(at)));
             if (outcome.status == 0) break;  // what was left to do took fewer
             ++failed;
             expect_failure(outcome, 1, "lost");
@@ -73,7 +69,7 @@ TEST_F(Faults, DeviceLost) {
         expect_goes_on(out);
     }
     const std::string splats = folder / "s.ply", data = folder / "data";
-    const Circumstances lost = with("EWA_FAULT_SUBMITS", "1");
+    const Circumstances lost = with_fault("EWA_FAULT_SUBMITS", "1");
     expect_failure(run_ewa({"render", splats, "--cameras", data, "-o", folder / "r", "--quiet"}, lost), 1,
                    "lost");
     expect_failure(run_ewa({"eval", splats, data, "--split", "all"}, lost), 1, "lost");
@@ -84,21 +80,21 @@ TEST_F(Faults, DeviceLost) {
 TEST_F(Faults, FullDisk) {
     // Whatever file it is that does not fit: config, metrics, checkpoint, splats, pictures, report.
     for (const int bytes : {0, 100, 900, 5000, 20000, 60000, 120000}) {
-        const Outcome outcome = train("o", {}, with("EWA_FAULT_BYTES", std::to_string(bytes)));
+        const Outcome outcome = train("o", {}, with_fault("EWA_FAULT_BYTES", std::to_string(bytes)));
         if (outcome.status == 0) continue;
         expect_failure(outcome, 1, "No space left");
         EXPECT_NE(outcome.err.find("/o/"), std::string::npos) << outcome.err;
         for (const std::string& file : files_below(folder / "o"))
             EXPECT_EQ(file.find(".tmp"), std::string::npos) << file;
     }
-    expect_failure(train("p", {}, with("EWA_FAULT_BYTES", "100")), 1, "No space left");
+    expect_failure(train("p", {}, with_fault("EWA_FAULT_BYTES", "100")), 1, "No space left");
     expect_goes_on("o");
 }
 
 TEST_F(Faults, ReadOnlyFolder) {
     expect_success(train("o"));
     const std::string before = read_file(folder / "o/splats.ply");
-    const Circumstances closed = with("EWA_FAULT_READ_ONLY", folder / "o");
+    const Circumstances closed = with_fault("EWA_FAULT_READ_ONLY", folder / "o");
     expect_failure(train("o", {}, closed), 1, "Read-only");
     EXPECT_EQ(read_file(folder / "o/splats.ply"), before);
     const std::string splats = folder / "s.ply", data = folder / "data";
@@ -112,10 +108,9 @@ TEST_F(Faults, ReadOnlyFolder) {
 }
 
 TEST_F(Faults, APhotographVanishes) {
-    const Names more{"--image-cache", "0", "--steps", "1000", "--save-every", "0"};
-    Circumstances vanishing;
-    vanishing.await_file = folder / "o/metrics.jsonl";
-    vanishing.then = [&] { fs::rename(folder / "data/images/2.png", folder / "away.png"); };
+    const Names more{"--image-cache", "0", "--save-every", "0"};
+    const Circumstances vanishing = held_at(
+        20, folder / "held", 0, [&] { fs::rename(folder / "data/images/2.png", folder / "away.png"); });
     expect_failure(train("o", more, vanishing), 2, "2.png");
     ASSERT_TRUE(fs::exists(folder / "o/checkpoint.ewa"));
     fs::rename(folder / "away.png", folder / "data/images/2.png");
@@ -123,29 +118,25 @@ TEST_F(Faults, APhotographVanishes) {
 }
 
 TEST_F(Faults, ASecondTrainerInTheSameFolder) {
-    Circumstances second;
-    second.await_file = folder / "o/metrics.jsonl";
     Outcome refused;
-    second.then = [&] { refused = train("o", {"--steps", "4000"}); };
-    expect_success(train("o", {"--steps", "4000"}, second));
+    expect_success(train("o", {}, held_at(20, folder / "held", 0, [&] { refused = train("o"); })));
     expect_failure(refused, 1, "another process");
-    expect_success(train("whole", {"--steps", "4000"}));
+    expect_success(train("whole"));
     EXPECT_EQ(read_file(folder / "o/splats.ply"), read_file(folder / "whole/splats.ply"));
 }
 
 TEST_F(Faults, SignalsThatAskToEnd) {
-    const Names more{"--steps", "3000"};
-    for (const int signal : {SIGTERM, SIGHUP, SIGINT}) {
-        std::string out = "o";
-        out += std::to_string(signal);
-        SCOPED_TRACE(out);
-        Circumstances asked;
-        asked.signal = signal;
-        asked.await_file = folder / (out + "/metrics.jsonl");
-        ASSERT_EQ(train(out, more, asked).status, 130);
-        EXPECT_EQ(read_json(folder / (out + "/summary.json"))["interrupted"], true);
-        expect_goes_on(out, more);
-    }
+    for (const int signal : {SIGTERM, SIGHUP, SIGINT})
+        for (const int submission : {1, 2, 20, 55}) {
+            std::string out = std::to_string(signal);
+            out.append("_").append(std::to_string(submission));
+            SCOPED_TRACE(out);
+            ASSERT_EQ(train(out, {}, held_at(submission, folder / "held", signal)).status, 130);
+            const auto summary = read_json(folder / (out + "/summary.json"));
+            EXPECT_EQ(summary["interrupted"], true);
+            EXPECT_LT(summary["steps"], 60);
+            expect_goes_on(out);
+        }
 }
 
 }  // namespace

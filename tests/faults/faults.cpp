@@ -3,8 +3,15 @@
 //   EWA_FAULT_ALLOCATIONS=N  from the N-th on, device memory cannot be allocated
 //   EWA_FAULT_SUBMITS=N      the N-th submission and those after it find the device lost
 //   EWA_FAULT_WAITS=N        the same of waiting for one
+//   EWA_FAULT_ACQUIRE=N,R    the N-th picture of a window cannot be had: the VkResult R
+//   EWA_FAULT_PRESENT=N,R    the N-th picture of a window is shown with the VkResult R
 //   EWA_FAULT_BYTES=N        the disk is full once N bytes have been written to regular files
 //   EWA_FAULT_READ_ONLY=DIR  nothing below DIR can be created, changed or removed
+//   EWA_FAULT_KILL=N         the program is killed at the N-th submission, file opened for writing, write
+//   (half of it done),
+//                            renaming or removal, whichever it is
+//   EWA_FAULT_HOLD=N:FILE    the N-th submission makes FILE and waits until it is gone: the test does in
+//   between what it likes
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -13,7 +20,9 @@
 
 #include <atomic>
 #include <cerrno>
+#include <csignal>
 #include <cstdarg>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <string>
@@ -31,6 +40,14 @@ bool due(const char* variable, std::atomic<long>& calls) {
     return from && ++calls >= std::atol(from);
 }
 
+/// The result that this call of those that `variable` counts is to have, or the one it has.
+VkResult instead(const char* variable, std::atomic<long>& calls, VkResult result) {
+    const char* from = std::getenv(variable);
+    if (!from || ++calls != std::atol(from)) return result;
+    const char* comma = std::strchr(from, ',');
+    return comma ? VkResult(std::atol(comma + 1)) : result;
+}
+
 bool read_only(const char* path) {
     const char* folder = std::getenv("EWA_FAULT_READ_ONLY");
     if (!folder || !path) return false;
@@ -41,6 +58,30 @@ bool read_only(const char* path) {
 int refuse() {
     errno = EROFS;
     return -1;
+}
+
+/// Whether this is the moment at which EWA_FAULT_KILL ends the program.
+bool last_moment() {
+    static std::atomic<long> calls{0};
+    return due("EWA_FAULT_KILL", calls);
+}
+
+void die() {
+    kill(getpid(), SIGKILL);
+}
+
+/// Waits at the submission that EWA_FAULT_HOLD names; no longer than its parent lives.
+void hold() {
+    static std::atomic<long> calls{0};
+    const char* from = std::getenv("EWA_FAULT_HOLD");
+    const char* colon = from ? std::strchr(from, ':') : nullptr;
+    if (!colon || ++calls != std::atol(from)) return;
+    const pid_t parent = getppid();
+    std::FILE* file = std::fopen(colon + 1, "w");
+    if (!file) std::abort();
+    std::fputs("held", file);
+    std::fclose(file);
+    while (access(colon + 1, F_OK) == 0 && getppid() == parent) usleep(1000);
 }
 
 }  // namespace
@@ -57,6 +98,8 @@ VkResult vkAllocateMemory(VkDevice device, const VkMemoryAllocateInfo* info,
 VkResult vkQueueSubmit(VkQueue queue, uint32_t count, const VkSubmitInfo* submits, VkFence fence) {
     static std::atomic<long> calls{0};
     if (due("EWA_FAULT_SUBMITS", calls)) return VK_ERROR_DEVICE_LOST;
+    if (last_moment()) die();
+    hold();
     return next<PFN_vkQueueSubmit>("vkQueueSubmit")(queue, count, submits, fence);
 }
 
@@ -68,13 +111,32 @@ VkResult vkWaitForFences(VkDevice device, uint32_t count, const VkFence* fences,
     return due("EWA_FAULT_WAITS", calls) ? VK_ERROR_DEVICE_LOST : result;
 }
 
+VkResult vkAcquireNextImageKHR(VkDevice device, VkSwapchainKHR swapchain, uint64_t timeout,
+                               VkSemaphore semaphore, VkFence fence, uint32_t* index) {
+    static std::atomic<long> calls{0};
+    // Nothing is acquired where it fails.
+    const VkResult result = instead("EWA_FAULT_ACQUIRE", calls, VK_SUCCESS);
+    if (result != VK_SUCCESS) return result;
+    return next<PFN_vkAcquireNextImageKHR>("vkAcquireNextImageKHR")(device, swapchain, timeout, semaphore,
+                                                                    fence, index);
+}
+
+VkResult vkQueuePresentKHR(VkQueue queue, const VkPresentInfoKHR* info) {
+    static std::atomic<long> calls{0};
+    return instead("EWA_FAULT_PRESENT", calls, next<PFN_vkQueuePresentKHR>("vkQueuePresentKHR")(queue, info));
+}
+
 ssize_t write(int file, const void* bytes, size_t count) {
     static std::atomic<long> written{0};
     const auto real = next<ssize_t (*)(int, const void*, size_t)>("write");
-    const char* room = std::getenv("EWA_FAULT_BYTES");
     struct stat status {};
-    if (!room || fstat(file, &status) != 0 || !S_ISREG(status.st_mode) || file <= 2)
-        return real(file, bytes, count);
+    if (file <= 2 || fstat(file, &status) != 0 || !S_ISREG(status.st_mode)) return real(file, bytes, count);
+    if (last_moment()) {
+        (void)!real(file, bytes, count / 2);
+        die();
+    }
+    const char* room = std::getenv("EWA_FAULT_BYTES");
+    if (!room) return real(file, bytes, count);
     const long left = std::atol(room) - written;
     if (left <= 0) {
         errno = ENOSPC;
@@ -90,17 +152,21 @@ int open(const char* path, int flags, ...) {
     va_start(arguments, flags);
     const mode_t mode = flags & O_CREAT ? va_arg(arguments, mode_t) : 0;
     va_end(arguments);
-    if ((flags & (O_WRONLY | O_RDWR | O_CREAT)) && read_only(path)) return refuse();
+    const bool writing = flags & (O_WRONLY | O_RDWR | O_CREAT);
+    if (writing && read_only(path)) return refuse();
+    if (writing && last_moment()) die();
     return next<int (*)(const char*, int, ...)>("open")(path, flags, mode);
 }
 
 int rename(const char* from, const char* to) {
     if (read_only(from) || read_only(to)) return refuse();
+    if (last_moment()) die();
     return next<int (*)(const char*, const char*)>("rename")(from, to);
 }
 
 int unlink(const char* path) {
     if (read_only(path)) return refuse();
+    if (last_moment()) die();
     return next<int (*)(const char*)>("unlink")(path);
 }
 }

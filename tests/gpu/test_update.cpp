@@ -348,8 +348,9 @@ struct Limited {
 };
 Limited limited_step(const std::array<double, 4>& from, const std::array<double, 4>& to, int used,
                      double most) {
-    double longest = 0;
-    for (size_t k = 0; k < size_t(used); ++k) longest = std::max(longest, std::abs(to[k] - from[k]));
+    double square = 0;
+    for (size_t k = 0; k < size_t(used); ++k) square += (to[k] - from[k]) * (to[k] - from[k]);
+    const double longest = std::sqrt(square);
     if (!(longest > most)) return {to, false};
     Limited result{from, true};
     for (size_t k = 0; k < size_t(used); ++k) result.value[k] += (to[k] - from[k]) * most / longest;

@@ -44,10 +44,10 @@ Client client_of(const Server& server, const std::string& token = "") {
     return Client({"127.0.0.1", server.port()}, token);
 }
 
-/// Until it holds, at most ten seconds.
+/// Until it holds, at most a minute.
 template <class Holds>
 bool soon(Holds holds) {
-    for (int i = 0; i < 1000; ++i) {
+    for (int i = 0; i < 6000; ++i) {
         if (holds()) return true;
         std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
@@ -161,16 +161,16 @@ TEST(LiveServer, TakesCommandsFromWhoHasTheToken) {
 TEST(LiveServer, StrangersAreTurnedAway) {
     Server server("127.0.0.1", 0, "secret");
     {
-        const Socket socket = connect_to("127.0.0.1", server.port(), 5);
-        socket.send(std::string(100000, 'x'), 5);
-        EXPECT_FALSE(socket.receive_line(100, 5)) << "a line too long ends the connection";
+        const Socket socket = connect_to("127.0.0.1", server.port(), kPatience);
+        socket.send(std::string(100000, 'x'), kPatience);
+        EXPECT_FALSE(socket.receive_line(100, kPatience)) << "a line too long ends the connection";
     }
     {
-        const Socket socket = connect_to("127.0.0.1", server.port(), 5);
+        const Socket socket = connect_to("127.0.0.1", server.port(), kPatience);
         for (const char* request :
              {"", "GET / HTTP/1.1", "status", "status -1", "status x", "splats", "splats 99999999999"}) {
-            ASSERT_TRUE(socket.send(std::string(request) + "\n", 5));
-            const auto line = socket.receive_line(200, 5);
+            ASSERT_TRUE(socket.send(std::string(request) + "\n", kPatience));
+            const auto line = socket.receive_line(200, kPatience);
             ASSERT_TRUE(line) << request;
             EXPECT_EQ(line->rfind("no ", 0), 0u) << request;
         }
@@ -184,11 +184,11 @@ TEST(LiveServer, StrangersAreTurnedAway) {
         }
     }));
     std::vector<Socket> many;
-    for (int i = 0; i < kMostClients; ++i) many.push_back(connect_to("127.0.0.1", server.port(), 5));
-    for (const Socket& socket : many) socket.send(std::string(kHello) + "\n", 5);
+    for (int i = 0; i < kMostClients; ++i) many.push_back(connect_to("127.0.0.1", server.port(), kPatience));
+    for (const Socket& socket : many) socket.send(std::string(kHello) + "\n", kPatience);
     EXPECT_TRUE(soon([&] {
-        const Socket socket = connect_to("127.0.0.1", server.port(), 5);
-        const auto line = socket.receive_line(200, 5);
+        const Socket socket = connect_to("127.0.0.1", server.port(), kPatience);
+        const auto line = socket.receive_line(200, kPatience);
         return line && line->rfind("no there are", 0) == 0;
     }));
 }
@@ -253,6 +253,44 @@ TEST(LiveWatcher, FollowsARunByItsConnection) {
     EXPECT_EQ(watcher.update().splats_step, 3);
     watcher.command("pause");
     EXPECT_TRUE(soon([&] { return server.paused(); }));
+}
+
+TEST(LiveWatcher, ATrainingThatGoesAwayAndOneBegunAnew) {
+    auto server = std::make_unique<Server>("127.0.0.1", 0, "");
+    const uint16_t port = server->port();
+    Watcher watcher({{}, Address{"127.0.0.1", port}, {}}, [] {});
+    const auto known = [&](size_t lines, int step) {
+        return watcher.update().status.metrics.size() == lines && watcher.update().splats_step == step;
+    };
+    server->report({500, 1000, 5, 0.25, 1.5, State::running, false, {}});
+    for (int i = 1; i <= 3; ++i) server->add_metrics(line_of(i));
+    ASSERT_TRUE(soon([&] { return server->wants_splats(500); }));
+    server->offer({500, some_splats(2)}, 0);
+    ASSERT_TRUE(soon([&] { return known(3, 500); }));
+
+    server.reset();
+    ASSERT_TRUE(soon([&] { return !watcher.update().connected && !watcher.update().problem.empty(); }));
+    EXPECT_TRUE(known(3, 500)) << "what was there stays to be seen";
+
+    server = std::make_unique<Server>("127.0.0.1", port, "");
+    server->report({2, 1000, 5, 0.25, 1.5, State::running, false, {}});
+    server->add_metrics(line_of(1));
+    ASSERT_TRUE(soon([&] { return server->wants_splats(2); }));
+    server->offer({2, some_splats(2)}, 0);
+    EXPECT_TRUE(soon([&] { return known(1, 2); })) << "the old run's curves, or its step, are kept";
+    EXPECT_TRUE(watcher.update().connected);
+    EXPECT_EQ(watcher.update().problem, "");
+}
+
+/// One that accepts and is silent: closing the window does not wait for it.
+TEST(LiveWatcher, EndsAtOnceWhereNobodyAnswers) {
+    const Listener silent("127.0.0.1", 0);
+    const auto start = std::chrono::steady_clock::now();
+    {
+        const Watcher watcher({{}, Address{"127.0.0.1", silent.port()}, {}}, [] {});
+        std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    }
+    EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(5));
 }
 
 }  // namespace

@@ -3,8 +3,11 @@
 // the twin and as the start of a training, under the validation layer.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <functional>
+#include <string>
 
 #include "bench/stability/compare.h"
 #include "gpu/test_device.h"
@@ -23,6 +26,8 @@ TEST_P(Stability, PictureAndGradientAreWithinTheirBounds) {
     const bench::StabilityResult result = bench::compare_with_twin(device(), cases()[GetParam()]);
     EXPECT_TRUE(result.finite);
     EXPECT_EQ(result.skipped, result.skipped_by_twin);
+    EXPECT_GT(result.drawn, 0u);
+    EXPECT_LE(result.pixels_at_threshold, std::max<uint64_t>(4, result.pixels / 200));
     for (const bench::Comparison& c : result.comparisons)
         EXPECT_TRUE(c.good()) << c.of << ": " << c.error << ", at most " << c.bound << " (condition "
                               << c.condition << ")";
@@ -68,11 +73,33 @@ TEST(StabilityNeedles, KeepTheirDigitsWhereAPlainDeterminantLosesThem) {
     }
 }
 
-/// The suite itself must be able to fail: a picture of other splats is not within the bounds.
+/// The suite itself must be able to fail: what other splats look like is not within the bounds, nor is their
+/// gradient.
 TEST(StabilityComparison, FindsAWrongScene) {
     bench::StabilityCase one = named("ordinary");
     bench::StabilityResult result = bench::compare_with_twin(device(), one);
     ASSERT_TRUE(result.good());
+    const auto comparisons_broken_by = [&](const std::function<void(Gaussians&)>& change) {
+        Gaussians other = one.gaussians;
+        change(other);
+        std::string broken;
+        for (const bench::Comparison& c : bench::compare_with_twin(device(), one, other).comparisons)
+            if (!c.good()) broken += c.of + ",";
+        return broken;
+    };
+    EXPECT_EQ(comparisons_broken_by([](Gaussians&) {}), "");
+    const std::string all = "picture,loss,means,quaternions,log scales,opacity logits,SH,";
+    EXPECT_EQ(comparisons_broken_by([](Gaussians& g) { g.means[0] += 0.05f; }), all);
+    EXPECT_EQ(comparisons_broken_by([](Gaussians& g) {
+                  for (float& logit : g.opacity_logits) logit += 0.01f;
+              }),
+              all);
+    EXPECT_NE(comparisons_broken_by([](Gaussians& g) { g.log_scales[3] += 1e-3f; }).find("picture"),
+              std::string::npos);
+    result.pixels_at_threshold = result.pixels / 100;
+    EXPECT_FALSE(result.good());
+    result.pixels_at_threshold = 0;
+    EXPECT_TRUE(result.good());
     result.comparisons.front().error = NAN;
     EXPECT_FALSE(result.good());
     result.comparisons.front().error = 0;

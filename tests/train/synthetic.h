@@ -5,7 +5,9 @@
 #include <filesystem>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
+#include <numeric>
 #include <string>
+#include <vector>
 
 #include "ewa/dataset.h"
 #include "reference/render.h"
@@ -77,6 +79,22 @@ inline void make_synthetic(Synthetic& out, size_t splats, int views, int width, 
     out.folder.write("sparse/0/images.txt", images);
     out.folder.write("sparse/0/points3D.txt", points);
     out.dataset = load_dataset(out.folder.path(), {});
+}
+
+/// One small capture, made once for all the tests of a program: 40 splats, 8 views of 48x36.
+inline const Synthetic& small_capture() {
+    static const Synthetic* made = [] {
+        static Synthetic synthetic;
+        make_synthetic(synthetic, 40, 8, 48, 36, 7);
+        return &synthetic;
+    }();
+    return *made;
+}
+
+inline std::vector<int> all_frames(const Dataset& dataset) {
+    std::vector<int> frames(dataset.frames.size());
+    std::iota(frames.begin(), frames.end(), 0);
+    return frames;
 }
 
 /// A start some way from the truth: grey splats at points shaken by `shake` world units.

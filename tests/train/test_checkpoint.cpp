@@ -4,8 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include <numeric>
-
 #include "ewa/error.h"
 #include "gpu/test_device.h"
 #include "train/synthetic.h"
@@ -74,40 +72,31 @@ TEST(Checkpoint, IsRefusedCutAndDamagedAtAnyByte) {
     expect_error<InputError>([&] { train::read_checkpoint(path); }, {"layout 2", "layout 1"});
 }
 
-const Synthetic& data() {
-    static const Synthetic* made = [] {
-        static Synthetic synthetic;
-        make_synthetic(synthetic, 40, 8, 48, 36, 7);
-        return &synthetic;
-    }();
-    return *made;
-}
-
 Split split() {
-    return split_frames(data().dataset, 4);
+    return split_frames(small_capture().dataset, 4);
 }
 
 TEST(Fingerprint, TellsDatasetsApart) {
-    Dataset dataset = data().dataset;
+    Dataset dataset = small_capture().dataset;
     const std::string own = train::dataset_fingerprint(dataset, split());
     EXPECT_EQ(own.size(), 16u);
-    EXPECT_EQ(own, train::dataset_fingerprint(data().dataset, split()));
+    EXPECT_EQ(own, train::dataset_fingerprint(small_capture().dataset, split()));
     EXPECT_NE(own, train::dataset_fingerprint(dataset, split_frames(dataset, 3)));
     dataset.frames[2].camera.translation.x += 1e-12;
     EXPECT_NE(own, train::dataset_fingerprint(dataset, split()));
-    dataset = data().dataset;
+    dataset = small_capture().dataset;
     dataset.frames[1].image_path = dataset.frames[2].image_path;
     EXPECT_NE(own, train::dataset_fingerprint(dataset, split()));
-    dataset = data().dataset;
+    dataset = small_capture().dataset;
     dataset.frames[0].name = "x";
     EXPECT_NE(own, train::dataset_fingerprint(dataset, split()));
-    dataset = data().dataset;
+    dataset = small_capture().dataset;
     dataset.frames[0].mask_path = dataset.frames[1].image_path;
     EXPECT_NE(own, train::dataset_fingerprint(dataset, split()));
-    dataset = data().dataset;
+    dataset = small_capture().dataset;
     dataset.frames[0].masks = MaskUse::ignore;
     EXPECT_NE(own, train::dataset_fingerprint(dataset, split()));
-    dataset = data().dataset;
+    dataset = small_capture().dataset;
     dataset.frames[0].distortion.k1 = 1e-9;
     EXPECT_NE(own, train::dataset_fingerprint(dataset, split()));
 }
@@ -127,9 +116,9 @@ TEST_P(RestoredTrainer, GoesOnAsIfNothingHadHappened) {
     options.halvings = 1;
     options.absolute_gradients = options.revised_opacity = true;  // of adc
     options.grow_gradient_absolute = 1e-5;
-    const Gaussians start = shaken_start(data(), 0.05, 1, 1);
+    const Gaussians start = shaken_start(small_capture(), 0.05, 1, 1);
     const auto frames = split().train;
-    Trainer whole(device(), data().dataset, frames, start, options);
+    Trainer whole(device(), small_capture().dataset, frames, start, options);
     std::vector<TrainerState> states;
     for (int step = 1; step <= 230; ++step) {
         whole.step();
@@ -138,7 +127,7 @@ TEST_P(RestoredTrainer, GoesOnAsIfNothingHadHappened) {
     const Gaussians expected = whole.gaussians();
     EXPECT_EQ(GetParam() == Strategy::none, expected.size() == start.size());
     for (const TrainerState& state : states) {
-        Trainer later(device(), data().dataset, frames, start, options);
+        Trainer later(device(), small_capture().dataset, frames, start, options);
         later.step();  // restoring replaces whatever was there
         later.restore(state);
         EXPECT_EQ(later.steps_done(), state.report.step);
@@ -158,8 +147,8 @@ TEST(TrainerRestore, RefusesAnotherTrainersState) {
     TrainOptions options;
     options.steps = 10;
     options.strategy = Strategy::none;
-    const Gaussians start = shaken_start(data(), 0.05, 1, 1);
-    Trainer trainer(device(), data().dataset, split().train, start, options);
+    const Gaussians start = shaken_start(small_capture(), 0.05, 1, 1);
+    Trainer trainer(device(), small_capture().dataset, split().train, start, options);
     const TrainerState state = trainer.state();
     TrainerState other = state;
     other.sh_degree = 0;

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numeric>
 
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
@@ -15,15 +14,6 @@ namespace ewa::test {
 namespace {
 
 const glm::dvec3 kPlace(5e6, 4e6, 300);
-
-const Synthetic& data() {
-    static const Synthetic* made = [] {
-        static Synthetic synthetic;
-        make_synthetic(synthetic, 40, 8, 48, 36, 7);
-        return &synthetic;
-    }();
-    return *made;
-}
 
 Dataset moved(Dataset dataset, const glm::dvec3& by) {
     for (Frame& frame : dataset.frames) frame.camera.translation -= frame.camera.rotation * by;
@@ -37,8 +27,7 @@ struct Trained {
 };
 
 Trained train(const Dataset& dataset) {
-    std::vector<int> frames(dataset.frames.size());
-    std::iota(frames.begin(), frames.end(), 0);
+    const std::vector<int> frames = all_frames(dataset);
     TrainOptions options;
     options.steps = 200;
     options.sh_degree = 1;
@@ -54,8 +43,8 @@ Trained train(const Dataset& dataset) {
 }
 
 TEST(FarFromTheOrigin, TrainsAsWellAsInTheMiddleAndComesOutWhereItWas) {
-    const Dataset far = moved(data().dataset, kPlace);
-    const Trained here = train(data().dataset), there = train(far);
+    const Dataset far = moved(small_capture().dataset, kPlace);
+    const Trained here = train(small_capture().dataset), there = train(far);
     EXPECT_EQ(here.gaussians.origin, glm::dvec3(0));
     EXPECT_NE(there.gaussians.origin, glm::dvec3(0));
     EXPECT_GT(here.psnr, 20);
@@ -71,15 +60,13 @@ TEST(FarFromTheOrigin, TrainsAsWellAsInTheMiddleAndComesOutWhereItWas) {
     }
     EXPECT_LT(worst, 1e-6);
     EXPECT_LT(farthest, 10);  // in the capture's own coordinates
-    std::vector<int> frames(far.frames.size());
-    std::iota(frames.begin(), frames.end(), 0);
+    const std::vector<int> frames = all_frames(far);
     EXPECT_NEAR(evaluate(device(), back, far, frames, {}).psnr, there.psnr, 0.01);
 }
 
 TEST(FarFromTheOrigin, ACheckpointGoesOnWhereItWas) {
-    const Dataset far = moved(data().dataset, kPlace);
-    std::vector<int> frames(far.frames.size());
-    std::iota(frames.begin(), frames.end(), 0);
+    const Dataset far = moved(small_capture().dataset, kPlace);
+    const std::vector<int> frames = all_frames(far);
     TrainOptions options;
     options.steps = 20;
     options.strategy = Strategy::none;
@@ -92,25 +79,26 @@ TEST(FarFromTheOrigin, ACheckpointGoesOnWhereItWas) {
     for (int step = 0; step < 10; ++step) second.step();
     EXPECT_EQ(whole.gaussians().means, second.gaussians().means);
     EXPECT_EQ(whole.gaussians().origin, second.gaussians().origin);
-    Trainer here(device(), data().dataset, frames, gaussians_from_points(data().dataset.points, 0), options);
+    Trainer here(device(), small_capture().dataset, frames,
+                 gaussians_from_points(small_capture().dataset.points, 0), options);
     EXPECT_THROW(here.restore(first.state()), std::exception);
 }
 
 TEST(FarFromTheOrigin, MovingASceneBackLeavesNoOrigin) {
-    Gaussians g = gaussians_from_points(moved(data().dataset, kPlace).points, 0);
+    Gaussians g = gaussians_from_points(moved(small_capture().dataset, kPlace).points, 0);
     ASSERT_NE(g.origin, glm::dvec3(0));
     glm::dmat4 back(1.0);
     back[3] = glm::dvec4(-kPlace, 1);
     transform_splats(g, back);
     EXPECT_EQ(g.origin, glm::dvec3(0));
-    const Gaussians here = gaussians_from_points(data().dataset.points, 0);
+    const Gaussians here = gaussians_from_points(small_capture().dataset.points, 0);
     for (size_t i = 0; i < g.size(); ++i) EXPECT_LT(glm::length(g.world_mean(i) - here.world_mean(i)), 1e-6);
 }
 
 TEST(FarFromTheOrigin, JoiningScenesKeepsBothInPlace) {
-    Gaussians joined = gaussians_from_points(moved(data().dataset, kPlace).points, 0);
+    Gaussians joined = gaussians_from_points(moved(small_capture().dataset, kPlace).points, 0);
     const Gaussians other =
-        gaussians_from_points(moved(data().dataset, kPlace + glm::dvec3(100, 0, 0)).points, 0);
+        gaussians_from_points(moved(small_capture().dataset, kPlace + glm::dvec3(100, 0, 0)).points, 0);
     const size_t n = joined.size();
     append_splats(joined, other);
     for (size_t i = 0; i < n; ++i)
@@ -119,7 +107,7 @@ TEST(FarFromTheOrigin, JoiningScenesKeepsBothInPlace) {
 
 /// Formats without room for double positions say what they cost.
 TEST(FarFromTheOrigin, AnotherFormatSaysWhatItRounds) {
-    const Gaussians g = gaussians_from_points(moved(data().dataset, kPlace).points, 0);
+    const Gaussians g = gaussians_from_points(moved(small_capture().dataset, kPlace).points, 0);
     const TempFolder folder;
     const auto remarks = save_splats(folder / "far.splat", g, SaveOptions{});
     bool said = false;

@@ -14,21 +14,6 @@
 namespace ewa::test {
 namespace {
 
-std::vector<int> all_frames(const Dataset& dataset) {
-    std::vector<int> frames(dataset.frames.size());
-    std::iota(frames.begin(), frames.end(), 0);
-    return frames;
-}
-
-const Synthetic& data() {
-    static const Synthetic* made = [] {
-        static Synthetic synthetic;
-        make_synthetic(synthetic, 40, 8, 48, 36, 7);
-        return &synthetic;
-    }();
-    return *made;
-}
-
 TrainOptions quick(int steps) {
     TrainOptions options;
     options.steps = steps;
@@ -75,7 +60,7 @@ struct Trained {
     double first_loss = 0;
 };
 Trained train(const TrainOptions& options, const Gaussians& start, int steps) {
-    Trainer trainer(device(), data().dataset, all_frames(data().dataset), start, options);
+    Trainer trainer(device(), small_capture().dataset, all_frames(small_capture().dataset), start, options);
     Trained run;
     for (int step = 1; step <= steps; ++step) {
         run.report = trainer.step();
@@ -90,18 +75,19 @@ Trained train(const TrainOptions& options, const Gaussians& start, int steps) {
 }
 
 double train_psnr(const Gaussians& gaussians) {
-    return evaluate(device(), gaussians, data().dataset, all_frames(data().dataset), {}).psnr;
+    return evaluate(device(), gaussians, small_capture().dataset, all_frames(small_capture().dataset), {})
+        .psnr;
 }
 
 TEST(Dataset, IsReadAsItWasMade) {
-    ASSERT_EQ(data().dataset.frames.size(), 8u);
-    ASSERT_EQ(data().dataset.points.positions.size(), 40u);
+    ASSERT_EQ(small_capture().dataset.frames.size(), 8u);
+    ASSERT_EQ(small_capture().dataset.points.positions.size(), 40u);
     // The photographs are the twin's, rounded to 8 bit and clamped: the truth itself scores about 59 dB.
-    EXPECT_GT(train_psnr(data().truth), 57);
+    EXPECT_GT(train_psnr(small_capture().truth), 57);
 }
 
 TEST(Trainer, OverfitsASmallScene) {
-    const Gaussians start = shaken_start(data(), 0.05, 1, 0);
+    const Gaussians start = shaken_start(small_capture(), 0.05, 1, 0);
     const double before = train_psnr(start);
     const Trained run = train(quick(200), start, 200);
     const double after = train_psnr(run.gaussians);
@@ -115,7 +101,7 @@ TEST(Trainer, OverfitsASmallScene) {
 }
 
 TEST(Trainer, TheSameSeedWritesTheSameBytesAndAnotherDoesNot) {
-    const Gaussians start = shaken_start(data(), 0.05, 1, 1);
+    const Gaussians start = shaken_start(small_capture(), 0.05, 1, 1);
     const auto bytes = [&](uint64_t seed) {
         TrainOptions options = quick(160);
         options.sh_degree = 1;
@@ -126,7 +112,7 @@ TEST(Trainer, TheSameSeedWritesTheSameBytesAndAnotherDoesNot) {
         options.seed = seed;
         const Trained run = train(options, start, 160);
         EXPECT_GT(run.gaussians.size(), start.size());  // densification took part
-        const auto path = data().folder / "out.ply";
+        const auto path = small_capture().folder / "out.ply";
         save_splats(path, run.gaussians);
         return file_bytes(path);
     };
@@ -136,13 +122,13 @@ TEST(Trainer, TheSameSeedWritesTheSameBytesAndAnotherDoesNot) {
 }
 
 TEST(Trainer, GrowsUpToTheCapAndNotPastIt) {
-    const Gaussians start = shaken_start(data(), 0.05, 1, 0);
+    const Gaussians start = shaken_start(small_capture(), 0.05, 1, 0);
     TrainOptions options = quick(300);
     options.strategy = Strategy::adc;
     options.grow_gradient = 1e-6;  // everything in view grows
     options.refine_stop = 30000;
     options.max_splats = 130;
-    Trainer trainer(device(), data().dataset, all_frames(data().dataset), start, options);
+    Trainer trainer(device(), small_capture().dataset, all_frames(small_capture().dataset), start, options);
     uint32_t most = 0;
     for (int step = 1; step <= 300; ++step) {
         const StepReport report = trainer.step();
@@ -155,14 +141,14 @@ TEST(Trainer, GrowsUpToTheCapAndNotPastIt) {
 }
 
 TEST(Trainer, WithoutAStrategyTheNumberStays) {
-    const Gaussians start = shaken_start(data(), 0.05, 1, 0);
+    const Gaussians start = shaken_start(small_capture(), 0.05, 1, 0);
     TrainOptions options = quick(160);
     options.grow_gradient = 1e-6;
     EXPECT_EQ(train(options, start, 160).report.splats, 40u);
 }
 
 TEST(Trainer, ASplatThatIsNotFiniteStaysOutAndTheRestLearns) {
-    Gaussians start = shaken_start(data(), 0.05, 1, 0);
+    Gaussians start = shaken_start(small_capture(), 0.05, 1, 0);
     start.means[3 * 5] = std::nanf("");
     const Trained run = train(quick(60), start, 60);
     EXPECT_EQ(run.report.skipped_nonfinite, 1u);
@@ -175,9 +161,9 @@ TEST(Trainer, ASplatThatIsNotFiniteStaysOutAndTheRestLearns) {
 }
 
 TEST(Trainer, CamerasInOnePlaceStillHaveAScale) {
-    Dataset panorama = data().dataset;
+    Dataset panorama = small_capture().dataset;
     for (Frame& frame : panorama.frames) frame.camera.translation = glm::dvec3(0.0);
-    const Gaussians start = shaken_start(data(), 0.05, 1, 0);
+    const Gaussians start = shaken_start(small_capture(), 0.05, 1, 0);
     for (const Strategy strategy : {Strategy::adc, Strategy::mcmc}) {
         TrainOptions options = quick(10);
         options.strategy = strategy;
@@ -194,12 +180,12 @@ TEST(Trainer, CamerasInOnePlaceStillHaveAScale) {
 }
 
 TEST(Trainer, RefusesWhatItCannotTrain) {
-    const Gaussians start = shaken_start(data(), 0.05, 1, 0);
+    const Gaussians start = shaken_start(small_capture(), 0.05, 1, 0);
     TrainOptions options = quick(10);
     const auto make = [&](const std::vector<int>& frames, const Gaussians& from, uint32_t cap) {
         return [&, frames, from, cap] {
             options.max_splats = cap;
-            Trainer(device(), data().dataset, frames, from, options);
+            Trainer(device(), small_capture().dataset, frames, from, options);
         };
     };
     expect_error<InputError>(make({}, start, 1000), {"no training photograph"});
@@ -208,7 +194,8 @@ TEST(Trainer, RefusesWhatItCannotTrain) {
 }
 
 TEST(Trainer, TimesEveryPass) {
-    Trainer trainer(device(), data().dataset, {0, 1}, shaken_start(data(), 0.05, 1, 0), quick(10));
+    Trainer trainer(device(), small_capture().dataset, {0, 1}, shaken_start(small_capture(), 0.05, 1, 0),
+                    quick(10));
     for (int step = 0; step < 3; ++step) trainer.step();
     double total = 0;
     bool blends = false;
@@ -232,7 +219,7 @@ TEST(Trainer, LearnsNothingFromWhatIsMasked) {
     const Gaussians with = learn(spoilt.masked), without = learn(spoilt.unmasked);
     // Against the photographs before they were spoilt.
     const auto clean = [&](const Gaussians& g) {
-        return evaluate(device(), g, data().dataset, all_frames(data().dataset), {}).psnr;
+        return evaluate(device(), g, small_capture().dataset, all_frames(small_capture().dataset), {}).psnr;
     };
     const double good = clean(with), bad = clean(without);
     printf("    %.2f dB with masks, %.2f dB without\n", good, bad);
@@ -277,40 +264,40 @@ TEST(Trainer, LearnsWhatEachPhotographsExposureWas) {
 /// A run on halves and quarters first ends at the whole resolution, and resumes to the byte in the middle of
 /// them.
 TEST(Trainer, AResolutionScheduleEndsAtTheWholeResolutionAndResumes) {
-    const Gaussians start = shaken_start(data(), 0.05, 1, 0);
+    const Gaussians start = shaken_start(small_capture(), 0.05, 1, 0);
     TrainOptions options = quick(200);
     options.halvings = 2;
-    const auto frames = all_frames(data().dataset);
-    Trainer whole(device(), data().dataset, frames, start, options);
+    const auto frames = all_frames(small_capture().dataset);
+    Trainer whole(device(), small_capture().dataset, frames, start, options);
     TrainerState middle;
     for (int step = 1; step <= 200; ++step) {
         whole.step();
         if (step == 30) middle = whole.state();
     }
     EXPECT_GT(train_psnr(whole.gaussians()), 25);
-    Trainer resumed(device(), data().dataset, frames, start, options);
+    Trainer resumed(device(), small_capture().dataset, frames, start, options);
     resumed.restore(middle);
     while (resumed.steps_done() < 200) resumed.step();
     EXPECT_EQ(resumed.gaussians().means, whole.gaussians().means);
     EXPECT_EQ(resumed.gaussians().sh, whole.gaussians().sh);
     // Half the sides are another picture: the first step tells.
-    const double loss = Trainer(device(), data().dataset, frames, start, quick(200)).step().loss;
-    EXPECT_NE(Trainer(device(), data().dataset, frames, start, options).step().loss, loss);
+    const double loss = Trainer(device(), small_capture().dataset, frames, start, quick(200)).step().loss;
+    EXPECT_NE(Trainer(device(), small_capture().dataset, frames, start, options).step().loss, loss);
 }
 
 TEST(Trainer, TheMemoryForecastHoldsForARun) {
-    const Gaussians start = shaken_start(data(), 0.05, 1, 1);
+    const Gaussians start = shaken_start(small_capture(), 0.05, 1, 1);
     TrainOptions options = quick(160);
     options.strategy = Strategy::adc;
     options.grow_gradient = 1e-5;
     options.refine_stop = 30000;
     options.max_splats = 60;
-    const MemoryForecast forecast =
-        forecast_memory(*device(), data().dataset, all_frames(data().dataset), start, options);
+    const MemoryForecast forecast = forecast_memory(*device(), small_capture().dataset,
+                                                    all_frames(small_capture().dataset), start, options);
     EXPECT_EQ(forecast.splats, 60u);
     DeviceOptions fresh;  // whose peak is this run's
     const auto own = open_device(fresh);
-    Trainer trainer(own, data().dataset, all_frames(data().dataset), start, options);
+    Trainer trainer(own, small_capture().dataset, all_frames(small_capture().dataset), start, options);
     for (int step = 0; step < 160; ++step) trainer.step();
     EXPECT_EQ(trainer.splats(), 60u);
     const uint64_t peak = peak_device_bytes(*own);
@@ -367,7 +354,9 @@ TEST(Trainer, TakesPhotographsOfSeveralSizes) {
     for (int step = 0; step < 120; ++step) trainer.step();
     const Gaussians learnt = trainer.gaussians();
     EXPECT_GT(evaluate(device(), learnt, dataset, all_frames(dataset), {}).psnr, 22);
-    EXPECT_GT(evaluate(device(), learnt, data().dataset, all_frames(data().dataset), {}).psnr, 22);
+    EXPECT_GT(
+        evaluate(device(), learnt, small_capture().dataset, all_frames(small_capture().dataset), {}).psnr,
+        22);
 }
 
 }  // namespace

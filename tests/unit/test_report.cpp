@@ -10,6 +10,7 @@
 #include "report/html.h"
 #include "report/pictures.h"
 #include "report/summary.h"
+#include "support/temp_folder.h"
 
 namespace {
 
@@ -56,21 +57,19 @@ TEST(Report, MetricsHaveTestFiguresOnlyWhereEvaluated) {
 }
 
 TEST(Report, MetricsLogCanBeReadWhileItGrows) {
-    const auto path = std::filesystem::temp_directory_path() / "ewa_test_metrics.jsonl";
-    {
-        MetricsLog log(path);
-        for (int step = 1; step <= 2; ++step) {
-            MetricsLine line;
-            line.step = step;
-            log.append(line);
-            std::ifstream file(path);
-            std::string text;
-            int lines = 0;
-            while (std::getline(file, text)) EXPECT_EQ(Json::parse(text)["step"], ++lines);
-            EXPECT_EQ(lines, step);
-        }
+    const test::TempFolder folder;
+    const auto path = folder / "metrics.jsonl";
+    MetricsLog log(path);
+    for (int step = 1; step <= 2; ++step) {
+        MetricsLine line;
+        line.step = step;
+        log.append(line);
+        std::ifstream file(path);
+        std::string text;
+        int lines = 0;
+        while (std::getline(file, text)) EXPECT_EQ(Json::parse(text)["step"], ++lines);
+        EXPECT_EQ(lines, step);
     }
-    std::filesystem::remove(path);
 }
 
 TEST(Report, MetricsLogSaysWhenTheDiskIsFull) {

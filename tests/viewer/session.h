@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// ewa-view in a window that is driven by the X server's own key and mouse events (xdotool, by XTEST).
+// ewa-view in a window that is driven by the X server's own key and mouse events (xdotool, by XTEST), and
+// that another client of the server looks at and drops files on.
 #pragma once
 #include <fcntl.h>
 #include <signal.h>
@@ -13,7 +14,8 @@
 #include <thread>
 #include <vector>
 
-#include "cli/program.h"
+#include "viewer/window_test.h"
+#include "viewer/x_client.h"
 
 namespace ewa::test {
 
@@ -24,9 +26,12 @@ inline bool have_xdotool() {
 class Session {
   public:
     /// Starts it in `folder`, where it leaves its screenshots, and waits for its window.
-    Session(const std::string& folder, std::vector<std::string> arguments) : folder_(folder) {
+    Session(const std::string& folder, std::vector<std::string> arguments,
+            const std::vector<std::pair<std::string, std::string>>& environment = {})
+        : folder_(folder) {
         child_ = fork();
         if (child_ == 0) {
+            for (const auto& [name, value] : environment) setenv(name.c_str(), value.c_str(), 1);
             if (chdir(folder.c_str()) != 0) _exit(127);
             dup2(open("out.txt", O_WRONLY | O_CREAT | O_TRUNC, 0600), STDOUT_FILENO);
             dup2(open("err.txt", O_WRONLY | O_CREAT | O_TRUNC, 0600), STDERR_FILENO);
@@ -98,6 +103,25 @@ class Session {
     pid_t child_ = -1;
     bool found_ = false;
     int png_ = 0, exr_ = 0;
+};
+
+/// A window with 400 splats, driven.
+class SessionTest : public WindowTest {
+  protected:
+    void SetUp() override {
+        WindowTest::SetUp();
+        if (IsSkipped()) return;
+        if (!have_xdotool())
+            GTEST_SKIP()
+                << "there is no xdotool (Debian: xdotool) to press keys with; the input is not tested";
+        std::filesystem::create_directories(shots_);
+    }
+    static Image screenshot(Session& session) {
+        const std::string path = session.screenshot();
+        EXPECT_NE(path, "") << "no screenshot was written";
+        return path.empty() ? Image(1, 1, 3) : load_image(path);
+    }
+    const std::string shots_ = folder_ / "shots";
 };
 
 }  // namespace ewa::test

@@ -4,27 +4,11 @@
 #include <random>
 
 #include "viewer/session.h"
-#include "viewer/window_test.h"
 
 namespace ewa::test {
 namespace {
 
-class Input : public WindowTest {
-  protected:
-    void SetUp() override {
-        WindowTest::SetUp();
-        if (!IsSkipped() && !have_xdotool())
-            GTEST_SKIP()
-                << "there is no xdotool (Debian: xdotool) to press keys with; the input is not tested";
-        std::filesystem::create_directories(shots_);
-    }
-    Image screenshot(Session& session) {
-        const std::string path = session.screenshot();
-        EXPECT_NE(path, "") << "no screenshot was written";
-        return path.empty() ? Image(1, 1, 3) : load_image(path);
-    }
-    const std::string shots_ = folder_ / "shots";
-};
+using Input = SessionTest;
 
 TEST_F(Input, KeysChooseModesCamerasAndViews) {
     Session session(shots_, {splats_, "--cameras", cameras_, "--size", "48x32"});
@@ -46,6 +30,57 @@ TEST_F(Input, KeysChooseModesCamerasAndViews) {
     session.send("key minus key minus key minus");
     EXPECT_GT(largest_difference(screenshot(session), rendered("3")), 0.05f) << "smaller splats";
     expect_silent(session.quit());
+}
+
+/// Not what the viewer believes to show, but what the X server has: no encoding is done twice on the way.
+TEST_F(Input, TheDisplayHasWhatRenderWrites) {
+    const XClient display(display_.name());
+    Session session(shots_, {splats_, "--cameras", cameras_, "--frame", "2", "--size", "48x32"});
+    ASSERT_TRUE(session.found());
+    session.send("key F2 key F1 key F1");  // neither panel nor hint
+    const auto window = display.window_titled("ewa");
+    ASSERT_TRUE(window);
+    const Image expected = rendered("2");
+    float difference = 1;
+    for (int i = 0; i < 100 && difference > kRounding; ++i) {
+        session.send("sleep 0.1");
+        difference = largest_difference(display.pixels(*window), expected);
+    }
+    EXPECT_LE(difference, kRounding);
+    expect_silent(session.quit());
+}
+
+/// The width of what F2 takes away from the window's upper border, where no splat is.
+int panel_width(const XClient& display, Session& session) {
+    const auto window = display.window_titled("ewa");
+    EXPECT_TRUE(window);
+    if (!window) return 0;
+    session.send("key F1 key F1");
+    const Image with = display.pixels_at_rest(*window);
+    session.send("key F2");
+    const Image without = display.pixels_at_rest(*window);
+    int left = with.width, right = 0;
+    for (int y = 0; y < 40; ++y)
+        for (int x = 0; x < with.width; ++x)
+            if (std::abs(with.at(x, y)[1] - without.at(x, y)[1]) > kRounding) {
+                left = std::min(left, x);
+                right = std::max(right, x);
+            }
+    return right - left;
+}
+
+TEST_F(Input, ADenseDisplayHasLargerText) {
+    const XClient display(display_.name());
+    int widths[2] = {};
+    for (const int dense : {0, 1}) {
+        if (dense) display.set_resources("Xft.dpi:\t192\n");
+        Session session(shots_, {splats_, "--cameras", cameras_, "--size", "800x600"});
+        ASSERT_TRUE(session.found());
+        widths[dense] = panel_width(display, session);
+        expect_silent(session.quit());
+    }
+    EXPECT_GT(widths[0], 100);
+    EXPECT_NEAR(double(widths[1]) / widths[0], 2, 0.3);
 }
 
 TEST_F(Input, TheMouseTurnsMovesAndZooms) {
@@ -75,7 +110,7 @@ TEST_F(Input, TheMouseTurnsMovesAndZooms) {
 TEST_F(Input, ComparesWithThePhotographByKey) {
     Session session(shots_, {splats_, "--cameras", cameras_, "--frame", "1", "--size", "96x32"});
     ASSERT_TRUE(session.found());
-    session.send("key F2 key v sleep 1");
+    session.send("key F2 key v");
     const Image beside = screenshot(session), photo = load_image(cameras_ + "/images/1.png");
     for (int x = 0; x < 48; ++x) EXPECT_NEAR(beside.at(48 + x, 16)[1], photo.at(x, 16)[1], kRounding);
     // A turn leaves the camera, and with it the photograph; G comes back.
@@ -83,7 +118,7 @@ TEST_F(Input, ComparesWithThePhotographByKey) {
         "mousemove 20 20 mousedown 1 sleep 0.2 mousemove 30 20 sleep 0.2 mousemove 40 20 sleep 0.2 mouseup "
         "1");
     EXPECT_GT(largest_difference(screenshot(session), beside), 0.1f);
-    session.send("key g sleep 1");
+    session.send("key g");
     EXPECT_LE(largest_difference(screenshot(session), beside), kRounding);
     expect_silent(session.quit());
 }

@@ -7,7 +7,6 @@
 #include <limits>
 #include <numbers>
 
-#include "viewer/compare.h"
 #include "viewer/framing.h"
 #include "viewer/pace.h"
 #include "viewer/picture.h"
@@ -249,52 +248,6 @@ TEST(Picture, ATransparentPhotographLiesOverTheBackground) {
     EXPECT_EQ(picture_of(photo, {0, 1, 1}).rgba, (std::vector<uint8_t>{128, 128, 128, 255}));
 }
 
-Picture flat(int width, int height, uint8_t value) {
-    return {width, height, std::vector<uint8_t>(size_t(width) * size_t(height) * 4, value), 0};
-}
-
-TEST(Compare, TheDifferenceOfEqualSizesIsPixelByPixel) {
-    Picture rendering = flat(4, 2, 100);
-    const Picture photo = flat(4, 2, 90);
-    rendering.rgba[4] = 30;  // the second pixel's red
-    Picture result = difference(rendering, photo, {0, 0, 4, 2});
-    EXPECT_EQ(result.rgba[0], 10);
-    EXPECT_EQ(result.rgba[4], 60);
-    EXPECT_EQ(result.rgba[3], 255);
-    const double mse = (23 * 100 + 3600) / 24.0 / 255 / 255;
-    EXPECT_NEAR(psnr_of_difference(result, {0, 0, 4, 2}), -10 * std::log10(mse), 1e-9);
-    amplify(result, 5);
-    EXPECT_EQ(result.rgba[0], 50);
-    EXPECT_EQ(result.rgba[4], 255);
-    EXPECT_EQ(result.rgba[3], 255);
-}
-
-TEST(Compare, BeyondThePhotographIsBlack) {
-    const Picture result = difference(flat(6, 4, 100), flat(2, 4, 0), {2, 0, 2, 4});
-    EXPECT_EQ(result.rgba[4 * 1], 0);
-    EXPECT_EQ(result.rgba[4 * 2], 100);
-    EXPECT_EQ(result.rgba[4 * 4], 0);
-    EXPECT_TRUE(std::isnan(psnr_of_difference(result, {9, 9, 0, 0})));
-}
-
-TEST(Compare, APhotographOfAnotherSizeIsSampled) {
-    Picture photo = flat(2, 1, 0);
-    for (size_t c = 0; c < 3; ++c) photo.rgba[4 + c] = 200;
-    const Picture result = difference(flat(4, 2, 0), photo, {0, 0, 4, 2});
-    EXPECT_EQ(result.rgba[0], 0);   // at 0.25 of the first pixel: the border goes on
-    EXPECT_EQ(result.rgba[4], 50);  // a quarter of the way to the second pixel's centre
-    EXPECT_EQ(result.rgba[4 * 3], 200);
-}
-
-TEST(Compare, PlacesKeepThePhotographsShape) {
-    const Arrangement beside = arrange(Comparison::beside, {801, 300}, {200, 100});
-    EXPECT_EQ(beside.rendering, (Rectangle{0, 0, 400, 300}));
-    EXPECT_EQ(beside.photograph, (Rectangle{400, 49, 401, 201}));
-    const Arrangement wipe = arrange(Comparison::wipe, {800, 300}, {200, 100});
-    EXPECT_EQ(wipe.rendering, (Rectangle{0, 0, 800, 300}));
-    EXPECT_EQ(wipe.photograph, (Rectangle{100, 0, 600, 300}));
-}
-
 TEST(Pace, GivesUpResolutionUntilPicturesAreFast) {
     Pace pace;
     EXPECT_EQ(pace.divisor(), 1);
@@ -306,6 +259,39 @@ TEST(Pace, GivesUpResolutionUntilPicturesAreFast) {
     EXPECT_EQ(pace.divisor(), 1);
     pace.drawn(1, 30);
     EXPECT_EQ(pace.divisor(), 1);
+}
+
+/// Where the splats cost what the pixels do not, a coarse picture is hardly faster than a fine one.
+TEST(Pace, GivesUpNoResolutionForNothing) {
+    const auto settled = [](double fixed, double by_pixels) {
+        Pace pace;
+        for (int i = 0; i < 100; ++i) {
+            const int divisor = i % 10 == 0 ? 1 : pace.divisor();  // it rests now and then
+            const double noise = 1 + 0.1 * std::sin(i * i);
+            pace.drawn(divisor, noise * (fixed + by_pixels / (divisor * divisor)));
+        }
+        return pace.divisor();
+    };
+    EXPECT_EQ(settled(200, 10), 1);
+    EXPECT_LE(settled(45, 80), 4);
+    EXPECT_GE(settled(45, 80), 2);
+    EXPECT_GE(settled(5, 900), 4);
+    EXPECT_EQ(settled(1, 20), 1);
+}
+
+TEST(Fluency, CountsPicturesOfAMovingCamera) {
+    Fluency fluency;
+    double time = 0;
+    fluency.shown(time += 5, false, 2);
+    fluency.shown(time += 30, true, 2);  // it has rested
+    EXPECT_EQ(fluency.rate(time), 0);
+    for (int i = 0; i < 20; ++i) fluency.shown(time += 0.1, true, i < 5 ? 2 : 3);
+    EXPECT_NEAR(fluency.rate(time), 10, 1e-6);
+    EXPECT_EQ(fluency.rate(time + 2), 0) << "it rests";
+    fluency.shown(time += 0.2, false, 1);  // the full picture of a camera at rest
+    EXPECT_EQ(fluency.count(), 20u);
+    EXPECT_NEAR(fluency.seconds(), 2, 1e-6);
+    EXPECT_EQ(fluency.by_divisor(), (std::map<int, uint64_t>{{2, 5}, {3, 15}}));
 }
 
 }  // namespace

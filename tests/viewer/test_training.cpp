@@ -1,30 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 // The window on a training that goes on.
 #include "viewer/session.h"
-#include "viewer/window_test.h"
 
 namespace ewa::test {
 namespace {
 
-class Training : public WindowTest {
+class Training : public SessionTest {
   protected:
-    void SetUp() override {
-        WindowTest::SetUp();
-        if (!IsSkipped() && !have_xdotool())
-            GTEST_SKIP()
-                << "there is no xdotool (Debian: xdotool) to press keys with; the input is not tested";
-        std::filesystem::create_directories(shots_);
-    }
     /// Until the pictures of the same camera change: 30 seconds at most.
     bool changes(Session& session) {
-        const Image first = load_image(session.screenshot());
+        const Image first = screenshot(session);
         for (int i = 0; i < 30; ++i) {
             session.send("sleep 1");
-            if (largest_difference(load_image(session.screenshot()), first) > 0.02f) return true;
+            if (largest_difference(screenshot(session), first) > 0.02f) return true;
         }
         return false;
     }
-    const std::string shots_ = folder_ / "shots", run_ = folder_ / "run";
+    const std::string run_ = folder_ / "run";
 };
 
 TEST_F(Training, OfAnotherProcessIsSeenAsItGoes) {
@@ -58,7 +50,7 @@ TEST_F(Training, OfItsOwnGoesOnUntilItsEnd) {
     ASSERT_TRUE(session.awaited(run_ + "/summary.json")) << "the training has not ended";
     EXPECT_EQ(read_json(run_ + "/summary.json")["steps"], 30);
     session.send("sleep 1");
-    EXPECT_GT(range_of(load_image(session.screenshot())), 0.2f);
+    EXPECT_GT(range_of(screenshot(session)), 0.2f);
     expect_silent(session.quit());
 }
 

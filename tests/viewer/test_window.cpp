@@ -1,11 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 // ewa-view as a process, in a real window on a virtual display.
+#include <vulkan/vulkan_core.h>
+
 #include "viewer/window_test.h"
 
 namespace ewa::test {
 namespace {
 
 using Window = WindowTest;
+
+Circumstances with_fault(const std::string& name, const std::string& value) {
+    Circumstances circumstances;
+    circumstances.environment = {{"LD_PRELOAD", EWA_FAULTS_LIBRARY}, {name, value}};
+    return circumstances;
+}
 
 TEST_F(Window, ShowsWhatRenderWrites) {
     const Image picture = shown({"--frame", "2"});
@@ -105,10 +113,32 @@ TEST_F(Window, AFilmGoesThroughTheSavedViews) {
     expect_failure(run_view({splats_, "--views", folder_ / "views.json"}), 2, "view 0");
 }
 
-TEST_F(Window, ALostDeviceIsOpenedAgain) {
-    expect_silent(run_view({splats_, "--cameras", cameras_, "--frame", "2", "--lose-device-at", "1",
-                            "--screenshot", folder_ / "shown.png"}));
-    EXPECT_LE(largest_difference(load_image(folder_ / "shown.png"), rendered("2")), kRounding);
+/// Whatever a swapchain may answer, at the first picture or later, the window ends up with the right one.
+TEST_F(Window, WhatASwapchainSaysIsHandled) {
+    const Image expected = rendered("2");
+    for (const VkResult result : {VK_ERROR_OUT_OF_DATE_KHR, VK_ERROR_SURFACE_LOST_KHR, VK_ERROR_DEVICE_LOST,
+                                  VK_SUBOPTIMAL_KHR, VK_TIMEOUT, VK_NOT_READY})
+        for (const char* call : {"EWA_FAULT_ACQUIRE", "EWA_FAULT_PRESENT"})
+            for (const char* at : {"1,", "2,"}) {
+                const bool acquires = std::string(call) == "EWA_FAULT_ACQUIRE";
+                if (acquires ? result == VK_SUBOPTIMAL_KHR : result == VK_TIMEOUT || result == VK_NOT_READY)
+                    continue;  // this call does not answer so, or has then acquired an image
+                SCOPED_TRACE(std::string(call) + " " + at + std::to_string(result));
+                const std::string path = folder_ / "shown.png";
+                std::filesystem::remove(path);
+                expect_silent(run_view({splats_, "--cameras", cameras_, "--frame", "2", "--screenshot", path},
+                                       with_fault(call, at + std::to_string(result))));
+                EXPECT_LE(largest_difference(load_image(path), expected), kRounding);
+            }
+}
+
+TEST_F(Window, WhatCannotBeMendedIsOneLine) {
+    const std::vector<std::string> arguments{splats_, "--screenshot", folder_ / "shown.png"};
+    expect_failure(run_view(arguments, with_fault("EWA_FAULT_ACQUIRE", "1,-3")), 1,
+                   "ErrorInitializationFailed");
+    for (const char* at : {"1", "3", "6"})
+        expect_failure(run_view(arguments, with_fault("EWA_FAULT_SUBMITS", at)), 1, "lost");
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "shown.png"));
 }
 
 TEST_F(Window, APictureThatCannotBeWrittenIsAFailure) {
@@ -130,6 +160,7 @@ TEST(WithoutWindow, WrongUseIsOneLine) {
     const std::string splats = folder / "splats.ply";
     expect_failure(run_view({}), 2, "PATH");
     expect_failure(run_view({folder / "none.ply"}), 2, "none.ply");
+    expect_failure(run_view({folder / "none"}), 2, "there is no such file or folder");
     expect_failure(run_view({splats, "--size", "640"}), 2, "--size");
     expect_failure(run_view({splats, "--size", "0x480"}), 2, "--size");
     expect_failure(run_view({splats, "--frame", "1"}), 2, "--cameras");

@@ -12,8 +12,7 @@
 
 namespace ewa::test {
 
-inline Outcome run_view(const std::vector<std::string>& arguments) {
-    Circumstances circumstances;
+inline Outcome run_view(const std::vector<std::string>& arguments, Circumstances circumstances = {}) {
     circumstances.program = EWA_VIEW_PROGRAM;
     return run_ewa(arguments, circumstances);
 }

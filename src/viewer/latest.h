@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// Work beside the window's own thread, of which only the last that was asked for matters.
+#pragma once
+#include <condition_variable>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <utility>
+
+namespace ewa::viewer {
+
+template <class Request, class Result>
+class Latest {
+  public:
+    /// make is called on the thread and throws nothing; on_news is called there when result() is another one.
+    Latest(std::function<Result(const Request&)> make, std::function<void()> on_news)
+        : make_(std::move(make)), on_news_(std::move(on_news)), thread_([this] { work(); }) {}
+    ~Latest() {
+        {
+            const std::lock_guard lock(mutex_);
+            stop_ = true;
+        }
+        wake_.notify_one();
+        thread_.join();
+    }
+    Latest(const Latest&) = delete;
+    Latest& operator=(const Latest&) = delete;
+
+    /// Takes the place of a request that waits.
+    void ask(Request request) {
+        const std::lock_guard lock(mutex_);
+        waiting_ = std::move(request);
+        wake_.notify_one();
+    }
+    /// The last one made, or null.
+    std::shared_ptr<const Result> result() const {
+        const std::lock_guard lock(mutex_);
+        return result_;
+    }
+
+  private:
+    void work() {
+        for (;;) {
+            std::optional<Request> request;
+            {
+                std::unique_lock lock(mutex_);
+                wake_.wait(lock, [this] { return stop_ || waiting_; });
+                if (stop_) return;
+                request = std::exchange(waiting_, std::nullopt);
+            }
+            auto made = std::make_shared<const Result>(make_(*request));
+            {
+                const std::lock_guard lock(mutex_);
+                result_ = std::move(made);
+            }
+            on_news_();
+        }
+    }
+
+    std::function<Result(const Request&)> make_;
+    std::function<void()> on_news_;
+    mutable std::mutex mutex_;
+    std::condition_variable wake_;
+    std::optional<Request> waiting_;
+    std::shared_ptr<const Result> result_;
+    bool stop_ = false;
+    std::thread thread_;
+};
+
+}  // namespace ewa::viewer

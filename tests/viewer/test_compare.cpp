@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+// The photograph against the splats, and the thread that such work is done on.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <future>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "viewer/compare.h"
+#include "viewer/latest.h"
+#include "viewer/photo.h"
+
+namespace ewa::viewer {
+namespace {
+
+Picture flat(int width, int height, uint8_t value) {
+    return {width, height, std::vector<uint8_t>(size_t(width) * size_t(height) * 4, value), 0};
+}
+
+TEST(Compare, TheDifferenceOfEqualSizesIsPixelByPixel) {
+    Picture rendering = flat(4, 2, 100);
+    const Picture photo = flat(4, 2, 90);
+    rendering.rgba[4] = 30;  // the second pixel's red
+    Picture result = difference(rendering, photo, {0, 0, 4, 2});
+    EXPECT_EQ(result.rgba[0], 10);
+    EXPECT_EQ(result.rgba[4], 60);
+    EXPECT_EQ(result.rgba[3], 255);
+    const double mse = (23 * 100 + 3600) / 24.0 / 255 / 255;
+    EXPECT_NEAR(psnr_of_difference(result, {0, 0, 4, 2}), -10 * std::log10(mse), 1e-9);
+    amplify(result, 5);
+    EXPECT_EQ(result.rgba[0], 50);
+    EXPECT_EQ(result.rgba[4], 255);
+    EXPECT_EQ(result.rgba[3], 255);
+}
+
+TEST(Compare, BeyondThePhotographIsBlack) {
+    const Picture result = difference(flat(6, 4, 100), flat(2, 4, 0), {2, 0, 2, 4});
+    EXPECT_EQ(result.rgba[4 * 1], 0);
+    EXPECT_EQ(result.rgba[4 * 2], 100);
+    EXPECT_EQ(result.rgba[4 * 4], 0);
+    EXPECT_TRUE(std::isnan(psnr_of_difference(result, {9, 9, 0, 0})));
+}
+
+TEST(Compare, APhotographOfAnotherSizeIsSampled) {
+    Picture photo = flat(2, 1, 0);
+    for (size_t c = 0; c < 3; ++c) photo.rgba[4 + c] = 200;
+    const Picture result = difference(flat(4, 2, 0), photo, {0, 0, 4, 2});
+    EXPECT_EQ(result.rgba[0], 0);   // at 0.25 of the first pixel: the border goes on
+    EXPECT_EQ(result.rgba[4], 50);  // a quarter of the way to the second pixel's centre
+    EXPECT_EQ(result.rgba[4 * 3], 200);
+}
+
+TEST(Compare, PlacesKeepThePhotographsShape) {
+    const Arrangement beside = arrange(Comparison::beside, {801, 300}, {200, 100});
+    EXPECT_EQ(beside.rendering, (Rectangle{0, 0, 400, 300}));
+    EXPECT_EQ(beside.photograph, (Rectangle{400, 49, 401, 201}));
+    const Arrangement covered = arrange(Comparison::beside, {801, 300}, {200, 100}, 101);
+    EXPECT_EQ(covered.rendering, (Rectangle{101, 0, 350, 300}));
+    EXPECT_EQ(covered.photograph, (Rectangle{451, 62, 350, 175}));
+    EXPECT_EQ(arrange(Comparison::beside, {801, 300}, {200, 100}, 300).rendering, beside.rendering);
+    const Arrangement wipe = arrange(Comparison::wipe, {800, 300}, {200, 100});
+    EXPECT_EQ(wipe.rendering, (Rectangle{0, 0, 800, 300}));
+    EXPECT_EQ(wipe.photograph, (Rectangle{100, 0, 600, 300}));
+}
+
+TEST(Compare, APictureOfItIsMadeWhereOneIsWanted) {
+    auto rendering = std::make_shared<FinishedPicture>();
+    rendering->picture = flat(4, 2, 100);
+    auto photo = std::make_shared<Photo>();
+    photo->picture = flat(4, 2, 90);
+    ComparisonRequest request{rendering, photo, {0, 0, 4, 2}, 0};
+    const Compared number = compare_with_photo(request);
+    EXPECT_NEAR(number.psnr, 20 * std::log10(25.5), 1e-9);
+    EXPECT_TRUE(number.difference.rgba.empty());
+    EXPECT_EQ(number.of, request);
+    request.gain = 3;
+    EXPECT_NE(number.of, request);
+    EXPECT_EQ(compare_with_photo(request).difference.rgba[0], 30);
+}
+
+TEST(Latest, WhatWaitsGivesWayToTheLast) {
+    std::promise<void> begun, go_on;
+    std::atomic<int> news = 0;
+    std::vector<int> made;
+    const auto make = [&](const int& request) {
+        made.push_back(request);
+        if (request == 1) {
+            begun.set_value();
+            go_on.get_future().wait();
+        }
+        return 10 * request;
+    };
+    {
+        Latest<int, int> latest(make, [&] { ++news; });
+        EXPECT_EQ(latest.result(), nullptr);
+        latest.ask(1);
+        begun.get_future().wait();
+        latest.ask(2);
+        latest.ask(3);
+        EXPECT_EQ(latest.result(), nullptr) << "asking does not wait";
+        go_on.set_value();
+        for (int i = 0; i < 1000 && news < 2; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        ASSERT_TRUE(latest.result());
+        EXPECT_EQ(*latest.result(), 30);
+    }
+    EXPECT_EQ(made, (std::vector<int>{1, 3}));
+}
+
+}  // namespace
+}  // namespace ewa::viewer

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+// Files dropped on the window, by another client of the X server as a file manager does it.
+#include "viewer/session.h"
+
+namespace ewa::test {
+namespace {
+
+class Drop : public SessionTest {
+  protected:
+    void SetUp() override {
+        SessionTest::SetUp();
+        if (!IsSkipped()) x_ = std::make_unique<XClient>(display_.name());
+    }
+    uint32_t window(const std::string& title = "ewa") const {
+        const auto found = x_->window_titled(title);
+        EXPECT_TRUE(found) << "no window is called " << title;
+        return found.value_or(0);
+    }
+    /// What a window of its own shows of it.
+    Image alone(const std::string& path) {
+        expect_silent(run_view({path, "--size", "96x64", "--screenshot", folder_ / "alone.png"}));
+        return load_image(folder_ / "alone.png");
+    }
+    /// Drops it, and what the window then shows.
+    Image dropped(Session& session, const std::string& path, const std::string& title) {
+        EXPECT_TRUE(x_->drop(window(), uri_of(path))) << "the window did not take it";
+        window(title + " - ewa");
+        return screenshot(session);
+    }
+    std::unique_ptr<XClient> x_;
+};
+
+TEST_F(Drop, OpensAFileOfAnyName) {
+    const std::string name = "a b%20+\xc3\xbc.ply";
+    make_splats(folder_ / name, 30, 0);
+    Session session(shots_, {splats_, "--size", "96x64"});
+    ASSERT_TRUE(session.found());
+    session.send("key F2");
+    const Image before = screenshot(session), after = dropped(session, folder_ / name, name);
+    EXPECT_EQ(largest_difference(after, alone(folder_ / name)), 0);
+    EXPECT_GT(largest_difference(after, before), 0.1f);
+    expect_silent(session.quit());
+}
+
+TEST_F(Drop, OpensTheFirstOfSeveral) {
+    make_splats(folder_ / "one.ply", 30, 0);
+    make_splats(folder_ / "two.ply", 60, 0);
+    Session session(shots_, {splats_, "--size", "96x64"});
+    ASSERT_TRUE(session.found());
+    ASSERT_TRUE(x_->drop(window(), uri_of(folder_ / "one.ply") + uri_of(folder_ / "two.ply")));
+    window("one.ply - ewa");
+    EXPECT_EQ(largest_difference(screenshot(session), alone(folder_ / "one.ply")), 0);
+    expect_silent(session.quit());
+}
+
+TEST_F(Drop, OpensFolders) {
+    expect_success(run_ewa({"train", cameras_, "-o", folder_ / "run", "--steps", "3", "--init", splats_,
+                            "--background", "0.2,0.4,0.6", "--quiet"}));
+    Session session(shots_, {splats_, "--size", "96x64"});
+    ASSERT_TRUE(session.found());
+    EXPECT_EQ(largest_difference(dropped(session, folder_ / "run", "run"), alone(folder_ / "run")), 0);
+    // A dataset of cameras alone shows nothing but them; its keys work.
+    const Image cameras = dropped(session, cameras_, "views");
+    EXPECT_EQ(largest_difference(cameras, alone(cameras_)), 0);
+    session.send("key v key Right");
+    EXPECT_GT(range_of(screenshot(session)), 0.3f) << "the dropped dataset's photograph";
+    EXPECT_EQ(largest_difference(dropped(session, splats_, "splats.ply"), alone(splats_)), 0);
+    expect_silent(session.quit());
+}
+
+/// The window stays as it was and says what is wrong, with the panel and without it.
+TEST_F(Drop, WhatCannotBeReadIsSaid) {
+    write_file(folder_ / "notes.txt", "no splats");
+    write_file(folder_ / "broken.ply", read_file(splats_).substr(0, 3000));
+    Session session(shots_, {splats_, "--size", "640x480"});
+    ASSERT_TRUE(session.found());
+    session.send("key F1 key F1");  // the hint would go by itself
+    const Image picture = screenshot(session);
+    for (const bool panel : {true, false}) {
+        if (!panel) session.send("key F2");
+        for (const char* name : {"notes.txt", "broken.ply", "absent.ply"}) {
+            const Image before = x_->pixels_at_rest(window());
+            EXPECT_TRUE(x_->drop(window(), uri_of(folder_ / name)));
+            const Image after = x_->pixels_at_rest(window());
+            EXPECT_GT(largest_difference(before, after), 0.3f) << name << " is not spoken of";
+            EXPECT_TRUE(x_->window_titled("splats.ply - ewa", 1)) << name;
+            EXPECT_EQ(largest_difference(screenshot(session), picture), 0) << name;
+        }
+    }
+    make_splats(folder_ / "good.ply", 30, 0);
+    dropped(session, folder_ / "good.ply", "good.ply");
+    expect_silent(session.quit());
+}
+
+TEST_F(Drop, TextIsNoFile) {
+    Session session(shots_, {splats_, "--size", "96x64"});
+    ASSERT_TRUE(session.found());
+    const Image before = screenshot(session);
+    // Not "file://" alone: GLFW 3.3 itself reads beyond its end.
+    for (const char* text :
+         {"", "\r\n", "# a remark\r\n", "http://example.org/splats.ply\r\n", "%zz%\r\nfile:"})
+        x_->drop(window(), text);
+    session.send("key 2 sleep 1 key 1 sleep 1");
+    EXPECT_EQ(largest_difference(screenshot(session), before), 0);
+    expect_silent(session.quit());
+}
+
+}  // namespace
+}  // namespace ewa::test
