@@ -52,8 +52,8 @@ struct SaveOptions {
 
 /// By extension. Written beside and renamed, so the path never holds half a file. Any format but .ply leaves
 /// out the splats that are not drawable. Returns one line for each thing that the format cannot hold: what is
-/// dropped, and the number of bits of what is quantised. Throws RunError (disk), InputError (extension, or
-/// values that the format has no room for).
+/// dropped, and the number of bits of what is quantised. Throws RunError (disk), InputError (extension,
+/// values that the format has no room for, or a .bin in the place of a .gltf's that is another's).
 std::vector<std::string> save_splats(const std::filesystem::path& path, const Gaussians& gaussians,
                                      const SaveOptions& options);
 

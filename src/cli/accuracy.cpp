@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <utility>
 
 #include "bench/accuracy.h"
 #include "cli/dataset_argument.h"
@@ -36,6 +37,7 @@ Trained train(const std::shared_ptr<gpu::Device>& device, const Dataset& dataset
     options.steps = steps;
     options.strategy = strategy;
     options.max_splats = kMaxSplats;
+    options.sh_degree = sh_degree_for(dataset);
     Gaussians start = gaussians_from_points(dataset.points, options.sh_degree);
     Trainer trainer(device, dataset, split.train, start, options);
     Trained result{{name, true, {}}, {}};
@@ -48,8 +50,8 @@ Trained train(const std::shared_ptr<gpu::Device>& device, const Dataset& dataset
         result.curve.points.push_back({fmt::format("step {}", report.step), report.seconds, psnr, 0});
     }
     const report::WorkPoint& last = result.curve.points.back();
-    fmt::print("{:<24} {:<14} {:8.2f} s  {:.2f} dB held out, {} splats\n", "training", name, last.time,
-               last.error, result.gaussians.size());
+    fmt::print("{:<24} {:<14} {:8.2f} s  {:.2f} dB held out, {} splats of SH degree {}\n", "training", name,
+               last.time, last.error, result.gaussians.size(), result.gaussians.sh_degree);
     return result;
 }
 
@@ -58,6 +60,23 @@ void print_table(const report::WorkPrecision& diagram) {
         for (const report::WorkPoint& p : series.points)
             fmt::print("{:<24} {:<14} {:10.2f} ms  RMS error {:.2e}, worst {:.2e}\n", series.name, p.name,
                        p.time, p.error, p.worst);
+}
+
+/// The diagram of training, where there is one.
+fs::path training_svg(const AccuracyArguments& arguments) {
+    if (arguments.svg.empty() || arguments.steps == 0) return {};
+    return fs::path(arguments.svg).replace_filename(arguments.svg.stem().string() + "_training.svg");
+}
+
+void check_files(const AccuracyArguments& arguments) {
+    const fs::path beside = training_svg(arguments);
+    const NamedFile splats{"--splats", arguments.splats}, svg{"--svg", arguments.svg};
+    keep_apart(svg, {splats});
+    keep_apart({"--svg's diagram of training", beside}, {splats});
+    keep_apart({"--json", arguments.json}, {splats, svg, {"--svg's diagram of training", beside}});
+    if (!arguments.json.empty()) check_writable(arguments.json, Folder::made);
+    for (const fs::path& file : {arguments.svg, beside})
+        if (!file.empty()) check_writable(file, Folder::there);
 }
 
 }  // namespace
@@ -96,6 +115,10 @@ int run_accuracy(const AccuracyArguments& arguments) {
     if (arguments.splats.empty() && arguments.steps == 0)
         throw InputError(
             "--accuracy: with --training-steps 0 there is nothing to draw; --splats names a file");
+    check_files(arguments);
+    Gaussians given;
+    if (!arguments.splats.empty()) given = load_splats(arguments.splats);
+    check_frames(arguments.dataset, "all", 0);
     const auto photographed = load_photographed(arguments.dataset, arguments.splats, {}, arguments.device);
     if (!photographed) return kInterruptedStatus;
     const Dataset& dataset = photographed->dataset;
@@ -121,7 +144,7 @@ int run_accuracy(const AccuracyArguments& arguments) {
     training.notes.push_back(
         fmt::format("{} steps of each strategy, at most {} splats, on {}; evaluation is not counted.",
                     arguments.steps, kMaxSplats, device_info(*device).name));
-    if (!arguments.splats.empty()) gaussians = load_splats(arguments.splats);
+    if (!arguments.splats.empty()) gaussians = std::move(given);
     const report::WorkPrecision rendering =
         rendering_diagram(device, gaussians, dataset.frames[size_t(split.test.front())].camera, {});
     print_table(rendering);
@@ -130,9 +153,8 @@ int run_accuracy(const AccuracyArguments& arguments) {
                                     {"training", report::work_precision_json(training)}});
     if (!arguments.svg.empty()) {
         core::write_text_file(arguments.svg, report::work_precision_svg(rendering));
-        fs::path beside = arguments.svg;
-        beside.replace_filename(arguments.svg.stem().string() + "_training.svg");
-        if (arguments.steps > 0) core::write_text_file(beside, report::work_precision_svg(training));
+        if (const fs::path beside = training_svg(arguments); !beside.empty())
+            core::write_text_file(beside, report::work_precision_svg(training));
     }
     return 0;
 }

@@ -3,8 +3,10 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <set>
 
 #include "cli/arguments.h"
@@ -17,6 +19,7 @@
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
+#include "io/gltf_splats.h"
 
 namespace ewa::cli {
 namespace {
@@ -86,10 +89,47 @@ void keep_if(Gaussians& gaussians, const Keep& keep) {
     if (kept.size() < gaussians.size()) select_splats(gaussians, kept);
 }
 
-void crop(Gaussians& gaussians, const std::string& box) {
-    const std::vector<double> n = parse_numbers("--crop", box);
+/// x, y, z, X, Y, Z
+using Box = std::array<double, 6>;
+
+/// What the user asked for, read.
+struct Edits {
+    glm::dmat4 transform;
+    std::optional<Box> crop;
+};
+
+Edits parse_edits(const ConvertArguments& arguments) {
+    Edits edits{parse_transform(arguments.transform), {}};
+    if (arguments.crop.empty()) return edits;
+    const std::vector<double> n = parse_numbers("--crop", arguments.crop);
     if (n.size() != 6 || n[0] > n[3] || n[1] > n[4] || n[2] > n[5])
-        throw InputError("--crop: '" + box + "' is not x,y,z,X,Y,Z with the lower corner first");
+        throw InputError("--crop: '" + arguments.crop +
+                         "' is not x,y,z,X,Y,Z with the lower corner first");
+    std::copy(n.begin(), n.end(), edits.crop.emplace().begin());
+    return edits;
+}
+
+size_t drawable_count(const Gaussians& gaussians) {
+    size_t count = 0;
+    for (size_t i = 0; i < gaussians.size(); ++i) count += drawable(gaussians, i);
+    return count;
+}
+
+/// Refuses what would leave less to see.
+void transform(Gaussians& gaussians, const glm::dmat4& matrix) {
+    if (matrix == glm::dmat4(1.0)) return;
+    const size_t before = drawable_count(gaussians);
+    transform_splats(gaussians, matrix);
+    const size_t after = drawable_count(gaussians);
+    if (after < before)
+        throw InputError(
+            fmt::format("--transform: {} of {} splats could not be drawn afterwards: a position or another "
+                        "value leaves the range of float32 (3.4e38); a smaller step keeps them, and an "
+                        "earlier convert --crop leaves them out",
+                        before - after, before));
+}
+
+void crop(Gaussians& gaussians, const Box& n) {
     keep_if(gaussians, [&](size_t i) {
         bool inside = true;
         for (size_t axis = 0; axis < 3; ++axis) {
@@ -101,10 +141,10 @@ void crop(Gaussians& gaussians, const std::string& box) {
 }
 
 /// What the user asked for, then what the format needs, so that the scene is what the file will hold.
-void edit(const ConvertArguments& arguments, SplatFormat format, Work& work) {
+void edit(const ConvertArguments& arguments, const Edits& edits, SplatFormat format, Work& work) {
     Gaussians& gaussians = work.gaussians;
-    transform_splats(gaussians, parse_transform(arguments.transform));
-    if (!arguments.crop.empty()) crop(gaussians, arguments.crop);
+    transform(gaussians, edits.transform);
+    if (edits.crop) crop(gaussians, *edits.crop);
     if (arguments.min_opacity > 0)
         keep_if(gaussians, [&](size_t i) {
             return 1 / (1 + std::exp(-static_cast<double>(gaussians.opacity_logits[i]))) >=
@@ -134,12 +174,51 @@ Json check(const ConvertArguments& arguments, const Work& work) {
     return json;
 }
 
+/// The .bin that is written beside OUT, or none.
+fs::path values_path(const ConvertArguments& arguments) {
+    const fs::path& out = arguments.files.back();
+    return format_of_name(out) == SplatFormat::gltf ? io::gltf_values_path(out) : fs::path();
+}
+
+/// What is written takes no other file's place, and can be written.
+void check_outputs(const ConvertArguments& arguments) {
+    const fs::path& out = arguments.files.back();
+    const fs::path values = values_path(arguments);
+    std::vector<NamedFile> others = {{"OUT", out}, {"the .bin of OUT", values}};
+    for (size_t i = 0; i + 1 < arguments.files.size(); ++i) {
+        const NamedFile input{"an input", arguments.files[i]};
+        keep_apart({"the .bin of OUT", values}, {input});
+        others.push_back(input);
+    }
+    keep_apart({"--json", arguments.json}, others);
+    check_writable(out, Folder::there);
+    if (!values.empty()) {
+        io::check_gltf_values(out);
+        check_writable(values, Folder::there);
+    }
+    if (!arguments.json.empty()) check_writable(arguments.json, Folder::made);
+}
+
+Json output_json(const ConvertArguments& arguments, const Gaussians& gaussians) {
+    const fs::path& out = arguments.files.back();
+    const fs::path values = values_path(arguments);
+    Json json = {{"file", out.string()},
+                 {"format", name_of(format_of_name(out))},
+                 {"splats", gaussians.size()},
+                 {"sh_degree", gaussians.sh_degree},
+                 {"bytes", fs::file_size(out)}};
+    if (!values.empty()) json["values"] = {{"file", values.string()}, {"bytes", fs::file_size(values)}};
+    return json;
+}
+
 int run(const ConvertArguments& arguments) {
     const fs::path& out = arguments.files.back();
     const SplatFormat format = format_of_name(out);
-    parse_transform(arguments.transform);  // wrong use is found before the inputs are read
+    // Wrong use is found before the inputs are read.
+    const Edits edits = parse_edits(arguments);
+    check_outputs(arguments);
     Work work = read_all(arguments);
-    edit(arguments, format, work);
+    edit(arguments, edits, format, work);
 
     const size_t count = work.gaussians.size();
     constexpr size_t kShowFrom = 500'000;
@@ -153,15 +232,13 @@ int run(const ConvertArguments& arguments) {
 
     if (!arguments.quiet) {
         fmt::print("{}\n", described(out, format, "", work.gaussians));
+        if (const fs::path values = values_path(arguments); !values.empty())
+            fmt::print("{}: the values of that glTF, {}\n", values.string(),
+                       bytes_text(fs::file_size(values)));
         for (const std::string& remark : remarks) fmt::print("  {}\n", remark);
     }
     Json json = {{"inputs", work.inputs},
-                 {"output",
-                  {{"file", out.string()},
-                   {"format", name_of(format)},
-                   {"splats", count},
-                   {"sh_degree", work.gaussians.sh_degree},
-                   {"bytes", fs::file_size(out)}}},
+                 {"output", output_json(arguments, work.gaussians)},
                  {"remarks", remarks}};
     if (arguments.check) json["check"] = check(arguments, work);
     if (!arguments.json.empty()) write_json(arguments.json, json);

@@ -3,14 +3,31 @@
 
 #include <algorithm>
 
+#include "cli/arguments.h"
 #include "cli/photograph_scene.h"
+#include "core/text.h"
 
 namespace ewa::cli {
 
 namespace fs = std::filesystem;
 
+bool names_mesh_scene(const fs::path& path) {
+    std::error_code error;
+    if (fs::is_directory(path, error)) return false;
+    const std::string extension = core::lower(path.extension().string());
+    return extension == ".gltf" || extension == ".glb" || is_mesh_scene(path);
+}
+
+void check_frames(const fs::path& path, const std::string& which, int test_every) {
+    if (names_mesh_scene(path)) select_frames(scene_cameras(path, {}), which, test_every);
+}
+
+int sh_degree_for(const Dataset& dataset) {
+    return dataset.color_depends_on_view ? kMaxShDegree : 0;
+}
+
 Dataset load_cameras_as_trained(const fs::path& path, int downscale) {
-    if (is_mesh_scene(path)) {
+    if (names_mesh_scene(path)) {
         Dataset dataset = scene_cameras(path, {});
         for (Frame& frame : dataset.frames) frame.camera = ewa::downscale(frame.camera, downscale);
         return dataset;
@@ -25,7 +42,7 @@ Dataset load_cameras_as_trained(const fs::path& path, int downscale) {
 
 std::optional<Photographed> load_photographed(const fs::path& path, const fs::path& splats,
                                               const DatasetOptions& options, const DeviceOptions& device) {
-    if (!is_mesh_scene(path)) return Photographed{load_dataset(path, options), nullptr};
+    if (!names_mesh_scene(path)) return Photographed{load_dataset(path, options), nullptr};
     if (const fs::path beside = splats.parent_path() / "dataset"; is_photographed(path, beside, {}))
         return Photographed{load_dataset(beside, options), nullptr};
     auto folder = std::make_unique<core::TemporaryFolder>("ewa-photographs-");

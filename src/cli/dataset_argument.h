@@ -10,10 +10,20 @@
 
 namespace ewa::cli {
 
+/// Whether this is a glTF of meshes: by its extension, whatever the file holds, else by what it holds.
+bool names_mesh_scene(const std::filesystem::path& path);
+
 /// The cameras of a dataset whose photographs need not be there. Where some are, frames without one are left
 /// out, as training leaves them out: otherwise they would shift which frames are held out.
 /// Dataset::missing_images counts them. Of a mesh scene the views that `ewa train` photographs.
 Dataset load_cameras_as_trained(const std::filesystem::path& path, int downscale);
+
+/// Throws InputError, as select_frames does, where a mesh scene has none of these frames: said before it is
+/// photographed. Of any other dataset load_photographed comes as soon.
+void check_frames(const std::filesystem::path& path, const std::string& which, int test_every);
+
+/// The SH degree that `auto` stands for.
+int sh_degree_for(const Dataset& dataset);
 
 /// A dataset with its photographs.
 struct Photographed {

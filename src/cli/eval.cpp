@@ -36,7 +36,10 @@ report::Json to_json(const Evaluation& evaluation) {
 
 int run(const EvalArguments& arguments) {
     const RenderOptions options = arguments.draw.options();
+    keep_apart({"--json", arguments.json}, {{"SPLATS", arguments.splats}});
+    if (!arguments.json.empty()) check_writable(arguments.json, Folder::made);
     const Gaussians gaussians = load_splats(arguments.splats);
+    check_frames(arguments.dataset, arguments.split, arguments.test_every);
     const auto photographed =
         load_photographed(arguments.dataset, arguments.splats,
                           {.downscale = arguments.downscale, .masks = arguments.masks}, arguments.device);

@@ -32,13 +32,19 @@ int run(const GradArguments& arguments) {
     if (arguments.output.extension() != ".ply")
         throw InputError("the gradient is written as a PLY: -o " + arguments.output.string() +
                          " does not end in .ply");
+    keep_apart({"--output", arguments.output}, {{"SPLATS", arguments.splats}});
+    keep_apart({"--json", arguments.json}, {{"SPLATS", arguments.splats}, {"--output", arguments.output}});
+    check_writable(arguments.output, Folder::made);
+    if (!arguments.json.empty()) check_writable(arguments.json, Folder::made);
     const Gaussians gaussians = load_splats(arguments.splats);
+    const std::string frame_index = std::to_string(arguments.frame);
+    check_frames(arguments.dataset, frame_index, 0);
     const auto photographed =
         load_photographed(arguments.dataset, arguments.splats,
                           {.downscale = arguments.downscale, .masks = arguments.masks}, arguments.device);
     if (!photographed) return kInterruptedStatus;
     const Dataset& dataset = photographed->dataset;
-    const int index = select_frames(dataset, std::to_string(arguments.frame), 0).front();
+    const int index = select_frames(dataset, frame_index, 0).front();
     const Frame& frame = dataset.frames[index];
     make_folder(arguments.output.parent_path());
 

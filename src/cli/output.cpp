@@ -1,23 +1,66 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/output.h"
 
+#include <unistd.h>
+
+#include <cerrno>
 #include <system_error>
 
 #include "core/atomic_file.h"
+#include "core/text.h"
 #include "ewa/error.h"
 
 namespace ewa::cli {
 
-void make_folder(const std::filesystem::path& folder) {
-    if (folder.empty()) return;
-    std::error_code error;
-    std::filesystem::create_directories(folder, error);
-    if (!error && !std::filesystem::is_directory(folder, error))
-        error = std::make_error_code(std::errc::not_a_directory);
-    if (error) throw RunError("cannot make the folder " + folder.string() + ": " + error.message());
+namespace fs = std::filesystem;
+
+namespace {
+
+[[noreturn]] void no_folder(const fs::path& folder, const std::error_code& error) {
+    throw RunError("cannot make the folder " + folder.string() + ": " + error.message());
 }
 
-void write_json(const std::filesystem::path& path, const report::Json& json) {
+/// As the file is called once links and dots are followed; it need not be there.
+fs::path resolved(const fs::path& path) {
+    std::error_code error;
+    const fs::path whole = fs::weakly_canonical(fs::absolute(path, error), error);
+    return error ? path.lexically_normal() : whole;
+}
+
+}  // namespace
+
+void make_folder(const fs::path& folder) {
+    if (folder.empty()) return;
+    std::error_code error;
+    fs::create_directories(folder, error);
+    if (!error && !fs::is_directory(folder, error)) error = std::make_error_code(std::errc::not_a_directory);
+    if (error) no_folder(folder, error);
+}
+
+void check_writable(const fs::path& file, Folder made) {
+    const fs::path folder = file.parent_path();
+    std::error_code error;
+    if (made == Folder::there || folder.empty() || fs::exists(folder, error)) {
+        const core::AtomicFile probe(file);  // goes as it came: nothing is committed
+        return;
+    }
+    fs::path above = folder;
+    while (!above.empty() && !fs::exists(above, error)) above = above.parent_path();
+    if (above.empty()) above = ".";
+    if (!fs::is_directory(above, error)) no_folder(folder, std::make_error_code(std::errc::not_a_directory));
+    if (access(above.c_str(), W_OK | X_OK) != 0)
+        no_folder(folder, std::error_code(errno, std::generic_category()));
+}
+
+void keep_apart(const NamedFile& written, const std::vector<NamedFile>& others) {
+    if (written.path.empty()) return;
+    for (const NamedFile& other : others)
+        if (!other.path.empty() && resolved(other.path) == resolved(written.path))
+            throw InputError(core::one_line(written.name + " " + written.path.string() + ": is " +
+                                            other.name + " too, whose place it would take"));
+}
+
+void write_json(const fs::path& path, const report::Json& json) {
     make_folder(path.parent_path());
     // Names and paths may hold bytes that are not UTF-8; those become U+FFFD.
     core::write_text_file(path, json.dump(2, ' ', false, report::Json::error_handler_t::replace) + "\n");

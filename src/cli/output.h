@@ -3,6 +3,7 @@
 #pragma once
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "report/summary.h"
 
@@ -10,6 +11,21 @@ namespace ewa::cli {
 
 /// Creates the folder and its parents. Throws RunError when it cannot be, or is something else.
 void make_folder(const std::filesystem::path& folder);
+
+/// Whether the folder of a file that is to be written is made where it is missing.
+enum class Folder { there, made };
+
+/// Throws RunError, as writing the file would: said before long work, not after it. Changes nothing.
+void check_writable(const std::filesystem::path& file, Folder folder);
+
+/// A file, and what it is to the user: an argument or an option.
+struct NamedFile {
+    std::string name;
+    std::filesystem::path path;  // empty: none
+};
+
+/// Throws InputError where `written` would take the place of one of the others, however each is spelled.
+void keep_apart(const NamedFile& written, const std::vector<NamedFile>& others);
 
 /// Pretty-printed, in one piece or not at all; the file's folder is made. Throws RunError.
 void write_json(const std::filesystem::path& path, const report::Json& json);

@@ -8,6 +8,7 @@
 #include <chrono>
 
 #include "cli/accuracy.h"
+#include "cli/dataset_argument.h"
 #include "cli/interrupt.h"
 #include "cli/output.h"
 #include "cli/photograph_scene.h"
@@ -194,7 +195,7 @@ void TrainRun::load() {
 /// What "auto" comes to.
 void TrainRun::settle_degree() {
     int& degree = arguments_.draw.sh_degree;
-    if (degree < 0) degree = dataset_.color_depends_on_view ? kMaxShDegree : 0;
+    if (degree < 0) degree = sh_degree_for(dataset_);
     options_ = train_options(arguments_);
     if (degree == 0 && !dataset_.color_depends_on_view)
         report_.remarks.push_back("no colour depends on the view, says the dataset: SH degree 0");

@@ -189,7 +189,9 @@ io::PosedImages read_model(const fs::path& path, const DatasetOptions& options) 
     const std::string name = core::one_line(path.string());
     if (is_file(path)) {
         if (core::lower(path.extension().string()) != ".json")
-            throw InputError(name + ": not a dataset; a dataset is a folder or a transforms.json");
+            throw InputError(name +
+                             ": not a dataset; a dataset is a folder, a transforms.json, or a glTF of meshes "
+                             "(.gltf, .glb)");
         return io::read_transforms(path, split_of(path), options.need_images);
     }
     if (!is_folder(path)) throw InputError(name + ": there is no such file or folder");

@@ -343,6 +343,13 @@ GltfDocument::Buffer GltfDocument::open_uri(const std::filesystem::path& folder,
     return buffer;
 }
 
+bool GltfDocument::refers_to(const std::filesystem::path& file) const {
+    std::error_code none;
+    return std::any_of(buffers_.begin(), buffers_.end(), [&](const Buffer& buffer) {
+        return !buffer.file.empty() && std::filesystem::equivalent(buffer.file, file, none);
+    });
+}
+
 uint64_t GltfDocument::bytes() const {
     uint64_t sum = file_bytes_;
     std::vector<std::filesystem::path> counted = {path_};

@@ -24,8 +24,14 @@ namespace ewa::io {
 /// InputError that names the file and the byte, or the mesh, node or accessor and its property.
 SplatScene read_gltf_splats(const std::filesystem::path& path);
 
-/// float32 throughout, sRGB colours. `binary`: .glb, else .gltf and a .bin of the same stem. Throws RunError;
-/// InputError for a scene without splats, or more than 4 GiB in a .glb.
+/// The .bin of the same stem that holds a .gltf's values.
+std::filesystem::path gltf_values_path(const std::filesystem::path& gltf);
+
+/// Throws InputError where that .bin is there and the .gltf is not, or does not refer to it: it is another's.
+void check_gltf_values(const std::filesystem::path& gltf);
+
+/// float32 throughout, sRGB colours. `binary`: .glb, else .gltf and its .bin. Throws RunError; InputError for
+/// a scene without splats, more than 4 GiB in a .glb, or as check_gltf_values does.
 std::vector<std::string> write_gltf_splats(const std::filesystem::path& path, const Gaussians& gaussians,
                                            const SaveOptions& options, bool binary);
 

@@ -9,7 +9,9 @@
 #include <nlohmann/json.hpp>
 
 #include "core/atomic_file.h"
+#include "core/text.h"
 #include "ewa/error.h"
+#include "io/gltf_document.h"
 #include "io/gltf_splats.h"
 #include "io/splat_values.h"
 
@@ -183,18 +185,40 @@ void write_binary(const std::filesystem::path& path, const Gaussians& gaussians,
     file.commit();
 }
 
-/// The buffer first: a .gltf that is there has its values.
+bool refers_to(const std::filesystem::path& gltf, const std::filesystem::path& values) try {
+    return GltfDocument(gltf).refers_to(values);
+} catch (const InputError&) {
+    return false;
+}
+
+/// The values are put in place first: a .gltf that is there has them. The .gltf is on disk by then, so that
+/// none stay without one.
 void write_pair(const std::filesystem::path& path, const Gaussians& gaussians,
                 const std::vector<Attribute>& attributes, Json json, const SaveOptions& options) {
-    const std::filesystem::path buffer = path.filename().replace_extension(".bin");
-    json["buffers"][0]["uri"] = percent_encoded(buffer.string());
-    core::AtomicFile values(path.parent_path() / buffer);
+    check_gltf_values(path);
+    const std::filesystem::path buffer = gltf_values_path(path);
+    json["buffers"][0]["uri"] = percent_encoded(buffer.filename().string());
+    core::AtomicFile values(buffer), file(path);
     write_values(values, gaussians, attributes, options);
+    file.write(json.dump(1) + "\n");
     values.commit();
-    core::write_text_file(path, json.dump(1) + "\n");
+    file.commit();
 }
 
 }  // namespace
+
+std::filesystem::path gltf_values_path(const std::filesystem::path& gltf) {
+    return std::filesystem::path(gltf).replace_extension(".bin");
+}
+
+void check_gltf_values(const std::filesystem::path& gltf) {
+    const std::filesystem::path values = gltf_values_path(gltf);
+    std::error_code none;
+    if (!std::filesystem::exists(values, none) || refers_to(gltf, values)) return;
+    throw InputError(core::one_line(
+        values.string() + ": would be replaced by the values of " + gltf.filename().string() +
+        ", and is no part of one that is there; choose another name, or .glb, which is one file"));
+}
 
 std::vector<std::string> write_gltf_splats(const std::filesystem::path& path, const Gaussians& gaussians,
                                            const SaveOptions& options, bool binary) {

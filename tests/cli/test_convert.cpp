@@ -2,7 +2,10 @@
 // ewa convert, and what the other commands make of every splat format.
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "cli/expect.h"
+#include "ewa/error.h"
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
 
@@ -118,6 +121,12 @@ TEST(Convert, WrongUse) {
     expect_failure(run_ewa({"convert", folder / "s.ply"}), 2, "FILES");
     expect_failure(run_ewa({"convert", folder / "s.ply", folder / "o.obj"}), 2, "supported: .ply");
     expect_failure(run_ewa({"convert", folder / "none.ply", folder / "o.ply"}), 2, "none.ply");
+    // Before the inputs are read.
+    expect_failure(run_ewa({"convert", folder / "none.ply", folder / "o.ply", "--crop", "1,2"}), 2, "--crop");
+    expect_failure(run_ewa({"convert", folder / "none.ply", folder / "none/o.ply"}), 1, "none/o.ply");
+    expect_failure(
+        run_ewa({"convert", folder / "none.ply", folder / "o.ply", "--json", folder / "s.ply/o.json"}), 1,
+        "s.ply/o.json");
     refuse({"--transform", "spin=1"}, "spin=1");
     refuse({"--transform", "turn=0,0,0,90"}, "turn=0,0,0,90");
     refuse({"--transform", "1,2,3"}, "1,2,3");
@@ -128,6 +137,70 @@ TEST(Convert, WrongUse) {
     refuse({"--min-opacity", "2"}, "min-opacity");
     refuse({"--max-sh", "4"}, "max-sh");
     refuse({"--sort", "size"}, "sort");
+}
+
+TEST(Convert, RefusesATransformAfterWhichNothingIsDrawn) {
+    const Folder folder;
+    make_splats(folder / "s.ply");
+    Gaussians splats = ewa::load_splats(folder / "s.ply");
+    splats.means[3] = std::numeric_limits<float>::quiet_NaN();  // was not drawn before either
+    ewa::save_splats(folder / "s.ply", splats);
+    for (const char* name : {"o.ply", "o.splat"}) {
+        const std::string out = folder / name;
+        expect_failure(
+            run_ewa({"convert", folder / "s.ply", out, "--quiet", "--transform", "scale=1e40", "--check"}), 2,
+            "49 of 49 splats could not be drawn");
+        EXPECT_FALSE(fs::exists(out));
+        expect_success(run_ewa({"convert", folder / "s.ply", out, "--quiet", "--transform", "scale=1e9"}));
+    }
+}
+
+TEST(Convert, NoFileTakesAnothersPlace) {
+    const Folder folder;
+    make_splats(folder / "s.ply");
+    const std::string good = read_file(folder / "s.ply");
+    const auto refuse = [&](const std::string& out, const std::string& json, const std::string& text) {
+        expect_failure(run_ewa({"convert", folder / "s.ply", folder / out, "--json", json}), 2, text);
+        EXPECT_FALSE(fs::exists(folder / out));
+        EXPECT_EQ(read_file(folder / "s.ply"), good);
+    };
+    refuse("o.ply", folder / "o.ply", "OUT");
+    refuse("o.ply", folder / "none/../o.ply", "OUT");
+    refuse("o.ply", folder / "s.ply", "an input");
+    refuse("o.gltf", folder / "o.bin", "the .bin of OUT");
+    fs::create_symlink(folder / "s.ply", folder / "link.json");
+    refuse("o.ply", folder / "link.json", "an input");
+    fs::copy_file(folder / "s.ply", folder / "o.bin");
+    expect_failure(run_ewa({"convert", folder / "o.bin", folder / "o.gltf"}), 2, "o.bin");
+    EXPECT_EQ(read_file(folder / "o.bin"), good);
+    // In place is no accident.
+    expect_success(run_ewa({"convert", folder / "s.ply", folder / "s.ply", "--max-sh", "0"}));
+    EXPECT_EQ(ewa::load_splats(folder / "s.ply").sh_degree, 0);
+}
+
+TEST(Convert, NamesTheBinOfAGltfAndLeavesOthersAlone) {
+    const Folder folder;
+    make_splats(folder / "s.ply");
+    const std::vector<std::string> convert{"convert", folder / "s.ply", folder / "g.gltf",
+                                           "--json",  folder / "g.json"};
+    write_file(folder / "g.bin", "somebody's");
+    expect_failure(run_ewa(convert), 2, "g.bin");
+    EXPECT_FALSE(fs::exists(folder / "g.gltf"));
+    write_file(folder / "g.gltf", R"({"asset": {"version": "2.0"}})");
+    expect_failure(run_ewa(convert), 2, "g.bin");
+    EXPECT_THROW(ewa::save_splats(folder / "g.gltf", ewa::load_splats(folder / "s.ply")), ewa::InputError);
+    EXPECT_EQ(read_file(folder / "g.bin"), "somebody's");
+    fs::remove(folder / "g.bin");
+    for (int again = 0; again < 2; ++again) {  // its own it replaces
+        const Outcome outcome = run_ewa(convert);
+        expect_success(outcome);
+        const auto bytes = fs::file_size(folder / "g.bin");
+        EXPECT_EQ(bytes, 50u * (12 + 8 + 16 + 12 + 4 + 4 * 12));
+        EXPECT_NE(outcome.out.find((folder / "g.bin") + ": the values of that glTF, 5 kB"),
+                  std::string::npos)
+            << outcome.out;
+        EXPECT_EQ(read_json(folder / "g.json")["output"]["values"]["bytes"], bytes);
+    }
 }
 
 TEST(Convert, FullDiskLeavesNoHalfFile) {

@@ -201,4 +201,50 @@ TEST(Dataset, EveryCommandTakesAMeshScene) {
                     read_file(folder / ("out/dataset.pictures/" + std::string(name))));
 }
 
+TEST(Dataset, EveryCommandSaysWhatIsWrongWithAMeshScene) {
+    const Folder folder;
+    make_splats(folder / "s.ply");
+    const std::string scene = folder / "bad.gltf", splats = folder / "s.ply";
+    const std::vector<std::vector<std::string>> commands = {
+        {"dataset", scene, "-o", folder / "d"},
+        {"render", splats, "--cameras", scene, "-o", folder / "r"},
+        {"eval", splats, scene},
+        {"grad", splats, scene, "--frame", "0", "-o", folder / "g.ply"},
+        {"bench", "--accuracy", scene}};
+    write_file(scene, leaf().substr(0, 40));
+    for (const auto& command : commands) expect_failure(run_ewa(command), 2, "byte");
+    expect_success(run_ewa({"convert", splats, scene, "--quiet"}));
+    for (const auto& command : commands) expect_failure(run_ewa(command), 2, "reach splats");
+    fs::remove(scene);
+    for (const auto& command : commands) expect_failure(run_ewa(command), 2, "bad.gltf");
+    write_file(folder / "text.txt", "no dataset");
+    expect_failure(run_ewa({"eval", splats, folder / "text.txt"}), 2, "glTF of meshes");
+}
+
+TEST(Dataset, FramesThatAreNotThereAreMissedBeforePhotographing) {
+    const Folder folder;
+    make_splats(folder / "s.ply");
+    const std::string scene = folder / "leaf.gltf", splats = folder / "s.ply";
+    write_file(scene, leaf());
+    const Outcome grad = run_ewa({"grad", splats, scene, "--frame", "99999", "-o", folder / "g.ply"});
+    expect_failure(grad, 2, "frame 99999");
+    EXPECT_EQ(grad.out, "");
+    const Outcome eval = run_ewa({"eval", splats, scene, "--test-every", "0"});
+    expect_failure(eval, 2, "test split");
+    EXPECT_EQ(eval.out, "");
+}
+
+TEST(Dataset, AccuracyTrainsADiffuseSceneWithoutSh) {
+    const Folder folder;
+    ASSERT_EQ(run_ewa(small("plaster.gltf", folder / "d")).status, 0);
+    ASSERT_EQ(run_ewa(small("tea_table.gltf", folder / "e")).status, 0);
+    const std::pair<const char*, const char*> cases[] = {{"d", "of SH degree 0\n"},
+                                                         {"e", "of SH degree 3\n"}};
+    for (const auto& [name, text] : cases) {
+        const Outcome outcome = run_ewa({"bench", "--accuracy", folder / name, "--training-steps", "1"});
+        ASSERT_EQ(outcome.status, 0) << outcome.err;
+        EXPECT_NE(outcome.out.find(text), std::string::npos) << outcome.out;
+    }
+}
+
 }  // namespace

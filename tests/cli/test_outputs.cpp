@@ -182,6 +182,33 @@ TEST(Outputs, PlacesThatCannotBeWritten) {
     expect_failure(run_ewa({"grad", splats, data, "--frame", "0", "-o", folder / "file/g.ply"}), 1, "file");
     expect_failure(run_ewa({"eval", splats, data, "--json", folder / "file/e.json"}), 1, "file");
     EXPECT_EQ(read_file(folder / "file"), "in the way");
+    // Before anything is read or trained.
+    const std::string none = folder / "none";
+    expect_failure(run_ewa({"eval", none, data, "--json", folder / "file/e.json"}), 1, "file");
+    expect_failure(run_ewa({"grad", none, data, "--frame", "0", "-o", folder / "file/g.ply"}), 1, "file");
+    expect_failure(run_ewa({"bench", "--accuracy", none, "--json", folder / "file/a/b.json"}), 1, "file/a");
+    expect_failure(run_ewa({"bench", "--accuracy", none, "--svg", folder / "none/b.svg"}), 1, "none/b.svg");
+    fs::create_directory(folder / "b_training.svg");
+    expect_failure(run_ewa({"bench", "--accuracy", none, "--svg", folder / "b.svg"}), 1, "b_training.svg");
+    expect_failure(run_ewa({"bench", "--accuracy", none, "--json", folder / "new/b.json"}), 2, none);
+    EXPECT_FALSE(fs::exists(folder / "new"));
+}
+
+TEST(Outputs, NoFileTakesAnothersPlace) {
+    const Folder folder;
+    make_dataset(folder / "data");
+    make_splats(folder / "s.ply");
+    const std::string splats = folder / "s.ply", data = folder / "data", out = folder / "o.ply",
+                      good = read_file(splats);
+    expect_failure(run_ewa({"eval", splats, data, "--json", splats}), 2, "is SPLATS too");
+    expect_failure(run_ewa({"grad", splats, data, "--frame", "0", "-o", splats}), 2, "is SPLATS too");
+    expect_failure(run_ewa({"grad", splats, data, "--frame", "0", "-o", out, "--json", out}), 2,
+                   "is --output too");
+    expect_failure(run_ewa({"bench", "--accuracy", data, "--splats", splats, "--json", splats}), 2,
+                   "is --splats too");
+    expect_failure(run_ewa({"bench", "--accuracy", data, "--svg", out, "--json", out}), 2, "is --svg too");
+    EXPECT_EQ(read_file(splats), good);
+    EXPECT_FALSE(fs::exists(out));
 }
 
 TEST(Outputs, StandardOutputThatIsFull) {
