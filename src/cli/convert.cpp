@@ -103,8 +103,7 @@ Edits parse_edits(const ConvertArguments& arguments) {
     if (arguments.crop.empty()) return edits;
     const std::vector<double> n = parse_numbers("--crop", arguments.crop);
     if (n.size() != 6 || n[0] > n[3] || n[1] > n[4] || n[2] > n[5])
-        throw InputError("--crop: '" + arguments.crop +
-                         "' is not x,y,z,X,Y,Z with the lower corner first");
+        throw InputError("--crop: '" + arguments.crop + "' is not x,y,z,X,Y,Z with the lower corner first");
     std::copy(n.begin(), n.end(), edits.crop.emplace().begin());
     return edits;
 }
@@ -237,9 +236,8 @@ int run(const ConvertArguments& arguments) {
                        bytes_text(fs::file_size(values)));
         for (const std::string& remark : remarks) fmt::print("  {}\n", remark);
     }
-    Json json = {{"inputs", work.inputs},
-                 {"output", output_json(arguments, work.gaussians)},
-                 {"remarks", remarks}};
+    Json json = {
+        {"inputs", work.inputs}, {"output", output_json(arguments, work.gaussians)}, {"remarks", remarks}};
     if (arguments.check) json["check"] = check(arguments, work);
     if (!arguments.json.empty()) write_json(arguments.json, json);
     return 0;

@@ -28,7 +28,7 @@ class GltfDocument {
     const tinygltf::Model& model() const { return model_; }
     bool binary() const { return binary_; }
     bool animated() const { return animated_; }
-    uint64_t bytes() const;  // of the file and the buffers outside it
+    uint64_t bytes() const;                                   // of the file and the buffers outside it
     bool refers_to(const std::filesystem::path& file) const;  // as one of its buffers
 
     /// Throws InputError "name: text".

@@ -181,8 +181,8 @@ TEST(Convert, NoFileTakesAnothersPlace) {
 TEST(Convert, NamesTheBinOfAGltfAndLeavesOthersAlone) {
     const Folder folder;
     make_splats(folder / "s.ply");
-    const std::vector<std::string> convert{"convert", folder / "s.ply", folder / "g.gltf",
-                                           "--json",  folder / "g.json"};
+    const std::vector<std::string> convert{"convert", folder / "s.ply", folder / "g.gltf", "--json",
+                                           folder / "g.json"};
     write_file(folder / "g.bin", "somebody's");
     expect_failure(run_ewa(convert), 2, "g.bin");
     EXPECT_FALSE(fs::exists(folder / "g.gltf"));
@@ -196,8 +196,7 @@ TEST(Convert, NamesTheBinOfAGltfAndLeavesOthersAlone) {
         expect_success(outcome);
         const auto bytes = fs::file_size(folder / "g.bin");
         EXPECT_EQ(bytes, 50u * (12 + 8 + 16 + 12 + 4 + 4 * 12));
-        EXPECT_NE(outcome.out.find((folder / "g.bin") + ": the values of that glTF, 5 kB"),
-                  std::string::npos)
+        EXPECT_NE(outcome.out.find((folder / "g.bin") + ": the values of that glTF, 5 kB"), std::string::npos)
             << outcome.out;
         EXPECT_EQ(read_json(folder / "g.json")["output"]["values"]["bytes"], bytes);
     }

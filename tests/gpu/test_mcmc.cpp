@@ -2,6 +2,8 @@
 // 3DGS-MCMC on the device against the twin: relocation, growth, noise, regularisers.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -11,6 +13,7 @@
 #include "gpu/twin_inputs.h"
 #include "pipeline/mcmc.h"
 #include "reference/mcmc.h"
+#include "reference/projection.h"
 
 namespace ewa::test {
 namespace {
@@ -256,6 +259,45 @@ TEST(Noise, IsTheTwins) {
         });
         EXPECT_EQ(download_model(start.model, start.model.params).means, moved.means);
     }
+}
+
+/// Along each axis of the splat the noise is `reach` at most, in the direction that it has; such are counted.
+TEST(Noise, IsNoLongerThanItsReach) {
+    Start start(3500, 400, 0, -9.0);
+    for (float& logit : start.gaussians.opacity_logits) logit = -8;
+    start.model = pipeline::upload_model(*device(), start.gaussians, 2, false);
+    Rig& r = rig();
+    pipeline::Frame frame;
+    frame.instance_capacity = 10;
+    const shared::Counts counts{};
+    frame.counts = gpu::Buffer(*device(), "counts", sizeof(counts));
+    frame.counts.upload(std::span<const shared::Counts>(&counts, 1));
+    const double reach = 0.1;
+    r.run([&](gpu::Recording& recording) {
+        record_noise(recording, r.kernels, start.model, frame, 5.0f, float(reach), 77, 12);
+    });
+    const Gaussians moved = download_model(start.model, start.model.params);
+    const reference::Values old = reference::to_double(start.gaussians);
+    uint32_t limited = 0;
+    for (size_t i = 0; i < old.size(); ++i) {
+        const auto n = core::normal3({uint32_t(i), 12, 77, shared::MCMC_NOISE_STREAM});
+        const reference::Splat splat = read_splat(old, i);
+        glm::dvec3 by = reference::noise(splat, {n[0], n[1], n[2]}, 5);
+        std::array<double, 4> unit = splat.quaternion;
+        const double norm = reference::robust_norm(unit);
+        for (double& q : unit) q /= norm;
+        const glm::dvec3 along = glm::transpose(reference::rotation_matrix(unit)) * by;
+        const double longest = std::max({std::abs(along.x), std::abs(along.y), std::abs(along.z)});
+        if (longest > reach) {
+            by *= reach / longest;
+            ++limited;
+        }
+        for (int k = 0; k < 3; ++k)
+            ASSERT_NEAR(moved.means[3 * i + size_t(k)], old.means[3 * i + size_t(k)] + by[k], 1e-6) << i;
+    }
+    EXPECT_GT(limited, 50u);
+    EXPECT_LT(limited, 350u);
+    EXPECT_EQ(frame.counts.download<shared::Counts>(1)[0].limited_steps, limited);
 }
 
 }  // namespace
