@@ -147,7 +147,7 @@ TEST(Exposure, AStepThatIsNotFiniteIsDroppedAndCounted) {
     GuardedFrame guarded(rig().shape(), {1, 16, 16, 1, true, false, false, true});
     s.picture.at(3, 3)[1] = std::numeric_limits<double>::infinity();
     run(s, guarded.frame, 1);
-    EXPECT_GT(guarded.frame.read_counts().dropped_updates, 0u);
+    EXPECT_EQ(guarded.frame.read_counts().dropped_updates, 3u);  // each row sees every channel
     EXPECT_EQ(s.exposures.download()[kPhoto], s.start[kPhoto]);
 }
 
@@ -156,6 +156,8 @@ TEST(Exposure, NothingMovesWhereTheInstancesDidNotFit) {
     GuardedFrame guarded(rig().shape(), {1, 16, 16, 1, true, false, false, true});
     run(s, guarded.frame, 1, guarded.frame.instance_capacity + 1);
     EXPECT_EQ(s.exposures.download()[kPhoto], s.start[kPhoto]);
+    run(s, guarded.frame, 1, guarded.frame.instance_capacity);  // they just fit
+    EXPECT_NE(s.exposures.download()[kPhoto], s.start[kPhoto]);
 }
 
 }  // namespace

@@ -303,6 +303,32 @@ TEST(UpdateEdges, AnUpdateThatIsNotFiniteIsDroppedAndCounted) {
     for (const float value : model.moments1.read<float>()) EXPECT_TRUE(std::isfinite(value));
 }
 
+/// What is not finite already is no update that was dropped; a gradient that is merely huge moves as any
+/// does.
+TEST(UpdateEdges, HugeGradientsMoveAndBrokenValuesAreNotCounted) {
+    Scene scene = random_scene(1907, 40, SplatKind::ordinary, 61, 47, 1);
+    Slots slots(scene);
+    size_t pushed = 0;
+    while (slots.tile_counts[pushed] == 0) ++pushed;
+    slots.slots[size_t(slots.places[slots.first[pushed]]) * shared::SLOT_FLOATS] = 1e25f;  // sum g
+    GuardedModel model(scene.gaussians);
+    Bench bench(slots);
+    bench.run(scene, model.model, model.moments1, model.moments2, 0, push_for(scene, 1));
+    EXPECT_EQ(bench.counts.read<shared::Counts>()[0].dropped_updates, 0u);
+    EXPECT_NE(model.read(model.model.params).opacity_logits[pushed], scene.gaussians.opacity_logits[pushed]);
+
+    Gaussians broken = scene.gaussians;
+    for (size_t k = 0; k < 3; ++k) broken.log_scales[3 * pushed + k] = std::nanf("");
+    GuardedModel other(broken);
+    slots.tile_counts[pushed] = 0;  // so it is not drawn
+    Bench again(slots);
+    again.run(scene, other.model, other.moments1, other.moments2, 0, push_for(scene, 1));
+    const Gaussians now = other.read(other.model.params);
+    EXPECT_TRUE(std::isnan(now.log_scales[3 * pushed]));
+    EXPECT_EQ(again.counts.read<shared::Counts>()[0].dropped_updates, 0u);
+    EXPECT_NE(now.log_scales[3 * pushed + 3], broken.log_scales[3 * pushed + 3]);
+}
+
 TEST(UpdateEdges, NothingMovesWhereTheInstancesDidNotFit) {
     const Scene scene = random_scene(1903, 40, SplatKind::ordinary, 61, 47);
     const Slots slots(scene);
@@ -317,6 +343,11 @@ TEST(UpdateEdges, NothingMovesWhereTheInstancesDidNotFit) {
     EXPECT_EQ(model.read(model.model.params).means, scene.gaussians.means);
     for (const float value : model.moments2.read<float>()) EXPECT_EQ(value, 0);
     for (const float value : bench.statistics.read<float>()) EXPECT_EQ(value, 0);
+
+    needed.instances = 1000;  // they just fit
+    bench.counts = Guarded("counts", std::vector<shared::Counts>{needed});
+    bench.run(scene, model.model, model.moments1, model.moments2, kStatistics, push);
+    EXPECT_NE(model.read(model.model.params).means, scene.gaussians.means);
 }
 
 /// A lower degree evaluated than stored: the coefficients above stay as they are.
