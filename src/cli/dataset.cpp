@@ -30,10 +30,11 @@ struct DatasetArguments {
 void parse_size(const std::string& text, PhotographOptions& options) {
     const char* const end = text.data() + text.size();
     const auto [cross, error] = std::from_chars(text.data(), end, options.width);
-    const bool good = error == std::errc() && cross != end && *cross == 'x' && [&] {
+    bool good = error == std::errc() && cross != end && *cross == 'x';
+    if (good) {
         const auto [last, second] = std::from_chars(cross + 1, end, options.height);
-        return second == std::errc() && last == end;
-    }();
+        good = second == std::errc() && last == end;
+    }
     if (!good || options.width < 1 || options.height < 1)
         throw InputError("--size: '" + text + "' is not WxH in pixels, such as 256x256");
 }

@@ -181,7 +181,7 @@ std::string manual_page(const CLI::App& program, const CLI::App* command) {
 }
 
 std::string bash_completion(const CLI::App& program) {
-    const std::string name = program.get_name();
+    const std::string& name = program.get_name();
     std::string function = "_" + name;
     std::replace(function.begin(), function.end(), '-', '_');
     std::string commands, cases, values, before_values = "${COMP_WORDS[COMP_CWORD-1]}";
@@ -242,7 +242,7 @@ void write_manual(const CLI::App& program, const std::string& folder) {
         make_folder(path.parent_path());
         core::write_text_file(path, text);
     };
-    const std::string name = program.get_name();
+    const std::string& name = program.get_name();
     write("man/man1/" + name + ".1", manual_page(program, nullptr));
     for (const CLI::App* command : shown_commands(program))
         write("man/man1/" + name + "-" + command->get_name() + ".1", manual_page(program, command));

@@ -84,7 +84,8 @@ class Encoder {
     /// In steps, with zero on one of them, so that it packs better.
     uint8_t encode_sh(double v, int step) {
         const double level = std::round(v * kShSteps) + kShSteps;
-        const double stepped = std::floor((level + step / 2) / step) * step;
+        const int half = step / 2;
+        const double stepped = std::floor((level + half) / step) * step;
         clamped_ += !(stepped >= 0 && stepped <= 256);
         return to_byte(stepped);
     }
