@@ -152,7 +152,7 @@ TEST(EmitEdges, WritesNothingWhereNotAllFit) {
 class Starts : public testing::TestWithParam<std::pair<uint32_t, uint32_t>> {};
 
 TEST_P(Starts, AreTheLowerBounds) {
-    const auto [tiles, items] = GetParam();
+    const uint32_t tiles = GetParam().first, items = GetParam().second;
     Rig& r = rig();
     Random random(tiles + items);
     std::vector<uint32_t> sorted(std::max(items, 1u));

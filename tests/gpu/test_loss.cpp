@@ -49,7 +49,7 @@ Inputs random_inputs(uint64_t seed, int width, int height) {
 class Loss : public testing::TestWithParam<std::pair<int, int>> {};
 
 TEST_P(Loss, ValueAndGradientAreTheTwins) {
-    const auto [width, height] = GetParam();
+    const int width = GetParam().first, height = GetParam().second;
     const Inputs in = random_inputs(uint64_t(width * 1000 + height), width, height);
     Rig& r = rig();
     GuardedFrame guarded(r.shape(), {1, uint32_t(width), uint32_t(height), 1, true, false});
@@ -89,7 +89,7 @@ TEST_P(Loss, ValueAndGradientAreTheTwins) {
 
 /// The photograph's alpha as the weight of a pixel.
 TEST_P(Loss, OfMaskedPicturesIsTheTwins) {
-    const auto [width, height] = GetParam();
+    const int width = GetParam().first, height = GetParam().second;
     Inputs in = random_inputs(uint64_t(width * 31 + height), width, height);
     reference::Raster photo(width, height, 3), weights(width, height, 1);
     for (int y = 0; y < height; ++y)
@@ -134,7 +134,7 @@ TEST_P(Loss, OfMaskedPicturesIsTheTwins) {
 
 /// The window's first half: exact up to float32 rounding of eleven products.
 TEST_P(Loss, MomentsAreBlurredDownTheColumns) {
-    const auto [width, height] = GetParam();
+    const int width = GetParam().first, height = GetParam().second;
     const Inputs in = random_inputs(uint64_t(width * 77 + height), width, height);
     Rig& r = rig();
     const auto sizes = pipeline::sizes_for(r.shape(), {1, uint32_t(width), uint32_t(height), 1, true, false});

@@ -21,7 +21,7 @@ using pipeline::Total;
 class Scan : public testing::TestWithParam<std::pair<uint32_t, uint32_t>> {};
 
 TEST_P(Scan, IsTheExclusivePrefixSum) {
-    const auto [items, block] = GetParam();
+    const uint32_t items = GetParam().first, block = GetParam().second;
     Rig& r = rig();
     Random random(items + block);
     for (const bool gathered : {false, true}) {
