@@ -30,9 +30,23 @@ void App::handle_number(int number, const KeyPress& press) {
 }
 
 void App::handle_key(const KeyPress& press) {
-    if (ImGui::GetIO().WantTextInput) return;
     const int key = press.key;
+    // These mean nothing to a field that is typed in, so they act beside it; the others are its own.
     if (key == GLFW_KEY_Q && press.control) return window_.close();
+    switch (key) {
+        case GLFW_KEY_F1:
+            show_help_ = !show_help_;
+            hint_until_ = {};
+            return;
+        case GLFW_KEY_F2:
+            show_panel_ = !show_panel_;
+            return;
+        case GLFW_KEY_F12:
+            return press.shift ? save_exr() : void(capture_ = true);
+        default:
+            break;
+    }
+    if (ImGui::GetIO().WantTextInput) return;
     if (key >= GLFW_KEY_1 && key <= GLFW_KEY_9) return handle_number(key - GLFW_KEY_1 + 1, press);
     float& scale = settings_.look.splat_scale;
     switch (key) {
@@ -66,15 +80,6 @@ void App::handle_key(const KeyPress& press) {
             return step_camera(1);
         case GLFW_KEY_V:
             return change_comparison();
-        case GLFW_KEY_F1:
-            show_help_ = !show_help_;
-            hint_until_ = {};
-            return;
-        case GLFW_KEY_F2:
-            show_panel_ = !show_panel_;
-            return;
-        case GLFW_KEY_F12:
-            return press.shift ? save_exr() : void(capture_ = true);
         default:
             return;
     }
