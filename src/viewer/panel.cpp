@@ -39,7 +39,8 @@ void edit_look(const PanelFacts& facts, Look& look) {
         look.mode = Mode(mode);
     if (facts.picture && facts.picture->request.look.mode == look.mode) {
         if (look.mode == Mode::depth)
-            ImGui::Text("white is depth %.4g", double(facts.picture->picture.white));
+            ImGui::Text("dark to white: depth %.4g to %.4g", double(facts.picture->picture.dark),
+                        double(facts.picture->picture.white));
         if (look.mode == Mode::count)
             ImGui::Text("red, yellow, white: up to %.0f splats", double(facts.picture->picture.white));
     }

@@ -19,11 +19,11 @@ float quantile(std::vector<float>& values, double share) {
     return *at;
 }
 
-float white_depth_of(const Rendering& rendering) {
+std::vector<float> solid_depths(const Rendering& rendering) {
     std::vector<float> depths;
     for (size_t i = 0; i < rendering.depth.pixels.size(); ++i)
         if (rendering.alpha.pixels[i] >= 0.5f) depths.push_back(rendering.depth.pixels[i]);
-    return quantile(depths, 0.98);
+    return depths;
 }
 
 float white_count_of(const Rendering& rendering) {
@@ -64,9 +64,17 @@ Picture picture_of(const Rendering& rendering, Mode mode) {
     Picture picture = empty_picture(rendering.color.width, rendering.color.height);
     const auto grey = [](float v) { return std::array<float, 3>{v, v, v}; };
     if (mode == Mode::depth) {
-        picture.white = white_depth_of(rendering);
-        const float scale = picture.white > 0 ? 1.0f / picture.white : 0.0f;
-        fill(picture, [&](size_t i) { return grey(rendering.depth.pixels[i] * scale); });
+        std::vector<float> depths = solid_depths(rendering);
+        picture.dark = quantile(depths, 0.02);
+        picture.white = quantile(depths, 0.98);
+        const float range = picture.white - picture.dark;
+        fill(picture, [&](size_t i) {
+            const float depth = rendering.depth.pixels[i];
+            if (!(depth > 0)) return grey(0);
+            if (!(range > 0)) return grey(1);
+            return grey(kDarkestDepth +
+                        (1 - kDarkestDepth) * std::clamp((depth - picture.dark) / range, 0.0f, 1.0f));
+        });
     } else if (mode == Mode::count) {
         picture.white = white_count_of(rendering);
         const float scale = picture.white > 0 ? 1.0f / picture.white : 0.0f;

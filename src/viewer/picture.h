@@ -17,13 +17,19 @@ Drawing drawing_for(Mode mode);
 struct Picture {
     int width = 0, height = 0;
     std::vector<uint8_t> rgba;
-    float white =
-        0;  // what white stands for: a view z (world units) in depth mode, a number of splats in count mode
+    /// What white stands for: a view z (world units) in depth mode, a number of splats in count mode.
+    float white = 0;
+    /// The view z that kDarkestDepth stands for, in depth mode.
+    float dark = 0;
 };
 
-/// Rounded and clamped as save_image does for a PNG. Depth is divided by its 98th percentile over what is at
-/// least half opaque, so that a few far splats do not turn everything else black; it is black where nothing
-/// is. The count goes from black over red and yellow to white at its 99th percentile.
+/// The grey of the nearest depth, so that what is near is not what is not there.
+inline constexpr float kDarkestDepth = 0.1f;
+
+/// Rounded and clamped as save_image does for a PNG. Depth goes from kDarkestDepth at its 2nd percentile to
+/// white at its 98th, both over what is at least half opaque, so that a few splats far off or before the
+/// camera do not take the contrast from the rest; it is black where nothing is. The count goes from black
+/// over red and yellow to white at its 99th percentile.
 Picture picture_of(const Rendering& rendering, Mode mode);
 
 /// RGB, or RGBA whose alpha is blended over the background.

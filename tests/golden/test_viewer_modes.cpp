@@ -79,13 +79,18 @@ Image shown_by_twin(const viewer::Look& look) {
         if (1 - blended.transmittance.values[i] >= 0.5) depths.push_back(blended.depth.values[i]);
         if (blended.blended[i] > 0) counts.push_back(double(blended.blended[i]));
     }
-    const double far = ranked(depths, 0.98), many = ranked(counts, 0.99);
+    const double near = ranked(depths, 0.02), far = ranked(depths, 0.98), many = ranked(counts, 0.99);
     Image image(seen.width, seen.height, 3);
     for (size_t i = 0; i < image.pixels.size() / 3; ++i)
         for (size_t c = 0; c < 3; ++c) {
             double value =
                 look.mode == Mode::ellipsoids ? solids.values[3 * i + c] : blended.color.values[3 * i + c];
-            if (look.mode == Mode::depth) value = blended.depth.values[i] / far;
+            // A tenth for the nearest; nothing is nearer than the near plane, but for where there is nothing.
+            if (look.mode == Mode::depth)
+                value =
+                    blended.depth.values[i] > 0
+                        ? 0.1 + 0.9 * std::clamp((blended.depth.values[i] - near) / (far - near), 0.0, 1.0)
+                        : 0;
             if (look.mode == Mode::opacity) value = 1 - blended.transmittance.values[i];
             // A third of the way for each of red, green, blue.
             if (look.mode == Mode::count) value = 3 * double(blended.blended[i]) / many - double(c);

@@ -314,7 +314,8 @@ TEST(Photographer, WhatIsUnlitShowsItsVertexColours) {
     scene.materials[0].unlit = true;
     for (mesh::Triangle& t : scene.triangles) t.colors.fill(0xff0000ffu);  // red alone
     const auto middle = [&] {
-        const float* pixel = shoot(scene, test::camera_down_z({0, 0, 5}, 9, 9, 10), 4).radiance.at(4, 4);
+        const Shot shot = shoot(scene, test::camera_down_z({0, 0, 5}, 9, 9, 10), 4);
+        const float* pixel = shot.radiance.at(4, 4);
         return glm::vec3(pixel[0], pixel[1], pixel[2]);
     };
     EXPECT_NEAR(middle().r, 0.5f, 1e-3f);

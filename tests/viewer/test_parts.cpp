@@ -221,9 +221,21 @@ TEST(Picture, RoundsAndClampsColor) {
 }
 
 TEST(Picture, DepthAndOpacityAreGrey) {
-    const Picture depth = picture_of(two_pixels(), Mode::depth);
-    EXPECT_EQ(depth.white, 2.0f);  // the 98th percentile of two values is the lower
-    EXPECT_EQ(depth.rgba, (std::vector<uint8_t>{255, 255, 255, 255, 255, 255, 255, 255}));
+    const Picture one_depth = picture_of(two_pixels(), Mode::depth);
+    EXPECT_EQ(one_depth.white, 2.0f);  // the 98th percentile of two values is the lower
+    EXPECT_EQ(one_depth.rgba, (std::vector<uint8_t>{255, 255, 255, 255, 255, 255, 255, 255}));
+    Rendering hundred{Image(101, 1, 3), Image(101, 1, 1), Image(101, 1, 1), Image(101, 1, 1)};
+    for (size_t i = 0; i < 100; ++i) {
+        hundred.alpha.pixels[i] = 1;
+        hundred.depth.pixels[i] = 1000 + float(i);
+    }
+    const Picture depth = picture_of(hundred, Mode::depth);
+    EXPECT_EQ(depth.dark, 1001.0f);
+    EXPECT_EQ(depth.white, 1097.0f);
+    EXPECT_EQ(depth.rgba[0], 26) << "the nearest is not black";
+    EXPECT_EQ(depth.rgba[4 * 49], 140) << "half way";
+    EXPECT_EQ(depth.rgba[4 * 99], 255);
+    EXPECT_EQ(depth.rgba[4 * 100], 0) << "nothing is";
     const Picture opacity = picture_of(two_pixels(), Mode::opacity);
     EXPECT_EQ(opacity.rgba, (std::vector<uint8_t>{255, 255, 255, 255, 128, 128, 128, 255}));
 }
