@@ -14,6 +14,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <numbers>
+#include <sstream>
 #include <stdexcept>
 #include <thread>
 
@@ -50,6 +51,16 @@ bool has_bytes(const std::string& path) {
     std::error_code error;
     const auto size = fs::file_size(path, error);
     return !error && size > 0;
+}
+
+/// Without what the counters of a coverage build say where a full disk, or none for them, stops them too.
+std::string without_counters(const std::string& text) {
+    std::istringstream lines(text);
+    std::string kept;
+    for (std::string line; std::getline(lines, line);)
+        if (!line.starts_with("libgcov profiling error:") && !line.starts_with("profiling:"))
+            kept += line + (lines.eof() ? "" : "\n");
+    return kept;
 }
 
 int wait_for(pid_t child, const Circumstances& circumstances) {
@@ -104,7 +115,7 @@ Outcome run_ewa(const std::vector<std::string>& arguments, const Circumstances& 
     Outcome outcome;
     outcome.status = wait_for(child, circumstances);
     if (circumstances.out_path.empty()) outcome.out = read_file(out);
-    outcome.err = read_file(err);
+    outcome.err = without_counters(read_file(err));
     return outcome;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The control of the run under synchronisation validation (scripts/check sync): where that is on, it does see a
-// barrier that is missing, and where it is off nothing does.
+// The control of the run under synchronisation validation (scripts/check sync): where that is on, it does see
+// a barrier that is missing, and where it is off nothing does.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
