@@ -3,6 +3,7 @@
 
 #include <unistd.h>
 
+#include <cerrno>
 #include <string_view>
 
 #include "core/atomic_file.h"
@@ -17,23 +18,27 @@ constexpr std::string_view kNote =
 volatile std::sig_atomic_t signalled = 0, at_terminal = 0;
 
 void note_signal(int signal) {
+    const int reason = errno;  // of what this comes in between of
     if (signal == SIGINT && at_terminal && !signalled)
         (void)!write(STDERR_FILENO, kNote.data(), kNote.size());
     signalled = 1;
+    errno = reason;
 }
 
 void end_without_traces(int signal) {
     core::remove_unfinished_files();
-    raise(signal);  // which does by now what it does by itself
+    std::signal(signal, SIG_DFL);
+    raise(signal);  // taken at the handler's end, until which it is blocked
 }
 
-/// `handler` for the signal, and what was there before.
-struct sigaction handle(int signal, void (*handler)(int), int flags) {
+/// `handler` for the signal, in which none of the others arrives, and what was there before.
+struct sigaction handle(int signal, void (*handler)(int)) {
     struct sigaction action {
     }, before{};
     action.sa_handler = handler;
-    action.sa_flags = flags;
+    action.sa_flags = SA_RESTART;
     sigemptyset(&action.sa_mask);
+    for (const int other : kSignals) sigaddset(&action.sa_mask, other);
     sigaction(signal, &action, &before);
     return before;
 }
@@ -43,7 +48,7 @@ struct sigaction handle(int signal, void (*handler)(int), int flags) {
 InterruptWatch::InterruptWatch() {
     at_terminal = isatty(STDERR_FILENO);
     for (size_t i = 0; i < kSignals.size(); ++i) {
-        before_[i] = handle(kSignals[i], note_signal, SA_RESTART);
+        before_[i] = handle(kSignals[i], note_signal);
         if (kSignals[i] == SIGHUP && before_[i].sa_handler == SIG_IGN)
             sigaction(SIGHUP, &before_[i], nullptr);
     }
@@ -63,7 +68,7 @@ void stop_if_interrupted() {
 
 void leave_nothing_when_ended() {
     for (const int signal : kSignals) {
-        const struct sigaction before = handle(signal, end_without_traces, SA_RESETHAND | SA_NODEFER);
+        const struct sigaction before = handle(signal, end_without_traces);
         if (before.sa_handler == SIG_IGN) sigaction(signal, &before, nullptr);
     }
 }
