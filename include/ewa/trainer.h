@@ -87,10 +87,12 @@ struct Evaluation {
 };
 
 /// Renders each frame and compares it with its photograph, both clamped to [0, 1], over the pixels that
-/// count. A frame in which none does is left out. exposures: of each of the frames, or none.
+/// count. A frame in which none does is left out. exposures: of each of the frames, or none. before_frame: is
+/// called before each; what it throws ends the evaluation.
 Evaluation evaluate(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians, const Dataset& dataset,
                     const std::vector<int>& frames, const RenderOptions& options,
-                    const std::vector<Exposure>& exposures = {});
+                    const std::vector<Exposure>& exposures = {},
+                    const std::function<void()>& before_frame = {});
 
 /// Device memory that a run is going to take at most, in bytes.
 struct MemoryForecast {

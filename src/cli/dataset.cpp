@@ -58,7 +58,7 @@ int run(const DatasetArguments& arguments) {
 
 Photographs photograph_with_progress(const DeviceOptions& device, const fs::path& scene,
                                      const fs::path& folder, const PhotographOptions& options, bool quiet) {
-    watch_for_interrupt();
+    const InterruptWatch watch;
     std::unique_ptr<Progress> progress;
     const Photographs made =
         photograph_scene(open_device(device), scene, folder, options, [&](int done, int total) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "cli/arguments.h"
+#include "cli/interrupt.h"
 #include "cli/photograph_scene.h"
 #include "core/text.h"
 
@@ -46,7 +47,9 @@ std::optional<Photographed> load_photographed(const fs::path& path, const fs::pa
     if (const fs::path beside = splats.parent_path() / "dataset"; is_photographed(path, beside, {}))
         return Photographed{load_dataset(beside, options), nullptr};
     auto folder = std::make_unique<core::TemporaryFolder>("ewa-photographs-");
-    if (photograph_with_progress(device, path, folder->path(), {}, false).interrupted) return std::nullopt;
+    // Its watch over signals has ended with it: what came too late for a view is met here.
+    if (photograph_with_progress(device, path, folder->path(), {}, false).interrupted || interrupted())
+        return std::nullopt;
     return Photographed{load_dataset(folder->path(), options), std::move(folder)};
 }
 

@@ -6,6 +6,7 @@
 #include <new>
 
 #include "cli/command.h"
+#include "cli/interrupt.h"
 #include "cli/manual.h"
 #include "cli/text.h"
 #include "core/text.h"
@@ -32,11 +33,13 @@ int fail(const std::string& who, const std::string& what, int status) {
 int run(const Command& command) {
     const std::string who = "ewa " + command.app->get_name();
     try {
+        leave_nothing_when_ended();
         const int status = command.action();
         // A full disk behind a redirected output shows up only here.
-        if (std::fflush(stdout) != 0 || std::ferror(stdout))
+        if (std::fflush(stdout) != 0)
             return fail(who, std::string("cannot write to standard output: ") + std::strerror(errno),
                         kFailed);
+        if (std::ferror(stdout)) return fail(who, "could not write all to standard output", kFailed);
         return status;
     } catch (const InputError& error) {
         return fail(who, error.what(), kWrongUse);

@@ -100,6 +100,13 @@ constexpr const char* kExitStatus =
     "0 done; 1 it failed while running; 2 wrong use or unreadable input{}.\n"
     "An error is one line on standard error.\n";
 
+constexpr const char* kSignals =
+    ".SH SIGNALS\n"
+    "SIGINT (Ctrl\\-C), SIGTERM and SIGHUP end a training after its step, rendering after the picture and\n"
+    "photographing after the view in hand; what is done is saved, however often they come meanwhile.\n"
+    "Other commands end at once, and what they were to write stays as it was.\n"
+    "SIGQUIT (Ctrl\\-\\e) ends each at once; a training then goes on from its last checkpoint.\n";
+
 std::string quoted(const std::string& text) {
     std::string out = "'";
     for (const char c : text) out += c == '\'' ? std::string("\\'") : std::string(1, c);
@@ -176,6 +183,7 @@ std::string manual_page(const CLI::App& program, const CLI::App* command) {
     page += ".SH OPTIONS\n";
     for (const CLI::Option* option : options_of(app)) page += option_entry(*option);
     page += fmt::format(kExitStatus, command || !commands.empty() ? "; 130 interrupted" : "");
+    if (command || !commands.empty()) page += kSignals;
     if (commands.empty()) page += ".SH SEE ALSO\n.BR ewa (1)\n";
     return page;
 }

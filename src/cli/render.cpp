@@ -69,7 +69,7 @@ int run(const RenderArguments& arguments) {
     make_folder(arguments.output);
 
     Renderer renderer(open_device(arguments.device), gaussians, options);
-    watch_for_interrupt();
+    const InterruptWatch watch;
     Progress progress("rendered", static_cast<int>(frames.size()), "frames", arguments.quiet);
     uint32_t skipped = 0;
     for (size_t i = 0; i < frames.size(); ++i) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cli/interrupt.h"
 #include "cli/output.h"
 #include "core/atomic_file.h"
 
@@ -34,6 +35,7 @@ std::vector<report::ReportPicture> draw_report_pictures(const PictureRequest& re
     Renderer renderer(request.device, request.gaussians, request.options);
     std::vector<report::ReportPicture> pictures;
     for (const int index : request.frames) {
+        stop_if_interrupted();
         const Frame& frame = request.dataset.frames[index];
         report::ReportPicture picture;
         picture.name = frame.name;

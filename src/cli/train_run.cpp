@@ -123,10 +123,12 @@ class TrainRun {
     void save_checkpoint(const Trainer& trainer);
     void train(Trainer& trainer, Progress& progress);
     void log(const StepReport& report, const std::optional<Evaluation>& evaluation);
-    Evaluation evaluate_frames(const Gaussians& gaussians, const std::vector<int>& frames,
-                               const std::vector<Exposure>& exposures = {}) const;
+    Evaluation judge_frames(const Gaussians& gaussians, const std::vector<int>& frames,
+                            const std::vector<Exposure>& exposures = {}) const;
     double train_psnr(const Trainer& trainer, const Gaussians& gaussians) const;
     void save(const Gaussians& gaussians) const;
+    void judge(const Trainer& trainer, const Gaussians& gaussians);
+    void draw(const Gaussians& gaussians);
     int finish(const Trainer& trainer);
     void print_result() const;
 
@@ -146,6 +148,7 @@ class TrainRun {
     std::optional<report::MetricsLog> log_file_;
     std::optional<TrainServer> server_;
     StepReport last_;
+    std::optional<Evaluation> last_evaluation_;
     report::ReportData report_;
     fs::path first_picture_;
 };
@@ -223,9 +226,10 @@ void TrainRun::describe() const {
                         line.bytes_saved > 0 ? ", saves " + bytes_text(line.bytes_saved) : ""));
 }
 
-Evaluation TrainRun::evaluate_frames(const Gaussians& gaussians, const std::vector<int>& frames,
-                                     const std::vector<Exposure>& exposures) const {
-    return evaluate(device_, gaussians, dataset_, frames, options_.render, exposures);
+/// Interrupted is thrown out of it.
+Evaluation TrainRun::judge_frames(const Gaussians& gaussians, const std::vector<int>& frames,
+                                  const std::vector<Exposure>& exposures) const {
+    return evaluate(device_, gaussians, dataset_, frames, options_.render, exposures, stop_if_interrupted);
 }
 
 /// Of training views spread over the capture, each through its exposure where these were learned.
@@ -236,7 +240,7 @@ double TrainRun::train_psnr(const Trainer& trainer, const Gaussians& gaussians) 
     for (size_t i = 0; i < split_.train.size() && !learned.empty(); ++i)
         if (std::find(frames.begin(), frames.end(), split_.train[i]) != frames.end())
             exposures.push_back(learned[i]);
-    return evaluate_frames(gaussians, frames, exposures).psnr;
+    return judge_frames(gaussians, frames, exposures).psnr;
 }
 
 void TrainRun::log(const StepReport& step, const std::optional<Evaluation>& evaluation) {
@@ -270,8 +274,13 @@ void TrainRun::resume(Trainer& trainer) {
             report_.remarks.push_back(remark);
             say(remark);
         }
-        trainer.restore(earlier_->state);
-        report_.metrics = report::parse_metrics(earlier_->metrics);
+        try {
+            trainer.restore(earlier_->state);
+            report_.metrics = report::parse_metrics(earlier_->metrics);
+        } catch (const InputError& error) {
+            throw InputError(checkpoint_.string() + ": " + error.what() +
+                             "; without --resume the training starts anew");
+        }
         earlier_wall_ = earlier_->wall_seconds;
         last_ = earlier_->state.report;
         say(fmt::format("resumed after step {} of {}", last_.step, arguments_.steps));
@@ -303,7 +312,8 @@ void TrainRun::train(Trainer& trainer, Progress& progress) {
 
         std::optional<Evaluation> evaluation;
         if (at(step, arguments_.eval_every) && !split_.test.empty()) {
-            evaluation = evaluate_frames(trainer.gaussians(), split_.test);
+            // To its end: a run that is resumed would not come back to it.
+            evaluation = evaluate(device_, trainer.gaussians(), dataset_, split_.test, options_.render);
             progress.note(fmt::format("step {}: held-out PSNR {:.2f} dB, SSIM {:.4f}", step, evaluation->psnr,
                                       evaluation->ssim));
         }
@@ -317,45 +327,47 @@ void TrainRun::train(Trainer& trainer, Progress& progress) {
     }
 }
 
+/// The figures of a training that ran to its end.
+void TrainRun::judge(const Trainer& trainer, const Gaussians& gaussians) {
+    say("evaluating");
+    if (!split_.test.empty()) {
+        last_evaluation_ = judge_frames(gaussians, split_.test);
+        report_.summary.test_psnr = last_evaluation_->psnr;
+        report_.summary.test_ssim = last_evaluation_->ssim;
+    }
+    report_.summary.train_psnr = train_psnr(trainer, gaussians);
+}
+
+/// What the report shows of it.
+void TrainRun::draw(const Gaussians& gaussians) {
+    const auto frames = spread_out(report_.held_out ? split_.test : split_.train, kReportPictures);
+    const fs::path subfolder = folder_ / (report_.held_out ? "test" : "train");
+    report_.pictures =
+        draw_report_pictures({device_, gaussians, dataset_, frames, options_.render}, subfolder);
+    first_picture_ = subfolder / (report::picture_names(dataset_.frames)[frames.front()].string() + ".png");
+    if (!arguments_.accuracy) return;
+    stop_if_interrupted();
+    const auto view = report_.held_out ? split_.test.front() : split_.train.front();
+    report_.work_precision.push_back(
+        rendering_diagram(device_, gaussians, dataset_.frames[view].camera, options_.render));
+}
+
 int TrainRun::finish(const Trainer& trainer) {
-    const bool cut_short = interrupted();
     const Gaussians gaussians = trainer.gaussians();
     save(gaussians);
     if (options_.exposure)
         write_json(folder_ / "exposures.json", exposures_json(dataset_, split_.train, trainer.exposures()));
     save_checkpoint(trainer);  // a kill from here on costs no training
 
-    report::Summary& summary = report_.summary;
-    std::optional<Evaluation> test;
-    if (!cut_short) {
-        say("evaluating");
-        if (!split_.test.empty()) test = evaluate_frames(gaussians, split_.test);
-        summary.train_psnr = train_psnr(trainer, gaussians);
-    }
-    if (test) {
-        summary.test_psnr = test->psnr;
-        summary.test_ssim = test->ssim;
-    }
-    if (last_.step > 0) log(last_, test);
+    const bool judged = done_uninterrupted([&] { judge(trainer, gaussians); });
+    if (last_.step > 0) log(last_, last_evaluation_);
     server_->finish(last_, gaussians);
+    report_.held_out = !split_.test.empty();
+    const bool cut_short = !judged || !done_uninterrupted([&] { draw(gaussians); });
+
     for (const PassTime& time : trainer.pass_times())
         report_.pass_times.push_back({time.pass, time.milliseconds});
-    report_.held_out = !split_.test.empty();
-    if (!cut_short) {
-        const auto frames = spread_out(report_.held_out ? split_.test : split_.train, kReportPictures);
-        const fs::path subfolder = folder_ / (report_.held_out ? "test" : "train");
-        report_.pictures =
-            draw_report_pictures({device_, gaussians, dataset_, frames, options_.render}, subfolder);
-        first_picture_ =
-            subfolder / (report::picture_names(dataset_.frames)[frames.front()].string() + ".png");
-    }
-
-    if (!cut_short && arguments_.accuracy) {
-        const auto view = report_.held_out ? split_.test.front() : split_.train.front();
-        report_.work_precision.push_back(
-            rendering_diagram(device_, gaussians, dataset_.frames[view].camera, options_.render));
-    }
-
+    report::Summary& summary = report_.summary;
     summary.steps = last_.step;
     summary.seconds = last_.seconds;
     summary.splats = static_cast<uint32_t>(gaussians.size());
@@ -413,7 +425,7 @@ int TrainRun::run() {
     }
     describe();
 
-    watch_for_interrupt();
+    const InterruptWatch watch;
     Trainer trainer(device_, dataset_, split_.train, start_, options_);
     start_ = {};
     if (trainer.photographs_on_disk() > 0)
@@ -475,7 +487,7 @@ int run_train(const TrainArguments& given) {
         if (fs::is_directory(arguments.output)) lock = std::make_unique<core::FolderLock>(arguments.output);
         const Photographs made = photograph_with_progress(arguments.device, arguments.scene,
                                                           arguments.dataset, {}, arguments.quiet);
-        if (made.interrupted) return kInterruptedStatus;
+        if (made.interrupted || interrupted()) return kInterruptedStatus;
     }
     return TrainRun(arguments, begin, std::move(lock)).run();
 }

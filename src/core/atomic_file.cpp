@@ -10,6 +10,7 @@
 #include <csignal>
 #include <cstdio>
 #include <cstring>
+#include <iterator>
 #include <string>
 #include <utility>
 
@@ -17,22 +18,52 @@
 #include "ewa/error.h"
 
 namespace ewa::core {
+namespace {
+
+/// A temporary that is there now, where a signal's handler finds it. More at a time, or a longer name, go
+/// without.
+struct Unfinished {
+    enum State { free, being_named, named };
+    std::atomic<int> state{free};
+    char path[1024] = {};
+};
+Unfinished unfinished[8];
+static_assert(std::atomic<int>::is_always_lock_free);
+
+int list_unfinished(const std::filesystem::path& path) {
+    for (int i = 0; i < int(std::size(unfinished)); ++i) {
+        int expected = Unfinished::free;
+        if (path.native().size() >= sizeof(unfinished[i].path)) break;
+        if (!unfinished[i].state.compare_exchange_strong(expected, Unfinished::being_named)) continue;
+        std::strcpy(unfinished[i].path, path.c_str());
+        unfinished[i].state = Unfinished::named;
+        return i;
+    }
+    return -1;
+}
+
+}  // namespace
+
+void remove_unfinished_files() noexcept {
+    for (const Unfinished& one : unfinished)
+        if (one.state == Unfinished::named) unlink(one.path);
+}
 
 void AtomicFile::fail(const char* doing) const {
     const int reason = errno;
     throw RunError(one_line(target_.string()) + ": " + doing + ": " + std::strerror(reason));
 }
 
-AtomicFile::AtomicFile(const std::filesystem::path& path) : target_(path) {
+AtomicFile::AtomicFile(const std::filesystem::path& path, Readers readers) : target_(path) {
     if (path.filename().empty() || path.filename() == "." || path.filename() == "..")
         throw RunError(one_line(path.string()) + ": cannot be written: it names a folder");
     std::error_code ignored;
-    if (std::filesystem::is_symlink(path, ignored)) {
+    if (readers == Readers::usual && std::filesystem::is_symlink(path, ignored)) {
         const std::filesystem::path resolved = std::filesystem::weakly_canonical(path, ignored);
         if (!resolved.empty()) target_ = resolved;
     }
     struct stat existing {};
-    const bool exists = stat(target_.c_str(), &existing) == 0;
+    const bool exists = readers == Readers::usual && stat(target_.c_str(), &existing) == 0;
     if (exists && !S_ISREG(existing.st_mode))
         throw RunError(one_line(path.string()) +
                        ": cannot be written: it is there and is not a regular file");
@@ -42,9 +73,11 @@ AtomicFile::AtomicFile(const std::filesystem::path& path) : target_(path) {
     do {
         temporary_ = target_.parent_path() /
                      (".ewa-" + std::to_string(getpid()) + "-" + std::to_string(counter++) + ".tmp");
-        descriptor_ = open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+        descriptor_ = open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC,
+                           readers == Readers::owner ? 0600 : 0666);
     } while (descriptor_ < 0 && errno == EEXIST);
     if (descriptor_ < 0) fail("cannot be written");
+    listed_ = list_unfinished(temporary_);
     // Where the file system has no permissions to keep, the file is still as good as any new one.
     if (exists && fchmod(descriptor_, existing.st_mode & 07777) != 0) errno = 0;
 }
@@ -52,6 +85,7 @@ AtomicFile::AtomicFile(const std::filesystem::path& path) : target_(path) {
 AtomicFile::~AtomicFile() {
     if (descriptor_ >= 0) close(descriptor_);
     if (!temporary_.empty()) unlink(temporary_.c_str());
+    if (listed_ >= 0) unfinished[listed_].state = Unfinished::free;
 }
 
 void AtomicFile::write(const void* bytes, size_t count) {
@@ -81,8 +115,8 @@ void AtomicFile::commit() {
     }
 }
 
-void write_text_file(const std::filesystem::path& path, std::string_view text) {
-    AtomicFile file(path);
+void write_text_file(const std::filesystem::path& path, std::string_view text, AtomicFile::Readers readers) {
+    AtomicFile file(path, readers);
     file.write(text);
     file.commit();
 }

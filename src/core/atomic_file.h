@@ -14,7 +14,11 @@ namespace ewa::core {
 /// no regular file is refused.
 class AtomicFile {
   public:
-    explicit AtomicFile(const std::filesystem::path& path);
+    /// Who may read a file: whoever the user's umask or the file that was there lets, or the owner alone;
+    /// what is for the owner alone takes a symbolic link's place instead of following it.
+    enum class Readers { usual, owner };
+
+    explicit AtomicFile(const std::filesystem::path& path, Readers readers = Readers::usual);
     ~AtomicFile();
     AtomicFile(const AtomicFile&) = delete;
     AtomicFile& operator=(const AtomicFile&) = delete;
@@ -30,10 +34,16 @@ class AtomicFile {
 
     std::filesystem::path target_, temporary_;
     int descriptor_ = -1;
+    int listed_ = -1;  // for remove_unfinished_files()
 };
 
 /// The file becomes `text`, or stays as it was and RunError is thrown.
-void write_text_file(const std::filesystem::path& path, std::string_view text);
+void write_text_file(const std::filesystem::path& path, std::string_view text,
+                     AtomicFile::Readers readers = AtomicFile::Readers::usual);
+
+/// Removes what is written beside its place at this moment: for the handler of a signal that ends the
+/// program, in which no destructor runs. Takes no lock and no memory.
+void remove_unfinished_files() noexcept;
 
 /// Removes from a folder what processes that were killed while they wrote have left there (names as
 /// AtomicFile gives them, of a process that is no more). What cannot be removed stays.

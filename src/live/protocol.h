@@ -19,8 +19,10 @@
 //                              ends with the connection that asked for it.
 //
 // A server answers strangers: it listens on the loopback unless told otherwise, takes commands only from who
-// has its token, keeps kMostClients connections at most, and closes one that sends a line too long or stays
-// silent for kPatience.
+// has its token, and closes a connection that sends a line too long or stays silent for kPatience. It has
+// kMostClients places. Where they are taken, a newcomer gets that of whoever has no token and has been silent
+// longest, for kSilence at least. Where nobody has, it may say hello and show the token, and whoever does has
+// a place beyond those; anything else is refused. So nobody without the token can shut out who has it.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -40,6 +42,7 @@ inline constexpr uint64_t kMostPayload = uint64_t(1) << 33;  // bytes a client t
 inline constexpr size_t kMostLines = 2000;                   // of metrics in an answer
 inline constexpr int kMostClients = 8;
 inline constexpr int kPatience = 30;  // seconds
+inline constexpr int kSilence = 2;    // seconds, after which a place may go to a newcomer
 
 enum class State { running, paused, done };
 

@@ -15,6 +15,7 @@ namespace {
 constexpr double kShare = 0.05;      // of the time that taking splats may cost
 constexpr double kLeastPause = 0.2;  // seconds between splats
 constexpr int kAcceptSeconds = 1;
+const std::string kFull = "no there are " + std::to_string(kMostClients) + " connections already\n";
 
 /// Takes the same time wherever the first difference stands.
 bool same_secret(const std::string& a, const std::string& b) {
@@ -38,8 +39,8 @@ std::string random_token() {
     return text;
 }
 
-Server::Server(const std::string& address, uint16_t port, std::string token)
-    : token_(std::move(token)), listener_(address, port), thread_([this] { listen(); }) {}
+Server::Server(const std::string& address, uint16_t port, std::string token, std::chrono::seconds silence)
+    : token_(std::move(token)), silence_(silence), listener_(address, port), thread_([this] { listen(); }) {}
 
 Server::~Server() {
     stop_ = true;
@@ -84,33 +85,66 @@ void Server::forget_finished() {
     });
 }
 
+size_t Server::count(std::atomic<bool> Client::*which) const {
+    return size_t(std::count_if(clients_.begin(), clients_.end(),
+                                [which](const Client& client) { return (client.*which).load(); }));
+}
+
+bool Server::end_silent(bool waiting, Clock::duration least) {
+    auto longest = clients_.end();
+    for (auto at = clients_.begin(); at != clients_.end(); ++at)
+        if (!at->trusted && !at->asking && at->waiting == waiting &&
+            (longest == clients_.end() || at->heard.load() < longest->heard.load()))
+            longest = at;
+    if (longest == clients_.end() || Clock::now() - longest->heard.load() < least) return false;
+    longest->socket.shut();
+    longest->thread.join();
+    clients_.erase(longest);
+    return true;
+}
+
+bool Server::make_room() {
+    const size_t placed = clients_.size() - count(&Client::waiting);
+    return placed < size_t(kMostClients) || end_silent(false, silence_);
+}
+
 void Server::listen() {
     while (!stop_) {
         Socket socket = listener_.accept(kAcceptSeconds);
         forget_finished();
         if (!socket || stop_) continue;
-        if (clients_.size() >= size_t(kMostClients)) {
-            socket.send("no there are " + std::to_string(kMostClients) + " connections already\n", 1);
+        const bool waiting = !make_room();
+        const bool full = waiting && count(&Client::waiting) >= size_t(kMostClients) &&
+                          !end_silent(true, Clock::duration::zero());
+        if (full) {
+            socket.send(kFull, 1);
             continue;
         }
         Client& client = clients_.emplace_back();
+        client.waiting = waiting;
         client.socket = std::move(socket);
         client.thread = std::thread([this, &client] { serve(client); });
     }
 }
 
 void Server::serve(Client& client) {
-    Rights rights;
     try {
         while (!stop_) {
-            const auto request = client.socket.receive_line(kMostRequest, kPatience);
-            if (!request || !answer(client, *request, rights)) break;
+            const auto request =
+                client.socket.receive_line(kMostRequest, client.waiting ? kSilence : kPatience);
+            if (!request) break;
+            client.asking = true;
+            const bool goes_on = answer(client, *request);
+            client.heard = Clock::now();
+            client.asking = false;
+            if (!goes_on) break;
         }
     } catch (const std::exception&) {
         // Out of memory for one who watches: the connection ends, the training does not.
     }
+    if (client.trusted) --trusted_;
     // Nobody is left who could say go.
-    if (rights.paused) paused_ = false;
+    if (client.paused) paused_ = false;
     client.socket.shut();
     client.done = true;
 }
@@ -144,15 +178,36 @@ std::shared_ptr<const Snapshot> Server::splats_after(int step) {
     return snapshot_ && snapshot_->step > step ? snapshot_ : nullptr;
 }
 
-bool Server::answer(Client& client, const std::string& request, Rights& rights) {
+bool Server::take_token(Client& client, const std::string& token) {
+    const Socket& socket = client.socket;
+    if (token_.empty() || !same_secret(token, token_)) {
+        socket.send("no another token\n", 1);
+        return false;
+    }
+    if (client.waiting && trusted_ >= kMostClients) {
+        socket.send(kFull, 1);
+        return false;
+    }
+    if (!client.trusted) ++trusted_;
+    client.trusted = true;
+    client.waiting = false;
+    return give(socket, std::string());
+}
+
+bool Server::answer(Client& client, const std::string& request) {
     const Socket& socket = client.socket;
     std::string_view rest = request;
     const std::string_view word = core::next_word(rest);
     const std::string argument(core::trim(rest));
     if (request == kHello) return give(socket, std::string());
+    if (word == "token") return take_token(client, argument);
+    if (client.waiting) {
+        socket.send(kFull, 1);
+        return false;
+    }
     if (word == "status") {
         const auto line = core::parse_integer<uint32_t>(argument);
-        return line ? give(socket, status_from(*line, rights.trusted))
+        return line ? give(socket, status_from(*line, client.trusted))
                     : socket.send("no status wants a number\n", 1);
     }
     if (word == "splats") {
@@ -161,19 +216,13 @@ bool Server::answer(Client& client, const std::string& request, Rights& rights) 
         const auto snapshot = splats_after(*step);
         return give(socket, snapshot ? encode(*snapshot) : std::vector<std::byte>());
     }
-    if (word == "token") {
-        rights.trusted = !token_.empty() && same_secret(argument, token_);
-        if (rights.trusted) return give(socket, std::string());
-        socket.send("no another token\n", 1);
-        return false;
-    }
     if (word != "pause" && word != "go" && word != "save")
         return socket.send("no there is no such request\n", 1);
-    if (!rights.trusted) return socket.send("no this needs the token\n", 1);
+    if (!client.trusted) return socket.send("no this needs the token\n", 1);
     if (word == "save")
         save_ = true;
     else
-        paused_ = rights.paused = word == "pause";
+        paused_ = client.paused = word == "pause";
     return give(socket, std::string());
 }
 

@@ -17,9 +17,10 @@ namespace ewa::live {
 
 class Server {
   public:
-    /// token: what commands are taken for; empty: from nobody. Throws RunError where the address cannot be
-    /// listened on.
-    Server(const std::string& address, uint16_t port, std::string token);
+    /// token: what commands are taken for; empty: from nobody. silence: after which one's place may go to a
+    /// newcomer. Throws RunError where the address cannot be listened on.
+    Server(const std::string& address, uint16_t port, std::string token,
+           std::chrono::seconds silence = std::chrono::seconds(kSilence));
     ~Server();
     Server(const Server&) = delete;
     Server& operator=(const Server&) = delete;
@@ -46,15 +47,23 @@ class Server {
         Socket socket;
         std::thread thread;
         std::atomic<bool> done = false;
-    };
-    struct Rights {
-        bool trusted = false,
-             paused = false;  // whether it has shown the token; whether it holds the training
+        std::atomic<bool> trusted = false;                    // it has shown the token
+        std::atomic<bool> waiting = false;                    // it has no place, and has to show the token
+        std::atomic<bool> asking = false;                     // a request of it is being answered
+        std::atomic<Clock::time_point> heard = Clock::now();  // the end of its last request
+        bool paused = false;                                  // it holds the training
     };
     void listen();
+    /// Whether there is a place for a newcomer, once one that is silent has given way.
+    bool make_room();
+    /// Ends the one silent longest, for `least` at least, of those without the token that wait or that do
+    /// not.
+    bool end_silent(bool waiting, Clock::duration least);
+    size_t count(std::atomic<bool> Client::*which) const;
     void serve(Client& client);
     /// False: the connection ends.
-    bool answer(Client& client, const std::string& request, Rights& rights);
+    bool answer(Client& client, const std::string& request);
+    bool take_token(Client& client, const std::string& token);
     bool give(const Socket& socket, std::span<const std::byte> payload) const;
     bool give(const Socket& socket, const std::string& payload) const;
     std::string status_from(size_t line, bool trusted) const;
@@ -62,12 +71,14 @@ class Server {
     void forget_finished();
 
     const std::string token_;
+    const Clock::duration silence_;
     Listener listener_;
     mutable std::mutex mutex_;
     Status status_;
     std::shared_ptr<const Snapshot> snapshot_;
     Clock::time_point next_snapshot_;
     std::list<Client> clients_;
+    std::atomic<int> trusted_ = 0;  // of the clients
     std::atomic<bool> wanted_ = false, paused_ = false, save_ = false, stop_ = false;
     std::thread thread_;  // last
 };

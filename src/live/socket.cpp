@@ -51,7 +51,9 @@ Addresses look_up(const std::string& host, uint16_t port, bool passive) {
     hints.ai_socktype = SOCK_STREAM;
     hints.ai_flags = passive ? AI_PASSIVE | AI_NUMERICHOST : 0;
     const int status = getaddrinfo(host.c_str(), std::to_string(port).c_str(), &hints, &found);
-    if (status != 0) throw RunError("the address " + host + " is not found: " + gai_strerror(status));
+    if (status != 0)
+        throw RunError("the address " + host + " is not found: " +
+                       (status == EAI_SYSTEM ? std::strerror(errno) : gai_strerror(status)));
     return {found, freeaddrinfo};
 }
 
@@ -120,7 +122,7 @@ Socket connect_to(const std::string& host, uint16_t port, int seconds, const std
     std::string reason = "no address";
     for (const addrinfo* at = addresses.get(); at; at = at->ai_next) {
         Socket socket(::socket(at->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0), stop);
-        int status = ::connect(socket.descriptor(), at->ai_addr, at->ai_addrlen);
+        int status = socket ? ::connect(socket.descriptor(), at->ai_addr, at->ai_addrlen) : -1;
         if (status != 0 && errno == EINPROGRESS) {
             if (!ready(socket.descriptor(), POLLOUT, after(seconds), stop)) {
                 reason = "no answer";
@@ -143,10 +145,10 @@ Listener::Listener(const std::string& address, uint16_t port) {
     const addrinfo& at = *addresses;
     socket_ = Socket(::socket(at.ai_family, SOCK_STREAM | SOCK_CLOEXEC, 0));
     const int yes = 1;
-    setsockopt(socket_.descriptor(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
     sockaddr_storage own{};
     socklen_t size = sizeof(own);
-    if (!socket_ || ::bind(socket_.descriptor(), at.ai_addr, at.ai_addrlen) != 0 ||
+    if (!socket_ || ::setsockopt(socket_.descriptor(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes)) != 0 ||
+        ::bind(socket_.descriptor(), at.ai_addr, at.ai_addrlen) != 0 ||
         ::listen(socket_.descriptor(), 4) != 0 ||
         getsockname(socket_.descriptor(), reinterpret_cast<sockaddr*>(&own), &size) != 0)
         throw RunError("cannot listen on " + address + ":" + std::to_string(port) + ": " +

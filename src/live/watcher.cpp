@@ -1,16 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "live/watcher.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
-#include <cerrno>
 #include <chrono>
-#include <cstring>
 #include <fstream>
 #include <utility>
 
+#include "core/atomic_file.h"
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
 
@@ -54,18 +49,7 @@ std::optional<LiveFile> read_live_file(const fs::path& folder) {
 
 void write_live_file(const fs::path& folder, const LiveFile& live) {
     const std::string text = Json{{"port", live.port}, {"token", live.token}}.dump() + "\n";
-    const fs::path path = folder / kLiveFile, beside = folder / (std::string(kLiveFile) + ".new");
-    const int descriptor =
-        ::open(beside.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0600);
-    const bool written = descriptor >= 0 && ::fchmod(descriptor, 0600) == 0 &&
-                         ::write(descriptor, text.data(), text.size()) == ssize_t(text.size());
-    const int reason = errno;
-    if (descriptor >= 0) ::close(descriptor);
-    std::error_code error;
-    if (written) fs::rename(beside, path, error);
-    if (!written || error)
-        throw RunError("cannot write " + path.string() + ": " +
-                       (error ? error.message() : std::strerror(reason)));
+    core::write_text_file(folder / kLiveFile, text, core::AtomicFile::Readers::owner);
 }
 
 Watcher::Watcher(WhatToWatch what, std::function<void()> on_news)
@@ -192,7 +176,12 @@ void Watcher::read_metrics() {
     std::string text = start_of(path, size_t(bytes));
     text.resize(text.rfind('\n') == std::string::npos ? 0
                                                       : text.rfind('\n') + 1);  // a line may be half written
-    std::vector<report::MetricsLine> lines = report::parse_metrics(text);
+    std::vector<report::MetricsLine> lines;
+    try {
+        lines = report::parse_metrics(text);
+    } catch (const InputError& bad) {
+        throw InputError(path.string() + ": " + bad.what());
+    }
     metrics_read_ = bytes;
     if (lines.empty()) return;
     change([&](Update& update) {

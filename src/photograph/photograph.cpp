@@ -97,13 +97,14 @@ class Run {
         const bool same =
             earlier && earlier->exposure && earlier->fingerprint == record_["fingerprint"].get<std::string>();
         if (!same) remove_views();
-        make_folder(folder_ / "images");
-        make_folder(folder_ / "depth");
-        core::remove_abandoned_files(folder_ / "images");
-        core::remove_abandoned_files(folder_ / "depth");
         result_.exposure = same ? *earlier->exposure : options_.exposure ? *options_.exposure : measured();
         record_["exposure"] = result_.exposure;
+        // Before the folders: without it, they would be taken for another's.
         core::write_text_file(folder_ / photograph::kRecord, record_.dump(1) + "\n");
+        for (const char* name : {"images", "depth"}) {
+            make_folder(folder_ / name);
+            core::remove_abandoned_files(folder_ / name);
+        }
     }
 
     /// From a few small pictures.

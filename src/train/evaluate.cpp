@@ -10,11 +10,12 @@ namespace ewa {
 
 Evaluation evaluate(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians, const Dataset& dataset,
                     const std::vector<int>& frames, const RenderOptions& options,
-                    const std::vector<Exposure>& exposures) {
+                    const std::vector<Exposure>& exposures, const std::function<void()>& before_frame) {
     const auto start = std::chrono::steady_clock::now();
     Renderer renderer(std::move(device), gaussians, options);
     Evaluation result;
     for (size_t i = 0; i < frames.size(); ++i) {
+        if (before_frame) before_frame();
         const Frame& frame = dataset.frames[size_t(frames[i])];
         const auto [photo, weights] = load_photograph(frame, options.background);
         Image picture = renderer.render(frame.camera).color;

@@ -34,6 +34,8 @@ namespace fs = std::filesystem;
     dup2(open(out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), STDOUT_FILENO);
     dup2(open(err.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), STDERR_FILENO);
     dup2(open("/dev/null", O_RDONLY), STDIN_FILENO);
+    const rlimit no_core{0, 0};
+    setrlimit(RLIMIT_CORE, &no_core);
     if (file_limit > 0) {
         // Ignored, so that the write fails with EFBIG as it would with ENOSPC.
         std::signal(SIGXFSZ, SIG_IGN);
@@ -45,6 +47,22 @@ namespace fs = std::filesystem;
     argv.push_back(nullptr);
     execv(program.c_str(), argv.data());
     _exit(127);
+}
+
+/// Sends it, and waits until the program, has taken it: a second one would not be told from it.
+void send(pid_t child, int signal) {
+    kill(child, signal);
+    const std::string status = "/proc/" + std::to_string(child) + "/status";
+    for (bool pending = true; pending;) {
+        pending = false;
+        std::ifstream lines(status);
+        for (std::string line; std::getline(lines, line);)
+            if (line.starts_with("State:") && line.find('Z') != std::string::npos)
+                return;
+            else if (line.starts_with("SigPnd:") || line.starts_with("ShdPnd:"))
+                pending |= std::stoull(line.substr(7), nullptr, 16) >> (signal - 1) & 1;
+        if (pending) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
 }
 
 bool has_bytes(const std::string& path) {
@@ -70,7 +88,8 @@ int wait_for(pid_t child, const Circumstances& circumstances) {
         const pid_t ended = waitpid(child, &status, signalled ? 0 : WNOHANG);
         if (ended == child) break;
         if (!signalled && has_bytes(circumstances.await_file)) {
-            if (circumstances.signal != 0) kill(child, circumstances.signal);
+            for (int i = 0; i < circumstances.times && circumstances.signal != 0; ++i)
+                send(child, circumstances.signal);
             if (circumstances.then) circumstances.then();
             signalled = true;
         }
@@ -107,7 +126,7 @@ Image disc(int width, int height, double shade) {
 Outcome run_ewa(const std::vector<std::string>& arguments, const Circumstances& circumstances) {
     const Folder folder;
     const std::string out = circumstances.out_path.empty() ? folder / "out" : circumstances.out_path;
-    const std::string err = folder / "err";
+    const std::string err = circumstances.err_path.empty() ? folder / "err" : circumstances.err_path;
     const std::string program = circumstances.program.empty() ? EWA_PROGRAM : circumstances.program;
     const pid_t child = fork();
     if (child < 0) throw std::runtime_error("fork failed");
@@ -115,7 +134,7 @@ Outcome run_ewa(const std::vector<std::string>& arguments, const Circumstances& 
     Outcome outcome;
     outcome.status = wait_for(child, circumstances);
     if (circumstances.out_path.empty()) outcome.out = read_file(out);
-    outcome.err = without_counters(read_file(err));
+    if (circumstances.err_path.empty()) outcome.err = without_counters(read_file(err));
     return outcome;
 }
 

@@ -216,7 +216,12 @@ TEST(Outputs, StandardOutputThatIsFull) {
     make_splats(folder / "s.ply");
     Circumstances full;
     full.out_path = "/dev/full";
-    expect_failure(run_ewa({"info", folder / "s.ply"}, full), 1, "standard output");
+    expect_failure(run_ewa({"info", folder / "s.ply"}, full), 1, "standard output: No space left");
+    // What was lost on the way is not forgotten where the last line fits.
+    make_dataset(folder / "data");
+    expect_failure(
+        run_ewa({"render", folder / "s.ply", "--cameras", folder / "data", "-o", folder / "r"}, full), 1,
+        "standard output");
 }
 
 TEST(Outputs, FullDiskLeavesNoHalfFile) {

@@ -2,7 +2,11 @@
 // A training that was ended, by Ctrl-C or kill -9, and goes on.
 #include <gtest/gtest.h>
 
+#include <zlib.h>
+
+#include <algorithm>
 #include <csignal>
+#include <cstring>
 #include <sstream>
 
 #include "cli/expect.h"
@@ -123,6 +127,42 @@ TEST_F(ResumeEdges, RefusesWhatWouldEndDifferently) {
     refused({}, "checksum");
     write_file(folder / "o/checkpoint.ewa", "ply");
     refused({}, "not a checkpoint");
+}
+
+/// A checkpoint whose section `section` has other bytes or another name, and the checksum that goes with
+/// them.
+std::string with_section(std::string checkpoint, const std::string& section, const std::string& name,
+                         char filler) {
+    constexpr size_t kStart = 16, kHeader = 32, kChecksum = 24;
+    for (size_t at = kStart; at < checkpoint.size();) {
+        uint64_t bytes = 0;
+        std::memcpy(&bytes, &checkpoint[at + 16], sizeof(bytes));
+        if (checkpoint.c_str() + at == section) {
+            std::copy(name.begin(), name.end(), checkpoint.begin() + std::ptrdiff_t(at));
+            if (filler) std::fill_n(checkpoint.begin() + std::ptrdiff_t(at + kHeader), bytes, filler);
+            const auto* begin = reinterpret_cast<const Bytef*>(&checkpoint[at]);
+            const auto sum = uint32_t(crc32_z(crc32_z(0, begin, kChecksum), begin + kHeader, size_t(bytes)));
+            std::memcpy(&checkpoint[at + kChecksum], &sum, sizeof(sum));
+            return checkpoint;
+        }
+        at += kHeader + bytes;
+    }
+    ADD_FAILURE() << "there is no section " << section;
+    return checkpoint;
+}
+
+TEST_F(ResumeEdges, NamesACheckpointThatIsWholeButWrong) {
+    const Names options{"--steps", "3", "--resume"};
+    expect_success(train("o", options));
+    const std::string path = folder / "o/checkpoint.ewa", good = read_file(path);
+    write_file(path, with_section(good, "moments2", "momentsX", 0));
+    expect_failure(train("o", options), 2, path + ": the state to go on from lacks moments2");
+    write_file(path, with_section(good, "metrics", "metrics", 'x'));
+    expect_failure(train("o", options), 2, path + ": line 1 of the metrics");
+    write_file(path, with_section(good, "settings", "settings", '['));
+    expect_failure(train("o", options), 2, path + ": its settings");
+    write_file(path, with_section(good, "settings", "settings", 0));
+    expect_success(train("o", options));
 }
 
 }  // namespace

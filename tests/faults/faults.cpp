@@ -6,12 +6,15 @@
 //   EWA_FAULT_ACQUIRE=N,R    the N-th picture of a window cannot be had: the VkResult R
 //   EWA_FAULT_PRESENT=N,R    the N-th picture of a window is shown with the VkResult R
 //   EWA_FAULT_BYTES=N        the disk is full once N bytes have been written to regular files
+//   EWA_FAULT_FSYNC=N        from the N-th on, regular files cannot be brought to the disk: a quota's end
+//   EWA_FAULT_CLOSE=N        the same of closing a regular file that has been written
 //   EWA_FAULT_READ_ONLY=DIR  nothing below DIR can be created, changed or removed
 //   EWA_FAULT_KILL=N         the program is killed at the N-th submission, file opened for writing, write
-//   (half of it done),
-//                            renaming or removal, whichever it is
+//                            (half of it done), renaming or removal, whichever it is
+//   EWA_FAULT_SIGNAL=N,S     the signal S arrives at the N-th submission or opening, writing, renaming or
+//                            removal of a file of core/atomic_file.h, and at each one after it
 //   EWA_FAULT_HOLD=N:FILE    the N-th submission makes FILE and waits until it is gone: the test does in
-//   between what it likes
+//                            between what it likes
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -40,12 +43,17 @@ bool due(const char* variable, std::atomic<long>& calls) {
     return from && ++calls >= std::atol(from);
 }
 
+int second_number(const char* variable) {
+    const char* comma = std::strchr(std::getenv(variable), ',');
+    if (!comma) std::abort();
+    return int(std::atol(comma + 1));
+}
+
 /// The result that this call of those that `variable` counts is to have, or the one it has.
 VkResult instead(const char* variable, std::atomic<long>& calls, VkResult result) {
     const char* from = std::getenv(variable);
     if (!from || ++calls != std::atol(from)) return result;
-    const char* comma = std::strchr(from, ',');
-    return comma ? VkResult(std::atol(comma + 1)) : result;
+    return VkResult(second_number(variable));
 }
 
 bool read_only(const char* path) {
@@ -60,10 +68,26 @@ int refuse() {
     return -1;
 }
 
-/// Whether this is the moment at which EWA_FAULT_KILL ends the program.
-bool last_moment() {
-    static std::atomic<long> calls{0};
+/// One more of the moments that EWA_FAULT_KILL counts; whether it ends the program. own: it is none of the
+/// driver's, whose number is not the program's to know, and EWA_FAULT_SIGNAL counts it too.
+bool last_moment(bool own) {
+    static std::atomic<long> calls{0}, signals{0};
+    if (own && due("EWA_FAULT_SIGNAL", signals)) raise(second_number("EWA_FAULT_SIGNAL"));
     return due("EWA_FAULT_KILL", calls);
+}
+
+/// The temporary that was opened last.
+std::atomic<int> temporary{-1};
+
+bool names_temporary(const char* path) {
+    const char* slash = std::strrchr(path, '/');
+    return std::strncmp(slash ? slash + 1 : path, ".ewa-", 5) == 0;
+}
+
+bool regular(int file, bool written) {
+    struct stat status {};
+    return fstat(file, &status) == 0 && S_ISREG(status.st_mode) &&
+           (!written || (fcntl(file, F_GETFL) & O_ACCMODE) != O_RDONLY);
 }
 
 void die() {
@@ -98,7 +122,7 @@ VkResult vkAllocateMemory(VkDevice device, const VkMemoryAllocateInfo* info,
 VkResult vkQueueSubmit(VkQueue queue, uint32_t count, const VkSubmitInfo* submits, VkFence fence) {
     static std::atomic<long> calls{0};
     if (due("EWA_FAULT_SUBMITS", calls)) return VK_ERROR_DEVICE_LOST;
-    if (last_moment()) die();
+    if (last_moment(true)) die();
     hold();
     return next<PFN_vkQueueSubmit>("vkQueueSubmit")(queue, count, submits, fence);
 }
@@ -129,9 +153,8 @@ VkResult vkQueuePresentKHR(VkQueue queue, const VkPresentInfoKHR* info) {
 ssize_t write(int file, const void* bytes, size_t count) {
     static std::atomic<long> written{0};
     const auto real = next<ssize_t (*)(int, const void*, size_t)>("write");
-    struct stat status {};
-    if (file <= 2 || fstat(file, &status) != 0 || !S_ISREG(status.st_mode)) return real(file, bytes, count);
-    if (last_moment()) {
+    if (file <= 2 || !regular(file, true)) return real(file, bytes, count);
+    if (last_moment(file == temporary)) {
         (void)!real(file, bytes, count / 2);
         die();
     }
@@ -154,19 +177,40 @@ int open(const char* path, int flags, ...) {
     va_end(arguments);
     const bool writing = flags & (O_WRONLY | O_RDWR | O_CREAT);
     if (writing && read_only(path)) return refuse();
-    if (writing && last_moment()) die();
-    return next<int (*)(const char*, int, ...)>("open")(path, flags, mode);
+    const bool own = writing && names_temporary(path);
+    if (writing && last_moment(own)) die();
+    const int file = next<int (*)(const char*, int, ...)>("open")(path, flags, mode);
+    if (own) temporary = file;
+    return file;
+}
+
+int fsync(int file) {
+    static std::atomic<long> calls{0};
+    if (regular(file, true) && due("EWA_FAULT_FSYNC", calls)) {
+        errno = EDQUOT;
+        return -1;
+    }
+    return next<int (*)(int)>("fsync")(file);
+}
+
+int close(int file) {
+    static std::atomic<long> calls{0};
+    const bool full = std::getenv("EWA_FAULT_CLOSE") && regular(file, true) && due("EWA_FAULT_CLOSE", calls);
+    const int result = next<int (*)(int)>("close")(file);
+    if (!full || result != 0) return result;
+    errno = EDQUOT;
+    return -1;
 }
 
 int rename(const char* from, const char* to) {
     if (read_only(from) || read_only(to)) return refuse();
-    if (last_moment()) die();
+    if (last_moment(names_temporary(from))) die();
     return next<int (*)(const char*, const char*)>("rename")(from, to);
 }
 
 int unlink(const char* path) {
     if (read_only(path)) return refuse();
-    if (last_moment()) die();
+    if (last_moment(names_temporary(path))) die();
     return next<int (*)(const char*)>("unlink")(path);
 }
 }

@@ -183,14 +183,55 @@ TEST(LiveServer, StrangersAreTurnedAway) {
             return false;
         }
     }));
-    std::vector<Socket> many;
-    for (int i = 0; i < kMostClients; ++i) many.push_back(connect_to("127.0.0.1", server.port(), kPatience));
-    for (const Socket& socket : many) socket.send(std::string(kHello) + "\n", kPatience);
-    EXPECT_TRUE(soon([&] {
-        const Socket socket = connect_to("127.0.0.1", server.port(), kPatience);
-        const auto line = socket.receive_line(200, kPatience);
-        return line && line->rfind("no there are", 0) == 0;
-    }));
+}
+
+/// As many as there are places, each with an answer had.
+std::vector<Socket> all_places(const Server& server) {
+    std::vector<Socket> taken;
+    for (int i = 0; i < kMostClients; ++i) {
+        taken.push_back(connect_to("127.0.0.1", server.port(), kPatience));
+        taken.back().send(std::string(kHello) + "\n", kPatience);
+        EXPECT_EQ(taken.back().receive_line(200, kPatience), "ok 0");
+    }
+    return taken;
+}
+
+bool answers(const Socket& socket) {
+    return socket.send("status x\n", kPatience) && socket.receive_line(200, kPatience);
+}
+
+TEST(LiveServer, WhoIsSilentGivesWay) {
+    Server server("127.0.0.1", 0, "secret", std::chrono::seconds(0));
+    const std::vector<Socket> taken = all_places(server);
+    ASSERT_TRUE(answers(taken[0]));  // the second has been silent longest now
+    Client newcomer = client_of(server);
+    EXPECT_EQ(newcomer.status(0).step, 0);
+    EXPECT_FALSE(answers(taken[1]));
+    for (size_t i = 2; i < taken.size(); ++i) EXPECT_TRUE(answers(taken[i])) << i;
+    EXPECT_TRUE(answers(taken[0]));
+}
+
+TEST(LiveServer, StrangersCannotShutOutTheOwner) {
+    Server server("127.0.0.1", 0, "secret", std::chrono::hours(1));
+    const std::vector<Socket> taken = all_places(server);
+    try {
+        client_of(server).status(0);
+        ADD_FAILURE() << "there was a place too many";
+    } catch (const InputError& error) {
+        EXPECT_NE(std::string(error.what()).find("8 connections"), std::string::npos) << error.what();
+    }
+    EXPECT_THROW(client_of(server, "secreT"), InputError);
+    std::vector<Socket> crowd;  // that says nothing, where the token would be shown
+    for (int i = 0; i < 3 * kMostClients; ++i)
+        crowd.push_back(connect_to("127.0.0.1", server.port(), kPatience));
+    Client owner = client_of(server, "secret");
+    EXPECT_TRUE(owner.status(0).commands);
+    owner.command("pause");
+    EXPECT_TRUE(server.paused());
+    for (int i = 0; i < 3 * kMostClients; ++i)
+        crowd.push_back(connect_to("127.0.0.1", server.port(), kPatience));
+    EXPECT_EQ(owner.status(0).state, State::paused);
+    for (const Socket& socket : taken) EXPECT_TRUE(answers(socket));
 }
 
 TEST(LiveServer, EndsWhileSomebodyLooksOn) {
@@ -204,6 +245,12 @@ TEST(LiveServer, EndsWhileSomebodyLooksOn) {
 TEST(LiveFiles, TheTokenIsTheOwnersAlone) {
     const TempFolder folder;
     EXPECT_FALSE(read_live_file(folder.path()));
+    // What is there of others' is not written to, nor does it make the token another's to read.
+    const auto others = folder.write("others.txt", "theirs");
+    std::filesystem::create_symlink(others, folder.path() / kLiveFile);
+    write_live_file(folder.path(), {7001, "abc"});
+    EXPECT_EQ(test::file_bytes(others), "theirs");
+    chmod((folder.path() / kLiveFile).c_str(), 0644);
     write_live_file(folder.path(), {7001, "abc"});
     struct stat facts {};
     ASSERT_EQ(stat((folder.path() / kLiveFile).c_str(), &facts), 0);
@@ -235,7 +282,8 @@ TEST(LiveWatcher, FollowsARunByItsFiles) {
     watcher.command("pause");
     EXPECT_TRUE(soon([&] { return watcher.update().problem.find("--serve") != std::string::npos; }));
     folder.write("metrics.jsonl", "nonsense\n");
-    EXPECT_TRUE(soon([&] { return watcher.update().problem.find("line 1") != std::string::npos; }));
+    EXPECT_TRUE(
+        soon([&] { return watcher.update().problem.find("metrics.jsonl: line 1") != std::string::npos; }));
 }
 
 TEST(LiveWatcher, FollowsARunByItsConnection) {

@@ -3,6 +3,8 @@
 #include <sys/stat.h>
 
 #include <csignal>
+#include <memory>
+#include <vector>
 
 #include "core/atomic_file.h"
 #include "support/temp_folder.h"
@@ -74,6 +76,42 @@ TEST(AtomicFile, KeepsPermissionsAndFollowsLinks) {
     struct stat status {};
     stat(path.c_str(), &status);
     EXPECT_EQ(status.st_mode & 0777, 0640u);
+}
+
+TEST(AtomicFile, ForTheOwnerAlone) {
+    TempFolder folder;
+    const auto path = folder.write("a.txt", "old"), others = folder.write("b.txt", "theirs");
+    std::filesystem::create_symlink("b.txt", folder / "link");
+    for (const auto& written : {path, folder / "link"}) {
+        core::write_text_file(written, "secret", AtomicFile::Readers::owner);
+        EXPECT_EQ(file_bytes(written), "secret");
+        struct stat status {};
+        lstat(written.c_str(), &status);
+        EXPECT_TRUE(S_ISREG(status.st_mode));
+        EXPECT_EQ(status.st_mode & 0777, 0600u);
+    }
+    EXPECT_EQ(file_bytes(others), "theirs");
+}
+
+// More at a time than the list holds, over and over: each that is listed goes, no other file does.
+TEST(AtomicFile, ASignalsHandlerRemovesWhatIsUnfinished) {
+    TempFolder folder;
+    for (int round = 0; round < 3; ++round) {
+        core::write_text_file(folder / "whole.txt", "whole");
+        {
+            AtomicFile one(folder / "one.txt"), two(folder / "two.txt");
+            one.write("text");
+            EXPECT_EQ(files_in(folder.path()), 3u);
+            core::remove_unfinished_files();
+            EXPECT_EQ(files_in(folder.path()), 1u);
+            std::vector<std::unique_ptr<AtomicFile>> many;
+            for (int i = 0; i < 20; ++i)
+                many.push_back(std::make_unique<AtomicFile>(folder / std::to_string(i)));
+            core::remove_unfinished_files();
+        }
+        EXPECT_EQ(files_in(folder.path()), 1u);
+    }
+    EXPECT_EQ(file_bytes(folder / "whole.txt"), "whole");
 }
 
 TEST(AtomicFile, TakesTheLongestName) {

@@ -103,7 +103,7 @@ TEST(Latest, WhatWaitsGivesWayToTheLast) {
         latest.ask(3);
         EXPECT_EQ(latest.result(), nullptr) << "asking does not wait";
         go_on.set_value();
-        for (int i = 0; i < 1000 && news < 2; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        for (int i = 0; i < 6000 && news < 2; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
         ASSERT_TRUE(latest.result());
         EXPECT_EQ(*latest.result(), 30);
     }

@@ -81,7 +81,7 @@ TEST_F(Drop, WhatCannotBeReadIsSaid) {
         for (const char* name : {"notes.txt", "broken.ply", "absent.ply"}) {
             const Image before = x_->pixels_at_rest(window());
             EXPECT_TRUE(x_->drop(window(), uri_of(folder_ / name)));
-            const Image after = x_->pixels_at_rest(window());
+            const Image after = x_->pixels_at_rest(window(), &before);
             EXPECT_GT(largest_difference(before, after), 0.3f) << name << " is not spoken of";
             EXPECT_TRUE(x_->window_titled("splats.ply - ewa", 1)) << name;
             EXPECT_EQ(largest_difference(screenshot(session), picture), 0) << name;

@@ -36,7 +36,7 @@ std::shared_ptr<const Gaussians> red_splat() {
 
 template <class Holds>
 bool soon(Holds holds) {
-    for (int i = 0; i < 3000; ++i) {
+    for (int i = 0; i < 6000; ++i) {
         if (holds()) return true;
         std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }

@@ -56,7 +56,7 @@ TEST_F(Training, OfItsOwnGoesOnUntilItsEnd) {
 
 TEST_F(Training, OfItsOwnIsSavedWhenTheWindowIsClosed) {
     Session session(shots_,
-                    {"--train", cameras_, "-o", run_, "--init", splats_, "--steps", "20000", "--quiet"});
+                    {"--train", cameras_, "-o", run_, "--init", splats_, "--steps", "1000000", "--quiet"});
     ASSERT_TRUE(session.found());
     ASSERT_TRUE(session.awaited(run_ + "/live.json"));
     session.send("sleep 2");

@@ -154,8 +154,13 @@ Image XClient::pixels(uint32_t window) const {
     return image;
 }
 
-Image XClient::pixels_at_rest(uint32_t window) const {
+Image XClient::pixels_at_rest(uint32_t window, const Image* before) const {
     Image last = pixels(window);
+    for (const auto until = Clock::now() + kPatience; before && Clock::now() < until;) {
+        if (last.pixels != before->pixels) break;
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        last = pixels(window);
+    }
     for (int i = 0, equal = 0; i < 200 && equal < 10; ++i) {
         std::this_thread::sleep_for(std::chrono::milliseconds(50));
         Image now = pixels(window);

@@ -21,8 +21,9 @@ class XClient {
     std::optional<uint32_t> window_titled(const std::string& end, double seconds = 60) const;
     /// RGB, as it stands on the display: panel, hint and all.
     Image pixels(uint32_t window) const;
-    /// The same once nothing has moved for half a second, or after ten.
-    Image pixels_at_rest(uint32_t window) const;
+    /// The same once nothing has moved for half a second, or after ten. before: not until something else than
+    /// this is there.
+    Image pixels_at_rest(uint32_t window, const Image* before = nullptr) const;
     /// What desktop settings say that clients should know, e.g. "Xft.dpi: 192".
     void set_resources(const std::string& text) const;
 
