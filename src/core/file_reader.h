@@ -12,10 +12,10 @@
 
 namespace ewa::core {
 
-/// Buffered reader of a regular file of known size, from front to back but for go_to. Every read is checked against what the file still holds,
-/// and what cannot be read is an InputError "path: byte N: ...", so no claim inside a file makes memory be
-/// taken for data that is not there. The file is read, not mapped: one that shrinks meanwhile is an error and
-/// not a SIGBUS.
+/// Buffered reader of a regular file of known size, from front to back but for go_to. Every read is checked
+/// against what the file still holds, and what cannot be read is an InputError "path: byte N: ...", so no
+/// claim inside a file makes memory be taken for data that is not there. The file is read, not mapped: one
+/// that shrinks meanwhile is an error and not a SIGBUS.
 class FileReader {
   public:
     /// Throws InputError when there is no such file, it is not a regular file or cannot be opened.

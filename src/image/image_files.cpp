@@ -39,9 +39,8 @@ image::Format checked_format(const std::filesystem::path& path, bool whole) {
 
 /// Through OpenImageIO, by the format's name: from the file's it would choose the reader by extension.
 std::unique_ptr<OIIO::ImageInput> open_image(const std::filesystem::path& path, image::Format format) {
-    static const bool limited =
-        OIIO::attribute("limits:imagesize_MB", int(image::kMaxDecodedBytes >> 20)) &&
-        OIIO::attribute("limits:channels", int(image::kMaxChannels));
+    static const bool limited = OIIO::attribute("limits:imagesize_MB", int(image::kMaxDecodedBytes >> 20)) &&
+                                OIIO::attribute("limits:channels", int(image::kMaxChannels));
     if (!limited) throw RunError("OpenImageIO has no limits of pictures' sizes");
     auto input = OIIO::ImageInput::create(image::plugin_of(format));
     if (!input) fail(path, OIIO::geterror());
@@ -51,6 +50,8 @@ std::unique_ptr<OIIO::ImageInput> open_image(const std::filesystem::path& path, 
     if (!input->open(path.string(), spec, request)) fail(path, input->geterror());
     if (spec.width < 1 || spec.height < 1 || spec.depth > 1 || spec.nchannels < 1 || spec.deep)
         fail(path, "it is not a two-dimensional picture");
+    if (format == image::Format::webp && spec.nchannels != 3)
+        fail(path, "the WebP is transparent; convert it to PNG");
     return input;
 }
 

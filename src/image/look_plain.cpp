@@ -48,20 +48,26 @@ Claim look_at_webp(core::FileReader& reader) {
     reader.skip(4, what);
     Claim claim{0, 0, 4, 1};
     const std::byte* data = reader.take(10, what);
+    bool transparent = false;
     if (type == "VP8X") {
-        if ((data[0] & std::byte(2)) != std::byte(0)) reader.fail("the WebP is a film; a picture is wanted");
+        if ((data[0] & std::byte(0x02)) != std::byte(0))
+            reader.fail("the WebP is a film; a picture is wanted");
+        transparent = (data[0] & std::byte(0x10)) != std::byte(0);
         claim.width = little_endian(data + 4, 3) + 1;
         claim.height = little_endian(data + 7, 3) + 1;
     } else if (type == "VP8L") {
         const uint64_t sizes = little_endian(data + 1, 4);
         claim.width = (sizes & 0x3fff) + 1;
         claim.height = (sizes >> 14 & 0x3fff) + 1;
+        transparent = (sizes >> 28 & 1) != 0;
     } else if (type == "VP8 ") {
         claim.width = little_endian(data + 6, 2) & 0x3fff;
         claim.height = little_endian(data + 8, 2) & 0x3fff;
     } else {
         reader.fail("the WebP begins with no picture");
     }
+    // OpenImageIO multiplies colour by alpha there, whatever it is asked.
+    if (transparent) reader.fail("the WebP is transparent; convert it to PNG");
     check_claim(reader, claim);
     return claim;
 }
@@ -108,8 +114,8 @@ Claim look_at_hdr(core::FileReader& reader) {
     } while (!line.empty());
     reader.read_line(line, kMaxLine);
     std::string_view rest = line;
-    const std::string_view y = core::next_word(rest), rows = core::next_word(rest),
-                           x = core::next_word(rest), columns = core::next_word(rest);
+    const std::string_view y = core::next_word(rest), rows = core::next_word(rest), x = core::next_word(rest),
+                           columns = core::next_word(rest);
     const auto height = core::parse_integer<uint32_t>(rows), width = core::parse_integer<uint32_t>(columns);
     if (y != "-Y" || x != "+X" || !height || !width)
         reader.fail("the HDR's size is not written as -Y height +X width");

@@ -37,11 +37,16 @@ constexpr std::array<uint64_t, 6> kCompressions = {kNotPacked, 5, 7, 8, 32946, 3
 /// Bytes of an unsigned integer of a TIFF type; 0 for the other types.
 int width_of(uint64_t type) {
     switch (type) {
-        case 1: return 1;
-        case 3: return 2;
-        case 4: return 4;
-        case 16: return 8;
-        default: return 0;
+        case 1:
+            return 1;
+        case 3:
+            return 2;
+        case 4:
+            return 4;
+        case 16:
+            return 8;
+        default:
+            return 0;
     }
 }
 
