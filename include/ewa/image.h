@@ -33,9 +33,11 @@ ImageSize read_image_size(const std::filesystem::path& path);
 /// The picture turned as EXIF's orientation (1..8) says; 5 to 8 exchange width and height.
 Image oriented(const Image& image, int orientation);
 
-/// Any format OpenImageIO reads, as 3 (RGB) or 4 (RGBA, colour not multiplied by alpha) channels; grey
-/// becomes RGB. 16-bit integers become value / 65535, floating-point files stay as they are. EXIF's
-/// orientation is left alone: the pixels come as they are stored. Throws InputError.
+/// PNG, JPEG, TIFF, EXR, WebP, BMP, binary PPM and PGM, and Radiance HDR, known by their first bytes, as 3
+/// (RGB) or 4 (RGBA, colour not multiplied by alpha) channels; grey becomes RGB. 16-bit integers become value
+/// / 65535, floating-point files stay as they are. EXIF's orientation is left alone: the pixels come as they
+/// are stored. At most 200 million pixels, 65,535 in a direction. Throws InputError, also for a file that is
+/// not whole.
 Image load_image(const std::filesystem::path& path);
 
 /// .png: 8 bit, rounded, clamped to [0, 1], NaN as 0. .exr: float32, not clamped. Colour is not multiplied by
@@ -66,14 +68,17 @@ double ssim(const Image& a, const Image& b, const Image& weights);
 /// How far apart two pictures are.
 struct ImageDifference {
     double psnr = 0, ssim = 0;  // as above: RGB, clamped to [0, 1]
-    double max_error = 0;       // of one value, not clamped; +inf where only one of the two is finite
+    // Over all values, alpha included, not clamped. Equal values, infinite or not a number too, differ by 0,
+    // others of which one is not finite by +inf (rms_error: nan where one is not a number).
+    double max_error = 0;
     int max_x = 0, max_y = 0, max_channel = 0;  // where it is; px from the top left corner
-    double mean_error = 0, rms_error = 0;       // over all values, not clamped
-    uint64_t over = 0;                          // pixels with a value further apart than the tolerance
+    double mean_error = 0;                      // of the values that are finite in both
+    double rms_error = 0;
+    uint64_t over = 0;  // pixels with a value further apart than the tolerance
 };
 
-/// OpenImageIO's comparison over the channels that both pictures have, and PSNR and SSIM. tolerance >= 0.
-/// Throws InputError when sizes differ.
+/// OpenImageIO's comparison, and PSNR and SSIM. A picture without alpha is opaque beside one that has it.
+/// tolerance >= 0. Throws InputError when sizes differ.
 ImageDifference compare_images(const Image& a, const Image& b, double tolerance = 0);
 
 }  // namespace ewa

@@ -74,6 +74,16 @@ void FileReader::skip(uint64_t n, std::string_view what) {
     offset_ += n;
 }
 
+void FileReader::go_to(uint64_t offset, std::string_view what) {
+    if (offset > size_)
+        fail("the file ends before " + std::string(what) + ", which is said to be at byte " +
+             std::to_string(offset) + " of " + std::to_string(size_));
+    if (lseek(descriptor_, static_cast<off_t>(offset), SEEK_SET) < 0)
+        fail(std::string("cannot be read: ") + std::strerror(errno));
+    begin_ = end_ = 0;
+    offset_ = offset;
+}
+
 std::string FileReader::read_zero_terminated(size_t limit, std::string_view what) {
     std::string text;
     while (const char c = read<char>(what)) {

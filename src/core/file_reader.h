@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A file read from front to back with every byte accounted for.
+// A file read with every byte accounted for.
 #pragma once
 #include <bit>
 #include <cstddef>
@@ -12,10 +12,10 @@
 
 namespace ewa::core {
 
-/// Buffered reader of a regular file of known size. Every read is checked against what the file still holds,
-/// and what cannot be read is an InputError "path: byte N: ...", so no claim inside a file makes memory be
-/// taken for data that is not there. The file is read, not mapped: one that shrinks meanwhile is an error and
-/// not a SIGBUS.
+/// Buffered reader of a regular file of known size, from front to back but for go_to. Every read is checked
+/// against what the file still holds, and what cannot be read is an InputError "path: byte N: ...", so no
+/// claim inside a file makes memory be taken for data that is not there. The file is read, not mapped: one
+/// that shrinks meanwhile is an error and not a SIGBUS.
 class FileReader {
   public:
     /// Throws InputError when there is no such file, it is not a regular file or cannot be opened.
@@ -26,7 +26,7 @@ class FileReader {
 
     const std::string& name() const { return name_; }
     uint64_t size() const { return size_; }
-    uint64_t offset() const { return offset_; }  // bytes read so far
+    uint64_t offset() const { return offset_; }  // of the next byte
     uint64_t remaining() const { return size_ - offset_; }
 
     /// The next n bytes, valid until the next call. `what` names them in the error.
@@ -42,6 +42,9 @@ class FileReader {
     }
 
     void skip(uint64_t n, std::string_view what);
+
+    /// What is read next begins at this byte. `what` names it in the error where the file has no such byte.
+    void go_to(uint64_t offset, std::string_view what);
 
     /// The text up to a zero byte, which is read too; at most `limit` bytes long.
     std::string read_zero_terminated(size_t limit, std::string_view what);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures on disk, through OpenImageIO.
+// Pictures on disk, through OpenImageIO and libpng.
 #include <OpenImageIO/imageio.h>
 
 #include <algorithm>
@@ -7,49 +7,64 @@
 #include <cstdint>
 #include <memory>
 #include <new>
+#include <stdexcept>
 
 #include "core/atomic_file.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/image.h"
 #include "image/encode.h"
-#include "image/integrity.h"
+#include "image/format.h"
+#include "image/png_file.h"
 
 namespace ewa {
 
 namespace {
 
-// A picture this large has to have a file that could hold it: what formats compress best (a single colour)
-// stays under this ratio, and a damaged header does not make gigabytes be taken.
-constexpr uint64_t kUncheckedBytes = uint64_t(256) << 20;
-constexpr uint64_t kMaxCompression = 5000;
-
 [[noreturn]] void fail(const std::filesystem::path& path, const std::string& reason) {
     throw InputError(core::one_line(path.string() + ": not a readable image: " + reason));
 }
 
-/// whole: the pixels will be read too, so they have to be there.
-std::unique_ptr<OIIO::ImageInput> open_image(const std::filesystem::path& path, bool whole) {
+/// The format, once the file's structure has been looked at.
+image::Format checked_format(const std::filesystem::path& path, bool whole) {
     std::error_code error;
     const std::filesystem::file_status status = std::filesystem::status(path, error);
     if (!std::filesystem::exists(status)) fail(path, "there is no such file");
     if (!std::filesystem::is_regular_file(status)) fail(path, "it is not a regular file");
-    image::check_png(path, whole);
-    if (whole) image::check_jpeg(path);
-    // Colour stays as the file has it; OpenImageIO would multiply it by alpha.
-    OIIO::ImageSpec request;
-    request.attribute("oiio:UnassociatedAlpha", 1);
-    auto input = OIIO::ImageInput::open(path.string(), &request);
+    core::FileReader reader(path);
+    const image::Format format = image::format_of(reader);
+    image::look_at(reader, format, whole);
+    return format;
+}
+
+/// Through OpenImageIO, by the format's name: from the file's it would choose the reader by extension.
+std::unique_ptr<OIIO::ImageInput> open_image(const std::filesystem::path& path, image::Format format) {
+    static const bool limited = OIIO::attribute("limits:imagesize_MB", int(image::kMaxDecodedBytes >> 20)) &&
+                                OIIO::attribute("limits:channels", int(image::kMaxChannels));
+    if (!limited) throw RunError("OpenImageIO has no limits of pictures' sizes");
+    auto input = OIIO::ImageInput::create(image::plugin_of(format));
     if (!input) fail(path, OIIO::geterror());
-    const OIIO::ImageSpec& spec = input->spec();
-    if (spec.width < 1 || spec.height < 1 || spec.depth > 1 || spec.nchannels < 1)
+    // Colour stays as the file has it; OpenImageIO would multiply it by alpha.
+    OIIO::ImageSpec request, spec;
+    request.attribute("oiio:UnassociatedAlpha", 1);
+    if (!input->open(path.string(), spec, request)) fail(path, input->geterror());
+    if (spec.width < 1 || spec.height < 1 || spec.depth > 1 || spec.nchannels < 1 || spec.deep)
         fail(path, "it is not a two-dimensional picture");
-    const double bytes = double(spec.width) * spec.height * spec.nchannels * sizeof(float);
-    const double file_bytes = double(std::filesystem::file_size(path, error));
-    if (bytes > double(kUncheckedBytes) && bytes > file_bytes * kMaxCompression)
-        fail(path, "its header claims " + std::to_string(spec.width) + " x " + std::to_string(spec.height) +
-                       " pixels, too many for its " + std::to_string(int64_t(file_bytes)) + " bytes");
+    if (format == image::Format::webp && spec.nchannels != 3)
+        fail(path, "the WebP is transparent; convert it to PNG");
     return input;
+}
+
+/// What OpenImageIO says of a picture that it has read nevertheless. libjpeg fills what it cannot decode with
+/// grey and only warns; bytes too many between two markers, which cameras leave, cost no pixel.
+void check_complaints(OIIO::ImageInput& input, image::Format format, const std::filesystem::path& path) {
+    if (!input.has_error()) return;
+    const std::string text = input.geterror();
+    const auto says = [&](const char* words) { return text.find(words) != std::string::npos; };
+    if (format == image::Format::jpeg && !says("Premature end") &&
+        (!says("Corrupt JPEG data") || says("extraneous bytes")))
+        return;
+    fail(path, text);
 }
 
 /// The first `channels` channels, as float. Integers are divided by their largest value, rounded once.
@@ -76,40 +91,62 @@ std::vector<float> read_channels(OIIO::ImageInput& input, int channels, const st
     return values;
 }
 
+/// Pixels as a file has them: grey, grey and alpha, RGB, or RGBA.
+struct Stored {
+    ImageSize size;
+    int channels = 0;
+    std::vector<float> values;
+};
+
+Stored read_file(const std::filesystem::path& path, bool pixels) try {
+    const image::Format format = checked_format(path, pixels);
+    Stored out;
+    if (format == image::Format::png) {
+        image::PngPicture png = image::read_png(path, pixels);
+        out = {png.size, png.channels, std::move(png.values)};
+    } else {
+        const auto input = open_image(path, format);
+        const OIIO::ImageSpec& spec = input->spec();
+        out.size = {spec.width, spec.height, spec.get_int_attribute("Orientation", 1),
+                    spec.format == OIIO::TypeDesc::UINT8};
+        // Whatever else a file has (depth, ids) is not colour.
+        const int colors = spec.nchannels < 3 ? 1 : 3;
+        const bool alpha = spec.nchannels > colors && spec.alpha_channel == colors;
+        out.channels = colors + (alpha ? 1 : 0);
+        if (pixels) out.values = read_channels(*input, out.channels, path);
+        check_complaints(*input, format, path);
+    }
+    if (out.size.orientation < 1 || out.size.orientation > 8) out.size.orientation = 1;
+    return out;
+} catch (const std::bad_alloc&) {
+    fail(path, "it is too large for this machine's memory");
+} catch (const std::length_error&) {
+    fail(path, "its header claims more than memory can hold");
+}
+
 }  // namespace
 
 ImageSize read_image_size(const std::filesystem::path& path) {
-    const auto input = open_image(path, false);
-    const OIIO::ImageSpec& spec = input->spec();
-    const int orientation = spec.get_int_attribute("Orientation", 1);
-    return {spec.width, spec.height, orientation >= 1 && orientation <= 8 ? orientation : 1,
-            spec.format == OIIO::TypeDesc::UINT8};
+    return read_file(path, false).size;
 }
 
 Image load_image(const std::filesystem::path& path) try {
-    const auto input = open_image(path, true);
-    const OIIO::ImageSpec& spec = input->spec();
-    // Grey, grey and alpha, RGB, RGBA; whatever else a file has (depth, ids) is not colour.
-    const bool grey = spec.nchannels < 3;
-    const int colors = grey ? 1 : 3;
-    const bool alpha = spec.nchannels > colors && spec.alpha_channel == colors;
-    const int stored = colors + (alpha ? 1 : 0);
-    std::vector<float> values = read_channels(*input, stored, path);
-
+    Stored stored = read_file(path, true);
+    const bool alpha = stored.channels % 2 == 0;
     Image image;
-    image.width = spec.width;
-    image.height = spec.height;
+    image.width = stored.size.width;
+    image.height = stored.size.height;
     image.channels = alpha ? 4 : 3;
-    if (!grey) {
-        image.pixels = std::move(values);
+    if (stored.channels >= 3) {
+        image.pixels = std::move(stored.values);
         return image;
     }
     const size_t count = size_t(image.width) * size_t(image.height);
     image.pixels.resize(count * size_t(image.channels));
     for (size_t i = 0; i < count; ++i) {
         float* pixel = &image.pixels[i * size_t(image.channels)];
-        pixel[0] = pixel[1] = pixel[2] = values[i * size_t(stored)];
-        if (alpha) pixel[3] = values[i * size_t(stored) + 1];
+        pixel[0] = pixel[1] = pixel[2] = stored.values[i * size_t(stored.channels)];
+        if (alpha) pixel[3] = stored.values[i * size_t(stored.channels) + 1];
     }
     return image;
 } catch (const std::bad_alloc&) {

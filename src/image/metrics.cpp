@@ -42,31 +42,42 @@ std::array<double, kTaps> window() {
     return taps;
 }
 
-/// Windowed sums at one pixel: of a, b, a a, b b, a b.
-using Moments = std::array<double, 5>;
+/// Windowed sums at the pixels of a row: of a, b, a a, b b, a b.
+using Moments = std::array<std::vector<double>, 5>;
 
-double ssim_of(const Moments& m) {
-    const double mean_product = m[0] * m[1], mean_squares = m[0] * m[0] + m[1] * m[1];
-    const double variances = m[2] + m[3] - mean_squares, covariance = m[4] - mean_product;
+double ssim_of(const Moments& m, size_t x) {
+    const double mean_product = m[0][x] * m[1][x], mean_squares = m[0][x] * m[0][x] + m[1][x] * m[1][x];
+    const double variances = m[2][x] + m[3][x] - mean_squares, covariance = m[4][x] - mean_product;
     return (2 * mean_product + shared::SSIM_C1) * (2 * covariance + shared::SSIM_C2) /
            ((mean_squares + shared::SSIM_C1) * (variances + shared::SSIM_C2));
 }
 
-/// The window along x at every pixel of a row.
-void blur_row(const Image& a, const Image& b, int y, int channel, const std::array<double, kTaps>& taps,
-              std::vector<Moments>& row) {
-    for (int x = 0; x < a.width; ++x) {
-        Moments sums{};
-        for (int i = std::max(0, x - kRadius); i <= std::min(a.width - 1, x + kRadius); ++i) {
-            const double tap = taps[size_t(i - x + kRadius)];
-            const double va = clamped(a.at(i, y)[channel]), vb = clamped(b.at(i, y)[channel]);
-            sums[0] += tap * va;
-            sums[1] += tap * vb;
-            sums[2] += tap * va * va;
-            sums[3] += tap * vb * vb;
-            sums[4] += tap * va * vb;
+void clear(Moments& moments, int width) {
+    for (auto& moment : moments) moment.assign(size_t(width), 0.0);
+}
+
+/// A row of one channel of both pictures, with zeros beyond its ends.
+struct Rows {
+    std::vector<double> a, b;
+};
+
+/// The window along x at every pixel of a row. Tap after tap over the row, which compilers vectorise.
+void blur_row(const Rows& rows, const std::array<double, kTaps>& taps, Moments& sums) {
+    const size_t width = rows.a.size() - 2 * kRadius;
+    clear(sums, int(width));
+    for (size_t i = 0; i < kTaps; ++i) {
+        const double tap = taps[i];
+        const double *a = &rows.a[i], *b = &rows.b[i];
+        double *sa = sums[0].data(), *sb = sums[1].data(), *saa = sums[2].data(), *sbb = sums[3].data(),
+               *sab = sums[4].data();
+        for (size_t x = 0; x < width; ++x) {
+            const double weighted_a = tap * a[x], weighted_b = tap * b[x];
+            sa[x] += weighted_a;
+            sb[x] += weighted_b;
+            saa[x] += weighted_a * a[x];
+            sbb[x] += weighted_b * b[x];
+            sab[x] += weighted_a * b[x];
         }
-        row[size_t(x)] = sums;
     }
 }
 
@@ -83,24 +94,44 @@ double weight_sum(const Image& weights, const Image& picture) {
     return sum;
 }
 
+/// a, pulled onto b where it weighs less, and b.
+void read_rows(const Image& a, const Image& b, const Image& weights, int y, int channel, Rows& rows) {
+    for (int x = 0; x < a.width; ++x) {
+        float value = a.at(x, y)[channel];
+        const float other = b.at(x, y)[channel];
+        if (!weights.pixels.empty()) {
+            const float weight = *weights.at(x, y);
+            value = weight * value + (1 - weight) * other;
+        }
+        rows.a[size_t(x + kRadius)] = clamped(value);
+        rows.b[size_t(x + kRadius)] = clamped(other);
+    }
+}
+
 /// Weighted sum of SSIM over the pixels of a channel. Only the rows under the window are held, however tall
 /// the picture.
 double ssim_sum(const Image& a, const Image& b, const Image& weights, int channel,
                 const std::array<double, kTaps>& taps) {
-    std::array<std::vector<Moments>, kTaps> rows;
-    for (auto& row : rows) row.resize(size_t(a.width));
+    std::array<Moments, kTaps> blurred_rows;
+    Moments sums;
+    Rows rows{std::vector<double>(size_t(a.width + 2 * kRadius)), {}};
+    rows.b = rows.a;
     double total = 0;
     int blurred = 0;
     for (int y = 0; y < a.height; ++y) {
-        for (; blurred <= std::min(a.height - 1, y + kRadius); ++blurred)
-            blur_row(a, b, blurred, channel, taps, rows[size_t(blurred % kTaps)]);
-        for (int x = 0; x < a.width; ++x) {
-            Moments sums{};
-            for (int j = std::max(0, y - kRadius); j <= std::min(a.height - 1, y + kRadius); ++j)
-                for (size_t k = 0; k < sums.size(); ++k)
-                    sums[k] += taps[size_t(j - y + kRadius)] * rows[size_t(j % kTaps)][size_t(x)][k];
-            total += weight_at(weights, x, y) * ssim_of(sums);
+        for (; blurred <= std::min(a.height - 1, y + kRadius); ++blurred) {
+            read_rows(a, b, weights, blurred, channel, rows);
+            blur_row(rows, taps, blurred_rows[size_t(blurred % kTaps)]);
         }
+        clear(sums, a.width);
+        for (int j = std::max(0, y - kRadius); j <= std::min(a.height - 1, y + kRadius); ++j)
+            for (size_t k = 0; k < sums.size(); ++k) {
+                const double tap = taps[size_t(j - y + kRadius)];
+                const double* from = blurred_rows[size_t(j % kTaps)][k].data();
+                double* sum = sums[k].data();
+                for (size_t x = 0; x < size_t(a.width); ++x) sum[x] += tap * from[x];
+            }
+        for (int x = 0; x < a.width; ++x) total += weight_at(weights, x, y) * ssim_of(sums, size_t(x));
     }
     return total;
 }
@@ -133,17 +164,9 @@ double ssim(const Image& a, const Image& b) {
 double ssim(const Image& a, const Image& b, const Image& weights) {
     const int channels = compared_channels(a, b);
     const double count = weight_sum(weights, a);
-    Image pulled = a;
-    if (!weights.pixels.empty())
-        for (int y = 0; y < a.height; ++y)
-            for (int x = 0; x < a.width; ++x)
-                for (int c = 0; c < channels; ++c) {
-                    const float weight = *weights.at(x, y);
-                    pulled.at(x, y)[c] = weight * a.at(x, y)[c] + (1 - weight) * b.at(x, y)[c];
-                }
     const std::array<double, kTaps> taps = window();
     double sum = 0;
-    for (int c = 0; c < channels; ++c) sum += ssim_sum(pulled, b, weights, c, taps);
+    for (int c = 0; c < channels; ++c) sum += ssim_sum(a, b, weights, c, taps);
     return sum / (count * channels);
 }
 

@@ -54,6 +54,21 @@ std::array<float, 3> heat(double t) {
     return color;
 }
 
+/// Each pixel's error as a colour; what is not a number is brightest.
+template <class Error>
+Image heat_map(const Image& a, const Image& b, double full_scale, const Error& error_at) {
+    if (a.width != b.width || a.height != b.height || a.channels < 3 || b.channels < 3)
+        throw std::logic_error("error_map: pictures of different sizes");
+    Image map(a.width, a.height, 3);
+    for (int y = 0; y < a.height; ++y)
+        for (int x = 0; x < a.width; ++x) {
+            const double error = error_at(x, y);
+            const auto color = heat(error <= full_scale ? error / full_scale : 1);
+            std::copy(color.begin(), color.end(), map.at(x, y));
+        }
+    return map;
+}
+
 }  // namespace
 
 std::vector<fs::path> picture_names(const std::vector<Frame>& frames) {
@@ -84,21 +99,30 @@ std::vector<fs::path> picture_names(const std::vector<Frame>& frames) {
 }
 
 Image error_map(const Image& a, const Image& b, double full_scale) {
-    if (a.width != b.width || a.height != b.height || a.channels < 3 || b.channels < 3)
-        throw std::logic_error("error_map: pictures of different sizes");
-    Image map(a.width, a.height, 3);
-    for (int y = 0; y < a.height; ++y)
-        for (int x = 0; x < a.width; ++x) {
-            double error = 0;
-            for (int c = 0; c < 3; ++c)
-                error +=
-                    std::abs(std::clamp(a.at(x, y)[c], 0.0f, 1.0f) - std::clamp(b.at(x, y)[c], 0.0f, 1.0f)) /
-                    3.0;
-            if (!(error <= full_scale)) error = full_scale;  // NaN too
-            const auto color = heat(error / full_scale);
-            std::copy(color.begin(), color.end(), map.at(x, y));
+    return heat_map(a, b, full_scale, [&](int x, int y) {
+        double error = 0;
+        for (int c = 0; c < 3; ++c)
+            error +=
+                std::abs(std::clamp(a.at(x, y)[c], 0.0f, 1.0f) - std::clamp(b.at(x, y)[c], 0.0f, 1.0f)) / 3.0;
+        return error;
+    });
+}
+
+Image value_error_map(const Image& a, const Image& b, double full_scale) {
+    const auto value = [](const Image& image, int x, int y, int c) {
+        return c < image.channels ? image.at(x, y)[c] : 1.0f;
+    };
+    return heat_map(a, b, full_scale, [&](int x, int y) {
+        double error = 0;
+        for (int c = 0; c < std::max(a.channels, b.channels); ++c) {
+            const float va = value(a, x, y, c), vb = value(b, x, y, c);
+            if (va == vb || (std::isnan(va) && std::isnan(vb))) continue;
+            const double one = std::abs(double(va) - double(vb));
+            if (!(one <= error)) error = one;
+            if (std::isnan(error)) break;
         }
-    return map;
+        return error;
+    });
 }
 
 std::string base64(const std::vector<unsigned char>& bytes) {

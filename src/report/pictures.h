@@ -17,8 +17,13 @@ namespace ewa::report {
 /// added.
 std::vector<std::filesystem::path> picture_names(const std::vector<Frame>& frames);
 
-/// |a - b| averaged over RGB, 0 dark to `full_scale` and above bright. Sizes must agree.
+/// |a - b| averaged over RGB, both clamped to [0, 1]; 0 dark to `full_scale` and above bright. Sizes must
+/// agree.
 Image error_map(const Image& a, const Image& b, double full_scale);
+
+/// The largest |a - b| of a pixel's values, alpha too (1 where only one picture has it), not clamped; colours
+/// as above. Values that are not finite are bright where the other's is not the same.
+Image value_error_map(const Image& a, const Image& b, double full_scale);
 
 std::string base64(const std::vector<unsigned char>& bytes);
 

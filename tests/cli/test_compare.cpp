@@ -32,7 +32,7 @@ TEST(Compare, EqualPicturesAreIdentical) {
     const Outcome outcome = run_ewa(
         {"compare", folder / "a.png", folder / "a.png", "--threshold", "99", "--json", folder / "j.json"});
     expect_success(outcome);
-    EXPECT_EQ(outcome.out, "PSNR inf dB  SSIM 1.00000  max error 0\n");
+    EXPECT_EQ(outcome.out, "PSNR inf dB  SSIM 1.00000  RMS 0  max error 0\n");
     const auto json = read_json(folder / "j.json");
     EXPECT_TRUE(json["psnr"].is_null());
     EXPECT_EQ(json["pictures"][0]["identical"], true);
@@ -111,6 +111,93 @@ TEST(Compare, WhatIsNotANumberDoesNotPass) {
     EXPECT_GT(ewa::load_image(folder / "m.png").at(4, 5)[0], 0.9f);
 }
 
+/// PSNR knows of neither, by its convention.
+TEST(Compare, TheThresholdHoldsForAlphaAndWhatIsBrighterThanWhite) {
+    const Folder folder;
+    save(folder / "five.exr", plain(5));
+    save(folder / "eighty.exr", plain(80));
+    Image opaque = plain(1, 20, 12, 4), clear = opaque;
+    for (size_t i = 3; i < clear.pixels.size(); i += 4) clear.pixels[i] = 0;
+    save(folder / "opaque.png", opaque);
+    save(folder / "clear.png", clear);
+    save(folder / "white.png", plain(1));
+    const auto compare = [&](const std::string& a, const std::string& b, const Names& more) {
+        Names command{"compare", folder / a, folder / b, "--json", folder / "j.json"};
+        command.insert(command.end(), more.begin(), more.end());
+        return run_ewa(command);
+    };
+    const Outcome bright =
+        compare("five.exr", "eighty.exr", {"--threshold", "100", "--heat-map", folder / "m.png"});
+    EXPECT_EQ(bright.status, 1);
+    EXPECT_NE(bright.out.find("PSNR inf dB"), std::string::npos) << bright.out;
+    EXPECT_NE(bright.out.find("RMS 75 "), std::string::npos) << bright.out;
+    EXPECT_NE(bright.out.find("under 100 dB (RMS over 1e-05) with alpha and values outside [0, 1]"),
+              std::string::npos)
+        << bright.out;
+    auto json = read_json(folder / "j.json");
+    EXPECT_EQ(json["rms"], 75);
+    EXPECT_EQ(json["passed"], false);
+    EXPECT_EQ(json["pictures"][0]["failed"], nlohmann::json({"rms"}));
+    EXPECT_GT(ewa::load_image(folder / "m.png").at(4, 5)[0], 0.9f);
+
+    // A picture without alpha is opaque. RMS of one channel of four: a half, 6.02 dB.
+    for (const char* other : {"opaque.png", "white.png"}) {
+        EXPECT_EQ(compare(other, "clear.png", {"--threshold", "6.1"}).status, 1) << other;
+        EXPECT_EQ(read_json(folder / "j.json")["rms"], 0.5) << other;
+        EXPECT_EQ(compare("clear.png", other, {"--threshold", "6"}).status, 0) << other;
+    }
+    expect_success(compare("opaque.png", "white.png", {"--threshold", "1000", "--max-error", "0"}));
+}
+
+TEST(Compare, TheLargestErrorMayBeLimited) {
+    const Folder folder;
+    Image b = plain(0.25f);
+    b.at(7, 3)[1] += 0.5f;
+    save(folder / "a.exr", plain(0.25f));
+    save(folder / "b.exr", b);
+    const auto compare = [&](const std::string& b_name, const std::string& limit) {
+        return run_ewa({"compare", folder / "a.exr", folder / b_name, "--max-error", limit, "--json",
+                        folder / "j.json"});
+    };
+    expect_success(compare("b.exr", "0.5"));
+    const Outcome bad = compare("b.exr", "0.49");
+    EXPECT_EQ(bad.status, 1);
+    EXPECT_EQ(bad.err, "");
+    EXPECT_NE(bad.out.find("max error over 0.49"), std::string::npos) << bad.out;
+    EXPECT_EQ(read_json(folder / "j.json")["worst"]["failed"], nlohmann::json({"max_error"}));
+    // Of infinite values only an equal one is near.
+    const float infinity = std::numeric_limits<float>::infinity(), nan = std::nanf("");
+    Image bright = plain(0.25f);
+    for (const float value : {infinity, -infinity, nan}) {
+        bright.at(7, 3)[1] = value;
+        save(folder / "bright.exr", bright);
+        EXPECT_EQ(compare("bright.exr", "1e9").status, 1);
+        for (const float other : {infinity, -infinity, nan}) {
+            bright.at(7, 3)[1] = other;
+            save(folder / "c.exr", bright);
+            const Outcome outcome =
+                run_ewa({"compare", folder / "bright.exr", folder / "c.exr", "--max-error", "1e9"});
+            const bool equal = value == other || (std::isnan(value) && std::isnan(other));
+            EXPECT_EQ(outcome.status, equal ? 0 : 1) << value << " " << other << ": " << outcome.out;
+        }
+    }
+    // A picture that is not there is no smaller error.
+    for (const char* name : {"x/1.png", "x/2.png", "y/1.png"}) save(folder / name, plain(0.5f));
+    EXPECT_EQ(run_ewa({"compare", folder / "x", folder / "y", "--max-error", "1"}).status, 1);
+}
+
+TEST(Compare, WhatIsNoPictureIsOneLine) {
+    const Folder folder;
+    save(folder / "a.png", plain(0.5f));
+    std::string png = read_file(folder / "a.png");
+    for (size_t i = 16; i < 24; ++i) png[i] = '\x7f';
+    write_file(folder / "huge.png", png);
+    write_file(folder / "x.gif", "GIF89a\xff\xff\xff\xff");
+    write_file(folder / "x.null?RES=4000x4000", "");
+    for (const char* name : {"huge.png", "x.gif", "x.null?RES=4000x4000"})
+        expect_failure(run_ewa({"compare", folder / name, folder / name}), 2, name);
+}
+
 TEST(Compare, WrongUse) {
     const Folder folder;
     save(folder / "a.png", plain(0.5f));
@@ -124,6 +211,7 @@ TEST(Compare, WrongUse) {
     expect_failure(run_ewa({"compare", a, folder / "absent.png"}), 2, "absent.png");
     expect_failure(run_ewa({"compare", a}), 2, "B");
     expect_failure(run_ewa({"compare", a, a, "--threshold", "much"}), 2, "--threshold");
+    expect_failure(run_ewa({"compare", a, a, "--max-error", "-1"}), 2, "--max-error");
     expect_failure(run_ewa({"compare", a, a, "--heat-map", folder / "m.txt"}), 2, "m.txt");
 }
 

@@ -39,6 +39,12 @@ TEST(FileReader, CrossesItsBuffer) {
     EXPECT_EQ(skipping.read<uint32_t>("v"), 1u);
     skipping.skip(4 * 600000, "v");
     EXPECT_EQ(skipping.read<uint32_t>("v"), 600002u);
+    skipping.go_to(4 * 7, "v");
+    EXPECT_EQ(skipping.read<uint32_t>("v"), 7u);
+    skipping.go_to(4 * 699999, "v");
+    EXPECT_EQ(skipping.read<uint32_t>("v"), 699999u);
+    EXPECT_EQ(skipping.remaining(), 0u);
+    expect_error<InputError>([&] { skipping.go_to(bytes.size() + 1, "more"); }, {"more", "2800001"});
     FileReader whole(path);
     EXPECT_EQ(std::memcmp(whole.take(bytes.size(), "all"), bytes.data(), bytes.size()), 0);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -160,6 +161,18 @@ TEST(Report, ErrorMapIsDarkWhereEqualAndBrightWhereNot) {
     EXPECT_LT(map.at(0, 0)[0], 0.05f);
     EXPECT_GT(map.at(1, 0)[0], 0.9f);
     EXPECT_GT(map.at(1, 0)[1], 0.9f);
+}
+
+TEST(Report, ValueErrorMapLooksAtAlphaAndBeyondWhite) {
+    Image a(5, 1, 4), b(5, 1, 3);
+    for (int x = 0; x < 5; ++x) a.at(x, 0)[3] = 1;
+    a.at(1, 0)[3] = 0;              // alpha
+    b.at(2, 0)[1] = -1;             // below black
+    b.at(3, 0)[2] = std::nanf("");  // in one
+    a.at(4, 0)[0] = b.at(4, 0)[0] = INFINITY;
+    const Image map = value_error_map(a, b, 0.25);
+    for (const int x : {0, 4}) EXPECT_LT(map.at(x, 0)[0], 0.05f) << x;
+    for (const int x : {1, 2, 3}) EXPECT_GT(map.at(x, 0)[0], 0.9f) << x;
 }
 
 std::vector<std::string> names_of(const std::vector<std::string>& frame_names) {
