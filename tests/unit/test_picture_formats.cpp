@@ -222,14 +222,14 @@ TEST(PictureFiles, HugeClaimsAreRefused) {
         {"e.exr", exr(99, 99, 60000), "tiles of 60000"},
         {"a.jpg", jpeg(65500, 65500, 1), "65500 x 65500"},
         {"a.webp", webp(0, 16384, 16384), "16384 x 16384"},
-        {"a.bmp", bmp(60000, 60000, 0), "60000 x 60000"},
+        {"a.bmp", bmp(60000, 60000, 0), "60000 x 60000 pixels of 3 channels, more than 200 million"},
         {"b.bmp", bmp(100, 0x80000000u, 0), "in a direction"},
         {"c.bmp", bmp(100, 100, 0), "rows of pixels"},
         {"a.ppm", "P6 60000 60000 255\n", "60000 x 60000"},
         {"b.ppm", "P6 1000 1000 255\n", "rows of pixels"},
-        {"c.ppm", "P6 # a note\n 5 # another\n5\n100\n" + std::string(75, 'x'), "not 255 or 65535"},
+        {"c.ppm", "P6 # a note\n 5 # another\n5\n100\n" + std::string(75, 'x'), "not 255"},
         {"d.ppm", "P6 99999999999999999999 1 255\n", "damaged"},
-        {"a.hdr", hdr + "60000 +X 60000\n", "60000 x 60000"},
+        {"a.hdr", hdr + "60000 +X 60000\n", "more than 200 million"},
         {"b.hdr", hdr + "2 +X -1\n", "-Y height +X width"},
     };
     for (const auto& one : cases) {
@@ -335,12 +335,8 @@ TEST(PictureFiles, DamagedAndStrangePngsAreOneErrorOrNone) {
     EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
 }
 
-TEST(PictureFiles, PpmsOf16BitsAndWebpsWithoutLoss) {
+TEST(PictureFiles, AWebpWithoutLossKeepsItsBytes) {
     TempFolder folder;
-    const auto ppm =
-        folder.write("a.ppm", "P6\n# deep\n1 1 65535\n" + big(1, 2) + big(256, 2) + big(65535, 2));
-    EXPECT_EQ(load_image(ppm).pixels, (std::vector<float>{1 / 65535.f, 256 / 65535.f, 1}));
-    EXPECT_FALSE(read_image_size(ppm).eight_bit);
     const auto path = folder.write("a.webp", kOpaqueWebp);
     const Image image = load_image(path);
     ASSERT_EQ(image.width, 4);
