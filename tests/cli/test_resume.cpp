@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A training that was ended, by Ctrl-C or kill -9, and goes on.
 #include <gtest/gtest.h>
+#include <zlib.h>
 
 #include <csignal>
 #include <sstream>
@@ -123,6 +124,41 @@ TEST_F(ResumeEdges, RefusesWhatWouldEndDifferently) {
     refused({}, "checksum");
     write_file(folder / "o/checkpoint.ewa", "ply");
     refused({}, "not a checkpoint");
+}
+
+/// The checkpoint with other settings, and the checksum that they have.
+std::string with_settings(const std::string& checkpoint, const std::string& settings) {
+    constexpr size_t kHeader = 16, kSum = kHeader + 24, kText = kHeader + 32;
+    uint64_t before = 0;
+    std::memcpy(&before, checkpoint.data() + kHeader + 16, sizeof(before));
+    std::string bytes = checkpoint.substr(0, kText) + settings + checkpoint.substr(kText + before);
+    const uint64_t size = settings.size();
+    std::memcpy(bytes.data() + kHeader + 16, &size, sizeof(size));
+    const auto* data = reinterpret_cast<const Bytef*>(bytes.data());
+    const auto sum = uint32_t(crc32_z(crc32_z(0, data + kHeader, 24), data + kText, settings.size()));
+    std::memcpy(bytes.data() + kSum, &sum, sizeof(sum));
+    return bytes;
+}
+
+TEST_F(ResumeEdges, RefusesSettingsThatAreNone) {
+    const Names options{"--steps", "2", "--resume"};
+    expect_success(train("o", options));
+    const std::string good = read_file(folder / "o/checkpoint.ewa");
+    const auto refused = [&](const std::string& settings, const std::string& text) {
+        write_file(folder / "o/checkpoint.ewa", with_settings(good, settings));
+        const Outcome outcome = train("o", options);
+        expect_failure(outcome, 2, text);
+        EXPECT_NE(outcome.err.find("checkpoint.ewa"), std::string::npos) << outcome.err;
+        EXPECT_LT(outcome.err.size(), 1000u);
+    };
+    const std::string deep = std::string(400000, '[') + std::string(400000, ']');
+    refused("{\"options\":{\"steps\":" + deep + "}}", "nests deeper");
+    refused(deep, "nests deeper");
+    refused("{\"options\":3}", "cannot be read");
+    refused("", "not valid JSON");
+    const std::string dataset = nlohmann::json::parse(good.substr(48, good.find("metrics") - 48))["dataset"];
+    const nlohmann::json longer{{"dataset", dataset}, {"options", {{"steps", std::string(100000, 'x')}}}};
+    refused(longer.dump(), "was written with --");
 }
 
 }  // namespace

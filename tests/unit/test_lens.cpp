@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Lens models against figures of another implementation, and the inversion of them.
 #include <cmath>
+#include <ctime>
 #include <sstream>
 
 #include "ewa/dataset.h"
@@ -243,6 +244,25 @@ TEST(Lens, AFisheyeSeesNothingBesideOrBehindItself) {
     EXPECT_EQ(camera.width, 400);
     EXPECT_EQ(camera.height, 400);
     EXPECT_EQ(camera.cx, 200);
+}
+
+/// What inner_border finds in steps is what all pixels of the border give, and costs no more in a large
+/// picture: of the processor's time, where the whole border of one takes half a minute.
+TEST(Lens, TheSizeOfAPictureIsNoWork) {
+    const std::clock_t begin = std::clock();
+    for (const Case& c : kCases) {
+        const Frame frame = from_text(c);
+        Camera large = frame.source;
+        const double times = 6000;
+        large.width *= int(times);
+        large.height *= int(times);
+        for (double* value : {&large.fx, &large.fy, &large.cx, &large.cy}) *value *= times;
+        const Camera camera = scene::undistorted_camera(large, frame.distortion);
+        // The border's pixels are finer, and the size is not rounded to the small picture's pixel.
+        EXPECT_NEAR(camera.width / times, frame.camera.width, 2.5) << c.model;
+        EXPECT_NEAR(camera.height / times, frame.camera.height, 2.5) << c.model;
+    }
+    EXPECT_LT(double(std::clock() - begin) / CLOCKS_PER_SEC, 10);
 }
 
 TEST(Lens, ACornerBeyondTheFoldShrinksThePicture) {
