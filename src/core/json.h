@@ -17,8 +17,8 @@ struct JsonLimits {
     size_t objects = size_t(1) << 20;
     size_t values = size_t(1) << 22;  // lists, and what is neither list nor object
     bool comments = false;            // whether // and /* */ may stand between values
-    std::string_view left_out;  // what stands under this key is neither kept nor counted; empty: nothing
-    uint64_t begin = 0;         // the byte of the file that the text begins at
+    std::string_view left_out = {};  // what stands under this key is neither kept nor counted; empty: nothing
+    uint64_t begin = 0;              // the byte of the file that the text begins at
 };
 
 /// The value, in one pass over the text, in time linear in its length (but for the logarithm that finds a

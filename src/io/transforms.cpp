@@ -221,9 +221,7 @@ void read_pose(const Entry& entry, Camera& camera) {
 
 PosedImages read_transforms(const std::filesystem::path& path, int split, bool with_points) {
     const std::string name = core::one_line(path.string());
-    core::JsonLimits limits;
-    limits.comments = true;  // which instant-ngp takes
-    const json top = core::read_json_file<json>(path, limits);
+    const json top = core::read_json_file<json>(path, {.comments = true});  // which instant-ngp takes
     if (!top.is_object()) throw InputError(name + ": is no JSON object");
     const auto frames = top.find("frames");
     if (frames == top.end() || !frames->is_array()) throw InputError(name + ": has no list \"frames\"");

@@ -83,9 +83,7 @@ Json to_json(const NamedView& view) {
 }  // namespace
 
 std::vector<NamedView> read_views(const std::filesystem::path& path) {
-    core::JsonLimits limits;
-    limits.bytes = kLargestFile;
-    const Json json = core::read_json_file<Json>(path, limits);
+    const Json json = core::read_json_file<Json>(path, {.bytes = kLargestFile});
     if (!json.is_object() || !json.contains("views") || !json["views"].is_array())
         throw InputError(path.string() + ": is no list of views: an object with \"views\" is expected");
     if (json["views"].size() > kMostViews)

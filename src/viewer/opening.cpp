@@ -50,10 +50,8 @@ std::shared_ptr<const Dataset> load_cameras(const fs::path& path, int downscale,
 }
 
 nlohmann::json read_config(const fs::path& path) {
-    core::JsonLimits limits;
-    limits.bytes = kLargestConfig;
     try {
-        const nlohmann::json json = core::read_json_file<nlohmann::json>(path, limits);
+        const auto json = core::read_json_file<nlohmann::json>(path, {.bytes = kLargestConfig});
         if (json.is_object()) return json;
     } catch (const InputError&) {
         // The run is shown without what its settings would say.

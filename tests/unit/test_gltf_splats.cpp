@@ -327,7 +327,7 @@ TEST(GltfSplats, ClaimsAreBounded) {
     // Time is that of the bytes, however many keys there are: of the processor, where quadratic time takes
     // minutes.
     std::string keys = "{\"asset\":{},\"x\":{";
-    for (int i = 0; i < 30000; ++i) keys += "\"" + std::to_string(i) + "\":{},";
+    for (int i = 0; i < 30000; ++i) keys.append("\"").append(std::to_string(i)).append("\":{},");
     const std::clock_t begin = std::clock();
     expect_error<InputError>([&] { load_splats(nested.folder().write("keys.gltf", keys + "\"\":0}}")); },
                              {"keys.gltf"});
