@@ -269,7 +269,7 @@ TEST(Transforms, LinksLeadOutOfNoFolder) {
     Scene scene;
     fs::remove(scene.folder / "images/a.png");
     fs::create_symlink(elsewhere / "a.png", scene.folder / "images/a.png");
-    scene.refuse({"frame 1", "images/a.png", "link out of", "cp -rL"});
+    scene.refuse({"frame 1", "a.png is a link out of", "cp -rL"});
     scene.model["frames"][1]["file_path"] = "images/a";
     scene.refuse({"frame 1", "images/a.png", "link out of"});
     scene.model["frames"][1]["file_path"] = "images/out/a.png";
