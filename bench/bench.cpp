@@ -11,7 +11,7 @@
 #include "bench/stability/cases.h"
 #include "bench/stability/stability.h"
 #include "core/atomic_file.h"
-#include "core/file_reader.h"
+#include "core/json.h"
 #include "ewa/device.h"
 #include "ewa/error.h"
 
@@ -29,14 +29,6 @@ double load() {
     double value = 0;
     std::ifstream("/proc/loadavg") >> value;
     return value;
-}
-
-Json read_json(const std::filesystem::path& path) {
-    try {
-        return Json::parse(core::read_text_file(path));
-    } catch (const Json::exception& error) {
-        throw InputError(path.string() + ": " + error.what());
-    }
 }
 
 int list_cases(bool stability) {
@@ -125,9 +117,9 @@ int run(const Options& options, const std::vector<std::string>& program) {
     if (options.first_step) return run_first_step(options.device);
     if (!options.results.empty() && options.compare.empty())
         throw InputError("--results is for --compare, which says what they are compared with");
-    const Json before = options.compare.empty() ? Json() : read_json(options.compare);
+    const Json before = options.compare.empty() ? Json() : core::read_json_file<Json>(options.compare);
     if (!options.results.empty()) {
-        print(compare_text(before, read_json(options.results)));
+        print(compare_text(before, core::read_json_file<Json>(options.results)));
         return 0;
     }
     const Result result = measure_all(options, program);

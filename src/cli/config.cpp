@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/config.h"
 
-#include "core/file_reader.h"
+#include "core/json.h"
 #include "ewa/error.h"
 #include "report/summary.h"
 
@@ -35,14 +35,7 @@ bool given(CLI::App& app, const std::string& name) {
 }
 
 Json parse(const std::filesystem::path& file) {
-    Json json;
-    try {
-        json = Json::parse(core::read_text_file(file));
-    } catch (const Json::parse_error& error) {
-        throw InputError(file.string() + ": not JSON, at byte " + std::to_string(error.byte));
-    } catch (const Json::exception& error) {  // a number out of range
-        throw InputError(file.string() + ": not JSON: " + error.what());
-    }
+    Json json = core::read_json_file<Json>(file);
     if (!json.is_object()) throw InputError(file.string() + ": not a JSON object of options");
     return json;
 }

@@ -16,6 +16,7 @@
 #include "cli/splat_difference.h"
 #include "cli/text.h"
 #include "cli/transform_argument.h"
+#include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
@@ -46,9 +47,9 @@ struct Work {
 
 std::string described(const fs::path& path, SplatFormat format, const std::string& variant,
                       const Gaussians& gaussians) {
-    return fmt::format("{}: {}{}, {} splats of SH degree {}, {}", path.string(), name_of(format),
-                       variant.empty() ? "" : " (" + variant + ")", gaussians.size(), gaussians.sh_degree,
-                       bytes_text(fs::file_size(path)));
+    return fmt::format("{}: {}{}, {} splats of SH degree {}, {}", core::one_line(path.string()),
+                       name_of(format), variant.empty() ? "" : " (" + variant + ")", gaussians.size(),
+                       gaussians.sh_degree, bytes_text(fs::file_size(path)));
 }
 
 /// Reads the inputs behind one another.
@@ -232,9 +233,9 @@ int run(const ConvertArguments& arguments) {
     if (!arguments.quiet) {
         fmt::print("{}\n", described(out, format, "", work.gaussians));
         if (const fs::path values = values_path(arguments); !values.empty())
-            fmt::print("{}: the values of that glTF, {}\n", values.string(),
+            fmt::print("{}: the values of that glTF, {}\n", core::one_line(values.string()),
                        bytes_text(fs::file_size(values)));
-        for (const std::string& remark : remarks) fmt::print("  {}\n", remark);
+        for (const std::string& remark : remarks) fmt::print("  {}\n", core::one_line(remark));
     }
     Json json = {
         {"inputs", work.inputs}, {"output", output_json(arguments, work.gaussians)}, {"remarks", remarks}};

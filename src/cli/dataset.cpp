@@ -79,7 +79,8 @@ Photographs photograph_with_progress(const DeviceOptions& device, const fs::path
     if (made.interrupted)
         fmt::print("interrupted; the same command goes on\n");
     else
-        fmt::print("{} views are in {}{}, exposure {:+.1f} stops; {}\n", made.views, folder.string(),
+        fmt::print("{} views are in {}{}, exposure {:+.1f} stops; {}\n", made.views,
+                   core::one_line(folder.string()),
                    made.kept > 0 ? fmt::format(" ({} were there already)", made.kept) : "", made.exposure,
                    made.color_depends_on_view ? "colours depend on the view"
                                               : "every material is diffuse: SH degree 0 suffices");

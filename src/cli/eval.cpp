@@ -9,6 +9,7 @@
 #include "cli/dataset_argument.h"
 #include "cli/interrupt.h"
 #include "cli/output.h"
+#include "core/text.h"
 #include "ewa/splat_files.h"
 #include "ewa/trainer.h"
 
@@ -50,7 +51,7 @@ int run(const EvalArguments& arguments) {
     const Evaluation evaluation =
         evaluate(open_device(arguments.device), gaussians, dataset, frames, options);
     for (const EvalFrame& frame : evaluation.frames)
-        fmt::print("{}  PSNR {:.3f} dB  SSIM {:.5f}\n", frame.name, frame.psnr, frame.ssim);
+        fmt::print("{}  PSNR {:.3f} dB  SSIM {:.5f}\n", core::one_line(frame.name), frame.psnr, frame.ssim);
     if (dataset.missing_images > 0)
         fmt::print("{} images are missing and left out\n", dataset.missing_images);
     fmt::print("mean of {} frames ({})  PSNR {:.3f} dB  SSIM {:.5f}  in {:.2f} s\n", evaluation.frames.size(),

@@ -9,6 +9,7 @@
 #include "cli/dataset_argument.h"
 #include "cli/interrupt.h"
 #include "cli/output.h"
+#include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/renderer.h"
 #include "ewa/splat_files.h"
@@ -59,11 +60,13 @@ int run(const GradArguments& arguments) {
                                     {"ssim", result.ssim},
                                     {"frame", index},
                                     {"name", frame.name}});
-    fmt::print("{}  loss {:.7g}  L1 {:.7g}  SSIM {:.7g}\n", frame.name, result.loss, result.l1, result.ssim);
+    fmt::print("{}  loss {:.7g}  L1 {:.7g}  SSIM {:.7g}\n", core::one_line(frame.name), result.loss,
+               result.l1, result.ssim);
     if (result.skipped_nonfinite > 0)
         fmt::print("{} splats have a value that is not finite and were not drawn\n",
                    result.skipped_nonfinite);
-    fmt::print("the gradient of {} splats is in {}\n", result.gradient.size(), arguments.output.string());
+    fmt::print("the gradient of {} splats is in {}\n", result.gradient.size(),
+               core::one_line(arguments.output.string()));
     return 0;
 }
 

@@ -53,7 +53,7 @@ void print_spread(const char* name, const Spread& spread) {
 }
 
 void print_file(const fs::path& path, const SplatScene& scene) {
-    fmt::print("{}\nformat          {}{}, {}\n", path.string(), name_of(scene.format),
+    fmt::print("{}\nformat          {}{}, {}\n", core::one_line(path.string()), name_of(scene.format),
                scene.variant.empty() ? "" : " (" + scene.variant + ")", bytes_text(fs::file_size(path)));
     if (scene.antialiased) fmt::print("anti-aliased    marked so: draw it with --antialias\n");
     for (const std::string& comment : scene.comments)
@@ -177,7 +177,7 @@ int info_dataset(const fs::path& path, int test_every, bool json) {
         fmt::print("{}\n", dataset_json(dataset, kind, split, extent).dump(2));
         return 0;
     }
-    fmt::print("{}\nkind            {}\n", path.string(), kind);
+    fmt::print("{}\nkind            {}\n", core::one_line(path.string()), kind);
     fmt::print("frames          {} ({} train, {} test with --test-every {})\n", dataset.frames.size(),
                split.train.size(), split.test.size(), test_every);
     if (dataset.missing_images > 0)

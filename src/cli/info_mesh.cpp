@@ -41,7 +41,8 @@ void info_mesh(const std::filesystem::path& path, int test_every, bool json) {
         fmt::print("{}\n", out.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
         return;
     }
-    fmt::print("{}\nkind            mesh scene (glTF), {}\n", path.string(), bytes_text(bytes));
+    fmt::print("{}\nkind            mesh scene (glTF), {}\n", core::one_line(path.string()),
+               bytes_text(bytes));
     for (const std::string& remark : scene.remarks)
         fmt::print("note            {}\n", core::one_line(remark));
     fmt::print("triangles       {} ({} more are left out: a corner is not finite)\n", scene.triangles.size(),

@@ -7,6 +7,7 @@
 #include <cstdio>
 
 #include "cli/text.h"
+#include "core/text.h"
 
 namespace ewa::cli {
 namespace {
@@ -67,7 +68,7 @@ void Progress::update(int done, const std::string& details) {
 void Progress::note(const std::string& line) {
     if (quiet_) return;
     clear_line();
-    std::puts(line.c_str());
+    std::puts(core::one_line(line).c_str());
     std::fflush(stdout);
 }
 

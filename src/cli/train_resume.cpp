@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "core/json.h"
 #include "ewa/error.h"
 
 namespace ewa::cli {
@@ -12,14 +13,20 @@ using report::Json;
 
 // Options that change when something is written, where it runs or what is held in memory, not what comes out.
 constexpr const char* kWithoutInfluence[] = {"dataset", "eval-every", "save-every", "device", "image-cache"};
+constexpr size_t kLongestValue = 200;   // of an option in an error, which a stranger may have written
 constexpr double kLeastPause = 30;      // seconds
 constexpr double kPausePerSaving = 50;  // times what saving took
 
 Json parse_settings(const std::filesystem::path& path, const std::string& stored) {
-    const Json json = Json::parse(stored, nullptr, false);
+    const std::string way_out = "; without --resume the training starts anew";
+    Json json;
+    try {
+        json = core::parse_json<Json>(stored, path.string() + ": its settings");
+    } catch (const InputError& error) {
+        throw InputError(error.what() + way_out);
+    }
     if (!json.is_object() || !json.contains("options") || !json["options"].is_object())
-        throw InputError(path.string() +
-                         ": its settings cannot be read; without --resume the training starts anew");
+        throw InputError(path.string() + ": its settings cannot be read" + way_out);
     return json;
 }
 
@@ -44,13 +51,13 @@ void check_resumable(const std::filesystem::path& path, const std::string& store
     for (const auto& [name, value] : now["options"].items()) {
         const Json other = then["options"].value(name, Json());
         if (other != value)
-            throw InputError(path.string() + ": was written with --" + name + " " + other.dump() + ", not " +
-                             value.dump() + way_out);
+            throw InputError(path.string() + ": was written with --" + name + " " +
+                             other.dump().substr(0, kLongestValue) + ", not " + value.dump() + way_out);
     }
 }
 
 std::string resume_remark(const std::string& stored, const Json& now) {
-    const Json then = Json::parse(stored);
+    const Json then = core::parse_json<Json>(stored, "the checkpoint's settings");
     for (const char* name : {"version", "device"})
         if (then.value(name, Json()) != now[name])
             return std::string("resumed with another ") + name + " than it began with";

@@ -114,7 +114,7 @@ class TrainRun {
         return earlier_wall_ + std::chrono::duration<double>(Clock::now() - begin_).count();
     }
     void say(const std::string& line) const {
-        if (!arguments_.quiet) fmt::print("{}\n", line);
+        if (!arguments_.quiet) fmt::print("{}\n", core::one_line(line));
     }
     void load();
     void settle_degree();

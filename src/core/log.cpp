@@ -6,6 +6,8 @@
 
 #include <memory>
 
+#include "core/text.h"
+
 namespace ewa::core {
 
 void warn(const std::string& text) {
@@ -17,7 +19,7 @@ void warn(const std::string& text) {
         }
         return made;
     }();
-    logger->warn("{}", text);
+    logger->warn("{}", one_line(text));
 }
 
 }  // namespace ewa::core

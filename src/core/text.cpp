@@ -1,19 +1,59 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/text.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <utility>
 
 namespace ewa::core {
 
 namespace {
 constexpr std::string_view kBlanks = " \t\r\n\v\f";
+
+/// The character in UTF-8 that the text begins with, and its bytes; none where there is no such character.
+std::pair<uint32_t, size_t> first_character(std::string_view text) {
+    const auto byte = [&](size_t i) { return static_cast<unsigned char>(text[i]); };
+    if (byte(0) < 0x80) return {byte(0), 1};
+    const size_t bytes = byte(0) >= 0xf0 ? 4 : byte(0) >= 0xe0 ? 3 : 2;
+    if (byte(0) < 0xc2 || byte(0) > 0xf4 || text.size() < bytes) return {0, 0};
+    uint32_t character = byte(0) & (0x7f >> bytes);
+    for (size_t i = 1; i < bytes; ++i) {
+        if (byte(i) >> 6 != 2) return {0, 0};
+        character = character << 6 | (byte(i) & 0x3f);
+    }
+    constexpr uint32_t kLeast[] = {0, 0, 0x80, 0x800, 0x10000};  // of that many bytes
+    return {character, character >= kLeast[bytes] && character <= 0x10ffff ? bytes : 0};
 }
 
+/// How many bytes to show as they are: of a character that neither commands a terminal, nor ends a line, nor
+/// turns the direction of the text about it.
+size_t shown_bytes(std::string_view text) {
+    const auto [c, bytes] = first_character(text);
+    const auto in = [c = c](uint32_t low, uint32_t high) { return c >= low && c <= high; };
+    const bool control =
+        c < 0x20 || in(0x7f, 0x9f) || in(0x200e, 0x200f) || in(0x2028, 0x202e) || in(0x2066, 0x2069);
+    return control ? 0 : bytes;
+}
+
+}  // namespace
+
 std::string one_line(std::string_view text) {
-    std::string result(trim(text));
-    for (char& c : result)
-        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
+    constexpr char kDigits[] = "0123456789abcdef";
+    std::string result;
+    for (std::string_view rest = trim(text); !rest.empty();) {
+        const size_t bytes = shown_bytes(rest);
+        if (bytes > 0) {
+            result += rest.substr(0, bytes);
+        } else if (kBlanks.find(rest[0]) != std::string_view::npos) {
+            result += ' ';
+        } else {
+            const auto byte = static_cast<unsigned char>(rest[0]);
+            result += {'\\', 'x', kDigits[byte >> 4], kDigits[byte & 15]};
+        }
+        rest.remove_prefix(std::max<size_t>(1, bytes));
+    }
     return result;
 }
 

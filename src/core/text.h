@@ -8,7 +8,9 @@
 
 namespace ewa::core {
 
-/// The text with every control character as a space: an error is one line whatever a file or a path holds.
+/// The text as it may be shown, whatever a file or a path holds: white space as spaces, every other control
+/// character (of Unicode too, and what turns the direction of text) and every byte that is no UTF-8 as \x1b,
+/// in hexadecimal. Every error, and every name that a terminal sees, goes through this.
 std::string one_line(std::string_view text);
 
 /// Cuts the first word (separated by blanks, tabs or carriage returns) off `rest`; empty at the end.

@@ -8,6 +8,7 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "io/colmap_model.h"
+#include "io/inside.h"
 
 namespace ewa::io {
 
@@ -43,15 +44,6 @@ constexpr ColmapLens kLenses[] = {
     {"EUCM", 2, Lens::unified, {&D::k1, &D::k2}}};
 
 constexpr uint64_t kMaxSize = 1u << 20;  // px
-
-/// Names come from a file that somebody else may have made; they must stay inside the images folder.
-bool leaves_folder(const std::string& name) {
-    std::string slashes = name;
-    std::replace(slashes.begin(), slashes.end(), '\\', '/');
-    const std::filesystem::path path = std::filesystem::path(slashes).lexically_normal();
-    const bool drive = name.size() > 1 && name[1] == ':';
-    return path.empty() || drive || path.is_absolute() || *path.begin() == "..";
-}
 
 }  // namespace
 
@@ -96,7 +88,10 @@ void ColmapBuilder::add_camera(uint32_t id, const ColmapLens& lens, uint64_t wid
 void ColmapBuilder::add_image(const std::array<double, 7>& pose, uint32_t camera_id, const std::string& name,
                               const Fail& fail) {
     const std::string image_name = "image \"" + core::one_line(name) + "\"";
-    if (leaves_folder(name)) fail(image_name + " lies outside the images folder");
+    const auto inside = name_inside(name);
+    if (!inside) return fail(image_name + " lies outside the images folder");
+    if (!links_stay_with_pictures(images_.parent_path(), images_.filename() / *inside))
+        fail(image_name + " is a link out of the dataset's folder; " + kLinkAdvice);
     const auto camera = cameras_.find(camera_id);
     if (camera == cameras_.end())
         fail(image_name + " has camera " + std::to_string(camera_id) + ", which is not there");
@@ -110,7 +105,7 @@ void ColmapBuilder::add_image(const std::array<double, 7>& pose, uint32_t camera
         glm::dquat(pose[0] / largest, pose[1] / largest, pose[2] / largest, pose[3] / largest));
     PosedImage image;
     image.name = name;
-    image.path = images_ / name;
+    image.path = images_ / *inside;
     image.camera = camera->second.camera;
     image.distortion = camera->second.distortion;
     image.camera.rotation = glm::mat3_cast(q);

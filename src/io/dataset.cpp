@@ -8,6 +8,7 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "io/colmap.h"
+#include "io/inside.h"
 #include "io/transforms.h"
 #include "scene/shape.h"
 #include "scene/undistort.h"
@@ -32,6 +33,16 @@ std::string size_text(int width, int height) {
     return std::to_string(width) + " x " + std::to_string(height);
 }
 
+/// Whether a folder of the dataset has this file. Throws where a link leads to it from elsewhere.
+bool has_file(const fs::path& folder, const fs::path& name) {
+    const fs::path path = folder / name;
+    if (!is_file(path)) return false;
+    if (!io::links_stay_with_pictures(folder.parent_path(), folder.filename() / name))
+        throw InputError(core::one_line(path.string()) + ": is a link out of the dataset's folder; " +
+                         io::kLinkAdvice);
+    return true;
+}
+
 /// The file of a frame: the model's, or its copy in images_K for a downscale factor K.
 struct Picture {
     fs::path path;
@@ -44,18 +55,18 @@ Picture find_picture(const io::PosedImage& image, const fs::path& folder, int do
         const fs::path inside = image.path.lexically_relative(folder);
         const fs::path copies =
             folder.parent_path() / (folder.filename().string() + "_" + std::to_string(downscale));
-        if (!inside.empty() && *inside.begin() != ".." && is_file(copies / inside))
+        if (!inside.empty() && *inside.begin() != ".." && has_file(copies, inside))
             return {copies / inside, true, 1};
     }
     return {image.path, is_file(image.path), downscale};
 }
 
 fs::path find_mask_in(const fs::path& masks, const fs::path& inside) {
-    fs::path replaced = masks / inside, added = masks / inside;
+    fs::path replaced = inside, added = inside;
     replaced.replace_extension(".png");
     added += ".png";
-    for (const fs::path& path : {added, replaced, masks / inside})
-        if (is_file(path)) return path;
+    for (const fs::path& name : {added, replaced, inside})
+        if (has_file(masks, name)) return masks / name;
     return {};
 }
 
@@ -106,8 +117,8 @@ void fit_to_file(Frame& frame) {
     camera.cy *= y;
 }
 
-/// Pinhole cameras of lenses met before: finding one undistorts the whole border of a picture, and most
-/// datasets have only a few lenses.
+/// Pinhole cameras of lenses met before: finding one takes some milliseconds, and most datasets have only a
+/// few lenses.
 class Pinholes {
   public:
     Camera of(const Camera& source, const Distortion& distortion) {

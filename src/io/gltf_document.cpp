@@ -5,8 +5,10 @@
 #include <nlohmann/json.hpp>
 
 #include "core/file_reader.h"
+#include "core/json.h"
 #include "core/text.h"
 #include "ewa/error.h"
+#include "io/inside.h"
 
 namespace ewa::io {
 
@@ -15,7 +17,6 @@ namespace {
 using nlohmann::json;
 
 constexpr uint32_t kMagic = 0x46546c67, kJsonChunk = 0x4e4f534a, kBinChunk = 0x004e4942;
-constexpr int kDeepest = 64;
 constexpr size_t kLongestReason = 300;  // of a library's error, which may quote the file at any length
 constexpr size_t kMostObjects = 1 << 15, kMostValues = 1 << 17;  // of splats; meshes have more nodes
 constexpr size_t kMeshFolds = 2;
@@ -69,30 +70,13 @@ Chunks read_chunks(core::FileReader& reader) {
 }
 
 json parse(const std::string& name, const Chunks& chunks, GltfContent content) {
-    size_t objects = 0, values = 0;
     const bool splats = content == GltfContent::splats;
-    const size_t most_objects = kMostObjects * (splats ? 1 : kMeshFolds);
-    const size_t most_values = kMostValues * (splats ? 1 : kMeshFolds);
-    const auto watch = [&](int depth, json::parse_event_t event, json& parsed) {
-        if (depth > kDeepest)
-            throw InputError(name + ": the JSON nests deeper than " + std::to_string(kDeepest) + " levels");
-        objects += event == json::parse_event_t::object_start;
-        values += event == json::parse_event_t::value;
-        if (objects > most_objects || values > most_values)
-            throw InputError(name + ": the JSON has more than " + std::to_string(most_objects) +
-                             " objects or " + std::to_string(most_values) + " values, which is no " +
-                             (splats ? "splat" : "mesh") + " scene");
-        return !(splats && event == json::parse_event_t::key && parsed == "extras");
-    };
-    try {
-        return json::parse(chunks.json, watch);
-    } catch (const json::parse_error& error) {
-        throw InputError(name + ": byte " + std::to_string(chunks.json_begin + error.byte) +
-                         ": not valid JSON: " + core::one_line(error.what()).substr(0, kLongestReason));
-    } catch (const json::exception& error) {
-        throw InputError(name +
-                         ": not valid JSON: " + core::one_line(error.what()).substr(0, kLongestReason));
-    }
+    core::JsonLimits limits;
+    limits.objects = kMostObjects * (splats ? 1 : kMeshFolds);
+    limits.values = kMostValues * (splats ? 1 : kMeshFolds);
+    if (splats) limits.left_out = "extras";
+    limits.begin = chunks.json_begin;
+    return core::parse_json<json>(chunks.json, name, limits);
 }
 
 /// The sections that the content needs, as text. Images are not among them: tinygltf would open them.
@@ -124,17 +108,6 @@ std::string percent_decoded(const std::string& text) {
         decoded += text[i];
     }
     return decoded;
-}
-
-/// Whether the path, once links are followed, stands below the folder.
-bool is_below(const std::filesystem::path& folder, const std::filesystem::path& path) {
-    std::error_code error;
-    const auto root = std::filesystem::weakly_canonical(folder.empty() ? "." : folder, error);
-    if (error) return false;
-    const auto target = std::filesystem::weakly_canonical(path, error);
-    if (error) return false;
-    const auto relative = target.lexically_relative(root);
-    return !relative.empty() && *relative.begin() != "..";
 }
 
 size_t component_bytes(int type) {
@@ -330,11 +303,11 @@ GltfDocument::Buffer GltfDocument::open_uri(const std::filesystem::path& folder,
     }
     constexpr size_t kLongestName = 1024;
     if (uri.size() > kLongestName) fail(what + "\"uri\" is longer than a file's name can be");
-    const std::filesystem::path relative = percent_decoded(uri);
-    buffer.file = folder / relative;
-    if (uri.find("://") != std::string::npos || relative.is_absolute() || !is_below(folder, buffer.file))
+    const auto relative = name_inside(percent_decoded(uri));
+    if (uri.find("://") != std::string::npos || !relative || !links_stay_inside(folder, *relative))
         fail(what + "\"uri\" " + uri.substr(0, 200) +
              " leaves the file's folder; only files in or below it are read");
+    buffer.file = folder / *relative;
     try {
         buffer.size = core::FileReader(buffer.file).size();
     } catch (const InputError& error) {

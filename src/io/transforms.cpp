@@ -6,9 +6,10 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "core/file_reader.h"
+#include "core/json.h"
 #include "core/text.h"
 #include "ewa/error.h"
+#include "io/inside.h"
 #include "io/points_ply.h"
 
 namespace ewa::io {
@@ -17,6 +18,7 @@ namespace {
 
 using nlohmann::json;
 
+constexpr size_t kLongestName = 200;  // in an error
 constexpr double kMaxSize = 1 << 20;  // px
 // Of the columns of a rotation from unit length and right angles. Files with four decimals stay under it.
 constexpr double kMaxRotationError = 1e-2;
@@ -24,8 +26,8 @@ constexpr double kMaxRotationError = 1e-2;
 /// A frame and the top of its file, asked together: what a frame does not say, the top says for all.
 class Entry {
   public:
-    Entry(const std::string& file, const json& top, const json& frame, size_t index)
-        : top_(top), frame_(frame), where_(file + ": frame " + std::to_string(index)) {}
+    Entry(const std::string& where, const json& top, const json& frame)
+        : top_(top), frame_(frame), where_(where) {}
 
     const json* find(const char* key) const {
         if (const auto it = frame_.find(key); it != frame_.end() && !it->is_null()) return &*it;
@@ -91,31 +93,38 @@ Distortion read_lens(const Entry& entry) {
     return d;
 }
 
-/// A path as a file wrote it, perhaps on Windows, from the folder of that file.
-std::filesystem::path resolve(const std::filesystem::path& folder, std::string text) {
-    std::replace(text.begin(), text.end(), '\\', '/');
-    return folder / std::filesystem::path(text).lexically_normal();
-}
-
 bool is_file(const std::filesystem::path& path) {
     std::error_code ignored;
     return std::filesystem::is_regular_file(path, ignored);
 }
 
+/// What the entry names under this key, from the folder of its file; empty where it names nothing.
+std::filesystem::path named_file(const Entry& entry, const char* key, const std::filesystem::path& folder) {
+    const std::string name = entry.text(key);
+    if (name.empty()) return {};
+    const auto inside = name_inside(name);
+    const std::string what = std::string("\"") + key + "\" " + name.substr(0, kLongestName);
+    if (!inside) entry.fail(what + " leaves the file's folder; only files in or below it are read");
+    if (!links_stay_with_pictures(folder, *inside))
+        entry.fail(what + " is a link out of the file's folder; " + kLinkAdvice);
+    return *inside;
+}
+
 void find_picture(const Entry& entry, const std::filesystem::path& folder, PosedImage& image) {
-    std::string name = entry.text("file_path");
+    const std::filesystem::path name = named_file(entry, "file_path", folder);
     if (name.empty()) entry.fail("\"file_path\" is missing");
-    std::replace(name.begin(), name.end(), '\\', '/');
-    name = std::filesystem::path(name).lexically_normal().string();
-    image.path = resolve(folder, name);
-    image.name = name;
+    image.path = folder / name;
+    image.name = name.string();
     if (is_file(image.path)) return;
-    for (const char* extension : {".png", ".jpg", ".jpeg"})
-        if (is_file(image.path.string() + extension)) {
-            image.path += extension;
-            image.name += extension;
-            return;
-        }
+    for (const char* extension : {".png", ".jpg", ".jpeg"}) {
+        const std::filesystem::path longer = name.string() + extension;
+        if (!is_file(folder / longer)) continue;
+        if (!links_stay_with_pictures(folder, longer))
+            entry.fail(longer.string() + " is a link out of the file's folder; " + kLinkAdvice);
+        image.path = folder / longer;
+        image.name = longer.string();
+        return;
+    }
 }
 
 int whole_size(const Entry& entry, const char* key, double value) {
@@ -208,45 +217,26 @@ void read_pose(const Entry& entry, Camera& camera) {
     camera.translation = -(camera.rotation * center);
 }
 
-json parse(const std::filesystem::path& path) {
-    const std::string text = core::read_text_file(path), name = core::one_line(path.string());
-    try {
-        constexpr bool kThrow = true, kComments = true;
-        // The dialects nest 5 levels; a stranger's file may nest a hundred million.
-        constexpr int kDeepest = 64;
-        const auto shallow = [&](int depth, json::parse_event_t, json&) {
-            if (depth > kDeepest)
-                throw InputError(name + ": nests deeper than " + std::to_string(kDeepest) + " levels");
-            return true;
-        };
-        return json::parse(text, shallow, kThrow, kComments);
-    } catch (const json::parse_error& error) {
-        throw InputError(name + ": byte " + std::to_string(error.byte) +
-                         ": not valid JSON: " + core::one_line(error.what()));
-    } catch (const json::exception& error) {
-        throw InputError(name + ": not valid JSON: " + core::one_line(error.what()));
-    }
-}
-
 }  // namespace
 
 PosedImages read_transforms(const std::filesystem::path& path, int split, bool with_points) {
     const std::string name = core::one_line(path.string());
-    const json top = parse(path);
+    const json top = core::read_json_file<json>(path, {.comments = true});  // which instant-ngp takes
     if (!top.is_object()) throw InputError(name + ": is no JSON object");
     const auto frames = top.find("frames");
     if (frames == top.end() || !frames->is_array()) throw InputError(name + ": has no list \"frames\"");
     PosedImages result;
-    result.folder = path.parent_path() / "images";
+    const std::filesystem::path folder = path.parent_path();
+    result.folder = folder / "images";
     for (size_t i = 0; i < frames->size(); ++i) {
-        const Entry entry(name, top, (*frames)[i], i);
+        const Entry entry(name + ": frame " + std::to_string(i), top, (*frames)[i]);
         if (!(*frames)[i].is_object()) entry.fail("is no JSON object");
         PosedImage image;
         image.split = split;
         image.distortion = read_lens(entry);
-        find_picture(entry, path.parent_path(), image);
-        if (const std::string mask = entry.text("mask_path"); !mask.empty())
-            image.mask = resolve(path.parent_path(), mask);
+        find_picture(entry, folder, image);
+        if (const auto mask = named_file(entry, "mask_path", folder); !mask.empty())
+            image.mask = folder / mask;
         read_pose(entry, image.camera);
         read_intrinsics(entry, image);
         result.images.push_back(std::move(image));
@@ -256,9 +246,9 @@ PosedImages read_transforms(const std::filesystem::path& path, int split, bool w
         result.color_depends_on_view = view->get<bool>();
     }
     const json empty = json::object();
-    const std::string points_path = Entry(name, top, empty, 0).text("ply_file_path");
-    if (with_points && !points_path.empty()) {
-        PlyPoints points = read_points_ply(resolve(path.parent_path(), points_path));
+    const auto points_name = named_file(Entry(name, top, empty), "ply_file_path", folder);
+    if (with_points && !points_name.empty()) {
+        PlyPoints points = read_points_ply(folder / points_name);
         result.points = std::move(points.points);
         result.dropped = std::move(points.dropped);
     }

@@ -2,12 +2,12 @@
 #include "io/view_list.h"
 
 #include <cmath>
-#include <fstream>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <nlohmann/json.hpp>
 
 #include "core/atomic_file.h"
+#include "core/json.h"
 #include "ewa/error.h"
 
 namespace ewa::io {
@@ -15,7 +15,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::uintmax_t kLargestFile = 16u << 20;  // bytes
+constexpr uint64_t kLargestFile = 16u << 20;  // bytes
 constexpr double kRotationTolerance = 1e-6;
 
 std::vector<double> numbers(const Json& json, const char* name, size_t count) {
@@ -83,12 +83,7 @@ Json to_json(const NamedView& view) {
 }  // namespace
 
 std::vector<NamedView> read_views(const std::filesystem::path& path) {
-    std::error_code error;
-    const auto bytes = std::filesystem::file_size(path, error);
-    if (error) throw InputError("cannot open " + path.string() + ": " + error.message());
-    if (bytes > kLargestFile) throw InputError(path.string() + ": too large for a list of views");
-    std::ifstream file(path, std::ios::binary);
-    const Json json = Json::parse(file, nullptr, false);
+    const Json json = core::read_json_file<Json>(path, {.bytes = kLargestFile});
     if (!json.is_object() || !json.contains("views") || !json["views"].is_array())
         throw InputError(path.string() + ": is no list of views: an object with \"views\" is expected");
     if (json["views"].size() > kMostViews)

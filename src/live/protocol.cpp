@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "core/json.h"
 #include "core/text.h"
 #include "ewa/error.h"
 
@@ -49,23 +50,27 @@ std::string encode(const Status& status) {
 }
 
 Status decode_status(const std::string& text) {
+    const std::string name = "the trainer's status";
+    const Json json = core::parse_json<Json>(text, name);
     try {
-        const Json json = Json::parse(text);
         Status status;
-        status.step = json.at("step").get<int>();
-        status.steps = json.at("steps").get<int>();
-        status.splats = json.at("splats").get<uint32_t>();
-        status.loss = json.at("loss").is_null() ? std::nan("") : json.at("loss").get<double>();
-        status.seconds = json.at("seconds").is_null() ? 0 : json.at("seconds").get<double>();
+        status.step = int(report::whole_number(json, "step", INT32_MAX));
+        status.steps = int(report::whole_number(json, "steps", INT32_MAX));
+        status.splats = uint32_t(report::whole_number(json, "splats", UINT32_MAX));
+        status.loss = report::number_or_nan(json, "loss");
+        status.seconds = json.at("seconds").is_null() ? 0 : report::number_or_nan(json, "seconds");
         const std::string state = json.at("state").get<std::string>();
         status.state = state == "paused" ? State::paused : state == "done" ? State::done : State::running;
         status.commands = json.at("commands").get<bool>();
-        std::string lines;
-        for (const Json& line : json.at("metrics")) lines += line.dump() + "\n";
-        status.metrics = report::parse_metrics(lines);
+        const Json& lines = json.at("metrics");
+        if (!lines.is_array() || lines.size() > kMostLines)
+            throw InputError("\"metrics\" is no list of at most " + std::to_string(kMostLines) + " lines");
+        for (const Json& line : lines) status.metrics.push_back(report::metrics_line(line));
         return status;
+    } catch (const InputError& error) {
+        throw InputError(name + " cannot be read: " + error.what());
     } catch (const Json::exception& error) {
-        throw InputError(std::string("the trainer's status cannot be read: ") + error.what());
+        throw InputError(name + " cannot be read: " + core::one_line(error.what()));
     }
 }
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/atomic_file.h"
+#include "core/json.h"
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
 
@@ -30,15 +31,24 @@ std::string start_of(const fs::path& path, size_t most) {
 
 /// How many steps the run's settings ask for; 0 where that cannot be read.
 int steps_of(const fs::path& folder) {
-    const Json json = Json::parse(start_of(folder / "config.json", kLargestConfig), nullptr, false);
-    const auto steps = json.is_object() ? json.find("steps") : json.end();
-    return json.is_object() && steps != json.end() && steps->is_number_integer() ? steps->get<int>() : 0;
+    try {
+        const Json json =
+            core::parse_json<Json>(start_of(folder / "config.json", kLargestConfig), "config.json");
+        return int(report::whole_number(json, "steps", INT32_MAX));
+    } catch (const InputError&) {
+        return 0;
+    }
 }
 
 }  // namespace
 
 std::optional<LiveFile> read_live_file(const fs::path& folder) {
-    const Json json = Json::parse(start_of(folder / kLiveFile, kLargestLiveFile), nullptr, false);
+    Json json;
+    try {
+        json = core::parse_json<Json>(start_of(folder / kLiveFile, kLargestLiveFile), kLiveFile);
+    } catch (const InputError&) {
+        return std::nullopt;  // none, half a one, or no longer one
+    }
     if (!json.is_object() || !json.contains("port") || !json["port"].is_number_unsigned() ||
         !json.contains("token") || !json["token"].is_string())
         return std::nullopt;

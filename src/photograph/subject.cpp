@@ -6,8 +6,8 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "core/file_reader.h"
 #include "core/hash.h"
+#include "core/json.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "io/gltf_mesh.h"
@@ -113,7 +113,12 @@ Subject read_subject(const fs::path& path, const PhotographOptions& options) {
 std::optional<Record> read_record(const fs::path& folder) {
     std::error_code none;
     if (!fs::exists(folder / kRecord, none)) return std::nullopt;
-    const auto json = nlohmann::json::parse(core::read_text_file(folder / kRecord), nullptr, false);
+    nlohmann::json json;
+    try {
+        json = core::read_json_file<nlohmann::json>(folder / kRecord);
+    } catch (const InputError&) {
+        return std::nullopt;  // half a one, or no record of ewa's
+    }
     if (!json.is_object() || !json.contains("fingerprint") || !json["fingerprint"].is_string())
         return std::nullopt;
     Record record{.fingerprint = json["fingerprint"].get<std::string>(), .exposure = std::nullopt};

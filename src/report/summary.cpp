@@ -3,9 +3,11 @@
 
 #include <cerrno>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <sstream>
 
+#include "core/json.h"
 #include "ewa/error.h"
 
 namespace ewa::report {
@@ -57,28 +59,43 @@ Json to_json(const MetricsLine& line) {
     return json;
 }
 
+uint64_t whole_number(const Json& object, const char* name, uint64_t most) {
+    const auto found = object.is_object() ? object.find(name) : object.end();
+    if (found == object.end() || !found->is_number_unsigned() || found->get<uint64_t>() > most)
+        throw InputError(std::string("\"") + name + "\" is no whole number of 0 to " + std::to_string(most));
+    return found->get<uint64_t>();
+}
+
+double number_or_nan(const Json& object, const char* name) {
+    const auto found = object.is_object() ? object.find(name) : object.end();
+    if (found == object.end() || !(found->is_null() || found->is_number()))
+        throw InputError(std::string("\"") + name + "\" is neither a number nor null");
+    return found->is_null() ? std::nan("") : found->get<double>();
+}
+
+MetricsLine metrics_line(const Json& json) {
+    MetricsLine line;
+    line.step = int(whole_number(json, "step", INT32_MAX));
+    line.seconds = number_or_nan(json, "seconds");
+    line.wall_seconds = number_or_nan(json, "wall_seconds");
+    line.loss = number_or_nan(json, "loss");
+    line.splats = uint32_t(whole_number(json, "splats", UINT32_MAX));
+    if (json.contains("test_psnr")) line.test_psnr = number_or_nan(json, "test_psnr");
+    if (json.contains("test_ssim")) line.test_ssim = number_or_nan(json, "test_ssim");
+    return line;
+}
+
 std::vector<MetricsLine> parse_metrics(const std::string& text) {
     std::vector<MetricsLine> lines;
     std::istringstream stream(text);
     std::string line;
     while (std::getline(stream, line)) {
+        const std::string name = "line " + std::to_string(lines.size() + 1) + " of the metrics";
+        const Json json = core::parse_json<Json>(line, name);
         try {
-            const Json json = Json::parse(line);
-            const auto number = [&](const char* name) {
-                const Json& value = json.at(name);
-                return value.is_null() ? std::nan("") : value.get<double>();
-            };
-            MetricsLine& read = lines.emplace_back();
-            read.step = json.at("step").get<int>();
-            read.seconds = number("seconds");
-            read.wall_seconds = number("wall_seconds");
-            read.loss = number("loss");
-            read.splats = json.at("splats").get<uint32_t>();
-            if (json.contains("test_psnr")) read.test_psnr = number("test_psnr");
-            if (json.contains("test_ssim")) read.test_ssim = number("test_ssim");
-        } catch (const Json::exception& error) {
-            throw InputError("line " + std::to_string(lines.size() + 1) +
-                             " of the metrics is not one: " + error.what());
+            lines.push_back(metrics_line(json));
+        } catch (const InputError& error) {
+            throw InputError(name + " is not one: " + error.what());
         }
     }
     return lines;

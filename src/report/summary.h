@@ -34,6 +34,11 @@ struct Summary {
 
 Json to_json(const Summary& summary);
 
+/// The whole number of 0 to `most` that an object holds under this name. Throws InputError that says so.
+uint64_t whole_number(const Json& object, const char* name, uint64_t most);
+/// The number, not a number for null. Throws InputError where there is neither.
+double number_or_nan(const Json& object, const char* name);
+
 struct MetricsLine {
     int step = 0;
     double seconds = 0, wall_seconds = 0, loss = 0;
@@ -42,6 +47,8 @@ struct MetricsLine {
 };
 
 Json to_json(const MetricsLine& line);
+/// The line that to_json wrote. Throws InputError that names what is missing or wrong.
+MetricsLine metrics_line(const Json& json);
 /// The lines of a metrics.jsonl, each as to_json wrote it. Throws InputError that names the line.
 std::vector<MetricsLine> parse_metrics(const std::string& text);
 std::string metrics_text(const std::vector<MetricsLine>& lines);

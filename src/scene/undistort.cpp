@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "ewa/error.h"
 #include "scene/lens.h"
@@ -32,27 +33,49 @@ glm::dvec2 source_pixel(const Camera& source, const Distortion& distortion, glm:
     return {source.fx * p.x + source.cx, source.fy * p.y + source.cy};
 }
 
-/// Of each side's undistorted border, the pixel that comes farthest in, in source pixels.
+/// Of each side's undistorted border, the pixel that comes farthest in, as a tangent; infinite where none
+/// does.
 struct Inner {
-    double left = -std::numeric_limits<double>::infinity(), right = std::numeric_limits<double>::infinity();
-    double top = left, bottom = right;
+    double left, right, top, bottom;
 };
 
-Inner inner_border(const Camera& source, const Distortion& distortion) {
-    Inner inner;
-    const auto visit = [&](double x, double y, auto&& use) {
-        if (const auto ray = undistort(distortion, normalized(source, x, y))) use(*ray);
+/// The largest of value(0) .. value(size - 1), each nothing where no ray in front reaches that pixel: looked
+/// for in steps that get finer about the best, since a file may claim any size and any number of lenses.
+/// `axis`, the pixel nearest to the principal point, is seen even where little of the side is.
+template <class Value>
+double largest(int size, double axis, const Value& value) {
+    constexpr int kSamples = 128;
+    double best = -std::numeric_limits<double>::infinity();
+    int at = 0;
+    const auto visit = [&](int i) {
+        const std::optional<double> found = value(i);
+        if (!found || !(*found > best)) return;
+        best = *found;
+        at = i;
     };
-    for (int y = 0; y < source.height; ++y) {
-        visit(0.5, y + 0.5, [&](glm::dvec2 ray) { inner.left = std::max(inner.left, ray.x); });
-        visit(source.width - 0.5, y + 0.5,
-              [&](glm::dvec2 ray) { inner.right = std::min(inner.right, ray.x); });
+    visit(static_cast<int>(std::clamp(axis, 0.0, size - 1.0)));
+    for (int low = 0, high = size - 1, step = 0; step != 1;) {
+        step = std::max(1, (high - low) / kSamples);
+        for (int i = low; i < high; i += step) visit(i);
+        visit(high);
+        low = std::max(0, at - step);
+        high = std::min(size - 1, at + step);
     }
-    for (int x = 0; x < source.width; ++x) {
-        visit(x + 0.5, 0.5, [&](glm::dvec2 ray) { inner.top = std::max(inner.top, ray.y); });
-        visit(x + 0.5, source.height - 0.5,
-              [&](glm::dvec2 ray) { inner.bottom = std::min(inner.bottom, ray.y); });
-    }
+    return best;
+}
+
+Inner inner_border(const Camera& source, const Distortion& distortion) {
+    // The ray of a pixel of the border along one axis, its sign such that the largest is the farthest in.
+    const auto ray = [&](double x, double y, int axis, double sign) -> std::optional<double> {
+        const auto found = undistort(distortion, normalized(source, x, y));
+        return found ? std::optional(sign * (*found)[axis]) : std::nullopt;
+    };
+    const double right = source.width - 0.5, bottom = source.height - 0.5;
+    Inner inner;
+    inner.left = largest(source.height, source.cy, [&](int y) { return ray(0.5, y + 0.5, 0, 1); });
+    inner.right = -largest(source.height, source.cy, [&](int y) { return ray(right, y + 0.5, 0, -1); });
+    inner.top = largest(source.width, source.cx, [&](int x) { return ray(x + 0.5, 0.5, 1, 1); });
+    inner.bottom = -largest(source.width, source.cx, [&](int x) { return ray(x + 0.5, bottom, 1, -1); });
     return inner;
 }
 
@@ -77,17 +100,25 @@ Camera scaled(const Camera& source, double scale_x, double scale_y) {
     return camera;
 }
 
-/// Whether the source holds the whole new picture, and the model has not folded anywhere in it.
-bool covers(const Camera& source, const Distortion& distortion, const Camera& camera) {
+/// Whether the source holds the whole new picture, and the model has not folded anywhere in it. `first` is
+/// looked at before the others, and becomes the point that failed: a little smaller, the picture mostly fails
+/// there again.
+bool covers(const Camera& source, const Distortion& distortion, const Camera& camera, glm::ivec2& first) {
     constexpr int kSteps = 64;
+    const auto holds = [&](int i, int j) {
+        const glm::dvec2 ray = normalized(camera, 0.5 + i * (camera.width - 1.0) / kSteps,
+                                          0.5 + j * (camera.height - 1.0) / kSteps);
+        const glm::dvec2 p = source_pixel(source, distortion, ray);
+        return p.x >= 0 && p.x <= source.width && p.y >= 0 && p.y <= source.height &&
+               one_to_one(distortion, ray);
+    };
+    if (!holds(first.x, first.y)) return false;
     for (int j = 0; j <= kSteps; ++j)
-        for (int i = 0; i <= kSteps; ++i) {
-            const glm::dvec2 ray = normalized(camera, 0.5 + i * (camera.width - 1.0) / kSteps,
-                                              0.5 + j * (camera.height - 1.0) / kSteps);
-            const glm::dvec2 p = source_pixel(source, distortion, ray);
-            const bool inside = p.x >= 0 && p.x <= source.width && p.y >= 0 && p.y <= source.height;
-            if (!inside || !one_to_one(distortion, ray)) return false;
-        }
+        for (int i = 0; i <= kSteps; ++i)
+            if (!holds(i, j)) {
+                first = {i, j};
+                return false;
+            }
     return true;
 }
 
@@ -100,9 +131,9 @@ Camera undistorted_camera(const Camera& source, const Distortion& distortion) {
     const Inner inner = inner_border(source, distortion);
     double x = axis_scale(distortion, source.fx, source.cx, source.width, inner.left, inner.right);
     double y = axis_scale(distortion, source.fy, source.cy, source.height, inner.top, inner.bottom);
-    for (;;) {
+    for (glm::ivec2 first(0);;) {
         const Camera camera = scaled(source, x, y);
-        if (covers(source, distortion, camera)) return camera;
+        if (covers(source, distortion, camera, first)) return camera;
         x *= kShrink;
         y *= kShrink;
         if (x < kMinScale * kShrink && y < kMinScale * kShrink) fail_folded();

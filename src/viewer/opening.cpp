@@ -2,9 +2,9 @@
 #include "viewer/opening.h"
 
 #include <algorithm>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "core/json.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/photograph.h"
@@ -15,9 +15,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr float kPointOpacity = 3;           // logit
-constexpr float kPointShrink = 1.2f;         // taken off the logarithm of a point's size
-constexpr size_t kLargestConfig = 1u << 20;  // bytes
+constexpr float kPointOpacity = 3;             // logit
+constexpr float kPointShrink = 1.2f;           // taken off the logarithm of a point's size
+constexpr uint64_t kLargestConfig = 1u << 20;  // bytes
 
 std::string name_of_path(const fs::path& path) {
     const fs::path clean = path.lexically_normal();
@@ -50,12 +50,13 @@ std::shared_ptr<const Dataset> load_cameras(const fs::path& path, int downscale,
 }
 
 nlohmann::json read_config(const fs::path& path) {
-    std::ifstream file(path, std::ios::binary);
-    std::string text(kLargestConfig, '\0');
-    file.read(text.data(), std::streamsize(text.size()));
-    text.resize(size_t(std::max<std::streamsize>(0, file.gcount())));
-    nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
-    return json.is_object() ? json : nlohmann::json::object();
+    try {
+        const auto json = core::read_json_file<nlohmann::json>(path, {.bytes = kLargestConfig});
+        if (json.is_object()) return json;
+    } catch (const InputError&) {
+        // The run is shown without what its settings would say.
+    }
+    return nlohmann::json::object();
 }
 
 std::string text_of(const nlohmann::json& config, const char* name) {

@@ -44,6 +44,30 @@ TEST(Inputs, DatasetsThatAreNone) {
     EXPECT_FALSE(fs::exists(folder / "out"));
 }
 
+/// What a name may do to the terminal that it is printed on.
+TEST(Inputs, NamesAreShownWithoutTheirControls) {
+    const Folder folder;
+    const std::string name = "a\x1b]0;title\x07\n.png", shown = "images/a\\x1b]0;title\\x07 .png";
+    make_dataset(folder / "data", {name, "b.png"});
+    make_splats(folder / "s.ply");
+    const Outcome eval =
+        run_ewa({"eval", folder / "s.ply", folder / "data", "--split", "all", "--json", folder / "e.json"});
+    expect_success(eval);
+    EXPECT_NE(eval.out.find(shown), std::string::npos) << eval.out;
+    EXPECT_EQ(eval.out.find('\x1b'), std::string::npos);
+    EXPECT_EQ(read_json(folder / "e.json")["frames"][0]["name"], "images/" + name);
+    const Outcome grad =
+        run_ewa({"grad", folder / "s.ply", folder / "data", "--frame", "0", "-o", folder / "g.ply"});
+    expect_success(grad);
+    EXPECT_NE(grad.out.find(shown), std::string::npos) << grad.out;
+    fs::rename(folder / "s.ply", folder / "s\x1b.ply");
+    const Outcome info = run_ewa({"info", folder / "s\x1b.ply"});
+    expect_success(info);
+    EXPECT_NE(info.out.find("/s\\x1b.ply\n"), std::string::npos) << info.out;
+    write_file(folder / ("data/images/" + name), "x");
+    expect_failure(run_ewa({"train", folder / "data", "-o", folder / "out"}), 2, shown);
+}
+
 TEST(Inputs, DatasetWithoutAnyImage) {
     const Folder folder;
     make_dataset(folder / "data");

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // A training that was ended, by Ctrl-C or kill -9, and goes on.
 #include <gtest/gtest.h>
-
 #include <zlib.h>
 
 #include <algorithm>
 #include <csignal>
 #include <cstring>
+#include <optional>
 #include <sstream>
 
 #include "cli/expect.h"
@@ -129,23 +129,27 @@ TEST_F(ResumeEdges, RefusesWhatWouldEndDifferently) {
     refused({}, "not a checkpoint");
 }
 
-/// A checkpoint whose section `section` has other bytes or another name, and the checksum that goes with
+/// A checkpoint whose section `section` has another name or other bytes, and the checksum that goes with
 /// them.
-std::string with_section(std::string checkpoint, const std::string& section, const std::string& name,
-                         char filler) {
-    constexpr size_t kStart = 16, kHeader = 32, kChecksum = 24;
+std::string with_section(const std::string& checkpoint, const std::string& section, const std::string& name,
+                         const std::optional<std::string>& bytes = {}) {
+    constexpr size_t kStart = 16, kHeader = 32, kSize = 16, kChecksum = 24;
     for (size_t at = kStart; at < checkpoint.size();) {
-        uint64_t bytes = 0;
-        std::memcpy(&bytes, &checkpoint[at + 16], sizeof(bytes));
+        uint64_t before = 0;
+        std::memcpy(&before, &checkpoint[at + kSize], sizeof(before));
         if (checkpoint.c_str() + at == section) {
-            std::copy(name.begin(), name.end(), checkpoint.begin() + std::ptrdiff_t(at));
-            if (filler) std::fill_n(checkpoint.begin() + std::ptrdiff_t(at + kHeader), bytes, filler);
-            const auto* begin = reinterpret_cast<const Bytef*>(&checkpoint[at]);
-            const auto sum = uint32_t(crc32_z(crc32_z(0, begin, kChecksum), begin + kHeader, size_t(bytes)));
-            std::memcpy(&checkpoint[at + kChecksum], &sum, sizeof(sum));
-            return checkpoint;
+            std::string header = checkpoint.substr(at, kHeader);
+            const std::string body = bytes ? *bytes : checkpoint.substr(at + kHeader, before);
+            std::copy(name.begin(), name.end(), header.begin());
+            const uint64_t size = body.size();
+            std::memcpy(&header[kSize], &size, sizeof(size));
+            const auto* header_bytes = reinterpret_cast<const Bytef*>(header.data());
+            const auto* body_bytes = reinterpret_cast<const Bytef*>(body.data());
+            const auto sum = uint32_t(crc32_z(crc32_z(0, header_bytes, kChecksum), body_bytes, body.size()));
+            std::memcpy(&header[kChecksum], &sum, sizeof(sum));
+            return checkpoint.substr(0, at) + header + body + checkpoint.substr(at + kHeader + before);
         }
-        at += kHeader + bytes;
+        at += kHeader + before;
     }
     ADD_FAILURE() << "there is no section " << section;
     return checkpoint;
@@ -155,13 +159,29 @@ TEST_F(ResumeEdges, NamesACheckpointThatIsWholeButWrong) {
     const Names options{"--steps", "3", "--resume"};
     expect_success(train("o", options));
     const std::string path = folder / "o/checkpoint.ewa", good = read_file(path);
-    write_file(path, with_section(good, "moments2", "momentsX", 0));
-    expect_failure(train("o", options), 2, path + ": the state to go on from lacks moments2");
-    write_file(path, with_section(good, "metrics", "metrics", 'x'));
-    expect_failure(train("o", options), 2, path + ": line 1 of the metrics");
-    write_file(path, with_section(good, "settings", "settings", '['));
-    expect_failure(train("o", options), 2, path + ": its settings");
-    write_file(path, with_section(good, "settings", "settings", 0));
+    const auto refused = [&](const std::string& checkpoint, const std::string& text) {
+        write_file(path, checkpoint);
+        const Outcome outcome = train("o", options);
+        expect_failure(outcome, 2, text);
+        EXPECT_NE(outcome.err.find(path), std::string::npos) << outcome.err;
+        EXPECT_LT(outcome.err.size(), 1000u);
+    };
+    refused(with_section(good, "moments2", "momentsX"), path + ": the state to go on from lacks moments2");
+    refused(with_section(good, "metrics", "metrics", "xxx"), path + ": line 1 of the metrics");
+
+    const auto settings = [&](const std::string& text) {
+        return with_section(good, "settings", "settings", text);
+    };
+    const std::string deep = std::string(400000, '[') + std::string(400000, ']');
+    refused(settings("{\"options\":{\"steps\":" + deep + "}}"), "nests deeper");
+    refused(settings(deep), "nests deeper");
+    refused(settings("{\"options\":3}"), "cannot be read");
+    refused(settings(""), "not valid JSON");
+    const std::string dataset = nlohmann::json::parse(good.substr(48, good.find("metrics") - 48))["dataset"];
+    const nlohmann::json longer{{"dataset", dataset}, {"options", {{"steps", std::string(100000, 'x')}}}};
+    refused(settings(longer.dump()), "was written with --");
+
+    write_file(path, with_section(good, "settings", "settings"));
     expect_success(train("o", options));
 }
 

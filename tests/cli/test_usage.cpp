@@ -114,6 +114,8 @@ TEST(Usage, ConfigNamesItsMistake) {
         write_file(file, text);
         expect_failure(run_ewa({"train", "/nowhere", "--config", file}), 2, mistake);
     }
+    write_file(file, "{\"background\":" + std::string(400000, '[') + std::string(400000, ']') + "}");
+    expect_failure(run_ewa({"train", "/nowhere", "--config", file}), 2, "c.json: the JSON nests deeper");
     expect_failure(run_ewa({"train", "/nowhere", "--config", folder / "absent.json"}), 2, "absent.json");
     // The command line wins over the file, so its mistake does not count.
     write_file(file, R"({"steps": 0, "dataset": "/elsewhere"})");

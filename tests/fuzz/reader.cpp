@@ -3,44 +3,19 @@
 // a byte or a property, within the memory and the time (a second, under the sanitizers) allowed.
 #include EWA_HEADER
 
-#include <sys/mman.h>
-#include <unistd.h>
 #include <zlib.h>
 
 #include <cctype>
 #include <cmath>
 #include <cstring>
-#include <ctime>
 #include <string>
 
 #include "ewa/error.h"
-#include "memory.h"
+#include "input.h"
 
 namespace {
 
 using namespace ewa;
-
-#define EWA_REQUIRE(condition)                                                    \
-    if (!(condition)) {                                                           \
-        std::fprintf(stderr, "%s does not hold: %s\n", #condition, text.c_str()); \
-        std::abort();                                                             \
-    }
-
-/// A file in memory that the reader opens by name.
-class MemoryFile {
-  public:
-    MemoryFile()
-        : descriptor_(memfd_create("fuzz", 0)), path_("/proc/self/fd/" + std::to_string(descriptor_)) {}
-    const std::string& hold(const uint8_t* data, size_t size) {
-        if (ftruncate(descriptor_, static_cast<off_t>(size)) != 0) std::abort();
-        if (pwrite(descriptor_, data, size, 0) != static_cast<ssize_t>(size)) std::abort();
-        return path_;
-    }
-
-  private:
-    int descriptor_;
-    std::string path_;
-};
 
 /// What would be found in a gzip stream is mutated unpacked: mutations of packed bytes only find its
 /// checksum.
@@ -58,7 +33,44 @@ class MemoryFile {
     return out;
 }
 
-#ifdef EWA_READ_MESH
+#ifdef EWA_SUM_CHECKPOINT
+/// The same for a checkpoint's sections: each with its checksum.
+std::string with_checksums(const uint8_t* data, size_t size) {
+    constexpr size_t kHeader = 16, kSum = 24, kSection = 32;
+    std::string bytes(reinterpret_cast<const char*>(data), size);
+    for (size_t at = kHeader; at + kSection <= size;) {
+        uint64_t length = 0;
+        std::memcpy(&length, &bytes[at + 16], sizeof(length));
+        if (length > size - at - kSection) break;
+        const auto* section = reinterpret_cast<const Bytef*>(&bytes[at]);
+        const auto sum = uint32_t(crc32_z(crc32_z(0, section, kSum), section + kSection, length));
+        std::memcpy(&bytes[at + kSum], &sum, sizeof(sum));
+        at += kSection + length;
+    }
+    return bytes;
+}
+
+void check_scene(const train::Checkpoint& checkpoint) {
+    const std::string text = std::to_string(checkpoint.state.arrays.size()) + " arrays";
+    EWA_REQUIRE(checkpoint.state.sh_degree >= 0 && checkpoint.state.sh_degree <= kMaxShDegree);
+    EWA_REQUIRE(checkpoint.state.report.step >= 0);
+}
+#elif defined(EWA_READ_POINTS)
+void check_scene(const io::PlyPoints& read) {
+    const std::string text = std::to_string(read.points.positions.size()) + " points";
+    EWA_REQUIRE(read.points.positions.size() == read.points.colors.size());
+    for (const glm::dvec3& p : read.points.positions)
+        EWA_REQUIRE(std::isfinite(float(p.x)) && std::isfinite(float(p.y)) && std::isfinite(float(p.z)));
+}
+#elif defined(EWA_READ_VIEWS)
+void check_scene(const std::vector<io::NamedView>& views) {
+    const std::string text = std::to_string(views.size()) + " views";
+    EWA_REQUIRE(views.size() <= io::kMostViews);
+    for (const io::NamedView& view : views)
+        EWA_REQUIRE(view.camera.width > 0 && view.camera.height > 0 && view.camera.fx > 0 &&
+                    view.camera.fy > 0);
+}
+#elif defined(EWA_READ_MESH)
 void check_scene(const mesh::Scene& scene) {
     const std::string text = std::to_string(scene.triangles.size()) + " triangles";
     EWA_REQUIRE(!scene.triangles.empty() && !scene.materials.empty());
@@ -98,8 +110,9 @@ void check_error(const std::string& text) {
     bool named = false;
     for (size_t at = text.find("byte "); at != std::string::npos; at = text.find("byte ", at + 1))
         named = named || std::isdigit(static_cast<unsigned char>(text[at + 5]));
-    for (const char* place : {"\"", "'", "`", "properties f_rest_", "attribute ", "accessor", "node ",
-                              "mesh ", "buffer ", "image ", "material ", "texture ", "the JSON ", "claims "})
+    for (const char* place :
+         {"\"", "'", "`", "properties f_rest_", "attribute ", "accessor", "node ", "mesh ", "buffer ",
+          "image ", "material ", "texture ", "the JSON ", "claims ", "view "})
         named = named || text.find(place) != std::string::npos;
     EWA_REQUIRE(named);
     EWA_REQUIRE(text.find('\n') == std::string::npos && text.size() < 2000);
@@ -108,28 +121,25 @@ void check_error(const std::string& text) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-    static MemoryFile file;
-    fuzz::watch_memory();
+    static fuzz::MemoryFile file;
     std::string bytes;
 #ifdef EWA_PACK_SPZ
-    if (size > 8 && std::memcmp(data, "NGSP", 4) == 0 && data[4] < 4) {
-        bytes = packed(data, size);
+    if (size > 8 && std::memcmp(data, "NGSP", 4) == 0 && data[4] < 4) bytes = packed(data, size);
+#endif
+#ifdef EWA_SUM_CHECKPOINT
+    bytes = with_checksums(data, size);
+#endif
+    if (!bytes.empty()) {
         data = reinterpret_cast<const uint8_t*>(bytes.data());
         size = bytes.size();
     }
-#endif
     const std::string& path = file.hold(data, size);
-    const std::clock_t start = std::clock();
-    const long long before = fuzz::live;
-    fuzz::peak = before;
-    try {
-        check_scene(EWA_READ(path));
-    } catch (const InputError& error) {
-        check_error(error.what());
-    }
-    fuzz::require_modest(size, before);
-    // Of the processor, so that a busy machine is no finding; libFuzzer's own limit ends what never returns.
-    const std::string text = "time for " + std::to_string(size) + " bytes";
-    EWA_REQUIRE(std::clock() - start < CLOCKS_PER_SEC);
+    fuzz::read_within(size, 1, [&] {
+        try {
+            check_scene(EWA_READ(path));
+        } catch (const InputError& error) {
+            check_error(error.what());
+        }
+    });
     return 0;
 }

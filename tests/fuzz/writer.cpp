@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Any values through one writer: what it wrote is read back as as many splats as are drawable, all of them
 // drawable.
-#include <unistd.h>
-
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <filesystem>
 
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
+#include "input.h"
 
 namespace {
 
@@ -38,21 +36,10 @@ Gaussians scene_of(const uint8_t* data, size_t size) {
     return g;
 }
 
-/// A folder in memory where there is one: every run writes a file.
-std::filesystem::path make_folder() {
-    const std::filesystem::path shared = "/dev/shm";
-    const auto root = std::filesystem::is_directory(shared) ? shared : std::filesystem::temp_directory_path();
-    const auto folder = root / ("ewa-fuzz-" + std::to_string(getpid()));
-    std::filesystem::create_directories(folder);
-    static std::filesystem::path kept = folder;
-    std::atexit([] { std::filesystem::remove_all(kept); });
-    return folder;
-}
-
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-    static const std::filesystem::path path = make_folder() / "a" EWA_EXTENSION;
+    static const std::filesystem::path path = fuzz::make_folder() / "a" EWA_EXTENSION;
     if (size < 2) return 0;
     const Gaussians g = scene_of(data, size);
     size_t drawn = 0;

@@ -89,6 +89,19 @@ TEST(LiveProtocol, DamagedBytesAreRefused) {
     EXPECT_THROW(decode_snapshot(nowhere), InputError);
     EXPECT_THROW(decode_status("{}"), InputError);
     EXPECT_THROW(decode_status("[1"), InputError);
+    const std::string status = encode(Status{});
+    const auto with = [&](const std::string& from, const std::string& to) {
+        std::string text = status;
+        return text.replace(text.find(from), from.size(), to);
+    };
+    EXPECT_EQ(decode_status(status).step, 0);
+    const std::string deep = std::string(200000, '[') + std::string(200000, ']');
+    for (const std::string& text :
+         {with("[]", "[" + deep + "]"), with("[]", "[3]"), with("[]", "{}"),
+          with("\"step\":0", "\"step\":" + deep), with("\"step\":0", "\"step\":1e300"),
+          with("\"step\":0", "\"step\":-1"), with("\"splats\":0", "\"splats\":5e9"),
+          with("\"running\"", "[]"), with("\"steps\"", "\"step\"")})
+        test::expect_error<InputError>([&] { decode_status(text); }, {"the trainer's status"});
     EXPECT_EQ(payload_of("ok 12"), 12u);
     for (const char* line : {"", "ok", "ok -1", "ok 1 2", "ok 99999999999", "no reason", "HTTP/1.1 400 Bad"})
         EXPECT_THROW(payload_of(line), InputError) << line;
@@ -259,7 +272,9 @@ TEST(LiveFiles, TheTokenIsTheOwnersAlone) {
     ASSERT_TRUE(live);
     EXPECT_EQ(live->port, 7001);
     EXPECT_EQ(live->token, "abc");
-    for (const char* text : {"", "{", "{\"port\": 70000, \"token\": \"\"}", "{\"port\": 1}", "[]"}) {
+    const std::string deep(5000, '[');
+    for (const char* text :
+         {"", "{", "{\"port\": 70000, \"token\": \"\"}", "{\"port\": 1}", "[]", deep.c_str()}) {
         folder.write(kLiveFile, text);
         EXPECT_FALSE(read_live_file(folder.path())) << text;
     }
@@ -267,6 +282,13 @@ TEST(LiveFiles, TheTokenIsTheOwnersAlone) {
 
 TEST(LiveWatcher, FollowsARunByItsFiles) {
     const TempFolder folder;
+    folder.write("config.json", std::string(400000, '['));
+    folder.write("metrics.jsonl", report::metrics_text({line_of(1)}));
+    {
+        const Watcher without({folder.path(), {}, {}}, [] {});
+        ASSERT_TRUE(soon([&] { return without.update().status.step == 1; }));
+        EXPECT_EQ(without.update().status.steps, 0);
+    }
     folder.write("config.json", "{\"steps\": 50}");
     folder.write("metrics.jsonl", report::metrics_text({line_of(1)}) + "{\"step\": 2, \"los");
     Watcher watcher({folder.path(), {}, {}}, [] {});

@@ -243,6 +243,24 @@ TEST(Colmap, RefusesImpossibleImages) {
     EXPECT_EQ(inside.load().frames[0].camera.rotation, glm::dmat3(1.0));
 }
 
+TEST(Colmap, LinksLeadOutOfNoFolder) {
+    namespace fs = std::filesystem;
+    const TempFolder elsewhere;
+    save_image(elsewhere / "b.png", Image(8, 6, 3));
+    Model model;
+    model.images = list({image(1, kPose, 3, "out/b.png")});
+    model.write();
+    fs::create_symlink(elsewhere.path(), model.folder / "images/out");
+    model.refuse({"images.bin: byte", "out/b.png", "link out of the dataset's folder"});
+    model.images = list({image(1, kPose, 3, "b.png")});
+    fs::remove(model.folder / "images/b.png");
+    fs::create_symlink(elsewhere / "b.png", model.folder / "images/b.png");
+    model.refuse({"images.bin: byte", "b.png", "link out of the dataset's folder"});
+    fs::remove_all(model.folder / "images");
+    fs::create_symlink(elsewhere.path(), model.folder / "images");
+    EXPECT_EQ(model.load().missing_images, 0);
+}
+
 TEST(Colmap, TextErrorsNameTheLine) {
     Model model;
     std::filesystem::remove_all(model.folder / "sparse");

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // glTF with KHR_gaussian_splatting: what nodes, quantised values, colour spaces and damage come to.
+#include <ctime>
 #include <glm/gtc/matrix_transform.hpp>
 #include <nlohmann/json.hpp>
 
@@ -323,6 +324,14 @@ TEST(GltfSplats, ClaimsAreBounded) {
     } catch (const InputError& error) {
         EXPECT_LT(std::string(error.what()).size(), 1000u);
     }
+    // Time is that of the bytes, however many keys there are: of the processor, where quadratic time takes
+    // minutes.
+    std::string keys = "{\"asset\":{},\"x\":{";
+    for (int i = 0; i < 30000; ++i) keys.append("\"").append(std::to_string(i)).append("\":{},");
+    const std::clock_t begin = std::clock();
+    expect_error<InputError>([&] { load_splats(nested.folder().write("keys.gltf", keys + "\"\":0}}")); },
+                             {"keys.gltf"});
+    EXPECT_LT(double(std::clock() - begin) / CLOCKS_PER_SEC, 10);
     Gltf instanced(g);
     instanced.top["nodes"] = json::array();
     instanced.top["scenes"][0]["nodes"] = json::array();

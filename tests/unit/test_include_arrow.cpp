@@ -52,7 +52,8 @@ const std::vector<std::pair<std::string, Rooms>> kLibraries = {
     {"zstd", {"src/io"}},
     {"zlib", {"src/io", "src/image", "src/train"}},
     {"nlohmann/",
-     {"src/io", "src/photograph", "src/train", "src/report", "src/live", "src/cli", "src/viewer"}},
+     {"src/core", "src/io", "src/photograph", "src/train", "src/report", "src/live", "src/cli",
+      "src/viewer"}},
     {"CLI/", {"src/cli", "src/viewer"}}};
 
 Rooms reached_from(const std::string& room) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Lens models against figures of another implementation, and the inversion of them.
+#include <algorithm>
 #include <cmath>
+#include <ctime>
 #include <sstream>
 
 #include "ewa/dataset.h"
@@ -243,6 +245,57 @@ TEST(Lens, AFisheyeSeesNothingBesideOrBehindItself) {
     EXPECT_EQ(camera.width, 400);
     EXPECT_EQ(camera.height, 400);
     EXPECT_EQ(camera.cx, 200);
+}
+
+Camera enlarged(Camera camera, int times) {
+    camera.width *= times;
+    camera.height *= times;
+    for (double* value : {&camera.fx, &camera.fy, &camera.cx, &camera.cy}) *value *= times;
+    return camera;
+}
+
+/// COLMAP's new size over the old by every pixel of the border.
+glm::dvec2 exact_scale(const Camera& c, const Distortion& lens) {
+    glm::dvec2 low(-HUGE_VAL), high(HUGE_VAL);
+    const auto visit = [&](double x, double y, int axis, bool first) {
+        const auto ray = scene::undistort(lens, {(x - c.cx) / c.fx, (y - c.cy) / c.fy});
+        if (ray && first) low[axis] = std::max(low[axis], (*ray)[axis]);
+        if (ray && !first) high[axis] = std::min(high[axis], (*ray)[axis]);
+    };
+    for (const bool first : {true, false}) {
+        for (int y = 0; y < c.height; ++y) visit(first ? 0.5 : c.width - 0.5, y + 0.5, 0, first);
+        for (int x = 0; x < c.width; ++x) visit(x + 0.5, first ? 0.5 : c.height - 0.5, 1, first);
+    }
+    const double x = std::min(-low.x * c.fx / c.cx, high.x * c.fx / (c.width - 0.5 - c.cx));
+    const double y = std::min(-low.y * c.fy / c.cy, high.y * c.fy / (c.height - 0.5 - c.cy));
+    return {std::clamp(x, 0.2, 2.0), std::clamp(y, 0.2, 2.0)};
+}
+
+TEST(Lens, TheBorderInStepsIsTheWholeBorder) {
+    for (const Case& c : kCases) {
+        const Frame frame = from_text(c);
+        const Camera large = enlarged(frame.source, 11);
+        const Camera camera = scene::undistorted_camera(large, frame.distortion);
+        glm::dvec2 scale = exact_scale(large, frame.distortion);
+        // Where a corner is not covered, both sides shrink in steps of 0.98.
+        for (int i = 0; i < 50 && int(scale.x * large.width) > camera.width; ++i) scale *= 0.98;
+        EXPECT_EQ(camera.width, int(scale.x * large.width)) << c.model;
+        EXPECT_EQ(camera.height, int(scale.y * large.height)) << c.model;
+    }
+}
+
+/// Of the processor's time, where every pixel of the border of one such picture takes half a minute.
+TEST(Lens, TheSizeOfAPictureIsNoWork) {
+    constexpr int kTimes = 6000;
+    const std::clock_t begin = std::clock();
+    for (const Case& c : kCases) {
+        const Frame frame = from_text(c);
+        const Camera camera = scene::undistorted_camera(enlarged(frame.source, kTimes), frame.distortion);
+        // The border's pixels are finer, so that they lie up to half a small picture's pixel farther out.
+        EXPECT_NEAR(double(camera.width) / kTimes, frame.camera.width, 4) << c.model;
+        EXPECT_NEAR(double(camera.height) / kTimes, frame.camera.height, 4) << c.model;
+    }
+    EXPECT_LT(double(std::clock() - begin) / CLOCKS_PER_SEC, 10);
 }
 
 TEST(Lens, ACornerBeyondTheFoldShrinksThePicture) {

@@ -239,6 +239,64 @@ TEST(Transforms, NamesWhatIsWrong) {
                              {"transforms.json", "64 levels"});
 }
 
+TEST(Transforms, NamesStayInTheFolder) {
+    const TempFolder elsewhere;
+    save_image(elsewhere / "secret.png", Image(8, 6, 3));
+    elsewhere.write("secret.ply", "ply\n");
+    const std::string absolute = (elsewhere / "secret").string();
+    const std::string beside = "../" + elsewhere.path().filename().string() + "/secret";
+    for (const std::string& name :
+         {beside, absolute, std::string("images/../../secret"), std::string("..\\secret"),
+          std::string("C:\\secret"), std::string("images/a.png\0", 13)}) {
+        Scene scene;
+        scene.model["frames"][1]["file_path"] = name;
+        scene.refuse({"transforms.json: frame 1", "\"file_path\"", "leaves the file's folder"});
+        scene.model["frames"][1]["file_path"] = name + ".png";
+        scene.refuse({"frame 1", "\"file_path\"", "leaves the file's folder"});
+        scene.model["frames"][1]["file_path"] = "images/a.png";
+        scene.model["frames"][1]["mask_path"] = name + ".png";
+        scene.refuse({"frame 1", "\"mask_path\"", "leaves the file's folder"});
+        scene.model["frames"][1].erase("mask_path");
+        scene.model["ply_file_path"] = name + ".ply";
+        scene.refuse({"transforms.json: ", "\"ply_file_path\"", "leaves the file's folder"});
+    }
+}
+
+TEST(Transforms, LinksLeadOutOfNoFolder) {
+    namespace fs = std::filesystem;
+    const TempFolder elsewhere;
+    save_image(elsewhere / "a.png", Image(8, 6, 3));
+    Scene scene;
+    fs::remove(scene.folder / "images/a.png");
+    fs::create_symlink(elsewhere / "a.png", scene.folder / "images/a.png");
+    scene.refuse({"frame 1", "a.png is a link out of", "cp -rL"});
+    scene.model["frames"][1]["file_path"] = "images/a";
+    scene.refuse({"frame 1", "images/a.png", "link out of"});
+    scene.model["frames"][1]["file_path"] = "images/out/a.png";
+    fs::create_symlink(elsewhere.path(), scene.folder / "images/out");
+    scene.refuse({"frame 1", "images/out/a.png", "link out of"});
+    scene.model["frames"][1].update({{"file_path", "images/b.png"}, {"mask_path", "images/out/a.png"}});
+    scene.refuse({"frame 1", "\"mask_path\"", "link out of"});
+    // Masks and smaller copies that the model does not name.
+    scene.model["frames"][1].erase("mask_path");
+    EXPECT_EQ(scene.load().frames.size(), 2u);
+    fs::create_directories(scene.folder / "masks");
+    fs::create_symlink(elsewhere / "a.png", scene.folder / "masks/b.png");
+    scene.refuse({"masks/b.png", "link out of"});
+    fs::remove_all(scene.folder / "masks");
+    fs::create_directories(scene.folder / "images_2");
+    fs::create_symlink(elsewhere / "a.png", scene.folder / "images_2/b.png");
+    expect_error<InputError>([&] { load_dataset(scene.folder.path(), {.downscale = 2}); },
+                             {"images_2/b.png", "link out of"});
+    // The folder of the pictures, and the dataset's own, may be links.
+    save_image(elsewhere / "b.png", Image(8, 6, 3));
+    fs::remove_all(scene.folder / "images");
+    fs::create_symlink(elsewhere.path(), scene.folder / "images");
+    fs::create_symlink(scene.folder.path(), elsewhere / "dataset");
+    EXPECT_EQ(scene.load().missing_images, 0);
+    EXPECT_EQ(load_dataset(elsewhere / "dataset", {}).missing_images, 0);
+}
+
 TEST(Transforms, EveryCutIsAnError) {
     const Scene scene;
     const auto path = scene.write();

@@ -64,14 +64,15 @@ TEST(ViewList, DamageIsRefusedWithItsPlace) {
         return text.replace(at, from.size(), to);
     };
     EXPECT_THROW(read_views(folder / "none.json"), InputError);
-    refused("", "no list");
+    refused("", "not valid JSON");
+    refused("{\"views\": " + std::string(3000000, '['), "nests deeper");
     refused("{\"views\": 3}", "no list");
-    refused(good.substr(0, good.size() / 2), "no list");
+    refused(good.substr(0, good.size() / 2), "not valid JSON");
     refused("{\"views\": [3]}", "view 0");
     refused(with("\"width\": 640", "\"width\": 0"), "view 1: width");
     refused(with("\"width\": 640", "\"width\": 1e9"), "view 1: width");
     refused(with("\"fx\": 500.1", "\"fx\": -1"), "view 1: a focal length");
-    refused(with("\"fx\": 500.1", "\"fx\": 1e999"), "no list");
+    refused(with("\"fx\": 500.1", "\"fx\": 1e999"), "not valid JSON");
     refused(with("\"fx\"", "\"gx\""), "view 1");
     refused(with("\"pivot\": [", "\"pivot\": [1,"), "pivot has not 3");
     refused(with("\"rotation\": [", "\"rotation\": [0,0,0, 0,0,0, 0,0,0], \"other\": ["), "rotation is none");

@@ -35,5 +35,15 @@ TEST(Opening, ARunOnAMeshSceneHasThePhotographsThatWereMade) {
     EXPECT_TRUE(after.dataset->frames[0].image_exists);
 }
 
+TEST(Opening, SettingsThatAreNoneLeaveTheSplats) {
+    const test::Folder folder;
+    std::filesystem::create_directories(folder / "run");
+    test::make_splats(folder / "run/splats.ply");
+    for (const std::string& config : {std::string(), std::string("[1]"), std::string(400000, '[')}) {
+        test::write_file(folder / "run/config.json", config);
+        EXPECT_EQ(open_scene(folder / "run", {}).gaussians->size(), 50u) << config.substr(0, 9);
+    }
+}
+
 }  // namespace
 }  // namespace ewa::viewer

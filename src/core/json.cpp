@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/json.h"
+
+#include <nlohmann/json.hpp>
+#include <type_traits>
+#include <vector>
+
+#include "core/file_reader.h"
+#include "core/text.h"
+#include "ewa/error.h"
+
+namespace ewa::core {
+
+namespace {
+
+constexpr size_t kMostOrderedKeys = 1024;
+constexpr size_t kLongestReason = 300;  // of nlohmann's, which may quote the text at any length
+
+/// Puts together what nlohmann's parser meets. Its own callback for this looks through the parent again at
+/// every end of an object or a list, which takes quadratic time.
+template <class Json>
+class Builder : public nlohmann::json_sax<Json> {
+  public:
+    Builder(const std::string& name, const JsonLimits& limits) : name_(name), limits_(limits) {}
+
+    Json take() { return std::move(top_); }
+
+    bool null() override { return leaf(nullptr); }
+    bool boolean(bool value) override { return leaf(value); }
+    bool number_integer(typename Json::number_integer_t value) override { return leaf(value); }
+    bool number_unsigned(typename Json::number_unsigned_t value) override { return leaf(value); }
+    bool number_float(typename Json::number_float_t value, const std::string&) override {
+        return leaf(value);
+    }
+    bool string(std::string& value) override { return leaf(std::move(value)); }
+    bool binary(typename Json::binary_t&) override { return false; }  // which JSON's text has not
+
+    bool start_object(std::size_t) override {
+        if (outside()) return descend();
+        count(++objects_ > limits_.objects);
+        return open(Json::object());
+    }
+    bool start_array(std::size_t) override {
+        if (outside()) return descend();
+        count(++values_ > limits_.values);
+        return open(Json::array());
+    }
+    bool key(std::string& key) override {
+        if (outside()) return true;
+        outside_from_ = !limits_.left_out.empty() && key == limits_.left_out ? depth_ : -1;
+        key_ = std::move(key);
+        return true;
+    }
+    bool end_object() override { return close(); }
+    bool end_array() override { return close(); }
+
+    bool parse_error(std::size_t byte, const std::string&, const nlohmann::json::exception& error) override {
+        throw InputError(name_ + ": byte " + std::to_string(limits_.begin + byte) +
+                         ": not valid JSON: " + one_line(error.what()).substr(0, kLongestReason));
+    }
+
+  private:
+    /// Whether this is, or stands below, what is left out.
+    bool outside() const { return outside_from_ >= 0; }
+
+    void count(bool too_many) const {
+        if (too_many)
+            throw InputError(name_ + ": the JSON has more than " + std::to_string(limits_.objects) +
+                             " objects or " + std::to_string(limits_.values) + " values");
+    }
+
+    template <class Value>
+    bool leaf(Value&& value) {
+        if (outside()) {
+            if (depth_ == outside_from_) outside_from_ = -1;
+            return true;
+        }
+        count(++values_ > limits_.values);
+        place(std::forward<Value>(value));
+        return true;
+    }
+
+    template <class Value>
+    Json& place(Value&& value) {
+        if (open_.empty()) return top_ = Json(std::forward<Value>(value));
+        Json& parent = *open_.back();
+        if (parent.is_array()) return parent.emplace_back(std::forward<Value>(value));
+        if (std::is_same_v<Json, nlohmann::ordered_json> && parent.size() >= kMostOrderedKeys)
+            throw InputError(name_ + ": the JSON has an object of more than " +
+                             std::to_string(kMostOrderedKeys) + " keys");
+        return parent[std::move(key_)] = Json(std::forward<Value>(value));
+    }
+
+    bool open(Json&& container) {
+        descend();
+        open_.push_back(&place(std::move(container)));  // its parent takes nothing more until it is closed
+        return true;
+    }
+
+    bool descend() {
+        if (++depth_ > limits_.depth)
+            throw InputError(name_ + ": the JSON nests deeper than " + std::to_string(limits_.depth) +
+                             " levels");
+        return true;
+    }
+
+    bool close() {
+        --depth_;
+        if (!outside())
+            open_.pop_back();
+        else if (depth_ == outside_from_)
+            outside_from_ = -1;
+        return true;
+    }
+
+    const std::string& name_;
+    const JsonLimits& limits_;
+    Json top_;
+    std::vector<Json*> open_;
+    std::string key_;
+    int depth_ = 0, outside_from_ = -1;  // the depth of the key whose value is left out; -1: none
+    size_t objects_ = 0, values_ = 0;
+};
+
+void check_size(uint64_t bytes, const std::string& name, const JsonLimits& limits) {
+    if (bytes > limits.bytes)
+        throw InputError(name + ": the JSON has " + std::to_string(bytes) + " bytes, more than " +
+                         std::to_string(limits.bytes));
+}
+
+}  // namespace
+
+template <class Json>
+Json parse_json(std::string_view text, const std::string& name, const JsonLimits& limits) {
+    check_size(text.size(), name, limits);
+    Builder<Json> builder(name, limits);
+    constexpr bool kWhole = true;
+    Json::sax_parse(text.begin(), text.end(), &builder, nlohmann::detail::input_format_t::json, kWhole,
+                    limits.comments);
+    return builder.take();
+}
+
+template <class Json>
+Json read_json_file(const std::filesystem::path& path, const JsonLimits& limits) {
+    FileReader reader(path);
+    check_size(reader.size(), reader.name(), limits);
+    const size_t size = size_t(reader.size());
+    return parse_json<Json>({reinterpret_cast<const char*>(reader.take(size, "the text")), size},
+                            reader.name(), limits);
+}
+
+template nlohmann::json parse_json(std::string_view, const std::string&, const JsonLimits&);
+template nlohmann::ordered_json parse_json(std::string_view, const std::string&, const JsonLimits&);
+template nlohmann::json read_json_file(const std::filesystem::path&, const JsonLimits&);
+template nlohmann::ordered_json read_json_file(const std::filesystem::path&, const JsonLimits&);
+
+}  // namespace ewa::core

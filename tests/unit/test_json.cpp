@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/json.h"
+
+#include <ctime>
+#include <nlohmann/json.hpp>
+
+#include "report/summary.h"
+#include "support/temp_folder.h"
+
+namespace {
+
+using namespace ewa;
+using core::JsonLimits;
+using core::parse_json;
+using nlohmann::json;
+using nlohmann::ordered_json;
+using test::expect_error;
+
+std::string times(size_t n, const std::string& text) {
+    std::string result;
+    for (size_t i = 0; i < n; ++i) result += text;
+    return result;
+}
+
+std::string between(const char* open, const std::string& inner, const char* close) {
+    return std::string(open).append(inner).append(close);
+}
+
+std::string keys(size_t n, const std::string& value) {
+    std::string text = "{";
+    for (size_t i = 0; i < n; ++i)
+        text.append(i ? ",\"" : "\"").append(std::to_string(i)).append("\":").append(value);
+    return text + "}";
+}
+
+void refuse(const std::string& text, std::initializer_list<std::string> parts,
+            const JsonLimits& limits = {}) {
+    expect_error<InputError>([&] { parse_json<json>(text, "a.json", limits); }, parts);
+    expect_error<InputError>([&] { parse_json<ordered_json>(text, "a.json", limits); }, parts);
+}
+
+TEST(Json, IsWhatNlohmannReads) {
+    for (const std::string text :
+         {"3", "-4", "2.5e-3", "18446744073709551615", "true", "null", R"("a\u00e4\n\u0000")", "[]", "{}",
+          R"({"b": [1, [], {"x": {}}, [[2]]], "a": {"c": null, "d": "e"}, "b": [3]})", " [1 ,\t2]\n"}) {
+        EXPECT_EQ(parse_json<json>(text, "a.json"), json::parse(text)) << text;
+        EXPECT_EQ(parse_json<ordered_json>(text, "a.json").dump(), ordered_json::parse(text).dump()) << text;
+    }
+    const std::string commented = "// one\n{/* two */\"a\": 1}";
+    EXPECT_EQ(parse_json<json>(commented, "a.json", JsonLimits{.comments = true}), (json{{"a", 1}}));
+    refuse(commented, {"a.json: byte 1: not valid JSON"});
+}
+
+TEST(Json, SaysWhereItIsNone) {
+    refuse("", {"a.json: byte 1: not valid JSON"});
+    refuse("[1, 2", {"a.json: byte 6: "});
+    refuse("[1] 2", {"a.json: byte 5: "});
+    refuse("{\"a\":\n oops}", {"a.json: byte 8: "});
+    refuse("[1e999]", {"a.json: byte 6: ", "out_of_range"});
+    refuse("[\"\xff\"]", {"a.json: byte 3: "});
+    refuse("nope", {"a.json: byte 102: "}, JsonLimits{.begin = 100});
+    // The library's own words quote the text at any length.
+    try {
+        parse_json<json>(between("[\"", std::string(100000, 'x'), "\" \""), "a.json");
+        ADD_FAILURE() << "nothing was thrown";
+    } catch (const InputError& error) {
+        EXPECT_LT(std::string(error.what()).size(), 500u);
+    }
+}
+
+TEST(Json, LeavesOutWhatIsNotWanted) {
+    const JsonLimits limits{.objects = 2, .values = 5, .left_out = "extras"};
+    EXPECT_EQ(parse_json<json>(R"({"extras": {"a": [1, {"extras": 2}], "b": {}}, "a": 1,
+                                  "c": {"extras": 3, "d": [2]}, "extras": [[]], "e": null})",
+                               "a.json", limits),
+              json::parse(R"({"a": 1, "c": {"d": [2]}, "e": null})"));
+    EXPECT_EQ(parse_json<json>(R"({"extras": "extras", "a": "extras"})", "a.json", limits),
+              json::parse(R"({"a": "extras"})"));
+}
+
+TEST(Json, LimitsHold) {
+    const JsonLimits few{.bytes = 40, .depth = 3, .objects = 2, .values = 5};
+    EXPECT_EQ(parse_json<json>("[[[1, 2]]]", "a.json", few).size(), 1u);
+    refuse("[[[[]]]]", {"a.json", "nests deeper than 3"}, few);
+    refuse("[{\"a\":{\"b\":[", {"nests deeper than 3"}, few);
+    refuse("[{},{},{}]", {"more than 2 objects"}, few);
+    refuse("[1,2,3,4,5]", {"or 5 values"}, few);
+    refuse("[[],[],[],[],[]]", {"or 5 values"}, few);
+    refuse(std::string(41, ' '), {"41 bytes, more than 40"}, few);
+    refuse("{\"extras\":[[[[", {"nests deeper"}, JsonLimits{.depth = 3, .left_out = "extras"});
+    for (const char* open : {"[", "{\"a\":", "[{\"a\":", "[[],"})
+        refuse(times(1000000, open), {"a.json", "nests deeper than 64 levels"});
+    refuse(between("[", times(1 << 22, "0,"), ""), {"4194304 values"});
+    refuse(between("[", times(1 << 20, "{},"), "{}]"), {"1048576 objects"});
+    // Each key of these is looked for among all the others.
+    parse_json<ordered_json>(keys(1024, "1"), "a.json");
+    expect_error<InputError>([] { parse_json<ordered_json>(keys(1025, "1"), "a.json"); },
+                             {"a.json", "more than 1024 keys"});
+    const test::TempFolder folder;
+    expect_error<InputError>(
+        [&] { core::read_json_file<json>(folder.write("a.json", std::string(41, ' ')), few); },
+        {"a.json", "41 bytes"});
+    expect_error<InputError>([&] { core::read_json_file<json>(folder / "none.json"); }, {"none.json"});
+}
+
+double seconds_to_parse(const std::string& text) {
+    const std::clock_t begin = std::clock();
+    parse_json<json>(text, "a.json");
+    return double(std::clock() - begin) / CLOCKS_PER_SEC;
+}
+
+/// Quadratic time would be minutes for these sizes, linear time is a fraction of a second: of the processor,
+/// so that a busy machine changes nothing.
+TEST(Json, TakesLinearTime) {
+    constexpr size_t kMany = 300000;
+    const std::string list = between("[", times(kMany, "[],"), "0]"),
+                      objects = between("[", times(kMany, "{\"a\":1},"), "0]");
+    for (const std::string& text :
+         {list, objects, keys(kMany, "[]"), keys(kMany, "{}"), keys(kMany, "0"),
+          between("{\"a\":", objects, "}"), between("[", times(kMany, "\"\\u00e4\","), "0]")})
+        EXPECT_LT(seconds_to_parse(text), 10) << text.substr(0, 20);
+}
+
+TEST(Json, MetricsThatAreNone) {
+    const std::string good = R"({"step":1,"seconds":1,"wall_seconds":null,"loss":0.5,"splats":7})";
+    EXPECT_EQ(report::parse_metrics(good + "\n" + good + "\n").size(), 2u);
+    const auto refused = [&](const std::string& line, const std::string& part) {
+        expect_error<InputError>([&] { report::parse_metrics(good + "\n" + line); },
+                                 {"line 2 of the metrics", part});
+    };
+    refused(times(400000, "["), "nests deeper");
+    refused(between("{\"step\":", times(400000, "["), ""), "nests deeper");
+    refused("[]", "\"step\"");
+    refused(R"({"step":1e300,"seconds":1,"wall_seconds":1,"loss":1,"splats":7})", "\"step\"");
+    refused(R"({"step":1,"seconds":1,"wall_seconds":1,"loss":"x","splats":7})", "\"loss\"");
+    refused(R"({"step":1,"seconds":1,"wall_seconds":1,"loss":1,"splats":-7})", "\"splats\"");
+}
+
+}  // namespace

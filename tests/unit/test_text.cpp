@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/text.h"
+
+#include <gtest/gtest.h>
+
+namespace {
+
+using ewa::core::one_line;
+
+TEST(Text, OneLineShowsWhatItIsSafeToShow) {
+    const std::pair<std::string, std::string> cases[] = {
+        {" a\n\tb\r\n", "a  b"},
+        {"caf\u00e9 \u65e5\u672c \U0001f98a", "caf\u00e9 \u65e5\u672c \U0001f98a"},
+        {"\x1b[2J\x7f", "\\x1b[2J\\x7f"},
+        {std::string("a\0b", 3), "a\\x00b"},
+        {"\xc2\x80\xc2\x9b"
+         "2J\u00a0",
+         "\\xc2\\x80\\xc2\\x9b2J\u00a0"},                              // control characters beyond ASCII
+        {"a\u202egnp.\u2066", "a\\xe2\\x80\\xaegnp.\\xe2\\x81\\xa6"},  // the direction of text
+        {"a\u2028b", "a\\xe2\\x80\\xa8b"},                             // the end of a line
+        {"caf\xe9", "caf\\xe9"},                                       // Latin-1
+        {"\x9b"
+         "2J",
+         "\\x9b2J"},
+        {"\xc0\x9b\xe0\x80\x9b", "\\xc0\\x9b\\xe0\\x80\\x9b"},  // too many bytes for what they say
+        {"\xf4\x90\x80\x80\xf0\x9f\x98", "\\xf4\\x90\\x80\\x80\\xf0\\x9f\\x98"}};
+    for (const auto& [text, shown] : cases) {
+        EXPECT_EQ(one_line(text), shown);
+        EXPECT_EQ(one_line(shown), shown);
+    }
+    EXPECT_EQ(one_line(""), "");
+}
+
+}  // namespace
