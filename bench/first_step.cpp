@@ -8,11 +8,11 @@
 
 #include <chrono>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 
 #include "bench/frame_run.h"
 #include "bench/measure.h"
+#include "core/temporary_folder.h"
 #include "ewa/error.h"
 
 extern char** environ;
@@ -26,25 +26,6 @@ int64_t now_nanoseconds() {
     using namespace std::chrono;
     return duration_cast<nanoseconds>(steady_clock::now().time_since_epoch()).count();
 }
-
-class TemporaryFolder {
-  public:
-    TemporaryFolder() {
-        std::string name = (std::filesystem::temp_directory_path() / "ewa-bench-XXXXXX").string();
-        if (!mkdtemp(name.data())) throw RunError("cannot make a folder for the shader cache: " + name);
-        path_ = name;
-    }
-    ~TemporaryFolder() {
-        std::error_code ignored;
-        std::filesystem::remove_all(path_, ignored);
-    }
-    TemporaryFolder(const TemporaryFolder&) = delete;
-    TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-    const std::filesystem::path& path() const { return path_; }
-
-  private:
-    std::filesystem::path path_;
-};
 
 /// This process's environment, with Mesa's and NVIDIA's shader caches in a folder.
 std::vector<std::string> environment_with_cache(const std::string& folder) {
@@ -112,7 +93,7 @@ int run_first_step(const std::string& device) {
 CaseResult measure_first_step(const Case& one, const MeasureOptions& options) {
     std::vector<double> cold, warm;
     for (int run = 0; run < (options.runs > 0 ? std::min(options.runs, kRuns) : kRuns); ++run) {
-        const TemporaryFolder cache;
+        const core::TemporaryFolder cache("ewa-bench-");
         cold.push_back(start_to_first_step(options.first_step_command, cache.path().string()));
         warm.push_back(start_to_first_step(options.first_step_command, cache.path().string()));
     }

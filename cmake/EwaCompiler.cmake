@@ -11,13 +11,19 @@ target_compile_options(ewa_compiler INTERFACE -Wall -Wextra -Werror -Wshadow -Wn
     # (CameraBlock.PairsOfFloatsHoldTheDoubles).
     $<$<CXX_COMPILER_ID:GNU>:-fno-tree-slp-vectorize>)
 target_compile_definitions(ewa_compiler INTERFACE EWA_VERSION="${PROJECT_VERSION}")
+# Half of a build is the tests' own code, which is not what takes time when they run, nor what is to be covered.
+set(ewa_is_test $<BOOL:$<TARGET_PROPERTY:EWA_IS_TEST>>)
+target_compile_options(ewa_compiler INTERFACE $<$<AND:$<CONFIG:Release>,${ewa_is_test}>:-O1>)
 if(EWA_SANITIZE)
+    # The tests too: of an inline function that a test and a room have, the test's is the one that is linked.
     target_compile_options(ewa_compiler INTERFACE -fsanitize=address,undefined -fno-omit-frame-pointer)
     target_link_options(ewa_compiler INTERFACE -fsanitize=address,undefined)
 endif()
 if(EWA_COVERAGE)
-    # Counters by thread would lose what they count together.
-    target_compile_options(ewa_compiler INTERFACE --coverage -fprofile-update=atomic)
+    # Threads lose counts of a line that they run at one moment, unless the counters are atomic. Those are most of the price of a
+    # short loop: rooms of short loops have plain ones, which still tell a line that ran from one that did not.
+    set(ewa_update $<IF:$<BOOL:$<TARGET_PROPERTY:EWA_PLAIN_COUNTERS>>,single,atomic>)
+    target_compile_options(ewa_compiler INTERFACE "$<$<NOT:${ewa_is_test}>:--coverage;-fprofile-update=${ewa_update}>")
     target_link_options(ewa_compiler INTERFACE --coverage)
 endif()
 if(EWA_FUZZ)

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 # What `cmake --install` puts where, and the package that find_package(ewa) reads.
-include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
 # libewa: the rooms of the house without its leaves, in one shared object, so that who links it needs none of what stands
@@ -18,8 +17,8 @@ set_target_properties(ewa_library PROPERTIES OUTPUT_NAME ewa EXPORT_NAME ewa LIN
     LINK_DEPENDS ${PROJECT_SOURCE_DIR}/cmake/libewa.map)
 target_link_options(ewa_library PRIVATE -Wl,--version-script=${PROJECT_SOURCE_DIR}/cmake/libewa.map -Wl,--as-needed
                                         -Wl,--no-undefined)
-target_link_libraries(ewa_library PRIVATE Vulkan::Vulkan OpenImageIO::OpenImageIO PNG::PNG spdlog::spdlog
-                                          ZLIB::ZLIB zstd::libzstd_shared)
+target_link_libraries(ewa_library PRIVATE Vulkan::Vulkan PNG::PNG spdlog::spdlog ZLIB::ZLIB zstd::libzstd_shared
+                                          ${CMAKE_DL_LIBS})
 target_compile_features(ewa_library INTERFACE cxx_std_20)
 target_include_directories(ewa_library INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
 if(EWA_SANITIZE)
@@ -48,12 +47,20 @@ foreach(program ewa-view ewa-bench)
         list(APPEND ewa_programs ${program})
     endif()
 endforeach()
+add_dependencies(ewa_library ewa_openimageio)
+# Beside libewa, and where EWA_MODULES_FROM_PROGRAMS says for the programs.
+install(TARGETS ewa_openimageio LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/ewa)
 install(TARGETS ${ewa_programs} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(TARGETS ewa_library EXPORT ewaTargets LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(DIRECTORY include/ewa DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
 install(DIRECTORY ${ewa_manual_folder}/ DESTINATION ${CMAKE_INSTALL_DATADIR})
-install(FILES README.md CHANGELOG.md LICENSE docs/training.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
-install(DIRECTORY examples DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(FILES README.md CHANGELOG.md CONTRIBUTING.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} RENAME copyright) # where Debian looks for it
+install(DIRECTORY docs examples DESTINATION ${CMAKE_INSTALL_DOCDIR})
+foreach(folder bench scenes) # to which README.md points
+    install(FILES ${folder}/README.md DESTINATION ${CMAKE_INSTALL_DOCDIR}/${folder})
+endforeach()
+install(FILES shaders/shared/constants.h DESTINATION ${CMAKE_INSTALL_DOCDIR}/shaders/shared)
 
 set(ewa_package ${CMAKE_INSTALL_LIBDIR}/cmake/ewa)
 install(EXPORT ewaTargets NAMESPACE ewa:: DESTINATION ${ewa_package})

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures in memory, on disk, and their distance from each other.
+// Pictures in memory, on disk, and their distance from each other. What reads, writes or compares them throws
+// RunError where the module that brings OpenImageIO (libewa_openimageio.so) is missing or does not fit.
 #pragma once
 #include <array>
 #include <cstddef>
@@ -51,6 +52,9 @@ Image downscale(const Image& image, int factor);
 
 /// RGB of a picture, where it is transparent over a background. RGB pictures come back as they are.
 Image over_background(const Image& image, const std::array<float, 3>& background);
+
+/// RGB and one channel of the same size as one picture of 4 channels.
+Image with_alpha(const Image& color, const Image& alpha);
 
 /// 10 log10(1 / MSE) over RGB, both pictures clamped to [0, 1]; +inf for equal pictures.
 /// Throws InputError when sizes differ.

@@ -89,7 +89,7 @@ int main(int argc, char** argv) {
         {app.add_subcommand("dataset", "Photographs a mesh scene (glTF) into a dataset to train on"), {}},
         {app.add_subcommand("bench", "Speed of every pass, and its error against the float64 twin"), {}},
         {app.add_subcommand("compare",
-                            "PSNR, SSIM and largest error of two pictures, or two folders of them"),
+                            "PSNR, SSIM and largest error of two pictures, folders of them, or splat scenes"),
          {}},
     };
     const Command write_pages{manual, [&] {

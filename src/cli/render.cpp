@@ -31,16 +31,6 @@ struct RenderArguments {
     bool quiet = false;
 };
 
-Image with_alpha(const Image& color, const Image& alpha) {
-    Image out(color.width, color.height, 4);
-    for (int y = 0; y < out.height; ++y)
-        for (int x = 0; x < out.width; ++x) {
-            std::copy_n(color.at(x, y), 3, out.at(x, y));
-            out.at(x, y)[3] = *alpha.at(x, y);
-        }
-    return out;
-}
-
 /// Divides by the largest value, which is returned: what a PNG's white stands for.
 float normalize(Image& image) {
     float largest = 0;

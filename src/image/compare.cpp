@@ -1,22 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // How far apart two pictures are, by OpenImageIO's comparison.
-#include <OpenImageIO/imagebuf.h>
-#include <OpenImageIO/imagebufalgo.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "ewa/image.h"
+#include "image/openimageio.h"
 
 namespace ewa {
 namespace {
-
-/// Looks at the picture's own memory; OpenImageIO does not write to what it only compares.
-OIIO::ImageBuf view_of(const Image& image) {
-    const OIIO::ImageSpec spec(image.width, image.height, image.channels, OIIO::TypeDesc::FLOAT);
-    return OIIO::ImageBuf(spec, const_cast<float*>(image.pixels.data()));
-}
 
 Image with_opaque_alpha(const Image& image) {
     Image result(image.width, image.height, 4);
@@ -51,31 +43,22 @@ void add_unclamped(const Image& a, const Image& b, ImageDifference& out) {
 }
 
 /// All values; a and b have the same channels.
-void compare_values(const Image& a, const Image& b, double tolerance, ImageDifference& out) {
-    const OIIO::ROI all(0, a.width, 0, a.height, 0, 1, 0, a.channels);
-    const float limit = float(tolerance);
-    const auto found = OIIO::ImageBufAlgo::compare(view_of(a), view_of(b), limit, limit, 0.0f, 0.0f, all, 1);
-    out.max_error = found.maxerror;
-    out.max_x = found.maxx;
-    out.max_y = found.maxy;
-    out.max_channel = found.maxc;
-    out.mean_error = found.meanerror;
-    out.over = found.nfail;
+ImageDifference compare_values(const Image& a, const Image& b, double tolerance) {
+    ImageDifference out = image::openimageio().compare(a, b, tolerance);
     add_unclamped(a, b, out);
+    return out;
 }
 
 }  // namespace
 
 ImageDifference compare_images(const Image& a, const Image& b, double tolerance) {
-    ImageDifference out;
-    out.psnr = psnr(a, b);  // refuses pictures that cannot be compared
+    const double of_colours = psnr(a, b);  // refuses pictures that cannot be compared
+    ImageDifference out =
+        a.channels == 3 && b.channels == 4   ? compare_values(with_opaque_alpha(a), b, tolerance)
+        : a.channels == 4 && b.channels == 3 ? compare_values(a, with_opaque_alpha(b), tolerance)
+                                             : compare_values(a, b, tolerance);
+    out.psnr = of_colours;
     out.ssim = ssim(a, b);
-    if (a.channels == 3 && b.channels == 4)
-        compare_values(with_opaque_alpha(a), b, tolerance, out);
-    else if (a.channels == 4 && b.channels == 3)
-        compare_values(a, with_opaque_alpha(b), tolerance, out);
-    else
-        compare_values(a, b, tolerance, out);
     return out;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "image/decode.h"
 
+#include <cerrno>
 #include <cstring>
 #include <fstream>
 #include <string_view>
@@ -29,10 +30,12 @@ Image decode(const std::vector<unsigned char>& bytes, const std::string& what, i
     // Through a file, so that it is looked at as closely as a photograph is.
     const core::TemporaryFolder folder("ewa-image-");
     const std::filesystem::path path = folder.path() / (std::string("image") + extension);
+    // Not by AtomicFile: nothing of it is kept, and a disk is slow to say that it has everything.
     std::ofstream file(path, std::ios::binary);
     file.write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
     file.close();
-    if (!file) throw RunError(path.string() + ": cannot be written: " + std::strerror(errno));
+    if (const int reason = errno; !file)
+        throw RunError(path.string() + ": cannot be written: " + std::strerror(reason));
     try {
         const ImageSize size = read_image_size(path);
         if (size.width > largest || size.height > largest)

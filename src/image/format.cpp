@@ -51,28 +51,6 @@ Format format_of(core::FileReader& reader) {
     return found->format;
 }
 
-const char* plugin_of(Format format) {
-    switch (format) {
-        case Format::png:
-            return "png";
-        case Format::jpeg:
-            return "jpeg";
-        case Format::tiff:
-            return "tiff";
-        case Format::exr:
-            return "openexr";
-        case Format::webp:
-            return "webp";
-        case Format::bmp:
-            return "bmp";
-        case Format::pnm:
-            return "pnm";
-        case Format::hdr:
-            return "hdr";
-    }
-    return "";
-}
-
 Claim look_at(core::FileReader& reader, Format format, bool whole) {
     switch (format) {
         case Format::png:

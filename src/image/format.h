@@ -13,9 +13,6 @@ enum class Format { png, jpeg, tiff, exr, webp, bmp, pnm, hdr };
 /// By its first bytes, whatever its name. Throws InputError for every other format.
 Format format_of(core::FileReader& reader);
 
-/// OpenImageIO's name of the format.
-const char* plugin_of(Format format);
-
 /// Reads the file's structure from its first byte, and decodes nothing. Throws InputError where the size is
 /// beyond a limit (limits.h), a part is missing that the pixels need, or the file uses what is not read. The
 /// codecs alone would print on standard error (libpng), fill what is missing with grey (libjpeg) or with

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "image/pictures_below.h"
 
-#include <OpenImageIO/imageio.h>
-
 #include <algorithm>
 #include <set>
 #include <string>
 
 #include "core/text.h"
 #include "ewa/error.h"
+#include "image/openimageio.h"
 
 namespace ewa::image {
 namespace {
@@ -18,7 +17,7 @@ namespace fs = std::filesystem;
 /// Extensions in small letters. Films and texts that OpenImageIO draws are no pictures to compare.
 std::set<std::string> picture_extensions() {
     std::set<std::string> extensions;
-    for (const auto& [format, names] : OIIO::get_extension_map())
+    for (const auto& [format, names] : openimageio().extensions())
         if (format != "ffmpeg" && format != "null" && format != "term" && format != "ptex")
             extensions.insert(names.begin(), names.end());
     return extensions;

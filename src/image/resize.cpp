@@ -68,4 +68,16 @@ Image over_background(const Image& image, const std::array<float, 3>& background
     return result;
 }
 
+Image with_alpha(const Image& color, const Image& alpha) {
+    assert(color.channels == 3 && alpha.channels == 1);
+    assert(color.width == alpha.width && color.height == alpha.height);
+    Image result(color.width, color.height, 4);
+    for (int y = 0; y < result.height; ++y)
+        for (int x = 0; x < result.width; ++x) {
+            std::copy_n(color.at(x, y), 3, result.at(x, y));
+            result.at(x, y)[3] = *alpha.at(x, y);
+        }
+    return result;
+}
+
 }  // namespace ewa

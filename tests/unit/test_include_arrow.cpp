@@ -19,6 +19,7 @@ const std::map<std::string, Rooms> kArrows = {
     {"shaders/passes", {"shaders/lib", "shaders/shared"}},
     {"src/core", {}},
     {"src/image", {"src/core", "shaders/shared"}},
+    {"src/openimageio", {"src/image"}},
     {"src/scene", {"src/core", "src/image"}},
     {"src/mesh", {"src/scene", "src/image", "shaders/shared"}},
     {"src/io", {"src/scene", "src/image", "src/mesh"}},
@@ -43,7 +44,8 @@ const std::map<std::string, std::string> kOwners = {
 
 /// Libraries that only some rooms may know.
 const std::vector<std::pair<std::string, Rooms>> kLibraries = {
-    {"OpenImageIO/", {"src/image"}},
+    {"OpenImageIO/", {"src/openimageio"}},
+    {"png.h", {"src/image"}},
     {"vulkan/", {"src/gpu", "src/passes", "src/pipeline", "src/viewer"}},
     {"GLFW/", {"src/viewer"}},
     {"imgui", {"src/viewer"}},
