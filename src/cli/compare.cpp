@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// ewa compare: how far apart two pictures are, or two folders of pictures of the same names.
+// ewa compare: how far apart two pictures are, or two folders of pictures of the same names; splat scenes in
+// place of either are drawn.
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
@@ -7,9 +8,13 @@
 #include <memory>
 #include <optional>
 
+#include "cli/arguments.h"
 #include "cli/command.h"
+#include "cli/compared_side.h"
+#include "cli/dataset_argument.h"
 #include "cli/output.h"
 #include "cli/picture_pairs.h"
+#include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/image.h"
 #include "report/pictures.h"
@@ -25,6 +30,20 @@ struct CompareArguments {
     fs::path a, b, json, heat_map;
     std::optional<double> threshold, max_error;
     double heat_scale = 0.25;
+
+    // How splat scenes are drawn.
+    fs::path cameras;
+    std::string frames = "all";
+    int test_every = 8, downscale = 1;
+    DrawArguments draw;
+    DeviceOptions device;
+};
+
+/// What is compared.
+struct Sides {
+    std::unique_ptr<ComparedSide> a, b;
+    Dataset cameras;  // of scenes
+    RenderOptions options;
 };
 
 struct Compared {
@@ -93,20 +112,74 @@ std::string reasons(const Compared& compared, const CompareArguments& arguments)
     return text;
 }
 
-Compared compare(const PicturePair& pair, const CompareArguments& arguments) {
-    const Image a = load_image(pair.a), b = load_image(pair.b);
+Sides open_sides(const CompareArguments& arguments) {
+    Sides sides;
+    const bool scene_a = names_splat_scene(arguments.a), scene_b = names_splat_scene(arguments.b);
+    const bool scene = scene_a || scene_b;
+    if (!scene && !arguments.cameras.empty())
+        throw InputError("--cameras: neither " + arguments.a.string() + " nor " + arguments.b.string() +
+                         " is a splat scene");
+    if (scene && arguments.cameras.empty())
+        throw InputError((scene_a ? arguments.a : arguments.b).string() +
+                         " is a splat scene; --cameras DATASET says where to look at it from");
+    // What is soon said comes first.
+    if (!scene_a) sides.a = picture_side(arguments.a);
+    if (!scene_b) sides.b = picture_side(arguments.b);
+    if (!scene) return sides;
+    sides.options = arguments.draw.options();
+    sides.cameras = load_cameras_as_trained(arguments.cameras, arguments.downscale);
+    const SceneViews views{sides.cameras,
+                           select_frames(sides.cameras, arguments.frames, arguments.test_every),
+                           sides.options, open_device(arguments.device)};
+    if (scene_a) sides.a = scene_side(arguments.a, views);
+    if (scene_b) sides.b = scene_side(arguments.b, views);
+    return sides;
+}
+
+/// What a comparison writes besides the figures; empty: nothing.
+fs::path heat_map_file(const PicturePair& pair, const CompareArguments& arguments) {
+    if (arguments.heat_map.empty() || pair.name.empty()) return arguments.heat_map;
+    return arguments.heat_map / (pair.name + ".png");
+}
+
+/// Throws where a file that is to be written is one of those that are read, or cannot be written.
+void check_outputs(const CompareArguments& arguments, const Sides& sides, const PicturePairs& pairs) {
+    std::vector<NamedFile> written = {{"--json", arguments.json}};
+    std::vector<NamedFile> read = {{"A", arguments.a}, {"B", arguments.b}, {"--cameras", arguments.cameras}};
+    for (const PicturePair& pair : pairs.pairs) {
+        written.push_back({"--heat-map", heat_map_file(pair, arguments)});
+        if (!sides.a->names().is_scene) read.push_back({"a picture of A", sides.a->place(pair.a)});
+        if (!sides.b->names().is_scene) read.push_back({"a picture of B", sides.b->place(pair.b)});
+    }
+    for (const Frame& frame : sides.cameras.frames) {
+        read.push_back({"a photograph of --cameras", frame.image_path});
+        read.push_back({"a mask of --cameras", frame.mask_path});
+    }
+    for (const char* name : {"transforms.json", "transforms_train.json", "transforms_test.json"})
+        if (!arguments.cameras.empty()) read.push_back({"a file of --cameras", arguments.cameras / name});
+    keep_apart(written, read);
+    for (const NamedFile& file : written)
+        if (!file.path.empty()) check_writable(file.path, Folder::made);
+}
+
+Compared compare(const PicturePair& pair, const Sides& sides, const CompareArguments& arguments) {
+    ComparedPicture a = sides.a->picture(pair.a), b = sides.b->picture(pair.b);
+    const bool drawn_a = sides.a->names().is_scene, drawn_b = sides.b->names().is_scene;
+    if (drawn_a && !drawn_b) adapt_drawn(a, b, sides.options.background);
+    if (drawn_b && !drawn_a) adapt_drawn(b, a, sides.options.background);
     Compared out{pair.name, {}, {}};
     try {
-        out.difference = compare_images(a, b);
+        out.difference = compare_images(a.image, b.image);
     } catch (const InputError& error) {
-        throw InputError(pair.a.string() + " and " + pair.b.string() + ": " + error.what());
+        throw InputError(sides.a->place(pair.a) + " and " + sides.b->place(pair.b) + ": " + error.what() +
+                         (drawn_a || drawn_b ? "; scenes are drawn through the cameras of undistorted "
+                                               "photographs, at --downscale (ewa eval takes photographs)"
+                                             : ""));
     }
     out.failed = beyond(out.difference, arguments);
-    if (!arguments.heat_map.empty()) {
-        const fs::path file =
-            pair.name.empty() ? arguments.heat_map : arguments.heat_map / (pair.name + ".png");
+    if (const fs::path file = heat_map_file(pair, arguments); !file.empty()) {
         make_folder(file.parent_path());
-        save_image(file, report::value_error_map(a, b, arguments.heat_scale));
+        save_image(file, report::value_error_map(a.image, b.image, arguments.heat_scale));
     }
     return out;
 }
@@ -139,38 +212,58 @@ Totals totals_of(const std::vector<Compared>& all) {
     return out;
 }
 
-void print(const std::vector<Compared>& all, const Totals& totals, const CompareArguments& arguments) {
-    for (const Compared& one : all)
-        fmt::print("{}{}{}{}\n", one.name, one.name.empty() ? "" : "  ", figures(one.difference),
-                   reasons(one, arguments));
-    if (all.size() > 1)
+void print(const Compared& one, const CompareArguments& arguments) {
+    fmt::print("{}{}{}{}\n", core::one_line(one.name), one.name.empty() ? "" : "  ", figures(one.difference),
+               reasons(one, arguments));
+    std::fflush(stdout);
+}
+
+void print(const Totals& totals, size_t pictures) {
+    if (pictures > 1)
         fmt::print(
             "mean of {} pictures  PSNR {:.3f} dB  SSIM {:.5f}; largest RMS {:.6g}, max error {:.6g}; "
             "worst: {}\n",
-            all.size(), totals.psnr, totals.ssim, totals.rms, totals.max_error, totals.worst->name);
+            pictures, totals.psnr, totals.ssim, totals.rms, totals.max_error,
+            core::one_line(totals.worst->name));
 }
 
 int run(const CompareArguments& arguments) {
-    const PicturePairs pairs = pair_pictures(arguments.a, arguments.b);
+    const Sides sides = open_sides(arguments);
+    const PicturePairs pairs = pair_pictures(sides.a->names(), sides.b->names());
+    check_outputs(arguments, sides, pairs);
     std::vector<Compared> all;
-    for (const PicturePair& pair : pairs.pairs) all.push_back(compare(pair, arguments));
+    for (const PicturePair& pair : pairs.pairs) {
+        all.push_back(compare(pair, sides, arguments));
+        print(all.back(), arguments);
+    }
+    std::vector<std::string> unpaired;
+    for (const fs::path& name : pairs.only_a) unpaired.push_back(sides.a->place(name));
+    for (const fs::path& name : pairs.only_b) unpaired.push_back(sides.b->place(name));
 
     const Totals totals = totals_of(all);
-    print(all, totals, arguments);
-    for (const fs::path& file : pairs.unpaired)
-        fmt::print("{}  has no picture of its name in the other folder\n", file.string());
+    print(totals, all.size());
+    for (const std::string& picture : unpaired)
+        fmt::print("{}  has no picture of its name on the other side\n", core::one_line(picture));
+    for (const ComparedSide* side : {sides.a.get(), sides.b.get()})
+        if (side->skipped_splats() > 0)
+            fmt::print("{}: {} splats have a value that is not finite and were not drawn\n",
+                       core::one_line(side->names().side), side->skipped_splats());
     // What should be there and is not differs most of all.
     const bool judged = arguments.threshold || arguments.max_error;
-    const bool passed = !judged || (totals.passed && pairs.unpaired.empty());
+    const bool passed = !judged || (totals.passed && unpaired.empty());
     if (!arguments.json.empty()) {
-        report::Json json = {{"psnr", number(totals.psnr)},           {"ssim", number(totals.ssim)},
-                             {"max_error", number(totals.max_error)}, {"rms", number(totals.rms)},
-                             {"worst", to_json(*totals.worst)},       {"passed", passed},
-                             {"pictures", report::Json::array()},     {"unpaired", report::Json::array()}};
+        report::Json json = {{"psnr", number(totals.psnr)},
+                             {"ssim", number(totals.ssim)},
+                             {"max_error", number(totals.max_error)},
+                             {"rms", number(totals.rms)},
+                             {"worst", to_json(*totals.worst)},
+                             {"passed", passed},
+                             {"pictures", report::Json::array()},
+                             {"unpaired", unpaired},
+                             {"skipped_nonfinite", {sides.a->skipped_splats(), sides.b->skipped_splats()}}};
         if (arguments.threshold) json["threshold"] = *arguments.threshold;
         if (arguments.max_error) json["max_error_allowed"] = *arguments.max_error;
         for (const Compared& one : all) json["pictures"].push_back(to_json(one));
-        for (const fs::path& file : pairs.unpaired) json["unpaired"].push_back(file.string());
         write_json(arguments.json, json);
     }
     return passed ? 0 : kTooFarApart;
@@ -180,7 +273,9 @@ int run(const CompareArguments& arguments) {
 
 Action add_compare(CLI::App& app) {
     const auto arguments = std::make_shared<CompareArguments>();
-    app.add_option("A", arguments->a, "A picture, or a folder of pictures")->required()->type_name("");
+    app.add_option("A", arguments->a, "A picture, a folder of pictures, or a splat scene")
+        ->required()
+        ->type_name("");
     app.add_option("B", arguments->b, "What it is compared with: the same")->required()->type_name("");
     app.add_option("--threshold", arguments->threshold,
                    "Exit status 1 where a picture's PSNR is under this, with or without alpha and values "
@@ -200,6 +295,22 @@ Action add_compare(CLI::App& app) {
         ->check(CLI::Range(1e-9, 1e9).description(""))
         ->type_name("E")
         ->capture_default_str();
+    CLI::Option* cameras =
+        app.add_option(
+               "--cameras", arguments->cameras,
+               "The dataset whose cameras to look at splat scenes through; each is compared with the "
+               "other scene, or with pictures named as ewa render names them, and rounded as they are")
+            ->type_name("DATASET");
+    const std::vector<CLI::Option*> before = app.get_options();
+    app.add_option("--frames", arguments->frames, "all, train, test, or indices in name order: 0,3,7")
+        ->type_name("FRAMES")
+        ->capture_default_str();
+    add_test_every_option(app, arguments->test_every);
+    add_draw_options(app, arguments->draw);
+    add_downscale_option(app, arguments->downscale);
+    add_device_options(app, arguments->device);
+    for (CLI::Option* option : app.get_options())
+        if (std::find(before.begin(), before.end(), option) == before.end()) option->needs(cameras);
     return [arguments] { return run(*arguments); };
 }
 

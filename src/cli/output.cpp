@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <map>
 #include <system_error>
 
 #include "core/atomic_file.h"
@@ -53,11 +54,20 @@ void check_writable(const fs::path& file, Folder made) {
 }
 
 void keep_apart(const NamedFile& written, const std::vector<NamedFile>& others) {
-    if (written.path.empty()) return;
+    keep_apart(std::vector{written}, others);
+}
+
+void keep_apart(const std::vector<NamedFile>& written, const std::vector<NamedFile>& others) {
+    std::map<fs::path, const NamedFile*> there;
     for (const NamedFile& other : others)
-        if (!other.path.empty() && resolved(other.path) == resolved(written.path))
-            throw InputError(core::one_line(written.name + " " + written.path.string() + ": is " +
-                                            other.name + " too, whose place it would take"));
+        if (!other.path.empty()) there.emplace(resolved(other.path), &other);
+    for (const NamedFile& file : written) {
+        if (file.path.empty()) continue;
+        const auto [taken, is_new] = there.emplace(resolved(file.path), &file);
+        if (!is_new)
+            throw InputError(core::one_line(file.name + " " + file.path.string() + ": is " +
+                                            taken->second->name + " too, whose place it would take"));
+    }
 }
 
 void write_json(const fs::path& path, const report::Json& json) {

@@ -26,6 +26,8 @@ struct NamedFile {
 
 /// Throws InputError where `written` would take the place of one of the others, however each is spelled.
 void keep_apart(const NamedFile& written, const std::vector<NamedFile>& others);
+/// Several, of each other too.
+void keep_apart(const std::vector<NamedFile>& written, const std::vector<NamedFile>& others);
 
 /// Pretty-printed, in one piece or not at all; the file's folder is made. Throws RunError.
 void write_json(const std::filesystem::path& path, const report::Json& json);

@@ -2,11 +2,13 @@
 // ewa compare: figures, heat maps, and the exit status that scripts go by.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "cli/expect.h"
 #include "ewa/image.h"
+#include "ewa/splat_files.h"
 
 namespace {
 
@@ -186,6 +188,162 @@ TEST(Compare, TheLargestErrorMayBeLimited) {
     EXPECT_EQ(run_ewa({"compare", folder / "x", folder / "y", "--max-error", "1"}).status, 1);
 }
 
+/// A scene through a dataset's cameras stands for the pictures that ewa render would write of it.
+class CompareScenes : public ::testing::Test {
+  protected:
+    void SetUp() override {
+        make_dataset(data_);
+        make_splats(scene_);
+        make_splats(other_, 40);
+    }
+    Outcome compare(const std::string& a, const std::string& b, const Names& more) const {
+        Names command{"compare", a, b, "--json", json_};
+        command.insert(command.end(), more.begin(), more.end());
+        return run_ewa(command);
+    }
+    /// What `ewa render` writes, and where.
+    std::string rendered(const std::string& name, const Names& more) const {
+        Names command{"render", scene_, "--cameras", data_, "-o", folder_ / name, "--quiet"};
+        command.insert(command.end(), more.begin(), more.end());
+        expect_success(run_ewa(command));
+        return folder_ / name;
+    }
+    Folder folder_;
+    const std::string data_ = folder_ / "data", scene_ = folder_ / "scene.ply",
+                      other_ = folder_ / "other.ply", json_ = folder_ / "j.json";
+};
+
+TEST_F(CompareScenes, WithPicturesOfThem) {
+    for (const char* format : {"png", "exr"}) {
+        const std::string pictures = rendered(format, {"--format", format, "--background", "0.2,0.4,0.6"});
+        const Names drawn{"--cameras", data_, "--background", "0.2,0.4,0.6", "--max-error", "0"};
+        for (const bool turned : {false, true}) {
+            const Outcome outcome =
+                turned ? compare(pictures, scene_, drawn) : compare(scene_, pictures, drawn);
+            expect_success(outcome);
+            EXPECT_EQ(read_json(json_)["pictures"].size(), 4u) << outcome.out;
+        }
+        EXPECT_EQ(compare(scene_, pictures, {"--cameras", data_, "--threshold", "30"}).status, 1)
+            << "with another background";
+        const Outcome outcome = compare(other_, pictures, drawn);
+        EXPECT_EQ(outcome.status, 1) << outcome.out;
+    }
+}
+
+TEST_F(CompareScenes, WithEachOther) {
+    const Names cameras{"--cameras", data_, "--max-error", "0"};
+    expect_success(compare(scene_, scene_, cameras));
+    const Outcome outcome = compare(scene_, other_, cameras);
+    EXPECT_EQ(outcome.status, 1);
+    EXPECT_NE(outcome.out.find("mean of 4 pictures"), std::string::npos) << outcome.out;
+    // The same figures as of the pictures themselves.
+    const auto drawn = read_json(json_);
+    const std::string pictures = rendered("now", {"--format", "exr"});
+    EXPECT_EQ(compare(pictures, other_, cameras).status, 1);
+    const auto loaded = read_json(json_);
+    EXPECT_EQ(drawn, loaded);
+    EXPECT_GT(drawn["max_error"], 0.05);
+}
+
+TEST_F(CompareScenes, OfSomeFrames) {
+    const std::string pictures = rendered("few", {"--frames", "1,3"});
+    const Outcome outcome = compare(scene_, pictures, {"--cameras", data_, "--threshold", "99"});
+    EXPECT_EQ(outcome.status, 1) << "two frames have no picture";
+    EXPECT_EQ(read_json(json_)["unpaired"].size(), 2u);
+    EXPECT_NE(outcome.out.find("has no picture of its name on the other side"), std::string::npos)
+        << outcome.out;
+    expect_success(compare(scene_, pictures, {"--cameras", data_, "--frames", "1,3", "--threshold", "99"}));
+    // Nothing is asked of those that are there besides.
+    const std::string all = rendered("all", {});
+    expect_success(compare(scene_, all, {"--cameras", data_, "--frames", "1,3", "--threshold", "99"}));
+    EXPECT_EQ(read_json(json_)["pictures"].size(), 2u);
+    EXPECT_TRUE(read_json(json_)["unpaired"].empty());
+    save(all + "/stranger.png", plain(0.5f));
+    EXPECT_EQ(compare(scene_, all, {"--cameras", data_, "--frames", "1,3", "--threshold", "99"}).status, 1);
+    // One picture goes with one frame, and its map is a picture.
+    const std::string one = pictures + "/3.png", map = folder_ / "map.png";
+    expect_success(
+        compare(one, scene_, {"--cameras", data_, "--frames", "3", "--threshold", "99", "--heat-map", map}));
+    EXPECT_EQ(ewa::load_image(map).width, ewa::load_image(one).width);
+    EXPECT_EQ(compare(one, scene_, {"--cameras", data_, "--frames", "1", "--threshold", "99"}).status, 1);
+    expect_failure(compare(one, scene_, {"--cameras", data_}), 2, "is one picture and");
+}
+
+/// A scene is what begins like one.
+TEST_F(CompareScenes, OfAnotherName) {
+    const std::string renamed = folder_ / "scene.dat";
+    fs::copy_file(scene_, renamed);
+    expect_success(compare(renamed, scene_, {"--cameras", data_, "--max-error", "0"}));
+}
+
+TEST_F(CompareScenes, SayWhatIsNotDrawn) {
+    ewa::Gaussians gaussians = ewa::load_splats(scene_);
+    gaussians.means[0] = std::nanf("");
+    const std::string bad = folder_ / "bad.ply";
+    ewa::save_splats(bad, gaussians);
+    const Outcome outcome = compare(scene_, bad, {"--cameras", data_});
+    expect_success(outcome);
+    EXPECT_NE(outcome.out.find(bad + ": 1 splats have a value that is not finite"), std::string::npos)
+        << outcome.out;
+    EXPECT_EQ(read_json(json_)["skipped_nonfinite"], nlohmann::json({0, 1}));
+}
+
+/// The colours of a PNG that can be seen through are those in front of no background.
+TEST_F(CompareScenes, WithPicturesCutOut) {
+    const std::string exact = rendered("exr", {"--format", "exr"}), cut = folder_ / "cut";
+    for (const char* name : {"/0", "/1", "/2", "/3"}) {
+        Image image = ewa::load_image(exact + name + ".exr");
+        for (size_t i = 0; i < image.pixels.size(); ++i)
+            if (i % 4 != 3) image.pixels[i] /= std::max(image.pixels[i / 4 * 4 + 3], 1e-6f);
+        save(cut + name + ".png", image);
+    }
+    // A step of 8 bits each of the colour and of alpha, on either side.
+    const Names command{"--cameras", data_, "--background", "0.2,0.4,0.6", "--max-error", "0.012"};
+    expect_success(compare(cut, scene_, command));
+    EXPECT_EQ(compare(cut, other_, command).status, 1);
+}
+
+/// What is written takes the place of nothing that is read, or else written.
+TEST_F(CompareScenes, WriteOverNothing) {
+    const std::string pictures = rendered("golden", {}), transforms = data_ + "/transforms.json",
+                      one = pictures + "/1.png", two = pictures + "/2.png", new_file = folder_ / "x.png";
+    const auto there = [&] {
+        std::string bytes = read_file(scene_) + read_file(transforms);
+        for (const char* name : {"/0.png", "/1.png", "/2.png", "/3.png"})
+            bytes += read_file(pictures + name) + read_file(data_ + "/images" + name);
+        return bytes;
+    };
+    const std::string before = there();
+    for (const Names& rest : {
+             Names{scene_, other_, "--cameras", data_, "--heat-map", data_ + "/images"},
+             Names{scene_, other_, "--cameras", transforms, "--json", transforms},
+             Names{scene_, other_, "--cameras", data_, "--json", transforms},
+             Names{scene_, pictures, "--cameras", data_, "--json", scene_},
+             Names{scene_, pictures, "--cameras", data_, "--json", one},
+             Names{scene_, pictures, "--cameras", data_, "--heat-map", pictures},
+             Names{pictures, data_ + "/images", "--heat-map", pictures},
+             Names{one, two, "--heat-map", one},
+             Names{one, two, "--heat-map", new_file, "--json", new_file},
+         }) {
+        Names command{"compare"};
+        command.insert(command.end(), rest.begin(), rest.end());
+        expect_failure(run_ewa(command), 2, "whose place it would take");
+    }
+    EXPECT_EQ(there(), before);
+}
+
+TEST_F(CompareScenes, WrongUse) {
+    const std::string pictures = folder_ / "data/images";
+    expect_failure(run_ewa({"compare", scene_, pictures}), 2, "--cameras");
+    expect_failure(run_ewa({"compare", pictures, pictures, "--cameras", data_}), 2, "is a splat scene");
+    expect_failure(run_ewa({"compare", pictures, pictures, "--kernel", "ewa"}), 2, "--cameras");
+    expect_failure(run_ewa({"compare", scene_, folder_ / "absent.ply", "--cameras", data_}), 2, "absent.ply");
+    expect_failure(run_ewa({"compare", scene_, folder_ / "absent", "--cameras", data_}), 2, "absent");
+    expect_failure(run_ewa({"compare", scene_, scene_, "--cameras", data_, "--json", scene_}), 2, "--json");
+    expect_failure(run_ewa({"compare", scene_, pictures, "--cameras", data_, "--downscale", "2"}), 2,
+                   scene_ + ", picture 0 and " + pictures + "/0.png: pictures of 24 x 16");
+}
+
 TEST(Compare, WhatIsNoPictureIsOneLine) {
     const Folder folder;
     save(folder / "a.png", plain(0.5f));
@@ -204,10 +362,11 @@ TEST(Compare, WrongUse) {
     save(folder / "small.png", plain(0.5f, 9, 9));
     save(folder / "d/x.png", plain(0.5f));
     save(folder / "e/y.png", plain(0.5f));
+    save(folder / "e/z.png", plain(0.5f));
     const std::string a = folder / "a.png";
     expect_failure(run_ewa({"compare", a, folder / "small.png"}), 2, "small.png");
-    expect_failure(run_ewa({"compare", a, folder / "d"}), 2, "is a folder");
-    expect_failure(run_ewa({"compare", folder / "d", folder / "e"}), 2, "no picture in");
+    expect_failure(run_ewa({"compare", a, folder / "e"}), 2, "is one picture and");
+    expect_failure(run_ewa({"compare", folder / "d", folder / "e"}), 2, "no picture of");
     expect_failure(run_ewa({"compare", a, folder / "absent.png"}), 2, "absent.png");
     expect_failure(run_ewa({"compare", a}), 2, "B");
     expect_failure(run_ewa({"compare", a, a, "--threshold", "much"}), 2, "--threshold");
