@@ -94,6 +94,7 @@ bool App::flying() const {
 }
 
 void App::move_by_itself(double seconds) {
+    if (capture_) return;  // F12 is of the view at that moment, which stands until its full picture is there
     if (settings_.turntable) {
         view_.orbit(kTurntableSpeed * seconds, 0);
         leave_camera();

@@ -23,14 +23,10 @@ void save(const std::filesystem::path& file, const Rendering& rendering, const P
     if (exr && mode == Mode::depth) return save_image(file, rendering.depth);
     if (exr && mode == Mode::count) return save_image(file, rendering.count);
     if (exr && mode == Mode::opacity) return save_image(file, rendering.alpha);
-    Image image(picture.width, picture.height, exr ? 4 : 3);
-    const size_t channels = size_t(image.channels);
-    for (size_t i = 0; i < image.pixels.size() / channels; ++i) {
-        for (size_t c = 0; c < 3; ++c)
-            image.pixels[channels * i + c] =
-                exr ? rendering.color.pixels[3 * i + c] : float(picture.rgba[4 * i + c]) / 255.0f;
-        if (exr) image.pixels[4 * i + 3] = rendering.alpha.pixels[i];
-    }
+    if (exr) return save_image(file, with_alpha(rendering.color, rendering.alpha));
+    Image image(picture.width, picture.height, 3);
+    for (size_t i = 0; i < image.pixels.size(); ++i)
+        image.pixels[i] = float(picture.rgba[i / 3 * 4 + i % 3]) / 255.0f;
     save_image(file, image);
 }
 

@@ -77,10 +77,11 @@ TEST(RenderThread, OpensItsDeviceAgainWhereItFails) {
             return open_device({});
         },
         [] {});
-    thread.set_scene(red_splat());
-    thread.ask(request(1));  // twice
+    // Each call may wake the thread by itself: only a count that both orders lead to is asked for.
+    thread.ask(request(1));
     ASSERT_TRUE(soon([&] { return thread.take_news().failure != nullptr; }));
-    EXPECT_EQ(opened, 2);
+    EXPECT_EQ(opened, 2) << "it was tried twice";
+    thread.set_scene(red_splat());
     thread.ask(request(2));
     ASSERT_TRUE(soon([&] { return thread.take_news().picture != nullptr; }));
     EXPECT_EQ(opened, 4);
