@@ -3,6 +3,7 @@
 
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
 #include <string_view>
 
@@ -15,13 +16,14 @@ constexpr std::array kSignals{SIGINT, SIGTERM, SIGHUP};
 constexpr std::string_view kNote =
     "\nending as soon as what is done is saved; Ctrl-\\ ends at once, without saving\n";
 
-volatile std::sig_atomic_t signalled = 0, at_terminal = 0;
+// Two signals can be handled at once, by two threads.
+std::atomic<bool> signalled = false, at_terminal = false;
+static_assert(std::atomic<bool>::is_always_lock_free, "or a handler may not use it");
 
 void note_signal(int signal) {
     const int reason = errno;  // of what this comes in between of
-    if (signal == SIGINT && at_terminal && !signalled)
-        (void)!write(STDERR_FILENO, kNote.data(), kNote.size());
-    signalled = 1;
+    const bool first = !signalled.exchange(true);
+    if (first && signal == SIGINT && at_terminal) (void)!write(STDERR_FILENO, kNote.data(), kNote.size());
     errno = reason;
 }
 
@@ -46,7 +48,7 @@ struct sigaction handle(int signal, void (*handler)(int)) {
 }  // namespace
 
 InterruptWatch::InterruptWatch() {
-    at_terminal = isatty(STDERR_FILENO);
+    at_terminal = isatty(STDERR_FILENO) != 0;
     for (size_t i = 0; i < kSignals.size(); ++i) {
         before_[i] = handle(kSignals[i], note_signal);
         if (kSignals[i] == SIGHUP && before_[i].sa_handler == SIG_IGN)
@@ -59,7 +61,7 @@ InterruptWatch::~InterruptWatch() {
 }
 
 bool interrupted() {
-    return signalled != 0;
+    return signalled;
 }
 
 void stop_if_interrupted() {

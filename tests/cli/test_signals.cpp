@@ -3,9 +3,14 @@
 // to save.
 #include <fcntl.h>
 #include <stdlib.h>
+#include <termios.h>
 #include <unistd.h>
 
+#include <array>
+#include <chrono>
 #include <csignal>
+#include <stdexcept>
+#include <thread>
 
 #include "cli/faults_test.h"
 
@@ -125,23 +130,66 @@ TEST_F(Signals, LeaveNoHalfWrittenFile) {
     EXPECT_GT(read_file(folder / "c/o.ply").size(), 1000u);
 }
 
-/// What still ends at once, and how somebody at a terminal learns of it.
+/// A terminal of its own for standard error. Reads on the side, or what fills it would hold the program.
+class Terminal {
+  public:
+    Terminal() : master_(posix_openpt(O_RDWR | O_NOCTTY)) {
+        if (master_ < 0 || grantpt(master_) != 0 || unlockpt(master_) != 0)
+            throw std::runtime_error("no terminal to be had");
+        path_ = ptsname(master_);
+        slave_ = open(path_.c_str(), O_RDWR | O_NOCTTY);  // or what was said goes with the program
+        reader_ = std::thread([this] {
+            std::array<char, 4096> bytes;
+            for (ssize_t n = 0; (n = read(master_, bytes.data(), bytes.size())) > 0;)
+                said_.append(bytes.data(), size_t(n));
+        });
+    }
+    Terminal(const Terminal&) = delete;
+    Terminal& operator=(const Terminal&) = delete;
+    ~Terminal() {
+        said();
+        close(master_);
+    }
+    const std::string& path() const { return path_; }
+    /// What is written waits, as after Ctrl-S, until a while after `file` is there.
+    std::jthread stand_still_until(const fs::path& file) {
+        tcflow(slave_, TCOOFF);
+        return std::jthread([this, file](const std::stop_token& enough) {
+            using namespace std::chrono_literals;
+            while (!fs::exists(file) && !enough.stop_requested()) std::this_thread::sleep_for(1ms);
+            std::this_thread::sleep_for(500ms);
+            tcflow(slave_, TCOON);
+        });
+    }
+    /// All that was said on it, at the end of its use.
+    const std::string& said() {
+        if (reader_.joinable()) {
+            close(slave_);  // the last who has it open: the reader ends
+            reader_.join();
+        }
+        return said_;
+    }
+
+  private:
+    int master_ = -1, slave_ = -1;
+    std::string path_, said_;
+    std::thread reader_;
+};
+
+/// What still ends at once, and how somebody at a terminal learns of it: from whichever thread is the first
+/// to be signalled, while others are, and once.
 TEST_F(Signals, CtrlBackslashEndsAtOnceAndATerminalSaysSo) {
-    const int terminal = posix_openpt(O_RDWR | O_NOCTTY);
-    ASSERT_GE(terminal, 0);
-    ASSERT_EQ(grantpt(terminal) | unlockpt(terminal), 0);
+    Terminal terminal;
     Circumstances held = held_at(20, folder / "held", SIGINT);
     held.times = 3;
-    held.err_path = ptsname(terminal);
-    const int kept =
-        open(held.err_path.c_str(), O_RDWR | O_NOCTTY);  // else what was said goes with the program
-    EXPECT_EQ(train("o", {}, held).status, 130);
-    std::string said(1000, '\0');
-    said.resize(size_t(std::max<ssize_t>(0, read(terminal, said.data(), said.size()))));
+    held.err_path = terminal.path();
+    {
+        const std::jthread still = terminal.stand_still_until(folder / "held");
+        EXPECT_EQ(train("o", {}, held).status, 130);
+    }
+    const std::string& said = terminal.said();
     EXPECT_NE(said.find("Ctrl-\\ ends at once"), std::string::npos) << said;
     EXPECT_EQ(said.find("Ctrl-\\"), said.rfind("Ctrl-\\")) << "once is enough";
-    close(kept);
-    close(terminal);
 
     EXPECT_EQ(train("p", {}, held_at(20, folder / "held", SIGQUIT)).status, 128 + SIGQUIT);
     expect_goes_on("p");
