@@ -17,7 +17,6 @@ namespace {
 constexpr double kRestSeconds = 0.2;  // without a change, until the full picture is asked for
 constexpr double kHintSeconds = 15, kNoteSeconds = 10;
 constexpr int kFirstDivisor = 2;  // something to see at once, then all of it
-constexpr int kRedraws = 3;
 constexpr Size kUsualSize{1280, 800};
 
 /// The window's size where none is asked for: the camera's, made smaller in proportion where the desktop has

@@ -147,7 +147,8 @@ class App {
     bool capture_ = false;  // write the picture as soon as it is the full one
     std::optional<int> pointed_camera_;
     uint64_t points_ = 0, points_asked_ = 0;  // answers to double clicks that were acted on; double clicks
-    int redraws_ = 0;                         // frames still to draw: ImGui answers input over a few
+    static constexpr int kRedraws = 3;        // frames over which ImGui answers input
+    int redraws_ = 0;                         // that are still to draw
     int devices_lost_ = 0;
     std::string note_;
     bool done_ = false;

@@ -12,7 +12,6 @@
 namespace ewa::viewer {
 namespace {
 
-constexpr int kRedraws = 3;
 constexpr int kMostDevicesLost = 5;  // one that is lost again and again is broken
 
 }  // namespace
