@@ -9,6 +9,7 @@
 #include "cli/expect.h"
 #include "ewa/image.h"
 #include "ewa/splat_files.h"
+#include "support/png_bytes.h"
 
 namespace {
 
@@ -286,6 +287,25 @@ TEST_F(CompareScenes, SayWhatIsNotDrawn) {
     EXPECT_NE(outcome.out.find(bad + ": 1 splats have a value that is not finite"), std::string::npos)
         << outcome.out;
     EXPECT_EQ(read_json(json_)["skipped_nonfinite"], nlohmann::json({0, 1}));
+}
+
+/// 16 bits hold what 8 do not, and no more is asked of them.
+TEST_F(CompareScenes, WithPicturesOf16Bits) {
+    const std::string exact = rendered("exr", {"--format", "exr"}), deep = folder_ / "deep",
+                      shallow = folder_ / "shallow";
+    fs::create_directories(deep);
+    for (const char* name : {"/0", "/1", "/2", "/3"}) {
+        const Image drawn = ewa::load_image(exact + name + ".exr");
+        Image image(drawn.width, drawn.height, 3);
+        for (size_t i = 0; i < image.pixels.size(); ++i)
+            image.pixels[i] = drawn.pixels[i / 3 * size_t(drawn.channels) + i % 3];
+        write_file(deep + name + ".png", deep_png(image));
+        save(shallow + name + ".png", image);
+    }
+    expect_success(compare(scene_, deep, {"--cameras", data_, "--max-error", "0"}));
+    expect_success(compare(scene_, shallow, {"--cameras", data_, "--max-error", "0"}));
+    EXPECT_EQ(compare(deep, shallow, {"--max-error", "0.0019"}).status, 1)
+        << "half a step of 8 bits is 0.00196";
 }
 
 /// The colours of a PNG that can be seen through are those in front of no background.

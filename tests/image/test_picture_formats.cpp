@@ -2,18 +2,21 @@
 // The formats that are read: whole files only, within limits, known by their first bytes, without a word on
 // standard error.
 #include <OpenImageIO/imageio.h>
-#include <zlib.h>
 
 #include <cmath>
 
 #include "ewa/image.h"
+#include "support/png_bytes.h"
 #include "support/temp_folder.h"
 
 namespace {
 
 using namespace ewa;
+using test::big;
 using test::bytes_of;
+using test::deflated;
 using test::expect_error;
+using test::png_chunk;
 using test::TempFolder;
 
 /// A file as OpenImageIO writes it.
@@ -132,10 +135,6 @@ INSTANTIATE_TEST_SUITE_P(Unit, PictureFormat, testing::ValuesIn(kinds()));
 
 std::string little(uint32_t value, size_t bytes = 4) {
     return bytes_of(value).substr(0, bytes);
-}
-std::string big(uint32_t value, size_t bytes = 4) {
-    std::string text = bytes_of(value);
-    return {text.rend() - std::ptrdiff_t(bytes), text.rend()};
 }
 std::string text_of(const char* bytes, size_t size) {
     return {bytes, size};
@@ -295,24 +294,9 @@ TEST(PictureFiles, AreKnownByTheirFirstBytes) {
     expect_error<InputError>([&] { load_image(empty); }, {"x.null?RES=4000x4000"});
 }
 
-std::string png_chunk(const std::string& type, const std::string& data) {
-    const auto sum = crc32(0, reinterpret_cast<const Bytef*>((type + data).data()), uInt(4 + data.size()));
-    return big(uint32_t(data.size())) + type + data + big(uint32_t(sum));
-}
-
-std::string deflated(const std::string& bytes) {
-    uLongf size = compressBound(uLong(bytes.size()));
-    std::string out(size, '\0');
-    compress(reinterpret_cast<Bytef*>(out.data()), &size, reinterpret_cast<const Bytef*>(bytes.data()),
-             uLong(bytes.size()));
-    out.resize(size);
-    return out;
-}
-
 /// 2 x 2 grey pixels, of the kind: bits, colour type, interlacing.
 std::string png(const std::string& notes, const std::string& rows, const char* kind = "\x08\0\0\0\0") {
-    return "\x89PNG\r\n\x1a\n" + png_chunk("IHDR", big(2) + big(2) + text_of(kind, 5)) + notes +
-           png_chunk("IDAT", deflated(rows)) + png_chunk("IEND", "");
+    return test::png_bytes(2, 2, text_of(kind, 5), notes, rows);
 }
 
 TEST(PictureFiles, DamagedAndStrangePngsAreOneErrorOrNone) {
