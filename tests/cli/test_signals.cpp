@@ -8,7 +8,9 @@
 
 #include <array>
 #include <chrono>
+#include <condition_variable>
 #include <csignal>
+#include <mutex>
 #include <stdexcept>
 #include <thread>
 
@@ -138,6 +140,7 @@ class Terminal {
             throw std::runtime_error("no terminal to be had");
         path_ = ptsname(master_);
         slave_ = open(path_.c_str(), O_RDWR | O_NOCTTY);  // or what was said goes with the program
+        if (slave_ < 0) throw std::runtime_error(path_ + " cannot be opened");
         reader_ = std::thread([this] {
             std::array<char, 4096> bytes;
             for (ssize_t n = 0; (n = read(master_, bytes.data(), bytes.size())) > 0;)
@@ -151,13 +154,15 @@ class Terminal {
         close(master_);
     }
     const std::string& path() const { return path_; }
-    /// What is written waits, as after Ctrl-S, until a while after `file` is there.
-    std::jthread stand_still_until(const fs::path& file) {
+    /// What is written waits, as after Ctrl-S: until asked to stop, or, lest the program never gets as far,
+    /// for a minute.
+    std::jthread stand_still() {
         tcflow(slave_, TCOOFF);
-        return std::jthread([this, file](const std::stop_token& enough) {
-            using namespace std::chrono_literals;
-            while (!fs::exists(file) && !enough.stop_requested()) std::this_thread::sleep_for(1ms);
-            std::this_thread::sleep_for(500ms);
+        return std::jthread([this](const std::stop_token& enough) {
+            std::mutex mutex;
+            std::unique_lock lock(mutex);
+            std::condition_variable_any().wait_for(lock, enough, std::chrono::minutes(1),
+                                                   [] { return false; });
             tcflow(slave_, TCOON);
         });
     }
@@ -184,7 +189,11 @@ TEST_F(Signals, CtrlBackslashEndsAtOnceAndATerminalSaysSo) {
     held.times = 3;
     held.err_path = terminal.path();
     {
-        const std::jthread still = terminal.stand_still_until(folder / "held");
+        std::jthread still = terminal.stand_still();
+        held.then = [&still, then = held.then] {
+            still.request_stop();
+            then();
+        };
         EXPECT_EQ(train("o", {}, held).status, 130);
     }
     const std::string& said = terminal.said();

@@ -4,6 +4,7 @@
 
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <thread>
@@ -216,11 +217,11 @@ bool answers(const Socket& socket) {
 TEST(LiveServer, WhoIsSilentGivesWay) {
     Server server("127.0.0.1", 0, "secret", std::chrono::seconds(0));
     const std::vector<Socket> taken = all_places(server);
-    ASSERT_TRUE(answers(taken[0]));  // the second has been silent longest now
+    ASSERT_TRUE(answers(taken[0]));  // any other has been silent for longer now
     Client newcomer = client_of(server);
     EXPECT_EQ(newcomer.status(0).step, 0);
-    EXPECT_FALSE(answers(taken[1]));
-    for (size_t i = 2; i < taken.size(); ++i) EXPECT_TRUE(answers(taken[i])) << i;
+    // Which of them is for the server's threads to know, who write down when they are done with an answer.
+    EXPECT_EQ(std::count_if(taken.begin() + 1, taken.end(), answers), kMostClients - 2);
     EXPECT_TRUE(answers(taken[0]));
 }
 
