@@ -4,7 +4,7 @@ include(CMakePackageConfigHelpers)
 
 # libewa: the rooms of the house without its leaves, in one shared object, so that who links it needs none of what stands
 # behind it. The programs link the rooms themselves and run without it.
-set(ewa_library_rooms core image scene mesh io gpu passes pipeline photograph train)
+set(ewa_library_rooms core image scene io gpu passes pipeline pathtracer train)
 set(ewa_objects $<TARGET_OBJECTS:ewa_shader_code>)
 foreach(room ${ewa_library_rooms})
     if(TARGET ewa_${room})
@@ -80,7 +80,7 @@ set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME ewa)
 set(CPACK_PACKAGE_CONTACT "The authors of ewa <ewa@localhost>")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "trains, renders and inspects 3D Gaussian splats on any Vulkan device")
-set(CPACK_PACKAGE_DESCRIPTION "Programs ewa, ewa-view and ewa-bench, and libewa with its headers. Photographs with cameras
+set(CPACK_PACKAGE_DESCRIPTION "Programs ewa, ewa-view and ewa-bench, and libewa with its headers. SyntheticDataset with cameras
 become a 3D Gaussian splat scene, on any Vulkan device, a plain CPU included.")
 set(CPACK_STRIP_FILES ON)
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)

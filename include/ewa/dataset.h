@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Photographs with their cameras, and the points they were reconstructed from.
+// SyntheticDataset with their cameras, and the points they were reconstructed from.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -102,11 +102,11 @@ Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& op
 Image load_frame_image(const Frame& frame);
 
 /// The same as a rendering is compared with it.
-struct Photograph {
+struct TrainingImage {
     Image picture;  // RGB, over the background where it is cut out
     Image weights;  // one channel, how much a pixel counts; empty where each counts
 };
-Photograph load_photograph(const Frame& frame, const std::array<float, 3>& background);
+TrainingImage load_training_image(const Frame& frame, const std::array<float, 3>& background);
 
 /// Indices of train and test frames: a frame's own split where the dataset has one, else test where its index
 /// in name order is a multiple of test_every (INRIA's and gsplat's rule); test_every 0: all train.

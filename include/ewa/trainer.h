@@ -150,7 +150,7 @@ class Trainer {
     uint32_t splats() const;
     int steps_done() const;
     std::vector<Exposure> exposures() const;   // of the training frames, where they are learned; else none
-    size_t photographs_on_disk() const;        // that the cache has no room for
+    size_t images_on_disk() const;             // that the cache has no room for
     std::vector<PassTime> pass_times() const;  // medians over the last steps, in recording order
 
   private:

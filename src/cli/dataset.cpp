@@ -8,8 +8,8 @@
 #include "cli/arguments.h"
 #include "cli/command.h"
 #include "cli/interrupt.h"
-#include "cli/photograph_scene.h"
 #include "cli/progress.h"
+#include "cli/synthetic_dataset.h"
 #include "core/text.h"
 #include "ewa/error.h"
 
@@ -22,12 +22,12 @@ struct DatasetArguments {
     fs::path scene, output;
     std::string size = "256x256", exposure = "auto";
     int views = -1;
-    PhotographOptions options;
+    SyntheticOptions options;
     DeviceOptions device;
     bool quiet = false;
 };
 
-void parse_size(const std::string& text, PhotographOptions& options) {
+void parse_size(const std::string& text, SyntheticOptions& options) {
     const char* const end = text.data() + text.size();
     const auto [cross, error] = std::from_chars(text.data(), end, options.width);
     bool good = error == std::errc() && cross != end && *cross == 'x';
@@ -40,7 +40,7 @@ void parse_size(const std::string& text, PhotographOptions& options) {
 }
 
 int run(const DatasetArguments& arguments) {
-    PhotographOptions options = arguments.options;
+    SyntheticOptions options = arguments.options;
     parse_size(arguments.size, options);
     if (arguments.views >= 0) options.views = arguments.views;
     if (arguments.exposure != "auto") {
@@ -49,19 +49,20 @@ int run(const DatasetArguments& arguments) {
             throw InputError("--exposure: '" + arguments.exposure +
                              "' is neither auto nor a number of stops");
     }
-    const Photographs made = photograph_with_progress(arguments.device, arguments.scene, arguments.output,
-                                                      options, arguments.quiet);
+    const SyntheticDataset made = photograph_with_progress(arguments.device, arguments.scene,
+                                                           arguments.output, options, arguments.quiet);
     return made.interrupted ? kInterruptedStatus : 0;
 }
 
 }  // namespace
 
-Photographs photograph_with_progress(const DeviceOptions& device, const fs::path& scene,
-                                     const fs::path& folder, const PhotographOptions& options, bool quiet) {
+SyntheticDataset photograph_with_progress(const DeviceOptions& device, const fs::path& scene,
+                                          const fs::path& folder, const SyntheticOptions& options,
+                                          bool quiet) {
     const InterruptWatch watch;
     std::unique_ptr<Progress> progress;
-    const Photographs made =
-        photograph_scene(open_device(device), scene, folder, options, [&](int done, int total) {
+    const SyntheticDataset made =
+        render_dataset(open_device(device), scene, folder, options, [&](int done, int total) {
             if (!progress) progress = std::make_unique<Progress>("photographed", total, "views", quiet);
             if (done > 0) progress->update(done);
             return !interrupted();
@@ -89,7 +90,7 @@ Photographs photograph_with_progress(const DeviceOptions& device, const fs::path
 
 Action add_dataset(CLI::App& app) {
     const auto arguments = std::make_shared<DatasetArguments>();
-    PhotographOptions& options = arguments->options;
+    SyntheticOptions& options = arguments->options;
     app.add_option("SCENE", arguments->scene, "A glTF with meshes (.gltf .glb)")->required()->type_name("");
     app.add_option("-o,--output", arguments->output,
                    "Folder for images/, depth/, points.ply and transforms.json; an ended run goes on there")

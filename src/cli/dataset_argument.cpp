@@ -5,7 +5,7 @@
 
 #include "cli/arguments.h"
 #include "cli/interrupt.h"
-#include "cli/photograph_scene.h"
+#include "cli/synthetic_dataset.h"
 #include "core/text.h"
 
 namespace ewa::cli {
@@ -44,7 +44,7 @@ Dataset load_cameras_as_trained(const fs::path& path, int downscale) {
 std::optional<Photographed> load_photographed(const fs::path& path, const fs::path& splats,
                                               const DatasetOptions& options, const DeviceOptions& device) {
     if (!names_mesh_scene(path)) return Photographed{load_dataset(path, options), nullptr};
-    if (const fs::path beside = splats.parent_path() / "dataset"; is_photographed(path, beside, {}))
+    if (const fs::path beside = splats.parent_path() / "dataset"; is_rendered(path, beside, {}))
         return Photographed{load_dataset(beside, options), nullptr};
     auto folder = std::make_unique<core::TemporaryFolder>("ewa-photographs-");
     // Its watch over signals has ended with it: what came too late for a view is met here.

@@ -70,7 +70,7 @@ Action add_eval(CLI::App& app) {
         ->type_name("");
     app.add_option(
            "DATASET", arguments->dataset,
-           "Photographs with cameras: COLMAP folder or transforms.json; or a glTF with meshes, which is "
+           "SyntheticDataset with cameras: COLMAP folder or transforms.json; or a glTF with meshes, which is "
            "photographed as ewa train does")
         ->required()
         ->type_name("");

@@ -16,9 +16,9 @@
 #include "core/text.h"
 #include "ewa/dataset.h"
 #include "ewa/error.h"
-#include "ewa/photograph.h"
 #include "ewa/renderer.h"
 #include "ewa/splat_files.h"
+#include "ewa/synthetic_dataset.h"
 #include "report/summary.h"
 
 namespace ewa::cli {

@@ -7,16 +7,16 @@
 
 #include "cli/text.h"
 #include "core/text.h"
-#include "ewa/photograph.h"
-#include "io/gltf_mesh.h"
+#include "ewa/synthetic_dataset.h"
+#include "io/gltf/gltf_mesh.h"
 
 namespace ewa::cli {
 
 void info_mesh(const std::filesystem::path& path, int test_every, bool json) {
-    const mesh::Scene scene = io::read_gltf_mesh(path);
+    const scene::MeshScene scene = io::read_gltf_mesh(path);
     const Dataset views = scene_cameras(path, {});
     const Split split = split_frames(views, test_every);
-    const mesh::Box box = mesh::bounds_of(scene);
+    const scene::Box box = scene::bounds_of(scene);
     const auto bytes = std::filesystem::file_size(path);
     // The last material is the one of triangles that name none.
     const size_t materials = scene.materials.size() - 1;

@@ -39,7 +39,7 @@ std::vector<report::ReportPicture> draw_report_pictures(const PictureRequest& re
         const Frame& frame = request.dataset.frames[index];
         report::ReportPicture picture;
         picture.name = frame.name;
-        Photograph photograph = load_photograph(frame, request.options.background);
+        TrainingImage photograph = load_training_image(frame, request.options.background);
         picture.photograph = std::move(photograph.picture);
         picture.rendering = renderer.render(frame.camera).color;
         picture.psnr = psnr(picture.rendering, picture.photograph, photograph.weights);

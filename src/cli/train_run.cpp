@@ -11,8 +11,8 @@
 #include "cli/dataset_argument.h"
 #include "cli/interrupt.h"
 #include "cli/output.h"
-#include "cli/photograph_scene.h"
 #include "cli/progress.h"
+#include "cli/synthetic_dataset.h"
 #include "cli/text.h"
 #include "cli/train_files.h"
 #include "cli/train_resume.h"
@@ -430,9 +430,9 @@ int TrainRun::run() {
     const InterruptWatch watch;
     Trainer trainer(device_, dataset_, split_.train, start_, options_);
     start_ = {};
-    if (trainer.photographs_on_disk() > 0)
+    if (trainer.images_on_disk() > 0)
         say(fmt::format("{} photographs do not fit in --image-cache {} and are read again for each step",
-                        trainer.photographs_on_disk(), arguments_.image_cache));
+                        trainer.images_on_disk(), arguments_.image_cache));
     last_.splats = trainer.splats();
     resume(trainer);
     {
@@ -487,8 +487,8 @@ int run_train(const TrainArguments& given) {
         arguments.dataset = arguments.output / "dataset";
         // Another training may be reading the photographs that are there.
         if (fs::is_directory(arguments.output)) lock = std::make_unique<core::FolderLock>(arguments.output);
-        const Photographs made = photograph_with_progress(arguments.device, arguments.scene,
-                                                          arguments.dataset, {}, arguments.quiet);
+        const SyntheticDataset made = photograph_with_progress(arguments.device, arguments.scene,
+                                                               arguments.dataset, {}, arguments.quiet);
         if (made.interrupted || interrupted()) return kInterruptedStatus;
     }
     return TrainRun(arguments, begin, std::move(lock)).run();

@@ -11,7 +11,7 @@ namespace ewa::reference {
 namespace {
 
 /// Where the ray enters the box, or nothing.
-std::optional<double> enter(const Ray& ray, const mesh::FloatBox& box, double reach) {
+std::optional<double> enter(const Ray& ray, const pathtracer::FloatBox& box, double reach) {
     double first = 0, last = reach;
     for (int axis = 0; axis < 3; ++axis) {
         const double low = double(box.low[axis]), high = double(box.high[axis]);
@@ -31,7 +31,7 @@ std::optional<double> enter(const Ray& ray, const mesh::FloatBox& box, double re
 
 }  // namespace
 
-std::optional<Hit> meet(const Ray& ray, const mesh::DeviceTriangle& triangle) {
+std::optional<Hit> meet(const Ray& ray, const pathtracer::DeviceTriangle& triangle) {
     const glm::dvec3 e1(triangle.edge1), e2(triangle.edge2);
     const glm::dvec3 p = glm::cross(ray.direction, e2), s = ray.origin - glm::dvec3(triangle.corner);
     const double determinant = glm::dot(e1, p);
@@ -43,7 +43,7 @@ std::optional<Hit> meet(const Ray& ray, const mesh::DeviceTriangle& triangle) {
     return Hit{0, t, b};
 }
 
-std::optional<Hit> nearest_of_all(const Ray& ray, std::span<const mesh::DeviceTriangle> triangles) {
+std::optional<Hit> nearest_of_all(const Ray& ray, std::span<const pathtracer::DeviceTriangle> triangles) {
     std::optional<Hit> nearest;
     Ray shorter = ray;
     for (uint32_t i = 0; i < triangles.size(); ++i)
@@ -54,8 +54,8 @@ std::optional<Hit> nearest_of_all(const Ray& ray, std::span<const mesh::DeviceTr
     return nearest;
 }
 
-std::optional<Hit> trace(const Ray& ray, std::span<const mesh::Node> nodes,
-                         std::span<const mesh::DeviceTriangle> triangles, size_t* deepest) {
+std::optional<Hit> trace(const Ray& ray, std::span<const pathtracer::Node> nodes,
+                         std::span<const pathtracer::DeviceTriangle> triangles, size_t* deepest) {
     std::optional<Hit> nearest;
     Ray shorter = ray;
     std::vector<uint32_t> waiting = {0};
@@ -72,7 +72,7 @@ std::optional<Hit> trace(const Ray& ray, std::span<const mesh::Node> nodes,
                 }
             continue;
         }
-        const mesh::Node& node = nodes[reference];
+        const pathtracer::Node& node = nodes[reference];
         const auto t0 = enter(ray, node.boxes[0], shorter.reach),
                    t1 = enter(ray, node.boxes[1], shorter.reach);
         const bool first = !t1 || (t0 && *t0 <= *t1);

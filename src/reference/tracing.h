@@ -6,7 +6,7 @@
 #include <optional>
 #include <span>
 
-#include "mesh/packing.h"
+#include "pathtracer/packing.h"
 
 namespace ewa::reference {
 
@@ -22,14 +22,14 @@ struct Hit {
 };
 
 /// Where the ray meets the triangle (Moeller and Trumbore 1997), from either side; edges belong to it.
-std::optional<Hit> meet(const Ray& ray, const mesh::DeviceTriangle& triangle);
+std::optional<Hit> meet(const Ray& ray, const pathtracer::DeviceTriangle& triangle);
 
 /// The nearest of all triangles, by asking each.
-std::optional<Hit> nearest_of_all(const Ray& ray, std::span<const mesh::DeviceTriangle> triangles);
+std::optional<Hit> nearest_of_all(const Ray& ray, std::span<const pathtracer::DeviceTriangle> triangles);
 
 /// The same through the hierarchy, in the shader's order; deepest: the most children that waited on the
 /// stack.
-std::optional<Hit> trace(const Ray& ray, std::span<const mesh::Node> nodes,
-                         std::span<const mesh::DeviceTriangle> triangles, size_t* deepest = nullptr);
+std::optional<Hit> trace(const Ray& ray, std::span<const pathtracer::Node> nodes,
+                         std::span<const pathtracer::DeviceTriangle> triangles, size_t* deepest = nullptr);
 
 }  // namespace ewa::reference

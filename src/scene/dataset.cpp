@@ -7,7 +7,7 @@
 
 #include "core/text.h"
 #include "ewa/error.h"
-#include "scene/shape.h"
+#include "scene/aspect.h"
 #include "scene/undistort.h"
 
 namespace ewa {
@@ -65,7 +65,7 @@ Image load_file(const Frame& frame) {
 
 }  // namespace
 
-Photograph load_photograph(const Frame& frame, const std::array<float, 3>& background) {
+TrainingImage load_training_image(const Frame& frame, const std::array<float, 3>& background) {
     const Image image = load_frame_image(frame);
     if (image.channels == 3 || frame.masks != MaskUse::ignore)
         return {over_background(image, background), {}};

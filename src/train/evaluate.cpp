@@ -17,7 +17,7 @@ Evaluation evaluate(std::shared_ptr<gpu::Device> device, const Gaussians& gaussi
     for (size_t i = 0; i < frames.size(); ++i) {
         if (before_frame) before_frame();
         const Frame& frame = dataset.frames[size_t(frames[i])];
-        const auto [photo, weights] = load_photograph(frame, options.background);
+        const auto [photo, weights] = load_training_image(frame, options.background);
         Image picture = renderer.render(frame.camera).color;
         if (!exposures.empty()) picture = exposed(std::move(picture), exposures.at(i));
         if (photo.width != picture.width || photo.height != picture.height)

@@ -20,7 +20,7 @@
 #include "pipeline/capacity.h"
 #include "pipeline/densify.h"
 #include "pipeline/mcmc.h"
-#include "train/photographs.h"
+#include "train/image_cache.h"
 #include "train/schedule.h"
 
 namespace ewa {
@@ -88,8 +88,8 @@ struct Trainer::State {
     Plan plan;
     Model model;
     pipeline::Frame frame;
-    train::Photographs photographs;
-    std::vector<train::Photographs> smaller;  // by halvings, from 1; what the schedule is past holds nothing
+    train::ImageCache photographs;
+    std::vector<train::ImageCache> smaller;  // by halvings, from 1; what the schedule is past holds nothing
     Exposures exposures;
     uint32_t instance_room;
     StepReport report;
@@ -135,14 +135,14 @@ struct Trainer::State {
     }
 
     /// At the resolution of this step. Resolutions rise: what is larger than this one's is still to come.
-    train::Photographs& photographs_at(int step) {
+    train::ImageCache& photographs_at(int step) {
         const size_t halvings = size_t(schedule.halvings_at(step));
         while (smaller.size() > halvings) smaller.pop_back();
         return halvings == 0 ? photographs : smaller.back();
     }
 
     void optimise(int step) {
-        train::Photographs& seen = photographs_at(step);
+        train::ImageCache& seen = photographs_at(step);
         const size_t index = train::frame_of_step(step, photographs.count(), options.seed);
         const CameraUse camera = seen.camera(index);
         const auto photo = seen.photo(index);
@@ -311,7 +311,7 @@ Gaussians Trainer::gaussians() const {
 uint32_t Trainer::splats() const {
     return state_->model.splats;
 }
-size_t Trainer::photographs_on_disk() const {
+size_t Trainer::images_on_disk() const {
     return state_->photographs.on_disk();
 }
 int Trainer::steps_done() const {

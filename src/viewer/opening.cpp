@@ -7,8 +7,8 @@
 #include "core/json.h"
 #include "core/text.h"
 #include "ewa/error.h"
-#include "ewa/photograph.h"
 #include "ewa/splat_files.h"
+#include "ewa/synthetic_dataset.h"
 
 namespace ewa::viewer {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "ewa/dataset.h"
-#include "viewer/compare.h"
+#include "viewer/photo_comparison.h"
 
 namespace ewa::viewer {
 

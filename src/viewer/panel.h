@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "ewa/dataset.h"
-#include "io/view_list.h"
+#include "io/datasets/view_list.h"
 #include "live/watcher.h"
-#include "viewer/compare.h"
+#include "viewer/photo_comparison.h"
 #include "viewer/render_thread.h"
 
 namespace ewa::viewer {

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "ewa/dataset.h"
-#include "viewer/compare.h"
+#include "viewer/photo_comparison.h"
 #include "viewer/render_thread.h"
 
 namespace ewa::viewer {

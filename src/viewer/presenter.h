@@ -5,7 +5,7 @@
 #include <span>
 
 #include "ewa/image.h"
-#include "viewer/compare.h"
+#include "viewer/photo_comparison.h"
 #include "viewer/swapchain.h"
 
 struct ImDrawData;

@@ -9,8 +9,8 @@
 #include "ewa/dataset.h"
 #include "ewa/error.h"
 #include "input.h"
-#include "io/colmap.h"
-#include "io/transforms.h"
+#include "io/datasets/colmap.h"
+#include "io/datasets/transforms.h"
 
 namespace {
 

@@ -71,10 +71,10 @@ void check_scene(const std::vector<io::NamedView>& views) {
                     view.camera.fy > 0);
 }
 #elif defined(EWA_READ_MESH)
-void check_scene(const mesh::Scene& scene) {
+void check_scene(const scene::MeshScene& scene) {
     const std::string text = std::to_string(scene.triangles.size()) + " triangles";
     EWA_REQUIRE(!scene.triangles.empty() && !scene.materials.empty());
-    for (const mesh::Triangle& t : scene.triangles) {
+    for (const scene::Triangle& t : scene.triangles) {
         EWA_REQUIRE(t.material < scene.materials.size());
         for (size_t k = 0; k < 3; ++k) {
             EWA_REQUIRE(std::isfinite(float(t.corners[k].x)) && std::isfinite(float(t.corners[k].y)) &&
@@ -83,15 +83,15 @@ void check_scene(const mesh::Scene& scene) {
         }
     }
     const auto within = [](int index, size_t size) { return index >= -1 && index < static_cast<int>(size); };
-    for (const mesh::Material& m : scene.materials) {
+    for (const scene::Material& m : scene.materials) {
         EWA_REQUIRE(within(m.base_texture, scene.textures.size()) &&
                     within(m.metal_texture, scene.textures.size()));
         EWA_REQUIRE(within(m.emitted_texture, scene.textures.size()));
         EWA_REQUIRE(m.opacity >= 0 && m.opacity <= 1 && m.emitted.x >= 0 && m.emitted.x < 1e30f);
     }
-    for (const mesh::Texture& t : scene.textures)
+    for (const scene::Texture& t : scene.textures)
         EWA_REQUIRE(t.image >= 0 && within(t.image, scene.images.size()));
-    for (const mesh::Light& light : scene.lights)
+    for (const scene::Light& light : scene.lights)
         EWA_REQUIRE(std::isfinite(light.direction.x) && light.intensity.x >= 0 && light.range >= 0);
 }
 #else

@@ -9,7 +9,7 @@
 #include "golden/golden.h"
 #include "reference/adam.h"
 #include "reference/render.h"
-#include "train/photographs.h"
+#include "train/image_cache.h"
 #include "train/schedule.h"
 #include "train/synthetic.h"
 

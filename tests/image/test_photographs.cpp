@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Photographs as captures have them: turned, of several sizes, deep, with smaller copies beside them.
+// SyntheticDataset as captures have them: turned, of several sizes, deep, with smaller copies beside them.
 #include <OpenImageIO/imageio.h>
 
 #include <cmath>
@@ -47,7 +47,7 @@ struct Capture {
     }
 };
 
-TEST(Photographs, OfSeveralCamerasAndSizes) {
+TEST(SyntheticDataset, OfSeveralCamerasAndSizes) {
     const Capture capture;
     const Dataset dataset = capture.load();
     EXPECT_EQ(load_frame_image(dataset.frames[0]).width, 8);
@@ -55,7 +55,7 @@ TEST(Photographs, OfSeveralCamerasAndSizes) {
     EXPECT_EQ(dataset.frames[1].camera.fx, 7);
 }
 
-TEST(Photographs, StayAsStoredWhereTheModelHasTheStoredShape) {
+TEST(SyntheticDataset, StayAsStoredWhereTheModelHasTheStoredShape) {
     const Capture capture("a.tif");
     for (int orientation : {3, 6}) {
         for (const char* name : {"a.tif", "a.jpg"}) {
@@ -68,7 +68,7 @@ TEST(Photographs, StayAsStoredWhereTheModelHasTheStoredShape) {
     }
 }
 
-TEST(Photographs, AreTurnedWhereOnlyThatFitsTheModel) {
+TEST(SyntheticDataset, AreTurnedWhereOnlyThatFitsTheModel) {
     const Capture capture("a.tif");
     const Image stored = ramp(6, 8);
     for (int orientation : {5, 6, 7, 8}) {
@@ -84,7 +84,7 @@ TEST(Photographs, AreTurnedWhereOnlyThatFitsTheModel) {
     }
 }
 
-TEST(Photographs, SmallerCopiesAreUsedWhereTheyAre) {
+TEST(SyntheticDataset, SmallerCopiesAreUsedWhereTheyAre) {
     const Capture capture;
     std::filesystem::create_directories(capture.folder / "images_2");
     save_image(capture.folder / "images_2/a.png", ramp(4, 3));
@@ -108,7 +108,7 @@ TEST(Photographs, SmallerCopiesAreUsedWhereTheyAre) {
     EXPECT_EQ(capture.load(2).missing_images, 1);
 }
 
-TEST(Photographs, CamerasAloneNeedNoFittingPicture) {
+TEST(SyntheticDataset, CamerasAloneNeedNoFittingPicture) {
     const Capture capture;
     save_image(capture.folder / "images/a.png", ramp(7, 7));
     capture.folder.write("images/b.png", "no picture");
@@ -118,7 +118,7 @@ TEST(Photographs, CamerasAloneNeedNoFittingPicture) {
     EXPECT_EQ(capture.load(2, false).frames[0].camera.width, 4);
 }
 
-TEST(Photographs, DeepAndLinearFilesKeepTheirValues) {
+TEST(SyntheticDataset, DeepAndLinearFilesKeepTheirValues) {
     const Capture capture;
     const auto text = "1 1 0 0 0 0 0 0 1 a.exr\n\n2 1 0 0 0 0 0 1 2 b.png\n\n";
     capture.folder.write("sparse/0/images.txt", text);
@@ -172,15 +172,15 @@ TEST(Masks, AreFoundByThePicturesName) {
         EXPECT_TRUE(dataset.frames[1].mask_path.empty());
         EXPECT_EQ(dataset.frames[1].masks, MaskUse::ignore);
 
-        const auto [picture, weights] = load_photograph(dataset.frames[0], {1, 1, 1});
+        const auto [picture, weights] = load_training_image(dataset.frames[0], {1, 1, 1});
         EXPECT_EQ(picture.pixels, ramp(8, 6).pixels);
         ASSERT_EQ(weights.pixels.size(), 48u);
         EXPECT_EQ(*weights.at(3, 2), 0);
         EXPECT_EQ(*weights.at(4, 2), 1);
-        EXPECT_TRUE(load_photograph(dataset.frames[1], {}).weights.pixels.empty());
+        EXPECT_TRUE(load_training_image(dataset.frames[1], {}).weights.pixels.empty());
 
         const Frame cut = with_masks(capture, MaskUse::cut).frames[0];
-        const auto over = load_photograph(cut, {0.25f, 0.5f, 1});
+        const auto over = load_training_image(cut, {0.25f, 0.5f, 1});
         EXPECT_TRUE(over.weights.pixels.empty());
         EXPECT_EQ(over.picture.at(0, 0)[1], 0.5f);
         EXPECT_EQ(over.picture.at(5, 3)[1], ramp(8, 6).at(5, 3)[1]);
@@ -196,8 +196,8 @@ TEST(Masks, MayBeAlphaAndOfAnotherSize) {
     for (int y = 0; y < 6; ++y)
         for (int x = 0; x < 8; ++x) picture.at(x, y)[3] = y < 3 ? 1.0f : 0.0f;
     save_image(capture.folder / "images/a.png", picture);
-    EXPECT_EQ(load_photograph(capture.load().frames[0], {1, 0, 0}).picture.at(2, 4)[0], 1);
-    const auto ignored = load_photograph(with_masks(capture, MaskUse::ignore).frames[0], {1, 0, 0});
+    EXPECT_EQ(load_training_image(capture.load().frames[0], {1, 0, 0}).picture.at(2, 4)[0], 1);
+    const auto ignored = load_training_image(with_masks(capture, MaskUse::ignore).frames[0], {1, 0, 0});
     EXPECT_EQ(*ignored.weights.at(2, 4), 0);
     EXPECT_EQ(*ignored.weights.at(2, 2), 1);
     EXPECT_EQ(ignored.picture.at(2, 4)[0], picture.at(2, 4)[0]);
@@ -207,11 +207,11 @@ TEST(Masks, MayBeAlphaAndOfAnotherSize) {
     // picture.
     std::filesystem::create_directories(capture.folder / "masks");
     save_image(capture.folder / "masks/a.png", half_white(16, 12));
-    const auto both = load_photograph(capture.load().frames[0], {});
+    const auto both = load_training_image(capture.load().frames[0], {});
     EXPECT_EQ(*both.weights.at(3, 2), 0);
     EXPECT_EQ(*both.weights.at(4, 2), 1);
     EXPECT_EQ(*both.weights.at(4, 3), 0);
-    const auto small = load_photograph(with_masks(capture, MaskUse::automatic, 2).frames[0], {});
+    const auto small = load_training_image(with_masks(capture, MaskUse::automatic, 2).frames[0], {});
     ASSERT_EQ(small.weights.width, 4);
     EXPECT_EQ(*small.weights.at(1, 0), 0);
     EXPECT_EQ(*small.weights.at(2, 0), 1);
@@ -236,7 +236,7 @@ TEST(Masks, MayBeNamedByTheModel) {
     save_image(folder / "cover/a.png", half_white(8, 6));
     const Frame frame = load_dataset(folder.path(), {}).frames.at(0);
     EXPECT_EQ(frame.mask_path, folder / "cover/a.png");
-    EXPECT_EQ(*load_photograph(frame, {}).weights.at(0, 0), 0);
+    EXPECT_EQ(*load_training_image(frame, {}).weights.at(0, 0), 0);
 }
 
 }  // namespace

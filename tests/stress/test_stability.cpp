@@ -9,7 +9,7 @@
 #include <functional>
 #include <string>
 
-#include "bench/stability/compare.h"
+#include "bench/stability/case_errors.h"
 #include "gpu/test_device.h"
 
 namespace ewa::test {

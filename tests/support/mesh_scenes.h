@@ -8,26 +8,26 @@
 #include <random>
 
 #include "ewa/camera.h"
-#include "mesh/mesh_scene.h"
+#include "scene/mesh_scene.h"
 
 namespace ewa::test {
 
 /// Reflects `albedo` in all directions alike, and nothing else.
-inline mesh::Material diffuse(const glm::vec3& albedo) {
-    mesh::Material m;
+inline scene::Material diffuse(const glm::vec3& albedo) {
+    scene::Material m;
     m.base = albedo;
     m.metallic = m.f0 = m.f90 = 0;
     return m;
 }
 
-inline mesh::Sky even_sky(float radiance) {
+inline scene::Sky even_sky(float radiance) {
     return {glm::vec3(radiance), glm::vec3(radiance), glm::vec3(radiance)};
 }
 
 /// a b c d counter-clockwise seen from the front; uv (0,1) (1,1) (1,0) (0,0): a texture stands upright.
-inline void add_quad(mesh::Scene& scene, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c,
+inline void add_quad(scene::MeshScene& scene, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c,
                      const glm::dvec3& d, uint32_t material = 0) {
-    mesh::Triangle t;
+    scene::Triangle t;
     t.material = material;
     t.corners = {a, b, c};
     t.uvs = {glm::vec2(0, 1), glm::vec2(1, 1), glm::vec2(1, 0)};
@@ -38,7 +38,7 @@ inline void add_quad(mesh::Scene& scene, const glm::dvec3& a, const glm::dvec3& 
 }
 
 /// A ball of flat triangles round the origin.
-inline void add_ball(mesh::Scene& scene, double radius, int rings, uint32_t material = 0) {
+inline void add_ball(scene::MeshScene& scene, double radius, int rings, uint32_t material = 0) {
     const auto at = [&](int ring, int side) {
         const double up = std::numbers::pi * (double(ring) / rings - 0.5),
                      turn = std::numbers::pi * side / rings;
@@ -52,13 +52,13 @@ inline void add_ball(mesh::Scene& scene, double radius, int rings, uint32_t mate
 }
 
 /// Triangles of all sizes anywhere in a cube, some of them needles and some without area.
-inline mesh::Scene random_triangles(uint32_t seed, size_t count) {
+inline scene::MeshScene random_triangles(uint32_t seed, size_t count) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> place(-10, 10), size(-2, 2);
-    mesh::Scene scene;
+    scene::MeshScene scene;
     scene.materials.push_back(diffuse(glm::vec3(0.5f)));
     for (size_t i = 0; i < count; ++i) {
-        mesh::Triangle t;
+        scene::Triangle t;
         const glm::dvec3 center(place(random), place(random), place(random));
         for (glm::dvec3& corner : t.corners)
             corner = center + glm::dvec3(size(random), size(random), size(random));

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <set>
 
-#include "train/photographs.h"
+#include "train/image_cache.h"
 
 namespace ewa::train {
 namespace {

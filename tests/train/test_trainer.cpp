@@ -316,7 +316,7 @@ TEST(Trainer, PhotographsOnDiskChangeNoResult) {
         TrainOptions options = quick(20);
         options.image_cache_bytes = bytes;
         Trainer trainer(device(), spoilt.masked, all_frames(spoilt.masked), start, options);
-        EXPECT_EQ(trainer.photographs_on_disk(), on_disk);
+        EXPECT_EQ(trainer.images_on_disk(), on_disk);
         for (int step = 0; step < 20; ++step) trainer.step();
         const Gaussians learnt = trainer.gaussians();
         if (on_disk == 0) held = learnt;

@@ -3,7 +3,7 @@
 #include <limits>
 
 #include "ewa/dataset.h"
-#include "io/colmap.h"
+#include "io/datasets/colmap.h"
 #include "support/temp_folder.h"
 
 namespace {

@@ -5,11 +5,11 @@
 #include <glm/matrix.hpp>
 #include <nlohmann/json.hpp>
 
-#include "ewa/photograph.h"
+#include "ewa/synthetic_dataset.h"
 #include "image/encode.h"
-#include "io/gltf_mesh.h"
-#include "mesh/dome.h"
-#include "photograph/photographer.h"
+#include "io/gltf/gltf_mesh.h"
+#include "pathtracer/dome.h"
+#include "pathtracer/path_tracer.h"
 #include "support/temp_folder.h"
 
 namespace {
@@ -53,7 +53,7 @@ class Gltf {
     }
     json& primitive() { return top["meshes"][0]["primitives"][0]; }
     json& node() { return top["nodes"][0]; }
-    mesh::Scene read() {
+    scene::MeshScene read() {
         top["buffers"] = {{{"uri", "a.bin"}, {"byteLength", buffer.size()}}};
         folder.write("a.bin", buffer);
         return io::read_gltf_mesh(folder.write("a.gltf", top.dump()));
@@ -67,7 +67,7 @@ class Gltf {
     TempFolder folder;
 };
 
-void expect_corners(const mesh::Triangle& t, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
+void expect_corners(const scene::Triangle& t, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
     EXPECT_EQ(t.corners[0], a);
     EXPECT_EQ(t.corners[1], b);
     EXPECT_EQ(t.corners[2], c);
@@ -75,10 +75,10 @@ void expect_corners(const mesh::Triangle& t, const glm::dvec3& a, const glm::dve
 
 TEST(GltfMesh, IndicesOfEveryTypeStripsAndFans) {
     Gltf plain;
-    const mesh::Scene scene = plain.read();
+    const scene::MeshScene scene = plain.read();
     ASSERT_EQ(scene.triangles.size(), 1u);
     expect_corners(scene.triangles[0], {0, 0, 0}, {1, 0, 0}, {0, 2, 0});
-    EXPECT_EQ(scene.triangles[0].normals[0], mesh::kNoNormal);
+    EXPECT_EQ(scene.triangles[0].normals[0], scene::kNoNormal);
 
     const std::pair<int, std::string> types[] = {{5121, bytes_of_list<uint8_t>({2, 0, 1})},
                                                  {5123, bytes_of_list<uint16_t>({2, 0, 1})},
@@ -86,7 +86,7 @@ TEST(GltfMesh, IndicesOfEveryTypeStripsAndFans) {
     for (const auto& [component, bytes] : types) {
         Gltf gltf;
         gltf.primitive()["indices"] = gltf.add(bytes, component, "SCALAR", 3);
-        const mesh::Scene read = gltf.read();
+        const scene::MeshScene read = gltf.read();
         ASSERT_EQ(read.triangles.size(), 1u) << component;
         expect_corners(read.triangles[0], {0, 2, 0}, {0, 0, 0}, {1, 0, 0});
     }
@@ -95,7 +95,7 @@ TEST(GltfMesh, IndicesOfEveryTypeStripsAndFans) {
         gltf.primitive()["mode"] = mode;
         gltf.primitive()["attributes"]["POSITION"] =
             gltf.add(bytes_of_list<float>({0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0}), 5126, "VEC3", 4);
-        const mesh::Scene read = gltf.read();
+        const scene::MeshScene read = gltf.read();
         ASSERT_EQ(read.triangles.size(), 2u) << mode;
         if (mode == 5)
             expect_corners(read.triangles[1], {1, 0, 0}, {1, 1, 0}, {0, 1, 0});
@@ -113,12 +113,12 @@ TEST(GltfMesh, NodesPlaceTurnScaleAndMirror) {
         {{"mesh", 0}, {"scale", {-1, 1, 1}}}};
     gltf.primitive()["attributes"]["NORMAL"] =
         gltf.add(bytes_of_list<float>({0, 0, 1, 0, 0, 1, 0, 0, 1}), 5126, "VEC3", 3);
-    const mesh::Scene scene = gltf.read();
+    const scene::MeshScene scene = gltf.read();
     ASSERT_EQ(scene.triangles.size(), 2u);
     EXPECT_LT(glm::length(scene.triangles[0].corners[1] - glm::dvec3(0, 22, 0)), 1e-9);
     // Mirrored: the corners change places, so that the front stays in front, and so does the normal.
     expect_corners(scene.triangles[1], {0, 2, 0}, {-1, 0, 0}, {0, 0, 0});
-    EXPECT_EQ(scene.triangles[1].normals[0], mesh::pack_normal({0, 0, 1}));
+    EXPECT_EQ(scene.triangles[1].normals[0], scene::pack_normal({0, 0, 1}));
 }
 
 TEST(GltfMesh, MaterialsAndTheirExtensions) {
@@ -136,8 +136,8 @@ TEST(GltfMesh, MaterialsAndTheirExtensions) {
           {{"KHR_materials_emissive_strength", {{"emissiveStrength", 4}}},
            {"KHR_materials_ior", {{"ior", 3}}},
            {"KHR_materials_specular", {{"specularFactor", 0.5}}}}}}};
-    mesh::Scene scene = gltf.read();
-    const mesh::Material& m = scene.materials[scene.triangles[0].material];
+    scene::MeshScene scene = gltf.read();
+    const scene::Material& m = scene.materials[scene.triangles[0].material];
     EXPECT_EQ(m.base, glm::vec3(0.1f, 0.2f, 0.3f));
     EXPECT_EQ(m.opacity, 0.4f);
     EXPECT_EQ(m.metallic, 0.0f);
@@ -147,14 +147,14 @@ TEST(GltfMesh, MaterialsAndTheirExtensions) {
     EXPECT_FLOAT_EQ(m.f90, 0.5f);
     EXPECT_TRUE(m.masked && m.two_sided && !m.blended);
     EXPECT_EQ(m.cutoff, 0.25f);
-    EXPECT_TRUE(mesh::color_depends_on_view(scene));
+    EXPECT_TRUE(scene::color_depends_on_view(scene));
     gltf.top["materials"][1]["extensions"]["KHR_materials_specular"]["specularFactor"] = 0;
-    EXPECT_FALSE(mesh::color_depends_on_view(gltf.read())) << "unused materials do not count";
+    EXPECT_FALSE(scene::color_depends_on_view(gltf.read())) << "unused materials do not count";
     gltf.top["materials"][1]["extensions"] = {{"KHR_materials_unlit", json::object()}};
     scene = gltf.read();
     EXPECT_EQ(scene.materials[1].emitted, glm::vec3(0.1f, 0.2f, 0.3f));
     EXPECT_EQ(scene.materials[1].base, glm::vec3(0));
-    EXPECT_FALSE(mesh::color_depends_on_view(scene));
+    EXPECT_FALSE(scene::color_depends_on_view(scene));
 }
 
 TEST(GltfMesh, TexturesFromFilesViewsAndUris) {
@@ -177,7 +177,7 @@ TEST(GltfMesh, TexturesFromFilesViewsAndUris) {
     gltf.primitive()["material"] = 0;
     gltf.primitive()["attributes"]["TEXCOORD_0"] =
         gltf.add(bytes_of_list<float>({0, 0, 1, 0, NAN, 1}), 5126, "VEC2", 3);
-    const mesh::Scene scene = gltf.read();
+    const scene::MeshScene scene = gltf.read();
     ASSERT_EQ(scene.textures.size(), 2u);
     EXPECT_EQ(scene.textures[0].wrap_s, shared::WRAP_CLAMP);
     EXPECT_EQ(scene.textures[0].wrap_t, shared::WRAP_MIRROR);
@@ -185,7 +185,7 @@ TEST(GltfMesh, TexturesFromFilesViewsAndUris) {
     EXPECT_EQ(scene.materials[0].base_texture, scene.materials[0].emitted_texture);
     EXPECT_EQ(scene.triangles[0].uvs[1], glm::vec2(1, 0));
     EXPECT_EQ(scene.triangles[0].uvs[2], glm::vec2(0, 1)) << "what is not finite is 0";
-    const std::vector<Image> images = photograph::decode_images(scene);
+    const std::vector<Image> images = pathtracer::decode_images(scene);
     ASSERT_EQ(images.size(), 2u);
     for (const Image& image : images) EXPECT_EQ(image.pixels, picture.pixels);
 
@@ -194,9 +194,9 @@ TEST(GltfMesh, TexturesFromFilesViewsAndUris) {
     gltf.top["images"][0]["uri"] = "none.png";
     gltf.refused({"image 0", "\"uri\""});
     gltf.folder.write("none.png", text.substr(0, 30));
-    expect_error<InputError>([&] { photograph::decode_images(gltf.read()); }, {"a.gltf: image 0: ", "PNG"});
+    expect_error<InputError>([&] { pathtracer::decode_images(gltf.read()); }, {"a.gltf: image 0: ", "PNG"});
     gltf.folder.write("none.png", "GIF89a");
-    expect_error<InputError>([&] { photograph::decode_images(gltf.read()); },
+    expect_error<InputError>([&] { pathtracer::decode_images(gltf.read()); },
                              {"image 0", "neither PNG nor JPEG"});
     gltf.top["textures"][0]["source"] = 5;
     gltf.refused({"texture 0", "\"source\""});
@@ -216,11 +216,11 @@ TEST(GltfMesh, AKnownVertexLandsOnItsPixel) {
                                  {"rotation", {0, std::sqrt(0.5), 0, std::sqrt(0.5)}}});
     gltf.top["nodes"].push_back({{"camera", 1}});
     gltf.top["scenes"][0]["nodes"] = {0, 1, 2};
-    const mesh::Scene scene = gltf.read();
+    const scene::MeshScene scene = gltf.read();
     ASSERT_EQ(scene.cameras.size(), 1u);
     EXPECT_EQ(scene.cameras[0].name, "side");
     EXPECT_EQ(scene.remarks.size(), 1u);
-    const Camera camera = mesh::pinhole_of(scene.cameras[0], 200, 100);
+    const Camera camera = pathtracer::pinhole_of(scene.cameras[0], 200, 100);
     const glm::dvec3 seen = camera.rotation * scene.triangles[0].corners[2] + camera.translation;
     const double focal = 50 / std::tan(0.4);
     // Right of the camera is -z in the world: the corner stands 1 to the left and 1 above, 5 ahead.
@@ -242,7 +242,7 @@ TEST(GltfMesh, LightsAndSky) {
     gltf.node()["translation"] = {1, 2, 3};
     gltf.node()["rotation"] = {-std::sqrt(0.5), 0, 0, std::sqrt(0.5)};  // -z becomes -y
     gltf.top["scenes"][0]["extras"]["sky"] = {{"zenith", {1, 2, 3}}};
-    const mesh::Scene scene = gltf.read();
+    const scene::MeshScene scene = gltf.read();
     ASSERT_EQ(scene.lights.size(), 1u);
     EXPECT_EQ(scene.lights[0].kind, shared::LIGHT_SPOT);
     EXPECT_EQ(scene.lights[0].intensity, glm::dvec3(10, 5, 0));
@@ -250,7 +250,7 @@ TEST(GltfMesh, LightsAndSky) {
     EXPECT_LT(glm::length(scene.lights[0].direction - glm::dvec3(0, -1, 0)), 1e-9);
     EXPECT_EQ(scene.lights[0].outer, 0.5);
     EXPECT_EQ(scene.sky.zenith, glm::vec3(1, 2, 3));
-    EXPECT_EQ(scene.sky.ground, mesh::Sky().ground);
+    EXPECT_EQ(scene.sky.ground, scene::Sky().ground);
     gltf.top["scenes"][0]["extras"]["sky"]["zenith"] = {1, 2};
     gltf.refused({"\"sky\"", "\"zenith\""});
 }
@@ -330,7 +330,7 @@ TEST(GltfMesh, TrianglesThatAreNotFiniteAreCounted) {
         gltf.add(bytes_of_list<float>({0, 0, 0, 1, 0, 0, 0,        1, 0, NAN, 0, 0, 1, 0,
                                        0, 0, 1, 0, 0, 0, INFINITY, 1, 0, 0,   0, 1, 0}),
                  5126, "VEC3", 9);
-    const mesh::Scene scene = gltf.read();
+    const scene::MeshScene scene = gltf.read();
     EXPECT_EQ(scene.triangles.size(), 1u);
     EXPECT_EQ(scene.dropped_triangles, 2u);
     gltf.node()["scale"] = {1e300, 1, 1};

@@ -20,27 +20,30 @@ const std::map<std::string, Rooms> kArrows = {
     {"src/core", {}},
     {"src/image", {"src/core", "shaders/shared"}},
     {"src/openimageio", {"src/image"}},
-    {"src/scene", {"src/core", "src/image"}},
-    {"src/mesh", {"src/scene", "src/image", "shaders/shared"}},
-    {"src/io", {"src/scene", "src/image", "src/mesh"}},
+    {"src/scene", {"src/core", "src/image", "shaders/shared"}},
+    {"src/io/gltf", {"src/scene", "src/image"}},
+    {"src/io/splats", {"src/scene", "src/io/gltf", "shaders/shared"}},
+    {"src/io/datasets", {"src/scene", "src/image", "src/io/splats"}},
     {"src/gpu", {"src/core"}},
     {"src/passes", {"src/gpu", "shaders/shared"}},
     {"src/pipeline", {"src/passes", "src/scene"}},
-    {"src/photograph", {"src/passes", "src/mesh", "src/io"}},
-    {"src/train", {"src/pipeline", "src/scene", "src/io"}},
+    {"src/pathtracer", {"src/passes", "src/scene", "src/io/gltf", "src/io/datasets"}},
+    {"src/train", {"src/pipeline", "src/scene", "src/io/splats", "src/io/datasets"}},
     {"src/report", {"src/scene", "src/image"}},
-    {"src/live", {"src/report", "src/io"}},
-    {"src/reference", {"src/scene", "src/mesh"}},
+    {"src/live", {"src/report", "src/io/splats"}},
+    {"src/reference", {"src/scene", "src/pathtracer"}},
+    {"src/bench", {"src/pipeline", "src/reference", "src/scene"}},
 };
 const Rooms kLeaves = {"src/cli", "src/viewer"};
 
 /// The room whose promises a public header declares; those not named here are plain values that any room may
 /// use.
 const std::map<std::string, std::string> kOwners = {
-    {"image.h", "src/image"},          {"camera.h", "src/scene"},      {"gaussians.h", "src/scene"},
-    {"dataset.h", "src/scene"},        {"splat_files.h", "src/io"},    {"device.h", "src/gpu"},
-    {"splat_edit.h", "src/scene"},     {"renderer.h", "src/pipeline"}, {"trainer.h", "src/train"},
-    {"photograph.h", "src/photograph"}};
+    {"image.h", "src/image"},           {"camera.h", "src/scene"},
+    {"gaussians.h", "src/scene"},       {"dataset.h", "src/scene"},
+    {"splat_files.h", "src/io/splats"}, {"device.h", "src/gpu"},
+    {"splat_edit.h", "src/scene"},      {"renderer.h", "src/pipeline"},
+    {"trainer.h", "src/train"},         {"synthetic_dataset.h", "src/pathtracer"}};
 
 /// Libraries that only some rooms may know.
 const std::vector<std::pair<std::string, Rooms>> kLibraries = {
@@ -50,13 +53,13 @@ const std::vector<std::pair<std::string, Rooms>> kLibraries = {
     {"GLFW/", {"src/viewer"}},
     {"imgui", {"src/viewer"}},
     {"nanoflann", {"src/scene"}},
-    {"tiny_gltf", {"src/io"}},
-    {"zstd", {"src/io"}},
-    {"zlib", {"src/io", "src/image", "src/train"}},
+    {"tiny_gltf", {"src/io/gltf"}},
+    {"zstd", {"src/io/splats"}},
+    {"zlib", {"src/io/splats", "src/image", "src/train"}},
     {"nlohmann/",
-     {"src/core", "src/io", "src/photograph", "src/train", "src/report", "src/live", "src/cli",
-      "src/viewer"}},
-    {"CLI/", {"src/cli", "src/viewer"}}};
+     {"src/core", "src/io/splats", "src/io/datasets", "src/io/gltf", "src/pathtracer", "src/train",
+      "src/report", "src/live", "src/bench", "src/cli", "src/viewer"}},
+    {"CLI/", {"src/cli", "src/viewer", "src/bench"}}};
 
 Rooms reached_from(const std::string& room) {
     Rooms reached = {room}, next = {room};
@@ -70,11 +73,13 @@ Rooms reached_from(const std::string& room) {
     return reached;
 }
 
-/// The first two parts of a path in the source tree, e.g. "src/io"; "include/ewa" for a public header.
+/// The folder whose dependencies count for a path in the source tree: its first two parts, e.g. "src/core", or
+/// three below src/io, e.g. "src/io/splats"; "include/ewa" for a public header.
 std::string room_of(const fs::path& path) {
     auto part = path.begin();
-    const std::string first = part->string();
-    return first + "/" + (++part)->string();
+    std::string room = part->string() + "/" + std::next(part)->string();
+    if (room == "src/io") room += "/" + std::next(part, 2)->string();
+    return room;
 }
 
 /// What the include names, as a path in the source tree; empty for a file of a library.
@@ -147,14 +152,14 @@ TEST(IncludeArrow, BreachesAreFound) {
     folder.write("include/ewa/trainer.h", "#include \"ewa/image.h\"\n");
     folder.write("include/ewa/wrong.h", "#include \"core/a.h\"\n");
     folder.write("src/core/a.h", "#include <string>\n");
-    folder.write("src/core/wrong.h", "#  include \"io/a.h\"\n");
+    folder.write("src/core/wrong.h", "#  include \"io/splats/a.h\"\n");
     folder.write("src/core/wrong_public.h", "#include \"ewa/image.h\"\n");
-    folder.write("src/io/a.h", "#include \"core/a.h\"\n#include \"ewa/image.h\"\n");
-    folder.write("src/io/wrong.cpp", "#include \"../train/a.h\"\n");
-    folder.write("src/io/wrong_library.cpp", "#include <vulkan/vulkan.h>\n");
-    folder.write("src/train/a.h", "#include \"io/a.h\"\n");
+    folder.write("src/io/splats/a.h", "#include \"core/a.h\"\n#include \"ewa/image.h\"\n");
+    folder.write("src/io/splats/wrong.cpp", "#include \"../../train/a.h\"\n");
+    folder.write("src/io/splats/wrong_library.cpp", "#include <vulkan/vulkan.h>\n");
+    folder.write("src/train/a.h", "#include \"io/splats/a.h\"\n");
     folder.write("src/cellar/wrong.h", "#include \"core/a.h\"\n");
-    folder.write("src/cli/main.cpp", "#include \"train/a.h\"\n#include \"io/a.h\"\n");
+    folder.write("src/cli/main.cpp", "#include \"train/a.h\"\n#include \"io/splats/a.h\"\n");
     folder.write("src/cli/wrong.cpp", "#include <GLFW/glfw3.h>\n");
     folder.write("shaders/shared/a.h", "");
     folder.write("shaders/lib/a.glsl", "#include \"../shared/a.h\"\n");

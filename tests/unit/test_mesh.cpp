@@ -8,9 +8,9 @@
 
 #include "core/random.h"
 #include "ewa/error.h"
-#include "mesh/dome.h"
-#include "mesh/light_table.h"
-#include "mesh/packing.h"
+#include "pathtracer/dome.h"
+#include "pathtracer/light_table.h"
+#include "pathtracer/packing.h"
 #include "reference/tracing.h"
 #include "support/mesh_scenes.h"
 #include "support/temp_folder.h"
@@ -19,18 +19,18 @@ namespace {
 
 using namespace ewa;
 
-mesh::FloatBox cube(float at, float size) {
+pathtracer::FloatBox cube(float at, float size) {
     return {glm::vec3(at), glm::vec3(at + size)};
 }
 
 /// Every triangle stands in exactly one leaf, and in every box on the way to it. Returns the most nodes on a
 /// way.
-int check_hierarchy(const mesh::Hierarchy& hierarchy, const std::vector<mesh::FloatBox>& boxes) {
+int check_hierarchy(const pathtracer::Hierarchy& hierarchy, const std::vector<pathtracer::FloatBox>& boxes) {
     std::vector<int> met(boxes.size());
     int deepest = 0;
     struct Place {
         uint32_t reference;
-        mesh::FloatBox box;
+        pathtracer::FloatBox box;
         int depth;
     };
     std::vector<Place> open = {{0, {glm::vec3(-3e38f), glm::vec3(3e38f)}, 1}};
@@ -43,7 +43,7 @@ int check_hierarchy(const mesh::Hierarchy& hierarchy, const std::vector<mesh::Fl
             EXPECT_LE(count, shared::TRACE_LEAF_MAX);
             for (uint32_t i = first; i < first + count; ++i) {
                 ++met[hierarchy.order[i]];
-                const mesh::FloatBox& box = boxes[hierarchy.order[i]];
+                const pathtracer::FloatBox& box = boxes[hierarchy.order[i]];
                 for (int axis = 0; axis < 3; ++axis)
                     EXPECT_TRUE(box.low[axis] >= place.box.low[axis] &&
                                 box.high[axis] <= place.box.high[axis]);
@@ -51,7 +51,7 @@ int check_hierarchy(const mesh::Hierarchy& hierarchy, const std::vector<mesh::Fl
             continue;
         }
         deepest = std::max(deepest, place.depth);
-        const mesh::Node& node = hierarchy.nodes[place.reference];
+        const pathtracer::Node& node = hierarchy.nodes[place.reference];
         for (size_t child = 0; child < 2; ++child)
             if (node.boxes[child].low.x <= node.boxes[child].high.x)
                 open.push_back({node.references[child], node.boxes[child], place.depth + 1});
@@ -64,30 +64,30 @@ TEST(Hierarchy, HoldsEveryTriangleOnce) {
     for (const size_t count : {1u, 2u, 4u, 5u, 100u, 5000u}) {
         std::mt19937 random(7);
         std::uniform_real_distribution<float> place(-5, 5);
-        std::vector<mesh::FloatBox> boxes;
+        std::vector<pathtracer::FloatBox> boxes;
         for (size_t i = 0; i < count; ++i) boxes.push_back(cube(place(random), 0.1f));
-        check_hierarchy(mesh::build_hierarchy(boxes), boxes);
+        check_hierarchy(pathtracer::build_hierarchy(boxes), boxes);
     }
 }
 
 TEST(Hierarchy, NeverOutgrowsTheStack) {
     // Boxes that double in size and distance: the heuristic cuts one off at a time.
-    std::vector<mesh::FloatBox> boxes;
+    std::vector<pathtracer::FloatBox> boxes;
     for (int i = -110; i < 110; ++i)
         for (int k = 0; k < 20; ++k)
             boxes.push_back(cube(std::exp2(float(i)) * (1 + 0.01f * float(k)), std::exp2(float(i - 9))));
-    const int deepest = check_hierarchy(mesh::build_hierarchy(boxes), boxes);
+    const int deepest = check_hierarchy(pathtracer::build_hierarchy(boxes), boxes);
     EXPECT_LE(deepest, int(shared::TRACE_STACK));
     EXPECT_GT(deepest, 40) << "the case does not reach the limit it is meant for";
     // The same place for all: no plane divides them.
     boxes.assign(4096, cube(1, 1));
-    EXPECT_LE(check_hierarchy(mesh::build_hierarchy(boxes), boxes), 12);
+    EXPECT_LE(check_hierarchy(pathtracer::build_hierarchy(boxes), boxes), 12);
 }
 
 TEST(Tracing, TheHierarchyFindsWhatBruteForceFinds) {
-    const mesh::PackedScene packed = mesh::pack(test::random_triangles(1, 3000), {});
-    const auto triangles = mesh::device_triangles(packed);
-    const auto nodes = mesh::device_nodes(packed);
+    const pathtracer::PackedScene packed = pathtracer::pack(test::random_triangles(1, 3000), {});
+    const auto triangles = pathtracer::device_triangles(packed);
+    const auto nodes = pathtracer::device_nodes(packed);
     std::mt19937 random(2);
     std::normal_distribution<double> normal;
     int hits = 0;
@@ -114,7 +114,7 @@ TEST(Packing, NormalsSurviveTheirPacking) {
     std::normal_distribution<double> normal;
     for (int i = 0; i < 1000; ++i) {
         const glm::dvec3 n = glm::normalize(glm::dvec3(normal(random), normal(random), normal(random)));
-        const uint32_t bits = mesh::pack_normal(3.0 * n);
+        const uint32_t bits = scene::pack_normal(3.0 * n);
         const double x = int16_t(bits & 0xffff) / 32767.0, y = int16_t(bits >> 16) / 32767.0;
         glm::dvec3 back(x, y, 1 - std::abs(x) - std::abs(y));
         if (back.z < 0) {
@@ -124,23 +124,23 @@ TEST(Packing, NormalsSurviveTheirPacking) {
         EXPECT_LT(glm::length(glm::normalize(back) - n), 1e-4);
     }
     for (const glm::dvec3& none : {glm::dvec3(0), glm::dvec3(NAN, 0, 1), glm::dvec3(INFINITY, 0, 1)})
-        EXPECT_EQ(mesh::pack_normal(none), mesh::kNoNormal);
-    EXPECT_NE(mesh::pack_normal({-1, 0, 0}), mesh::kNoNormal);
+        EXPECT_EQ(scene::pack_normal(none), scene::kNoNormal);
+    EXPECT_NE(scene::pack_normal({-1, 0, 0}), scene::kNoNormal);
 }
 
 TEST(Packing, EmptyScenesAndTooManyTexelsAreRefused) {
-    test::expect_error<InputError>([] { mesh::pack({}, {}); }, {"no triangles"});
-    mesh::Scene scene = test::random_triangles(1, 1);
+    test::expect_error<InputError>([] { pathtracer::pack({}, {}); }, {"no triangles"});
+    scene::MeshScene scene = test::random_triangles(1, 1);
     test::expect_error<InputError>(
         [&] {
-            mesh::pack(scene, {Image(8192, 4096, 3), Image(8192, 4097, 3)});
+            pathtracer::pack(scene, {Image(8192, 4096, 3), Image(8192, 4097, 3)});
         },
         {"texels"});
 }
 
 TEST(LightTable, DrawsByPower) {
     const std::vector<double> wanted = {0.5, 0.05, 0.25, 0.0, 0.2};
-    const mesh::AliasTable table = mesh::alias_table(wanted);
+    const pathtracer::AliasTable table = pathtracer::alias_table(wanted);
     std::vector<double> found(wanted.size());
     for (size_t i = 0; i < wanted.size(); ++i) {
         found[i] += table.threshold[i] / double(wanted.size());
@@ -150,8 +150,8 @@ TEST(LightTable, DrawsByPower) {
 }
 
 TEST(Dome, LooksAtTheSceneFromAllSides) {
-    const mesh::Box box{{-1, 2, -3}, {3, 4, 5}};
-    const auto cameras = mesh::dome_cameras(box, 48, 320, 200);
+    const scene::Box box{{-1, 2, -3}, {3, 4, 5}};
+    const auto cameras = pathtracer::dome_cameras(box, 48, 320, 200);
     ASSERT_EQ(cameras.size(), 48u);
     glm::dvec3 sum(0);
     for (const Camera& camera : cameras) {

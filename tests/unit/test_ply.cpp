@@ -4,8 +4,8 @@
 #include <random>
 
 #include "ewa/splat_files.h"
-#include "io/ply.h"
-#include "io/points_ply.h"
+#include "io/datasets/points_ply.h"
+#include "io/splats/ply.h"
 #include "support/temp_folder.h"
 
 namespace {

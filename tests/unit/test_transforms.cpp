@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "ewa/dataset.h"
-#include "io/transforms.h"
+#include "io/datasets/transforms.h"
 #include "support/temp_folder.h"
 
 namespace {

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "io/view_list.h"
+#include "io/datasets/view_list.h"
 #include "support/temp_folder.h"
 
 namespace ewa::io {

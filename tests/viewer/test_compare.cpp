@@ -10,9 +10,9 @@
 #include <thread>
 #include <vector>
 
-#include "viewer/compare.h"
 #include "viewer/latest.h"
 #include "viewer/photo.h"
+#include "viewer/photo_comparison.h"
 
 namespace ewa::viewer {
 namespace {

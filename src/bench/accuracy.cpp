@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bench/accuracy.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <thread>
+
+#include "bench/format_figures.h"
+#include "bench/spread.h"
+#include "gpu/executor.h"
+#include "pipeline/camera_block.h"
+#include "pipeline/capacity.h"
+#include "pipeline/forward.h"
+#include "pipeline/plan.h"
+#include "reference/volume.h"
+#include "shared/constants.h"
+
+namespace ewa::bench {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr int kPixelsWanted = 3000, kRuns = 7;
+
+struct Pixel {
+    int x = 0, y = 0;
+};
+
+std::vector<Pixel> spread_pixels(const Camera& camera) {
+    const int step = std::max(1, int(std::sqrt(double(camera.width) * camera.height / kPixelsWanted)));
+    std::vector<Pixel> pixels;
+    for (int y = step / 2; y < camera.height; y += step)
+        for (int x = step / 2; x < camera.width; x += step) pixels.push_back({x, y});
+    return pixels;
+}
+
+/// Of every pixel, shared out over the host's threads; returns seconds.
+template <class Evaluate>
+double evaluate_pixels(const std::vector<Pixel>& pixels, std::vector<glm::dvec3>& out, Evaluate evaluate) {
+    out.resize(pixels.size());
+    std::atomic<size_t> next{0};
+    const auto work = [&] {
+        constexpr size_t kAtOnce = 16;
+        for (size_t begin; (begin = next.fetch_add(kAtOnce)) < pixels.size();)
+            for (size_t i = begin; i < std::min(begin + kAtOnce, pixels.size()); ++i)
+                out[i] = evaluate(pixels[i].x + 0.5, pixels[i].y + 0.5);
+    };
+    const auto start = Clock::now();
+    std::vector<std::thread> threads;
+    for (unsigned t = 1; t < host_threads(); ++t) threads.emplace_back(work);
+    work();
+    for (std::thread& t : threads) t.join();
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+void take_error(const std::vector<glm::dvec3>& exact, const std::vector<glm::dvec3>& actual,
+                AccuracyPoint& point) {
+    double sum = 0;
+    for (size_t i = 0; i < exact.size(); ++i)
+        for (int c = 0; c < 3; ++c) {
+            const double e = std::abs(exact[i][c] - actual[i][c]);
+            sum += e * e;
+            point.worst = std::max(point.worst, e);
+        }
+    point.rms = std::sqrt(sum / (3.0 * double(exact.size())));
+}
+
+struct SplattingChoice {
+    std::string series, name;
+    Kernel kernel = Kernel::peak;
+    int sh_degree = 3;
+    double alpha_min = shared::ALPHA_MIN;
+    uint32_t tile_height = 0;  // 0: the device's own tile
+};
+
+/// Draws the frame several times; the picture's pixels and the median time.
+AccuracyPoint splat(const std::shared_ptr<gpu::Device>& device, const Gaussians& gaussians,
+                    const Camera& camera, const RenderOptions& options, const SplattingChoice& choice,
+                    const std::vector<Pixel>& pixels, const std::vector<glm::dvec3>& exact) {
+    RenderOptions own = options;
+    own.kernel = choice.kernel;
+    own.sh_degree = choice.sh_degree;
+    passes::Shape shape = passes::shape_for(device->limits());
+    shape.cut_off = float(choice.alpha_min);
+    if (choice.tile_height > 0) shape.tile_height = choice.tile_height;
+    pipeline::Kernels kernels(*device, shape);
+    gpu::Executor executor(*device);
+    const pipeline::Plan plan = pipeline::plan_picture(gaussians, own, false);
+    const pipeline::Model model = pipeline::upload_model(*device, gaussians, 0, false);
+    const shared::CameraBlock block = pipeline::camera_block(camera, shape, model.origin);
+    gpu::Buffer buffer(*device, "camera", sizeof(block), gpu::Texel::none, true);
+    buffer.upload(std::span<const shared::CameraBlock>(&block, 1));
+    const pipeline::CameraUse use{&buffer, 0, uint32_t(camera.width), uint32_t(camera.height)};
+    pipeline::Frame frame;
+    frame.instance_capacity = pipeline::first_capacity(model.splats);
+    const auto draw = [&] {
+        pipeline::run_until_it_fits(
+            kernels, executor, frame,
+            {model.splats, use.width, use.height, frame.instance_capacity, false, false},
+            [&](gpu::Recording& recording) {
+                pipeline::record_forward(recording, kernels, plan, model, frame, use, own.background);
+            });
+    };
+    AccuracyPoint point;
+    point.name = choice.name;
+    point.milliseconds = time_repeated(kRuns, draw).wall.median;
+    const auto planes = frame.planes.download<float>(frame.sizes.planes / 4);
+    std::vector<glm::dvec3> actual;
+    for (const Pixel& p : pixels) {
+        const size_t at = size_t(p.y) * frame.sizes.stride + size_t(p.x), plane = frame.sizes.plane_floats;
+        actual.emplace_back(planes[at], planes[plane + at], planes[2 * plane + at]);
+    }
+    take_error(exact, actual, point);
+    return point;
+}
+
+std::vector<SplattingChoice> splatting_choices(const Gaussians& gaussians, const gpu::Limits& limits) {
+    const int degree = sh_degree_present(gaussians);
+    std::vector<SplattingChoice> choices;
+    for (const int per : {16, 64, 255, 1024, 4096})
+        choices.push_back(
+            {"splatting, cut-off", "1/" + std::to_string(per), Kernel::peak, degree, 1.0 / per, 0});
+    for (int d = 0; d <= degree; ++d)
+        choices.push_back({"splatting, SH degree", std::to_string(d), Kernel::peak, d, shared::ALPHA_MIN, 0});
+    const passes::Shape shape = passes::shape_for(limits);
+    for (const uint32_t height :
+         {shape.tile_height / 2, shape.tile_height, 2 * shape.tile_height, 4 * shape.tile_height})
+        choices.push_back({"splatting, tile", text_of("%ux%u", shape.tile_width, height), Kernel::peak,
+                           degree, shared::ALPHA_MIN, height});
+    choices.push_back({"splatting, kernel", "peak", Kernel::peak, degree, shared::ALPHA_MIN, 0});
+    choices.push_back({"splatting, kernel", "antialias", Kernel::antialias, degree, shared::ALPHA_MIN, 0});
+    choices.push_back({"splatting, kernel", "unit mass", Kernel::unit_mass, degree, shared::ALPHA_MIN, 0});
+    return choices;
+}
+
+}  // namespace
+
+Accuracy measure_accuracy(const std::shared_ptr<gpu::Device>& device, const Gaussians& gaussians,
+                          const Camera& camera, const RenderOptions& options,
+                          const std::function<void(const std::string&)>& say) {
+    Accuracy result;
+    result.threads = host_threads();
+    const std::vector<Pixel> pixels = spread_pixels(camera);
+    result.pixels = int(pixels.size());
+    say(text_of("integrals along %d rays in float64, %u threads", result.pixels, result.threads));
+    RenderOptions whole = options;
+    whole.sh_degree = kMaxShDegree;
+    const reference::Volume volume(reference::to_double(gaussians), camera, whole);
+    std::vector<glm::dvec3> exact, actual;
+    result.exact_seconds =
+        evaluate_pixels(pixels, exact, [&](double x, double y) { return volume.exact(x, y); });
+
+    say("splatting on the device");
+    for (const SplattingChoice& choice : splatting_choices(gaussians, device->limits())) {
+        if (result.series.empty() || result.series.back().name != choice.series)
+            result.series.push_back({choice.series, choice.series == "splatting, cut-off", {}});
+        result.series.back().points.push_back(
+            splat(device, gaussians, camera, options, choice, pixels, exact));
+    }
+    say("ray-marching on the host");
+    AccuracySeries marcher{"ray-marcher (host)", true, {}};
+    const double share = double(camera.width) * camera.height / double(pixels.size());
+    for (int samples = 4; samples <= 1024; samples *= 2) {
+        AccuracyPoint point;
+        point.name = std::to_string(samples) + " samples";
+        point.milliseconds = 1000 * share * evaluate_pixels(pixels, actual, [&](double x, double y) {
+                                 return volume.marched(x, y, samples);
+                             });
+        take_error(exact, actual, point);
+        marcher.points.push_back(point);
+    }
+    result.series.push_back(std::move(marcher));
+    return result;
+}
+
+}  // namespace ewa::bench

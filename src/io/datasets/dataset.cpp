@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which kind of dataset a path holds, and what every kind is checked for once its model is read.
+#include "ewa/dataset.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/sandboxed_path.h"
+#include "core/text.h"
+#include "ewa/error.h"
+#include "io/datasets/colmap.h"
+#include "io/datasets/transforms.h"
+#include "scene/aspect.h"
+#include "scene/undistort.h"
+
+namespace ewa {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_file(const fs::path& path) {
+    std::error_code ignored;
+    return fs::is_regular_file(path, ignored);
+}
+
+bool is_folder(const fs::path& path) {
+    std::error_code ignored;
+    return fs::is_directory(path, ignored);
+}
+
+std::string size_text(int width, int height) {
+    return std::to_string(width) + " x " + std::to_string(height);
+}
+
+/// Whether a folder of the dataset has this file. Throws where a link leads to it from elsewhere.
+bool has_file(const fs::path& folder, const fs::path& name) {
+    const fs::path path = folder / name;
+    if (!is_file(path)) return false;
+    if (!core::links_stay_with_pictures(folder.parent_path(), folder.filename() / name))
+        throw InputError(core::one_line(path.string()) + ": is a link out of the dataset's folder; " +
+                         core::kLinkAdvice);
+    return true;
+}
+
+/// The file of a frame: the model's, or its copy in images_K for a downscale factor K.
+struct Picture {
+    fs::path path;
+    bool exists = false;
+    int downscale = 1;  // what is left to do
+};
+
+Picture find_picture(const io::PosedImage& image, const fs::path& folder, int downscale) {
+    if (downscale > 1) {
+        const fs::path inside = image.path.lexically_relative(folder);
+        const fs::path copies =
+            folder.parent_path() / (folder.filename().string() + "_" + std::to_string(downscale));
+        if (!inside.empty() && *inside.begin() != ".." && has_file(copies, inside))
+            return {copies / inside, true, 1};
+    }
+    return {image.path, is_file(image.path), downscale};
+}
+
+fs::path find_mask_in(const fs::path& masks, const fs::path& inside) {
+    fs::path replaced = inside, added = inside;
+    replaced.replace_extension(".png");
+    added += ".png";
+    for (const fs::path& name : {added, replaced, inside})
+        if (has_file(masks, name)) return masks / name;
+    return {};
+}
+
+/// The mask file of a picture, where there is one: its copy in masks_K, the model's, or that in masks. A mask
+/// may have any size of its picture's shape.
+fs::path find_mask(const io::PosedImage& image, const fs::path& folder, int downscale) {
+    const fs::path inside = image.path.lexically_relative(folder), root = folder.parent_path();
+    const bool below = !inside.empty() && *inside.begin() != "..";
+    if (below && downscale > 1) {
+        const fs::path small = find_mask_in(root / ("masks_" + std::to_string(downscale)), inside);
+        if (!small.empty()) return small;
+    }
+    if (!image.mask.empty() && is_file(image.mask)) return image.mask;
+    return below ? find_mask_in(root / "masks", inside) : fs::path();
+}
+
+/// Whether masks are for ignoring or for cutting out is one decision for a dataset.
+void settle_masks(Dataset& dataset, MaskUse wanted) {
+    const bool files = std::any_of(dataset.frames.begin(), dataset.frames.end(),
+                                   [](const Frame& frame) { return !frame.mask_path.empty(); });
+    if (wanted == MaskUse::automatic) wanted = files ? MaskUse::ignore : MaskUse::cut;
+    for (Frame& frame : dataset.frames) {
+        frame.masks = wanted;
+        if (wanted == MaskUse::none) frame.mask_path.clear();
+    }
+}
+
+/// The camera and the orientation of the file's own pixels.
+void fit_to_file(Frame& frame) {
+    const ImageSize size = read_image_size(frame.image_path);
+    Camera& camera = frame.source;
+    const bool stored = scene::same_shape(camera.width, camera.height, size.width, size.height);
+    const bool turned = !stored && size.orientation >= 5 &&
+                        scene::same_shape(camera.width, camera.height, size.height, size.width);
+    const int width = turned ? size.height : size.width, height = turned ? size.width : size.height;
+    frame.orientation = turned ? size.orientation : 1;
+    frame.eight_bit = size.eight_bit;
+    if (!stored && !turned)
+        throw InputError(core::one_line(frame.image_path.string() + ": frame \"" + frame.name + "\" is " +
+                                        size_text(size.width, size.height) + " pixels, but its camera has " +
+                                        size_text(camera.width, camera.height)));
+    const double x = double(width) / camera.width, y = double(height) / camera.height;
+    camera.width = width;
+    camera.height = height;
+    camera.fx *= x;
+    camera.cx *= x;
+    camera.fy *= y;
+    camera.cy *= y;
+}
+
+/// Pinhole cameras of lenses met before: finding one takes some milliseconds, and most datasets have only a
+/// few lenses.
+class Pinholes {
+  public:
+    Camera of(const Camera& source, const Distortion& distortion) {
+        const auto known = std::find_if(known_.begin(), known_.end(), [&](const Known& k) {
+            const Camera& c = k.source;
+            return k.distortion == distortion && c.width == source.width && c.height == source.height &&
+                   c.fx == source.fx && c.fy == source.fy && c.cx == source.cx && c.cy == source.cy;
+        });
+        if (known == known_.end()) {
+            known_.push_back({source, distortion, scene::undistorted_camera(source, distortion)});
+            return known_.back().pinhole;
+        }
+        Camera camera = known->pinhole;
+        camera.rotation = source.rotation;
+        camera.translation = source.translation;
+        return camera;
+    }
+
+  private:
+    struct Known {
+        Camera source;
+        Distortion distortion;
+        Camera pinhole;
+    };
+    std::vector<Known> known_;
+};
+
+Frame make_frame(const io::PosedImage& image, const Picture& picture, const DatasetOptions& options,
+                 Pinholes& pinholes) {
+    Frame frame;
+    frame.name = image.name;
+    frame.image_path = picture.path;
+    frame.image_exists = picture.exists;
+    frame.source = image.camera;
+    frame.downscale = picture.downscale;
+    try {
+        if (picture.exists) fit_to_file(frame);
+    } catch (const InputError&) {
+        // Cameras alone were asked for: a picture that does not fit, or is none, leaves the model's word.
+        if (options.need_images) throw;
+        frame.downscale = options.downscale;
+    }
+    frame.distortion = image.distortion;
+    frame.split = image.split;
+    try {
+        frame.pinhole = pinholes.of(frame.source, frame.distortion);
+        frame.camera = downscale(frame.pinhole, frame.downscale);
+    } catch (const InputError& error) {
+        throw InputError(core::one_line("frame \"" + image.name + "\": " + error.what()));
+    }
+    return frame;
+}
+
+/// The images folder that belongs to a COLMAP model.
+fs::path images_folder(const fs::path& root, const fs::path& model) {
+    if (model != root) return root / "images";
+    // The model's own folder was given: its pictures stand beside it, or beside the sparse/ it lies in.
+    const fs::path absolute = fs::absolute(root / "x").parent_path();
+    for (const fs::path& folder : {absolute, absolute.parent_path(), absolute.parent_path().parent_path()})
+        if (is_folder(folder / "images")) return folder / "images";
+    return root / "images";
+}
+
+void append(io::PosedImages& all, io::PosedImages more) {
+    std::move(more.images.begin(), more.images.end(), std::back_inserter(all.images));
+    if (all.points.positions.empty()) all.points = std::move(more.points);
+    if (all.dropped.count == 0) all.dropped.first = std::move(more.dropped.first);
+    all.dropped.count += more.dropped.count;
+    all.color_depends_on_view = all.color_depends_on_view || more.color_depends_on_view;
+}
+
+/// Blender's scenes say by the file's name what its frames are for.
+int split_of(const fs::path& path) {
+    const std::string stem = path.stem().string();
+    return stem == "transforms_train" ? 1 : stem == "transforms_test" ? 2 : 0;
+}
+
+io::PosedImages read_model(const fs::path& path, const DatasetOptions& options) {
+    const std::string name = core::one_line(path.string());
+    if (is_file(path)) {
+        if (core::lower(path.extension().string()) != ".json")
+            throw InputError(name +
+                             ": not a dataset; a dataset is a folder, a transforms.json, or a glTF of meshes "
+                             "(.gltf, .glb)");
+        return io::read_transforms(path, split_of(path), options.need_images);
+    }
+    if (!is_folder(path)) throw InputError(name + ": there is no such file or folder");
+    if (const std::optional<fs::path> model = io::find_colmap_model(path)) {
+        const fs::path images = images_folder(path, *model);
+        const fs::path copies = images.string() + "_" + std::to_string(options.downscale);
+        if (options.need_images && !is_folder(images) && !is_folder(copies))
+            throw InputError(core::one_line(images.string()) + ": the folder of the images is missing");
+        return io::read_colmap(*model, images);
+    }
+    if (is_file(path / "transforms.json"))
+        return io::read_transforms(path / "transforms.json", 0, options.need_images);
+    io::PosedImages all;
+    all.folder = path / "images";
+    all.color_depends_on_view = false;  // unless a file says so, or says nothing
+    bool found = false;
+    for (const char* file : {"transforms_train.json", "transforms_test.json"})
+        if (is_file(path / file)) {
+            append(all, io::read_transforms(path / file, split_of(file), options.need_images));
+            found = true;
+        }
+    if (!found)
+        throw InputError(
+            name +
+            ": not a dataset; looked for cameras and images (.bin or .txt) in sparse/0, sparse and the "
+            "folder itself, transforms.json, transforms_train.json and transforms_test.json");
+    return all;
+}
+
+}  // namespace
+
+Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& options) {
+    if (options.downscale < 1) throw InputError("the downscale factor has to be 1 or more");
+    io::PosedImages model = read_model(path, options);
+    const std::string name = core::one_line(path.string());
+    if (model.images.empty()) throw InputError(name + ": the dataset has no images");
+    Dataset dataset;
+    dataset.root = is_folder(path) ? path : path.parent_path();
+    dataset.points = std::move(model.points);
+    dataset.color_depends_on_view = model.color_depends_on_view;
+    dataset.dropped_points = model.dropped.count;
+    dataset.first_dropped_point = std::move(model.dropped.first);
+    std::stable_sort(model.images.begin(), model.images.end(),
+                     [](const io::PosedImage& a, const io::PosedImage& b) { return a.name < b.name; });
+    Pinholes pinholes;
+    for (const io::PosedImage& image : model.images) {
+        const Picture picture = find_picture(image, model.folder, options.downscale);
+        dataset.missing_images += !picture.exists;
+        const bool usable = image.camera.width > 0 && (picture.exists || !options.need_images);
+        if (!usable) continue;
+        dataset.frames.push_back(make_frame(image, picture, options, pinholes));
+        dataset.frames.back().mask_path = find_mask(image, model.folder, options.downscale);
+    }
+    settle_masks(dataset, options.masks);
+    if (dataset.frames.empty())
+        throw InputError(name + ": none of the " + std::to_string(model.images.size()) +
+                         " images is there, the first being " +
+                         core::one_line(model.images.front().path.string()));
+    return dataset;
+}
+
+}  // namespace ewa

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/datasets/points_ply.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/text.h"
+#include "ewa/error.h"
+#include "io/datasets/posed_images.h"
+#include "io/splats/ply_table.h"
+
+namespace ewa::io {
+
+PlyPoints read_points_ply(const std::filesystem::path& path) {
+    PlyTable table(path);
+    const PlyElement& vertex = table.go_to("vertex");
+    std::vector<size_t> columns;
+    for (const char* name : {"x", "y", "z"}) {
+        const std::optional<size_t> found = vertex.find(name);
+        if (!found || vertex.properties[*found].list_count)
+            throw InputError(table.name() + ": the vertices have no number \"" + name + "\"");
+        columns.push_back(*found);
+    }
+    double color_scale = 1;
+    for (const char* name : {"red", "green", "blue"}) {
+        const std::optional<size_t> found = vertex.find(name);
+        if (!found || vertex.properties[*found].list_count) break;
+        const PlyType type = vertex.properties[*found].type;
+        if (type == PlyType::float32 || type == PlyType::float64) color_scale = 255;
+        columns.push_back(*found);
+    }
+    const bool colored = columns.size() == 6;
+
+    PlyPoints result;
+    table.read(columns, [&](size_t index, const double* row) {
+        const auto byte = [&](double v) -> uint8_t {
+            return v > 0 ? static_cast<uint8_t>(std::lround(std::min(v * color_scale, 255.0))) : uint8_t(0);
+        };
+        std::array<uint8_t, 3> color{128, 128, 128};
+        if (colored) color = {byte(row[3]), byte(row[4]), byte(row[5])};
+        add_point(result.points, result.dropped, {row[0], row[1], row[2]}, color,
+                  [&] { return core::one_line(path.string()) + ": vertex " + std::to_string(index); });
+    });
+    return result;
+}
+
+}  // namespace ewa::io

@@ -1,0 +1,258 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/datasets/transforms.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "core/json.h"
+#include "core/sandboxed_path.h"
+#include "core/text.h"
+#include "ewa/error.h"
+#include "io/datasets/points_ply.h"
+
+namespace ewa::io {
+
+namespace {
+
+using nlohmann::json;
+
+constexpr size_t kLongestName = 200;  // in an error
+constexpr double kMaxSize = 1 << 20;  // px
+// Of the columns of a rotation from unit length and right angles. Files with four decimals stay under it.
+constexpr double kMaxRotationError = 1e-2;
+
+/// A frame and the top of its file, asked together: what a frame does not say, the top says for all.
+class Entry {
+  public:
+    Entry(const std::string& where, const json& top, const json& frame)
+        : top_(top), frame_(frame), where_(where) {}
+
+    const json* find(const char* key) const {
+        if (const auto it = frame_.find(key); it != frame_.end() && !it->is_null()) return &*it;
+        if (const auto it = top_.find(key); it != top_.end() && !it->is_null()) return &*it;
+        return nullptr;
+    }
+
+    std::optional<double> number(const char* key) const {
+        const json* value = find(key);
+        if (!value) return std::nullopt;
+        if (!value->is_number()) fail(std::string("\"") + key + "\" is no number");
+        const double number = value->get<double>();
+        if (!std::isfinite(number)) fail(std::string("\"") + key + "\" is not finite");
+        return number;
+    }
+
+    std::string text(const char* key) const {
+        const json* value = find(key);
+        if (!value) return {};
+        if (!value->is_string()) fail(std::string("\"") + key + "\" is no text");
+        return value->get<std::string>();
+    }
+
+    [[noreturn]] void fail(const std::string& text) const {
+        throw InputError(where_ + ": " + core::one_line(text));
+    }
+
+  private:
+    const json& top_;
+    const json& frame_;
+    std::string where_;
+};
+
+/// nerfstudio's and instant-ngp's lenses. k4 is a fourth radial term to the one and divides to the other (and
+/// to OpenCV); only a fisheye and a camera that calls itself FULL_OPENCV leave no doubt.
+Distortion read_lens(const Entry& entry) {
+    static constexpr std::string_view kPerspective[] = {
+        "", "PINHOLE", "SIMPLE_PINHOLE", "OPENCV", "SIMPLE_RADIAL", "RADIAL", "FULL_OPENCV"};
+    static constexpr std::string_view kFisheye[] = {"OPENCV_FISHEYE", "SIMPLE_RADIAL_FISHEYE",
+                                                    "RADIAL_FISHEYE"};
+    const auto holds = [](auto& list, const std::string& name) {
+        return std::find(std::begin(list), std::end(list), name) != std::end(list);
+    };
+    const std::string model = entry.text("camera_model");
+    const json* flag = entry.find("is_fisheye");
+    const bool fisheye = holds(kFisheye, model) || (flag && *flag != json(false) && *flag != json(0));
+    if (!fisheye && !holds(kPerspective, model))
+        entry.fail("the camera model " + model + " is not supported; undistort the images to PINHOLE first");
+    Distortion d;
+    d.lens = fisheye ? Lens::fisheye : Lens::brown;
+    const std::pair<const char*, double Distortion::*> terms[] = {
+        {"k1", &Distortion::k1}, {"k2", &Distortion::k2}, {"k3", &Distortion::k3}, {"k4", &Distortion::k4},
+        {"k5", &Distortion::k5}, {"k6", &Distortion::k6}, {"p1", &Distortion::p1}, {"p2", &Distortion::p2}};
+    for (const auto& [key, term] : terms) d.*term = entry.number(key).value_or(0);
+    const std::pair<const char*, bool> unsure[] = {{"k4", !fisheye && model != "FULL_OPENCV"},
+                                                   {"k5", model != "FULL_OPENCV"},
+                                                   {"k6", model != "FULL_OPENCV"},
+                                                   {"ftheta_p0", true}};
+    for (const auto& [key, refused] : unsure)
+        if (refused && entry.number(key).value_or(0) != 0)
+            entry.fail(std::string("the distortion term ") + key +
+                       " is not supported; undistort the images to PINHOLE first");
+    return d;
+}
+
+bool is_file(const std::filesystem::path& path) {
+    std::error_code ignored;
+    return std::filesystem::is_regular_file(path, ignored);
+}
+
+/// What the entry names under this key, from the folder of its file; empty where it names nothing.
+std::filesystem::path named_file(const Entry& entry, const char* key, const std::filesystem::path& folder) {
+    const std::string name = entry.text(key);
+    if (name.empty()) return {};
+    const auto inside = core::name_inside(name);
+    const std::string what = std::string("\"") + key + "\" " + name.substr(0, kLongestName);
+    if (!inside) entry.fail(what + " leaves the file's folder; only files in or below it are read");
+    if (!core::links_stay_with_pictures(folder, *inside))
+        entry.fail(what + " is a link out of the file's folder; " + core::kLinkAdvice);
+    return *inside;
+}
+
+void find_picture(const Entry& entry, const std::filesystem::path& folder, PosedImage& image) {
+    const std::filesystem::path name = named_file(entry, "file_path", folder);
+    if (name.empty()) entry.fail("\"file_path\" is missing");
+    image.path = folder / name;
+    image.name = name.string();
+    if (is_file(image.path)) return;
+    for (const char* extension : {".png", ".jpg", ".jpeg"}) {
+        const std::filesystem::path longer = name.string() + extension;
+        if (!is_file(folder / longer)) continue;
+        if (!core::links_stay_with_pictures(folder, longer))
+            entry.fail(longer.string() + " is a link out of the file's folder; " + core::kLinkAdvice);
+        image.path = folder / longer;
+        image.name = longer.string();
+        return;
+    }
+}
+
+int whole_size(const Entry& entry, const char* key, double value) {
+    if (!(value >= 1 && value <= kMaxSize) || value != std::floor(value))
+        entry.fail(std::string("\"") + key + "\" is no size in pixels");
+    return static_cast<int>(value);
+}
+
+double focal_from_angle(const Entry& entry, const char* key, int size) {
+    const double angle = *entry.number(key);
+    if (!(angle > 0 && angle < std::numbers::pi))
+        entry.fail(std::string("\"") + key + "\" is no angle between 0 and pi (radians)");
+    return 0.5 * size / std::tan(0.5 * angle);
+}
+
+/// Width and height stay 0 where nothing tells them.
+void read_intrinsics(const Entry& entry, PosedImage& image) {
+    Camera& camera = image.camera;
+    const std::optional<double> w = entry.number("w"), h = entry.number("h");
+    if (w && h) {
+        camera.width = whole_size(entry, "w", *w);
+        camera.height = whole_size(entry, "h", *h);
+    } else if (is_file(image.path)) {
+        const ImageSize size = read_image_size(image.path);
+        camera.width = size.width;
+        camera.height = size.height;
+    } else {
+        return;
+    }
+    if (const auto fl_x = entry.number("fl_x"))
+        camera.fx = *fl_x;
+    else if (entry.number("camera_angle_x"))
+        camera.fx = focal_from_angle(entry, "camera_angle_x", camera.width);
+    else
+        entry.fail("neither \"fl_x\" nor \"camera_angle_x\" is there");
+    if (const auto fl_y = entry.number("fl_y"))
+        camera.fy = *fl_y;
+    else if (!entry.number("fl_x") && entry.number("camera_angle_y"))
+        camera.fy = focal_from_angle(entry, "camera_angle_y", camera.height);
+    else
+        camera.fy = camera.fx;
+    if (!(camera.fx > 0 && camera.fy > 0)) entry.fail("a focal length is not positive");
+    camera.cx = entry.number("cx").value_or(0.5 * camera.width);
+    camera.cy = entry.number("cy").value_or(0.5 * camera.height);
+}
+
+/// The nearest rotation (the orthogonal factor of the polar decomposition), by Higham's iteration.
+glm::dmat3 nearest_rotation(glm::dmat3 m) {
+    for (int i = 0; i < 30; ++i) m = 0.5 * (m + glm::transpose(glm::inverse(m)));
+    return m;
+}
+
+double rotation_error(const glm::dmat3& m) {
+    const glm::dmat3 product = glm::transpose(m) * m;
+    double error = 0;
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) error = std::max(error, std::abs(product[i][j] - (i == j ? 1.0 : 0.0)));
+    return error;
+}
+
+void read_pose(const Entry& entry, Camera& camera) {
+    const json* rows = entry.find("transform_matrix");
+    if (!rows) entry.fail("\"transform_matrix\" is missing");
+    if (!rows->is_array() || (rows->size() != 3 && rows->size() != 4))
+        entry.fail("\"transform_matrix\" has no 3 or 4 rows");
+    glm::dmat3 axes;
+    glm::dvec3 center;
+    for (int row = 0; row < 3; ++row) {
+        const json& values = (*rows)[size_t(row)];
+        if (!values.is_array() || values.size() != 4)
+            entry.fail("a row of \"transform_matrix\" has no 4 numbers");
+        for (int column = 0; column < 4; ++column) {
+            const json& value = values[size_t(column)];
+            if (!value.is_number() || !std::isfinite(value.get<double>()))
+                entry.fail("\"transform_matrix\" holds something that is no finite number");
+            (column < 3 ? axes[column][row] : center[row]) = value.get<double>();
+        }
+    }
+    const double determinant = glm::determinant(axes);
+    if (!(determinant > 0)) entry.fail("\"transform_matrix\" is no rotation: it mirrors or is degenerate");
+    axes /= std::cbrt(determinant);
+    if (!(rotation_error(axes) <= kMaxRotationError))
+        entry.fail(
+            "\"transform_matrix\" is no rotation: its columns differ in length or are not at right angles");
+    axes = nearest_rotation(axes);
+    // OpenGL's camera looks along -z with y up; OpenCV's along z with y down.
+    axes[1] = -axes[1];
+    axes[2] = -axes[2];
+    camera.rotation = glm::transpose(axes);
+    camera.translation = -(camera.rotation * center);
+}
+
+}  // namespace
+
+PosedImages read_transforms(const std::filesystem::path& path, int split, bool with_points) {
+    const std::string name = core::one_line(path.string());
+    const json top = core::read_json_file<json>(path, {.comments = true});  // which instant-ngp takes
+    if (!top.is_object()) throw InputError(name + ": is no JSON object");
+    const auto frames = top.find("frames");
+    if (frames == top.end() || !frames->is_array()) throw InputError(name + ": has no list \"frames\"");
+    PosedImages result;
+    const std::filesystem::path folder = path.parent_path();
+    result.folder = folder / "images";
+    for (size_t i = 0; i < frames->size(); ++i) {
+        const Entry entry(name + ": frame " + std::to_string(i), top, (*frames)[i]);
+        if (!(*frames)[i].is_object()) entry.fail("is no JSON object");
+        PosedImage image;
+        image.split = split;
+        image.distortion = read_lens(entry);
+        find_picture(entry, folder, image);
+        if (const auto mask = named_file(entry, "mask_path", folder); !mask.empty())
+            image.mask = folder / mask;
+        read_pose(entry, image.camera);
+        read_intrinsics(entry, image);
+        result.images.push_back(std::move(image));
+    }
+    if (const auto view = top.find("view_dependent"); view != top.end() && !view->is_null()) {
+        if (!view->is_boolean()) throw InputError(name + ": \"view_dependent\" is neither true nor false");
+        result.color_depends_on_view = view->get<bool>();
+    }
+    const json empty = json::object();
+    const auto points_name = named_file(Entry(name, top, empty), "ply_file_path", folder);
+    if (with_points && !points_name.empty()) {
+        PlyPoints points = read_points_ply(folder / points_name);
+        result.points = std::move(points.points);
+        result.dropped = std::move(points.dropped);
+    }
+    return result;
+}
+
+}  // namespace ewa::io

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/datasets/view_list.h"
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <nlohmann/json.hpp>
+
+#include "core/atomic_file.h"
+#include "core/json.h"
+#include "ewa/error.h"
+
+namespace ewa::io {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr uint64_t kLargestFile = 16u << 20;  // bytes
+constexpr double kRotationTolerance = 1e-6;
+
+std::vector<double> numbers(const Json& json, const char* name, size_t count) {
+    const Json& list = json.at(name);
+    std::vector<double> values =
+        list.is_array() ? list.get<std::vector<double>>() : std::vector{list.get<double>()};
+    if (values.size() != count)
+        throw InputError(std::string(name) + " has not " + std::to_string(count) + " numbers");
+    for (const double value : values)
+        if (!std::isfinite(value)) throw InputError(std::string(name) + " is not finite");
+    return values;
+}
+
+bool is_rotation(const glm::dmat3& r) {
+    const glm::dmat3 product = r * glm::transpose(r);
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j)
+            if (!(std::abs(product[i][j] - (i == j)) < kRotationTolerance)) return false;
+    return glm::determinant(r) > 0;
+}
+
+NamedView parse_view(const Json& json) {
+    NamedView view;
+    view.name = json.value("name", std::string());
+    Camera& camera = view.camera;
+    for (const auto& [name, side] : {std::pair{"width", &camera.width}, {"height", &camera.height}}) {
+        const double value = numbers(json, name, 1)[0];
+        if (!(value >= 1 && value <= 65536)) throw InputError(std::string(name) + " is not in 1..65536");
+        *side = int(value);
+    }
+    camera.fx = numbers(json, "fx", 1)[0];
+    camera.fy = numbers(json, "fy", 1)[0];
+    camera.cx = numbers(json, "cx", 1)[0];
+    camera.cy = numbers(json, "cy", 1)[0];
+    if (!(camera.fx > 0) || !(camera.fy > 0)) throw InputError("a focal length is not above zero");
+    const auto rotation = numbers(json, "rotation", 9), translation = numbers(json, "translation", 3),
+               pivot = numbers(json, "pivot", 3);
+    for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 3; ++column)
+            camera.rotation[column][row] = rotation[size_t(3 * row + column)];
+        camera.translation[row] = translation[size_t(row)];
+        view.pivot[row] = pivot[size_t(row)];
+    }
+    if (!is_rotation(camera.rotation)) throw InputError("its rotation is none");
+    return view;
+}
+
+Json to_json(const NamedView& view) {
+    const Camera& c = view.camera;
+    Json rotation = Json::array();
+    for (int row = 0; row < 3; ++row)
+        for (int column = 0; column < 3; ++column) rotation.push_back(c.rotation[column][row]);
+    return {{"name", view.name},
+            {"width", c.width},
+            {"height", c.height},
+            {"fx", c.fx},
+            {"fy", c.fy},
+            {"cx", c.cx},
+            {"cy", c.cy},
+            {"rotation", rotation},
+            {"translation", {c.translation.x, c.translation.y, c.translation.z}},
+            {"pivot", {view.pivot.x, view.pivot.y, view.pivot.z}}};
+}
+
+}  // namespace
+
+std::vector<NamedView> read_views(const std::filesystem::path& path) {
+    const Json json = core::read_json_file<Json>(path, {.bytes = kLargestFile});
+    if (!json.is_object() || !json.contains("views") || !json["views"].is_array())
+        throw InputError(path.string() + ": is no list of views: an object with \"views\" is expected");
+    if (json["views"].size() > kMostViews)
+        throw InputError(path.string() + ": more than " + std::to_string(kMostViews) + " views");
+    std::vector<NamedView> views;
+    for (const Json& entry : json["views"]) {
+        const std::string where = path.string() + ": view " + std::to_string(views.size()) + ": ";
+        try {
+            views.push_back(parse_view(entry));
+        } catch (const InputError& problem) {
+            throw InputError(where + problem.what());
+        } catch (const Json::exception& problem) {
+            throw InputError(where + problem.what());
+        }
+    }
+    return views;
+}
+
+void write_views(const std::filesystem::path& path, const std::vector<NamedView>& views) {
+    Json list = Json::array();
+    for (const NamedView& view : views) list.push_back(to_json(view));
+    core::write_text_file(path,
+                          Json{{"views", list}}.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+}  // namespace ewa::io

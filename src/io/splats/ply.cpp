@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/splats/ply.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cstring>
+
+#include "core/atomic_file.h"
+#include "core/text.h"
+#include "ewa/error.h"
+#include "io/splats/ply_table.h"
+#include "io/splats/splat_scene.h"
+
+namespace ewa::io {
+
+namespace {
+
+constexpr size_t kBeforeSh = 11;  // columns before f_rest: x y z opacity scale_0..2 rot_0..3
+constexpr int kMaxFileDegree = 4;
+
+/// K of f_rest_0..3K-1 as the degree it belongs to.
+int degree_of(const PlyTable& table, const PlyElement& vertex) {
+    size_t count = 0;
+    for (const PlyProperty& property : vertex.properties) count += property.name.starts_with("f_rest_");
+    for (int degree = 0; degree <= kMaxFileDegree; ++degree)
+        if (count == 3 * (size_t(sh_coefficients(degree)) - 1)) return degree;
+    throw InputError(table.name() + ": " + std::to_string(count) +
+                     " properties f_rest_* fit no SH degree (0, 9, 24 or 45 are degree 0 to 3)");
+}
+
+size_t column(const PlyTable& table, const PlyElement& vertex, const std::string& name) {
+    const std::optional<size_t> found = vertex.find(name);
+    if (found && !vertex.properties[*found].list_count) return *found;
+    std::string text = table.name() + ": the vertices have no property \"" + name + "\"";
+    if (found) text = table.name() + ": the property \"" + name + "\" is a list, not a number";
+    if (name == "scale_2")
+        text += "; 2D Gaussian splats are not supported";
+    else if (name.starts_with("f_dc_") && !vertex.find("opacity"))
+        text += "; this is a point cloud, not a splat file";
+    throw InputError(text);
+}
+
+/// Columns in the order that read_ply's rows use: the eleven, then SH as it is in memory.
+std::vector<size_t> splat_columns(const PlyTable& table, const PlyElement& vertex, int degree,
+                                  int file_degree) {
+    std::vector<size_t> columns;
+    const auto add = [&](const std::string& name) { columns.push_back(column(table, vertex, name)); };
+    for (const char* name : {"x", "y", "z"}) add(name);
+    for (int i = 0; i < 3; ++i) column(table, vertex, "f_dc_" + std::to_string(i));
+    add("opacity");
+    for (int i = 0; i < 3; ++i) add("scale_" + std::to_string(i));
+    for (int i = 0; i < 4; ++i) add("rot_" + std::to_string(i));
+    for (int channel = 0; channel < 3; ++channel) add("f_dc_" + std::to_string(channel));
+    const int per_channel = sh_coefficients(file_degree) - 1;
+    for (int k = 0; k < sh_coefficients(degree) - 1; ++k)
+        for (int channel = 0; channel < 3; ++channel)
+            add("f_rest_" + std::to_string(channel * per_channel + k));
+    return columns;
+}
+
+/// The mark of a scene that was trained anti-aliased, with a name for each program that writes one.
+bool says_antialiased(const std::string& comment) {
+    std::string_view rest = comment;
+    const std::string key = core::lower(core::next_word(rest)), value = core::lower(core::trim(rest));
+    return (key == "splatrendermode:" && value == "mip") || (key == "antialiased" && value == "1");
+}
+
+bool any_antialiased(const std::vector<std::string>& comments) {
+    return std::any_of(comments.begin(), comments.end(), says_antialiased);
+}
+
+/// What the file has besides, for the reader of `ewa info`.
+void remark_ignored(const PlyElement& vertex, const std::vector<size_t>& columns, SplatScene& scene) {
+    std::string ignored;
+    for (size_t i = 0; i < vertex.properties.size(); ++i) {
+        const std::string& name = vertex.properties[i].name;
+        if (std::find(columns.begin(), columns.end(), i) != columns.end() || name.starts_with("f_rest_") ||
+            name == "nx" || name == "ny" || name == "nz")
+            continue;
+        constexpr size_t kLongest = 200;
+        if (ignored.size() > kLongest) {
+            ignored += ", ...";
+            break;
+        }
+        ignored += (ignored.empty() ? "" : ", ") + name;
+    }
+    if (!ignored.empty()) scene.remarks.push_back("properties that are no splat's are left out: " + ignored);
+    if (scene.file_sh_degree > kMaxShDegree)
+        scene.remarks.push_back("has SH degree " + std::to_string(scene.file_sh_degree) + "; degrees above " +
+                                std::to_string(kMaxShDegree) + " are left out");
+}
+
+/// Positions that float32 would round are written as double.
+bool in_double(const Gaussians& gaussians) {
+    return gaussians.origin != glm::dvec3(0);
+}
+
+std::string header(const Gaussians& gaussians, const SaveOptions& options) {
+    std::string text = "ply\nformat binary_little_endian 1.0\n";
+    for (const std::string& comment : options.comments) text += "comment " + core::one_line(comment) + "\n";
+    if (options.antialiased && !any_antialiased(options.comments)) text += "comment SplatRenderMode: mip\n";
+    text += "element vertex " + std::to_string(gaussians.size()) + "\n";
+    const auto property = [&](const std::string& name) { text += "property float " + name + "\n"; };
+    for (const char* name : {"x", "y", "z"})
+        text += std::string("property ") + (in_double(gaussians) ? "double " : "float ") + name + "\n";
+    for (const char* name : {"nx", "ny", "nz"}) property(name);
+    for (int i = 0; i < 3; ++i) property("f_dc_" + std::to_string(i));
+    for (int i = 0; i < 3 * (sh_coefficients(gaussians.sh_degree) - 1); ++i)
+        property("f_rest_" + std::to_string(i));
+    property("opacity");
+    for (int i = 0; i < 3; ++i) property("scale_" + std::to_string(i));
+    for (int i = 0; i < 4; ++i) property("rot_" + std::to_string(i));
+    return text + "end_header\n";
+}
+
+void append_row(const Gaussians& gaussians, size_t i, std::vector<float>& rows) {
+    const size_t stride = gaussians.sh_stride();
+    const auto append = [&](const float* values, size_t n) { rows.insert(rows.end(), values, values + n); };
+    if (in_double(gaussians)) {
+        const glm::dvec3 mean = gaussians.world_mean(i);
+        std::array<float, 6> bytes;
+        std::memcpy(bytes.data(), &mean[0], sizeof(bytes));
+        append(bytes.data(), bytes.size());
+    } else {
+        append(&gaussians.means[3 * i], 3);
+    }
+    rows.insert(rows.end(), 3, 0.0f);
+    append(&gaussians.sh[stride * i], 3);
+    for (size_t channel = 0; channel < 3; ++channel)
+        for (size_t k = 3; k < stride; k += 3) rows.push_back(gaussians.sh[stride * i + k + channel]);
+    rows.push_back(gaussians.opacity_logits[i]);
+    append(&gaussians.log_scales[3 * i], 3);
+    append(&gaussians.quaternions[4 * i], 4);
+}
+
+}  // namespace
+
+SplatScene read_ply(const std::filesystem::path& path) {
+    PlyTable table(path);
+    SplatScene scene;
+    scene.comments = table.comments();
+    scene.variant = table.format_name();
+    scene.antialiased = any_antialiased(scene.comments);
+    const PlyElement& vertex = table.go_to("vertex");
+    scene.file_sh_degree = degree_of(table, vertex);
+    Gaussians& gaussians = scene.gaussians;
+    gaussians.sh_degree = std::min(scene.file_sh_degree, kMaxShDegree);
+    const std::vector<size_t> columns =
+        splat_columns(table, vertex, gaussians.sh_degree, scene.file_sh_degree);
+    remark_ignored(vertex, columns, scene);
+    require_memory(table.name(), table.file_bytes(), vertex.count, gaussians.sh_degree);
+    gaussians.resize(static_cast<size_t>(vertex.count));
+    const size_t stride = gaussians.sh_stride();
+    const auto copy = [](const double* from, float* to, size_t n) {
+        for (size_t k = 0; k < n; ++k) to[k] = static_cast<float>(from[k]);
+    };
+    const bool wide = vertex.properties[columns[0]].type == PlyType::float64;
+    std::vector<glm::dvec3> positions(wide ? gaussians.size() : 0);
+    table.read(columns, [&](size_t i, const double* row) {
+        if (wide)
+            positions[i] = {row[0], row[1], row[2]};
+        else
+            copy(row, &gaussians.means[3 * i], 3);
+        gaussians.opacity_logits[i] = static_cast<float>(row[3]);
+        copy(row + 4, &gaussians.log_scales[3 * i], 3);
+        copy(row + 7, &gaussians.quaternions[4 * i], 4);
+        copy(row + kBeforeSh, &gaussians.sh[stride * i], stride);
+    });
+    if (wide) set_world_means(gaussians, positions);
+    return scene;
+}
+
+std::vector<std::string> write_ply(const std::filesystem::path& path, const Gaussians& gaussians,
+                                   const SaveOptions& options) {
+    const size_t n = gaussians.size();
+    assert(gaussians.means.size() == 3 * n && gaussians.quaternions.size() == 4 * n);
+    assert(gaussians.log_scales.size() == 3 * n && gaussians.sh.size() == gaussians.sh_stride() * n);
+    core::AtomicFile file(path);
+    file.write(header(gaussians, options));
+    constexpr size_t kRowsAtOnce = 4096;
+    std::vector<float> rows;
+    for (size_t i = 0; i < n; ++i) {
+        append_row(gaussians, i, rows);
+        if ((i + 1) % kRowsAtOnce == 0 || i + 1 == n) {
+            file.write(rows.data(), rows.size() * sizeof(float));
+            rows.clear();
+            if (options.progress) options.progress(i + 1, n);
+        }
+    }
+    file.commit();
+    return {};
+}
+
+}  // namespace ewa::io

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/splats/splat.h"
+
+#include "core/atomic_file.h"
+#include "core/file_reader.h"
+#include "io/splats/splat_scene.h"
+#include "io/splats/splat_values.h"
+
+namespace ewa::io {
+
+namespace {
+
+constexpr size_t kSplatBytes = 32;
+
+void decode(const std::byte* bytes, size_t i, Gaussians& gaussians) {
+    float place[3], scale[3];
+    uint8_t color[4], rotation[4];
+    std::memcpy(place, bytes, 12);
+    std::memcpy(scale, bytes + 12, 12);
+    std::memcpy(color, bytes + 24, 4);
+    std::memcpy(rotation, bytes + 28, 4);
+    for (size_t k = 0; k < 3; ++k) {
+        gaussians.means[3 * i + k] = place[k];
+        gaussians.log_scales[3 * i + k] = log_of_scale(scale[k]);
+        gaussians.sh[3 * i + k] = float(sh0_of_color(color[k] / 255.0));
+    }
+    gaussians.opacity_logits[i] = float(logit_of_level(color[3], 255));
+    float q[4];
+    for (size_t k = 0; k < 4; ++k) q[k] = (float(rotation[k]) - 128) / 128;
+    const std::array<double, 4> unit = unit_quaternion(q);
+    for (size_t k = 0; k < 4; ++k) gaussians.quaternions[4 * i + k] = float(unit[k]);
+}
+
+void encode(const Gaussians& gaussians, size_t i, std::byte* bytes) {
+    float scale[3];
+    uint8_t color[4], rotation[4];
+    const float* sh = &gaussians.sh[gaussians.sh_stride() * i];
+    for (size_t k = 0; k < 3; ++k) {
+        scale[k] = scale_of_log(gaussians.log_scales[3 * i + k]);
+        color[k] = to_byte(color_of_sh0(sh[k]) * 255);
+    }
+    color[3] = to_byte(sigmoid(gaussians.opacity_logits[i]) * 255);
+    const std::array<double, 4> q = unit_quaternion(&gaussians.quaternions[4 * i]);
+    // Of the two signs of a rotation the one whose largest component is negative: 128 has no room for +1.
+    const double sign = q[largest_component(q)] > 127.5 / 128 ? -1 : 1;
+    for (size_t k = 0; k < 4; ++k) rotation[k] = to_byte(sign * q[k] * 128 + 128);
+    std::memcpy(bytes, &gaussians.means[3 * i], 12);
+    std::memcpy(bytes + 12, scale, 12);
+    std::memcpy(bytes + 24, color, 4);
+    std::memcpy(bytes + 28, rotation, 4);
+}
+
+}  // namespace
+
+SplatScene read_splat(const std::filesystem::path& path) {
+    core::FileReader reader(path);
+    if (reader.size() % kSplatBytes != 0) {
+        reader.skip(reader.size() / kSplatBytes * kSplatBytes, "the splats");
+        reader.fail("the file ends inside splat " + std::to_string(reader.size() / kSplatBytes) +
+                    ": it has " + std::to_string(reader.size()) +
+                    " bytes, and 32 make a splat; it is truncated or no .splat file");
+    }
+    SplatScene scene;
+    scene.format = SplatFormat::splat;
+    const size_t count = size_t(reader.size() / kSplatBytes);
+    scene.gaussians.resize(count);
+    for (size_t i = 0; i < count; ++i) decode(reader.take(kSplatBytes, "a splat"), i, scene.gaussians);
+    return scene;
+}
+
+std::vector<std::string> write_splat(const std::filesystem::path& path, const Gaussians& gaussians,
+                                     const SaveOptions& options) {
+    core::AtomicFile file(path);
+    constexpr size_t kSplatsAtOnce = 8192;
+    std::vector<std::byte> bytes(kSplatsAtOnce * kSplatBytes);
+    const size_t n = gaussians.size();
+    for (size_t begin = 0; begin < n; begin += kSplatsAtOnce) {
+        const size_t end = std::min(begin + kSplatsAtOnce, n);
+        for (size_t i = begin; i < end; ++i) encode(gaussians, i, &bytes[(i - begin) * kSplatBytes]);
+        file.write(bytes.data(), (end - begin) * kSplatBytes);
+        if (options.progress) options.progress(end, n);
+    }
+    file.commit();
+    std::vector<std::string> remarks;
+    remark_dropped_sh(gaussians, remarks);
+    remarks.push_back(
+        "colours and opacities have 8 bits, clamped to 0..1; rotations have 8 bits a component");
+    return remarks;
+}
+
+}  // namespace ewa::io

@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every splat format, by what a file begins with or what it is to be called.
+#include "ewa/splat_files.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "core/log.h"
+#include "core/text.h"
+#include "ewa/error.h"
+#include "ewa/splat_edit.h"
+#include "io/splats/compressed_ply.h"
+#include "io/splats/gltf_splats.h"
+#include "io/splats/ply.h"
+#include "io/splats/ply_table.h"
+#include "io/splats/splat.h"
+#include "io/splats/splat_scene.h"
+#include "io/splats/spz.h"
+
+namespace ewa {
+
+namespace {
+
+struct Kind {
+    SplatFormat format;
+    std::string_view extension, name;
+};
+/// An extension that ends another comes after it.
+constexpr Kind kKinds[] = {{SplatFormat::compressed_ply, ".compressed.ply", "compressed PLY"},
+                           {SplatFormat::ply, ".ply", "PLY"},
+                           {SplatFormat::splat, ".splat", "splat"},
+                           {SplatFormat::spz, ".spz", "SPZ"},
+                           {SplatFormat::glb, ".glb", "GLB"},
+                           {SplatFormat::gltf, ".gltf", "glTF"}};
+
+const Kind* kind_of_name(const std::filesystem::path& path) {
+    const std::string name = core::lower(path.filename().string());
+    for (const Kind& kind : kKinds)
+        if (name.ends_with(kind.extension)) return &kind;
+    return nullptr;
+}
+
+[[noreturn]] void refuse(const std::filesystem::path& path) {
+    throw InputError(core::one_line(path.string() +
+                                    ": not a supported kind of splat file; supported: .ply, .compressed.ply, "
+                                    ".splat, .spz, .glb, .gltf"));
+}
+
+bool starts(std::string_view head, std::string_view magic) {
+    return head.substr(0, magic.size()) == magic;
+}
+
+/// The kind that the first bytes tell, or null.
+const SplatFormat* format_of_head(std::string_view head) {
+    struct Magic {
+        std::string_view bytes;
+        SplatFormat format;
+    };
+    static constexpr Magic kMagics[] = {{"ply\n", SplatFormat::ply},    {"ply\r", SplatFormat::ply},
+                                        {"glTF", SplatFormat::glb},     {"NGSP", SplatFormat::spz},
+                                        {"\x1f\x8b", SplatFormat::spz}, {"{", SplatFormat::gltf}};
+    for (const Magic& magic : kMagics)
+        if (starts(head, magic.bytes)) return &magic.format;
+    return nullptr;
+}
+
+/// The scene without what is never drawn, where there is such.
+Gaussians drawable_only(const Gaussians& gaussians, std::vector<std::string>& remarks) {
+    std::vector<uint32_t> kept;
+    for (size_t i = 0; i < gaussians.size(); ++i)
+        if (drawable(gaussians, i)) kept.push_back(uint32_t(i));
+    remarks.push_back(std::to_string(gaussians.size() - kept.size()) +
+                      " splats have a value that is not finite or a zero quaternion and are left out");
+    Gaussians selected = gaussians;
+    select_splats(selected, kept);
+    return selected;
+}
+
+std::vector<std::string> write(const std::filesystem::path& path, SplatFormat format,
+                               const Gaussians& gaussians, const SaveOptions& options) {
+    switch (format) {
+        case SplatFormat::ply:
+            return io::write_ply(path, gaussians, options);
+        case SplatFormat::compressed_ply:
+            return io::write_compressed_ply(path, gaussians, options);
+        case SplatFormat::splat:
+            return io::write_splat(path, gaussians, options);
+        case SplatFormat::spz:
+            return io::write_spz(path, gaussians, options);
+        case SplatFormat::glb:
+            return io::write_gltf_splats(path, gaussians, options, true);
+        case SplatFormat::gltf:
+            return io::write_gltf_splats(path, gaussians, options, false);
+    }
+    return {};
+}
+
+}  // namespace
+
+namespace {
+
+/// The scene with world positions for its means, as float32 rounds them.
+Gaussians in_float_positions(Gaussians gaussians) {
+    for (size_t i = 0; i < gaussians.size(); ++i) {
+        const glm::dvec3 mean = gaussians.world_mean(i);
+        for (int axis = 0; axis < 3; ++axis) gaussians.means[3 * i + size_t(axis)] = float(mean[axis]);
+    }
+    gaussians.origin = glm::dvec3(0);
+    return gaussians;
+}
+
+std::string rounding_remark(const glm::dvec3& origin) {
+    const double farthest = std::max({std::abs(origin.x), std::abs(origin.y), std::abs(origin.z)});
+    const float step = std::nextafter(float(farthest), INFINITY) - float(farthest);
+    char text[160];
+    std::snprintf(
+        text, sizeof(text),
+        "positions are rounded to %.3g units, float32's step so far from the origin; .ply keeps them, or "
+        "--transform move= brings them near it",
+        double(step));
+    return text;
+}
+
+}  // namespace
+
+std::string_view name_of(SplatFormat format) {
+    for (const Kind& kind : kKinds)
+        if (kind.format == format) return kind.name;
+    return "";
+}
+
+SplatFormat format_of_name(const std::filesystem::path& path) {
+    const Kind* kind = kind_of_name(path);
+    if (!kind) refuse(path);
+    return kind->format;
+}
+
+SplatFormat format_of_file(const std::filesystem::path& path) {
+    const Kind* kind = kind_of_name(path);
+    std::error_code error;
+    if (!kind && !std::filesystem::is_regular_file(path, error)) refuse(path);
+    core::FileReader reader(path);
+    // Any bytes may be the first coordinate of a .splat.
+    if (kind && kind->format == SplatFormat::splat && reader.size() % 32 == 0) return SplatFormat::splat;
+    constexpr uint64_t kHeadBytes = 4;
+    const size_t size = size_t(std::min(reader.size(), kHeadBytes));
+    const std::string head(reinterpret_cast<const char*>(reader.take(size, "the header")), size);
+    const SplatFormat* told = format_of_head(head);
+    if (!told && !kind) refuse(path);
+    const SplatFormat format = told ? *told : kind->format;
+    if (format != SplatFormat::ply) return format;
+    return io::is_compressed_ply(io::PlyTable(path)) ? SplatFormat::compressed_ply : SplatFormat::ply;
+}
+
+SplatScene read_splats(const std::filesystem::path& path) {
+    switch (format_of_file(path)) {
+        case SplatFormat::ply:
+            return io::read_ply(path);
+        case SplatFormat::compressed_ply:
+            return io::read_compressed_ply(path);
+        case SplatFormat::splat:
+            return io::read_splat(path);
+        case SplatFormat::spz:
+            return io::read_spz(path);
+        case SplatFormat::glb:
+        case SplatFormat::gltf:
+            return io::read_gltf_splats(path);
+    }
+    refuse(path);
+}
+
+Gaussians load_splats(const std::filesystem::path& path) {
+    SplatScene scene = read_splats(path);
+    for (const std::string& remark : scene.remarks)
+        core::warn(core::one_line(path.string()) + ": " + core::one_line(remark));
+    return std::move(scene.gaussians);
+}
+
+std::vector<std::string> save_splats(const std::filesystem::path& path, const Gaussians& gaussians,
+                                     const SaveOptions& options) {
+    const SplatFormat format = format_of_name(path);
+    std::vector<std::string> remarks, more;
+    const bool ply = format == SplatFormat::ply;
+    if (!ply && gaussians.origin != glm::dvec3(0)) {
+        remarks = save_splats(path, in_float_positions(gaussians), options);
+        remarks.push_back(rounding_remark(gaussians.origin));
+        return remarks;
+    }
+    bool whole = true;
+    for (size_t i = 0; i < gaussians.size() && whole && !ply; ++i) whole = drawable(gaussians, i);
+    if (whole)
+        more = write(path, format, gaussians, options);
+    else
+        more = write(path, format, drawable_only(gaussians, remarks), options);
+    remarks.insert(remarks.end(), more.begin(), more.end());
+    if (options.antialiased && !ply && format != SplatFormat::spz)
+        remarks.push_back("the mark that the scene was trained anti-aliased is dropped");
+    if (!options.comments.empty() && !ply && format != SplatFormat::compressed_ply)
+        remarks.push_back("comments are dropped");
+    return remarks;
+}
+
+void save_splats(const std::filesystem::path& path, const Gaussians& gaussians,
+                 const std::vector<std::string>& comments) {
+    for (const std::string& remark : save_splats(path, gaussians, SaveOptions{.comments = comments}))
+        core::warn(core::one_line(path.string()) + ": " + core::one_line(remark));
+}
+
+}  // namespace ewa

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pathtracer/dome.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <numbers>
+
+namespace ewa::pathtracer {
+
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+constexpr double kLowest = 8 * kDegree, kHighest = 65 * kDegree, kAngle = 45 * kDegree;
+
+/// axes: columns right, up, back.
+Camera camera_at(const glm::dvec3& position, const glm::dmat3& axes, double focal, int width, int height) {
+    Camera camera{width, height, focal, focal, 0.5 * width, 0.5 * height};
+    camera.rotation = glm::transpose(glm::dmat3(axes[0], -axes[1], -axes[2]));
+    camera.translation = -(camera.rotation * position);
+    return camera;
+}
+
+/// How far from the centre the box's corners all lie within the picture. axes: columns right, up, back.
+double distance_for(const scene::Box& box, const glm::dmat3& axes, double tan_x, double tan_y) {
+    double distance = 0;
+    for (int corner = 0; corner < 8; ++corner) {
+        glm::dvec3 offset = box.high - box.center();
+        for (int axis = 0; axis < 3; ++axis)
+            if (corner >> axis & 1) offset[axis] = -offset[axis];
+        const glm::dvec3 p = glm::transpose(axes) * offset;
+        distance = std::max({distance, std::abs(p.x) / tan_x + p.z, std::abs(p.y) / tan_y + p.z});
+    }
+    return distance > 0 ? distance : 1;
+}
+
+}  // namespace
+
+std::vector<Camera> dome_cameras(const scene::Box& box, int count, int width, int height) {
+    const double focal = 0.5 * std::min(width, height) / std::tan(0.5 * kAngle);
+    const double golden = std::numbers::pi * (3 - std::sqrt(5.0));
+    std::vector<Camera> cameras;
+    for (int i = 0; i < count; ++i) {
+        const double share = (i + 0.5) / count;
+        const double sine = std::sin(kLowest) + share * (std::sin(kHighest) - std::sin(kLowest));
+        const double level = std::sqrt(1 - sine * sine), turn = golden * i;
+        const glm::dvec3 back(level * std::sin(turn), sine, level * std::cos(turn));
+        const glm::dvec3 right = glm::normalize(glm::cross(glm::dvec3(0, 1, 0), back));
+        const glm::dmat3 axes(right, glm::cross(back, right), back);
+        const double distance = distance_for(box, axes, 0.5 * width / focal, 0.5 * height / focal);
+        cameras.push_back(camera_at(box.center() + distance * back, axes, focal, width, height));
+    }
+    return cameras;
+}
+
+Camera pinhole_of(const scene::FileCamera& camera, int width, int height) {
+    return camera_at(camera.position, camera.axes, 0.5 * height / std::tan(0.5 * camera.vertical_angle),
+                     width, height);
+}
+
+}  // namespace ewa::pathtracer

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pathtracer/path_tracer.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "ewa/error.h"
+
+namespace ewa::pathtracer {
+
+namespace {
+
+/// Steps one ray may take so that an invocation stays under the device's limit on turns of its loops: per
+/// path a ray and a question to a light for each bounce, and the bounces' own loop.
+uint32_t steps_for(const passes::Shape& shape, int samples) {
+    const uint32_t surfaces = uint32_t(samples) * (shared::TRACE_BOUNCES + 1);
+    return (shape.loop_limit - surfaces - 1) / (2 * surfaces);
+}
+
+}  // namespace
+
+PathTracer::PathTracer(std::shared_ptr<gpu::Device> device, const pathtracer::PackedScene& scene,
+                       const scene::Sky& sky)
+    : device_(std::move(device)),
+      shape_(passes::shape_for(device_->limits())),
+      executor_(*device_),
+      paths_(*device_, shape_, scene.alpha_tested),
+      depth_(*device_, shape_, scene.alpha_tested),
+      nodes_(upload("mesh nodes", scene.nodes, gpu::Texel::rgba32ui)),
+      triangles_(upload("mesh triangles", scene.triangles, gpu::Texel::rgba32ui)),
+      surfaces_(upload("mesh surfaces", scene.surfaces, gpu::Texel::rgba32ui)),
+      materials_(upload("mesh materials", scene.materials, gpu::Texel::rgba32ui)),
+      textures_(upload("mesh textures", scene.textures, gpu::Texel::rgba32ui)),
+      texels_(upload("mesh texels", scene.texels, gpu::Texel::rgba8)),
+      lights_(upload("mesh lights", scene.lights, gpu::Texel::rgba32ui)),
+      counts_(*device_, "trace counts", sizeof(shared::TraceCounts)),
+      sky_(sky),
+      origin_(scene.origin),
+      unit_(scene.unit),
+      light_count_(scene.light_count) {}
+
+gpu::Buffer PathTracer::upload(const char* name, const std::vector<uint32_t>& words, gpu::Texel texel) {
+    gpu::Buffer buffer(*device_, name, words.size() * sizeof(uint32_t), texel);
+    buffer.upload(std::span<const uint32_t>(words));
+    return buffer;
+}
+
+gpu::Buffer PathTracer::view_of(const Camera& camera, double brightest) {
+    if (camera.width < 1 || camera.height < 1 || !(camera.fx > 0) || !(camera.fy > 0))
+        throw InputError("a camera's size or focal length is not above zero");
+    shared::TraceView view{};
+    const glm::dvec3 position = (camera.position() - origin_) / unit_;
+    for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 3; ++column)
+            view.rotation[3 * row + column] = float(camera.rotation[column][row]);
+        view.position[row] = float(position[row]);
+        view.zenith[row] = sky_.zenith[row];
+        view.horizon[row] = sky_.horizon[row];
+        view.ground[row] = sky_.ground[row];
+    }
+    view.focal[0] = float(camera.fx);
+    view.focal[1] = float(camera.fy);
+    view.center[0] = float(camera.cx);
+    view.center[1] = float(camera.cy);
+    view.size[0] = uint32_t(camera.width);
+    view.size[1] = uint32_t(camera.height);
+    view.sample_max = float(std::min(brightest, 3e38));
+    gpu::Buffer buffer(*device_, "trace view", sizeof(view), gpu::Texel::none, true);
+    buffer.upload(std::span<const shared::TraceView>(&view, 1));
+    return buffer;
+}
+
+shared::TraceCounts PathTracer::trace_paths(const gpu::Buffer& view, uint64_t pixels, int samples,
+                                            uint64_t seed) {
+    shared::TracePush push{};
+    push.max_steps = steps_for(shape_, samples_at_once_);
+    push.lights = light_count_;
+    push.seed[0] = uint32_t(seed);
+    push.seed[1] = uint32_t(seed >> 32);
+    const passes::TracePaths::Buffers buffers{mesh(), lights_, view, sums_, counts_};
+    for (int first = 0; first < samples; first += samples_at_once_) {
+        push.first_sample = uint32_t(first);
+        push.samples = uint32_t(std::min(samples_at_once_, samples - first));
+        // A submission each: a device that also draws a desktop ends one that takes long.
+        gpu::Recording recording(device_->limits());
+        if (first == 0) {
+            recording.fill(sums_, 0, 0, pixels * 16);
+            recording.fill(counts_, 0, 0, sizeof(shared::TraceCounts));
+        }
+        paths_.record(recording, shape_, buffers, pixels, push);
+        executor_.run(recording);
+    }
+    return counts_.download<shared::TraceCounts>(1).front();
+}
+
+Image PathTracer::radiance(const Camera& camera, int samples, uint64_t seed, double brightest) {
+    const gpu::Buffer view = view_of(camera, brightest);
+    const uint64_t pixels = uint64_t(camera.width) * uint64_t(camera.height);
+    if (!sums_ || sums_.bytes() < pixels * 16) {
+        sums_ = {};
+        sums_ = gpu::Buffer(*device_, "radiance sums", pixels * 16);
+    }
+    shared::TraceCounts counts = trace_paths(view, pixels, samples, seed);
+    while (counts.unfinished_rays > 0 && samples_at_once_ > 1) {
+        samples_at_once_ /= 2;
+        counts = trace_paths(view, pixels, samples, seed);
+    }
+    unfinished_ += counts.unfinished_rays;
+    dropped_ += counts.dropped_samples;
+    Image image(camera.width, camera.height, 4);
+    image.pixels = sums_.download<float>(pixels * 4);
+    for (float& value : image.pixels) value /= float(samples);
+    return image;
+}
+
+PathTracer::Seen PathTracer::seen(const Camera& camera) {
+    const gpu::Buffer view = view_of(camera, 0);
+    const uint64_t pixels = uint64_t(camera.width) * uint64_t(camera.height);
+    const gpu::Buffer found(*device_, "seen", pixels * 16);
+    shared::TracePush push{};
+    push.max_steps = shape_.loop_limit - 1;
+    gpu::Recording recording(device_->limits());
+    recording.fill(counts_, 0, 0, sizeof(shared::TraceCounts));
+    depth_.record(recording, shape_, {mesh(), view, found, counts_}, pixels, push);
+    executor_.run(recording);
+    unfinished_ += counts_.download<shared::TraceCounts>(1).front().unfinished_rays;
+
+    struct Pixel {
+        float z;
+        uint32_t triangle;
+        float barycentric[2];
+    };
+    const auto values = found.download<Pixel>(pixels);
+    Seen seen{Image(camera.width, camera.height, 1), std::vector<uint32_t>(pixels)};
+    for (size_t i = 0; i < pixels; ++i) {
+        seen.depth.pixels[i] = float(double(values[i].z) * unit_);
+        seen.triangles[i] = values[i].triangle;
+    }
+    return seen;
+}
+
+}  // namespace ewa::pathtracer

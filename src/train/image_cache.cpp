@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/image_cache.h"
+
+#include <algorithm>
+#include <cstring>
+#include <numeric>
+
+#include "core/random.h"
+#include "ewa/error.h"
+#include "pipeline/camera_block.h"
+#include "pipeline/photo.h"
+
+namespace ewa::train {
+
+namespace {
+
+bool transparent(const Image& image) {
+    bool found = false;
+    for (size_t i = 3; image.channels == 4 && i < image.pixels.size(); i += 4)
+        found = found || image.pixels[i] < 1;
+    return found;
+}
+
+}  // namespace
+
+ImageCache::ImageCache(gpu::Device& device, const passes::Shape& shape, const Dataset& dataset,
+                       const std::vector<int>& frames, uint64_t cache_bytes, const glm::dvec3& origin,
+                       int reduction)
+    : device_(device), photos_(frames.size()) {
+    const uint64_t align = std::max<uint64_t>(device.limits().uniform_alignment, 16);
+    camera_stride_ = (sizeof(shared::CameraBlock) + align - 1) / align * align;
+    std::vector<std::byte> blocks(camera_stride_ * std::max<size_t>(frames.size(), 1));
+    uint64_t held_bytes = 0;
+    for (size_t i = 0; i < frames.size(); ++i) {
+        Frame& frame = frames_.emplace_back(dataset.frames[size_t(frames[i])]);
+        if (reduction > 1) {
+            frame.downscale *= reduction;
+            frame.camera = downscale(frame.pinhole, frame.downscale);
+        }
+        const shared::CameraBlock block = pipeline::camera_block(frame.camera, shape, origin);
+        std::memcpy(&blocks[i * camera_stride_], &block, sizeof(block));
+        const uint64_t bytes =
+            pipeline::photo_bytes(frame.camera.width, frame.camera.height, frame.eight_bit);
+        const bool held = held_bytes + bytes <= cache_bytes;
+        on_disk_ += !held;
+        if (held) {
+            held_bytes += bytes;
+            photos_[i] = upload(frame, load_frame_image(frame));
+        }
+        any_masked_ = any_masked_ || photos_[i].masked || (!held && frame.masks == MaskUse::ignore);
+    }
+    cameras_ = gpu::Buffer(device, "cameras", blocks.size(), gpu::Texel::none, true);
+    cameras_.upload(std::span<const std::byte>(blocks));
+}
+
+ImageCache::Held ImageCache::upload(const Frame& frame, const Image& image) const {
+    if (image.width != frame.camera.width || image.height != frame.camera.height)
+        throw InputError("frame " + frame.name + " changed its size while it was read");
+    return {pipeline::upload_photo(device_, image, frame.eight_bit),
+            frame.masks == MaskUse::ignore && transparent(image)};
+}
+
+ImageCache::Photo ImageCache::photo(size_t i) {
+    if (photos_[i].texels) return {photos_[i].texels, photos_[i].masked};
+    prepare(i);
+    const Image image = reading_.get();
+    visitor_ = {};  // goes first: there is room for one
+    visitor_ = upload(frames_[i], image);
+    return {visitor_.texels, visitor_.masked};
+}
+
+void ImageCache::prepare(size_t i) {
+    if (photos_[i].texels || (reading_.valid() && coming_ == i)) return;
+    coming_ = i;
+    reading_ = std::async(std::launch::async, [&frame = frames_[i]] { return load_frame_image(frame); });
+}
+
+pipeline::CameraUse ImageCache::camera(size_t i) const {
+    const Camera& camera = frames_[i].camera;
+    return {&cameras_, i * camera_stride_, uint32_t(camera.width), uint32_t(camera.height)};
+}
+
+size_t frame_of_step(int step, size_t count, uint64_t seed) {
+    const uint32_t epoch = uint32_t(size_t(step - 1) / count);
+    std::vector<std::pair<uint32_t, uint32_t>> order(count);
+    for (uint32_t i = 0; i < count; ++i)
+        order[i] = {core::pcg4d({i, epoch, uint32_t(seed), uint32_t(seed >> 32) ^ 0x66726d65u})[0], i};
+    const auto place = order.begin() + std::ptrdiff_t(size_t(step - 1) % count);
+    std::nth_element(order.begin(), place, order.end());
+    return place->second;
+}
+
+}  // namespace ewa::train
