@@ -1,0 +1,100 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Checks the documents: links, anchors, paths of the source tree, long sentences, and words that CONTRIBUTING.md replaces.
+
+    tests/docs/check_words.py [FILE...]     Markdown files and headers; without any: all documents and include/ewa/*.h
+    tests/docs/check_words.py --random N    prints N random paragraphs, for a reader to judge
+
+Code does not count as words. Exit status 1 if a check fails.
+"""
+import pathlib, random, re, sys
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+MOST_WORDS = 30
+BANNED = {  # pattern: what to write
+    r"twins?": "CPU reference", r"legs?": "CI job", r"rooms? of": "module", r"forecasts?": "memory estimate",
+    r"photograph(s|ed|ing|er|ers)?": "training image, or render", r"posed images?": "image record",
+    r"halvings?": "downsample levels", r"left out|lea(ve|ves|ving) out": "skipped", r"look(s|ed|ing)? on": "watch",
+    r"go(es|ing)? on|went on": "continue", r"a break|breaks of|unbroken": "mutant, or original", r"anew": "again",
+    r"stands?(?! for|.alone)|stood": "is", r"more seldom": "less often", r"laid down": "written", r"there(of|by)|where(of|by)": "of it",
+    r"what is so|whoever": "the subject's name", r"arrows? of": "dependency", r"(is|are|being) held(?![- ]out)": "cached, or stored",
+}
+WORD = re.compile(r"\w+(?:[-'’.,]\w+)*")
+SOURCE_PATH = re.compile(r"`((?:src|shaders|tests|include|scripts|cmake|docs|examples|scenes)/[\w./-]*)`")
+
+
+def slug(heading):
+    return re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
+
+
+def blocks_of_markdown(text):
+    """(line, text) of each paragraph, list item, heading and cell of a table."""
+    text = re.sub(r"^```.*?^```", lambda m: "\n" * m.group().count("\n"), text, flags=re.M | re.S)
+    text = re.sub(r"^    .*$", "", text, flags=re.M)
+    block, first, heading = [], 1, False
+    for number, line in enumerate([*text.splitlines(), ""], 1):
+        if block and (heading or re.match(r"\s*(- |\d+\. |#|\||$)", line)):
+            yield first, " ".join(block)
+            block = []
+        heading = line.startswith("#")
+        if line.startswith("|"):
+            yield from ((number, cell.strip()) for cell in line.strip("|").split("|"))
+        elif line.strip():
+            first = first if block else number
+            block.append(re.sub(r"^\s*(- |\d+\. |#+ )", "", line).strip())
+
+
+def blocks_of_header(text):
+    """(line, text) of each comment. One at the end of a line begins a comment that the next lines may continue."""
+    block, first = [], 1
+    for number, line in enumerate([*text.splitlines(), ""], 1):
+        whole, end = re.match(r"\s*///?(?!/) ?(.*)", line), re.search(r"\S\s+//[/<]* ?(.*)", line)
+        if whole and whole.group(1) and "SPDX" not in line:
+            first = first if block else number
+            block.append(whole.group(1))
+            continue
+        if block:
+            yield first, " ".join(block)
+        block, first = ([end.group(1)], number) if end and not whole else ([], number)
+    if block:
+        yield first, " ".join(block)
+
+
+def problems_of(path):
+    text = path.read_text()
+    markdown = path.suffix == ".md"
+    for line, block in (blocks_of_markdown if markdown else blocks_of_header)(text):
+        plain = re.sub(r"`[^`]*`", "x", re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", block))
+        for sentence in re.split(r"(?<=[.!?:])\W*\s+", plain):
+            if (words := len(WORD.findall(sentence))) > MOST_WORDS:
+                yield f"{line}: {words} words in a sentence: {sentence[:60]}..."
+        for pattern, instead in BANNED.items() if markdown else ():
+            if found := re.search(rf"\b({pattern})\b", plain, re.I):
+                yield f"{line}: '{found.group()}': write {instead}"
+        for source in SOURCE_PATH.findall(block) if markdown else ():
+            if not (ROOT / source).exists():
+                yield f"{line}: there is no {source}"
+        for target in re.findall(r"\]\((?!\w+:)([^)\s]+)\)", block) if markdown else ():
+            name, _, anchor = target.partition("#")
+            file = path.parent / name if name else path
+            if not file.exists():
+                yield f"{line}: broken link: {target}"
+            elif anchor and anchor not in map(slug, re.findall(r"^#+ (.*)$", file.read_text(), re.M)):
+                yield f"{line}: no heading for {target}"
+
+
+def main(arguments):
+    documents = [p for p in sorted(ROOT.rglob("*.md")) if not {"build", "out"} & set(p.relative_to(ROOT).parts)]
+    if arguments[:1] == ["--random"]:
+        long = [(p, *b) for p in documents for b in blocks_of_markdown(p.read_text()) if len(b[1].split()) > 12]
+        for path, line, block in random.Random(15).sample(long, int(arguments[1])):
+            print(f"{path.relative_to(ROOT)}:{line}: {block}\n")
+        return 0
+    files = [pathlib.Path(a).resolve() for a in arguments] or documents + sorted(ROOT.glob("include/ewa/*.h"))
+    problems = [f"{path.relative_to(ROOT)}:{problem}" for path in files for problem in problems_of(path)]
+    print(*problems, f"docs: {len(files)} files, {len(problems)} problems", sep="\n")
+    return 1 if problems else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
