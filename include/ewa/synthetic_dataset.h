@@ -44,7 +44,7 @@ bool is_mesh_scene(const std::filesystem::path& path);
 
 /// SyntheticDataset the scene into a folder: images/*.png (8 bit, sRGB's curve over min(1, radiance * 2^exposure),
 /// alpha where the sky is seen), depth/*.exr (camera z in world units, 0 where nothing is), points.ply, and
-/// last transforms.json, in the glTF's own world. docs/photographs.md says what light is modelled.
+/// last transforms.json, in the glTF's own world. docs/meshes.md says what light is modelled.
 /// photographs.json names what the pictures are of: an ended run goes on where it was, and a folder of other
 /// photographs is made anew. progress(done, views) is asked before the first view and after each; false ends
 /// the run. Throws InputError (the file, as io/gltf_mesh.h says; a folder with a dataset that is not of this

@@ -87,7 +87,7 @@ EWA_UINT(KERNEL_ANTIALIAS,
          1u);  // Mip-Splatting (Yu et al. 2024, eq. 9): times sqrt(det before / det after low-pass)
 EWA_UINT(KERNEL_UNIT_MASS, 2u);  // EWA (Zwicker et al. 2001): times 1 / (2 pi sqrt(det)) per px^2
 
-// SyntheticDataset of mesh scenes (docs/photographs.md says what the path tracer models).
+// SyntheticDataset of mesh scenes (docs/meshes.md says what the path tracer models).
 EWA_UINT(TRACE_STACK, 48u);         // deepest hierarchy: far children that wait while a ray goes down
 EWA_UINT(TRACE_LEAF_MAX, 4u);       // triangles a leaf
 EWA_UINT(TRACE_BOUNCES, 5u);        // a path turns at most this often
