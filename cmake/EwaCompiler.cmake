@@ -11,9 +11,11 @@ target_compile_options(ewa_compiler INTERFACE -Wall -Wextra -Werror -Wshadow -Wn
     # (CameraBlock.PairsOfFloatsHoldTheDoubles).
     $<$<CXX_COMPILER_ID:GNU>:-fno-tree-slp-vectorize>)
 target_compile_definitions(ewa_compiler INTERFACE EWA_VERSION="${PROJECT_VERSION}")
-# Half of a build is the tests' own code, which is not what takes time when they run, nor what is to be covered.
+# Optimising costs most of the time of these targets' compilation and gains nothing when they run: the tests' own code, and
+# targets whose property EWA_COLD says that no loop over splats or pixels is in them.
 set(ewa_is_test $<BOOL:$<TARGET_PROPERTY:EWA_IS_TEST>>)
-target_compile_options(ewa_compiler INTERFACE $<$<AND:$<CONFIG:Release>,${ewa_is_test}>:-O1>)
+set(ewa_is_cold $<BOOL:$<TARGET_PROPERTY:EWA_COLD>>)
+target_compile_options(ewa_compiler INTERFACE $<$<AND:$<CONFIG:Release>,$<OR:${ewa_is_test},${ewa_is_cold}>>:-O1>)
 if(EWA_SANITIZE)
     # The tests too: of an inline function that a test and a room have, the test's is the one that is linked.
     target_compile_options(ewa_compiler INTERFACE -fsanitize=address,undefined -fno-omit-frame-pointer)
@@ -33,5 +35,6 @@ if(EWA_FUZZ)
 endif()
 find_program(CCACHE ccache)
 if(CCACHE)
-    set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE})
+    # Without these it would not cache what a precompiled header takes part in.
+    set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros ${CCACHE})
 endif()

@@ -2,13 +2,16 @@
 // The benchmark: speed per pass against what the host's cores can do, and error against the float64 twin.
 // Both `ewa bench` and the stand-alone ewa-bench are this and nothing more.
 #pragma once
-#include <CLI/App.hpp>
 #include <filesystem>
 #include <functional>
 #include <string>
 #include <vector>
 
 #include "ewa/gaussians.h"
+
+namespace CLI {
+class App;
+}
 
 namespace ewa::bench {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Results as text for a terminal, and as JSON (bench/README.md has the schema).
 #pragma once
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "bench/result.h"

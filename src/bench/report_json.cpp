@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bench/report.h"
 
+#include <nlohmann/json.hpp>
+
 namespace ewa::bench {
 namespace {
 

@@ -2,11 +2,13 @@
 #include "cli/arguments.h"
 
 #include <spdlog/fmt/fmt.h>
+#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <charconv>
 #include <map>
 
+#include "cli/checks.h"
 #include "ewa/error.h"
 
 namespace ewa::cli {

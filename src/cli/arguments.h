@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // Options that several commands have, with the same names, ranges and meaning in each.
 #pragma once
-#include <CLI/CLI.hpp>
 #include <string>
 #include <vector>
 
 #include "ewa/dataset.h"
 #include "ewa/device.h"
 #include "ewa/render_options.h"
+
+namespace CLI {
+class App;
+}
 
 namespace ewa::cli {
 
@@ -31,15 +34,6 @@ void add_draw_options(CLI::App& app, DrawArguments& arguments);
 
 /// --device and --validation.
 void add_device_options(CLI::App& app, DeviceOptions& options);
-
-/// For a number from low to high; the help shows it as type_name("N") instead of the range.
-template <typename T>
-CLI::Validator in_range(T low, T high) {
-    return CLI::Range(low, high).description("");
-}
-
-/// Refuses a sign: CLI11 reads -1 into an unsigned number as its largest value.
-CLI::Validator without_sign();
 
 /// --masks
 void add_masks_option(CLI::App& app, MaskUse& masks);

@@ -2,6 +2,7 @@
 // ewa bench: speed per pass, error against the float64 twin, and error against run time.
 #include "bench/bench.h"
 
+#include <CLI/CLI.hpp>
 #include <memory>
 
 #include "cli/accuracy.h"

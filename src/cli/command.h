@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The commands of the program, one file each.
 #pragma once
-#include <CLI/CLI.hpp>
 #include <functional>
 #include <string>
+
+namespace CLI {
+class App;
+}
 
 namespace ewa::cli {
 

@@ -2,6 +2,8 @@
 // ewa compare: how far apart two pictures are, or two folders of pictures of the same names; splat scenes in
 // place of either are drawn.
 #include <spdlog/fmt/fmt.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <cmath>

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Options from a JSON file, under the names they have on the command line.
 #pragma once
-#include <CLI/CLI.hpp>
 #include <filesystem>
+
+namespace CLI {
+class App;
+}
 
 namespace ewa::cli {
 

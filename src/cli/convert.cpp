@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // ewa convert: from any splat format to any other, edited on the way.
 #include <spdlog/fmt/fmt.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <array>
@@ -10,6 +12,7 @@
 #include <set>
 
 #include "cli/arguments.h"
+#include "cli/checks.h"
 #include "cli/command.h"
 #include "cli/output.h"
 #include "cli/progress.h"

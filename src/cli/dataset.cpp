@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // ewa dataset: photographs of a mesh scene.
 #include <spdlog/fmt/fmt.h>
+#include <CLI/CLI.hpp>
 
 #include <charconv>
 #include <memory>
 
 #include "cli/arguments.h"
+#include "cli/checks.h"
 #include "cli/command.h"
 #include "cli/interrupt.h"
 #include "cli/progress.h"

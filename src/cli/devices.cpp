@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // ewa devices: what --device can name.
 #include <spdlog/fmt/fmt.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
 
 #include <memory>
 

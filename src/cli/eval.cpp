@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // ewa eval: PSNR and SSIM of a splat scene against a dataset's photographs.
 #include <spdlog/fmt/fmt.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
 
 #include <memory>
 

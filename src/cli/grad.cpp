@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // ewa grad: the training loss of one view, and its gradient with respect to every stored value.
 #include <spdlog/fmt/fmt.h>
+#include <CLI/CLI.hpp>
 
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "cli/arguments.h"
+#include "cli/checks.h"
 #include "cli/command.h"
 #include "cli/dataset_argument.h"
 #include "cli/interrupt.h"

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // ewa info: what is in a splat file or a dataset.
 #include <spdlog/fmt/fmt.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <map>

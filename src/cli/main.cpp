@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // ewa: reads the arguments, runs one command, and turns every failure into one line and an exit status.
+#include <CLI/CLI.hpp>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>

@@ -2,6 +2,7 @@
 #include "cli/manual.h"
 
 #include <spdlog/fmt/fmt.h>
+#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <filesystem>

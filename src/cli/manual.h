@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Manual pages and shell completion, from the option parser itself.
 #pragma once
-#include <CLI/CLI.hpp>
 #include <string>
 #include <vector>
+
+namespace CLI {
+class App;
+}
 
 namespace ewa::cli {
 

@@ -2,6 +2,7 @@
 #include "cli/output.h"
 
 #include <unistd.h>
+#include <nlohmann/json.hpp>
 
 #include <cerrno>
 #include <map>

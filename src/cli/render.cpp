@@ -2,6 +2,7 @@
 // ewa render: pictures of a splat scene through a dataset's cameras. The photographs themselves are not
 // needed.
 #include <spdlog/fmt/fmt.h>
+#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <memory>

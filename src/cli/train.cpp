@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // ewa train: its options.
+#include <CLI/CLI.hpp>
 #include <memory>
 
+#include "cli/checks.h"
 #include "cli/command.h"
 #include "cli/config.h"
 #include "cli/train_run.h"

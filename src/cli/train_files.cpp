@@ -2,6 +2,7 @@
 #include "cli/train_files.h"
 
 #include <sys/resource.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <cmath>

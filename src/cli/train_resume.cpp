@@ -2,6 +2,7 @@
 #include "cli/train_resume.h"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "core/json.h"
 #include "ewa/error.h"

@@ -2,6 +2,7 @@
 #include "cli/train_run.h"
 
 #include <spdlog/fmt/fmt.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <array>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Error against run time: the diagram in which methods of different price compare.
 #pragma once
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 

@@ -10,6 +10,7 @@
 #include <ctime>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "memory.h"
 
@@ -38,15 +39,21 @@ class MemoryFile {
     std::string path_;
 };
 
-/// A folder in memory where there is one: every run writes a file.
+/// A new folder, in memory where possible: every run writes a file. It goes when the program ends.
 inline std::filesystem::path make_folder() {
+    struct Folders {
+        std::vector<std::filesystem::path> made;
+        ~Folders() {
+            for (const auto& folder : made) std::filesystem::remove_all(folder);
+        }
+    };
+    static Folders folders;
     const std::filesystem::path shared = "/dev/shm";
     const auto root = std::filesystem::is_directory(shared) ? shared : std::filesystem::temp_directory_path();
-    const auto folder = root / ("ewa-fuzz-" + std::to_string(getpid()));
-    std::filesystem::create_directories(folder);
-    static std::filesystem::path kept = folder;
-    std::atexit([] { std::filesystem::remove_all(kept); });
-    return folder;
+    const std::string number = std::to_string(getpid()) + "-" + std::to_string(folders.made.size());
+    folders.made.push_back(root / ("ewa-fuzz-" + number));
+    std::filesystem::create_directories(folders.made.back());
+    return folders.made.back();
 }
 
 /// Reads an input of so many bytes, within the memory of memory.h and so many seconds of the processor, so

@@ -2,16 +2,15 @@
 // What the window shows in each of its modes, drawn by its own thread on every device, against the float64
 // twin.
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <exception>
-#include <thread>
 
 #include "golden/devices.h"
 #include "golden/golden.h"
 #include "reference/ellipsoids.h"
 #include "reference/render.h"
 #include "support/random_scene.h"
+#include "support/soon.h"
 #include "viewer/render_thread.h"
 
 namespace ewa::test {
@@ -107,10 +106,10 @@ Image shown_by(const std::shared_ptr<gpu::Device>& device, const viewer::Look& l
     request.look = look;
     thread.ask(request);
     viewer::RenderThread::News news;
-    for (int i = 0; i < 6000 && !news.picture && !news.failure; ++i) {
-        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    soon([&] {
         news = thread.take_news();
-    }
+        return news.picture || news.failure;
+    });
     if (news.failure) std::rethrow_exception(news.failure);
     if (!news.picture) return Image(1, 1, 3);
     const viewer::Picture& picture = news.picture->picture;

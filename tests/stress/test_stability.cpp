@@ -33,22 +33,30 @@ TEST_P(Stability, PictureAndGradientAreWithinTheirBounds) {
                               << c.condition << ")";
 }
 
-TEST_P(Stability, TrainingFromItStaysFinite) {
+/// Every second case is slow.
+class StabilityTraining : public testing::TestWithParam<size_t> {};
+
+TEST_P(StabilityTraining, StaysFinite) {
     const bench::StabilityCase& one = cases()[GetParam()];
     const bench::StabilityTraining training =
         bench::train_from(device(), one, one.gaussians.size() > 10000 ? 5 : 40);
     EXPECT_TRUE(training.finite);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, Stability, testing::Range(size_t(0), cases().size()),
-                         [](const testing::TestParamInfo<size_t>& tested) {
-                             std::string name = cases()[tested.param].name;
-                             for (char& c : name) {
-                                 if (c == '-') c = 'm';
-                                 if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
-                             }
-                             return name;
-                         });
+std::string case_name(const testing::TestParamInfo<size_t>& tested) {
+    std::string name = cases()[tested.param].name;
+    for (char& c : name) {
+        if (c == '-') c = 'm';
+        if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
+    }
+    return name;
+}
+
+INSTANTIATE_TEST_SUITE_P(All, Stability, testing::Range(size_t(0), cases().size()), case_name);
+INSTANTIATE_TEST_SUITE_P(All, StabilityTraining, testing::Range(size_t(0), cases().size(), size_t(2)),
+                         case_name);
+INSTANTIATE_TEST_SUITE_P(Slow, StabilityTraining, testing::Range(size_t(1), cases().size(), size_t(2)),
+                         case_name);
 
 bench::StabilityCase named(const std::string& name) {
     for (const bench::StabilityCase& one : cases())

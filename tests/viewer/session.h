@@ -7,13 +7,12 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <string>
-#include <thread>
 #include <vector>
 
+#include "support/soon.h"
 #include "viewer/window_test.h"
 #include "viewer/x_client.h"
 
@@ -72,12 +71,9 @@ class Session {
         return awaited(path) ? path : "";
     }
     bool awaited(const std::string& path) const {
-        for (int i = 0; i < 1200; ++i) {
-            if (std::filesystem::exists(path)) return true;  // files are whole when they have their name
-            if (kill(child_, 0) != 0) return false;
-            std::this_thread::sleep_for(std::chrono::milliseconds(50));
-        }
-        return false;
+        bool there = false;  // a file is whole when it has its name
+        soon([&] { return (there = std::filesystem::exists(path)) || kill(child_, 0) != 0; });
+        return there;
     }
 
     /// Ctrl-Q; its exit status, and what it has said.
@@ -85,10 +81,7 @@ class Session {
         send("key ctrl+q");
         int status = 0;
         pid_t ended = 0;
-        for (int i = 0; i < 600 && ended == 0; ++i) {
-            ended = waitpid(child_, &status, WNOHANG);
-            if (ended == 0) std::this_thread::sleep_for(std::chrono::milliseconds(100));
-        }
+        soon([&] { return (ended = waitpid(child_, &status, WNOHANG)) != 0; });
         Outcome outcome;  // its status is -1 where it has not ended
         if (ended == child_)
             outcome.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
@@ -115,6 +108,13 @@ class SessionTest : public WindowTest {
             GTEST_SKIP()
                 << "there is no xdotool (Debian: xdotool) to press keys with; the input is not tested";
         std::filesystem::create_directories(shots_);
+    }
+    /// Sends the commands one by one, each after a frame that has seen the one before.
+    static void act(Session& session, const std::vector<std::string>& commands) {
+        for (const std::string& command : commands) {
+            session.send(command);
+            screenshot(session);
+        }
     }
     static Image screenshot(Session& session) {
         const std::string path = session.screenshot();

@@ -3,13 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <future>
 #include <memory>
-#include <thread>
 #include <vector>
 
+#include "support/soon.h"
 #include "viewer/latest.h"
 #include "viewer/photo.h"
 #include "viewer/photo_comparison.h"
@@ -103,7 +102,7 @@ TEST(Latest, WhatWaitsGivesWayToTheLast) {
         latest.ask(3);
         EXPECT_EQ(latest.result(), nullptr) << "asking does not wait";
         go_on.set_value();
-        for (int i = 0; i < 6000 && news < 2; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        EXPECT_TRUE(test::soon([&] { return news >= 2; }));
         ASSERT_TRUE(latest.result());
         EXPECT_EQ(*latest.result(), 30);
     }

@@ -84,12 +84,10 @@ TEST_F(Drop, WhatCannotBeReadIsSaid) {
             const Image before = x_->pixels_at_rest(window());
             EXPECT_TRUE(x_->drop(window(), uri_of(folder_ / name)));
             Image after = before;
-            for (int i = 0; i < 600; ++i) {
+            soon([&] {
                 after = x_->pixels(window());
-                if (std::min(largest_difference(before, after), largest_difference(quiet, after)) > 0.3f)
-                    break;
-                session.send("sleep 0.1");
-            }
+                return std::min(largest_difference(before, after), largest_difference(quiet, after)) > 0.3f;
+            });
             EXPECT_GT(largest_difference(before, after), 0.3f) << name << " is not spoken of";
             EXPECT_GT(largest_difference(quiet, after), 0.3f) << name << " is not spoken of";
             EXPECT_TRUE(x_->window_titled("splats.ply - ewa", 1)) << name;
@@ -109,7 +107,7 @@ TEST_F(Drop, TextIsNoFile) {
     for (const char* text :
          {"", "\r\n", "# a remark\r\n", "http://example.org/splats.ply\r\n", "%zz%\r\nfile:"})
         x_->drop(window(), text);
-    session.send("key 2 sleep 1 key 1 sleep 1");
+    act(session, {"key 2", "key 1"});
     EXPECT_EQ(largest_difference(screenshot(session), before), 0);
     expect_silent(session.quit());
 }

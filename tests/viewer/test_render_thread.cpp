@@ -3,10 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
-#include <chrono>
-#include <thread>
 
 #include "ewa/error.h"
+#include "support/soon.h"
 #include "viewer/opening.h"
 #include "viewer/render_thread.h"
 
@@ -34,14 +33,7 @@ std::shared_ptr<const Gaussians> red_splat() {
     return std::make_shared<const Gaussians>(splats_of_points(points));
 }
 
-template <class Holds>
-bool soon(Holds holds) {
-    for (int i = 0; i < 6000; ++i) {
-        if (holds()) return true;
-        std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    }
-    return false;
-}
+using test::soon;
 
 TEST(RenderThread, DrawsTheSceneItWasGivenLast) {
     RenderThread thread([] { return open_device({}); }, [] {});

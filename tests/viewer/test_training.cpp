@@ -7,14 +7,10 @@ namespace {
 
 class Training : public SessionTest {
   protected:
-    /// Until the pictures of the same camera change: 30 seconds at most.
+    /// Until the pictures of the same camera change.
     bool changes(Session& session) {
         const Image first = screenshot(session);
-        for (int i = 0; i < 30; ++i) {
-            session.send("sleep 1");
-            if (largest_difference(screenshot(session), first) > 0.02f) return true;
-        }
-        return false;
+        return soon([&] { return largest_difference(screenshot(session), first) > 0.02f; });
     }
     const std::string run_ = folder_ / "run";
 };
@@ -27,8 +23,7 @@ TEST_F(Training, OfAnotherProcessIsSeenAsItGoes) {
               nullptr);
         _exit(127);
     }
-    for (int i = 0; i < 600 && !std::filesystem::exists(run_ + "/live.json"); ++i)
-        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    ASSERT_TRUE(soon([&] { return std::filesystem::exists(run_ + "/live.json"); }));
     Session session(shots_, {run_, "--size", "96x64"});
     ASSERT_TRUE(session.found());
     session.send("key F2");
@@ -38,7 +33,7 @@ TEST_F(Training, OfAnotherProcessIsSeenAsItGoes) {
     waitpid(trainer, &status, 0);
     EXPECT_EQ(WEXITSTATUS(status), 130);
     EXPECT_FALSE(std::filesystem::exists(run_ + "/live.json"));
-    session.send("key 2 sleep 1 key 1");
+    act(session, {"key 2", "key 1"});
     EXPECT_NE(session.screenshot(), "") << "it does not answer once the training has gone";
     expect_silent(session.quit());
 }
@@ -49,8 +44,7 @@ TEST_F(Training, OfItsOwnGoesOnUntilItsEnd) {
     ASSERT_TRUE(session.found());
     ASSERT_TRUE(session.awaited(run_ + "/summary.json")) << "the training has not ended";
     EXPECT_EQ(read_json(run_ + "/summary.json")["steps"], 30);
-    session.send("sleep 1");
-    EXPECT_GT(range_of(screenshot(session)), 0.2f);
+    EXPECT_TRUE(soon([&] { return range_of(screenshot(session)) > 0.2f; }));
     expect_silent(session.quit());
 }
 
@@ -59,7 +53,7 @@ TEST_F(Training, OfItsOwnIsSavedWhenTheWindowIsClosed) {
                     {"--train", cameras_, "-o", run_, "--init", splats_, "--steps", "1000000", "--quiet"});
     ASSERT_TRUE(session.found());
     ASSERT_TRUE(session.awaited(run_ + "/live.json"));
-    session.send("sleep 2");
+    EXPECT_TRUE(changes(session)) << "the training does not go on";
     expect_silent(session.quit());
     ASSERT_TRUE(std::filesystem::exists(run_ + "/summary.json")) << "nothing was saved";
     EXPECT_TRUE(std::filesystem::exists(run_ + "/checkpoint.ewa"));

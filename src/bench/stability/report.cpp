@@ -2,6 +2,7 @@
 #include "bench/stability/report.h"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "bench/format_figures.h"
 
