@@ -44,8 +44,13 @@ Gui::Gui(const Window& window, const PresentDevice& device, Presenter& presenter
     info.MSAASamples = VK_SAMPLE_COUNT_1_BIT;
     info.CheckVkResultFn = check;
     ImGui_ImplVulkan_Init(&info, presenter.swapchain().overlay_pass());
+    // Before the first frame: the upload waits for the device.
+#if IMGUI_VERSION_NUM < 19000
     presenter.run_once([](vk::CommandBuffer commands) { ImGui_ImplVulkan_CreateFontsTexture(commands); });
     ImGui_ImplVulkan_DestroyFontUploadObjects();
+#else
+    ImGui_ImplVulkan_CreateFontsTexture();  // has command buffers of its own
+#endif
 }
 
 Gui::~Gui() {
