@@ -18,8 +18,8 @@ namespace {
 
 constexpr int kConnectSeconds = 3;
 constexpr std::chrono::seconds kPatience(30);
-constexpr uint64_t kMostHeader = 8192;                // bytes of an answer before its body
-constexpr uint64_t kMostText = 16u << 20;             // bytes of a body that is text
+constexpr uint64_t kMostHeader = 8192;               // bytes of an answer before its body
+constexpr uint64_t kMostText = 16u << 20;            // bytes of a body that is text
 constexpr uint64_t kMostSplats = uint64_t(1) << 33;  // bytes of a body that is splats
 
 /// A nameless file in memory, which readers open by path.
@@ -53,7 +53,9 @@ class MemoryFile {
 class Client::Http final : public httplib::ClientImpl {
   public:
     Http(const Address& address, const std::string& token, const std::atomic<bool>* stop)
-        : ClientImpl(address.host, address.port), name_(address.host + ":" + std::to_string(address.port)), stop_(stop) {
+        : ClientImpl(address.host, address.port),
+          name_(address.host + ":" + std::to_string(address.port)),
+          stop_(stop) {
         set_connection_timeout(kConnectSeconds);
         set_tcp_nodelay(true);
         set_decompress(false);
@@ -100,7 +102,8 @@ class Client::Http final : public httplib::ClientImpl {
         if (!result) throw RunError("the connection to " + name_ + " has ended");
         if (!result->get_header_value("Server").starts_with("ewa/"))
             throw InputError("what answers at " + name_ + " is not a training of ewa");
-        if (result->status >= 400) throw InputError("the trainer refuses: " + core::one_line(core::trim(text)));
+        if (result->status >= 400)
+            throw InputError("the trainer refuses: " + core::one_line(core::trim(text)));
         return *result;
     }
 

@@ -40,6 +40,7 @@ HttpServer::HttpServer(const std::string& address, uint16_t port, Answer answer)
     set_socket_options(set_listener_options);
     set_tcp_nodelay(true);
     set_default_headers({{"Server", "ewa/" EWA_VERSION},
+                         {"Accept-Ranges", "none"},
                          {"Cache-Control", "no-store"},
                          {"Cross-Origin-Resource-Policy", "same-origin"},
                          {"X-Content-Type-Options", "nosniff"}});

@@ -14,7 +14,7 @@
 namespace ewa::live {
 
 inline constexpr size_t kMostConnections = 64;
-inline constexpr size_t kMostRequest = 4096;               // bytes of request line and headers
+inline constexpr size_t kMostRequest = 4096;                // bytes of request line and headers
 inline constexpr std::chrono::seconds kRequestPatience{2};  // for all of them
 
 /// cpp-httplib's constructor makes the whole process ignore SIGPIPE, which Wire does not need.

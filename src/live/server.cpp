@@ -34,12 +34,13 @@ bool same_secret(const std::string& a, const std::string& b) {
 /// Whether "HOST[:PORT]" is an address in numbers or localhost. A page whose name was made to lead here has
 /// its own name there.
 bool own_host(const std::string& text) {
-    const size_t end = text.starts_with('[') ? text.find(']') : text.find(':');
-    std::string host = core::lower(std::string_view(text).substr(0, end));
-    if (host.starts_with('[')) host.erase(0, 1);
     unsigned char address[16];
-    return host == "localhost" || inet_pton(AF_INET, host.c_str(), address) == 1 ||
-           inet_pton(AF_INET6, host.c_str(), address) == 1;
+    if (text.starts_with('[')) {
+        const size_t end = text.find(']');
+        return end != std::string::npos && inet_pton(AF_INET6, text.substr(1, end - 1).c_str(), address) == 1;
+    }
+    const std::string host = core::lower(text.substr(0, text.find(':')));
+    return host == "localhost" || inet_pton(AF_INET, host.c_str(), address) == 1;
 }
 
 bool of_a_web_page(const Request& request) {
@@ -60,19 +61,20 @@ void refuse(Response& response, int status, const std::string& why) {
 /// guest: lives until the answer has been sent.
 void give_text(Response& response, std::string text, const char* type, std::shared_ptr<void> guest) {
     const size_t size = text.size();
-    response.set_content_provider(
-        size, type,
-        [text = std::move(text), guest = std::move(guest)](size_t from, size_t count, httplib::DataSink& sink) {
-            return sink.write(text.data() + from, count);
-        });
+    response.set_content_provider(size, type,
+                                  [text = std::move(text), guest = std::move(guest)](
+                                      size_t from, size_t count, httplib::DataSink& sink) {
+                                      return sink.write(text.data() + from, count);
+                                  });
 }
 
 /// As PLY, a few rows at a time: there is no second copy of the splats.
 void give_ply(Response& response, std::shared_ptr<const Snapshot> splats, std::shared_ptr<void> guest) {
     const std::string header = io::ply_header(splats->gaussians, {});
     const size_t row = io::ply_row_bytes(splats->gaussians);
+    const size_t size = header.size() + row * splats->gaussians.size();
     response.set_content_provider(
-        header.size() + row * splats->gaussians.size(), "application/octet-stream",
+        size, "application/octet-stream",
         [header, row, splats = std::move(splats), guest = std::move(guest)](size_t from, size_t,
                                                                             httplib::DataSink& sink) {
             if (from < header.size()) return sink.write(header.data() + from, header.size() - from);
@@ -103,8 +105,8 @@ Server::Server(const std::string& address, uint16_t port, std::string token, std
     : token_(std::move(token)),
       lease_(lease),
       http_(std::make_unique<HttpServer>(
-          address, port,
-          [this](const Request& request, Response& response) { answer(request, response); })) {}
+          address, port, [this](const Request& request, Response& response) { answer(request, response); })) {
+}
 
 Server::~Server() {
     {
@@ -193,16 +195,16 @@ std::shared_ptr<const Snapshot> Server::splats_for(bool trusted, bool fresh) {
     std::unique_lock lock(mutex_);
     wanted_ = true;
     if (fresh)
-        news_.wait_for(lock, kFreshWait, [this, step = status_.step] {
-            return stop_ || (splats_ && splats_->step >= step);
-        });
+        news_.wait_for(lock, kFreshWait,
+                       [this, step = status_.step] { return stop_ || (splats_ && splats_->step >= step); });
     if (trusted) return splats_;
     auto given = given_.lock();
     if (!given) given_ = given = splats_;
     return given;
 }
 
-void Server::give_splats(const Request& request, Response& response, bool trusted, std::shared_ptr<void> guest) {
+void Server::give_splats(const Request& request, Response& response, bool trusted,
+                         std::shared_ptr<void> guest) {
     const std::string known = request.get_header_value("If-None-Match");
     const auto splats = splats_for(trusted, known.empty());
     const std::string tag = splats ? "\"" + run_ + "-" + std::to_string(splats->step) + "\"" : "";
@@ -244,7 +246,8 @@ void Server::answer(const Request& request, Response& response) {
         const bool lines = request.has_param("metrics");
         const auto first = core::parse_integer<uint32_t>(lines ? request.get_param_value("metrics") : "0");
         if (!first) return refuse(response, 400, "metrics wants the number of the first line");
-        return give_text(response, status_from(lines ? *first : SIZE_MAX, trusted), "application/json", guest);
+        return give_text(response, status_from(lines ? *first : SIZE_MAX, trusted), "application/json",
+                         guest);
     }
     if (get && path == "/splats") return give_splats(request, response, trusted, guest);
     if (request.method != "POST" || (path != "/pause" && path != "/resume" && path != "/save"))

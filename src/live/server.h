@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The trainer's side: an HTTP server through which others watch and command a training run.
 //
-//   GET /status[?metrics=N]  JSON: see status.h. "metrics" are the lines of metrics.jsonl from the N-th on, at
+//   GET /status[?metrics=N]  JSON: see status.h. "metrics" are the lines of metrics.jsonl from the N-th on,
+//   at
 //                            most kMostLines of them, and none without ?metrics.
 //   GET /splats              The splats as PLY (io/ply.h). ETag names them, Ewa-Step is their step. Asking
 //                            makes the trainer take newer ones. 304 where If-None-Match names the newest.

@@ -65,8 +65,11 @@ TEST(LiveClient, Addresses) {
 TEST(LiveClient, NamesReachAServer) {
     const Server server("127.0.0.1", 0, "secret");
     EXPECT_TRUE(Client({"localhost", server.port()}, "secret").status(0).commands);
-    test::expect_error<RunError>([] { Client({"127.0.0.1", 1}, "").status(0); },
-                                 {"cannot reach 127.0.0.1:1"});
+    test::expect_error<RunError>(
+        [] {
+            Client({"127.0.0.1", 1}, "").status(0);
+        },
+        {"cannot reach 127.0.0.1:1"});
 }
 
 /// Whatever answers: an error, soon, in bounded memory.
@@ -80,17 +83,18 @@ TEST(LiveClient, AnswersOfOthersAreErrors) {
     };
     std::string ply =
         "ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nend_header\n";
-    for (const std::string& answer : std::vector<std::string>
-         {std::string("ok 0\n"), std::string("no\r\n\r\n"), std::string(1, '\0'),
-          "HTTP/1.1 200 " + std::string(1000000, 'a') + "\r\n\r\n",  // a stack overflow in cpp-httplib
-          "HTTP/1.1 100 Continue\r\n\r\nHTTP/1.1 200 " + std::string(1000000, 'a') + "\r\n\r\n",
-          std::string(1000000, 'a'), headers, ok + "X: " + std::string(1000000, 'a') + "\r\n\r\n", ok + "\r\n",
-          ok + "Content-Length: 99999999999999\r\n\r\n{", ok + "Content-Length: -1\r\n\r\n{",
-          ok + "Transfer-Encoding: chunked\r\n\r\nfffffffffffffff\r\n" + status, sized(""), sized("{}"),
-          sized(status).substr(0, 100), sized(std::string(17u << 20, ' ') + status), sized(ply),
-          "HTTP/1.1 301 Moved\r\nServer: ewa/1\r\nLocation: http://127.0.0.1:1/\r\nContent-Length: 0\r\n\r\n",
-          "HTTP/1.1 200 OK\r\nServer: other\r\nContent-Length: " + std::to_string(status.size()) + "\r\n\r\n" +
-              status}) {
+    for (const std::string& answer : std::vector<std::string>{
+             std::string("ok 0\n"), std::string("no\r\n\r\n"), std::string(1, '\0'),
+             "HTTP/1.1 200 " + std::string(1000000, 'a') + "\r\n\r\n",  // a stack overflow in cpp-httplib
+             "HTTP/1.1 100 Continue\r\n\r\nHTTP/1.1 200 " + std::string(1000000, 'a') + "\r\n\r\n",
+             std::string(1000000, 'a'), headers, ok + "X: " + std::string(1000000, 'a') + "\r\n\r\n",
+             ok + "\r\n", ok + "Content-Length: 99999999999999\r\n\r\n{", ok + "Content-Length: -1\r\n\r\n{",
+             ok + "Transfer-Encoding: chunked\r\n\r\nfffffffffffffff\r\n" + status, sized(""), sized("{}"),
+             sized(status).substr(0, 100), sized(std::string(17u << 20, ' ') + status), sized(ply),
+             "HTTP/1.1 301 Moved\r\nServer: ewa/1\r\nLocation: http://127.0.0.1:1/\r\nContent-Length: "
+             "0\r\n\r\n",
+             "HTTP/1.1 200 OK\r\nServer: other\r\nContent-Length: " + std::to_string(status.size()) +
+                 "\r\n\r\n" + status}) {
         const RawServer server(answer);
         Client client({"127.0.0.1", server.port()}, "");
         const std::string told = answer.substr(0, 60);
@@ -108,8 +112,11 @@ TEST(LiveClient, AnswersOfOthersAreErrors) {
         fails([&] { client.splats(""); });
     }
     const RawServer refuses("HTTP/1.1 403 No\r\nServer: ewa/1\r\nContent-Length: 9\r\n\r\nnot \x1b[you");
-    test::expect_error<InputError>([&] { Client({"127.0.0.1", refuses.port()}, "").status(0); },
-                                   {"the trainer refuses: not \\x1b[you"});
+    test::expect_error<InputError>(
+        [&] {
+            Client({"127.0.0.1", refuses.port()}, "").status(0);
+        },
+        {"the trainer refuses: not \\x1b[you"});
 }
 
 TEST(LiveClient, EverySplatFileCutShortIsRefused) {
@@ -122,8 +129,11 @@ TEST(LiveClient, EverySplatFileCutShortIsRefused) {
     for (size_t size = 0; size < ply.size(); size += 7) {
         const RawServer cut("HTTP/1.1 200 OK\r\nServer: ewa/1\r\nContent-Length: " + std::to_string(size) +
                             "\r\n\r\n" + ply.substr(0, size));
-        test::expect_error<InputError>([&] { Client({"127.0.0.1", cut.port()}, "").splats(""); },
-                                       {"the trainer's splats cannot be read"});
+        test::expect_error<InputError>(
+            [&] {
+                Client({"127.0.0.1", cut.port()}, "").splats("");
+            },
+            {"the trainer's splats cannot be read"});
     }
 }
 

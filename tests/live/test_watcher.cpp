@@ -94,7 +94,8 @@ TEST(LiveWatcher, FollowsARunByItsConnection) {
 /// A pause lasts while the window is there, and ends after it has gone.
 TEST(LiveWatcher, HoldsAPauseWhileItLives) {
     Server server("127.0.0.1", 0, "secret", std::chrono::seconds(1));
-    auto watcher = std::make_unique<Watcher>(WhatToWatch{{}, Address{"127.0.0.1", server.port()}, "secret"}, [] {});
+    auto watcher =
+        std::make_unique<Watcher>(WhatToWatch{{}, Address{"127.0.0.1", server.port()}, "secret"}, [] {});
     watcher->command("pause");
     ASSERT_TRUE(soon([&] { return server.paused(); }));
     const auto start = std::chrono::steady_clock::now();
