@@ -3,10 +3,9 @@
 
 #include <httplib.h>
 #include <sys/mman.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <utility>
+#include <cstdio>
 
 #include "core/text.h"
 #include "ewa/error.h"
@@ -23,28 +22,12 @@ constexpr uint64_t kMostText = 16u << 20;            // bytes of a body that is 
 constexpr uint64_t kMostSplats = uint64_t(1) << 33;  // bytes of a body that is splats
 
 /// A nameless file in memory, which readers open by path.
-class MemoryFile {
-  public:
-    MemoryFile() : descriptor_(memfd_create("the trainer's splats", MFD_CLOEXEC)) {
-        if (descriptor_ < 0) throw RunError("out of memory for the trainer's splats");
+struct MemoryFile {
+    std::unique_ptr<std::FILE, int (*)(std::FILE*)> file;
+    MemoryFile() : file(fdopen(memfd_create("splats", MFD_CLOEXEC), "wb"), std::fclose) {
+        if (!file) throw RunError("out of memory for the trainer's splats");
     }
-    ~MemoryFile() { ::close(descriptor_); }
-    MemoryFile(const MemoryFile&) = delete;
-    MemoryFile& operator=(const MemoryFile&) = delete;
-
-    bool append(const char* bytes, size_t count) {
-        while (count > 0) {
-            const ssize_t written = ::write(descriptor_, bytes, count);
-            if (written <= 0) return false;
-            bytes += written;
-            count -= size_t(written);
-        }
-        return true;
-    }
-    std::string path() const { return "/proc/self/fd/" + std::to_string(descriptor_); }
-
-  private:
-    int descriptor_;
+    std::string path() const { return "/proc/self/fd/" + std::to_string(fileno(file.get())); }
 };
 
 }  // namespace
@@ -129,16 +112,18 @@ Status Client::status(size_t first_line) {
 }
 
 std::optional<TaggedSplats> Client::splats(const std::string& tag) {
-    MemoryFile file;
-    const auto answer =
-        http_->get("/splats", {{"If-None-Match", tag.empty() ? "\"none\"" : tag}}, kMostSplats,
-                   [&](const char* bytes, size_t count) { return file.append(bytes, count); });
+    MemoryFile memory;
+    const auto answer = http_->get("/splats", {{"If-None-Match", tag.empty() ? "\"none\"" : tag}},
+                                   kMostSplats, [&](const char* bytes, size_t count) {
+                                       return std::fwrite(bytes, 1, count, memory.file.get()) == count;
+                                   });
     if (answer.status == 304) return std::nullopt;
+    if (std::fflush(memory.file.get()) != 0) throw RunError("out of memory for the trainer's splats");
     TaggedSplats splats;
     splats.step = std::max(0, core::parse_integer<int>(answer.get_header_value("Ewa-Step")).value_or(0));
     splats.tag = answer.get_header_value("ETag");
     try {
-        splats.gaussians = io::read_ply(file.path()).gaussians;
+        splats.gaussians = io::read_ply(memory.path()).gaussians;
     } catch (const InputError& error) {
         throw InputError("the trainer's splats cannot be read: " + std::string(error.what()));
     }
