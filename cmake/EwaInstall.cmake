@@ -28,18 +28,26 @@ if(EWA_COVERAGE)
     target_link_options(ewa_library PRIVATE --coverage)
 endif()
 
-# Manual pages and completions, written by the programs from their own options.
-set(ewa_manual_folder ${PROJECT_BINARY_DIR}/manual)
-add_custom_command(OUTPUT ${ewa_manual_folder}/man/man1/ewa.1 COMMAND ewa manual ${ewa_manual_folder} DEPENDS ewa
-                   COMMENT "Writing manual pages" VERBATIM)
-set(ewa_manual_pages ${ewa_manual_folder}/man/man1/ewa.1)
-if(TARGET ewa-view)
-    add_custom_command(OUTPUT ${ewa_manual_folder}/man/man1/ewa-view.1
-                       COMMAND ewa-view --manual ${ewa_manual_folder} DEPENDS ewa-view
-                       COMMENT "Writing ewa-view's manual page" VERBATIM)
-    list(APPEND ewa_manual_pages ${ewa_manual_folder}/man/man1/ewa-view.1)
+# Manual pages and shell completions, made from what the programs' --help says.
+find_program(HELP2MAN help2man)
+if(NOT HELP2MAN)
+    message(STATUS "There is no help2man: manual pages are not built")
+    set(HELP2MAN "")
 endif()
-add_custom_target(manual ALL DEPENDS ${ewa_manual_pages})
+set(ewa_manual_folder ${PROJECT_BINARY_DIR}/manual)
+set(ewa_manual_stamps "")
+foreach(program ewa ewa-view)
+    if(TARGET ${program})
+        add_custom_command(OUTPUT ${PROJECT_BINARY_DIR}/${program}.manual
+            COMMAND ${PROJECT_SOURCE_DIR}/cmake/write-manual $<TARGET_FILE:${program}> ${ewa_manual_folder} ${HELP2MAN}
+            COMMAND ${CMAKE_COMMAND} -E touch ${PROJECT_BINARY_DIR}/${program}.manual
+            DEPENDS ${program} ${PROJECT_SOURCE_DIR}/cmake/write-manual ${PROJECT_SOURCE_DIR}/cmake/completion.awk
+                    ${PROJECT_SOURCE_DIR}/cmake/manual.h2m ${PROJECT_SOURCE_DIR}/cmake/manual_commands.h2m
+            WORKING_DIRECTORY ${PROJECT_SOURCE_DIR} COMMENT "Writing the manual of ${program}" VERBATIM)
+        list(APPEND ewa_manual_stamps ${PROJECT_BINARY_DIR}/${program}.manual)
+    endif()
+endforeach()
+add_custom_target(manual ALL DEPENDS ${ewa_manual_stamps})
 
 set(ewa_programs ewa)
 foreach(program ewa-view ewa-bench)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// SyntheticDataset with their cameras, and the points they were reconstructed from.
+// Images with their cameras, and the points they were reconstructed from.
 #pragma once
 #include <array>
 #include <cstdint>

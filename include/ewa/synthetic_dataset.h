@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// SyntheticDataset of mesh scenes: from a glTF of triangles to a dataset to train on.
+// Renders of mesh scenes: from a glTF of triangles to a dataset to train on.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -42,7 +42,7 @@ struct SyntheticDataset {
 /// Whether the file is a glTF of triangles without splats.
 bool is_mesh_scene(const std::filesystem::path& path);
 
-/// SyntheticDataset the scene into a folder: images/*.png (8 bit, sRGB's curve over min(1, radiance * 2^exposure),
+/// Renders the scene into a folder: images/*.png (8 bit, sRGB's curve over min(1, radiance * 2^exposure),
 /// alpha where the sky is seen), depth/*.exr (camera z in world units, 0 where nothing is), points.ply, and
 /// last transforms.json, in the glTF's own world. docs/meshes.md says what light is modelled.
 /// photographs.json names what the pictures are of: an ended run goes on where it was, and a folder of other

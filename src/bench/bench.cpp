@@ -79,29 +79,31 @@ Result measure_all(const Options& options, const std::vector<std::string>& progr
 void add_options(CLI::App& app, Options& options) {
     app.add_option("--json", options.json, "Write the results to this file")->type_name("FILE");
     app.add_option("--cases", options.cases,
-                   "Only cases whose name holds, or with * or ? matches, one of these")
+                   "Run only the cases whose name contains one of these, or matches it with * and ?")
         ->type_name("PATTERN,...");
-    app.add_flag("--list", options.list, "Name the cases and do nothing");
-    app.add_option("--runs", options.runs, "How often a case runs (0: for about a second, 5 to 25 times)")
+    app.add_flag("--list", options.list, "List the cases and quit");
+    app.add_option("--runs", options.runs, "Runs of each case; 0: for about a second, 5 to 25 times")
         ->check(CLI::Range(0, 1000).description(""))
         ->type_name("N");
-    app.add_option("--device", options.device, "Number or part of the name of a device, see ewa devices")
+    app.add_option("--device", options.device,
+                   "The device: its number or a part of its name (see ewa devices)")
         ->type_name("NAME|N");
     app.add_flag("--check", options.check,
-                 "Compare the results with the float64 twin; exit status 1 where one is off");
-    app.add_flag("--large", options.large, "Also the cases that take gigabytes, or minutes on a CPU");
-    app.add_option("--compare", options.compare, "Print new over old per case and pass, old from this file")
+                 "Compare the results with the CPU reference; exit status 1 at a difference");
+    app.add_flag("--large", options.large, "Also run the cases that need gigabytes, or minutes on a CPU");
+    app.add_option("--compare", options.compare,
+                   "Print the ratio of the new times to those in this file, for each case and pass")
         ->type_name("OLD.json");
-    app.add_option("--results", options.results, "With --compare: take the new results from this file")
+    app.add_option("--results", options.results, "With --compare: read the new results from this file")
         ->type_name("NEW.json");
     app.add_flag("--stability", options.stability,
-                 "Stiff and extreme scenes against the float64 twin, and training from each; exit status 1 "
-                 "where a bound is "
-                 "broken");
-    app.add_option("FILE", options.scene, "With --stability: this splat file in place of the built-in scenes")
+                 "Test stiff and extreme scenes against the CPU reference, and train from each; exit status "
+                 "1 if a bound is exceeded");
+    app.add_option("FILE", options.scene,
+                   "With --stability: test this splat file instead of the built-in scenes")
         ->type_name("");
     app.add_option("--training-steps", options.training_steps,
-                   "With --stability: steps from each scene, 0 for none")
+                   "With --stability: training steps from each scene; 0: none")
         ->check(CLI::Range(0, 100000).description(""))
         ->type_name("N");
     app.add_flag("--first-step", options.first_step, "What the case first_step starts as a new process")

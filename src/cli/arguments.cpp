@@ -115,7 +115,8 @@ CLI::Validator without_sign() {
 }
 
 void add_device_options(CLI::App& app, DeviceOptions& options) {
-    app.add_option("--device", options.selector, "Number or part of the name of a device (see ewa devices)")
+    app.add_option("--device", options.selector,
+                   "The device: its number or a part of its name (see ewa devices)")
         ->type_name("NAME|N");
     app.add_flag("--validation", options.validation, "Turn the Vulkan validation layer on")
         ->group("For developers");
@@ -129,10 +130,9 @@ const std::map<std::string, MaskUse> kMaskUses = {{"auto", MaskUse::automatic},
 }
 
 void add_masks_option(CLI::App& app, MaskUse& masks) {
-    app.add_option(
-           "--masks", masks,
-           "What masks/ and alpha are for: ignore (pixels do not count), cut (out of the background), none, "
-           "or auto: ignore where there are mask files, else cut")
+    app.add_option("--masks", masks,
+                   "How to use masks/ and alpha: ignore (pixels do not count), cut (the background replaces "
+                   "pixels), none, or auto: ignore if there are mask files, else cut")
         ->transform(CLI::CheckedTransformer(kMaskUses).description(""))
         ->type_name("USE")
         ->default_str(masks_text(masks));
@@ -145,14 +145,14 @@ std::string masks_text(MaskUse masks) {
 }
 
 void add_downscale_option(CLI::App& app, int& downscale) {
-    app.add_option("--downscale", downscale, "Divide the pictures' width and height by this")
+    app.add_option("--downscale", downscale, "Divide the width and height of the images by this")
         ->check(in_range(1, 1024))
         ->type_name("K")
         ->capture_default_str();
 }
 
 void add_test_every_option(CLI::App& app, int& test_every) {
-    app.add_option("--test-every", test_every, "Every K-th picture in name order is held out; 0: none")
+    app.add_option("--test-every", test_every, "Hold out every K-th image in name order; 0: none")
         ->check(in_range(0, 1000000000))
         ->type_name("K")
         ->capture_default_str();

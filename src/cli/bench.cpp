@@ -18,13 +18,13 @@ Action add_bench(CLI::App& app) {
     const auto accuracy = std::make_shared<AccuracyArguments>();
     const auto wanted = std::make_shared<bool>(false);
     app.add_flag("--accuracy", *wanted,
-                 "Error against run time on the dataset FILE: of rendering, against the integral along each "
-                 "ray, and of "
-                 "--training-steps (600) of each strategy");
-    app.add_option("--splats", accuracy->splats, "With --accuracy: draw this scene, not the one trained")
+                 "Measure error and run time on the dataset FILE: of rendering, compared with the integral "
+                 "along each ray, and of --training-steps [600] of each strategy");
+    app.add_option("--splats", accuracy->splats,
+                   "With --accuracy: render this scene instead of the trained one")
         ->type_name("FILE");
     app.add_option("--svg", accuracy->svg,
-                   "With --accuracy: write the diagrams to FILE and, of training, NAME_training.svg")
+                   "With --accuracy: write the diagrams to FILE, and those of training to NAME_training.svg")
         ->type_name("FILE");
     options->read_splats = load_splats;
     const CLI::Option* steps = app.get_option("--training-steps");

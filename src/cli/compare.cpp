@@ -275,33 +275,32 @@ int run(const CompareArguments& arguments) {
 
 Action add_compare(CLI::App& app) {
     const auto arguments = std::make_shared<CompareArguments>();
-    app.add_option("A", arguments->a, "A picture, a folder of pictures, or a splat scene")
+    app.add_option("A", arguments->a, "An image, a folder of images, or a splat scene")
         ->required()
         ->type_name("");
-    app.add_option("B", arguments->b, "What it is compared with: the same")->required()->type_name("");
+    app.add_option("B", arguments->b, "The same kind of thing, to compare with A")->required()->type_name("");
     app.add_option("--threshold", arguments->threshold,
-                   "Exit status 1 where a picture's PSNR is under this, with or without alpha and values "
-                   "outside 0 to 1, or a picture has no other")
+                   "Exit status 1 if the PSNR of an image is below this, with or without alpha and values "
+                   "outside 0 to 1, or if an image has no counterpart")
         ->check(CLI::Range(0.0, 1000.0).description(""))
         ->type_name("PSNR");
-    app.add_option(
-           "--max-error", arguments->max_error,
-           "Exit status 1 where a value, alpha too, is further off than this, or a picture has no other")
+    app.add_option("--max-error", arguments->max_error,
+                   "Exit status 1 if a value, alpha included, differs by more than this, or if an image has "
+                   "no counterpart")
         ->check(CLI::Range(0.0, 1e9).description(""))
         ->type_name("E");
-    app.add_option("--json", arguments->json, "Write the figures to this file")->type_name("FILE");
+    app.add_option("--json", arguments->json, "Write the results to this file")->type_name("FILE");
     app.add_option("--heat-map", arguments->heat_map,
-                   "Write the error as a picture (.png, .exr), or one a pair into this folder")
+                   "Write the error as an image (.png, .exr), or one image for each pair into this folder")
         ->type_name("OUT");
-    app.add_option("--heat-scale", arguments->heat_scale, "Error that the heat map draws brightest")
+    app.add_option("--heat-scale", arguments->heat_scale, "The error that the heat map shows brightest")
         ->check(CLI::Range(1e-9, 1e9).description(""))
         ->type_name("E")
         ->capture_default_str();
     CLI::Option* cameras =
-        app.add_option(
-               "--cameras", arguments->cameras,
-               "The dataset whose cameras to look at splat scenes through; each is compared with the "
-               "other scene, or with pictures named as ewa render names them, and rounded as they are")
+        app.add_option("--cameras", arguments->cameras,
+                       "Render splat scenes through the cameras of this dataset. A scene is compared with "
+                       "the other scene, or with images as ewa render names and rounds them")
             ->type_name("DATASET");
     const std::vector<CLI::Option*> before = app.get_options();
     app.add_option("--frames", arguments->frames, "all, train, test, or indices in name order: 0,3,7")

@@ -249,21 +249,21 @@ int run(const ConvertArguments& arguments) {
 
 void add_editing_options(CLI::App& app, ConvertArguments& arguments) {
     app.add_option("--transform", arguments.transform,
-                   "move=x,y,z, turn=x,y,z,degrees, scale=s or a matrix of 12 or 16 numbers, row after row; "
-                   "repeated: one after the other. In the frame of a PLY: y down, z forward")
+                   "move=x,y,z, turn=x,y,z,degrees, scale=s, or a matrix of 12 or 16 numbers by rows. Repeat "
+                   "it for several steps. Axes are those of a PLY: y down, z forward")
         ->type_name("STEP")
         ->expected(1)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
         ->take_all();
-    app.add_option("--crop", arguments.crop, "Keep the splats whose centre is in this box, after --transform")
+    app.add_option("--crop", arguments.crop, "Keep the splats whose centre is in this box after --transform")
         ->type_name("x,y,z,X,Y,Z");
-    app.add_option("--min-opacity", arguments.min_opacity, "Keep the splats of at least this opacity")
+    app.add_option("--min-opacity", arguments.min_opacity, "Keep the splats with at least this opacity")
         ->check(in_range(0.0, 1.0))
         ->type_name("0..1");
-    app.add_option("--max-sh", arguments.max_sh, "Cut view-dependent colour to this degree")
+    app.add_option("--max-sh", arguments.max_sh, "Highest SH degree to keep")
         ->check(in_range(0, kMaxShDegree))
         ->type_name("0..3");
-    app.add_option("--sort", arguments.sort, "morton: neighbours in the file are neighbours in space")
+    app.add_option("--sort", arguments.sort, "morton: sort splats along a space-filling curve")
         ->check(CLI::IsMember({"morton"}))
         ->type_name("ORDER");
 }
@@ -272,19 +272,20 @@ void add_editing_options(CLI::App& app, ConvertArguments& arguments) {
 
 Action add_convert(CLI::App& app) {
     const auto arguments = std::make_shared<ConvertArguments>();
-    app.add_option(
-           "FILES", arguments->files,
-           "One input or several to be joined, then the output: .ply .compressed.ply .splat .spz .glb .gltf")
+    app.add_option("FILES", arguments->files,
+                   "One or more inputs, which are joined, then the output: .ply .compressed.ply .splat .spz "
+                   ".glb .gltf")
         ->required()
         ->expected(2, -1)
         ->type_name("IN... OUT");
     add_editing_options(app, *arguments);
-    app.add_option("--spz-version", arguments->spz_version, "3 (every reader knows it) or 4 (smaller, newer)")
+    app.add_option("--spz-version", arguments->spz_version,
+                   "3 (every reader supports it) or 4 (newer and smaller)")
         ->check(CLI::IsMember({3, 4}))
         ->type_name("3|4")
         ->capture_default_str();
-    app.add_flag("--check", arguments->check, "Read the output back and print the error it made");
-    app.add_option("--json", arguments->json, "Write what was done, lost and checked to this file")
+    app.add_flag("--check", arguments->check, "Read the output back and print the error of the conversion");
+    app.add_option("--json", arguments->json, "Write the steps, the losses and the check to this file")
         ->type_name("FILE");
     app.add_flag("--quiet", arguments->quiet, "Print nothing but errors");
     return [arguments] { return run(*arguments); };

@@ -95,22 +95,23 @@ Action add_dataset(CLI::App& app) {
     SyntheticOptions& options = arguments->options;
     app.add_option("SCENE", arguments->scene, "A glTF with meshes (.gltf .glb)")->required()->type_name("");
     app.add_option("-o,--output", arguments->output,
-                   "Folder for images/, depth/, points.ply and transforms.json; an ended run goes on there")
+                   "Folder for images/, depth/, points.ply and transforms.json. A run that was interrupted "
+                   "continues there")
         ->required()
         ->type_name("DIR");
-    app.add_option(
-           "--views", arguments->views,
-           "Cameras on a dome over the scene; 0: the file's own [the file's where it has 8 or more, else 48]")
+    app.add_option("--views", arguments->views,
+                   "Number of cameras on a dome over the scene; 0: the cameras of the file [those of the "
+                   "file if there are 8 or more, else 48]")
         ->check(in_range(0, 100000))
         ->type_name("N");
     app.add_option("--size", arguments->size, "Width and height in pixels")
         ->type_name("WxH")
         ->capture_default_str();
-    app.add_option("--samples", options.samples, "Paths a pixel")
+    app.add_option("--samples", options.samples, "Paths for each pixel")
         ->check(in_range(1, 65536))
         ->type_name("N")
         ->capture_default_str();
-    app.add_option("--points", options.points, "Points on the surfaces, for the first splats; 0: none")
+    app.add_option("--points", options.points, "Points on the surfaces, from which training starts; 0: none")
         ->check(in_range(0, 10000000))
         ->type_name("N")
         ->capture_default_str();

@@ -46,7 +46,7 @@ int run(bool json) {
 
 Action add_devices(CLI::App& app) {
     const auto json = std::make_shared<bool>(false);
-    app.add_flag("--json", *json, "As JSON");
+    app.add_flag("--json", *json, "Print JSON");
     return [json] { return run(*json); };
 }
 

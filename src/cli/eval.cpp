@@ -70,17 +70,16 @@ Action add_eval(CLI::App& app) {
                    "The splat scene (.ply .compressed.ply .splat .spz .glb .gltf)")
         ->required()
         ->type_name("");
-    app.add_option(
-           "DATASET", arguments->dataset,
-           "SyntheticDataset with cameras: COLMAP folder or transforms.json; or a glTF with meshes, which is "
-           "photographed as ewa train does")
+    app.add_option("DATASET", arguments->dataset,
+                   "Images with cameras: a COLMAP folder or transforms.json, or a glTF with meshes, which is "
+                   "rendered as ewa train does")
         ->required()
         ->type_name("");
     app.add_option("--split", arguments->split, "test, train or all")
         ->check(CLI::IsMember({"test", "train", "all"}))
         ->capture_default_str();
     add_test_every_option(app, arguments->test_every);
-    app.add_option("--json", arguments->json, "Write the figures to this file")->type_name("FILE");
+    app.add_option("--json", arguments->json, "Write the results to this file")->type_name("FILE");
     add_draw_options(app, arguments->draw);
     add_downscale_option(app, arguments->downscale);
     add_masks_option(app, arguments->masks);

@@ -81,18 +81,17 @@ Action add_grad(CLI::App& app) {
                    "The splat scene (.ply .compressed.ply .splat .spz .glb .gltf)")
         ->required()
         ->type_name("");
-    app.add_option(
-           "DATASET", arguments->dataset,
-           "SyntheticDataset with cameras: COLMAP folder or transforms.json; or a glTF with meshes, which is "
-           "photographed as ewa train does")
+    app.add_option("DATASET", arguments->dataset,
+                   "Images with cameras: a COLMAP folder or transforms.json, or a glTF with meshes, which is "
+                   "rendered as ewa train does")
         ->required()
         ->type_name("");
-    app.add_option("--frame", arguments->frame, "Which view: index in name order over all frames, from 0")
+    app.add_option("--frame", arguments->frame, "The view: its index in name order over all frames, from 0")
         ->required()
         ->check(in_range(0, 1000000000))
         ->type_name("I");
     app.add_option("-o,--output", arguments->output,
-                   "PLY with the properties of a splat file, each holding dL/d(that stored value)")
+                   "A PLY with the properties of a splat file; each holds dL/d(stored value)")
         ->required()
         ->type_name("OUT.ply");
     app.add_option("--json", arguments->json, "Write loss, l1, ssim, frame (its index) and name to this file")

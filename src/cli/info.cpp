@@ -221,7 +221,7 @@ Action add_info(CLI::App& app) {
                    "glTF of meshes")
         ->required();
     add_test_every_option(app, arguments->test_every);
-    app.add_flag("--json", arguments->json, "As JSON");
+    app.add_flag("--json", arguments->json, "Print JSON");
     return [arguments] { return run(arguments->path, arguments->test_every, arguments->json); };
 }
 

@@ -8,8 +8,8 @@
 
 #include "cli/command.h"
 #include "cli/interrupt.h"
-#include "cli/manual.h"
 #include "cli/text.h"
+#include "core/help_text.h"
 #include "core/text.h"
 #include "ewa/error.h"
 
@@ -69,35 +69,28 @@ int main(int argc, char** argv) {
     app.name("ewa");
     app.set_version_flag("--version", "ewa " EWA_VERSION);
     app.require_subcommand(1);
-    app.get_formatter()->column_width(34);
+    app.formatter_fn([](const CLI::App* shown, const std::string& name, CLI::AppFormatMode mode) {
+        constexpr size_t kColumn = 30;  // of the descriptions
+        CLI::Formatter formatter;
+        formatter.column_width(kColumn);
+        return core::help_text(formatter.make_help(shown, name, mode), kColumn);
+    });
 
-    // Without a group it stands in no help: the build calls it.
-    CLI::App* manual =
-        app.add_subcommand("manual", "Writes the manual pages and shell completions below DIR");
-    std::string manual_folder;
-    manual->group("");
-    manual->add_option("DIR", manual_folder)->required();
     Command commands[] = {
-        {app.add_subcommand("train", "From photographs with cameras to splats"), {}},
-        {app.add_subcommand("render", "Pictures of a splat scene through a dataset's cameras"), {}},
-        {app.add_subcommand("eval", "PSNR and SSIM of a splat scene against photographs"), {}},
-        {app.add_subcommand("grad", "Gradient of the training loss for one view"), {}},
-        {app.add_subcommand("convert", "From any splat format to any other, joined and edited on the way"),
+        {app.add_subcommand("train", "Trains splats from images with known cameras"), {}},
+        {app.add_subcommand("render", "Renders a splat scene through the cameras of a dataset"), {}},
+        {app.add_subcommand("eval", "Measures PSNR and SSIM of a splat scene against images"), {}},
+        {app.add_subcommand("grad", "Writes the gradient of the training loss for one view"), {}},
+        {app.add_subcommand("convert", "Converts, joins and edits splat files"), {}},
+        {app.add_subcommand("info", "Shows what a splat file or a dataset holds, and what rendering skips"),
          {}},
-        {app.add_subcommand("info", "What is in a splat file or a dataset, and what rendering it leaves out"),
+        {app.add_subcommand("devices", "Lists the Vulkan devices of this machine"), {}},
+        {app.add_subcommand("dataset", "Renders a mesh scene (glTF) into a dataset to train on"), {}},
+        {app.add_subcommand("bench",
+                            "Measures the speed of each pass, and its error against the CPU reference"),
          {}},
-        {app.add_subcommand("devices", "The Vulkan devices of this machine"), {}},
-        {app.add_subcommand("dataset", "SyntheticDataset a mesh scene (glTF) into a dataset to train on"),
-         {}},
-        {app.add_subcommand("bench", "Speed of every pass, and its error against the float64 twin"), {}},
-        {app.add_subcommand("compare",
-                            "PSNR, SSIM and largest error of two pictures, folders of them, or splat scenes"),
-         {}},
+        {app.add_subcommand("compare", "Compares two images, folders of images, or splat scenes"), {}},
     };
-    const Command write_pages{manual, [&] {
-                                  write_manual(app, manual_folder);
-                                  return 0;
-                              }};
     commands[0].action = add_train(*commands[0].app, command_line(argc, argv));
     commands[1].action = add_render(*commands[1].app);
     commands[2].action = add_eval(*commands[2].app);
@@ -124,5 +117,5 @@ int main(int argc, char** argv) {
     }
     for (const Command& command : commands)
         if (command.app->parsed()) return run(command);
-    return run(write_pages);
+    return kWrongUse;  // not reached: the parser requires a command
 }

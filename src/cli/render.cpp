@@ -90,10 +90,11 @@ Action add_render(CLI::App& app) {
                    "The splat scene (.ply .compressed.ply .splat .spz .glb .gltf)")
         ->required()
         ->type_name("");
-    app.add_option("--cameras", arguments->cameras, "The dataset whose cameras to look through")
+    app.add_option("--cameras", arguments->cameras, "The dataset whose cameras to render through")
         ->required()
         ->type_name("DATASET");
-    app.add_option("-o,--output", arguments->output, "Folder for the pictures, named like the dataset's")
+    app.add_option("-o,--output", arguments->output,
+                   "Folder for the images, which get the names of the dataset's")
         ->type_name("DIR")
         ->capture_default_str();
     app.add_option("--frames", arguments->frames, "all, train, test, or indices in name order: 0,3,7")
@@ -104,7 +105,7 @@ Action add_render(CLI::App& app) {
         ->check(CLI::IsMember({"png", "exr"}))
         ->capture_default_str();
     app.add_option("--mode", arguments->mode,
-                   "color, depth (view z; a png is divided by its maximum) or alpha")
+                   "color, depth (view z; a png is scaled by its maximum) or alpha")
         ->check(CLI::IsMember({"color", "depth", "alpha"}))
         ->capture_default_str();
     add_draw_options(app, arguments->draw);

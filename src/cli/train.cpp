@@ -84,7 +84,7 @@ Action add_train(CLI::App& app, const std::string& command_line) {
     arguments.command_line = command_line;
     app.add_option(
            "DATASET", arguments.dataset,
-           "SyntheticDataset with cameras: COLMAP folder or transforms.json; or a glTF with meshes, which is "
+           "Images with cameras: COLMAP folder or transforms.json; or a glTF with meshes, which is "
            "photographed into DIR/dataset first")
         ->type_name("");
     app.add_option(

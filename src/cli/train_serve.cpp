@@ -24,6 +24,7 @@ TrainServer::TrainServer(const std::string& where, const std::filesystem::path& 
     if (where.empty()) return;
     const size_t colon = where.rfind(':');
     address_ = colon == std::string::npos ? kHere : where.substr(0, colon);
+    if (address_.empty()) address_ = kHere;
     if (address_.size() > 2 && address_.front() == '[') address_ = address_.substr(1, address_.size() - 2);
     const auto port = core::parse_integer<uint16_t>(
         std::string_view(where).substr(colon == std::string::npos ? 0 : colon + 1));
@@ -42,8 +43,10 @@ TrainServer::~TrainServer() {
 
 std::string TrainServer::announcement() const {
     if (!server_) return {};
-    return fmt::format("to look on: ewa-view {}, or ewa-view --connect {}:{}", folder_.string(), address_,
-                       server_->port());
+    const bool v6 = address_.find(':') != std::string::npos;
+    const std::string where = fmt::format("{}:{}", v6 ? "[" + address_ + "]" : address_, server_->port());
+    return fmt::format("to watch: ewa-view {}, ewa-view --connect {}, or curl http://{}/status",
+                       folder_.string(), where, where);
 }
 
 void TrainServer::add_metrics(const report::MetricsLine& line) {
@@ -51,7 +54,12 @@ void TrainServer::add_metrics(const report::MetricsLine& line) {
 }
 
 void TrainServer::report(const StepReport& report, live::State state) {
-    server_->report({report.step, steps_, report.splats, report.loss, report.seconds, state, false, {}});
+    server_->report({.step = report.step,
+                     .steps = steps_,
+                     .splats = report.splats,
+                     .loss = report.loss,
+                     .seconds = report.seconds,
+                     .state = state});
 }
 
 void TrainServer::attend(const Trainer& trainer, const StepReport& step, const std::function<void()>& save) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// ewa train --serve: what those who look on are given, and what they may ask for.
+// ewa train --serve: shows a training to those who watch it, and does what they ask for.
 #pragma once
 #include <filesystem>
 #include <functional>
@@ -13,18 +13,18 @@ namespace ewa::cli {
 
 class TrainServer {
   public:
-    /// where: [ADDRESS:]PORT, or "" for nobody. The token goes to folder/live.json, which is gone when this
-    /// is. Throws InputError, RunError.
+    /// where: [ADDRESS:]PORT, or "" for no server. steps: of the whole training. folder/live.json holds the
+    /// token while this lives. Throws InputError, RunError.
     TrainServer(const std::string& where, const std::filesystem::path& folder, int steps);
     ~TrainServer();
 
-    /// One line for the terminal; empty where nobody can look on.
+    /// One line for the terminal that says how to watch; empty without a server.
     std::string announcement() const;
     void add_metrics(const report::MetricsLine& line);
-    /// After a step: gives what is asked for, and while the training is to pause comes back only when it is
-    /// to go on or was interrupted. save: splats and checkpoint.
+    /// Call after each step. Takes splats and saves where somebody asked for it. While somebody pauses the
+    /// training, returns only at its end or at an interruption. save: writes splats and checkpoint.
     void attend(const Trainer& trainer, const StepReport& report, const std::function<void()>& save);
-    /// The last splats: nothing more will come.
+    /// Shows the last splats, and that the training is done.
     void finish(const StepReport& report, const Gaussians& gaussians);
 
   private:

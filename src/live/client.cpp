@@ -1,54 +1,148 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "live/client.h"
 
-#include <algorithm>
+#include <httplib.h>
+#include <sys/mman.h>
 
+#include <algorithm>
+#include <cstdio>
+
+#include "core/text.h"
 #include "ewa/error.h"
+#include "io/splats/ply.h"
+#include "live/wire.h"
 
 namespace ewa::live {
 namespace {
 
-constexpr int kConnectSeconds = 10;
-constexpr size_t kMostAnswer = 512;   // bytes of an answer's first line
-constexpr size_t kChunk = 16u << 20;  // bytes that memory is taken for before they have come
+constexpr int kConnectSeconds = 3;
+constexpr std::chrono::seconds kPatience(30);
+constexpr uint64_t kMostHeader = 8192;               // bytes of an answer before its body
+constexpr uint64_t kMostText = 16u << 20;            // bytes of a body that is text
+constexpr uint64_t kMostSplats = uint64_t(1) << 33;  // bytes of a body that is splats
+
+/// A nameless file in memory, which readers open by path.
+struct MemoryFile {
+    std::unique_ptr<std::FILE, int (*)(std::FILE*)> file;
+    MemoryFile() : file(fdopen(memfd_create("splats", MFD_CLOEXEC), "wb"), std::fclose) {
+        if (!file) throw RunError("out of memory for the trainer's splats");
+    }
+    std::string path() const { return "/proc/self/fd/" + std::to_string(fileno(file.get())); }
+};
 
 }  // namespace
 
-Client::Client(const Address& address, const std::string& token, const std::atomic<bool>* stop)
-    : socket_(connect_to(address.host, address.port, kConnectSeconds, stop)),
-      who_(address.host + ":" + std::to_string(address.port)) {
-    if (!ask(std::string(kHello)).empty()) throw InputError(who_ + " is no training of ewa");
-    if (!token.empty()) ask("token " + token);
-}
-
-std::vector<std::byte> Client::ask(const std::string& request) {
-    const RunError gone("the connection to " + who_ + " has ended");
-    if (!socket_.send(request + "\n", kPatience)) throw gone;
-    const auto line = socket_.receive_line(kMostAnswer, kPatience);
-    if (!line) throw gone;
-    const uint64_t bytes = payload_of(*line);
-    std::vector<std::byte> payload;
-    while (payload.size() < bytes) {
-        const size_t from = payload.size();
-        payload.resize(size_t(std::min<uint64_t>(bytes, from + kChunk)));
-        if (!socket_.receive(std::span(payload).subspan(from), kPatience)) throw gone;
+/// cpp-httplib's client on a Wire: it would read a status line of any length, and crash on a long one.
+class Client::Http final : public httplib::ClientImpl {
+  public:
+    Http(const Address& address, const std::string& token, const std::atomic<bool>* stop)
+        : ClientImpl(address.host, address.port),
+          name_(address.host + ":" + std::to_string(address.port)),
+          stop_(stop) {
+        set_connection_timeout(kConnectSeconds);
+        set_tcp_nodelay(true);
+        set_decompress(false);
+        // The server refuses names, for the sake of browsers. This is none.
+        httplib::Headers headers{{"Host", "localhost"}};
+        if (!token.empty()) headers.emplace("Authorization", "Bearer " + token);
+        set_default_headers(std::move(headers));
     }
-    return payload;
-}
+
+    /// The answer, its body given to `take` as it comes where its status is 200.
+    httplib::Response get(const std::string& path, const httplib::Headers& headers, uint64_t most,
+                          const httplib::ContentReceiver& take) {
+        std::string text;  // of another status
+        const auto begin = [&](const httplib::Response& response) {
+            wire_->allow(response.status == 200 ? most : kMostHeader);
+            good_ = response.status == 200;
+            return true;
+        };
+        const auto receive = [&](const char* bytes, size_t count) {
+            if (good_) return take(bytes, count);
+            text.append(bytes, count);
+            return true;
+        };
+        return checked(Get(path, headers, begin, receive), text);
+    }
+
+    void post(const std::string& path) {
+        const auto result = Post(path);
+        checked(result, result ? result->body : "");
+    }
+
+    const std::string& name() const { return name_; }
+
+  private:
+    bool process_socket(const Socket& socket, std::function<bool(httplib::Stream&)> exchange) override {
+        Wire wire(socket.sock, kMostHeader, kPatience, stop_);
+        wire_ = &wire;
+        return exchange(wire);
+    }
+
+    httplib::Response checked(const httplib::Result& result, const std::string& text) const {
+        if (result.error() == httplib::Error::Connection)
+            throw RunError("cannot reach " + name_ + ": nobody answers there");
+        if (!result) throw RunError("the connection to " + name_ + " has ended");
+        if (!result->get_header_value("Server").starts_with("ewa/"))
+            throw InputError("what answers at " + name_ + " is not a training of ewa");
+        if (result->status >= 400)
+            throw InputError("the trainer refuses: " + core::one_line(core::trim(text)));
+        return *result;
+    }
+
+    const std::string name_;
+    const std::atomic<bool>* const stop_;
+    Wire* wire_ = nullptr;  // of the present exchange
+    bool good_ = false;
+};
+
+Client::Client(const Address& address, const std::string& token, const std::atomic<bool>* stop)
+    : http_(std::make_unique<Http>(address, token, stop)) {}
+
+Client::~Client() = default;
 
 Status Client::status(size_t first_line) {
-    const auto payload = ask("status " + std::to_string(first_line));
-    return decode_status(std::string(reinterpret_cast<const char*>(payload.data()), payload.size()));
+    std::string text;
+    http_->get("/status?metrics=" + std::to_string(first_line), {}, kMostText,
+               [&](const char* bytes, size_t count) {
+                   text.append(bytes, count);
+                   return text.size() <= kMostText;
+               });
+    return decode_status(text);
 }
 
-std::optional<Snapshot> Client::splats(int step) {
-    const auto payload = ask("splats " + std::to_string(step));
-    if (payload.empty()) return std::nullopt;
-    return decode_snapshot(payload);
+std::optional<TaggedSplats> Client::splats(const std::string& tag) {
+    MemoryFile memory;
+    const auto answer = http_->get("/splats", {{"If-None-Match", tag.empty() ? "\"none\"" : tag}},
+                                   kMostSplats, [&](const char* bytes, size_t count) {
+                                       return std::fwrite(bytes, 1, count, memory.file.get()) == count;
+                                   });
+    if (answer.status == 304) return std::nullopt;
+    if (std::fflush(memory.file.get()) != 0) throw RunError("out of memory for the trainer's splats");
+    TaggedSplats splats;
+    splats.step = std::max(0, core::parse_integer<int>(answer.get_header_value("Ewa-Step")).value_or(0));
+    splats.tag = answer.get_header_value("ETag");
+    try {
+        splats.gaussians = io::read_ply(memory.path()).gaussians;
+    } catch (const InputError& error) {
+        throw InputError("the trainer's splats cannot be read: " + std::string(error.what()));
+    }
+    return splats;
 }
 
 void Client::command(const std::string& name) {
-    ask(name);
+    http_->post("/" + name);
+}
+
+Address parse_address(const std::string& text) {
+    const size_t colon = text.rfind(':');
+    const std::string_view digits =
+        colon == std::string::npos ? "" : std::string_view(text).substr(colon + 1);
+    const uint16_t port = core::parse_integer<uint16_t>(digits).value_or(0);
+    std::string host = text.substr(0, colon == std::string::npos ? 0 : colon);
+    if (host.size() >= 2 && host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
+    if (port == 0) throw InputError("'" + text + "' is not an address such as localhost:7000");
+    return {host.empty() ? "localhost" : host, port};
 }
 
 }  // namespace ewa::live

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "live/server.h"
 
+#include <arpa/inet.h>
 #include <sys/random.h>
 
 #include <algorithm>
@@ -8,21 +9,82 @@
 
 #include "core/text.h"
 #include "ewa/error.h"
+#include "io/splats/ply.h"
+#include "live/http_server.h"
 
 namespace ewa::live {
 namespace {
 
+using httplib::Request;
+using httplib::Response;
+
 constexpr double kShare = 0.05;      // of the time that taking splats may cost
 constexpr double kLeastPause = 0.2;  // seconds between splats
-constexpr int kAcceptSeconds = 1;
-const std::string kFull = "no there are " + std::to_string(kMostClients) + " connections already\n";
+constexpr std::chrono::seconds kFreshWait(5);
+constexpr size_t kRowsAtOnce = 4096;
 
-/// Takes the same time wherever the first difference stands.
+/// The time does not depend on where the first difference is.
 bool same_secret(const std::string& a, const std::string& b) {
     if (a.size() != b.size()) return false;
     unsigned difference = 0;
     for (size_t i = 0; i < a.size(); ++i) difference |= unsigned(a[i] ^ b[i]);
     return difference == 0;
+}
+
+/// Whether "HOST[:PORT]" is an address in numbers or localhost. A page whose name was made to lead here has
+/// its own name there.
+bool own_host(const std::string& text) {
+    unsigned char address[16];
+    if (text.starts_with('[')) {
+        const size_t end = text.find(']');
+        return end != std::string::npos && inet_pton(AF_INET6, text.substr(1, end - 1).c_str(), address) == 1;
+    }
+    const std::string host = core::lower(text.substr(0, text.find(':')));
+    return host == "localhost" || inet_pton(AF_INET, host.c_str(), address) == 1;
+}
+
+bool of_a_web_page(const Request& request) {
+    const std::string site = request.get_header_value("Sec-Fetch-Site");  // "none": typed by the user
+    return request.has_header("Origin") || (!site.empty() && site != "none" && site != "same-origin");
+}
+
+bool has_body(const Request& request) {
+    const std::string length = request.get_header_value("Content-Length");
+    return request.has_header("Transfer-Encoding") || (!length.empty() && length != "0");
+}
+
+void refuse(Response& response, int status, const std::string& why) {
+    response.status = status;
+    response.set_content(why + "\n", "text/plain");
+}
+
+/// guest: lives until the answer has been sent.
+void give_text(Response& response, std::string text, const char* type, std::shared_ptr<void> guest) {
+    const size_t size = text.size();
+    response.set_content_provider(size, type,
+                                  [text = std::move(text), guest = std::move(guest)](
+                                      size_t from, size_t count, httplib::DataSink& sink) {
+                                      return sink.write(text.data() + from, count);
+                                  });
+}
+
+/// As PLY, a few rows at a time: there is no second copy of the splats.
+void give_ply(Response& response, std::shared_ptr<const Snapshot> splats, std::shared_ptr<void> guest) {
+    const std::string header = io::ply_header(splats->gaussians, {});
+    const size_t row = io::ply_row_bytes(splats->gaussians);
+    const size_t size = header.size() + row * splats->gaussians.size();
+    response.set_content_provider(
+        size, "application/octet-stream",
+        [header, row, splats = std::move(splats), guest = std::move(guest)](size_t from, size_t,
+                                                                            httplib::DataSink& sink) {
+            if (from < header.size()) return sink.write(header.data() + from, header.size() - from);
+            const size_t first = (from - header.size()) / row;
+            const size_t end = std::min(first + kRowsAtOnce, splats->gaussians.size());
+            std::vector<float> rows;
+            rows.reserve(row / sizeof(float) * (end - first));
+            for (size_t i = first; i < end; ++i) io::append_ply_row(splats->gaussians, i, rows);
+            return sink.write(reinterpret_cast<const char*>(rows.data()), rows.size() * sizeof(float));
+        });
 }
 
 }  // namespace
@@ -39,15 +101,24 @@ std::string random_token() {
     return text;
 }
 
-Server::Server(const std::string& address, uint16_t port, std::string token, std::chrono::seconds silence)
-    : token_(std::move(token)), silence_(silence), listener_(address, port), thread_([this] { listen(); }) {}
+Server::Server(const std::string& address, uint16_t port, std::string token, std::chrono::milliseconds lease)
+    : token_(std::move(token)),
+      lease_(lease),
+      http_(std::make_unique<HttpServer>(
+          address, port, [this](const Request& request, Response& response) { answer(request, response); })) {
+}
 
 Server::~Server() {
-    stop_ = true;
-    listener_.shut();
-    thread_.join();
-    for (Client& client : clients_) client.socket.shut();
-    for (Client& client : clients_) client.thread.join();
+    {
+        const std::lock_guard lock(mutex_);
+        stop_ = true;
+    }
+    news_.notify_all();
+    http_.reset();
+}
+
+uint16_t Server::port() const {
+    return http_->port();
 }
 
 void Server::report(const Status& status) {
@@ -63,167 +134,130 @@ void Server::add_metrics(const report::MetricsLine& line) {
 }
 
 bool Server::wants_splats(int step) const {
-    if (!wanted_) return false;
     const std::lock_guard lock(mutex_);
-    return (!snapshot_ || snapshot_->step != step) && Clock::now() >= next_snapshot_;
+    return wanted_ && (!splats_ || splats_->step != step) && Clock::now() >= next_splats_;
 }
 
 void Server::offer(Snapshot&& snapshot, double seconds) {
     auto shared = std::make_shared<const Snapshot>(std::move(snapshot));
-    const std::lock_guard lock(mutex_);
-    snapshot_ = std::move(shared);
-    wanted_ = false;
     const std::chrono::duration<double> pause(std::max(kLeastPause, seconds / kShare));
-    next_snapshot_ = Clock::now() + std::chrono::duration_cast<Clock::duration>(pause);
-}
-
-void Server::forget_finished() {
-    clients_.remove_if([](Client& client) {
-        if (!client.done) return false;
-        client.thread.join();
-        return true;
-    });
-}
-
-size_t Server::count(std::atomic<bool> Client::*which) const {
-    return size_t(std::count_if(clients_.begin(), clients_.end(),
-                                [which](const Client& client) { return (client.*which).load(); }));
-}
-
-bool Server::end_silent(bool waiting, Clock::duration least) {
-    auto longest = clients_.end();
-    for (auto at = clients_.begin(); at != clients_.end(); ++at)
-        if (!at->trusted && !at->asking && at->waiting == waiting &&
-            (longest == clients_.end() || at->heard.load() < longest->heard.load()))
-            longest = at;
-    if (longest == clients_.end() || Clock::now() - longest->heard.load() < least) return false;
-    longest->socket.shut();
-    longest->thread.join();
-    clients_.erase(longest);
-    return true;
-}
-
-bool Server::make_room() {
-    const size_t placed = clients_.size() - count(&Client::waiting);
-    return placed < size_t(kMostClients) || end_silent(false, silence_);
-}
-
-void Server::listen() {
-    while (!stop_) {
-        Socket socket = listener_.accept(kAcceptSeconds);
-        forget_finished();
-        if (!socket || stop_) continue;
-        const bool waiting = !make_room();
-        const bool full = waiting && count(&Client::waiting) >= size_t(kMostClients) &&
-                          !end_silent(true, Clock::duration::zero());
-        if (full) {
-            socket.send(kFull, 1);
-            continue;
-        }
-        Client& client = clients_.emplace_back();
-        client.waiting = waiting;
-        client.socket = std::move(socket);
-        client.thread = std::thread([this, &client] { serve(client); });
+    {
+        const std::lock_guard lock(mutex_);
+        std::swap(splats_, shared);
+        wanted_ = false;
+        next_splats_ = Clock::now() + std::chrono::duration_cast<Clock::duration>(pause);
     }
+    news_.notify_all();
 }
 
-void Server::serve(Client& client) {
-    try {
-        while (!stop_) {
-            const auto request =
-                client.socket.receive_line(kMostRequest, client.waiting ? kSilence : kPatience);
-            if (!request) break;
-            client.asking = true;
-            const bool goes_on = answer(client, *request);
-            client.heard = Clock::now();
-            client.asking = false;
-            if (!goes_on) break;
-        }
-    } catch (const std::exception&) {
-        // Out of memory for one who watches: the connection ends, the training does not.
-    }
-    if (client.trusted) --trusted_;
-    // Nobody is left who could say go.
-    if (client.paused) paused_ = false;
-    client.socket.shut();
-    client.done = true;
+bool Server::paused_now() {
+    if (trusted_ == 0 && Clock::now() > lease_end_) paused_ = false;
+    return paused_;
 }
 
-bool Server::give(const Socket& socket, std::span<const std::byte> payload) const {
-    return socket.send("ok " + std::to_string(payload.size()) + "\n", kPatience) &&
-           socket.send(payload, kPatience);
+bool Server::paused() {
+    const std::lock_guard lock(mutex_);
+    return paused_now();
 }
 
-bool Server::give(const Socket& socket, const std::string& payload) const {
-    return give(socket, std::as_bytes(std::span(payload)));
+bool Server::take_save() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(save_, false);
 }
 
-std::string Server::status_from(size_t line, bool trusted) const {
+std::shared_ptr<void> Server::enter(bool trusted) {
+    const std::lock_guard lock(mutex_);
+    size_t& count = trusted ? trusted_ : strangers_;
+    if (!trusted && count >= kMostStrangers) return nullptr;
+    ++count;
+    return {this, [&count, this](Server*) {
+                const std::lock_guard leaving(mutex_);
+                --count;
+                if (&count == &trusted_) lease_end_ = Clock::now() + lease_;
+            }};
+}
+
+std::string Server::status_from(size_t line, bool trusted) {
     Status status;
     {
         const std::lock_guard lock(mutex_);
-        status = {status_.step,    status_.steps, status_.splats, status_.loss,
-                  status_.seconds, status_.state, trusted,        {}};
+        status = {run_,         status_.step,    status_.steps, status_.splats,
+                  status_.loss, status_.seconds, status_.state, trusted};
         const auto& lines = status_.metrics;
         for (size_t i = line; i < lines.size() && i - line < kMostLines; ++i)
             status.metrics.push_back(lines[i]);
+        if (status.state == State::running && paused_now()) status.state = State::paused;
     }
-    if (status.state == State::running && paused_) status.state = State::paused;
     return encode(status);
 }
 
-std::shared_ptr<const Snapshot> Server::splats_after(int step) {
-    const std::lock_guard lock(mutex_);
+std::shared_ptr<const Snapshot> Server::splats_for(bool trusted, bool fresh) {
+    std::unique_lock lock(mutex_);
     wanted_ = true;
-    return snapshot_ && snapshot_->step > step ? snapshot_ : nullptr;
+    if (fresh)
+        news_.wait_for(lock, kFreshWait,
+                       [this, step = status_.step] { return stop_ || (splats_ && splats_->step >= step); });
+    if (trusted) return splats_;
+    auto given = given_.lock();
+    if (!given) given_ = given = splats_;
+    return given;
 }
 
-bool Server::take_token(Client& client, const std::string& token) {
-    const Socket& socket = client.socket;
-    if (token_.empty() || !same_secret(token, token_)) {
-        socket.send("no another token\n", 1);
-        return false;
+void Server::give_splats(const Request& request, Response& response, bool trusted,
+                         std::shared_ptr<void> guest) {
+    const std::string known = request.get_header_value("If-None-Match");
+    const auto splats = splats_for(trusted, known.empty());
+    const std::string tag = splats ? "\"" + run_ + "-" + std::to_string(splats->step) + "\"" : "";
+    if (!known.empty() && (!splats || known == tag)) {
+        response.status = 304;
+        return;
     }
-    if (client.waiting && trusted_ >= kMostClients) {
-        socket.send(kFull, 1);
-        return false;
+    if (!splats) {
+        response.set_header("Retry-After", "1");
+        return refuse(response, 503, "no splats have been taken yet; ask again");
     }
-    if (!client.trusted) ++trusted_;
-    client.trusted = true;
-    client.waiting = false;
-    return give(socket, std::string());
+    response.set_header("ETag", tag);
+    response.set_header("Ewa-Step", std::to_string(splats->step));
+    give_ply(response, splats, std::move(guest));
 }
 
-bool Server::answer(Client& client, const std::string& request) {
-    const Socket& socket = client.socket;
-    std::string_view rest = request;
-    const std::string_view word = core::next_word(rest);
-    const std::string argument(core::trim(rest));
-    if (request == kHello) return give(socket, std::string());
-    if (word == "token") return take_token(client, argument);
-    if (client.waiting) {
-        socket.send(kFull, 1);
-        return false;
-    }
-    if (word == "status") {
-        const auto line = core::parse_integer<uint32_t>(argument);
-        return line ? give(socket, status_from(*line, client.trusted))
-                    : socket.send("no status wants a number\n", 1);
-    }
-    if (word == "splats") {
-        const auto step = core::parse_integer<int>(argument);
-        if (!step) return socket.send("no splats wants a step\n", 1);
-        const auto snapshot = splats_after(*step);
-        return give(socket, snapshot ? encode(*snapshot) : std::vector<std::byte>());
-    }
-    if (word != "pause" && word != "go" && word != "save")
-        return socket.send("no there is no such request\n", 1);
-    if (!client.trusted) return socket.send("no this needs the token\n", 1);
-    if (word == "save")
+void Server::command(const std::string& path) {
+    const std::lock_guard lock(mutex_);
+    if (path == "/save")
         save_ = true;
     else
-        paused_ = client.paused = word == "pause";
-    return give(socket, std::string());
+        paused_ = path == "/pause";
+}
+
+void Server::answer(const Request& request, Response& response) {
+    if (request.get_header_value_count("Host") != 1 || !own_host(request.get_header_value("Host")))
+        return refuse(response, 403, "the Host header must be localhost or an address in numbers");
+    if (of_a_web_page(request)) return refuse(response, 403, "requests from web pages are refused");
+    if (has_body(request)) return refuse(response, 413, "a request has no body here");
+    const std::string shown = request.get_header_value("Authorization");
+    const bool trusted = !token_.empty() && same_secret(shown, "Bearer " + token_);
+    if (!shown.empty() && !trusted) return refuse(response, 401, "this is not the run's token");
+    const auto guest = enter(trusted);
+    if (!guest) return refuse(response, 503, "too many clients without the token; try again");
+
+    const bool get = request.method == "GET" || request.method == "HEAD";
+    const std::string& path = request.path;
+    if (get && path == "/status") {
+        const bool lines = request.has_param("metrics");
+        const auto first = core::parse_integer<uint32_t>(lines ? request.get_param_value("metrics") : "0");
+        if (!first) return refuse(response, 400, "metrics wants the number of the first line");
+        return give_text(response, status_from(lines ? *first : SIZE_MAX, trusted), "application/json",
+                         guest);
+    }
+    if (get && path == "/splats") return give_splats(request, response, trusted, guest);
+    if (request.method != "POST" || (path != "/pause" && path != "/resume" && path != "/save"))
+        return refuse(response, 404, "there is GET /status, /splats and POST /pause, /resume, /save");
+    if (!trusted) {
+        response.set_header("WWW-Authenticate", "Bearer");
+        return refuse(response, 401, "this needs the token: Authorization: Bearer TOKEN (see live.json)");
+    }
+    command(path);
+    give_text(response, "done\n", "text/plain", guest);
 }
 
 }  // namespace ewa::live

@@ -1,89 +1,111 @@
 // SPDX-License-Identifier: Apache-2.0
-// The trainer's side: lets others look on (protocol.h). The training loop leaves here what there is to see,
-// and never waits for whoever sees it.
+// The trainer's side: an HTTP server through which others watch and command a training run.
+//
+//   GET /status[?metrics=N]  JSON: see status.h. "metrics" are the lines of metrics.jsonl from the N-th on,
+//   at
+//                            most kMostLines of them, and none without ?metrics.
+//   GET /splats              The splats as PLY (io/ply.h). ETag names them, Ewa-Step is their step. Asking
+//                            makes the trainer take newer ones. 304 where If-None-Match names the newest.
+//                            Without If-None-Match the answer waits up to 5 seconds for splats of the step
+//                            at which it was asked, and is 503 where none have ever been taken.
+//   POST /pause              Holds the training before its next step, while requests with the token keep
+//                            coming: 10 seconds after the last one it continues by itself.
+//   POST /resume, /save      Continue; save splats and checkpoint.
+//
+// A POST needs "Authorization: Bearer TOKEN". GET works without; a wrong token is refused everywhere.
+// An error is one line of text.
+//
+// Strangers reach the port. The server therefore
+// - refuses a Host that is neither an address in numbers nor localhost (DNS rebinding), and whatever a web
+//   page sends (Origin, Sec-Fetch-Site);
+// - reads 4 KiB of request line and headers at most, within 2 seconds, and never a body;
+// - answers one request a connection, 64 at a time; a newcomer takes the place of the connection that has
+//   waited longest without a request (http_server.h);
+// - answers kMostStrangers without the token at a time, and gives those one set of splats, so that slow
+//   readers keep no other sets in memory;
+// - ends an answer that is read slower than 16 KB/s (wire.h).
 #pragma once
-#include <atomic>
 #include <chrono>
-#include <functional>
-#include <list>
+#include <condition_variable>
 #include <memory>
 #include <mutex>
-#include <thread>
+#include <string>
 
-#include "live/protocol.h"
-#include "live/socket.h"
+#include "ewa/gaussians.h"
+#include "live/status.h"
+
+namespace httplib {
+struct Request;
+struct Response;
+}  // namespace httplib
 
 namespace ewa::live {
 
+class HttpServer;
+
+inline constexpr size_t kMostStrangers = 8;
+inline constexpr std::chrono::seconds kLease{10};
+
+struct Snapshot {
+    int step = 0;
+    Gaussians gaussians;
+};
+
+/// 128 bits from the system's random source, in hexadecimal. Throws RunError.
+std::string random_token();
+
+/// Safe to use from several threads. The training loop never waits for a client.
 class Server {
   public:
-    /// token: what commands are taken for; empty: from nobody. silence: after which one's place may go to a
-    /// newcomer. Throws RunError where the address cannot be listened on.
+    /// Listens at once. port 0: any free one. token: empty refuses all commands. lease: how long a pause
+    /// outlasts the last request with the token. Throws RunError where the address cannot be listened on.
     Server(const std::string& address, uint16_t port, std::string token,
-           std::chrono::seconds silence = std::chrono::seconds(kSilence));
+           std::chrono::milliseconds lease = kLease);
     ~Server();
     Server(const Server&) = delete;
     Server& operator=(const Server&) = delete;
 
-    uint16_t port() const { return listener_.port(); }
+    uint16_t port() const;
 
-    // For the training loop's thread.
+    // For the training loop.
 
-    /// What status answers with; its metrics and commands are not looked at.
+    /// What /status answers from now on. Members run, commands and metrics are ignored.
     void report(const Status& status);
     void add_metrics(const report::MetricsLine& line);
-    /// Whether splats of this step should be taken: somebody asked since the last ones, and taking them costs
-    /// at most a twentieth of the time.
+    /// Whether splats of this step should be taken: somebody asked since the last ones, and taking them
+    /// costs at most a twentieth of the time.
     bool wants_splats(int step) const;
-    /// Splats, and how long taking them took.
+    /// seconds: how long taking them took.
     void offer(Snapshot&& snapshot, double seconds);
-    bool paused() const { return paused_; }
-    /// Whether a saving has been asked for since the last call.
-    bool take_save() { return save_.exchange(false); }
+    bool paused();
+    /// Whether saving was asked for since the last call.
+    bool take_save();
 
   private:
     using Clock = std::chrono::steady_clock;
-    struct Client {
-        Socket socket;
-        std::thread thread;
-        std::atomic<bool> done = false;
-        std::atomic<bool> trusted = false;                    // it has shown the token
-        std::atomic<bool> waiting = false;                    // it has no place, and has to show the token
-        std::atomic<bool> asking = false;                     // a request of it is being answered
-        std::atomic<Clock::time_point> heard = Clock::now();  // the end of its last request
-        bool paused = false;                                  // it holds the training
-    };
-    void listen();
-    /// Whether there is a place for a newcomer, once one that is silent has given way.
-    bool make_room();
-    /// Ends the one silent longest, for `least` at least, of those without the token that wait or that do
-    /// not.
-    bool end_silent(bool waiting, Clock::duration least);
-    size_t count(std::atomic<bool> Client::*which) const;
-    void serve(Client& client);
-    /// False: the connection ends.
-    bool answer(Client& client, const std::string& request);
-    bool take_token(Client& client, const std::string& token);
-    bool give(const Socket& socket, std::span<const std::byte> payload) const;
-    bool give(const Socket& socket, const std::string& payload) const;
-    std::string status_from(size_t line, bool trusted) const;
-    std::shared_ptr<const Snapshot> splats_after(int step);
-    void forget_finished();
 
-    const std::string token_;
-    const Clock::duration silence_;
-    Listener listener_;
-    mutable std::mutex mutex_;
+    void answer(const httplib::Request& request, httplib::Response& response);
+    void give_splats(const httplib::Request& request, httplib::Response& response, bool trusted,
+                     std::shared_ptr<void> guest);
+    std::string status_from(size_t line, bool trusted);
+    /// The newest splats, or null. fresh: waits for those of the present step, a bounded time.
+    std::shared_ptr<const Snapshot> splats_for(bool trusted, bool fresh);
+    void command(const std::string& path);
+    /// Counts a request until the pointer is gone. Null: there are too many without the token.
+    std::shared_ptr<void> enter(bool trusted);
+    bool paused_now();  // under mutex_
+
+    const std::string token_, run_ = random_token();
+    const std::chrono::milliseconds lease_;
+    mutable std::mutex mutex_;  // of what follows but http_
+    std::condition_variable news_;
     Status status_;
-    std::shared_ptr<const Snapshot> snapshot_;
-    Clock::time_point next_snapshot_;
-    std::list<Client> clients_;
-    std::atomic<int> trusted_ = 0;  // of the clients
-    std::atomic<bool> wanted_ = false, paused_ = false, save_ = false, stop_ = false;
-    std::thread thread_;  // last
+    std::shared_ptr<const Snapshot> splats_;
+    std::weak_ptr<const Snapshot> given_;  // to those without the token, while any of them reads it
+    Clock::time_point next_splats_, lease_end_;
+    size_t trusted_ = 0, strangers_ = 0;  // requests that are being answered
+    bool wanted_ = false, paused_ = false, save_ = false, stop_ = false;
+    std::unique_ptr<HttpServer> http_;  // last: its threads use the rest
 };
-
-/// 128 bits from the system's source, as text.
-std::string random_token();
 
 }  // namespace ewa::live

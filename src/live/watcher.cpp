@@ -118,6 +118,8 @@ void Watcher::work() {
             look();
         } catch (const std::exception& error) {
             client_.reset();
+            run_.clear();
+            tag_.clear();
             problem = error.what();
         }
         if (update().problem != problem || update().connected != bool(client_))
@@ -132,33 +134,33 @@ void Watcher::work() {
 }
 
 void Watcher::look() {
-    const auto connect = [this](const Address& address, const std::string& token) {
-        client_ = std::make_unique<Client>(address, token, &stop_);
-        fresh_ = true;
-    };
-    if (!client_ && what_.address) connect(*what_.address, what_.token);
+    if (!client_ && what_.address) client_ = std::make_unique<Client>(*what_.address, what_.token, &stop_);
     if (!client_ && !what_.folder.empty()) {
         try {
-            const auto live = read_live_file(what_.folder);
-            if (live) connect({"127.0.0.1", live->port}, live->token);
+            if (const auto live = read_live_file(what_.folder)) {
+                auto client = std::make_unique<Client>(Address{"127.0.0.1", live->port}, live->token, &stop_);
+                client->status(UINT32_MAX);
+                client_ = std::move(client);
+            }
         } catch (const std::exception&) {
-            // The trainer that wrote it is no more, or is another user's: its files remain.
+            // The trainer that wrote the file has gone, or belongs to another user. The run's files remain.
         }
     }
     if (client_) return look_by_connection();
     if (!what_.folder.empty()) look_at_files();
-    if (next_command()) throw InputError("the training cannot be reached; --serve lets it be");
+    if (next_command()) throw InputError("the training cannot be reached; start it with --serve");
 }
 
 void Watcher::look_by_connection() {
     while (const auto name = next_command()) client_->command(*name);
-    // Behind a new connection there may be another run, begun anew in the same place: nothing of what is
-    // known holds.
-    const bool fresh = fresh_;
     const Update before = update();
-    Status status = client_->status(fresh ? 0 : before.status.metrics.size());
-    const std::optional<Snapshot> splats = client_->splats(fresh ? -1 : before.splats_step);
-    fresh_ = false;
+    Status status = client_->status(run_.empty() ? 0 : before.status.metrics.size());
+    const bool fresh = status.run != run_;
+    if (fresh && !run_.empty()) status = client_->status(0);
+    run_ = status.run;
+    if (fresh) tag_.clear();
+    std::optional<TaggedSplats> splats = client_->splats(tag_);
+    if (splats) tag_ = splats->tag;
     const bool same = !splats && status.metrics.empty() && status.step == before.status.step &&
                       status.state == before.status.state && before.connected;
     if (same) return;
@@ -173,7 +175,7 @@ void Watcher::look_by_connection() {
         update.status.metrics = std::move(metrics);
         update.connected = true;
         if (!splats) return;
-        update.splats = std::make_shared<const Gaussians>(splats->gaussians);
+        update.splats = std::make_shared<const Gaussians>(std::move(splats->gaussians));
         update.splats_step = splats->step;
     });
 }

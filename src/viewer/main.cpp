@@ -9,7 +9,7 @@
 #include <new>
 #include <utility>
 
-#include "cli/manual.h"
+#include "core/help_text.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "viewer/app.h"
@@ -32,7 +32,6 @@ struct Arguments {
     PanelSettings settings;
     bool antialias = false;
     DeviceOptions device;
-    std::string manual;
     bool verbose = false;
 };
 
@@ -158,58 +157,55 @@ Startup open(const Arguments& arguments) {
 }
 
 void add_options(CLI::App& app, Arguments& arguments) {
-    app.add_option(
-           "PATH", arguments.path,
-           "Splats (.ply .compressed.ply .splat .spz .glb .gltf), a dataset, or the folder of a training run")
+    app.add_option("PATH", arguments.path,
+                   "A splat file (.ply .compressed.ply .splat .spz .glb .gltf), a dataset, or the folder of "
+                   "a training run")
         ->type_name("");
     CLI::Option* train = app.add_flag(
         "--train", arguments.train,
-        "Train on the dataset and look on; further options are those of ewa train, such as --steps");
+        "Train on the dataset and show the progress. Other options are passed to ewa train, such as --steps");
     app.add_option("-o,--output", arguments.output,
-                   "With --train: the run's folder [out/<name of the dataset>]")
+                   "With --train: the folder of the run [out/<name of the dataset>]")
         ->needs(train)
         ->type_name("DIR");
-    app.add_option("--connect", arguments.connect, "Look on at a training that was started with --serve")
+    app.add_option("--connect", arguments.connect, "Show a training that runs with --serve")
         ->excludes(train)
         ->type_name("HOST:PORT");
     app.add_option("--token", arguments.token,
-                   "With --connect: lets you pause and save; the run's live.json has it")
+                   "With --connect: allows pause and save. live.json in the folder of the run holds it")
         ->type_name("TEXT");
-    app.add_option("--cameras", arguments.cameras, "A dataset whose cameras to look through")
+    app.add_option("--cameras", arguments.cameras, "A dataset whose cameras the window offers")
         ->type_name("DATASET");
-    app.add_option("--frame", arguments.frame, "Which of its cameras to start from, in name order (0)")
+    app.add_option("--frame", arguments.frame, "The camera to start from, numbered in name order [0]")
         ->type_name("I");
     app.add_option("--mode", arguments.settings.look.mode,
                    "color, depth, alpha, count (splats per pixel) or ellipsoids")
         ->transform(CLI::CheckedTransformer(kModes).description(""))
         ->type_name("MODE");
     app.add_option("--compare", arguments.settings.comparison,
-                   "The photograph of the camera: none, beside, wipe or difference")
+                   "How to show the image of the camera: none, beside, wipe or difference")
         ->transform(CLI::CheckedTransformer(kComparisons).description(""))
         ->type_name("HOW");
     app.add_option("--background", arguments.background, "Colour behind the splats: r,g,b in 0..1")
         ->type_name("COLOUR");
-    app.add_flag("--antialias", arguments.antialias, "Draw with Mip-Splatting's filter");
+    app.add_flag("--antialias", arguments.antialias, "Render with the filter of Mip-Splatting");
     app.add_option("--size", arguments.size,
-                   "Of the window, in px; otherwise in the camera's shape, as there is room")
+                   "Size of the window in pixels [the shape of the camera, as large as the screen allows]")
         ->type_name("WxH");
-    app.add_option("--screenshot", arguments.picture,
-                   "Write what the window shows as a PNG, without the panel, and end")
+    app.add_option("--screenshot", arguments.picture, "Write the view as a PNG, without the panel, and quit")
         ->type_name("FILE");
     app.add_option("--views", arguments.views, "Saved views, as the window writes them")->type_name("FILE");
-    app.add_option("--film", arguments.film, "Write a film through the saved views, a PNG a frame, and end")
+    app.add_option("--film", arguments.film,
+                   "Write a film through the saved views, one PNG for each frame, and quit")
         ->type_name("DIR");
-    app.add_option("--film-seconds", arguments.settings.film_seconds, "From view to view (2)")
+    app.add_option("--film-seconds", arguments.settings.film_seconds, "Seconds from one view to the next [2]")
         ->check(CLI::Range(0.04f, 3600.0f).description(""))
         ->type_name("S");
     app.add_option("--device", arguments.device.selector,
-                   "Number or part of the name of the device that draws (see ewa devices)")
+                   "The device that renders: its number or a part of its name (see ewa devices)")
         ->type_name("NAME|N");
     app.add_flag("--verbose", arguments.verbose,
-                 "At the end: when the first picture was there, how many came while the camera moved");
-    // Without a group it stands in no help: the build calls it.
-    app.add_option("--manual", arguments.manual, "Write the manual page and shell completions below DIR")
-        ->group("");
+                 "At the end, print the time of the first picture and the frame rate while the camera moved");
 }
 
 /// Opens the device while the scene is being read. OpenDevice gives that one first, and then opens it anew.
@@ -234,13 +230,9 @@ class DeviceOpener {
     std::shared_ptr<std::shared_ptr<gpu::Device>> first_ = std::make_shared<std::shared_ptr<gpu::Device>>();
 };
 
-int run(const CLI::App& app, const Arguments& arguments) {
+int run(const Arguments& arguments) {
     const auto started = std::chrono::steady_clock::now();
     try {
-        if (!arguments.manual.empty()) {
-            cli::write_manual(app, arguments.manual);
-            return kDone;
-        }
         DeviceOpener opener(arguments.device);
         Startup startup = open(arguments);
         startup.started = started;
@@ -282,7 +274,12 @@ int main(int argc, char** argv) {
     CLI::App app{"Shows a 3D Gaussian splat scene in a window. F1 in the window lists its keys."};
     app.name("ewa-view");
     app.set_version_flag("--version", "ewa-view " EWA_VERSION);
-    app.get_formatter()->column_width(34);
+    app.formatter_fn([](const CLI::App* shown, const std::string& name, CLI::AppFormatMode mode) {
+        constexpr size_t kColumn = 30;  // of the descriptions
+        CLI::Formatter formatter;
+        formatter.column_width(kColumn);
+        return core::help_text(formatter.make_help(shown, name, mode), kColumn);
+    });
     Arguments arguments;
     add_options(app, arguments);
     app.allow_extras();
@@ -295,5 +292,5 @@ int main(int argc, char** argv) {
         if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) return app.exit(error);
         return fail(std::string(error.what()) + " (see ewa-view --help)", kWrongUse);
     }
-    return run(app, arguments);
+    return run(arguments);
 }

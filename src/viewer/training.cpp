@@ -84,13 +84,13 @@ std::optional<std::string> draw_training(const live::Update& run) {
     if (psnr.size() == 1) ImGui::Text("held-out PSNR %.2f dB", double(psnr.front()));
     if (run.connected && status.commands && status.state != live::State::done) {
         const bool paused = status.state == live::State::paused;
-        if (ImGui::Button(paused ? "Go on" : "Pause")) command = paused ? "go" : "pause";
+        if (ImGui::Button(paused ? "Resume" : "Pause")) command = paused ? "resume" : "pause";
         ImGui::SameLine();
         if (ImGui::Button("Save now")) command = "save";
     } else if (run.connected && status.state != live::State::done) {
-        ImGui::TextDisabled("looking on; --token lets you pause it");
+        ImGui::TextDisabled("watching; --token lets you pause and save");
     } else if (status.state != live::State::done) {
-        ImGui::TextDisabled("by the files that it writes");
+        ImGui::TextDisabled("watching the files of the run");
     }
     if (!run.problem.empty()) ImGui::TextWrapped("%s", run.problem.c_str());
     return command;

@@ -12,11 +12,10 @@
 
 namespace ewa::viewer {
 
-/// What the user asked for in it: pause, go or save.
+/// Draws the panel. Returns what the user asked for in it: pause, resume or save.
 std::optional<std::string> draw_training(const live::Update& run);
 
-/// `ewa train` from beside this program, with `--serve 0`. It runs at its own pace: nothing here makes it
-/// wait.
+/// `ewa train` from beside this program, with `--serve 0`. It never waits for the window.
 class TrainProcess {
   public:
     /// arguments: DATASET and whatever options of ewa train. Throws RunError where it cannot be started.

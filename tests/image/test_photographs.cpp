@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// SyntheticDataset as captures have them: turned, of several sizes, deep, with smaller copies beside them.
+// Images as captures have them: turned, of several sizes, deep, with smaller copies beside them.
 #include <OpenImageIO/imageio.h>
 
 #include <cmath>

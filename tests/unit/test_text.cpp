@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "core/help_text.h"
+
 namespace {
 
 using ewa::core::one_line;
@@ -29,6 +31,25 @@ TEST(Text, OneLineShowsWhatItIsSafeToShow) {
         EXPECT_EQ(one_line(shown), shown);
     }
     EXPECT_EQ(one_line(""), "");
+}
+
+TEST(Text, HelpBreaksBetweenWords) {
+    const std::string twelve = "twelve chars", long_word(90, 'x');
+    const auto repeated = [&](int count) {
+        std::string text = twelve;
+        for (int i = 1; i < count; ++i) text += " " + twelve;
+        return text;
+    };
+    using ewa::core::help_text;
+    EXPECT_EQ(help_text("", 10), "");
+    EXPECT_EQ(help_text("a\n\n  b\n", 10), "a\n\n  b\n");
+    EXPECT_EQ(help_text(std::string(80, 'x'), 10), std::string(80, 'x') + "\n");
+    EXPECT_EQ(help_text(long_word, 10), long_word + "\n") << "a word is never broken";
+    EXPECT_EQ(help_text(repeated(7), 10), repeated(6) + "\n" + twelve + "\n");
+    EXPECT_EQ(help_text("  -o,--out   " + repeated(6), 13),
+              "  -o, --out  " + repeated(5) + "\n" + std::string(13, ' ') + twelve + "\n");
+    EXPECT_EQ(help_text(std::string(13, ' ') + repeated(6), 13),
+              std::string(13, ' ') + repeated(5) + "\n" + std::string(13, ' ') + twelve + "\n");
 }
 
 }  // namespace

@@ -96,7 +96,9 @@ bool in_double(const Gaussians& gaussians) {
     return gaussians.origin != glm::dvec3(0);
 }
 
-std::string header(const Gaussians& gaussians, const SaveOptions& options) {
+}  // namespace
+
+std::string ply_header(const Gaussians& gaussians, const SaveOptions& options) {
     std::string text = "ply\nformat binary_little_endian 1.0\n";
     for (const std::string& comment : options.comments) text += "comment " + core::one_line(comment) + "\n";
     if (options.antialiased && !any_antialiased(options.comments)) text += "comment SplatRenderMode: mip\n";
@@ -114,7 +116,12 @@ std::string header(const Gaussians& gaussians, const SaveOptions& options) {
     return text + "end_header\n";
 }
 
-void append_row(const Gaussians& gaussians, size_t i, std::vector<float>& rows) {
+size_t ply_row_bytes(const Gaussians& gaussians) {
+    const size_t positions = in_double(gaussians) ? 6 : 3;  // in floats
+    return sizeof(float) * (positions + 3 + gaussians.sh_stride() + 1 + 3 + 4);
+}
+
+void append_ply_row(const Gaussians& gaussians, size_t i, std::vector<float>& rows) {
     const size_t stride = gaussians.sh_stride();
     const auto append = [&](const float* values, size_t n) { rows.insert(rows.end(), values, values + n); };
     if (in_double(gaussians)) {
@@ -133,8 +140,6 @@ void append_row(const Gaussians& gaussians, size_t i, std::vector<float>& rows) 
     append(&gaussians.log_scales[3 * i], 3);
     append(&gaussians.quaternions[4 * i], 4);
 }
-
-}  // namespace
 
 SplatScene read_ply(const std::filesystem::path& path) {
     PlyTable table(path);
@@ -177,11 +182,11 @@ std::vector<std::string> write_ply(const std::filesystem::path& path, const Gaus
     assert(gaussians.means.size() == 3 * n && gaussians.quaternions.size() == 4 * n);
     assert(gaussians.log_scales.size() == 3 * n && gaussians.sh.size() == gaussians.sh_stride() * n);
     core::AtomicFile file(path);
-    file.write(header(gaussians, options));
+    file.write(ply_header(gaussians, options));
     constexpr size_t kRowsAtOnce = 4096;
     std::vector<float> rows;
     for (size_t i = 0; i < n; ++i) {
-        append_row(gaussians, i, rows);
+        append_ply_row(gaussians, i, rows);
         if ((i + 1) % kRowsAtOnce == 0 || i + 1 == n) {
             file.write(rows.data(), rows.size() * sizeof(float));
             rows.clear();

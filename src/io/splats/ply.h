@@ -25,4 +25,10 @@ SplatScene read_ply(const std::filesystem::path& path);
 std::vector<std::string> write_ply(const std::filesystem::path& path, const Gaussians& gaussians,
                                    const SaveOptions& options);
 
+/// The bytes that write_ply would write, in pieces: the header, then the rows of the splats.
+std::string ply_header(const Gaussians& gaussians, const SaveOptions& options);
+size_t ply_row_bytes(const Gaussians& gaussians);
+/// Appends the row of splat i, ply_row_bytes() / 4 floats, to `rows`.
+void append_ply_row(const Gaussians& gaussians, size_t i, std::vector<float>& rows);
+
 }  // namespace ewa::io

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// The state of a training run, as GET /status answers it.
+#pragma once
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "report/summary.h"
+
+namespace ewa::live {
+
+inline constexpr size_t kMostLines = 2000;  // of metrics in one answer
+
+enum class State { running, paused, done };
+
+struct Status {
+    std::string run = {};  // a name drawn for each run: a new run may answer at an old run's address
+    int step = 0, steps = 0;
+    uint32_t splats = 0;
+    double loss = 0, seconds = 0;  // loss: NaN before the first step; seconds: of training alone
+    State state = State::running;
+    bool commands = false;  // whether this client may give commands
+    std::vector<report::MetricsLine> metrics = {};
+};
+
+/// One JSON object with the members of Status by name; "state" is "running", "paused" or "done".
+std::string encode(const Status& status);
+/// Throws InputError that names the member.
+Status decode_status(const std::string& text);
+
+}  // namespace ewa::live

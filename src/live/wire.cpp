@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "live/wire.h"
+
+#include <poll.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <cerrno>
+
+namespace ewa::live {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr milliseconds kNap(100);    // between looks at `stop`
+constexpr uint64_t kLeastRate = 16;  // bytes a millisecond that a reader must take
+
+bool try_again() {
+    return errno == EINTR || errno == EAGAIN || errno == EWOULDBLOCK;
+}
+
+}  // namespace
+
+Wire::Wire(int socket, uint64_t bytes, milliseconds patience, const std::atomic<bool>* stop,
+           milliseconds write_grace)
+    : socket_(socket),
+      left_(bytes),
+      patience_(patience),
+      write_grace_(write_grace),
+      stop_(stop),
+      due_(Clock::now() + patience) {}
+
+void Wire::allow(uint64_t bytes) {
+    left_ += bytes;
+    each_wait_ = true;
+}
+
+bool Wire::ready(short events, Clock::time_point due) const {
+    for (;;) {
+        if (stop_ && *stop_) return false;
+        const auto left = std::max(milliseconds(0), std::chrono::ceil<milliseconds>(due - Clock::now()));
+        const auto nap = stop_ ? std::min(left, kNap) : left;
+        pollfd waiting{socket_, events, 0};
+        const int result = poll(&waiting, 1, int(nap.count()));
+        if (result > 0) return true;
+        if (result < 0 && errno != EINTR) return false;
+        if (Clock::now() >= due) return false;
+    }
+}
+
+ssize_t Wire::read(char* to, size_t size) {
+    size = size_t(std::min<uint64_t>(size, left_));
+    if (size == 0) return -1;
+    for (;;) {
+        if (!ready(POLLIN, each_wait_ ? Clock::now() + patience_ : due_)) return -1;
+        const ssize_t got = ::recv(socket_, to, size, MSG_DONTWAIT);
+        if (got < 0 && try_again()) continue;
+        if (got > 0) left_ -= uint64_t(got);
+        return got;
+    }
+}
+
+ssize_t Wire::write(const char* from, size_t size) {
+    if (written_ == 0) first_write_ = Clock::now();
+    size_t sent = 0;
+    while (sent < size) {
+        if (!ready(POLLOUT, first_write_ + write_grace_ + milliseconds(written_ / kLeastRate))) return -1;
+        const ssize_t now = ::send(socket_, from + sent, size - sent, MSG_NOSIGNAL | MSG_DONTWAIT);
+        if (now < 0 && try_again()) continue;
+        if (now <= 0) return -1;
+        sent += size_t(now);
+        written_ += uint64_t(now);
+    }
+    return ssize_t(size);
+}
+
+}  // namespace ewa::live
