@@ -8,12 +8,16 @@
 #include <vector>
 
 #include "ewa/device.h"
+#include "support/shared_by_tests.h"
 
 namespace ewa::test {
 
-inline const std::vector<std::shared_ptr<gpu::Device>>& all_devices() {
-    static const auto opened = [] {
-        std::vector<std::shared_ptr<gpu::Device>> devices;
+using Devices = std::vector<std::shared_ptr<gpu::Device>>;
+inline SharedByTests<Devices>* const devices_of_all = SharedByTests<Devices>::add();
+
+inline const Devices& all_devices() {
+    return devices_of_all->get([] {
+        Devices devices;
         if (const char* name = std::getenv("EWA_TEST_DEVICE")) {
             devices.push_back(open_device({.selector = name, .validation = true}));
             return devices;
@@ -22,8 +26,7 @@ inline const std::vector<std::shared_ptr<gpu::Device>>& all_devices() {
             if (info.unusable.empty())
                 devices.push_back(open_device({.selector = std::to_string(info.index), .validation = true}));
         return devices;
-    }();
-    return opened;
+    });
 }
 
 }  // namespace ewa::test

@@ -146,9 +146,9 @@ struct Rig {
         executor.run(commands);
     }
 };
+inline SharedByTests<Rig>* const rig_of_all = SharedByTests<Rig>::add();
 inline Rig& rig() {
-    static Rig shared_rig;
-    return shared_rig;
+    return rig_of_all->get([] { return Rig(); });
 }
 
 inline Guarded zero_counts() {

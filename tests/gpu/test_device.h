@@ -7,28 +7,29 @@
 
 #include "ewa/device.h"
 #include "gpu/device.h"
+#include "support/shared_by_tests.h"
 
 namespace ewa::test {
 
+using SharedDevice = SharedByTests<std::shared_ptr<gpu::Device>>;
+inline SharedDevice* const checked_device_of_all = SharedDevice::add();
+inline SharedDevice* const unchecked_device_of_all = SharedDevice::add();
+
+inline std::shared_ptr<gpu::Device> open_test_device(bool validation) {
+    DeviceOptions options;
+    if (const char* name = std::getenv("EWA_TEST_DEVICE")) options.selector = name;
+    options.validation = validation;
+    return open_device(options);
+}
+
 inline std::shared_ptr<gpu::Device> device() {
-    static const std::shared_ptr<gpu::Device> opened = [] {
-        DeviceOptions options;
-        if (const char* name = std::getenv("EWA_TEST_DEVICE")) options.selector = name;
-        options.validation = true;
-        return open_device(options);
-    }();
-    return opened;
+    return checked_device_of_all->get([] { return open_test_device(true); });
 }
 
 /// The same without the layer, for sizes that a software driver binds and the layer, by the driver's own
 /// numbers, objects to.
 inline std::shared_ptr<gpu::Device> unchecked_device() {
-    static const std::shared_ptr<gpu::Device> opened = [] {
-        DeviceOptions options;
-        if (const char* name = std::getenv("EWA_TEST_DEVICE")) options.selector = name;
-        return open_device(options);
-    }();
-    return opened;
+    return unchecked_device_of_all->get([] { return open_test_device(false); });
 }
 
 }  // namespace ewa::test

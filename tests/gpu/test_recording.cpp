@@ -278,14 +278,20 @@ std::optional<std::string> unordered_pair(const std::vector<Command>& commands) 
     return std::nullopt;
 }
 
+/// What the commands of frames() refer to.
+struct FrameParts {
+    pipeline::Model model;
+    pipeline::Frame frame;
+    gpu::Buffer camera, photo;
+    pipeline::Exposures exposures;
+};
+SharedByTests<FrameParts>* const frame_parts = SharedByTests<FrameParts>::add();
+
 /// The commands of a step of training, an opacity reset and a picture with depth.
 std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     Rig& r = rig();
     const Scene scene = random_scene(3000, 50, SplatKind::ordinary, 61, 47, 2);
-    static pipeline::Model model;
-    static pipeline::Frame frame;
-    static gpu::Buffer camera, photo;
-    static pipeline::Exposures exposures;
+    auto& [model, frame, camera, photo, exposures] = frame_parts->get([] { return FrameParts(); });
     exposures = pipeline::Exposures(*device(), 3);
     const pipeline::ExposureUse exposure{&exposures, 1, 0.01f, 1};
     model = pipeline::upload_model(*device(), scene.gaussians, 2, true);
