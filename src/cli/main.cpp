@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// ewa: reads the arguments, runs one command, and turns every failure into one line and an exit status.
+// ewa: parses the arguments, runs one command, and turns an error into one line and an exit status.
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <new>
 
 #include "cli/command.h"
+#include "cli/help_format.h"
 #include "cli/interrupt.h"
 #include "cli/manual.h"
-#include "cli/text.h"
 #include "core/text.h"
 #include "ewa/error.h"
 
@@ -33,25 +33,35 @@ int fail(const std::string& who, const std::string& what, int status) {
 int run(const Command& command) {
     const std::string who = "ewa " + command.app->get_name();
     try {
-        leave_nothing_when_ended();
+        remove_temporary_files_on_signals();
         const int status = command.action();
-        // A full disk behind a redirected output shows up only here.
+        // If output is redirected to a full disk, only this flush fails.
         if (std::fflush(stdout) != 0)
             return fail(who, std::string("cannot write to standard output: ") + std::strerror(errno),
                         kFailed);
-        if (std::ferror(stdout)) return fail(who, "could not write all to standard output", kFailed);
+        if (std::ferror(stdout)) return fail(who, "cannot write all of standard output", kFailed);
         return status;
     } catch (const InputError& error) {
         return fail(who, error.what(), kWrongUse);
-    } catch (const CLI::Error& error) {  // a value of --config that its option refuses
+    } catch (const CLI::Error& error) {  // an invalid value in --config
         return fail(who, error.what(), kWrongUse);
     } catch (const RunError& error) {
         return fail(who, error.what(), kFailed);
     } catch (const std::bad_alloc&) {
-        return fail(who, "out of host memory; --downscale or a smaller scene needs less", kFailed);
+        return fail(who, "out of host memory; try --downscale or a smaller scene", kFailed);
     } catch (const std::exception& error) {
         return fail(who, std::string("unexpected failure: ") + error.what(), kFailed);
     }
+}
+
+/// The word as a POSIX shell reads it back.
+std::string shell_quoted(const std::string& word) {
+    static constexpr const char* kPlain =
+        "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=./,:@%";
+    if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
+    std::string quoted = "'";
+    for (const char c : word) quoted += c == '\'' ? "'\\''" : std::string(1, c);
+    return quoted + "'";
 }
 
 std::string command_line(int argc, char** argv) {
@@ -68,30 +78,29 @@ int main(int argc, char** argv) {
     app.name("ewa");
     app.set_version_flag("--version", "ewa " EWA_VERSION);
     app.require_subcommand(1);
-    app.get_formatter()->column_width(34);
+    set_help_format(app);
 
-    // Without a group it stands in no help: the build calls it.
+    // The build calls it. Without a group no help lists it.
     CLI::App* manual =
         app.add_subcommand("manual", "Writes the manual pages and shell completions below DIR");
     std::string manual_folder;
     manual->group("");
     manual->add_option("DIR", manual_folder)->required();
     Command commands[] = {
-        {app.add_subcommand("train", "From photographs with cameras to splats"), {}},
-        {app.add_subcommand("render", "Pictures of a splat scene through a dataset's cameras"), {}},
-        {app.add_subcommand("eval", "PSNR and SSIM of a splat scene against photographs"), {}},
-        {app.add_subcommand("grad", "Gradient of the training loss for one view"), {}},
-        {app.add_subcommand("convert", "From any splat format to any other, joined and edited on the way"),
+        {app.add_subcommand("train", "Train splats from images with cameras"), {}},
+        {app.add_subcommand("render", "Render a splat scene through the cameras of a dataset"), {}},
+        {app.add_subcommand("eval", "Compute PSNR and SSIM of a splat scene against images"), {}},
+        {app.add_subcommand("grad", "Compute the gradient of the training loss for one view"), {}},
+        {app.add_subcommand("convert", "Convert, join and edit splat files"), {}},
+        {app.add_subcommand("info",
+                            "Show the content of a splat file or dataset, and what rendering it skips"),
          {}},
-        {app.add_subcommand("info", "What is in a splat file or a dataset, and what rendering it leaves out"),
+        {app.add_subcommand("devices", "List the Vulkan devices of this machine"), {}},
+        {app.add_subcommand("dataset", "Render a mesh scene (glTF) into a dataset to train on"), {}},
+        {app.add_subcommand("bench",
+                            "Measure the time of each pass, and its error against the CPU reference"),
          {}},
-        {app.add_subcommand("devices", "The Vulkan devices of this machine"), {}},
-        {app.add_subcommand("dataset", "SyntheticDataset a mesh scene (glTF) into a dataset to train on"),
-         {}},
-        {app.add_subcommand("bench", "Speed of every pass, and its error against the float64 twin"), {}},
-        {app.add_subcommand("compare",
-                            "PSNR, SSIM and largest error of two pictures, folders of them, or splat scenes"),
-         {}},
+        {app.add_subcommand("compare", "Compare two images, two folders of images, or splat scenes"), {}},
     };
     const Command write_pages{manual, [&] {
                                   write_manual(app, manual_folder);
@@ -116,9 +125,8 @@ int main(int argc, char** argv) {
         for (const Command& command : commands)
             if (command.app->parsed()) who += " " + command.app->get_name();
         std::string what = error.what();
-        // CLI11 asks for a sub-command without a word on the one it does not know.
-        if (who == "ewa" && argc > 1 && argv[1][0] != '-')
-            what = "there is no command " + shell_quoted(argv[1]);
+        // CLI11 asks for a sub-command without naming the unknown one.
+        if (who == "ewa" && argc > 1 && argv[1][0] != '-') what = "unknown command " + shell_quoted(argv[1]);
         return fail(who, what + " (see " + who + " --help)", kWrongUse);
     }
     for (const Command& command : commands)
