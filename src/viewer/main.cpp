@@ -100,20 +100,20 @@ std::filesystem::path output_of(const Arguments& arguments) {
     return std::filesystem::path("out") / (path.filename().empty() ? "dataset" : path.filename());
 }
 
-Scene open_what(const Arguments& arguments, Startup& startup) {
+OpenedScene open_what(const Arguments& arguments, Startup& startup) {
     if (!arguments.connect.empty()) {
         startup.watch = live::WhatToWatch{};
         startup.watch->address = live::parse_address(arguments.connect);
         startup.watch->token = arguments.token;
         const std::filesystem::path& what = arguments.path.empty() ? arguments.cameras : arguments.path;
-        Scene scene = what.empty() ? Scene() : open_scene(what, {});
+        OpenedScene scene = what.empty() ? OpenedScene() : open_scene(what, {});
         if (!scene.gaussians) scene.gaussians = std::make_shared<const Gaussians>();
         scene.title = arguments.connect;
         return scene;
     }
     if (arguments.path.empty())
         throw InputError("PATH is required: splats, a dataset, or a run's folder (see ewa-view --help)");
-    Scene scene = open_scene(arguments.path, arguments.cameras);
+    OpenedScene scene = open_scene(arguments.path, arguments.cameras);
     if (arguments.train) {
         if (!scene.dataset || !scene.run.empty())
             throw InputError("--train needs a dataset, and " + arguments.path.string() + " is not one");
@@ -247,11 +247,8 @@ int run(const CLI::App& app, const Arguments& arguments) {
         }
         DeviceOpener opener(arguments.device);
         Startup startup = open(arguments);
-        startup.started = started;
-        const auto elapsed = [&] {
-            return std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
-        };
-        startup.read_after = elapsed();
+        startup.times.started = started;
+        startup.times.scene_read = startup.times.now();
         std::optional<TrainProcess> trainer;
         if (arguments.train) {
             std::vector<std::string> options{arguments.path.string()};
@@ -259,7 +256,7 @@ int run(const CLI::App& app, const Arguments& arguments) {
             startup.trainer = &trainer.emplace(options, startup.watch->folder);
         }
         startup.device_name = opener.name();
-        startup.device_after = elapsed();
+        startup.times.device_open = startup.times.now();
         startup.open_device = opener.function();
         App(startup).run();
         return kDone;
