@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// ewa-bench: the benchmark as a program of its own, for a machine that has a device and nothing else.
+// ewa-bench: the benchmark as a program of its own, for a machine that has only a Vulkan device.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <new>
 
 #include "bench/bench.h"
+#include "core/help_text.h"
 #include "core/text.h"
 #include "ewa/error.h"
 
@@ -19,8 +20,10 @@ int fail(const std::string& what, int status) {
 }  // namespace
 
 int main(int argc, char** argv) {
-    CLI::App app{"Speed of every pass of ewa on a Vulkan device, and its error against the float64 twin."};
+    CLI::App app{
+        "Measures the time of each pass of ewa on a Vulkan device, and its error against the CPU reference."};
     app.name("ewa-bench");
+    ewa::core::use_help_text<CLI::Formatter>(app);
     app.set_version_flag("--version", "ewa " EWA_VERSION);
     ewa::bench::Options options;
     ewa::bench::add_options(app, options);

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <thread>
 
-#include "bench/format_figures.h"
-#include "bench/spread.h"
+#include "bench/report.h"
+#include "bench/statistics.h"
 #include "gpu/executor.h"
 #include "pipeline/camera_block.h"
 #include "pipeline/capacity.h"
@@ -35,7 +35,7 @@ std::vector<Pixel> spread_pixels(const Camera& camera) {
     return pixels;
 }
 
-/// Of every pixel, shared out over the host's threads; returns seconds.
+/// Computes all pixels on all host threads. Returns seconds.
 template <class Evaluate>
 double evaluate_pixels(const std::vector<Pixel>& pixels, std::vector<glm::dvec3>& out, Evaluate evaluate) {
     out.resize(pixels.size());
@@ -71,10 +71,10 @@ struct SplattingChoice {
     Kernel kernel = Kernel::peak;
     int sh_degree = 3;
     double alpha_min = shared::ALPHA_MIN;
-    uint32_t tile_height = 0;  // 0: the device's own tile
+    uint32_t tile_height = 0;  // 0: the tile of the device
 };
 
-/// Draws the frame several times; the picture's pixels and the median time.
+/// Renders the frame several times. Returns its pixels and the median time.
 AccuracyPoint splat(const std::shared_ptr<gpu::Device>& device, const Gaussians& gaussians,
                     const Camera& camera, const RenderOptions& options, const SplattingChoice& choice,
                     const std::vector<Pixel>& pixels, const std::vector<glm::dvec3>& exact) {

@@ -50,7 +50,7 @@ bool all_good(const Result& result) {
 
 void print(const std::string& text) {
     std::fputs(text.c_str(), stdout);
-    std::fflush(stdout);  // a run takes minutes: each case shows when it is done
+    std::fflush(stdout);  // a run takes minutes: show each case when it is done
 }
 
 Result measure_all(const Options& options, const std::vector<std::string>& program) {
@@ -79,34 +79,34 @@ Result measure_all(const Options& options, const std::vector<std::string>& progr
 void add_options(CLI::App& app, Options& options) {
     app.add_option("--json", options.json, "Write the results to this file")->type_name("FILE");
     app.add_option("--cases", options.cases,
-                   "Run only the cases whose name contains one of these, or matches it with * and ?")
+                   "Run only the cases whose name contains, or matches if it has * or ?, one of these")
         ->type_name("PATTERN,...");
-    app.add_flag("--list", options.list, "List the cases and quit");
-    app.add_option("--runs", options.runs, "Runs of each case; 0: for about a second, 5 to 25 times")
+    app.add_flag("--list", options.list, "List the cases and exit");
+    app.add_option("--runs", options.runs, "Runs of each case (0: as many as fit in about a second, 5 to 25)")
         ->check(CLI::Range(0, 1000).description(""))
         ->type_name("N");
-    app.add_option("--device", options.device,
-                   "The device: its number or a part of its name (see ewa devices)")
+    app.add_option("--device", options.device, "Number of the device, or part of its name (see ewa devices)")
         ->type_name("NAME|N");
     app.add_flag("--check", options.check,
-                 "Compare the results with the CPU reference; exit status 1 at a difference");
-    app.add_flag("--large", options.large, "Also run the cases that need gigabytes, or minutes on a CPU");
+                 "Compare the results with the CPU reference; exit with status 1 if one exceeds its bound");
+    app.add_flag("--large", options.large, "Also run the cases that take gigabytes, or minutes on a CPU");
     app.add_option("--compare", options.compare,
-                   "Print the ratio of the new times to those in this file, for each case and pass")
+                   "Print new time over old time per case and pass; this file has the old ones")
         ->type_name("OLD.json");
-    app.add_option("--results", options.results, "With --compare: read the new results from this file")
+    app.add_option("--results", options.results,
+                   "With --compare: read the new results from this file instead of measuring")
         ->type_name("NEW.json");
     app.add_flag("--stability", options.stability,
-                 "Test stiff and extreme scenes against the CPU reference, and train from each; exit status "
-                 "1 if a bound is exceeded");
+                 "Compare stiff and extreme scenes with the CPU reference, and train from each; exit with "
+                 "status 1 if a bound is exceeded");
     app.add_option("FILE", options.scene,
-                   "With --stability: test this splat file instead of the built-in scenes")
+                   "With --stability: use this splat file instead of the built-in scenes")
         ->type_name("");
     app.add_option("--training-steps", options.training_steps,
                    "With --stability: training steps from each scene; 0: none")
         ->check(CLI::Range(0, 100000).description(""))
         ->type_name("N");
-    app.add_flag("--first-step", options.first_step, "What the case first_step starts as a new process")
+    app.add_flag("--first-step", options.first_step, "The new process that the case first_step starts")
         ->group("");
 }
 
@@ -115,11 +115,10 @@ int run(const Options& options, const std::vector<std::string>& program) {
     if (options.stability)
         return run_stability({options.cases, options.training_steps, options.device, options.json,
                               options.scene, options.read_splats});
-    if (!options.scene.empty())
-        throw InputError(options.scene.string() + ": a file is for --stability, which was not asked for");
+    if (!options.scene.empty()) throw InputError(options.scene.string() + ": a file needs --stability");
     if (options.first_step) return run_first_step(options.device);
     if (!options.results.empty() && options.compare.empty())
-        throw InputError("--results is for --compare, which says what they are compared with");
+        throw InputError("--results needs --compare OLD.json to compare with");
     const Json before = options.compare.empty() ? Json() : core::read_json_file<Json>(options.compare);
     if (!options.results.empty()) {
         print(compare_text(before, core::read_json_file<Json>(options.results)));

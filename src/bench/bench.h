@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The benchmark: speed per pass against what the host's cores can do, and error against the float64 twin.
-// Both `ewa bench` and the stand-alone ewa-bench are this and nothing more.
+// The benchmark: time per pass against the same work on the host's cores, and error against the CPU
+// reference. `ewa bench` and ewa-bench are two programs around it.
 #pragma once
 #include <filesystem>
 #include <functional>
@@ -22,18 +22,18 @@ struct Options {
     bool list = false, check = false, large = false, first_step = false;
     std::filesystem::path json;
     std::filesystem::path compare;  // results to compare with
-    std::filesystem::path results;  // taken in place of measuring
-    bool stability = false;         // the stability suite in place of timings
-    std::filesystem::path scene;    // of that: a splat file in place of the built-in cases
-    int training_steps = 500;       // of that
-    /// Reads a splat file, where the program can.
+    std::filesystem::path results;  // read these instead of measuring
+    bool stability = false;         // run the stability suite instead of timings
+    std::filesystem::path scene;    // with stability: a splat file instead of the built-in cases
+    int training_steps = 500;       // with stability
+    /// Reads a splat file; empty: the program cannot.
     std::function<Gaussians(const std::filesystem::path&)> read_splats;
 };
 
 void add_options(CLI::App& app, Options& options);
 
-/// program: how this program is started again to run the benchmark, its path and what stands before the
-/// options. Returns the exit status: 1 where a check is not within its bound. Throws InputError and RunError.
+/// program: the command that starts this benchmark again: its path, and the words before the options. Returns
+/// the exit status: 1 if a check exceeds its bound. Throws InputError, RunError.
 int run(const Options& options, const std::vector<std::string>& program);
 
 }  // namespace ewa::bench

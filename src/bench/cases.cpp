@@ -47,7 +47,7 @@ std::vector<Case> all_cases() {
         cases.push_back(frame_case(Kind::forward, layout, splats, width, height, sh_degree, large));
         if (train) cases.push_back(frame_case(Kind::train, layout, splats, width, height, sh_degree, large));
     };
-    add(Layout::capture, 2000, 64, 48, 1, true);  // for tests: a moment, on any device
+    add(Layout::capture, 2000, 64, 48, 1, true);  // for tests: fast on any device
     add(Layout::capture, 14000, 270, 480, 3, true);
     add(Layout::capture, 70000, 270, 480, 3, true);
     for (const auto& [width, height] : {std::pair{960, 540}, {1920, 1080}}) {

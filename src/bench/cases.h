@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The fixed set of cases. A case's name says all of it: figures of two machines or two commits are compared
-// by name.
+// The fixed set of cases. The name of a case describes it completely: results of two machines or commits are
+// compared by name.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -9,18 +9,18 @@
 namespace ewa::bench {
 
 enum class Kind {
-    forward,     // one picture
+    forward,     // render one image
     train,       // forward, loss, backward, update
     sort,        // stable radix sort of random 32-bit keys with 32-bit values
-    update,      // projection backward and Adam alone, on the slots of one training frame
-    first_step,  // a new process until its first training step is done
+    update,      // backward projection and Adam only, on the gradient slots of one training frame
+    first_step,  // a new process up to the end of its first training step
 };
 
 enum class Layout {
-    capture,  // a few large objects before a backdrop, as photographs of a table or a room give them
+    capture,  // a few large objects before a backdrop, as in a capture of a table or a room
     cloud,    // many small objects at many depths
-    sparse,   // cloud with small opaque splats: few a pixel
-    dense,    // cloud with large faint splats: many a pixel, and none of them closes it
+    sparse,   // cloud with small opaque splats: few per pixel
+    dense,    // cloud with large faint splats: many per pixel, none of which saturates it
 };
 
 struct Case {
@@ -35,12 +35,12 @@ struct Case {
 
 std::vector<Case> all_cases();
 
-/// Whether a name is meant by patterns as select_cases takes them.
+/// Whether a name matches patterns in the form of select_cases.
 bool name_matches(const std::string& name, const std::string& patterns);
 
-/// Patterns separated by commas; one that holds * or ? must match the whole name, another any part of it.
-/// Empty: all but the large ones, unless `large`. A pattern names large cases too. Throws InputError where
-/// nothing matches.
+/// Selects by patterns separated by commas. A pattern with * or ? must match the whole name, any other a part
+/// of it. Empty: all cases, without the large ones unless `large`. Patterns also select large cases. Throws
+/// InputError if none match.
 std::vector<Case> select_cases(const std::string& patterns, bool large);
 
 }  // namespace ewa::bench

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How long a new process takes until its first training step is done. Shader caches live in the driver, so
-// only new processes can tell.
+// The time from the start of a process to the end of its first training step. Drivers keep shader caches per
+// process, so a new process is needed.
 #include <fcntl.h>
 #include <spawn.h>
 #include <sys/wait.h>
@@ -10,7 +10,7 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "bench/frame_run.h"
+#include "bench/device_runs.h"
 #include "bench/measure.h"
 #include "core/temporary_folder.h"
 #include "ewa/error.h"
@@ -27,7 +27,7 @@ int64_t now_nanoseconds() {
     return duration_cast<nanoseconds>(steady_clock::now().time_since_epoch()).count();
 }
 
-/// This process's environment, with Mesa's and NVIDIA's shader caches in a folder.
+/// The environment of this process with the shader caches of Mesa and NVIDIA in a folder.
 std::vector<std::string> environment_with_cache(const std::string& folder) {
     std::vector<std::string> result;
     for (char** entry = environ; *entry; ++entry) {
@@ -48,10 +48,10 @@ std::vector<char*> pointers(std::vector<std::string>& texts) {
     return result;
 }
 
-/// What a command prints on standard output. Throws RunError unless it ends with status 0.
+/// The standard output of a command. Throws RunError unless it exits with status 0.
 std::string output_of(std::vector<std::string> command, std::vector<std::string> environment) {
     int ends[2];
-    if (pipe2(ends, O_CLOEXEC) != 0) throw RunError("cannot make a pipe");
+    if (pipe2(ends, O_CLOEXEC) != 0) throw RunError("cannot create a pipe");
     posix_spawn_file_actions_t actions;
     posix_spawn_file_actions_init(&actions);
     posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
@@ -83,7 +83,7 @@ double start_to_first_step(const std::vector<std::string>& command, const std::s
 int run_first_step(const std::string& device) {
     for (const Case& one : all_cases()) {
         if (one.kind != Kind::first_step) continue;
-        // The run that its construction makes is the step.
+        // The constructor runs the step.
         const FrameRun run(open_device({.selector = device}), make_scene(one), true);
         std::printf("%lld\n", static_cast<long long>(now_nanoseconds()));
     }

@@ -7,13 +7,12 @@
 
 #include "bench/ceiling/ceiling.h"
 #include "bench/check.h"
-#include "bench/frame_run.h"
-#include "bench/sort_run.h"
+#include "bench/device_runs.h"
 
 namespace ewa::bench {
 namespace {
 
-/// Samples by pass, in order of first appearance. Times of one run under one name are added up.
+/// Samples per pass, in order of first appearance. Times of one name within one run are added.
 class PassSamples {
   public:
     void add(const std::string& name, double milliseconds) { running(name) += milliseconds; }
@@ -49,7 +48,7 @@ PassResult& pass_of(CaseResult& result, const std::string& name) {
     return result.passes.back();
 }
 
-/// work() runs and leaves the device's own times of its passes behind.
+/// work() runs once; timings() returns the device's pass times of that run.
 template <class Work, class Timings>
 void time_passes(CaseResult& result, int runs, Work work, Timings timings) {
     PassSamples samples;
@@ -73,7 +72,7 @@ void time_passes(CaseResult& result, int runs, Work work, Timings timings) {
         [&](const std::string& name, const Spread& spread) { pass_of(result, name).time.wall = spread; });
 }
 
-/// The processor time of each pass, by submissions of their own.
+/// The CPU time of each pass, from separate submissions.
 void time_passes_apart(CaseResult& result, FrameRun& run, int runs) {
     PassSamples samples;
     repeat(runs, [&] {
@@ -104,19 +103,19 @@ void set_bytes(CaseResult& result, const std::string& name, double bytes) {
     if (PassResult* pass = find_pass(result, name)) pass->bytes = bytes;
 }
 
-/// For a pass that does little but move memory: as long as the host takes to copy as much.
+/// The ceiling of a pass that mainly moves memory: the time that the host takes to copy as many bytes.
 void set_copy_ceiling(CaseResult& result, const std::string& name, double bytes, const Bandwidth& copies) {
     set_bytes(result, name, bytes);
     set_ceiling(result, name,
                 {spread_of({bytes / copies.wall * 1e-6}), spread_of({bytes / copies.cpu * 1e-6})});
 }
 
-/// A pass of the sort reads the keys to count, then reads and writes keys and values.
+/// Each pass of the sort reads the keys to count them, then reads and writes keys and values.
 double sort_bytes(uint64_t items, const pipeline::RadixCut& cut) {
     return 20.0 * double(items) * cut.passes;
 }
 
-/// Parameters, moments and records are read and written once; slots are read.
+/// Parameters, moments and records are read and written once; gradient slots are read.
 void add_bytes(CaseResult& result, const FrameRun& run, const Bandwidth& copies) {
     const double params = double(pipeline::parameter_bytes(run.model().capacity, run.model().sh_degree));
     const double records = double(run.model().splats) * shared::RECORD_TEXELS * 16;
@@ -156,13 +155,13 @@ void add_ceilings(CaseResult& result, const FrameRun& run, int runs) {
 }
 
 void check_frame(CaseResult& result, const std::shared_ptr<gpu::Device>& device, const FrameRun& run,
-                 const Scene& scene) {
+                 const BenchScene& scene) {
     const auto add = [&](const std::vector<Check>& checks) {
         result.checks.insert(result.checks.end(), checks.begin(), checks.end());
     };
     add(check_lists(run, scene));
-    if (!within_twins_reach(result.one)) {
-        result.note = "picture and gradient not checked: the float64 twin would take minutes";
+    if (!reference_is_feasible(result.one)) {
+        result.note = "picture and gradient not checked: the CPU reference would take minutes";
         return;
     }
     add(check_picture(run, scene));
@@ -170,8 +169,8 @@ void check_frame(CaseResult& result, const std::shared_ptr<gpu::Device>& device,
     if (result.one.kind == Kind::update) add(check_update(device, scene));
 }
 
-/// Processor time tells something only of a device that runs on the processor.
-void leave_cpu_to_cpu_devices(CaseResult& result, const gpu::Device& device) {
+/// CPU time is meaningful only for a device that runs on the CPU.
+void drop_cpu_times_of_gpus(CaseResult& result, const gpu::Device& device) {
     if (device.limits().cpu) return;
     result.total.cpu = {};
     for (PassResult& pass : result.passes) pass.time.cpu = {};
@@ -181,7 +180,7 @@ CaseResult measure_frame(const std::shared_ptr<gpu::Device>& device, const Case&
                          const MeasureOptions& options, const Bandwidth& copies) {
     CaseResult result;
     result.one = one;
-    const Scene scene = make_scene(one);
+    const BenchScene scene = make_scene(one);
     FrameRun run(device, scene, one.kind != Kind::forward);
     run.run();
     const auto timings = [&] { return run.timings(); };
@@ -199,7 +198,7 @@ CaseResult measure_frame(const std::shared_ptr<gpu::Device>& device, const Case&
     add_bytes(result, run, copies);
     if (one.kind != Kind::update) add_ceilings(result, run, options.runs);
     if (options.check) check_frame(result, device, run, scene);
-    leave_cpu_to_cpu_devices(result, *device);
+    drop_cpu_times_of_gpus(result, *device);
     return result;
 }
 
@@ -216,7 +215,7 @@ CaseResult measure_sort(const std::shared_ptr<gpu::Device>& device, const Case& 
     set_bytes(result, "sort", sort_bytes(one.splats, run.cut()));
     set_ceiling(result, "sort", time_sort(one.splats, 32, options.runs));
     if (options.check) result.checks.push_back(run.check());
-    leave_cpu_to_cpu_devices(result, *device);
+    drop_cpu_times_of_gpus(result, *device);
     return result;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a case and writes down what it took.
+// Runs a case and measures it.
 #pragma once
 #include <memory>
 
@@ -11,17 +11,16 @@ namespace ewa::bench {
 struct MeasureOptions {
     int runs = 0;  // 0: see repeat()
     bool check = false;
-    std::vector<std::string>
-        first_step_command;  // the program, and what makes it run run_first_step() for a device
+    std::vector<std::string> first_step_command;  // the command that calls run_first_step() for a device
 };
 
 CaseResult measure(const std::shared_ptr<gpu::Device>& device, const Case& one, const MeasureOptions& options,
                    const Bandwidth& copies);
 
-/// Opens a device, uploads a scene, trains one step and prints the steady clock's nanoseconds at its end.
+/// Opens a device, uploads a scene, trains one step and prints the time of its end (steady clock, ns).
 int run_first_step(const std::string& device);
 
-/// Starts that command in a new process with an empty shader cache, and again with the cache it left.
+/// Runs the command in a new process, first with an empty shader cache, then with the cache of that run.
 CaseResult measure_first_step(const Case& one, const MeasureOptions& options);
 
 }  // namespace ewa::bench

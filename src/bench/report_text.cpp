@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "bench/format_figures.h"
 #include "bench/report.h"
+
+#include <cstdarg>
+#include <cstdio>
 
 namespace ewa::bench {
 namespace {
@@ -11,7 +13,7 @@ std::string share_text(double part, double whole) {
 
 std::string pass_line(const CaseResult& result, const PassResult& pass) {
     const Spread &wall = pass.time.wall, &cpu = pass.time.cpu;
-    // Of a CPU device on a busy machine the processor time says more.
+    // On a busy machine, the CPU time of a CPU device is more precise.
     const double best = cpu.samples > 0 ? cpu.median : wall.median;
     std::string line =
         text_of("  %-22s %9.3f +- %5.1f %%", pass.name.c_str(), wall.median, 100 * relative_noise(wall));
@@ -39,6 +41,25 @@ std::string total_line(const char* name, const Timed& timed) {
 }
 
 }  // namespace
+
+std::string text_of(const char* format, ...) {
+    va_list arguments, again;
+    va_start(arguments, format);
+    va_copy(again, arguments);
+    const int length = std::vsnprintf(nullptr, 0, format, arguments);
+    std::string text(size_t(length > 0 ? length : 0), '\0');
+    std::vsnprintf(text.data(), text.size() + 1, format, again);
+    va_end(again);
+    va_end(arguments);
+    return text;
+}
+
+std::string scaled(double value) {
+    const char* units[] = {"", " k", " M", " G", " T"};
+    int unit = 0;
+    for (; value >= 999.5 && unit < 4; ++unit) value /= 1000;
+    return text_of("%.3g%s", value, units[unit]);
+}
 
 std::string header_text(const Result& result) {
     const Host& host = result.host;

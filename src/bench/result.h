@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a run of the benchmark found out.
+// The results of a benchmark run.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -7,7 +7,7 @@
 
 #include "bench/cases.h"
 #include "bench/ceiling/ceiling.h"
-#include "bench/spread.h"
+#include "bench/statistics.h"
 #include "ewa/device.h"
 
 namespace ewa::bench {
@@ -15,11 +15,11 @@ namespace ewa::bench {
 struct PassResult {
     std::string name;
     Timed time;        // cpu only on a CPU device
-    double bytes = 0;  // moved at least, where that is known; else 0
-    Timed ceiling;     // the host at the same work; no samples where there is no such figure
+    double bytes = 0;  // least number moved, if known; else 0
+    Timed ceiling;     // the host at the same work; no samples: unknown
 };
 
-/// One comparison with the float64 twin, or with the rule that a sort or a scan follows.
+/// One comparison with the CPU reference, or with the rule of a sort or a scan.
 struct Check {
     std::string what;
     double error = 0;
@@ -37,15 +37,15 @@ struct CaseResult {
     uint64_t device_bytes = 0;
     Timed ceiling_blend;  // the same lists on the host
     std::vector<Check> checks;
-    std::string note;  // what was left out and why
+    std::string note;  // what was skipped, and why
 };
 
 /// log(time) = log(factor) + exponent log(x), by least squares.
 struct Scaling {
-    std::string of;       // what was fitted
+    std::string of;       // the fitted cases
     std::string against;  // "splats" or "pairs evaluated"
     double exponent = 0;
-    double residual = 0;  // root mean square of the logarithm's residuals
+    double residual = 0;  // root mean square, of the logarithms
     int points = 0;
 };
 
@@ -65,8 +65,8 @@ struct Result {
     std::vector<Scaling> scaling;
 };
 
-/// Over the forward cases: splats at each fixed image and layout with three points or more, and pairs over
-/// all.
+/// Fits time against splats for each image size and layout with at least three cases, and against evaluated
+/// pairs for all forward cases.
 std::vector<Scaling> fit_scaling(const std::vector<CaseResult>& cases);
 
 }  // namespace ewa::bench

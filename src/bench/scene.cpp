@@ -15,11 +15,11 @@
 namespace ewa::bench {
 namespace {
 
-/// What tells the layouts apart.
+/// The parameters of a layout.
 struct Style {
     int objects = 0;
-    double radius = 0;                       // of an object, as a share of its distance
-    double size = 0;                         // of a splat, as a share of the spacing
+    double radius = 0;                       // of an object, relative to its distance
+    double size = 0;                         // of a splat, relative to the spacing
     double size_spread = 0;                  // standard deviation of the logarithm
     std::array<double, 3> opacity_shares{};  // faint, middling, opaque; they add up to 1
 };
@@ -62,7 +62,7 @@ Camera camera_of(const Case& one) {
     camera.fx = camera.fy = 0.9 * std::max(one.width, one.height);
     camera.cx = 0.5 * one.width;
     camera.cy = 0.5 * one.height;
-    // Any rotation but the identity, so that nothing lines up with the axes.
+    // A rotation that is not the identity, so that nothing is aligned with the axes.
     const double c = std::cos(0.4), s = std::sin(0.4), d = std::cos(-0.3), e = std::sin(-0.3);
     const glm::dmat3 about_y(c, 0, -s, 0, 1, 0, s, 0, c), about_x(1, 0, 0, 0, d, e, 0, -e, d);
     camera.rotation = about_x * about_y;
@@ -78,7 +78,7 @@ std::vector<Object> make_objects(const Style& style, const Camera& camera) {
         const auto shape = uniform(kObjectShape, i);
         Object object;
         const double z = 2.5 * std::pow(4.0, place[0]);
-        // A quarter of the width beyond each border: a photograph never shows the whole scene.
+        // A quarter of the width beyond each border: an image never shows the whole scene.
         object.centre = {2.5 * (place[1] - 0.5) * reach.x * z, 2.5 * (place[2] - 0.5) * reach.y * z, z};
         const double radius = style.radius * z * (0.5 + place[3]);
         object.radii = radius * glm::dvec3(0.4 + shape[0], 0.4 + shape[1], 0.4 + shape[2]);
@@ -90,7 +90,7 @@ std::vector<Object> make_objects(const Style& style, const Camera& camera) {
     return objects;
 }
 
-/// A part of a sphere about the camera that fills the view and half as much again.
+/// A part of a sphere around the camera, 1.5 times as large as the view.
 struct Backdrop {
     double radius = 18;
     glm::dvec2 tangents{0};
@@ -210,8 +210,8 @@ Image make_photo(int width, int height) {
 
 }  // namespace
 
-Scene make_scene(const Case& one) {
-    Scene scene;
+BenchScene make_scene(const Case& one) {
+    BenchScene scene;
     scene.camera = camera_of(one);
     scene.gaussians.sh_degree = one.sh_degree;
     scene.gaussians.resize(one.splats);

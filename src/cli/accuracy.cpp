@@ -30,8 +30,8 @@ struct Trained {
     Gaussians gaussians;
 };
 
-/// One strategy from the dataset's points, evaluated on the held-out views now and then; that is not counted
-/// as time.
+/// Trains with one strategy from the points of the dataset. Evaluates held-out views several times; that time
+/// does not count.
 Trained train(const std::shared_ptr<gpu::Device>& device, const Dataset& dataset, const Split& split,
               const std::string& name, Strategy strategy, int steps) {
     TrainOptions options;
@@ -63,7 +63,7 @@ void print_table(const report::WorkPrecision& diagram) {
                        p.time, p.error, p.worst);
 }
 
-/// The diagram of training, where there is one.
+/// The file of the training diagram; empty: none.
 fs::path training_svg(const AccuracyArguments& arguments) {
     if (arguments.svg.empty() || arguments.steps == 0) return {};
     return fs::path(arguments.svg).replace_filename(arguments.svg.stem().string() + "_training.svg");
@@ -99,33 +99,32 @@ report::WorkPrecision rendering_diagram(const std::shared_ptr<gpu::Device>& devi
         diagram.series.push_back(std::move(out));
     }
     diagram.notes.push_back(
-        fmt::format("{} splats, {}x{}, on {}. The error is taken at {} pixels against the "
-                    "emission-absorption integral of the splats "
-                    "as 3D Gaussians, in float64 along each ray ({:.1f} s).",
+        fmt::format("{} splats, {}x{}, on {}. The error is measured at {} pixels against the "
+                    "emission-absorption integral of the splats as 3D Gaussians, computed in float64 along "
+                    "each ray ({:.1f} s).",
                     gaussians.size(), camera.width, camera.height, device_info(*device).name, accuracy.pixels,
                     accuracy.exact_seconds));
     diagram.notes.push_back(fmt::format(
-        "The ray-marcher is C++ in float64 on {} threads of the host, its time that of those pixels times "
-        "their share of "
-        "the picture; splatting is the whole frame on the device, recording and waiting included.",
+        "The ray-marcher is C++ in float64 on {} host threads; its time at those pixels is scaled to the "
+        "whole "
+        "image. The time of splatting is the whole frame on the device, with recording and waiting.",
         accuracy.threads));
     return diagram;
 }
 
 int run_accuracy(const AccuracyArguments& arguments) {
     if (arguments.splats.empty() && arguments.steps == 0)
-        throw InputError(
-            "--accuracy: with --training-steps 0 there is nothing to draw; --splats names a file");
+        throw InputError("--accuracy: --training-steps 0 leaves no scene to render; name one with --splats");
     check_files(arguments);
     Gaussians given;
     if (!arguments.splats.empty()) given = load_splats(arguments.splats);
     check_frames(arguments.dataset, "all", 0);
-    const auto photographed = load_photographed(arguments.dataset, arguments.splats, {}, arguments.device);
-    if (!photographed) return kInterruptedStatus;
-    const Dataset& dataset = photographed->dataset;
+    const auto loaded = load_with_images(arguments.dataset, arguments.splats, {}, arguments.device);
+    if (!loaded) return kInterruptedStatus;
+    const Dataset& dataset = loaded->dataset;
     const Split split = split_frames(dataset, 8);
     if (split.test.empty() || split.train.empty())
-        throw InputError(arguments.dataset.string() + ": too few photographs to hold one out");
+        throw InputError(arguments.dataset.string() + ": too few images to hold one out");
     const auto device = open_device(arguments.device);
     fmt::print("device: {}\n", device_info(*device).name);
 
@@ -133,7 +132,7 @@ int run_accuracy(const AccuracyArguments& arguments) {
         "Training: held-out PSNR against run time", "seconds of training", "PSNR, dB", true, {}, {}};
     Gaussians gaussians;
     if (arguments.steps > 0 && dataset.points.positions.empty())
-        throw InputError(arguments.dataset.string() + ": has no points to start training from");
+        throw InputError(arguments.dataset.string() + ": has no points to start the training from");
     const std::pair<const char*, Strategy> strategies[] = {
         {"none", Strategy::none}, {"mcmc", Strategy::mcmc}, {"adc", Strategy::adc}};
     for (const auto& [name, strategy] : strategies) {
@@ -143,7 +142,7 @@ int run_accuracy(const AccuracyArguments& arguments) {
         gaussians = std::move(trained.gaussians);
     }
     training.notes.push_back(
-        fmt::format("{} steps of each strategy, at most {} splats, on {}; evaluation is not counted.",
+        fmt::format("{} steps of each strategy, at most {} splats, on {}; evaluation does not count.",
                     arguments.steps, kMaxSplats, device_info(*device).name));
     if (!arguments.splats.empty()) gaussians = std::move(given);
     const report::WorkPrecision rendering =

@@ -13,18 +13,18 @@
 namespace ewa::cli {
 
 struct AccuracyArguments {
-    std::filesystem::path dataset, splats;  // splats empty: those that the training here ends with
-    std::filesystem::path json, svg;        // empty: none; beside svg stands NAME_training.svg
-    int steps = 600;                        // of each training, 0: none
+    std::filesystem::path dataset, splats;  // splats empty: the result of the training
+    std::filesystem::path json, svg;        // empty: not written; NAME_training.svg is written beside svg
+    int steps = 600;                        // of each training; 0: no training
     DeviceOptions device;
 };
 
-/// The diagram of rendering a scene from a camera.
+/// Error against run time of rendering a scene through one camera.
 report::WorkPrecision rendering_diagram(const std::shared_ptr<gpu::Device>& device,
                                         const Gaussians& gaussians, const Camera& camera,
                                         const RenderOptions& options);
 
-/// Prints tables and writes the files. Returns the exit status.
+/// Prints tables and writes the files. Returns the exit status. Throws InputError, RunError.
 int run_accuracy(const AccuracyArguments& arguments);
 
 }  // namespace ewa::cli

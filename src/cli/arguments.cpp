@@ -72,17 +72,17 @@ RenderOptions DrawArguments::options() const {
 void add_draw_options(CLI::App& app, DrawArguments& arguments) {
     app.add_option("--background", arguments.background,
                    arguments.random_allowed
-                       ? "Colour behind the splats: r,g,b in 0..1, or random (a new one each step)"
-                       : "Colour behind the splats: r,g,b in 0..1")
+                       ? "Background colour: r,g,b in 0..1, or random (a new colour each step)"
+                       : "Background colour: r,g,b in 0..1")
         ->type_name("COLOUR")
         ->capture_default_str();
     app.add_option("--kernel", arguments.kernel,
-                   "Footprint: peak (3DGS), antialias (Mip-Splatting), ewa (unit mass)")
+                   "Footprint of a splat: peak (3DGS), antialias (Mip-Splatting) or ewa (unit mass)")
         ->check(CLI::IsMember({"peak", "antialias", "ewa"}))
         ->capture_default_str();
-    app.add_flag("--antialias", arguments.antialias, "The same as --kernel antialias");
+    app.add_flag("--antialias", arguments.antialias, "Short for --kernel antialias");
     if (!arguments.degree_by_dataset) {
-        app.add_option("--sh-degree", arguments.sh_degree, "Highest degree of view-dependent colour")
+        app.add_option("--sh-degree", arguments.sh_degree, "Highest degree of the spherical harmonics")
             ->check(in_range(0, kMaxShDegree))
             ->type_name("0..3")
             ->capture_default_str();
@@ -90,9 +90,8 @@ void add_draw_options(CLI::App& app, DrawArguments& arguments) {
     }
     arguments.sh_degree = -1;
     app.add_option("--sh-degree", arguments.sh_degree,
-                   "Highest degree of view-dependent colour; auto: 3, or 0 where the dataset says that no "
-                   "colour depends on "
-                   "the view")
+                   "Highest degree of the spherical harmonics. auto: 3, or 0 if the dataset says that no "
+                   "colour depends on the view")
         ->transform(CLI::Validator(
             [](std::string& text) {
                 if (text != "auto") return CLI::Range(0, kMaxShDegree)(text);
@@ -116,9 +115,9 @@ CLI::Validator without_sign() {
 
 void add_device_options(CLI::App& app, DeviceOptions& options) {
     app.add_option("--device", options.selector,
-                   "The device: its number or a part of its name (see ewa devices)")
+                   "Number of the device, or part of its name (see ewa devices)")
         ->type_name("NAME|N");
-    app.add_flag("--validation", options.validation, "Turn the Vulkan validation layer on")
+    app.add_flag("--validation", options.validation, "Enable the Vulkan validation layer")
         ->group("For developers");
 }
 
@@ -130,9 +129,10 @@ const std::map<std::string, MaskUse> kMaskUses = {{"auto", MaskUse::automatic},
 }
 
 void add_masks_option(CLI::App& app, MaskUse& masks) {
-    app.add_option("--masks", masks,
-                   "How to use masks/ and alpha: ignore (pixels do not count), cut (the background replaces "
-                   "pixels), none, or auto: ignore if there are mask files, else cut")
+    app.add_option(
+           "--masks", masks,
+           "Use of masks/ and alpha: ignore (masked pixels do not count), cut (masked pixels show the "
+           "background), none, or auto (ignore if there are mask files, else cut)")
         ->transform(CLI::CheckedTransformer(kMaskUses).description(""))
         ->type_name("USE")
         ->default_str(masks_text(masks));
@@ -145,17 +145,43 @@ std::string masks_text(MaskUse masks) {
 }
 
 void add_downscale_option(CLI::App& app, int& downscale) {
-    app.add_option("--downscale", downscale, "Divide the width and height of the images by this")
+    app.add_option("--downscale", downscale, "Divide the width and height of the images by K")
         ->check(in_range(1, 1024))
         ->type_name("K")
         ->capture_default_str();
 }
 
 void add_test_every_option(CLI::App& app, int& test_every) {
-    app.add_option("--test-every", test_every, "Hold out every K-th image in name order; 0: none")
+    app.add_option("--test-every", test_every, "Hold out every K-th image in name order for testing; 0: none")
         ->check(in_range(0, 1000000000))
         ->type_name("K")
         ->capture_default_str();
+}
+
+void add_splats(CLI::App& app, std::filesystem::path& splats) {
+    app.add_option("SPLATS", splats, "Splat file (.ply .compressed.ply .splat .spz .glb .gltf)")
+        ->required()
+        ->type_name("");
+}
+
+void add_dataset(CLI::App& app, std::filesystem::path& dataset) {
+    app.add_option(
+           "DATASET", dataset,
+           "Images with cameras: a COLMAP folder or transforms.json. Or a glTF file of meshes, which is "
+           "rendered as in ewa train")
+        ->required()
+        ->type_name("");
+}
+
+void add_frames_options(CLI::App& app, std::string& frames, int& test_every) {
+    app.add_option("--frames", frames, "all, train, test, or indices in name order such as 0,3,7")
+        ->type_name("FRAMES")
+        ->capture_default_str();
+    add_test_every_option(app, test_every);
+}
+
+void add_quiet_option(CLI::App& app, bool& quiet) {
+    app.add_flag("--quiet", quiet, "Print only errors");
 }
 
 std::vector<int> select_frames(const Dataset& dataset, const std::string& which, int test_every) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Options that several commands have, with the same names, ranges and meaning in each.
+// Arguments that several commands share, with the same names, ranges and help texts.
 #pragma once
 #include <string>
 #include <vector>
@@ -14,23 +14,27 @@ class App;
 
 namespace ewa::cli {
 
-/// How a picture is drawn: --background, --kernel, --antialias, --sh-degree.
+/// How splats are rendered: --background, --kernel, --antialias, --sh-degree.
 struct DrawArguments {
     std::string background = "0,0,0";
     std::string kernel = "peak";
-    bool antialias = false;        // the short form of --kernel antialias
-    int sh_degree = kMaxShDegree;  // -1, in training: as the dataset needs
+    bool antialias = false;        // short for --kernel antialias
+    int sh_degree = kMaxShDegree;  // -1: auto, in training only
 
-    bool random_allowed = false;  // whether the background may be random, as in training
-
-    bool degree_by_dataset = false;  // whether sh_degree may be left to the dataset, as in training
+    // Training only.
+    bool random_allowed = false;     // --background random
+    bool degree_by_dataset = false;  // --sh-degree auto
 
     bool random_background() const { return random_allowed && background == "random"; }
-    /// Throws InputError for a background that is not three numbers of [0, 1]. A random background is black
-    /// here.
+    /// A random background is black here. Throws InputError for a background that is not three numbers in [0,
+    /// 1].
     RenderOptions options() const;
 };
 void add_draw_options(CLI::App& app, DrawArguments& arguments);
+
+/// The required positionals SPLATS and DATASET.
+void add_splats(CLI::App& app, std::filesystem::path& splats);
+void add_dataset(CLI::App& app, std::filesystem::path& dataset);
 
 /// --device and --validation.
 void add_device_options(CLI::App& app, DeviceOptions& options);
@@ -40,10 +44,13 @@ void add_masks_option(CLI::App& app, MaskUse& masks);
 std::string masks_text(MaskUse masks);
 
 void add_downscale_option(CLI::App& app, int& downscale);
+/// --frames and --test-every.
+void add_frames_options(CLI::App& app, std::string& frames, int& test_every);
+void add_quiet_option(CLI::App& app, bool& quiet);
 void add_test_every_option(CLI::App& app, int& test_every);
 
-/// Indices of frames for "all", "train", "test" or a list like "0,3,7" in name order. Throws InputError, also
-/// when there are none.
+/// The indices of the frames that --frames names: "all", "train", "test", or a list such as "0,3,7" in name
+/// order. Throws InputError, also if there are none.
 std::vector<int> select_frames(const Dataset& dataset, const std::string& which, int test_every);
 
 }  // namespace ewa::cli

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The commands of the program, one file each.
+// The commands of ewa, one file each.
 #pragma once
 #include <functional>
 #include <string>
@@ -10,11 +10,11 @@ class App;
 
 namespace ewa::cli {
 
-/// What a command does once its options are read; returns the exit status. InputError ends with 2, anything
-/// else thrown with 1.
+/// Runs a command after its options are parsed. Returns the exit status; InputError gives 2, any other
+/// exception 1.
 using Action = std::function<int()>;
 
-/// Each adds its options to its own sub-command.
+/// Each adds the options of its command to `app`.
 Action add_train(CLI::App& app, const std::string& command_line);
 Action add_render(CLI::App& app);
 Action add_eval(CLI::App& app);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// DATASET as commands take it: a folder or file as load_dataset's, or a glTF of meshes.
+// The DATASET argument of commands: what load_dataset reads, or a glTF file of meshes.
 #pragma once
 #include <memory>
 #include <optional>
@@ -7,33 +7,40 @@
 #include "core/temporary_folder.h"
 #include "ewa/dataset.h"
 #include "ewa/device.h"
+#include "ewa/synthetic_dataset.h"
 
 namespace ewa::cli {
 
-/// Whether this is a glTF of meshes: by its extension, whatever the file holds, else by what it holds.
+/// Whether the path names a glTF file of meshes: by its extension, else by its content.
 bool names_mesh_scene(const std::filesystem::path& path);
 
-/// The cameras of a dataset whose photographs need not be there. Where some are, frames without one are left
-/// out, as training leaves them out: otherwise they would shift which frames are held out.
-/// Dataset::missing_images counts them. Of a mesh scene the views that `ewa train` photographs.
+/// The cameras of a dataset, whose images may be missing. If only some are, their frames are skipped as in
+/// training, so that the same frames are held out; Dataset::missing_images counts them. Of a mesh scene: the
+/// views that `ewa train` renders.
 Dataset load_cameras_as_trained(const std::filesystem::path& path, int downscale);
 
-/// Throws InputError, as select_frames does, where a mesh scene has none of these frames: said before it is
-/// photographed. Of any other dataset load_photographed comes as soon.
+/// Throws InputError, as select_frames does, if a mesh scene has none of these frames, before it is rendered.
+/// Other datasets are checked once load_with_images has read them.
 void check_frames(const std::filesystem::path& path, const std::string& which, int test_every);
 
 /// The SH degree that `auto` stands for.
 int sh_degree_for(const Dataset& dataset);
 
-/// A dataset with its photographs.
-struct Photographed {
+/// A dataset with its images.
+struct LoadedDataset {
     Dataset dataset;
-    std::unique_ptr<core::TemporaryFolder> folder;  // that they are in for the time being, or none
+    std::unique_ptr<core::TemporaryFolder> folder;  // the temporary folder of the images, or null
 };
 
-/// Of a mesh scene: the photographs that `ewa train` left in `dataset` beside the splats, where they are of
-/// this scene; else taken now, with progress. Nothing where Ctrl-C ended that.
-std::optional<Photographed> load_photographed(const std::filesystem::path& path,
+/// Renders a mesh scene into a dataset, with progress, and prints its notes. SyntheticDataset::interrupted:
+/// Ctrl-C ended it. Throws InputError, RunError.
+SyntheticDataset render_with_progress(const DeviceOptions& device, const std::filesystem::path& scene,
+                                      const std::filesystem::path& folder, const SyntheticOptions& options,
+                                      bool quiet);
+
+/// Loads a dataset. Of a mesh scene: the images that `ewa train` left in `dataset` beside the splats, if they
+/// show this scene, else renders it into a temporary folder. Nothing if Ctrl-C ended the rendering.
+std::optional<LoadedDataset> load_with_images(const std::filesystem::path& path,
                                               const std::filesystem::path& splats,
                                               const DatasetOptions& options, const DeviceOptions& device);
 

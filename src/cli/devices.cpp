@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// ewa devices: what --device can name.
+// ewa devices: the devices that --device can name.
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
@@ -7,7 +7,7 @@
 #include <memory>
 
 #include "cli/command.h"
-#include "cli/text.h"
+#include "core/text.h"
 #include "ewa/device.h"
 #include "report/summary.h"
 
@@ -34,10 +34,11 @@ int run(bool json) {
         return 0;
     }
     if (devices.empty())
-        fmt::print("no Vulkan device; the package mesa-vulkan-drivers brings one for the CPU\n");
+        fmt::print("no Vulkan device; the package mesa-vulkan-drivers contains one for the CPU\n");
     for (const DeviceInfo& device : devices)
         fmt::print("{}  {} ({}, {}, Vulkan {}, {} lanes, {}){}\n", device.index, device.name, device.type,
-                   device.driver, device.api_version, device.subgroup_size, bytes_text(device.memory_bytes),
+                   device.driver, device.api_version, device.subgroup_size,
+                   core::bytes_text(device.memory_bytes),
                    device.unusable.empty() ? "" : "  unusable: " + device.unusable);
     return 0;
 }

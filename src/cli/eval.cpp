@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// ewa eval: PSNR and SSIM of a splat scene against a dataset's photographs.
+// ewa eval: PSNR and SSIM of a splat scene against the images of a dataset.
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
@@ -43,19 +43,18 @@ int run(const EvalArguments& arguments) {
     if (!arguments.json.empty()) check_writable(arguments.json, Folder::made);
     const Gaussians gaussians = load_splats(arguments.splats);
     check_frames(arguments.dataset, arguments.split, arguments.test_every);
-    const auto photographed =
-        load_photographed(arguments.dataset, arguments.splats,
-                          {.downscale = arguments.downscale, .masks = arguments.masks}, arguments.device);
-    if (!photographed) return kInterruptedStatus;
-    const Dataset& dataset = photographed->dataset;
+    const auto loaded =
+        load_with_images(arguments.dataset, arguments.splats,
+                         {.downscale = arguments.downscale, .masks = arguments.masks}, arguments.device);
+    if (!loaded) return kInterruptedStatus;
+    const Dataset& dataset = loaded->dataset;
     const std::vector<int> frames = select_frames(dataset, arguments.split, arguments.test_every);
 
     const Evaluation evaluation =
         evaluate(open_device(arguments.device), gaussians, dataset, frames, options);
     for (const EvalFrame& frame : evaluation.frames)
         fmt::print("{}  PSNR {:.3f} dB  SSIM {:.5f}\n", core::one_line(frame.name), frame.psnr, frame.ssim);
-    if (dataset.missing_images > 0)
-        fmt::print("{} images are missing and left out\n", dataset.missing_images);
+    if (dataset.missing_images > 0) fmt::print("{} images are missing and skipped\n", dataset.missing_images);
     fmt::print("mean of {} frames ({})  PSNR {:.3f} dB  SSIM {:.5f}  in {:.2f} s\n", evaluation.frames.size(),
                arguments.split, evaluation.psnr, evaluation.ssim, evaluation.seconds);
     if (!arguments.json.empty()) write_json(arguments.json, to_json(evaluation));
@@ -66,16 +65,9 @@ int run(const EvalArguments& arguments) {
 
 Action add_eval(CLI::App& app) {
     const auto arguments = std::make_shared<EvalArguments>();
-    app.add_option("SPLATS", arguments->splats,
-                   "The splat scene (.ply .compressed.ply .splat .spz .glb .gltf)")
-        ->required()
-        ->type_name("");
-    app.add_option("DATASET", arguments->dataset,
-                   "Images with cameras: a COLMAP folder or transforms.json, or a glTF with meshes, which is "
-                   "rendered as ewa train does")
-        ->required()
-        ->type_name("");
-    app.add_option("--split", arguments->split, "test, train or all")
+    add_splats(app, arguments->splats);
+    add_dataset(app, arguments->dataset);
+    app.add_option("--split", arguments->split, "Frames to evaluate: test, train or all")
         ->check(CLI::IsMember({"test", "train", "all"}))
         ->capture_default_str();
     add_test_every_option(app, arguments->test_every);

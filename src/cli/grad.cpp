@@ -32,7 +32,7 @@ int run(const GradArguments& arguments) {
     const RenderOptions options = arguments.draw.options();
     if (format_of_name(arguments.output) != SplatFormat::ply)
         throw InputError("--output " + arguments.output.string() +
-                         ": a gradient is written as .ply; the other formats hold no values but a splat's");
+                         ": a gradient is written as .ply; the other formats cannot store it");
     if (arguments.output.extension() != ".ply")
         throw InputError("the gradient is written as a PLY: -o " + arguments.output.string() +
                          " does not end in .ply");
@@ -43,11 +43,11 @@ int run(const GradArguments& arguments) {
     const Gaussians gaussians = load_splats(arguments.splats);
     const std::string frame_index = std::to_string(arguments.frame);
     check_frames(arguments.dataset, frame_index, 0);
-    const auto photographed =
-        load_photographed(arguments.dataset, arguments.splats,
-                          {.downscale = arguments.downscale, .masks = arguments.masks}, arguments.device);
-    if (!photographed) return kInterruptedStatus;
-    const Dataset& dataset = photographed->dataset;
+    const auto loaded =
+        load_with_images(arguments.dataset, arguments.splats,
+                         {.downscale = arguments.downscale, .masks = arguments.masks}, arguments.device);
+    if (!loaded) return kInterruptedStatus;
+    const Dataset& dataset = loaded->dataset;
     const int index = select_frames(dataset, frame_index, 0).front();
     const Frame& frame = dataset.frames[index];
     make_folder(arguments.output.parent_path());
@@ -66,8 +66,7 @@ int run(const GradArguments& arguments) {
     fmt::print("{}  loss {:.7g}  L1 {:.7g}  SSIM {:.7g}\n", core::one_line(frame.name), result.loss,
                result.l1, result.ssim);
     if (result.skipped_nonfinite > 0)
-        fmt::print("{} splats have a value that is not finite and were not drawn\n",
-                   result.skipped_nonfinite);
+        fmt::print("{} splats with a value that is not finite were skipped\n", result.skipped_nonfinite);
     fmt::print("the gradient of {} splats is in {}\n", result.gradient.size(),
                core::one_line(arguments.output.string()));
     return 0;
@@ -77,24 +76,17 @@ int run(const GradArguments& arguments) {
 
 Action add_grad(CLI::App& app) {
     const auto arguments = std::make_shared<GradArguments>();
-    app.add_option("SPLATS", arguments->splats,
-                   "The splat scene (.ply .compressed.ply .splat .spz .glb .gltf)")
-        ->required()
-        ->type_name("");
-    app.add_option("DATASET", arguments->dataset,
-                   "Images with cameras: a COLMAP folder or transforms.json, or a glTF with meshes, which is "
-                   "rendered as ewa train does")
-        ->required()
-        ->type_name("");
-    app.add_option("--frame", arguments->frame, "The view: its index in name order over all frames, from 0")
+    add_splats(app, arguments->splats);
+    add_dataset(app, arguments->dataset);
+    app.add_option("--frame", arguments->frame, "Index of the view over all frames, in name order from 0")
         ->required()
         ->check(in_range(0, 1000000000))
         ->type_name("I");
     app.add_option("-o,--output", arguments->output,
-                   "A PLY with the properties of a splat file; each holds dL/d(stored value)")
+                   "PLY with the properties of a splat file; each holds the gradient dL/d(stored value)")
         ->required()
         ->type_name("OUT.ply");
-    app.add_option("--json", arguments->json, "Write loss, l1, ssim, frame (its index) and name to this file")
+    app.add_option("--json", arguments->json, "Write loss, l1, ssim, frame (index) and name to this file")
         ->type_name("FILE");
     add_draw_options(app, arguments->draw);
     add_downscale_option(app, arguments->downscale);

@@ -1,20 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// ewa info: what is in a splat file or a dataset.
+// ewa info: the content of a splat file, and the command itself.
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <algorithm>
-#include <map>
 #include <memory>
-#include <tuple>
 
 #include "cli/arguments.h"
 #include "cli/command.h"
-#include "cli/dataset_argument.h"
-#include "cli/info_mesh.h"
+#include "cli/info_dataset.h"
 #include "cli/splat_statistics.h"
-#include "cli/text.h"
 #include "core/text.h"
 #include "ewa/dataset.h"
 #include "ewa/error.h"
@@ -43,10 +38,10 @@ Json plan_json(const std::vector<PlanLine>& lines) {
 
 void print_plan(const char* title, const std::vector<PlanLine>& lines) {
     if (lines.empty()) return;
-    fmt::print("left out when {}\n", title);
+    fmt::print("skipped when {}\n", title);
     for (const PlanLine& line : lines)
         fmt::print("  {}: {}{}\n", line.what, line.why,
-                   line.bytes_saved > 0 ? ", saves " + bytes_text(line.bytes_saved) : "");
+                   line.bytes_saved > 0 ? ", saves " + core::bytes_text(line.bytes_saved) : "");
 }
 
 void print_spread(const char* name, const Spread& spread) {
@@ -56,15 +51,16 @@ void print_spread(const char* name, const Spread& spread) {
 
 void print_file(const fs::path& path, const SplatScene& scene) {
     fmt::print("{}\nformat          {}{}, {}\n", core::one_line(path.string()), name_of(scene.format),
-               scene.variant.empty() ? "" : " (" + scene.variant + ")", bytes_text(fs::file_size(path)));
-    if (scene.antialiased) fmt::print("anti-aliased    marked so: draw it with --antialias\n");
+               scene.variant.empty() ? "" : " (" + scene.variant + ")",
+               core::bytes_text(fs::file_size(path)));
+    if (scene.antialiased) fmt::print("anti-aliased    yes: render it with --antialias\n");
     for (const std::string& comment : scene.comments)
         fmt::print("comment         {}\n", core::one_line(comment));
     for (const std::string& remark : scene.remarks)
         fmt::print("note            {}\n", core::one_line(remark));
 }
 
-int info_splats(const fs::path& path, bool json) {
+void info_splats(const fs::path& path, bool json) {
     const SplatScene scene = read_splats(path);
     const Gaussians& gaussians = scene.gaussians;
     const SplatStatistics statistics = splat_statistics(gaussians);
@@ -87,9 +83,9 @@ int info_splats(const fs::path& path, bool json) {
                           {"scale", range_json(statistics.scale)},
                           {"nonfinite", statistics.nonfinite},
                           {"plan", {{"rendering", plan_json(rendering)}, {"training", plan_json(training)}}}};
-        // A file's text may be no UTF-8, which JSON is.
+        // Text from the file may not be UTF-8; invalid bytes become U+FFFD.
         fmt::print("{}\n", out.dump(2, ' ', false, Json::error_handler_t::replace));
-        return 0;
+        return;
     }
     print_file(path, scene);
     fmt::print("splats          {}\n", gaussians.size());
@@ -99,111 +95,22 @@ int info_splats(const fs::path& path, bool json) {
                statistics.high[2]);
     print_spread("opacity", statistics.opacity);
     print_spread("scale", statistics.scale);
-    fmt::print("not drawn       {} (a value is not finite, or the quaternion is zero)\n",
+    fmt::print("undrawable      {} (a value is not finite, or the quaternion is zero)\n",
                statistics.nonfinite);
     print_plan("rendering", rendering);
     print_plan("training", training);
-    return 0;
-}
-
-const char* dataset_kind(const fs::path& path) {
-    if (!fs::is_directory(path)) return "transforms";
-    return fs::exists(path / "sparse") ? "COLMAP" : "transforms";
-}
-
-/// How many frames share a size and intrinsics, most common first.
-struct CameraGroup {
-    int frames = 0;
-    Camera camera;
-    bool distorted = false;
-};
-std::vector<CameraGroup> camera_groups(const Dataset& dataset) {
-    std::map<std::tuple<int, int, double, double, double, double, bool>, CameraGroup> groups;
-    for (const Frame& frame : dataset.frames) {
-        const Camera& c = frame.camera;
-        const bool distorted = !frame.distortion.none();
-        CameraGroup& group = groups[{c.width, c.height, c.fx, c.fy, c.cx, c.cy, distorted}];
-        group.camera = c;
-        group.distorted = distorted;
-        ++group.frames;
-    }
-    std::vector<CameraGroup> list;
-    for (const auto& [key, group] : groups) list.push_back(group);
-    std::stable_sort(list.begin(), list.end(), [](auto& a, auto& b) { return a.frames > b.frames; });
-    return list;
-}
-
-Json dataset_json(const Dataset& dataset, const char* kind, const Split& split, double extent) {
-    Json cameras = Json::array();
-    for (const CameraGroup& group : camera_groups(dataset))
-        cameras.push_back({{"frames", group.frames},
-                           {"width", group.camera.width},
-                           {"height", group.camera.height},
-                           {"fx", group.camera.fx},
-                           {"fy", group.camera.fy},
-                           {"cx", group.camera.cx},
-                           {"cy", group.camera.cy},
-                           {"distorted", group.distorted}});
-    return {{"kind", kind},
-            {"frames", dataset.frames.size()},
-            {"missing_images", dataset.missing_images},
-            {"cameras", cameras},
-            {"points", dataset.points.positions.size()},
-            {"dropped_points", dataset.dropped_points},
-            {"color_depends_on_view", dataset.color_depends_on_view},
-            {"extent", extent},
-            {"train", split.train.size()},
-            {"test", split.test.size()}};
-}
-
-void print_cameras(const Dataset& dataset) {
-    constexpr size_t kShown = 4;
-    const auto groups = camera_groups(dataset);
-    for (size_t i = 0; i < std::min(kShown, groups.size()); ++i) {
-        const Camera& c = groups[i].camera;
-        fmt::print("{:<16}{}x{}, fx {:.6g}, fy {:.6g}, cx {:.6g}, cy {:.6g}{} ({} frames)\n",
-                   i == 0 ? "cameras" : "", c.width, c.height, c.fx, c.fy, c.cx, c.cy,
-                   groups[i].distorted ? ", undistorted on loading" : "", groups[i].frames);
-    }
-    if (groups.size() > kShown) fmt::print("{:<16}and {} more\n", "", groups.size() - kShown);
-}
-
-int info_dataset(const fs::path& path, int test_every, bool json) {
-    const Dataset dataset = load_cameras_as_trained(path, 1);
-    const char* kind = dataset_kind(path);
-    const Split split = split_frames(dataset, test_every);
-    std::vector<int> every(dataset.frames.size());
-    for (size_t i = 0; i < every.size(); ++i) every[i] = static_cast<int>(i);
-    const double extent = every.empty() ? 0 : scene_extent(dataset, every);
-    if (json) {
-        fmt::print("{}\n", dataset_json(dataset, kind, split, extent).dump(2));
-        return 0;
-    }
-    fmt::print("{}\nkind            {}\n", core::one_line(path.string()), kind);
-    fmt::print("frames          {} ({} train, {} test with --test-every {})\n", dataset.frames.size(),
-               split.train.size(), split.test.size(), test_every);
-    if (dataset.missing_images > 0)
-        fmt::print("images          {} are missing, their frames left out unless all are\n",
-                   dataset.missing_images);
-    print_cameras(dataset);
-    fmt::print("points          {} ({} dropped: a coordinate is not finite)\n",
-               dataset.points.positions.size(), dataset.dropped_points);
-    if (!dataset.color_depends_on_view)
-        fmt::print("colour          does not depend on the view: training leaves SH degrees 1 to {} out\n",
-                   kMaxShDegree);
-    fmt::print("extent          {:.6g} (1.1 times the farthest camera from the cameras' mean)\n", extent);
-    return 0;
 }
 
 int run(const fs::path& path, int test_every, bool json) {
     std::error_code error;
-    if (!fs::exists(path, error)) throw InputError(path.string() + ": there is no such file or folder");
-    if (fs::is_directory(path) || path.extension() == ".json") return info_dataset(path, test_every, json);
-    if (is_mesh_scene(path)) {
+    if (!fs::exists(path, error)) throw InputError(path.string() + ": no such file or folder");
+    if (fs::is_directory(path) || path.extension() == ".json")
+        info_dataset(path, test_every, json);
+    else if (is_mesh_scene(path))
         info_mesh(path, test_every, json);
-        return 0;
-    }
-    return info_splats(path, json);
+    else
+        info_splats(path, json);
+    return 0;
 }
 
 }  // namespace
@@ -215,10 +122,10 @@ Action add_info(CLI::App& app) {
         bool json = false;
     };
     const auto arguments = std::make_shared<Arguments>();
-    app.add_option("PATH", arguments->path,
-                   "A splat file (.ply .compressed.ply .splat .spz .glb .gltf), a COLMAP folder, a "
-                   "transforms.json, or a "
-                   "glTF of meshes")
+    app.add_option(
+           "PATH", arguments->path,
+           "Splat file (.ply .compressed.ply .splat .spz .glb .gltf), COLMAP folder, transforms.json, or "
+           "glTF file of meshes")
         ->required();
     add_test_every_option(app, arguments->test_every);
     app.add_flag("--json", arguments->json, "Print JSON");

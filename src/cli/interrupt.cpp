@@ -13,27 +13,26 @@ namespace ewa::cli {
 namespace {
 
 constexpr std::array kSignals{SIGINT, SIGTERM, SIGHUP};
-constexpr std::string_view kNote =
-    "\nending as soon as what is done is saved; Ctrl-\\ ends at once, without saving\n";
+constexpr std::string_view kNote = "\nsaving, then ending; Ctrl-\\ ends at once without saving\n";
 
-// Two signals can be handled at once, by two threads.
+// Two threads can handle two signals at the same time.
 std::atomic<bool> signalled = false, at_terminal = false;
-static_assert(std::atomic<bool>::is_always_lock_free, "or a handler may not use it");
+static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may use only lock-free atomics");
 
 void note_signal(int signal) {
-    const int reason = errno;  // of what this comes in between of
+    const int reason = errno;  // the interrupted code may still read it
     const bool first = !signalled.exchange(true);
     if (first && signal == SIGINT && at_terminal) (void)!write(STDERR_FILENO, kNote.data(), kNote.size());
     errno = reason;
 }
 
-void end_without_traces(int signal) {
+void remove_files_and_end(int signal) {
     core::remove_unfinished_files();
     std::signal(signal, SIG_DFL);
-    raise(signal);  // taken at the handler's end, until which it is blocked
+    raise(signal);  // delivered when this handler returns: until then it is blocked
 }
 
-/// `handler` for the signal, in which none of the others arrives, and what was there before.
+/// Installs a handler during which the other signals are blocked. Returns the previous one.
 struct sigaction handle(int signal, void (*handler)(int)) {
     struct sigaction action {
     }, before{};
@@ -68,9 +67,9 @@ void stop_if_interrupted() {
     if (interrupted()) throw Interrupted();
 }
 
-void leave_nothing_when_ended() {
+void remove_temporary_files_on_signals() {
     for (const int signal : kSignals) {
-        const struct sigaction before = handle(signal, end_without_traces);
+        const struct sigaction before = handle(signal, remove_files_and_end);
         if (before.sa_handler == SIG_IGN) sigaction(signal, &before, nullptr);
     }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Ctrl-C and termination asked for politely: long work looks here between its steps.
+// Ctrl-C and other requests to end. Long work checks for them between its steps.
 #pragma once
 #include <csignal>
 
@@ -7,10 +7,10 @@
 
 namespace ewa::cli {
 
-/// While it lives, SIGINT, SIGTERM and SIGHUP (unless nohup had it ignored) are only noted, however often
-/// they come: timeout(1) signals the program and then its group, and a second Ctrl-C must not cost what the
-/// first is about to save. What ends the program at once is SIGQUIT (Ctrl-\), as a terminal is told, and
-/// SIGKILL. Afterwards signals do what they did before. One at a time.
+/// While a watch exists, SIGINT, SIGTERM and SIGHUP (unless nohup ignores it) only set a flag, however often
+/// they arrive. timeout(1) signals the program and then its group, and a second Ctrl-C must not prevent what
+/// the first one saves. SIGQUIT (Ctrl-\, as a terminal is told) and SIGKILL still end the program at once.
+/// The destructor restores the handlers. At most one watch exists at a time.
 class InterruptWatch {
   public:
     InterruptWatch();
@@ -22,13 +22,13 @@ class InterruptWatch {
     std::array<struct sigaction, 3> before_;
 };
 
-/// Whether a watch has noted a signal.
+/// Whether a signal has arrived during a watch.
 bool interrupted();
 
-/// Thrown by stop_if_interrupted() out of work that has no other way to end early.
+/// Thrown by stop_if_interrupted() in work that has no other way to end early.
 struct Interrupted {};
 void stop_if_interrupted();
-/// Whether the work was done to its end; not begun where it has been interrupted before.
+/// Runs the work, unless a signal has arrived before. Returns whether it ran to its end.
 template <class Work>
 bool done_uninterrupted(Work&& work) {
     try {
@@ -40,11 +40,11 @@ bool done_uninterrupted(Work&& work) {
     }
 }
 
-/// For all the time that nobody watches: the same signals end the program as they do by themselves, but what
-/// is being written beside its place goes first. Those that are ignored stay so.
-void leave_nothing_when_ended();
+/// Outside a watch: the same signals delete the temporary files, then end the program. Ignored signals stay
+/// ignored.
+void remove_temporary_files_on_signals();
 
-/// What a program ended by Ctrl-C exits with.
+/// The exit status after Ctrl-C.
 inline constexpr int kInterruptedStatus = 130;
 
 }  // namespace ewa::cli

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// ewa: reads the arguments, runs one command, and turns every failure into one line and an exit status.
+// ewa: parses the arguments, runs one command, and turns an error into one line and an exit status.
 #include <CLI/CLI.hpp>
 #include <cerrno>
 #include <cstdio>
@@ -8,7 +8,6 @@
 
 #include "cli/command.h"
 #include "cli/interrupt.h"
-#include "cli/text.h"
 #include "core/help_text.h"
 #include "core/text.h"
 #include "ewa/error.h"
@@ -34,25 +33,35 @@ int fail(const std::string& who, const std::string& what, int status) {
 int run(const Command& command) {
     const std::string who = "ewa " + command.app->get_name();
     try {
-        leave_nothing_when_ended();
+        remove_temporary_files_on_signals();
         const int status = command.action();
-        // A full disk behind a redirected output shows up only here.
+        // If output is redirected to a full disk, only this flush fails.
         if (std::fflush(stdout) != 0)
             return fail(who, std::string("cannot write to standard output: ") + std::strerror(errno),
                         kFailed);
-        if (std::ferror(stdout)) return fail(who, "could not write all to standard output", kFailed);
+        if (std::ferror(stdout)) return fail(who, "cannot write all of standard output", kFailed);
         return status;
     } catch (const InputError& error) {
         return fail(who, error.what(), kWrongUse);
-    } catch (const CLI::Error& error) {  // a value of --config that its option refuses
+    } catch (const CLI::Error& error) {  // an invalid value in --config
         return fail(who, error.what(), kWrongUse);
     } catch (const RunError& error) {
         return fail(who, error.what(), kFailed);
     } catch (const std::bad_alloc&) {
-        return fail(who, "out of host memory; --downscale or a smaller scene needs less", kFailed);
+        return fail(who, "out of host memory; try --downscale or a smaller scene", kFailed);
     } catch (const std::exception& error) {
         return fail(who, std::string("unexpected failure: ") + error.what(), kFailed);
     }
+}
+
+/// The word as a POSIX shell reads it back.
+std::string shell_quoted(const std::string& word) {
+    static constexpr const char* kPlain =
+        "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=./,:@%";
+    if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
+    std::string quoted = "'";
+    for (const char c : word) quoted += c == '\'' ? "'\\''" : std::string(1, c);
+    return quoted + "'";
 }
 
 std::string command_line(int argc, char** argv) {
@@ -69,13 +78,7 @@ int main(int argc, char** argv) {
     app.name("ewa");
     app.set_version_flag("--version", "ewa " EWA_VERSION);
     app.require_subcommand(1);
-    app.formatter_fn([](const CLI::App* shown, const std::string& name, CLI::AppFormatMode mode) {
-        constexpr size_t kColumn = 30;  // of the descriptions
-        CLI::Formatter formatter;
-        formatter.column_width(kColumn);
-        return core::help_text(formatter.make_help(shown, name, mode), kColumn);
-    });
-
+    core::use_help_text<CLI::Formatter>(app);
     Command commands[] = {
         {app.add_subcommand("train", "Trains splats from images with known cameras"), {}},
         {app.add_subcommand("render", "Renders a splat scene through the cameras of a dataset"), {}},
@@ -110,9 +113,8 @@ int main(int argc, char** argv) {
         for (const Command& command : commands)
             if (command.app->parsed()) who += " " + command.app->get_name();
         std::string what = error.what();
-        // CLI11 asks for a sub-command without a word on the one it does not know.
-        if (who == "ewa" && argc > 1 && argv[1][0] != '-')
-            what = "there is no command " + shell_quoted(argv[1]);
+        // CLI11 asks for a sub-command without naming the unknown one.
+        if (who == "ewa" && argc > 1 && argv[1][0] != '-') what = "unknown command " + shell_quoted(argv[1]);
         return fail(who, what + " (see " + who + " --help)", kWrongUse);
     }
     for (const Command& command : commands)

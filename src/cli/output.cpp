@@ -19,10 +19,10 @@ namespace fs = std::filesystem;
 namespace {
 
 [[noreturn]] void no_folder(const fs::path& folder, const std::error_code& error) {
-    throw RunError("cannot make the folder " + folder.string() + ": " + error.message());
+    throw RunError("cannot create the folder " + folder.string() + ": " + error.message());
 }
 
-/// As the file is called once links and dots are followed; it need not be there.
+/// The path without links and dots. The file need not exist.
 fs::path resolved(const fs::path& path) {
     std::error_code error;
     const fs::path whole = fs::weakly_canonical(fs::absolute(path, error), error);
@@ -43,7 +43,7 @@ void check_writable(const fs::path& file, Folder made) {
     const fs::path folder = file.parent_path();
     std::error_code error;
     if (made == Folder::there || folder.empty() || fs::exists(folder, error)) {
-        const core::AtomicFile probe(file);  // goes as it came: nothing is committed
+        const core::AtomicFile probe(file);  // removed again: nothing is committed
         return;
     }
     fs::path above = folder;
@@ -66,8 +66,8 @@ void keep_apart(const std::vector<NamedFile>& written, const std::vector<NamedFi
         if (file.path.empty()) continue;
         const auto [taken, is_new] = there.emplace(resolved(file.path), &file);
         if (!is_new)
-            throw InputError(core::one_line(file.name + " " + file.path.string() + ": is " +
-                                            taken->second->name + " too, whose place it would take"));
+            throw InputError(core::one_line(file.name + " " + file.path.string() + " is the same file as " +
+                                            taken->second->name + "; it would be overwritten"));
     }
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writing what the user asked for.
+// Writing files that the user asked for.
 #pragma once
 #include <filesystem>
 #include <string>
@@ -9,27 +9,27 @@
 
 namespace ewa::cli {
 
-/// Creates the folder and its parents. Throws RunError when it cannot be, or is something else.
+/// Creates the folder and its parents. Throws RunError if that fails.
 void make_folder(const std::filesystem::path& folder);
 
-/// Whether the folder of a file that is to be written is made where it is missing.
+/// Whether a missing folder of an output file is created.
 enum class Folder { there, made };
 
-/// Throws RunError, as writing the file would: said before long work, not after it. Changes nothing.
+/// Throws RunError if the file could not be written, before long work instead of after it. Changes nothing.
 void check_writable(const std::filesystem::path& file, Folder folder);
 
-/// A file, and what it is to the user: an argument or an option.
+/// A file with the argument or option that names it.
 struct NamedFile {
     std::string name;
     std::filesystem::path path;  // empty: none
 };
 
-/// Throws InputError where `written` would take the place of one of the others, however each is spelled.
+/// Throws InputError if `written` is the same file as one of the others, however the paths are spelled.
 void keep_apart(const NamedFile& written, const std::vector<NamedFile>& others);
-/// Several, of each other too.
+/// The same for several files, which must also differ from each other.
 void keep_apart(const std::vector<NamedFile>& written, const std::vector<NamedFile>& others);
 
-/// Pretty-printed, in one piece or not at all; the file's folder is made. Throws RunError.
+/// Writes indented JSON, atomically; creates the folder of the file. Throws RunError.
 void write_json(const std::filesystem::path& path, const report::Json& json);
 
 }  // namespace ewa::cli

@@ -6,7 +6,6 @@
 
 #include <cstdio>
 
-#include "cli/text.h"
 #include "core/text.h"
 
 namespace ewa::cli {
@@ -54,7 +53,7 @@ void Progress::update(int done, const std::string& details) {
     std::string line = fmt::format("{} {}/{} {}", what_, done, total_, unit_);
     if (!details.empty()) line += ", " + details;
     if (rate_ > 0) line += fmt::format(", {:.3g} {}/s", rate_, unit_);
-    if (rate_ > 0 && done < total_) line += ", " + duration_text((total_ - done) / rate_) + " left";
+    if (rate_ > 0 && done < total_) line += ", " + core::duration_text((total_ - done) / rate_) + " left";
 
     clear_line();
     std::fputs(line.c_str(), stdout);

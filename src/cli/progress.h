@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How far a long work is: a line that is redrawn on a terminal, a line for every tenth elsewhere.
+// Progress of long work: one line that is redrawn on a terminal, or a line per tenth of the work in a file.
 #pragma once
 #include <chrono>
 #include <string>
@@ -8,17 +8,18 @@ namespace ewa::cli {
 
 class Progress {
   public:
-    /// total: units of work, of which `unit` is the plural ("steps"). quiet: prints nothing at all.
+    /// what: a verb such as "rendered". unit: the plural of a unit of work, such as "steps". quiet: print
+    /// nothing.
     Progress(std::string what, int total, std::string unit, bool quiet);
     ~Progress();
 
-    /// details: what else the line shows, e.g. the loss.
+    /// details: more text for the line, such as the loss.
     void update(int done, const std::string& details = "");
 
-    /// A line of its own that stays; the progress line goes on below it.
+    /// Prints a line that stays, above the progress line.
     void note(const std::string& line);
 
-    /// Whether update(done) would print, for details that cost something to make.
+    /// Whether update(done) would print: details may be costly to compute.
     bool due(int done) const;
 
   private:
@@ -27,7 +28,7 @@ class Progress {
     int total_, next_tenth_ = 1;
     bool quiet_, terminal_, drawn_ = false;
     Clock::time_point start_ = Clock::now(), printed_{};
-    // The rate of the recent past: (time, done) of a while ago.
+    // Start of the interval that the rate is measured over.
     Clock::time_point window_start_ = start_;
     int window_done_ = 0;
     double rate_ = 0;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// ewa render: pictures of a splat scene through a dataset's cameras. The photographs themselves are not
-// needed.
+// ewa render: renders a splat scene through the cameras of a dataset, whose images are not needed.
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
 
@@ -32,7 +31,7 @@ struct RenderArguments {
     bool quiet = false;
 };
 
-/// Divides by the largest value, which is returned: what a PNG's white stands for.
+/// Divides by the largest value and returns it: the value of white in a PNG.
 float normalize(Image& image) {
     float largest = 0;
     for (const float v : image.pixels) largest = std::max(largest, v);
@@ -41,8 +40,8 @@ float normalize(Image& image) {
     return largest;
 }
 
-/// The picture to save; `remark` is what the reader of the file must know besides.
-Image picture(Rendering&& rendering, const RenderArguments& arguments, std::string& remark) {
+/// The image to save. remark: a fact that the file itself does not hold.
+Image chosen_image(Rendering&& rendering, const RenderArguments& arguments, std::string& remark) {
     const bool exr = arguments.format == "exr";
     if (arguments.mode == "alpha") return std::move(rendering.alpha);
     if (arguments.mode == "color")
@@ -72,13 +71,13 @@ int run(const RenderArguments& arguments) {
         std::string remark;
         const fs::path file = arguments.output / (names[frames[i]].string() + "." + arguments.format);
         make_folder(file.parent_path());
-        save_image(file, picture(std::move(rendering), arguments, remark));
+        save_image(file, chosen_image(std::move(rendering), arguments, remark));
         if (!remark.empty()) progress.note(file.string() + ": " + remark);
         progress.update(static_cast<int>(i) + 1);
     }
     if (skipped > 0)
-        progress.note(fmt::format("{} splats have a value that is not finite and were not drawn", skipped));
-    progress.note(fmt::format("{} pictures are in {}", frames.size(), arguments.output.string()));
+        progress.note(fmt::format("{} splats with a value that is not finite were skipped", skipped));
+    progress.note(fmt::format("{} images are in {}", frames.size(), arguments.output.string()));
     return 0;
 }
 
@@ -86,32 +85,27 @@ int run(const RenderArguments& arguments) {
 
 Action add_render(CLI::App& app) {
     const auto arguments = std::make_shared<RenderArguments>();
-    app.add_option("SPLATS", arguments->splats,
-                   "The splat scene (.ply .compressed.ply .splat .spz .glb .gltf)")
-        ->required()
-        ->type_name("");
-    app.add_option("--cameras", arguments->cameras, "The dataset whose cameras to render through")
+    add_splats(app, arguments->splats);
+    app.add_option("--cameras", arguments->cameras, "Dataset whose cameras to render through")
         ->required()
         ->type_name("DATASET");
     app.add_option("-o,--output", arguments->output,
-                   "Folder for the images, which get the names of the dataset's")
+                   "Folder for the renders, named like the images of the dataset")
         ->type_name("DIR")
         ->capture_default_str();
-    app.add_option("--frames", arguments->frames, "all, train, test, or indices in name order: 0,3,7")
-        ->type_name("FRAMES")
-        ->capture_default_str();
-    add_test_every_option(app, arguments->test_every);
-    app.add_option("--format", arguments->format, "png (8 bit, clamped) or exr (float32, not clamped)")
+    add_frames_options(app, arguments->frames, arguments->test_every);
+    app.add_option("--format", arguments->format,
+                   "File format: png (8 bit, clamped) or exr (float32, not clamped)")
         ->check(CLI::IsMember({"png", "exr"}))
         ->capture_default_str();
     app.add_option("--mode", arguments->mode,
-                   "color, depth (view z; a png is scaled by its maximum) or alpha")
+                   "color, depth (view z; divided by its maximum in a png) or alpha")
         ->check(CLI::IsMember({"color", "depth", "alpha"}))
         ->capture_default_str();
     add_draw_options(app, arguments->draw);
     add_downscale_option(app, arguments->downscale);
     add_device_options(app, arguments->device);
-    app.add_flag("--quiet", arguments->quiet, "Print nothing but errors");
+    add_quiet_option(app, arguments->quiet);
     return [arguments] { return run(*arguments); };
 }
 

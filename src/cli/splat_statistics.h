@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Figures that describe a splat scene at a glance.
+// Figures of a splat scene, and the largest differences between two.
 #pragma once
 #include <array>
 #include <cstddef>
@@ -11,14 +11,15 @@ namespace ewa::cli {
 
 inline constexpr int kHistogramBins = 24;
 
-/// Of the finite values; zeros where there is none.
+/// Figures of the finite values; zeros if there are none.
 struct Spread {
     double min = 0, median = 0, max = 0;
-    std::array<size_t, kHistogramBins> histogram{};  // even bins from min to max, of the logarithm for scales
+    std::array<size_t, kHistogramBins>
+        histogram{};  // equal bins from min to max; of the logarithm for scales
 };
 
 struct SplatStatistics {
-    std::array<double, 3> low{}, high{};  // of the finite means, world units
+    std::array<double, 3> low{}, high{};  // bounds of the finite means, world units
     Spread opacity;                       // after the sigmoid
     Spread scale;                         // standard deviations, world units, all three axes
     size_t nonfinite = 0;                 // splats with a value that is not finite or a zero quaternion
@@ -26,7 +27,18 @@ struct SplatStatistics {
 
 SplatStatistics splat_statistics(const Gaussians& gaussians);
 
-/// One character a bin, from a space over "." to "@".
+/// One character per bin, from " " (empty) to "@" (fullest).
 std::string histogram_text(const Spread& spread);
+
+struct Difference {
+    std::string what, unit;
+    // Of the magnitudes. Two values that are both not finite count as equal.
+    double largest = 0, mean = 0;
+};
+
+/// Differences of means (world units), scales (natural logarithm), rotations (degrees), opacities, colours
+/// (0..1) and SH coefficients above degree 0; coefficients that one scene lacks count as zero. The scenes
+/// have the same order. Throws RunError if their sizes differ.
+std::array<Difference, 6> differences(const Gaussians& a, const Gaussians& b);
 
 }  // namespace ewa::cli

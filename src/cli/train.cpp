@@ -82,10 +82,9 @@ Action add_train(CLI::App& app, const std::string& command_line) {
     const auto state = std::make_shared<CommandState>();
     TrainArguments& arguments = state->arguments;
     arguments.command_line = command_line;
-    app.add_option(
-           "DATASET", arguments.dataset,
-           "Images with cameras: COLMAP folder or transforms.json; or a glTF with meshes, which is "
-           "photographed into DIR/dataset first")
+    app.add_option("DATASET", arguments.dataset,
+                   "Images with cameras: COLMAP folder or transforms.json; or a glTF with meshes, which is "
+                   "photographed into DIR/dataset first")
         ->type_name("");
     app.add_option(
            "-o,--output", arguments.output,

@@ -13,8 +13,6 @@
 #include "cli/interrupt.h"
 #include "cli/output.h"
 #include "cli/progress.h"
-#include "cli/synthetic_dataset.h"
-#include "cli/text.h"
 #include "cli/train_files.h"
 #include "cli/train_resume.h"
 #include "cli/train_serve.h"
@@ -215,18 +213,18 @@ void TrainRun::describe() const {
     say("device: " + report_.summary.device);
     const MemoryForecast memory = forecast_memory(*device_, dataset_, split_.train, start_, options_);
     say(fmt::format("memory: up to {} for {} splats ({} model, {} frame, {} photographs)",
-                    bytes_text(memory.total()), memory.splats, bytes_text(memory.model),
-                    bytes_text(memory.frame), bytes_text(memory.photographs)));
+                    core::bytes_text(memory.total()), memory.splats, core::bytes_text(memory.model),
+                    core::bytes_text(memory.frame), core::bytes_text(memory.photographs)));
     const uint64_t there = device_info(*device_).memory_bytes;
     if (memory.total() > there)
         say(fmt::format(
             "the device has {}: if memory runs out, a smaller --max-splats, --image-cache or a larger "
             "--downscale takes less",
-            bytes_text(there)));
+            core::bytes_text(there)));
     if (!arguments_.verbose) return;
     for (const report::LeftOut& line : report_.plan)
         say(fmt::format("left out: {} ({}{})", line.what, line.why,
-                        line.bytes_saved > 0 ? ", saves " + bytes_text(line.bytes_saved) : ""));
+                        line.bytes_saved > 0 ? ", saves " + core::bytes_text(line.bytes_saved) : ""));
 }
 
 /// Interrupted is thrown out of it.
@@ -390,8 +388,8 @@ int TrainRun::finish(const Trainer& trainer) {
 void TrainRun::print_result() const {
     const report::Summary& s = report_.summary;
     say(fmt::format("{} {} steps in {} of training ({} in all), {} splats",
-                    s.interrupted ? "interrupted after" : "trained", s.steps, duration_text(s.seconds),
-                    duration_text(s.wall_seconds), s.splats));
+                    s.interrupted ? "interrupted after" : "trained", s.steps, core::duration_text(s.seconds),
+                    core::duration_text(s.wall_seconds), s.splats));
     if (s.test_psnr) say(fmt::format("held-out PSNR {:.2f} dB, SSIM {:.4f}", *s.test_psnr, *s.test_ssim));
     if (s.train_psnr) say(fmt::format("training PSNR {:.2f} dB", *s.train_psnr));
     if (s.skipped_nonfinite > 0)
@@ -488,8 +486,8 @@ int run_train(const TrainArguments& given) {
         arguments.dataset = arguments.output / "dataset";
         // Another training may be reading the photographs that are there.
         if (fs::is_directory(arguments.output)) lock = std::make_unique<core::FolderLock>(arguments.output);
-        const SyntheticDataset made = photograph_with_progress(arguments.device, arguments.scene,
-                                                               arguments.dataset, {}, arguments.quiet);
+        const SyntheticDataset made =
+            render_with_progress(arguments.device, arguments.scene, arguments.dataset, {}, arguments.quiet);
         if (made.interrupted || interrupted()) return kInterruptedStatus;
     }
     return TrainRun(arguments, begin, std::move(lock)).run();

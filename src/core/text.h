@@ -2,6 +2,7 @@
 // Small text helpers shared by the readers of text files.
 #pragma once
 #include <charconv>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -33,5 +34,11 @@ std::optional<T> parse_integer(std::string_view word) {
     if (error != std::errc() || end != word.data() + word.size()) return std::nullopt;
     return value;
 }
+
+/// Bytes with three digits in powers of 1000, such as "850 B" or "12.3 MB".
+std::string bytes_text(uint64_t bytes);
+
+/// Seconds as "12 s", "3 min 05 s" or "2 h 10 min".
+std::string duration_text(double seconds);
 
 }  // namespace ewa::core

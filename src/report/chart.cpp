@@ -9,19 +9,9 @@
 namespace ewa::report {
 namespace {
 
-// The drawing's own units; the page scales it.
+// Units of the drawing; the page scales it.
 constexpr double kWidth = 400, kHeight = 240;
 constexpr double kLeft = 48, kRight = 16, kTop = 12, kBottom = 44;
-
-struct Axis {
-    double low = 0, high = 1, tick = 1;
-    std::vector<double> ticks() const {
-        std::vector<double> at;
-        for (double i = std::ceil(low / tick - 1e-9); i * tick <= high + 1e-9 * tick; ++i)
-            at.push_back(i * tick);
-        return at;
-    }
-};
 
 /// A tick distance of 1, 2 or 5 times a power of ten that gives about `wanted` ticks.
 Axis make_axis(double low, double high, int wanted, bool round_out) {
@@ -40,34 +30,26 @@ Axis make_axis(double low, double high, int wanted, bool round_out) {
     return axis;
 }
 
-struct Frame {
-    Axis x, y;
-    double px(double v) const { return kLeft + (v - x.low) / (x.high - x.low) * (kWidth - kLeft - kRight); }
-    double py(double v) const {
-        return kHeight - kBottom - (v - y.low) / (y.high - y.low) * (kHeight - kTop - kBottom);
-    }
-};
-
-std::string polyline(const Frame& frame, const std::vector<ChartPoint>& points, const char* css) {
+std::string polyline(const Axes& axes, const std::vector<ChartPoint>& points, const char* css) {
     std::string path;
     for (const ChartPoint& p : points)
-        path += fmt::format("{}{:.1f},{:.1f}", path.empty() ? "" : " ", frame.px(p.x), frame.py(p.y));
+        path += fmt::format("{}{:.1f},{:.1f}", path.empty() ? "" : " ", axes.px(p.x), axes.py(p.y));
     return fmt::format("<polyline class=\"{}\" points=\"{}\"/>\n", css, path);
 }
 
-std::string grid(const Frame& frame, const Chart& chart) {
+std::string grid(const Axes& axes, const Chart& chart) {
     std::string svg;
     const double bottom = kHeight - kBottom;
-    for (double v : frame.y.ticks())
+    for (double v : axes.y.ticks())
         svg += fmt::format(
             "<line class=\"grid\" x1=\"{0}\" x2=\"{1}\" y1=\"{2:.1f}\" y2=\"{2:.1f}\"/>"
             "<text class=\"tick\" text-anchor=\"end\" x=\"{3}\" y=\"{4:.1f}\">{5}</text>\n",
-            kLeft, kWidth - kRight, frame.py(v), kLeft - 6, frame.py(v) + 4, short_number(v, 4));
-    for (double v : frame.x.ticks())
+            kLeft, kWidth - kRight, axes.py(v), kLeft - 6, axes.py(v) + 4, short_number(v, 4));
+    for (double v : axes.x.ticks())
         svg += fmt::format(
             "<line class=\"axis\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1}\" y2=\"{2}\"/>"
             "<text class=\"tick\" text-anchor=\"middle\" x=\"{0:.1f}\" y=\"{3}\">{4}</text>\n",
-            frame.px(v), bottom, bottom + 4, bottom + 17, short_number(v, 4));
+            axes.px(v), bottom, bottom + 4, bottom + 17, short_number(v, 4));
     svg += fmt::format("<line class=\"axis\" x1=\"{0}\" x2=\"{1}\" y1=\"{2}\" y2=\"{2}\"/>\n", kLeft,
                        kWidth - kRight, bottom);
     svg += fmt::format("<text class=\"label\" text-anchor=\"middle\" x=\"{}\" y=\"{}\">{}</text>\n",
@@ -75,7 +57,7 @@ std::string grid(const Frame& frame, const Chart& chart) {
     return svg;
 }
 
-/// Mean over a window of a tenth of the points, centred: a single view's loss says little of the next one's.
+/// The mean over a centred window of a tenth of the points: losses differ much between views.
 std::vector<ChartPoint> running_mean(const std::vector<ChartPoint>& points) {
     const size_t half = points.size() / 20;
     std::vector<ChartPoint> mean(points);
@@ -89,6 +71,17 @@ std::vector<ChartPoint> running_mean(const std::vector<ChartPoint>& points) {
 }
 
 }  // namespace
+
+double Axis::place(double value) const {
+    return logarithmic ? std::log10(value) : value;
+}
+
+std::vector<double> Axis::ticks() const {
+    std::vector<double> at;
+    for (double i = std::ceil(low / tick - 1e-9); i * tick <= high + 1e-9 * tick; ++i)
+        at.push_back(logarithmic ? std::pow(10, i * tick) : i * tick);
+    return at;
+}
 
 std::string escape_html(std::string_view text) {
     std::string out;
@@ -136,9 +129,9 @@ std::string chart_svg(const Chart& chart) {
 
     const auto [low, high] =
         std::minmax_element(points.begin(), points.end(), [](auto& a, auto& b) { return a.y < b.y; });
-    Frame frame;
-    frame.x = make_axis(std::min(0.0, points.front().x), points.back().x, 4, false);
-    frame.y = make_axis(chart.zero_based ? std::min(0.0, low->y) : low->y, high->y, 4, true);
+    Axes axes{{}, {}, kWidth, kHeight, kLeft, kRight, kTop, kBottom};
+    axes.x = make_axis(std::min(0.0, points.front().x), points.back().x, 4, false);
+    axes.y = make_axis(chart.zero_based ? std::min(0.0, low->y) : low->y, high->y, 4, true);
 
     std::string svg = fmt::format(
         "<figure class=\"chart\"><figcaption>{}{}</figcaption>\n"
@@ -146,13 +139,13 @@ std::string chart_svg(const Chart& chart) {
         escape_html(chart.title),
         chart.y_label.empty() ? "" : " <span>" + escape_html(chart.y_label) + "</span>", kWidth, kHeight,
         escape_html(chart.title));
-    svg += grid(frame, chart);
-    svg += polyline(frame, points, chart.smooth ? "raw" : "line");
-    if (chart.smooth) svg += polyline(frame, running_mean(points), "line");
+    svg += grid(axes, chart);
+    svg += polyline(axes, points, chart.smooth ? "raw" : "line");
+    if (chart.smooth) svg += polyline(axes, running_mean(points), "line");
     if (points.size() <= 30 && !chart.smooth)
         for (const ChartPoint& p : points)
-            svg += fmt::format("<circle class=\"dot\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3\"/>", frame.px(p.x),
-                               frame.py(p.y));
+            svg += fmt::format("<circle class=\"dot\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3\"/>", axes.px(p.x),
+                               axes.py(p.y));
     return svg + "</svg></figure>\n";
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/text.h"
 #include "report/chart.h"
 #include "report/pictures.h"
 #include "report/style.h"
@@ -13,10 +14,9 @@
 namespace ewa::report {
 namespace {
 
-// An error of this much (of 1) is drawn brightest; above it a pixel is plainly wrong to the eye.
+// The error (of 1) that is shown brightest. Larger errors are obvious to the eye.
 constexpr double kErrorFullScale = 0.25;
-// Wide enough for a third of the page on a display with two pixels a point; keeps the file to a few
-// megabytes.
+// A third of the page on a display with two pixels per point; keeps the file at a few megabytes.
 constexpr int kPictureWidth = 720;
 
 std::string figure(const std::string& value, const std::string& label) {
@@ -35,13 +35,6 @@ std::string duration(double seconds) {
     return fmt::format("{} h {:02} min", total / 3600, total / 60 % 60);
 }
 
-std::string bytes_text(uint64_t bytes) {
-    const std::string number = short_number(double(bytes));
-    const size_t digits = number.find_first_of("kMGT");
-    return digits == std::string::npos ? number + " B"
-                                       : number.substr(0, digits) + " " + number.substr(digits) + "B";
-}
-
 std::string headline(const ReportData& data) {
     const Summary& s = data.summary;
     std::string html =
@@ -50,9 +43,8 @@ std::string headline(const ReportData& data) {
     for (const std::string& remark : data.remarks)
         html += "<p class=\"warn\">" + escape_html(remark) + "</p>\n";
     if (s.skipped_nonfinite > 0)
-        html += fmt::format(
-            "<p class=\"warn\">{} splats have a value that is not finite and are not drawn.</p>\n",
-            s.skipped_nonfinite);
+        html += fmt::format("<p class=\"warn\">{} splats with a value that is not finite are skipped.</p>\n",
+                            s.skipped_nonfinite);
     if (s.limited_steps > 0)
         html +=
             fmt::format("<p class=\"warn\">{} steps were too long for their splat and were shortened.</p>\n",
@@ -65,10 +57,10 @@ std::string headline(const ReportData& data) {
     html += figure(s.test_ssim ? fmt::format("{:.4f}", *s.test_ssim) : "–", "SSIM, held-out views");
     html += figure(decibels(s.train_psnr), "PSNR, training views");
     html += figure(short_number(s.splats), "splats");
-    html += figure(duration(s.seconds), fmt::format("training, of {} in all", duration(s.wall_seconds)));
-    html += figure(s.steps > 0 ? fmt::format("{:.3g} ms", 1000 * s.seconds / s.steps) : "–", "a step");
-    html += figure(bytes_text(s.peak_device_bytes), "device memory at most");
-    html += figure(bytes_text(s.peak_host_bytes), "host memory at most");
+    html += figure(duration(s.seconds), fmt::format("training, of {} in total", duration(s.wall_seconds)));
+    html += figure(s.steps > 0 ? fmt::format("{:.3g} ms", 1000 * s.seconds / s.steps) : "–", "per step");
+    html += figure(core::bytes_text(s.peak_device_bytes), "peak device memory");
+    html += figure(core::bytes_text(s.peak_host_bytes), "peak host memory");
     return html + "</div>\n";
 }
 
@@ -89,8 +81,7 @@ std::string charts(const std::vector<MetricsLine>& metrics) {
     std::string html;
     for (const Chart& chart : {loss_steps, loss_time, psnr_steps, psnr_time, splats})
         html += chart_svg(chart);
-    return html.empty() ? ""
-                        : "<h2>Course of the training</h2>\n<div class=\"charts\">\n" + html + "</div>\n";
+    return html.empty() ? "" : "<h2>Training curves</h2>\n<div class=\"charts\">\n" + html + "</div>\n";
 }
 
 std::string pictures(const ReportData& data) {
@@ -103,9 +94,9 @@ std::string pictures(const ReportData& data) {
             "</figcaption><div class=\"trio\">\n",
             escape_html(view.name), decibels(view.psnr), view.ssim);
         const std::pair<const Image*, std::string> trio[] = {
-            {&view.photograph, "photograph"},
-            {&view.rendering, "rendering"},
-            {&error, fmt::format("error, bright from {:g} of full scale", kErrorFullScale)}};
+            {&view.photograph, "image"},
+            {&view.rendering, "render"},
+            {&error, fmt::format("error, brightest from {:g} of full scale", kErrorFullScale)}};
         for (const auto& [image, label] : trio)
             html += fmt::format("<div><img alt=\"{0}\" src=\"{1}\">{0}</div>\n", label,
                                 data_uri(*image, kPictureWidth));
@@ -131,7 +122,7 @@ std::string passes(const std::vector<NamedTime>& times) {
             escape_html(time.name), time.milliseconds, total > 0 ? 100 * time.milliseconds / total : 0,
             longest > 0 ? 100 * time.milliseconds / longest : 0);
     return html + fmt::format(
-                      "<tr><td>all</td><td class=\"number\">{:.3f}</td><td></td><td></td></tr>\n</table>\n"
+                      "<tr><td>total</td><td class=\"number\">{:.3f}</td><td></td><td></td></tr>\n</table>\n"
                       "<p class=\"soft\">Medians over the last steps.</p>\n",
                       total);
 }
@@ -145,12 +136,12 @@ std::string work_precision(const std::vector<WorkPrecision>& diagrams) {
 std::string plan(const std::vector<LeftOut>& lines) {
     if (lines.empty()) return "";
     std::string html =
-        "<h2>What this scene does not need, left out</h2>\n<table><tr><th>left out</th><th>because</th>"
+        "<h2>Work that this scene does not need</h2>\n<table><tr><th>skipped</th><th>reason</th>"
         "<th class=\"number\">saves</th></tr>\n";
     for (const LeftOut& line : lines)
         html += fmt::format("<tr><td>{}</td><td>{}</td><td class=\"number\">{}</td></tr>\n",
                             escape_html(line.what), escape_html(line.why),
-                            line.bytes_saved > 0 ? bytes_text(line.bytes_saved) : "");
+                            line.bytes_saved > 0 ? core::bytes_text(line.bytes_saved) : "");
     return html + "</table>\n";
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The report of a training run: one HTML file that needs nothing beside it.
+// The report of a training run: one self-contained HTML file.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -14,7 +14,7 @@ namespace ewa::report {
 
 struct ReportPicture {
     std::string name;
-    Image photograph, rendering;  // RGB, of one size
+    Image photograph, rendering;  // RGB, of equal size
     double psnr = 0, ssim = 0;
 };
 
@@ -38,10 +38,10 @@ struct ReportData {
     std::vector<std::pair<std::string, std::string>> settings;  // name, value
     std::vector<ReportPicture> pictures;
     std::vector<WorkPrecision> work_precision;
-    bool held_out = true;  // the pictures were not trained on
+    bool held_out = true;  // the images were held out from training
 };
 
-/// Every string is escaped; a part without data is left out.
+/// Escapes all strings and skips sections without data.
 std::string html_report(const ReportData& data);
 
 }  // namespace ewa::report

@@ -15,8 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The name's parts without root, "." and "..", so that it stays inside the output folder. Backslashes are
-/// separators in models written on Windows.
+/// The parts of a name without root, "." and "..", so that the path stays inside the output folder. Models
+/// written on Windows separate with backslashes.
 std::vector<std::string> inner_parts(std::string name) {
     std::replace(name.begin(), name.end(), '\\', '/');
     std::vector<std::string> parts;
@@ -26,7 +26,7 @@ std::vector<std::string> inner_parts(std::string name) {
     return parts;
 }
 
-/// How many leading folders all names share.
+/// The number of leading folders that all names share.
 size_t shared_folders(const std::vector<std::vector<std::string>>& names) {
     if (names.empty()) return 0;
     size_t shared = names.front().size() - 1;
@@ -38,7 +38,7 @@ size_t shared_folders(const std::vector<std::vector<std::string>>& names) {
     return shared;
 }
 
-/// Dark violet over orange to pale yellow, even in lightness (matplotlib's inferno at five places).
+/// Dark violet over orange to pale yellow, with even lightness: five samples of matplotlib's inferno.
 std::array<float, 3> heat(double t) {
     static constexpr double kColors[5][3] = {{0.001, 0.000, 0.014},
                                              {0.342, 0.062, 0.429},
@@ -54,11 +54,11 @@ std::array<float, 3> heat(double t) {
     return color;
 }
 
-/// Each pixel's error as a colour; what is not a number is brightest.
+/// The error of each pixel as a colour; NaN is brightest.
 template <class Error>
 Image heat_map(const Image& a, const Image& b, double full_scale, const Error& error_at) {
     if (a.width != b.width || a.height != b.height || a.channels < 3 || b.channels < 3)
-        throw std::logic_error("error_map: pictures of different sizes");
+        throw std::logic_error("error_map: images of different sizes");
     Image map(a.width, a.height, 3);
     for (int y = 0; y < a.height; ++y)
         for (int x = 0; x < a.width; ++x) {

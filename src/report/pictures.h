@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a report shows of the pictures: file names, the error map, and data URIs.
+// File names of renders, error maps, and data URIs.
 #pragma once
 #include <filesystem>
 #include <string>
@@ -10,25 +10,23 @@
 
 namespace ewa::report {
 
-/// Where each frame's picture goes, relative to the output folder, without extension: the image's stem, under
-/// the subfolders in which the frames' names differ ("images/1.jpg", "images/2.jpg" -> "1", "2";
-/// "left/1.jpg", "right/1.jpg" -> "left/1", "right/1"). Names never climb out of the folder, and no two are
-/// the same: where stems collide (1.jpg beside 1.png) the whole file name is kept, and after that a number is
-/// added.
+/// The path of each frame's render, relative to the output folder and without extension. It is the stem of
+/// the image below the subfolders in which the names differ: "images/1.jpg", "images/2.jpg" -> "1", "2";
+/// "left/1.jpg", "right/1.jpg" -> "left/1", "right/1". All paths stay inside the folder and differ: equal
+/// stems (1.jpg, 1.png) keep their extension, then a number is added.
 std::vector<std::filesystem::path> picture_names(const std::vector<Frame>& frames);
 
-/// |a - b| averaged over RGB, both clamped to [0, 1]; 0 dark to `full_scale` and above bright. Sizes must
-/// agree.
+/// |a - b| averaged over RGB, both clamped to [0, 1], as colours from dark (0) to bright (`full_scale` and
+/// above). The sizes must be equal.
 Image error_map(const Image& a, const Image& b, double full_scale);
 
-/// The largest |a - b| of a pixel's values, alpha too (1 where only one picture has it), not clamped; colours
-/// as above. Values that are not finite are bright where the other's is not the same.
+/// The largest |a - b| of a pixel's values, not clamped, in the same colours. Alpha counts too; it is 1 where
+/// only one image has it. A value that is not finite is brightest, unless both are equal.
 Image value_error_map(const Image& a, const Image& b, double full_scale);
 
 std::string base64(const std::vector<unsigned char>& bytes);
 
-/// The picture as an 8-bit PNG in a data URI, made smaller by a whole factor where it is wider than
-/// max_width.
+/// The image as an 8-bit PNG in a data URI, reduced by a whole factor if it is wider than max_width.
 std::string data_uri(const Image& image, int max_width);
 
 }  // namespace ewa::report

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The report's style sheet: follows the reader's light or dark setting, and prints.
+// The style sheet of the report. It follows the reader's light or dark setting, and has rules for print.
 #pragma once
 
 namespace ewa::report {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a training run leaves in numbers: summary.json and the lines of metrics.jsonl.
+// The numbers of a training run: summary.json and the lines of metrics.jsonl.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -11,11 +11,11 @@
 
 namespace ewa::report {
 
-/// Keys keep the order they were written in, so that two runs' files can be compared line by line.
+/// Keys keep their order, so that the files of two runs can be compared line by line.
 using Json = nlohmann::ordered_json;
 
-/// A figure that does not exist (no test set, nothing evaluated) is null in the file; so is one that is not
-/// finite, which JSON has no number for (the PSNR of equal pictures).
+/// A missing number (no test set, nothing evaluated) is null in the file. So is a number that is not finite,
+/// such as the PSNR of equal images.
 struct Summary {
     int steps = 0;
     double seconds = 0;       // training alone
@@ -34,9 +34,9 @@ struct Summary {
 
 Json to_json(const Summary& summary);
 
-/// The whole number of 0 to `most` that an object holds under this name. Throws InputError that says so.
+/// The whole number from 0 to `most` under this name. Throws InputError if there is none.
 uint64_t whole_number(const Json& object, const char* name, uint64_t most);
-/// The number, not a number for null. Throws InputError where there is neither.
+/// The number under this name, or NaN for null. Throws InputError if there is neither.
 double number_or_nan(const Json& object, const char* name);
 
 struct MetricsLine {
@@ -47,20 +47,20 @@ struct MetricsLine {
 };
 
 Json to_json(const MetricsLine& line);
-/// The line that to_json wrote. Throws InputError that names what is missing or wrong.
+/// Parses what to_json wrote. Throws InputError that names the missing or wrong value.
 MetricsLine metrics_line(const Json& json);
-/// The lines of a metrics.jsonl, each as to_json wrote it. Throws InputError that names the line.
+/// Parses a metrics.jsonl. Throws InputError that names the line.
 std::vector<MetricsLine> parse_metrics(const std::string& text);
 std::string metrics_text(const std::vector<MetricsLine>& lines);
 
-/// Appends one JSON object a line and hands each to the operating system at once, so that a run can be
-/// watched, and an interrupted one keeps what it had. Starts a file of the lines given.
+/// Writes metrics.jsonl line by line and flushes each line, so that a run can be watched and an interrupted
+/// one keeps its lines.
 class MetricsLog {
   public:
-    /// Throws RunError when the file cannot be created.
+    /// Creates the file with the earlier lines. Throws RunError.
     explicit MetricsLog(const std::filesystem::path& path, const std::vector<MetricsLine>& earlier = {});
 
-    /// Throws RunError when the line cannot be written.
+    /// Throws RunError if the line cannot be written.
     void append(const MetricsLine& line);
 
   private:

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "report/chart.h"
 
@@ -13,46 +14,25 @@ namespace ewa::report {
 namespace {
 
 constexpr double kWidth = 720, kHeight = 420, kLeft = 64, kRight = 190, kTop = 36, kBottom = 52;
-// Told apart by those who do not tell red from green (Okabe and Ito 2008).
+// Distinct for readers who cannot tell red from green (Okabe and Ito 2008).
 constexpr const char* kColors[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
                                    "#e69f00", "#56b4e9", "#8c6d31"};
+constexpr double kDecibelStep = 2;
 
 bool shown(const WorkPoint& p) {
     return std::isfinite(p.time) && std::isfinite(p.error) && p.time > 0 && p.error > 0;
 }
 
-/// Whole powers of ten around the values, or whole steps of decibels; at least one.
-class Axis {
-  public:
-    explicit Axis(bool even = false) : even_(even) {}
-    void take(double value) {
-        const int below = int(std::floor(place(value))), above = int(std::ceil(place(value)));
-        low_ = empty_ ? below : std::min(low_, below);
-        high_ = empty_ ? above : std::max(high_, above);
-        if (high_ == low_) ++high_;
-        empty_ = false;
-    }
-    double share(double value) const { return (place(value) - low_) / (high_ - low_); }
-    std::vector<double> ticks() const {
-        std::vector<double> at;
-        for (int i = low_; i <= high_; ++i) at.push_back(even_ ? kStep * i : std::pow(10, i));
-        return at;
-    }
+/// An axis from whole step to whole step around the values, at least one step long.
+Axis whole_steps(const std::vector<double>& values, Axis axis) {
+    const auto [least, most] = std::minmax_element(values.begin(), values.end());
+    axis.low = axis.tick * std::floor(axis.place(*least) / axis.tick);
+    axis.high = axis.tick * std::ceil(axis.place(*most) / axis.tick);
+    if (axis.high == axis.low) axis.high += axis.tick;
+    return axis;
+}
 
-  private:
-    static constexpr double kStep = 2;  // dB
-    double place(double value) const { return even_ ? value / kStep : std::log10(value); }
-    bool even_, empty_ = true;
-    int low_ = 0, high_ = 1;
-};
-
-struct Plot {
-    Axis x, y;
-    double px(double v) const { return kLeft + x.share(v) * (kWidth - kLeft - kRight); }
-    double py(double v) const { return kHeight - kBottom - y.share(v) * (kHeight - kTop - kBottom); }
-};
-
-std::string grid(const Plot& plot, const WorkPrecision& diagram) {
+std::string grid(const Axes& axes, const WorkPrecision& diagram) {
     std::string svg = fmt::format("<text x=\"{}\" y=\"20\" font-weight=\"600\" font-size=\"15\">{}</text>\n",
                                   kLeft, escape_html(diagram.title));
     const auto line = [](double x1, double y1, double x2, double y2) {
@@ -61,14 +41,14 @@ std::string grid(const Plot& plot, const WorkPrecision& diagram) {
             "stroke-opacity=\"0.4\"/>",
             x1, y1, x2, y2);
     };
-    for (const double tick : plot.x.ticks()) {
-        const double x = plot.px(tick);
+    for (const double tick : axes.x.ticks()) {
+        const double x = axes.px(tick);
         svg += line(x, kTop, x, kHeight - kBottom) +
                fmt::format("<text x=\"{:.1f}\" y=\"{}\" text-anchor=\"middle\">{:g}</text>\n", x,
                            kHeight - kBottom + 18, tick);
     }
-    for (const double tick : plot.y.ticks()) {
-        const double y = plot.py(tick);
+    for (const double tick : axes.y.ticks()) {
+        const double y = axes.py(tick);
         svg += line(kLeft, y, kWidth - kRight, y) +
                fmt::format("<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"end\">{:g}</text>\n", kLeft - 6, y + 4,
                            tick);
@@ -80,12 +60,12 @@ std::string grid(const Plot& plot, const WorkPrecision& diagram) {
     return svg;
 }
 
-std::string drawn(const Plot& plot, const WorkSeries& series, size_t number) {
+std::string drawn(const Axes& axes, const WorkSeries& series, size_t number) {
     const char* color = kColors[number % std::size(kColors)];
     std::string path, dots;
     for (const WorkPoint& p : series.points) {
         if (!shown(p)) continue;
-        const double x = plot.px(p.time), y = plot.py(p.error);
+        const double x = axes.px(p.time), y = axes.py(p.error);
         path += fmt::format("{:.1f},{:.1f} ", x, y);
         dots += fmt::format(
             "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"4\" fill=\"{}\"><title>{}: {:.3g}, {:.3g}</title>"
@@ -106,24 +86,30 @@ std::string drawn(const Plot& plot, const WorkSeries& series, size_t number) {
 }  // namespace
 
 std::string work_precision_svg(const WorkPrecision& diagram) {
-    Plot plot{Axis(false), Axis(diagram.decibels)};
-    size_t points = 0;
+    std::vector<double> times, errors;
     for (const WorkSeries& series : diagram.series)
         for (const WorkPoint& p : series.points) {
             if (!shown(p)) continue;
-            plot.x.take(p.time);
-            plot.y.take(p.error);
-            ++points;
+            times.push_back(p.time);
+            errors.push_back(p.error);
         }
-    if (points < 2) return "";
+    if (times.size() < 2) return "";
+    const Axis powers{true, 0, 1, 1}, decibels{false, 0, 1, kDecibelStep};
+    const Axes axes{whole_steps(times, powers),
+                    whole_steps(errors, diagram.decibels ? decibels : powers),
+                    kWidth,
+                    kHeight,
+                    kLeft,
+                    kRight,
+                    kTop,
+                    kBottom};
     std::string svg = fmt::format(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" "
-        "role=\"img\" "
-        "aria-label=\"{2}\" font-family=\"system-ui, DejaVu Sans, sans-serif\" font-size=\"12\" "
+        "role=\"img\" aria-label=\"{2}\" font-family=\"system-ui, DejaVu Sans, sans-serif\" font-size=\"12\" "
         "fill=\"#70777d\">\n",
         kWidth, kHeight, escape_html(diagram.title));
-    svg += grid(plot, diagram);
-    for (size_t i = 0; i < diagram.series.size(); ++i) svg += drawn(plot, diagram.series[i], i);
+    svg += grid(axes, diagram);
+    for (size_t i = 0; i < diagram.series.size(); ++i) svg += drawn(axes, diagram.series[i], i);
     return svg + "</svg>\n";
 }
 
@@ -133,7 +119,7 @@ std::string work_precision_html(const WorkPrecision& diagram) {
     std::string html = "<h2>Error against run time</h2>\n" + svg;
     for (const std::string& note : diagram.notes) html += "<p class=\"soft\">" + escape_html(note) + "</p>\n";
     html += fmt::format(
-        "<table><tr><th>way</th><th></th><th class=\"number\">{}</th><th class=\"number\">{}</th>"
+        "<table><tr><th>method</th><th></th><th class=\"number\">{}</th><th class=\"number\">{}</th>"
         "<th class=\"number\">worst</th></tr>\n",
         escape_html(diagram.x_label), escape_html(diagram.y_label));
     for (const WorkSeries& series : diagram.series)

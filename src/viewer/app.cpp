@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "ewa/error.h"
 #include "viewer/framing.h"
@@ -14,14 +13,12 @@
 namespace ewa::viewer {
 namespace {
 
-constexpr double kRestSeconds = 0.2;  // without a change, until the full picture is asked for
 constexpr double kHintSeconds = 15, kNoteSeconds = 10;
-constexpr int kFirstDivisor = 2;  // something to see at once, then all of it
+constexpr double kPollSeconds = 0.05;  // while a better frame, a file or a screenshot is on its way
 constexpr Size kUsualSize{1280, 800};
 
-/// The window's size where none is asked for: the camera's, made smaller in proportion where the desktop has
-/// less room. With a picture to write the camera's size is kept, since that is the picture's. A window to
-/// look at is not smaller than the panel needs.
+/// The size of the window if none is asked for: that of the camera, scaled down to fit the desktop and up to
+/// the size that the panel needs. A screenshot keeps the camera's size, which is the size of its file.
 Size window_size(const Startup& startup, const WindowSystem& system) {
     if (startup.size) return *startup.size;
     Size size = kUsualSize;
@@ -39,19 +36,9 @@ Size window_size(const Startup& startup, const WindowSystem& system) {
             std::max(1, int(std::lround(size.height * scale)))};
 }
 
-Viewpoint start_view(const Scene& scene, std::optional<int> frame, Size size) {
+Viewpoint start_view(const OpenedScene& scene, std::optional<int> frame, Size size) {
     if (scene.dataset) return dataset_view(*scene.gaussians, *scene.dataset, frame.value_or(0));
     return framing_view(*scene.gaussians, size.width, size.height);
-}
-
-bool same_place(const Camera& a, const Camera& b) {
-    return a.rotation == b.rotation && a.translation == b.translation;
-}
-
-bool same_view(const PictureRequest& a, const PictureRequest& b) {
-    const Camera &p = a.camera, &q = b.camera;
-    return a.look == b.look && p.width == q.width && p.height == q.height && p.fx == q.fx && p.fy == q.fy &&
-           p.cx == q.cx && p.cy == q.cy && same_place(p, q);
 }
 
 std::chrono::steady_clock::time_point in(double seconds) {
@@ -67,6 +54,11 @@ std::string reason(const std::exception_ptr& failure) {
     }
 }
 
+template <class Result>
+bool ready(const std::future<Result>& future) {
+    return future.valid() && future.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+}
+
 }  // namespace
 
 std::filesystem::path free_name(const std::string& stem, const std::string& extension) {
@@ -76,6 +68,22 @@ std::filesystem::path free_name(const std::string& stem, const std::string& exte
     }
 }
 
+void SceneState::set_gaussians(std::shared_ptr<const Gaussians> gaussians) {
+    scene.gaussians = std::move(gaussians);
+    sh_degree = sh_degree_present(*scene.gaussians);
+    plan = plan_lines(*scene.gaussians, {}, Purpose::picture);
+}
+
+bool Message::expire(Clock::time_point now) {
+    bool expired = false;
+    for (Clock::time_point* until : {&hint_until, &note_until}) {
+        if (*until == Clock::time_point{} || now < *until) continue;
+        *until = {};
+        expired = true;
+    }
+    return expired;
+}
+
 App::App(const Startup& startup)
     : startup_(startup),
       window_(system_, startup.scene.title + " - ewa", window_size(startup, system_), !startup.picture),
@@ -83,72 +91,43 @@ App::App(const Startup& startup)
       view_(start_view(startup.scene, startup.frame, startup.size.value_or(kUsualSize))),
       settings_(startup.settings),
       views_(startup.views),
+      times_(startup.times),
       device_name_(startup.device_name),
       capture_(startup.picture.has_value()),
-      redraws_(kRedraws),
-      photos_(load_photo, [this] { system_.wake(); }),
-      comparisons_(compare_with_photo, [this] { system_.wake(); }),
-      thread_(startup.open_device, [this] { system_.wake(); }) {
+      comparison_([this] { system_.wake(); }),
+      renders_(startup.open_device, [this] { system_.wake(); }),
+      live_(startup.trainer, [this] { system_.wake(); }) {
     last_frame_ = Clock::now();
-    hint_until_ = in(kHintSeconds);
+    message_.hint_until = in(kHintSeconds);
     adopt(startup.scene, startup.frame);
     settings_.look = startup.settings.look;
     if (startup.film) start_film();
-    if (startup.watch) watch(*startup.watch);
-    window_after_ = std::chrono::duration<double>(Clock::now() - startup.started).count();
+    if (startup.watch) live_.watch(*startup.watch);
+    times_.window_is_open();
 }
 
-void App::watch(const live::WhatToWatch& what) {
-    watcher_.reset();  // the old one first: it may say nothing any more
-    run_ = {};
-    watcher_ = std::make_unique<live::Watcher>(what, [this] { system_.wake(); });
+void App::redraw(int frames) {
+    redraws_ = std::max(redraws_, frames);
 }
 
-/// News of the run. Its splats take the place of those that are shown.
-void App::take_live() {
-    if (startup_.trainer && run_.status.state != live::State::done) {
-        if (const auto status = startup_.trainer->status(); status && *status != 0 && note_.empty())
-            say("the training has ended with status " + std::to_string(*status) +
-                "; the terminal has its reason");
+void App::adopt(OpenedScene scene, std::optional<int> frame) {
+    state_.scene = std::move(scene);
+    state_.set_gaussians(state_.scene.gaussians);
+    renders_.set_scene(state_.scene.gaussians);
+    settings_.look.kernel = state_.scene.look.kernel;
+    settings_.look.background = state_.scene.look.background;
+    settings_.look.sh_degree = state_.sh_degree;
+    message_.note.clear();
+    if (!state_.scene.remark.empty()) say(state_.scene.remark);
+    state_.framed = state_.scene.gaussians->size() > 0;
+    comparison_.set_scene(++state_.number);
+    leave_camera();
+    state_.start_frame.reset();
+    if (state_.scene.dataset) {
+        state_.camera_size = camera_size(*state_.scene.dataset, view_.radius());
+        state_.start_frame = at_camera_ = frame.value_or(0);
     }
-    if (!watcher_ || watcher_->number() == run_.number) return;
-    const auto before = run_.splats;
-    run_ = watcher_->update();
-    redraws_ = std::max(redraws_, 1);
-    if (run_.splats == before || !run_.splats || run_.splats->size() == 0) return;
-    scene_.gaussians = run_.splats;
-    scene_number_ = thread_.set_scene(scene_.gaussians);
-    const int degree = sh_degree_present(*scene_.gaussians);
-    if (settings_.look.sh_degree == scene_sh_degree_) settings_.look.sh_degree = degree;
-    scene_sh_degree_ = degree;
-    plan_ = plan_lines(*scene_.gaussians, {}, Purpose::picture);
-    // With the first splats it is known what there is to turn about; a camera that the user has chosen stays.
-    if (!viewed_ && (!scene_.dataset || stands_at_ == start_frame_))
-        view_.restart(start_view(scene_, start_frame_, window_.framebuffer()));
-    viewed_ = true;
-}
-
-void App::adopt(Scene scene, std::optional<int> frame) {
-    scene_ = std::move(scene);
-    scene_number_ = thread_.set_scene(scene_.gaussians);
-    scene_sh_degree_ = sh_degree_present(*scene_.gaussians);
-    plan_ = plan_lines(*scene_.gaussians, {}, Purpose::picture);
-    settings_.look.kernel = scene_.look.kernel;
-    settings_.look.background = scene_.look.background;
-    settings_.look.sh_degree = scene_sh_degree_;
-    note_.clear();
-    if (!scene_.remark.empty()) say(scene_.remark);
-    viewed_ = scene_.gaussians->size() > 0;
-    ++opened_;
-    photo_.reset();  // frames are numbers, and those of another dataset are other pictures
-    photo_asked_.reset();
-    stands_at_.reset();
-    start_frame_.reset();
-    if (scene_.dataset) {
-        camera_size_ = camera_size(*scene_.dataset, view_.radius());
-        start_frame_ = stands_at_ = frame.value_or(0);
-    }
-    redraws_ = kRedraws;
+    redraw(kRedraws);
 }
 
 void App::open(const std::filesystem::path& path) {
@@ -161,17 +140,35 @@ void App::open(const std::filesystem::path& path) {
 }
 
 void App::take_opened() {
-    if (!opening_.valid() || opening_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
+    if (!ready(opening_)) return;
     try {
-        Scene scene = opening_.get();
+        OpenedScene scene = opening_.get();
         view_.restart(start_view(scene, {}, window_.framebuffer()));
         window_.set_title(scene.title + " - ewa");
         adopt(std::move(scene), {});
-        watcher_.reset();
-        if (!scene_.run.empty()) watch({scene_.run, {}, {}, scene_.splats_time});
+        live_.stop();
+        if (!state_.scene.run.empty()) live_.watch({state_.scene.run, {}, {}, state_.scene.splats_time});
     } catch (const std::exception& error) {
         say(error.what());
     }
+}
+
+/// New splats of the run replace those that are shown.
+void App::take_live() {
+    if (const auto status = live_.failure(); status && message_.note.empty())
+        say("the training ended with status " + std::to_string(*status) +
+            "; see the terminal for the reason");
+    const LiveRun::News news = live_.take();
+    if (news.any) redraw();
+    if (!news.splats) return;
+    const int degree_before = state_.sh_degree;
+    state_.set_gaussians(news.splats);
+    renders_.set_scene(news.splats);
+    if (settings_.look.sh_degree == degree_before) settings_.look.sh_degree = state_.sh_degree;
+    // The first splats tell what to look at, unless the user has moved the camera.
+    if (!state_.framed && (!state_.scene.dataset || at_camera_ == state_.start_frame))
+        view_.restart(start_view(state_.scene, state_.start_frame, window_.framebuffer()));
+    state_.framed = true;
 }
 
 void App::run() {
@@ -181,24 +178,22 @@ void App::run() {
         const double seconds = std::chrono::duration<double>(now - last_frame_).count();
         last_frame_ = now;
         if (window_.stirred()) redraws_ = kRedraws;
-        for (Clock::time_point* until : {&hint_until_, &note_until_}) {
-            if (*until == Clock::time_point{} || now < *until) continue;
-            *until = {};
-            redraws_ = std::max(redraws_, 1);
-        }
+        if (message_.expire(now)) redraw();
         if (!scripted()) {
             for (const KeyPress& key : keys) handle_key(key);
             move_by_itself(std::min(seconds, 0.1));
             if (const auto dropped = window_.take_dropped(); !dropped.empty()) open(dropped);
         }
         take_opened();
-        take_news();
+        take_renders();
+        take_comparison();
+        if (ready(saving_)) say(saving_.get());
         take_live();
-        if (film_) film();
+        if (film_) continue_film();
         if (redraws_ > 0) draw();
         ask();
     }
-    if (startup_.verbose) tell_times();
+    if (startup_.verbose) times_.print(renders_.shown().get());
     if (scripted() && !done_)
         throw RunError("the window was closed before " +
                        startup_.picture.value_or(startup_.film.value_or("")).string() + " was written");
@@ -207,106 +202,55 @@ void App::run() {
 /// How long to wait for input, in seconds.
 double App::patience() const {
     if (redraws_ > 0 || flying() || settings_.turntable) return 1.0 / 60;
-    return asked_.divisor > 1 || opening_.valid() || saving_.valid() ? kRestSeconds / 4 : 1.0;
+    return renders_.reduced() || opening_.valid() || saving_.valid() ? kPollSeconds : 1.0;
 }
 
 void App::say(const std::string& note) {
-    note_ = note;
-    note_until_ = in(kNoteSeconds);
-    redraws_ = std::max(redraws_, kRedraws);
-}
-
-PictureRequest App::wanted() const {
-    const Rectangle place = arrangement().rendering;
-    return {view_.camera(place.width, place.height), settings_.look, 1, asked_.serial + 1, {}};
+    message_.note = note;
+    message_.note_until = in(kNoteSeconds);
+    redraw(kRedraws);
 }
 
 void App::ask() {
     const Size size = window_.framebuffer();
     if (size.width == 0 || size.height == 0 || film_) return;
-    PictureRequest request = wanted();
-    const auto now = Clock::now();
-    const bool first = asked_.serial == 0, other_scene = asked_scene_ != scene_number_;
-    if (first || other_scene || !same_view(request, asked_)) {
-        changed_ = now;
-        request.divisor = scripted() ? 1 : first ? kFirstDivisor : pace_.divisor();
-    } else if (asked_.divisor == 1 || now - changed_ < std::chrono::duration<double>(kRestSeconds)) {
-        return;
-    }
-    // A full picture in the making is not what a moving camera should wait behind; it is not asked for anew
-    // either.
-    asked_ = request;
-    asked_scene_ = scene_number_;
-    thread_.ask(asked_);
+    const Rectangle place = arrangement().rendering;
+    renders_.ask(view_.camera(place.width, place.height), settings_.look, scripted());
 }
 
-void App::take_news() {
-    const RenderThread::News news = thread_.take_news();
+void App::take_renders() {
+    const Renders::News news = renders_.take();
     if (news.device) device_name_ = *news.device;
     if (news.failure) {
-        if (scripted() || !shown_) std::rethrow_exception(news.failure);
+        if (scripted() || !renders_.shown()) std::rethrow_exception(news.failure);
         film_.reset();
-        if (note_ != reason(news.failure)) say(reason(news.failure));
+        if (message_.note != reason(news.failure)) say(reason(news.failure));
     }
-    if (news.points > points_) {
-        points_ = news.points;
+    if (news.point_answered) {
         if (news.point) {
             view_.focus(*news.point);
             leave_camera();
         } else {
-            say("there is nothing to look at");
+            say("no splat is opaque enough here to look at");
         }
-        redraws_ = kRedraws;
+        redraw(kRedraws);
     }
     for (const auto& file : news.written)
         if (!film_) say("wrote " + std::filesystem::absolute(file).string());
-    if (const auto photo = photos_.result(); photo != photo_ && photo && photo->scene == opened_) {
-        photo_ = photo;
-        if (photo_->failure.empty()) screen_->presenter.set_picture(Layer::photograph, photo_->picture);
-        redraws_ = kRedraws;
+    if (news.frame) redraw(2);  // a panel that has more to show takes its new size one frame later
+}
+
+void App::take_comparison() {
+    switch (comparison_.take()) {
+        case ImageComparison::News::image:
+            if (comparison_.image()->failure.empty())
+                screen_->presenter.set_picture(Layer::image, comparison_.image()->picture);
+            return redraw(kRedraws);
+        case ImageComparison::News::comparison:
+            return redraw(2);
+        case ImageComparison::News::none:
+            return;
     }
-    if (const auto compared = comparisons_.result(); compared != compared_) {
-        compared_ = compared;
-        redraws_ = std::max(redraws_, 2);
-    }
-    if (saving_.valid() && saving_.wait_for(std::chrono::seconds(0)) == std::future_status::ready)
-        say(saving_.get());
-    if (news.picture == shown_) return;
-    shown_ = news.picture;
-    pace_.drawn(shown_->request.divisor, shown_->milliseconds);
-    redraws_ = std::max(redraws_, 2);  // a panel that has more to say takes its new size a frame later
-}
-
-/// Of what is on the screen since the last picture was.
-void App::count_picture() {
-    if (!shown_ || shown_ == counted_) return;
-    const std::chrono::duration<double> now = Clock::now() - startup_.started;
-    if (!first_picture_) first_picture_ = now.count();
-    const bool moved = counted_ && !same_place(shown_->request.camera, counted_->request.camera);
-    fluency_.shown(now.count(), moved, shown_->request.divisor);
-    counted_ = shown_;
-}
-
-void App::tell_times() const {
-    if (first_picture_)
-        std::fprintf(stderr, "first picture after %.0f ms: scene read %.0f, device open %.0f, window %.0f\n",
-                     1000 * *first_picture_, 1000 * startup_.read_after, 1000 * startup_.device_after,
-                     1000 * window_after_);
-    if (shown_)
-        std::fprintf(stderr, "last picture: %d x %d px in %.1f ms\n", shown_->picture.width,
-                     shown_->picture.height, shown_->milliseconds);
-    if (fluency_.count() == 0) return;
-    std::fprintf(stderr, "moving: %llu pictures in %.1f s, %.1f a second;",
-                 static_cast<unsigned long long>(fluency_.count()), fluency_.seconds(),
-                 double(fluency_.count()) / fluency_.seconds());
-    for (const auto& [divisor, count] : fluency_.by_divisor())
-        std::fprintf(stderr, " %llu at 1/%d", static_cast<unsigned long long>(count), divisor);
-    std::fprintf(stderr, "\n");
-}
-
-bool App::settled() const {
-    return shown_ && shown_->request.serial == asked_.serial && shown_->request.divisor == 1 &&
-           shown_->scene == scene_number_ && points_ == points_asked_;
 }
 
 }  // namespace ewa::viewer

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The viewer: from input to requests, from finished pictures to the window.
+// The viewer's window thread: turns input into requests, and finished frames into what the window shows.
 #pragma once
 #include <chrono>
 #include <filesystem>
@@ -8,42 +8,56 @@
 #include <optional>
 #include <string>
 
-#include "viewer/film.h"
 #include "viewer/gui.h"
-#include "viewer/latest.h"
+#include "viewer/image_comparison.h"
 #include "viewer/opening.h"
 #include "viewer/pace.h"
 #include "viewer/panel.h"
-#include "viewer/photo.h"
+#include "viewer/renders.h"
 #include "viewer/training.h"
 #include "viewer/view_camera.h"
+#include "viewer/views.h"
 
 namespace ewa::viewer {
 
+/// What the command line asks for.
 struct Startup {
-    Scene scene;
+    OpenedScene scene;
     std::optional<int> frame;                      // of the dataset
     std::optional<Size> size;                      // of the window
-    std::optional<std::filesystem::path> picture;  // write it and be done
-    std::optional<std::filesystem::path> film;     // write one through the views here and be done
+    std::optional<std::filesystem::path> picture;  // write this screenshot, then exit
+    std::optional<std::filesystem::path> film;     // write a film through `views` into this folder, then exit
     std::vector<io::NamedView> views;
     PanelSettings settings;
     OpenDevice open_device;
     std::string device_name;
-    std::optional<live::WhatToWatch> watch;  // a run
-    TrainProcess* trainer = nullptr;         // of this viewer, outlives it
-    bool verbose = false;                    // times on standard error
-    std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
-    double read_after = 0, device_after = 0;  // seconds: the scene was read, the device open
+    std::optional<live::WhatToWatch> watch;  // a training run
+    TrainProcess* trainer = nullptr;         // the viewer's own; outlives the App
+    bool verbose = false;                    // print times on standard error
+    StartTimes times;
 };
 
-/// What shows pictures in the window. Made anew where its device is lost.
-struct Screen {
-    Screen(const WindowSystem& system, Window& window, const std::string& device_name)
-        : device(system, window, device_name), presenter(device), gui(window, device, presenter) {}
-    PresentDevice device;
-    Presenter presenter;
-    Gui gui;
+/// What App knows of the open scene.
+struct SceneState {
+    OpenedScene scene;
+    uint64_t number = 0;  // scenes opened so far
+    int sh_degree = 0;    // the highest that changes the image
+    std::vector<PlanLine> plan;
+    double camera_size = 1;          // of a drawn camera, world units
+    std::optional<int> start_frame;  // the frame that "reset" returns to
+    bool framed = false;             // the first view was chosen when there were splats
+
+    void set_gaussians(std::shared_ptr<const Gaussians> gaussians);
+};
+
+/// The text over the image.
+struct Message {
+    using Clock = std::chrono::steady_clock;
+    std::string note;  // the last one; the panel keeps showing it
+    Clock::time_point note_until{}, hint_until{};
+
+    /// Hides what has been shown long enough. Returns whether something changed.
+    bool expire(Clock::time_point now);
 };
 
 class App {
@@ -51,27 +65,24 @@ class App {
     /// Opens the window. Throws RunError.
     explicit App(const Startup& startup);
 
-    /// Until the window is closed, or the one picture is written. Throws RunError, InputError.
+    /// Runs until the window is closed or the requested files are written. Throws RunError, InputError.
     void run();
 
   private:
     using Clock = std::chrono::steady_clock;
 
-    // app.cpp: the loop.
-    void adopt(Scene scene, std::optional<int> frame);
+    // app.cpp: the loop, and what the threads report.
+    void adopt(OpenedScene scene, std::optional<int> frame);
     void open(const std::filesystem::path& path);
     void take_opened();
+    void take_renders();
+    void take_comparison();
+    void take_live();
     void ask();
-    PictureRequest wanted() const;
-    void take_news();
-    bool settled() const;  // what is shown is the full picture of what is wanted
     bool scripted() const { return startup_.picture || startup_.film; }
     double patience() const;
+    void redraw(int frames = 1);
     void say(const std::string& note);
-    void tell_times() const;  // on standard error
-
-    void watch(const live::WhatToWatch& what);
-    void take_live();
 
     // app_input.cpp: keys and the mouse.
     void handle_key(const KeyPress& press);
@@ -81,87 +92,69 @@ class App {
     void move_by_itself(double seconds);
     bool flying() const;
 
-    // app_cameras.cpp: the dataset's cameras, their photographs, saved views.
+    // app_views.cpp: the dataset's cameras, saved views, and the film.
     void go_to_camera(int frame);
     void go_to_nearest_camera();
     void step_camera(int step);
-    void leave_camera() { stands_at_.reset(); }
+    void leave_camera() { at_camera_.reset(); }
+    void reset_view();
     void change_comparison();
-    bool comparing() const;
-    Arrangement arrangement() const;
-    void ask_for_photo();
-    std::optional<ComparisonRequest> comparison_wanted() const;
-    bool compared() const;  // what comparison_wanted() was is there
-    void choose_picture();
     void save_view(size_t number);
-    void go_to_view(size_t number);
+    void go_to_view(const io::NamedView& view);
+    void go_to_number(size_t number);
+    void write_views();
     void start_film();
-    void film();
+    void continue_film();
 
-    // app_draw.cpp: a frame of the window.
+    // app_draw.cpp: one frame of the window.
     void draw();
     bool present(ImDrawData* drawn, Image* capture);
     void panel();
     void obey(const PanelActions& actions);
     void overlays();
+    void load_image();
+    void choose_picture();
+    bool comparing() const;  // the image of the camera is shown or compared
+    std::optional<ComparisonRequest> comparison_wanted() const;
+    Arrangement arrangement() const;
     void save(Image&& image);
-    void count_picture();
     void save_exr();
 
     const Startup& startup_;
     WindowSystem system_;
     Window window_;
     std::unique_ptr<Screen> screen_;
-    Scene scene_;
-    uint64_t scene_number_ = 0;
-    int scene_sh_degree_ = 0;
-    std::vector<PlanLine> plan_;
-    double camera_size_ = 1;
+    SceneState state_;
     ViewCamera view_;
+    std::optional<int> at_camera_;  // the frame of the dataset whose camera the view is at
     PanelSettings settings_;
-    std::optional<int> start_frame_, stands_at_;  // frames of the dataset
-    std::vector<io::NamedView> views_;
+    SavedViews views_;
     std::optional<Film> film_;
-    live::Update run_;
-    bool viewed_ = false;  // the view has been chosen for splats that there are
-    Pace pace_;
-    Fluency fluency_;
-    double window_after_ = 0;              // seconds after the start
-    std::optional<double> first_picture_;  // the same, that it was shown
+    SessionTimes times_;
     std::string device_name_;
+    Message message_;
 
-    std::shared_ptr<const FinishedPicture> shown_, counted_;  // the last one; the last that fluency_ knows of
-    uint64_t opened_ = 0;                                     // scenes so far
-    std::shared_ptr<const Photo> photo_;
-    std::optional<PhotoRequest> photo_asked_;
-    std::optional<ComparisonRequest> comparison_asked_;
-    std::shared_ptr<const Compared> compared_;
-    std::shared_ptr<const Picture> on_screen_;  // as the rendering: what the presenter has
+    std::shared_ptr<const ByteImage> on_screen_;  // the presenter's picture: a render or a difference
     bool difference_on_screen_ = false;
-    PictureRequest asked_;
-    uint64_t asked_scene_ = 0;
-    Clock::time_point changed_;  // when what is wanted last changed
-    Clock::time_point last_frame_, hint_until_, note_until_;
-    int panel_right_ = 0;  // px of the window that it covers from the left
+    Clock::time_point last_frame_;
+    int panel_right_ = 0;  // px of the window that the panel covers, from the left
     bool show_panel_ = true, show_help_ = false, dragging_wipe_ = false;
-    bool capture_ = false;  // write the picture as soon as it is the full one
-    std::optional<int> pointed_camera_;
-    uint64_t points_ = 0, points_asked_ = 0;  // answers to double clicks that were acted on; double clicks
-    static constexpr int kRedraws = 3;        // frames over which ImGui answers input
-    int redraws_ = 0;                         // that are still to draw
+    bool capture_ = false;               // write a screenshot as soon as the full frame is shown
+    std::optional<int> pointed_camera_;  // the frame whose camera is under the pointer
+    static constexpr int kRedraws = 3;   // frames that ImGui needs to answer input
+    int redraws_ = kRedraws;             // frames that are still to draw
     int devices_lost_ = 0;
-    std::string note_;
     bool done_ = false;
-    std::future<Scene> opening_;
-    std::future<std::string> saving_;  // a screenshot; what there is to say of it
-    // Last: they are gone before what they wake.
-    Latest<PhotoRequest, Photo> photos_;
-    Latest<ComparisonRequest, Compared> comparisons_;
-    RenderThread thread_;
-    std::unique_ptr<live::Watcher> watcher_;
+    std::future<OpenedScene> opening_;
+    std::future<std::string> saving_;  // a screenshot; the message about it
+
+    // Their threads call wake() of the window system. Declared last, so that they end before it does.
+    ImageComparison comparison_;
+    Renders renders_;
+    LiveRun live_;
 };
 
-/// The first of <stem>-1<extension>, <stem>-2<extension> … that is not there yet.
+/// The first of <stem>-1<extension>, <stem>-2<extension>, ... that does not exist.
 std::filesystem::path free_name(const std::string& stem, const std::string& extension);
 
 }  // namespace ewa::viewer

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A frame of the window.
+// One frame of the window.
 #include <imgui.h>
 
 #include <algorithm>
@@ -12,34 +12,33 @@
 namespace ewa::viewer {
 namespace {
 
-constexpr int kMostDevicesLost = 5;  // one that is lost again and again is broken
+constexpr int kMostDevicesLost = 5;  // a device that is lost more often is broken
 
 }  // namespace
 
 void App::panel() {
     PanelFacts facts;
-    facts.title = scene_.title;
+    facts.title = state_.scene.title;
     facts.device = device_name_;
-    facts.splats = scene_.gaussians->size();
-    facts.scene_sh_degree = scene_sh_degree_;
-    facts.dataset = scene_.dataset.get();
-    facts.picture = shown_.get();
-    facts.plan = &plan_;
-    facts.views = &views_;
-    facts.drawing = !settled();
-    facts.note = note_;
-    if (photo_ && stands_at_ && photo_->frame == *stands_at_) facts.photo_failure = photo_->failure;
-    if (comparing() && compared()) facts.psnr = compared_->psnr;
-    const std::chrono::duration<double> now = Clock::now() - startup_.started;
-    facts.pictures_a_second = fluency_.rate(now.count());
-    facts.first_picture = first_picture_;
+    facts.splats = state_.scene.gaussians->size();
+    facts.scene_sh_degree = state_.sh_degree;
+    facts.dataset = state_.scene.dataset.get();
+    facts.picture = renders_.shown().get();
+    facts.plan = &state_.plan;
+    facts.views = &views_.all();
+    facts.drawing = !renders_.settled();
+    facts.note = message_.note;
+    if (at_camera_) facts.image_failure = comparison_.failure_of(*at_camera_);
+    if (comparing() && comparison_.compared()) facts.psnr = comparison_.compared()->psnr;
+    facts.pictures_a_second = times_.rate();
+    facts.first_picture = times_.first_frame();
     if (film_) {
         facts.film_frame = film_->next;
         facts.film_frames = film_->frames;
     }
-    if (watcher_) facts.run = &run_;
+    facts.run = live_.update();
     facts.up = view_.up();
-    facts.stands_at = stands_at_;
+    facts.at_camera = at_camera_;
     const PanelActions actions = draw_panel(facts, settings_);
     panel_right_ = int(actions.right * ImGui::GetIO().DisplayFramebufferScale.x);
     obey(actions);
@@ -48,98 +47,132 @@ void App::panel() {
 void App::obey(const PanelActions& actions) {
     if (actions.screenshot) capture_ = true;
     if (actions.exr) save_exr();
-    if (actions.reset) {
-        view_.reset();
-        stands_at_ = start_frame_;
-    }
+    if (actions.reset) reset_view();
     if (actions.frame) go_to_camera(*actions.frame);
-    if (actions.command && watcher_) watcher_->command(*actions.command);
+    if (actions.command) live_.command(*actions.command);
     if (actions.up) view_.set_up(*actions.up);
-    if (actions.save_view) {
-        size_t number = 1;
-        while (std::any_of(views_.begin(), views_.end(),
-                           [&](const io::NamedView& view) { return view.name == std::to_string(number); }))
-            ++number;
-        save_view(number);
-    }
-    if (actions.view && *actions.view < views_.size()) {
-        const io::NamedView& view = views_[*actions.view];
-        view_.stand({view.camera, view.pivot, view_.up(), view_.radius()});
-        leave_camera();
-    }
-    if (actions.forget && *actions.forget < views_.size())
-        views_.erase(views_.begin() + std::ptrdiff_t(*actions.forget));
+    if (actions.save_view) save_view(views_.free_number());
+    if (actions.view && *actions.view < views_.size()) go_to_view(views_.all()[*actions.view]);
+    if (actions.forget) views_.erase(*actions.forget);
     if (actions.film && views_.size() >= 2) start_film();
     if (actions.stop_film) film_.reset();
-    if (!actions.write_views) return;
-    try {
-        const std::filesystem::path file = free_name("ewa-views", ".json");
-        io::write_views(file, views_);
-        say("wrote " + std::filesystem::absolute(file).string() + "; --views opens it");
-    } catch (const RunError& error) {
-        say(error.what());
-    }
+    if (actions.write_views) write_views();
 }
 
 void App::overlays() {
     const Arrangement places = arrangement();
     pointed_camera_.reset();
-    if (settings_.cameras && scene_.dataset) {
+    if (settings_.cameras && state_.scene.dataset) {
         const Camera seen = view_.camera(places.rendering.width, places.rendering.height);
-        pointed_camera_ = draw_cameras({*scene_.dataset, seen, places.rendering, camera_size_, stands_at_});
+        pointed_camera_ =
+            draw_cameras({*state_.scene.dataset, seen, places.rendering, state_.camera_size, at_camera_});
     }
     if (comparing()) draw_comparison(settings_.comparison, places, settings_.wipe);
-    if (Clock::now() < hint_until_ && !show_help_) draw_hint(scene_.dataset != nullptr);
+    if (Clock::now() < message_.hint_until && !show_help_) draw_hint(state_.scene.dataset != nullptr);
+}
+
+Arrangement App::arrangement() const {
+    const Comparison comparison = at_camera_ ? settings_.comparison : Comparison::none;
+    Size image{1, 1};
+    if (at_camera_) {
+        const Camera& camera = state_.scene.dataset->frames[size_t(*at_camera_)].camera;
+        image = {camera.width, camera.height};
+    }
+    const Size window = window_.framebuffer();
+    return arrange(comparison, {std::max(1, window.width), std::max(1, window.height)}, image, panel_right_);
+}
+
+bool App::comparing() const {
+    return settings_.comparison != Comparison::none && at_camera_ && comparison_.image_of(*at_camera_);
+}
+
+void App::load_image() {
+    if (settings_.comparison == Comparison::none || !at_camera_) return;
+    const Rectangle place = arrangement().image;
+    comparison_.load(*at_camera_, state_.scene.dataset->frames[size_t(*at_camera_)],
+                     {place.width, place.height}, settings_.look.background);
+}
+
+/// The full frame can be compared if it shows colours from the camera of the image.
+std::optional<ComparisonRequest> App::comparison_wanted() const {
+    const auto& shown = renders_.shown();
+    if (!comparing() || !renders_.settled() || shown->request.look.mode != Mode::color) return std::nullopt;
+    const Rectangle rendering = arrangement().rendering, image = arrangement().image;
+    if (shown->picture.width != rendering.width || shown->picture.height != rendering.height)
+        return std::nullopt;
+    const bool difference = settings_.comparison == Comparison::difference;
+    return ComparisonRequest{shown, comparison_.image_of(*at_camera_),
+                             fitted({image.width, image.height}, {0, 0, rendering.width, rendering.height}),
+                             difference ? settings_.gain : 0};
+}
+
+/// Gives the presenter the render or its difference to the image. The last difference stays until the next is
+/// ready.
+void App::choose_picture() {
+    const auto& shown = renders_.shown();
+    if (!shown) return;
+    const auto wanted = comparison_wanted();
+    comparison_.compare(wanted);
+    std::shared_ptr<const ByteImage> picture(shown, &shown->picture);
+    if (wanted && wanted->gain > 0) {
+        if (const auto compared = comparison_.compared())
+            picture = std::shared_ptr<const ByteImage>(compared, &compared->difference);
+        else if (difference_on_screen_)
+            return;
+    }
+    difference_on_screen_ = picture.get() != &shown->picture;
+    if (picture == on_screen_) return;
+    on_screen_ = picture;
+    screen_->presenter.set_picture(Layer::rendering, *picture);
 }
 
 void App::draw() {
     --redraws_;
-    ask_for_photo();
+    load_image();
     const Comparison before = settings_.comparison;
     screen_->gui.begin_frame();
     if (!scripted()) overlays();
     const int covered = std::exchange(panel_right_, 0);
     if (show_panel_ && !scripted()) panel();
-    if (panel_right_ != covered) redraws_ = std::max(redraws_, 1);
+    if (panel_right_ != covered) redraw();
     if (show_help_) draw_help(show_help_);
-    if (!scripted() && Clock::now() < note_until_) draw_note(note_);
+    if (!scripted() && Clock::now() < message_.note_until) draw_note(message_.note);
     handle_mouse();
     ImDrawData* drawn = screen_->gui.end_frame();
-    if (settings_.comparison != before) redraws_ = std::max(redraws_, kRedraws);
+    if (settings_.comparison != before) redraw(kRedraws);
     choose_picture();
 
-    const bool photo_ready = settings_.comparison == Comparison::none || !stands_at_ || comparing() ||
-                             (photo_ && photo_->frame == *stands_at_);
-    const bool difference_ready = !comparison_asked_ || comparison_asked_->gain == 0 || compared();
+    const bool image_ready =
+        settings_.comparison == Comparison::none || !at_camera_ || comparison_.loaded(*at_camera_);
+    const auto& requested = comparison_.requested();
+    const bool difference_ready = !requested || requested->gain == 0 || comparison_.compared();
     const bool capture =
-        capture_ && settled() && photo_ready && difference_ready && !film_ && !saving_.valid();
+        capture_ && renders_.settled() && image_ready && difference_ready && !film_ && !saving_.valid();
     Image image;
     if (!present(drawn, capture ? &image : nullptr)) {
-        // Nothing can be shown while minimised; otherwise the window is just changing, and the next try is
-        // soon.
+        // A minimised window shows nothing. Otherwise the window is changing: try again soon.
         const Size size = window_.framebuffer();
-        if (size.width > 0 && size.height > 0) redraws_ = std::max(redraws_, 1);
+        if (size.width > 0 && size.height > 0) redraw();
         return;
     }
-    count_picture();
+    times_.count(renders_.shown());
     if (capture) save(std::move(image));
 }
 
 bool App::present(ImDrawData* drawn, Image* capture) {
     const Arrangement places = arrangement();
     std::vector<Layer> layers;
-    if (shown_) {
-        // The last picture may have been made for another size: it keeps its shape until the next one is
-        // there.
-        const Camera& camera = shown_->request.camera;
+    if (renders_.shown()) {
+        // The last frame may have another size. It keeps its shape until the next one is ready.
+        const Camera& camera = renders_.shown()->request.camera;
         layers.push_back({Layer::rendering, fitted({camera.width, camera.height}, places.rendering)});
     }
     if (comparing() && settings_.comparison == Comparison::beside)
-        layers.push_back({Layer::photograph, places.photograph});
+        layers.push_back({Layer::image, places.image});
     if (comparing() && settings_.comparison == Comparison::wipe) {
-        Rectangle part = places.photograph;
+        Rectangle part = places.image;
         part.width = int(float(part.width) * settings_.wipe + 0.5f);
-        layers.push_back({Layer::photograph, part, 0, double(part.width) / places.photograph.width});
+        layers.push_back({Layer::image, part, 0, double(part.width) / places.image.width});
     }
     try {
         return screen_->presenter.draw(window_.framebuffer(), layers, drawn, capture);
@@ -150,10 +183,11 @@ bool App::present(ImDrawData* drawn, Image* capture) {
     }
     screen_.reset();
     screen_ = std::make_unique<Screen>(system_, window_, device_name_);
-    if (photo_ && photo_->failure.empty()) screen_->presenter.set_picture(Layer::photograph, photo_->picture);
+    if (const auto image = comparison_.image(); image && image->failure.empty())
+        screen_->presenter.set_picture(Layer::image, image->picture);
     on_screen_.reset();
     choose_picture();
-    say("the device that shows the window, or its place on the screen, was lost and has been opened again");
+    say("the device or surface of the window was lost and has been opened again");
     return false;
 }
 
@@ -176,14 +210,12 @@ void App::save(Image&& image) {
     });
 }
 
-/// The rendering alone, in floating point, drawn and written by the thread.
+/// Writes the render alone, in floating point.
 void App::save_exr() {
     const Size size = window_.framebuffer();
     if (size.width == 0 || size.height == 0 || film_) return;
-    asked_ = wanted();
-    asked_.file = free_name("ewa-view", ".exr");
-    asked_scene_ = scene_number_;
-    thread_.ask(asked_);
+    const Rectangle place = arrangement().rendering;
+    renders_.write(view_.camera(place.width, place.height), settings_.look, free_name("ewa-view", ".exr"));
 }
 
 }  // namespace ewa::viewer

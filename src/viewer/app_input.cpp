@@ -13,10 +13,10 @@ namespace ewa::viewer {
 namespace {
 
 constexpr double kRadiansPerPixel = 0.005;
-constexpr double kFlySpeed = 0.8;        // distances to the pivot, a second
-constexpr double kTurntableSpeed = 0.4;  // radians a second
+constexpr double kFlySpeed = 0.8;        // distances to the pivot per second
+constexpr double kTurntableSpeed = 0.4;  // radians per second
 constexpr float kScaleStep = 1.25f, kLeastScale = 0.05f, kMostScale = 2;
-constexpr float kStillPixels = 4;  // less of a drag is a click
+constexpr float kStillPixels = 4;  // a shorter drag is a click
 
 }  // namespace
 
@@ -24,19 +24,20 @@ void App::handle_number(int number, const KeyPress& press) {
     if (press.control)
         save_view(size_t(number));
     else if (press.shift)
-        go_to_view(size_t(number));
+        go_to_number(size_t(number));
     else if (number <= 5)
         settings_.look.mode = Mode(number - 1);
 }
 
 void App::handle_key(const KeyPress& press) {
     const int key = press.key;
-    // These mean nothing to a field that is typed in, so they act beside it; the others are its own.
+    // A text field does not use these keys, so they act while one is edited. The other keys belong to the
+    // field.
     if (key == GLFW_KEY_Q && press.control) return window_.close();
     switch (key) {
         case GLFW_KEY_F1:
             show_help_ = !show_help_;
-            hint_until_ = {};
+            message_.hint_until = {};
             return;
         case GLFW_KEY_F2:
             show_panel_ = !show_panel_;
@@ -51,8 +52,7 @@ void App::handle_key(const KeyPress& press) {
     float& scale = settings_.look.splat_scale;
     switch (key) {
         case GLFW_KEY_R:
-            view_.reset();
-            stands_at_ = start_frame_;
+            reset_view();
             settings_.turntable = false;
             return;
         case GLFW_KEY_MINUS:
@@ -94,11 +94,11 @@ bool App::flying() const {
 }
 
 void App::move_by_itself(double seconds) {
-    if (capture_) return;  // F12 is of the view at that moment, which stands until its full picture is there
+    if (capture_) return;  // the screenshot shows the view at the key press, once its full frame is ready
     if (settings_.turntable) {
         view_.orbit(kTurntableSpeed * seconds, 0);
         leave_camera();
-        redraws_ = std::max(redraws_, 1);
+        redraw();
     }
     if (!flying()) return;
     const auto either = [&](int minus, int plus) {
@@ -109,7 +109,7 @@ void App::move_by_itself(double seconds) {
                          either(GLFW_KEY_S, GLFW_KEY_W));
     view_.fly(way * (seconds * kFlySpeed * (fast ? 4 : 1)));
     leave_camera();
-    redraws_ = std::max(redraws_, 1);
+    redraw();
 }
 
 void App::handle_drag(double right, double down) {
@@ -119,7 +119,7 @@ void App::handle_drag(double right, double down) {
     if (left_button && io.KeyCtrl) {
         view_.look(right * kRadiansPerPixel, down * kRadiansPerPixel);
     } else if (left_button) {
-        // A click is not a drag, or no double click would ever find its camera where it was.
+        // Ignore the small motion of a click, so that a double click does not move the camera.
         if (!ImGui::IsMouseDragging(ImGuiMouseButton_Left, kStillPixels)) return;
         view_.orbit(right * kRadiansPerPixel, down * kRadiansPerPixel);
     } else if (ImGui::IsMouseDown(ImGuiMouseButton_Right) || ImGui::IsMouseDown(ImGuiMouseButton_Middle)) {
@@ -138,14 +138,14 @@ void App::handle_mouse() {
     const Arrangement places = arrangement();
     const bool wiping = comparing() && settings_.comparison == Comparison::wipe;
     if (ImGui::IsMouseClicked(ImGuiMouseButton_Left))
-        dragging_wipe_ = wiping && over_wipe(places.photograph, settings_.wipe);
+        dragging_wipe_ = wiping && over_wipe(places.image, settings_.wipe);
     if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) dragging_wipe_ = false;
-    if (dragging_wipe_ || (wiping && over_wipe(places.photograph, settings_.wipe)))
+    if (dragging_wipe_ || (wiping && over_wipe(places.image, settings_.wipe)))
         ImGui::SetMouseCursor(ImGuiMouseCursor_ResizeEW);
     const double x = io.MousePos.x * double(io.DisplayFramebufferScale.x);
     const double y = io.MousePos.y * double(io.DisplayFramebufferScale.y);
     if (dragging_wipe_) {
-        settings_.wipe = float(std::clamp((x - places.photograph.x) / places.photograph.width, 0.0, 1.0));
+        settings_.wipe = float(std::clamp((x - places.image.x) / places.image.width, 0.0, 1.0));
         return;
     }
     if (io.MouseDelta.x != 0 || io.MouseDelta.y != 0) handle_drag(io.MouseDelta.x, io.MouseDelta.y);
@@ -154,8 +154,8 @@ void App::handle_mouse() {
         leave_camera();
     }
     if (ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left)) {
-        points_asked_ = thread_.ask_point(view_.camera(places.rendering.width, places.rendering.height),
-                                          {x - places.rendering.x, y - places.rendering.y});
+        renders_.ask_point(view_.camera(places.rendering.width, places.rendering.height),
+                           {x - places.rendering.x, y - places.rendering.y});
         return;
     }
     if (pointed_camera_ && ImGui::IsMouseReleased(ImGuiMouseButton_Left) &&

@@ -11,7 +11,7 @@
 namespace ewa::viewer {
 namespace {
 
-constexpr size_t kSamples = 200000;  // means looked at; percentiles of more change nothing that is seen
+constexpr size_t kSamples = 200000;  // of the means; more do not change the percentiles visibly
 
 std::vector<glm::dvec3> sampled_means(const Gaussians& gaussians, float least_logit) {
     std::vector<glm::dvec3> means;
@@ -24,15 +24,15 @@ std::vector<glm::dvec3> sampled_means(const Gaussians& gaussians, float least_lo
     return means;
 }
 
-/// Reorders the values, of which there is at least one.
+/// Reorders the values. There must be at least one.
 double quantile(std::vector<double>& values, double share) {
     const auto at = values.begin() + std::ptrdiff_t(share * double(values.size() - 1));
     std::nth_element(values.begin(), at, values.end());
     return *at;
 }
 
-/// The median view z of the splats at least half opaque in the picture's middle third; 0 where it holds too
-/// little to tell.
+/// The median view z of the splats in the middle third of the image that are at least half opaque; 0 if there
+/// are too few.
 double middle_depth(const Gaussians& gaussians, const Camera& camera) {
     std::vector<double> depths;
     for (const glm::dvec3& mean : sampled_means(gaussians, 0.0f)) {
@@ -56,7 +56,7 @@ glm::dvec3 mean_up(const Dataset& dataset) {
         const glm::dmat3& r = frame.camera.rotation;
         sum -= glm::dvec3(r[0][1], r[1][1], r[2][1]);
     }
-    // Cameras turned every way have no common up.
+    // Cameras with all orientations have no common up.
     if (!(glm::length(sum) > 0.1 * double(dataset.frames.size()))) return {0, -1, 0};
     return glm::normalize(sum);
 }

@@ -23,7 +23,7 @@ Gui::Gui(const Window& window, const PresentDevice& device, Presenter& presenter
     pool_ = device.handle().createDescriptorPoolUnique(create);
 
     ImGui::CreateContext();
-    ImGui::GetIO().IniFilename = nullptr;  // looking at a file leaves no other behind
+    ImGui::GetIO().IniFilename = nullptr;  // write no settings file
     ImGui::StyleColorsDark();
     ImGui::GetStyle().ScaleAllSizes(window.scale());
     ImFontConfig font;
@@ -39,7 +39,8 @@ Gui::Gui(const Window& window, const PresentDevice& device, Presenter& presenter
     info.Queue = device.queue();
     info.DescriptorPool = *pool_;
     info.MinImageCount = presenter.swapchain().least_images();
-    // Vertex buffers go round this many frames; one frame is in flight at a time, so that the least will do.
+    // ImGui cycles its vertex buffers over this many frames. Only one frame is in flight, so the minimum is
+    // enough.
     info.ImageCount = info.MinImageCount;
     info.MSAASamples = VK_SAMPLE_COUNT_1_BIT;
     info.CheckVkResultFn = check;
@@ -54,7 +55,7 @@ Gui::Gui(const Window& window, const PresentDevice& device, Presenter& presenter
 }
 
 Gui::~Gui() {
-    (void)vkDeviceWaitIdle(device_.handle());  // the last frame may still be drawn
+    (void)vkDeviceWaitIdle(device_.handle());  // the last frame may still be in flight
     ImGui_ImplVulkan_Shutdown();
     ImGui_ImplGlfw_Shutdown();
     ImGui::DestroyContext();

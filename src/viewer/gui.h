@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Dear ImGui on one window: its life, and a frame of it.
+// Dear ImGui on one window, and all that shows pictures there.
 #pragma once
 #include "viewer/presenter.h"
 
@@ -7,7 +7,7 @@ namespace ewa::viewer {
 
 class Gui {
   public:
-    /// After the window's own callbacks are set: ImGui's call them in turn.
+    /// The window's own callbacks must be set before: those of ImGui call them.
     Gui(const Window& window, const PresentDevice& device, Presenter& presenter);
     ~Gui();
     Gui(const Gui&) = delete;
@@ -19,6 +19,15 @@ class Gui {
   private:
     const PresentDevice& device_;
     vk::UniqueDescriptorPool pool_;
+};
+
+/// What shows pictures in the window. Created again if its device is lost.
+struct Screen {
+    Screen(const WindowSystem& system, Window& window, const std::string& device_name)
+        : device(system, window, device_name), presenter(device), gui(window, device, presenter) {}
+    PresentDevice device;
+    Presenter presenter;
+    Gui gui;
 };
 
 }  // namespace ewa::viewer

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Work beside the window's own thread, of which only the last that was asked for matters.
+// Work on a thread of its own, of which only the last request matters.
 #pragma once
 #include <condition_variable>
 #include <functional>
@@ -14,7 +14,7 @@ namespace ewa::viewer {
 template <class Request, class Result>
 class Latest {
   public:
-    /// make is called on the thread and throws nothing; on_news is called there when result() is another one.
+    /// make runs on the thread and never throws. on_news is called there when result() has changed.
     Latest(std::function<Result(const Request&)> make, std::function<void()> on_news)
         : make_(std::move(make)), on_news_(std::move(on_news)), thread_([this] { work(); }) {}
     ~Latest() {
@@ -28,13 +28,13 @@ class Latest {
     Latest(const Latest&) = delete;
     Latest& operator=(const Latest&) = delete;
 
-    /// Takes the place of a request that waits.
+    /// Replaces a request that is waiting.
     void ask(Request request) {
         const std::lock_guard lock(mutex_);
         waiting_ = std::move(request);
         wake_.notify_one();
     }
-    /// The last one made, or null.
+    /// The last result, or null.
     std::shared_ptr<const Result> result() const {
         const std::lock_guard lock(mutex_);
         return result_;

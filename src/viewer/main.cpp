@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// ewa-view: reads the arguments, opens the scene in a window, and turns every failure into one line and an
-// exit status.
+// ewa-view: parses the arguments, opens the scene in a window, and turns an error into one line and an exit
+// status.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
@@ -80,8 +80,7 @@ std::array<float, 3> parse_background(const std::string& text) {
 }
 
 void check_frame(const Startup& startup) {
-    if (startup.frame && !startup.scene.dataset)
-        throw InputError("--frame needs --cameras DATASET, whose frame it is");
+    if (startup.frame && !startup.scene.dataset) throw InputError("--frame needs --cameras DATASET");
     if (!startup.scene.dataset) return;
     const int count = int(startup.scene.dataset->frames.size());
     if (startup.frame.value_or(0) < 0 || startup.frame.value_or(0) >= count)
@@ -90,7 +89,7 @@ void check_frame(const Startup& startup) {
                          " frames, numbered from 0 in name order");
 }
 
-/// Where `ewa train` would put it.
+/// The folder that `ewa train` would choose.
 std::filesystem::path output_of(const Arguments& arguments) {
     if (!arguments.output.empty()) return arguments.output;
     std::error_code error;
@@ -99,23 +98,23 @@ std::filesystem::path output_of(const Arguments& arguments) {
     return std::filesystem::path("out") / (path.filename().empty() ? "dataset" : path.filename());
 }
 
-Scene open_what(const Arguments& arguments, Startup& startup) {
+OpenedScene open_what(const Arguments& arguments, Startup& startup) {
     if (!arguments.connect.empty()) {
         startup.watch = live::WhatToWatch{};
         startup.watch->address = live::parse_address(arguments.connect);
         startup.watch->token = arguments.token;
         const std::filesystem::path& what = arguments.path.empty() ? arguments.cameras : arguments.path;
-        Scene scene = what.empty() ? Scene() : open_scene(what, {});
+        OpenedScene scene = what.empty() ? OpenedScene() : open_scene(what, {});
         if (!scene.gaussians) scene.gaussians = std::make_shared<const Gaussians>();
         scene.title = arguments.connect;
         return scene;
     }
     if (arguments.path.empty())
         throw InputError("PATH is required: splats, a dataset, or a run's folder (see ewa-view --help)");
-    Scene scene = open_scene(arguments.path, arguments.cameras);
+    OpenedScene scene = open_scene(arguments.path, arguments.cameras);
     if (arguments.train) {
         if (!scene.dataset || !scene.run.empty())
-            throw InputError("--train needs a dataset, and " + arguments.path.string() + " is none");
+            throw InputError("--train needs a dataset, and " + arguments.path.string() + " is not one");
         scene.remark.clear();
         startup.watch = live::WhatToWatch{};
         startup.watch->folder = output_of(arguments);
@@ -142,7 +141,7 @@ Startup open(const Arguments& arguments) {
     if (!arguments.views.empty()) startup.views = io::read_views(arguments.views);
     if (!arguments.film.empty()) {
         if (startup.views.empty())
-            throw InputError("--film needs --views FILE, with the views to go through");
+            throw InputError("--film needs --views FILE with the views to pass through");
         startup.film = arguments.film;
     }
     startup.scene = open_what(arguments, startup);
@@ -157,15 +156,15 @@ Startup open(const Arguments& arguments) {
 }
 
 void add_options(CLI::App& app, Arguments& arguments) {
-    app.add_option("PATH", arguments.path,
-                   "A splat file (.ply .compressed.ply .splat .spz .glb .gltf), a dataset, or the folder of "
-                   "a training run")
+    app.add_option(
+           "PATH", arguments.path,
+           "Splat file (.ply .compressed.ply .splat .spz .glb .gltf), dataset, or folder of a training run")
         ->type_name("");
     CLI::Option* train = app.add_flag(
         "--train", arguments.train,
-        "Train on the dataset and show the progress. Other options are passed to ewa train, such as --steps");
+        "Train on the dataset and watch. Other options are passed to ewa train, such as --steps");
     app.add_option("-o,--output", arguments.output,
-                   "With --train: the folder of the run [out/<name of the dataset>]")
+                   "With --train: folder of the run [out/<name of the dataset>]")
         ->needs(train)
         ->type_name("DIR");
     app.add_option("--connect", arguments.connect, "Show a training that runs with --serve")
@@ -174,41 +173,45 @@ void add_options(CLI::App& app, Arguments& arguments) {
     app.add_option("--token", arguments.token,
                    "With --connect: allows pause and save. live.json in the folder of the run holds it")
         ->type_name("TEXT");
-    app.add_option("--cameras", arguments.cameras, "A dataset whose cameras the window offers")
+    app.add_option("--cameras", arguments.cameras, "Dataset whose cameras to show and to look through")
         ->type_name("DATASET");
-    app.add_option("--frame", arguments.frame, "The camera to start from, numbered in name order [0]")
+    app.add_option("--frame", arguments.frame, "Index of the camera to start from, in name order (0)")
         ->type_name("I");
     app.add_option("--mode", arguments.settings.look.mode,
-                   "color, depth, alpha, count (splats per pixel) or ellipsoids")
+                   "What to show: color, depth, alpha, count (splats per pixel) or ellipsoids")
         ->transform(CLI::CheckedTransformer(kModes).description(""))
         ->type_name("MODE");
     app.add_option("--compare", arguments.settings.comparison,
-                   "How to show the image of the camera: none, beside, wipe or difference")
+                   "Comparison with the image of the camera: none, beside, wipe or difference")
         ->transform(CLI::CheckedTransformer(kComparisons).description(""))
         ->type_name("HOW");
-    app.add_option("--background", arguments.background, "Colour behind the splats: r,g,b in 0..1")
+    app.add_option("--background", arguments.background, "Background colour: r,g,b in 0..1")
         ->type_name("COLOUR");
     app.add_flag("--antialias", arguments.antialias, "Render with the filter of Mip-Splatting");
     app.add_option("--size", arguments.size,
-                   "Size of the window in pixels [the shape of the camera, as large as the screen allows]")
+                   "Size of the window in px [the shape of the camera, as large as fits]")
         ->type_name("WxH");
-    app.add_option("--screenshot", arguments.picture, "Write the view as a PNG, without the panel, and quit")
+    app.add_option("--screenshot", arguments.picture,
+                   "Write what the window shows, without the panel, as a PNG, and exit")
         ->type_name("FILE");
-    app.add_option("--views", arguments.views, "Saved views, as the window writes them")->type_name("FILE");
+    app.add_option("--views", arguments.views, "Saved views, in the format that the window writes")
+        ->type_name("FILE");
     app.add_option("--film", arguments.film,
-                   "Write a film through the saved views, one PNG for each frame, and quit")
+                   "Write a film through the saved views, one PNG per frame, and exit")
         ->type_name("DIR");
-    app.add_option("--film-seconds", arguments.settings.film_seconds, "Seconds from one view to the next [2]")
+    app.add_option("--film-seconds", arguments.settings.film_seconds,
+                   "Duration of the film from view to view (2)")
         ->check(CLI::Range(0.04f, 3600.0f).description(""))
         ->type_name("S");
     app.add_option("--device", arguments.device.selector,
-                   "The device that renders: its number or a part of its name (see ewa devices)")
+                   "Number of the device that renders, or part of its name (see ewa devices)")
         ->type_name("NAME|N");
     app.add_flag("--verbose", arguments.verbose,
-                 "At the end, print the time of the first picture and the frame rate while the camera moved");
+                 "At the end, print the time of the first frame and the frame rate of the moving camera");
 }
 
-/// Opens the device while the scene is being read. OpenDevice gives that one first, and then opens it anew.
+/// Opens the device while the scene is being read. function() returns that device first; later calls open it
+/// again.
 class DeviceOpener {
   public:
     explicit DeviceOpener(const DeviceOptions& options)
@@ -235,11 +238,8 @@ int run(const Arguments& arguments) {
     try {
         DeviceOpener opener(arguments.device);
         Startup startup = open(arguments);
-        startup.started = started;
-        const auto elapsed = [&] {
-            return std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
-        };
-        startup.read_after = elapsed();
+        startup.times.started = started;
+        startup.times.scene_read = startup.times.now();
         std::optional<TrainProcess> trainer;
         if (arguments.train) {
             std::vector<std::string> options{arguments.path.string()};
@@ -247,7 +247,7 @@ int run(const Arguments& arguments) {
             startup.trainer = &trainer.emplace(options, startup.watch->folder);
         }
         startup.device_name = opener.name();
-        startup.device_after = elapsed();
+        startup.times.device_open = startup.times.now();
         startup.open_device = opener.function();
         App(startup).run();
         return kDone;
@@ -256,9 +256,8 @@ int run(const Arguments& arguments) {
     } catch (const RunError& error) {
         return fail(error.what(), kFailed);
     } catch (const vk::DeviceLostError& error) {
-        return fail(
-            std::string("the device that shows the window was lost, again and again: ") + error.what(),
-            kFailed);
+        return fail(std::string("the device that shows the window was lost several times: ") + error.what(),
+                    kFailed);
     } catch (const vk::SystemError& error) {
         return fail(std::string("the device that shows the window failed: ") + error.what(), kFailed);
     } catch (const std::bad_alloc&) {
@@ -271,15 +270,10 @@ int run(const Arguments& arguments) {
 }  // namespace
 
 int main(int argc, char** argv) {
-    CLI::App app{"Shows a 3D Gaussian splat scene in a window. F1 in the window lists its keys."};
+    CLI::App app{"Shows a 3D Gaussian splat scene in a window. F1 in the window lists the keys."};
     app.name("ewa-view");
     app.set_version_flag("--version", "ewa-view " EWA_VERSION);
-    app.formatter_fn([](const CLI::App* shown, const std::string& name, CLI::AppFormatMode mode) {
-        constexpr size_t kColumn = 30;  // of the descriptions
-        CLI::Formatter formatter;
-        formatter.column_width(kColumn);
-        return core::help_text(formatter.make_help(shown, name, mode), kColumn);
-    });
+    core::use_help_text<CLI::Formatter>(app);
     Arguments arguments;
     add_options(app, arguments);
     app.allow_extras();

@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr float kPointOpacity = 3;             // logit
-constexpr float kPointShrink = 1.2f;           // taken off the logarithm of a point's size
+constexpr float kPointShrink = 1.2f;           // subtracted from the logarithm of a point's size
 constexpr uint64_t kLargestConfig = 1u << 20;  // bytes
 
 std::string name_of_path(const fs::path& path) {
@@ -30,18 +30,17 @@ bool is_dataset_file(const fs::path& path) {
     return name.starts_with("transforms") && core::lower(path.extension().string()) == ".json";
 }
 
-/// points: wanted too, which are read along with the photographs alone.
+/// points: also load the points, which are read only together with the images.
 std::shared_ptr<const Dataset> load_cameras(const fs::path& path, int downscale, bool points) {
     Dataset dataset;
     if (is_mesh_scene(path)) dataset = scene_cameras(path, {});
     try {
         if (points && dataset.frames.empty()) dataset = load_dataset(path, {.downscale = downscale});
     } catch (const InputError&) {
-        // A photograph or the points are not as they should be: the cameras may still be seen.
+        // An image or the points are invalid: the cameras alone may still load.
     }
     if (dataset.frames.empty()) dataset = load_dataset(path, {.downscale = downscale, .need_images = false});
-    // Frames without a file are left out, as training and `ewa render` leave them out, where there are any
-    // others.
+    // Skip frames without an image, unless all are, as training and `ewa render` do.
     const auto missing = [](const Frame& frame) { return !frame.image_exists; };
     if (!std::all_of(dataset.frames.begin(), dataset.frames.end(), missing))
         std::erase_if(dataset.frames, missing);
@@ -54,7 +53,7 @@ nlohmann::json read_config(const fs::path& path) {
         const auto json = core::read_json_file<nlohmann::json>(path, {.bytes = kLargestConfig});
         if (json.is_object()) return json;
     } catch (const InputError&) {
-        // The run is shown without what its settings would say.
+        // The run is shown without its settings.
     }
     return nlohmann::json::object();
 }
@@ -77,8 +76,8 @@ Look look_of(const nlohmann::json& config) {
     return look;
 }
 
-/// The dataset of a run, as its config.json names it: relative to where the training was started, which may
-/// be here or any folder above the run's. Of a mesh scene, the photographs that the training made of it.
+/// The dataset that config.json names, relative to the folder where the training was started: the current one
+/// or any folder above the run. Of a mesh scene: the images that the training rendered.
 fs::path dataset_of(const fs::path& run, const nlohmann::json& config) {
     const fs::path named = text_of(config, "dataset");
     if (named.empty()) return {};
@@ -94,8 +93,8 @@ fs::path dataset_of(const fs::path& run, const nlohmann::json& config) {
     return {};
 }
 
-Scene open_run(const fs::path& run, const fs::path& cameras) {
-    Scene scene;
+OpenedScene open_run(const fs::path& run, const fs::path& cameras) {
+    OpenedScene scene;
     scene.run = run;
     const nlohmann::json config = read_config(run / "config.json");
     scene.look = look_of(config);
@@ -113,7 +112,7 @@ Scene open_run(const fs::path& run, const fs::path& cameras) {
         if (!dataset.empty())
             scene.dataset = load_cameras(dataset, factor, !splats);
         else
-            scene.remark = "its dataset is not found; --cameras DATASET shows its cameras";
+            scene.remark = "the dataset of this run was not found; name it with --cameras DATASET";
     } catch (const InputError& problem) {
         if (!cameras.empty()) throw;
         scene.remark = problem.what();
@@ -123,14 +122,15 @@ Scene open_run(const fs::path& run, const fs::path& cameras) {
     return scene;
 }
 
-Scene open_dataset(const fs::path& path) {
-    Scene scene;
+OpenedScene open_dataset(const fs::path& path) {
+    OpenedScene scene;
     scene.dataset = load_cameras(path, 1, true);
     scene.gaussians = std::make_shared<const Gaussians>(splats_of_points(scene.dataset->points));
-    scene.remark =
-        is_mesh_scene(path) ? "these are the views of a mesh scene; ewa train photographs it and makes splats"
-        : scene.gaussians->size() > 0 ? "these are the dataset's points; ewa train makes splats of them"
-                                      : "this dataset has cameras, but no points and no splats";
+    scene.remark = is_mesh_scene(path)
+                       ? "these are the views of a mesh scene; ewa train renders it and trains splats"
+                   : scene.gaussians->size() > 0
+                       ? "these are the points of the dataset; ewa train trains splats from them"
+                       : "this dataset has cameras, but no points and no splats";
     return scene;
 }
 
@@ -151,10 +151,10 @@ Gaussians splats_of_points(const PointCloud& points) {
     return splats;
 }
 
-Scene open_scene(const fs::path& path, const fs::path& cameras) {
+OpenedScene open_scene(const fs::path& path, const fs::path& cameras) {
     std::error_code error;
-    Scene scene;
-    if (!fs::exists(path, error)) throw InputError(path.string() + ": there is no such file or folder");
+    OpenedScene scene;
+    if (!fs::exists(path, error)) throw InputError(path.string() + ": no such file or folder");
     if (fs::is_directory(path, error)) {
         scene = is_run(path) ? open_run(path, cameras) : open_dataset(path);
     } else if (is_dataset_file(path) || is_mesh_scene(path)) {

@@ -13,10 +13,10 @@ namespace {
 
 constexpr ImU32 kCameraColor = IM_COL32(90, 200, 255, 150), kPointedColor = IM_COL32(255, 210, 60, 255);
 constexpr ImU32 kTextColor = IM_COL32(255, 255, 255, 255), kShadowColor = IM_COL32(0, 0, 0, 190);
-constexpr float kGrab = 12;      // px around what can be clicked
-constexpr double kFar = 100000;  // px beyond which a line's end says nothing
+constexpr float kGrab = 12;      // px around a target that count as on it
+constexpr double kFar = 100000;  // px; line ends are clamped to this
 
-/// Framebuffer pixels to ImGui's coordinates.
+/// Converts framebuffer pixels to ImGui's coordinates.
 ImVec2 gui_point(double x, double y) {
     const ImVec2 scale = ImGui::GetIO().DisplayFramebufferScale;
     return {float(std::clamp(x, -kFar, kFar)) / std::max(scale.x, 1e-3f),
@@ -29,7 +29,7 @@ void label(ImDrawList& list, const ImVec2& at, const char* text) {
     list.AddText(at, kTextColor, text);
 }
 
-/// A knob with an arrow to each side.
+/// A knob with an arrow on each side.
 void grip(ImDrawList& list, const ImVec2& at, float radius) {
     list.AddCircleFilled(at, radius, kShadowColor);
     list.AddCircle(at, radius, kTextColor, 0, 1.5f);
@@ -46,7 +46,7 @@ std::optional<int> pointed_at(const CamerasShown& cameras) {
     std::optional<int> nearest;
     float least = kGrab;
     for (size_t i = 0; i < cameras.dataset.frames.size(); ++i) {
-        if (int(i) == cameras.stands_at) continue;
+        if (int(i) == cameras.at_camera) continue;
         const auto pixel = projected(cameras.dataset.frames[i].camera.position(), cameras.view);
         if (!pixel) continue;
         const ImVec2 at = gui_point(pixel->x + cameras.place.x, pixel->y + cameras.place.y);
@@ -58,11 +58,11 @@ std::optional<int> pointed_at(const CamerasShown& cameras) {
     return nearest;
 }
 
-float wipe_position(const Rectangle& photograph, float wipe) {
-    return gui_point(photograph.x + double(wipe) * photograph.width, 0).x;
+float wipe_position(const Rectangle& image, float wipe) {
+    return gui_point(image.x + double(wipe) * image.width, 0).x;
 }
 
-/// A window that takes no input, in the middle, its foot at y. Goes on until ImGui::End().
+/// Begins a centred window without input whose lower border is at y. End it with ImGui::End().
 void begin_message(const char* name, float y) {
     ImGui::SetNextWindowPos(ImVec2(ImGui::GetIO().DisplaySize.x / 2, y), ImGuiCond_Always,
                             ImVec2(0.5f, 1.0f));
@@ -81,7 +81,7 @@ std::optional<int> draw_cameras(const CamerasShown& cameras) {
     list.PushClipRect(gui_point(place.x, place.y), gui_point(place.x + place.width, place.y + place.height));
     const std::optional<int> pointed = pointed_at(cameras);
     for (size_t i = 0; i < cameras.dataset.frames.size(); ++i) {
-        if (int(i) == cameras.stands_at) continue;
+        if (int(i) == cameras.at_camera) continue;
         const bool here = int(i) == pointed;
         for (const Segment& segment : frustum_segments(cameras.dataset.frames[i].camera, cameras.size)) {
             const auto line = projected(segment, cameras.view);
@@ -102,7 +102,7 @@ std::optional<int> draw_cameras(const CamerasShown& cameras) {
 
 void draw_comparison(Comparison comparison, const Arrangement& arrangement, float wipe) {
     ImDrawList& list = *ImGui::GetBackgroundDrawList();
-    const Rectangle &photo = arrangement.photograph, &rendering = arrangement.rendering;
+    const Rectangle &photo = arrangement.image, &rendering = arrangement.rendering;
     const float line = ImGui::GetTextLineHeight();
     const auto foot = [&](const Rectangle& place, const char* text, float share) {
         const ImVec2 low = gui_point(place.x + place.width * double(share), place.y + place.height);
@@ -110,21 +110,21 @@ void draw_comparison(Comparison comparison, const Arrangement& arrangement, floa
     };
     if (comparison == Comparison::beside) {
         foot(fitted({photo.width, photo.height}, rendering), "splats", 0.5f);
-        foot(photo, "photograph", 0.5f);
+        foot(photo, "image", 0.5f);
     } else if (comparison == Comparison::wipe) {
         const float x = wipe_position(photo, wipe);
         list.AddLine({x, gui_point(0, photo.y).y}, {x, gui_point(0, photo.y + photo.height).y},
                      IM_COL32(255, 255, 255, 220), 2);
         grip(list, {x, gui_point(0, photo.y + photo.height / 2.0).y}, line);
-        if (wipe > 0.15f) foot(photo, "photograph", wipe / 2);
+        if (wipe > 0.15f) foot(photo, "image", wipe / 2);
         if (wipe < 0.85f) foot(photo, "splats", (1 + wipe) / 2);
     } else if (comparison == Comparison::difference) {
-        foot(photo, "difference to the photograph", 0.5f);
+        foot(photo, "difference to the image", 0.5f);
     }
 }
 
-bool over_wipe(const Rectangle& photograph, float wipe) {
-    return std::abs(ImGui::GetIO().MousePos.x - wipe_position(photograph, wipe)) < kGrab;
+bool over_wipe(const Rectangle& image, float wipe) {
+    return std::abs(ImGui::GetIO().MousePos.x - wipe_position(image, wipe)) < kGrab;
 }
 
 void draw_note(const std::string& note) {
@@ -139,12 +139,12 @@ void draw_note(const std::string& note) {
     ImGui::End();
 }
 
-void draw_hint(bool photographs) {
-    // Above the names of what is compared.
+void draw_hint(bool images) {
+    // Above the labels of the compared images.
     begin_message("hint", ImGui::GetIO().DisplaySize.y - 3 * ImGui::GetTextLineHeight());
     ImGui::TextUnformatted("drag: turn    right drag: move    wheel: closer    double click: look at");
-    ImGui::TextUnformatted(photographs ? "2: depth    V: compare with the photographs    F1: all keys"
-                                       : "2: depth    W A S D: fly    F1: all keys");
+    ImGui::TextUnformatted(images ? "2: depth    V: compare with the images    F1: all keys"
+                                  : "2: depth    W A S D: fly    F1: all keys");
     ImGui::End();
 }
 

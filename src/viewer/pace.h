@@ -1,80 +1,45 @@
 // SPDX-License-Identifier: Apache-2.0
-// How much resolution a moving camera can have, and how fluent its pictures are.
+// The resolution of a moving camera, and the frame times that the viewer reports.
 #pragma once
-#include <algorithm>
-#include <cmath>
+#include <chrono>
 #include <cstdint>
 #include <map>
+#include <memory>
+#include <optional>
 
 namespace ewa::viewer {
 
-/// A picture takes a time that its splats cost at any resolution, and one that its pixels cost: t(d) = full
-/// (fixed + (1 - fixed) / d^2). Resolution is given up as far as that helps.
+struct RenderedFrame;
+
+/// Chooses the resolution of a moving camera. A frame's time has a part that its splats cost at any
+/// resolution, and a part per pixel: t(d) = full (fixed + (1 - fixed) / d^2) at divisor d. Resolution is
+/// lowered only as far as that helps.
 class Pace {
   public:
-    /// What to divide the size by while the camera moves.
+    /// What to divide the width and height by while the camera moves.
     int divisor() const { return divisor_; }
 
-    /// Told of every finished picture.
-    void drawn(int with_divisor, double milliseconds) {
-        learn(with_divisor, milliseconds);
-        const double full = milliseconds / share(with_divisor);
-        const auto expected = [&](int divisor) { return full * share(divisor); };
-        const double goal = std::max(kGoal, kWorth * expected(kMost));
-        if (expected(divisor_) > kSlack * goal) {
-            while (divisor_ < kMost && expected(divisor_) > goal) ++divisor_;
-        } else if (divisor_ > 1 && expected(divisor_ - 1) * kSlack < goal) {
-            --divisor_;
-        }
-    }
+    /// Learns from a finished frame.
+    void drawn(int with_divisor, double milliseconds);
 
   private:
-    static constexpr double kGoal = 40;    // ms
-    static constexpr double kWorth = 1.3;  // times the smallest picture's time is as good as that
-    static constexpr double kSlack = 1.2;  // one picture is not as fast as the next
-    static constexpr int kMost = 8;
-
-    static double pixels(int divisor) { return 1.0 / (divisor * divisor); }
-    double share(int divisor) const { return fixed_ + (1 - fixed_) * pixels(divisor); }
-
-    /// From two pictures of nearly the same view.
-    void learn(int divisor, double milliseconds) {
-        const double a = pixels(last_divisor_), b = pixels(divisor);
-        if (last_ > 0 && divisor != last_divisor_) {
-            const double ratio = milliseconds / last_, below = ratio * (1 - a) - (1 - b);
-            const double fixed = below != 0 ? (b - ratio * a) / below : 0;
-            if (std::isfinite(fixed)) fixed_ = (fixed_ + std::clamp(fixed, 0.0, 1.0)) / 2;
-        }
-        last_divisor_ = divisor;
-        last_ = milliseconds;
-    }
+    double share(int divisor) const;  // t(divisor) / full
+    void learn(int divisor, double milliseconds);
 
     int divisor_ = 1, last_divisor_ = 1;
     double last_ = 0, fixed_ = 0;
 };
 
-/// Pictures of a moving camera, as they are shown.
+/// The frame rate of a moving camera, counted when frames are shown.
 class Fluency {
   public:
-    /// A picture is shown at this time (s, of a steady clock). moved: its camera is not the last one's.
-    void shown(double time, bool moved, int divisor) {
-        const double pause = time - last_;
-        last_ = time;
-        if (!moved || !(pause < kRest)) {
-            rate_ = 0;
-            return;
-        }
-        ++count_;
-        ++by_divisor_[divisor];
-        seconds_ += pause;
-        // Smooth over some ten pictures.
-        const double rate = 1 / std::max(pause, 1e-4);
-        rate_ = rate_ > 0 ? 1 / (0.9 / rate_ + 0.1 / rate) : rate;
-    }
-    /// Pictures a second; 0 while the camera rests.
+    /// A frame is shown at this time (s, of a steady clock). moved: its camera differs from that of the last
+    /// frame.
+    void shown(double time, bool moved, int divisor);
+    /// Frames per second; 0 while the camera rests.
     double rate(double time) const { return time - last_ < kRest ? rate_ : 0; }
 
-    // Since the start.
+    // Totals since the start.
     uint64_t count() const { return count_; }
     double seconds() const { return seconds_; }
     const std::map<int, uint64_t>& by_divisor() const { return by_divisor_; }
@@ -84,6 +49,34 @@ class Fluency {
     double last_ = -kRest, rate_ = 0, seconds_ = 0;
     uint64_t count_ = 0;
     std::map<int, uint64_t> by_divisor_;
+};
+
+/// Seconds after the start of the program.
+struct StartTimes {
+    std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
+    double scene_read = 0, device_open = 0, window_open = 0;
+    double now() const {
+        return std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+    }
+};
+
+/// The times of a session, for the panel and for --verbose.
+class SessionTimes {
+  public:
+    explicit SessionTimes(const StartTimes& start) : start_(start) {}
+
+    /// The frame is on the screen now. Counts each frame once.
+    void count(const std::shared_ptr<const RenderedFrame>& frame);
+    void window_is_open() { start_.window_open = start_.now(); }
+    std::optional<double> first_frame() const { return first_frame_; }
+    double rate() const { return fluency_.rate(start_.now()); }
+    void print(const RenderedFrame* last) const;  // on standard error
+
+  private:
+    StartTimes start_;
+    Fluency fluency_;
+    std::optional<double> first_frame_;
+    std::shared_ptr<const RenderedFrame> counted_;
 };
 
 }  // namespace ewa::viewer

@@ -25,12 +25,12 @@ void show_facts(const PanelFacts& facts) {
         ImGui::Text("%zu splats", facts.splats);
         return;
     }
-    const FinishedPicture& shown = *facts.picture;
-    ImGui::Text("%zu splats, %u drawn", facts.splats, shown.splats_drawn);
+    const RenderedFrame& shown = *facts.picture;
+    ImGui::Text("%zu splats, %u visible", facts.splats, shown.splats_drawn);
     ImGui::Text("%d x %d px in %.1f ms%s", shown.picture.width, shown.picture.height, shown.milliseconds,
                 facts.drawing ? "  ..." : "");
     if (shown.skipped_nonfinite > 0)
-        ImGui::Text("%u splats are not finite and not drawn", shown.skipped_nonfinite);
+        ImGui::Text("%u splats are not finite and are skipped", shown.skipped_nonfinite);
 }
 
 void edit_look(const PanelFacts& facts, Look& look) {
@@ -58,7 +58,7 @@ void edit_look(const PanelFacts& facts, Look& look) {
 }
 
 void choose_up(const PanelFacts& facts, PanelActions& actions) {
-    const char* present = "as the cameras";
+    const char* present = "from cameras";
     for (const Axis& choice : kAxes)
         if (choice.axis == facts.up) present = choice.name;
     if (!ImGui::BeginCombo("up", present)) return;
@@ -69,25 +69,25 @@ void choose_up(const PanelFacts& facts, PanelActions& actions) {
 
 void edit_cameras(const PanelFacts& facts, PanelSettings& settings, PanelActions& actions) {
     const int last = int(facts.dataset->frames.size()) - 1;
-    int frame = facts.stands_at.value_or(0);
-    if (ImGui::SliderInt("camera", &frame, 0, last, facts.stands_at ? "%d" : "-",
+    int frame = facts.at_camera.value_or(0);
+    if (ImGui::SliderInt("camera", &frame, 0, last, facts.at_camera ? "%d" : "-",
                          ImGuiSliderFlags_AlwaysClamp))
         actions.frame = frame;
-    if (facts.stands_at)
-        ImGui::TextDisabled("%s", facts.dataset->frames[size_t(*facts.stands_at)].name.c_str());
-    ImGui::Checkbox("show the cameras", &settings.cameras);
+    if (facts.at_camera)
+        ImGui::TextDisabled("%s", facts.dataset->frames[size_t(*facts.at_camera)].name.c_str());
+    ImGui::Checkbox("show cameras", &settings.cameras);
     int comparison = int(settings.comparison);
-    if (ImGui::Combo("photograph", &comparison, "none\0beside\0wipe\0difference\0"))
+    if (ImGui::Combo("compare", &comparison, "none\0beside\0wipe\0difference\0"))
         settings.comparison = Comparison(comparison);
     if (settings.comparison == Comparison::wipe)
         ImGui::SliderFloat("wipe", &settings.wipe, 0, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp);
     if (settings.comparison == Comparison::difference)
-        ImGui::SliderFloat("times", &settings.gain, 1, 16, "%.0f", ImGuiSliderFlags_AlwaysClamp);
+        ImGui::SliderFloat("gain", &settings.gain, 1, 16, "%.0f", ImGuiSliderFlags_AlwaysClamp);
     if (settings.comparison == Comparison::none) return;
-    if (!facts.photo_failure.empty())
-        ImGui::TextWrapped("%s", facts.photo_failure.c_str());
-    else if (!facts.stands_at)
-        ImGui::TextDisabled("G: to the nearest camera");
+    if (!facts.image_failure.empty())
+        ImGui::TextWrapped("%s", facts.image_failure.c_str());
+    else if (!facts.at_camera)
+        ImGui::TextDisabled("G: go to the nearest camera");
     else if (facts.psnr && std::isfinite(*facts.psnr))
         ImGui::Text("PSNR of this view %.2f dB", *facts.psnr);
 }
@@ -104,12 +104,12 @@ void edit_views(const PanelFacts& facts, PanelSettings& settings, PanelActions& 
     if (facts.views->empty()) return;
     if (ImGui::Button("Write to a file")) actions.write_views = true;
     if (facts.views->size() < 2) return;
-    ImGui::SliderFloat("s a view", &settings.film_seconds, 0.2f, 10, "%.1f", ImGuiSliderFlags_AlwaysClamp);
+    ImGui::SliderFloat("s per view", &settings.film_seconds, 0.2f, 10, "%.1f", ImGuiSliderFlags_AlwaysClamp);
     if (facts.film_frame >= 0) {
         ImGui::ProgressBar(float(facts.film_frame) / float(std::max(1, facts.film_frames)));
-        actions.stop_film = ImGui::Button("Stop");
+        actions.stop_film = ImGui::Button("Stop film");
     } else {
-        actions.film = ImGui::Button("Film through them");
+        actions.film = ImGui::Button("Write film");
     }
 }
 
@@ -118,13 +118,12 @@ void show_details(const PanelFacts& facts) {
         for (const PassTime& time : facts.picture->pass_times)
             if (time.milliseconds >= 0.005)
                 ImGui::Text("%-18s %8.2f ms", time.pass.c_str(), time.milliseconds);
-        ImGui::Text("%-18s %8.2f ms", "from asked to shown", facts.picture->milliseconds);
+        ImGui::Text("%-18s %8.2f ms", "request to frame", facts.picture->milliseconds);
         if (facts.pictures_a_second > 0)
-            ImGui::Text("%-18s %8.1f", "moving, a second", facts.pictures_a_second);
-        if (facts.first_picture)
-            ImGui::Text("%-18s %8.0f ms", "first after start", 1000 * *facts.first_picture);
+            ImGui::Text("%-18s %8.1f", "moving, per second", facts.pictures_a_second);
+        if (facts.first_picture) ImGui::Text("%-18s %8.0f ms", "first frame", 1000 * *facts.first_picture);
     }
-    if (facts.plan && ImGui::CollapsingHeader("Left out")) {
+    if (facts.plan && ImGui::CollapsingHeader("Skipped work")) {
         for (const PlanLine& line : *facts.plan) {
             ImGui::BulletText("%s", line.what.c_str());
             if (line.bytes_saved > 0)
@@ -151,7 +150,7 @@ PanelActions draw_panel(const PanelFacts& facts, PanelSettings& settings) {
     ImGui::SetNextWindowPos(ImVec2(line * 0.6f, line * 0.6f), ImGuiCond_FirstUseEver);
     ImGui::SetNextWindowBgAlpha(0.85f);
     if (ImGui::Begin("ewa", nullptr, ImGuiWindowFlags_AlwaysAutoResize)) {
-        // A window that was tiny for a moment has pushed the panel out of it.
+        // A window that was tiny for a moment has pushed the panel outside.
         const ImVec2 at = ImGui::GetWindowPos();
         if (at.x < 0 || at.y < 0) ImGui::SetWindowPos(ImVec2(std::max(at.x, 0.0f), std::max(at.y, 0.0f)));
         actions.right = ImGui::GetWindowPos().x + ImGui::GetWindowSize().x;
@@ -178,7 +177,7 @@ PanelActions draw_panel(const PanelFacts& facts, PanelSettings& settings) {
             ImGui::TextUnformatted(facts.note.c_str());
             ImGui::PopTextWrapPos();
         }
-        ImGui::TextDisabled("F1: keys   F2: hides this panel");
+        ImGui::TextDisabled("F1: keys   F2: hide this panel");
     }
     ImGui::End();
     return actions;
@@ -186,31 +185,31 @@ PanelActions draw_panel(const PanelFacts& facts, PanelSettings& settings) {
 
 void draw_help(bool& open) {
     static const std::array<std::array<const char*, 2>, 25> rows{
-        {{"left drag", "turn around the scene"},
+        {{"left drag", "orbit the scene"},
          {"Ctrl + left drag", "look around"},
          {"right or middle drag", "move sideways"},
-         {"wheel", "closer, farther"},
-         {"double click", "look at this point and turn around it"},
-         {"W S  A D  Q E", "fly: forward back, left right, down up"},
-         {"Shift", "four times as fast"},
+         {"wheel", "move closer or farther"},
+         {"double click", "look at this point and orbit it"},
+         {"W S  A D  Q E", "fly: forward, back; left, right; down, up"},
+         {"Shift", "fly four times as fast"},
          {"T", "turntable"},
-         {"U", "another axis is up"},
-         {"R", "back to the start"},
+         {"U", "change the up axis"},
+         {"R", "reset the view"},
          {"", ""},
          {"1 2 3 4 5", "colour, depth, opacity, splats per pixel, ellipsoids"},
-         {"- +", "smaller, larger splats"},
-         {"C", "show the cameras; a click goes to one"},
-         {"left right", "the camera before, after"},
-         {"G", "the nearest camera"},
-         {"V", "photograph: beside, wipe, difference"},
+         {"- +", "make splats smaller, larger"},
+         {"C", "show cameras; a click goes to one"},
+         {"left right", "go to the previous, next camera"},
+         {"G", "go to the nearest camera"},
+         {"V", "compare with the image: beside, wipe, difference"},
          {"", ""},
-         {"Ctrl + 1 to 9", "keep this view under a number"},
-         {"Shift + 1 to 9", "go to the view of a number"},
+         {"Ctrl + 1 to 9", "save this view under a number"},
+         {"Shift + 1 to 9", "go to the saved view"},
          {"F12", "screenshot (PNG); with Shift: EXR"},
-         {"F1", "these keys"},
-         {"F2", "the panel"},
-         {"Ctrl + Q", "end"},
-         {"drop a file", "opens it: splats, a dataset, a run's folder"}}};
+         {"F1", "show or hide these keys"},
+         {"F2", "show or hide the panel"},
+         {"Ctrl + Q", "quit"},
+         {"drop a file", "open it: splats, dataset, or folder of a run"}}};
     const ImVec2 size = ImGui::GetIO().DisplaySize;
     ImGui::SetNextWindowPos(ImVec2(size.x / 2, size.y / 2), ImGuiCond_Appearing, ImVec2(0.5f, 0.5f));
     if (ImGui::Begin("Keys", &open, ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse) &&

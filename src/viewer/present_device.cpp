@@ -9,7 +9,7 @@
 namespace ewa::viewer {
 namespace {
 
-/// A family that draws and shows on the surface, or -1.
+/// A queue family that supports graphics and presents to the surface, or -1.
 int showing_family(vk::PhysicalDevice device, vk::SurfaceKHR surface) {
     const auto extensions = device.enumerateDeviceExtensionProperties();
     const bool swapchains = std::any_of(extensions.begin(), extensions.end(), [](const auto& extension) {
@@ -64,7 +64,7 @@ void PresentDevice::choose(const std::string& preferred_name) {
         queue_family_ = uint32_t(family);
         best = place;
     }
-    if (!physical_) throw RunError("no Vulkan device of this machine can show pictures in this window");
+    if (!physical_) throw RunError("no Vulkan device of this machine can show images in this window");
 }
 
 void PresentDevice::create_device() {
@@ -84,7 +84,7 @@ vk::UniqueDeviceMemory PresentDevice::allocate(const vk::MemoryRequirements& nee
     for (uint32_t i = 0; i < memory.memoryTypeCount; ++i)
         if ((needs.memoryTypeBits & (1u << i)) && (memory.memoryTypes[i].propertyFlags & wanted) == wanted)
             return device_->allocateMemoryUnique(vk::MemoryAllocateInfo(needs.size, i));
-    throw RunError("the device has no memory for the window's pictures");
+    throw RunError("the device has no suitable memory for the images of the window");
 }
 
 HostBuffer PresentDevice::host_buffer(vk::DeviceSize bytes, vk::BufferUsageFlags usage) const {

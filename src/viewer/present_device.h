@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// The Vulkan device that shows pictures in a window. Not the one that computes them: that one knows of no
-// window.
+// The Vulkan device that shows images in a window. The device that renders is opened without a window.
 #pragma once
 #include "viewer/window.h"
 
 namespace ewa::viewer {
 
-/// A buffer the host writes or reads.
+/// A buffer that the host writes or reads.
 struct HostBuffer {
     vk::UniqueBuffer buffer;
     vk::UniqueDeviceMemory memory;
@@ -22,8 +21,8 @@ struct DeviceImage {
 
 class PresentDevice {
   public:
-    /// Prefers the device of this name, else a discrete, integrated, virtual, then CPU device. Throws
-    /// RunError where none can show pictures in the window.
+    /// Prefers the device of this name, then a discrete, integrated, virtual and CPU device. Throws RunError
+    /// if none can show images in the window.
     PresentDevice(const WindowSystem& system, const Window& window, const std::string& preferred_name);
     ~PresentDevice();
     PresentDevice(const PresentDevice&) = delete;
@@ -46,7 +45,7 @@ class PresentDevice {
     vk::UniqueDeviceMemory allocate(const vk::MemoryRequirements& needs,
                                     vk::MemoryPropertyFlags wanted) const;
 
-    // In this order: each is destroyed before what it came from.
+    // Declared in the order of creation: each is destroyed before its parent.
     vk::UniqueInstance instance_;
     vk::UniqueSurfaceKHR surface_;
     vk::PhysicalDevice physical_;

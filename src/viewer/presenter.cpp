@@ -47,7 +47,7 @@ const Use kDrawnOn{Stage::eColorAttachmentOutput,
                    Access::eColorAttachmentRead | Access::eColorAttachmentWrite,
                    Layout::eColorAttachmentOptimal};
 
-/// Inside the window, so that a blit never leaves the image.
+/// Clips to the window, so that a blit stays inside the image.
 Rectangle clipped(const Rectangle& rectangle, Size room) {
     const int left = std::clamp(rectangle.x, 0, room.width), top = std::clamp(rectangle.y, 0, room.height);
     return {left, top, std::clamp(rectangle.x + rectangle.width, left, room.width) - left,
@@ -93,33 +93,33 @@ void Presenter::submit(const vk::Semaphore* after, const vk::Semaphore* then) {
     pending_ = true;
 }
 
-void Presenter::set_picture(Layer::Slot slot, const Picture& picture) {
-    wait();  // the submission before may still read the staging buffer
-    Held& held = pictures_[slot];
-    if (held.staging.bytes < picture.rgba.size()) {
-        held.staging = {};
-        held.staging = device_.host_buffer(picture.rgba.size(), vk::BufferUsageFlagBits::eTransferSrc);
+void Presenter::set_picture(Layer::Slot slot, const ByteImage& picture) {
+    wait();  // the previous submission may still read the staging buffer
+    Slot& slot_data = pictures_[slot];
+    if (slot_data.staging.bytes < picture.rgba.size()) {
+        slot_data.staging = {};
+        slot_data.staging = device_.host_buffer(picture.rgba.size(), vk::BufferUsageFlagBits::eTransferSrc);
     }
-    std::memcpy(held.staging.mapped, picture.rgba.data(), picture.rgba.size());
+    std::memcpy(slot_data.staging.mapped, picture.rgba.data(), picture.rgba.size());
     const Size size{picture.width, picture.height};
-    if (held.image.size != size) {
-        // Where the window's format encodes to sRGB, the picture's decodes from it: its values come out as
-        // they went in.
+    if (slot_data.image.size != size) {
+        // If the window's format encodes to sRGB, this one decodes from it, so that values stay unchanged.
         const vk::Format format = swapchain_.srgb() ? vk::Format::eR8G8B8A8Srgb : vk::Format::eR8G8B8A8Unorm;
-        held.image = {};
-        held.image = device_.image(size, format, Usage::eTransferDst | Usage::eTransferSrc);
+        slot_data.image = {};
+        slot_data.image = device_.image(size, format, Usage::eTransferDst | Usage::eTransferSrc);
     }
-    held.fresh = true;
+    slot_data.fresh = true;
 }
 
-void Presenter::record_upload(Held& held) {
-    change(*commands_, *held.image.image, kNothingYet, kWritten);
+void Presenter::record_upload(Slot& slot_data) {
+    change(*commands_, *slot_data.image.image, kNothingYet, kWritten);
     vk::BufferImageCopy copy;
     copy.setImageSubresource(kLayer).setImageExtent(
-        {uint32_t(held.image.size.width), uint32_t(held.image.size.height), 1});
-    commands_->copyBufferToImage(*held.staging.buffer, *held.image.image, Layout::eTransferDstOptimal, copy);
-    change(*commands_, *held.image.image, kWritten, kRead);
-    held.fresh = false;
+        {uint32_t(slot_data.image.size.width), uint32_t(slot_data.image.size.height), 1});
+    commands_->copyBufferToImage(*slot_data.staging.buffer, *slot_data.image.image,
+                                 Layout::eTransferDstOptimal, copy);
+    change(*commands_, *slot_data.image.image, kWritten, kRead);
+    slot_data.fresh = false;
 }
 
 void Presenter::record_layers(vk::Image target, std::span<const Layer> layers) {
@@ -183,7 +183,7 @@ Image Presenter::captured() const {
 bool Presenter::draw(Size window, std::span<const Layer> layers, ImDrawData* panel, Image* capture) {
     if (window.width == 0 || window.height == 0) return false;
     if (capture && !swapchain_.readable())
-        throw RunError("this display does not let a window's picture be read back");
+        throw RunError("this display does not allow reading the window back");
     wait();
     if (outdated_ || !swapchain_.exists() || made_for_ != window) {
         if (!swapchain_.recreate(window)) return false;
@@ -197,8 +197,8 @@ bool Presenter::draw(Size window, std::span<const Layer> layers, ImDrawData* pan
     }
     const vk::Image target = swapchain_.image(*index);
     begin();
-    for (Held& held : pictures_)
-        if (held.fresh) record_upload(held);
+    for (Slot& slot_data : pictures_)
+        if (slot_data.fresh) record_upload(slot_data);
     record_layers(target, layers);
     if (capture) {
         change(*commands_, target, kWritten, kRead);

@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// Puts pictures and the panel over them into the window.
+// Shows images and the panel in the window.
 #pragma once
 #include <array>
 #include <span>
 
 #include "ewa/image.h"
-#include "viewer/photo_comparison.h"
+#include "viewer/comparison.h"
 #include "viewer/swapchain.h"
 
 struct ImDrawData;
 
 namespace ewa::viewer {
 
-/// Part of a picture, and where in the window it goes.
+/// Part of an image, and its place in the window.
 struct Layer {
-    enum Slot { rendering, photograph } slot = rendering;
+    enum Slot { rendering, image } slot = rendering;
     Rectangle target;            // inside the window
-    double left = 0, right = 1;  // of the picture's width; the whole height
+    double left = 0, right = 1;  // shares of the image's width; the height is complete
 };
 
 class Presenter {
@@ -24,16 +24,16 @@ class Presenter {
     explicit Presenter(const PresentDevice& device);
     ~Presenter();
 
-    /// What a layer of this slot shows from the next draw() on.
-    void set_picture(Layer::Slot slot, const Picture& picture);
+    /// Sets the image of a slot for the next draw().
+    void set_picture(Layer::Slot slot, const ByteImage& picture);
 
-    /// One frame: the layers one over the other on black, those without a picture left out, then the panel.
-    /// capture, if not null, receives what the window shows without the panel. False when nothing was drawn:
-    /// the window is minimised or is just changing.
+    /// Draws one frame: the layers that have an image, in order on black, then the panel. capture: receives
+    /// the window without the panel; null: no capture. Returns false if nothing was drawn because the window
+    /// is minimised or changing.
     bool draw(Size window, std::span<const Layer> layers, ImDrawData* panel, Image* capture);
 
     const Swapchain& swapchain() const { return swapchain_; }
-    /// Runs commands once and waits until they are done.
+    /// Runs commands once and waits for them.
     template <class Record>
     void run_once(Record record) {
         begin();
@@ -47,12 +47,12 @@ class Presenter {
     void begin();
     void submit(const vk::Semaphore* after, const vk::Semaphore* then);
     void wait();
-    struct Held {
+    struct Slot {
         HostBuffer staging;
         DeviceImage image;
-        bool fresh = false;  // staging holds a picture that the image does not
+        bool fresh = false;  // the image does not have the data of staging yet
     };
-    void record_upload(Held& held);
+    void record_upload(Slot& slot);
     void record_layers(vk::Image target, std::span<const Layer> layers);
     void record_capture(vk::Image target);
     void record_panel(uint32_t index, ImDrawData* panel);
@@ -61,13 +61,13 @@ class Presenter {
     const PresentDevice& device_;
     Swapchain swapchain_;
     bool outdated_ = true;
-    Size made_for_;  // the window's, when the swapchain was made: its own may differ
+    Size made_for_;  // size of the window when the swapchain was created; its images may differ
     vk::UniqueCommandPool pool_;
     vk::UniqueCommandBuffer commands_;
     vk::UniqueFence done_;
     bool pending_ = false;  // a submission whose fence has not been waited for
     HostBuffer readback_;
-    std::array<Held, 2> pictures_;  // by slot
+    std::array<Slot, 2> pictures_;  // by slot
 };
 
 }  // namespace ewa::viewer

@@ -11,14 +11,15 @@
 namespace ewa::viewer {
 namespace {
 
-constexpr int kProbeSide = 256;  // px of the picture that a depth is taken from
+constexpr int kProbeSide = 256;  // px of the depth image that a point is read from
 
 RenderOptions options_of(const Look& look) {
     return {look.background, look.kernel, look.sh_degree};
 }
 
-/// As `ewa render` writes it: EXR with alpha and as it is, PNG as it is shown.
-void save(const std::filesystem::path& file, const Rendering& rendering, const Picture& picture, Mode mode) {
+/// Writes a file as `ewa render` does: EXR holds the values with alpha, PNG what the window shows.
+void save(const std::filesystem::path& file, const Rendering& rendering, const ByteImage& picture,
+          Mode mode) {
     const bool exr = file.extension() == ".exr";
     if (exr && mode == Mode::depth) return save_image(file, rendering.depth);
     if (exr && mode == Mode::count) return save_image(file, rendering.count);
@@ -51,7 +52,7 @@ uint64_t RenderThread::set_scene(std::shared_ptr<const Gaussians> gaussians) {
     return ++scene_number_;
 }
 
-void RenderThread::ask(const PictureRequest& request) {
+void RenderThread::ask(const RenderRequest& request) {
     const std::lock_guard lock(mutex_);
     if (!waiting_.empty() && waiting_.back().file.empty()) waiting_.pop_back();
     waiting_.push_back(request);
@@ -131,12 +132,12 @@ void RenderThread::carry_out(const Work& work) {
     });
 }
 
-std::shared_ptr<const FinishedPicture> RenderThread::draw(const PictureRequest& request, uint64_t scene) {
+std::shared_ptr<const RenderedFrame> RenderThread::draw(const RenderRequest& request, uint64_t scene) {
     const auto start = std::chrono::steady_clock::now();
     const Look& look = request.look;
     const Camera camera = downscale(request.camera, request.divisor);
     const DrawOptions options{options_of(look), drawing_for(look.mode), double(look.splat_scale)};
-    auto finished = std::make_shared<FinishedPicture>();
+    auto finished = std::make_shared<RenderedFrame>();
     finished->request = request;
     finished->scene = scene;
     const bool bytes_do = request.file.empty() && (look.mode == Mode::color || look.mode == Mode::ellipsoids);
@@ -190,7 +191,7 @@ void RenderThread::work() {
                 fail(work);
                 break;
             } catch (...) {
-                // The device may be lost, or its memory full of what is no longer needed: both go with it.
+                // The device may be lost, or its memory full of unused buffers. Opening it again solves both.
                 renderer_.reset();
                 device_.reset();
                 scene_is_up_ = false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Draws pictures beside the window's own thread, so that a slow one never holds up the input.
+// Renders frames on a thread of its own, so that a slow frame never blocks input.
 #pragma once
 #include <condition_variable>
 #include <filesystem>
@@ -11,11 +11,11 @@
 #include <string>
 #include <thread>
 
-#include "viewer/picture.h"
+#include "viewer/byte_image.h"
 
 namespace ewa::viewer {
 
-/// What a picture depends on besides the splats and the camera.
+/// What a frame depends on besides splats and camera.
 struct Look {
     Mode mode = Mode::color;
     std::array<float, 3> background{0, 0, 0};
@@ -25,49 +25,51 @@ struct Look {
     bool operator==(const Look&) const = default;
 };
 
-struct PictureRequest {
-    Camera camera;  // of the size that the picture will be shown at
+struct RenderRequest {
+    Camera camera;  // of the size at which the frame is shown
     Look look;
-    int divisor = 1;  // the picture has 1/divisor of that size
+    int divisor = 1;  // the frame has 1/divisor of that size
     uint64_t serial = 0;
-    std::filesystem::path file;  // write it there too: what `ewa render` writes under that extension
+    std::filesystem::path
+        file;  // also write it here, as `ewa render` does for this extension; empty: no file
 };
 
-struct FinishedPicture {
-    PictureRequest request;
-    Picture picture;
+struct RenderedFrame {
+    RenderRequest request;
+    ByteImage picture;
     std::vector<PassTime> pass_times;
-    double milliseconds = 0;  // from request to finished picture
+    double milliseconds = 0;  // from request to finished frame
     uint32_t skipped_nonfinite = 0, splats_drawn = 0;
     uint64_t device_bytes = 0;
-    uint64_t scene = 0;  // which set_scene() it shows
+    uint64_t scene = 0;  // the number that set_scene() returned
 };
 
-/// Opens the device that draws; called on the thread.
+/// Opens the device that renders; called on the thread.
 using OpenDevice = std::function<std::shared_ptr<gpu::Device>()>;
 
 class RenderThread {
   public:
-    /// on_news is called on the thread whenever news() has something new. A device that is lost is opened
-    /// again, once for each picture that fails.
+    /// on_news is called on the thread when take_news() has something new. A lost device is opened again,
+    /// once for each frame that fails.
     RenderThread(OpenDevice open, std::function<void()> on_news);
     ~RenderThread();
 
-    /// The scene of all pictures asked for from now on. The returned number is FinishedPicture::scene.
+    /// Sets the scene of all frames requested from now on. Returns the number that RenderedFrame::scene will
+    /// have.
     uint64_t set_scene(std::shared_ptr<const Gaussians> gaussians);
-    /// Takes the place of a request that waits and has no file; the picture in the making is finished first.
-    void ask(const PictureRequest& request);
-    /// What is at a pixel of the camera's picture: News::point, once News::points is the number returned. Of
-    /// several that wait only the last is answered.
+    /// Replaces a waiting request that has no file. The frame that is being rendered is finished first.
+    void ask(const RenderRequest& request);
+    /// Asks for the point at a pixel. News::point has it once News::points is the returned number. Only the
+    /// last of several waiting requests is answered.
     uint64_t ask_point(const Camera& camera, const glm::dvec2& pixel);
 
     struct News {
-        std::shared_ptr<const FinishedPicture> picture;  // the last complete one, or null
-        std::exception_ptr failure;                      // why the last request failed, if it did
-        std::optional<std::string> device;               // its name, once it is open
-        uint64_t points = 0;                             // the last ask_point() that was answered
-        std::optional<glm::dvec3> point;                 // world; nothing where no splat is half opaque
-        std::vector<std::filesystem::path> written;      // files, since the last take_news()
+        std::shared_ptr<const RenderedFrame> picture;  // the last complete frame, or null
+        std::exception_ptr failure;                    // why the last request failed, if it did
+        std::optional<std::string> device;             // its name, once it is open
+        uint64_t points = 0;                           // number of the last answered ask_point()
+        std::optional<glm::dvec3> point;               // world; empty where no splat is half opaque
+        std::vector<std::filesystem::path> written;    // files, since the last take_news()
     };
     News take_news();
 
@@ -79,7 +81,7 @@ class RenderThread {
     };
     struct Work {
         std::shared_ptr<const Gaussians> scene;  // null: as before
-        std::optional<PictureRequest> request;
+        std::optional<RenderRequest> request;
         std::optional<Probe> probe;
         uint64_t scene_number = 0;
     };
@@ -88,13 +90,13 @@ class RenderThread {
     void carry_out(const Work& work);
     void fail(const Work& work);
     void prepare(const Work& work);
-    std::shared_ptr<const FinishedPicture> draw(const PictureRequest& request, uint64_t scene);
+    std::shared_ptr<const RenderedFrame> draw(const RenderRequest& request, uint64_t scene);
     std::optional<glm::dvec3> point_at(const Probe& probe);
     void report(const std::function<void(News&)>& change);
 
     OpenDevice open_;
     std::function<void()> on_news_;
-    // Touched by the thread alone.
+    // Used by the thread only.
     std::shared_ptr<gpu::Device> device_;
     std::optional<Renderer> renderer_;
     std::shared_ptr<const Gaussians> scene_;
@@ -102,7 +104,7 @@ class RenderThread {
 
     mutable std::mutex mutex_;
     std::condition_variable wake_;
-    std::vector<PictureRequest> waiting_;  // in order; only the last may be without a file
+    std::vector<RenderRequest> waiting_;  // in order; only the last may have no file
     std::optional<Probe> probe_;
     std::shared_ptr<const Gaussians> next_scene_;
     uint64_t scene_number_ = 0, probes_ = 0;

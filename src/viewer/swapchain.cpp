@@ -11,11 +11,11 @@ namespace {
 
 using Usage = vk::ImageUsageFlagBits;
 
-// ns. A window that lies hidden may be given no image for as long as it does, and has to answer nevertheless.
+// ns. A hidden window may get no image as long as it is hidden, and must still handle events.
 constexpr uint64_t kPatience = 100'000'000;
 
 [[noreturn]] void fail(VkResult result) {
-    const std::string what = "the window can show no more pictures: " + vk::to_string(vk::Result(result));
+    const std::string what = "the window cannot show images any more: " + vk::to_string(vk::Result(result));
     if (result == VK_ERROR_DEVICE_LOST) throw vk::DeviceLostError(what);
     if (result == VK_ERROR_SURFACE_LOST_KHR) throw vk::SurfaceLostKHRError(what);
     throw RunError(what);
@@ -44,7 +44,7 @@ Size extent_of(const vk::SurfaceCapabilitiesKHR& surface, Size window) {
 Swapchain::Swapchain(const PresentDevice& device) : device_(device) {
     const auto surface = device_.physical().getSurfaceCapabilitiesKHR(device_.surface());
     if (!(surface.supportedUsageFlags & Usage::eTransferDst))
-        throw RunError("this display does not take copied pictures");
+        throw RunError("this display does not support copying images to it");
     readable_ = bool(surface.supportedUsageFlags & Usage::eTransferSrc);
     least_images_ = std::max(2u, surface.minImageCount);
     choose_format();
@@ -56,7 +56,7 @@ bool Swapchain::srgb() const {
     return format() == vk::Format::eB8G8R8A8Srgb || format() == vk::Format::eR8G8B8A8Srgb;
 }
 
-/// The pictures hold what an 8-bit file would: UNORM shows them as they are. An sRGB format comes last.
+/// Images hold the values of an 8-bit file, which UNORM shows unchanged. An sRGB format is the last choice.
 void Swapchain::choose_format() {
     const auto formats = device_.physical().getSurfaceFormatsKHR(device_.surface());
     for (const vk::Format wanted : {vk::Format::eB8G8R8A8Unorm, vk::Format::eR8G8B8A8Unorm,
@@ -66,7 +66,7 @@ void Swapchain::choose_format() {
                 format_ = format;
                 return;
             }
-    throw RunError("this display has no format of 8 bits a channel");
+    throw RunError("this display has no format with 8 bits per channel");
 }
 
 void Swapchain::create_overlay_pass() {
@@ -138,7 +138,7 @@ void Swapchain::create_targets() {
 }
 
 Swapchain::Acquired Swapchain::acquire() {
-    // The plain function: a changed window is no exception here, and Vulkan-Hpp would throw it.
+    // The C function: Vulkan-Hpp would throw when the window has changed, which is no error here.
     uint32_t index = 0;
     const VkResult result =
         vkAcquireNextImageKHR(device_.handle(), *swapchain_, kPatience, *acquired_, VK_NULL_HANDLE, &index);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The pictures that the window cycles through, made anew whenever the window changes.
+// The swapchain: images that the window cycles through, recreated when the window changes.
 #pragma once
 #include <optional>
 
@@ -11,28 +11,28 @@ class Swapchain {
   public:
     explicit Swapchain(const PresentDevice& device);
 
-    /// False when the window has no size now. Afterwards nothing of the old images is in use.
+    /// Returns false if the window has no size. No old image is in use afterwards.
     bool recreate(Size window);
 
-    /// The index of the image to draw next, whose `acquired` semaphore will be signalled. Nothing when the
-    /// window has changed and recreate() must come first, or when it has no image to spare just now. Throws
-    /// vk::SurfaceLostKHRError, vk::DeviceLostError, RunError; so does present().
+    /// The index of the next image; its `acquired` semaphore will be signalled. Empty if the window has
+    /// changed (outdated: call recreate() first) or has no free image now. acquire() and present() throw
+    /// vk::SurfaceLostKHRError, vk::DeviceLostError, RunError.
     struct Acquired {
         std::optional<uint32_t> index;
         bool outdated = false;
     };
     Acquired acquire();
-    /// False when recreate() must come before the next acquire().
+    /// Returns false if recreate() must precede the next acquire().
     bool present(uint32_t index);
 
     bool exists() const { return bool(swapchain_); }
     Size size() const { return size_; }
     vk::Format format() const { return format_.format; }
-    bool srgb() const;                           // the only format of the surface encodes what is drawn
-    bool readable() const { return readable_; }  // its images can be copied to the host
+    bool srgb() const;                           // the surface has only formats that encode to sRGB
+    bool readable() const { return readable_; }  // images can be copied to the host
     uint32_t least_images() const { return least_images_; }
     uint32_t image_count() const { return uint32_t(images_.size()); }
-    vk::RenderPass overlay_pass() const { return *overlay_pass_; }  // draws over what the image holds
+    vk::RenderPass overlay_pass() const { return *overlay_pass_; }  // keeps the content of the image
 
     vk::Image image(uint32_t index) const { return images_[index]; }
     vk::Framebuffer framebuffer(uint32_t index) const { return *framebuffers_[index]; }
@@ -55,7 +55,8 @@ class Swapchain {
     std::vector<vk::UniqueImageView> views_;
     std::vector<vk::UniqueFramebuffer> framebuffers_;
     vk::UniqueSemaphore acquired_;
-    std::vector<vk::UniqueSemaphore> drawn_;  // one an image: presenting may still wait on the one before
+    std::vector<vk::UniqueSemaphore>
+        drawn_;  // one per image: presentation may still wait on the previous one
 };
 
 }  // namespace ewa::viewer

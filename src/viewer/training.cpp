@@ -21,9 +21,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr size_t kMostPoints = 400;  // of a curve
+constexpr size_t kMostPoints = 400;  // of a plotted curve
 
-/// At most kMostPoints values, each the mean over as many neighbours as it takes.
+/// At most kMostPoints values: means over groups of neighbours.
 std::vector<float> curve(const std::vector<float>& values) {
     if (values.size() <= kMostPoints) return values;
     std::vector<float> means(kMostPoints);
@@ -73,7 +73,7 @@ std::optional<std::string> draw_training(const live::Update& run) {
         ImGui::ProgressBar(float(status.step) / float(status.steps),
                            ImVec2(ImGui::GetTextLineHeight() * 17, 0));
     if (run.splats_step >= 0 && status.state != live::State::done)
-        ImGui::Text("the splats shown are of step %d", run.splats_step);
+        ImGui::Text("splats of step %d", run.splats_step);
     std::vector<float> loss, psnr;
     for (const report::MetricsLine& line : status.metrics) {
         if (std::isfinite(line.loss)) loss.push_back(float(line.loss));
@@ -121,6 +121,30 @@ std::optional<int> TrainProcess::status() {
     if (!status_ && waitpid(child_, &ended, WNOHANG) == child_)
         status_ = WIFEXITED(ended) ? WEXITSTATUS(ended) : 128 + WTERMSIG(ended);
     return status_;
+}
+
+void LiveRun::watch(const live::WhatToWatch& what) {
+    watcher_.reset();  // the old watcher stops before the update is replaced
+    update_ = {};
+    watcher_ = std::make_unique<live::Watcher>(what, wake_);
+}
+
+LiveRun::News LiveRun::take() {
+    if (!watcher_ || watcher_->number() == update_.number) return {};
+    const auto before = update_.splats;
+    update_ = watcher_->update();
+    const bool fresh = update_.splats != before && update_.splats && update_.splats->size() > 0;
+    return {true, fresh ? update_.splats : nullptr};
+}
+
+void LiveRun::command(const std::string& command) {
+    if (watcher_) watcher_->command(command);
+}
+
+std::optional<int> LiveRun::failure() const {
+    if (!trainer_ || update_.status.state == live::State::done) return std::nullopt;
+    const std::optional<int> status = trainer_->status();
+    return status && *status != 0 ? status : std::nullopt;
 }
 
 }  // namespace ewa::viewer

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// The panel of a training run, and the trainer as a process of the viewer's own.
+// A training run that the window watches: its panel, its news, and the trainer that the viewer starts.
 #pragma once
 #include <sys/types.h>
 
 #include <filesystem>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,19 +20,45 @@ std::optional<std::string> draw_training(const live::Update& run);
 /// `ewa train` from beside this program, with `--serve 0`. It never waits for the window.
 class TrainProcess {
   public:
-    /// arguments: DATASET and whatever options of ewa train. Throws RunError where it cannot be started.
+    /// arguments: DATASET and options of ewa train. Throws RunError if it cannot be started.
     TrainProcess(const std::vector<std::string>& arguments, const std::filesystem::path& output);
-    /// Ends a training that still runs as Ctrl-C does: it saves its splats and a checkpoint first.
+    /// Interrupts a training that still runs, as Ctrl-C does: it saves splats and a checkpoint first.
     ~TrainProcess();
     TrainProcess(const TrainProcess&) = delete;
     TrainProcess& operator=(const TrainProcess&) = delete;
 
-    /// Its exit status once it has ended; 128 + the signal that ended it.
+    /// The exit status once it has ended; 128 + the signal if one ended it.
     std::optional<int> status();
 
   private:
     pid_t child_ = -1;
     std::optional<int> status_;
+};
+
+/// The training run that the window watches, if any.
+class LiveRun {
+  public:
+    /// trainer: the viewer's own, or null. wake: called on a thread when take() has something new.
+    LiveRun(TrainProcess* trainer, std::function<void()> wake) : trainer_(trainer), wake_(std::move(wake)) {}
+
+    void watch(const live::WhatToWatch& what);
+    void stop() { watcher_.reset(); }
+    /// The status of the run, or null without one.
+    const live::Update* update() const { return watcher_ ? &update_ : nullptr; }
+    struct News {
+        bool any = false;
+        std::shared_ptr<const Gaussians> splats;  // new ones, at least one; or null
+    };
+    News take();
+    void command(const std::string& command);
+    /// The exit status of a trainer that failed before the run was done.
+    std::optional<int> failure() const;
+
+  private:
+    TrainProcess* trainer_;
+    std::function<void()> wake_;
+    live::Update update_;
+    std::unique_ptr<live::Watcher> watcher_;
 };
 
 }  // namespace ewa::viewer

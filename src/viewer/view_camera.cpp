@@ -11,14 +11,15 @@
 namespace ewa::viewer {
 namespace {
 
-constexpr double kPoleMargin = std::numbers::pi / 90;  // closest that orbiting comes to looking along `up`
-constexpr double kClosest = 1e-3;                      // distance to the pivot, in scene radii
+constexpr double kPoleMargin =
+    std::numbers::pi / 90;         // least angle between view and `up` that orbiting reaches
+constexpr double kClosest = 1e-3;  // distance to the pivot, in scene radii
 
 glm::dmat3 rotation_about(const glm::dvec3& axis, double angle) {
     return glm::dmat3(glm::rotate(glm::dmat4(1.0), angle, axis));
 }
 
-/// Rounding adds up over thousands of small turns; the rows are made orthonormal again after each.
+/// Makes the rows orthonormal again. Otherwise rounding errors grow over thousands of small turns.
 glm::dmat3 orthonormal(const glm::dmat3& rotation) {
     const glm::dmat3 rows = glm::transpose(rotation);
     const glm::dvec3 forward = glm::normalize(rows[2]);
@@ -57,7 +58,7 @@ void ViewCamera::place(const glm::dmat3& rotation, const glm::dvec3& position) {
 void ViewCamera::turn(double yaw, double pitch, const glm::dvec3& center) {
     const glm::dvec3 forward = axis(2);
     const double angle = std::acos(std::clamp(glm::dot(forward, up_), -1.0, 1.0));
-    // A view that starts closer to a pole than the margin may stay there, but come no closer.
+    // A view that starts closer to a pole than the margin may stay there but not come closer.
     const double lowest = std::min(kPoleMargin, angle);
     const double highest = std::max(std::numbers::pi - kPoleMargin, angle);
     pitch = angle - std::clamp(angle - pitch, lowest, highest);

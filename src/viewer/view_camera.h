@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The camera that mouse and keys move: around a pivot, towards it, or freely. Knows nothing of windows.
+// The camera that mouse and keys move: around a pivot, towards it, or freely. Independent of the window.
 #pragma once
 #include <glm/vec3.hpp>
 
@@ -7,14 +7,14 @@
 
 namespace ewa::viewer {
 
-/// The camera for a picture of another size: what `camera` shows stays in view, centred, with square pixels
-/// of one scale. The same size gives back the same camera, bit for bit.
+/// The camera for an image of another size. The view of `camera` stays visible and centred; pixels stay
+/// square. The same size returns the same camera, bit for bit.
 Camera fitted(const Camera& camera, int width, int height);
 
-/// Where a view starts from, and what it moves about.
+/// A place to look from, and the point to orbit.
 struct Viewpoint {
     Camera camera;
-    glm::dvec3 pivot{0, 0, 1};  // world; what orbiting turns about
+    glm::dvec3 pivot{0, 0, 1};  // world; the centre of orbiting
     glm::dvec3 up{0, -1, 0};    // world, unit length
     double radius = 1;          // of the scene, world units
 };
@@ -23,22 +23,22 @@ class ViewCamera {
   public:
     explicit ViewCamera(const Viewpoint& start) : start_(start) { reset(); }
 
-    /// Angles in radians, of a drag to the right and down: the scene follows the pointer.
+    /// Angles in radians of a drag to the right and down. The scene follows the pointer.
     void orbit(double right, double down);  // about the pivot
     void look(double right, double down);   // about the camera itself
-    /// Pixels of a picture of this height: what is at the pivot's distance follows the pointer.
+    /// Pixels of an image of this size. Points at the distance of the pivot follow the pointer.
     void pan(double right, double down, int width, int height);
-    /// Positive: closer. A step takes off a tenth of the distance to the pivot.
+    /// Positive: closer. A step reduces the distance to the pivot by a tenth.
     void zoom(double steps);
-    /// Camera axes (x right, y down, z forward), in distances to the pivot.
+    /// Moves along the camera axes (x right, y down, z forward), in units of the distance to the pivot.
     void fly(const glm::dvec3& amount);
-    /// Turns to a point, which becomes the pivot.
+    /// Turns to a point and makes it the pivot.
     void focus(const glm::dvec3& point);
     void reset();
     void restart(const Viewpoint& start);
     void set_up(const glm::dvec3& up);
 
-    /// Another place to stand; what reset() comes back to stays.
+    /// Moves to another place. reset() still returns to the start.
     void stand(const Viewpoint& place);
     Viewpoint place() const { return {camera_, pivot_, up_, start_.radius}; }
     const glm::dvec3& up() const { return up_; }

@@ -23,12 +23,12 @@ std::string glfw_reason() {
 WindowSystem::WindowSystem() {
     if (!glfwInit())
         throw RunError("no window can be opened: " + glfw_reason() +
-                       "; ewa-view needs a desktop session, ewa render needs none");
+                       "; ewa-view needs a desktop session; ewa render does not");
     if (!glfwVulkanSupported()) {
         const std::string reason = glfw_reason();
         glfwTerminate();
         throw RunError("no window can be opened: " + reason +
-                       "; the Vulkan loader has no driver that can show pictures on this display");
+                       "; no Vulkan driver can show images on this display");
     }
 }
 
@@ -95,7 +95,7 @@ void Window::watch() {
 vk::UniqueSurfaceKHR Window::surface(vk::Instance instance) const {
     VkSurfaceKHR surface = VK_NULL_HANDLE;
     if (glfwCreateWindowSurface(instance, window_, nullptr, &surface) != VK_SUCCESS)
-        throw RunError("Vulkan cannot show pictures in this window: " + glfw_reason());
+        throw RunError("Vulkan cannot show images in this window: " + glfw_reason());
     return vk::UniqueSurfaceKHR(surface, instance);
 }
 

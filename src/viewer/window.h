@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One GLFW window: its life, and the keys.
+// One GLFW window and its input.
 #pragma once
 #include <filesystem>
 #include <memory>
@@ -8,13 +8,13 @@
 #include <vector>
 
 #include "gpu/vulkan.h"
-#include "viewer/size.h"
+#include "viewer/byte_image.h"
 
 struct GLFWwindow;
 
 namespace ewa::viewer {
 
-/// GLFW itself, initialised while one of these lives. Throws RunError where there is no display.
+/// Initialises GLFW; the destructor terminates it. Throws RunError if there is no display.
 class WindowSystem {
   public:
     WindowSystem();
@@ -22,20 +22,20 @@ class WindowSystem {
     WindowSystem(const WindowSystem&) = delete;
     WindowSystem& operator=(const WindowSystem&) = delete;
 
-    /// What the desktop leaves free for a window on the main monitor, px; zero where that is unknown.
+    /// The free size for a window on the main monitor, px; zero if unknown.
     Size room() const;
     std::vector<const char*> vulkan_extensions() const;
-    /// Makes a Window::wait() return. For any thread.
+    /// Makes Window::wait() return. Any thread may call it.
     void wake() const;
 };
 
-/// A key as it was pressed: by the time it is looked at, the others may be released.
+/// A key press with the modifiers at that time.
 struct KeyPress {
     int key = 0;
     bool shift = false, control = false;
 };
 
-/// Wakes it at the end of its life.
+/// Wakes the window system at its destruction.
 struct Wake {
     const WindowSystem& system;
     ~Wake() { system.wake(); }
@@ -43,7 +43,7 @@ struct Wake {
 
 class Window {
   public:
-    /// Throws RunError. resizable: also asks window managers to keep the size where it is false.
+    /// resizable: false also asks the window manager to keep the size. Throws RunError.
     Window(const WindowSystem& system, const std::string& title, Size size, bool resizable);
     ~Window();
     Window(const Window&) = delete;
@@ -52,16 +52,16 @@ class Window {
     GLFWwindow* handle() const { return window_; }
     vk::UniqueSurfaceKHR surface(vk::Instance instance) const;
     Size framebuffer() const;  // px; zero while minimised
-    float scale() const;       // of text, on dense displays
+    float scale() const;       // of text, on high-density displays
     bool closed() const;
     void close();
     bool held(int key) const;
 
-    /// Waits for input, at most this long (0: takes what is there), and returns the keys pressed since.
+    /// Waits for input, at most this long (0: no wait). Returns the keys pressed since the last call.
     std::vector<KeyPress> wait(double seconds);
-    /// Input or a change of the window came with the last wait().
+    /// Whether the last wait() brought input or a change of the window.
     bool stirred() const { return stirred_; }
-    /// What was dropped on the window since the last call; empty: nothing.
+    /// The file that was dropped on the window since the last call; empty: none.
     std::filesystem::path take_dropped() { return std::exchange(dropped_, {}); }
     void set_title(const std::string& title);
 

@@ -29,7 +29,7 @@ TEST(Ceiling, SortsStablyByTheLowBits) {
 
 /// A tiny case as the twin draws it, and its lists as the device would hand them over.
 struct Drawn {
-    bench::Scene scene;
+    bench::BenchScene scene;
     reference::Picture picture;
     std::vector<float> records;
     std::vector<uint32_t> splats, tile_starts;

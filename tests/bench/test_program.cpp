@@ -37,6 +37,14 @@ nlohmann::json read_json(const std::filesystem::path& path) {
 
 const std::string kProgram = EWA_BENCH_PROGRAM;
 
+TEST(BenchProgram, HelpFits80Columns) {
+    const Ended help = run(kProgram + " --help");
+    EXPECT_EQ(help.status, 0) << help.output;
+    EXPECT_NE(help.output.find("--stability"), std::string::npos) << help.output;
+    std::istringstream lines(help.output);
+    for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 80u) << line;
+}
+
 TEST(BenchProgram, LinksTheVulkanLoaderAndTheRuntimeAlone) {
     const Ended ended = run("ldd " + kProgram);
     ASSERT_EQ(ended.status, 0) << ended.output;

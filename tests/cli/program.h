@@ -17,15 +17,15 @@ struct Outcome {
 };
 
 struct Circumstances {
-    std::string program;         // runs instead of ewa
-    std::string out_path;        // standard output goes here instead of Outcome::out
-    std::string err_path;        // likewise Outcome::err
-    size_t file_limit = 0;       // bytes that no file may exceed, as on a full disk; 0: none
-    std::string await_file;      // as soon as this file has a byte, `signal` is sent
-    int signal = 0;              // 0: none
-    int times = 1;               // that it is sent, each time after the one before has been taken
-    std::function<void()> then;  // called in the place of sending a signal, or after it
-    std::vector<std::pair<std::string, std::string>> environment;
+    std::string program = {};         // runs instead of ewa
+    std::string out_path = {};        // standard output goes here instead of Outcome::out
+    std::string err_path = {};        // likewise Outcome::err
+    size_t file_limit = 0;            // bytes that no file may exceed, as on a full disk; 0: none
+    std::string await_file = {};      // as soon as this file has a byte, `signal` is sent
+    int signal = 0;                   // 0: none
+    int times = 1;                    // that it is sent, each time after the one before has been taken
+    std::function<void()> then = {};  // called in the place of sending a signal, or after it
+    std::vector<std::pair<std::string, std::string>> environment = {};
 };
 
 Outcome run_ewa(const std::vector<std::string>& arguments, const Circumstances& circumstances = {});

@@ -83,7 +83,7 @@ TEST(Compare, FoldersPairByName) {
                         folder / "j.json", "--heat-map", folder / "maps"};
     const Outcome outcome = run_ewa(command);
     expect_success(outcome);
-    EXPECT_NE(outcome.out.find("mean of 2 pictures"), std::string::npos) << outcome.out;
+    EXPECT_NE(outcome.out.find("mean of 2 images"), std::string::npos) << outcome.out;
     EXPECT_NE(outcome.out.find("worst: deep/two"), std::string::npos) << outcome.out;
     EXPECT_EQ(files_below(folder / "maps"), (Names{"deep/two.png", "one.png"}));
     const auto json = read_json(folder / "j.json");
@@ -97,7 +97,7 @@ TEST(Compare, AMissingPictureFailsTheThreshold) {
     for (const char* name : {"a/1.png", "a/2.png", "b/1.png"}) save(folder / name, plain(0.5f));
     const Outcome told = run_ewa({"compare", folder / "a", folder / "b"});
     expect_success(told);
-    EXPECT_NE(told.out.find("2.png  has no picture"), std::string::npos) << told.out;
+    EXPECT_NE(told.out.find("2.png  has no image"), std::string::npos) << told.out;
     const Outcome outcome = run_ewa({"compare", folder / "a", folder / "b", "--threshold", "10"});
     EXPECT_EQ(outcome.status, 1) << outcome.err;
 }
@@ -236,7 +236,7 @@ TEST_F(CompareScenes, WithEachOther) {
     expect_success(compare(scene_, scene_, cameras));
     const Outcome outcome = compare(scene_, other_, cameras);
     EXPECT_EQ(outcome.status, 1);
-    EXPECT_NE(outcome.out.find("mean of 4 pictures"), std::string::npos) << outcome.out;
+    EXPECT_NE(outcome.out.find("mean of 4 images"), std::string::npos) << outcome.out;
     // The same figures as of the pictures themselves.
     const auto drawn = read_json(json_);
     const std::string pictures = rendered("now", {"--format", "exr"});
@@ -251,7 +251,7 @@ TEST_F(CompareScenes, OfSomeFrames) {
     const Outcome outcome = compare(scene_, pictures, {"--cameras", data_, "--threshold", "99"});
     EXPECT_EQ(outcome.status, 1) << "two frames have no picture";
     EXPECT_EQ(read_json(json_)["unpaired"].size(), 2u);
-    EXPECT_NE(outcome.out.find("has no picture of its name on the other side"), std::string::npos)
+    EXPECT_NE(outcome.out.find("has no image of this name on the other side"), std::string::npos)
         << outcome.out;
     expect_success(compare(scene_, pictures, {"--cameras", data_, "--frames", "1,3", "--threshold", "99"}));
     // Nothing is asked of those that are there besides.
@@ -267,7 +267,7 @@ TEST_F(CompareScenes, OfSomeFrames) {
         compare(one, scene_, {"--cameras", data_, "--frames", "3", "--threshold", "99", "--heat-map", map}));
     EXPECT_EQ(ewa::load_image(map).width, ewa::load_image(one).width);
     EXPECT_EQ(compare(one, scene_, {"--cameras", data_, "--frames", "1", "--threshold", "99"}).status, 1);
-    expect_failure(compare(one, scene_, {"--cameras", data_}), 2, "is one picture and");
+    expect_failure(compare(one, scene_, {"--cameras", data_}), 2, "is one image and");
 }
 
 /// A scene is what begins like one.
@@ -347,7 +347,7 @@ TEST_F(CompareScenes, WriteOverNothing) {
          }) {
         Names command{"compare"};
         command.insert(command.end(), rest.begin(), rest.end());
-        expect_failure(run_ewa(command), 2, "whose place it would take");
+        expect_failure(run_ewa(command), 2, "it would be overwritten");
     }
     EXPECT_EQ(there(), before);
 }
@@ -361,7 +361,7 @@ TEST_F(CompareScenes, WrongUse) {
     expect_failure(run_ewa({"compare", scene_, folder_ / "absent", "--cameras", data_}), 2, "absent");
     expect_failure(run_ewa({"compare", scene_, scene_, "--cameras", data_, "--json", scene_}), 2, "--json");
     expect_failure(run_ewa({"compare", scene_, pictures, "--cameras", data_, "--downscale", "2"}), 2,
-                   scene_ + ", picture 0 and " + pictures + "/0.png: pictures of 24 x 16");
+                   scene_ + ", image 0 and " + pictures + "/0.png: pictures of 24 x 16");
 }
 
 TEST(Compare, WhatIsNoPictureIsOneLine) {
@@ -385,8 +385,8 @@ TEST(Compare, WrongUse) {
     save(folder / "e/z.png", plain(0.5f));
     const std::string a = folder / "a.png";
     expect_failure(run_ewa({"compare", a, folder / "small.png"}), 2, "small.png");
-    expect_failure(run_ewa({"compare", a, folder / "e"}), 2, "is one picture and");
-    expect_failure(run_ewa({"compare", folder / "d", folder / "e"}), 2, "no picture of");
+    expect_failure(run_ewa({"compare", a, folder / "e"}), 2, "is one image and");
+    expect_failure(run_ewa({"compare", folder / "d", folder / "e"}), 2, "no image of");
     expect_failure(run_ewa({"compare", a, folder / "absent.png"}), 2, "absent.png");
     expect_failure(run_ewa({"compare", a}), 2, "B");
     expect_failure(run_ewa({"compare", a, a, "--threshold", "much"}), 2, "--threshold");

@@ -154,7 +154,7 @@ TEST(Dataset, TrainPhotographsAMeshSceneFirst) {
     const Outcome again =
         run_ewa({"train", folder / "leaf.gltf", "-o", folder / "out", "--steps", "2", "--resume"});
     EXPECT_EQ(again.status, 0) << again.err;
-    EXPECT_NE(again.out.find("8 were there already"), std::string::npos) << again.out;
+    EXPECT_NE(again.out.find("8 existed already"), std::string::npos) << again.out;
     expect_failure(run_ewa({"train", folder / "none.glb", "-o", folder / "out3"}), 2, "none.glb");
     EXPECT_FALSE(fs::exists(folder / "out3"));
 }
@@ -179,7 +179,7 @@ TEST(Dataset, EveryCommandTakesAMeshScene) {
     const std::vector<std::string> eval{"eval", splats, scene, "--json", folder / "scene.json"};
     const Outcome beside = run_ewa(eval);
     ASSERT_EQ(beside.status, 0) << beside.err;
-    EXPECT_EQ(beside.out.find("photographed"), std::string::npos) << "they lie beside the splats";
+    EXPECT_EQ(beside.out.find("rendered"), std::string::npos) << "they lie beside the splats";
     ASSERT_EQ(run_ewa({"eval", splats, folder / "out/dataset", "--json", folder / "dataset.json"}).status, 0);
     const auto of_scene = read_json(folder / "scene.json");
     EXPECT_EQ(of_scene["psnr"], read_json(folder / "dataset.json")["psnr"]);
@@ -189,7 +189,7 @@ TEST(Dataset, EveryCommandTakesAMeshScene) {
     fs::remove(folder / "out/dataset/depth/view_003.exr");
     const Outcome anew = run_ewa(eval);
     ASSERT_EQ(anew.status, 0) << anew.err;
-    EXPECT_NE(anew.out.find("photographed 8/8 views"), std::string::npos) << anew.out;
+    EXPECT_NE(anew.out.find("rendered 8/8 views"), std::string::npos) << anew.out;
     EXPECT_EQ(read_json(folder / "scene.json")["frames"], of_scene["frames"]);
     EXPECT_FALSE(fs::exists(folder / "out/dataset/depth/view_003.exr")) << "reading leaves a run as it is";
     EXPECT_EQ(run_ewa({"grad", splats, scene, "--frame", "2", "-o", folder / "g.ply"}).status, 0);

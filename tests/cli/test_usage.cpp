@@ -39,6 +39,40 @@ TEST(Usage, HelpFitsATerminal) {
     EXPECT_NE(help.find("adc,mcmc,none"), std::string::npos) << help;
 }
 
+/// Each line of the help, and that no line breaks a word: a terminal of 80 columns wraps longer lines
+/// anywhere.
+void expect_80_columns(const std::string& name, const Outcome& outcome) {
+    expect_success(outcome);
+    std::istringstream lines(outcome.out);
+    size_t count = 0;
+    for (std::string line; std::getline(lines, line); ++count)
+        EXPECT_LE(line.size(), 80u) << name << ": " << line;
+    EXPECT_GT(count, 5u) << name;
+}
+
+TEST(Usage, HelpFits80ColumnsForEveryCommand) {
+    const Outcome all = run_ewa({"--help"});
+    expect_80_columns("ewa", all);
+    std::istringstream lines(all.out.substr(all.out.find("Subcommands:")));
+    std::vector<std::string> commands;
+    for (std::string line; std::getline(lines, line);)
+        if (line.size() > 3 && line.starts_with("  ") && line[2] != ' ')
+            commands.push_back(line.substr(2, line.find(' ', 2) - 2));
+    EXPECT_GE(commands.size(), 10u) << all.out;
+    for (const std::string& command : commands) expect_80_columns(command, run_ewa({command, "--help"}));
+#ifdef EWA_VIEW_PROGRAM
+    expect_80_columns("ewa-view", run_ewa({"--help"}, {.program = EWA_VIEW_PROGRAM}));
+#endif
+    // Wrapping loses no words, and the rest of a description continues in its own column.
+    const std::string train = run_ewa({"train", "--help"}).out;
+    const size_t from = train.find("--strategy"), to = train.find("--max-splats");
+    ASSERT_TRUE(from < to && to != std::string::npos) << train;
+    const std::string strategy = train.substr(from, to - from);
+    EXPECT_NE(strategy.find("\n" + std::string(30, ' ')), std::string::npos) << strategy;
+    for (const char* word : {"adc", "mcmc", "none", "auto", "5000"})
+        EXPECT_NE(strategy.find(word), std::string::npos) << strategy;
+}
+
 struct WrongUse {
     std::vector<std::string> arguments;
     std::string text;

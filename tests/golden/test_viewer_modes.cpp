@@ -101,7 +101,7 @@ Image shown_by_twin(const viewer::Look& look) {
 Image shown_by(const std::shared_ptr<gpu::Device>& device, const viewer::Look& look) {
     viewer::RenderThread thread([device] { return device; }, [] {});
     thread.set_scene(std::make_shared<const Gaussians>(splats()));
-    viewer::PictureRequest request;
+    viewer::RenderRequest request;
     request.camera = camera();
     request.look = look;
     thread.ask(request);
@@ -112,7 +112,7 @@ Image shown_by(const std::shared_ptr<gpu::Device>& device, const viewer::Look& l
     });
     if (news.failure) std::rethrow_exception(news.failure);
     if (!news.picture) return Image(1, 1, 3);
-    const viewer::Picture& picture = news.picture->picture;
+    const viewer::ByteImage& picture = news.picture->picture;
     Image image(picture.width, picture.height, 3);
     for (size_t i = 0; i < image.pixels.size() / 3; ++i)
         for (size_t c = 0; c < 3; ++c) image.pixels[3 * i + c] = float(picture.rgba[4 * i + c]) / 255.0f;

@@ -110,7 +110,7 @@ ReportData made_up_data() {
     }
     data.pass_times = {{"project", 1.5}, {"blend", 4.5}};
     data.plan = {{"SH buffers", "no view-dependent colour", 45000000}};
-    data.remarks = {"3 images are missing and left out"};
+    data.remarks = {"3 images are missing and skipped"};
     data.settings = {{"steps", "100"}};
     ReportPicture picture;
     picture.name = "a\"b.jpg";

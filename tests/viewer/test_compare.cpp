@@ -9,22 +9,22 @@
 #include <vector>
 
 #include "support/soon.h"
+#include "viewer/comparison.h"
+#include "viewer/image_comparison.h"
 #include "viewer/latest.h"
-#include "viewer/photo.h"
-#include "viewer/photo_comparison.h"
 
 namespace ewa::viewer {
 namespace {
 
-Picture flat(int width, int height, uint8_t value) {
+ByteImage flat(int width, int height, uint8_t value) {
     return {width, height, std::vector<uint8_t>(size_t(width) * size_t(height) * 4, value), 0};
 }
 
 TEST(Compare, TheDifferenceOfEqualSizesIsPixelByPixel) {
-    Picture rendering = flat(4, 2, 100);
-    const Picture photo = flat(4, 2, 90);
+    ByteImage rendering = flat(4, 2, 100);
+    const ByteImage photo = flat(4, 2, 90);
     rendering.rgba[4] = 30;  // the second pixel's red
-    Picture result = difference(rendering, photo, {0, 0, 4, 2});
+    ByteImage result = difference(rendering, photo, {0, 0, 4, 2});
     EXPECT_EQ(result.rgba[0], 10);
     EXPECT_EQ(result.rgba[4], 60);
     EXPECT_EQ(result.rgba[3], 255);
@@ -37,7 +37,7 @@ TEST(Compare, TheDifferenceOfEqualSizesIsPixelByPixel) {
 }
 
 TEST(Compare, BeyondThePhotographIsBlack) {
-    const Picture result = difference(flat(6, 4, 100), flat(2, 4, 0), {2, 0, 2, 4});
+    const ByteImage result = difference(flat(6, 4, 100), flat(2, 4, 0), {2, 0, 2, 4});
     EXPECT_EQ(result.rgba[4 * 1], 0);
     EXPECT_EQ(result.rgba[4 * 2], 100);
     EXPECT_EQ(result.rgba[4 * 4], 0);
@@ -45,9 +45,9 @@ TEST(Compare, BeyondThePhotographIsBlack) {
 }
 
 TEST(Compare, APhotographOfAnotherSizeIsSampled) {
-    Picture photo = flat(2, 1, 0);
+    ByteImage photo = flat(2, 1, 0);
     for (size_t c = 0; c < 3; ++c) photo.rgba[4 + c] = 200;
-    const Picture result = difference(flat(4, 2, 0), photo, {0, 0, 4, 2});
+    const ByteImage result = difference(flat(4, 2, 0), photo, {0, 0, 4, 2});
     EXPECT_EQ(result.rgba[0], 0);   // at 0.25 of the first pixel: the border goes on
     EXPECT_EQ(result.rgba[4], 50);  // a quarter of the way to the second pixel's centre
     EXPECT_EQ(result.rgba[4 * 3], 200);
@@ -56,29 +56,29 @@ TEST(Compare, APhotographOfAnotherSizeIsSampled) {
 TEST(Compare, PlacesKeepThePhotographsShape) {
     const Arrangement beside = arrange(Comparison::beside, {801, 300}, {200, 100});
     EXPECT_EQ(beside.rendering, (Rectangle{0, 0, 400, 300}));
-    EXPECT_EQ(beside.photograph, (Rectangle{400, 49, 401, 201}));
+    EXPECT_EQ(beside.image, (Rectangle{400, 49, 401, 201}));
     const Arrangement covered = arrange(Comparison::beside, {801, 300}, {200, 100}, 101);
     EXPECT_EQ(covered.rendering, (Rectangle{101, 0, 350, 300}));
-    EXPECT_EQ(covered.photograph, (Rectangle{451, 62, 350, 175}));
+    EXPECT_EQ(covered.image, (Rectangle{451, 62, 350, 175}));
     EXPECT_EQ(arrange(Comparison::beside, {801, 300}, {200, 100}, 300).rendering, beside.rendering);
     const Arrangement wipe = arrange(Comparison::wipe, {800, 300}, {200, 100});
     EXPECT_EQ(wipe.rendering, (Rectangle{0, 0, 800, 300}));
-    EXPECT_EQ(wipe.photograph, (Rectangle{100, 0, 600, 300}));
+    EXPECT_EQ(wipe.image, (Rectangle{100, 0, 600, 300}));
 }
 
 TEST(Compare, APictureOfItIsMadeWhereOneIsWanted) {
-    auto rendering = std::make_shared<FinishedPicture>();
+    auto rendering = std::make_shared<RenderedFrame>();
     rendering->picture = flat(4, 2, 100);
-    auto photo = std::make_shared<Photo>();
+    auto photo = std::make_shared<CameraImage>();
     photo->picture = flat(4, 2, 90);
     ComparisonRequest request{rendering, photo, {0, 0, 4, 2}, 0};
-    const Compared number = compare_with_photo(request);
+    const Compared number = compare_with_image(request);
     EXPECT_NEAR(number.psnr, 20 * std::log10(25.5), 1e-9);
     EXPECT_TRUE(number.difference.rgba.empty());
     EXPECT_EQ(number.of, request);
     request.gain = 3;
     EXPECT_NE(number.of, request);
-    EXPECT_EQ(compare_with_photo(request).difference.rgba[0], 30);
+    EXPECT_EQ(compare_with_image(request).difference.rgba[0], 30);
 }
 
 TEST(Latest, WhatWaitsGivesWayToTheLast) {

@@ -13,7 +13,7 @@ namespace {
 const std::string kMesh = std::string(EWA_SOURCE_DIR) + "/scenes/railing.gltf";
 
 TEST(Opening, AMeshSceneIsItsViews) {
-    const Scene scene = open_scene(kMesh, {});
+    const OpenedScene scene = open_scene(kMesh, {});
     ASSERT_TRUE(scene.dataset);
     EXPECT_EQ(scene.dataset->frames.size(), 44u);
     EXPECT_EQ(scene.gaussians->size(), 0u);
@@ -24,12 +24,12 @@ TEST(Opening, ARunOnAMeshSceneHasThePhotographsThatWereMade) {
     const test::Folder folder;
     std::filesystem::create_directories(folder / "run");
     test::write_file(folder / "run/config.json", "{\"dataset\": \"" + kMesh + "\"}");
-    const Scene before = open_scene(folder / "run", {});
+    const OpenedScene before = open_scene(folder / "run", {});
     ASSERT_TRUE(before.dataset) << before.remark;
     EXPECT_EQ(before.dataset->frames.size(), 44u);
     EXPECT_FALSE(before.dataset->frames[0].image_exists);
     test::make_dataset(folder / "run/dataset");
-    const Scene after = open_scene(folder / "run", {});
+    const OpenedScene after = open_scene(folder / "run", {});
     ASSERT_TRUE(after.dataset) << after.remark;
     EXPECT_NE(after.dataset->frames.size(), 44u);
     EXPECT_TRUE(after.dataset->frames[0].image_exists);

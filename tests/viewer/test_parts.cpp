@@ -7,9 +7,9 @@
 #include <limits>
 #include <numbers>
 
+#include "viewer/byte_image.h"
 #include "viewer/framing.h"
 #include "viewer/pace.h"
-#include "viewer/picture.h"
 
 namespace ewa::viewer {
 namespace {
@@ -215,13 +215,13 @@ Rendering two_pixels() {
 }
 
 TEST(Picture, RoundsAndClampsColor) {
-    const Picture picture = picture_of(two_pixels(), Mode::color);
+    const ByteImage picture = picture_of(two_pixels(), Mode::color);
     EXPECT_EQ(picture.rgba, (std::vector<uint8_t>{128, 255, 0, 255, 26, 0, 77, 255}));
     EXPECT_EQ(picture_of(two_pixels(), Mode::ellipsoids).rgba, picture.rgba);
 }
 
 TEST(Picture, DepthAndOpacityAreGrey) {
-    const Picture one_depth = picture_of(two_pixels(), Mode::depth);
+    const ByteImage one_depth = picture_of(two_pixels(), Mode::depth);
     EXPECT_EQ(one_depth.white, 2.0f);  // the 98th percentile of two values is the lower
     EXPECT_EQ(one_depth.rgba, (std::vector<uint8_t>{255, 255, 255, 255, 255, 255, 255, 255}));
     Rendering hundred{Image(101, 1, 3), Image(101, 1, 1), Image(101, 1, 1), Image(101, 1, 1)};
@@ -229,19 +229,19 @@ TEST(Picture, DepthAndOpacityAreGrey) {
         hundred.alpha.pixels[i] = 1;
         hundred.depth.pixels[i] = 1000 + float(i);
     }
-    const Picture depth = picture_of(hundred, Mode::depth);
+    const ByteImage depth = picture_of(hundred, Mode::depth);
     EXPECT_EQ(depth.dark, 1001.0f);
     EXPECT_EQ(depth.white, 1097.0f);
     EXPECT_EQ(depth.rgba[0], 26) << "the nearest is not black";
     EXPECT_EQ(depth.rgba[4 * 49], 140) << "half way";
     EXPECT_EQ(depth.rgba[4 * 99], 255);
     EXPECT_EQ(depth.rgba[4 * 100], 0) << "nothing is";
-    const Picture opacity = picture_of(two_pixels(), Mode::opacity);
+    const ByteImage opacity = picture_of(two_pixels(), Mode::opacity);
     EXPECT_EQ(opacity.rgba, (std::vector<uint8_t>{255, 255, 255, 255, 128, 128, 128, 255}));
 }
 
 TEST(Picture, CountsAreHeat) {
-    const Picture count = picture_of(two_pixels(), Mode::count);
+    const ByteImage count = picture_of(two_pixels(), Mode::count);
     EXPECT_EQ(count.white, 30.0f);
     EXPECT_EQ(count.rgba, (std::vector<uint8_t>{0, 0, 0, 255, 255, 255, 255, 255}));
     EXPECT_EQ(heat(1 / 3.0f)[0], 1.0f);

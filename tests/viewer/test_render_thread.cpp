@@ -12,8 +12,8 @@
 namespace ewa::viewer {
 namespace {
 
-PictureRequest request(uint64_t serial) {
-    PictureRequest request;
+RenderRequest request(uint64_t serial) {
+    RenderRequest request;
     Camera& camera = request.camera;
     camera.width = 40;
     camera.height = 30;

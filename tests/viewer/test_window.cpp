@@ -160,7 +160,7 @@ TEST(WithoutWindow, WrongUseIsOneLine) {
     const std::string splats = folder / "splats.ply";
     expect_failure(run_view({}), 2, "PATH");
     expect_failure(run_view({folder / "none.ply"}), 2, "none.ply");
-    expect_failure(run_view({folder / "none"}), 2, "there is no such file or folder");
+    expect_failure(run_view({folder / "none"}), 2, "no such file or folder");
     expect_failure(run_view({splats, "--size", "640"}), 2, "--size");
     expect_failure(run_view({splats, "--size", "0x480"}), 2, "--size");
     expect_failure(run_view({splats, "--frame", "1"}), 2, "--cameras");

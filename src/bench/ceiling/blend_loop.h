@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Blending in plain C++: the loop of shaders/passes/blend.comp on vectors of the CPU, the ceiling its speed
-// is held against. It takes the device's own records and sorted lists, so that both do the same work.
+// Blending in plain C++ with CPU vectors: the loop of shaders/passes/blend.comp, whose time the pass is compared with. It
+// uses the records and sorted lists of the device, so that both do the same work.
 #pragma once
 #include <cstdint>
 
 namespace ewa::bench {
 
-/// One frame's lists as they come from the device. A tile holds 64 pixels.
+/// The lists of one frame, downloaded from the device. A tile has 64 pixels.
 struct BlendLists {
-    const float* records = nullptr;         // 12 floats a splat, as in shaders/shared/layouts.h
+    const float* records = nullptr;         // 12 floats per splat, as in shaders/shared/layouts.h
     const std::uint32_t* splats = nullptr;  // of each sorted instance
     const std::uint32_t* tile_starts = nullptr;
     std::uint32_t width = 0, height = 0;  // px
@@ -16,7 +16,7 @@ struct BlendLists {
     float background[3] = {0, 0, 0};
 };
 
-/// (pixel, splat) pairs. Evaluated: list entries a pixel looks at, the one that closes it included.
+/// Numbers of (pixel, splat) pairs. evaluated: the list entries that pixels read, including the one that saturates them.
 struct PairCounts {
     std::uint64_t evaluated = 0, blended = 0;
 };

@@ -12,12 +12,12 @@ namespace {
 
 constexpr uint32_t kTilesATurn = 16;
 
-struct Kernel {
+struct BlendVariant {
     BlendTile blend;
     const char* text;
 };
 
-Kernel best_kernel() {
+BlendVariant best_variant() {
 #ifdef EWA_BENCH_X86
     if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("fma"))
         return {blend_tile_avx512, "AVX-512 and FMA"};
@@ -27,7 +27,7 @@ Kernel best_kernel() {
     return {blend_tile_portable, "portable"};
 }
 
-/// visit(tile) for every tile, shared out over all threads as they come free.
+/// Calls visit(tile) for each tile. All threads take the next tiles when they are free.
 template <class Visit>
 void for_all_tiles(uint32_t tiles, Visit visit) {
     std::atomic<uint32_t> next{0};
@@ -44,7 +44,7 @@ void for_all_tiles(uint32_t tiles, Visit visit) {
 }  // namespace
 
 std::string vector_text() {
-    return best_kernel().text;
+    return best_variant().text;
 }
 
 void on_threads(unsigned count, const std::function<void(unsigned)>& work) {
@@ -56,7 +56,7 @@ void on_threads(unsigned count, const std::function<void(unsigned)>& work) {
 
 Timed time_blend(const BlendLists& lists, uint32_t tiles, int runs, std::vector<float>& planes) {
     planes.assign(size_t(4) * lists.width * lists.height, 0.0f);
-    const BlendTile blend = best_kernel().blend;
+    const BlendTile blend = best_variant().blend;
     return time_repeated(runs, [&] {
         for_all_tiles(tiles, [&](uint32_t tile, unsigned) { blend(lists, tile, planes.data()); });
     });
@@ -88,7 +88,7 @@ Bandwidth copy_bandwidth() {
             std::memcpy(target.data() + thread * share, source.data() + thread * share, share);
         });
     });
-    const double gigabytes = 2e-6 * double(share * host_threads());  // a millisecond
+    const double gigabytes = 2e-6 * double(share * host_threads());  // per millisecond
     return {gigabytes / timed.wall.least, gigabytes / timed.cpu.least};
 }
 

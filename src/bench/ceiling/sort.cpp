@@ -11,7 +11,7 @@ namespace ewa::bench {
 namespace {
 
 constexpr uint32_t kDigitBits = 11;
-constexpr size_t kFewestOfAThread = 32768;  // fewer items are sorted before another thread has started
+constexpr size_t kFewestOfAThread = 32768;  // fewer items are sorted faster than a thread starts
 
 struct Pairs {
     std::vector<uint32_t> keys, values;
@@ -21,8 +21,8 @@ struct Pairs {
     }
 };
 
-/// One pass: each thread owns a contiguous share of the items, counts its digits, learns from the counts of
-/// all where its items of each digit begin, and moves them.
+/// One pass. Each thread owns a contiguous share of the items and counts its digits. The counts of all
+/// threads tell where its items of each digit go.
 void sort_pass(const Pairs& from, Pairs& to, uint32_t shift, uint32_t digits, std::vector<uint32_t>& counts) {
     const size_t items = from.keys.size();
     const unsigned threads = unsigned(std::clamp<size_t>(items / kFewestOfAThread, 1, host_threads()));

@@ -5,7 +5,7 @@
 #include <cfloat>
 #include <cmath>
 
-#include "bench/gradient_distance.h"
+#include "bench/check.h"
 #include "core/random.h"
 #include "ewa/renderer.h"
 #include "reference/order.h"
@@ -21,16 +21,16 @@ using reference::Raster;
 using reference::Values;
 
 constexpr double kUnit = 0x1p-24;       // half a float32 step, relative
-constexpr double kPictureFloor = 5e-6;  // of a scene whose condition is ordinary
+constexpr double kPictureFloor = 5e-6;  // of a well-conditioned scene
 constexpr double kGradientFloor = 1e-4;
 constexpr double kRoundings = 32;      // of a chain of float32 operations on each stored value
-constexpr double kAtThreshold = 2e-4;  // relative distance at which float32 may decide otherwise
+constexpr double kAtThreshold = 2e-4;  // relative distance at which float32 may decide differently
 constexpr double kPerturbation = 1e-10;
 constexpr int kPerturbations = 3;
 constexpr double kLargest = FLT_MAX;
-constexpr uint64_t kFewPixels = 4, kPixelsEach = 200;  // that may stand on a threshold
+constexpr uint64_t kFewPixels = 4, kPixelsEach = 200;  // that may be close to a threshold
 
-/// Every stored value moved by a relative kPerturbation, up or down.
+/// Moves each stored value by a relative kPerturbation, up or down.
 Values perturbed(const Values& values, const glm::dvec3& eye, uint32_t draw) {
     Values out = values;
     uint32_t counter = 0;
@@ -54,7 +54,7 @@ Values perturbed(const Values& values, const glm::dvec3& eye, uint32_t draw) {
     return out;
 }
 
-/// Pixels in which a decision of the model (1/255, 0.99, the stop) hangs on less than kAtThreshold.
+/// Pixels where a decision of the model (1/255, 0.99, the stop) is within kAtThreshold of its threshold.
 std::vector<uint8_t> pixels_at_threshold(const Picture& picture) {
     const auto whiteners = reference::whiteners_of(picture.projected);
     const reference::Instances& lists = picture.instances;
@@ -75,7 +75,7 @@ std::vector<uint8_t> pixels_at_threshold(const Picture& picture) {
                                        .raw;
                 const double alpha = raw >= shared::ALPHA_MIN ? std::min(raw, shared::ALPHA_MAX) : 0;
                 const double next = transmittance * (1 - alpha);
-                // Exactly (1 - ALPHA_MAX)^2 is a decision both sides take alike.
+                // At exactly (1 - ALPHA_MAX)^2 both sides decide equally.
                 const bool exact = reference::stops(next) && raw > shared::ALPHA_MAX;
                 hangs = hangs || near(raw, shared::ALPHA_MIN) || near(raw, shared::ALPHA_MAX) ||
                         (alpha > 0 && !exact && near(next, shared::TRANSMITTANCE_STOP));
@@ -92,9 +92,9 @@ struct Difference {
     bool finite = true;
 };
 
-/// Of the pixels that are not left out; over scale.
+/// Of the pixels that are not excluded, divided by scale.
 template <class Pixel>
-Difference picture_difference(const Raster& expected, const std::vector<uint8_t>& left_out, double scale,
+Difference picture_difference(const Raster& expected, const std::vector<uint8_t>& excluded, double scale,
                               Pixel actual) {
     Difference d;
     for (int y = 0; y < expected.height; ++y)
@@ -102,7 +102,7 @@ Difference picture_difference(const Raster& expected, const std::vector<uint8_t>
             for (int c = 0; c < 3; ++c) {
                 const double value = actual(x, y, c);
                 d.finite = d.finite && std::isfinite(value);
-                if (left_out[size_t(y) * size_t(expected.width) + size_t(x)]) continue;
+                if (excluded[size_t(y) * size_t(expected.width) + size_t(x)]) continue;
                 const double e = std::abs(value - expected.at(x, y)[c]) / scale;
                 if (!(e <= d.largest)) d.largest = e;
             }
@@ -115,7 +115,7 @@ double scale_of(const Raster& raster) {
     return scale;
 }
 
-/// The norm of what is within float32's range; without overflow of the squares.
+/// The norm of the values clamped to the range of float32, with squares that cannot overflow.
 double norm_of(const std::vector<double>& v) {
     double largest = 0, sum = 0;
     for (const double x : v) largest = std::max(largest, std::min(std::abs(x), kLargest));
@@ -123,9 +123,8 @@ double norm_of(const std::vector<double>& v) {
     return largest * std::sqrt(sum);
 }
 
-/// A rotation changes a splat as much as a stretch does, but for one that is round: there the gradient by the
-/// quaternion is zero and no measure of an error. What takes its place is this share of the gradient by the
-/// scales.
+/// The least norm of the quaternion gradient to measure an error against. It is zero for round splats, which
+/// a rotation does not change; then this share of the gradient of the scales replaces it.
 double least_quaternion_norm(const StabilityCase& one, const Values& gradient) {
     constexpr double kShare = 1e-3;
     const Values values = reference::to_double(one.gaussians);
@@ -145,25 +144,25 @@ bool all_finite(const Gaussians& g) {
            finite(g.sh);
 }
 
-/// The twin's picture with each determinant as float32's a c - b^2 makes it: what the sum of the minors is
-/// for.
+/// The error of the reference image if each determinant is a c - b^2 in float32. It shows why the pipeline
+/// adds the minors instead.
 double plain_determinant_error(const Picture& picture, const RenderOptions& options,
-                               const std::vector<uint8_t>& left_out, double scale) {
+                               const std::vector<uint8_t>& excluded, double scale) {
     std::vector<reference::Projected> plain = picture.projected;
     for (reference::Projected& p : plain) {
         const float a = float(p.a), b = float(p.b), c = float(p.c);
         p.det = double(a * c - b * b);
-        if (!(p.det > 0)) p.visible = false;  // as renderers do that compute it so
+        if (!(p.det > 0)) p.visible = false;  // as renderers do that compute it this way
     }
     const auto order = reference::depth_order(plain);
     const auto lists = reference::make_instances(plain, order, picture.instances.grid);
     const auto blended = reference::blend(plain, lists, options.background);
-    return picture_difference(picture.blended.color, left_out, scale,
+    return picture_difference(picture.blended.color, excluded, scale,
                               [&](int x, int y, int c) { return blended.color.at(x, y)[c]; })
         .largest;
 }
 
-/// For each group of the gradient, the norm that an error of it is taken relative to at least.
+/// For each group of the gradient: the least norm that its error is divided by.
 std::vector<double> least_norms(const StabilityCase& one, const Values& gradient) {
     return {0, least_quaternion_norm(one, gradient), 0, 0, 0};
 }
@@ -173,25 +172,25 @@ struct Conditions {
     double groups[5] = {};
 };
 
-/// The twin's error under a change of every stored value, over the size of the change: the largest of
-/// several.
-Conditions conditions_of(const StabilityCase& one, const Image& photo, const LossGradientTwin& twin,
-                         const std::vector<uint8_t>& left_out, double scale) {
+/// The error of the reference under changes of each stored value, divided by the size of the change: the
+/// largest of several.
+Conditions conditions_of(const StabilityCase& one, const Image& photo, const LossGradientTwin& expected,
+                         const std::vector<uint8_t>& excluded, double scale) {
     const Values values = reference::to_double(one.gaussians);
-    const std::vector<double> least = least_norms(one, twin.gradient);
+    const std::vector<double> least = least_norms(one, expected.gradient);
     Conditions k;
     for (uint32_t draw = 0; draw < kPerturbations; ++draw) {
         const LossGradientTwin moved = reference::loss_gradient(
             perturbed(values, one.camera.position(), draw), one.camera, photo, one.options);
         const double picture =
-            picture_difference(twin.picture.blended.color, left_out, scale, [&](int x, int y, int c) {
+            picture_difference(expected.picture.blended.color, excluded, scale, [&](int x, int y, int c) {
                 return moved.picture.blended.color.at(x, y)[c];
             }).largest;
         k.picture = std::max(k.picture, picture / kPerturbation);
-        k.loss =
-            std::max(k.loss, std::abs(moved.loss - twin.loss) / std::max(1.0, twin.loss) / kPerturbation);
+        k.loss = std::max(
+            k.loss, std::abs(moved.loss - expected.loss) / std::max(1.0, expected.loss) / kPerturbation);
         int group = 0;
-        for_each_group(moved.gradient, twin.gradient, [&](const char*, const auto& a, const auto& b) {
+        for_each_group(moved.gradient, expected.gradient, [&](const char*, const auto& a, const auto& b) {
             k.groups[group] =
                 std::max(k.groups[group], relative_distance(a, b, least[size_t(group)]) / kPerturbation);
             ++group;
@@ -200,7 +199,7 @@ Conditions conditions_of(const StabilityCase& one, const Image& photo, const Los
     return k;
 }
 
-/// A problem without a condition number has no bound of its own.
+/// Without a finite condition number, the floor is the bound.
 double bound(double floor, double condition) {
     if (!std::isfinite(condition)) return floor;
     return std::max(floor, kRoundings * condition * kUnit);
@@ -217,26 +216,26 @@ bool StabilityResult::good() const {
 StabilityResult compare_with_twin(const std::shared_ptr<gpu::Device>& device, const StabilityCase& one,
                                   const Gaussians& drawn) {
     const Image photo = stability_photo(one.camera.width, one.camera.height);
-    const LossGradientTwin twin = reference::loss_gradient(one.gaussians, one.camera, photo, one.options);
-    const std::vector<uint8_t> at_threshold = pixels_at_threshold(twin.picture);
-    const double scale = scale_of(twin.picture.blended.color);
-    const Conditions condition = conditions_of(one, photo, twin, at_threshold, scale);
+    const LossGradientTwin expected = reference::loss_gradient(one.gaussians, one.camera, photo, one.options);
+    const std::vector<uint8_t> at_threshold = pixels_at_threshold(expected.picture);
+    const double scale = scale_of(expected.picture.blended.color);
+    const Conditions condition = conditions_of(one, photo, expected, at_threshold, scale);
 
     StabilityResult result;
     result.name = one.name;
     result.what = one.what;
     result.splats = uint32_t(one.gaussians.size());
-    result.drawn = uint32_t(twin.picture.order.size());
-    result.skipped_by_twin = twin.picture.skipped_nonfinite;
+    result.drawn = uint32_t(expected.picture.order.size());
+    result.skipped_by_twin = expected.picture.skipped_nonfinite;
     result.pixels = at_threshold.size();
     result.pixels_at_threshold = uint64_t(std::count(at_threshold.begin(), at_threshold.end(), 1));
-    result.plain_determinant = plain_determinant_error(twin.picture, one.options, at_threshold, scale);
+    result.plain_determinant = plain_determinant_error(expected.picture, one.options, at_threshold, scale);
 
     Renderer renderer(device, drawn, one.options);
     const Rendering rendering = renderer.render(one.camera);
     result.skipped = renderer.skipped_nonfinite();
     const Difference picture =
-        picture_difference(twin.picture.blended.color, at_threshold, scale,
+        picture_difference(expected.picture.blended.color, at_threshold, scale,
                            [&](int x, int y, int c) { return double(rendering.color.at(x, y)[c]); });
     result.comparisons.push_back(
         {"picture", picture.largest, bound(kPictureFloor, condition.picture), condition.picture});
@@ -244,11 +243,12 @@ StabilityResult compare_with_twin(const std::shared_ptr<gpu::Device>& device, co
     const LossGradient gradient = loss_gradient(device, drawn, one.camera, photo, one.options);
     result.loss = gradient.loss;
     result.finite = picture.finite && std::isfinite(gradient.loss) && all_finite(gradient.gradient);
-    result.comparisons.push_back({"loss", std::abs(gradient.loss - twin.loss) / std::max(1.0, twin.loss),
+    result.comparisons.push_back({"loss",
+                                  std::abs(gradient.loss - expected.loss) / std::max(1.0, expected.loss),
                                   bound(kPictureFloor, condition.loss), condition.loss});
-    const std::vector<double> least = least_norms(one, twin.gradient);
+    const std::vector<double> least = least_norms(one, expected.gradient);
     int group = 0;
-    for_each_group(gradient.gradient, twin.gradient, [&](const char* name, const auto& a, const auto& b) {
+    for_each_group(gradient.gradient, expected.gradient, [&](const char* name, const auto& a, const auto& b) {
         const double k = condition.groups[group];
         result.comparisons.push_back(
             {name, relative_distance(a, b, least[size_t(group)]), bound(kGradientFloor, k), k});

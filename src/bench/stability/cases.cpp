@@ -9,7 +9,7 @@
 #include <iterator>
 #include <limits>
 
-#include "bench/format_figures.h"
+#include "bench/report.h"
 #include "core/random.h"
 
 namespace ewa::bench {
@@ -31,7 +31,7 @@ glm::dmat3 turned(double angle_x, double angle_y) {
     return glm::dmat3(1, 0, 0, 0, cx, sx, 0, -sx, cx) * glm::dmat3(cy, 0, -sy, 0, 1, 0, sy, 0, cy);
 }
 
-/// Where no case says otherwise: a small picture, looked at from no special place.
+/// The default camera: a small image from a generic position.
 Camera usual_camera() {
     Camera camera;
     camera.width = 64;
@@ -52,7 +52,7 @@ struct Sketch {
     double logit = 0;
 };
 
-/// A splat that lands at a share of the picture, `pixels` wide.
+/// A splat at a relative position in the image, `pixels` wide.
 Sketch usual_sketch(uint32_t i, const Camera& camera, double z) {
     const auto a = uniform(i, 1), b = uniform(i, 2), c = uniform(i, 3);
     Sketch s;
@@ -161,10 +161,10 @@ void add_scales(Table& table) {
             for (uint32_t i = 0; i < 40; ++i) {
                 Sketch s = usual_sketch(i, camera, usual_depth(i));
                 s.scale *= factor;
-                if (factor > 1) s.logit = between(uniform(i, 6)[0], -3, -1);  // seen through
+                if (factor > 1) s.logit = between(uniform(i, 6)[0], -3, -1);  // transparent
                 builder.add(s);
             }
-            // Where none of them can be seen there are others, which must not notice.
+            // If none of them is visible, others are, which must not be affected.
             const bool unseen =
                 kernel == Kernel::antialias ? factor < 1 : kernel == Kernel::unit_mass && factor > 1;
             for (uint32_t i = 0; unseen && i < 20; ++i) builder.add(usual_sketch(i, camera, usual_depth(i)));
@@ -195,7 +195,7 @@ void add_depths(Table& table) {
     for (const double distance : {1e-6, 1e-3, 0.02, 1e4, 1e8}) {
         Builder at(camera);
         for (uint32_t i = 0; i < 40; ++i) at.add(usual_sketch(i, camera, distance * usual_depth(i) / 5));
-        // Behind the near plane there is nothing to see but what stands elsewhere.
+        // Splats behind the near plane are invisible; the others are not.
         for (uint32_t i = 0; distance < 0.01 && i < 20; ++i) at.add(usual_sketch(i, camera, usual_depth(i)));
         table.add(text_of("distance_%.0e", distance), "so far from the camera", at.take());
     }
@@ -219,7 +219,7 @@ void add_far_from_origin(Table& table) {
     table.add("offset_1e7", "a scene of 5 km, 1e7 from the origin, positions in float32", stored.take(),
               camera);
 
-    // Held as a georeferenced capture is: positions in float32 relative to an origin in double.
+    // Stored as a georeferenced capture: float32 positions relative to a float64 origin.
     Camera near = usual_camera();
     Gaussians held = usual_scene(near, 60, 3);
     held.origin = place;
@@ -308,7 +308,7 @@ void add_quaternions(Table& table) {
 void add_colors(Table& table) {
     for (const double factor : {1e3, 1e6, 1e19, 1e28, 1e36}) {
         Gaussians g = usual_scene(usual_camera(), 50, 3);
-        // Beyond what a colour may be a splat is skipped; those before it stay.
+        // A splat whose colour exceeds the range is skipped; those in front of it are not.
         const size_t spared = factor > 1e30 ? 20 * g.sh_stride() : 0;
         for (size_t i = spared; i < g.sh.size(); ++i) g.sh[i] = float(g.sh[i] * factor);
         table.add(text_of("sh_%.0e", factor), "SH coefficients times this", std::move(g));
@@ -323,8 +323,8 @@ float& stored_value(Gaussians& g, size_t splat, size_t value) {
     return g.sh[g.sh_stride() * splat + value - 11];
 }
 
-/// Splat 2 i has its value i replaced, so that each value of a splat is at some time the bad one, and those
-/// between are as they should be: what is bad must not reach them.
+/// Replaces value i of splat 2 i, so that each value of a splat is bad once. The splats between are good and
+/// must not be affected.
 void add_replaced(Table& table) {
     constexpr float inf = std::numeric_limits<float>::infinity();
     const std::pair<const char*, float> bad[] = {{"nan", std::numeric_limits<float>::quiet_NaN()},
@@ -362,7 +362,7 @@ std::vector<StabilityCase> stability_cases() {
 }
 
 StabilityCase stability_case_of(const std::string& name, const Gaussians& gaussians) {
-    // The middle half of the splats along each axis is what the camera looks at.
+    // The camera looks at the middle half of the splats along each axis.
     glm::dvec3 low(0), high(0);
     for (int k = 0; k < 3; ++k) {
         std::vector<double> values;

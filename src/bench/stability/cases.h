@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Stiff and extreme scenes: the one table that the tests and `ewa bench --stability` go through.
+// Stiff and extreme scenes, for the tests and `ewa bench --stability`.
 #pragma once
 #include <string>
 #include <vector>
@@ -13,20 +13,19 @@ namespace ewa::bench {
 
 struct StabilityCase {
     std::string name;  // family_value
-    std::string what;  // one line: what is extreme about it
+    std::string what;  // one line: what is extreme
     Gaussians gaussians;
     Camera camera;
     RenderOptions options;
 };
 
-/// Every case, in the order of the families. Pure: the same scenes on every machine up to the last bits of
-/// exp and log.
+/// All cases in the order of their families. Equal on all machines up to the last bits of exp and log.
 std::vector<StabilityCase> stability_cases();
 
-/// A scene of a user's, seen from a distance at which it fills the picture.
+/// A user's scene, seen from a distance at which it fills the image.
 StabilityCase stability_case_of(const std::string& name, const Gaussians& gaussians);
 
-/// RGB in [0, 1]: smooth waves and noise, what the loss of a case is taken against.
+/// The target image of the loss, RGB in [0, 1]: smooth waves and noise.
 Image stability_photo(int width, int height);
 
 }  // namespace ewa::bench

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The stability suite as a command: every case against the float64 twin, then training from each.
+// The stability suite as a command: compares each case with the CPU reference, then trains from it.
 #pragma once
 #include <filesystem>
 #include <functional>
@@ -16,12 +16,11 @@ struct StabilityOptions {
     int training_steps = 500;    // 0: none
     std::string device;          // as in DeviceOptions
     std::filesystem::path json;  // empty: none
-    std::filesystem::path file;  // a scene of the user's in place of the built-in cases
-    std::function<Gaussians(const std::filesystem::path&)> read;  // of that file
+    std::filesystem::path file;  // a user's scene instead of the built-in cases
+    std::function<Gaussians(const std::filesystem::path&)> read;  // reads that file
 };
 
-/// Prints the table. Returns 1 where a bound is broken or something is not finite. Throws InputError,
-/// RunError.
+/// Prints the table. Returns 1 if a bound is exceeded or a value is not finite. Throws InputError, RunError.
 int run_stability(const StabilityOptions& options);
 
 }  // namespace ewa::bench

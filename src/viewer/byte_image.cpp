@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "viewer/picture.h"
+#include "viewer/byte_image.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 namespace ewa::viewer {
 namespace {
 
-/// save_image's rounding, and zero for NaN.
+/// Rounds as save_image does; NaN becomes zero.
 uint8_t to_byte(float v) {
     return v > 0.0f ? uint8_t(std::min(v, 1.0f) * 255.0f + 0.5f) : uint8_t(0);
 }
@@ -33,9 +33,9 @@ float white_count_of(const Rendering& rendering) {
     return quantile(counts, 0.99);
 }
 
-/// rgb(i) gives the three values of pixel i.
+/// rgb(i): the three values of pixel i.
 template <class Values>
-void fill(Picture& picture, Values rgb) {
+void fill(ByteImage& picture, Values rgb) {
     for (size_t i = 0; i < picture.rgba.size() / 4; ++i) {
         const std::array<float, 3> values = rgb(i);
         for (size_t c = 0; c < 3; ++c) picture.rgba[4 * i + c] = to_byte(values[c]);
@@ -43,7 +43,7 @@ void fill(Picture& picture, Values rgb) {
     }
 }
 
-Picture empty_picture(int width, int height) {
+ByteImage empty_picture(int width, int height) {
     return {width, height, std::vector<uint8_t>(size_t(width) * size_t(height) * 4), 0};
 }
 
@@ -60,8 +60,8 @@ std::array<float, 3> heat(float share) {
             std::clamp(3 * share - 2, 0.0f, 1.0f)};
 }
 
-Picture picture_of(const Rendering& rendering, Mode mode) {
-    Picture picture = empty_picture(rendering.color.width, rendering.color.height);
+ByteImage picture_of(const Rendering& rendering, Mode mode) {
+    ByteImage picture = empty_picture(rendering.color.width, rendering.color.height);
     const auto grey = [](float v) { return std::array<float, 3>{v, v, v}; };
     if (mode == Mode::depth) {
         std::vector<float> depths = solid_depths(rendering);
@@ -90,9 +90,9 @@ Picture picture_of(const Rendering& rendering, Mode mode) {
     return picture;
 }
 
-Picture picture_of(const Image& image, const std::array<float, 3>& background) {
+ByteImage picture_of(const Image& image, const std::array<float, 3>& background) {
     const Image opaque = over_background(image, background);
-    Picture picture = empty_picture(opaque.width, opaque.height);
+    ByteImage picture = empty_picture(opaque.width, opaque.height);
     fill(picture, [&](size_t i) {
         const float* values = &opaque.pixels[3 * i];
         return std::array<float, 3>{values[0], values[1], values[2]};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "viewer/photo_comparison.h"
+#include "viewer/comparison.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,8 +8,8 @@
 namespace ewa::viewer {
 namespace {
 
-/// Channel c at a position in pixels, pixel centres at +0.5, the border continued.
-float bilinear(const Picture& picture, double x, double y, size_t c) {
+/// Channel c at a position in pixels. Pixel centres are at +0.5; the border is repeated.
+float bilinear(const ByteImage& picture, double x, double y, size_t c) {
     const double left = std::clamp(x - 0.5, 0.0, picture.width - 1.0);
     const double top = std::clamp(y - 0.5, 0.0, picture.height - 1.0);
     const int x0 = int(left), y0 = int(top);
@@ -36,19 +36,19 @@ Rectangle fitted(Size shape, const Rectangle& room) {
     return result;
 }
 
-Arrangement arrange(Comparison comparison, Size window, Size photograph, int covered) {
+Arrangement arrange(Comparison comparison, Size window, Size image, int covered) {
     const Rectangle whole{0, 0, window.width, window.height};
-    if (comparison != Comparison::beside) return {whole, fitted(photograph, whole)};
+    if (comparison != Comparison::beside) return {whole, fitted(image, whole)};
     const int from = covered <= window.width / 3 ? covered : 0;
     const int half = std::max(1, (window.width - from) / 2);
     const Rectangle right{from + half, 0, std::max(1, window.width - from - half), window.height};
-    return {{from, 0, half, window.height}, fitted(photograph, right)};
+    return {{from, 0, half, window.height}, fitted(image, right)};
 }
 
-Picture difference(const Picture& rendering, const Picture& photograph, const Rectangle& place) {
-    Picture result{rendering.width, rendering.height, std::vector<uint8_t>(rendering.rgba.size()), 0};
-    const double scale_x = double(photograph.width) / std::max(1, place.width);
-    const double scale_y = double(photograph.height) / std::max(1, place.height);
+ByteImage difference(const ByteImage& rendering, const ByteImage& image, const Rectangle& place) {
+    ByteImage result{rendering.width, rendering.height, std::vector<uint8_t>(rendering.rgba.size()), 0};
+    const double scale_x = double(image.width) / std::max(1, place.width);
+    const double scale_y = double(image.height) / std::max(1, place.height);
     for (int y = 0; y < result.height; ++y)
         for (int x = 0; x < result.width; ++x) {
             const size_t at = 4 * (size_t(y) * size_t(result.width) + size_t(x));
@@ -56,20 +56,19 @@ Picture difference(const Picture& rendering, const Picture& photograph, const Re
             const int inner_x = x - place.x, inner_y = y - place.y;
             if (inner_x < 0 || inner_y < 0 || inner_x >= place.width || inner_y >= place.height) continue;
             for (size_t c = 0; c < 3; ++c) {
-                const float photo =
-                    bilinear(photograph, (inner_x + 0.5) * scale_x, (inner_y + 0.5) * scale_y, c);
+                const float photo = bilinear(image, (inner_x + 0.5) * scale_x, (inner_y + 0.5) * scale_y, c);
                 result.rgba[at + c] = uint8_t(std::abs(float(rendering.rgba[at + c]) - photo) + 0.5f);
             }
         }
     return result;
 }
 
-void amplify(Picture& picture, float gain) {
+void amplify(ByteImage& picture, float gain) {
     for (size_t i = 0; i < picture.rgba.size(); ++i)
         if (i % 4 != 3) picture.rgba[i] = uint8_t(std::min(float(picture.rgba[i]) * gain, 255.0f) + 0.5f);
 }
 
-double psnr_of_difference(const Picture& difference, const Rectangle& place) {
+double psnr_of_difference(const ByteImage& difference, const Rectangle& place) {
     double sum = 0;
     size_t count = 0;
     for (int y = std::max(0, place.y); y < std::min(difference.height, place.y + place.height); ++y)

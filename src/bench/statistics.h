@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Several timings of one thing, as a median and how far they lie from it.
+// Repeated timings of one piece of work: median and spread.
 #pragma once
 #include <functional>
 #include <vector>
@@ -16,25 +16,25 @@ struct Spread {
 
 Spread spread_of(std::vector<double> samples);
 
-/// 1.4826 MAD / median: the relative standard deviation, where the timings are normally distributed.
+/// 1.4826 MAD / median: the relative standard deviation of normally distributed timings.
 double relative_noise(const Spread& spread);
 
-/// Both in milliseconds. cpu: processor time of all of the process's threads divided by the number of the
-/// host's threads, which is the wall time that the same work takes when nothing else runs and every thread
-/// has an equal share of it. On a busy machine it repeats to a few per cent where wall time does not.
+/// Milliseconds. cpu: the CPU time of all threads of the process divided by the number of host threads. This
+/// is the wall time of the same work on an idle machine whose threads share it equally. On a busy machine it
+/// varies by a few per cent, while wall time varies much more.
 struct Timed {
     Spread wall, cpu;
 };
 
 unsigned host_threads();
 
-/// Calls work() `runs` times; runs 0: as often as fits in about a second, at least 5 and at most 25 times.
+/// Calls work() `runs` times. runs 0: for about a second, at least 5 and at most 25 times.
 void repeat(int runs, const std::function<void()>& work);
 
-/// Of each call, after one that does not count.
+/// Times each call, after one that does not count.
 Timed time_repeated(int runs, const std::function<void()>& work);
 
-/// Times one thing after the other.
+/// Collects the times between start() and stop().
 class Stopwatch {
   public:
     void start();

@@ -1,34 +1,36 @@
 // SPDX-License-Identifier: Apache-2.0
-// One frame or training step of a scene on the device, again and again.
+// Work that the benchmark repeats on the device: a frame or training step of a scene, and a sort.
 #pragma once
 #include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
 
+#include "bench/result.h"
 #include "bench/scene.h"
 #include "ewa/device.h"
 #include "gpu/executor.h"
 #include "pipeline/backward.h"
 #include "pipeline/capacity.h"
+#include "pipeline/sorting.h"
 
 namespace ewa::bench {
 
 class FrameRun {
   public:
-    /// Uploads the scene and runs once, which settles how much room the instances need and compiles the
-    /// kernels. Without options: before black, of the scene's SH degree.
-    FrameRun(std::shared_ptr<gpu::Device> device, const Scene& scene, bool train,
+    /// Uploads the scene and runs once, which sizes the instance buffers and compiles the kernels. options:
+    /// by default a black background and the SH degree of the scene.
+    FrameRun(std::shared_ptr<gpu::Device> device, const BenchScene& scene, bool train,
              const std::optional<RenderOptions>& options = {});
 
-    /// One more. Records, submits and waits.
+    /// Records, submits and waits for one more run.
     void run();
-    /// The same work, but every command is a submission of its own with each(name, submit) around it.
+    /// The same work with one submission per command, each through each(name, submit).
     void run_apart(const std::function<void(const std::string&, const std::function<void()>&)>& each);
-    /// Runs the projection's gradient and Adam alone, on the slots the last run left.
+    /// Runs only the backward projection and Adam, on the gradient slots of the last run.
     void run_update();
-    /// Adam's learning rates; zero at first, so that every run meets the same parameters and does the same
-    /// work.
+    /// Sets Adam's learning rates. They start at zero, so that all runs do the same work on the same
+    /// parameters.
     void set_rates(const pipeline::Rates& rates) { rates_ = rates; }
 
     const std::vector<gpu::Timing>& timings() const { return executor_.timings(); }
@@ -64,6 +66,29 @@ class FrameRun {
     pipeline::Sorted sorted_;
     shared::Counts counts_{};
     bool train_ = false;
+};
+
+/// The radix sort of random 32-bit keys, each with its index as value.
+class SortRun {
+  public:
+    SortRun(std::shared_ptr<gpu::Device> device, uint32_t items);
+
+    /// Copies the input and sorts the copy.
+    void run();
+    const pipeline::RadixCut& cut() const { return cut_; }
+    const std::vector<gpu::Timing>& timings() const { return executor_.timings(); }
+    /// Compares with a stable sort on the host.
+    Check check() const;
+
+  private:
+    std::shared_ptr<gpu::Device> device_;
+    pipeline::Kernels kernels_;
+    gpu::Executor executor_;
+    pipeline::RadixCut cut_;
+    uint32_t items_;
+    std::vector<uint32_t> input_;
+    gpu::Buffer source_, keys_[2], values_[2], counters_, counter_prefix_, digit_totals_, counts_;
+    uint32_t result_ = 0;
 };
 
 }  // namespace ewa::bench

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "bench/frame_run.h"
+#include "bench/device_runs.h"
 
 #include <algorithm>
 #include <utility>
 
+#include "core/random.h"
 #include "pipeline/camera_block.h"
 #include "pipeline/photo.h"
+#include "reference/sort.h"
 
 namespace ewa::bench {
 namespace {
@@ -20,7 +22,7 @@ RenderOptions black_background(int sh_degree) {
 
 }  // namespace
 
-FrameRun::FrameRun(std::shared_ptr<gpu::Device> device, const Scene& scene, bool train,
+FrameRun::FrameRun(std::shared_ptr<gpu::Device> device, const BenchScene& scene, bool train,
                    const std::optional<RenderOptions>& options)
     : device_(std::move(device)),
       kernels_(*device_),
@@ -75,8 +77,8 @@ void FrameRun::run_apart(const std::function<void(const std::string&, const std:
 }
 
 void FrameRun::run_update() {
-    // The whole frame is recorded and its last pass taken out: what that pass binds is written in one place
-    // alone.
+    // Record the whole frame and take its last pass, so that the bindings of the pass are defined in one
+    // place only.
     gpu::Recording whole(device_->limits());
     record(whole);
     executor_.run(only(whole.commands().back()), true);
@@ -92,6 +94,49 @@ std::vector<uint32_t> FrameRun::tile_starts() const {
 
 std::vector<float> FrameRun::records() const {
     return frame_.records.download<float>(size_t(model_.splats) * shared::RECORD_TEXELS * 4);
+}
+
+SortRun::SortRun(std::shared_ptr<gpu::Device> device, uint32_t items)
+    : device_(std::move(device)), kernels_(*device_), executor_(*device_), items_(items), input_(items) {
+    pipeline::FrameRequest request;
+    request.splats = items;
+    request.width = request.height = 8;
+    const pipeline::Sizes sizes = pipeline::sizes_for(kernels_.shape(), request);
+    cut_ = sizes.depth_sort;
+    for (uint32_t i = 0; i < items; ++i) input_[i] = core::pcg4d({i, 0x736f7274u, 0, 0})[0];
+    source_ = gpu::Buffer(*device_, "input", sizes.splat_words);
+    source_.upload(std::span<const uint32_t>(input_));
+    for (gpu::Buffer* buffer : {&keys_[0], &keys_[1], &values_[0], &values_[1]})
+        *buffer = gpu::Buffer(*device_, "pairs", sizes.splat_words, gpu::Texel::rgba32ui);
+    counters_ = gpu::Buffer(*device_, "counters", sizes.counters);
+    counter_prefix_ = gpu::Buffer(*device_, "counter prefix", sizes.counters);
+    digit_totals_ = gpu::Buffer(*device_, "digit totals", sizes.digit_totals);
+    counts_ = gpu::Buffer(*device_, "counts", sizeof(shared::Counts), gpu::Texel::none, false, true);
+}
+
+void SortRun::run() {
+    gpu::Recording recording(device_->limits());
+    recording.copy(source_, 0, keys_[0], 0, uint64_t(items_) * 4);
+    result_ = record_sort(recording, kernels_,
+                          {{&keys_[0], &keys_[1]},
+                           {&values_[0], &values_[1]},
+                           {},
+                           true,
+                           counters_,
+                           counter_prefix_,
+                           digit_totals_,
+                           counts_},
+                          cut_, items_, items_, true, "sort");
+    executor_.run(recording, true);
+}
+
+Check SortRun::check() const {
+    const auto expected = reference::stable_order<uint32_t>(input_);
+    const auto keys = keys_[result_].download<uint32_t>(items_),
+               values = values_[result_].download<uint32_t>(items_);
+    uint64_t wrong = 0;
+    for (uint32_t i = 0; i < items_; ++i) wrong += values[i] != expected[i] || keys[i] != input_[expected[i]];
+    return {"sort: wrong entries", double(wrong), 0};
 }
 
 }  // namespace ewa::bench

@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/convert_edits.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/gtc/matrix_transform.hpp>
+
+#include "core/text.h"
+#include "ewa/error.h"
+#include "ewa/splat_edit.h"
+
+namespace ewa::cli {
+namespace {
+
+[[noreturn]] void refuse(const std::string& step) {
+    throw InputError(
+        "--transform: '" + step +
+        "' is not move=x,y,z, turn=x,y,z,degrees (about that axis), scale=s, or the 12 or 16 numbers of "
+        "a matrix, row by row");
+}
+
+/// Numbers separated by commas, all finite. Throws InputError that names the option.
+std::vector<double> parse_numbers(const std::string& option, const std::string& text) {
+    std::vector<double> numbers;
+    size_t begin = 0;
+    while (true) {
+        const size_t end = std::min(text.find(',', begin), text.size());
+        const std::optional<double> number =
+            core::parse_number(core::trim(std::string_view(text).substr(begin, end - begin)));
+        if (!number || !std::isfinite(*number))
+            throw InputError(option + ": '" + text + "' is not a list of numbers separated by commas");
+        numbers.push_back(*number);
+        if (end == text.size()) return numbers;
+        begin = end + 1;
+    }
+}
+
+glm::dmat4 parse_matrix(const std::string& step) {
+    const std::vector<double> numbers = parse_numbers("--transform", step);
+    if (numbers.size() != 12 && numbers.size() != 16) refuse(step);
+    glm::dmat4 matrix(1.0);
+    for (size_t i = 0; i < numbers.size(); ++i) matrix[int(i % 4)][int(i / 4)] = numbers[i];
+    return matrix;
+}
+
+/// Quarter turns are exact, because their sine and cosine are set exactly.
+glm::dmat4 turn(const glm::dvec3& axis, double degrees) {
+    const double quarter = std::remainder(degrees, 360.0) / 90;
+    double sine = std::sin(quarter * std::acos(0.0)), cosine = std::cos(quarter * std::acos(0.0));
+    if (quarter == std::round(quarter)) {
+        sine = std::round(sine);
+        cosine = std::round(cosine);
+    }
+    const glm::dvec3 n = glm::normalize(axis);
+    glm::dmat4 matrix(1.0);
+    for (int column = 0; column < 3; ++column)
+        for (int row = 0; row < 3; ++row)
+            matrix[column][row] = (1 - cosine) * n[column] * n[row] + (column == row ? cosine : 0);
+    matrix[0][1] += sine * n.z, matrix[1][0] -= sine * n.z;
+    matrix[2][0] += sine * n.y, matrix[0][2] -= sine * n.y;
+    matrix[1][2] += sine * n.x, matrix[2][1] -= sine * n.x;
+    return matrix;
+}
+
+glm::dmat4 parse_step(const std::string& step) {
+    const size_t equals = step.find('=');
+    if (equals == std::string::npos) return parse_matrix(step);
+    const std::string name = step.substr(0, equals);
+    const std::vector<double> n = parse_numbers("--transform", step.substr(equals + 1));
+    if (name == "move" && n.size() == 3) return glm::translate(glm::dmat4(1.0), glm::dvec3(n[0], n[1], n[2]));
+    if (name == "scale" && n.size() == 1) return glm::scale(glm::dmat4(1.0), glm::dvec3(n[0]));
+    if (name == "turn" && n.size() == 4 && std::hypot(n[0], n[1], n[2]) > 0)
+        return turn({n[0], n[1], n[2]}, n[3]);
+    refuse(step);
+}
+
+template <typename Keep>
+void keep_if(Gaussians& gaussians, const Keep& keep) {
+    std::vector<uint32_t> kept;
+    for (size_t i = 0; i < gaussians.size(); ++i)
+        if (keep(i)) kept.push_back(static_cast<uint32_t>(i));
+    if (kept.size() < gaussians.size()) select_splats(gaussians, kept);
+}
+
+size_t drawable_count(const Gaussians& gaussians) {
+    size_t count = 0;
+    for (size_t i = 0; i < gaussians.size(); ++i) count += drawable(gaussians, i);
+    return count;
+}
+
+/// Refuses a transform after which fewer splats can be drawn.
+void transform(Gaussians& gaussians, const glm::dmat4& matrix) {
+    if (matrix == glm::dmat4(1.0)) return;
+    const size_t before = drawable_count(gaussians);
+    transform_splats(gaussians, matrix);
+    const size_t after = drawable_count(gaussians);
+    if (after < before)
+        throw InputError(fmt::format(
+            "--transform: {} of {} splats could not be drawn afterwards: a value would exceed the range of "
+            "float32 (3.4e38); use a smaller step, or remove them first with convert --crop",
+            before - after, before));
+}
+
+void crop(Gaussians& gaussians, const std::array<double, 6>& n) {
+    keep_if(gaussians, [&](size_t i) {
+        bool inside = true;
+        for (size_t axis = 0; axis < 3; ++axis) {
+            const double v = gaussians.world_mean(i)[int(axis)];
+            inside = inside && v >= n[axis] && v <= n[3 + axis];
+        }
+        return inside;
+    });
+}
+
+}  // namespace
+
+glm::dmat4 parse_transform(const std::vector<std::string>& steps) {
+    glm::dmat4 matrix(1.0);
+    for (const std::string& step : steps) matrix = parse_step(step) * matrix;
+    return matrix;
+}
+
+std::optional<std::array<double, 6>> parse_crop(const std::string& text) {
+    if (text.empty()) return std::nullopt;
+    const std::vector<double> n = parse_numbers("--crop", text);
+    if (n.size() != 6 || n[0] > n[3] || n[1] > n[4] || n[2] > n[5])
+        throw InputError("--crop: '" + text + "' is not x,y,z,X,Y,Z with the lower corner first");
+    return std::array{n[0], n[1], n[2], n[3], n[4], n[5]};
+}
+
+std::optional<std::string> apply_edits(Gaussians& gaussians, const Edits& edits, SplatFormat format) {
+    transform(gaussians, edits.transform);
+    if (edits.crop) crop(gaussians, *edits.crop);
+    if (edits.min_opacity > 0)
+        keep_if(gaussians, [&](size_t i) {
+            return 1 / (1 + std::exp(-static_cast<double>(gaussians.opacity_logits[i]))) >= edits.min_opacity;
+        });
+    if (gaussians.sh_degree > edits.max_sh) set_sh_degree(gaussians, edits.max_sh);
+    std::optional<std::string> remark;
+    if (format != SplatFormat::ply) {
+        const size_t before = gaussians.size();
+        keep_if(gaussians, [&](size_t i) { return drawable(gaussians, i); });
+        if (gaussians.size() < before)
+            remark = fmt::format("{} splats with a value that is not finite or a zero quaternion are skipped",
+                                 before - gaussians.size());
+    }
+    if (edits.morton || format == SplatFormat::compressed_ply)
+        select_splats(gaussians, morton_order(gaussians));
+    return remark;
+}
+
+}  // namespace ewa::cli
