@@ -17,7 +17,7 @@ std::string help_text(std::string_view text, size_t column) {
             // The blank takes the place of one of those before the description.
             const size_t gap = line.find("  ", comma);
             if (gap != std::string::npos) line.erase(gap, 1);
-            line.insert(comma + 1, " ");
+            line.insert(comma + 1, 1, ' ');
         }
         const bool described = line.size() > column && line[column - 1] == ' ' && line[0] == ' ';
         const size_t begin = std::min(line.find_first_not_of(' '), line.size());
