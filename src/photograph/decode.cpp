@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "image/decode.h"
+#include "image/image_files.h"
 #include "ewa/error.h"
 #include "photograph/photographer.h"
 

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "ewa/photograph.h"
-#include "image/encode.h"
+#include "image/image_files.h"
 #include "io/gltf_mesh.h"
 #include "mesh/dome.h"
 #include "photograph/photographer.h"
