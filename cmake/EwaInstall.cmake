@@ -17,7 +17,7 @@ set_target_properties(ewa_library PROPERTIES OUTPUT_NAME ewa EXPORT_NAME ewa LIN
     LINK_DEPENDS ${PROJECT_SOURCE_DIR}/cmake/libewa.map)
 target_link_options(ewa_library PRIVATE -Wl,--version-script=${PROJECT_SOURCE_DIR}/cmake/libewa.map -Wl,--as-needed
                                         -Wl,--no-undefined)
-target_link_libraries(ewa_library PRIVATE Vulkan::Vulkan PNG::PNG spdlog::spdlog ZLIB::ZLIB zstd::libzstd_shared
+target_link_libraries(ewa_library PRIVATE Vulkan::Vulkan PNG::PNG JPEG::JPEG spdlog::spdlog ZLIB::ZLIB zstd::libzstd_shared
                                           ${CMAKE_DL_LIBS})
 target_compile_features(ewa_library INTERFACE cxx_std_20)
 target_include_directories(ewa_library INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
@@ -55,9 +55,11 @@ foreach(program ewa-view ewa-bench)
         list(APPEND ewa_programs ${program})
     endif()
 endforeach()
-add_dependencies(ewa_library ewa_openimageio)
-# Beside libewa, and where EWA_MODULES_FROM_PROGRAMS says for the programs.
-install(TARGETS ewa_openimageio LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/ewa)
+if(TARGET ewa_openimageio)
+    add_dependencies(ewa_library ewa_openimageio)
+    # Beside libewa, and where EWA_MODULES_FROM_PROGRAMS says for the programs.
+    install(TARGETS ewa_openimageio LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/ewa)
+endif()
 install(TARGETS ${ewa_programs} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(TARGETS ewa_library EXPORT ewaTargets LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(DIRECTORY include/ewa DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures in memory, on disk, and their distance from each other. What reads, writes or compares them throws
-// RunError where the module that brings OpenImageIO (libewa_openimageio.so) is missing or does not fit.
+// Pictures in memory, on disk, and their distance from each other. Every format but PNG and JPEG needs the
+// module with OpenImageIO (libewa_openimageio.so). Where that is missing or does not fit, reading or writing
+// such a file throws RunError.
 #pragma once
 #include <array>
 #include <cstddef>
@@ -23,7 +24,7 @@ struct Image {
     const float* at(int x, int y) const { return &pixels[(size_t(y) * width + x) * channels]; }
 };
 
-/// What the file's header says. Throws InputError.
+/// What the file's header says. The pixels are not decoded, so damage to them may pass. Throws InputError.
 struct ImageSize {
     int width = 0, height = 0;  // as the pixels are stored
     int orientation = 1;        // EXIF's: how to turn them upright, see oriented
@@ -36,9 +37,9 @@ Image oriented(const Image& image, int orientation);
 
 /// PNG, JPEG, TIFF, EXR, WebP, BMP, binary PPM and PGM, and Radiance HDR, known by their first bytes, as 3
 /// (RGB) or 4 (RGBA, colour not multiplied by alpha) channels; grey becomes RGB. 16-bit integers become value
-/// / 65535, floating-point files stay as they are. EXIF's orientation is left alone: the pixels come as they
-/// are stored. At most 200 million pixels, 65,535 in a direction. Throws InputError, also for a file that is
-/// not whole.
+/// / 65535, floating-point files stay as they are. CMYK becomes RGB: each colour times K. EXIF's orientation is
+/// left alone: the pixels come as they are stored. At most 200 million pixels, 65,535 in a direction. Throws
+/// InputError, also for a truncated file.
 Image load_image(const std::filesystem::path& path);
 
 /// .png: 8 bit, rounded, clamped to [0, 1], NaN as 0. .exr: float32, not clamped. Colour is not multiplied by
@@ -81,7 +82,7 @@ struct ImageDifference {
     uint64_t over = 0;  // pixels with a value further apart than the tolerance
 };
 
-/// OpenImageIO's comparison, and PSNR and SSIM. A picture without alpha is opaque beside one that has it.
+/// Compares all values, and gives PSNR and SSIM. A picture without alpha is opaque beside one that has it.
 /// tolerance >= 0. Throws InputError when sizes differ.
 ImageDifference compare_images(const Image& a, const Image& b, double tolerance = 0);
 

@@ -7,12 +7,10 @@
 #include <map>
 #include <set>
 
-#include "core/file_reader.h"
 #include "ewa/error.h"
 #include "ewa/renderer.h"
 #include "ewa/splat_files.h"
-#include "image/format.h"
-#include "image/pictures_below.h"
+#include "image/image_files.h"
 #include "report/pictures.h"
 
 namespace ewa::cli {
@@ -29,19 +27,18 @@ class ImageSide : public ComparedSide {
         if (names_.one_image)
             read_image_size(path);  // throws if there is no such image
         else
-            names_.asked = image::pictures_below(path);
+            names_.asked = image::images_below(path);
     }
     const SideNames& names() const override { return names_; }
     std::string place(const fs::path& name) const override { return file(name).string(); }
     ComparedImage picture(const fs::path& name) override {
         ComparedImage picture{load_image(file(name))};
-        core::FileReader reader(file(name));
-        const image::Format format = image::format_of(reader);
+        const std::string_view format = image::format_name(file(name));
         if (read_image_size(file(name)).eight_bit)
             picture.levels = 255;
-        else if (format == image::Format::png)
+        else if (format == "png")
             picture.levels = 65535;
-        picture.transparent = picture.image.channels == 4 && format != image::Format::exr;
+        picture.transparent = picture.image.channels == 4 && format != "openexr";
         return picture;
     }
     uint32_t skipped_splats() const override { return 0; }

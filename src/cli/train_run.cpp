@@ -21,7 +21,6 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
-#include "image/openimageio.h"
 #include "pipeline/model.h"
 #include "train/checkpoint.h"
 #include "train/initialise.h"
@@ -174,7 +173,6 @@ void TrainRun::load() {
         earlier_ = train::read_checkpoint(checkpoint_);
         check_resumable(checkpoint_, earlier_->settings, settings_);
     }
-    image::openimageio();  // the pictures at the end need it, even where the photographs do not
     // The first file written tells before the training whether the folder takes any.
     const report::Json config = to_config(arguments_);
     write_json(folder_ / "config.json", config);

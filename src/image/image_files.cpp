@@ -1,73 +1,98 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures on disk, through OpenImageIO and libpng.
+#include "image/image_files.h"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <memory>
 #include <new>
 #include <stdexcept>
 
 #include "core/atomic_file.h"
 #include "core/text.h"
 #include "ewa/error.h"
-#include "ewa/image.h"
-#include "image/encode.h"
-#include "image/format.h"
+#include "image/codecs.h"
 #include "image/openimageio.h"
-#include "image/png_file.h"
 
 namespace ewa {
 
 namespace {
 
-[[noreturn]] void fail(const std::filesystem::path& path, const std::string& reason) {
-    throw InputError(core::one_line(path.string() + ": not a readable image: " + reason));
-}
+namespace fs = std::filesystem;
 
-/// The format, once the file's structure has been looked at.
-image::Format checked_format(const std::filesystem::path& path, bool whole) {
-    std::error_code error;
-    const std::filesystem::file_status status = std::filesystem::status(path, error);
-    if (!std::filesystem::exists(status)) fail(path, "there is no such file");
-    if (!std::filesystem::is_regular_file(status)) fail(path, "it is not a regular file");
-    core::FileReader reader(path);
-    const image::Format format = image::format_of(reader);
-    image::look_at(reader, format, whole);
-    return format;
-}
+struct CloseFile {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+};
+using File = std::unique_ptr<std::FILE, CloseFile>;
 
-/// Through OpenImageIO, for every format but PNG.
-image::StoredPicture read_by_openimageio(const std::filesystem::path& path, image::Format format,
-                                         bool pixels) {
-    image::OpenImageIO& reader = image::openimageio();
+/// Calls `read`. Throws InputError "name: not a readable image: reason" for any reason that it throws.
+template <class Read>
+auto with_name(const std::string& name, const Read& read) {
+    const auto fail = [&](const std::string& reason) {
+        throw InputError(core::one_line(name + ": not a readable image: " + reason));
+    };
     try {
-        return reader.read(path.string(), format, pixels);
+        return read();
+    } catch (const InputError&) {
+        throw;  // of core::FileReader, which has the name
+    } catch (const RunError& error) {
+        throw RunError(core::one_line(name + ": " + error.what()));
     } catch (const std::runtime_error& error) {
-        fail(path, error.what());
+        fail(error.what());
+    } catch (const std::bad_alloc&) {
+        fail("it is too large for this machine's memory");
+    } catch (const std::length_error&) {
+        fail("its header claims more than memory can hold");
     }
+    throw std::logic_error("with_name");
 }
 
-image::StoredPicture read_file(const std::filesystem::path& path, bool pixels) try {
-    const image::Format format = checked_format(path, pixels);
-    image::StoredPicture out;
-    if (format == image::Format::png) {
-        image::PngPicture png = image::read_png(path, pixels);
-        out = {png.size, png.channels, std::move(png.values)};
-    } else {
-        out = read_by_openimageio(path, format, pixels);
+File open_file(const fs::path& path) {
+    std::error_code error;
+    // Before it is opened: opening a named pipe would wait for a writer.
+    const fs::file_status status = fs::status(path, error);
+    if (!fs::exists(status)) throw std::runtime_error("there is no such file");
+    if (!fs::is_regular_file(status)) throw std::runtime_error("it is not a regular file");
+    File file(std::fopen(path.c_str(), "rbe"));
+    if (!file) throw std::runtime_error(std::strerror(errno));
+    return file;
+}
+
+const image::Format& format_of(std::FILE* file) {
+    std::array<char, 16> bytes;
+    const size_t size = std::fread(bytes.data(), 1, bytes.size(), file);
+    std::rewind(file);
+    const image::Format* format = image::format_of({bytes.data(), size});
+    if (!format)
+        throw std::runtime_error(
+            "its first bytes are none of a PNG, JPEG, TIFF, EXR, WebP, BMP, binary PPM or PGM, or Radiance "
+            "HDR "
+            "file; convert it to one of these");
+    return *format;
+}
+
+/// PNG or JPEG.
+image::StoredImage read_stream(std::FILE* file, uint64_t bytes, const image::Format& format, bool pixels) {
+    const auto read = format.name == "png" ? image::read_png : image::read_jpeg;
+    return read(file, bytes, pixels);
+}
+
+image::StoredImage read_file(const fs::path& path, bool pixels) {
+    const File file = open_file(path);
+    const image::Format& format = format_of(file.get());
+    const uint64_t bytes = fs::file_size(path);
+    if (!format.by_openimageio()) return read_stream(file.get(), bytes, format, pixels);
+    if (format.probe) {
+        core::FileReader reader(path);
+        format.probe(reader);
     }
-    if (out.size.orientation < 1 || out.size.orientation > 8) out.size.orientation = 1;
-    return out;
-} catch (const std::bad_alloc&) {
-    fail(path, "it is too large for this machine's memory");
-} catch (const std::length_error&) {
-    fail(path, "its header claims more than memory can hold");
+    return image::openimageio().read(path.string(), std::string(format.name), pixels,
+                                     [&](const image::ImageHeader& header) { check_limits(header, bytes); });
 }
 
-}  // namespace
-
-ImageSize read_image_size(const std::filesystem::path& path) {
-    return read_file(path, false).size;
-}
-
-Image load_image(const std::filesystem::path& path) try {
-    image::StoredPicture stored = read_file(path, true);
+/// Grey becomes RGB.
+Image with_colour(image::StoredImage stored) {
     const bool alpha = stored.channels % 2 == 0;
     Image image;
     image.width = stored.size.width;
@@ -85,27 +110,83 @@ Image load_image(const std::filesystem::path& path) try {
         if (alpha) pixel[3] = stored.values[i * size_t(stored.channels) + 1];
     }
     return image;
-} catch (const std::bad_alloc&) {
-    fail(path, "it is too large for this machine's memory");
 }
 
-void save_image(const std::filesystem::path& path, const Image& image) {
+}  // namespace
+
+ImageSize read_image_size(const fs::path& path) {
+    ImageSize size = with_name(path.string(), [&] { return read_file(path, false).size; });
+    if (size.orientation < 1 || size.orientation > 8) size.orientation = 1;
+    return size;
+}
+
+Image load_image(const fs::path& path) {
+    return with_name(path.string(), [&] { return with_colour(read_file(path, true)); });
+}
+
+void save_image(const fs::path& path, const Image& image) {
     const std::string extension = core::lower(path.extension().string());
     if (extension != ".png" && extension != ".exr")
         throw InputError(core::one_line(path.string() + ": pictures are written as .png or .exr"));
     if (image.width < 1 || image.height < 1 || image.channels < 1)
         throw InputError(core::one_line(path.string() + ": a picture without pixels cannot be written"));
-    // Encoded in memory and written by AtomicFile, which sees a full disk where the codecs' own writers may
-    // not.
+    // AtomicFile notices a full disk. The codecs' own writers may not.
     std::vector<unsigned char> bytes;
     try {
-        bytes = extension == ".exr" ? image::encode_exr(image) : image::encode_png(image);
-    } catch (const RunError& error) {
+        bytes = extension == ".exr" ? image::openimageio().encode_exr(image) : image::encode_png(image);
+    } catch (const std::runtime_error& error) {
         throw RunError(core::one_line(path.string() + ": " + error.what()));
     }
     core::AtomicFile file(path);
     file.write(bytes.data(), bytes.size());
     file.commit();
 }
+
+namespace image {
+
+Image decode(std::span<const unsigned char> bytes, const std::string& what, int largest) {
+    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    const Format* format = image::format_of(text);
+    if (!format || format->by_openimageio())
+        throw InputError(core::one_line(what + ": is neither PNG nor JPEG"));
+    return with_name(what, [&] {
+        // fmemopen takes a pointer to non-const, and does not write through it in mode r.
+        const File file(fmemopen(const_cast<unsigned char*>(bytes.data()), bytes.size(), "r"));
+        if (!file) throw std::bad_alloc();
+        const ImageSize size = read_stream(file.get(), bytes.size(), *format, false).size;
+        if (size.width > largest || size.height > largest)
+            throw std::runtime_error("it has " + std::to_string(size.width) + " x " +
+                                     std::to_string(size.height) + " pixels, more than " +
+                                     std::to_string(largest) + " in a direction");
+        std::rewind(file.get());
+        return with_colour(read_stream(file.get(), bytes.size(), *format, true));
+    });
+}
+
+std::string_view format_name(const fs::path& path) {
+    return with_name(path.string(), [&] { return ewa::format_of(open_file(path).get()).name; });
+}
+
+std::vector<fs::path> images_below(const fs::path& folder) try {
+    // Of the formats that are read, and of those that others take for images: these are errors, not
+    // overlooked.
+    static constexpr std::string_view kExtensions[] = {
+        ".bmp", ".dib",  ".env",  ".exr",  ".hdr",  ".jfi", ".jfif", ".jif",  ".jpe", ".jpeg",
+        ".jpg", ".mxr",  ".pfm",  ".pgm",  ".png",  ".pnm", ".ppm",  ".rgbe", ".sm",  ".sxr",
+        ".tif", ".tiff", ".tx",   ".vsm",  ".webp", ".dds", ".dpx",  ".gif",  ".ico", ".jp2",
+        ".j2k", ".heic", ".heif", ".avif", ".pbm",  ".psd", ".tga"};
+    std::vector<fs::path> found;
+    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder))
+        if (const std::string extension = core::lower(entry.path().extension().string());
+            entry.is_regular_file() && std::ranges::find(kExtensions, extension) != std::end(kExtensions))
+            found.push_back(fs::relative(entry.path(), folder));
+    std::ranges::sort(found);
+    return found;
+} catch (const fs::filesystem_error& error) {
+    throw InputError(
+        core::one_line(folder.string() + ": the folder cannot be read: " + error.code().message()));
+}
+
+}  // namespace image
 
 }  // namespace ewa

@@ -1,60 +1,36 @@
 // SPDX-License-Identifier: Apache-2.0
-// OpenImageIO, behind a module that is loaded when the first picture needs it. Distributions build
-// OpenImageIO with some two hundred libraries behind it, whose start takes longer than most commands do.
+// OpenImageIO, for every format but PNG and JPEG. It stands behind a module that is loaded with the first
+// such image: it brings some two hundred libraries, whose start takes longer than most commands, and a
+// machine without it still has PNG and JPEG.
 #pragma once
 #include <cstdint>
-#include <map>
+#include <functional>
 #include <string>
 #include <vector>
 
-#include "ewa/image.h"
-#include "image/format.h"
+#include "image/codecs.h"
 
 namespace ewa::image {
 
-/// Pixels as a file has them: grey, grey and alpha, RGB, or RGBA.
-struct StoredPicture {
-    ImageSize size;
-    int channels = 0;
-    std::vector<float> values;  // of 8 bits / 255, of 16 bits / 65535
+/// What the module exports under the name kModuleEntry. The functions may run on several threads at once.
+/// They throw std::runtime_error with OpenImageIO's reason, without the file's name, and std::bad_alloc.
+struct OpenImageIO {
+    const char* version;  // EWA_VERSION; the loader reads it before it calls a function
+
+    /// Makes OpenImageIO refuse larger images. False where it has no such limits.
+    bool (*limit)(uint64_t decoded_bytes, uint64_t channels);
+    /// Reads a file whose probe has passed, by OpenImageIO's reader of this name. Calls `check` before it
+    /// takes memory for the pixels.
+    StoredImage (*read)(const std::string& path, const std::string& reader, bool pixels,
+                        const std::function<void(const ImageHeader&)>& check);
+    /// The bytes of an EXR file of 32-bit floats.
+    std::vector<unsigned char> (*encode_exr)(const Image& image);
 };
+constexpr const char* kModuleFile = "libewa_openimageio.so";
+constexpr const char* kModuleEntry = "ewa_openimageio_module";
 
-/// What ewa asks of OpenImageIO. Functions may be called from several threads at once. Errors are
-/// std::runtime_error with OpenImageIO's reason, without the file's name, and std::bad_alloc.
-class OpenImageIO {
-  public:
-    virtual ~OpenImageIO() = default;
-
-    /// What larger pictures are refused by; false where OpenImageIO knows no such limits.
-    virtual bool limit(uint64_t decoded_bytes, uint64_t channels) = 0;
-
-    /// Of a file that has been looked at (format.h) and is not PNG (png_file.h). pixels: the values too.
-    virtual StoredPicture read(const std::string& path, Format format, bool pixels) = 0;
-
-    /// The bytes of a file; width * height * channels values.
-    virtual std::vector<unsigned char> encode_png(int width, int height, int channels,
-                                                  const uint8_t* values) = 0;
-    virtual std::vector<unsigned char> encode_exr(int width, int height, int channels,
-                                                  const float* values) = 0;
-
-    /// max_error, its place, mean_error and over; a and b have one size and the same channels.
-    virtual ImageDifference compare(const Image& a, const Image& b, double tolerance) = 0;
-
-    /// Extensions without the dot, by the name of the format.
-    virtual std::map<std::string, std::vector<std::string>> extensions() = 0;
-};
-
-/// What the module holds under the name kOpenImageIOEntry. A module of another version is told before
-/// anything of it is called.
-struct OpenImageIOModule {
-    const char* version;  // EWA_VERSION
-    OpenImageIO* (*instance)();
-};
-constexpr const char* kOpenImageIOFile = "libewa_openimageio.so";
-constexpr const char* kOpenImageIOEntry = "ewa_openimageio_module";
-
-/// Loads the module at the first call, from beside the program, or libewa, that asks; with ewa's limits
-/// (limits.h). Throws RunError where there is no module, or none that fits.
-OpenImageIO& openimageio();
+/// Loads the module at the first call, from its folder beside the program or libewa, and sets ewa's limits.
+/// Throws RunError where there is no module, or it does not fit.
+const OpenImageIO& openimageio();
 
 }  // namespace ewa::image

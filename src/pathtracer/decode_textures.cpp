@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "image/image_files.h"
 #include "ewa/error.h"
-#include "image/decode.h"
+#include "image/image_files.h"
 #include "pathtracer/path_tracer.h"
 
 namespace ewa::pathtracer {

@@ -8,7 +8,7 @@
 #include <set>
 #include <stdexcept>
 
-#include "image/encode.h"
+#include "image/image_files.h"
 
 namespace ewa::report {
 namespace {

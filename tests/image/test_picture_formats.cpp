@@ -180,10 +180,14 @@ std::string exr(int32_t right, int32_t bottom, uint32_t tile = 0, uint32_t flags
            std::string(64, '\0');
 }
 
+/// A grey progressive JPEG whose scans all have the blocks' means, of which each takes one bit: 0.
 std::string jpeg(uint32_t width, uint32_t height, int scans) {
-    std::string bytes = "\xff\xd8\xff\xc2" + big(11, 2) + "\x08" + big(height, 2) + big(width, 2) +
-                        text_of("\x01\x01\x11\0", 4);
-    for (int i = 0; i < scans; ++i) bytes += "\xff\xda" + big(8, 2) + text_of("\x01\x01\0\0\0\0", 6);
+    const std::string quantisation = "\xff\xdb" + big(67, 2) + text_of("\0", 1) + std::string(64, '\1');
+    const std::string codes = "\xff\xc4" + big(20, 2) + text_of("\0\1", 2) + std::string(16, '\0');
+    std::string bytes = "\xff\xd8" + quantisation + codes + "\xff\xc2" + big(11, 2) + "\x08" +
+                        big(height, 2) + big(width, 2) + text_of("\x01\x01\x11\0", 4);
+    for (int i = 0; i < scans; ++i)
+        bytes += "\xff\xda" + big(8, 2) + text_of("\x01\x01\0\0\0\0", 6) + std::string(8, '\0');
     return bytes + "\xff\xd9";
 }
 
@@ -229,7 +233,9 @@ TEST(PictureFiles, HugeClaimsAreRefused) {
         {"c.ppm", "P6 # a note\n 5 # another\n5\n100\n" + std::string(75, 'x'), "not 255"},
         {"d.ppm", "P6 99999999999999999999 1 255\n", "damaged"},
         {"a.hdr", hdr + "60000 +X 60000\n", "more than 200 million"},
-        {"b.hdr", hdr + "2 +X -1\n", "-Y height +X width"},
+        {"b.hdr", hdr + "2 +X -1\n", "not a two-dimensional picture"},
+        {"c.hdr", hdr + "99999999999 +X 3\n", "in a direction"},
+        {"d.hdr", hdr + "14000 +X 14000\n", "too many for its"},
     };
     for (const auto& one : cases) {
         const auto path = folder.write(one.name, one.bytes);
@@ -240,6 +246,9 @@ TEST(PictureFiles, HugeClaimsAreRefused) {
 
 TEST(PictureFiles, WhatIsNotReadSaysWhy) {
     TempFolder folder;
+    EXPECT_EQ(load_image(folder.write("scans.jpg", jpeg(64, 64, 100))).at(63, 63)[0], 128 / 255.0f);
+    const std::string upside_down =
+        "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n+Y 2 +X 2\n" + std::string(16, '\x40');
     const struct {
         const char* name;
         std::string bytes, says;
@@ -251,6 +260,7 @@ TEST(PictureFiles, WhatIsNotReadSaysWhy) {
         {"deep.exr", exr(3, 3, 0, 0x800), "deep"},
         {"parts.exr", exr(3, 3, 0, 0x1000), "several parts"},
         {"chroma.exr", exr(3, 3, 0, 0, 2), "fewer pixels"},
+        {"rows.hdr", upside_down, "-Y height +X width"},
     };
     for (const auto& one : cases) {
         const auto path = folder.write(one.name, one.bytes);

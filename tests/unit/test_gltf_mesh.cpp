@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "ewa/synthetic_dataset.h"
-#include "image/encode.h"
+#include "image/image_files.h"
 #include "io/gltf/gltf_mesh.h"
 #include "pathtracer/dome.h"
 #include "pathtracer/path_tracer.h"

@@ -49,6 +49,8 @@ const std::map<std::string, std::string> kOwners = {
 const std::vector<std::pair<std::string, Rooms>> kLibraries = {
     {"OpenImageIO/", {"src/openimageio"}},
     {"png.h", {"src/image"}},
+    {"jpeglib.h", {"src/image"}},
+    {"jerror.h", {"src/image"}},
     {"vulkan/", {"src/gpu", "src/passes", "src/pipeline", "src/viewer"}},
     {"GLFW/", {"src/viewer"}},
     {"imgui", {"src/viewer"}},
@@ -56,7 +58,7 @@ const std::vector<std::pair<std::string, Rooms>> kLibraries = {
     {"nanoflann", {"src/scene"}},
     {"tiny_gltf", {"src/io/gltf"}},
     {"zstd", {"src/io/splats"}},
-    {"zlib", {"src/io/splats", "src/image", "src/train"}},
+    {"zlib", {"src/io/splats", "src/train"}},
     {"nlohmann/",
      {"src/core", "src/io/splats", "src/io/datasets", "src/io/gltf", "src/pathtracer", "src/train",
       "src/report", "src/live", "src/bench", "src/cli", "src/viewer"}},

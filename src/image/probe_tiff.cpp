@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// TIFF 6.0 and BigTIFF: the first directory's entries, and where its strips or tiles lie. What is not packed
-// is as long as its rows; a codec that finds too little in a packed strip says so itself.
+// TIFF 6.0 and BigTIFF: the entries of the first directory, and where its strips or tiles are. OpenImageIO
+// takes a tile beyond the end of a file for one that is there. A codec reports too few bytes in a compressed
+// strip itself.
 #include <algorithm>
 #include <array>
 #include <map>
 #include <string>
 #include <vector>
 
-#include "image/format.h"
-#include "image/integers.h"
+#include "image/codecs.h"
 
 namespace ewa::image {
 
@@ -30,24 +30,13 @@ enum Tag : uint64_t {
     kTileBytes = 325
 };
 
-constexpr uint64_t kNotPacked = 1;
+constexpr uint64_t kNotCompressed = 1;
 /// None, LZW, JPEG, deflate (both numbers), PackBits. The others are of fax machines and archives.
-constexpr std::array<uint64_t, 6> kCompressions = {kNotPacked, 5, 7, 8, 32946, 32773};
+constexpr std::array<uint64_t, 6> kCompressions = {kNotCompressed, 5, 7, 8, 32946, 32773};
 
 /// Bytes of an unsigned integer of a TIFF type; 0 for the other types.
 int width_of(uint64_t type) {
-    switch (type) {
-        case 1:
-            return 1;
-        case 3:
-            return 2;
-        case 4:
-            return 4;
-        case 16:
-            return 8;
-        default:
-            return 0;
-    }
+    return type == 1 ? 1 : type == 3 ? 2 : type == 4 ? 4 : type == 16 ? 8 : 0;
 }
 
 class Directory {
@@ -114,32 +103,32 @@ struct Parts {
     bool tiles = false;
 };
 
-Parts parts_of(const core::FileReader& reader, Directory& directory, const Claim& claim) {
+Parts parts_of(const core::FileReader& reader, Directory& directory, const ImageHeader& image) {
     Parts parts{directory.value(kTileWidth, 0), directory.value(kTileHeight, 0), true};
     if (parts.width == 0 && parts.height == 0)
-        return {claim.width, std::min(directory.value(kRowsPerStrip, claim.height), claim.height), false};
+        return {image.width, std::min(directory.value(kRowsPerStrip, image.height), image.height), false};
     if (parts.width > kMaxSide || parts.height > kMaxSide || parts.width * parts.height > kMaxTilePixels)
         reader.fail("the TIFF claims tiles of " + std::to_string(parts.width) + " x " +
                     std::to_string(parts.height) + " pixels");
     return parts;
 }
 
-/// Every strip or tile lies in the file and, where it is not packed, holds its rows.
-void check_parts(const core::FileReader& reader, Directory& directory, const Claim& claim, uint64_t bits,
-                 bool packed, uint64_t planes) {
-    const Parts parts = parts_of(reader, directory, claim);
+/// Every strip or tile is in the file and, where it is not compressed, holds its rows.
+void check_parts(const core::FileReader& reader, Directory& directory, const ImageHeader& image,
+                 uint64_t bits, bool compressed, uint64_t planes) {
+    const Parts parts = parts_of(reader, directory, image);
     if (parts.width < 1 || parts.height < 1) reader.fail("the TIFF has strips or tiles of no pixels");
     const auto offsets = directory.values(parts.tiles ? kTileOffsets : kStripOffsets);
     const auto bytes = directory.values(parts.tiles ? kTileBytes : kStripBytes);
-    const uint64_t across = (claim.width + parts.width - 1) / parts.width,
-                   down = (claim.height + parts.height - 1) / parts.height;
+    const uint64_t across = (image.width + parts.width - 1) / parts.width,
+                   down = (image.height + parts.height - 1) / parts.height;
     if (offsets.size() < across * down * planes || bytes.size() < across * down * planes)
         reader.fail("the TIFF does not say where all its strips or tiles are");
-    const uint64_t row_bits = parts.width * bits * (planes > 1 ? 1 : claim.channels);
+    const uint64_t row_bits = parts.width * bits * (planes > 1 ? 1 : image.channels);
     for (uint64_t i = 0; i < across * down * planes; ++i) {
         const uint64_t begin = i % (across * down) / across * parts.height;
-        const uint64_t rows = parts.tiles ? parts.height : std::min(parts.height, claim.height - begin);
-        const uint64_t least = packed ? 1 : (row_bits + 7) / 8 * rows;
+        const uint64_t rows = parts.tiles ? parts.height : std::min(parts.height, image.height - begin);
+        const uint64_t least = compressed ? 1 : (row_bits + 7) / 8 * rows;
         if (offsets[i] > reader.size() || bytes[i] > reader.size() - offsets[i])
             reader.fail("the TIFF is truncated: its strip or tile " + std::to_string(i) + " of " +
                         std::to_string(bytes[i]) + " bytes at byte " + std::to_string(offsets[i]) +
@@ -152,19 +141,19 @@ void check_parts(const core::FileReader& reader, Directory& directory, const Cla
 
 }  // namespace
 
-Claim look_at_tiff(core::FileReader& reader) {
+void probe_tiff(core::FileReader& reader) {
     Directory directory(reader);
-    const uint64_t bits = directory.value(kBits, 1), compression = directory.value(kCompression, kNotPacked);
+    const uint64_t bits = directory.value(kBits, 1),
+                   compression = directory.value(kCompression, kNotCompressed);
     if (bits < 1 || bits > 64) reader.fail("the TIFF has values of " + std::to_string(bits) + " bits");
-    const Claim claim{directory.value(kWidth, 0), directory.value(kHeight, 0), directory.value(kSamples, 1),
-                      (bits + 7) / 8};
-    check_claim(reader, claim);
+    const ImageHeader image{directory.value(kWidth, 0), directory.value(kHeight, 0),
+                            directory.value(kSamples, 1), (bits + 7) / 8};
+    check_limits(image, reader.size());
     if (std::find(kCompressions.begin(), kCompressions.end(), compression) == kCompressions.end())
         reader.fail("the TIFF is compressed by method " + std::to_string(compression) +
                     "; save it with none, LZW, deflate, PackBits or JPEG");
     const bool planar = directory.value(kPlanar, 1) == 2;
-    check_parts(reader, directory, claim, bits, compression != kNotPacked, planar ? claim.channels : 1);
-    return claim;
+    check_parts(reader, directory, image, bits, compression != kNotCompressed, planar ? image.channels : 1);
 }
 
 }  // namespace ewa::image

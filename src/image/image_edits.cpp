@@ -2,13 +2,14 @@
 #include <algorithm>
 #include <cassert>
 
+#include "ewa/exposure.h"
 #include "ewa/image.h"
 
 namespace ewa {
 
 namespace {
 
-/// The old pixels under one new pixel along an axis: the first, and the share of each that is covered.
+/// The old pixels under one new pixel along an axis: the first one, and the covered share of each.
 struct Cover {
     int first = 0;
     std::vector<double> weights;
@@ -78,6 +79,35 @@ Image with_alpha(const Image& color, const Image& alpha) {
             result.at(x, y)[3] = *alpha.at(x, y);
         }
     return result;
+}
+
+Image oriented(const Image& image, int orientation) {
+    assert(orientation >= 1 && orientation <= 8);
+    if (orientation == 1) return image;
+    // EXIF 2.32, tag 274: where the first row and column of the stored picture are in the upright one.
+    const bool swapped = orientation >= 5;
+    const bool from_right = orientation == 2 || orientation == 3 || orientation == 7 || orientation == 8;
+    const bool from_bottom = orientation == 3 || orientation == 4 || orientation == 6 || orientation == 7;
+    Image result(swapped ? image.height : image.width, swapped ? image.width : image.height, image.channels);
+    for (int y = 0; y < result.height; ++y)
+        for (int x = 0; x < result.width; ++x) {
+            const int column = swapped ? y : x, row = swapped ? x : y;
+            const float* from = image.at(from_right ? image.width - 1 - column : column,
+                                         from_bottom ? image.height - 1 - row : row);
+            for (int c = 0; c < image.channels; ++c) result.at(x, y)[c] = from[c];
+        }
+    return result;
+}
+
+Image exposed(Image picture, const Exposure& exposure) {
+    for (size_t p = 0; p < picture.pixels.size(); p += size_t(picture.channels)) {
+        float* color = &picture.pixels[p];
+        const float r = color[0], g = color[1], b = color[2];
+        for (size_t c = 0; c < 3; ++c)
+            color[c] =
+                exposure[4 * c] * r + exposure[4 * c + 1] * g + exposure[4 * c + 2] * b + exposure[4 * c + 3];
+    }
+    return picture;
 }
 
 }  // namespace ewa

@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+// JPEG by libjpeg-turbo, with its default transform (ISLOW) and upsampling.
+// jpeglib.h needs FILE, and jerror.h needs jpeglib.h.
+#include <cstdio>
+
+#include <jpeglib.h>
+
+#include <jerror.h>
+
+#include <csetjmp>
+#include <cstring>
+#include <stdexcept>
+
+#include "image/codecs.h"
+
+namespace ewa::image {
+
+namespace {
+
+/// CMYK is stored inverted, so colour is the product with K. Rounded to 8 bits, as OpenImageIO does.
+void cmyk_to_rgb(const JSAMPLE* cmyk, size_t pixels, float* rgb) {
+    constexpr float kUnit = 1.0f / 255;
+    for (size_t i = 0; i < pixels; ++i)
+        for (size_t c = 0; c < 3; ++c) {
+            const float product = float(cmyk[4 * i + c]) * kUnit * (float(cmyk[4 * i + 3]) * kUnit);
+            rgb[3 * i + c] = float(uint8_t(product * 255 + 0.5f)) / 255.0f;
+        }
+}
+
+/// libjpeg's error handler must not return, so it leaves by longjmp. Each function that calls setjmp has no
+/// object with a destructor, and what must be released belongs to the class.
+class JpegReader {
+  public:
+    explicit JpegReader(std::FILE* file) : file_(file) {}
+    ~JpegReader() { jpeg_destroy_decompress(&jpeg_); }
+    JpegReader(const JpegReader&) = delete;
+    JpegReader& operator=(const JpegReader&) = delete;
+
+    StoredImage read(uint64_t file_bytes, bool pixels) {
+        if (!read_header()) fail();
+        const bool cmyk = jpeg_.jpeg_color_space == JCS_CMYK || jpeg_.jpeg_color_space == JCS_YCCK;
+        const uint64_t channels = uint64_t(jpeg_.num_components);
+        check_limits({jpeg_.image_width, jpeg_.image_height, channels, 1}, file_bytes);
+        if (channels > 3 && !cmyk) throw std::runtime_error("the JPEG has more than 4 channels");
+        StoredImage image;
+        image.size = {int(jpeg_.image_width), int(jpeg_.image_height), orientation(), true};
+        // The second of two channels has no known meaning.
+        image.channels = channels < 3 ? 1 : 3;
+        if (pixels) read_values(image, cmyk);
+        return image;
+    }
+
+  private:
+    [[noreturn]] void fail() const { throw std::runtime_error(message_); }
+
+    static JpegReader& self(j_common_ptr jpeg) { return *static_cast<JpegReader*>(jpeg->client_data); }
+
+    [[noreturn]] static void on_error(j_common_ptr jpeg) {
+        char text[JMSG_LENGTH_MAX];
+        jpeg->err->format_message(jpeg, text);
+        std::snprintf(self(jpeg).message_, sizeof(self(jpeg).message_), "the JPEG is damaged: %s", text);
+        std::longjmp(self(jpeg).jump_, 1);
+    }
+
+    /// libjpeg warns where it fills what it cannot decode with grey. That is an error here. Superfluous bytes
+    /// between two markers, which some cameras write, cost no pixel.
+    static void on_message(j_common_ptr jpeg, int level) {
+        if (level >= 0) return;  // a note, not a warning
+        switch (jpeg->err->msg_code) {
+            case JWRN_JPEG_EOF:
+                std::strcpy(self(jpeg).message_, "the JPEG is truncated");
+                std::longjmp(self(jpeg).jump_, 1);
+            case JWRN_HIT_MARKER:
+            case JWRN_HUFF_BAD_CODE:
+            case JWRN_ARITH_BAD_CODE:
+            case JWRN_MUST_RESYNC:
+                on_error(jpeg);
+            default:
+                break;
+        }
+    }
+
+    /// Each scan costs a pass over the whole picture, however few bytes it has.
+    static void on_progress(j_common_ptr jpeg) {
+        if (reinterpret_cast<j_decompress_ptr>(jpeg)->input_scan_number <= kMaxJpegScans) return;
+        std::snprintf(self(jpeg).message_, sizeof(self(jpeg).message_), "the JPEG has more than %d scans",
+                      kMaxJpegScans);
+        std::longjmp(self(jpeg).jump_, 1);
+    }
+
+    bool read_header() {
+        jpeg_.err = jpeg_std_error(&errors_);
+        errors_.error_exit = on_error;
+        errors_.emit_message = on_message;
+        jpeg_.client_data = this;
+        if (setjmp(jump_)) return false;
+        jpeg_create_decompress(&jpeg_);
+        progress_.progress_monitor = on_progress;
+        jpeg_.progress = &progress_;
+        jpeg_stdio_src(&jpeg_, file_);
+        jpeg_save_markers(&jpeg_, kExifMarker, 0xffff);
+        jpeg_read_header(&jpeg_, TRUE);
+        return true;
+    }
+    bool start(J_COLOR_SPACE color_space) {
+        if (setjmp(jump_)) return false;
+        jpeg_.out_color_space = color_space;
+        jpeg_start_decompress(&jpeg_);
+        return true;
+    }
+    bool read_row(JSAMPROW row) {
+        if (setjmp(jump_)) return false;
+        jpeg_read_scanlines(&jpeg_, &row, 1);
+        return true;
+    }
+    /// Reads up to the end-of-image marker.
+    bool finish() {
+        if (setjmp(jump_)) return false;
+        jpeg_finish_decompress(&jpeg_);
+        return true;
+    }
+
+    void read_values(StoredImage& image, bool cmyk) {
+        if (!start(cmyk ? JCS_CMYK : jpeg_.out_color_space)) fail();
+        const size_t width = size_t(image.size.width), channels = size_t(image.channels);
+        const size_t components = size_t(jpeg_.output_components);
+        std::vector<JSAMPLE> row(width * components);
+        image.values.resize(width * channels * size_t(image.size.height));
+        for (size_t y = 0; y < size_t(image.size.height); ++y) {
+            if (!read_row(row.data())) fail();
+            float* values = &image.values[y * width * channels];
+            if (cmyk) {
+                cmyk_to_rgb(row.data(), width, values);
+                continue;
+            }
+            for (size_t x = 0; x < width; ++x)
+                for (size_t c = 0; c < channels; ++c)
+                    values[x * channels + c] = float(row[x * components + c]) / 255.0f;
+        }
+        if (!finish()) fail();
+    }
+
+    int orientation() const {
+        static constexpr char kName[] = "Exif\0";  // and the second zero that ends a literal
+        int found = 1;
+        for (const jpeg_marker_struct* m = jpeg_.marker_list; m; m = m->next)
+            if (m->data_length > sizeof(kName) && std::memcmp(m->data, kName, sizeof(kName)) == 0)
+                found = exif_orientation(m->data + sizeof(kName), m->data_length - sizeof(kName));
+        return found;
+    }
+
+    static constexpr int kExifMarker = JPEG_APP0 + 1;
+
+    std::FILE* file_;
+    jpeg_decompress_struct jpeg_{};
+    jpeg_error_mgr errors_{};
+    jpeg_progress_mgr progress_{};
+    std::jmp_buf jump_{};
+    char message_[JMSG_LENGTH_MAX + 64] = {};
+};
+
+}  // namespace
+
+StoredImage read_jpeg(std::FILE* file, uint64_t file_bytes, bool pixels) {
+    return JpegReader(file).read(file_bytes, pixels);
+}
+
+}  // namespace ewa::image
