@@ -35,7 +35,9 @@ void set_listener_options(int socket) {
 
 }  // namespace
 
-HttpServer::HttpServer(const std::string& address, uint16_t port, Answer answer) {
+HttpServer::HttpServer(const std::string& address, uint16_t port, std::chrono::milliseconds patience,
+                       Answer answer)
+    : patience_(patience) {
     sigaction(SIGPIPE, &action, nullptr);
     set_socket_options(set_listener_options);
     set_tcp_nodelay(true);
@@ -121,7 +123,7 @@ void HttpServer::process(Self& self, httplib::Stream& stream,
 
 void HttpServer::serve(Connection& connection) {
     try {
-        Wire wire(connection.socket, kMostRequest, kRequestPatience);
+        Wire wire(connection.socket, kMostRequest, patience_);
         process(*this, wire, [&](httplib::Request& request) {
             const std::lock_guard lock(mutex_);
             if (connection.cut) throw RunError("the connection was cut");

@@ -4,6 +4,7 @@
 #pragma once
 #include <httplib.h>
 
+#include <chrono>
 #include <csignal>
 #include <functional>
 #include <future>
@@ -14,8 +15,7 @@
 namespace ewa::live {
 
 inline constexpr size_t kMostConnections = 64;
-inline constexpr size_t kMostRequest = 4096;                // bytes of request line and headers
-inline constexpr std::chrono::seconds kRequestPatience{2};  // for all of them
+inline constexpr size_t kMostRequest = 4096;  // bytes of request line and headers
 
 /// cpp-httplib's constructor makes the whole process ignore SIGPIPE, which Wire does not need.
 struct SigpipeBefore {
@@ -29,8 +29,8 @@ class HttpServer final : private SigpipeBefore, private httplib::Server {
     /// until the answer has been sent.
     using Answer = std::function<void(const httplib::Request&, httplib::Response&)>;
 
-    /// Listens at once; port 0: any free one. Throws RunError.
-    HttpServer(const std::string& address, uint16_t port, Answer answer);
+    /// Listens at once; port 0: any free one. patience: for a whole request. Throws RunError.
+    HttpServer(const std::string& address, uint16_t port, std::chrono::milliseconds patience, Answer answer);
     /// Cuts every connection. The caller ends its own waits in `answer` before.
     ~HttpServer();
 
@@ -51,6 +51,7 @@ class HttpServer final : private SigpipeBefore, private httplib::Server {
     static void process(Self& self, httplib::Stream& stream,
                         const std::function<void(httplib::Request&)>& begin);
 
+    const std::chrono::milliseconds patience_;
     uint16_t port_ = 0;
     std::mutex mutex_;  // of what follows
     std::list<Connection> connections_;

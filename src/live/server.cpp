@@ -101,12 +101,13 @@ std::string random_token() {
     return text;
 }
 
-Server::Server(const std::string& address, uint16_t port, std::string token, std::chrono::milliseconds lease)
+Server::Server(const std::string& address, uint16_t port, std::string token, std::chrono::milliseconds lease,
+               std::chrono::milliseconds request_patience)
     : token_(std::move(token)),
       lease_(lease),
       http_(std::make_unique<HttpServer>(
-          address, port, [this](const Request& request, Response& response) { answer(request, response); })) {
-}
+          address, port, request_patience,
+          [this](const Request& request, Response& response) { answer(request, response); })) {}
 
 Server::~Server() {
     {

@@ -44,7 +44,7 @@ namespace ewa::live {
 class HttpServer;
 
 inline constexpr size_t kMostStrangers = 8;
-inline constexpr std::chrono::seconds kLease{10};
+inline constexpr std::chrono::seconds kLease{10}, kRequestPatience{2};
 
 struct Snapshot {
     int step = 0;
@@ -60,7 +60,8 @@ class Server {
     /// Listens at once. port 0: any free one. token: empty refuses all commands. lease: how long a pause
     /// outlasts the last request with the token. Throws RunError where the address cannot be listened on.
     Server(const std::string& address, uint16_t port, std::string token,
-           std::chrono::milliseconds lease = kLease);
+           std::chrono::milliseconds lease = kLease,
+           std::chrono::milliseconds request_patience = kRequestPatience);
     ~Server();
     Server(const Server&) = delete;
     Server& operator=(const Server&) = delete;

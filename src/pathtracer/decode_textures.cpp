@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "image/image_files.h"
 #include "ewa/error.h"
 #include "image/image_files.h"
 #include "pathtracer/path_tracer.h"

@@ -241,7 +241,7 @@ TEST(LiveServer, RequestsAreSmall) {
 
 /// 100 that say nothing, and some that never end what they say, take no place from who asks.
 TEST(LiveServer, IdleConnectionsGiveWay) {
-    Server server("127.0.0.1", 0, "secret");
+    Server server("127.0.0.1", 0, "secret", kLease, 1h);
     std::vector<RawSocket> crowd;
     for (int i = 0; i < 100; ++i) {
         crowd.emplace_back(server.port());
