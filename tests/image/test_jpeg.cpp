@@ -117,9 +117,10 @@ TEST(Jpeg, DamagedPixelsAreAnError) {
     const std::string whole = test::file_bytes(path);
     const size_t scan = whole.find("\xff\xda") + 14, restart = whole.find("\xff\xd0", scan);
     testing::internal::CaptureStderr();
-    // A scan without its first bytes, a restart marker out of turn, and superfluous bytes before such damage.
+    // A scan whose first part has one byte, a restart marker out of turn, and superfluous bytes before such
+    // damage.
     std::string cut = whole, turn = whole, both = whole;
-    cut.erase(scan, 12);
+    cut.erase(scan + 1, restart - scan - 1);
     turn[restart + 1] = '\xd5';
     both.replace(restart + 1, 1, "\xd5").insert(whole.find("\xff\xdb"), "bytes of no use");
     for (const std::string& bytes : {cut, turn, both}) {
