@@ -22,6 +22,8 @@ inline bool have_xdotool() {
     return std::system("command -v xdotool > /dev/null 2>&1") == 0;
 }
 
+inline constexpr double kSessionPatience = 180;  // seconds; only a machine with no time to spare needs them
+
 class Session {
   public:
     /// Starts it in `folder`, where it leaves its screenshots, and waits for its window.
@@ -63,7 +65,7 @@ class Session {
         return std::system(("timeout 300 xdotool " + path + " > /dev/null 2>&1").c_str()) == 0;
     }
 
-    /// Asks for a screenshot, and the path of what was written; empty after 60 seconds.
+    /// Asks for a screenshot, and the path of what was written; empty where nothing is.
     std::string screenshot(const std::string& extension = ".png") {
         const std::string path =
             folder_ + "/ewa-view-" + std::to_string(extension == ".png" ? ++png_ : ++exr_) + extension;
@@ -72,7 +74,8 @@ class Session {
     }
     bool awaited(const std::string& path) const {
         bool there = false;  // a file is whole when it has its name
-        soon([&] { return (there = std::filesystem::exists(path)) || kill(child_, 0) != 0; });
+        soon([&] { return (there = std::filesystem::exists(path)) || kill(child_, 0) != 0; },
+             kSessionPatience);
         return there;
     }
 
@@ -81,7 +84,7 @@ class Session {
         send("key ctrl+q");
         int status = 0;
         pid_t ended = 0;
-        soon([&] { return (ended = waitpid(child_, &status, WNOHANG)) != 0; });
+        soon([&] { return (ended = waitpid(child_, &status, WNOHANG)) != 0; }, kSessionPatience);
         Outcome outcome;  // its status is -1 where it has not ended
         if (ended == child_)
             outcome.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
