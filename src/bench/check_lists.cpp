@@ -4,9 +4,8 @@
 #include <cmath>
 
 #include "bench/check.h"
-#include "reference/footprint.h"
+#include "reference/instances.h"
 #include "reference/projection.h"
-#include "reference/scan.h"
 #include "reference/sort.h"
 
 namespace ewa::bench {

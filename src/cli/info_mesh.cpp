@@ -8,7 +8,7 @@
 #include "cli/text.h"
 #include "core/text.h"
 #include "ewa/synthetic_dataset.h"
-#include "io/gltf/gltf_mesh.h"
+#include "io/gltf/mesh.h"
 
 namespace ewa::cli {
 

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <string_view>
 
-#include "core/temporary_folder.h"
+#include "core/folders.h"
 #include "core/text.h"
 #include "ewa/error.h"
 

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "scene/camera_path.h"
+#include "scene/camera.h"
 #include "viewer/size.h"
 
 namespace ewa::viewer {

@@ -4,7 +4,7 @@
 #include <random>
 
 #include "ewa/splat_files.h"
-#include "io/datasets/points_ply.h"
+#include "io/datasets/image_records.h"
 #include "io/splats/ply.h"
 #include "support/temp_folder.h"
 

@@ -6,7 +6,7 @@
 
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
-#include "io/splats/spz_layout.h"
+#include "io/splats/spz.cpp"
 #include "support/splat_scenes.h"
 #include "support/temp_folder.h"
 
