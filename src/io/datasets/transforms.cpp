@@ -22,8 +22,8 @@ namespace {
 using nlohmann::json;
 using Json = nlohmann::ordered_json;
 
-constexpr size_t kLongestName = 200;  // in an error
-constexpr double kMaxSize = 1 << 20;  // px
+constexpr size_t kLongestName = 200;      // in an error
+constexpr double kLongestSide = 1 << 20;  // px
 // Deviation of a rotation's columns from unit length and right angles. Files with four decimals stay below
 // it.
 constexpr double kMaxRotationError = 1e-2;
@@ -129,7 +129,7 @@ void find_image(const Entry& entry, const std::filesystem::path& folder, ImageRe
 }
 
 int whole_size(const Entry& entry, const char* key, double value) {
-    if (!(value >= 1 && value <= kMaxSize) || value != std::floor(value))
+    if (!(value >= 1 && value <= kLongestSide) || value != std::floor(value))
         entry.fail(std::string("\"") + key + "\" is not a whole number of pixels in 1..1048576");
     return static_cast<int>(value);
 }

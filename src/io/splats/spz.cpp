@@ -14,10 +14,10 @@ namespace ewa::io {
 
 namespace {
 
-constexpr uint32_t kMagic = 0x5053474e;                       // "NGSP"
+constexpr uint32_t kSpzMagic = 0x5053474e;                    // "NGSP"
 constexpr size_t kHeaderBytes = 16, kPackedHeaderBytes = 32;  // versions 1 to 3; version 4
 constexpr uint8_t kAntialiased = 1, kHasExtensions = 2;       // flags
-constexpr int kMaxFileDegree = 4;
+constexpr int kMaxSpzDegree = 4;
 constexpr unsigned kMaxFractionalBits = 24;
 constexpr double kColorScale = 0.15 * 255, kColorOffset = 0.5 * 255;
 constexpr double kScaleSteps = 16, kScaleOffset = 10;
@@ -58,11 +58,11 @@ Header parse_header(const std::byte* bytes, const core::FileReader& reader) {
     header.file_degree = int(bytes[12]);
     header.fractional_bits = uint8_t(bytes[13]);
     header.flags = uint8_t(bytes[14]);
-    if (magic != kMagic)
+    if (magic != kSpzMagic)
         reader.fail("this is not an SPZ file (its packed data does not start with \"NGSP\")");
     if (header.version < 1 || header.version > 4)
         reader.fail("SPZ version " + std::to_string(header.version) + " is unknown; 1 to 4 are supported");
-    if (header.file_degree > kMaxFileDegree)
+    if (header.file_degree > kMaxSpzDegree)
         reader.fail("the header's SH degree " + std::to_string(header.file_degree) + " is not 0 to 4");
     if (header.fractional_bits > kMaxFractionalBits)
         reader.fail("the header has " + std::to_string(header.fractional_bits) +
@@ -358,7 +358,7 @@ void write_block(Block block, size_t bytes_each, Encoder& encoder, size_t count,
 
 std::vector<std::byte> header(const Gaussians& gaussians, const SaveOptions& options, int bits) {
     std::vector<std::byte> bytes(kHeaderBytes);
-    const uint32_t words[3] = {kMagic, uint32_t(options.spz_version), uint32_t(gaussians.size())};
+    const uint32_t words[3] = {kSpzMagic, uint32_t(options.spz_version), uint32_t(gaussians.size())};
     std::memcpy(bytes.data(), words, sizeof(words));
     bytes[12] = std::byte(gaussians.sh_degree);
     bytes[13] = std::byte(bits);
