@@ -8,7 +8,7 @@ namespace ewa {
 
 struct Camera {
     int width = 0, height = 0;              // px
-    double fx = 0, fy = 0, cx = 0, cy = 0;  // px; (cx, cy) measured from the image's top left corner
+    double fx = 0, fy = 0, cx = 0, cy = 0;  // px; (cx, cy) from the image's top left corner
     glm::dmat3 rotation{1.0};               // world to camera: p_camera = rotation * p_world + translation
     glm::dvec3 translation{0.0};            // world units
 
@@ -16,8 +16,9 @@ struct Camera {
     glm::dvec3 position() const { return -(glm::transpose(rotation) * translation); }
 };
 
-/// The same view at 1/factor of the resolution, matching downscale(Image, factor): sizes rounded down (at
-/// least 1), focal lengths and principal point scaled by the exact size ratio per axis.
+/// The same view at 1/factor of the resolution, to match downscale(Image, factor). Sizes are rounded down, to
+/// at least 1 px. Focal lengths and principal point are scaled by the exact ratio of sizes per axis. factor
+/// >= 1.
 Camera downscale(const Camera& camera, int factor);
 
 }  // namespace ewa

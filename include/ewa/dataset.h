@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Images with their cameras, and the points they were reconstructed from.
+// Training images with their cameras, and the points that they were reconstructed from.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -13,53 +13,54 @@
 
 namespace ewa {
 
-/// How a lens bends the ray (x, y, 1); src/scene/lens.h has the formulas.
+/// Lens models. src/scene/lens.h has the formulas.
 enum class Lens {
-    brown,    // radial (a quotient of polynomials) and tangential: OpenCV's perspective model
-    fisheye,  // radial in the angle, tangential, thin prism: OpenCV's fisheye and COLMAP's THIN_PRISM_FISHEYE
-    fisheye624,  // six radial terms, then tangential and thin prism of the result: COLMAP's
-                 // RAD_TAN_THIN_PRISM_FISHEYE
+    brown,       // radial (a quotient of polynomials) and tangential: OpenCV's perspective model
+    fisheye,     // radial in the angle, tangential, thin prism: OpenCV's fisheye, COLMAP's THIN_PRISM_FISHEYE
+    fisheye624,  // six radial terms, then tangential and thin prism: COLMAP's RAD_TAN_THIN_PRISM_FISHEYE
     fov,         // Devernay and Faugeras 2001; k1 is omega (radians)
     division,    // Fitzgibbon 2001; k1
     unified      // enhanced unified camera model, Khomutenko et al. 2016; k1 is alpha, k2 is beta
 };
 
-/// What a lens adds to a pinhole. Names and signs are OpenCV's (calib3d, "Detailed Description"); a lens
-/// leaves those it has no use for at zero.
+/// The distortion of a lens relative to a pinhole. Names and signs are OpenCV's (calib3d, "Detailed
+/// Description"). Parameters that a lens does not have are zero.
 struct Distortion {
     double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0, k4 = 0, k5 = 0, k6 = 0;
-    double s1 = 0, s2 = 0, s3 = 0,
-           s4 = 0;  // thin prism: s1 and s3 times the squared radius, s2 and s4 times its square
+    /// Thin prism: s1 and s3 of the squared radius, s2 and s4 of its square.
+    double s1 = 0, s2 = 0, s3 = 0, s4 = 0;
     Lens lens = Lens::brown;
     bool operator==(const Distortion&) const = default;
-    /// A pinhole: nothing to undo.
+    /// Whether the lens is a pinhole.
     bool none() const { return *this == Distortion{}; }
 };
 
-/// What masks are for. A mask is white where its picture counts: a file in masks/ (beside images/) that has
-/// the picture's name, with .png in place of its extension or after it; a frame's mask_path in
-/// transforms.json; or a picture's own alpha.
+/// The use of masks. A mask is white where the image counts. There are three sources of masks:
+/// - A file in masks/ (beside images/) with the image's name. Its extension may be replaced by .png or followed
+///   by .png.
+/// - A frame's mask_path in transforms.json.
+/// - The image's own alpha.
 enum class MaskUse {
-    automatic,  // ignore where the dataset has mask files, else cut
-    ignore,     // pixels under the mask do not count, in the loss and in PSNR and SSIM
-    cut,        // pixels under the mask are the background's colour
-    none        // neither masks nor alpha are looked at
+    automatic,  // ignore if the dataset has mask files, else cut
+    ignore,     // masked pixels do not count in the loss, PSNR and SSIM
+    cut,        // masked pixels have the background's colour
+    none        // masks and alpha are not used
 };
 
 struct Frame {
-    std::string name;                  // as the dataset names it, e.g. "0001.jpg"
+    std::string name;                  // in the dataset, e.g. "0001.jpg"
     std::filesystem::path image_path;  // may not exist: see image_exists
     bool image_exists = false;
-    int orientation = 1;    // EXIF's, of the file: 1 unless the camera belongs to the turned picture
-    bool eight_bit = true;  // the file has no more than 256 levels
-    Camera camera;          // the pinhole camera that load_frame_image's picture has
-    Camera source;          // intrinsics of the file itself (differs where it is distorted or scaled)
+    int orientation = 1;    // EXIF orientation to apply; 1 unless the camera belongs to the turned image
+    bool eight_bit = true;  // the file has at most 256 levels
+    Camera camera;          // the pinhole camera of load_frame_image's result
+    Camera source;          // the camera of the file's pixels, before undistortion and downscaling
     std::filesystem::path mask_path;  // empty: none
-    MaskUse masks = MaskUse::cut;     // what alpha is for in load_frame_image's picture; never automatic
+    MaskUse masks = MaskUse::cut;     // the use of alpha in load_frame_image's result; never automatic
     Distortion distortion;            // of the file
-    Camera pinhole;                   // of the file's picture once it is undistorted, before it is downscaled
-    int downscale = 1;                // of the file's picture, which may be a smaller copy already
-    int split = 0;  // 0 by the rule of split_frames; 1 train, 2 test where the dataset says so
+    Camera pinhole;                   // after undistortion, before downscaling
+    int downscale = 1;  // factor that is applied to the file, which may be a smaller copy already
+    int split = 0;      // 1 train, 2 test; 0: split_frames decides
 };
 
 struct PointCloud {
@@ -71,45 +72,48 @@ struct Dataset {
     std::filesystem::path root;
     std::vector<Frame> frames;        // sorted by name
     PointCloud points;                // may be empty
-    int missing_images = 0;           // entries whose image file is not there
-    int dropped_points = 0;           // points with a coordinate that is not finite, left out of `points`
-    std::string first_dropped_point;  // where the first of them stands: file and byte, line or vertex
-    bool color_depends_on_view =
-        true;  // false where the dataset says that SH degree 0 suffices: "view_dependent": false
+    int missing_images = 0;           // entries whose image file does not exist
+    int dropped_points = 0;           // points with a coordinate that is not finite; they are not in `points`
+    std::string first_dropped_point;  // position of the first: file and byte, line or vertex
+    /// False if the dataset has "view_dependent": false. Then SH degree 0 suffices.
+    bool color_depends_on_view = true;
 };
 
 struct DatasetOptions {
     int downscale = 1;  // >= 1
     MaskUse masks = MaskUse::automatic;
-    bool need_images = true;  // false: cameras alone; frames without a file are kept where the size is known
+    bool need_images = true;  // false: only cameras; frames without a file are kept if the size is known
 };
 
-/// A folder with a COLMAP model (.bin or .txt, in sparse/0, sparse or the folder itself) and images/, else a
-/// folder with transforms.json or transforms_train.json and transforms_test.json, or one of these files
-/// (src/io/transforms.h has the dialects). World coordinates and camera axes come out in the OpenCV
-/// convention; the world frame is the file's own. With need_images, frames without a file are left out and
-/// counted, and every other file's size is checked against the model: it is the model's, or the model's
-/// resized by one factor, which the intrinsics then follow. Cameras belong to the pixels as they are stored,
-/// which is how COLMAP reads them; EXIF's orientation is followed only where it asks for a quarter turn and
-/// the turned picture has the model's shape while the stored one has not. With a downscale factor K, a
-/// picture that is in images_K (beside images) is taken from there as it is. Throws InputError.
+/// Loads a dataset. There are three kinds of paths:
+/// - A folder with a COLMAP model (.bin or .txt, in sparse/0, sparse or the folder itself) and images/.
+/// - A folder with transforms.json, or with transforms_train.json and transforms_test.json.
+/// - One of these files. src/io/datasets/transforms.h has the dialects.
+///
+/// Camera axes follow the OpenCV convention; the world frame is the file's own. With need_images, frames
+/// without a file are skipped and counted. Each other file has the model's size, or that size resized by one
+/// factor, which the intrinsics then follow. As in COLMAP, cameras belong to the pixels as stored. EXIF's
+/// orientation is applied only if it is a quarter turn and only the turned image has the model's aspect ratio.
+/// With a downscale factor K, images in images_K (beside images) are used as they are. Throws InputError.
 Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& options);
 
-/// The frame's picture as the pinhole `frame.camera` sees it: undistorted (bilinear; the focal lengths stay
-/// and the size changes so that no pixel is blank, src/scene/undistort.h) and downscaled as the frame says. 3
-/// channels, or 4 where the frame has a mask or the file alpha: their product, for the use that frame.masks
-/// says. Throws InputError, also where a value of the file is not finite.
+/// Loads the frame's image as the pinhole `frame.camera` sees it: turned, undistorted and downscaled.
+/// Undistortion is bilinear and keeps the focal lengths; the size changes so that no pixel is blank
+/// (src/scene/lens.h). The result has 3 channels, or 4 if the frame has a mask or the file has alpha. The
+/// fourth is their product, for the use frame.masks. Throws InputError, also if a value of the file is not
+/// finite.
 Image load_frame_image(const Frame& frame);
 
-/// The same as a rendering is compared with it.
+/// The frame's image in the form that a render is compared with.
 struct TrainingImage {
-    Image picture;  // RGB, over the background where it is cut out
-    Image weights;  // one channel, how much a pixel counts; empty where each counts
+    Image picture;  // RGB, composited over the background if masks cut
+    Image weights;  // one channel, the weight of each pixel; empty if all count
 };
 TrainingImage load_training_image(const Frame& frame, const std::array<float, 3>& background);
 
-/// Indices of train and test frames: a frame's own split where the dataset has one, else test where its index
-/// in name order is a multiple of test_every (INRIA's and gsplat's rule); test_every 0: all train.
+/// Indices of train and test frames. A frame's own split wins. Otherwise it is a test frame if its index in
+/// the order of names is a multiple of test_every, as in INRIA's code and gsplat. test_every 0: all are train
+/// frames.
 struct Split {
     std::vector<int> train, test;
 };
@@ -119,10 +123,10 @@ Split split_frames(const Dataset& dataset, int test_every);
 /// getNerfppNorm).
 double scene_extent(const Dataset& dataset, const std::vector<int>& frames);
 
-/// One splat a point: scale sqrt(mean squared distance to the 3 nearest neighbours, squared distance at least
-/// 1e-7), identity rotation, opacity 0.1, colour in SH degree 0 (INRIA's create_from_pcd). With fewer than 3
-/// other points the mean is over those there are; a single point gets scale 1. Throws InputError without
-/// points, or when one is not finite.
+/// One splat per point, as in INRIA's create_from_pcd: identity rotation, opacity 0.1, colour in SH degree 0.
+/// The scale is the root of the mean squared distance to the 3 nearest neighbours, which is at least 1e-7.
+/// With fewer neighbours, the mean is over these; a single point has scale 1. Throws InputError without
+/// points, or if one is not finite.
 Gaussians gaussians_from_points(const PointCloud& points, int sh_degree);
 
 }  // namespace ewa

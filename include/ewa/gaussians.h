@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A splat scene in memory: structure of arrays, values exactly as an INRIA PLY stores them.
+// A splat scene in memory, as a structure of arrays. Values are exactly as in an INRIA PLY.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -10,22 +10,23 @@ namespace ewa {
 
 inline constexpr int kMaxShDegree = 3;
 
-/// Number of SH coefficients a colour channel has at a degree: (degree + 1)^2.
+/// The number of SH coefficients of a colour channel: (degree + 1)^2.
 constexpr int sh_coefficients(int degree) {
     return (degree + 1) * (degree + 1);
 }
 
 struct Gaussians {
-    int sh_degree = 0;         // 0..3
-    glm::dvec3 origin{0.0};    // world; zero but in a scene far from the world's origin, see settle_origin
-    std::vector<float> means;  // 3 n, world units, relative to `origin`
-    std::vector<float> quaternions;     // 4 n, w x y z, of any non-zero norm
+    int sh_degree = 0;  // 0..3
+    glm::dvec3 origin{
+        0.0};  // world; zero unless the scene is far from the world's origin, see set_world_means
+    std::vector<float> means;           // 3 n, world units, relative to `origin`
+    std::vector<float> quaternions;     // 4 n, w x y z, any non-zero norm
     std::vector<float> log_scales;      // 3 n, natural logarithm of the standard deviations in world units
     std::vector<float> opacity_logits;  // n
     std::vector<float> sh;              // n * (degree + 1)^2 * 3: coefficient after coefficient, RGB inner
 
     size_t size() const { return opacity_logits.size(); }
-    /// Where splat i stands in the world.
+    /// The position of splat i in the world.
     glm::dvec3 world_mean(size_t i) const {
         return origin + glm::dvec3(means[3 * i], means[3 * i + 1], means[3 * i + 2]);
     }
@@ -39,20 +40,20 @@ struct Gaussians {
     }
 };
 
-/// The highest degree that has a coefficient other than zero; what the scene needs, not what the file has
-/// room for.
+/// The highest degree with a non-zero coefficient: the degree that the scene needs, which may be below
+/// sh_degree.
 int sh_degree_present(const Gaussians& gaussians);
 
-/// Sets the means to these world positions, and the origin with them: zero up to a
-/// distance of 1,000 units, or 64 times the scene's size, from the world's origin; further out (a
-/// georeferenced capture) whole units near the middle of the positions, the outermost tenth and what is not
-/// finite left aside.
+/// Sets the means to these world positions, and the origin with them. The origin is zero if the scene is
+/// within 1,000 units, or 64 times its size, of the world's origin. Otherwise, as in a georeferenced capture,
+/// it is the middle of the positions in whole units. The middle ignores the outermost tenth and positions
+/// that are not finite.
 void set_world_means(Gaussians& gaussians, const std::vector<glm::dvec3>& positions);
 
-/// The same of the positions that the scene has: none moves by more than float32 rounds.
+/// The same with the scene's own positions. They move by at most float32's rounding.
 void settle_origin(Gaussians& gaussians);
 
-/// Whether every stored value of splat i is finite and its quaternion is not zero. Others are never drawn.
+/// Whether all values of splat i are finite and its quaternion is not zero. Other splats are never visible.
 bool drawable(const Gaussians& gaussians, size_t i);
 
 }  // namespace ewa

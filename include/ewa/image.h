@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures in memory, on disk, and their distance from each other. Every format but PNG and JPEG needs the
-// module with OpenImageIO (libewa_openimageio.so). Where that is missing or does not fit, reading or writing
-// such a file throws RunError.
+// Images in memory and on disk, and their differences. Every format but PNG and JPEG needs the module with
+// OpenImageIO (libewa_openimageio.so). If that is missing or has another version, reading or writing such a
+// file throws RunError.
 #pragma once
 #include <array>
 #include <cstddef>
@@ -11,8 +11,8 @@
 
 namespace ewa {
 
-/// Row-major, interleaved, first row at the top. 8-bit sRGB files become value / 255 with no linearisation;
-/// that is the space splats are trained and blended in.
+/// Row-major, interleaved, first row at the top. 8-bit sRGB files become value / 255, without linearisation.
+/// Splats are trained and blended in that space.
 struct Image {
     int width = 0, height = 0, channels = 0;
     std::vector<float> pixels;  // width * height * channels
@@ -24,66 +24,68 @@ struct Image {
     const float* at(int x, int y) const { return &pixels[(size_t(y) * width + x) * channels]; }
 };
 
-/// What the file's header says. The pixels are not decoded, so damage to them may pass. Throws InputError.
+/// The contents of an image file's header. Damage to the pixels may go unnoticed: they are not decoded.
 struct ImageSize {
     int width = 0, height = 0;  // as the pixels are stored
-    int orientation = 1;        // EXIF's: how to turn them upright, see oriented
+    int orientation = 1;        // EXIF's, see oriented
     bool eight_bit = true;      // no more than 256 levels
 };
+/// Throws InputError.
 ImageSize read_image_size(const std::filesystem::path& path);
 
-/// The picture turned as EXIF's orientation (1..8) says; 5 to 8 exchange width and height.
+/// The image turned by EXIF's orientation (1..8). 5 to 8 exchange width and height.
 Image oriented(const Image& image, int orientation);
 
-/// PNG, JPEG, TIFF, EXR, WebP, BMP, binary PPM and PGM, and Radiance HDR, known by their first bytes, as 3
-/// (RGB) or 4 (RGBA, colour not multiplied by alpha) channels; grey becomes RGB. 16-bit integers become value
-/// / 65535, floating-point files stay as they are. CMYK becomes RGB: each colour times K. EXIF's orientation is
-/// left alone: the pixels come as they are stored. At most 200 million pixels, 65,535 in a direction. Throws
-/// InputError, also for a truncated file.
+/// Reads PNG, JPEG, TIFF, EXR, WebP, BMP, binary PPM and PGM, and Radiance HDR, recognised by their first
+/// bytes. The result has 3 channels (RGB), or 4 (RGBA, colour not multiplied by alpha). Grey becomes RGB.
+/// 16-bit integers become value / 65535, and floating-point values stay. Pixels are as stored: EXIF's
+/// orientation is not applied. CMYK becomes RGB: each colour times K. The limits are 200 million pixels and 65,535 px per side. Throws InputError,
+/// also for a truncated file.
 Image load_image(const std::filesystem::path& path);
 
-/// .png: 8 bit, rounded, clamped to [0, 1], NaN as 0. .exr: float32, not clamped. Colour is not multiplied by
-/// alpha. Written beside and renamed. Throws RunError (disk), InputError (extension, no pixels).
+/// Writes .png (8 bit, rounded, clamped to [0, 1], NaN as 0) or .exr (float32, not clamped). Colour is not
+/// multiplied by alpha. A temporary file is written and renamed. Throws RunError (disk), InputError
+/// (extension, no pixels).
 void save_image(const std::filesystem::path& path, const Image& image);
 
-/// The size divided by factor, rounded down, at least 1; each new pixel is the mean over the area it covers:
-/// factor x factor blocks where the size is a multiple, else blocks of the exact size ratio, borders
-/// weighted. factor >= 1.
+/// Divides the size by factor >= 1, rounded down, to at least 1 px. Each new pixel is the mean over the area
+/// that it covers. These areas have the exact ratio of sizes; pixels on their borders are weighted by their
+/// share.
 Image downscale(const Image& image, int factor);
 
-/// RGB of a picture, where it is transparent over a background. RGB pictures come back as they are.
+/// The RGB of an image composited over a background. RGB images stay as they are.
 Image over_background(const Image& image, const std::array<float, 3>& background);
 
-/// RGB and one channel of the same size as one picture of 4 channels.
+/// An RGBA image from an RGB image and a one-channel image of the same size.
 Image with_alpha(const Image& color, const Image& alpha);
 
-/// 10 log10(1 / MSE) over RGB, both pictures clamped to [0, 1]; +inf for equal pictures.
-/// Throws InputError when sizes differ.
+/// 10 log10(1 / MSE) over RGB, with both images clamped to [0, 1]. +inf for equal images. Throws InputError
+/// if the sizes differ.
 double psnr(const Image& a, const Image& b);
-/// Each pixel's share is its weight (one channel of the same size; empty: equal weights). NaN where no pixel
-/// counts.
+/// Weighs each pixel by one channel of the same size; an empty image means equal weights. NaN if all weights
+/// are zero.
 double psnr(const Image& a, const Image& b, const Image& weights);
 
-/// Mean SSIM over pixels and RGB: 11 x 11 Gaussian window, sigma 1.5, zero padded (Wang et al. 2004), both
-/// pictures clamped to [0, 1], computed in float64. Throws InputError when sizes differ.
+/// Mean SSIM over pixels and RGB (Wang et al. 2004), with an 11 x 11 Gaussian window, sigma 1.5 and zero
+/// padding. Both images are clamped to [0, 1]. Computed in float64. Throws InputError if the sizes differ.
 double ssim(const Image& a, const Image& b);
-/// Of a pulled onto b where it weighs less (w a + (1 - w) b), each pixel's share its weight.
+/// The SSIM of w a + (1 - w) b and b, with each pixel weighted by w.
 double ssim(const Image& a, const Image& b, const Image& weights);
 
-/// How far apart two pictures are.
+/// The difference of two images.
 struct ImageDifference {
     double psnr = 0, ssim = 0;  // as above: RGB, clamped to [0, 1]
-    // Over all values, alpha included, not clamped. Equal values, infinite or not a number too, differ by 0,
-    // others of which one is not finite by +inf (rms_error: nan where one is not a number).
+    // Over all values including alpha, not clamped. Equal values differ by 0, also if infinite or NaN. Other
+    // pairs with a value that is not finite differ by +inf (rms_error: NaN if one is NaN).
     double max_error = 0;
     int max_x = 0, max_y = 0, max_channel = 0;  // where it is; px from the top left corner
-    double mean_error = 0;                      // of the values that are finite in both
+    double mean_error = 0;                      // over the values that are finite in both
     double rms_error = 0;
-    uint64_t over = 0;  // pixels with a value further apart than the tolerance
+    uint64_t over = 0;  // pixels with a difference above the tolerance
 };
 
-/// Compares all values, and gives PSNR and SSIM. A picture without alpha is opaque beside one that has it.
-/// tolerance >= 0. Throws InputError when sizes differ.
+/// Compares all values, and gives PSNR and SSIM. If only one image has alpha, the other counts as opaque.
+/// tolerance >= 0. Throws InputError if the sizes differ.
 ImageDifference compare_images(const Image& a, const Image& b, double tolerance = 0);
 
 }  // namespace ewa

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Changing a splat scene as a whole.
+// Edits of a whole splat scene.
 #pragma once
 #include <cstdint>
 #include <glm/mat4x4.hpp>
@@ -10,24 +10,24 @@
 
 namespace ewa {
 
-/// The scene seen after p -> linear part of `matrix` * p + its translation (column vectors, world units; the
-/// last row must be 0 0 0 1). Covariances become M Sigma M^T: rotations and uniform scales turn quaternions
-/// and scales, anything else is decomposed anew. View-dependent colour turns with the orthogonal part of M,
-/// mirrors included. A turn by a multiple of 90 degrees about an axis is exact in means and SH. Throws
-/// InputError when the matrix is not finite, not affine or flattens space.
+/// Applies an affine transform p -> M p + t to column vectors in world units. The last row must be 0 0 0 1.
+/// Covariances become M Sigma M^T. Rotations and uniform scales change quaternions and scales directly; for
+/// other transforms, each covariance is decomposed. View-dependent colour turns with the orthogonal part of
+/// M, including mirrors. A turn by a multiple of 90 degrees about an axis is exact in means and SH. Throws
+/// InputError if the matrix is not finite, is not affine or flattens space.
 void transform_splats(Gaussians& gaussians, const glm::dmat4& matrix);
 
-/// Keeps the splats of `indices` (each < size), in that order; what is repeated is repeated.
+/// Replaces the scene by the splats of `indices`, in that order. Each index is < size and may be repeated.
 void select_splats(Gaussians& gaussians, const std::vector<uint32_t>& indices);
 
-/// Cuts or fills with zeros up to the degree (0..3).
+/// Sets the SH degree (0..3). Higher coefficients are cut, new ones are zero.
 void set_sh_degree(Gaussians& gaussians, int degree);
 
-/// Behind those of `gaussians`; the degree becomes the larger of both.
+/// Appends the splats of `more`. The SH degree becomes the larger of both.
 void append_splats(Gaussians& gaussians, const Gaussians& more);
 
-/// The splats along a Z-order curve of 21 bits an axis over the bounds of the finite means, ties and splats
-/// without a finite mean (last) by index. Neighbours in the list are neighbours in space.
+/// The splat indices in Morton order: along a Z-order curve with 21 bits per axis over the bounds of the
+/// finite means. Ties are in order of the index. Splats without a finite mean come last.
 std::vector<uint32_t> morton_order(const Gaussians& gaussians);
 
 }  // namespace ewa

@@ -2,62 +2,43 @@
 // Splat scenes on disk.
 #pragma once
 #include <filesystem>
-#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "ewa/gaussians.h"
+#include "ewa/splat_scene.h"
 
 namespace ewa {
 
-/// How each is laid out: src/io/ply.h, compressed_ply.h, splat.h, spz.h, gltf_splats.h.
-enum class SplatFormat { ply, compressed_ply, splat, spz, glb, gltf };
-
-/// As the messages call it, e.g. "SPZ".
+/// The name in messages, e.g. "SPZ".
 std::string_view name_of(SplatFormat format);
 
-/// By extension: .ply .compressed.ply .splat .spz .glb .gltf, in upper or lower case. Throws InputError for
-/// any other.
+/// The format of an extension, in upper or lower case: .ply .compressed.ply .splat .spz .glb .gltf. Throws
+/// InputError for any other.
 SplatFormat format_of_name(const std::filesystem::path& path);
 
-/// By what the file begins with; where that does not tell, as for .splat, by extension. Throws InputError.
+/// The format of a file by its first bytes, or by its extension where these do not tell, as for .splat.
+/// Throws InputError.
 SplatFormat format_of_file(const std::filesystem::path& path);
 
-/// A scene and what its file says besides.
-struct SplatScene {
-    Gaussians gaussians;  // in the frame of an INRIA PLY (x right, y down, z forward), whichever the file has
-    SplatFormat format = SplatFormat::ply;
-    std::string variant;       // within the format, e.g. "version 3", "ascii"; may be empty
-    int file_sh_degree = 0;    // may be above 3: what is above is left out of gaussians
-    bool antialiased = false;  // the file says that it was trained with --antialias (Mip-Splatting)
-    std::vector<std::string> comments;
-    std::vector<std::string> remarks;  // one line each: what the file holds that is not taken
-};
-
-/// In any of the formats. Memory: at most twice the larger of the file and the scene. A file that claims more
-/// than 4 times its size (SPZ, which is packed: 32 times) and 40 MiB is refused. A value may be not finite
-/// where the format can hold that. Throws InputError that names the file and the byte or property.
+/// Reads any of the formats. The peak memory is at most twice the larger of the file and the scene. A file is
+/// refused if it claims more than 4 times its size and 40 MiB; for SPZ, which is compressed, 32 times. Values
+/// may be infinite or NaN if the format can store that. Throws InputError that names the file and the byte or
+/// property.
 SplatScene read_splats(const std::filesystem::path& path);
 
-/// The scene alone. What is not taken of the file is a warning.
+/// Reads the splats alone. Skipped contents are warnings on standard error.
 Gaussians load_splats(const std::filesystem::path& path);
 
-struct SaveOptions {
-    std::vector<std::string> comments = {};  // one line each, where the format has room for them
-    bool antialiased = false;
-    int spz_version = 3;                                    // 3 or 4
-    std::function<void(uint64_t, uint64_t)> progress = {};  // splats written, splats in all
-};
-
-/// By extension. Written beside and renamed, so the path never holds half a file. Any format but .ply leaves
-/// out the splats that are not drawable. Returns one line for each thing that the format cannot hold: what is
-/// dropped, and the number of bits of what is quantised. Throws RunError (disk), InputError (extension,
-/// values that the format has no room for, or a .bin in the place of a .gltf's that is another's).
+/// Writes the format of the extension to a temporary file and renames it. So the path never holds half a
+/// file. All formats but .ply skip the splats that are not drawable. Returns one line for each thing that the
+/// format cannot store: what is dropped, and the number of bits of quantised values. Throws RunError (disk).
+/// Throws InputError for an unknown extension, values out of the format's range, or a .bin beside a .gltf
+/// that belongs to another file.
 std::vector<std::string> save_splats(const std::filesystem::path& path, const Gaussians& gaussians,
                                      const SaveOptions& options);
 
-/// comments: one PLY comment line each.
+/// The same with default options. Returned lines become warnings. `comments` are PLY comments, one line each.
 void save_splats(const std::filesystem::path& path, const Gaussians& gaussians,
                  const std::vector<std::string>& comments = {});
 

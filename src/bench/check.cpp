@@ -9,10 +9,9 @@
 
 #include "ewa/renderer.h"
 #include "reference/adam.h"
-#include "reference/footprint.h"
+#include "reference/instances.h"
 #include "reference/projection.h"
 #include "reference/render.h"
-#include "reference/scan.h"
 #include "reference/sort.h"
 #include "shared/constants.h"
 

@@ -12,7 +12,7 @@
 
 #include "bench/device_runs.h"
 #include "bench/measure.h"
-#include "core/temporary_folder.h"
+#include "core/folders.h"
 #include "ewa/error.h"
 
 extern char** environ;

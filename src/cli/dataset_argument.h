@@ -4,7 +4,7 @@
 #include <memory>
 #include <optional>
 
-#include "core/temporary_folder.h"
+#include "core/folders.h"
 #include "ewa/dataset.h"
 #include "ewa/device.h"
 #include "ewa/synthetic_dataset.h"

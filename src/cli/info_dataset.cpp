@@ -12,7 +12,7 @@
 #include "cli/dataset_argument.h"
 #include "core/text.h"
 #include "ewa/synthetic_dataset.h"
-#include "io/gltf/gltf_mesh.h"
+#include "io/gltf/mesh.h"
 #include "report/summary.h"
 
 namespace ewa::cli {

@@ -17,7 +17,7 @@
 #include "cli/train_resume.h"
 #include "cli/train_serve.h"
 #include "core/atomic_file.h"
-#include "core/folder_lock.h"
+#include "core/folders.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/splat_files.h"

@@ -20,8 +20,7 @@
 namespace ewa::core {
 namespace {
 
-/// A temporary that is there now, where a signal's handler finds it. More at a time, or a longer name, go
-/// without.
+/// An existing temporary file, for signal handlers. Further files and longer names are not recorded.
 struct Unfinished {
     enum State { free, being_named, named };
     std::atomic<int> state{free};
@@ -65,10 +64,9 @@ AtomicFile::AtomicFile(const std::filesystem::path& path, Readers readers) : tar
     struct stat existing {};
     const bool exists = readers == Readers::usual && stat(target_.c_str(), &existing) == 0;
     if (exists && !S_ISREG(existing.st_mode))
-        throw RunError(one_line(path.string()) +
-                       ": cannot be written: it is there and is not a regular file");
+        throw RunError(one_line(path.string()) + ": cannot be written: it exists and is not a regular file");
 
-    // A name of its own, not one made from the target's, which may already be as long as a name can be.
+    // The name does not contain the target's, which may have the maximum length already.
     static std::atomic<unsigned> counter{0};
     do {
         temporary_ = target_.parent_path() /
@@ -78,7 +76,7 @@ AtomicFile::AtomicFile(const std::filesystem::path& path, Readers readers) : tar
     } while (descriptor_ < 0 && errno == EEXIST);
     if (descriptor_ < 0) fail("cannot be written");
     listed_ = list_unfinished(temporary_);
-    // Where the file system has no permissions to keep, the file is still as good as any new one.
+    // A file system without permissions is no error.
     if (exists && fchmod(descriptor_, existing.st_mode & 07777) != 0) errno = 0;
 }
 
@@ -100,13 +98,12 @@ void AtomicFile::write(const void* bytes, size_t count) {
 }
 
 void AtomicFile::commit() {
-    // Network and quota file systems report a full disk as late as here.
+    // Network and quota file systems may report a full disk only here.
     if (fsync(descriptor_) != 0 && errno != EINVAL && errno != EROFS) fail("cannot be written to disk");
     if (close(std::exchange(descriptor_, -1)) != 0) fail("cannot be written to disk");
     if (rename(temporary_.c_str(), target_.c_str()) != 0) fail("cannot be put in place");
     temporary_.clear();
-    // The new name reaches the disk with its directory. The file itself is safe already, so failing is no
-    // error.
+    // The directory holds the new name. The file itself is on disk already, so a failure is no error.
     const std::filesystem::path parent = target_.has_parent_path() ? target_.parent_path() : ".";
     const int directory = open(parent.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (directory >= 0) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files that are there whole or not at all.
+// Files that exist completely or not at all.
 #pragma once
 #include <cstddef>
 #include <filesystem>
@@ -7,15 +7,14 @@
 
 namespace ewa::core {
 
-/// Writes beside the path, in the same directory, and takes the path's place when commit() is called: until
-/// then, and whenever something fails, the path keeps what it held. The temporary is removed by the
-/// destructor. Throws RunError that names the path and the system's reason (a full disk is found at write,
-/// fsync or close). An existing target keeps its permissions; a symbolic link is followed; a target that is
-/// no regular file is refused.
+/// Writes a temporary file in the same directory, which commit() renames to the path. Until then, and after
+/// any failure, the path keeps its content. The destructor removes the temporary file. Throws RunError that
+/// names the path and the system's reason; a full disk shows at write, fsync or close. An existing target
+/// keeps its permissions. A symbolic link is followed. A target that is not a regular file is refused.
 class AtomicFile {
   public:
-    /// Who may read a file: whoever the user's umask or the file that was there lets, or the owner alone;
-    /// what is for the owner alone takes a symbolic link's place instead of following it.
+    /// usual: the umask or the existing file decides who may read. owner: only the owner may, and a symbolic
+    /// link is replaced instead of followed.
     enum class Readers { usual, owner };
 
     explicit AtomicFile(const std::filesystem::path& path, Readers readers = Readers::usual);
@@ -26,7 +25,7 @@ class AtomicFile {
     void write(const void* bytes, size_t count);
     void write(std::string_view text) { write(text.data(), text.size()); }
 
-    /// Everything on disk, then the rename. Call once, last.
+    /// Flushes everything to disk, then renames. Call once, last.
     void commit();
 
   private:
@@ -37,16 +36,16 @@ class AtomicFile {
     int listed_ = -1;  // for remove_unfinished_files()
 };
 
-/// The file becomes `text`, or stays as it was and RunError is thrown.
+/// Replaces the content of a file. On failure, throws RunError and the file keeps its content.
 void write_text_file(const std::filesystem::path& path, std::string_view text,
                      AtomicFile::Readers readers = AtomicFile::Readers::usual);
 
-/// Removes what is written beside its place at this moment: for the handler of a signal that ends the
-/// program, in which no destructor runs. Takes no lock and no memory.
+/// Removes all current temporary files. It is for a signal handler that ends the program without destructors.
+/// It uses neither locks nor memory allocation.
 void remove_unfinished_files() noexcept;
 
-/// Removes from a folder what processes that were killed while they wrote have left there (names as
-/// AtomicFile gives them, of a process that is no more). What cannot be removed stays.
+/// Removes the temporary files that killed processes left in a folder. Their names have AtomicFile's form and
+/// the number of a process that no longer exists. Failures are ignored.
 void remove_abandoned_files(const std::filesystem::path& folder);
 
 }  // namespace ewa::core

@@ -19,7 +19,7 @@ constexpr size_t kBufferBytes = size_t(1) << 20;
 
 FileReader::FileReader(const std::filesystem::path& path) : name_(one_line(path.string())) {
     struct stat status {};
-    // Looked at before it is opened: opening a named pipe would wait for a writer.
+    // Checked before it is opened, because opening a named pipe would wait for a writer.
     if (stat(path.c_str(), &status) != 0)
         throw InputError(name_ + ": cannot be read: " + std::strerror(errno));
     if (!S_ISREG(status.st_mode)) throw InputError(name_ + ": is not a regular file");

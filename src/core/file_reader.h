@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A file read with every byte accounted for.
+// Bounds-checked reading of files.
 #pragma once
 #include <bit>
 #include <cstddef>
@@ -12,13 +12,12 @@
 
 namespace ewa::core {
 
-/// Buffered reader of a regular file of known size, from front to back but for go_to. Every read is checked
-/// against what the file still holds, and what cannot be read is an InputError "path: byte N: ...", so no
-/// claim inside a file makes memory be taken for data that is not there. The file is read, not mapped: one
-/// that shrinks meanwhile is an error and not a SIGBUS.
+/// Buffered sequential reader of a regular file. Every read is checked against the remaining bytes, and
+/// throws InputError "path: byte N: ..." if it fails. So a claim inside a file cannot cause an allocation for
+/// missing data. The file is read, not mapped, so a file that shrinks meanwhile is an error and not a SIGBUS.
 class FileReader {
   public:
-    /// Throws InputError when there is no such file, it is not a regular file or cannot be opened.
+    /// Throws InputError if the file does not exist, is not a regular file or cannot be opened.
     explicit FileReader(const std::filesystem::path& path);
     ~FileReader();
     FileReader(const FileReader&) = delete;
@@ -43,17 +42,17 @@ class FileReader {
 
     void skip(uint64_t n, std::string_view what);
 
-    /// What is read next begins at this byte. `what` names it in the error where the file has no such byte.
+    /// Continues at this byte. `what` names it in the error if the file has no such byte.
     void go_to(uint64_t offset, std::string_view what);
 
-    /// The text up to a zero byte, which is read too; at most `limit` bytes long.
+    /// The text before a zero byte, at most `limit` bytes. The zero byte is consumed.
     std::string read_zero_terminated(size_t limit, std::string_view what);
 
-    /// The text up to a line feed (read, not returned; a carriage return before it neither) or the end of the
-    /// file; at most `limit` bytes long. False where there is nothing left.
+    /// The text before a line feed or the end of the file, at most `limit` bytes. A carriage return before
+    /// the line feed is removed. False at the end of the file.
     bool read_line(std::string& line, size_t limit);
 
-    /// Throws unless the rest of the file has room for `count` items of at least `bytes_each` bytes.
+    /// Throws unless the rest of the file can hold `count` items of at least `bytes_each` bytes.
     void require_room(uint64_t count, uint64_t bytes_each, std::string_view what) const;
 
     /// Throws InputError "path: byte N: text".
@@ -66,7 +65,7 @@ class FileReader {
     int descriptor_ = -1;
     uint64_t size_ = 0, offset_ = 0;
     std::vector<std::byte> buffer_;
-    size_t begin_ = 0, end_ = 0;  // the part of the buffer that was read from the file and not yet taken
+    size_t begin_ = 0, end_ = 0;  // the part of the buffer that was read from the file but not taken
 };
 
 /// The whole file as text. Throws InputError.

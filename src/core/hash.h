@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A number that tells contents apart: not proof against those who want two to agree.
+// A hash that distinguishes contents. It does not resist deliberate collisions.
 #pragma once
 #include <cstddef>
 #include <cstdint>

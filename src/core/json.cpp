@@ -14,10 +14,10 @@ namespace ewa::core {
 namespace {
 
 constexpr size_t kMostOrderedKeys = 1024;
-constexpr size_t kLongestReason = 300;  // of nlohmann's, which may quote the text at any length
+constexpr size_t kLongestReason = 300;  // limits nlohmann's message, which may quote the text at any length
 
-/// Puts together what nlohmann's parser meets. Its own callback for this looks through the parent again at
-/// every end of an object or a list, which takes quadratic time.
+/// Builds the value from nlohmann's parser events. nlohmann's own callback searches the parent at the end of
+/// every object and list, which takes quadratic time.
 template <class Json>
 class Builder : public nlohmann::json_sax<Json> {
   public:
@@ -33,21 +33,21 @@ class Builder : public nlohmann::json_sax<Json> {
         return leaf(value);
     }
     bool string(std::string& value) override { return leaf(std::move(value)); }
-    bool binary(typename Json::binary_t&) override { return false; }  // which JSON's text has not
+    bool binary(typename Json::binary_t&) override { return false; }  // JSON text has none
 
     bool start_object(std::size_t) override {
-        if (outside()) return descend();
+        if (skipping()) return descend();
         count(++objects_ > limits_.objects);
         return open(Json::object());
     }
     bool start_array(std::size_t) override {
-        if (outside()) return descend();
+        if (skipping()) return descend();
         count(++values_ > limits_.values);
         return open(Json::array());
     }
     bool key(std::string& key) override {
-        if (outside()) return true;
-        outside_from_ = !limits_.left_out.empty() && key == limits_.left_out ? depth_ : -1;
+        if (skipping()) return true;
+        skipped_from_ = !limits_.skipped.empty() && key == limits_.skipped ? depth_ : -1;
         key_ = std::move(key);
         return true;
     }
@@ -60,8 +60,8 @@ class Builder : public nlohmann::json_sax<Json> {
     }
 
   private:
-    /// Whether this is, or stands below, what is left out.
-    bool outside() const { return outside_from_ >= 0; }
+    /// Whether the current value is skipped or is part of a skipped value.
+    bool skipping() const { return skipped_from_ >= 0; }
 
     void count(bool too_many) const {
         if (too_many)
@@ -71,8 +71,8 @@ class Builder : public nlohmann::json_sax<Json> {
 
     template <class Value>
     bool leaf(Value&& value) {
-        if (outside()) {
-            if (depth_ == outside_from_) outside_from_ = -1;
+        if (skipping()) {
+            if (depth_ == skipped_from_) skipped_from_ = -1;
             return true;
         }
         count(++values_ > limits_.values);
@@ -93,7 +93,7 @@ class Builder : public nlohmann::json_sax<Json> {
 
     bool open(Json&& container) {
         descend();
-        open_.push_back(&place(std::move(container)));  // its parent takes nothing more until it is closed
+        open_.push_back(&place(std::move(container)));  // the parent does not grow until it is closed
         return true;
     }
 
@@ -106,10 +106,10 @@ class Builder : public nlohmann::json_sax<Json> {
 
     bool close() {
         --depth_;
-        if (!outside())
+        if (!skipping())
             open_.pop_back();
-        else if (depth_ == outside_from_)
-            outside_from_ = -1;
+        else if (depth_ == skipped_from_)
+            skipped_from_ = -1;
         return true;
     }
 
@@ -118,7 +118,7 @@ class Builder : public nlohmann::json_sax<Json> {
     Json top_;
     std::vector<Json*> open_;
     std::string key_;
-    int depth_ = 0, outside_from_ = -1;  // the depth of the key whose value is left out; -1: none
+    int depth_ = 0, skipped_from_ = -1;  // the depth of the key whose value is skipped; -1: none
     size_t objects_ = 0, values_ = 0;
 };
 

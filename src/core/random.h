@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Counter-based random numbers: a pure function of its counter, the same as shaders/lib/random.glsl bit for
-// bit in the integers. pcg4d of Jarzynski and Olano 2020, "Hash Functions for GPU Rendering".
+// Counter-based random numbers: pure functions of a counter. The integers equal those of
+// shaders/lib/random.glsl.
 #pragma once
 #include <array>
 #include <cmath>
@@ -9,6 +9,7 @@
 
 namespace ewa::core {
 
+/// pcg4d (Jarzynski and Olano 2020, "Hash Functions for GPU Rendering").
 inline std::array<uint32_t, 4> pcg4d(std::array<uint32_t, 4> v) {
     for (uint32_t& x : v) x = x * 1664525u + 1013904223u;
     const auto mix = [&] {
@@ -23,7 +24,7 @@ inline std::array<uint32_t, 4> pcg4d(std::array<uint32_t, 4> v) {
     return v;
 }
 
-/// In (0, 1), both ends out.
+/// Four uniform numbers in the open interval (0, 1).
 inline std::array<double, 4> uniform4(std::array<uint32_t, 4> counter) {
     const auto bits = pcg4d(counter);
     std::array<double, 4> result{};
@@ -39,8 +40,8 @@ inline std::array<double, 3> normal3(std::array<uint32_t, 4> counter) {
     return {r0 * std::cos(turn * u[1]), r0 * std::sin(turn * u[1]), r1 * std::cos(turn * u[3])};
 }
 
-/// A pair of Sobol's first two dimensions, shuffled and Owen-scrambled by hashing (Burley 2020): every
-/// aligned block of 2^m indices is a (0, m, 2)-net. The same as shaders/lib/low_discrepancy.glsl.
+/// A point of Sobol's first two dimensions, shuffled and Owen-scrambled by hashing (Burley 2020). Every
+/// aligned block of 2^m indices is a (0, m, 2)-net. It equals shaders/lib/low_discrepancy.glsl.
 inline std::array<double, 2> sobol_pair(uint32_t index, std::array<uint32_t, 3> seed) {
     const auto reversed = [](uint32_t x) {
         x = (x >> 16) | (x << 16);
@@ -55,7 +56,7 @@ inline std::array<double, 2> sobol_pair(uint32_t index, std::array<uint32_t, 3> 
         return x;
     };
     const uint32_t i = reversed(laine_karras(reversed(index), seed[0]));
-    uint32_t second = i;  // i(x) as i(1 + x), polynomials over GF(2)
+    uint32_t second = i;  // i(x) -> i(1 + x) as polynomials over GF(2)
     second ^= (second & 0xffff0000u) >> 16;
     second ^= (second & 0xff00ff00u) >> 8;
     second ^= (second & 0xf0f0f0f0u) >> 4;

@@ -10,7 +10,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// Most names meet no link, which is found sooner than where links lead.
+/// Whether a part of the name is a link. This is faster than following links, and most names have none.
 bool meets_link(const fs::path& folder, const fs::path& name) {
     fs::path at = folder;
     std::error_code none;
@@ -43,7 +43,7 @@ bool links_stay_inside(const fs::path& folder, const fs::path& name) {
     return !relative.empty() && *relative.begin() != "..";
 }
 
-bool links_stay_with_pictures(const fs::path& folder, const fs::path& name) {
+bool links_stay_with_images(const fs::path& folder, const fs::path& name) {
     if (links_stay_inside(folder, name)) return true;
     const fs::path first = *name.begin(), rest = name.lexically_relative(first);
     return rest != "." && links_stay_inside(folder / first, rest);

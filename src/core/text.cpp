@@ -2,11 +2,14 @@
 #include "core/text.h"
 
 #include <spdlog/fmt/fmt.h>
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <utility>
 
 namespace ewa::core {
@@ -14,7 +17,7 @@ namespace ewa::core {
 namespace {
 constexpr std::string_view kBlanks = " \t\r\n\v\f";
 
-/// The character in UTF-8 that the text begins with, and its bytes; none where there is no such character.
+/// The first character in UTF-8 and its number of bytes, which is 0 if the bytes are not UTF-8.
 std::pair<uint32_t, size_t> first_character(std::string_view text) {
     const auto byte = [&](size_t i) { return static_cast<unsigned char>(text[i]); };
     if (byte(0) < 0x80) return {byte(0), 1};
@@ -25,12 +28,12 @@ std::pair<uint32_t, size_t> first_character(std::string_view text) {
         if (byte(i) >> 6 != 2) return {0, 0};
         character = character << 6 | (byte(i) & 0x3f);
     }
-    constexpr uint32_t kLeast[] = {0, 0, 0x80, 0x800, 0x10000};  // of that many bytes
+    constexpr uint32_t kLeast[] = {0, 0, 0x80, 0x800, 0x10000};  // with that many bytes
     return {character, character >= kLeast[bytes] && character <= 0x10ffff ? bytes : 0};
 }
 
-/// How many bytes to show as they are: of a character that neither commands a terminal, nor ends a line, nor
-/// turns the direction of the text about it.
+/// The number of bytes to display unchanged: of a character that neither controls a terminal, nor ends a
+/// line, nor changes the direction of text.
 size_t shown_bytes(std::string_view text) {
     const auto [c, bytes] = first_character(text);
     const auto in = [c = c](uint32_t low, uint32_t high) { return c >= low && c <= high; };
@@ -90,7 +93,7 @@ std::optional<double> parse_number(std::string_view word) {
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
     if (end != word.data() + word.size() || error == std::errc::invalid_argument) return std::nullopt;
     if (error == std::errc::result_out_of_range) {
-        // from_chars leaves the value alone; what is too small to hold is zero, what is too large infinite.
+        // from_chars does not set the value here. Too small becomes zero, too large infinite.
         const size_t exponent = word.find_first_of("eE");
         const bool small = exponent != std::string_view::npos
                                ? word.substr(exponent + 1).starts_with('-')
@@ -118,6 +121,18 @@ std::string duration_text(double seconds) {
     if (total < 60) return fmt::format("{} s", total);
     if (total < 3600) return fmt::format("{} min {:02} s", total / 60, total % 60);
     return fmt::format("{} h {:02} min", total / 3600, total / 60 % 60);
+}
+
+void warn(const std::string& text) {
+    static const std::shared_ptr<spdlog::logger> logger = [] {
+        std::shared_ptr<spdlog::logger> made = spdlog::get("ewa");
+        if (!made) {
+            made = spdlog::stderr_color_mt("ewa");
+            made->set_pattern("%^%l%$: %v");
+        }
+        return made;
+    }();
+    logger->warn("{}", one_line(text));
 }
 
 }  // namespace ewa::core

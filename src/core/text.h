@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Small text helpers shared by the readers of text files.
+// Text: parsing of words and numbers, safe display of foreign text, and warnings.
 #pragma once
 #include <charconv>
 #include <cstdint>
@@ -9,21 +9,21 @@
 
 namespace ewa::core {
 
-/// The text as it may be shown, whatever a file or a path holds: white space as spaces, every other control
-/// character (of Unicode too, and what turns the direction of text) and every byte that is no UTF-8 as \x1b,
-/// in hexadecimal. Every error, and every name that a terminal sees, goes through this.
+/// The text in a form that is safe to display, on one line. White space becomes spaces. Other control
+/// characters, characters that change the direction of text, and bytes that are not UTF-8 become hexadecimal,
+/// as \x1b. All errors and all names for a terminal must pass through this.
 std::string one_line(std::string_view text);
 
-/// Cuts the first word (separated by blanks, tabs or carriage returns) off `rest`; empty at the end.
+/// Removes the first word from `rest` and returns it. White space separates words. Empty at the end.
 std::string_view next_word(std::string_view& rest);
 
-/// Without leading and trailing white space.
+/// The text without leading and trailing white space.
 std::string_view trim(std::string_view text);
 
-/// In lower case (ASCII).
+/// The text in lower case (ASCII only).
 std::string lower(std::string_view text);
 
-/// The whole word as a number, "nan" and "inf" included; independent of the locale.
+/// The whole word as a number, including "nan" and "inf". Independent of the locale.
 std::optional<double> parse_number(std::string_view word);
 
 /// The whole word as an integer that fits T.
@@ -40,5 +40,9 @@ std::string bytes_text(uint64_t bytes);
 
 /// Seconds as "12 s", "3 min 05 s" or "2 h 10 min".
 std::string duration_text(double seconds);
+
+/// Prints a line on standard error through the spdlog logger named "ewa", whose level can silence it.
+/// Standard output is reserved for results.
+void warn(const std::string& text);
 
 }  // namespace ewa::core

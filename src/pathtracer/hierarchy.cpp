@@ -23,7 +23,7 @@ float half_area(const FloatBox& box) {
     return d.x * d.y + d.y * d.z + d.z * d.x;
 }
 
-/// Nodes on the longest way down when each halves the number of triangles.
+/// The depth of a tree whose nodes halve the number of triangles.
 int halving_levels(uint32_t count) {
     return int(std::bit_width(count - 1));
 }
@@ -147,7 +147,7 @@ class Builder {
     /// Reorders the triangles and returns how many go left: at least one, and not all.
     uint32_t divide(uint32_t first, uint32_t count, int depth) {
         const auto begin = hierarchy_.order.begin() + first, end = begin + count;
-        // This node, and below it as many as halving needs.
+        // This node and the levels that halving needs below it would exceed the limit.
         const bool deep = depth + 1 + halving_levels(count) > int(shared::TRACE_STACK);
         if (const Split split = best_split(first, count); split.axis >= 0 && !deep) {
             const FloatBox centers = center_bounds(first, count);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A bounding volume hierarchy of two-child nodes, built by the surface area heuristic over bins (Wald 2007).
+// A bounding volume hierarchy of two-child nodes, built by the binned surface area heuristic (Wald 2007).
 #pragma once
 #include <array>
 #include <cstdint>
@@ -17,18 +17,19 @@ struct FloatBox {
 };
 
 struct Node {
-    std::array<FloatBox, 2> boxes;             // of a child that is none: low above high
-    std::array<uint32_t, 2> references{0, 0};  // as layouts.h describes them
+    std::array<FloatBox, 2> boxes;             // low above high for a missing child
+    std::array<uint32_t, 2> references{0, 0};  // see layouts.h
 };
 
 struct Hierarchy {
-    std::vector<Node> nodes;      // the first is the root
-    std::vector<uint32_t> order;  // leaves count triangles in this order: order[i] is the i-th's number
+    std::vector<Node> nodes;  // the first is the root
+    std::vector<uint32_t>
+        order;  // leaves refer to sorted indices; order[i] is the triangle at sorted index i
 };
 
-/// Boxes of finite numbers, one a triangle, at most 2^28 of them. No leaf has more than TRACE_LEAF_MAX, and
-/// no way down more than TRACE_STACK nodes: where the heuristic would grow deeper, the halves are equal in
-/// number instead.
+/// `boxes` are the finite bounds of at most 2^28 triangles. A leaf has at most TRACE_LEAF_MAX triangles, and
+/// a path from the root at most TRACE_STACK nodes. Where the heuristic would exceed that depth, nodes split
+/// into equal counts.
 Hierarchy build_hierarchy(std::span<const FloatBox> boxes);
 
 }  // namespace ewa::pathtracer

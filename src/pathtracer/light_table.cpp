@@ -31,9 +31,9 @@ Entry entry_of(const scene::Light& light, const glm::dvec3& origin, double unit,
     const bool directional = light.kind == shared::LIGHT_DIRECTIONAL;
     const glm::dvec3 direction = glm::normalize(light.direction);
     const glm::dvec3 place = directional ? -direction : (light.position - origin) / unit;
-    // Irradiance falls with the square of the distance, which is measured in units here.
+    // Irradiance falls with the square of the distance, which is in device units.
     const glm::dvec3 strength = directional ? light.intensity : light.intensity / (unit * unit);
-    // The cone's linear ramp in the cosine, as KHR_lights_punctual writes it.
+    // The cone's linear ramp in the cosine, as in KHR_lights_punctual.
     const double scale = 1 / std::max(0.001, std::cos(light.inner) - std::cos(light.outer));
     for (size_t i = 0; i < 3; ++i) {
         w[i] = word(place[int(i)]);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which light a path asks: a table that draws each by its share of the power.
+// The table from which a path samples a light in proportion to its power.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -9,20 +9,21 @@
 namespace ewa::pathtracer {
 
 struct LightTable {
-    std::vector<uint32_t> words;  // as layouts.h describes lights
+    std::vector<uint32_t> words;  // see layouts.h
     uint32_t count = 0;
     std::vector<double>
         triangle_density;  // per material: probability per area (device units) on its triangles
 };
 
-/// Punctual lights, then the triangles whose material emits, by their place in `order`. emission: mean
-/// radiance per material. Powers: 4 pi of a point's intensity, directional light over the scene's disc, pi
-/// times area and radiance of a triangle, all means over the channels.
+/// The entries are the punctual lights, then the emitting triangles by their sorted index in `order`.
+/// `emission` is the mean radiance per material. The power, averaged over the channels, is 4 pi times the
+/// intensity of a point light, a directional light's irradiance on the scene's disc, and pi times area and
+/// radiance of a triangle.
 LightTable light_table(const scene::MeshScene& scene, const glm::dvec3& origin, double unit,
                        const std::vector<uint32_t>& order, const std::vector<double>& emission);
 
-/// Vose's alias method: entry i is kept where a number of [0, 1) is below threshold[i], else alias[i] is
-/// taken.
+/// Vose's alias method (1991): for a random number in [0, 1), entry i selects i below threshold[i], else
+/// alias[i].
 struct AliasTable {
     std::vector<double> threshold;
     std::vector<uint32_t> alias;

@@ -9,7 +9,9 @@
 #include <numbers>
 
 #include "ewa/error.h"
+#include "image/image_files.h"
 #include "pathtracer/light_table.h"
+#include "scene/color.h"
 
 namespace ewa::pathtracer {
 
@@ -23,8 +25,8 @@ void append(std::vector<uint32_t>& words, const glm::vec3& v, uint32_t last) {
     words.insert(words.end(), {word(v.x), word(v.y), word(v.z), last});
 }
 
-/// An edge is a difference rounded to float32: the corner it ends at may lie this much outside the box of the
-/// corners.
+/// An edge is a difference rounded to float32, so its end may be outside the box of the corners by this
+/// share.
 constexpr float kRounding = 4e-7f;
 
 FloatBox box_of(const DeviceTriangle& t) {
@@ -53,7 +55,7 @@ class Packer {
         pack_materials(lights.triangle_density);
         packed_.lights = lights.words;
         packed_.light_count = lights.count;
-        // A buffer has one texel at least.
+        // A buffer needs at least one texel.
         for (std::vector<uint32_t>* words : {&packed_.textures, &packed_.lights, &packed_.texels})
             if (words->empty()) words->resize(4);
         return std::move(packed_);
@@ -61,7 +63,7 @@ class Packer {
 
   private:
     void place() {
-        if (scene_.triangles.empty()) throw InputError("the scene has no triangles to photograph");
+        if (scene_.triangles.empty()) throw InputError("the scene has no triangles to render");
         if (scene_.triangles.size() > scene::kMostTriangles)
             throw InputError("the scene has " + std::to_string(scene_.triangles.size()) +
                              " triangles, more than " + std::to_string(scene::kMostTriangles));
@@ -149,15 +151,12 @@ class Packer {
         return result;
     }
 
-    /// In linear light, not quite zero: what emits anywhere is drawn sometimes.
+    /// In linear light, and above zero, so that a texture that emits anywhere is sampled sometimes.
     static glm::dvec3 mean_color(const Image& image) {
         glm::dvec3 sum(0);
         for (int y = 0; y < image.height; ++y)
             for (int x = 0; x < image.width; ++x)
-                for (int c = 0; c < 3; ++c) {
-                    const double v = image.at(x, y)[c];
-                    sum[c] += v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
-                }
+                for (int c = 0; c < 3; ++c) sum[c] += scene::linear_of_srgb(image.at(x, y)[c]);
         const double count = double(image.width) * image.height;
         return count > 0 ? glm::max(sum / count, glm::dvec3(1e-3)) : glm::dvec3(1);
     }
@@ -194,6 +193,14 @@ glm::vec3 vector(const uint32_t* words) {
 }
 
 }  // namespace
+
+std::vector<Image> decode_images(const scene::MeshScene& scene) {
+    constexpr int kLargest = 8192;
+    std::vector<Image> images;
+    for (const scene::EncodedImage& encoded : scene.images)
+        images.push_back(image::decode(encoded.bytes, encoded.what, kLargest));
+    return images;
+}
 
 PackedScene pack(const scene::MeshScene& scene, const std::vector<Image>& images) {
     return Packer(scene, images).pack();

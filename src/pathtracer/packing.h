@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A scene as the buffers that lib/mesh.glsl, lib/traversal.glsl and lib/lights.glsl read.
+// A scene as the buffers for lib/mesh.glsl, lib/traversal.glsl and lib/lights.glsl.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -14,33 +14,37 @@
 
 namespace ewa::pathtracer {
 
-/// Texels of all textures together: 256 MiB.
+/// The limit on the texels of all textures together, which is 256 MiB.
 inline constexpr uint64_t kMostTexels = uint64_t(1) << 26;
 
-/// Device coordinates are (world - origin) / unit: the scene's middle, and a power of two that makes its
-/// radius 8 to 16.
+/// Device coordinates are (world - origin) / unit. The origin is the scene's centre, the unit a power of two
+/// that makes its radius 8 to 16.
 struct PackedScene {
-    std::vector<uint32_t> nodes, triangles, surfaces, materials, textures,
-        lights;                    // whole rgba32ui texels, one at least
+    /// Whole rgba32ui texels, at least one.
+    std::vector<uint32_t> nodes, triangles, surfaces, materials, textures, lights;
     std::vector<uint32_t> texels;  // RGBA, 8 bits each
     uint32_t light_count = 0;
     bool alpha_tested = false;
     glm::dvec3 origin{0.0};
     double unit = 1;
-    std::vector<uint32_t> order;  // the scene's triangle that stands at each place
+    std::vector<uint32_t> order;  // the scene's triangle at each sorted index
 };
 
-/// images: those of the scene, decoded, 3 or 4 channels; an empty one stands for white. Throws InputError for
-/// a scene without triangles, or more than kMostTriangles or kMostTexels.
+/// The decoded images of the scene's textures: PNG and JPEG, as in glTF, of at most 8192 x 8192 pixels.
+/// Throws InputError that names the image.
+std::vector<Image> decode_images(const scene::MeshScene& scene);
+
+/// `images` are the scene's decoded images with 3 or 4 channels. An empty image is white. Throws InputError
+/// for a scene without triangles, or above kMostTriangles or kMostTexels.
 PackedScene pack(const scene::MeshScene& scene, const std::vector<Image>& images);
 
-/// The corners as the device has them, in the order of PackedScene::order, for the twin.
+/// The triangles in device coordinates and in sorted order, for the CPU reference.
 struct DeviceTriangle {
     glm::vec3 corner, edge1, edge2;
 };
 std::vector<DeviceTriangle> device_triangles(const PackedScene& packed);
 
-/// The hierarchy as the device has it.
+/// The hierarchy in device coordinates, for the CPU reference.
 std::vector<Node> device_nodes(const PackedScene& packed);
 
 }  // namespace ewa::pathtracer

@@ -10,8 +10,8 @@ namespace ewa::pathtracer {
 
 namespace {
 
-/// Steps one ray may take so that an invocation stays under the device's limit on turns of its loops: per
-/// path a ray and a question to a light for each bounce, and the bounces' own loop.
+/// The steps of one ray so that an invocation stays below the device's limit on loop iterations. Per bounce,
+/// a path has a ray, a shadow ray, and an iteration of the loop over bounces.
 uint32_t steps_for(const passes::Shape& shape, int samples) {
     const uint32_t surfaces = uint32_t(samples) * (shared::TRACE_BOUNCES + 1);
     return (shape.loop_limit - surfaces - 1) / (2 * surfaces);
@@ -81,7 +81,7 @@ shared::TraceCounts PathTracer::trace_paths(const gpu::Buffer& view, uint64_t pi
     for (int first = 0; first < samples; first += samples_at_once_) {
         push.first_sample = uint32_t(first);
         push.samples = uint32_t(std::min(samples_at_once_, samples - first));
-        // A submission each: a device that also draws a desktop ends one that takes long.
+        // One submission each, because a device that also drives a desktop aborts long submissions.
         gpu::Recording recording(device_->limits());
         if (first == 0) {
             recording.fill(sums_, 0, 0, pixels * 16);

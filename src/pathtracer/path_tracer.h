@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A packed scene on a device, and pictures of it through pinholes.
+// A packed scene on a device, and renders of it through pinholes.
 #pragma once
 #include <memory>
 #include <optional>
@@ -17,23 +17,22 @@ namespace ewa::pathtracer {
 
 class PathTracer {
   public:
-    /// Throws RunError where the scene does not fit the device.
+    /// Throws RunError if the scene does not fit the device.
     PathTracer(std::shared_ptr<gpu::Device> device, const pathtracer::PackedScene& scene,
                const scene::Sky& sky);
 
-    /// RGBA: mean radiance of the surfaces each pixel sees (times its coverage) and the share of it that they
-    /// cover. samples
-    /// >= 1 paths a pixel, a function of camera, samples and seed alone. A path brighter than `brightest` in
-    /// a channel counts as that bright.
+    /// RGBA per pixel: mean radiance of the visible surfaces times their coverage, and their coverage. There
+    /// are `samples` >= 1 paths per pixel. The result is a function of camera, samples and seed. Each channel
+    /// of a path is clamped to `brightest`.
     Image radiance(const Camera& camera, int samples, uint64_t seed, double brightest);
 
     struct Seen {
         Image depth;  // one channel: camera z of the pixel's centre in world units, 0: nothing
-        std::vector<uint32_t> triangles;  // place in PackedScene::order, 0xffffffff: none
+        std::vector<uint32_t> triangles;  // sorted index in PackedScene::order, 0xffffffff: none
     };
     Seen seen(const Camera& camera);
 
-    /// So far: rays that the limit on steps ended, and paths that were not finite and count as black.
+    /// Totals so far: rays that the limit on steps ended, and paths that were not finite and count as black.
     uint64_t unfinished_rays() const { return unfinished_; }
     uint64_t dropped_samples() const { return dropped_; }
 
@@ -55,12 +54,8 @@ class PathTracer {
     glm::dvec3 origin_;
     double unit_;
     uint32_t light_count_;
-    int samples_at_once_ = 8;  // paths a pixel and dispatch; fewer give each ray more steps
+    int samples_at_once_ = 8;  // paths per pixel and dispatch; with fewer, each ray may take more steps
     uint64_t unfinished_ = 0, dropped_ = 0;
 };
-
-/// The pictures that the scene's textures are of; those that cannot be decoded are an InputError that names
-/// them. PNG and JPEG, as glTF has them, of at most 8192 x 8192 pixels.
-std::vector<Image> decode_images(const scene::MeshScene& scene);
 
 }  // namespace ewa::pathtracer

@@ -10,9 +10,8 @@
 #include "core/json.h"
 #include "core/text.h"
 #include "ewa/error.h"
-#include "io/gltf/gltf_mesh.h"
-#include "pathtracer/dome.h"
-#include "pathtracer/path_tracer.h"
+#include "io/gltf/mesh.h"
+#include "pathtracer/virtual_camera.h"
 
 namespace ewa {
 namespace pathtracer {
@@ -44,7 +43,7 @@ std::vector<Camera> cameras_for(const scene::MeshScene& scene, const SyntheticOp
         return pathtracer::dome_cameras(scene::bounds_of(scene), o.views.value_or(kDomeViews), o.width,
                                         o.height);
     if (in_file == 0)
-        throw InputError(name + ": has no perspective cameras; --views N puts N on a dome over the scene");
+        throw InputError(name + ": has no perspective cameras; --views N places N on a dome over the scene");
     std::vector<Camera> cameras;
     for (const scene::FileCamera& camera : scene.cameras)
         cameras.push_back(pathtracer::pinhole_of(camera, o.width, o.height));
@@ -95,20 +94,20 @@ std::string RenderJob::depth_name(size_t view) const {
     return "depth/" + stem(view, cameras.size()) + ".exr";
 }
 
-bool RenderJob::taken(const fs::path& folder, size_t view) const {
+bool RenderJob::rendered(const fs::path& folder, size_t view) const {
     return fs::exists(folder / image_name(view)) && fs::exists(folder / depth_name(view));
 }
 
 RenderJob read_render_job(const fs::path& path, const SyntheticOptions& options) {
     check(options);
-    RenderJob subject{.options = options,
-                      .name = path.filename().string(),
-                      .scene = io::read_gltf_mesh(path),
-                      .packed = {},
-                      .cameras = {}};
-    subject.packed = pathtracer::pack(subject.scene, decode_images(subject.scene));
-    subject.cameras = cameras_for(subject.scene, options, core::one_line(path.string()));
-    return subject;
+    RenderJob job{.options = options,
+                  .name = path.filename().string(),
+                  .scene = io::read_gltf_mesh(path),
+                  .packed = {},
+                  .cameras = {}};
+    job.packed = pathtracer::pack(job.scene, decode_images(job.scene));
+    job.cameras = cameras_for(job.scene, options, core::one_line(path.string()));
+    return job;
 }
 
 std::optional<Record> read_record(const fs::path& folder) {
@@ -118,7 +117,7 @@ std::optional<Record> read_record(const fs::path& folder) {
     try {
         json = core::read_json_file<nlohmann::json>(folder / kRecord);
     } catch (const InputError&) {
-        return std::nullopt;  // half a one, or no record of ewa's
+        return std::nullopt;  // truncated, or not a record of ewa
     }
     if (!json.is_object() || !json.contains("fingerprint") || !json["fingerprint"].is_string())
         return std::nullopt;
@@ -139,10 +138,10 @@ bool is_rendered(const std::filesystem::path& scene, const std::filesystem::path
     std::error_code none;
     const auto record = pathtracer::read_record(folder);
     if (!record || !std::filesystem::exists(folder / "transforms.json", none)) return false;
-    const pathtracer::RenderJob subject = pathtracer::read_render_job(scene, options);
-    if (record->fingerprint != subject.fingerprint()) return false;
-    for (size_t i = 0; i < subject.cameras.size(); ++i)
-        if (!subject.taken(folder, i)) return false;
+    const pathtracer::RenderJob job = pathtracer::read_render_job(scene, options);
+    if (record->fingerprint != job.fingerprint()) return false;
+    for (size_t i = 0; i < job.cameras.size(); ++i)
+        if (!job.rendered(folder, i)) return false;
     return true;
 }
 

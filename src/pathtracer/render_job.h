@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is photographed: the scene, from which cameras, and the files that its photographs become.
+// The work of rendering a dataset: scene, cameras and file names, and the record that identifies finished
+// renders.
 #pragma once
 #include <filesystem>
 #include <optional>
@@ -13,7 +14,7 @@
 
 namespace ewa::pathtracer {
 
-/// The file in a folder of photographs that names what they are of.
+/// The record in a folder of renders. Folders of earlier versions have this name, so it stays.
 inline constexpr const char* kRecord = "photographs.json";
 
 struct RenderJob {
@@ -23,20 +24,20 @@ struct RenderJob {
     pathtracer::PackedScene packed;
     std::vector<Camera> cameras;
 
-    /// Of everything that the pictures depend on.
+    /// A hash of everything that the images depend on.
     std::string fingerprint() const;
-    /// Paths within the folder of photographs.
+    /// Paths relative to the dataset's folder.
     std::string image_name(size_t view) const;
     std::string depth_name(size_t view) const;
-    /// The depth is written last.
-    bool taken(const std::filesystem::path& folder, size_t view) const;
+    /// Whether image and depth of a view exist. The depth is written last.
+    bool rendered(const std::filesystem::path& folder, size_t view) const;
 };
 
-/// Throws InputError: the file, as io/gltf_mesh.h says; options out of range; no cameras where the file's are
-/// asked for.
+/// Reads and packs the scene. Throws InputError as io::read_gltf_mesh does, for options out of range, and if
+/// the options ask for the file's cameras but it has none.
 RenderJob read_render_job(const std::filesystem::path& scene, const SyntheticOptions& options);
 
-/// What a folder's record says of the photographs in it; nothing where there is none that can be read.
+/// The contents of a folder's record. Empty if the record is missing or unreadable.
 struct Record {
     std::string fingerprint;
     std::optional<double> exposure;  // stops

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The order of the work: read, pack, find the cameras and the exposure, photograph view after view, choose
-// points, and write transforms.json last.
+// Renders a mesh scene to a dataset: read, pack, find cameras and exposure, render each view, sample points,
+// and write transforms.json last.
 #include "ewa/synthetic_dataset.h"
 
 #include <algorithm>
@@ -13,10 +13,10 @@
 #include "core/random.h"
 #include "core/text.h"
 #include "ewa/error.h"
-#include "io/datasets/transforms_write.h"
-#include "pathtracer/develop.h"
+#include "io/datasets/transforms.h"
 #include "pathtracer/path_tracer.h"
 #include "pathtracer/render_job.h"
+#include "pathtracer/virtual_camera.h"
 #include "shared/constants.h"
 
 namespace ewa {
@@ -30,44 +30,43 @@ void make_folder(const fs::path& folder) {
     std::error_code error;
     fs::create_directories(folder, error);
     if (error || !fs::is_directory(folder))
-        throw RunError(core::one_line(folder.string() + ": the folder cannot be made: " + error.message()));
+        throw RunError(
+            core::one_line(folder.string() + ": the folder cannot be created: " + error.message()));
 }
 
 class Run {
   public:
-    Run(const std::shared_ptr<gpu::Device>& device, pathtracer::RenderJob subject, const fs::path& folder)
-        : subject_(std::move(subject)),
-          folder_(folder),
-          photographer_(device, subject_.packed, subject_.scene.sky) {
-        record_ = {{"scene", subject_.name},
+    Run(const std::shared_ptr<gpu::Device>& device, pathtracer::RenderJob job, const fs::path& folder)
+        : job_(std::move(job)), folder_(folder), tracer_(device, job_.packed, job_.scene.sky) {
+        record_ = {{"scene", job_.name},
                    {"views", cameras_.size()},
                    {"samples", options_.samples},
                    {"seed", options_.seed},
-                   {"fingerprint", subject_.fingerprint()}};
+                   {"fingerprint", job_.fingerprint()}};
         result_.views = int(cameras_.size());
-        result_.color_depends_on_view = scene::color_depends_on_view(subject_.scene);
-        result_.dropped_triangles = subject_.scene.dropped_triangles;
-        result_.remarks = subject_.scene.remarks;
+        result_.color_depends_on_view = scene::color_depends_on_view(job_.scene);
+        result_.dropped_triangles = job_.scene.dropped_triangles;
+        result_.remarks = job_.scene.remarks;
     }
 
     SyntheticDataset run(const std::function<bool(int, int)>& progress) {
         prepare_folder();
         result_.interrupted = !progress(0, int(cameras_.size()));
         for (size_t i = 0; i < cameras_.size() && !result_.interrupted; ++i) {
-            if (subject_.taken(folder_, i))
+            if (job_.rendered(folder_, i))
                 ++result_.kept;
             else
-                photograph(i);
+                render(i);
             result_.interrupted = !progress(int(i) + 1, int(cameras_.size()));
         }
         if (!result_.interrupted) finish();
-        result_.unfinished_rays = photographer_.unfinished_rays();
-        result_.dropped_samples = photographer_.dropped_samples();
+        result_.unfinished_rays = tracer_.unfinished_rays();
+        result_.dropped_samples = tracer_.dropped_samples();
         return result_;
     }
 
   private:
-    /// The files an earlier run wrote, and no others.
+    /// Removes the files of an earlier run, and no others.
     void remove_views() {
         std::vector<fs::path> old{folder_ / "transforms.json"};
         for (const char* name : {"images", "depth"}) {
@@ -83,7 +82,7 @@ class Run {
         }
     }
 
-    /// What an earlier run recorded, where its pictures are the same; else the folder is cleared of them.
+    /// Continues an earlier run if its record matches, else removes its files.
     void prepare_folder() {
         make_folder(folder_);
         const auto earlier = pathtracer::read_record(folder_);
@@ -92,14 +91,14 @@ class Run {
             if (!earlier && fs::exists(folder_ / name))
                 throw InputError(
                     core::one_line(folder_.string() + ": holds \"" + name +
-                                   "\" that are no photographs of a mesh scene; name another folder"));
+                                   "\" that ewa did not render from a mesh scene; name another folder"));
         core::remove_abandoned_files(folder_);
         const bool same =
             earlier && earlier->exposure && earlier->fingerprint == record_["fingerprint"].get<std::string>();
         if (!same) remove_views();
         result_.exposure = same ? *earlier->exposure : options_.exposure ? *options_.exposure : measured();
         record_["exposure"] = result_.exposure;
-        // Before the folders: without it, they would be taken for another's.
+        // Written before the folders, which without it would count as another program's.
         core::write_text_file(folder_ / pathtracer::kRecord, record_.dump(1) + "\n");
         for (const char* name : {"images", "depth"}) {
             make_folder(folder_ / name);
@@ -107,40 +106,40 @@ class Run {
         }
     }
 
-    /// From a few small pictures.
+    /// Measures the exposure in a few small images.
     double measured() {
-        constexpr size_t kPictures = 8;
+        constexpr size_t kImages = 8;
         constexpr int kSmaller = 4, kSamples = 8;
         std::vector<Image> radiances;
-        const size_t count = std::min(kPictures, cameras_.size());
+        const size_t count = std::min(kImages, cameras_.size());
         for (size_t i = 0; i < count; ++i)
-            radiances.push_back(
-                photographer_.radiance(downscale(cameras_[i * cameras_.size() / count], kSmaller), kSamples,
-                                       options_.seed, std::numeric_limits<double>::infinity()));
+            radiances.push_back(tracer_.radiance(downscale(cameras_[i * cameras_.size() / count], kSmaller),
+                                                 kSamples, options_.seed,
+                                                 std::numeric_limits<double>::infinity()));
         return pathtracer::automatic_exposure(radiances);
     }
 
-    void photograph(size_t i) {
+    void render(size_t i) {
         const double factor = std::exp2(result_.exposure);
-        // Each view has numbers of its own.
+        // Each view has its own random numbers.
         const auto words =
             core::pcg4d({uint32_t(i), 0, uint32_t(options_.seed), uint32_t(options_.seed >> 32)});
         const uint64_t seed = uint64_t(words[0]) << 32 | words[1];
         const Image radiance =
-            photographer_.radiance(cameras_[i], options_.samples, seed, shared::TRACE_SAMPLE_MAX / factor);
-        save_image(folder_ / subject_.image_name(i), pathtracer::develop(radiance, factor));
-        save_image(folder_ / subject_.depth_name(i), photographer_.seen(cameras_[i]).depth);
+            tracer_.radiance(cameras_[i], options_.samples, seed, shared::TRACE_SAMPLE_MAX / factor);
+        save_image(folder_ / job_.image_name(i), pathtracer::develop(radiance, factor));
+        save_image(folder_ / job_.depth_name(i), tracer_.seen(cameras_[i]).depth);
     }
 
-    /// As many from each view, at pixels drawn by counting; those that see nothing give none.
+    /// Points from equally many random pixels of each view. Pixels without a surface give none.
     PointCloud points() const {
         PointCloud cloud;
         if (options_.points == 0) return cloud;
         const auto each = uint32_t((size_t(options_.points) + cameras_.size() - 1) / cameras_.size());
         for (size_t view = 0; view < cameras_.size(); ++view) {
             const Camera& camera = cameras_[view];
-            const Image image = load_image(folder_ / subject_.image_name(view)),
-                        depth = load_image(folder_ / subject_.depth_name(view));
+            const Image image = load_image(folder_ / job_.image_name(view)),
+                        depth = load_image(folder_ / job_.depth_name(view));
             for (uint32_t i = 0; i < each && cloud.positions.size() < size_t(options_.points); ++i) {
                 const auto u = core::uniform4({i, uint32_t(view), uint32_t(options_.seed), 0x706f696eu});
                 const int x = int(u[0] * camera.width), y = int(u[1] * camera.height);
@@ -171,15 +170,15 @@ class Run {
             file.points = "points.ply";
         }
         for (size_t i = 0; i < cameras_.size(); ++i)
-            file.frames.push_back({subject_.image_name(i), subject_.depth_name(i), cameras_[i]});
+            file.frames.push_back({job_.image_name(i), job_.depth_name(i), cameras_[i]});
         io::write_transforms(folder_ / "transforms.json", file);
     }
 
-    pathtracer::RenderJob subject_;
-    const SyntheticOptions& options_ = subject_.options;
-    const std::vector<Camera>& cameras_ = subject_.cameras;
+    pathtracer::RenderJob job_;
+    const SyntheticOptions& options_ = job_.options;
+    const std::vector<Camera>& cameras_ = job_.cameras;
     fs::path folder_;
-    PathTracer photographer_;
+    PathTracer tracer_;
     nlohmann::ordered_json record_;
     SyntheticDataset result_;
 };

@@ -25,7 +25,7 @@ std::vector<double> ssim_window() {
 
 namespace {
 
-/// One channel of a picture.
+/// One channel of an image.
 using Plane = std::vector<double>;
 
 /// dot(window, values around i), with zeros outside [0, size).
@@ -65,7 +65,7 @@ Plane limited(Plane plane) {
     return plane;
 }
 
-/// Returns the sum of SSIM over the plane; gradient is that sum's.
+/// Returns the sum of SSIM over the plane, and its gradient with respect to `rendered`.
 double ssim_sum(const Plane& rendered, const Plane& target, int width, int height, Plane& gradient) {
     const std::vector<double> window = ssim_window();
     const Plane x = limited(rendered), y = limited(target);
@@ -83,7 +83,7 @@ double ssim_sum(const Plane& rendered, const Plane& target, int width, int heigh
         sum += ssim;
         by_xx[i] = -ssim / d2;
         by_xy[i] = 2 * n1 / (d1 * d2);
-        // mx stands in n1 and d1, and in sxx and sxy through their products of means.
+        // mx occurs in n1 and d1, and through the products of means in sxx and sxy.
         by_mx[i] =
             2 * my[i] * n2 / (d1 * d2) - 2 * mx[i] * ssim / d1 - 2 * mx[i] * by_xx[i] - my[i] * by_xy[i];
     }
@@ -130,6 +130,34 @@ Loss image_loss(const Raster& rendered, const Raster& target, const Raster& weig
     }
     Loss out = image_loss(pulled, target);
     for (size_t i = 0; i < pulled.values.size(); ++i) out.gradient.values[i] *= weights.values[i / 3];
+    return out;
+}
+
+Raster exposed(const Raster& picture, const Exposure& e) {
+    Raster out(picture.width, picture.height, 3);
+    for (int y = 0; y < picture.height; ++y)
+        for (int x = 0; x < picture.width; ++x) {
+            const double* c = picture.at(x, y);
+            for (size_t row = 0; row < 3; ++row)
+                out.at(x, y)[row] =
+                    e[4 * row] * c[0] + e[4 * row + 1] * c[1] + e[4 * row + 2] * c[2] + e[4 * row + 3];
+        }
+    return out;
+}
+
+ExposureGradient exposed_backward(const Raster& picture, const Exposure& e, const Raster& gradient) {
+    assert(picture.width == gradient.width && picture.height == gradient.height);
+    ExposureGradient out{Raster(picture.width, picture.height, 3), {}};
+    for (int y = 0; y < picture.height; ++y)
+        for (int x = 0; x < picture.width; ++x)
+            for (size_t row = 0; row < 3; ++row) {
+                const double g = gradient.at(x, y)[row];
+                for (size_t k = 0; k < 3; ++k) {
+                    out.picture.at(x, y)[k] += g * e[4 * row + k];
+                    out.exposure[4 * row + k] += g * picture.at(x, y)[k];
+                }
+                out.exposure[4 * row + 3] += g;
+            }
     return out;
 }
 

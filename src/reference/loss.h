@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-// The training loss of a picture and its gradient.
+// The training loss of an image and its gradient.
 //
 //   L    = (1 - SSIM_WEIGHT) mean|x - y| + SSIM_WEIGHT (1 - mean SSIM)       means over pixels and RGB
 //   SSIM = (2 mx my + C1)(2 sxy + C2) / ((mx^2 + my^2 + C1)(sxx + syy + C2)) Wang et al. 2004, eq. 13
-// with mx = w * x, sxx = w * x^2 - mx^2, sxy = w * xy - mx my and so on; w is a Gaussian window whose weights
+// with mx = w * x, sxx = w * x^2 - mx^2, sxy = w * xy - mx my and so on. w is a Gaussian window whose weights
 // add up to 1, zero padded at the border (3DGS, utils/loss_utils.py), where the sums are therefore smaller.
-// The rendering x is not clamped to [0, 1]; SSIM takes both pictures within SSIM_LIMIT of zero.
+// The render x is not clamped to [0, 1]. SSIM clamps both images to [-SSIM_LIMIT, SSIM_LIMIT].
 //
-// As w is symmetric, with the partial derivatives taken with mx, E[xx], E[xy] as the variables:
+// w is symmetric. With mx, E[xx] and E[xy] as the variables of the partial derivatives:
 //   dSSIM/dx = w * (dSSIM/dmx) + 2 x (w * dSSIM/dE[xx]) + y (w * dSSIM/dE[xy])
 // The derivative of |.| at 0 is 0.
 //
-// Where a pixel counts only by a weight m, x' = m x + (1 - m) y takes the place of x: dL/dx = m dL/dx'.
+// With a pixel weight m, x' = m x + (1 - m) y replaces x, so dL/dx = m dL/dx'.
 #pragma once
+#include <array>
 #include <vector>
 
 #include "reference/values.h"
@@ -32,5 +33,21 @@ Loss image_loss(const Raster& rendered, const Raster& target, const Raster& weig
 
 /// The window's 2 * SSIM_RADIUS + 1 taps along one axis.
 std::vector<double> ssim_window();
+
+// The exposure of a training image (include/ewa/exposure.h), and the gradient through it:
+//   c' = M c + b:   dL/dc = M^T dL/dc',   dL/dM = sum over pixels of dL/dc' c^T,   dL/db = sum of dL/dc'
+
+/// Three rows of (matrix row, offset).
+using Exposure = std::array<double, 12>;
+
+/// The RGB image with the exposure applied.
+Raster exposed(const Raster& picture, const Exposure& exposure);
+
+struct ExposureGradient {
+    Raster picture;       // dL/d(image)
+    Exposure exposure{};  // dL/d(exposure)
+};
+/// `picture` is the image before the exposure, `gradient` is dL/d(exposed image).
+ExposureGradient exposed_backward(const Raster& picture, const Exposure& exposure, const Raster& gradient);
 
 }  // namespace ewa::reference

@@ -7,12 +7,36 @@
 #include <glm/matrix.hpp>
 #include <numbers>
 
-#include "reference/spherical_harmonics.h"
 #include "shared/constants.h"
 
 namespace ewa::reference {
 
 using namespace shared;
+
+std::array<glm::dvec3, kMaxCoefficients> sh_basis_gradient(int degree, const glm::dvec3& direction) {
+    const double x = direction.x, y = direction.y, z = direction.z;
+    const double xx = x * x, yy = y * y, zz = z * z, xy = x * y, xz = x * z, yz = y * z;
+    std::array<glm::dvec3, kMaxCoefficients> gradient{};
+    if (degree < 1) return gradient;
+    gradient[1] = {0, -SH_C1, 0};
+    gradient[2] = {0, 0, SH_C1};
+    gradient[3] = {-SH_C1, 0, 0};
+    if (degree < 2) return gradient;
+    gradient[4] = SH_C2_0 * glm::dvec3(y, x, 0);
+    gradient[5] = SH_C2_1 * glm::dvec3(0, z, y);
+    gradient[6] = SH_C2_2 * glm::dvec3(-2 * x, -2 * y, 4 * z);
+    gradient[7] = SH_C2_3 * glm::dvec3(z, 0, x);
+    gradient[8] = SH_C2_4 * glm::dvec3(2 * x, -2 * y, 0);
+    if (degree < 3) return gradient;
+    gradient[9] = SH_C3_0 * glm::dvec3(6 * xy, 3 * xx - 3 * yy, 0);
+    gradient[10] = SH_C3_1 * glm::dvec3(yz, xz, xy);
+    gradient[11] = SH_C3_2 * glm::dvec3(-2 * xy, 4 * zz - xx - 3 * yy, 8 * yz);
+    gradient[12] = SH_C3_3 * glm::dvec3(-6 * xz, -6 * yz, 6 * zz - 3 * xx - 3 * yy);
+    gradient[13] = SH_C3_4 * glm::dvec3(4 * zz - 3 * xx - yy, -2 * xy, 8 * xz);
+    gradient[14] = SH_C3_5 * glm::dvec3(2 * xz, -2 * yz, xx - yy);
+    gradient[15] = SH_C3_6 * glm::dvec3(3 * xx - 3 * yy, -6 * xy, 0);
+    return gradient;
+}
 
 double robust_norm(const std::array<double, 4>& q) {
     double largest = 0;
@@ -41,7 +65,7 @@ bool stored_values_usable(const Splat& splat) {
     return std::isfinite(splat.opacity_logit) && robust_norm(splat.quaternion) >= QUATERNION_MIN;
 }
 
-/// Phrased so that NaN fails it.
+/// False for NaN.
 bool within(double most, const glm::dvec3& v) {
     return std::abs(v.x) <= most && std::abs(v.y) <= most && std::abs(v.z) <= most;
 }
@@ -51,8 +75,8 @@ double sum_of_sizes(const Rows& m) {
     return sizes.x + sizes.y + sizes.z;
 }
 
-/// x/z (or y/z) moved into the picture's span plus a margin of JACOBIAN_MARGIN half pictures on either side,
-/// measured from the principal point (gsplat, Utils.cuh, persp_proj).
+/// Clamps x/z or y/z to the image with a margin of JACOBIAN_MARGIN half images on each side, relative to the
+/// principal point (gsplat, Utils.cuh, persp_proj).
 double clamp_slope(double slope, double focal, double principal, int size, bool& free) {
     const double margin = JACOBIAN_MARGIN * size / (2 * focal);
     const double low = -(principal / focal + margin);
@@ -73,7 +97,7 @@ void project_shape(const Splat& splat, const Camera& camera, ProjectionSteps& s)
     s.rotation = rotation_matrix(s.unit_quaternion);
     s.scale = {std::exp(splat.log_scale.x), std::exp(splat.log_scale.y), std::exp(splat.log_scale.z)};
 
-    // A row vector times a matrix is vector * matrix in glm.
+    // In glm, vector * matrix is a row vector times a matrix.
     s.screen = {jacobian.x * camera.rotation, jacobian.y * camera.rotation};
     s.m = {(s.screen.x * s.rotation) * s.scale, (s.screen.y * s.rotation) * s.scale};
 }
@@ -148,6 +172,127 @@ Projected project(const Gaussians& gaussians, size_t i, const Camera& camera, co
 
 Projected project(const Values& values, size_t i, const Camera& camera, const RenderOptions& options) {
     return project(read_splat(values, i), camera, options);
+}
+
+namespace {
+
+/// dL/ddet0 and dL/dtrace given dL/dfactor, where det = det0 + LOW_PASS * trace + LOW_PASS^2.
+struct DetGradient {
+    double det0 = 0, trace = 0;
+};
+
+DetGradient kernel_backward(Kernel kernel, const ProjectionSteps& s, double det, double by_factor) {
+    switch (kernel) {
+        case Kernel::peak:
+            return {};
+        case Kernel::antialias: {
+            // sqrt(det0 / det). det0 > 0, because otherwise the factor is zero and the splat invisible.
+            const double by_det = -0.5 * s.kernel_factor / det;
+            return {by_factor * (0.5 / std::sqrt(s.det0 * det) + by_det), by_factor * by_det * LOW_PASS};
+        }
+        case Kernel::unit_mass: {
+            const double by_det = -0.5 * s.kernel_factor / det;
+            return {by_factor * by_det, by_factor * by_det * LOW_PASS};
+        }
+    }
+    return {};
+}
+
+Rows m_gradient(const ProjectionSteps& s, const ScreenGradient& g, const DetGradient& det) {
+    const Rows& m = s.m;
+    Rows out;
+    out.x = 2 * g.a * m.x + g.b * m.y;
+    out.y = g.b * m.x + 2 * g.c * m.y;
+    const glm::dvec3 n = glm::cross(m.x, m.y);
+    out.x += 2 * det.det0 * glm::cross(m.y, n) + 2 * det.trace * m.x;
+    out.y += 2 * det.det0 * glm::cross(n, m.x) + 2 * det.trace * m.y;
+    return out;
+}
+
+/// dL/d(unit quaternion) from dL/dR, the derivative of rotation_matrix(); r[column][row] as glm has it.
+std::array<double, 4> rotation_backward(const std::array<double, 4>& q, const glm::dmat3& r) {
+    const auto [w, x, y, z] = q;
+    return {2 * (x * (r[1][2] - r[2][1]) + y * (r[2][0] - r[0][2]) + z * (r[0][1] - r[1][0])),
+            2 * (y * (r[0][1] + r[1][0]) + z * (r[0][2] + r[2][0]) + w * (r[1][2] - r[2][1]) -
+                 2 * x * (r[1][1] + r[2][2])),
+            2 * (x * (r[0][1] + r[1][0]) + z * (r[1][2] + r[2][1]) + w * (r[2][0] - r[0][2]) -
+                 2 * y * (r[0][0] + r[2][2])),
+            2 * (x * (r[0][2] + r[2][0]) + y * (r[1][2] + r[2][1]) + w * (r[0][1] - r[1][0]) -
+                 2 * z * (r[0][0] + r[1][1]))};
+}
+
+void shape_backward(const ProjectionSteps& s, const Rows& by_m, Splat& out) {
+    // dL/d(R S), column k = by axis k.
+    glm::dmat3 by_rs(0);
+    for (int k = 0; k < 3; ++k) by_rs[k] = s.screen.x * by_m.x[k] + s.screen.y * by_m.y[k];
+    glm::dmat3 by_r(0);
+    for (int k = 0; k < 3; ++k) {
+        by_r[k] = by_rs[k] * s.scale[k];
+        out.log_scale[k] = s.scale[k] * glm::dot(s.rotation[k], by_rs[k]);
+    }
+    const std::array<double, 4> by_unit = rotation_backward(s.unit_quaternion, by_r);
+    double along = 0;
+    for (int k = 0; k < 4; ++k) along += s.unit_quaternion[k] * by_unit[k];
+    for (int k = 0; k < 4; ++k)
+        out.quaternion[k] = (by_unit[k] - s.unit_quaternion[k] * along) / s.quaternion_norm;
+}
+
+/// dL/d(view position) through mean2d and through J.
+glm::dvec3 view_backward(const ProjectionSteps& s, const Camera& camera, const ScreenGradient& g,
+                         const Rows& by_m) {
+    const double z = s.view.z, fx = camera.fx, fy = camera.fy;
+    glm::dvec3 by_view{g.mean2d.x * fx / z, g.mean2d.y * fy / z, 0};
+    by_view.z = -(g.mean2d.x * fx * s.view.x + g.mean2d.y * fy * s.view.y) / (z * z);
+
+    // dL/dJ = dL/dM (W R S)^T, row by row.
+    const glm::dmat3 wrs =
+        camera.rotation *
+        glm::dmat3(s.rotation[0] * s.scale[0], s.rotation[1] * s.scale[1], s.rotation[2] * s.scale[2]);
+    const glm::dvec3 by_jx = wrs * by_m.x, by_jy = wrs * by_m.y;
+    // J's entries are fx/z and -fx tx/z; the slope tx = x/z moves with x and z unless it is clamped.
+    by_view.z += -(fx * by_jx.x + fy * by_jy.y) / (z * z);
+    by_view.z += (fx * s.slope.x * by_jx.z + fy * s.slope.y * by_jy.z) / (z * z);
+    const double by_slope_x = s.slope_free.x ? -fx / z * by_jx.z : 0;
+    const double by_slope_y = s.slope_free.y ? -fy / z * by_jy.z : 0;
+    by_view.x += by_slope_x / z;
+    by_view.y += by_slope_y / z;
+    by_view.z += -(by_slope_x * s.view.x + by_slope_y * s.view.y) / (z * z);
+    return by_view;
+}
+
+/// Sets the coefficients' gradient and returns dL/d(mean - camera position) through the direction.
+glm::dvec3 color_backward(const Splat& splat, const ProjectionSteps& s, const glm::dvec3& gradient,
+                          Splat& out) {
+    glm::dvec3 by_color(0);
+    for (int k = 0; k < 3; ++k) by_color[k] = s.raw_color[k] > 0 ? gradient[k] : 0;
+    const auto basis = sh_basis(s.sh_degree, s.direction);
+    const auto basis_gradient = sh_basis_gradient(s.sh_degree, s.direction);
+    glm::dvec3 by_direction(0);
+    for (int j = 0; j < sh_coefficients(s.sh_degree); ++j) {
+        out.sh[j] = basis[j] * by_color;
+        by_direction += glm::dot(by_color, splat.sh[j]) * basis_gradient[j];
+    }
+    return (by_direction - s.direction * glm::dot(s.direction, by_direction)) / glm::length(s.offset);
+}
+
+}  // namespace
+
+Splat project_backward(const Splat& splat, const Camera& camera, const RenderOptions& options,
+                       const ScreenGradient& gradient) {
+    Splat out;
+    out.sh_degree = splat.sh_degree;
+    ProjectionSteps s;
+    const Projected projected = project(splat, camera, options, &s);
+    if (!projected.visible) return out;
+
+    const DetGradient by_det =
+        kernel_backward(options.kernel, s, projected.det, gradient.opacity * s.sigmoid);
+    const Rows by_m = m_gradient(s, gradient, by_det);
+    shape_backward(s, by_m, out);
+    out.opacity_logit = gradient.opacity * s.kernel_factor * s.sigmoid * (1 - s.sigmoid);
+    const glm::dvec3 by_offset = color_backward(splat, s, gradient.color, out);
+    out.mean = glm::transpose(camera.rotation) * view_backward(s, camera, gradient, by_m) + by_offset;
+    return out;
 }
 
 }  // namespace ewa::reference

@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// One splat seen by one camera: where it lies in the picture, how far it reaches, how opaque and what colour
-// it is.
+// The projection of a splat to an image: position, footprint, opacity and colour.
 //
-// The mean goes through the pinhole; the covariance through the pinhole's linearisation at the mean (Zwicker
-// et al. 2001, "EWA Splatting", eq. 31; Kerbl et al. 2023, "3D Gaussian Splatting", eq. 5 and 6):
-//   p      = W (mean - camera position)                                 view coordinates
-//   mean2d = (fx p.x / p.z + cx, fy p.y / p.z + cy)                     px, not clamped
-//   J      = [fx/z 0 -fx tx/z; 0 fy/z -fy ty/z]                         tx = clamp(p.x / z), ty = clamp(p.y /
-//   z) M      = J W R S                                                    2 x 3; R from the unit quaternion,
-//   S = exp(log scale) [a b; b c] = M M^T + LOW_PASS * I                                   px^2 det0   =
-//   det(M M^T) = |row0 x row1|^2                               Cauchy-Binet: the squared 2 x 2 minors of M
-//   det    = det0 + LOW_PASS * trace(M M^T) + LOW_PASS^2                never the cancelling a c - b^2
+// The pinhole projects the mean, and its linearisation at the mean projects the covariance (Zwicker et al.
+// 2001, "EWA Splatting", eq. 31; Kerbl et al. 2023, "3D Gaussian Splatting", eq. 5 and 6):
+//   p          = W (mean - camera position)                   view coordinates
+//   mean2d     = (fx p.x / p.z + cx, fy p.y / p.z + cy)       px, not clamped
+//   J          = [fx/z 0 -fx tx/z; 0 fy/z -fy ty/z]           tx = clamp(p.x / z), ty = clamp(p.y / z)
+//   M          = J W R S                                      2 x 3; R: unit quaternion, S: exp(log scale)
+//   [a b; b c] = M M^T + LOW_PASS * I                         px^2
+//   det0       = det(M M^T) = |row0 x row1|^2                 Cauchy-Binet: squared 2 x 2 minors of M
+//   det        = det0 + LOW_PASS * trace(M M^T) + LOW_PASS^2  avoids the cancellation of a c - b^2
 // Opacity is sigmoid(logit) times the kernel's factor (KERNEL_* in shared/constants.h):
 //   peak 1;  antialias sqrt(max(0, det0 / det));  unit mass 1 / (2 pi sqrt(det))
 // Colour is max(0, COLOR_OFFSET + sum_j sh_j Y_j(direction)), direction = normalise(mean - camera position).
 #pragma once
+#include <array>
 #include <cstddef>
 #include <glm/mat3x3.hpp>
 #include <glm/vec2.hpp>
@@ -23,19 +23,22 @@
 #include "ewa/camera.h"
 #include "ewa/render_options.h"
 #include "reference/values.h"
+#include "scene/color.h"
 
 namespace ewa::reference {
 
-/// Neither flag set: culled, that is z not above NEAR_PLANE or opacity below ALPHA_MIN. Only a visible
-/// splat's other members hold anything.
+using scene::sh_basis;
+
+/// If neither flag is set, the splat is culled: z is not above NEAR_PLANE, or the opacity is below ALPHA_MIN.
+/// The other members are valid for a visible splat.
 struct Projected {
     bool visible = false;
-    /// A mean, quaternion, log scale or opacity that is not finite, a quaternion under QUATERNION_MIN, or a
-    /// mean beyond VIEW_MAX, wherever the splat is. Also one in front of the camera whose footprint is beyond
-    /// FOOTPRINT_MAX or whose colour is beyond COLOR_MAX or not finite.
+    /// Set for a mean, quaternion, log scale or opacity that is not finite, a quaternion below
+    /// QUATERNION_MIN, or a mean beyond VIEW_MAX. In front of the camera, also for a footprint beyond
+    /// FOOTPRINT_MAX, or a colour beyond COLOR_MAX or not finite.
     bool skipped_nonfinite = false;
     double z = 0;                // view depth, world units
-    glm::dvec2 mean2d{0};        // px from the picture's top left corner
+    glm::dvec2 mean2d{0};        // px from the image's top left corner
     double a = 0, b = 0, c = 0;  // covariance with the low-pass, px^2
     double det = 0;              // of that covariance
     double opacity = 0;          // peak of the footprint, before the clamp to ALPHA_MAX
@@ -47,7 +50,7 @@ struct Rows {
     glm::dvec3 x{0}, y{0};
 };
 
-/// What the way back through the projection needs again.
+/// Intermediate values for the backward pass.
 struct ProjectionSteps {
     glm::dvec3 offset{0};         // mean - camera position
     glm::dvec3 view{0};           // p
@@ -67,16 +70,43 @@ struct ProjectionSteps {
     glm::dvec3 raw_color{0};  // before the max
 };
 
-/// steps: filled in when given and the splat is visible.
+/// `steps` is set if it is given and the splat is visible.
 Projected project(const Splat& splat, const Camera& camera, const RenderOptions& options,
                   ProjectionSteps* steps = nullptr);
 Projected project(const Gaussians& gaussians, size_t i, const Camera& camera, const RenderOptions& options);
 Projected project(const Values& values, size_t i, const Camera& camera, const RenderOptions& options);
 
-/// Columns are the rotated axes; the quaternion (w x y z) has unit norm.
+/// The columns are the rotated axes. The quaternion (w x y z) must have unit norm.
 glm::dmat3 rotation_matrix(const std::array<double, 4>& unit_quaternion);
 
 /// Euclidean norm without overflow or underflow of the squares.
 double robust_norm(const std::array<double, 4>& quaternion);
+
+/// dL/d(output of the projection of a splat). b occurs twice in the symmetric covariance, and its gradient
+/// counts both: moving b by e changes L by gradient.b * e. As a symmetric matrix, dL/dSigma = [a b/2; b/2 c].
+struct ScreenGradient {
+    glm::dvec2 mean2d{0};
+    double a = 0, b = 0, c = 0;
+    double opacity = 0;
+    glm::dvec3 color{0};
+    glm::dvec2 absolute{0};  // sum over pixels of |dL/dmean2d|, by component (Ye et al. 2024, AbsGS, eq. 7)
+};
+
+// The backward pass of the projection, with G = dL/dSigma as a symmetric matrix:
+//   dL/dM  = 2 G M, plus the kernel factor's share through det0 and det:
+//            ddet0/drow0 = 2 row1 x n, ddet0/drow1 = 2 n x row0 with n = row0 x row1; dtrace/dM = 2 M
+//   dL/dJ  = dL/dM (W R S)^T;  dL/d(R S) = (J W)^T dL/dM
+//   dL/dlog s_k = s_k sum_i R_ik dL/d(R S)_ik
+//   dL/dq  = (I - q^ q^T) dL/dq^ / |q|, q^ = q / |q|
+// The mean moves mean2d, J (not through a slope that is clamped) and the direction of the colour.
+// A channel of the colour that max(0, .) clamps to zero has no gradient.
+
+/// dL/d(stored value). Zero for an invisible splat, and for coefficients above the degree in use.
+Splat project_backward(const Splat& splat, const Camera& camera, const RenderOptions& options,
+                       const ScreenGradient& gradient);
+
+/// dY_j/d(x, y, z) of the polynomials in scene/color.h, with independent x, y and z. The caller's
+/// normalisation removes the part along the direction.
+std::array<glm::dvec3, kMaxCoefficients> sh_basis_gradient(int degree, const glm::dvec3& direction);
 
 }  // namespace ewa::reference

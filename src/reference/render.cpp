@@ -1,41 +1,41 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "reference/render.h"
 
-#include "reference/order.h"
-#include "reference/project_backward.h"
+#include "reference/projection.h"
+#include "reference/sort.h"
 
 namespace ewa::reference {
 
 Picture render(const Values& values, const Camera& camera, const RenderOptions& options,
-               const TwinOptions& twin) {
+               const ReferenceOptions& reference) {
     Picture out;
     for (size_t i = 0; i < values.size(); ++i) {
         out.projected.push_back(project(values, i, camera, options));
         if (out.projected.back().skipped_nonfinite) ++out.skipped_nonfinite;
     }
     out.order = depth_order(out.projected);
-    const TileGrid grid{camera.width, camera.height, twin.tile_width, twin.tile_height};
-    out.instances = make_instances(out.projected, out.order, grid, twin.smoothing);
-    out.blended = blend(out.projected, out.instances, options.background, twin.smoothing);
+    const TileGrid grid{camera.width, camera.height, reference.tile_width, reference.tile_height};
+    out.instances = make_instances(out.projected, out.order, grid, reference.smoothing);
+    out.blended = blend(out.projected, out.instances, options.background, reference.smoothing);
     return out;
 }
 
 Picture render(const Gaussians& gaussians, const Camera& camera, const RenderOptions& options,
-               const TwinOptions& twin) {
-    return render(to_double(gaussians), camera, options, twin);
+               const ReferenceOptions& reference) {
+    return render(to_double(gaussians), camera, options, reference);
 }
 
-LossGradientTwin loss_gradient(const Values& values, const Camera& camera, const Image& target,
-                               const RenderOptions& options, const TwinOptions& twin) {
-    LossGradientTwin out;
-    out.picture = render(values, camera, options, twin);
+ReferenceGradient loss_gradient(const Values& values, const Camera& camera, const Image& target,
+                                const RenderOptions& options, const ReferenceOptions& reference) {
+    ReferenceGradient out;
+    out.picture = render(values, camera, options, reference);
     const Loss loss = image_loss(out.picture.blended.color, to_double(target));
     out.loss = loss.loss;
     out.l1 = loss.l1;
     out.ssim = loss.ssim;
     out.picture_gradient = loss.gradient;
     out.blend = blend_backward(out.picture.projected, out.picture.instances, out.picture.blended,
-                               loss.gradient, twin.smoothing);
+                               loss.gradient, reference.smoothing);
     out.gradient = zeros_like(values);
     for (size_t i = 0; i < values.size(); ++i)
         write_splat(out.gradient, i,
@@ -45,9 +45,9 @@ LossGradientTwin loss_gradient(const Values& values, const Camera& camera, const
     return out;
 }
 
-LossGradientTwin loss_gradient(const Gaussians& gaussians, const Camera& camera, const Image& target,
-                               const RenderOptions& options, const TwinOptions& twin) {
-    return loss_gradient(to_double(gaussians), camera, target, options, twin);
+ReferenceGradient loss_gradient(const Gaussians& gaussians, const Camera& camera, const Image& target,
+                                const RenderOptions& options, const ReferenceOptions& reference) {
+    return loss_gradient(to_double(gaussians), camera, target, options, reference);
 }
 
 }  // namespace ewa::reference

@@ -10,7 +10,7 @@ namespace ewa::reference {
 
 namespace {
 
-/// Where the ray enters the box, or nothing.
+/// The distance at which the ray enters the box. Empty if it misses.
 std::optional<double> enter(const Ray& ray, const pathtracer::FloatBox& box, double reach) {
     double first = 0, last = reach;
     for (int axis = 0; axis < 3; ++axis) {
@@ -27,6 +27,16 @@ std::optional<double> enter(const Ray& ray, const pathtracer::FloatBox& box, dou
     }
     if (first > last) return std::nullopt;
     return first;
+}
+
+/// Tests the triangles [first, end). Each hit replaces `nearest` and shortens the ray.
+void meet_range(Ray& ray, std::span<const pathtracer::DeviceTriangle> triangles, uint32_t first, uint32_t end,
+                std::optional<Hit>& nearest) {
+    for (uint32_t i = first; i < end; ++i)
+        if (auto hit = meet(ray, triangles[i])) {
+            nearest = Hit{i, hit->distance, hit->barycentric};
+            ray.reach = hit->distance;
+        }
 }
 
 }  // namespace
@@ -46,11 +56,7 @@ std::optional<Hit> meet(const Ray& ray, const pathtracer::DeviceTriangle& triang
 std::optional<Hit> nearest_of_all(const Ray& ray, std::span<const pathtracer::DeviceTriangle> triangles) {
     std::optional<Hit> nearest;
     Ray shorter = ray;
-    for (uint32_t i = 0; i < triangles.size(); ++i)
-        if (auto hit = meet(shorter, triangles[i])) {
-            nearest = Hit{i, hit->distance, hit->barycentric};
-            shorter.reach = hit->distance;
-        }
+    meet_range(shorter, triangles, 0, uint32_t(triangles.size()), nearest);
     return nearest;
 }
 
@@ -65,11 +71,7 @@ std::optional<Hit> trace(const Ray& ray, std::span<const pathtracer::Node> nodes
         if (reference & shared::LEAF_FLAG) {
             const uint32_t first = reference & shared::LEAF_FIRST_MASK;
             const uint32_t count = ((reference & ~shared::LEAF_FLAG) >> shared::LEAF_COUNT_SHIFT) + 1;
-            for (uint32_t i = first; i < first + count; ++i)
-                if (auto hit = meet(shorter, triangles[i])) {
-                    nearest = Hit{i, hit->distance, hit->barycentric};
-                    shorter.reach = hit->distance;
-                }
+            meet_range(shorter, triangles, first, first + count, nearest);
             continue;
         }
         const pathtracer::Node& node = nodes[reference];

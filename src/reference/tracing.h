@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The float64 twin of shaders/lib/traversal.glsl.
+// The float64 CPU reference of shaders/lib/traversal.glsl.
 #pragma once
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
@@ -11,7 +11,7 @@
 namespace ewa::reference {
 
 struct Ray {
-    glm::dvec3 origin, direction;  // of any length, in which distances are measured
+    glm::dvec3 origin, direction;  // the length of the direction is the unit of distances
     double reach = 1e300;
 };
 
@@ -21,14 +21,14 @@ struct Hit {
     glm::dvec2 barycentric{0.0};  // weights of corners 1 and 2
 };
 
-/// Where the ray meets the triangle (Moeller and Trumbore 1997), from either side; edges belong to it.
+/// The intersection of the ray and the triangle (Moeller and Trumbore 1997), from either side, including the
+/// edges.
 std::optional<Hit> meet(const Ray& ray, const pathtracer::DeviceTriangle& triangle);
 
-/// The nearest of all triangles, by asking each.
+/// The nearest hit, by testing every triangle.
 std::optional<Hit> nearest_of_all(const Ray& ray, std::span<const pathtracer::DeviceTriangle> triangles);
 
-/// The same through the hierarchy, in the shader's order; deepest: the most children that waited on the
-/// stack.
+/// The same through the hierarchy, in the order of the shader. `deepest` gets the largest size of the stack.
 std::optional<Hit> trace(const Ray& ray, std::span<const pathtracer::Node> nodes,
                          std::span<const pathtracer::DeviceTriangle> triangles, size_t* deepest = nullptr);
 

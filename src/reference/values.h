@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Splats in float64: the scene as the twin reads it, and gradients with respect to it.
+// Splats and images in float64: the CPU reference's scene, and gradients with respect to it.
 #pragma once
 #include <array>
 #include <cstddef>
@@ -13,7 +13,7 @@ namespace ewa::reference {
 
 inline constexpr int kMaxCoefficients = sh_coefficients(kMaxShDegree);
 
-/// The layout of Gaussians in double. Holds a scene, or dL/d(stored value) in place of each stored value.
+/// The layout of Gaussians in double. Holds a scene, or dL/d(stored value) for each stored value.
 struct Values {
     int sh_degree = 0;
     std::vector<double> means, quaternions, log_scales, opacity_logits, sh;
@@ -30,7 +30,7 @@ struct Splat {
     glm::dvec3 log_scale{0};
     double opacity_logit = 0;
     int sh_degree = 0;
-    std::array<glm::dvec3, kMaxCoefficients> sh{};  // RGB per coefficient; those above sh_degree are zero
+    std::array<glm::dvec3, kMaxCoefficients> sh{};  // RGB per coefficient; zero above sh_degree
 };
 
 Values to_double(const Gaussians& gaussians);
@@ -38,10 +38,10 @@ Values zeros_like(const Values& values);
 
 Splat read_splat(const Gaussians& gaussians, size_t i);
 Splat read_splat(const Values& values, size_t i);
-/// Coefficients above values.sh_degree are left out.
+/// Coefficients above values.sh_degree are skipped.
 void write_splat(Values& values, size_t i, const Splat& splat);
 
-/// A picture in double, row-major and interleaved as Image.
+/// An image in double, row-major and interleaved as in Image.
 struct Raster {
     int width = 0, height = 0, channels = 0;
     std::vector<double> values;
@@ -53,7 +53,7 @@ struct Raster {
     const double* at(int x, int y) const { return &values[(size_t(y) * width + x) * channels]; }
 };
 
-/// RGB of a picture with 3 or more channels.
+/// The RGB of an image with 3 or more channels.
 Raster to_double(const Image& image);
 
 }  // namespace ewa::reference

@@ -12,13 +12,13 @@
 namespace ewa::reference {
 namespace {
 
-constexpr double kReach = 6;  // standard deviations beyond which a splat is nothing: 1e-9 of it
+constexpr double kReach = 6;  // standard deviations; only 1e-9 of a splat is beyond
 
 double normal_cdf(double x) {
     return 0.5 * std::erfc(-x * std::numbers::sqrt2 / 2);
 }
 
-/// Optical depth of a splat between two distances.
+/// The optical depth of a splat between two distances.
 double depth_between(const RayGaussian& g, double from, double to) {
     return g.depth * (normal_cdf((to - g.middle) / g.sigma) - normal_cdf((from - g.middle) / g.sigma));
 }
@@ -30,7 +30,8 @@ double density(const RayGaussian& g, double t) {
                : g.depth * std::exp(-0.5 * u * u) / (g.sigma * std::sqrt(2 * std::numbers::pi));
 }
 
-/// Where the integrand changes its shape: at whole standard deviations of every splat.
+/// Borders of the quadrature's intervals: the integrand changes its shape at a few standard deviations of
+/// every splat.
 std::vector<double> borders_of(const std::vector<RayGaussian>& line, double near) {
     std::vector<double> borders{near};
     for (const RayGaussian& g : line)
@@ -68,7 +69,7 @@ Volume::Volume(const Values& values, const Camera& camera, const RenderOptions& 
 }
 
 void Volume::list(uint32_t member, const Projected& p, double size) {
-    // Where perspective bends a splat's outline its linear footprint says too little: such a one is in every
+    // If perspective bends a splat's outline, its linear footprint is too small. Such a splat is in every
     // tile.
     const bool bent = kReach * size > 0.25 * p.z;
     const double x = 1.35 * kReach * std::sqrt(p.a) + 1, y = 1.35 * kReach * std::sqrt(p.c) + 1;

@@ -1,8 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ewa/camera.h"
+#include "scene/camera.h"
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
+#include <cstdint>
+#include <glm/ext/quaternion_double.hpp>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/matrix.hpp>
+#include <stdexcept>
+
+#include "ewa/camera.h"
+#include "shared/constants.h"
 
 namespace ewa {
 
@@ -17,6 +27,103 @@ Camera downscale(const Camera& camera, int factor) {
     result.fy *= y;
     result.cy *= y;
     return result;
+}
+
+namespace {
+
+glm::dvec3 catmull_rom(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, const glm::dvec3& d,
+                       double t) {
+    return 0.5 * (2.0 * b + (c - a) * t + (2.0 * a - 5.0 * b + 4.0 * c - d) * (t * t) +
+                  (3.0 * b - a - 3.0 * c + d) * (t * t * t));
+}
+
+glm::dmat3 between(const glm::dmat3& a, const glm::dmat3& b, double t) {
+    const glm::dquat p(a), q(b);
+    return glm::dmat3(glm::normalize(glm::slerp(p, q, t)));
+}
+
+}  // namespace
+
+Camera along_path(std::span<const Camera> keys, double time) {
+    if (keys.empty()) throw std::logic_error("a path without cameras");
+    const double last = double(keys.size() - 1);
+    time = std::clamp(time, 0.0, last);
+    const size_t index = std::min(size_t(time), keys.size() >= 2 ? keys.size() - 2 : 0);
+    const double t = time - double(index);
+    const Camera& from = keys[index];
+    const Camera& to = keys[std::min(index + 1, keys.size() - 1)];
+
+    Camera camera = keys.front();
+    const double share = double(camera.width) / from.width, share_to = double(camera.width) / to.width;
+    camera.fx = std::pow(from.fx * share, 1 - t) * std::pow(to.fx * share_to, t);
+    camera.fy = std::pow(from.fy * share, 1 - t) * std::pow(to.fy * share_to, t);
+    if (t == 0) {
+        camera.rotation = from.rotation;
+        camera.translation = from.translation;
+        return camera;
+    }
+    const glm::dvec3 b = from.position(), c = to.position();
+    const glm::dvec3 a = index > 0 ? keys[index - 1].position() : b + (b - c);
+    const glm::dvec3 d = index + 2 < keys.size() ? keys[index + 2].position() : c + (c - b);
+    camera.rotation = between(from.rotation, to.rotation, t);
+    camera.translation = -(camera.rotation * catmull_rom(a, b, c, d, t));
+    return camera;
+}
+
+namespace {
+
+glm::dvec3 view_of(const glm::dvec3& point, const Camera& camera) {
+    return camera.rotation * point + camera.translation;
+}
+
+glm::dvec2 pixel_of(const glm::dvec3& view, const Camera& camera) {
+    return {camera.fx * view.x / view.z + camera.cx, camera.fy * view.y / view.z + camera.cy};
+}
+
+}  // namespace
+
+std::array<Segment, 10> frustum_segments(const Camera& camera, double depth) {
+    const glm::dvec3 eye = camera.position();
+    const auto world = [&](double x, double y) {
+        const glm::dvec3 view((x - camera.cx) / camera.fx * depth, (y - camera.cy) / camera.fy * depth,
+                              depth);
+        return eye + glm::transpose(camera.rotation) * view;
+    };
+    const double w = camera.width, h = camera.height;
+    const std::array corners{world(0, 0), world(w, 0), world(w, h), world(0, h)};
+    const glm::dvec3 roof = world(w / 2, -h / 5);
+    std::array<Segment, 10> segments;
+    for (size_t i = 0; i < 4; ++i) {
+        segments[i] = {eye, corners[i]};
+        segments[4 + i] = {corners[i], corners[(i + 1) % 4]};
+    }
+    segments[8] = {world(w / 4, 0), roof};
+    segments[9] = {world(3 * w / 4, 0), roof};
+    return segments;
+}
+
+std::optional<std::array<glm::dvec2, 2>> projected(const Segment& segment, const Camera& camera) {
+    glm::dvec3 from = view_of(segment.from, camera), to = view_of(segment.to, camera);
+    constexpr double kNear = shared::NEAR_PLANE;
+    if (!(from.z > kNear) && !(to.z > kNear)) return std::nullopt;
+    if (from.z < kNear) from += (to - from) * ((kNear - from.z) / (to.z - from.z));
+    if (to.z < kNear) to += (from - to) * ((kNear - to.z) / (from.z - to.z));
+    return std::array{pixel_of(from, camera), pixel_of(to, camera)};
+}
+
+std::optional<glm::dvec2> projected(const glm::dvec3& point, const Camera& camera) {
+    const glm::dvec3 view = view_of(point, camera);
+    if (!(view.z > shared::NEAR_PLANE)) return std::nullopt;
+    return pixel_of(view, camera);
+}
+
+bool same_aspect(int old_width, int old_height, int width, int height) {
+    if (int64_t(width) * old_height == int64_t(height) * old_width) return true;
+    const double x = double(width) / old_width, y = double(height) / old_height;
+    if (x > 0.9 && x < 1.1) return false;
+    const double low = std::max((width - 1.0) / old_width, (height - 1.0) / old_height);
+    const double high = std::min((width + 1.0) / old_width, (height + 1.0) / old_height);
+    return low < high && x > 0 && y > 0;
 }
 
 }  // namespace ewa

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is asked of a dataset once it is loaded. Loading it is src/io/dataset.cpp.
+// The images, splits and extent of a loaded dataset. src/io/datasets/dataset.cpp loads it.
 #include "ewa/dataset.h"
 
 #include <algorithm>
@@ -7,14 +7,14 @@
 
 #include "core/text.h"
 #include "ewa/error.h"
-#include "scene/aspect.h"
-#include "scene/undistort.h"
+#include "scene/camera.h"
+#include "scene/lens.h"
 
 namespace ewa {
 
 namespace {
 
-/// One value that is not finite would make the loss, and every gradient of its view, not finite.
+/// One value that is not finite would make the loss and every gradient of its view not finite.
 void check_finite(const Image& image, const std::filesystem::path& path) {
     const auto bad = std::find_if(image.pixels.begin(), image.pixels.end(),
                                   [](float value) { return !std::isfinite(value); });
@@ -22,11 +22,11 @@ void check_finite(const Image& image, const std::filesystem::path& path) {
     const auto pixel = (bad - image.pixels.begin()) / image.channels;
     throw InputError(core::one_line(path.string()) + ": the pixel at column " +
                      std::to_string(pixel % image.width) + ", row " + std::to_string(pixel / image.width) +
-                     " holds a value that is not finite; write it as a number, or leave the picture out");
+                     " holds a value that is not finite; replace it by a number, or remove the image");
 }
 
-/// The picture with a mask's red (grey) channel on its alpha. The mask may have another size, of the same
-/// shape.
+/// The image with its alpha multiplied by the mask's red (grey) channel. The mask is sampled at the image's
+/// size.
 Image with_mask(const Image& image, const Image& mask) {
     Image result(image.width, image.height, 4);
     for (int y = 0; y < image.height; ++y)
@@ -55,10 +55,10 @@ Image load_file(const Frame& frame) {
     if (frame.mask_path.empty()) return image;
     const Image mask = load_image(frame.mask_path);
     check_finite(mask, frame.mask_path);
-    if (!scene::same_shape(image.width, image.height, mask.width, mask.height))
+    if (!same_aspect(image.width, image.height, mask.width, mask.height))
         throw InputError(core::one_line(frame.mask_path.string()) + ": the mask is " +
                          std::to_string(mask.width) + " x " + std::to_string(mask.height) +
-                         " pixels, its picture " + std::to_string(image.width) + " x " +
+                         " pixels, its image " + std::to_string(image.width) + " x " +
                          std::to_string(image.height));
     return with_mask(image, mask);
 }

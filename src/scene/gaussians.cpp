@@ -14,38 +14,9 @@ namespace ewa {
 namespace {
 constexpr double kInitialOpacity = 0.1;
 constexpr double kMinSquaredDistance = 1e-7;  // keeps the logarithm of a duplicate's scale finite
-constexpr double kLonelyScale = 1.0;  // world units; a single point has no neighbour to take a scale from
-}  // namespace
+constexpr double kLonelyScale = 1.0;          // world units; a single point has no neighbour for its scale
 
-int sh_degree_present(const Gaussians& gaussians) {
-    const size_t stride = gaussians.sh_stride();
-    for (int degree = gaussians.sh_degree; degree > 0; --degree) {
-        const size_t begin = size_t(sh_coefficients(degree - 1)) * 3,
-                     end = size_t(sh_coefficients(degree)) * 3;
-        for (size_t splat = 0; splat < gaussians.size(); ++splat) {
-            const float* sh = &gaussians.sh[splat * stride];
-            // NaN counts as present: it has to reach the check that reports it.
-            if (std::any_of(sh + begin, sh + end, [](float v) { return v != 0.0f; })) return degree;
-        }
-    }
-    return 0;
-}
-
-bool drawable(const Gaussians& gaussians, size_t i) {
-    const auto finite = [](const float* values, size_t count) {
-        return std::all_of(values, values + count, [](float v) { return std::isfinite(v); });
-    };
-    const float* q = &gaussians.quaternions[4 * i];
-    const bool rotated = q[0] != 0 || q[1] != 0 || q[2] != 0 || q[3] != 0;
-    const size_t stride = gaussians.sh_stride();
-    return rotated && finite(q, 4) && finite(&gaussians.means[3 * i], 3) &&
-           finite(&gaussians.log_scales[3 * i], 3) && std::isfinite(gaussians.opacity_logits[i]) &&
-           finite(&gaussians.sh[stride * i], stride);
-}
-
-namespace {
-
-/// Whole units near the middle of the bulk of the positions where that lies far out, else zero.
+/// Whole units near the middle of most positions if that is far from the world's origin, else zero.
 glm::dvec3 origin_for(const std::vector<glm::dvec3>& positions) {
     constexpr double kFar = 64, kLeast = 1000, kOutermost = 0.05;
     glm::dvec3 middle(0);
@@ -72,6 +43,32 @@ glm::dvec3 origin_for(const std::vector<glm::dvec3>& positions) {
 
 }  // namespace
 
+int sh_degree_present(const Gaussians& gaussians) {
+    const size_t stride = gaussians.sh_stride();
+    for (int degree = gaussians.sh_degree; degree > 0; --degree) {
+        const size_t begin = size_t(sh_coefficients(degree - 1)) * 3,
+                     end = size_t(sh_coefficients(degree)) * 3;
+        for (size_t splat = 0; splat < gaussians.size(); ++splat) {
+            const float* sh = &gaussians.sh[splat * stride];
+            // NaN counts as present, so that it reaches the check that reports it.
+            if (std::any_of(sh + begin, sh + end, [](float v) { return v != 0.0f; })) return degree;
+        }
+    }
+    return 0;
+}
+
+bool drawable(const Gaussians& gaussians, size_t i) {
+    const auto finite = [](const float* values, size_t count) {
+        return std::all_of(values, values + count, [](float v) { return std::isfinite(v); });
+    };
+    const float* q = &gaussians.quaternions[4 * i];
+    const bool rotated = q[0] != 0 || q[1] != 0 || q[2] != 0 || q[3] != 0;
+    const size_t stride = gaussians.sh_stride();
+    return rotated && finite(q, 4) && finite(&gaussians.means[3 * i], 3) &&
+           finite(&gaussians.log_scales[3 * i], 3) && std::isfinite(gaussians.opacity_logits[i]) &&
+           finite(&gaussians.sh[stride * i], stride);
+}
+
 void set_world_means(Gaussians& gaussians, const std::vector<glm::dvec3>& positions) {
     gaussians.origin = origin_for(positions);
     gaussians.means.resize(3 * positions.size());
@@ -87,7 +84,7 @@ void settle_origin(Gaussians& gaussians) {
 }
 
 Gaussians gaussians_from_points(const PointCloud& points, int sh_degree) {
-    if (points.positions.empty()) throw InputError("there are no points to start splats from");
+    if (points.positions.empty()) throw InputError("there are no points to create splats from");
     if (points.colors.size() != points.positions.size())
         throw InputError(std::to_string(points.positions.size()) + " points have " +
                          std::to_string(points.colors.size()) + " colours");

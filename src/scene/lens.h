@@ -1,33 +1,48 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lens models: x right, y down, in units of the focal length (z = 1).
+// Lens models and undistortion. Rays are (x, y, 1): x right, y down, in units of the focal length.
 //
-// Each takes a ray (x, y, 1) to a plane, q = (x, y) or for a fisheye q = angle * (x, y) / |(x, y)|, and bends
-// that plane. With r2 = |q|^2 and T(q) = (2 p1 x y + p2 (r2 + 2 x^2), p1 (r2 + 2 y^2) + 2 p2 x y):
+// A lens takes a ray to the plane point q and bends that plane. q = (x, y), but for a fisheye q = angle * (x,
+// y) / |(x, y)|. With r2 = |q|^2 and T(q) = (2 p1 x y + p2 (r2 + 2 x^2), p1 (r2 + 2 y^2) + 2 p2 x y):
 //   brown       q (1 + k1 r2 + k2 r2^2 + k3 r2^3) / (1 + k4 r2 + k5 r2^2 + k6 r2^3) + T(q)
 //   fisheye     q (1 + k1 r2 + k2 r2^2 + k3 r2^3 + k4 r2^4) + T(q) + r2 (s1, s3)
 //   fisheye624  p + T(p) + |p|^2 (s1 + |p|^2 s2, s3 + |p|^2 s4) with p = q (1 + k1 r2 + ... + k6 r2^6)
 //   fov         q atan(2 r tan(k1 / 2)) / (r k1)
 //   division    q 2 / (1 + sqrt(1 - 4 k1 r2)), the inverse of p / (1 + k1 |p|^2)
 //   unified     q / (k1 sqrt(k2 r2 + 1) + 1 - k1)
-// These are OpenCV's (calib3d, fisheye) and COLMAP's (src/colmap/sensor/models.h).
+// These are the models of OpenCV (calib3d, fisheye) and COLMAP (src/colmap/sensor/models.h).
 #pragma once
 #include <glm/vec2.hpp>
 #include <optional>
 
+#include "ewa/camera.h"
 #include "ewa/dataset.h"
+#include "ewa/image.h"
 
 namespace ewa::scene {
 
-/// Where a lens puts the ray (x, y, 1). Not finite where the model has no value.
+/// The image of the ray (x, y, 1). Not finite where the model has no value.
 glm::dvec2 distort(const Distortion& lens, glm::dvec2 ray);
 
-/// The ray in front of the camera that a lens puts there. Newton's method from the axis outward, each step
-/// cut so that it stays where the model is one to one: of several rays, it is the one that hangs together
-/// with the axis. None where the model folds before it gets there, or where the ray comes from the side or
+/// The inverse: the ray in front of the camera whose image is `point`. Newton's method starts on the axis,
+/// and each step is cut so that it stays where the model is one to one. So of several rays, the result is the
+/// one connected to the axis. Empty if the model folds on the way, or if the ray comes from the side or from
 /// behind.
 std::optional<glm::dvec2> undistort(const Distortion& lens, glm::dvec2 point);
 
-/// Whether the model keeps the sense of rotation about that ray. Where it does not, it has folded over.
+/// Whether the model keeps the orientation around that ray. If it does not, it has folded over.
 bool one_to_one(const Distortion& lens, glm::dvec2 ray);
+
+/// The pinhole camera of the undistorted image, as COLMAP's image_undistorter chooses it (blank_pixels 0;
+/// src/colmap/image/undistortion.cc). Pose and focal lengths are the source's. The size is the largest
+/// without blank pixels, between 0.2 and 2 times the source's. It comes from the undistorted pixel centres of
+/// the border: each axis shrinks or grows about the principal point, in one ratio, until the nearer border
+/// fits. Border pixels that no ray in front reaches do not count. If the rectangle still leaves the source at
+/// a corner, as in a fisheye's circle, both axes shrink further. Without distortion, the source is returned.
+/// Throws InputError if no such rectangle exists because the model folds over.
+Camera undistorted_camera(const Camera& source, const Distortion& distortion);
+
+/// The image of `camera`, sampled bilinearly from the image of `source`.
+Image undistort_image(const Image& image, const Camera& source, const Distortion& distortion,
+                      const Camera& camera);
 
 }  // namespace ewa::scene

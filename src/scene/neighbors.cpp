@@ -12,8 +12,8 @@ namespace {
 
 constexpr size_t kNeighbors = 3;
 
-/// The points at different places, and how many stand at each. The tree is built over these: with duplicates
-/// in it a query would have to visit all of them, n queries n^2.
+/// The distinct positions with the number of points at each. The tree holds only these, because a query would
+/// visit all duplicates of a position, and n queries n^2.
 struct Places {
     std::vector<glm::dvec3> positions;
     std::vector<size_t> counts;
@@ -33,7 +33,7 @@ bool before(const glm::dvec3& a, const glm::dvec3& b) {
     return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
 }
 
-/// Sum over the nearest others, the nearest first, until there are three or none is left.
+/// The mean over the three nearest other points, or over all if there are fewer.
 double mean_at(const Places& places, const Tree& tree, size_t place) {
     std::array<size_t, kNeighbors + 1> index{};
     std::array<double, kNeighbors + 1> squared{};

@@ -1,12 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-// Selecting, ordering and joining splats.
-#include "ewa/splat_edit.h"
-
+// Selection, order, concatenation and affine transforms of splats.
 #include <algorithm>
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
 #include <limits>
+#include <numbers>
+
+#include "ewa/error.h"
+#include "ewa/splat_edit.h"
+#include "scene/color.h"
 
 namespace ewa {
 
@@ -14,7 +21,7 @@ namespace {
 
 constexpr int kMortonBits = 21;  // three axes fill 63 bits
 
-/// `stride` values a splat, taken in the order of the indices.
+/// Keeps the values of the indexed splats, `stride` values per splat.
 void select_values(std::vector<float>& values, size_t stride, const std::vector<uint32_t>& indices) {
     std::vector<float> selected(indices.size() * stride);
     for (size_t i = 0; i < indices.size(); ++i) {
@@ -24,7 +31,7 @@ void select_values(std::vector<float>& values, size_t stride, const std::vector<
     values = std::move(selected);
 }
 
-/// The lowest 21 bits, two zero bits between each and the next.
+/// Spreads the lowest 21 bits, with two zero bits between neighbours.
 uint64_t spread_bits(uint64_t v) {
     v = (v | v << 32) & 0x1f00000000ffffull;
     v = (v | v << 16) & 0x1f0000ff0000ffull;
@@ -52,6 +59,171 @@ Bounds bounds_of(const Gaussians& g) {
             bounds.high[axis] = std::max(bounds.high[axis], double(g.means[3 * i + axis]));
         }
     return bounds;
+}
+
+using scene::kMaxShCoefficients;
+using scene::sh_basis;
+using ShMatrix = std::array<std::array<double, kMaxShCoefficients>, kMaxShCoefficients>;
+
+/// Singular value decomposition A = U diag(s) V^T by one-sided Jacobi rotations (Hestenes 1958). U's columns
+/// are the rotated columns of A divided by their lengths.
+struct Decomposition {
+    glm::dmat3 u{1.0};
+    glm::dvec3 s{0.0};
+    glm::dmat3 v{1.0};
+};
+
+Decomposition decompose(glm::dmat3 a) {
+    Decomposition result;
+    constexpr int kSweeps = 30;
+    for (int sweep = 0; sweep < kSweeps; ++sweep) {
+        bool turned = false;
+        for (int p = 0; p < 2; ++p)
+            for (int q = p + 1; q < 3; ++q) {
+                const double pq = glm::dot(a[p], a[q]), pp = glm::dot(a[p], a[p]), qq = glm::dot(a[q], a[q]);
+                if (!(std::abs(pq) > 1e-16 * std::sqrt(pp * qq))) continue;
+                turned = true;
+                const double zeta = (qq - pp) / (2 * pq);
+                const double t = (zeta >= 0 ? 1 : -1) / (std::abs(zeta) + std::hypot(1.0, zeta));
+                const double c = 1 / std::hypot(1.0, t), s = c * t;
+                const auto turn = [&](glm::dmat3& m) {
+                    const glm::dvec3 old = m[p];
+                    m[p] = c * old - s * m[q];
+                    m[q] = s * old + c * m[q];
+                };
+                turn(a);
+                turn(result.v);
+            }
+        if (!turned) break;
+    }
+    for (int i = 0; i < 3; ++i) {
+        result.s[i] = glm::length(a[i]);
+        result.u[i] = result.s[i] > 0 ? a[i] / result.s[i] : glm::dvec3(0);
+    }
+    return result;
+}
+
+/// Replaces columns of length 0 so that the three are a right-handed orthonormal frame. An axis may change
+/// its sign, which does not change the covariance.
+glm::dmat3 right_handed(glm::dmat3 u) {
+    for (int i = 0; i < 3; ++i) {
+        if (glm::length(u[i]) > 0) continue;
+        const glm::dvec3 other = u[(i + 1) % 3], third = u[(i + 2) % 3];
+        if (glm::length(other) > 0 && glm::length(third) > 0) {
+            u[i] = glm::cross(other, third);
+            continue;
+        }
+        const glm::dvec3 from = glm::length(other) > 0 ? other : third;
+        const glm::dvec3 away = std::abs(from.x) < 0.6 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
+        const glm::dvec3 side = away - from * glm::dot(from, away);
+        u[i] = glm::length(side) > 0 ? glm::normalize(side) : glm::dvec3(1, 0, 0);
+    }
+    if (glm::determinant(u) < 0) u[2] = -u[2];
+    return u;
+}
+
+/// Snaps a value near a whole number to it, so that turns by 90 degrees are exact.
+double snapped(double v) {
+    const double whole = std::round(v);
+    return std::abs(v - whole) < 1e-12 ? whole : v;
+}
+
+/// D with c' = D c for f'(d) = f(O^T d), O orthogonal. D_jk is the integral of Y_j(d) Y_k(O^T d) over the
+/// sphere. The Gauss-Legendre rule with 4 nodes in z and 8 even angles is exact for degree 3.
+ShMatrix sh_rotation(const glm::dmat3& orthogonal, int degree) {
+    constexpr int kAngles = 8;
+    const double inner = std::sqrt(3.0 / 7 - 2.0 / 7 * std::sqrt(6.0 / 5)),
+                 outer = std::sqrt(3.0 / 7 + 2.0 / 7 * std::sqrt(6.0 / 5));
+    const double inner_weight = (18 + std::sqrt(30.0)) / 36, outer_weight = (18 - std::sqrt(30.0)) / 36;
+    const double nodes[4][2] = {
+        {-outer, outer_weight}, {-inner, inner_weight}, {inner, inner_weight}, {outer, outer_weight}};
+    ShMatrix d{};
+    const int count = sh_coefficients(degree);
+    for (const auto& [z, weight] : nodes)
+        for (int a = 0; a < kAngles; ++a) {
+            const double angle = 2 * std::numbers::pi * (a + 0.5) / kAngles, r = std::sqrt(1 - z * z);
+            const glm::dvec3 direction(r * std::cos(angle), r * std::sin(angle), z);
+            const auto here = sh_basis(degree, direction);
+            const auto there = sh_basis(degree, glm::transpose(orthogonal) * direction);
+            for (int j = 0; j < count; ++j)
+                for (int k = 0; k < count; ++k)
+                    d[size_t(j)][size_t(k)] +=
+                        weight * 2 * std::numbers::pi / kAngles * here[size_t(j)] * there[size_t(k)];
+        }
+    for (auto& row : d)
+        for (double& v : row) v = snapped(v);
+    return d;
+}
+
+void turn_sh(Gaussians& gaussians, const glm::dmat3& orthogonal) {
+    if (gaussians.sh_degree == 0) return;
+    const ShMatrix d = sh_rotation(orthogonal, gaussians.sh_degree);
+    const size_t count = size_t(sh_coefficients(gaussians.sh_degree)), stride = gaussians.sh_stride();
+    std::array<double, kMaxShCoefficients> turned{};
+    for (size_t i = 0; i < gaussians.size(); ++i)
+        for (size_t channel = 0; channel < 3; ++channel) {
+            float* sh = &gaussians.sh[i * stride + channel];
+            for (size_t j = 1; j < count; ++j) {
+                turned[j] = 0;
+                for (size_t k = 1; k < count; ++k)
+                    if (d[j][k] != 0) turned[j] += d[j][k] * double(sh[3 * k]);
+            }
+            for (size_t j = 1; j < count; ++j) sh[3 * j] = float(turned[j]);
+        }
+}
+
+void move_means(Gaussians& gaussians, const glm::dmat4& matrix) {
+    std::vector<glm::dvec3> positions(gaussians.size());
+    for (size_t i = 0; i < positions.size(); ++i)
+        positions[i] = glm::dvec3(matrix * glm::dvec4(gaussians.world_mean(i), 1));
+    set_world_means(gaussians, positions);
+}
+
+/// Transforms quaternions and scales by M = scale * rotation.
+void turn_similar(Gaussians& gaussians, const glm::dquat& rotation, double scale) {
+    const double grown = std::log(scale);
+    for (size_t i = 0; i < gaussians.size(); ++i) {
+        float* q = &gaussians.quaternions[4 * i];
+        const double w = q[0], x = q[1], y = q[2], z = q[3];
+        const glm::dquat& r = rotation;
+        q[0] = float(r.w * w - r.x * x - r.y * y - r.z * z);
+        q[1] = float(r.w * x + r.x * w + r.y * z - r.z * y);
+        q[2] = float(r.w * y - r.x * z + r.y * w + r.z * x);
+        q[3] = float(r.w * z + r.x * y - r.y * x + r.z * w);
+        for (size_t axis = 0; axis < 3; ++axis)
+            gaussians.log_scales[3 * i + axis] = float(double(gaussians.log_scales[3 * i + axis]) + grown);
+    }
+}
+
+/// Transforms quaternions and scales by any M. The singular value decomposition of M R S has the factors of
+/// Sigma' = (M R S)(M R S)^T. Scales are relative to the largest, so that none overflows.
+void turn_general(Gaussians& gaussians, const glm::dmat3& linear) {
+    for (size_t i = 0; i < gaussians.size(); ++i) {
+        float* q = &gaussians.quaternions[4 * i];
+        float* log_scale = &gaussians.log_scales[3 * i];
+        if (!drawable(gaussians, i)) continue;
+        const glm::dmat3 rotation = glm::mat3_cast(glm::normalize(glm::dquat(q[0], q[1], q[2], q[3])));
+        const double largest = std::max({log_scale[0], log_scale[1], log_scale[2]});
+        glm::dmat3 factor = linear * rotation;
+        for (int axis = 0; axis < 3; ++axis) factor[axis] *= std::exp(log_scale[axis] - largest);
+        const Decomposition parts = decompose(factor);
+        const glm::dquat turned = glm::normalize(glm::quat_cast(right_handed(parts.u)));
+        q[0] = float(turned.w), q[1] = float(turned.x), q[2] = float(turned.y), q[3] = float(turned.z);
+        for (int axis = 0; axis < 3; ++axis)
+            log_scale[axis] =
+                float(largest + std::log(std::max(parts.s[axis], double(std::numeric_limits<float>::min()))));
+    }
+}
+
+void check(const glm::dmat4& matrix, double determinant) {
+    for (int column = 0; column < 4; ++column)
+        for (int row = 0; row < 4; ++row)
+            if (!std::isfinite(matrix[column][row]))
+                throw InputError("the transform has an entry that is not finite");
+    if (matrix[0][3] != 0 || matrix[1][3] != 0 || matrix[2][3] != 0 || matrix[3][3] != 1)
+        throw InputError("the transform is not affine: its last row is not 0 0 0 1");
+    if (determinant == 0 || !std::isfinite(determinant))
+        throw InputError("the transform flattens space: its determinant is " + std::to_string(determinant));
 }
 
 }  // namespace
@@ -123,6 +295,31 @@ std::vector<uint32_t> morton_order(const Gaussians& gaussians) {
     std::vector<uint32_t> order(entries.size());
     for (size_t i = 0; i < order.size(); ++i) order[i] = entries[i].index;
     return order;
+}
+
+void transform_splats(Gaussians& gaussians, const glm::dmat4& matrix) {
+    const glm::dmat3 linear(matrix);
+    const double determinant = glm::determinant(linear);
+    check(matrix, determinant);
+    if (matrix == glm::dmat4(1.0)) return;
+    move_means(gaussians, matrix);
+    if (linear == glm::dmat3(1.0)) return;
+
+    const Decomposition parts = decompose(linear);
+    const glm::dmat3 orthogonal = parts.u * glm::transpose(parts.v);  // of the polar decomposition of M
+    glm::dmat3 exact = orthogonal;
+    for (int column = 0; column < 3; ++column)
+        for (int row = 0; row < 3; ++row) exact[column][row] = snapped(orthogonal[column][row]);
+    const double largest = std::max({parts.s.x, parts.s.y, parts.s.z}),
+                 least = std::min({parts.s.x, parts.s.y, parts.s.z});
+    if (least <= 1e-12 * largest) throw InputError("the transform flattens space along an axis");
+    // M and -M have the same effect on a covariance.
+    if (largest - least <= 1e-9 * largest)
+        turn_similar(gaussians, glm::quat_cast(determinant < 0 ? -exact : exact),
+                     std::cbrt(std::abs(determinant)));
+    else
+        turn_general(gaussians, linear);
+    turn_sh(gaussians, exact);
 }
 
 }  // namespace ewa

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "scene/frustum.h"
+#include "scene/camera.h"
 
 namespace ewa::viewer {
 namespace {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "scene/camera_path.h"
+#include "scene/camera.h"
 
 namespace ewa::viewer {
 

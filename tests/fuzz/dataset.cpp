@@ -20,13 +20,13 @@ namespace fs = std::filesystem;
 #ifdef EWA_COLMAP
 constexpr const char* kFiles[] = {"cameras" EWA_COLMAP, "images" EWA_COLMAP, "points3D" EWA_COLMAP};
 
-io::PosedImages read_model(const fs::path& folder) {
+io::ImageRecords read_model(const fs::path& folder) {
     return io::read_colmap(folder, folder / "images");
 }
 #else
 constexpr const char* kFiles[] = {"transforms.json", "points.ply"};
 
-io::PosedImages read_model(const fs::path& folder) {
+io::ImageRecords read_model(const fs::path& folder) {
     constexpr bool kWithPoints = true;
     return io::read_transforms(folder / kFiles[0], 0, kWithPoints);
 }
@@ -48,10 +48,10 @@ void check_inside(const fs::path& folder, const fs::path& path) {
     EWA_REQUIRE(text.find('\0') == std::string::npos);
 }
 
-void check(const fs::path& folder, const io::PosedImages& read) {
+void check(const fs::path& folder, const io::ImageRecords& read) {
     const std::string text = std::to_string(read.images.size()) + " images";
     EWA_REQUIRE(read.points.positions.size() == read.points.colors.size());
-    for (const io::PosedImage& image : read.images) {
+    for (const io::ImageRecord& image : read.images) {
         check_inside(folder, image.path);
         if (!image.mask.empty()) check_inside(folder, image.mask);
     }

@@ -43,7 +43,7 @@ void compare(const std::string& bytes) {
     core::JsonLimits few;
     few.depth = 5;
     few.objects = few.values = 20;
-    few.left_out = "extras";
+    few.skipped = "extras";
     taken([&] { core::parse_json<Json>(bytes, "a.json", few); });
 }
 

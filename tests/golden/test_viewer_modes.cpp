@@ -7,7 +7,7 @@
 
 #include "golden/devices.h"
 #include "golden/golden.h"
-#include "reference/ellipsoids.h"
+#include "reference/blend.h"
 #include "reference/render.h"
 #include "support/random_scene.h"
 #include "support/soon.h"

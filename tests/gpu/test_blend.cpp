@@ -8,7 +8,7 @@
 #include "gpu/guarded.h"
 #include "gpu/twin_inputs.h"
 #include "pipeline/sizes.h"
-#include "reference/ellipsoids.h"
+#include "reference/blend.h"
 
 namespace ewa::test {
 namespace {

@@ -13,7 +13,7 @@
 #include "pipeline/densify.h"
 #include "pipeline/sizes.h"
 #include "pipeline/sorting.h"
-#include "reference/densify.h"
+#include "reference/strategy.h"
 
 namespace ewa::test {
 namespace {

@@ -12,7 +12,6 @@
 #include "pipeline/exposure.h"
 #include "pipeline/photo.h"
 #include "reference/adam.h"
-#include "reference/exposure.h"
 #include "reference/loss.h"
 
 namespace ewa::test {

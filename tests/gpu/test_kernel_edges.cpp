@@ -12,7 +12,7 @@
 #include "gpu/guarded.h"
 #include "gpu/twin_inputs.h"
 #include "pipeline/mcmc.h"
-#include "reference/mcmc.h"
+#include "reference/strategy.h"
 
 namespace ewa::test {
 namespace {

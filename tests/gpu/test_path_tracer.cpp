@@ -5,8 +5,8 @@
 #include <algorithm>
 
 #include "gpu/test_device.h"
-#include "pathtracer/develop.h"
 #include "pathtracer/path_tracer.h"
+#include "pathtracer/virtual_camera.h"
 #include "reference/tracing.h"
 #include "support/mesh_scenes.h"
 

@@ -11,7 +11,7 @@
 #include "gpu/twin_inputs.h"
 #include "pipeline/backward.h"
 #include "reference/adam.h"
-#include "reference/densify.h"
+#include "reference/strategy.h"
 #include "support/gradient_check.h"
 
 namespace ewa::test {
@@ -22,7 +22,7 @@ constexpr uint32_t kGradient = 1, kStatistics = 2, kRegularised = 4, kAbsolute =
 /// A scene's way back up to the instances by the twin, in the device's buffers.
 struct Slots {
     Scene scene;
-    reference::LossGradientTwin twin;
+    reference::ReferenceGradient twin;
     std::vector<float> slots;
     std::vector<uint32_t> tile_counts, first, places;  // places run against the instances
 

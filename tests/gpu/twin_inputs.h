@@ -34,8 +34,8 @@ inline Scene random_scene(uint64_t seed, size_t splats, SplatKind kind, int widt
 }
 
 /// The twin with the device's tiles, so that lists can be compared tile by tile.
-inline reference::TwinOptions twin_tiles(const passes::Shape& shape) {
-    reference::TwinOptions twin;
+inline reference::ReferenceOptions twin_tiles(const passes::Shape& shape) {
+    reference::ReferenceOptions twin;
     twin.tile_width = int(shape.tile_width);
     twin.tile_height = int(shape.tile_height);
     return twin;

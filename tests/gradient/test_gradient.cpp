@@ -34,7 +34,7 @@ TEST_P(Gradient, IsTheSlopeOfTheTwinsLoss) {
     options.kernel = c.kernel;
     options.background = {0.3f, 0.6f, 0.1f};
     const LossGradient device_gradient = loss_gradient(device(), gaussians, camera, target, options);
-    const reference::LossGradientTwin twin = reference::loss_gradient(gaussians, camera, target, options);
+    const reference::ReferenceGradient twin = reference::loss_gradient(gaussians, camera, target, options);
 
     // The loss jumps where a contribution crosses 1/255; the best of several steps is one that crosses none.
     reference::Values values = reference::to_double(gaussians);

@@ -9,8 +9,7 @@
 #include <numbers>
 #include <vector>
 
-#include "scene/camera_path.h"
-#include "scene/frustum.h"
+#include "scene/camera.h"
 
 namespace ewa {
 namespace {

@@ -206,7 +206,7 @@ TEST(Colmap, LensModels) {
 TEST(Colmap, RefusesImpossibleCameras) {
     const std::vector<std::pair<std::string, const char*>> cases = {
         {camera(3, 1, 0, 6, {1, 1, 0, 0}), "0 x 6"},
-        {camera(3, 1, 8, ~uint64_t(0), {1, 1, 0, 0}), "pixels large"},
+        {camera(3, 1, 8, ~uint64_t(0), {1, 1, 0, 0}), "invalid size"},
         {camera(3, 1, 8, 6, {0, 1, 0, 0}), "not positive"},
         {camera(3, 1, 8, 6, {1, -1, 0, 0}), "not positive"},
         {camera(3, 1, 8, 6, {kNan, 1, 0, 0}), "finite"},

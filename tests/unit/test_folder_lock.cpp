@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // One holder of a folder at a time; whoever ends lets go.
-#include "core/folder_lock.h"
+#include "core/folders.h"
 
 #include <optional>
 

@@ -295,7 +295,7 @@ TEST(GltfSplats, NamesWhatIsWrong) {
     refuse([](Gltf& f) { f.accessor("POSITION").erase("bufferView"); }, {"POSITION", "bufferView"});
     refuse([](Gltf& f) { f.accessor("POSITION")["componentType"] = 5130; }, {"componentType"});
     refuse([](Gltf& f) { f.top["bufferViews"][0]["byteOffset"] = 1000000000000000; },
-           {"POSITION", "ends behind its buffer"});
+           {"POSITION", "ends after its buffer"});
     refuse([](Gltf& f) { f.top["bufferViews"][0]["byteStride"] = 4; }, {"POSITION", "byteStride"});
     refuse([](Gltf& f) { f.top["buffers"][0]["byteLength"] = 1000000000000000; }, {"buffer 0", "byteLength"});
     refuse([](Gltf& f) { f.top["nodes"][0]["mesh"] = 5; }, {"node 0", "mesh"});

@@ -69,7 +69,7 @@ TEST(Json, SaysWhereItIsNone) {
 }
 
 TEST(Json, LeavesOutWhatIsNotWanted) {
-    const JsonLimits limits{.objects = 2, .values = 5, .left_out = "extras"};
+    const JsonLimits limits{.objects = 2, .values = 5, .skipped = "extras"};
     EXPECT_EQ(parse_json<json>(R"({"extras": {"a": [1, {"extras": 2}], "b": {}}, "a": 1,
                                   "c": {"extras": 3, "d": [2]}, "extras": [[]], "e": null})",
                                "a.json", limits),
@@ -87,7 +87,7 @@ TEST(Json, LimitsHold) {
     refuse("[1,2,3,4,5]", {"or 5 values"}, few);
     refuse("[[],[],[],[],[]]", {"or 5 values"}, few);
     refuse(std::string(41, ' '), {"41 bytes, more than 40"}, few);
-    refuse("{\"extras\":[[[[", {"nests deeper"}, JsonLimits{.depth = 3, .left_out = "extras"});
+    refuse("{\"extras\":[[[[", {"nests deeper"}, JsonLimits{.depth = 3, .skipped = "extras"});
     for (const char* open : {"[", "{\"a\":", "[{\"a\":", "[[],"})
         refuse(times(1000000, open), {"a.json", "nests deeper than 64 levels"});
     refuse(between("[", times(1 << 22, "0,"), ""), {"4194304 values"});

@@ -7,7 +7,6 @@
 
 #include "ewa/dataset.h"
 #include "scene/lens.h"
-#include "scene/undistort.h"
 #include "support/temp_folder.h"
 
 namespace {

@@ -8,9 +8,9 @@
 
 #include "core/random.h"
 #include "ewa/error.h"
-#include "pathtracer/dome.h"
 #include "pathtracer/light_table.h"
 #include "pathtracer/packing.h"
+#include "pathtracer/virtual_camera.h"
 #include "reference/tracing.h"
 #include "support/mesh_scenes.h"
 #include "support/temp_folder.h"

@@ -4,7 +4,7 @@
 #include <random>
 
 #include "ewa/splat_files.h"
-#include "io/datasets/points_ply.h"
+#include "io/datasets/image_records.h"
 #include "io/splats/ply.h"
 #include "support/temp_folder.h"
 
@@ -272,7 +272,7 @@ TEST(Ply, NamesWhatIsWrong) {
     refuse(header("ascii", vertex + "property half x\n"), {"\"half\""});
     refuse(header("ascii", vertex + "property list float float x\n"), {"length"});
     refuse(header("ascii", "element vertex -1\n"), {"\"-1\""});
-    refuse(header("ascii", "property float x\n"), {"before the first element"});
+    refuse(header("ascii", "property float x\n"), {"precedes the first element"});
     refuse(header("binary_middle_endian", all), {"binary_middle_endian"});
     refuse("ply\n" + all + "end_header\n", {"format"});
     refuse("ply\nformat ascii 1.0\nnonsense\n", {"nonsense"});

@@ -9,9 +9,8 @@
 #include <numbers>
 #include <set>
 
-#include "reference/order.h"
 #include "reference/render.h"
-#include "reference/scan.h"
+#include "reference/sort.h"
 #include "support/random_scene.h"
 
 namespace ewa::reference {
@@ -71,7 +70,7 @@ TEST(ReferenceBlend, UnitMassKernelKeepsItsMass) {
     scene.opacity_logits = {0.4f};
     RenderOptions options;
     options.kernel = Kernel::unit_mass;
-    TwinOptions twin;
+    ReferenceOptions twin;
     twin.smoothing.cut = AlphaCut::none;
     const Picture picture = render(scene, camera, options, twin);
     double total = 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // dL/d(footprint, colour) against central differences of the blend, on pictures without jumps.
-#include "reference/blend_backward.h"
+#include "reference/blend.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 
-#include "reference/order.h"
+#include "reference/sort.h"
 #include "support/gradient_check.h"
 #include "support/random_scene.h"
 

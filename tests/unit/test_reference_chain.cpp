@@ -16,7 +16,7 @@ struct Chain {
     Values values;
     Image target;
     RenderOptions options;
-    TwinOptions twin;
+    ReferenceOptions twin;
 
     double loss() const {
         const Picture picture = render(values, camera, options, twin);
@@ -50,7 +50,7 @@ Chain random_chain(uint64_t seed, test::SplatKind kind, size_t count, int degree
 }
 
 void check(Chain chain) {
-    const LossGradientTwin result =
+    const ReferenceGradient result =
         loss_gradient(chain.values, chain.camera, chain.target, chain.options, chain.twin);
     EXPECT_NEAR(result.loss, chain.loss(), 1e-14);
     EXPECT_TRUE(test::splat_gradients_agree(result.gradient, differences(chain, result.gradient),
@@ -94,13 +94,13 @@ TEST(ReferenceChain, SkippedSplatsChangeNothing) {
     const Camera camera = test::random_camera(7);
     Gaussians scene = test::random_gaussians(7, 20, test::SplatKind::ordinary, camera, 2);
     const Image target = test::random_target(7, camera.width, camera.height);
-    const LossGradientTwin clean = loss_gradient(scene, camera, target, {});
+    const ReferenceGradient clean = loss_gradient(scene, camera, target, {});
     EXPECT_EQ(clean.picture.skipped_nonfinite, 0u);
     scene.resize(22);
     for (float& q : scene.quaternions) q = q == 0 ? 1.0f : q;
     scene.means[3 * 20] = std::nanf("");
     scene.log_scales[3 * 21 + 1] = INFINITY;
-    const LossGradientTwin with = loss_gradient(scene, camera, target, {});
+    const ReferenceGradient with = loss_gradient(scene, camera, target, {});
     EXPECT_EQ(with.picture.skipped_nonfinite, 2u);
     EXPECT_EQ(with.picture.blended.color.values, clean.picture.blended.color.values);
     for (const auto* array : {&with.gradient.means, &with.gradient.quaternions, &with.gradient.sh})
@@ -122,7 +122,7 @@ TEST(ReferenceChain, ExtremesStayFinite) {
             RenderOptions options;
             options.kernel = Kernel(kernel);
             const Image target = test::random_target(seed, camera.width, camera.height);
-            const LossGradientTwin out = loss_gradient(scene, camera, target, options);
+            const ReferenceGradient out = loss_gradient(scene, camera, target, options);
             EXPECT_TRUE(std::isfinite(out.loss));
             for (const auto* array :
                  {&out.gradient.means, &out.gradient.quaternions, &out.gradient.log_scales,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Adaptive density control: each decision at its threshold, and what comes of it.
-#include "reference/densify.h"
+#include "reference/strategy.h"
 
 #include <gtest/gtest.h>
 

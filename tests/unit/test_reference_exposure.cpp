@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The exposure's gradient against differences.
-#include "reference/exposure.h"
+#include "reference/loss.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The way back through projection against central differences of projection alone.
-#include "reference/project_backward.h"
+#include "reference/projection.h"
 
 #include <gtest/gtest.h>
 

@@ -9,7 +9,6 @@
 #include <limits>
 #include <numbers>
 
-#include "reference/spherical_harmonics.h"
 #include "shared/constants.h"
 #include "support/random_scene.h"
 

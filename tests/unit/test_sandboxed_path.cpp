@@ -38,21 +38,21 @@ TEST(Inside, Links) {
     for (const fs::path& root : {folder.path(), elsewhere / "root"}) {
         for (const char* name : {"images/a.png", "images/none.png", "images/b.png", "images/dangling.png"}) {
             EXPECT_TRUE(core::links_stay_inside(root, name)) << name;
-            EXPECT_TRUE(core::links_stay_with_pictures(root, name)) << name;
+            EXPECT_TRUE(core::links_stay_with_images(root, name)) << name;
         }
         for (const char* name :
              {"images/out/deep/secret.png", "images/out.png", "top.png", "images/out/none.png"}) {
             EXPECT_FALSE(core::links_stay_inside(root, name)) << name;
-            EXPECT_FALSE(core::links_stay_with_pictures(root, name)) << name;
+            EXPECT_FALSE(core::links_stay_with_images(root, name)) << name;
         }
         EXPECT_FALSE(core::links_stay_inside(root, "photos/deep/secret.png"));
-        EXPECT_TRUE(core::links_stay_with_pictures(root, "photos/deep/secret.png"));
+        EXPECT_TRUE(core::links_stay_with_images(root, "photos/deep/secret.png"));
     }
     const fs::path before = fs::current_path();
     fs::current_path(folder.path());
     EXPECT_TRUE(core::links_stay_inside("", "images/b.png"));
     EXPECT_FALSE(core::links_stay_inside("", "images/out.png"));
-    EXPECT_TRUE(core::links_stay_with_pictures("", "photos/deep/secret.png"));
+    EXPECT_TRUE(core::links_stay_with_images("", "photos/deep/secret.png"));
     fs::current_path(before);
 }
 

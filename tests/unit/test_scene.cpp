@@ -6,7 +6,6 @@
 #include "ewa/dataset.h"
 #include "scene/lens.h"
 #include "scene/neighbors.h"
-#include "scene/undistort.h"
 #include "shared/constants.h"
 #include "support/temp_folder.h"
 

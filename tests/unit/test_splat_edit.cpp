@@ -8,7 +8,7 @@
 
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
-#include "scene/sh_basis.h"
+#include "scene/color.h"
 #include "support/splat_scenes.h"
 #include "support/temp_folder.h"
 

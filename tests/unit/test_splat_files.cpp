@@ -3,10 +3,10 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <array>
 
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
-#include "io/splats/spz_layout.h"
 #include "support/splat_scenes.h"
 #include "support/temp_folder.h"
 
@@ -224,8 +224,9 @@ TEST(Splat, BytesAsLaidOut) {
 
 /// One splat of degree 0 in the layout of a version, with the bytes of its blocks.
 std::string spz(uint32_t version, uint8_t degree, const std::string& blocks, uint32_t count = 1) {
-    return bytes_of(io::spz::kMagic) + bytes_of(version) + bytes_of(count) + bytes_of(degree) +
-           bytes_of(uint8_t(12)) + std::string(2, '\0') + blocks;
+    constexpr uint32_t kMagic = 0x5053474e;  // "NGSP"
+    return bytes_of(kMagic) + bytes_of(version) + bytes_of(count) + bytes_of(degree) + bytes_of(uint8_t(12)) +
+           std::string(2, '\0') + blocks;
 }
 
 TEST(Spz, VersionsOneToThree) {
@@ -274,9 +275,10 @@ TEST(Spz, TurnsTheFrame) {
     glm::dmat4 half_turn(1.0);
     half_turn[1][1] = half_turn[2][2] = -1;
     transform_splats(turned, half_turn);
+    const std::array<float, 15> signs = {-1, -1, 1, -1, 1, 1, -1, 1, -1, 1, -1, -1, 1, -1, 1};
     for (size_t i = 0; i < back.size(); ++i)
         for (size_t k = 1; k < 16; ++k)
-            EXPECT_EQ(turned.sh[48 * i + 3 * k], float(io::spz::kFlipSh[k - 1]) * back.sh[48 * i + 3 * k]);
+            EXPECT_EQ(turned.sh[48 * i + 3 * k], signs[k - 1] * back.sh[48 * i + 3 * k]);
 }
 
 TEST(Spz, RefusesWithTheReason) {

@@ -212,7 +212,7 @@ TEST(Transforms, NamesWhatIsWrong) {
         scene.refuse(parts);
     };
     refuse("fl_x", 0, {"not positive"});
-    refuse("fl_x", "ten", {"\"fl_x\"", "no number"});
+    refuse("fl_x", "ten", {"\"fl_x\"", "not a number"});
     refuse("w", 7.5, {"\"w\""});
     refuse("w", -8, {"\"w\""});
     refuse("w", 1e12, {"\"w\""});

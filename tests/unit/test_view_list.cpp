@@ -66,7 +66,7 @@ TEST(ViewList, DamageIsRefusedWithItsPlace) {
     EXPECT_THROW(read_views(folder / "none.json"), InputError);
     refused("", "not valid JSON");
     refused("{\"views\": " + std::string(3000000, '['), "nests deeper");
-    refused("{\"views\": 3}", "no list");
+    refused("{\"views\": 3}", "not a list");
     refused(good.substr(0, good.size() / 2), "not valid JSON");
     refused("{\"views\": [3]}", "view 0");
     refused(with("\"width\": 640", "\"width\": 0"), "view 1: width");
@@ -74,8 +74,9 @@ TEST(ViewList, DamageIsRefusedWithItsPlace) {
     refused(with("\"fx\": 500.1", "\"fx\": -1"), "view 1: a focal length");
     refused(with("\"fx\": 500.1", "\"fx\": 1e999"), "not valid JSON");
     refused(with("\"fx\"", "\"gx\""), "view 1");
-    refused(with("\"pivot\": [", "\"pivot\": [1,"), "pivot has not 3");
-    refused(with("\"rotation\": [", "\"rotation\": [0,0,0, 0,0,0, 0,0,0], \"other\": ["), "rotation is none");
+    refused(with("\"pivot\": [", "\"pivot\": [1,"), "pivot needs 3");
+    refused(with("\"rotation\": [", "\"rotation\": [0,0,0, 0,0,0, 0,0,0], \"other\": ["),
+            "rotation is not orthonormal");
 }
 
 }  // namespace

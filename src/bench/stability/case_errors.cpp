@@ -8,16 +8,16 @@
 #include "bench/check.h"
 #include "core/random.h"
 #include "ewa/renderer.h"
-#include "reference/order.h"
 #include "reference/render.h"
+#include "reference/sort.h"
 #include "shared/constants.h"
 
 namespace ewa::bench {
 namespace {
 
-using reference::LossGradientTwin;
 using reference::Picture;
 using reference::Raster;
+using reference::ReferenceGradient;
 using reference::Values;
 
 constexpr double kUnit = 0x1p-24;       // half a float32 step, relative
@@ -174,13 +174,13 @@ struct Conditions {
 
 /// The error of the reference under changes of each stored value, divided by the size of the change: the
 /// largest of several.
-Conditions conditions_of(const StabilityCase& one, const Image& photo, const LossGradientTwin& expected,
+Conditions conditions_of(const StabilityCase& one, const Image& photo, const ReferenceGradient& expected,
                          const std::vector<uint8_t>& excluded, double scale) {
     const Values values = reference::to_double(one.gaussians);
     const std::vector<double> least = least_norms(one, expected.gradient);
     Conditions k;
     for (uint32_t draw = 0; draw < kPerturbations; ++draw) {
-        const LossGradientTwin moved = reference::loss_gradient(
+        const ReferenceGradient moved = reference::loss_gradient(
             perturbed(values, one.camera.position(), draw), one.camera, photo, one.options);
         const double picture =
             picture_difference(expected.picture.blended.color, excluded, scale, [&](int x, int y, int c) {
@@ -216,7 +216,8 @@ bool StabilityResult::good() const {
 StabilityResult compare_with_twin(const std::shared_ptr<gpu::Device>& device, const StabilityCase& one,
                                   const Gaussians& drawn) {
     const Image photo = stability_photo(one.camera.width, one.camera.height);
-    const LossGradientTwin expected = reference::loss_gradient(one.gaussians, one.camera, photo, one.options);
+    const ReferenceGradient expected =
+        reference::loss_gradient(one.gaussians, one.camera, photo, one.options);
     const std::vector<uint8_t> at_threshold = pixels_at_threshold(expected.picture);
     const double scale = scale_of(expected.picture.blended.color);
     const Conditions condition = conditions_of(one, photo, expected, at_threshold, scale);

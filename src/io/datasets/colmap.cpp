@@ -2,22 +2,74 @@
 #include "io/datasets/colmap.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <functional>
 #include <glm/gtc/quaternion.hpp>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
 
+#include "core/file_reader.h"
 #include "core/sandboxed_path.h"
 #include "core/text.h"
 #include "ewa/error.h"
-#include "io/datasets/colmap_model.h"
+#include "io/datasets/image_records.h"
 
 namespace ewa::io {
 
 namespace {
 
+/// Throws InputError that names the position in the file.
+using Fail = std::function<void(const std::string&)>;
+
+/// A lens model. A camera's parameters are f or fx fy, then cx cy, then the terms.
+struct ColmapLens {
+    std::string_view name;
+    size_t focal_lengths = 1;
+    Lens lens = Lens::brown;
+    std::array<double Distortion::*, 12> terms{};  // null after the last
+
+    size_t parameters() const {
+        return focal_lengths + 2 + size_t(std::find(terms.begin(), terms.end(), nullptr) - terms.begin());
+    }
+};
+
+/// Collects a model and checks its ids. Errors go to the Fail of the file that is being read.
+class ColmapBuilder {
+  public:
+    explicit ColmapBuilder(std::filesystem::path images) : images_(std::move(images)) {
+        result_.folder = images_;
+    }
+
+    void add_camera(uint32_t id, const ColmapLens& lens, uint64_t width, uint64_t height,
+                    const std::vector<double>& parameters, const Fail& fail);
+    /// pose: qw qx qy qz tx ty tz, world to camera.
+    void add_image(const std::array<double, 7>& pose, uint32_t camera_id, const std::string& name,
+                   const Fail& fail);
+    /// `where` is called for the first dropped point.
+    void add_point(const glm::dvec3& position, const std::array<uint8_t, 3>& color,
+                   const std::function<std::string()>& where) {
+        io::add_point(result_.points, result_.dropped, position, color, where);
+    }
+    ImageRecords take() { return std::move(result_); }
+
+  private:
+    struct CameraModel {
+        Camera camera;
+        Distortion distortion;
+    };
+    std::filesystem::path images_;
+    std::map<uint32_t, CameraModel> cameras_;
+    ImageRecords result_;
+};
+
 using D = Distortion;
 
-// In the order of COLMAP's model ids, each with its parameters after the principal point in the file's order
-// (src/colmap/sensor/models.h).
+// In the order of COLMAP's model ids. The terms are in the order of the file, after the principal point
+// (COLMAP, src/colmap/sensor/models.h).
 constexpr ColmapLens kLenses[] = {
     {"SIMPLE_PINHOLE", 1, Lens::brown, {}},
     {"PINHOLE", 2, Lens::brown, {}},
@@ -45,17 +97,12 @@ constexpr ColmapLens kLenses[] = {
 
 constexpr uint64_t kMaxSize = 1u << 20;  // px
 
-}  // namespace
-
-size_t ColmapLens::parameters() const {
-    const auto end = std::find(terms.begin(), terms.end(), nullptr);
-    return focal_lengths + 2 + size_t(end - terms.begin());
-}
-
+/// By COLMAP's number, or null.
 const ColmapLens* colmap_lens(int64_t id) {
     return id >= 0 && id < int64_t(std::size(kLenses)) ? &kLenses[id] : nullptr;
 }
 
+/// By COLMAP's name, or null.
 const ColmapLens* colmap_lens(std::string_view name) {
     const auto* found =
         std::find_if(std::begin(kLenses), std::end(kLenses), [&](auto& lens) { return lens.name == name; });
@@ -66,7 +113,8 @@ void ColmapBuilder::add_camera(uint32_t id, const ColmapLens& lens, uint64_t wid
                                const std::vector<double>& parameters, const Fail& fail) {
     const std::string camera_name = "camera " + std::to_string(id);
     if (width < 1 || height < 1 || width > kMaxSize || height > kMaxSize)
-        fail(camera_name + " is " + std::to_string(width) + " x " + std::to_string(height) + " pixels large");
+        fail(camera_name + " has an invalid size of " + std::to_string(width) + " x " +
+             std::to_string(height) + " pixels");
     Camera camera;
     camera.width = static_cast<int>(width);
     camera.height = static_cast<int>(height);
@@ -82,28 +130,29 @@ void ColmapBuilder::add_camera(uint32_t id, const ColmapLens& lens, uint64_t wid
         std::all_of(parameters.begin(), parameters.end(), [](double v) { return std::isfinite(v); });
     if (!(camera.fx > 0 && camera.fy > 0) || !finite)
         fail(camera_name + " has a focal length that is not positive, or a parameter that is not finite");
-    if (!cameras_.emplace(id, Taken{camera, distortion}).second) fail(camera_name + " is there twice");
+    if (!cameras_.emplace(id, CameraModel{camera, distortion}).second)
+        fail(camera_name + " is defined twice");
 }
 
 void ColmapBuilder::add_image(const std::array<double, 7>& pose, uint32_t camera_id, const std::string& name,
                               const Fail& fail) {
     const std::string image_name = "image \"" + core::one_line(name) + "\"";
     const auto inside = core::name_inside(name);
-    if (!inside) return fail(image_name + " lies outside the images folder");
-    if (!core::links_stay_with_pictures(images_.parent_path(), images_.filename() / *inside))
+    if (!inside) return fail(image_name + " is outside the images folder");
+    if (!core::links_stay_with_images(images_.parent_path(), images_.filename() / *inside))
         fail(image_name + " is a link out of the dataset's folder; " + core::kLinkAdvice);
     const auto camera = cameras_.find(camera_id);
     if (camera == cameras_.end())
-        fail(image_name + " has camera " + std::to_string(camera_id) + ", which is not there");
+        fail(image_name + " refers to camera " + std::to_string(camera_id) + ", which is not defined");
     double largest = 0;
     for (double v : pose)
         if (!std::isfinite(v)) fail(image_name + " has a pose that is not finite");
     for (size_t i = 0; i < 4; ++i) largest = std::max(largest, std::abs(pose[i]));
     if (largest == 0) fail(image_name + " has a quaternion of zero");
-    // Divided first, so that the squares of very small or large components do not leave the range of double.
+    // The division keeps the squares of very small or large components within the range of double.
     const glm::dquat q = glm::normalize(
         glm::dquat(pose[0] / largest, pose[1] / largest, pose[2] / largest, pose[3] / largest));
-    PosedImage image;
+    ImageRecord image;
     image.name = name;
     image.path = images_ / *inside;
     image.camera = camera->second.camera;
@@ -113,10 +162,188 @@ void ColmapBuilder::add_image(const std::array<double, 7>& pose, uint32_t camera
     result_.images.push_back(std::move(image));
 }
 
-void ColmapBuilder::add_point(const glm::dvec3& position, const std::array<uint8_t, 3>& color,
-                              const std::function<std::string()>& where) {
-    io::add_point(result_.points, result_.dropped, position, color, where);
+constexpr size_t kMaxName = 4096;
+// Bytes of the shortest entry of each list, and of each item that an entry counts.
+constexpr uint64_t kCameraBytes = 4 + 4 + 8 + 8 + 3 * 8, kImageBytes = 4 + 7 * 8 + 4 + 1 + 8;
+constexpr uint64_t kPointBytes = 8 + 3 * 8 + 3 + 8 + 8, kObservationBytes = 3 * 8, kTrackBytes = 2 * 4;
+
+uint64_t read_count(core::FileReader& reader, uint64_t bytes_each, const char* what) {
+    const auto count = reader.read<uint64_t>(what);
+    reader.require_room(count, bytes_each, what);
+    return count;
 }
+
+void read_binary_cameras(const std::filesystem::path& path, ColmapBuilder& builder) {
+    core::FileReader reader(path);
+    const Fail fail = [&](const std::string& text) { reader.fail(text); };
+    const uint64_t count = read_count(reader, kCameraBytes, "cameras");
+    for (uint64_t i = 0; i < count; ++i) {
+        const auto id = reader.read<uint32_t>("a camera");
+        const auto lens_id = reader.read<int32_t>("a camera");
+        const auto width = reader.read<uint64_t>("a camera"), height = reader.read<uint64_t>("a camera");
+        const ColmapLens* lens = colmap_lens(int64_t(lens_id));
+        if (!lens)
+            reader.fail("camera " + std::to_string(id) + " has the unknown lens model number " +
+                        std::to_string(lens_id) +
+                        "; undistort the images with `colmap image_undistorter` and use its output");
+        std::vector<double> parameters(lens->parameters());
+        for (double& parameter : parameters) parameter = reader.read<double>("a camera");
+        builder.add_camera(id, *lens, width, height, parameters, fail);
+    }
+}
+
+void read_binary_images(const std::filesystem::path& path, ColmapBuilder& builder) {
+    core::FileReader reader(path);
+    const Fail fail = [&](const std::string& text) { reader.fail(text); };
+    const uint64_t count = read_count(reader, kImageBytes, "images");
+    for (uint64_t i = 0; i < count; ++i) {
+        reader.skip(sizeof(uint32_t), "an image");  // its id
+        std::array<double, 7> pose;
+        for (double& value : pose) value = reader.read<double>("an image");
+        const auto camera_id = reader.read<uint32_t>("an image");
+        const std::string name = reader.read_zero_terminated(kMaxName, "the name of an image");
+        builder.add_image(pose, camera_id, name, fail);
+        const uint64_t observations = read_count(reader, kObservationBytes, "observations");
+        reader.skip(observations * kObservationBytes, "observations");
+    }
+}
+
+void read_binary_points(const std::filesystem::path& path, ColmapBuilder& builder) {
+    core::FileReader reader(path);
+    const uint64_t count = read_count(reader, kPointBytes, "points");
+    for (uint64_t i = 0; i < count; ++i) {
+        const uint64_t begin = reader.offset();
+        reader.skip(sizeof(uint64_t), "a point");  // its id
+        glm::dvec3 position;
+        for (int axis = 0; axis < 3; ++axis) position[axis] = reader.read<double>("a point");
+        std::array<uint8_t, 3> color;
+        for (uint8_t& channel : color) channel = reader.read<uint8_t>("a point");
+        reader.skip(sizeof(double), "a point");  // its reprojection error
+        const uint64_t track = read_count(reader, kTrackBytes, "entries of a track");
+        reader.skip(track * kTrackBytes, "a track");
+        builder.add_point(position, color, [&] {
+            return core::one_line(path.string()) + ": the point at byte " + std::to_string(begin);
+        });
+    }
+}
+
+void read_colmap_binary(const std::filesystem::path& model, ColmapBuilder& builder) {
+    read_binary_cameras(model / "cameras.bin", builder);
+    read_binary_images(model / "images.bin", builder);
+    if (std::filesystem::exists(model / "points3D.bin")) read_binary_points(model / "points3D.bin", builder);
+}
+
+constexpr size_t kMaxLine = size_t(1) << 28;  // the observations of one image are one line
+
+/// The lines of a file with their numbers, and the words of a line.
+class Lines {
+  public:
+    explicit Lines(const std::filesystem::path& path) : reader_(path) {}
+
+    /// Reads the next line. False at the end of the file.
+    bool next() {
+        ++number_;
+        const bool there = reader_.read_line(line_, kMaxLine);
+        rest_ = line_;
+        return there;
+    }
+
+    /// Reads the next line that is neither empty nor a comment. False at the end of the file.
+    bool next_entry() {
+        while (next()) {
+            const std::string_view text = core::trim(line_);
+            if (!text.empty() && text.front() != '#') return true;
+        }
+        return false;
+    }
+
+    std::string_view word() { return core::next_word(rest_); }
+    std::string_view rest() const { return core::trim(rest_); }
+
+    double number(const char* what) {
+        const std::string_view text = word();
+        const std::optional<double> value = core::parse_number(text);
+        if (!value) fail(std::string(what) + ": \"" + std::string(text.substr(0, 60)) + "\" is not a number");
+        return *value;
+    }
+
+    template <class T>
+    T integer(const char* what) {
+        const std::string_view text = word();
+        const std::optional<T> value = core::parse_integer<T>(text);
+        if (!value)
+            fail(std::string(what) + ": \"" + std::string(text.substr(0, 60)) +
+                 "\" is not an integer in range");
+        return *value;
+    }
+
+    std::string where() const { return reader_.name() + ":" + std::to_string(number_); }
+    void fail(const std::string& text) const { throw InputError(where() + ": " + core::one_line(text)); }
+
+  private:
+    core::FileReader reader_;
+    std::string line_;
+    std::string_view rest_;
+    size_t number_ = 0;
+};
+
+// # CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]
+void read_text_cameras(const std::filesystem::path& path, ColmapBuilder& builder) {
+    Lines lines(path);
+    const Fail fail = [&](const std::string& text) { lines.fail(text); };
+    while (lines.next_entry()) {
+        const auto id = lines.integer<uint32_t>("camera id");
+        const std::string_view name = lines.word();
+        const ColmapLens* lens = colmap_lens(name);
+        if (!lens) {
+            lines.fail("unknown lens model \"" + std::string(name) +
+                       "\"; undistort the images with `colmap image_undistorter` and use its output");
+            return;
+        }
+        const auto width = lines.integer<uint64_t>("width"), height = lines.integer<uint64_t>("height");
+        std::vector<double> parameters(lens->parameters());
+        for (double& parameter : parameters) parameter = lines.number("camera parameter");
+        if (!lines.rest().empty()) lines.fail("a " + std::string(name) + " camera has too many parameters");
+        builder.add_camera(id, *lens, width, height, parameters, fail);
+    }
+}
+
+// # IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME, then a line of observations that may be empty.
+void read_text_images(const std::filesystem::path& path, ColmapBuilder& builder) {
+    Lines lines(path);
+    const Fail fail = [&](const std::string& text) { lines.fail(text); };
+    while (lines.next_entry()) {
+        lines.integer<uint32_t>("image id");
+        std::array<double, 7> pose;
+        for (double& value : pose) value = lines.number("pose");
+        const auto camera_id = lines.integer<uint32_t>("camera id");
+        if (lines.rest().empty()) lines.fail("the image has no name");
+        builder.add_image(pose, camera_id, std::string(lines.rest()), fail);
+        lines.next();
+    }
+}
+
+// # POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[]
+void read_text_points(const std::filesystem::path& path, ColmapBuilder& builder) {
+    Lines lines(path);
+    while (lines.next_entry()) {
+        lines.integer<uint64_t>("point id");
+        glm::dvec3 position;
+        for (int axis = 0; axis < 3; ++axis) position[axis] = lines.number("coordinate");
+        std::array<uint8_t, 3> color;
+        for (uint8_t& channel : color) channel = lines.integer<uint8_t>("colour");
+        lines.number("reprojection error");
+        builder.add_point(position, color, [&] { return lines.where(); });
+    }
+}
+
+void read_colmap_text(const std::filesystem::path& model, ColmapBuilder& builder) {
+    read_text_cameras(model / "cameras.txt", builder);
+    read_text_images(model / "images.txt", builder);
+    if (std::filesystem::exists(model / "points3D.txt")) read_text_points(model / "points3D.txt", builder);
+}
+
+}  // namespace
 
 std::optional<std::filesystem::path> find_colmap_model(const std::filesystem::path& root) {
     std::error_code ignored;
@@ -128,7 +355,7 @@ std::optional<std::filesystem::path> find_colmap_model(const std::filesystem::pa
     return std::nullopt;
 }
 
-PosedImages read_colmap(const std::filesystem::path& model, const std::filesystem::path& images) {
+ImageRecords read_colmap(const std::filesystem::path& model, const std::filesystem::path& images) {
     ColmapBuilder builder(images);
     if (std::filesystem::exists(model / "cameras.bin") && std::filesystem::exists(model / "images.bin"))
         read_colmap_binary(model, builder);

@@ -1,56 +1,49 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which kind of dataset a path holds, and what every kind is checked for once its model is read.
+// Recognises the kind of dataset at a path, reads its model, and checks its images and masks.
 #include "ewa/dataset.h"
 
 #include <algorithm>
 #include <cmath>
 
+#include "core/folders.h"
 #include "core/sandboxed_path.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "io/datasets/colmap.h"
 #include "io/datasets/transforms.h"
-#include "scene/aspect.h"
-#include "scene/undistort.h"
+#include "scene/camera.h"
+#include "scene/lens.h"
 
 namespace ewa {
 
 namespace {
 
 namespace fs = std::filesystem;
-
-bool is_file(const fs::path& path) {
-    std::error_code ignored;
-    return fs::is_regular_file(path, ignored);
-}
-
-bool is_folder(const fs::path& path) {
-    std::error_code ignored;
-    return fs::is_directory(path, ignored);
-}
+using core::is_file;
+using core::is_folder;
 
 std::string size_text(int width, int height) {
     return std::to_string(width) + " x " + std::to_string(height);
 }
 
-/// Whether a folder of the dataset has this file. Throws where a link leads to it from elsewhere.
+/// Whether a folder of the dataset has this file. Throws if a link leads out of the dataset.
 bool has_file(const fs::path& folder, const fs::path& name) {
     const fs::path path = folder / name;
     if (!is_file(path)) return false;
-    if (!core::links_stay_with_pictures(folder.parent_path(), folder.filename() / name))
+    if (!core::links_stay_with_images(folder.parent_path(), folder.filename() / name))
         throw InputError(core::one_line(path.string()) + ": is a link out of the dataset's folder; " +
                          core::kLinkAdvice);
     return true;
 }
 
-/// The file of a frame: the model's, or its copy in images_K for a downscale factor K.
-struct Picture {
+/// The image file of a frame: the model's, or its copy in images_K for a downscale factor K.
+struct ImageFile {
     fs::path path;
     bool exists = false;
-    int downscale = 1;  // what is left to do
+    int downscale = 1;  // factor that still has to be applied
 };
 
-Picture find_picture(const io::PosedImage& image, const fs::path& folder, int downscale) {
+ImageFile find_image(const io::ImageRecord& image, const fs::path& folder, int downscale) {
     if (downscale > 1) {
         const fs::path inside = image.path.lexically_relative(folder);
         const fs::path copies =
@@ -70,9 +63,8 @@ fs::path find_mask_in(const fs::path& masks, const fs::path& inside) {
     return {};
 }
 
-/// The mask file of a picture, where there is one: its copy in masks_K, the model's, or that in masks. A mask
-/// may have any size of its picture's shape.
-fs::path find_mask(const io::PosedImage& image, const fs::path& folder, int downscale) {
+/// The mask file of an image: its copy in masks_K, the model's, or the one in masks. Empty if there is none.
+fs::path find_mask(const io::ImageRecord& image, const fs::path& folder, int downscale) {
     const fs::path inside = image.path.lexically_relative(folder), root = folder.parent_path();
     const bool below = !inside.empty() && *inside.begin() != "..";
     if (below && downscale > 1) {
@@ -83,7 +75,7 @@ fs::path find_mask(const io::PosedImage& image, const fs::path& folder, int down
     return below ? find_mask_in(root / "masks", inside) : fs::path();
 }
 
-/// Whether masks are for ignoring or for cutting out is one decision for a dataset.
+/// Resolves MaskUse::automatic once for the whole dataset.
 void settle_masks(Dataset& dataset, MaskUse wanted) {
     const bool files = std::any_of(dataset.frames.begin(), dataset.frames.end(),
                                    [](const Frame& frame) { return !frame.mask_path.empty(); });
@@ -94,13 +86,13 @@ void settle_masks(Dataset& dataset, MaskUse wanted) {
     }
 }
 
-/// The camera and the orientation of the file's own pixels.
+/// Scales frame.source to the size of the file and sets the orientation. Throws if the aspect ratios differ.
 void fit_to_file(Frame& frame) {
     const ImageSize size = read_image_size(frame.image_path);
     Camera& camera = frame.source;
-    const bool stored = scene::same_shape(camera.width, camera.height, size.width, size.height);
-    const bool turned = !stored && size.orientation >= 5 &&
-                        scene::same_shape(camera.width, camera.height, size.height, size.width);
+    const bool stored = same_aspect(camera.width, camera.height, size.width, size.height);
+    const bool turned =
+        !stored && size.orientation >= 5 && same_aspect(camera.width, camera.height, size.height, size.width);
     const int width = turned ? size.height : size.width, height = turned ? size.width : size.height;
     frame.orientation = turned ? size.orientation : 1;
     frame.eight_bit = size.eight_bit;
@@ -117,9 +109,9 @@ void fit_to_file(Frame& frame) {
     camera.cy *= y;
 }
 
-/// Pinhole cameras of lenses met before: finding one takes some milliseconds, and most datasets have only a
-/// few lenses.
-class Pinholes {
+/// Cached pinhole cameras, one per lens: finding one takes some milliseconds, and most datasets have few
+/// lenses.
+class PinholeCache {
   public:
     Camera of(const Camera& source, const Distortion& distortion) {
         const auto known = std::find_if(known_.begin(), known_.end(), [&](const Known& k) {
@@ -146,18 +138,18 @@ class Pinholes {
     std::vector<Known> known_;
 };
 
-Frame make_frame(const io::PosedImage& image, const Picture& picture, const DatasetOptions& options,
-                 Pinholes& pinholes) {
+Frame make_frame(const io::ImageRecord& image, const ImageFile& file, const DatasetOptions& options,
+                 PinholeCache& pinholes) {
     Frame frame;
     frame.name = image.name;
-    frame.image_path = picture.path;
-    frame.image_exists = picture.exists;
+    frame.image_path = file.path;
+    frame.image_exists = file.exists;
     frame.source = image.camera;
-    frame.downscale = picture.downscale;
+    frame.downscale = file.downscale;
     try {
-        if (picture.exists) fit_to_file(frame);
+        if (file.exists) fit_to_file(frame);
     } catch (const InputError&) {
-        // Cameras alone were asked for: a picture that does not fit, or is none, leaves the model's word.
+        // If only cameras are needed, the model's size replaces that of an unusable image.
         if (options.need_images) throw;
         frame.downscale = options.downscale;
     }
@@ -175,14 +167,14 @@ Frame make_frame(const io::PosedImage& image, const Picture& picture, const Data
 /// The images folder that belongs to a COLMAP model.
 fs::path images_folder(const fs::path& root, const fs::path& model) {
     if (model != root) return root / "images";
-    // The model's own folder was given: its pictures stand beside it, or beside the sparse/ it lies in.
+    // The path is the model's own folder: images/ is beside it, or beside the sparse/ that contains it.
     const fs::path absolute = fs::absolute(root / "x").parent_path();
     for (const fs::path& folder : {absolute, absolute.parent_path(), absolute.parent_path().parent_path()})
         if (is_folder(folder / "images")) return folder / "images";
     return root / "images";
 }
 
-void append(io::PosedImages& all, io::PosedImages more) {
+void append(io::ImageRecords& all, io::ImageRecords more) {
     std::move(more.images.begin(), more.images.end(), std::back_inserter(all.images));
     if (all.points.positions.empty()) all.points = std::move(more.points);
     if (all.dropped.count == 0) all.dropped.first = std::move(more.dropped.first);
@@ -190,13 +182,13 @@ void append(io::PosedImages& all, io::PosedImages more) {
     all.color_depends_on_view = all.color_depends_on_view || more.color_depends_on_view;
 }
 
-/// Blender's scenes say by the file's name what its frames are for.
+/// In Blender's scenes, the file name states the split.
 int split_of(const fs::path& path) {
     const std::string stem = path.stem().string();
     return stem == "transforms_train" ? 1 : stem == "transforms_test" ? 2 : 0;
 }
 
-io::PosedImages read_model(const fs::path& path, const DatasetOptions& options) {
+io::ImageRecords read_model(const fs::path& path, const DatasetOptions& options) {
     const std::string name = core::one_line(path.string());
     if (is_file(path)) {
         if (core::lower(path.extension().string()) != ".json")
@@ -215,9 +207,9 @@ io::PosedImages read_model(const fs::path& path, const DatasetOptions& options) 
     }
     if (is_file(path / "transforms.json"))
         return io::read_transforms(path / "transforms.json", 0, options.need_images);
-    io::PosedImages all;
+    io::ImageRecords all;
     all.folder = path / "images";
-    all.color_depends_on_view = false;  // unless a file says so, or says nothing
+    all.color_depends_on_view = false;  // true as soon as one file does not state the opposite
     bool found = false;
     for (const char* file : {"transforms_train.json", "transforms_test.json"})
         if (is_file(path / file)) {
@@ -227,16 +219,16 @@ io::PosedImages read_model(const fs::path& path, const DatasetOptions& options) 
     if (!found)
         throw InputError(
             name +
-            ": not a dataset; looked for cameras and images (.bin or .txt) in sparse/0, sparse and the "
-            "folder itself, transforms.json, transforms_train.json and transforms_test.json");
+            ": not a dataset; expected cameras and images (.bin or .txt) in sparse/0, sparse or the folder "
+            "itself, or transforms.json, transforms_train.json or transforms_test.json");
     return all;
 }
 
 }  // namespace
 
 Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& options) {
-    if (options.downscale < 1) throw InputError("the downscale factor has to be 1 or more");
-    io::PosedImages model = read_model(path, options);
+    if (options.downscale < 1) throw InputError("the downscale factor must be 1 or more");
+    io::ImageRecords model = read_model(path, options);
     const std::string name = core::one_line(path.string());
     if (model.images.empty()) throw InputError(name + ": the dataset has no images");
     Dataset dataset;
@@ -246,20 +238,20 @@ Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& op
     dataset.dropped_points = model.dropped.count;
     dataset.first_dropped_point = std::move(model.dropped.first);
     std::stable_sort(model.images.begin(), model.images.end(),
-                     [](const io::PosedImage& a, const io::PosedImage& b) { return a.name < b.name; });
-    Pinholes pinholes;
-    for (const io::PosedImage& image : model.images) {
-        const Picture picture = find_picture(image, model.folder, options.downscale);
-        dataset.missing_images += !picture.exists;
-        const bool usable = image.camera.width > 0 && (picture.exists || !options.need_images);
+                     [](const io::ImageRecord& a, const io::ImageRecord& b) { return a.name < b.name; });
+    PinholeCache pinholes;
+    for (const io::ImageRecord& image : model.images) {
+        const ImageFile file = find_image(image, model.folder, options.downscale);
+        dataset.missing_images += !file.exists;
+        const bool usable = image.camera.width > 0 && (file.exists || !options.need_images);
         if (!usable) continue;
-        dataset.frames.push_back(make_frame(image, picture, options, pinholes));
+        dataset.frames.push_back(make_frame(image, file, options, pinholes));
         dataset.frames.back().mask_path = find_mask(image, model.folder, options.downscale);
     }
     settle_masks(dataset, options.masks);
     if (dataset.frames.empty())
         throw InputError(name + ": none of the " + std::to_string(model.images.size()) +
-                         " images is there, the first being " +
+                         " images exists, the first being " +
                          core::one_line(model.images.front().path.string()));
     return dataset;
 }

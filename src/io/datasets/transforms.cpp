@@ -3,27 +3,32 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/matrix.hpp>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "core/atomic_file.h"
+#include "core/folders.h"
 #include "core/json.h"
 #include "core/sandboxed_path.h"
 #include "core/text.h"
 #include "ewa/error.h"
-#include "io/datasets/points_ply.h"
+#include "io/datasets/image_records.h"
 
 namespace ewa::io {
 
 namespace {
 
 using nlohmann::json;
+using Json = nlohmann::ordered_json;
 
-constexpr size_t kLongestName = 200;  // in an error
-constexpr double kMaxSize = 1 << 20;  // px
-// Of the columns of a rotation from unit length and right angles. Files with four decimals stay under it.
+constexpr size_t kLongestName = 200;      // in an error
+constexpr double kLongestSide = 1 << 20;  // px
+// Deviation of a rotation's columns from unit length and right angles. Files with four decimals stay below
+// it.
 constexpr double kMaxRotationError = 1e-2;
 
-/// A frame and the top of its file, asked together: what a frame does not say, the top says for all.
+/// A frame and the top of its file. A key is looked up in the frame, then at the top.
 class Entry {
   public:
     Entry(const std::string& where, const json& top, const json& frame)
@@ -38,7 +43,7 @@ class Entry {
     std::optional<double> number(const char* key) const {
         const json* value = find(key);
         if (!value) return std::nullopt;
-        if (!value->is_number()) fail(std::string("\"") + key + "\" is no number");
+        if (!value->is_number()) fail(std::string("\"") + key + "\" is not a number");
         const double number = value->get<double>();
         if (!std::isfinite(number)) fail(std::string("\"") + key + "\" is not finite");
         return number;
@@ -47,7 +52,7 @@ class Entry {
     std::string text(const char* key) const {
         const json* value = find(key);
         if (!value) return {};
-        if (!value->is_string()) fail(std::string("\"") + key + "\" is no text");
+        if (!value->is_string()) fail(std::string("\"") + key + "\" is not a string");
         return value->get<std::string>();
     }
 
@@ -61,8 +66,9 @@ class Entry {
     std::string where_;
 };
 
-/// nerfstudio's and instant-ngp's lenses. k4 is a fourth radial term to the one and divides to the other (and
-/// to OpenCV); only a fisheye and a camera that calls itself FULL_OPENCV leave no doubt.
+/// The lenses of nerfstudio and instant-ngp. They disagree on k4: a fourth radial term, or as in OpenCV a
+/// term of the denominator. It is accepted only where its meaning is certain: for a fisheye and for
+/// FULL_OPENCV.
 Distortion read_lens(const Entry& entry) {
     static constexpr std::string_view kPerspective[] = {
         "", "PINHOLE", "SIMPLE_PINHOLE", "OPENCV", "SIMPLE_RADIAL", "RADIAL", "FULL_OPENCV"};
@@ -93,33 +99,28 @@ Distortion read_lens(const Entry& entry) {
     return d;
 }
 
-bool is_file(const std::filesystem::path& path) {
-    std::error_code ignored;
-    return std::filesystem::is_regular_file(path, ignored);
-}
-
-/// What the entry names under this key, from the folder of its file; empty where it names nothing.
+/// The file that the entry names under this key, relative to `folder`. Empty if it names none.
 std::filesystem::path named_file(const Entry& entry, const char* key, const std::filesystem::path& folder) {
     const std::string name = entry.text(key);
     if (name.empty()) return {};
     const auto inside = core::name_inside(name);
     const std::string what = std::string("\"") + key + "\" " + name.substr(0, kLongestName);
     if (!inside) entry.fail(what + " leaves the file's folder; only files in or below it are read");
-    if (!core::links_stay_with_pictures(folder, *inside))
+    if (!core::links_stay_with_images(folder, *inside))
         entry.fail(what + " is a link out of the file's folder; " + core::kLinkAdvice);
     return *inside;
 }
 
-void find_picture(const Entry& entry, const std::filesystem::path& folder, PosedImage& image) {
+void find_image(const Entry& entry, const std::filesystem::path& folder, ImageRecord& image) {
     const std::filesystem::path name = named_file(entry, "file_path", folder);
     if (name.empty()) entry.fail("\"file_path\" is missing");
     image.path = folder / name;
     image.name = name.string();
-    if (is_file(image.path)) return;
+    if (core::is_file(image.path)) return;
     for (const char* extension : {".png", ".jpg", ".jpeg"}) {
         const std::filesystem::path longer = name.string() + extension;
-        if (!is_file(folder / longer)) continue;
-        if (!core::links_stay_with_pictures(folder, longer))
+        if (!core::is_file(folder / longer)) continue;
+        if (!core::links_stay_with_images(folder, longer))
             entry.fail(longer.string() + " is a link out of the file's folder; " + core::kLinkAdvice);
         image.path = folder / longer;
         image.name = longer.string();
@@ -128,26 +129,26 @@ void find_picture(const Entry& entry, const std::filesystem::path& folder, Posed
 }
 
 int whole_size(const Entry& entry, const char* key, double value) {
-    if (!(value >= 1 && value <= kMaxSize) || value != std::floor(value))
-        entry.fail(std::string("\"") + key + "\" is no size in pixels");
+    if (!(value >= 1 && value <= kLongestSide) || value != std::floor(value))
+        entry.fail(std::string("\"") + key + "\" is not a whole number of pixels in 1..1048576");
     return static_cast<int>(value);
 }
 
 double focal_from_angle(const Entry& entry, const char* key, int size) {
     const double angle = *entry.number(key);
     if (!(angle > 0 && angle < std::numbers::pi))
-        entry.fail(std::string("\"") + key + "\" is no angle between 0 and pi (radians)");
+        entry.fail(std::string("\"") + key + "\" is not an angle between 0 and pi (radians)");
     return 0.5 * size / std::tan(0.5 * angle);
 }
 
-/// Width and height stay 0 where nothing tells them.
-void read_intrinsics(const Entry& entry, PosedImage& image) {
+/// Width and height stay 0 if neither the entry nor an image file states them.
+void read_intrinsics(const Entry& entry, ImageRecord& image) {
     Camera& camera = image.camera;
     const std::optional<double> w = entry.number("w"), h = entry.number("h");
     if (w && h) {
         camera.width = whole_size(entry, "w", *w);
         camera.height = whole_size(entry, "h", *h);
-    } else if (is_file(image.path)) {
+    } else if (core::is_file(image.path)) {
         const ImageSize size = read_image_size(image.path);
         camera.width = size.width;
         camera.height = size.height;
@@ -159,7 +160,7 @@ void read_intrinsics(const Entry& entry, PosedImage& image) {
     else if (entry.number("camera_angle_x"))
         camera.fx = focal_from_angle(entry, "camera_angle_x", camera.width);
     else
-        entry.fail("neither \"fl_x\" nor \"camera_angle_x\" is there");
+        entry.fail("\"fl_x\" or \"camera_angle_x\" is missing");
     if (const auto fl_y = entry.number("fl_y"))
         camera.fy = *fl_y;
     else if (!entry.number("fl_x") && entry.number("camera_angle_y"))
@@ -189,52 +190,66 @@ void read_pose(const Entry& entry, Camera& camera) {
     const json* rows = entry.find("transform_matrix");
     if (!rows) entry.fail("\"transform_matrix\" is missing");
     if (!rows->is_array() || (rows->size() != 3 && rows->size() != 4))
-        entry.fail("\"transform_matrix\" has no 3 or 4 rows");
+        entry.fail("\"transform_matrix\" needs 3 or 4 rows");
     glm::dmat3 axes;
     glm::dvec3 center;
     for (int row = 0; row < 3; ++row) {
         const json& values = (*rows)[size_t(row)];
         if (!values.is_array() || values.size() != 4)
-            entry.fail("a row of \"transform_matrix\" has no 4 numbers");
+            entry.fail("a row of \"transform_matrix\" needs 4 numbers");
         for (int column = 0; column < 4; ++column) {
             const json& value = values[size_t(column)];
             if (!value.is_number() || !std::isfinite(value.get<double>()))
-                entry.fail("\"transform_matrix\" holds something that is no finite number");
+                entry.fail("\"transform_matrix\" holds an entry that is not a finite number");
             (column < 3 ? axes[column][row] : center[row]) = value.get<double>();
         }
     }
     const double determinant = glm::determinant(axes);
-    if (!(determinant > 0)) entry.fail("\"transform_matrix\" is no rotation: it mirrors or is degenerate");
+    if (!(determinant > 0)) entry.fail("\"transform_matrix\" is not a rotation: it mirrors or is degenerate");
     axes /= std::cbrt(determinant);
     if (!(rotation_error(axes) <= kMaxRotationError))
         entry.fail(
-            "\"transform_matrix\" is no rotation: its columns differ in length or are not at right angles");
+            "\"transform_matrix\" is not a rotation: its columns differ in length or are not at right "
+            "angles");
     axes = nearest_rotation(axes);
-    // OpenGL's camera looks along -z with y up; OpenCV's along z with y down.
+    // OpenGL's camera looks along -z with y up, OpenCV's along z with y down.
     axes[1] = -axes[1];
     axes[2] = -axes[2];
     camera.rotation = glm::transpose(axes);
     camera.translation = -(camera.rotation * center);
 }
 
+Json matrix_of(const Camera& camera) {
+    glm::dmat3 axes = glm::transpose(camera.rotation);
+    axes[1] = -axes[1];
+    axes[2] = -axes[2];
+    const glm::dvec3 position = camera.position();
+    Json rows = Json::array();
+    for (int row = 0; row < 3; ++row)
+        rows.push_back({axes[0][row], axes[1][row], axes[2][row], position[row]});
+    rows.push_back({0.0, 0.0, 0.0, 1.0});
+    return rows;
+}
+
 }  // namespace
 
-PosedImages read_transforms(const std::filesystem::path& path, int split, bool with_points) {
+ImageRecords read_transforms(const std::filesystem::path& path, int split, bool with_points) {
     const std::string name = core::one_line(path.string());
-    const json top = core::read_json_file<json>(path, {.comments = true});  // which instant-ngp takes
-    if (!top.is_object()) throw InputError(name + ": is no JSON object");
+    const json top = core::read_json_file<json>(path, {.comments = true});  // as instant-ngp accepts them
+    if (!top.is_object()) throw InputError(name + ": is not a JSON object");
     const auto frames = top.find("frames");
-    if (frames == top.end() || !frames->is_array()) throw InputError(name + ": has no list \"frames\"");
-    PosedImages result;
+    if (frames == top.end() || !frames->is_array())
+        throw InputError(name + ": the list \"frames\" is missing");
+    ImageRecords result;
     const std::filesystem::path folder = path.parent_path();
     result.folder = folder / "images";
     for (size_t i = 0; i < frames->size(); ++i) {
         const Entry entry(name + ": frame " + std::to_string(i), top, (*frames)[i]);
-        if (!(*frames)[i].is_object()) entry.fail("is no JSON object");
-        PosedImage image;
+        if (!(*frames)[i].is_object()) entry.fail("is not a JSON object");
+        ImageRecord image;
         image.split = split;
         image.distortion = read_lens(entry);
-        find_picture(entry, folder, image);
+        find_image(entry, folder, image);
         if (const auto mask = named_file(entry, "mask_path", folder); !mask.empty())
             image.mask = folder / mask;
         read_pose(entry, image.camera);
@@ -253,6 +268,24 @@ PosedImages read_transforms(const std::filesystem::path& path, int split, bool w
         result.dropped = std::move(points.dropped);
     }
     return result;
+}
+
+void write_transforms(const std::filesystem::path& path, const TransformsFile& file) {
+    Json top = {{"camera_model", "PINHOLE"}};
+    for (const auto& [key, text] : file.remarks) top[key] = text;
+    if (!file.color_depends_on_view) top["view_dependent"] = false;
+    if (!file.points.empty()) top["ply_file_path"] = file.points;
+    top["frames"] = Json::array();
+    for (const TransformsFrame& frame : file.frames) {
+        const Camera& camera = frame.camera;
+        Json entry = {{"file_path", frame.image}, {"w", camera.width},
+                      {"h", camera.height},       {"fl_x", camera.fx},
+                      {"fl_y", camera.fy},        {"cx", camera.cx},
+                      {"cy", camera.cy},          {"transform_matrix", matrix_of(camera)}};
+        if (!frame.depth.empty()) entry["depth_file_path"] = frame.depth;
+        top["frames"].push_back(std::move(entry));
+    }
+    core::write_text_file(path, top.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
 }  // namespace ewa::io

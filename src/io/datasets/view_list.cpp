@@ -23,7 +23,7 @@ std::vector<double> numbers(const Json& json, const char* name, size_t count) {
     std::vector<double> values =
         list.is_array() ? list.get<std::vector<double>>() : std::vector{list.get<double>()};
     if (values.size() != count)
-        throw InputError(std::string(name) + " has not " + std::to_string(count) + " numbers");
+        throw InputError(std::string(name) + " needs " + std::to_string(count) + " numbers");
     for (const double value : values)
         if (!std::isfinite(value)) throw InputError(std::string(name) + " is not finite");
     return values;
@@ -59,7 +59,7 @@ NamedView parse_view(const Json& json) {
         camera.translation[row] = translation[size_t(row)];
         view.pivot[row] = pivot[size_t(row)];
     }
-    if (!is_rotation(camera.rotation)) throw InputError("its rotation is none");
+    if (!is_rotation(camera.rotation)) throw InputError("rotation is not orthonormal");
     return view;
 }
 
@@ -85,7 +85,7 @@ Json to_json(const NamedView& view) {
 std::vector<NamedView> read_views(const std::filesystem::path& path) {
     const Json json = core::read_json_file<Json>(path, {.bytes = kLargestFile});
     if (!json.is_object() || !json.contains("views") || !json["views"].is_array())
-        throw InputError(path.string() + ": is no list of views: an object with \"views\" is expected");
+        throw InputError(path.string() + ": is not a list of views: expected an object with \"views\"");
     if (json["views"].size() > kMostViews)
         throw InputError(path.string() + ": more than " + std::to_string(kMostViews) + " views");
     std::vector<NamedView> views;

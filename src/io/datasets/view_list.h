@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Named cameras in a JSON file: {"views": [{"name": "...", "width": px, "height": px, "fx": px, "fy": px,
-// "cx": px, "cy": px, "rotation": [9 numbers, world to camera, row after row], "translation": [3], "pivot":
-// [3]}, ...]}.
+// Named cameras in a JSON file. Sizes are in px; the rotation is world to camera, row after row:
+//   {"views": [{"name": "...", "width": n, "height": n, "fx": n, "fy": n, "cx": n, "cy": n,
+//               "rotation": [9 numbers], "translation": [3], "pivot": [3]}, ...]}
 #pragma once
 #include <filesystem>
 #include <glm/vec3.hpp>
@@ -15,16 +15,16 @@ namespace ewa::io {
 struct NamedView {
     std::string name;
     Camera camera;
-    glm::dvec3 pivot{0};  // world; what it looks at
+    glm::dvec3 pivot{0};  // world; the point that the viewer orbits
 };
 
 inline constexpr size_t kMostViews = 10000;
 
-/// Throws InputError that names the file and the view: more than kMostViews, a value that is missing or not
-/// finite, a size out of 1..65536, a rotation that is none (to 1e-6).
+/// Throws InputError that names the file and the view. Causes are more than kMostViews views, a value that is
+/// missing or not finite, a size out of 1..65536, or a rotation that is not orthonormal to 1e-6.
 std::vector<NamedView> read_views(const std::filesystem::path& path);
 
-/// Written beside and renamed; every number is read back as it was. Throws RunError.
+/// Writes a temporary file and renames it. Every number survives a round trip unchanged. Throws RunError.
 void write_views(const std::filesystem::path& path, const std::vector<NamedView>& views);
 
 }  // namespace ewa::io

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tinygltf's implementation. What it may do is set for this room as a whole, in CMakeLists.txt: its classes
-// differ with these settings. tinygltf opens no file of its own here; what it parses is text that was looked
-// at before.
+// The implementation of tinygltf. CMakeLists.txt sets its options for the whole library, because they change
+// its classes. It opens no files here: GltfDocument checks the text and passes it on.
 #include <fstream>
 #include <nlohmann/json.hpp>
 

@@ -7,7 +7,6 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
-#include "io/splats/splat_scene.h"
 #include "io/splats/splat_values.h"
 
 namespace ewa::io {
@@ -25,7 +24,7 @@ const char* const kBoxNames[] = {"min_x",       "min_y",       "min_z",       "m
 constexpr size_t kBoxValues = std::size(kBoxNames), kColorsFrom = 12;
 const char* const kPackedNames[] = {"packed_position", "packed_rotation", "packed_scale", "packed_color"};
 
-/// As in the file: three ranges of three axes each, all minima before all maxima.
+/// As in the file: three ranges of three axes each, minima before maxima in each range.
 using Box = std::array<float, kBoxValues>;
 
 double unpacked(const Box& box, size_t range, size_t axis, double t) {
@@ -109,7 +108,7 @@ void read_vertices(PlyTable& table, const std::vector<Box>& boxes, Gaussians& ga
     for (const size_t column : columns)
         if (element.properties[column].type != PlyType::uint32)
             throw InputError(table.name() + ": the property \"" + element.properties[column].name +
-                             "\" is no uint");
+                             "\" is not a uint");
     if ((element.count + kChunkSplats - 1) / kChunkSplats != boxes.size())
         throw InputError(table.name() + ": " + std::to_string(element.count) +
                          " splats need a chunk for every " + std::to_string(kChunkSplats) +
@@ -140,7 +139,7 @@ int sh_degree_of(const PlyTable& table) {
             if (element.properties.size() == 3 * (size_t(sh_coefficients(degree)) - 1)) return degree;
         throw InputError(table.name() + ": the element \"sh\" has " +
                          std::to_string(element.properties.size()) +
-                         " properties, which fits no SH degree (9, 24 or 45 are degree 1 to 3)");
+                         " properties, which does not fit any SH degree (9, 24 or 45 are degree 1 to 3)");
     }
     return 0;
 }
@@ -159,7 +158,7 @@ void read_sh(PlyTable& table, Gaussians& gaussians) {
     for (const size_t column : columns)
         if (element.properties[column].type != PlyType::uint8)
             throw InputError(table.name() + ": the property \"" + element.properties[column].name +
-                             "\" is no uchar");
+                             "\" is not a uchar");
     table.read(columns, [&](size_t i, const double* row) {
         float* sh = &gaussians.sh[gaussians.sh_stride() * i] + 3;
         for (size_t k = 0; k < columns.size(); ++k) sh[k] = float(unpack_sh(row[k]));
@@ -180,7 +179,7 @@ std::string header(const Gaussians& gaussians, const SaveOptions& options) {
     return text + "end_header\n";
 }
 
-/// The values that a chunk's box bounds: mean, scale, colour.
+/// The values that a chunk's box bounds: mean, clamped log scale, colour.
 std::array<double, 9> bounded(const Gaussians& gaussians, size_t i) {
     std::array<double, 9> values{};
     for (size_t k = 0; k < 3; ++k) {
@@ -284,7 +283,7 @@ std::vector<std::string> write_compressed_ply(const std::filesystem::path& path,
     std::vector<std::string> remarks = {
         "the splats are in Morton order",
         "positions and scales have 11, 10 and 11 bits in the box of their 256 splats, colours 8 bits in it, "
-        "opacities 8 bits, rotations 10 bits a component"};
+        "opacities 8 bits, rotations 10 bits per component"};
     if (gaussians.sh_degree > 0)
         remarks.push_back("SH coefficients of degree 1 and more have 8 bits, clamped to -4..4");
     return remarks;

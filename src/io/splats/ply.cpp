@@ -10,7 +10,7 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "io/splats/ply_table.h"
-#include "io/splats/splat_scene.h"
+#include "io/splats/splat_values.h"
 
 namespace ewa::io {
 
@@ -19,14 +19,14 @@ namespace {
 constexpr size_t kBeforeSh = 11;  // columns before f_rest: x y z opacity scale_0..2 rot_0..3
 constexpr int kMaxFileDegree = 4;
 
-/// K of f_rest_0..3K-1 as the degree it belongs to.
+/// The SH degree of f_rest_0..3K-1.
 int degree_of(const PlyTable& table, const PlyElement& vertex) {
     size_t count = 0;
     for (const PlyProperty& property : vertex.properties) count += property.name.starts_with("f_rest_");
     for (int degree = 0; degree <= kMaxFileDegree; ++degree)
         if (count == 3 * (size_t(sh_coefficients(degree)) - 1)) return degree;
     throw InputError(table.name() + ": " + std::to_string(count) +
-                     " properties f_rest_* fit no SH degree (0, 9, 24 or 45 are degree 0 to 3)");
+                     " properties f_rest_* do not fit any SH degree (0, 9, 24 or 45 are degree 0 to 3)");
 }
 
 size_t column(const PlyTable& table, const PlyElement& vertex, const std::string& name) {
@@ -41,7 +41,7 @@ size_t column(const PlyTable& table, const PlyElement& vertex, const std::string
     throw InputError(text);
 }
 
-/// Columns in the order that read_ply's rows use: the eleven, then SH as it is in memory.
+/// Columns in the order of read_ply's rows: the eleven, then SH in the order of memory.
 std::vector<size_t> splat_columns(const PlyTable& table, const PlyElement& vertex, int degree,
                                   int file_degree) {
     std::vector<size_t> columns;
@@ -59,7 +59,7 @@ std::vector<size_t> splat_columns(const PlyTable& table, const PlyElement& verte
     return columns;
 }
 
-/// The mark of a scene that was trained anti-aliased, with a name for each program that writes one.
+/// Whether the comment is the anti-aliased mark of one of the programs that write it.
 bool says_antialiased(const std::string& comment) {
     std::string_view rest = comment;
     const std::string key = core::lower(core::next_word(rest)), value = core::lower(core::trim(rest));
@@ -70,7 +70,7 @@ bool any_antialiased(const std::vector<std::string>& comments) {
     return std::any_of(comments.begin(), comments.end(), says_antialiased);
 }
 
-/// What the file has besides, for the reader of `ewa info`.
+/// Adds a remark on the contents that are skipped.
 void remark_ignored(const PlyElement& vertex, const std::vector<size_t>& columns, SplatScene& scene) {
     std::string ignored;
     for (size_t i = 0; i < vertex.properties.size(); ++i) {
@@ -85,13 +85,14 @@ void remark_ignored(const PlyElement& vertex, const std::vector<size_t>& columns
         }
         ignored += (ignored.empty() ? "" : ", ") + name;
     }
-    if (!ignored.empty()) scene.remarks.push_back("properties that are no splat's are left out: " + ignored);
+    if (!ignored.empty())
+        scene.remarks.push_back("properties that splats do not have are skipped: " + ignored);
     if (scene.file_sh_degree > kMaxShDegree)
         scene.remarks.push_back("has SH degree " + std::to_string(scene.file_sh_degree) + "; degrees above " +
-                                std::to_string(kMaxShDegree) + " are left out");
+                                std::to_string(kMaxShDegree) + " are skipped");
 }
 
-/// Positions that float32 would round are written as double.
+/// Whether float32 would round the world positions.
 bool in_double(const Gaussians& gaussians) {
     return gaussians.origin != glm::dvec3(0);
 }

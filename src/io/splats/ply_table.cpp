@@ -13,7 +13,7 @@ namespace {
 
 constexpr size_t kMaxHeaderLine = size_t(1) << 16;
 constexpr uint64_t kMaxHeaderBytes = uint64_t(1) << 22;
-constexpr size_t kMaxProperties = 1024;  // of an element; each is compared with all before it
+constexpr size_t kMaxProperties = 1024;  // per element; each is compared with all before it
 constexpr size_t kMaxWord = 512;         // longer than any number that a program writes
 
 std::optional<PlyType> type_of(std::string_view name) {
@@ -82,7 +82,7 @@ PlyTable::PlyTable(const std::filesystem::path& path) : reader_(path) {
 
 void PlyTable::parse_header() {
     std::string line;
-    // Looked at before a line is read: the first line of a file of another kind may be anything.
+    // Checked before a line is read: the first line of another kind of file may have any length.
     if (reader_.remaining() < 4 || std::memcmp(reader_.take(3, "the header"), "ply", 3) != 0)
         fail("this is not a PLY file (it does not start with \"ply\")");
     if (!reader_.read_line(line, kMaxHeaderLine) || !core::trim(line).empty())
@@ -106,7 +106,7 @@ void PlyTable::parse_header() {
         } else if (keyword == "property") {
             parse_property(rest);
         } else if (keyword != "obj_info" && !keyword.empty()) {
-            fail("the header line \"" + line.substr(0, 60) + "\" is none that PLY knows");
+            fail("the header line \"" + line.substr(0, 60) + "\" is unknown in PLY");
         }
     }
     fail("the file ends inside the header (there is no \"end_header\")");
@@ -121,7 +121,7 @@ void PlyTable::parse_format(std::string_view rest) {
     else if (format == "binary_big_endian")
         format_ = Format::big_endian;
     else
-        fail("the format \"" + std::string(format) + "\" is none that PLY knows");
+        fail("the format \"" + std::string(format) + "\" is unknown in PLY");
 }
 
 std::string_view PlyTable::format_name() const {
@@ -148,12 +148,12 @@ void PlyTable::parse_element(std::string_view rest) {
 }
 
 void PlyTable::parse_property(std::string_view rest) {
-    if (elements_.empty()) fail("a property stands before the first element");
+    if (elements_.empty()) fail("a property precedes the first element");
     PlyElement& element = elements_.back();
     const auto next_type = [&] {
         const std::string_view word = core::next_word(rest);
         const std::optional<PlyType> type = type_of(word);
-        if (!type) fail("the property type \"" + std::string(word) + "\" is none that PLY knows");
+        if (!type) fail("the property type \"" + std::string(word) + "\" is unknown in PLY");
         return *type;
     };
     PlyProperty property;
@@ -176,8 +176,7 @@ void PlyTable::parse_property(std::string_view rest) {
 }
 
 void PlyTable::check_room(const PlyElement& element) const {
-    // The shortest row of text is one digit and one separator a value; the last separator may be missing,
-    // which the reading of the rows allows for and this division does not see.
+    // The shortest row of text is one digit and one separator per value. The last separator may be missing.
     const uint64_t columns = element.properties.size();
     const uint64_t least =
         format_ == Format::ascii ? std::max<uint64_t>(2 * columns, 1) - 1 : element.row_bytes();
@@ -245,7 +244,7 @@ void PlyTable::read_row(const PlyElement& element, std::vector<double>& values) 
 uint64_t PlyTable::read_list_count(const PlyProperty& property) {
     const double count = read_value(*property.list_count, property.name);
     if (!(count >= 0) || count > 4294967295.0 || count != std::floor(count))
-        fail("the list \"" + property.name + "\" has a length that is none");
+        fail("the list \"" + property.name + "\" has an invalid length");
     return static_cast<uint64_t>(count);
 }
 
@@ -267,7 +266,7 @@ double PlyTable::read_ascii_value(std::string_view what) {
         c = reader_.read<char>(what);
     }
     const std::optional<double> value = core::parse_number(word);
-    if (!value) fail("\"" + word + "\" is no number (" + std::string(what) + ")");
+    if (!value) fail("\"" + word + "\" is not a number (" + std::string(what) + ")");
     return *value;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The PLY container (Turk 1994): a text header that declares elements and their properties, then their rows.
-// What the properties mean is the business of ply.h and points_ply.h.
+// The PLY container (Turk 1994): a text header declares elements and their properties, and their rows follow.
+// ply.h, compressed_ply.h and datasets/image_records.h interpret the properties.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -18,22 +18,22 @@ enum class PlyType { int8, uint8, int16, uint16, int32, uint32, float32, float64
 
 struct PlyProperty {
     std::string name;
-    PlyType type = PlyType::float32;    // of the value, or of each of a list's values
-    std::optional<PlyType> list_count;  // there for a list
+    PlyType type = PlyType::float32;    // of the value, or of each value of a list
+    std::optional<PlyType> list_count;  // type of a list's length; empty if the property is not a list
     size_t offset = 0;                  // in a binary row of an element without lists
 };
 
 struct PlyElement {
     std::string name;
-    uint64_t count = 0;  // as claimed
+    uint64_t count = 0;  // as the header claims
     std::vector<PlyProperty> properties;
 
     bool has_lists() const;
-    size_t row_bytes() const;  // of a binary row whose lists are all empty
+    size_t row_bytes() const;  // of a binary row with empty lists
     std::optional<size_t> find(std::string_view property) const;
 };
 
-/// ascii, binary_little_endian and binary_big_endian. Throws InputError that names the byte.
+/// Reads ascii, binary_little_endian and binary_big_endian. Throws InputError that names the byte.
 class PlyTable {
   public:
     explicit PlyTable(const std::filesystem::path& path);
@@ -42,17 +42,15 @@ class PlyTable {
     uint64_t file_bytes() const { return reader_.size(); }
     const std::vector<PlyElement>& elements() const { return elements_; }
     const std::vector<std::string>& comments() const { return comments_; }
-    /// As the header calls it, e.g. "ascii".
+    /// The format's name in the header, e.g. "ascii".
     std::string_view format_name() const;
 
-    /// The element, after checking that the file is long enough for the rows that the header claims: from
-    /// here on memory may be taken for count rows. Throws where there is no such element. Elements before it
-    /// are skipped.
+    /// Skips to an element and checks that the file is long enough for the rows that its header claims. So
+    /// the caller may allocate memory for count rows. Throws if there is no such element.
     const PlyElement& go_to(std::string_view element);
 
-    /// The rows of the element gone to, in order: row(index, values), values in the order of `columns`
-    /// (indices of properties that are no lists). A property's value is converted to double, which holds
-    /// every PLY type exactly.
+    /// Calls row(index, values) for each row of that element, in order. The values follow `columns`, the
+    /// indices of properties that are not lists. Double holds every PLY type exactly.
     void read(const std::vector<size_t>& columns, const std::function<void(size_t, const double*)>& row);
 
     [[noreturn]] void fail(std::string_view text) const { reader_.fail(text); }
@@ -66,7 +64,8 @@ class PlyTable {
     void parse_property(std::string_view rest);
     void check_room(const PlyElement& element) const;
     void skip_rows(const PlyElement& element);
-    void read_row(const PlyElement& element, std::vector<double>& values);  // a list's value is its length
+    void read_row(const PlyElement& element,
+                  std::vector<double>& values);  // the value of a list is its length
     double read_value(PlyType type, std::string_view what);
     uint64_t read_list_count(const PlyProperty& property);
     double read_ascii_value(std::string_view what);
@@ -76,7 +75,7 @@ class PlyTable {
     Format format_ = Format::ascii;
     std::vector<PlyElement> elements_;
     std::vector<std::string> comments_;
-    size_t next_element_ = 0;  // the one whose rows come next in the file
+    size_t next_element_ = 0;  // the element whose rows come next in the file
 };
 
 }  // namespace ewa::io

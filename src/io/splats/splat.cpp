@@ -3,7 +3,6 @@
 
 #include "core/atomic_file.h"
 #include "core/file_reader.h"
-#include "io/splats/splat_scene.h"
 #include "io/splats/splat_values.h"
 
 namespace ewa::io {
@@ -41,7 +40,8 @@ void encode(const Gaussians& gaussians, size_t i, std::byte* bytes) {
     }
     color[3] = to_byte(sigmoid(gaussians.opacity_logits[i]) * 255);
     const std::array<double, 4> q = unit_quaternion(&gaussians.quaternions[4 * i]);
-    // Of the two signs of a rotation the one whose largest component is negative: 128 has no room for +1.
+    // Both signs of a quaternion are the same rotation. A byte cannot hold +1, so the largest component is
+    // negated.
     const double sign = q[largest_component(q)] > 127.5 / 128 ? -1 : 1;
     for (size_t k = 0; k < 4; ++k) rotation[k] = to_byte(sign * q[k] * 128 + 128);
     std::memcpy(bytes, &gaussians.means[3 * i], 12);
@@ -58,7 +58,7 @@ SplatScene read_splat(const std::filesystem::path& path) {
         reader.skip(reader.size() / kSplatBytes * kSplatBytes, "the splats");
         reader.fail("the file ends inside splat " + std::to_string(reader.size() / kSplatBytes) +
                     ": it has " + std::to_string(reader.size()) +
-                    " bytes, and 32 make a splat; it is truncated or no .splat file");
+                    " bytes, not a multiple of 32; it is truncated or not a .splat file");
     }
     SplatScene scene;
     scene.format = SplatFormat::splat;
@@ -84,7 +84,7 @@ std::vector<std::string> write_splat(const std::filesystem::path& path, const Ga
     std::vector<std::string> remarks;
     remark_dropped_sh(gaussians, remarks);
     remarks.push_back(
-        "colours and opacities have 8 bits, clamped to 0..1; rotations have 8 bits a component");
+        "colours and opacities have 8 bits, clamped to 0..1; rotations have 8 bits per component");
     return remarks;
 }
 

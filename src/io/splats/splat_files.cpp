@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every splat format, by what a file begins with or what it is to be called.
+// The registry of the splat formats: it selects a format by the first bytes or the extension of a file.
 #include "ewa/splat_files.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 
-#include "core/log.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
@@ -15,7 +14,7 @@
 #include "io/splats/ply.h"
 #include "io/splats/ply_table.h"
 #include "io/splats/splat.h"
-#include "io/splats/splat_scene.h"
+#include "io/splats/splat_values.h"
 #include "io/splats/spz.h"
 
 namespace ewa {
@@ -26,7 +25,7 @@ struct Kind {
     SplatFormat format;
     std::string_view extension, name;
 };
-/// An extension that ends another comes after it.
+/// An extension that is the end of another one comes after it.
 constexpr Kind kKinds[] = {{SplatFormat::compressed_ply, ".compressed.ply", "compressed PLY"},
                            {SplatFormat::ply, ".ply", "PLY"},
                            {SplatFormat::splat, ".splat", "splat"},
@@ -51,7 +50,7 @@ bool starts(std::string_view head, std::string_view magic) {
     return head.substr(0, magic.size()) == magic;
 }
 
-/// The kind that the first bytes tell, or null.
+/// The format that the first bytes identify, or null.
 const SplatFormat* format_of_head(std::string_view head) {
     struct Magic {
         std::string_view bytes;
@@ -65,13 +64,13 @@ const SplatFormat* format_of_head(std::string_view head) {
     return nullptr;
 }
 
-/// The scene without what is never drawn, where there is such.
+/// The scene without the splats that are never visible.
 Gaussians drawable_only(const Gaussians& gaussians, std::vector<std::string>& remarks) {
     std::vector<uint32_t> kept;
     for (size_t i = 0; i < gaussians.size(); ++i)
         if (drawable(gaussians, i)) kept.push_back(uint32_t(i));
     remarks.push_back(std::to_string(gaussians.size() - kept.size()) +
-                      " splats have a value that is not finite or a zero quaternion and are left out");
+                      " splats have a value that is not finite or a zero quaternion and are skipped");
     Gaussians selected = gaussians;
     select_splats(selected, kept);
     return selected;
@@ -96,11 +95,7 @@ std::vector<std::string> write(const std::filesystem::path& path, SplatFormat fo
     return {};
 }
 
-}  // namespace
-
-namespace {
-
-/// The scene with world positions for its means, as float32 rounds them.
+/// The scene with world positions as its means, rounded to float32.
 Gaussians in_float_positions(Gaussians gaussians) {
     for (size_t i = 0; i < gaussians.size(); ++i) {
         const glm::dvec3 mean = gaussians.world_mean(i);
@@ -114,11 +109,11 @@ std::string rounding_remark(const glm::dvec3& origin) {
     const double farthest = std::max({std::abs(origin.x), std::abs(origin.y), std::abs(origin.z)});
     const float step = std::nextafter(float(farthest), INFINITY) - float(farthest);
     char text[160];
-    std::snprintf(
-        text, sizeof(text),
-        "positions are rounded to %.3g units, float32's step so far from the origin; .ply keeps them, or "
-        "--transform move= brings them near it",
-        double(step));
+    std::snprintf(text, sizeof(text),
+                  "positions are rounded to %.3g units, float32's step so far from the origin; save a .ply, "
+                  "or move the "
+                  "scene near the origin with --transform move=",
+                  double(step));
     return text;
 }
 
@@ -141,7 +136,7 @@ SplatFormat format_of_file(const std::filesystem::path& path) {
     std::error_code error;
     if (!kind && !std::filesystem::is_regular_file(path, error)) refuse(path);
     core::FileReader reader(path);
-    // Any bytes may be the first coordinate of a .splat.
+    // A .splat begins with a coordinate, so its first bytes may look like any format.
     if (kind && kind->format == SplatFormat::splat && reader.size() % 32 == 0) return SplatFormat::splat;
     constexpr uint64_t kHeadBytes = 4;
     const size_t size = size_t(std::min(reader.size(), kHeadBytes));

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the splat formats store in other units than a Gaussians holds, and bytes made of real numbers.
+// Shared parts of the splat formats: conversions of units, quantisation, and the limit on memory.
 #pragma once
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
-
+#include <string>
+#include "ewa/splat_scene.h"
 #include "shared/constants.h"
 
 namespace ewa::io {
@@ -15,14 +16,14 @@ inline double sigmoid(double x) {
     return 1 / (1 + std::exp(-x));
 }
 
-/// Of p clamped to [least, most]: an opacity of 0 or 1 has no finite logit.
+/// The logit of p clamped to [least, most]. An opacity of 0 or 1 has no finite logit.
 inline double logit(double p, double least, double most) {
     if (!std::isnan(p)) p = std::clamp(p, least, most);
     return std::log(p) - std::log1p(-p);
 }
 
-/// An opacity of 0..1 stored in `levels` + 1 steps. The ends are taken a quarter of a step inwards, which
-/// rounds back to them.
+/// The logit of an opacity of 0..1 that is stored in `levels` + 1 steps. The ends move inwards by a quarter
+/// of a step, so they round back to themselves.
 inline double logit_of_steps(double p, uint32_t levels) {
     return logit(p, 0.25 / levels, 1 - 0.25 / levels);
 }
@@ -30,7 +31,7 @@ inline double logit_of_level(uint32_t level, uint32_t levels) {
     return logit_of_steps(double(level) / levels, levels);
 }
 
-/// Rounded and clamped to 0..levels; what is not a number is 0.
+/// The value rounded and clamped to 0..levels. NaN becomes 0.
 inline uint32_t to_level(double value, uint32_t levels) {
     if (!(value > 0)) return 0;
     return uint32_t(std::min(std::floor(value + 0.5), double(levels)));
@@ -40,7 +41,7 @@ inline uint8_t to_byte(double value) {
     return uint8_t(to_level(value, 255));
 }
 
-/// The colour in [0, 1] that SH coefficient 0 gives, and back.
+/// The colour in [0, 1] of SH coefficient 0, and the inverse.
 inline double color_of_sh0(double sh0) {
     return sh0 * shared::SH_C0 + shared::COLOR_OFFSET;
 }
@@ -48,29 +49,41 @@ inline double sh0_of_color(double color) {
     return (color - shared::COLOR_OFFSET) / shared::SH_C0;
 }
 
-/// The logarithm of a linear scale; 0 becomes the smallest that float32 holds, a negative one not a number.
+/// The logarithm of a linear scale. 0 becomes the smallest normal float32, a negative scale NaN.
 inline float log_of_scale(double scale) {
     return float(std::log(scale >= 0 ? std::max(scale, double(std::numeric_limits<float>::min())) : NAN));
 }
 
-/// A linear scale that float32 holds as a finite number.
+/// The linear scale, limited to the finite range of float32.
 inline float scale_of_log(double log_scale) {
     return float(std::min(std::exp(log_scale), double(std::numeric_limits<float>::max())));
 }
 
-/// w x y z of length 1; 1 0 0 0 for a zero quaternion.
+/// w x y z of length 1. A zero quaternion becomes 1 0 0 0.
 inline std::array<double, 4> unit_quaternion(const float* q) {
     const double length = std::hypot(std::hypot(q[0], q[1]), std::hypot(q[2], q[3]));
     if (!(length > 0) || !std::isfinite(length)) return {1, 0, 0, 0};
     return {q[0] / length, q[1] / length, q[2] / length, q[3] / length};
 }
 
-/// The component of the largest magnitude.
+/// The index of the component with the largest magnitude.
 inline size_t largest_component(const std::array<double, 4>& q) {
     size_t largest = 0;
     for (size_t i = 1; i < 4; ++i)
         if (std::abs(q[i]) > std::abs(q[largest])) largest = i;
     return largest;
 }
+
+/// Expansion limits: memory per byte of the file. Compressed SH coefficients of zero take almost no bytes.
+inline constexpr uint64_t kPlainExpansion = 4, kPackedExpansion = 32;
+
+/// Throws InputError if `count` splats of a degree take more memory than `expansion` times the file plus 40
+/// MiB. No real scene repeats itself that much. Without this limit, a file of a few kB could claim all
+/// memory.
+void require_memory(const std::string& name, uint64_t file_bytes, uint64_t count, int sh_degree,
+                    uint64_t expansion = kPlainExpansion);
+
+/// Adds "SH degrees 1 to 3 are dropped: ..." if the scene has view-dependent colour.
+void remark_dropped_sh(const Gaussians& gaussians, std::vector<std::string>& remarks);
 
 }  // namespace ewa::io

@@ -1,34 +1,46 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bytes that a file holds packed, unpacked as they are read, and packed as they are written.
+// Compressed streams: a file's bytes are decompressed while they are read, and compressed while they are
+// written.
 #pragma once
 #include <cstddef>
 #include <functional>
 #include <memory>
 #include <string_view>
-#include <vector>
 
 #include "core/file_reader.h"
 
 namespace ewa::io {
 
-/// A stream of unpacked bytes. What is damaged is an InputError that names the byte of the packed file.
+/// A stream of decompressed bytes. Damage is an InputError that names the byte of the compressed file.
 class Unpacker {
   public:
     virtual ~Unpacker() = default;
-    /// Exactly n bytes. `what` names them in the error.
-    virtual void read(std::byte* to, size_t n, std::string_view what) = 0;
-    /// Whether the stream has ended where the bytes read so far do.
-    virtual bool at_end() = 0;
+
+    /// Reads exactly n bytes. `what` names them in the error.
+    void read(std::byte* to, size_t n, std::string_view what);
+
+    /// Whether the stream ends after the bytes that have been read.
+    bool at_end();
+
+  protected:
+    explicit Unpacker(core::FileReader& reader) : reader_(reader) {}
+
+    /// Decompresses at most n bytes and returns their number. 0 if the library only consumed input. Sets
+    /// ended_ at the end of the stream.
+    virtual size_t advance(std::byte* to, size_t n) = 0;
+
+    core::FileReader& reader_;
+    bool ended_ = false;
 };
 
-/// gzip (RFC 1952) from where the reader stands to its member's end.
+/// gzip (RFC 1952) from the reader's position to the end of the member.
 std::unique_ptr<Unpacker> open_gzip(core::FileReader& reader);
 
-/// A Zstandard frame (RFC 8878) of `packed_bytes` from where the reader stands; its window is at most the
+/// A Zstandard frame (RFC 8878) of `packed_bytes` from the reader's position. Its window is limited to the
 /// larger of 16 MiB and `unpacked_bytes`.
 std::unique_ptr<Unpacker> open_zstd(core::FileReader& reader, uint64_t packed_bytes, uint64_t unpacked_bytes);
 
-/// Takes unpacked bytes; packed ones go to the sink it was made with.
+/// Compresses bytes and passes the result to its sink.
 class Packer {
   public:
     using Sink = std::function<void(const void*, size_t)>;

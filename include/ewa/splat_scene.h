@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// A splat scene with the other contents of its file, and the options of saving one.
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "ewa/gaussians.h"
+
+namespace ewa {
+
+/// The layouts are in src/io/splats: ply.h, compressed_ply.h, splat.h, spz.h, gltf_splats.h.
+enum class SplatFormat { ply, compressed_ply, splat, spz, glb, gltf };
+
+struct SplatScene {
+    Gaussians gaussians;  // in the frame of an INRIA PLY (x right, y down, z forward), whatever the file uses
+    SplatFormat format = SplatFormat::ply;
+    std::string variant;       // of the format, e.g. "version 3", "ascii"; may be empty
+    int file_sh_degree = 0;    // may exceed 3; gaussians holds at most degree 3
+    bool antialiased = false;  // the file states that the scene was trained with --antialias (Mip-Splatting)
+    std::vector<std::string> comments;
+    std::vector<std::string> remarks;  // one line for each kind of content that is skipped
+};
+
+struct SaveOptions {
+    std::vector<std::string> comments = {};  // one line each; kept by the formats that can store them
+    bool antialiased = false;
+    int spz_version = 3;                                    // 3 or 4
+    std::function<void(uint64_t, uint64_t)> progress = {};  // splats written, all splats
+};
+
+}  // namespace ewa

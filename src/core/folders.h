@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// Folders: tests for files and folders, a lock between processes, and temporary folders.
+#pragma once
+#include <filesystem>
+#include <string>
+
+namespace ewa::core {
+
+/// Whether the path is a regular file or a folder. False on any error.
+bool is_file(const std::filesystem::path& path);
+bool is_folder(const std::filesystem::path& path);
+
+/// Locks a folder until the object or the process ends. Nothing is left on disk. Throws RunError if another
+/// process holds the lock. On a file system without locks, this does nothing.
+class FolderLock {
+  public:
+    explicit FolderLock(const std::filesystem::path& folder);
+    ~FolderLock();
+    FolderLock(const FolderLock&) = delete;
+    FolderLock& operator=(const FolderLock&) = delete;
+
+  private:
+    int descriptor_ = -1;
+};
+
+/// A new folder in the system's folder for temporary files. The destructor removes it with its contents.
+class TemporaryFolder {
+  public:
+    /// The folder's name begins with `prefix`. Throws RunError.
+    explicit TemporaryFolder(const std::string& prefix);
+    ~TemporaryFolder();
+    TemporaryFolder(const TemporaryFolder&) = delete;
+    TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+    const std::filesystem::path& path() const { return path_; }
+
+  private:
+    std::filesystem::path path_;
+};
+
+}  // namespace ewa::core

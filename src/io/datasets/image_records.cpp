@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/datasets/image_records.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/atomic_file.h"
+#include "core/text.h"
+#include "ewa/error.h"
+#include "io/splats/ply_table.h"
+
+namespace ewa::io {
+
+void add_point(PointCloud& points, DroppedPoints& dropped, const glm::dvec3& position,
+               const std::array<uint8_t, 3>& color, const std::function<std::string()>& where) {
+    for (int axis = 0; axis < 3; ++axis)
+        if (!std::isfinite(static_cast<float>(position[axis]))) {
+            if (dropped.count++ == 0) dropped.first = where();
+            return;
+        }
+    points.positions.push_back(position);
+    points.colors.push_back(color);
+}
+
+PlyPoints read_points_ply(const std::filesystem::path& path) {
+    PlyTable table(path);
+    const PlyElement& vertex = table.go_to("vertex");
+    std::vector<size_t> columns;
+    for (const char* name : {"x", "y", "z"}) {
+        const std::optional<size_t> found = vertex.find(name);
+        if (!found || vertex.properties[*found].list_count)
+            throw InputError(table.name() + ": the vertices have no number \"" + name + "\"");
+        columns.push_back(*found);
+    }
+    double color_scale = 1;
+    for (const char* name : {"red", "green", "blue"}) {
+        const std::optional<size_t> found = vertex.find(name);
+        if (!found || vertex.properties[*found].list_count) break;
+        const PlyType type = vertex.properties[*found].type;
+        if (type == PlyType::float32 || type == PlyType::float64) color_scale = 255;
+        columns.push_back(*found);
+    }
+    const bool colored = columns.size() == 6;
+
+    PlyPoints result;
+    table.read(columns, [&](size_t index, const double* row) {
+        const auto byte = [&](double v) -> uint8_t {
+            return v > 0 ? static_cast<uint8_t>(std::lround(std::min(v * color_scale, 255.0))) : uint8_t(0);
+        };
+        std::array<uint8_t, 3> color{128, 128, 128};
+        if (colored) color = {byte(row[3]), byte(row[4]), byte(row[5])};
+        add_point(result.points, result.dropped, {row[0], row[1], row[2]}, color,
+                  [&] { return core::one_line(path.string()) + ": vertex " + std::to_string(index); });
+    });
+    return result;
+}
+
+void write_points_ply(const std::filesystem::path& path, const PointCloud& points) {
+    std::string text =
+        "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(points.positions.size()) +
+        "\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar "
+        "green\nproperty uchar blue\nend_header\n";
+    for (size_t i = 0; i < points.positions.size(); ++i) {
+        for (int axis = 0; axis < 3; ++axis) {
+            const float value = float(points.positions[i][axis]);
+            text.append(reinterpret_cast<const char*>(&value), sizeof(value));
+        }
+        for (const uint8_t channel : points.colors[i]) text += char(channel);
+    }
+    core::write_text_file(path, text);
+}
+
+}  // namespace ewa::io

@@ -1,0 +1,447 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/gltf/document.h"
+
+#include <algorithm>
+#include <glm/gtc/quaternion.hpp>
+#include <nlohmann/json.hpp>
+
+#include "core/file_reader.h"
+#include "core/json.h"
+#include "core/sandboxed_path.h"
+#include "core/text.h"
+#include "ewa/error.h"
+
+namespace ewa::io {
+
+namespace {
+
+using nlohmann::json;
+
+constexpr uint32_t kMagic = 0x46546c67, kJsonChunk = 0x4e4f534a, kBinChunk = 0x004e4942;
+constexpr size_t kLongestReason = 300;  // limits a library's error, which may quote the file at any length
+constexpr size_t kMostObjects = 1 << 15, kMostValues = 1 << 17;  // for splats; meshes have more nodes
+constexpr size_t kMeshFactor = 2;
+constexpr uint64_t kMostImageBytes = uint64_t(64) << 20;
+
+struct Chunks {
+    std::string json;
+    uint64_t json_begin = 0;               // offset of the text in the file
+    uint64_t bin_begin = 0, bin_size = 0;  // of a .glb
+    bool binary = false;
+};
+
+Chunks read_chunks(core::FileReader& reader) {
+    Chunks chunks;
+    uint64_t size = reader.size();
+    if (size >= 4) {
+        uint32_t magic = 0;
+        std::memcpy(&magic, reader.take(4, "the header"), 4);
+        chunks.binary = magic == kMagic;
+        if (!chunks.binary) chunks.json.assign(reinterpret_cast<const char*>(&magic), 4);
+    }
+    if (chunks.binary) {
+        const auto version = reader.read<uint32_t>("the header");
+        if (version != 2) reader.fail("GLB version " + std::to_string(version) + " is not supported; 2 is");
+        const auto length = reader.read<uint32_t>("the header");
+        if (length > reader.size())
+            reader.fail("the header claims " + std::to_string(length) + " bytes, but the file has " +
+                        std::to_string(reader.size()) + "; it is truncated");
+        size = reader.read<uint32_t>("the first chunk");
+        if (reader.read<uint32_t>("the first chunk") != kJsonChunk)
+            reader.fail("the first chunk is not JSON");
+        chunks.json_begin = reader.offset();
+    } else {
+        size -= chunks.json.size();
+    }
+    if (size > reader.remaining())
+        reader.fail("the JSON claims " + std::to_string(size) + " bytes, but only " +
+                    std::to_string(reader.remaining()) + " follow");
+    const std::byte* text = reader.take(size_t(size), "the JSON");
+    chunks.json.append(reinterpret_cast<const char*>(text), size_t(size));
+    if (chunks.binary && reader.remaining() > 0) {
+        chunks.bin_size = reader.read<uint32_t>("the second chunk");
+        if (reader.read<uint32_t>("the second chunk") != kBinChunk)
+            reader.fail("the second chunk is not BIN");
+        chunks.bin_begin = reader.offset();
+        if (chunks.bin_size > reader.remaining())
+            reader.fail("the second chunk claims " + std::to_string(chunks.bin_size) + " bytes, but only " +
+                        std::to_string(reader.remaining()) + " follow; the file is truncated");
+    }
+    return chunks;
+}
+
+json parse(const std::string& name, const Chunks& chunks, GltfContent content) {
+    const bool splats = content == GltfContent::splats;
+    core::JsonLimits limits;
+    limits.objects = kMostObjects * (splats ? 1 : kMeshFactor);
+    limits.values = kMostValues * (splats ? 1 : kMeshFactor);
+    if (splats) limits.skipped = "extras";
+    limits.begin = chunks.json_begin;
+    return core::parse_json<json>(chunks.json, name, limits);
+}
+
+/// The sections that the content needs, as text. Images are excluded, because tinygltf would open them.
+std::string needed_sections(const json& top, GltfContent content) {
+    json kept = json::object();
+    const auto keep = [&](std::initializer_list<const char*> keys) {
+        for (const char* key : keys)
+            if (const auto found = top.find(key); found != top.end()) kept[key] = *found;
+    };
+    keep({"asset", "scene", "scenes", "nodes", "meshes", "accessors", "bufferViews", "extensionsUsed",
+          "extensionsRequired"});
+    if (content == GltfContent::meshes) keep({"materials", "textures", "samplers", "cameras", "extensions"});
+    // Strings are names here, so bytes that are not UTF-8 may be replaced.
+    return kept.dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+std::string percent_decoded(const std::string& text) {
+    std::string decoded;
+    for (size_t i = 0; i < text.size(); ++i) {
+        unsigned value = 0;
+        if (text[i] == '%' && i + 2 < text.size()) {
+            const auto [end, error] = std::from_chars(&text[i + 1], &text[i + 1] + 2, value, 16);
+            if (error == std::errc() && end == &text[i + 1] + 2) {
+                decoded += char(value);
+                i += 2;
+                continue;
+            }
+        }
+        decoded += text[i];
+    }
+    return decoded;
+}
+
+size_t component_bytes(int type) {
+    switch (type) {
+        case TINYGLTF_COMPONENT_TYPE_BYTE:
+        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
+            return 1;
+        case TINYGLTF_COMPONENT_TYPE_SHORT:
+        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
+            return 2;
+        case TINYGLTF_COMPONENT_TYPE_FLOAT:
+        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
+            return 4;
+        default:
+            return 0;
+    }
+}
+
+size_t components(const tinygltf::Accessor& accessor) {
+    const int n = accessor.type == TINYGLTF_TYPE_SCALAR ? 1
+                  : accessor.type == TINYGLTF_TYPE_VEC2 || accessor.type == TINYGLTF_TYPE_VEC3 ||
+                          accessor.type == TINYGLTF_TYPE_VEC4
+                      ? accessor.type
+                      : 0;
+    return size_t(n);
+}
+
+template <class T>
+double value_of(const std::byte* bytes, bool normalized) {
+    T value;
+    std::memcpy(&value, bytes, sizeof(T));
+    if (std::is_floating_point_v<T> || !normalized) return double(value);
+    return std::max(double(value) / double(std::numeric_limits<T>::max()), -1.0);
+}
+
+double decode(int type, bool normalized, const std::byte* bytes) {
+    switch (type) {
+        case TINYGLTF_COMPONENT_TYPE_BYTE:
+            return value_of<int8_t>(bytes, normalized);
+        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
+            return value_of<uint8_t>(bytes, normalized);
+        case TINYGLTF_COMPONENT_TYPE_SHORT:
+            return value_of<int16_t>(bytes, normalized);
+        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
+            return value_of<uint16_t>(bytes, normalized);
+        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
+            return value_of<uint32_t>(bytes, normalized);
+        default:
+            return value_of<float>(bytes, false);
+    }
+}
+
+/// The name of the missing property in tinygltf's errors that describe it in words.
+std::string missing_property(const std::string& error) {
+    for (const auto& [words, property] : {std::pair{"Spot light", "spot"},
+                                          {"Orthographic camera", "orthographic"},
+                                          {"Perspective camera", "perspective"}})
+        if (error.find(std::string(words) + " description not found") != std::string::npos)
+            return std::string(" (\"") + property + "\")";
+    return {};
+}
+
+const std::vector<int>& roots(const GltfDocument& document) {
+    const tinygltf::Model& model = document.model();
+    if (model.scenes.empty()) document.fail("\"scenes\" is missing, so nothing is placed in the world");
+    const int index = std::max(model.defaultScene, 0);
+    if (size_t(index) >= model.scenes.size())
+        document.fail("\"scene\" is " + std::to_string(index) + ", which does not exist");
+    return model.scenes[size_t(index)].nodes;
+}
+
+glm::dmat4 local(const GltfDocument& document, const tinygltf::Node& node, int index) {
+    const auto size = [&](const std::vector<double>& values, size_t n, const char* property) {
+        if (!values.empty() && values.size() != n)
+            document.fail("node " + std::to_string(index) + ": \"" + property + "\" needs " +
+                          std::to_string(n) + " numbers");
+        return !values.empty();
+    };
+    glm::dmat4 matrix(1.0);
+    if (size(node.matrix, 16, "matrix")) {
+        for (int i = 0; i < 16; ++i) matrix[i / 4][i % 4] = node.matrix[size_t(i)];
+        return matrix;
+    }
+    if (size(node.rotation, 4, "rotation")) {
+        const glm::dquat q(node.rotation[3], node.rotation[0], node.rotation[1], node.rotation[2]);
+        if (!(glm::length(q) > 0)) document.fail("node " + std::to_string(index) + ": \"rotation\" is zero");
+        matrix = glm::mat4_cast(glm::normalize(q));
+    }
+    if (size(node.scale, 3, "scale"))
+        for (int i = 0; i < 3; ++i) matrix[i] *= node.scale[size_t(i)];
+    if (size(node.translation, 3, "translation"))
+        for (int i = 0; i < 3; ++i) matrix[3][i] = node.translation[size_t(i)];
+    return matrix;
+}
+
+}  // namespace
+
+void GltfDocument::fail(const std::string& text) const {
+    throw InputError(name_ + ": " + core::one_line(text));
+}
+
+GltfDocument::GltfDocument(const std::filesystem::path& path, GltfContent content) : path_(path) {
+    json top;
+    uint64_t bin_begin = 0, bin_size = 0;
+    {
+        core::FileReader reader(path);
+        name_ = reader.name();
+        file_bytes_ = reader.size();
+        const Chunks chunks = read_chunks(reader);
+        binary_ = chunks.binary;
+        bin_begin = chunks.bin_begin;
+        bin_size = chunks.bin_size;
+        top = parse(name_, chunks, content);
+    }
+    if (!top.is_object()) fail("the JSON is not an object");
+    if (!top.contains("asset")) fail("the JSON has no \"asset\", which every glTF has");
+    if (const auto list = top.find("buffers"); list != top.end())
+        add_buffers(path.parent_path(), &*list, bin_begin, bin_size);
+    if (const auto list = top.find("images"); list != top.end() && content == GltfContent::meshes)
+        add_images(&*list);
+    if (const auto list = top.find("animations"); list != top.end()) animated_ = !list->empty();
+    const std::string text = needed_sections(top, content);
+    top = nullptr;
+    tinygltf::TinyGLTF loader;
+    std::string error, warning;
+    bool loaded = false;
+    try {
+        loaded =
+            loader.LoadASCIIFromString(&model_, &error, &warning, text.data(), unsigned(text.size()), "");
+    } catch (const std::exception& exception) {
+        error = exception.what();
+    }
+    if (!loaded || !error.empty())
+        fail("is not a valid glTF: " + error.substr(0, kLongestReason) + missing_property(error));
+}
+
+void GltfDocument::add_buffers(const std::filesystem::path& folder, const void* json_buffers,
+                               uint64_t chunk_begin, uint64_t chunk_size) {
+    const json& list = *static_cast<const json*>(json_buffers);
+    if (!list.is_array()) fail("\"buffers\" is not a list");
+    for (size_t i = 0; i < list.size(); ++i) {
+        const std::string what = "buffer " + std::to_string(i) + ": ";
+        if (!list[i].is_object()) fail(what + "is not an object");
+        const auto length = list[i].find("byteLength");
+        if (length == list[i].end() || !length->is_number_unsigned())
+            fail(what + "\"byteLength\" is not a whole number of 0 or more");
+        const auto uri = list[i].find("uri");
+        if (uri != list[i].end() && !uri->is_string()) fail(what + "\"uri\" is not a string");
+        Buffer buffer;
+        if (uri != list[i].end())
+            buffer = open_uri(folder, uri->get_ref<const std::string&>(), what);
+        else if (binary_ && i == 0)
+            buffer = {path_, chunk_begin, chunk_size, {}};
+        else
+            fail(what + "has no \"uri\", and is not the first of a .glb");
+        if (length->get<uint64_t>() > buffer.size)
+            fail(what + "\"byteLength\" is " + std::to_string(length->get<uint64_t>()) + ", but it holds " +
+                 std::to_string(buffer.size) + " bytes");
+        buffer.size = length->get<uint64_t>();
+        buffers_.push_back(std::move(buffer));
+    }
+}
+
+void GltfDocument::add_images(const void* json_images) {
+    const json& list = *static_cast<const json*>(json_images);
+    if (!list.is_array()) fail("\"images\" is not a list");
+    for (size_t i = 0; i < list.size(); ++i) {
+        const std::string what = "image " + std::to_string(i) + ": ";
+        if (!list[i].is_object()) fail(what + "is not an object");
+        ImageSource source;
+        if (const auto uri = list[i].find("uri"); uri != list[i].end()) {
+            if (!uri->is_string()) fail(what + "\"uri\" is not a string");
+            source.uri = uri->get<std::string>();
+        } else if (const auto view = list[i].find("bufferView"); view != list[i].end()) {
+            if (!view->is_number_unsigned() ||
+                view->get<uint64_t>() > uint64_t(std::numeric_limits<int>::max()))
+                fail(what + "\"bufferView\" is not a whole number of 0 or more");
+            source.view = view->get<int>();
+        }
+        images_.push_back(std::move(source));
+    }
+}
+
+GltfDocument::Buffer GltfDocument::open_view(int index, const std::string& what) const {
+    if (index < 0 || size_t(index) >= model_.bufferViews.size())
+        fail(what + "\"bufferView\" is missing or there is none of this number");
+    const tinygltf::BufferView& view = model_.bufferViews[size_t(index)];
+    if (view.buffer < 0 || size_t(view.buffer) >= buffers_.size())
+        fail(what + "its buffer view's \"buffer\" does not exist");
+    const Buffer& buffer = buffers_[size_t(view.buffer)];
+    if (view.byteOffset > buffer.size || view.byteLength > buffer.size - view.byteOffset)
+        fail(what + "its buffer view ends after its buffer, which has " + std::to_string(buffer.size) +
+             " bytes");
+    Buffer part{buffer.file, buffer.begin + view.byteOffset, view.byteLength, {}};
+    if (buffer.file.empty())
+        part.data.assign(buffer.data.begin() + std::ptrdiff_t(view.byteOffset),
+                         buffer.data.begin() + std::ptrdiff_t(view.byteOffset + view.byteLength));
+    return part;
+}
+
+std::vector<unsigned char> GltfDocument::image_bytes(size_t index) const {
+    const ImageSource& source = images_[index];
+    const std::string what = "image " + std::to_string(index) + ": ";
+    Buffer buffer =
+        source.uri.empty() ? open_view(source.view, what) : open_uri(path_.parent_path(), source.uri, what);
+    if (buffer.size > kMostImageBytes)
+        fail(what + "claims " + std::to_string(buffer.size) + " bytes, more than " +
+             std::to_string(kMostImageBytes));
+    if (buffer.file.empty()) return std::move(buffer.data);
+    core::FileReader reader(buffer.file);
+    reader.skip(buffer.begin, what);
+    const std::byte* bytes = reader.take(size_t(buffer.size), what);
+    const auto* begin = reinterpret_cast<const unsigned char*>(bytes);
+    return {begin, begin + buffer.size};
+}
+
+GltfDocument::Buffer GltfDocument::open_uri(const std::filesystem::path& folder, const std::string& uri,
+                                            const std::string& what) const {
+    Buffer buffer;
+    if (uri.starts_with("data:")) {
+        std::string mime;
+        if (!tinygltf::IsDataURI(uri) || !tinygltf::DecodeDataURI(&buffer.data, mime, uri, 0, false))
+            fail(what + "the data \"uri\" is not base64 of a media type that glTF allows");
+        buffer.size = buffer.data.size();
+        return buffer;
+    }
+    constexpr size_t kLongestName = 1024;
+    if (uri.size() > kLongestName) fail(what + "\"uri\" is longer than a file's name can be");
+    const auto relative = core::name_inside(percent_decoded(uri));
+    if (uri.find("://") != std::string::npos || !relative || !core::links_stay_inside(folder, *relative))
+        fail(what + "\"uri\" " + uri.substr(0, 200) +
+             " leaves the file's folder; only files in or below it are read");
+    buffer.file = folder / *relative;
+    try {
+        buffer.size = core::FileReader(buffer.file).size();
+    } catch (const InputError& error) {
+        fail(what + "\"uri\": " + error.what());
+    }
+    return buffer;
+}
+
+bool GltfDocument::refers_to(const std::filesystem::path& file) const {
+    std::error_code none;
+    return std::any_of(buffers_.begin(), buffers_.end(), [&](const Buffer& buffer) {
+        return !buffer.file.empty() && std::filesystem::equivalent(buffer.file, file, none);
+    });
+}
+
+uint64_t GltfDocument::bytes() const {
+    uint64_t sum = file_bytes_;
+    std::vector<std::filesystem::path> counted = {path_};
+    for (const Buffer& buffer : buffers_) {
+        if (buffer.file.empty() || std::find(counted.begin(), counted.end(), buffer.file) != counted.end())
+            continue;
+        counted.push_back(buffer.file);
+        sum += buffer.size;
+    }
+    return sum;
+}
+
+const tinygltf::Accessor& GltfDocument::accessor(int index, const std::string& what, bool indices) const {
+    const auto refuse = [&](const std::string& text) {
+        fail(what + ": accessor " + std::to_string(index) + ": " + text);
+    };
+    if (index < 0 || size_t(index) >= model_.accessors.size()) refuse("there is none of this number");
+    const tinygltf::Accessor& a = model_.accessors[size_t(index)];
+    if (a.sparse.isSparse) refuse("\"sparse\" is not supported");
+    const uint64_t element = component_bytes(a.componentType) * components(a);
+    if (element == 0 || (a.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT && !indices))
+        refuse("\"componentType\" or \"type\" is none that such an attribute has");
+    if (a.bufferView < 0 || size_t(a.bufferView) >= model_.bufferViews.size())
+        refuse("\"bufferView\" is missing or there is none of this number");
+    const tinygltf::BufferView& view = model_.bufferViews[size_t(a.bufferView)];
+    if (view.buffer < 0 || size_t(view.buffer) >= buffers_.size())
+        refuse("its buffer view's \"buffer\" is none of the file's");
+    const uint64_t size = buffers_[size_t(view.buffer)].size;
+    if (view.byteOffset > size || view.byteLength > size - view.byteOffset)
+        refuse("its buffer view ends after its buffer, which has " + std::to_string(size) + " bytes");
+    const uint64_t stride = view.byteStride == 0 ? element : view.byteStride;
+    if (stride < element) refuse("its buffer view's \"byteStride\" is smaller than an element");
+    const uint64_t room = view.byteLength < a.byteOffset ? 0 : view.byteLength - a.byteOffset;
+    if (a.count > 0 && (room < element || (room - element) / stride < a.count - 1))
+        refuse("its " + std::to_string(a.count) + " elements do not fit its buffer view of " +
+               std::to_string(view.byteLength) + " bytes");
+    return a;
+}
+
+void GltfDocument::read(const tinygltf::Accessor& accessor, const std::string& what,
+                        const std::function<void(size_t, const double*)>& element) const {
+    const tinygltf::BufferView& view = model_.bufferViews[size_t(accessor.bufferView)];
+    const Buffer& buffer = buffers_[size_t(view.buffer)];
+    const size_t width = component_bytes(accessor.componentType), count = components(accessor);
+    const size_t stride = view.byteStride == 0 ? width * count : view.byteStride;
+    const uint64_t begin = view.byteOffset + accessor.byteOffset;
+    const auto each = [&](size_t i, const std::byte* bytes) {
+        double values[4] = {};
+        for (size_t k = 0; k < count; ++k)
+            values[k] = decode(accessor.componentType, accessor.normalized, bytes + k * width);
+        element(i, values);
+    };
+    if (buffer.file.empty()) {
+        const auto* data = reinterpret_cast<const std::byte*>(buffer.data.data()) + begin;
+        for (size_t i = 0; i < accessor.count; ++i) each(i, data + i * stride);
+        return;
+    }
+    core::FileReader reader(buffer.file);
+    reader.skip(buffer.begin + begin, what);
+    for (size_t i = 0; i < accessor.count; ++i) {
+        each(i, reader.take(width * count, what));
+        if (i + 1 < accessor.count) reader.skip(stride - width * count, what);
+    }
+}
+
+void visit_nodes(const GltfDocument& document, const glm::dmat4& world,
+                 const std::function<void(int, const glm::dmat4&)>& visit) {
+    const std::vector<tinygltf::Node>& nodes = document.model().nodes;
+    std::vector<bool> visited(nodes.size());
+    std::vector<std::pair<int, glm::dmat4>> open;
+    const std::vector<int>& first = roots(document);
+    for (size_t i = first.size(); i-- > 0;) open.emplace_back(first[i], world);
+    while (!open.empty()) {
+        const auto [index, parent] = open.back();
+        open.pop_back();
+        if (index < 0 || size_t(index) >= nodes.size())
+            document.fail("node " + std::to_string(index) + ": there is none of this number");
+        if (visited[size_t(index)])
+            document.fail("node " + std::to_string(index) + " has two parents or is its own ancestor");
+        visited[size_t(index)] = true;
+        const tinygltf::Node& node = nodes[size_t(index)];
+        const glm::dmat4 matrix = parent * local(document, node, index);
+        visit(index, matrix);
+        for (size_t i = node.children.size(); i-- > 0;) open.emplace_back(node.children[i], matrix);
+    }
+}
+
+}  // namespace ewa::io

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+// The structure of a glTF file (through tinygltf), the numbers of its accessors, and the tree of its nodes.
+#pragma once
+#include <tiny_gltf.h>
+
+#include <filesystem>
+#include <functional>
+#include <glm/mat4x4.hpp>
+#include <string>
+#include <vector>
+
+namespace ewa::io {
+
+/// The sections of the file that a reader needs.
+enum class GltfContent {
+    splats,  // scenes, nodes, meshes, accessors, buffer views; neither materials nor "extras"
+    meshes   // also materials, textures, samplers, cameras, lights, "extras"; images stay encoded
+};
+
+/// Parses only the sections that the content needs. A file that is nested or branched beyond any real scene
+/// is refused before memory is allocated.
+class GltfDocument {
+  public:
+    /// Throws InputError that names the file and the byte or the property.
+    explicit GltfDocument(const std::filesystem::path& path, GltfContent content = GltfContent::splats);
+
+    const std::string& name() const { return name_; }
+    const tinygltf::Model& model() const { return model_; }
+    bool binary() const { return binary_; }
+    bool animated() const { return animated_; }
+    uint64_t bytes() const;                                   // of the file and of its external buffers
+    bool refers_to(const std::filesystem::path& file) const;  // as one of its buffers
+
+    /// Throws InputError "name: text".
+    [[noreturn]] void fail(const std::string& text) const;
+
+    /// The accessor, after a check that its buffer holds every element. `what` names it in the error.
+    /// `indices` allows 32-bit integers, which no attribute has.
+    const tinygltf::Accessor& accessor(int index, const std::string& what, bool indices = false) const;
+
+    /// Calls element(index, values) for the elements in order. Normalised integers become 0..1 or -1..1.
+    void read(const tinygltf::Accessor& accessor, const std::string& what,
+              const std::function<void(size_t, const double*)>& element) const;
+
+    /// With GltfContent::meshes: the number of images, and the encoded bytes of one, from its file, buffer or
+    /// data URI. Throws InputError, also for more than 64 MiB.
+    size_t images() const { return images_.size(); }
+    std::vector<unsigned char> image_bytes(size_t index) const;
+
+  private:
+    struct Buffer {
+        std::filesystem::path file;  // empty: the bytes are in data
+        uint64_t begin = 0, size = 0;
+        std::vector<unsigned char> data;
+    };
+    struct ImageSource {
+        std::string uri;  // empty: the image is in the buffer view
+        int view = -1;
+    };
+    void add_buffers(const std::filesystem::path& folder, const void* json_buffers, uint64_t chunk_begin,
+                     uint64_t chunk_size);
+    void add_images(const void* json_images);
+    Buffer open_uri(const std::filesystem::path& folder, const std::string& uri,
+                    const std::string& what) const;
+    Buffer open_view(int index, const std::string& what) const;
+
+    std::string name_;
+    std::filesystem::path path_;
+    uint64_t file_bytes_ = 0;
+    bool binary_ = false, animated_ = false;
+    tinygltf::Model model_;
+    std::vector<Buffer> buffers_;
+    std::vector<ImageSource> images_;
+};
+
+/// Calls visit(index, matrix) for every node of the default scene, or of the first one if there is no
+/// default. `matrix` maps the node's frame to the world, and `world` is applied last. Parents come before
+/// children, siblings in order. Throws InputError that names the node and its property. Causes include a
+/// missing scene and a node that is reached twice.
+void visit_nodes(const GltfDocument& document, const glm::dmat4& world,
+                 const std::function<void(int, const glm::dmat4&)>& visit);
+
+}  // namespace ewa::io

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// glTF 2.0 scenes of triangles, as .glb or .gltf. Buffers and images are files beside it or embedded.
+#pragma once
+#include <filesystem>
+
+#include "scene/mesh_scene.h"
+
+namespace ewa::io {
+
+/// Reads the default scene in the file's world:
+///   triangles   modes 4, 5 and 6, with or without indices of any integer type; vertex colours
+///   materials   factors and textures of base colour, metallic-roughness and emission; alpha modes
+///   cameras     perspective ones
+///   extensions  KHR_lights_punctual, KHR_materials_specular (factor), _ior, _unlit, _emissive_strength
+///   sky         radiances in "extras": {"sky": {"zenith": [r, g, b], "horizon": [...], "ground": [...]}}
+/// Images stay encoded. Triangles with a corner that is not finite are skipped and counted. Contents that a
+/// render does not show are remarks. A required extension that is not listed, sparse accessors and compressed
+/// ones are refused. The limits are kMostTriangles, and 16 times the file plus 20 MiB. Throws InputError that
+/// names the file and the byte, or the mesh, node, material or accessor and its property. A file with splats
+/// and without triangles is an InputError too.
+scene::MeshScene read_gltf_mesh(const std::filesystem::path& path);
+
+/// Whether the file is a glTF whose meshes have triangles and no splats. False for anything else.
+bool is_gltf_mesh(const std::filesystem::path& path);
+
+}  // namespace ewa::io

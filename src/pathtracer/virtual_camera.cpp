@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pathtracer/virtual_camera.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <numbers>
+
+#include "scene/color.h"
+
+namespace ewa::pathtracer {
+
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+constexpr double kLowest = 8 * kDegree, kHighest = 65 * kDegree, kAngle = 45 * kDegree;
+
+/// axes: columns right, up, back.
+Camera camera_at(const glm::dvec3& position, const glm::dmat3& axes, double focal, int width, int height) {
+    Camera camera{width, height, focal, focal, 0.5 * width, 0.5 * height};
+    camera.rotation = glm::transpose(glm::dmat3(axes[0], -axes[1], -axes[2]));
+    camera.translation = -(camera.rotation * position);
+    return camera;
+}
+
+/// The smallest distance from the centre with all corners of the box in the image. axes: columns right, up,
+/// back.
+double distance_for(const scene::Box& box, const glm::dmat3& axes, double tan_x, double tan_y) {
+    double distance = 0;
+    for (int corner = 0; corner < 8; ++corner) {
+        glm::dvec3 offset = box.high - box.center();
+        for (int axis = 0; axis < 3; ++axis)
+            if (corner >> axis & 1) offset[axis] = -offset[axis];
+        const glm::dvec3 p = glm::transpose(axes) * offset;
+        distance = std::max({distance, std::abs(p.x) / tan_x + p.z, std::abs(p.y) / tan_y + p.z});
+    }
+    return distance > 0 ? distance : 1;
+}
+
+}  // namespace
+
+std::vector<Camera> dome_cameras(const scene::Box& box, int count, int width, int height) {
+    const double focal = 0.5 * std::min(width, height) / std::tan(0.5 * kAngle);
+    const double golden = std::numbers::pi * (3 - std::sqrt(5.0));
+    std::vector<Camera> cameras;
+    for (int i = 0; i < count; ++i) {
+        const double share = (i + 0.5) / count;
+        const double sine = std::sin(kLowest) + share * (std::sin(kHighest) - std::sin(kLowest));
+        const double level = std::sqrt(1 - sine * sine), turn = golden * i;
+        const glm::dvec3 back(level * std::sin(turn), sine, level * std::cos(turn));
+        const glm::dvec3 right = glm::normalize(glm::cross(glm::dvec3(0, 1, 0), back));
+        const glm::dmat3 axes(right, glm::cross(back, right), back);
+        const double distance = distance_for(box, axes, 0.5 * width / focal, 0.5 * height / focal);
+        cameras.push_back(camera_at(box.center() + distance * back, axes, focal, width, height));
+    }
+    return cameras;
+}
+
+Camera pinhole_of(const scene::FileCamera& camera, int width, int height) {
+    return camera_at(camera.position, camera.axes, 0.5 * height / std::tan(0.5 * camera.vertical_angle),
+                     width, height);
+}
+
+float developed(double value) {
+    if (!(value > 0)) return 0;
+    return float(scene::srgb_of_linear(std::min(value, 1.0)));
+}
+
+Image develop(const Image& radiance, double factor) {
+    bool whole = true;
+    for (size_t i = 3; i < radiance.pixels.size(); i += 4) whole = whole && radiance.pixels[i] >= 1;
+    Image image(radiance.width, radiance.height, whole ? 3 : 4);
+    for (size_t i = 0; i < radiance.pixels.size() / 4; ++i) {
+        const float* from = &radiance.pixels[4 * i];
+        float* to = &image.pixels[size_t(image.channels) * i];
+        for (int c = 0; c < 3; ++c)
+            to[c] = from[3] > 0 ? developed(double(from[c]) / double(from[3]) * factor) : 0.0f;
+        if (!whole) to[3] = from[3];
+    }
+    return image;
+}
+
+double automatic_exposure(const std::vector<Image>& radiances) {
+    std::vector<float> values;
+    for (const Image& image : radiances)
+        for (size_t i = 0; i < image.pixels.size(); i += 4) {
+            const float* pixel = &image.pixels[i];
+            if (pixel[3] >= 0.5f) values.push_back(std::max({pixel[0], pixel[1], pixel[2]}) / pixel[3]);
+        }
+    if (values.empty()) return 0;
+    const auto place = values.begin() + std::ptrdiff_t(double(values.size() - 1) * 0.95);
+    std::nth_element(values.begin(), place, values.end());
+    if (!(*place > 0)) return 0;
+    return std::round(10 * std::log2(0.8 / double(*place))) / 10;
+}
+
+}  // namespace ewa::pathtracer

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+// Strategies that add, move and remove splats: adaptive density control (ADC) and Markov chain Monte Carlo
+// (MCMC).
+//
+// ADC (Kerbl et al. 2023, section 5.2, and its published code, scene/gaussian_model.py:
+// add_densification_stats, densify_and_clone, densify_and_split, densify_and_prune, reset_opacity):
+// - A splat grows if the mean over views of |dL/d(mean in normalised device coordinates)| reaches the
+//   threshold.
+// - It is cloned if its largest scale is at most split_scale * extent, else split in two.
+// - It is pruned if its opacity is below prune_opacity.
+// - Once opacity has been reset, it is also pruned if its largest scale is above prune_scale * extent.
+// - The published code prunes after it grows, so this applies to a split's children with their smaller
+//   scales.
+//
+// MCMC (Kheradmand et al. 2024): the values of a splat that several share, the choice of sources, the noise
+// of the means.
+#pragma once
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <span>
+#include <vector>
+
+#include "ewa/camera.h"
+#include "reference/blend.h"
+#include "reference/values.h"
+
+namespace ewa::reference {
+
+struct DensifyStatistics {
+    /// Sums of the norm, in normalised device coordinates (width and height are 2).
+    std::vector<double> gradient_sum;
+    std::vector<uint32_t> views;  // number of views in which the splat had a tile
+    explicit DensifyStatistics(size_t n = 0) : gradient_sum(n, 0.0), views(n, 0u) {}
+};
+
+/// in_view has one flag per splat, whether it had a tile. A pixel is 2/width in device coordinates, so the
+/// gradient is (x * width / 2, y * height / 2). `absolute` uses the sums of the pixels' absolute gradients.
+void accumulate(DensifyStatistics& statistics, std::span<const ScreenGradient> gradients,
+                std::span<const uint8_t> in_view, const Camera& camera, bool absolute = false);
+
+struct DensifyOptions {
+    double extent = 1;  // of the scene, world units
+    double grow_gradient = 2e-4;
+    double split_scale = 0.01;  // share of extent
+    double prune_opacity = 0.005;
+    double prune_scale = 0.1;  // share of extent
+    bool prune_large = false;  // true once opacity has been reset
+    uint64_t max_splats = UINT64_MAX;
+};
+
+enum class Decision : uint8_t { keep, clone, split, prune };
+
+/// mean_gradient is gradient_sum / views, or 0 for a splat that was never in view.
+Decision decide(const Splat& splat, double mean_gradient, const DensifyOptions& options);
+
+/// Decides for all splats. A clone or split adds one splat, and pruned splats are subtracted first. If growth
+/// exceeds max_splats, the clones and splits with the highest indices become `keep`.
+std::vector<Decision> decide(const Values& values, const DensifyStatistics& statistics,
+                             const DensifyOptions& options);
+
+/// A split's child: mean + R (scale * normal), scales divided by SPLIT_SCALE, and the parent's other values.
+/// `normal` has three independent standard normal numbers. revised_opacity gives the child 1 - (1 -
+/// opacity)^(1/2) (Rota Bulo et al. 2024, "Revising densification", eq. 9).
+Splat split_child(const Splat& parent, const glm::dvec3& normal, bool revised_opacity = false);
+
+struct Densified {
+    Values values;  // kept splats in index order, then the clones, then the children pair by pair
+    std::vector<uint32_t> source;  // the old index of each
+    std::vector<uint8_t> fresh;    // 1 for copies and children, whose optimiser moments start at zero
+};
+
+/// `normals` has two entries for each split, in index order.
+Densified densify(const Values& values, std::span<const Decision> decisions,
+                  std::span<const glm::dvec3> normals);
+
+/// logit <- min(logit, logit of ceiling). 3DGS uses 0.01. The optimiser moments of the opacities restart at
+/// zero.
+void reset_opacity(Values& values, double ceiling);
+
+/// Eq. 9: the values of each of N splats that replace one of opacity o: opacity 1 - (1 - o)^(1/N) and the
+/// factor of the scales. Up to N = 20, it is the paper's double sum, whose terms cancel (to 1e-9); beyond, an
+/// integral.
+struct Share {
+    double opacity = 0, scale_factor = 1;
+};
+Share share_of(double opacity, int parts);
+
+/// The source of each draw: the splat whose interval of the cumulative weights contains
+/// floor(random * total / 2^32).
+std::vector<uint32_t> draw_sources(std::span<const uint32_t> weights, std::span<const uint32_t> random);
+
+/// The mean of a source or a copy, moved by `spread` standard deviations times a normal draw. World units.
+glm::dvec3 apart(const Splat& source, const glm::dvec3& normal, double spread);
+
+/// Eq. 8: amplitude * sigmoid(-MCMC_GATE_SLOPE (opacity - MCMC_GATE_OPACITY)) * Sigma * normal, world units.
+glm::dvec3 noise(const Splat& splat, const glm::dvec3& normal, double amplitude);
+
+}  // namespace ewa::reference
