@@ -5,12 +5,13 @@
 #include <string>
 #include <vector>
 
+#include "core/output.h"
 #include "report/summary.h"
 
 namespace ewa::cli {
 
-/// Creates the folder and its parents. Throws RunError when it cannot be, or is something else.
-void make_folder(const std::filesystem::path& folder);
+using core::make_folder;
+using core::write_json;
 
 /// Whether the folder of a file that is to be written is made where it is missing.
 enum class Folder { there, made };
@@ -28,8 +29,5 @@ struct NamedFile {
 void keep_apart(const NamedFile& written, const std::vector<NamedFile>& others);
 /// Several, of each other too.
 void keep_apart(const std::vector<NamedFile>& written, const std::vector<NamedFile>& others);
-
-/// Pretty-printed, in one piece or not at all; the file's folder is made. Throws RunError.
-void write_json(const std::filesystem::path& path, const report::Json& json);
 
 }  // namespace ewa::cli
