@@ -3,9 +3,11 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <memory>
 #include <new>
 
 #include "cli/command.h"
+#include "cli/help_formatter.h"
 #include "cli/interrupt.h"
 #include "cli/manual.h"
 #include "cli/text.h"
@@ -68,7 +70,7 @@ int main(int argc, char** argv) {
     app.name("ewa");
     app.set_version_flag("--version", "ewa " EWA_VERSION);
     app.require_subcommand(1);
-    app.get_formatter()->column_width(34);
+    app.formatter(std::make_shared<HelpFormatter>());  // of the commands too
 
     // Without a group it stands in no help: the build calls it.
     CLI::App* manual =
@@ -77,20 +79,18 @@ int main(int argc, char** argv) {
     manual->group("");
     manual->add_option("DIR", manual_folder)->required();
     Command commands[] = {
-        {app.add_subcommand("train", "From photographs with cameras to splats"), {}},
-        {app.add_subcommand("render", "Pictures of a splat scene through a dataset's cameras"), {}},
-        {app.add_subcommand("eval", "PSNR and SSIM of a splat scene against photographs"), {}},
+        {app.add_subcommand("train", "Trains splats on images with cameras"), {}},
+        {app.add_subcommand("render", "Renders a splat scene through a dataset's cameras"), {}},
+        {app.add_subcommand("eval", "PSNR and SSIM of a splat scene against a dataset's images"), {}},
         {app.add_subcommand("grad", "Gradient of the training loss for one view"), {}},
-        {app.add_subcommand("convert", "From any splat format to any other, joined and edited on the way"),
-         {}},
-        {app.add_subcommand("info", "What is in a splat file or a dataset, and what rendering it leaves out"),
+        {app.add_subcommand("convert", "Converts, joins and edits splat files"), {}},
+        {app.add_subcommand("info", "What a splat file or a dataset holds, and what rendering it can skip"),
          {}},
         {app.add_subcommand("devices", "The Vulkan devices of this machine"), {}},
-        {app.add_subcommand("dataset", "SyntheticDataset a mesh scene (glTF) into a dataset to train on"),
-         {}},
-        {app.add_subcommand("bench", "Speed of every pass, and its error against the float64 twin"), {}},
+        {app.add_subcommand("dataset", "Renders a mesh scene (glTF) into a dataset to train on"), {}},
+        {app.add_subcommand("bench", "Speed of every pass, and its error against the CPU reference"), {}},
         {app.add_subcommand("compare",
-                            "PSNR, SSIM and largest error of two pictures, folders of them, or splat scenes"),
+                            "PSNR, SSIM and largest error of two images, folders of them, or splat scenes"),
          {}},
     };
     const Command write_pages{manual, [&] {

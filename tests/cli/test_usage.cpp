@@ -2,6 +2,8 @@
 // Wrong use: exit status 2, one line, nothing written.
 #include <gtest/gtest.h>
 
+#include <sstream>
+
 #include "cli/expect.h"
 
 namespace {
@@ -18,6 +20,16 @@ TEST(Usage, HelpAndVersion) {
         EXPECT_NE(help.out.find("--"), std::string::npos) << command;
     }
     EXPECT_NE(run_ewa({"train", "--help"}).out.find("--max-splats"), std::string::npos);
+}
+
+TEST(Usage, HelpFitsATerminal) {
+    for (const char* command : {"", "train", "render", "eval", "grad", "convert", "info", "devices",
+                                "dataset", "bench", "compare"}) {
+        std::vector<std::string> arguments{command, "--help"};
+        if (arguments.front().empty()) arguments.erase(arguments.begin());
+        std::istringstream help(run_ewa(arguments).out);
+        for (std::string line; std::getline(help, line);) EXPECT_LE(line.size(), 80u) << line;
+    }
 }
 
 TEST(Usage, ManualPagesHaveEveryOptionOfTheHelp) {
