@@ -11,20 +11,14 @@
 
 namespace ewa::cli {
 
-/// How a picture is drawn: --background, --kernel, --antialias, --sh-degree.
+/// How a scene is rendered: --background, --kernel, --antialias, --sh-degree.
 struct DrawArguments {
     std::string background = "0,0,0";
     std::string kernel = "peak";
-    bool antialias = false;        // the short form of --kernel antialias
-    int sh_degree = kMaxShDegree;  // -1, in training: as the dataset needs
+    bool antialias = false;  // the short form of --kernel antialias
+    int sh_degree = kMaxShDegree;
 
-    bool random_allowed = false;  // whether the background may be random, as in training
-
-    bool degree_by_dataset = false;  // whether sh_degree may be left to the dataset, as in training
-
-    bool random_background() const { return random_allowed && background == "random"; }
-    /// Throws InputError for a background that is not three numbers of [0, 1]. A random background is black
-    /// here.
+    /// Throws InputError if the background is not three numbers in [0, 1].
     RenderOptions options() const;
 };
 void add_draw_options(CLI::App& app, DrawArguments& arguments);
@@ -43,7 +37,6 @@ CLI::Validator without_sign();
 
 /// --masks
 void add_masks_option(CLI::App& app, MaskUse& masks);
-std::string masks_text(MaskUse masks);
 
 void add_downscale_option(CLI::App& app, int& downscale);
 void add_test_every_option(CLI::App& app, int& test_every);

@@ -22,9 +22,6 @@ Dataset load_cameras_as_trained(const std::filesystem::path& path, int downscale
 /// photographed. Of any other dataset load_photographed comes as soon.
 void check_frames(const std::filesystem::path& path, const std::string& which, int test_every);
 
-/// The SH degree that `auto` stands for.
-int sh_degree_for(const Dataset& dataset);
-
 /// A dataset with its photographs.
 struct Photographed {
     Dataset dataset;
