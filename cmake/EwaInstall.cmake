@@ -4,7 +4,7 @@ include(CMakePackageConfigHelpers)
 
 # libewa: the rooms of the house without its leaves, in one shared object, so that who links it needs none of what stands
 # behind it. The programs link the rooms themselves and run without it.
-set(ewa_library_rooms core image scene io gpu passes pipeline pathtracer train)
+set(ewa_library_rooms core image scene io gpu passes pipeline pathtracer report train)
 set(ewa_objects $<TARGET_OBJECTS:ewa_shader_code>)
 foreach(room ${ewa_library_rooms})
     if(TARGET ewa_${room})

@@ -14,6 +14,7 @@
 #include "cli/output.h"
 #include "core/atomic_file.h"
 #include "ewa/error.h"
+#include "ewa/evaluation.h"
 #include "ewa/splat_files.h"
 #include "ewa/trainer.h"
 
@@ -38,7 +39,8 @@ Trained train(const std::shared_ptr<gpu::Device>& device, const Dataset& dataset
     options.steps = steps;
     options.strategy = strategy;
     options.max_splats = kMaxSplats;
-    options.sh_degree = sh_degree_for(dataset);
+    options.sh_degree = kAutomaticShDegree;
+    options = resolve(options, dataset);
     Gaussians start = gaussians_from_points(dataset.points, options.sh_degree);
     Trainer trainer(device, dataset, split.train, start, options);
     Trained result{{name, true, {}}, {}};

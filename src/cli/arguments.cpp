@@ -6,10 +6,10 @@
 
 #include <algorithm>
 #include <charconv>
-#include <map>
 
 #include "cli/checks.h"
 #include "ewa/error.h"
+#include "train/run_options.h"
 
 namespace ewa::cli {
 namespace {
@@ -31,16 +31,6 @@ bool parse_number(const std::string& text, T& value) {
     return error == std::errc() && end == text.data() + text.size();
 }
 
-std::array<float, 3> parse_background(const std::string& text) {
-    const auto parts = comma_separated(text);
-    std::array<float, 3> color{};
-    bool good = parts.size() == 3;
-    for (size_t i = 0; good && i < 3; ++i)
-        good = parse_number(parts[i], color[i]) && color[i] >= 0 && color[i] <= 1;
-    if (!good) throw InputError("--background: '" + text + "' is not r,g,b with each in 0..1, such as 1,1,1");
-    return color;
-}
-
 std::vector<int> listed_frames(const Dataset& dataset, const std::string& list) {
     std::vector<int> frames;
     for (const std::string& part : comma_separated(list)) {
@@ -59,48 +49,37 @@ std::vector<int> listed_frames(const Dataset& dataset, const std::string& list) 
 }  // namespace
 
 RenderOptions DrawArguments::options() const {
-    RenderOptions render;
-    if (!random_background()) render.background = parse_background(background);
+    RunOptions drawn;
+    const auto set = [&](const char* name, const std::string& text) {
+        try {
+            train::run_option(name).set(drawn, text);
+        } catch (const InputError& error) {
+            throw InputError(std::string("--") + name + ": " + error.what());
+        }
+    };
+    if (background == "random") throw InputError("--background: only ewa train takes random");
+    set("background", background);
+    set("kernel", kernel);
+    RenderOptions render = drawn.train.render;
     if (antialias && kernel == "ewa") throw InputError("--antialias and --kernel ewa exclude each other");
-    render.kernel = antialias || kernel == "antialias" ? Kernel::antialias
-                    : kernel == "ewa"                  ? Kernel::unit_mass
-                                                       : Kernel::peak;
+    if (antialias) render.kernel = Kernel::antialias;
     render.sh_degree = sh_degree;
     return render;
 }
 
 void add_draw_options(CLI::App& app, DrawArguments& arguments) {
-    app.add_option("--background", arguments.background,
-                   arguments.random_allowed
-                       ? "Background colour: r,g,b in 0..1, or random (a new colour each step)"
-                       : "Background colour: r,g,b in 0..1")
+    app.add_option("--background", arguments.background, "Background colour: r,g,b in 0..1")
         ->type_name("COLOUR")
         ->capture_default_str();
-    app.add_option("--kernel", arguments.kernel,
-                   "Footprint of a splat: peak (3DGS), antialias (Mip-Splatting) or ewa (unit mass)")
-        ->check(CLI::IsMember({"peak", "antialias", "ewa"}))
+    const train::RunOption& kernel = train::run_option("kernel");
+    app.add_option("--kernel", arguments.kernel, kernel.help)
+        ->check(CLI::IsMember(kernel.choices))
         ->capture_default_str();
-    app.add_flag("--antialias", arguments.antialias, "Short for --kernel antialias");
-    if (!arguments.degree_by_dataset) {
-        app.add_option("--sh-degree", arguments.sh_degree, "Highest degree of the spherical harmonics")
-            ->check(in_range(0, kMaxShDegree))
-            ->type_name("0..3")
-            ->capture_default_str();
-        return;
-    }
-    arguments.sh_degree = -1;
-    app.add_option("--sh-degree", arguments.sh_degree,
-                   "Highest degree of the spherical harmonics. auto: 3, or 0 if the dataset says that no "
-                   "colour depends on the view")
-        ->transform(CLI::Validator(
-            [](std::string& text) {
-                if (text != "auto") return CLI::Range(0, kMaxShDegree)(text);
-                text = "-1";
-                return std::string();
-            },
-            ""))
-        ->type_name("auto|0..3")
-        ->default_str("auto");
+    app.add_flag("--antialias", arguments.antialias, "The same as --kernel antialias");
+    app.add_option("--sh-degree", arguments.sh_degree, "Highest degree of the spherical harmonics")
+        ->check(in_range(0, kMaxShDegree))
+        ->type_name("0..3")
+        ->capture_default_str();
 }
 
 CLI::Validator without_sign() {
@@ -114,45 +93,35 @@ CLI::Validator without_sign() {
 }
 
 void add_device_options(CLI::App& app, DeviceOptions& options) {
-    app.add_option("--device", options.selector,
-                   "Number of the device, or part of its name (see ewa devices)")
-        ->type_name("NAME|N");
+    const train::RunOption& device = train::run_option("device");
+    app.add_option("--device", options.selector, device.help)->type_name(device.value);
     app.add_flag("--validation", options.validation, "Enable the Vulkan validation layer")
         ->group("For developers");
 }
 
-namespace {
-const std::map<std::string, MaskUse> kMaskUses = {{"auto", MaskUse::automatic},
-                                                  {"ignore", MaskUse::ignore},
-                                                  {"cut", MaskUse::cut},
-                                                  {"none", MaskUse::none}};
-}
-
 void add_masks_option(CLI::App& app, MaskUse& masks) {
-    app.add_option(
-           "--masks", masks,
-           "Use of masks/ and alpha: ignore (masked pixels do not count), cut (masked pixels show the "
-           "background), none, or auto (ignore if there are mask files, else cut)")
-        ->transform(CLI::CheckedTransformer(kMaskUses).description(""))
-        ->type_name("USE")
-        ->default_str(masks_text(masks));
-}
-
-std::string masks_text(MaskUse masks) {
-    for (const auto& [name, use] : kMaskUses)
-        if (use == masks) return name;
-    return {};
+    const train::RunOption& option = train::run_option("masks");
+    app.add_option_function<std::string>(
+           "--masks",
+           [&option, &masks](const std::string& text) {
+               RunOptions run;
+               option.set(run, text);
+               masks = run.masks;
+           },
+           option.help)
+        ->check(CLI::IsMember(option.choices))
+        ->default_str("auto");
 }
 
 void add_downscale_option(CLI::App& app, int& downscale) {
-    app.add_option("--downscale", downscale, "Divide the width and height of the images by K")
+    app.add_option("--downscale", downscale, train::run_option("downscale").help)
         ->check(in_range(1, 1024))
         ->type_name("K")
         ->capture_default_str();
 }
 
 void add_test_every_option(CLI::App& app, int& test_every) {
-    app.add_option("--test-every", test_every, "Hold out every K-th image in name order for testing; 0: none")
+    app.add_option("--test-every", test_every, train::run_option("test-every").help)
         ->check(in_range(0, 1000000000))
         ->type_name("K")
         ->capture_default_str();

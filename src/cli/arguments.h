@@ -14,20 +14,14 @@ class App;
 
 namespace ewa::cli {
 
-/// How splats are rendered: --background, --kernel, --antialias, --sh-degree.
+/// How a scene is rendered: --background, --kernel, --antialias, --sh-degree.
 struct DrawArguments {
     std::string background = "0,0,0";
     std::string kernel = "peak";
-    bool antialias = false;        // short for --kernel antialias
-    int sh_degree = kMaxShDegree;  // -1: auto, in training only
+    bool antialias = false;  // the short form of --kernel antialias
+    int sh_degree = kMaxShDegree;
 
-    // Training only.
-    bool random_allowed = false;     // --background random
-    bool degree_by_dataset = false;  // --sh-degree auto
-
-    bool random_background() const { return random_allowed && background == "random"; }
-    /// A random background is black here. Throws InputError for a background that is not three numbers in [0,
-    /// 1].
+    /// Throws InputError if the background is not three numbers in [0, 1].
     RenderOptions options() const;
 };
 void add_draw_options(CLI::App& app, DrawArguments& arguments);
@@ -41,7 +35,6 @@ void add_device_options(CLI::App& app, DeviceOptions& options);
 
 /// --masks
 void add_masks_option(CLI::App& app, MaskUse& masks);
-std::string masks_text(MaskUse masks);
 
 void add_downscale_option(CLI::App& app, int& downscale);
 /// --frames and --test-every.

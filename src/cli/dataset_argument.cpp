@@ -25,10 +25,6 @@ void check_frames(const fs::path& path, const std::string& which, int test_every
     if (names_mesh_scene(path)) select_frames(scene_cameras(path, {}), which, test_every);
 }
 
-int sh_degree_for(const Dataset& dataset) {
-    return dataset.color_depends_on_view ? kMaxShDegree : 0;
-}
-
 Dataset load_cameras_as_trained(const fs::path& path, int downscale) {
     if (names_mesh_scene(path)) {
         Dataset dataset = scene_cameras(path, {});

@@ -23,9 +23,6 @@ Dataset load_cameras_as_trained(const std::filesystem::path& path, int downscale
 /// Other datasets are checked once load_with_images has read them.
 void check_frames(const std::filesystem::path& path, const std::string& which, int test_every);
 
-/// The SH degree that `auto` stands for.
-int sh_degree_for(const Dataset& dataset);
-
 /// A dataset with its images.
 struct LoadedDataset {
     Dataset dataset;

@@ -12,8 +12,8 @@
 #include "cli/interrupt.h"
 #include "cli/output.h"
 #include "core/text.h"
+#include "ewa/evaluation.h"
 #include "ewa/splat_files.h"
-#include "ewa/trainer.h"
 
 namespace ewa::cli {
 namespace {

@@ -18,6 +18,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
+/// As make_folder says it.
 [[noreturn]] void no_folder(const fs::path& folder, const std::error_code& error) {
     throw RunError("cannot create the folder " + folder.string() + ": " + error.message());
 }
@@ -30,14 +31,6 @@ fs::path resolved(const fs::path& path) {
 }
 
 }  // namespace
-
-void make_folder(const fs::path& folder) {
-    if (folder.empty()) return;
-    std::error_code error;
-    fs::create_directories(folder, error);
-    if (!error && !fs::is_directory(folder, error)) error = std::make_error_code(std::errc::not_a_directory);
-    if (error) no_folder(folder, error);
-}
 
 void check_writable(const fs::path& file, Folder made) {
     const fs::path folder = file.parent_path();
@@ -69,12 +62,6 @@ void keep_apart(const std::vector<NamedFile>& written, const std::vector<NamedFi
             throw InputError(core::one_line(file.name + " " + file.path.string() + " is the same file as " +
                                             taken->second->name + "; it would be overwritten"));
     }
-}
-
-void write_json(const fs::path& path, const report::Json& json) {
-    make_folder(path.parent_path());
-    // Names and paths may hold bytes that are not UTF-8; those become U+FFFD.
-    core::write_text_file(path, json.dump(2, ' ', false, report::Json::error_handler_t::replace) + "\n");
 }
 
 }  // namespace ewa::cli

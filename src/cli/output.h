@@ -5,12 +5,13 @@
 #include <string>
 #include <vector>
 
+#include "core/output.h"
 #include "report/summary.h"
 
 namespace ewa::cli {
 
-/// Creates the folder and its parents. Throws RunError if that fails.
-void make_folder(const std::filesystem::path& folder);
+using core::make_folder;
+using core::write_json;
 
 /// Whether a missing folder of an output file is created.
 enum class Folder { there, made };
@@ -28,8 +29,5 @@ struct NamedFile {
 void keep_apart(const NamedFile& written, const std::vector<NamedFile>& others);
 /// The same for several files, which must also differ from each other.
 void keep_apart(const std::vector<NamedFile>& written, const std::vector<NamedFile>& others);
-
-/// Writes indented JSON, atomically; creates the folder of the file. Throws RunError.
-void write_json(const std::filesystem::path& path, const report::Json& json);
 
 }  // namespace ewa::cli

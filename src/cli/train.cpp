@@ -1,125 +1,149 @@
 // SPDX-License-Identifier: Apache-2.0
-// ewa train: its options.
+// ewa train: its options, a dataset from a mesh scene where one is given, and the run.
 #include <CLI/CLI.hpp>
+#include <chrono>
 #include <memory>
 
+#include "cli/accuracy.h"
+#include "cli/arguments.h"
 #include "cli/checks.h"
 #include "cli/command.h"
 #include "cli/config.h"
-#include "cli/train_run.h"
+#include "cli/dataset_argument.h"
+#include "cli/train_observer.h"
+#include "core/folders.h"
+#include "core/text.h"
 #include "ewa/error.h"
+#include "ewa/run.h"
+#include "report/work_precision.h"
+#include "train/run_options.h"
 
 namespace ewa::cli {
 namespace {
 
-struct CommandState {
-    TrainArguments arguments;
-    std::filesystem::path config;
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+struct TrainArguments {
+    RunOptions run;
+    TrainOutput output;
+    fs::path config;
+    bool antialias = false, accuracy = false;
 };
 
-constexpr int kMaxSteps = 1000000000;
-
-void add_model_options(CLI::App& app, TrainArguments& arguments) {
-    app.add_option("--steps", arguments.steps, "Optimisation steps, one view each")
-        ->check(in_range(1, kMaxSteps))
-        ->type_name("N")
-        ->capture_default_str();
-    app.add_option("--strategy", arguments.strategy,
-                   "adc grows and prunes splats (3DGS); mcmc relocates dead ones and grows to the cap "
-                   "(3DGS-MCMC); none keeps their number; auto is mcmc from 5000 steps on, else adc")
-        ->check(CLI::IsMember({"auto", "adc", "mcmc", "none"}))
-        ->capture_default_str();
-    app.add_option("--max-splats", arguments.max_splats, "Never more splats than this")
-        ->check(without_sign())
-        ->check(in_range(1u, 1000000000u))
-        ->type_name("N")
-        ->capture_default_str();
-    app.add_option(
-           "--init", arguments.init,
-           "sfm (the dataset's points; random where it has none), random (where the cameras look), or a "
-           "splat file to go on from")
-        ->type_name("sfm|random|FILE")
-        ->capture_default_str();
-    app.add_flag("--absgrad", arguments.absgrad,
-                 "adc: grow where the pixels' absolute gradients are large, which do not cancel (AbsGS)");
-    app.add_flag("--revised-opacity", arguments.revised_opacity,
-                 "adc: the two halves of a split are together as opaque as it was");
-    app.add_flag(
-        "--exposure", arguments.exposure,
-        "Learn each photograph's exposure (an affine map of colours), for captures where it changes");
-    app.add_option("--resolution-schedule", arguments.resolution_schedule,
-                   "Start with the photographs' sides halved N times; each tenth of the run doubles them")
-        ->check(in_range(0, 6))
-        ->type_name("N")
-        ->capture_default_str();
-    app.add_option("--seed", arguments.seed, "Same seed, same device: same bytes")
-        ->check(without_sign())
-        ->type_name("S")
-        ->capture_default_str();
-    app.add_option("--image-cache", arguments.image_cache,
-                   "MiB of decoded photographs held on the device; the others are read again each time")
-        ->check(without_sign())
-        ->check(in_range(uint64_t(0), uint64_t(1) << 40))
-        ->type_name("MiB")
-        ->capture_default_str();
-    arguments.draw.random_allowed = arguments.draw.degree_by_dataset = true;
-    add_draw_options(app, arguments.draw);
-    add_downscale_option(app, arguments.downscale);
-    add_masks_option(app, arguments.masks);
-    add_test_every_option(app, arguments.test_every);
+/// The option's own check, which names neither the option nor where it was read.
+CLI::Validator accepted_by(const train::RunOption& option) {
+    return CLI::Validator(
+        [&option](std::string& text) {
+            try {
+                RunOptions scratch;
+                option.set(scratch, text);
+                return std::string();
+            } catch (const InputError& error) {
+                return std::string(error.what());
+            }
+        },
+        "");
 }
 
-int run(CLI::App& app, CommandState& state) {
-    TrainArguments& arguments = state.arguments;
-    if (!state.config.empty()) apply_config(app, state.config);
-    if (arguments.dataset.empty()) throw InputError("DATASET is required (see ewa train --help)");
-    return run_train(arguments);
+void add_run_option(CLI::App& app, const train::RunOption& option, RunOptions& options) {
+    const bool positional = option.name == "dataset";
+    const std::string name = positional ? "DATASET" : "--" + option.name;
+    if (option.flag) {
+        app.add_flag(name, option.flag(options), option.help);
+        return;
+    }
+    CLI::Option* added = app.add_option_function<std::string>(
+        name, [&option, &options](const std::string& text) { option.set(options, text); }, option.help);
+    if (option.choices.empty())
+        added->check(accepted_by(option))->type_name(positional ? "" : option.value);
+    else
+        added->check(CLI::IsMember(option.choices))->type_name(option.value);
+    added->default_str(train::value_text(option, options));
+}
+
+void add_run_options(CLI::App& app, TrainArguments& arguments) {
+    for (const train::RunOption& option : train::run_options()) {
+        if (option.name == "device") continue;  // comes with --validation
+        add_run_option(app, option, arguments.run);
+        if (option.name == "kernel")
+            app.add_flag("--antialias", arguments.antialias, "The same as --kernel antialias");
+    }
+}
+
+void settle_kernel(TrainArguments& arguments) {
+    if (!arguments.antialias) return;
+    Kernel& kernel = arguments.run.train.render.kernel;
+    if (kernel == Kernel::unit_mass) throw InputError("--antialias and --kernel ewa exclude each other");
+    kernel = Kernel::antialias;
+}
+
+/// Renders a mesh scene into the run's folder, which becomes the dataset. Returns false if Ctrl-C ended that.
+bool render_scene(TrainArguments& arguments) {
+    RunOptions& run = arguments.run;
+    const std::string extension = core::lower(run.dataset.extension().string());
+    if (extension != ".gltf" && extension != ".glb") return true;
+    run.scene = run.dataset;
+    run.output = output_folder(run);
+    run.dataset = run.output / "dataset";
+    // Another training may be reading the images that are there.
+    std::unique_ptr<core::FolderLock> lock;
+    if (fs::is_directory(run.output)) lock = std::make_unique<core::FolderLock>(run.output);
+    const SyntheticDataset made =
+        render_with_progress(run.device, run.scene, run.dataset, {}, arguments.output.quiet);
+    return !made.interrupted && !interrupted();
+}
+
+std::string accuracy_section(const RunScene& scene) {
+    return report::work_precision_html(
+        rendering_diagram(scene.device, scene.gaussians, scene.camera, scene.options));
+}
+
+int run(CLI::App& app, TrainArguments& arguments) {
+    const auto begin = Clock::now();
+    RunOptions& options = arguments.run;
+    if (!arguments.config.empty()) apply_config(app, arguments.config);
+    if (options.dataset.empty()) throw InputError("DATASET is required (see ewa train --help)");
+    settle_kernel(arguments);
+    check_options(options);  // before the images of a mesh scene are rendered
+    if (!render_scene(arguments)) return kInterruptedStatus;
+    if (arguments.accuracy) options.report_section = accuracy_section;
+    options.seconds_before = std::chrono::duration<double>(Clock::now() - begin).count();
+    TrainObserver observer(arguments.output, options.train.steps);
+    const RunResult result = run_training(options, observer);
+    observer.print(result);
+    return result.summary.interrupted ? kInterruptedStatus : 0;
 }
 
 }  // namespace
 
 Action add_train(CLI::App& app, const std::string& command_line) {
-    const auto state = std::make_shared<CommandState>();
-    TrainArguments& arguments = state->arguments;
-    arguments.command_line = command_line;
-    app.add_option("DATASET", arguments.dataset,
-                   "Images with cameras: COLMAP folder or transforms.json; or a glTF with meshes, which is "
-                   "photographed into DIR/dataset first")
-        ->type_name("");
-    app.add_option(
-           "-o,--output", arguments.output,
-           "Folder for splats.ply, summary.json, metrics.jsonl, report.html, config.json and checkpoint.ewa "
-           "[out/<name of the dataset>]")
+    const auto arguments = std::make_shared<TrainArguments>();
+    RunOptions& options = arguments->run;
+    options.command = command_line;
+    app.add_option("-o,--output", options.output,
+                   "Folder for splats.ply, summary.json, metrics.jsonl, report.html, config.json and "
+                   "checkpoint.ewa [out/<name of the dataset>]")
         ->type_name("DIR");
-    add_model_options(app, arguments);
-    app.add_option("--eval-every", arguments.eval_every,
-                   "Evaluate the held-out views every N steps; 0: only at the end")
-        ->check(in_range(0, kMaxSteps))
-        ->type_name("N")
-        ->capture_default_str();
+    add_run_options(app, *arguments);
+    app.add_flag("--accuracy", arguments->accuracy,
+                 "At the end, measure error against run time for the report, as ewa bench --accuracy does");
     app.add_option(
-           "--save-every", arguments.save_every,
-           "Save splats.ply and checkpoint.ewa every N steps; 0: the checkpoint every 30 seconds or more")
-        ->check(in_range(0, kMaxSteps))
-        ->type_name("N")
-        ->capture_default_str();
-    app.add_flag("--accuracy", arguments.accuracy,
-                 "At the end, draw error against run time for the report, as ewa bench --accuracy does");
-    app.add_option("--serve", arguments.serve,
-                   "Let ewa-view look on by this port (0: any free one), of this machine alone unless an "
-                   "address stands "
-                   "before it; DIR/live.json has the token that pausing and saving need")
+           "--serve", arguments->output.serve,
+           "Let ewa-view and HTTP clients watch by this port (0: any free port). Only this machine can "
+           "connect, unless an address stands before the port. Pausing and saving need the token in "
+           "DIR/live.json")
         ->type_name("[ADDRESS:]PORT");
-    app.add_flag("--resume", arguments.resume,
-                 "Go on from DIR's checkpoint.ewa, or start where there is none");
-    app.add_option("--config", state->config,
-                   "JSON with the names of these options, such as a run's config.json; the command line wins")
+    app.add_flag("--resume", options.resume, "Continue from DIR's checkpoint.ewa, or start if there is none");
+    app.add_option("--config", arguments->config,
+                   "JSON with the names of these options, such as a run's config.json. The command line has "
+                   "precedence")
         ->type_name("FILE");
-    add_device_options(app, arguments.device);
-    const auto quiet = app.add_flag("--quiet", arguments.quiet, "Print nothing but errors");
-    app.add_flag("--verbose", arguments.verbose, "Print the plan: what this scene does not need")
+    add_device_options(app, options.device);
+    const auto quiet = app.add_flag("--quiet", arguments->output.quiet, "Print only errors");
+    app.add_flag("--verbose", arguments->output.verbose, "Print the plan: what this scene does not need")
         ->excludes(quiet);
-    return [&app, state] { return run(app, *state); };
+    return [&app, arguments] { return run(app, *arguments); };
 }
 
 }  // namespace ewa::cli

@@ -127,12 +127,6 @@ std::string passes(const std::vector<NamedTime>& times) {
                       total);
 }
 
-std::string work_precision(const std::vector<WorkPrecision>& diagrams) {
-    std::string html;
-    for (const WorkPrecision& diagram : diagrams) html += work_precision_html(diagram);
-    return html;
-}
-
 std::string plan(const std::vector<LeftOut>& lines) {
     if (lines.empty()) return "";
     std::string html =
@@ -167,8 +161,8 @@ std::string html_report(const ReportData& data) {
     return "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
            "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" +
            escape_html(data.title) + " – ewa</title>\n<style>" + kStyle + "</style></head>\n<body><main>\n" +
-           headline(data) + pictures(data) + charts(data.metrics) + passes(data.pass_times) +
-           work_precision(data.work_precision) + plan(data.plan) + settings(data) + "</main></body></html>\n";
+           headline(data) + pictures(data) + charts(data.metrics) + passes(data.pass_times) + data.section +
+           plan(data.plan) + settings(data) + "</main></body></html>\n";
 }
 
 }  // namespace ewa::report

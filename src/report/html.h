@@ -8,7 +8,6 @@
 
 #include "ewa/image.h"
 #include "report/summary.h"
-#include "report/work_precision.h"
 
 namespace ewa::report {
 
@@ -37,11 +36,11 @@ struct ReportData {
     std::vector<std::string> remarks;                           // e.g. "3 images are missing"
     std::vector<std::pair<std::string, std::string>> settings;  // name, value
     std::vector<ReportPicture> pictures;
-    std::vector<WorkPrecision> work_precision;
-    bool held_out = true;  // the images were held out from training
+    std::string section;   // HTML that the report contains as it is
+    bool held_out = true;  // the pictures were not trained on
 };
 
-/// Escapes all strings and skips sections without data.
+/// Escapes every string but `section`. A part without data is skipped.
 std::string html_report(const ReportData& data);
 
 }  // namespace ewa::report

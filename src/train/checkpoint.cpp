@@ -40,7 +40,7 @@ static_assert(sizeof(SectionHeader) == 32);
 uint32_t checksum_of(const SectionHeader& header, std::span<const std::byte> data) {
     const auto* head = reinterpret_cast<const Bytef*>(&header);
     const uLong sum = crc32_z(0, head, offsetof(SectionHeader, checksum));
-    if (data.empty()) return uint32_t(sum);  // zlib takes a null pointer for the wish to begin anew
+    if (data.empty()) return uint32_t(sum);  // zlib restarts the sum for a null pointer
     return uint32_t(crc32_z(sum, reinterpret_cast<const Bytef*>(data.data()), data.size()));
 }
 
@@ -110,7 +110,7 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
     const auto version = file.read<uint32_t>("the version");
     if (version != kVersion)
         file.fail("a checkpoint of layout " + std::to_string(version) +
-                  "; this version of ewa goes on from layout " + std::to_string(kVersion));
+                  "; this version of ewa reads layout " + std::to_string(kVersion));
     const auto sections = file.read<uint32_t>("the number of sections");
     if (sections < std::size(kFixed) || sections > kMaxSections)
         file.fail("a checkpoint of " + std::to_string(sections) + " sections");
@@ -132,7 +132,7 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
     state.report = {int(block.step),       block.seconds,           block.loss,         block.splats,
                     block.dropped_updates, block.skipped_nonfinite, block.limited_steps};
     for (uint32_t i = uint32_t(fixed.size()); i < sections; ++i) state.arrays.push_back(read_section(file));
-    if (file.remaining() > 0) file.fail("there is something behind the last section");
+    if (file.remaining() > 0) file.fail("there are bytes behind the last section");
     return checkpoint;
 }
 

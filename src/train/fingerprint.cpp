@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What tells datasets apart.
+// A hash that differs between datasets.
 #include <algorithm>
 #include <cstdio>
 
@@ -28,12 +28,12 @@ void add_distortion(Hash& hash, const Distortion& d) {
         hash.add(k);
 }
 
-/// Size and beginning.
+/// The size and the first 64 KiB.
 void add_file(Hash& hash, const std::filesystem::path& path) {
     core::FileReader file(path);
     hash.add(file.size());
     const size_t head = size_t(std::min<uint64_t>(file.size(), 1u << 16));
-    hash.add(file.take(head, "the picture"), head);
+    hash.add(file.take(head, "the image"), head);
 }
 
 }  // namespace

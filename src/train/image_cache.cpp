@@ -64,7 +64,7 @@ ImageCache::Photo ImageCache::photo(size_t i) {
     if (photos_[i].texels) return {photos_[i].texels, photos_[i].masked};
     prepare(i);
     const Image image = reading_.get();
-    visitor_ = {};  // goes first: there is room for one
+    visitor_ = {};  // frees its memory first
     visitor_ = upload(frames_[i], image);
     return {visitor_.texels, visitor_.masked};
 }

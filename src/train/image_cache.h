@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The training photographs and their cameras, for the device.
+// The training images and their cameras on the device.
 #pragma once
 #include <future>
 #include <vector>
@@ -11,13 +11,13 @@
 
 namespace ewa::train {
 
-/// Holds decoded photographs on the device up to a number of bytes: the first frames that fit. The others
-/// stay on disk and are read again each time; which ones are held changes no result. Beside the cache there
-/// is one photograph on the device and one being read.
+/// Caches decoded images on the device up to a number of bytes: the first frames that fit. The others are read
+/// again at each use. Which images are cached changes no result. Besides the cache, one image is on the device
+/// and one is being read.
 class ImageCache {
   public:
-    /// Loads and uploads the pictures that are held, their sides divided by `reduction`. origin: of the model
-    /// that the cameras look at. Throws InputError that names the frame.
+    /// Loads and uploads the cached images, with their sides divided by `reduction`. frames: indices into
+    /// dataset.frames. origin: of the model's positions. Throws InputError that names the frame.
     ImageCache(gpu::Device& device, const passes::Shape& shape, const Dataset& dataset,
                const std::vector<int>& frames, uint64_t cache_bytes, const glm::dvec3& origin,
                int reduction = 1);
@@ -25,17 +25,17 @@ class ImageCache {
     size_t count() const { return photos_.size(); }
     size_t on_disk() const { return on_disk_; }
 
-    /// A photograph as the loss takes it, valid until the next call.
+    /// An image as the loss reads it. Valid until the next call of photo.
     struct Photo {
         const gpu::Buffer& texels;
-        bool masked;  // its alpha says how much each pixel counts, and some count less
+        bool masked;  // its alpha weights the pixels, and some weigh less than 1
     };
-    /// Reads it where it is not held. The device must be idle. Throws InputError.
+    /// Reads image i if it is not cached. The device must be idle. Throws InputError.
     Photo photo(size_t i);
-    /// Starts reading photograph i in the background where it is not held, for the next call of photo.
+    /// Starts reading image i in the background for the next call of photo, if it is not cached.
     void prepare(size_t i);
 
-    /// Whether a photograph may be masked.
+    /// Whether an image may be masked.
     bool any_masked() const { return any_masked_; }
     pipeline::CameraUse camera(size_t i) const;
 
@@ -58,8 +58,8 @@ class ImageCache {
     uint64_t camera_stride_ = 0;
 };
 
-/// The frame of a step (from 1): each photograph once an epoch, every epoch in an order of its own, a pure
-/// function of the seed.
+/// The index of the image of a step, which counts from 1. Each epoch shows every image once, in an order of its
+/// own. A pure function of the seed.
 size_t frame_of_step(int step, size_t count, uint64_t seed);
 
 }  // namespace ewa::train

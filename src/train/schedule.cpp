@@ -8,10 +8,11 @@ namespace ewa::train {
 namespace {
 
 constexpr double kFullRun = 30000;
-constexpr int kLeastRefineEvery = 50;    // steps: about one look at each photograph of a small capture
-constexpr int kLeastRelocateEvery = 25;  // steps: time enough for what was relocated to fade or to stay
-constexpr int kLeastResetEvery = 1000;   // steps
-constexpr int kLeastShEvery = 50;        // steps
+// Lower limits of intervals, in steps.
+constexpr int kLeastRefineEvery = 50;    // a small capture shows each of its images about once
+constexpr int kLeastRelocateEvery = 25;  // a relocated splat has time to fade or to stay
+constexpr int kLeastResetEvery = 1000;
+constexpr int kLeastShEvery = 50;
 
 double decayed(double first, double last, double share) {
     const double t = std::clamp(share, 0.0, 1.0);
@@ -93,6 +94,15 @@ Schedule schedule_for(const TrainOptions& options) {
 }  // namespace ewa::train
 
 namespace ewa {
+
+TrainOptions resolve(TrainOptions options, const Dataset& dataset) {
+    const bool adc_asked_for = options.absolute_gradients || options.revised_opacity;
+    if (options.strategy == Strategy::automatic)
+        options.strategy = adc_asked_for ? Strategy::adc : strategy_for(options.steps);
+    if (options.sh_degree == kAutomaticShDegree)
+        options.sh_degree = dataset.color_depends_on_view ? kMaxShDegree : 0;
+    return options;
+}
 
 Strategy strategy_for(int steps) {
     constexpr int kLeastForMcmc = 5000;

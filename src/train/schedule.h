@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// When a run does what: pure functions of the step and the options.
+// When a training does what: pure functions of the step and the options.
 //
-// The intervals of TrainOptions are those of a 30,000 step run. A shorter run keeps their proportions as far
-// as sense allows: a densification needs statistics over many views, and an opacity reset needs a few hundred
-// steps to heal, so both have a floor below which they do not shrink.
+// The intervals of TrainOptions are those of a 30,000 step run. A shorter run shortens them in proportion, down to
+// a lower limit. A densification needs statistics over many views, and an opacity reset needs a few hundred steps
+// to recover from.
 //
-// 3DGS-MCMC puts copies onto their source and leaves it to the noise to part them. That takes thousands of
-// steps: two copies that are more opaque than the noise's gate feel the same gradient and stay one. A shorter
-// run therefore starts copies apart, the more the shorter it is.
+// In 3DGS-MCMC, clones start at the source's position and separate only through noise. That takes thousands of
+// steps, and opaque clones never separate: they get the same gradient. A shorter run therefore starts clones apart,
+// the more the shorter it is.
 //
-// The learning rates of 3DGS are those of 30,000 steps. In a short run means do not reach their places and
-// view-dependent colour does not unfold, so both learn faster there, the more the shorter the run is.
+// The learning rates of 3DGS are those of 30,000 steps. In a shorter run the means do not reach their positions and
+// view-dependent colour does not develop. Both therefore learn faster, the more the shorter the run is.
 #pragma once
 #include <cstdint>
 
@@ -22,8 +22,8 @@ struct Schedule {
     int steps = 0;
     int refine_start = 0, refine_stop = 0, refine_every = 0;  // steps
     int relocate_stop = 0, relocate_every = 0;                // steps, of MCMC
-    double growth = 1;            // of MCMC, a refinement: as fast, by the share of the run, as in a full run
-    double copy_spread = 0;       // of MCMC
+    double growth = 1;       // of MCMC at each refinement, so that the whole run grows as much as a full run
+    double copy_spread = 0;  // of MCMC
     int opacity_reset_every = 0;  // 0: never
     int sh_degree_every = 0;
     int sh_degree = 0;  // the highest
@@ -41,7 +41,7 @@ struct Schedule {
     bool was_reset(int step) const;
     /// SH degree evaluated in this step.
     int degree(int step) const;
-    /// How many times the photographs' sides are halved in this step (OpenSplat's resolution schedule).
+    /// How many times the training images' sides are halved in this step (OpenSplat's resolution schedule).
     int halvings_at(int step) const;
     /// Learning rate of the means: exponential from means_rate to means_rate_final over the run (Plenoxels'
     /// decay, as 3DGS uses it), times the scene extent.
@@ -50,8 +50,8 @@ struct Schedule {
     double exposure_rate(int step) const;
 };
 
-/// Bytes of the photographs' cache that those of so many halvings may take: what is left of it by the smaller
-/// ones, each of which gets a quarter of the next larger one's share.
+/// The part of image_cache_bytes for images whose sides are halved so often. Each level gets a quarter of the
+/// level above it, and the full resolution gets the rest.
 uint64_t cache_share(const TrainOptions& options, int halvings);
 
 Schedule schedule_for(const TrainOptions& options);

@@ -21,6 +21,7 @@
 #include "pipeline/densify.h"
 #include "pipeline/mcmc.h"
 #include "train/image_cache.h"
+#include "train/initial_splats.h"
 #include "train/schedule.h"
 
 namespace ewa {
@@ -213,12 +214,10 @@ struct Trainer::State {
 Trainer::Trainer(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
                  const std::vector<int>& train_frames, const Gaussians& start, const TrainOptions& options) {
     if (train_frames.empty())
-        throw InputError("no training photograph; a smaller --test-every share leaves some");
-    if (start.size() == 0) throw InputError("no splat to start from");
-    if (start.size() > options.max_splats)
-        throw InputError("the start has " + std::to_string(start.size()) +
-                         " splats, more than --max-splats " + std::to_string(options.max_splats));
-    state_ = std::make_unique<State>(std::move(device), dataset, train_frames, start, options);
+        throw InputError("there is no training image; a larger --test-every leaves more of them");
+    train::check_start(start.size(), options);
+    state_ =
+        std::make_unique<State>(std::move(device), dataset, train_frames, start, resolve(options, dataset));
 }
 Trainer::~Trainer() = default;
 
@@ -276,20 +275,21 @@ void Trainer::restore(const TrainerState& state) {
     const uint32_t splats = state.report.splats;
     if (state.sh_degree != s.model.sh_degree || state.report.step > s.options.steps ||
         splats > s.options.max_splats || splats == 0)
-        throw InputError("the state to go on from is of another SH degree, of more steps or of more splats");
+        throw InputError(
+            "the state does not fit this training: another SH degree, more steps or more splats");
     const auto buffers = buffers_of(s.plan, s.model, s.exposures, splats);
     const bool moved = !state.arrays.empty() && state.arrays.back().name == "origin";
     glm::dvec3 origin(0);
     if (moved && state.arrays.back().bytes.size() == sizeof(origin))
         std::memcpy(&origin, state.arrays.back().bytes.data(), sizeof(origin));
     if (origin != s.model.origin)
-        throw InputError("the state to go on from has its means relative to another origin");
+        throw InputError("the state does not fit this training: its means are relative to another origin");
     if (state.arrays.size() != buffers.size() + moved)
-        throw InputError("the state to go on from is of another strategy");
+        throw InputError("the state does not fit this training: it is of another strategy");
     for (size_t i = 0; i < buffers.size(); ++i)
         if (state.arrays[i].name != buffers[i].name || state.arrays[i].bytes.size() != buffers[i].bytes)
-            throw InputError("the state to go on from lacks " + std::string(buffers[i].name) + " of " +
-                             std::to_string(splats) + " splats");
+            throw InputError("the state does not fit this training: it lacks " +
+                             std::string(buffers[i].name) + " of " + std::to_string(splats) + " splats");
     s.model = {};  // its memory first
     s.model.splats = s.model.capacity = splats;
     s.model.sh_degree = state.sh_degree;

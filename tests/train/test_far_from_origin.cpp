@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "ewa/evaluation.h"
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
 #include "ewa/trainer.h"

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "ewa/error.h"
+#include "ewa/evaluation.h"
 #include "ewa/splat_files.h"
 #include "ewa/trainer.h"
 #include "gpu/test_device.h"
@@ -188,7 +189,7 @@ TEST(Trainer, RefusesWhatItCannotTrain) {
             Trainer(device(), small_capture().dataset, frames, from, options);
         };
     };
-    expect_error<InputError>(make({}, start, 1000), {"no training photograph"});
+    expect_error<InputError>(make({}, start, 1000), {"no training image"});
     expect_error<InputError>(make({0}, Gaussians{}, 1000), {"no splat"});
     expect_error<InputError>(make({0}, start, 39), {"40", "39"});
 }
@@ -285,25 +286,25 @@ TEST(Trainer, AResolutionScheduleEndsAtTheWholeResolutionAndResumes) {
     EXPECT_NE(Trainer(device(), small_capture().dataset, frames, start, options).step().loss, loss);
 }
 
-TEST(Trainer, TheMemoryForecastHoldsForARun) {
+TEST(Trainer, TheMemoryEstimateHoldsForARun) {
     const Gaussians start = shaken_start(small_capture(), 0.05, 1, 1);
     TrainOptions options = quick(160);
     options.strategy = Strategy::adc;
     options.grow_gradient = 1e-5;
     options.refine_stop = 30000;
     options.max_splats = 60;
-    const MemoryForecast forecast = forecast_memory(*device(), small_capture().dataset,
+    const MemoryEstimate estimate = estimate_memory(*device(), small_capture().dataset,
                                                     all_frames(small_capture().dataset), start, options);
-    EXPECT_EQ(forecast.splats, 60u);
+    EXPECT_EQ(estimate.splats, 60u);
     DeviceOptions fresh;  // whose peak is this run's
     const auto own = open_device(fresh);
     Trainer trainer(own, small_capture().dataset, all_frames(small_capture().dataset), start, options);
     for (int step = 0; step < 160; ++step) trainer.step();
     EXPECT_EQ(trainer.splats(), 60u);
     const uint64_t peak = peak_device_bytes(*own);
-    printf("    forecast %.0f KiB, peak %.0f KiB\n", forecast.total() / 1024.0, double(peak) / 1024);
-    EXPECT_LT(peak, 1.1 * forecast.total());
-    EXPECT_GT(peak, 0.5 * forecast.total());
+    printf("    estimate %.0f KiB, peak %.0f KiB\n", estimate.total() / 1024.0, double(peak) / 1024);
+    EXPECT_LT(peak, 1.1 * estimate.total());
+    EXPECT_GT(peak, 0.5 * estimate.total());
 }
 
 TEST(Trainer, PhotographsOnDiskChangeNoResult) {

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/initialise.h"
+#include "train/initial_splats.h"
+
+#include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
 #include <array>
@@ -10,10 +12,14 @@
 #include <numbers>
 
 #include "core/random.h"
+#include "ewa/error.h"
 #include "ewa/splat_edit.h"
+#include "ewa/splat_files.h"
 
 namespace ewa::train {
 namespace {
+
+constexpr uint32_t kRandomSplats = 50000;
 
 /// Four numbers of (0, 1) for each seed, splat and use of it.
 std::array<double, 4> uniform(uint64_t seed, uint32_t index, uint32_t use) {
@@ -45,11 +51,11 @@ glm::dvec3 point_on_a_ray(const Camera& camera, double depth, const std::array<d
     return camera.position() + glm::transpose(camera.rotation) * (depth * u[2] * glm::normalize(ray));
 }
 
-/// A point of the sphere that a camera sees.
+/// A point of the sphere that at least one camera sees.
 glm::dvec3 seen_point(const Dataset& dataset, const std::vector<int>& frames, const Sphere& sphere,
                       uint64_t seed, uint32_t index) {
-    constexpr uint32_t kAttempts =
-        64;  // a forward-facing capture's frustums fill some hundredths of the sphere
+    // The frustums of a forward-facing capture fill a few hundredths of the sphere.
+    constexpr uint32_t kAttempts = 64;
     for (uint32_t attempt = 0; attempt < kAttempts; ++attempt) {
         const glm::dvec3 point = point_in_sphere(sphere, uniform(seed, index, 2 * attempt));
         if (std::any_of(frames.begin(), frames.end(),
@@ -68,7 +74,7 @@ Sphere viewed_sphere(const Dataset& dataset, const std::vector<int>& frames) {
     for (const int i : frames) mean += dataset.frames[i].camera.position() / double(frames.size());
 
     // The sum of squared distances from the axes is least where sum(I - d d^T) (p - o) = 0. Positions are
-    // taken relative to their mean, so that a scene far from the origin loses no digits.
+    // relative to their mean, so a scene far from the origin loses no digits.
     glm::dmat3 normal(0.0);
     glm::dvec3 right(0.0);
     for (const int i : frames) {
@@ -78,8 +84,8 @@ Sphere viewed_sphere(const Dataset& dataset, const std::vector<int>& frames) {
         right += across * (dataset.frames[i].camera.position() - mean);
     }
     const double count = double(frames.size());
-    // Near-parallel axes: the determinant over its largest possible value, 8/27 for directions in all of
-    // space.
+    // The determinant is near 0 if the axes are nearly parallel. Its largest value is 8/27 of the cubed count,
+    // for directions in all of space.
     if (glm::determinant(normal) > 1e-4 * count * count * count) {
         const glm::dvec3 offset = glm::inverse(normal) * right;
         double distance = 0, towards = 0;
@@ -111,10 +117,33 @@ Gaussians random_gaussians(const Dataset& dataset, const std::vector<int>& frame
     return gaussians_from_points(points, sh_degree);
 }
 
-Gaussians with_sh_degree(const Gaussians& gaussians, int degree) {
-    Gaussians out = gaussians;
-    set_sh_degree(out, degree);
-    return out;
+Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, const std::vector<int>& frames) {
+    const int degree = options.train.sh_degree;
+    Gaussians start;
+    if (options.init == "sfm") {
+        if (dataset.dropped_points > 0)
+            throw InputError(
+                fmt::format("{}: a coordinate is not finite ({} such points in all); remove them, or start "
+                            "from --init random",
+                            dataset.first_dropped_point, dataset.dropped_points));
+        if (!dataset.points.positions.empty()) start = gaussians_from_points(dataset.points, degree);
+    }
+    if (options.init == "random" || (options.init == "sfm" && start.size() == 0)) {
+        const uint32_t count = std::min(kRandomSplats, options.train.max_splats);
+        start = random_gaussians(dataset, frames, static_cast<int>(count), options.train.seed, degree);
+    } else if (options.init != "sfm") {
+        start = load_splats(options.init);
+        set_sh_degree(start, degree);
+    }
+    check_start(start.size(), options.train);
+    return start;
+}
+
+void check_start(size_t splats, const TrainOptions& options) {
+    if (splats == 0) throw InputError("there are no splats to start from; --init random makes some");
+    if (splats > options.max_splats)
+        throw InputError(fmt::format("there are {} splats to start from, more than --max-splats {}", splats,
+                                     options.max_splats));
 }
 
 }  // namespace ewa::train

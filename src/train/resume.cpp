@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "cli/train_resume.h"
+#include "train/resume.h"
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "core/json.h"
 #include "ewa/error.h"
+#include "train/run_options.h"
 
-namespace ewa::cli {
+namespace ewa::train {
 namespace {
 
-using report::Json;
+using Json = nlohmann::ordered_json;
 
-// Options that change when something is written, where it runs or what is held in memory, not what comes out.
-constexpr const char* kWithoutInfluence[] = {"dataset", "eval-every", "save-every", "device", "image-cache"};
-constexpr size_t kLongestValue = 200;   // of an option in an error, which a stranger may have written
+// Of an option's value in an error. The checkpoint may come from a stranger.
+constexpr size_t kLongestValue = 200;
 constexpr double kLeastPause = 30;      // seconds
-constexpr double kPausePerSaving = 50;  // times what saving took
+constexpr double kPausePerSaving = 50;  // times the duration of a save
 
 Json parse_settings(const std::filesystem::path& path, const std::string& stored) {
     const std::string way_out = "; without --resume the training starts anew";
@@ -31,15 +31,27 @@ Json parse_settings(const std::filesystem::path& path, const std::string& stored
     return json;
 }
 
+/// The value as to_config writes it: "1.0,1,1" and "1,1,1" are the same background.
+Json normalised(const RunOption& option, const Json& value) {
+    try {
+        RunOptions options;
+        option.set(options, value.is_string() ? value.get<std::string>() : value.dump());
+        return option.get(options);
+    } catch (const InputError&) {
+        return value;
+    }
+}
+
 }  // namespace
 
-Json checkpoint_settings(const TrainArguments& arguments, const std::string& fingerprint) {
-    Json options = to_config(arguments);
-    for (const char* name : kWithoutInfluence) options.erase(name);
+Json checkpoint_settings(const RunOptions& options, const std::string& fingerprint) {
+    Json decisive;
+    for (const RunOption& option : run_options())
+        if (option.decides_result) decisive[option.name] = option.get(options);
     Json json;
     json["version"] = EWA_VERSION;
     json["dataset"] = fingerprint;
-    json["options"] = options;
+    json["options"] = decisive;
     return json;
 }
 
@@ -47,11 +59,11 @@ void check_resumable(const std::filesystem::path& path, const std::string& store
     const Json then = parse_settings(path, stored);
     const std::string way_out = "; without --resume the training starts anew, -o takes another folder";
     if (then.value("dataset", Json()) != now["dataset"])
-        throw InputError(path.string() +
-                         ": is of another dataset, or its photographs or cameras have changed" + way_out);
+        throw InputError(path.string() + ": is of another dataset, or its images or cameras have changed" +
+                         way_out);
     for (const auto& [name, value] : now["options"].items()) {
         const Json other = then["options"].value(name, Json());
-        if (other != value)
+        if (normalised(run_option(name), other) != value)
             throw InputError(path.string() + ": was written with --" + name + " " +
                              other.dump().substr(0, kLongestValue) + ", not " + value.dump() + way_out);
     }
@@ -75,4 +87,4 @@ void SavePace::saved(double seconds_taken) {
     pause_ = std::max(kLeastPause, kPausePerSaving * seconds_taken);
 }
 
-}  // namespace ewa::cli
+}  // namespace ewa::train

@@ -6,11 +6,15 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-#include "train/initialise.h"
+#include "ewa/error.h"
+#include "ewa/splat_files.h"
+#include "support/temp_folder.h"
+#include "train/initial_splats.h"
 
 namespace {
 
 using namespace ewa;
+using namespace ewa::test;
 using namespace ewa::train;
 
 /// Cameras on a circle of radius 3 around `center`; towards: looking at it, else away from it. A focal length
@@ -126,12 +130,42 @@ TEST(Initialise, ShDegreeIsRaisedAndLowered) {
     g.sh_degree = 1;
     g.resize(2);
     for (size_t i = 0; i < g.sh.size(); ++i) g.sh[i] = float(i + 1);
-    const Gaussians up = with_sh_degree(g, 3);
+    TempFolder folder;
+    save_splats(folder / "start.ply", g);
+    const auto start_of_degree = [&](int degree) {
+        RunOptions options;
+        options.init = (folder / "start.ply").string();
+        options.train.sh_degree = degree;
+        return initial_splats(options, {}, {});
+    };
+    const Gaussians up = start_of_degree(3);
     EXPECT_EQ(up.sh.size(), 2 * 48u);
     EXPECT_EQ(up.sh[48], 13.0f);
     EXPECT_EQ(up.sh[12], 0.0f);
-    EXPECT_EQ(with_sh_degree(up, 1).sh, g.sh);
-    EXPECT_EQ(with_sh_degree(g, 0).sh, (std::vector<float>{1, 2, 3, 13, 14, 15}));
+    EXPECT_EQ(start_of_degree(1).sh, g.sh);
+    EXPECT_EQ(start_of_degree(0).sh, (std::vector<float>{1, 2, 3, 13, 14, 15}));
+}
+
+TEST(Initialise, StartsFromPointsOrRandomSplats) {
+    Dataset dataset = circle({0, 0, 0}, true);
+    const auto frames = every_frame(dataset);
+    RunOptions options;
+    options.train.sh_degree = 1;
+    options.train.max_splats = 70;
+    EXPECT_EQ(initial_splats(options, dataset, frames).size(), 70u);  // random, since there are no points
+    dataset.points.positions = {{1, 2, 3}, {4, 5, 6}};
+    dataset.points.colors = {{1, 2, 3}, {4, 5, 6}};
+    EXPECT_EQ(initial_splats(options, dataset, frames).means, (std::vector<float>{1, 2, 3, 4, 5, 6}));
+    options.init = "random";
+    EXPECT_EQ(initial_splats(options, dataset, frames).size(), 70u);
+    options.init = "sfm";
+    options.train.max_splats = 1;
+    expect_error<InputError>([&] { initial_splats(options, dataset, frames); },
+                             {"2 splats", "--max-splats 1"});
+    dataset.dropped_points = 3;
+    dataset.first_dropped_point = "points.ply: vertex 7";
+    expect_error<InputError>([&] { initial_splats(options, dataset, frames); },
+                             {"vertex 7", "3 such points"});
 }
 
 }  // namespace

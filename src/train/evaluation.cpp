@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// A scene's pictures against photographs.
+#include "ewa/evaluation.h"
+
 #include <chrono>
 #include <cmath>
 
 #include "ewa/error.h"
-#include "ewa/trainer.h"
+#include "ewa/renderer.h"
 
 namespace ewa {
 

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// How close renders of a scene are to a dataset's images.
+#pragma once
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ewa/dataset.h"
+#include "ewa/device.h"
+#include "ewa/exposure.h"
+#include "ewa/gaussians.h"
+#include "ewa/render_options.h"
+
+namespace ewa {
+
+struct EvalFrame {
+    std::string name;  // Frame::name
+    double psnr = 0;   // dB
+    double ssim = 0;
+};
+
+struct Evaluation {
+    double psnr = 0, ssim = 0;  // means over `frames`
+    std::vector<EvalFrame> frames;
+    double seconds = 0;  // wall time
+};
+
+/// Renders frames of the dataset and compares each with its image. Values are clamped to [0, 1]. Pixels with
+/// weight 0 do not count, and a frame without any other pixel is skipped.
+/// frames: indices into dataset.frames.
+/// exposures: applied to the renders, one for each of `frames` in the same order; or empty.
+/// before_frame: called before each frame; an exception from it ends the evaluation.
+/// Throws InputError (an image that cannot be read or changed its size), RunError (device).
+Evaluation evaluate(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians, const Dataset& dataset,
+                    const std::vector<int>& frames, const RenderOptions& options,
+                    const std::vector<Exposure>& exposures = {},
+                    const std::function<void()>& before_frame = {});
+
+}  // namespace ewa

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// The figures of a training run: those of summary.json, and one line of metrics.jsonl.
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace ewa {
+
+/// summary.json. A figure that does not exist (no test set, not evaluated) is null there. So is one that is not
+/// finite, such as the PSNR of equal images.
+struct Summary {
+    int steps = 0;
+    double seconds = 0;       // training alone
+    double wall_seconds = 0;  // with start-up, evaluation and saving
+    uint32_t splats = 0;
+    std::optional<double> test_psnr, test_ssim, train_psnr;  // dB
+    std::string device;
+    uint64_t peak_device_bytes = 0, peak_host_bytes = 0;
+    uint64_t seed = 0;
+    uint32_t skipped_nonfinite = 0;  // these three as in StepReport
+    uint64_t dropped_updates = 0;
+    uint64_t limited_steps = 0;
+    std::string version, command, strategy;
+    bool interrupted = false;  // the run was stopped before its end
+};
+
+/// A line of metrics.jsonl.
+struct MetricsLine {
+    int step = 0;
+    double seconds = 0, wall_seconds = 0;  // as in Summary, so far
+    double loss = 0;                       // of this step
+    uint32_t splats = 0;
+    std::optional<double> test_psnr, test_ssim;  // if the test views were evaluated after this step
+};
+
+}  // namespace ewa

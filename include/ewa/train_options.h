@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+// The options of a training.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+
+#include "ewa/render_options.h"
+
+namespace ewa {
+
+/// How the number of splats changes during training.
+enum class Strategy {
+    none,      // it does not
+    adc,       // adaptive density control of 3DGS: splats are cloned, split and pruned
+    mcmc,      // 3DGS-MCMC: dead splats are relocated, and the number grows to max_splats
+    automatic  // strategy_for(steps); adc if an option of adc is set
+};
+
+/// The strategy, adc or mcmc, that gives better images after this many steps (measurements: docs/training.md).
+Strategy strategy_for(int steps);
+
+/// TrainOptions::sh_degree: 3, or 0 if the dataset says that no colour depends on the view.
+inline constexpr int kAutomaticShDegree = -1;
+
+/// Options of a Trainer. Learning rates are those of Adam. Lengths are in world units. "Scene extent" is
+/// scene_extent() of ewa/dataset.h, or the median distance of the start's splats if all cameras coincide.
+struct TrainOptions {
+    int steps = 30000;  // optimisation steps, of one view each
+    Strategy strategy = Strategy::mcmc;
+    uint32_t max_splats = 1000000;   // hard limit
+    int sh_degree = 3;               // 0 to 3, or kAutomaticShDegree
+    uint64_t seed = 0;               // the same seed on the same device gives the same bytes
+    bool random_background = false;  // a new background colour each step
+    /// Device memory for decoded training images, in bytes. Images beyond it are read again for each step.
+    uint64_t image_cache_bytes = uint64_t(4) << 30;
+    RenderOptions render{};  // background and kernel of training and evaluation
+
+    // Learning rates of 3DGS (arguments/__init__.py). Those of the means are per unit of scene extent.
+    double means_rate = 1.6e-4, means_rate_final = 1.6e-6;
+    double sh0_rate = 2.5e-3, sh_rest_rate = 1.25e-4;
+    double opacity_rate = 0.025;
+    double scale_rate = 5e-3, quaternion_rate = 1e-3;
+    /// Multiplies the rates of means and of SH above degree 0 in short runs: by this at 0 steps, linearly down
+    /// to 1 at 30,000 steps. Not used with mcmc, whose noise depends on the means' rate.
+    double short_run_gain = 2;
+
+    bool exposure = false;  // learns an exposure for each training image, from the identity
+    double exposure_rate = 0.01, exposure_rate_final = 0.001;
+
+    // Adaptive density control. Steps are those of a 30,000 step run; a shorter run scales them
+    // (src/train/schedule.h).
+    int refine_start = 500, refine_stop = 15000, refine_every = 100;
+    int opacity_reset_every = 3000;  // 0: never
+    int sh_degree_every = 1000;      // the SH degree rises by one this often
+    int halvings = 0;                // the images' sides are halved this often at the start
+    int resolution_every = 3000;     // one halving is undone this often
+    double grow_gradient = 2e-4;     // mean norm of dL/d(mean in normalised device coordinates)
+    /// Uses the sum of the pixels' absolute gradients, which do not cancel (AbsGS), and their own threshold.
+    bool absolute_gradients = false;
+    double grow_gradient_absolute = 8e-4;  // gsplat's
+    bool revised_opacity = false;          // both halves of a split are together as opaque as their parent
+    double split_scale = 0.01;             // larger splats are split, others cloned; share of scene extent
+    double prune_opacity = 0.005;
+    double prune_scale = 0.1;  // share of scene extent; used after the first opacity reset
+
+    // 3DGS-MCMC (Kheradmand et al. 2024), with the values of its code and of gsplat. It shares refine_start
+    // and refine_every.
+    int relocate_stop = 25000;
+    double growth = 1.05;  // factor of the number of splats at each refinement, up to max_splats
+    /// Standard deviations between a copy and its source in a run of 0 steps, linearly down to 0 at 30,000
+    /// steps, where noise has the time to separate them (src/train/schedule.h).
+    double copy_spread = 1;
+    double dead_opacity = 0.005;
+    double noise_rate = 5e5;       // times the means' learning rate
+    double opacity_weight = 0.01;  // regulariser weight of the mean opacity
+    double scale_weight = 0.01;    // regulariser weight of the mean scale, in units of scene extent
+};
+
+}  // namespace ewa

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// A training run as `ewa train` shows it: lines on the terminal, signals, and those who watch by --serve.
+#pragma once
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cli/interrupt.h"
+#include "cli/progress.h"
+#include "cli/train_serve.h"
+#include "ewa/run.h"
+
+namespace ewa::cli {
+
+struct TrainOutput {
+    bool quiet = false, verbose = false;
+    std::string serve;  // [ADDRESS:]PORT; empty: no server
+};
+
+class TrainObserver : public RunObserver {
+  public:
+    /// steps: of the whole training.
+    TrainObserver(const TrainOutput& output, int steps) : output_(output), steps_(steps) {}
+
+    bool should_stop() override { return interrupted(); }
+    void on_note(const std::string& line) override;
+    void on_start(const RunStart& start) override;
+    void on_plan(const std::vector<PlanLine>& plan) override;
+    void on_begin(const std::filesystem::path& folder, const std::vector<MetricsLine>& metrics) override;
+    void on_step(const StepReport& step) override;
+    void on_evaluation(int step, const Evaluation& evaluation) override;
+    void on_metrics(const MetricsLine& line) override;
+    void between_steps(const StepReport& step, const Trainer& trainer,
+                       const std::function<void()>& save) override;
+    void on_saved(const StepReport& step) override;
+    void on_evaluated(const StepReport& step, const Gaussians& gaussians) override;
+
+    void print(const RunResult& result);
+
+  private:
+    TrainOutput output_;
+    int steps_;
+    std::optional<InterruptWatch> watch_;
+    std::optional<TrainServer> server_;
+    std::optional<Progress> progress_;
+};
+
+}  // namespace ewa::cli

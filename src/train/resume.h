@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a checkpoint says about its run, and whether a run may continue from it.
+#pragma once
+#include <chrono>
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "ewa/run.h"
+
+namespace ewa::train {
+
+/// The settings of a checkpoint: version, the dataset's fingerprint, and the options that decide the result.
+/// The run adds the device.
+nlohmann::ordered_json checkpoint_settings(const RunOptions& options, const std::string& fingerprint);
+
+/// Throws InputError that names the first difference if a run with the settings `now` would end with another
+/// result. stored: the settings of the checkpoint at `path`.
+void check_resumable(const std::filesystem::path& path, const std::string& stored,
+                     const nlohmann::ordered_json& now);
+
+/// A remark if version or device differ, since the result's bytes may then differ. Else an empty text.
+std::string resume_remark(const std::string& stored, const nlohmann::ordered_json& now);
+
+/// Says when to save a checkpoint: every so many steps. With 0, by the clock: every 30 seconds, or less often so
+/// that saving takes less than 2 percent of the time.
+class SavePace {
+  public:
+    explicit SavePace(int every) : every_(every) {}
+    bool due(int step) const;
+    void saved(double seconds_taken);
+
+  private:
+    using Clock = std::chrono::steady_clock;
+    int every_;
+    Clock::time_point last_ = Clock::now();
+    double pause_ = 30;  // seconds
+};
+
+}  // namespace ewa::train

@@ -1,0 +1,344 @@
+// SPDX-License-Identifier: Apache-2.0
+// A training run: load, open the device, resume, train, evaluate, report.
+#include "ewa/run.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <chrono>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "ewa/error.h"
+#include "image/openimageio.h"
+#include "pipeline/model.h"
+#include "report/pictures.h"
+#include "train/checkpoint.h"
+#include "train/resume.h"
+#include "train/run_evaluation.h"
+#include "train/run_files.h"
+#include "train/run_input.h"
+#include "train/run_options.h"
+
+namespace ewa {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using Json = nlohmann::ordered_json;
+
+double seconds_since(Clock::time_point begin) {
+    return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+bool at(int step, int every) {
+    return every > 0 && step % every == 0;
+}
+
+/// Thrown out of an evaluation that the observer stops.
+struct Stopped {};
+
+/// What training a scene without view-dependent colour skips, besides what its plan says.
+PlanLine skipped_sh_degrees(uint32_t splats) {
+    // Parameters and both of Adam's moments.
+    const uint64_t bytes =
+        3 * (pipeline::parameter_bytes(splats, kMaxShDegree) - pipeline::parameter_bytes(splats, 0));
+    return {fmt::format("SH degrees 1 to {}", kMaxShDegree),
+            "the dataset says that no colour depends on the view", bytes};
+}
+
+std::vector<PlanLine> plan_of(const train::RunInput& input) {
+    const TrainOptions& options = input.options.train;
+    auto plan = plan_lines(input.start, options.render,
+                           options.strategy == Strategy::adc ? Purpose::densifying : Purpose::training,
+                           input.dataset.frames.front().masks == MaskUse::ignore, options.exposure);
+    if (input.without_view_dependence()) plan.push_back(skipped_sh_degrees(uint32_t(input.start.size())));
+    return plan;
+}
+
+class Run {
+  public:
+    Run(const RunOptions& options, RunObserver& observer)
+        : observer_(observer),
+          begin_(Clock::now()),
+          input_(train::load_run(options)),
+          folder_(input_.options.output),
+          pace_(options.save_every) {}
+
+    RunResult run();
+
+  private:
+    const RunOptions& options() const { return input_.options; }
+    double wall_seconds() const { return earlier_wall_ + options().seconds_before + seconds_since(begin_); }
+    void read_checkpoint();
+    void open_folder();
+    void start();
+    void restore(Trainer& trainer);
+    void save_splats(const Gaussians& gaussians) const;
+    void save_checkpoint(const Trainer& trainer);
+    void train(Trainer& trainer);
+    void after_step(Trainer& trainer);
+    void log(const std::optional<Evaluation>& evaluation);
+    void stop_if_asked() const;
+    template <class Work>
+    bool done_unless_stopped(Work&& work) const;
+    train::RunOutcome outcome(const Gaussians& gaussians) const;
+    void evaluate_result(const Trainer& trainer, const Gaussians& gaussians);
+    void render_result(const Gaussians& gaussians);
+    void finish(const Trainer& trainer);
+    void fill_summary(const Trainer& trainer);
+
+    RunObserver& observer_;
+    Clock::time_point begin_;
+    double earlier_wall_ = 0;  // of the run that this one continues
+    train::RunInput input_;
+    train::RunFolder folder_;
+    train::SavePace pace_;
+    Json settings_;  // of the checkpoint
+    std::optional<train::Checkpoint> earlier_;
+    std::shared_ptr<gpu::Device> device_;
+    std::optional<report::MetricsLog> log_file_;
+    StepReport last_;
+    std::optional<Evaluation> last_evaluation_;
+    report::ReportData report_;
+    std::filesystem::path first_render_;
+};
+
+void Run::read_checkpoint() {
+    settings_ =
+        train::checkpoint_settings(options(), train::dataset_fingerprint(input_.dataset, input_.split));
+    if (!options().resume || !std::filesystem::exists(folder_.checkpoint())) return;
+    earlier_ = train::read_checkpoint(folder_.checkpoint());
+    train::check_resumable(folder_.checkpoint(), earlier_->settings, settings_);
+}
+
+/// Writes config.json, which tells before the training whether the folder takes files.
+void Run::open_folder() {
+    const Json config = train::to_config(options());
+    folder_.begin(config);
+    for (const train::RunOption& option : train::run_options())
+        report_.settings.emplace_back(option.name, train::value_text(option, options()));
+}
+
+/// Opens the device and tells the observer what the run begins with.
+void Run::start() {
+    device_ = open_device(options().device);
+    report_.title = input_.name;
+    report_.remarks = input_.remarks;
+    report::Summary& summary = report_.summary;
+    summary.device = device_info(*device_).name;
+    summary.seed = options().train.seed;
+    summary.version = EWA_VERSION;
+    summary.command = options().command;
+    summary.strategy = train::name_of(options().train.strategy);
+    settings_["device"] = summary.device;
+
+    const Camera& camera = input_.dataset.frames[size_t(input_.split.train.front())].camera;
+    RunStart start;
+    start.name = input_.name;
+    start.train_views = input_.split.train.size();
+    start.test_views = input_.split.test.size();
+    start.width = camera.width;
+    start.height = camera.height;
+    start.splats = input_.start.size();
+    start.remarks = input_.remarks;
+    start.device = device_info(*device_);
+    start.memory =
+        estimate_memory(*device_, input_.dataset, input_.split.train, input_.start, options().train);
+    observer_.on_start(start);
+}
+
+/// Continues from the checkpoint, if there is one.
+void Run::restore(Trainer& trainer) {
+    if (!earlier_) return;
+    const std::string remark = train::resume_remark(earlier_->settings, settings_);
+    if (!remark.empty()) {
+        report_.remarks.push_back(remark);
+        observer_.on_note(remark);
+    }
+    try {
+        trainer.restore(earlier_->state);
+        report_.metrics = report::parse_metrics(earlier_->metrics);
+    } catch (const InputError& error) {
+        throw InputError(folder_.checkpoint().string() + ": " + error.what() +
+                         "; without --resume the training starts anew");
+    }
+    earlier_wall_ = earlier_->wall_seconds;
+    last_ = earlier_->state.report;
+    observer_.on_note(fmt::format("resumed after step {} of {}", last_.step, options().train.steps));
+    earlier_.reset();
+}
+
+void Run::save_splats(const Gaussians& gaussians) const {
+    folder_.save_splats(gaussians, last_.step, options().train.render);
+}
+
+void Run::save_checkpoint(const Trainer& trainer) {
+    const auto start = Clock::now();
+    train::write_checkpoint(folder_.checkpoint(),
+                            {settings_.dump(-1, ' ', false, Json::error_handler_t::replace),
+                             report::metrics_text(report_.metrics), wall_seconds(), trainer.state()});
+    pace_.saved(seconds_since(start));
+}
+
+void Run::log(const std::optional<Evaluation>& evaluation) {
+    MetricsLine line;
+    line.step = last_.step;
+    line.seconds = last_.seconds;
+    line.wall_seconds = wall_seconds();
+    line.loss = last_.loss;
+    line.splats = last_.splats;
+    if (evaluation) {
+        line.test_psnr = evaluation->psnr;
+        line.test_ssim = evaluation->ssim;
+    }
+    log_file_->append(line);
+    report_.metrics.push_back(line);
+    observer_.on_metrics(line);
+}
+
+/// Evaluates, logs and saves as far as this step is due for it.
+void Run::after_step(Trainer& trainer) {
+    const int step = last_.step;
+    std::optional<Evaluation> evaluation;
+    if (at(step, options().eval_every) && !input_.split.test.empty()) {
+        // Cannot be stopped: a run that is resumed would not repeat it.
+        evaluation =
+            evaluate(device_, trainer.gaussians(), input_.dataset, input_.split.test, options().train.render);
+        observer_.on_evaluation(step, *evaluation);
+    }
+    const int log_every = std::max(1, options().train.steps / 100);
+    if (evaluation || step == 1 || at(step, log_every)) log(evaluation);
+    if (pace_.due(step)) save_checkpoint(trainer);
+    if (at(step, options().save_every)) save_splats(trainer.gaussians());
+    observer_.between_steps(last_, trainer, [&] {
+        save_splats(trainer.gaussians());
+        save_checkpoint(trainer);
+    });
+}
+
+void Run::train(Trainer& trainer) {
+    const int steps = options().train.steps;
+    try {
+        while (trainer.steps_done() < steps && !observer_.should_stop()) {
+            last_ = trainer.step();
+            observer_.on_step(last_);
+            if (last_.step < steps) after_step(trainer);  // finish() does so after the last step
+        }
+    } catch (const InputError&) {
+        // An image that vanished is found before its step begins, so the state is consistent.
+        save_checkpoint(trainer);
+        throw;
+    }
+}
+
+void Run::stop_if_asked() const {
+    if (observer_.should_stop()) throw Stopped();
+}
+
+/// Whether the work was done to its end.
+template <class Work>
+bool Run::done_unless_stopped(Work&& work) const {
+    try {
+        stop_if_asked();
+        work();
+        return true;
+    } catch (const Stopped&) {
+        return false;
+    }
+}
+
+train::RunOutcome Run::outcome(const Gaussians& gaussians) const {
+    return {device_, input_, gaussians, [this] { stop_if_asked(); }};
+}
+
+void Run::evaluate_result(const Trainer& trainer, const Gaussians& gaussians) {
+    observer_.on_note("evaluating");
+    if (!input_.split.test.empty()) {
+        last_evaluation_ = train::evaluate_test(outcome(gaussians));
+        report_.summary.test_psnr = last_evaluation_->psnr;
+        report_.summary.test_ssim = last_evaluation_->ssim;
+    }
+    report_.summary.train_psnr = train::train_psnr(outcome(gaussians), trainer.exposures());
+}
+
+void Run::render_result(const Gaussians& gaussians) {
+    const std::vector<int> frames = train::report_frames(input_.split);
+    const auto subfolder = folder_.path() / (report_.held_out ? "test" : "train");
+    report_.pictures = train::render_report_images(outcome(gaussians), frames, subfolder);
+    const auto names = report::picture_names(input_.dataset.frames);
+    first_render_ = subfolder / (names[size_t(frames.front())].string() + ".png");
+    if (!options().report_section) return;
+    stop_if_asked();
+    const Camera& camera = input_.dataset.frames[size_t(frames.front())].camera;
+    report_.section = options().report_section({device_, gaussians, camera, options().train.render});
+}
+
+void Run::fill_summary(const Trainer& trainer) {
+    for (const PassTime& time : trainer.pass_times())
+        report_.pass_times.push_back({time.pass, time.milliseconds});
+    report::Summary& summary = report_.summary;
+    summary.steps = last_.step;
+    summary.seconds = last_.seconds;
+    summary.splats = trainer.splats();
+    summary.skipped_nonfinite = last_.skipped_nonfinite;
+    summary.dropped_updates = last_.dropped_updates;
+    summary.limited_steps = last_.limited_steps;
+    summary.peak_device_bytes = peak_device_bytes(*device_);
+    summary.peak_host_bytes = train::peak_host_bytes(*device_);
+    summary.wall_seconds = wall_seconds();
+}
+
+void Run::finish(const Trainer& trainer) {
+    const Gaussians gaussians = trainer.gaussians();
+    save_splats(gaussians);
+    if (options().train.exposure)
+        folder_.save_exposures(input_.dataset, input_.split.train, trainer.exposures());
+    save_checkpoint(trainer);  // from here on, a kill costs no training
+    observer_.on_saved(last_);
+
+    const bool evaluated = done_unless_stopped([&] { evaluate_result(trainer, gaussians); });
+    if (last_.step > 0) log(last_evaluation_);
+    observer_.on_evaluated(last_, gaussians);
+    report_.held_out = !input_.split.test.empty();
+    report_.summary.interrupted = !evaluated || !done_unless_stopped([&] { render_result(gaussians); });
+    fill_summary(trainer);
+    folder_.save_report(report_);
+}
+
+RunResult Run::run() {
+    read_checkpoint();
+    image::openimageio();  // the report's images need it, even if the training images do not
+    open_folder();
+    start();
+    const std::vector<PlanLine> plan = plan_of(input_);
+    for (const PlanLine& line : plan) report_.plan.push_back({line.what, line.why, line.bytes_saved});
+
+    Trainer trainer(device_, input_.dataset, input_.split.train, input_.start, options().train);
+    input_.start = {};
+    observer_.on_plan(plan);
+    if (trainer.images_on_disk() > 0)
+        observer_.on_note(
+            fmt::format("{} training images exceed --image-cache {} MiB and are read again for each step",
+                        trainer.images_on_disk(), options().train.image_cache_bytes >> 20));
+    last_.splats = trainer.splats();
+    restore(trainer);
+    log_file_.emplace(folder_.metrics(), report_.metrics);
+    observer_.on_begin(folder_.path(), report_.metrics);
+    train(trainer);
+    finish(trainer);
+    return {report_.summary, folder_.path(), first_render_};
+}
+
+}  // namespace
+
+RunResult run_training(const RunOptions& options, RunObserver& observer) {
+    check_options(options);
+    return Run(options, observer).run();
+}
+
+RunResult run_training(const RunOptions& options) {
+    RunObserver nobody;
+    return run_training(options, nobody);
+}
+
+}  // namespace ewa

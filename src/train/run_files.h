@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// The files in a run's folder.
+#pragma once
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "core/folders.h"
+#include "ewa/run.h"
+#include "report/html.h"
+
+namespace ewa::train {
+
+/// A run's folder. No other process can train in it while this lives.
+class RunFolder {
+  public:
+    /// Creates the folder and removes what killed processes left half written. Throws RunError if it cannot be
+    /// created or another process uses it.
+    explicit RunFolder(const std::filesystem::path& path);
+
+    const std::filesystem::path& path() const { return path_; }
+    std::filesystem::path checkpoint() const { return path_ / "checkpoint.ewa"; }
+    std::filesystem::path metrics() const { return path_ / "metrics.jsonl"; }
+
+    // All of these throw RunError.
+    /// Writes config.json. Removes the results of an earlier run: they must not stay beside this run's metrics
+    /// if it fails.
+    void begin(const nlohmann::ordered_json& config) const;
+    void save_splats(const Gaussians& gaussians, int step, const RenderOptions& render) const;
+    /// exposures: one for each of the training frames.
+    void save_exposures(const Dataset& dataset, const std::vector<int>& frames,
+                        const std::vector<Exposure>& exposures) const;
+    /// summary.json and report.html.
+    void save_report(const report::ReportData& report) const;
+
+  private:
+    std::filesystem::path path_;
+    core::FolderLock lock_;
+};
+
+/// The largest memory of the process so far, in bytes. Without the memory of a CPU device, which
+/// peak_device_bytes counts.
+uint64_t peak_host_bytes(const gpu::Device& device);
+
+}  // namespace ewa::train

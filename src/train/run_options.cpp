@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/run_options.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <charconv>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <utility>
+
+#include "core/text.h"
+#include "ewa/error.h"
+
+namespace ewa::train {
+namespace {
+
+using Json = nlohmann::ordered_json;
+template <class T>
+using Member = T& (*)(RunOptions&);
+template <class T>
+using Names = std::vector<std::pair<const char*, T>>;
+
+constexpr int kMostSteps = 1000000000;
+constexpr bool kDecides = true, kDoesNotDecide = false;
+
+const Names<Strategy> kStrategies = {{"auto", Strategy::automatic},
+                                     {"adc", Strategy::adc},
+                                     {"mcmc", Strategy::mcmc},
+                                     {"none", Strategy::none}};
+const Names<MaskUse> kMaskUses = {{"auto", MaskUse::automatic},
+                                  {"ignore", MaskUse::ignore},
+                                  {"cut", MaskUse::cut},
+                                  {"none", MaskUse::none}};
+const Names<Kernel> kKernels = {
+    {"peak", Kernel::peak}, {"antialias", Kernel::antialias}, {"ewa", Kernel::unit_mass}};
+
+template <class T>
+const T& read(Member<T> member, const RunOptions& options) {
+    return member(const_cast<RunOptions&>(options));
+}
+
+template <class T>
+T parse_within(const std::string& text, T low, T high) {
+    const auto value = core::parse_integer<T>(text);
+    if (!value || *value < low || *value > high)
+        throw InputError(fmt::format("'{}' is not a whole number from {} to {}", text, low, high));
+    return *value;
+}
+
+template <class T>
+const char* name_among(const Names<T>& names, T value) {
+    const auto found =
+        std::find_if(names.begin(), names.end(), [&](const auto& named) { return named.second == value; });
+    return found == names.end() ? "" : found->first;
+}
+
+template <class T>
+RunOption number(const char* name, const char* value, const char* help, bool decides, Member<T> member, T low,
+                 T high) {
+    return {name,
+            value,
+            help,
+            decides,
+            {},
+            [=](const RunOptions& options) { return Json(read(member, options)); },
+            [=](RunOptions& options, const std::string& text) {
+                member(options) = parse_within(text, low, high);
+            }};
+}
+
+RunOption flag(const char* name, const char* help, Member<bool> member) {
+    return {name,
+            "",
+            help,
+            kDecides,
+            {},
+            [=](const RunOptions& options) { return Json(read(member, options)); },
+            [=](RunOptions& options, const std::string& text) {
+                if (text != "true" && text != "false")
+                    throw InputError("'" + text + "' is neither true nor false");
+                member(options) = text == "true";
+            },
+            member};
+}
+
+template <class T>
+RunOption choice(const char* name, const char* help, Member<T> member, const Names<T>& names) {
+    std::vector<std::string> choices;
+    for (const auto& [known, value] : names) choices.emplace_back(known);
+    return {name,
+            "TEXT",
+            help,
+            kDecides,
+            choices,
+            [=, &names](const RunOptions& options) { return Json(name_among(names, read(member, options))); },
+            [=, &names](RunOptions& options, const std::string& text) {
+                for (const auto& [known, value] : names)
+                    if (text == known) {
+                        member(options) = value;
+                        return;
+                    }
+                throw InputError(fmt::format("'{}' is not one of {}", text, fmt::join(choices, ", ")));
+            }};
+}
+
+RunOption words(const char* name, const char* value, const char* help, bool decides,
+                Member<std::string> member) {
+    return {name,
+            value,
+            help,
+            decides,
+            {},
+            [=](const RunOptions& options) { return Json(read(member, options)); },
+            [=](RunOptions& options, const std::string& text) { member(options) = text; }};
+}
+
+RunOption dataset_option() {
+    return {"dataset",
+            "PATH",
+            "Images with cameras: a COLMAP folder or transforms.json. Or a glTF file with meshes, which is "
+            "first rendered into DIR/dataset",
+            kDoesNotDecide,
+            {},
+            [](const RunOptions& options) {
+                return Json((options.scene.empty() ? options.dataset : options.scene).string());
+            },
+            [](RunOptions& options, const std::string& text) { options.dataset = text; }};
+}
+
+RunOption sh_degree_option() {
+    return {"sh-degree",
+            "auto|0..3",
+            "Highest SH degree of view-dependent colour. auto: 3, or 0 if the dataset says that no colour "
+            "depends on the view",
+            kDecides,
+            {},
+            [](const RunOptions& options) {
+                const int degree = options.train.sh_degree;
+                return degree == kAutomaticShDegree ? Json("auto") : Json(degree);
+            },
+            [](RunOptions& options, const std::string& text) {
+                options.train.sh_degree =
+                    text == "auto" ? kAutomaticShDegree : parse_within(text, 0, kMaxShDegree);
+            }};
+}
+
+RunOption image_cache_option() {
+    return {"image-cache",
+            "MiB",
+            "Device memory for decoded training images. Images beyond it are read again for each step",
+            kDoesNotDecide,
+            {},
+            [](const RunOptions& options) { return Json(options.train.image_cache_bytes >> 20); },
+            [](RunOptions& options, const std::string& text) {
+                options.train.image_cache_bytes = parse_within(text, uint64_t(0), uint64_t(1) << 40) << 20;
+            }};
+}
+
+RunOption background_option() {
+    return {"background",
+            "COLOUR",
+            "Colour behind the splats: r,g,b in 0..1, or random (a new one each step)",
+            kDecides,
+            {},
+            [](const RunOptions& options) {
+                const auto& [r, g, b] = options.train.render.background;
+                return Json(options.train.random_background ? "random" : fmt::format("{},{},{}", r, g, b));
+            },
+            [](RunOptions& options, const std::string& text) {
+                options.train.random_background = text == "random";
+                options.train.render.background =
+                    text == "random" ? std::array<float, 3>{} : parse_colour(text);
+            }};
+}
+
+std::vector<RunOption> make_table() {
+    return {
+        dataset_option(),
+        number<int>(
+            "steps", "N", "Optimisation steps, one view each", kDecides,
+            [](RunOptions& o) -> int& { return o.train.steps; }, 1, kMostSteps),
+        choice<Strategy>(
+            "strategy",
+            "adc adds and removes splats (3DGS). mcmc relocates dead splats and grows to --max-splats "
+            "(3DGS-MCMC). none keeps the number of splats. auto is mcmc from 5000 steps on, else adc",
+            [](RunOptions& o) -> Strategy& { return o.train.strategy; }, kStrategies),
+        number<uint32_t>(
+            "max-splats", "N", "Upper limit of the number of splats", kDecides,
+            [](RunOptions& o) -> uint32_t& { return o.train.max_splats; }, 1u, 1000000000u),
+        sh_degree_option(),
+        flag("absgrad",
+             "adc: add splats where the sum of the pixels' absolute gradients is large (AbsGS). Such "
+             "gradients "
+             "do not cancel",
+             [](RunOptions& o) -> bool& { return o.train.absolute_gradients; }),
+        flag("revised-opacity", "adc: both halves of a split splat are together as opaque as it was",
+             [](RunOptions& o) -> bool& { return o.train.revised_opacity; }),
+        flag(
+            "exposure",
+            "Learn an exposure (an affine map of colours) for each training image. For captures in which the "
+            "exposure varies",
+            [](RunOptions& o) -> bool& { return o.train.exposure; }),
+        number<int>(
+            "resolution-schedule", "N",
+            "Start with the images' sides halved N times. Each tenth of the run doubles them", kDecides,
+            [](RunOptions& o) -> int& { return o.train.halvings; }, 0, 6),
+        words("init", "sfm|random|FILE",
+              "First splats. sfm: the dataset's points, or random if it has none. random: where the cameras "
+              "look. FILE: a splat file",
+              kDecides, [](RunOptions& o) -> std::string& { return o.init; }),
+        number<int>(
+            "downscale", "K", "Divide the images' width and height by this", kDecides,
+            [](RunOptions& o) -> int& { return o.downscale; }, 1, 1024),
+        choice<MaskUse>(
+            "masks",
+            "What masks/ and alpha are for. ignore: masked pixels do not count. cut: masked pixels have the "
+            "background's colour. none: neither is used. auto: ignore if there are mask files, else cut",
+            [](RunOptions& o) -> MaskUse& { return o.masks; }, kMaskUses),
+        number<int>(
+            "test-every", "K", "Hold out every K-th image in name order. 0: none", kDecides,
+            [](RunOptions& o) -> int& { return o.test_every; }, 0, 1000000000),
+        number<uint64_t>(
+            "seed", "S", "The same seed on the same device gives the same bytes", kDecides,
+            [](RunOptions& o) -> uint64_t& { return o.train.seed; }, uint64_t(0), UINT64_MAX),
+        image_cache_option(),
+        background_option(),
+        choice<Kernel>(
+            "kernel", "Footprint of a splat: peak (3DGS), antialias (Mip-Splatting) or ewa (unit mass)",
+            [](RunOptions& o) -> Kernel& { return o.train.render.kernel; }, kKernels),
+        number<int>(
+            "eval-every", "N", "Evaluate the held-out views every N steps. 0: only at the end",
+            kDoesNotDecide, [](RunOptions& o) -> int& { return o.eval_every; }, 0, kMostSteps),
+        number<int>(
+            "save-every", "N",
+            "Save splats.ply and checkpoint.ewa every N steps. 0: save the checkpoint every 30 seconds or "
+            "more",
+            kDoesNotDecide, [](RunOptions& o) -> int& { return o.save_every; }, 0, kMostSteps),
+        words("device", "NAME|N", "Number of a device, or part of its name (see ewa devices)", kDoesNotDecide,
+              [](RunOptions& o) -> std::string& { return o.device.selector; }),
+    };
+}
+
+}  // namespace
+
+const std::vector<RunOption>& run_options() {
+    static const std::vector<RunOption> table = make_table();
+    return table;
+}
+
+const RunOption& run_option(std::string_view name) {
+    const auto& all = run_options();
+    const auto found =
+        std::find_if(all.begin(), all.end(), [&](const RunOption& o) { return o.name == name; });
+    if (found == all.end()) throw std::logic_error("no option " + std::string(name));
+    return *found;
+}
+
+std::string value_text(const RunOption& option, const RunOptions& options) {
+    const Json value = option.get(options);
+    return value.is_string() ? value.get<std::string>() : value.dump();
+}
+
+Json to_config(const RunOptions& options) {
+    Json json;
+    for (const RunOption& option : run_options()) json[option.name] = option.get(options);
+    return json;
+}
+
+std::array<float, 3> parse_colour(const std::string& text) {
+    std::array<float, 3> colour{};
+    const char *at = text.data(), *const end = at + text.size();
+    bool good = true;
+    for (size_t c = 0; good && c < 3; ++c) {
+        if (c > 0) good = at != end && *at++ == ',';
+        const auto [next, error] = std::from_chars(at, end, colour[c]);
+        good = good && error == std::errc() && colour[c] >= 0 && colour[c] <= 1;
+        at = next;
+    }
+    if (!good || at != end) throw InputError("'" + text + "' is not r,g,b with each in 0..1, such as 1,1,1");
+    return colour;
+}
+
+std::string name_of(Strategy strategy) {
+    return name_among(kStrategies, strategy);
+}
+
+}  // namespace ewa::train

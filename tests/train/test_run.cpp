@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: Apache-2.0
+// A whole training run through the library: its files, stopping and resuming, and its options.
+#include "ewa/run.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "core/json.h"
+#include "ewa/error.h"
+#include "train/run_options.h"
+#include "train/synthetic.h"
+
+namespace ewa::test {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+RunOptions small_run(const fs::path& output) {
+    RunOptions options;
+    options.dataset = small_capture().folder.path();
+    options.output = output;
+    options.train.steps = 40;
+    options.train.strategy = Strategy::mcmc;
+    options.train.max_splats = 60;
+    options.train.seed = 3;
+    options.train.exposure = true;
+    options.test_every = 4;
+    options.eval_every = 20;
+    return options;
+}
+
+/// Notes what it is told, and stops the run before the step after `last_step`.
+struct Recorder : RunObserver {
+    explicit Recorder(int last_step = 1000) : last_step_(last_step) {}
+    bool should_stop() override { return steps >= last_step_ || stop_late_ == calls_; }
+    void on_note(const std::string& line) override { notes.push_back(line); }
+    void on_start(const RunStart& start) override {
+        calls_ = "start";
+        started = start;
+    }
+    void on_begin(const fs::path&, const std::vector<MetricsLine>& metrics) override {
+        earlier_lines = metrics.size();
+    }
+    void on_step(const StepReport& report) override { steps = report.step; }
+    void on_evaluation(int step, const Evaluation& evaluation) override {
+        evaluated.push_back(step);
+        EXPECT_EQ(evaluation.frames.size(), 2u);
+    }
+    void on_metrics(const MetricsLine& line) override { logged.push_back(line.step); }
+    void between_steps(const StepReport& report, const Trainer& trainer,
+                       const std::function<void()>& save) override {
+        EXPECT_EQ(trainer.steps_done(), report.step);
+        if (report.step == save_at) save();
+        if (report.step == save_at) saved_at_step = fs::exists(save_file);
+    }
+    void on_saved(const StepReport&) override { calls_ = "saved"; }
+    void on_evaluated(const StepReport&, const Gaussians& gaussians) override {
+        splats_at_end = gaussians.size();
+    }
+
+    RunStart started;
+    int steps = 0, save_at = 0;
+    fs::path save_file;
+    bool saved_at_step = false;
+    size_t earlier_lines = 0, splats_at_end = 0;
+    std::vector<std::string> notes;
+    std::vector<int> evaluated, logged;
+    void stop_after_saving() { stop_late_ = "saved"; }
+
+  private:
+    int last_step_;
+    std::string calls_ = "none", stop_late_ = "never";
+};
+
+Json json_of(const fs::path& path) {
+    return core::read_json_file<Json>(path);
+}
+
+TEST(Run, WritesItsFilesAndTellsItsObserver) {
+    TempFolder folder;
+    RunOptions options = small_run(folder / "o");
+    options.report_section = [](const RunScene& scene) {
+        return "<p>a view of " + std::to_string(scene.camera.width) + " px</p>";
+    };
+    Recorder recorder;
+    recorder.save_at = 7;
+    recorder.save_file = folder / "o/splats.ply";
+    const RunResult result = run_training(options, recorder);
+    for (const char* file : {"config.json", "metrics.jsonl", "checkpoint.ewa", "splats.ply", "summary.json",
+                             "report.html", "exposures.json"})
+        EXPECT_TRUE(fs::exists(folder / "o" / file)) << file;
+    EXPECT_EQ(result.folder, folder / "o");
+    EXPECT_TRUE(fs::exists(result.first_render)) << result.first_render;
+    EXPECT_EQ(result.summary.steps, 40);
+    EXPECT_FALSE(result.summary.interrupted);
+    EXPECT_EQ(result.summary.strategy, "mcmc");
+    EXPECT_EQ(json_of(folder / "o/summary.json")["test_psnr"].get<double>(), *result.summary.test_psnr);
+    EXPECT_NE(file_bytes(folder / "o/report.html").find("<p>a view of 48 px</p>"), std::string::npos);
+
+    EXPECT_EQ(recorder.started.train_views, 6u);
+    EXPECT_EQ(recorder.started.test_views, 2u);
+    EXPECT_EQ(recorder.started.splats, 40u);
+    EXPECT_GT(recorder.started.memory.total(), 0u);
+    EXPECT_EQ(recorder.steps, 40);
+    EXPECT_EQ(recorder.evaluated, std::vector<int>{20});
+    EXPECT_EQ(recorder.logged.size(), 40u);
+    EXPECT_TRUE(recorder.saved_at_step);
+    EXPECT_EQ(recorder.splats_at_end, result.summary.splats);
+    const Json config = json_of(folder / "o/config.json");
+    EXPECT_EQ(config["strategy"], "mcmc");
+    EXPECT_EQ(config["sh-degree"], 3);
+    EXPECT_EQ(config["background"], "0,0,0");
+}
+
+TEST(Run, StoppedAndResumedEndsWithTheSameBytes) {
+    TempFolder folder;
+    run_training(small_run(folder / "whole"));
+    RunOptions options = small_run(folder / "cut");
+    options.resume = true;  // starts, since there is no checkpoint
+    for (const int last : {13, 27}) {
+        Recorder stops(last);
+        const RunResult result = run_training(options, stops);
+        EXPECT_TRUE(result.summary.interrupted);
+        EXPECT_EQ(result.summary.steps, last);
+        EXPECT_FALSE(result.summary.test_psnr);
+    }
+    Recorder late;
+    late.stop_after_saving();
+    EXPECT_TRUE(run_training(options, late).summary.interrupted);
+    EXPECT_EQ(late.earlier_lines, 27u);
+    EXPECT_EQ(late.steps, 40);
+
+    const RunResult result = run_training(options);
+    EXPECT_FALSE(result.summary.interrupted);
+    for (const char* file : {"splats.ply", "exposures.json", "config.json"})
+        EXPECT_EQ(file_bytes(folder / "cut" / file), file_bytes(folder / "whole" / file)) << file;
+
+    options.train.seed = 4;
+    expect_error<InputError>([&] { run_training(options); }, {"--seed 3, not 4"});
+}
+
+TEST(Run, RefusesOptionsThatExcludeEachOther) {
+    TempFolder folder;
+    RunOptions options = small_run(folder / "o");
+    options.train.absolute_gradients = true;
+    expect_error<InputError>([&] { run_training(options); }, {"--absgrad", "--strategy adc"});
+    options.train.strategy = Strategy::automatic;
+    EXPECT_NO_THROW(check_options(options));
+    EXPECT_EQ(resolve(options.train, {}).strategy, Strategy::adc);
+    EXPECT_FALSE(fs::exists(folder / "o"));
+}
+
+TEST(Run, AnExceptionOfTheObserverEndsIt) {
+    struct Thrower : RunObserver {
+        void on_step(const StepReport& step) override {
+            if (step.step == 5) throw std::domain_error("enough");
+        }
+    } thrower;
+    TempFolder folder;
+    EXPECT_THROW(run_training(small_run(folder / "o"), thrower), std::domain_error);
+    EXPECT_FALSE(fs::exists(folder / "o/summary.json"));
+    EXPECT_NO_THROW(run_training(small_run(folder / "o")));  // the folder is free again
+}
+
+TEST(RunOptions, AreNamedAfterTheirFolderOrScene) {
+    TempFolder folder;
+    RunOptions options;
+    folder.write("capture/transforms.json", "{}");
+    options.dataset = folder / "capture";
+    EXPECT_EQ(run_name(options), "capture");
+    EXPECT_EQ(output_folder(options), fs::path("out/capture"));
+    options.dataset = folder / "capture/transforms.json";
+    EXPECT_EQ(run_name(options), "capture");
+    options.scene = "scenes/plaster.gltf";
+    EXPECT_EQ(run_name(options), "plaster");
+    options.output = "here";
+    EXPECT_EQ(output_folder(options), fs::path("here"));
+}
+
+/// Every option changes a member of its own, and comes back from its text.
+TEST(RunOptions, TableReadsWhatItWrites) {
+    const std::map<std::string, std::string> other{{"dataset", "d"},
+                                                   {"steps", "7"},
+                                                   {"strategy", "adc"},
+                                                   {"max-splats", "8"},
+                                                   {"sh-degree", "2"},
+                                                   {"absgrad", "true"},
+                                                   {"revised-opacity", "true"},
+                                                   {"exposure", "true"},
+                                                   {"resolution-schedule", "3"},
+                                                   {"init", "random"},
+                                                   {"downscale", "2"},
+                                                   {"masks", "cut"},
+                                                   {"test-every", "5"},
+                                                   {"seed", "18446744073709551615"},
+                                                   {"image-cache", "9"},
+                                                   {"background", "0.25,1,0"},
+                                                   {"kernel", "ewa"},
+                                                   {"eval-every", "6"},
+                                                   {"save-every", "4"},
+                                                   {"device", "cpu"}};
+    ASSERT_EQ(train::run_options().size(), other.size());
+    RunOptions all;
+    for (const train::RunOption& option : train::run_options()) {
+        SCOPED_TRACE(option.name);
+        const Json before = train::to_config(RunOptions());
+        RunOptions one;
+        option.set(one, other.at(option.name));
+        option.set(all, other.at(option.name));
+        EXPECT_EQ(train::value_text(option, one), other.at(option.name));
+        const Json after = train::to_config(one);
+        for (const auto& [name, value] : after.items())
+            EXPECT_EQ(value != before[name], name == option.name) << name;
+        option.set(one, train::value_text(option, RunOptions()));
+        EXPECT_EQ(train::to_config(one), before);
+        EXPECT_FALSE(option.help.empty());
+        if (option.flag) {
+            EXPECT_TRUE(option.flag(all));
+        }
+    }
+    const Json config = train::to_config(all);
+    for (const auto& [name, text] : other)
+        EXPECT_EQ(train::value_text(train::run_option(name), all), text) << name;
+    EXPECT_EQ(all.train.image_cache_bytes, uint64_t(9) << 20);
+    EXPECT_EQ(all.train.render.kernel, Kernel::unit_mass);
+    EXPECT_EQ(config.begin().key(), "dataset");
+}
+
+TEST(RunOptions, TableRefusesWhatIsOutOfRange) {
+    const std::pair<const char*, const char*> wrong[] = {{"steps", "0"},
+                                                         {"steps", "1000000001"},
+                                                         {"steps", "many"},
+                                                         {"steps", "1.5"},
+                                                         {"max-splats", "-1"},
+                                                         {"max-splats", "0"},
+                                                         {"seed", "-1"},
+                                                         {"sh-degree", "4"},
+                                                         {"strategy", "luck"},
+                                                         {"background", "1,1"},
+                                                         {"background", "0,0,2"},
+                                                         {"background", "1,1,1,1"},
+                                                         {"background", "1,nan,1"},
+                                                         {"absgrad", "perhaps"},
+                                                         {"kernel", "box"},
+                                                         {"downscale", "1025"},
+                                                         {"background", ""},
+                                                         {"image-cache", "x"}};
+    for (const auto& [name, text] : wrong) {
+        RunOptions options;
+        expect_error<InputError>([&, n = name, t = text] { train::run_option(n).set(options, t); },
+                                 {std::string("'") + text + "'"});
+        EXPECT_EQ(train::to_config(options), train::to_config(RunOptions())) << name << " " << text;
+    }
+}
+
+}  // namespace
+}  // namespace ewa::test
