@@ -1,6 +1,7 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// The picture through a photograph's exposure, which the loss compares with the photograph. One invocation owns one pixel.
+// Applies a training image's exposure to the render, before the loss compares the two.
+// One invocation owns one pixel. It reads the render's planes and the exposure, and writes the exposed planes.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/exposure.glsl"

@@ -1,7 +1,8 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// The way back through expose: the gradient by the picture is the transposed matrix times that by the exposed one, and the
-// gradient by the exposure is summed over pixels. One workgroup is one subgroup and owns EXPOSURE_BLOCK pixels.
+// Gradient of expose. dL/d(render) is the transposed matrix times dL/d(exposed render); dL/d(exposure) is summed over
+// pixels. One workgroup is one subgroup and owns EXPOSURE_BLOCK pixels. It reads the render and the exposure, updates
+// dL/d(image) in place, and writes its block's partial sums of dL/d(exposure).
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"

@@ -1,7 +1,7 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Carries the derivatives of SSIM back through the window (it is symmetric: the same blur), down the columns. One
-// invocation owns LOSS_ROWS rows of one texel of plane workgroup.z.
+// Gradient of the SSIM window, down the columns. The window is symmetric, so this is the same blur. One invocation owns
+// LOSS_ROWS rows of one texel of plane workgroup.z. It reads the derivatives of SSIM and writes them blurred.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/ssim.glsl"

@@ -1,9 +1,10 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Second half of the way back, along the rows, and the gradient of the whole loss by the rendering:
-// dL/dx = ssim_scale (blur dS/d(mean x) + 2 x blur dS/d(mean x^2) + y blur dS/d(mean x y)) + l1_scale sign(x - y),
-// the first part where |x| is within SSIM_LIMIT.
-// One invocation owns LOSS_TEXELS texels of channel workgroup.z, one subgroup one partial sum of |x - y|.
+// Gradient of the SSIM window along the rows, and the gradient of the whole loss by the render x:
+// dL/dx = ssim_scale (blur dS/d(mean x) + 2 x blur dS/d(mean x^2) + y blur dS/d(mean x y)) + l1_scale sign(x - y).
+// The first term applies where |x| is within SSIM_LIMIT.
+// One invocation owns LOSS_TEXELS texels of channel workgroup.z; one subgroup owns one partial sum of |x - y|.
+// It reads the blurred derivatives, the render and the target, and writes dL/d(image) and the partial sums.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"

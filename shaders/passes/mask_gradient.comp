@@ -1,7 +1,7 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// The way back through mask_pictures: the gradient by the rendering, times how much the pixel counts. One invocation owns
-// one pixel.
+// Gradient of mask_pictures: dL/d(image) times the pixel's weight.
+// One invocation owns one pixel. It reads the weight from the training image's alpha, and updates dL/d(image) in place.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 

@@ -1,6 +1,7 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Lowers every opacity to at most a given one and forgets its moments (3DGS, section 5.2). One invocation owns splat i.
+// Lowers every opacity to at most a given one and zeroes its moments (3DGS, section 5.2).
+// One invocation owns splat i. It updates the opacity in the parameters and in both moments.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/params.glsl"

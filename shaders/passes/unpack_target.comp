@@ -1,6 +1,7 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Spreads a photograph's RGBA texels into planes, over the background where it is transparent. One invocation owns one pixel.
+// Unpacks a training image's RGBA texels into planes, over the background where it is transparent.
+// One invocation owns one pixel. It reads the pixel's texel and writes the target planes.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 

@@ -96,8 +96,8 @@ void record_backward(gpu::Recording& recording, Kernels& kernels, const Plan& pl
                  float(1 / (1 - std::pow(shared::ADAM_BETA1, step))),
                  float(1 / (1 - std::pow(shared::ADAM_BETA2, step))),
                  {0.5f * float(camera.width), 0.5f * float(camera.height)},
-                 rates.opacity_pull,
-                 rates.scale_pull});
+                 rates.opacity_weight,
+                 rates.scale_weight});
 }
 
 }  // namespace ewa::pipeline

@@ -10,7 +10,7 @@ struct Rates {
     float mean = 0, opacity = 0, quaternion = 0, scale = 0, sh0 = 0, sh_rest = 0;
     uint32_t step = 1;  // Adam's, from 1
     // Where plan.regularised: d(loss)/d(opacity) and d(loss)/d(scale along one axis) of every splat.
-    float opacity_pull = 0, scale_pull = 0;
+    float opacity_weight = 0, scale_weight = 0;
 };
 
 /// photo: width * height texels, RGBA. Its alpha cuts it out of the background or, where `masked`, says how

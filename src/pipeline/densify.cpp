@@ -35,7 +35,7 @@ uint32_t count_outputs(Kernels& kernels, gpu::Executor& executor, const Model& m
                 {frame.tile_counts, nullptr, frame.prefix, frame.scan_totals, frame.counts}, model.splats,
                 frame.sizes.scan_block, Total::densified, "densify offsets");
     executor.run(recording);
-    return frame.read_counts().densified;
+    return frame.read_counts().scan_total;
 }
 
 /// The lowest threshold, at least the rules' own, whose generation fits under the cap; infinity where none

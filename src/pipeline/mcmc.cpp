@@ -22,7 +22,7 @@ struct Scanned {
         record_scan(recording, kernels, {values, nullptr, prefix, totals, frame.counts}, model.splats,
                     frame.sizes.scan_block, Total::densified, "relocation offsets");
         executor.run(recording);
-        sum = frame.read_counts().densified;
+        sum = frame.read_counts().scan_total;
     }
 };
 

@@ -179,7 +179,7 @@ uint32_t Renderer::skipped_nonfinite() const {
 }
 
 uint32_t Renderer::splats_drawn() const {
-    return state_->counts.drawn;
+    return state_->counts.visible;
 }
 
 std::vector<PassTime> Renderer::pass_times() const {

@@ -128,8 +128,8 @@ struct Trainer::State {
         r.sh_rest = float(schedule.sh_rest_rate);
         r.step = uint32_t(step);
         if (plan.regularised) {
-            r.opacity_pull = float(options.opacity_weight / model.splats);
-            r.scale_pull = float(options.scale_weight / (3.0 * model.splats * extent));
+            r.opacity_weight = float(options.opacity_weight / model.splats);
+            r.scale_weight = float(options.scale_weight / (3.0 * model.splats * extent));
         }
         return r;
     }

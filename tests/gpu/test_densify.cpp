@@ -202,7 +202,7 @@ TEST(DensifyEdges, WritesNothingPastItsRoom) {
              frame.prefix, frame.scan_totals, params, moments1, moments2},
             push(room));
     });
-    EXPECT_GT(frame.read_counts().densified, room);
+    EXPECT_GT(frame.read_counts().scan_total, room);
     expect_intact({&params, &moments1, &moments2});
     EXPECT_TRUE(guarded.intact());
     for (const uint32_t word : params.read<uint32_t>()) EXPECT_NE(word, kPoison);  // and all of it is filled

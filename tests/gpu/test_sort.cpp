@@ -45,8 +45,8 @@ TEST_P(Scan, IsTheExclusivePrefixSum) {
         }
         EXPECT_EQ(before[blocks], sum);
         const auto read = counts.read<shared::Counts>()[0];
-        EXPECT_EQ(gathered ? read.instances : read.densified, sum);
-        EXPECT_EQ(gathered ? read.densified : read.instances, 0u);
+        EXPECT_EQ(gathered ? read.instances : read.scan_total, sum);
+        EXPECT_EQ(gathered ? read.scan_total : read.instances, 0u);
         expect_intact({&values, &prefix, &totals, &counts});
     }
 }

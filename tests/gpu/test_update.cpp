@@ -262,8 +262,8 @@ TEST(UpdateRegularisers, PullAtEveryOpacityAndScale) {
     GuardedModel plain(scene.gaussians), pulled(scene.gaussians);
     Bench bench(slots);
     auto push = push_for(scene, 1);
-    push.opacity_pull = 0.7f;
-    push.scale_pull = 0.3f;
+    push.opacity_weight = 0.7f;
+    push.scale_weight = 0.3f;
     bench.run(scene, plain.model, plain.moments1, plain.moments2, kGradient, push);
     bench.run(scene, pulled.model, pulled.moments1, pulled.moments2, kGradient | kRegularised, push);
     const Gaussians a = plain.read(plain.moments1), b = pulled.read(pulled.moments1);
@@ -273,10 +273,10 @@ TEST(UpdateRegularisers, PullAtEveryOpacityAndScale) {
     };
     for (size_t i = 0; i < scene.gaussians.size(); ++i) {
         const double o = 1 / (1 + std::exp(-double(scene.gaussians.opacity_logits[i])));
-        near(b.opacity_logits[i], a.opacity_logits[i], push.opacity_pull * o * (1 - o));
+        near(b.opacity_logits[i], a.opacity_logits[i], push.opacity_weight * o * (1 - o));
         for (size_t k = 3 * i; k < 3 * i + 3; ++k)
             near(b.log_scales[k], a.log_scales[k],
-                 push.scale_pull * std::exp(double(scene.gaussians.log_scales[k])));
+                 push.scale_weight * std::exp(double(scene.gaussians.log_scales[k])));
     }
     EXPECT_EQ(a.means, b.means);
     EXPECT_EQ(a.quaternions, b.quaternions);
@@ -458,7 +458,7 @@ TEST(UpdateLimits, ScalesStayWithinTheirBorders) {
     for (const float sign : {1.0f, -1.0f}) {
         GuardedModel pulled(start);
         Bench again(slots);
-        push.scale_pull = sign * 1e9f;  // down, or up
+        push.scale_weight = sign * 1e9f;  // down, or up
         again.run(one_way, pulled.model, pulled.moments1, pulled.moments2, kRegularised, push);
         const Gaussians after = pulled.read(pulled.model.params);
         for (size_t i = 3; i < after.log_scales.size(); ++i)
