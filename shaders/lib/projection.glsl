@@ -27,7 +27,7 @@ struct Projection {
     vec3 m0, m1;           // rows of M (px)
     bool in_range;         // quaternion and mean are within bounds
     bool footprint_in_range; // the footprint is within bounds; holds for splats in front of the camera only
-    float unit;            // factor from px to the units of a, b, c and det: 1, or less if the footprint's squares would overflow
+    float unit;            // px to the units of a, b, c and det: 1, or less if squares would overflow
     float a, b, c, det;    // Sigma2 = [a b; b c]
     vec3 minors;           // m0 x m1
     float det0;            // det(M M^T), without the low-pass

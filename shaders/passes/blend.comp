@@ -41,7 +41,7 @@ void main() {
     vec3 color[PIXELS];
     [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
         // A pixel outside the image starts closed, so that it never keeps the tile's loop running.
-        T[p] = px < push.size[0] && py + p * ROW_STEP < push.size[1] ? 1.0 : -1.0;
+        T[p] = px < push.image.size[0] && py + p * ROW_STEP < push.image.size[1] ? 1.0 : -1.0;
         color[p] = vec3(0.0);
         depth[p] = count[p] = 0.0;
     }
@@ -78,15 +78,15 @@ void main() {
     const vec3 background = vec3(push.background[0], push.background[1], push.background[2]);
     [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
         const uint y = py + p * ROW_STEP;
-        if (px < push.size[0] && y < push.size[1]) {
-            const uint at = y * push.stride + px;
+        if (px < push.image.size[0] && y < push.image.size[1]) {
+            const uint at = y * push.image.stride + px;
             const float left = abs(T[p]);
-            planes[PLANE_R * push.plane_floats + at] = color[p].r + left * background.r;
-            planes[PLANE_G * push.plane_floats + at] = color[p].g + left * background.g;
-            planes[PLANE_B * push.plane_floats + at] = color[p].b + left * background.b;
-            planes[PLANE_T * push.plane_floats + at] = left;
-            if (WITH_DEPTH) planes[PLANE_DEPTH * push.plane_floats + at] = depth[p];
-            if (WITH_COUNT) planes[PLANE_COUNT * push.plane_floats + at] = count[p];
+            planes[PLANE_R * push.image.plane_floats + at] = color[p].r + left * background.r;
+            planes[PLANE_G * push.image.plane_floats + at] = color[p].g + left * background.g;
+            planes[PLANE_B * push.image.plane_floats + at] = color[p].b + left * background.b;
+            planes[PLANE_T * push.image.plane_floats + at] = left;
+            if (WITH_DEPTH) planes[PLANE_DEPTH * push.image.plane_floats + at] = depth[p];
+            if (WITH_COUNT) planes[PLANE_COUNT * push.image.plane_floats + at] = count[p];
         }
     }
 }

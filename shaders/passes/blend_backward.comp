@@ -61,15 +61,15 @@ void main() {
     vec3 gradient[PIXELS];
     [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
         const uint y = py + p * ROW_STEP;
-        const bool inside = px < push.size[0] && y < push.size[1];
-        const uint at = min(y, push.size[1] - 1u) * push.stride + min(px, push.size[0] - 1u);
+        const bool inside = px < push.image.size[0] && y < push.image.size[1];
+        const uint at = min(y, push.image.size[1] - 1u) * push.image.stride + min(px, push.image.size[0] - 1u);
         T[p] = inside ? 1.0 : -1.0;
-        gradient[p] = vec3(image_gradient[PLANE_R * push.plane_floats + at],
-                           image_gradient[PLANE_G * push.plane_floats + at],
-                           image_gradient[PLANE_B * push.plane_floats + at]);
-        rest[p] = dot(gradient[p], vec3(planes[PLANE_R * push.plane_floats + at],
-                                        planes[PLANE_G * push.plane_floats + at],
-                                        planes[PLANE_B * push.plane_floats + at]));
+        gradient[p] = vec3(image_gradient[PLANE_R * push.image.plane_floats + at],
+                           image_gradient[PLANE_G * push.image.plane_floats + at],
+                           image_gradient[PLANE_B * push.image.plane_floats + at]);
+        rest[p] = dot(gradient[p], vec3(planes[PLANE_R * push.image.plane_floats + at],
+                                        planes[PLANE_G * push.image.plane_floats + at],
+                                        planes[PLANE_B * push.image.plane_floats + at]));
     }
     const uint end = tile_starts[tile + 1u];
     uint k = tile_starts[tile];

@@ -20,9 +20,9 @@ layout(push_constant, scalar) uniform Push { LossPush push; };
 
 void main() {
     const uint item = item_index();
-    const uint row_texels = push.stride / 4u, plane = push.plane_floats / 4u, channel = gl_WorkGroupID.z;
+    const uint row_texels = push.image.stride / 4u, plane = push.image.plane_floats / 4u, channel = gl_WorkGroupID.z;
     const uint row_items = (row_texels + LOSS_TEXELS - 1u) / LOSS_TEXELS;
-    const bool inside = item < row_items * push.size[1];
+    const bool inside = item < row_items * push.image.size[1];
     const int row = int(item / row_items) * int(row_texels), first = int(item % row_items * LOSS_TEXELS);
     vec4 m[DERIVATIVE_PLANES][LOSS_TEXELS];
     [[unroll]] for (uint q = 0; q < DERIVATIVE_PLANES; ++q) {

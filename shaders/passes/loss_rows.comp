@@ -18,9 +18,9 @@ layout(push_constant, scalar) uniform Push { LossPush push; };
 
 void main() {
     const uint item = item_index();
-    const uint row_texels = push.stride / 4u, plane = push.plane_floats / 4u, channel = gl_WorkGroupID.z;
+    const uint row_texels = push.image.stride / 4u, plane = push.image.plane_floats / 4u, channel = gl_WorkGroupID.z;
     const uint row_items = (row_texels + LOSS_TEXELS - 1u) / LOSS_TEXELS;
-    const bool inside = item < row_items * push.size[1];
+    const bool inside = item < row_items * push.image.size[1];
     const int row = int(item / row_items) * int(row_texels), first = int(item % row_items * LOSS_TEXELS);
     vec4 m[MOMENT_PLANES][LOSS_TEXELS];
     [[unroll]] for (uint q = 0; q < MOMENT_PLANES; ++q) {
@@ -41,7 +41,7 @@ void main() {
         const vec4 inverse = 1.0 / (b1 * b2);
         // Columns past the image's width are in the last texel and do not count.
         const uint x = 4u * uint(first + o);
-        const vec4 mask = inside ? vec4(lessThan(uvec4(x, x + 1u, x + 2u, x + 3u), uvec4(push.size[0]))) : vec4(0.0);
+        const vec4 mask = inside ? vec4(lessThan(uvec4(x, x + 1u, x + 2u, x + 3u), uvec4(push.image.size[0]))) : vec4(0.0);
         const vec4 s = mask * a1 * a2 * inverse;
         if (inside && first + o < int(row_texels)) {
             const uint at = DERIVATIVE_PLANES * channel * plane + uint(row + first + o);

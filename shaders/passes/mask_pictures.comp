@@ -5,19 +5,20 @@
 // into the target planes, and a copy of the render that is moved towards the target where the weight is below 1.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
+#include "lib/image.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(set = 0, binding = 0) uniform samplerBuffer photo;
 layout(set = 0, binding = 1, scalar) readonly buffer Image { float image[]; };
 layout(set = 0, binding = 2, scalar) writeonly buffer Target { float target[]; };
 layout(set = 0, binding = 3, scalar) writeonly buffer Masked { float masked[]; };
-layout(push_constant, scalar) uniform Push { MaskPush push; };
+layout(push_constant, scalar) uniform Push { ImageLayout push; };
 
 void main() {
     const uint i = item_index();
     if (i >= push.size[0] * push.size[1]) return;
     const vec4 texel = texelFetch(photo, int(i));
-    const uint at = (i / push.size[0]) * push.stride + i % push.size[0];
+    const uint at = pixel_offset(push, i);
     for (uint c = 0; c < 3; ++c) {
         const uint k = c * push.plane_floats + at;
         target[k] = texel[c];

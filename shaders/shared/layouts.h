@@ -45,7 +45,12 @@ EWA_UINT(SLOT_FLOATS, 12u);
 EWA_UINT(SLOT_TEXELS, 3u);
 
 // ---- Image planes ----
-// Plane p of pixel (x, y) is float p * plane_floats + y * stride + x. stride is a multiple of 4.
+// Plane p of pixel (x, y) is float p * plane_floats + y * stride + x.
+struct ImageLayout {
+    uint size[2];  // px
+    uint stride;   // floats a row, a multiple of 4
+    uint plane_floats;
+};
 EWA_UINT(PLANE_R, 0u);
 EWA_UINT(PLANE_G, 1u);
 EWA_UINT(PLANE_B, 2u);
@@ -178,9 +183,7 @@ struct TileStartsPush {
 
 struct BlendPush {
     float background[3];
-    uint size[2];  // px
-    uint stride;   // floats a row
-    uint plane_floats;
+    ImageLayout image;
     uint tiles[2];
     uint tile_step[2];  // tile = workgroup.x * step.x + workgroup.y * step.y
     uint capacity;      // of instances
@@ -188,25 +191,15 @@ struct BlendPush {
 
 struct UnpackPush {
     float background[3];
-    uint size[2];
-    uint stride;
-    uint plane_floats;
+    ImageLayout image;
 };
 
 struct PackPush {
     uint plane_floats;
 };
 
-struct MaskPush {
-    uint size[2];
-    uint stride;
-    uint plane_floats;
-};
-
 struct ExposurePush {
-    uint size[2];
-    uint stride;
-    uint plane_floats;
+    ImageLayout image;
     uint photo;  // index of the training image
 };
 
@@ -220,9 +213,7 @@ struct ExposureUpdatePush {
 };
 
 struct LossPush {
-    uint size[2];
-    uint stride;
-    uint plane_floats;
+    ImageLayout image;
     float ssim_scale;  // d(loss)/d(SSIM of one pixel and channel)
     float l1_scale;    // d(loss)/d|x - y| of one pixel and channel
 };
