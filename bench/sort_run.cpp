@@ -7,11 +7,11 @@
 namespace ewa::bench {
 
 SortRun::SortRun(std::shared_ptr<gpu::Device> device, uint32_t items)
-    : device_(std::move(device)), kernels_(*device_), executor_(*device_), items_(items), input_(items) {
+    : device_(std::move(device)), cache_(*device_), executor_(*device_), items_(items), input_(items) {
     pipeline::FrameRequest request;
     request.splats = items;
     request.width = request.height = 8;
-    const pipeline::Sizes sizes = pipeline::sizes_for(kernels_.shape(), request);
+    const pipeline::Sizes sizes = pipeline::sizes_for(cache_.config(), request);
     cut_ = sizes.depth_sort;
     for (uint32_t i = 0; i < items; ++i) input_[i] = core::pcg4d({i, 0x736f7274u, 0, 0})[0];
     source_ = gpu::Buffer(*device_, "input", sizes.splat_words);
@@ -27,16 +27,17 @@ SortRun::SortRun(std::shared_ptr<gpu::Device> device, uint32_t items)
 void SortRun::run() {
     gpu::Recording recording(device_->limits());
     recording.copy(source_, 0, keys_[0], 0, uint64_t(items_) * 4);
-    result_ = record_sort(recording, kernels_,
-                          {{&keys_[0], &keys_[1]},
-                           {&values_[0], &values_[1]},
-                           {},
-                           true,
-                           counters_,
-                           counter_prefix_,
-                           digit_totals_,
-                           counts_},
-                          cut_, items_, items_, true, "sort");
+    result_ =
+        record_sort(recording, cache_,
+                    {.keys = {&keys_[0], &keys_[1]},
+                     .values = {&values_[0], &values_[1]},
+                     .indices = {},
+                     .own_indices = true,
+                     .counters = counters_,
+                     .counter_prefix = counter_prefix_,
+                     .digit_totals = digit_totals_,
+                     .counts = counts_},
+                    {.cut = cut_, .items = items_, .capacity = items_, .keep_keys = true, .name = "sort"});
     executor_.run(recording, true);
 }
 

@@ -23,7 +23,7 @@ class SortRun {
 
   private:
     std::shared_ptr<gpu::Device> device_;
-    pipeline::Kernels kernels_;
+    passes::PassCache cache_;
     gpu::Executor executor_;
     pipeline::RadixCut cut_;
     uint32_t items_;

@@ -106,6 +106,9 @@ MemoryForecast forecast_memory(const gpu::Device& device, const Dataset& dataset
                                const std::vector<int>& train_frames, const Gaussians& start,
                                const TrainOptions& options);
 
+/// What a Trainer of these options skips. masks: some training images have pixels that do not count.
+std::vector<PlanLine> plan_lines(const Gaussians& start, const TrainOptions& options, bool masks = false);
+
 struct StepReport {
     int step = 0;        // steps done
     double seconds = 0;  // of training alone
@@ -151,6 +154,7 @@ class Trainer {
     int steps_done() const;
     std::vector<Exposure> exposures() const;   // of the training frames, where they are learned; else none
     size_t photographs_on_disk() const;        // that the cache has no room for
+    std::vector<PlanLine> plan() const;        // what the run skips
     std::vector<PassTime> pass_times() const;  // medians over the last steps, in recording order
 
   private:

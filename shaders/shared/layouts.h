@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Every block that host and shaders share, under the scalar block layout, and every mode and target that both
-// name. src/passes/layout_checks.cpp asserts the sizes of the blocks.
+// name. src/passes/pass.cpp asserts the sizes of the blocks.
 #ifndef EWA_SHARED_LAYOUTS_H
 #define EWA_SHARED_LAYOUTS_H
 #include "glue.h"

@@ -60,9 +60,9 @@ RenderOptions DrawArguments::options() const {
     RenderOptions render;
     if (!random_background()) render.background = parse_background(background);
     if (antialias && kernel == "ewa") throw InputError("--antialias and --kernel ewa exclude each other");
-    render.kernel = antialias || kernel == "antialias" ? Kernel::antialias
-                    : kernel == "ewa"                  ? Kernel::unit_mass
-                                                       : Kernel::peak;
+    render.kernel = antialias || kernel == "antialias" ? Footprint::antialias
+                    : kernel == "ewa"                  ? Footprint::unit_mass
+                                                       : Footprint::peak;
     render.sh_degree = sh_degree;
     return render;
 }

@@ -19,16 +19,16 @@ struct DetGradient {
     double det0 = 0, trace = 0;
 };
 
-DetGradient kernel_backward(Kernel kernel, const ProjectionSteps& s, double det, double by_factor) {
+DetGradient kernel_backward(Footprint kernel, const ProjectionSteps& s, double det, double by_factor) {
     switch (kernel) {
-        case Kernel::peak:
+        case Footprint::peak:
             return {};
-        case Kernel::antialias: {
+        case Footprint::antialias: {
             // sqrt(det0 / det); det0 > 0, or the factor were zero and the splat not visible.
             const double by_det = -0.5 * s.kernel_factor / det;
             return {by_factor * (0.5 / std::sqrt(s.det0 * det) + by_det), by_factor * by_det * LOW_PASS};
         }
-        case Kernel::unit_mass: {
+        case Footprint::unit_mass: {
             const double by_det = -0.5 * s.kernel_factor / det;
             return {by_factor * by_det, by_factor * by_det * LOW_PASS};
         }

@@ -78,13 +78,13 @@ void project_shape(const Splat& splat, const Camera& camera, ProjectionSteps& s)
     s.m = {(s.screen.x * s.rotation) * s.scale, (s.screen.y * s.rotation) * s.scale};
 }
 
-double kernel_factor(Kernel kernel, double det0, double det) {
+double kernel_factor(Footprint kernel, double det0, double det) {
     switch (kernel) {
-        case Kernel::peak:
+        case Footprint::peak:
             return 1;
-        case Kernel::antialias:
+        case Footprint::antialias:
             return std::sqrt(std::max(0.0, det0 / det));
-        case Kernel::unit_mass:
+        case Footprint::unit_mass:
             return 1 / (2 * std::numbers::pi * std::sqrt(det));
     }
     return 0;

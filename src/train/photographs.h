@@ -6,7 +6,7 @@
 
 #include "ewa/dataset.h"
 #include "gpu/buffer.h"
-#include "passes/shape.h"
+#include "passes/kernel_config.h"
 #include "pipeline/forward.h"
 
 namespace ewa::train {
@@ -18,7 +18,7 @@ class Photographs {
   public:
     /// Loads and uploads the pictures that are held, their sides divided by `reduction`. origin: of the model
     /// that the cameras look at. Throws InputError that names the frame.
-    Photographs(gpu::Device& device, const passes::Shape& shape, const Dataset& dataset,
+    Photographs(gpu::Device& device, const passes::KernelConfig& config, const Dataset& dataset,
                 const std::vector<int>& frames, uint64_t cache_bytes, const glm::dvec3& origin,
                 int reduction = 1);
 

@@ -121,7 +121,7 @@ void App::take_live() {
     const int degree = sh_degree_present(*scene_.gaussians);
     if (settings_.look.sh_degree == scene_sh_degree_) settings_.look.sh_degree = degree;
     scene_sh_degree_ = degree;
-    plan_ = plan_lines(*scene_.gaussians, {}, Purpose::picture);
+    plan_ = plan_lines(*scene_.gaussians, RenderOptions{});
     // With the first splats it is known what there is to turn about; a camera that the user has chosen stays.
     if (!viewed_ && (!scene_.dataset || stands_at_ == start_frame_))
         view_.restart(start_view(scene_, start_frame_, window_.framebuffer()));
@@ -132,7 +132,7 @@ void App::adopt(Scene scene, std::optional<int> frame) {
     scene_ = std::move(scene);
     scene_number_ = thread_.set_scene(scene_.gaussians);
     scene_sh_degree_ = sh_degree_present(*scene_.gaussians);
-    plan_ = plan_lines(*scene_.gaussians, {}, Purpose::picture);
+    plan_ = plan_lines(*scene_.gaussians, RenderOptions{});
     settings_.look.kernel = scene_.look.kernel;
     settings_.look.background = scene_.look.background;
     settings_.look.sh_degree = scene_sh_degree_;

@@ -9,6 +9,7 @@
 
 #include "gpu/guarded.h"
 #include "gpu/twin_inputs.h"
+#include "passes/project.h"
 #include "pipeline/backward.h"
 #include "reference/adam.h"
 #include "reference/densify.h"
@@ -28,7 +29,7 @@ struct Slots {
 
     explicit Slots(const Scene& s) : scene(s) {
         const Image target = random_target(31, s.camera.width, s.camera.height);
-        twin = reference::loss_gradient(s.gaussians, s.camera, target, s.options, twin_tiles(rig().shape()));
+        twin = reference::loss_gradient(s.gaussians, s.camera, target, s.options, twin_tiles(rig().config()));
         const auto& sorted = twin.picture.instances.sorted;
         const size_t splats = s.gaussians.size();
         tile_counts.resize(splats);
@@ -56,7 +57,7 @@ struct Bench {
     Guarded records, slots, tile_counts, first, places, counts, statistics;
 
     explicit Bench(const Slots& s)
-        : camera(camera_buffer(s.scene.camera, rig().shape())),
+        : camera(camera_buffer(s.scene.camera, rig().config())),
           records("records", pack_records(s.twin.picture.projected), gpu::Texel::rgba32f),
           slots("slots", s.slots, gpu::Texel::rgba32f),
           tile_counts("tile counts", s.tile_counts),
@@ -71,10 +72,25 @@ struct Bench {
         Rig& r = rig();
         const int degree = evaluated_degree < 0 ? scene.gaussians.sh_degree : evaluated_degree;
         r.run([&](gpu::Recording& recording) {
-            r.kernels.get<passes::Update>(uint32_t(degree), uint32_t(scene.options.kernel), mode)
-                .record(recording, r.shape(),
-                        {model.params, camera, 0, records, slots, moments1, moments2, tile_counts, first,
-                         places, counts, model.params, moments1, moments2, statistics},
+            r.cache
+                .get<passes::Update>({{shared::SPEC_SH_DEGREE, uint32_t(degree)},
+                                      {shared::SPEC_KERNEL, uint32_t(scene.options.kernel)},
+                                      {shared::SPEC_MODE, mode}})
+                .record(recording,
+                        {.params = model.params,
+                         .camera = camera,
+                         .records = records,
+                         .slots = slots,
+                         .moments1 = moments1,
+                         .moments2 = moments2,
+                         .tile_counts = tile_counts,
+                         .first_instances = first,
+                         .counts = counts,
+                         .params_out = model.params,
+                         .moments1_out = moments1,
+                         .moments2_out = moments2,
+                         .statistics = statistics,
+                         .sorted_indices = places},
                         push);
         });
         expect_intact({&records, &slots, &tile_counts, &first, &places, &counts, &statistics});
@@ -117,7 +133,7 @@ struct Case {
     SplatKind kind;
     size_t splats;
     int sh_degree;
-    Kernel kernel;
+    Footprint kernel;
 };
 
 class UpdatePass : public testing::TestWithParam<Case> {};
@@ -145,13 +161,13 @@ TEST_P(UpdatePass, GradientIsTheTwins) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, UpdatePass,
-                         testing::Values(Case{SplatKind::ordinary, 200, 0, Kernel::peak},
-                                         Case{SplatKind::ordinary, 201, 3, Kernel::antialias},
-                                         Case{SplatKind::ordinary, 202, 2, Kernel::unit_mass},
-                                         Case{SplatKind::mixed, 300, 1, Kernel::peak},
-                                         Case{SplatKind::mixed, 301, 3, Kernel::antialias},
-                                         Case{SplatKind::needles, 150, 2, Kernel::peak},
-                                         Case{SplatKind::ordinary, 1, 3, Kernel::peak}),
+                         testing::Values(Case{SplatKind::ordinary, 200, 0, Footprint::peak},
+                                         Case{SplatKind::ordinary, 201, 3, Footprint::antialias},
+                                         Case{SplatKind::ordinary, 202, 2, Footprint::unit_mass},
+                                         Case{SplatKind::mixed, 300, 1, Footprint::peak},
+                                         Case{SplatKind::mixed, 301, 3, Footprint::antialias},
+                                         Case{SplatKind::needles, 150, 2, Footprint::peak},
+                                         Case{SplatKind::ordinary, 1, 3, Footprint::peak}),
                          [](const testing::TestParamInfo<Case>& tested) {
                              const Case& c = tested.param;
                              return std::string(name_of(c.kind)) + "_" + std::to_string(c.splats) + "_sh" +
