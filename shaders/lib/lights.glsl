@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Next-event sampling: punctual lights (KHR_lights_punctual) and emissive triangles. One light is drawn by its share of
-// the power (alias method, Vose 1991). The sky is not sampled: it is smooth, so sampling the surface's reflection finds
-// it well.
+// Next-event sampling: punctual lights (KHR_lights_punctual) and emissive triangles. One light is drawn by its
+// share of the power (alias method, Vose 1991). The sky is not sampled: it is smooth, so sampling the surface's
+// reflection finds it well.
 #ifndef EWA_LIB_LIGHTS
 #define EWA_LIB_LIGHTS
 layout(set = 0, binding = 6) uniform usamplerBuffer lights;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sums over a subgroup by shuffles with constant distances. They cost next to nothing where subgroup arithmetic is
-// slow.
+// Sums over a subgroup by shuffles with constant distances. They cost next to nothing where
+// subgroup arithmetic is slow.
 #ifndef EWA_LIB_SUBGROUP
 #define EWA_LIB_SUBGROUP
 #extension GL_KHR_shader_subgroup_basic : require

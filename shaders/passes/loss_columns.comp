@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // First half of the SSIM window: blurs four moments of the render x and the target y down the columns (Wang et al.
 // 2004). x^2 and y^2 are needed as a sum only.
-// One invocation owns LOSS_ROWS rows of one texel of channel workgroup.z. It reads render and target, and writes the
-// moments.
+// One invocation owns LOSS_ROWS rows of one texel of channel workgroup.z. It reads render and target,
+// and writes the moments.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/ssim.glsl"

@@ -1,10 +1,10 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
 // Writes the next generation of splats into new buffers.
-// One invocation owns new splat j. It reads the parameters and moments of splat j or of its source, and writes splat j.
-// A dead splat, and one beyond the old number, becomes a copy of its source. A source and its copies share what the
-// source was (lib/mcmc.glsl) and start with zero moments. With a spread, each is placed by a normal draw of the
-// source's Gaussian.
+// One invocation owns new splat j. It reads the parameters and moments of splat j or of its source, and writes
+// splat j. A dead splat, and one beyond the old number, becomes a copy of its source. A source and its copies share
+// what the source was (lib/mcmc.glsl) and start with zero moments. With a spread, each is placed by a normal draw
+// of the source's Gaussian.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/params.glsl"

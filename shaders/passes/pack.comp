@@ -1,8 +1,8 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Packs the colour planes into 8-bit RGBA, one word a pixel in rows of `stride`, rounded and clamped as save_image
-// does. One invocation owns one texel of each plane, which is 4 pixels of a row. It reads the planes and writes the
-// packed words.
+// Packs the colour planes into 8-bit RGBA, one word a pixel in rows of `stride`, rounded and clamped as
+// save_image does. One invocation owns one texel of each plane, which is 4 pixels of a row. It reads the planes
+// and writes the packed words.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 

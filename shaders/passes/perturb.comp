@@ -1,8 +1,8 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Adds noise of a splat's own shape to its mean; transparent splats move more (Kheradmand et al. 2024, eq. 8): mean +=
-// amplitude sigmoid(-MCMC_GATE_SLOPE (opacity - MCMC_GATE_OPACITY)) Sigma n, at most `max_length` along each axis of
-// the splat.
+// Adds noise of a splat's own shape to its mean; transparent splats move more (Kheradmand et al. 2024, eq. 8): mean
+// += amplitude sigmoid(-MCMC_GATE_SLOPE (opacity - MCMC_GATE_OPACITY)) Sigma n, at most `max_length` along each
+// axis of the splat.
 // One invocation owns splat i. It updates the splat's mean in place and counts shortened steps.
 // A frame whose instances did not fit changes nothing: the host repeats it.
 #extension GL_GOOGLE_include_directive : require

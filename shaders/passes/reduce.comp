@@ -1,8 +1,8 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
 // Adds floats in a fixed order.
-// One workgroup is one subgroup and owns one block of the source. It writes the sum to sums[block] or to Counts:
-// REDUCE_TO_*.
+// One workgroup is one subgroup and owns one block of the source. It writes the sum to sums[block]
+// or to Counts: REDUCE_TO_*.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"

@@ -1,9 +1,9 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
 // Exclusive prefix sums within blocks.
-// One workgroup is one subgroup and owns one block of `block` entries. It reads them, and writes for each entry the sum
-// of the entries before it in the block, and the block's total. SPEC_MODE: SCAN_GATHERED takes source[order[e]] as
-// entry e.
+// One workgroup is one subgroup and owns one block of `block` entries. It reads them, and writes for each entry
+// the sum of the entries before it in the block, and the block's total. SPEC_MODE: SCAN_GATHERED takes
+// source[order[e]] as entry e.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"

@@ -284,9 +284,9 @@ struct PerturbPush {
 
 // ---- A mesh scene for ray tracing: buffers of rgba32ui texels that hold floats by their bits ----
 // Positions are relative to an origin, which the host subtracts in float64.
-// Node: for each of two children low x y z, reference; high x y z, 0. A reference is the index of a node, or
-// of a leaf: LEAF_FLAG, triangles - 1 at LEAF_COUNT_SHIFT, and the first triangle. A missing child has low
-// above high.
+// Node: for each of two children low x y z, reference; high x y z, 0. A reference is the index of a
+// node, or of a leaf: LEAF_FLAG, triangles - 1 at LEAF_COUNT_SHIFT, and the first triangle. A missing
+// child has low above high.
 EWA_UINT(NODE_TEXELS, 4u);
 EWA_UINT(LEAF_FLAG, 0x80000000u);
 EWA_UINT(LEAF_COUNT_SHIFT, 28u);

@@ -19,8 +19,8 @@ struct Blend : TilePass {
     };
 };
 
-/// Gradient of blending, written to the slot of every (splat, tile) instance. Variant: SPEC_MODE (0 or
-/// BLEND_BACKWARD_ABSOLUTE).
+/// Gradient of blending, written to the slot of every (splat, tile) instance. Variant:
+/// SPEC_MODE (0 or BLEND_BACKWARD_ABSOLUTE).
 struct BlendBackward : TilePass {
     static constexpr char shader[] = "blend_backward";
     struct Buffers {

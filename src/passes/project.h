@@ -16,8 +16,8 @@ struct Project : ElementPass {
     static Groups groups(const KernelConfig& c, const Push& push) { return element_groups(c, push.splats); }
 };
 
-/// Gradient of the projection, fused with Adam. Variant: SPEC_SH_DEGREE, SPEC_KERNEL, SPEC_MODE (UPDATE_*
-/// bits).
+/// Gradient of the projection, fused with Adam. Variant: SPEC_SH_DEGREE,
+/// SPEC_KERNEL, SPEC_MODE (UPDATE_* bits).
 struct Update : ElementPass {
     static constexpr char shader[] = "update";
     struct Buffers {

@@ -113,8 +113,8 @@ void record_backward(gpu::Recording& recording, passes::PassCache& cache, const 
                  .slots = frame.slots},
                 blend_push(cache.config(), frame, inputs.background));
 
-    // A gradient alone has no second moments or statistics. It does not use those bindings, but they need a
-    // buffer.
+    // A gradient alone has no second moments or statistics. It does not use those bindings, but
+    // they need a buffer.
     const gpu::Buffer& moments2 = plan.adam ? model.moments2 : model.moments1;
     const gpu::Buffer& statistics = plan.statistics ? model.statistics : frame.partials;
     const CameraUse& camera = inputs.camera;

@@ -22,8 +22,8 @@ void record_loss(gpu::Recording& recording, passes::PassCache& cache, const Fram
                  const FrameInputs& inputs, const gpu::Buffer& photo, bool masked = false,
                  const ExposureUse* exposure = nullptr);
 
-/// Gradients of blending and projection. With plan.adam it moves the model; without, it writes the gradient
-/// to model.moments1.
+/// Gradients of blending and projection. With plan.adam it moves the model; without, it writes
+/// the gradient to model.moments1.
 void record_backward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
                      const Model& model, const FrameBuffers& frame, const FrameInputs& inputs,
                      const Sorted& sorted, const Rates& rates);

@@ -25,8 +25,8 @@ shared::DensifyPush push_of(const Model& model, const FrameBuffers& frame, const
             .revised_opacity = rules.revised_opacity ? 1u : 0u};
 }
 
-/// Number of splats in the next generation at a threshold. Leaves their offsets in frame.prefix and
-/// frame.scan_totals.
+/// Number of splats in the next generation at a threshold. Leaves their offsets
+/// in frame.prefix and frame.scan_totals.
 uint32_t count_outputs(passes::PassCache& cache, gpu::Executor& executor, const Model& model,
                        const FrameBuffers& frame, const DensifyRules& rules, float threshold) {
     gpu::Recording recording(cache.device().limits());
@@ -47,8 +47,8 @@ uint32_t count_outputs(passes::PassCache& cache, gpu::Executor& executor, const 
     return frame.read_counts().scan_total;
 }
 
-/// The lowest threshold, at least that of the rules, whose generation fits under the cap; infinity if none
-/// does.
+/// The lowest threshold, at least that of the rules, whose generation fits under the cap;
+/// infinity if none does.
 float fitting_threshold(passes::PassCache& cache, gpu::Executor& executor, const Model& model,
                         const FrameBuffers& frame, const DensifyRules& rules) {
     const float never = std::numeric_limits<float>::infinity();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A splat scene on the device: parameters, and in training Adam's moments. A training step changes nothing
-// else.
+// A splat scene on the device: parameters, and in training Adam's moments. A training
+// step changes nothing else.
 #pragma once
 #include <cstdint>
 
@@ -22,8 +22,8 @@ constexpr uint64_t parameter_bytes(uint32_t capacity, int sh_degree) {
     return blocks * shared::PARAM_BLOCK * parameter_planes(sh_degree) * 16;
 }
 
-/// Index of flat float f of splat i in such a buffer, in floats. planes: texel planes a splat
-/// (shared/layouts.h).
+/// Index of flat float f of splat i in such a buffer, in floats. planes: texel
+/// planes a splat (shared/layouts.h).
 constexpr size_t parameter_index(uint32_t planes, uint32_t f, size_t i) {
     const size_t block = i / shared::PARAM_BLOCK, within = i % shared::PARAM_BLOCK;
     return ((block * planes + f / 4) * shared::PARAM_BLOCK + within) * 4 + f % 4;

@@ -30,8 +30,8 @@ uint64_t counter_words(const RadixCut& cut) {
 void check_image(const passes::KernelConfig& config, const FrameRequest& request, const Sizes& sizes) {
     const std::string size = std::to_string(request.width) + "x" + std::to_string(request.height);
     if (request.width == 0 || request.height == 0) throw InputError("an image of " + size + " pixels");
-    // The loops that limit the size: over a splat's tile rows, and in training over its instances, 8 at a
-    // time.
+    // The loops that limit the size: over a splat's tile rows, and in training over its instances,
+    // 8 at a time.
     const uint64_t most_tiles = uint64_t(8) * config.loop_limit;
     if (sizes.tiles_x + sizes.tiles_y + 2 > config.loop_limit || sizes.tiles > most_tiles)
         throw InputError("an image of " + size + " pixels has more than the " + std::to_string(most_tiles) +

@@ -45,8 +45,8 @@ struct Sizes {
     shared::ImageLayout image() const { return {{width, height}, stride, plane_floats}; }
 };
 
-/// Throws InputError that names the limit if the image is empty, or larger than tile indices and loop limits
-/// allow.
+/// Throws InputError that names the limit if the image is empty, or larger than tile indices
+/// and loop limits allow.
 Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request);
 
 }  // namespace ewa::pipeline

@@ -131,8 +131,8 @@ struct Trainer::State {
     }
 
     Noise noise(int step) const {
-        // Sigma is a square of lengths. Divided by the extent it is a length again, as in a scene of unit
-        // extent.
+        // Sigma is a square of lengths. Divided by the extent it is a length again, as in a
+        // scene of unit extent.
         const double amplitude = options.noise_rate * schedule.mean_rate(step, 1) / extent;
         return {.amplitude = float(amplitude),
                 .max_length = float(extent),
@@ -140,8 +140,8 @@ struct Trainer::State {
                 .step = uint32_t(step)};
     }
 
-    /// The training images at this step's resolution. Frees those of lower resolutions: resolutions only
-    /// rise.
+    /// The training images at this step's resolution. Frees those of lower
+    /// resolutions: resolutions only rise.
     train::Photographs& photographs_at(int step) {
         const size_t halvings = size_t(schedule.halvings_at(step));
         while (smaller.size() > halvings) smaller.pop_back();
