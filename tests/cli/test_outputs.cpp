@@ -2,6 +2,8 @@
 // What the commands write, and what happens where they cannot.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "cli/expect.h"
 #include "ewa/image.h"
 #include "ewa/splat_files.h"
