@@ -194,9 +194,9 @@ TEST(DensifyEdges, WritesNothingPastItsRoom) {
     r.run([&](gpu::Recording& recording) {
         r.cache.get<passes::DensifyDecide>().record(
             recording, {start.model.params, start.model.statistics, frame.tile_counts}, push(0));
-        record_scan(recording, r.cache,
-                    {frame.tile_counts, nullptr, frame.prefix, frame.scan_totals, frame.counts},
-                    {500, frame.sizes.scan_block, shared::TOTAL_SCAN, "offsets"});
+        pipeline::record_scan(recording, r.cache,
+                              {frame.tile_counts, nullptr, frame.prefix, frame.scan_totals, frame.counts},
+                              {500, frame.sizes.scan_block, shared::TOTAL_SCAN, "offsets"});
         r.cache.get<passes::DensifyWrite>({{shared::SPEC_SH_DEGREE, 1}})
             .record(recording,
                     {start.model.params, start.model.moments1, start.model.moments2, start.model.statistics,

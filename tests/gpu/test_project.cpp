@@ -123,7 +123,7 @@ std::string case_name(const testing::TestParamInfo<Case>& info) {
 TEST(ProjectInspection, ScalesAreShiftedAndTheDrawnCounted) {
     Scene scene = random_scene(910, 500, SplatKind::mixed, 61, 47, 1);
     const Output shifted = run_project(scene, true, std::log(0.5f)), plain = run_project(scene, false, 3);
-    EXPECT_EQ(plain.totals.drawn, 0u);
+    EXPECT_EQ(plain.totals.visible, 0u);
     EXPECT_EQ(plain.records, run_project(scene).records) << "without inspection the shift means nothing";
     for (float& scale : scene.gaussians.log_scales) scale += std::log(0.5f);
     const Output smaller = run_project(scene, true);
@@ -132,7 +132,7 @@ TEST(ProjectInspection, ScalesAreShiftedAndTheDrawnCounted) {
     size_t drawn = 0;
     for (const uint32_t count : shifted.counts) drawn += count > 0;
     EXPECT_GT(drawn, 50u);
-    EXPECT_EQ(shifted.totals.drawn, drawn);
+    EXPECT_EQ(shifted.totals.visible, drawn);
 }
 
 INSTANTIATE_TEST_SUITE_P(

@@ -365,6 +365,7 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     pipeline::PlanRequest request{.purpose = pipeline::Purpose::training,
                                   .scene_degree = 2,
                                   .present_degree = 2,
+                                  .render = {},
                                   .drawing = Drawing::depth,
                                   .statistics = true};
     gpu::Recording step = r.recording();

@@ -16,7 +16,6 @@ namespace ewa::test {
 namespace {
 
 using pipeline::RadixCut;
-using pipeline::Total;
 
 class Scan : public testing::TestWithParam<std::pair<uint32_t, uint32_t>> {};
 
@@ -33,9 +32,9 @@ TEST_P(Scan, IsTheExclusivePrefixSum) {
         Guarded values("source", source), ranks("order", order), prefix("prefix", source.size() * 4),
             totals("totals", (blocks + 1) * 4), counts = zero_counts();
         r.run([&](gpu::Recording& recording) {
-            record_scan(recording, r.cache,
-                        {values, gathered ? &ranks.buffer() : nullptr, prefix, totals, counts},
-                        {items, block, gathered ? shared::TOTAL_INSTANCES : shared::TOTAL_SCAN, "scan"});
+            pipeline::record_scan(
+                recording, r.cache, {values, gathered ? &ranks.buffer() : nullptr, prefix, totals, counts},
+                {items, block, gathered ? shared::TOTAL_INSTANCES : shared::TOTAL_SCAN, "scan"});
         });
         const auto within = prefix.read<uint32_t>(), before = totals.read<uint32_t>();
         uint32_t sum = 0;
@@ -82,7 +81,7 @@ Sorted run_sort(const std::vector<uint32_t>& input, const RadixCut& cut, bool ow
     Guarded counts("counts", std::vector<shared::Counts>{start});
     uint32_t result = 0;
     r.run([&](gpu::Recording& recording) {
-        result = record_sort(
+        result = pipeline::record_sort(
             recording, r.cache,
             {{&keys0.buffer(), &keys1.buffer()},
              {&values0.buffer(), &values1.buffer()},
