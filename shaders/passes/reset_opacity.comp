@@ -8,8 +8,8 @@
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(set = 0, binding = 0, scalar) buffer Params { vec4 params[]; };
-layout(set = 0, binding = 1, scalar) buffer Moments1 { vec4 moments1[]; };
-layout(set = 0, binding = 2, scalar) buffer Moments2 { vec4 moments2[]; };
+layout(set = 0, binding = 1, scalar) writeonly buffer Moments1 { vec4 moments1[]; };
+layout(set = 0, binding = 2, scalar) writeonly buffer Moments2 { vec4 moments2[]; };
 layout(push_constant, scalar) uniform Push { ResetPush push; };
 
 void main() {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <map>
 #include <optional>
+#include <set>
 #include <stdexcept>
 
 #include "gpu/guarded.h"
@@ -31,8 +32,9 @@ std::map<uint32_t, Accesses> instruction_accesses(std::span<const uint32_t> spir
     constexpr uint32_t kDecorate = 71, kDecorationBinding = 33;
     constexpr uint32_t kLoad = 61, kStore = 62, kAccessChain = 65, kInBoundsAccessChain = 66;
     constexpr uint32_t kFirstAtomic = 227, kLastAtomic = 242, kAtomicLoad = 227, kAtomicStore = 228;
-    constexpr uint32_t kFunctionCall = 57, kCopyMemory = 63;
+    constexpr uint32_t kFunctionCall = 57, kVariable = 59, kUniformConstant = 0, kCopyMemory = 63;
     std::map<uint32_t, uint32_t> base;  // pointer or variable -> binding
+    std::set<uint32_t> texel_buffers;   // variables
     std::map<uint32_t, Accesses> result;
     const auto touch = [&](uint32_t pointer, bool read, bool write) {
         if (const auto found = base.find(pointer); found != base.end()) {
@@ -44,15 +46,16 @@ std::map<uint32_t, Accesses> instruction_accesses(std::span<const uint32_t> spir
         const uint32_t op = spirv[at] & 0xffff;
         const auto words = spirv.subspan(at, spirv[at] >> 16);
         if (op == kDecorate && words[2] == kDecorationBinding) base[words[1]] = words[3];
+        if (op == kVariable && words[3] == kUniformConstant) texel_buffers.insert(words[2]);
         if (op == kAccessChain || op == kInBoundsAccessChain)
             if (const auto found = base.find(words[3]); found != base.end()) base[words[2]] = found->second;
         if (op == kLoad) touch(words[3], true, false);
         if (op == kStore) touch(words[1], false, true);
         if (op >= kFirstAtomic && op <= kLastAtomic)
             touch(words[op == kAtomicStore ? 1 : 3], op != kAtomicStore, op != kAtomicLoad);
-        // Not expected of glslang; here they count as both.
+        // Functions take texel buffers by pointer, to read them. Nothing else is expected here.
         if (op == kFunctionCall || op == kCopyMemory)
-            for (const uint32_t word : words.subspan(1)) touch(word, true, true);
+            for (const uint32_t word : words.subspan(1)) touch(word, true, !texel_buffers.count(word));
     }
     return result;
 }
