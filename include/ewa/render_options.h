@@ -1,17 +1,32 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a picture depends on besides the splats and the camera.
+// What an image depends on besides the splats and the camera.
 #pragma once
 #include <array>
 
 namespace ewa {
 
-/// How opacity depends on the footprint; values are KERNEL_* of shaders/shared/constants.h.
-enum class Kernel { peak = 0, antialias = 1, unit_mass = 2 };
+/// How a splat's opacity depends on its footprint. Values are KERNEL_* of shaders/shared/constants.h.
+enum class Footprint { peak = 0, antialias = 1, unit_mass = 2 };
 
 struct RenderOptions {
     std::array<float, 3> background{0, 0, 0};
-    Kernel kernel = Kernel::peak;
-    int sh_degree = 3;  // degrees above this, or above what the scene has, are left out
+    Footprint kernel = Footprint::peak;
+    int sh_degree = 3;  // degrees above this, or above the scene's, are skipped
+};
+
+enum class Drawing {
+    color,
+    depth,      // Rendering::depth also
+    count,      // Rendering::count also
+    ellipsoids  // each splat as a solid of ELLIPSOID_REACH standard deviations: the nearest one's shaded
+                // colour
+};
+
+/// What may differ from one image of a scene to the next.
+struct DrawOptions {
+    RenderOptions render;
+    Drawing drawing = Drawing::color;
+    double splat_scale = 1;  // factor of every splat's scales, above 0
 };
 
 }  // namespace ewa

@@ -10,6 +10,7 @@
 #include "ewa/device.h"
 #include "ewa/gaussians.h"
 #include "ewa/image.h"
+#include "ewa/plan.h"
 #include "ewa/render_options.h"
 
 namespace ewa {
@@ -20,28 +21,6 @@ struct Rendering {
     Image depth;  // one channel, sum of view z * alpha_i * T_i, divided by alpha where alpha > 0; empty
                   // unless asked for
     Image count;  // one channel, splats blended; empty unless asked for
-};
-
-enum class Drawing {
-    color,
-    depth,      // Rendering::depth also
-    count,      // Rendering::count also
-    ellipsoids  // each splat as a solid of ELLIPSOID_REACH standard deviations: the nearest one's colour,
-                // shaded
-};
-
-/// What may differ from one picture of a scene to the next.
-struct DrawOptions {
-    RenderOptions render;
-    Drawing drawing = Drawing::color;
-    double splat_scale = 1;  // factor of every splat's scales, above 0
-};
-
-/// What the plan left out, for `ewa info` and `--verbose`: one line each, with the bytes it saves.
-struct PlanLine {
-    std::string what;
-    std::string why;
-    uint64_t bytes_saved = 0;
 };
 
 struct PassTime {
@@ -95,13 +74,7 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
                            const Camera& camera, const Image& target, const RenderOptions& options,
                            bool alpha_is_weight = false);
 
-/// What is left out for this scene and request. masks: training photographs have pixels that do not count.
-enum class Purpose {
-    picture,
-    training,
-    densifying
-};  // densifying: training with a strategy that gathers statistics (ADC)
-std::vector<PlanLine> plan_lines(const Gaussians& gaussians, const RenderOptions& options, Purpose purpose,
-                                 bool masks = false, bool exposure = false);
+/// What a Renderer of this scene skips, in colour images with these options.
+std::vector<PlanLine> plan_lines(const Gaussians& gaussians, const RenderOptions& options);
 
 }  // namespace ewa

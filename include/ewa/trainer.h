@@ -33,6 +33,9 @@ MemoryEstimate estimate_memory(const gpu::Device& device, const Dataset& dataset
                                const std::vector<int>& train_frames, const Gaussians& start,
                                const TrainOptions& options);
 
+/// What a Trainer of these options skips. masks: some training images have pixels that do not count.
+std::vector<PlanLine> plan_lines(const Gaussians& start, const TrainOptions& options, bool masks = false);
+
 struct StepReport {
     int step = 0;        // steps done
     double seconds = 0;  // wall time in Trainer::step so far
@@ -84,6 +87,7 @@ class Trainer {
     int steps_done() const;
     std::vector<Exposure> exposures() const;   // one for each training frame; empty if not learned
     size_t images_on_disk() const;             // training images that are not cached
+    std::vector<PlanLine> plan() const;        // what the run skips
     std::vector<PassTime> pass_times() const;  // medians over the last steps, in recording order
 
   private:

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The camera's uniform block, and points seen from it. The including pass defines BINDING_CAMERA.
+// The camera's uniform block, and points in camera coordinates. The including pass defines BINDING_CAMERA.
 #ifndef EWA_LIB_CAMERA
 #define EWA_LIB_CAMERA
 #include "lib/double_float.glsl"
 
 layout(set = 0, binding = BINDING_CAMERA, scalar) uniform CameraUniform { CameraBlock camera; };
 
-// Rows of the world to camera rotation as a matrix that multiplies column vectors.
+// The world-to-camera rotation as a matrix that multiplies column vectors.
 mat3 camera_rotation() {
     return mat3(camera.rotation_hi[0], camera.rotation_hi[3], camera.rotation_hi[6], camera.rotation_hi[1],
                 camera.rotation_hi[4], camera.rotation_hi[7], camera.rotation_hi[2], camera.rotation_hi[5],
@@ -18,7 +18,7 @@ struct View {
     vec2 x, y, z;    // camera coordinates as float pairs
 };
 
-// The camera's position leaves first, in two floats, so that a scene far from the origin loses nothing to float32.
+// Subtracts the camera's position first, in two floats: a scene far from the origin then loses no precision to float32.
 View view_point(vec3 mean) {
     vec2 d[3];
     [[unroll]] for (int j = 0; j < 3; ++j) {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// What adaptive density control does with one splat (3DGS, section 5.2 and densify_and_prune of its code): a splat
-// whose mean gradient is above the threshold is cloned where it is small and split where it is large; one that has
-// become transparent, or too large once that is asked for, goes. A split's children are judged by their own size.
+// What adaptive density control does with one splat (3DGS, section 5.2 and densify_and_prune of its code). A splat
+// whose mean gradient reaches the threshold is cloned if it is small and split if it is large. A splat that has
+// become transparent is pruned, and one that is too large once prune_scale is set. The children of a split are judged
+// by their own size.
 #ifndef EWA_LIB_DENSIFY
 #define EWA_LIB_DENSIFY
 const uint ACTION_PRUNE = 0u, ACTION_KEEP = 1u, ACTION_CLONE = 2u, ACTION_SPLIT = 3u;
@@ -21,8 +22,9 @@ uint action_of(DensifyPush push, vec4 mean_logit, vec4 quaternion, vec4 scale_re
     return grow ? ACTION_CLONE : ACTION_KEEP;
 }
 
-// The logit of the opacity that two splats in one place need to let through what one does: 1 - t, with t^2 = 1 - opacity.
-// (1 - t) / t = (1 - t^2) / (t (1 + t)), in logarithms and with opacity = exp(logit) t^2: nothing cancels, nothing overflows.
+// Logit of 1 - t with t^2 = 1 - opacity: two splats of that opacity in one place transmit as much as one of
+// `logit`. (1 - t) / t = (1 - t^2) / (t (1 + t)), evaluated in logarithms with opacity = exp(logit) t^2. No
+// term cancels or overflows.
 float halved_logit(float logit) {
     const float log_t = -0.5 * (max(logit, 0.0) + log(1.0 + exp(-abs(logit))));
     return logit + log_t - log(1.0 + exp(log_t));

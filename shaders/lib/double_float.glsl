@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sums and products of float pairs (hi, lo), about 48 bits: Dekker 1971, Knuth TAOCP 4.2.2. `precise` keeps the
-// compiler from contracting or reordering the error terms away. Nothing here relies on a fused multiply-add.
+// compiler from contracting or reordering the error terms. No operation relies on a fused multiply-add.
 #ifndef EWA_LIB_DOUBLE_FLOAT
 #define EWA_LIB_DOUBLE_FLOAT
 
@@ -26,7 +26,7 @@ vec2 two_product(float a, float b) {
     precise float bh = cb - (cb - b);
     precise float bl = b - bh;
     precise float e = ((ah * bh - p) + ah * bl + al * bh) + al * bl;
-    // The split overflows near FLT_MAX; the plain product is then the best there is.
+    // The split overflows near FLT_MAX. The plain product is the best result there.
     return vec2(p, abs(e) <= abs(p) ? e : 0.0);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A photograph's exposure: an affine map of colours, three rows of (matrix row, offset), 12 floats.
+// A training image's exposure: an affine map of colours, three rows of (matrix row, offset), 12 floats.
 #ifndef EWA_LIB_EXPOSURE
 #define EWA_LIB_EXPOSURE
 vec3 exposed_color(vec4 rows[3], vec3 color) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which tiles a splat's ellipse {alpha >= ALPHA_MIN} reaches, tile row by tile row, in closed form.
-// The answer errs to the large side only, so leaving out the other tiles never changes the picture.
+// The result may include too many tiles but never too few, so culling never changes the image.
 #ifndef EWA_LIB_FOOTPRINT
 #define EWA_LIB_FOOTPRINT
 
@@ -14,10 +14,10 @@ struct Footprint {
     uint row_begin, row_end;
 };
 
-// Slack for the rounding of what follows, in units of u and v; 3.3 is the largest reach an ordinary splat has.
+// Slack for rounding, in units of u and v. An ordinary splat has a reach of at most 3.3.
 const float REACH_SLACK = 1e-3;
 
-// First and one-past-last tile that holds a pixel centre in mean + [left, right] (px), of `size` pixels. The slack covers the
+// First and one-past-last tile with a pixel centre in mean + [left, right] (px), of `size` pixels. The slack covers the
 // rounding of the terms, which may be far larger than their sum.
 uvec2 tiles_between(float mean, float left, float right, uint tile, uint size) {
     const float slack = 1e-3 + 4e-7 * (abs(mean) + abs(left) + abs(right));
@@ -28,7 +28,7 @@ uvec2 tiles_between(float mean, float left, float right, uint tile, uint size) {
     return begin <= end ? uvec2(uint(begin) / tile, uint(end) / tile + 1u) : uvec2(0u);
 }
 
-// Empty (row_begin == row_end) where the opacity is under ALPHA_MIN, or anything is NaN.
+// Empty (row_begin == row_end) where the opacity is below ALPHA_MIN or a value is NaN.
 Footprint footprint_of(vec4 record0, vec4 record1, uvec2 size) {
     Footprint f;
     f.mean = record0.xy;
@@ -53,8 +53,8 @@ float border(Footprint f, float dy) {
     return f.k * dy + (sqrt(max(0.0, f.reach * f.reach - v * v)) + REACH_SLACK) / f.ux;
 }
 
-// Tile columns reached in a tile row: the border is concave in dy, so its maximum over the row's pixel centres stands
-// at its peak or, where that lies outside, at the nearer end. The left border is the right one turned by 180 degrees.
+// Tile columns reached in a tile row. The border is concave in dy, so its maximum over the row's pixel centres is at its
+// peak, or at the nearer end if the peak is outside the row. The left border is the right one turned by 180 degrees.
 uvec2 columns_of(Footprint f, uint row, uvec2 size) {
     const float half_height = f.reach / f.vy;
     const float low = clamp(float(row * TILE_HEIGHT) + 0.5 - f.mean.y, -half_height, half_height);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The way back from what the tiles added up to a splat's M and scales. Needs projection.glsl.
+// Gradient from the sums of a splat's tiles to its M and scales. Needs projection.glsl.
 #ifndef EWA_LIB_FOOTPRINT_GRADIENT
 #define EWA_LIB_FOOTPRINT_GRADIENT
 
-// What the tiles added to a splat, see SLOT_FLOATS.
+// Sums over the slots of a splat; see SLOT_FLOATS.
 struct Sums {
     float g;
     vec2 gw;       // sum g u, sum g v
@@ -14,13 +14,13 @@ struct Sums {
 
 struct FootprintGradient {
     vec2 mean;         // dL/d(mean in px)
-    vec2 absolute;     // of each pixel, summed
+    vec2 absolute;     // sum over pixels of |dL/d(mean in px)|
     vec3 dm0, dm1;     // dL/d(rows of M)
     vec3 log_scale;    // dL/d(logarithms of the scales)
     vec3 torque;       // dL/d(rotation about the splat's own axes, radians)
 };
 
-// exp(x) - exp(-x), to the last digits near zero also: the splat that is nearly round.
+// exp(x) - exp(-x), accurate near zero too (a splat that is nearly round).
 vec3 twice_sinh(vec3 x) {
     const vec3 q = x * x, e = exp(clamp(x, -80.0, 80.0));
     const vec3 series = 2.0 * x * (1.0 + q / 6.0 * (1.0 + q / 20.0 * (1.0 + q / 42.0)));
@@ -28,11 +28,11 @@ vec3 twice_sinh(vec3 x) {
 }
 
 // From the whitened sums to the 2D Gaussian and its M. With power = -(u^2 + v^2) and (u, v) = L d, L = [ux, -k ux; 0, vy]:
-// d(power)/d(mean) = 2 L^T (u, v), d(power)/dM = 4 L^T (u, v)(u, v)^T L M. L M is taken first: of a long needle, L^T L and M
-// by themselves have terms that are thousands of times their product.
+// d(power)/d(mean) = 2 L^T (u, v), d(power)/dM = 4 L^T (u, v)(u, v)^T L M. L M is computed first: for a long needle, L^T L
+// and M have terms that are thousands of times their product.
 //
-// P = M^T dL/dM is symmetric, being that product's square. Its diagonal is the gradient by the logarithms of the scales; an
-// entry beside it, times s_i / s_j - s_j / s_i, the torque about the third axis.
+// P = M^T dL/dM is symmetric, as the square of that product. Its diagonal is the gradient by the logarithms of the scales.
+// An off-diagonal entry times s_i / s_j - s_j / s_i is the torque about the third axis.
 FootprintGradient footprint_gradient(Sums s, Projection p, vec3 log_scale) {
     const float skew = -p.k * p.ux;
     FootprintGradient f;
@@ -41,7 +41,7 @@ FootprintGradient footprint_gradient(Sums s, Projection p, vec3 log_scale) {
 
     const vec3 m0 = p.unit * p.m0, m1 = p.unit * p.m1, n = p.minors;
     const float low_pass = p.unit * p.unit * float(LOW_PASS), ux = p.ux / p.unit, vy = p.vy / p.unit;
-    // c m0 - b m1 = LOW_PASS m0 + m1 x (m0 x m1), in which nothing cancels.
+    // c m0 - b m1 = LOW_PASS m0 + m1 x (m0 x m1), where no term cancels.
     const vec3 lu = (ux / p.c) * (low_pass * m0 + cross(m1, n)), lv = vy * m1;
     const vec3 hu = s.gww.x * lu + s.gww.y * lv, hv = s.gww.y * lu + s.gww.z * lv;
     f.dm0 = 4.0 * p.ux * hu;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Light that arrives without being met by chance: punctual lights (KHR_lights_punctual) and emitting triangles, one drawn by
-// its share of the power (alias method, Vose 1991). The sky is smooth, so that sampling the surface's own reflection finds
-// it well enough.
+// Next-event sampling: punctual lights (KHR_lights_punctual) and emissive triangles. One light is drawn by its
+// share of the power (alias method, Vose 1991). The sky is not sampled: it is smooth, so sampling the surface's
+// reflection finds it well.
 #ifndef EWA_LIB_LIGHTS
 #define EWA_LIB_LIGHTS
 layout(set = 0, binding = 6) uniform usamplerBuffer lights;
@@ -9,8 +9,8 @@ layout(set = 0, binding = 6) uniform usamplerBuffer lights;
 struct Incoming {
     vec3 direction;    // to the light
     float distance;
-    vec3 radiance;     // of a triangle: divided by the density; else irradiance at right angles, divided by the probability
-    float density;     // a steradian; 0: the light has no extent
+    vec3 radiance;     // triangle: divided by the density; else normal irradiance, divided by the probability
+    float density;     // per steradian; 0: the light has no extent
 };
 
 Incoming light_at(vec3 point, uint count, float choice, vec2 u) {
@@ -30,7 +30,7 @@ Incoming light_at(vec3 point, uint count, float choice, vec2 u) {
         const float distance = length(to), range = uintBitsToFloat(c.w);
         if (!(distance > 0.0)) return none;
         const vec3 direction = to / distance;
-        // The specification's windows: to the range, and of the cone.
+        // The specification's window functions of range and cone.
         const float ratio = range > 0.0 ? distance / range : 0.0, ratio2 = ratio * ratio;
         float window = clamp(1.0 - ratio2 * ratio2, 0.0, 1.0);
         if (a.w == LIGHT_SPOT) {

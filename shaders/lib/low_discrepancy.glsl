@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pairs of Sobol's first two dimensions, shuffled and Owen-scrambled by hashing (Burley 2020, "Practical Hash-based Owen
-// Scrambling"): every aligned block of 2^m samples is a (0, m, 2)-net, and different seeds are independent. The same in
-// src/core/random.h.
+// Pairs of Sobol's first two dimensions, shuffled and Owen-scrambled by hashing (Burley 2020, "Practical Hash-based
+// Owen Scrambling"). Every aligned block of 2^m samples is a (0, m, 2)-net, and different seeds are independent.
+// src/core/random.h computes the same numbers.
 #ifndef EWA_LIB_LOW_DISCREPANCY
 #define EWA_LIB_LOW_DISCREPANCY
 #include "lib/random.glsl"
@@ -24,7 +24,7 @@ uint pascal_shift(uint i) {
     return i ^ ((i & 0xaaaaaaaau) >> 1u);
 }
 
-// In (0, 1), both ends out. seed: three independent words.
+// In the open interval (0, 1). seed: three independent words.
 vec2 sobol_pair(uint index, uvec3 seed) {
     const uint i = bitfieldReverse(laine_karras(bitfieldReverse(index), seed.x));
     const uvec2 bits = bitfieldReverse(uvec2(laine_karras(i, seed.y), laine_karras(pascal_shift(i), seed.z)));

@@ -3,13 +3,13 @@
 #ifndef EWA_LIB_MCMC
 #define EWA_LIB_MCMC
 
-// Opacity and factor of the scales of each of `parts` splats that stand where one of this logit stood and together
-// look like it (eq. 9). The sum of that equation,
+// relocated: opacity and scale factor of each of `parts` splats that replace one splat of this logit in its place and
+// together look like it (eq. 9). The sum of that equation,
 //   sum_{i=1..N} sum_{k=0..i-1} C(i-1, k) (-1)^k x^(k+1) / sqrt(k + 1)  with x the new opacity,
-// cancels beyond float32 for large N. With 1 / sqrt(k) = 2 / sqrt(pi) integral exp(-k t^2) dt it is
+// loses all digits of float32 to cancellation for large N. With 1 / sqrt(k) = 2 / sqrt(pi) integral exp(-k t^2) dt it is
 //   2 / sqrt(pi) integral_0^inf 1 - (1 - x exp(-t^2))^N dt,
-// where nothing cancels and the trapezoidal rule converges exponentially. ln(1 + x) and exp(x) - 1 are needed near zero,
-// where a share of thousands lies, and where drivers' log and exp have few digits left.
+// where no term cancels and the trapezoidal rule converges exponentially.
+// With thousands of parts, ln(1 + x) and exp(x) - 1 are needed near zero, where drivers' log and exp have few digits left.
 float log_1p(float x) {   // x > -1
     const float s = x / (2.0 + x), q = s * s;
     const float series = 2.0 * s * (1.0 + q * (1.0 / 3.0 + q * (0.2 + q * (1.0 / 7.0 + q * (1.0 / 9.0 + q / 11.0)))));

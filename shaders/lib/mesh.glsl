@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The buffers of a mesh scene (shared/layouts.h has their texels) and what is read from them. The including pass binds
-// them at 0 to 5.
+// The buffers of a mesh scene, and functions that read them. shared/layouts.h describes their texels. The including
+// pass binds them at 0 to 5.
 #ifndef EWA_LIB_MESH
 #define EWA_LIB_MESH
 
@@ -13,7 +13,7 @@ layout(set = 0, binding = 4) uniform usamplerBuffer textures;
 layout(set = 0, binding = 5) uniform samplerBuffer texels;
 
 struct Surface {
-    vec3 normal;     // shading normal, world axes, on the front side; zero where the file gives none
+    vec3 normal;     // shading normal, world axes, on the front side; zero if the file has none
     vec2 uv;
     vec4 color;      // linear
 };
@@ -37,7 +37,7 @@ Surface surface_at(uint triangle, vec2 barycentric) {
     const uvec4 a = texelFetch(surfaces, at), b = texelFetch(surfaces, at + 1), c = texelFetch(surfaces, at + 2);
     const vec3 w = vec3(1.0 - barycentric.x - barycentric.y, barycentric);
     Surface s;
-    // A normal that is none is packed as the word of no direction.
+    // This word marks a missing normal; no direction packs to it.
     s.normal = a.x == 0x80008000u ? vec3(0.0)
                                   : w.x * normalize(unpack_normal(a.x)) + w.y * normalize(unpack_normal(a.y)) +
                                         w.z * normalize(unpack_normal(a.z));
@@ -58,11 +58,11 @@ vec3 linear_of_srgb(vec3 v) {
     return mix(v / 12.92, pow((v + 0.055) / 1.055, vec3(2.4)), greaterThan(v, vec3(0.04045)));
 }
 
-// Bilinear, of values that the curve has made linear first. Of the finest level only: samples are many.
+// Bilinear, of linearised values. It uses the finest level only: paths take many samples.
 vec4 sample_texture(uint index, vec2 uv, bool srgb) {
     const uvec4 t = texelFetch(textures, int(index));
     const ivec2 size = ivec2(t.yz);
-    // uv beyond this is noise at any size; NaN becomes 0.
+    // uv beyond this range is noise at any size. NaN becomes 0.
     const vec2 p = clamp(uv, vec2(-1048576.0), vec2(1048576.0)) * vec2(size) -
                    ((t.w & TEXTURE_NEAREST) != 0u ? vec2(0.0) : vec2(0.5));
     const vec2 corner = clamp(floor(p), vec2(-2e9), vec2(2e9));
@@ -110,7 +110,7 @@ Material material_at(uint index, Surface s) {
     return m;
 }
 
-// Opacity alone, for rays that may pass.
+// Opacity only, for rays that may pass through the surface.
 float opacity_at(uint triangle, uint material, vec2 barycentric, out uint flags, out float cutoff) {
     const Surface s = surface_at(triangle, barycentric);
     const int at = int(material * MATERIAL_TEXELS);

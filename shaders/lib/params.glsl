@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a splat's parameters stand (shared/layouts.h).
+// Index of a splat's parameters (shared/layouts.h).
 #ifndef EWA_LIB_PARAMS
 #define EWA_LIB_PARAMS
-// Texel of plane `plane` of splat i, where `planes` are stored a splat.
+// Texel of plane `plane` of splat i, with `planes` planes stored a splat.
 uint param_texel(uint planes, uint plane, uint i) {
     return (i / PARAM_BLOCK * planes + plane) * PARAM_BLOCK + i % PARAM_BLOCK;
 }

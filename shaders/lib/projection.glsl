@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // From a splat's parameters to its 2D Gaussian: Sigma2 = J W Sigma W^T J^T + LOW_PASS I (EWA; Zwicker et al. 2001,
-// eq. 22 to 31), with M = J W R S, so that Sigma2 = M M^T + LOW_PASS I. Shared by the forward and the backward pass.
-// Needs camera.glsl and quaternion.glsl.
+// eq. 22 to 31). With M = J W R S, Sigma2 = M M^T + LOW_PASS I. The forward and the backward pass share this code.
 #ifndef EWA_LIB_PROJECTION
 #define EWA_LIB_PROJECTION
 #include "lib/camera.glsl"
@@ -26,9 +25,9 @@ struct Projection {
     bvec2 tangent_clamped;
     vec2 focal_over_z;
     vec3 m0, m1;           // rows of M (px)
-    bool in_range;         // the quaternion and the mean can be computed with,
-    bool footprint_in_range; // and the footprint of a splat before the camera
-    float unit;            // 1, or less where the footprint's squares would overflow: px to the units of the next line
+    bool in_range;         // quaternion and mean are within bounds
+    bool footprint_in_range; // the footprint is within bounds; holds for splats in front of the camera only
+    float unit;            // px to the units of a, b, c and det: 1, or less if squares would overflow
     float a, b, c, det;    // Sigma2 = [a b; b c]
     vec3 minors;           // m0 x m1
     float det0;            // det(M M^T), without the low-pass
@@ -39,7 +38,7 @@ struct Projection {
 
 float sigmoid(float x) { return 1.0 / (1.0 + exp(-x)); }
 
-// A scale under exp(LOG_SCALE_MIN) shows no more than that one, and the ratio of two of them can be computed with.
+// A scale below exp(LOG_SCALE_MIN) looks the same as exp(LOG_SCALE_MIN), and ratios of such scales stay finite.
 vec3 computable_log_scale(vec3 log_scale) { return max(log_scale, vec3(float(LOG_SCALE_MIN))); }
 
 Projection project_splat(SplatShape splat) {
@@ -65,11 +64,11 @@ Projection project_splat(SplatShape splat) {
 
     const vec3 far = abs(p.view.offset), wide = abs(p.m0) + abs(p.m1);
     const float footprint = wide.x + wide.y + wide.z;
-    // Phrased so that NaN fails it.
+    // A NaN fails these comparisons.
     p.in_range = far.x <= float(VIEW_MAX) && far.y <= float(VIEW_MAX) && far.z <= float(VIEW_MAX) &&
                  p.quaternion_norm >= float(QUATERNION_MIN);
     p.footprint_in_range = footprint <= float(FOOTPRINT_MAX);
-    // A power of two, so that it rounds nothing.
+    // A power of two, so that the product is exact.
     p.unit = footprint > 1073741824.0 ? 9.094947017729282e-13 : 1.0;
     const vec3 m0 = p.unit * p.m0, m1 = p.unit * p.m1;
     const float aa = dot(m0, m0), cc = dot(m1, m1);
@@ -77,8 +76,8 @@ Projection project_splat(SplatShape splat) {
     p.a = aa + low_pass;
     p.b = dot(m0, m1);
     p.c = cc + low_pass;
-    // det(M M^T) is the sum of the squared 2x2 minors of M (Cauchy-Binet). A minor is in turn a product: two scales and how
-    // far the third axis points at the camera. Nothing cancels, however thin the splat and however wide the view.
+    // det(M M^T) is the sum of the squared 2x2 minors of M (Cauchy-Binet). A minor is a product of two scales and of how
+    // far the third axis points at the camera. No term cancels, however thin the splat and however wide the view.
     const vec3 x_scale = p.unit * p.focal_over_z.x * scale, y_scale = p.unit * p.focal_over_z.y * scale;
     p.minors = (vec3(p.tangent, 1.0) * directions) * x_scale.yzx * y_scale.zxy;
     p.det0 = dot(p.minors, p.minors);

@@ -3,7 +3,7 @@
 #ifndef EWA_LIB_QUATERNION
 #define EWA_LIB_QUATERNION
 
-// The largest component is divided out first, so that norms from 1e-38 to 1e38 neither overflow nor vanish.
+// Divides by the largest component first, so that norms from 1e-38 to 1e38 neither overflow nor underflow.
 vec4 normalize_quaternion(vec4 q, out float norm) {
     const float largest = max(max(abs(q.x), abs(q.y)), max(abs(q.z), abs(q.w)));
     const vec4 scaled = q / largest;
@@ -19,8 +19,8 @@ mat3 rotation_of(vec4 q) {
                 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y));
 }
 
-// dL/dq of the unit quaternion, from dL/d(rotation about its own axes): a turn by the small angles w is q (1, w / 2), so the
-// gradient is 2 q (0, torque), at right angles to q.
+// dL/dq of the unit quaternion, from dL/d(rotation about its own axes). A rotation by small angles w is q (1, w / 2), so
+// the gradient is 2 q (0, torque), at right angles to q.
 vec4 torque_on_quaternion(vec4 q, vec3 torque) {
     return 2.0 * vec4(-dot(q.yzw, torque), q.x * torque + cross(q.yzw, torque));
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Counter-based random numbers: a pure function of its counter, the same in src/core/random.h.
-// pcg4d of Jarzynski and Olano 2020, "Hash Functions for GPU Rendering".
+// Counter-based random numbers: a pure function of the counter. src/core/random.h computes the same numbers.
+// pcg4d is from Jarzynski and Olano 2020, "Hash Functions for GPU Rendering".
 #ifndef EWA_LIB_RANDOM
 #define EWA_LIB_RANDOM
 uvec4 pcg4d(uvec4 v) {
@@ -17,7 +17,7 @@ uvec4 pcg4d(uvec4 v) {
     return v;
 }
 
-// In (0, 1), both ends out.
+// In the open interval (0, 1).
 vec4 uniform4(uvec4 counter) { return (vec4(pcg4d(counter) >> 8u) + 0.5) / 16777216.0; }
 
 // Three independent standard normal numbers (Box and Muller 1958).

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a glTF material scatters light: a Lambert layer under a GGX one, as the specification's appendix B has it, with
-// KHR_materials_specular's F0 and F90. Directions point away from the surface, in a frame whose z is the normal.
+// Reflection of a glTF material: a Lambert layer under a GGX layer, as in appendix B of the specification, with F0 and
+// F90 of KHR_materials_specular. Directions point away from the surface, in a frame whose z is the normal.
 #ifndef EWA_LIB_REFLECTION
 #define EWA_LIB_REFLECTION
 
 const float PI = 3.14159265358979;
-const float LAMBERT_BLUR = 0.35;  // least GGX width of a mirror that is met after a Lambert reflection
+const float LAMBERT_BLUR = 0.35;  // least GGX width after a Lambert reflection
 
 struct Reflector {
     vec3 diffuse;    // albedo of the Lambert layer without Fresnel's share
     vec3 f0, f90;
     float width;     // GGX alpha
-    float mirror_share;  // probability to sample the GGX layer
+    float mirror_share;  // probability of sampling the GGX layer
     float dielectric_f0, dielectric_f90, metallic;
 };
 
@@ -42,7 +42,7 @@ float ggx_lambda(float width, vec3 v) {
     return 0.5 * (sqrt(1.0 + width * width * dot(v.xy, v.xy) / (v.z * v.z)) - 1.0);
 }
 
-// The reflected radiance for one unit of radiance a steradian times the cosine, and the density of sample_reflection.
+// BRDF times the cosine, and the density with which sample_reflection chooses in_dir.
 vec3 evaluate_reflection(Reflector r, vec3 out_dir, vec3 in_dir, out float density) {
     density = 0.0;
     if (!(in_dir.z > 0.0) || !(out_dir.z > 0.0)) return vec3(0.0);
@@ -61,8 +61,8 @@ vec3 evaluate_reflection(Reflector r, vec3 out_dir, vec3 in_dir, out float densi
     return (diffuse + mirror) * in_dir.z;
 }
 
-// A direction of about that distribution: a cosine for the Lambert layer, visible normals for GGX (Heitz 2018). May lie
-// under the surface, where nothing is reflected to.
+// Samples a direction: cosine-weighted for the Lambert layer, visible normals for GGX (Heitz 2018). The direction may
+// point below the surface, where the BRDF is zero.
 vec3 sample_reflection(Reflector r, vec3 out_dir, float choice, vec2 u) {
     const float turn = 2.0 * PI;
     if (choice >= r.mirror_share) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How the lanes of the radix sort share the items: contiguous chunks of whole texels (4 items).
+// How the lanes of the radix sort divide the items: contiguous chunks of whole texels (4 items).
 #ifndef EWA_LIB_SORTING
 #define EWA_LIB_SORTING
 layout(constant_id = SPEC_RADIX_BITS) const uint RADIX_BITS = 8;

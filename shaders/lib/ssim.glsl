@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The SSIM window and its blur. Images are planes of floats fetched 4 at a time;
-// what lies outside the image is zero.
+// The SSIM window and its blur. Images are planes of floats fetched 4 at a time; outside the image every value is zero.
 #ifndef EWA_LIB_SSIM
 #define EWA_LIB_SSIM
 const int RADIUS = int(SSIM_RADIUS);
@@ -11,11 +10,11 @@ const float W_SUM = 1.0 + 2.0 * (W1 + W2 + W3 + W4 + W5);
 // Weight of the tap at distance d.
 const float WINDOW[6] = {1.0 / W_SUM, W1 / W_SUM, W2 / W_SUM, W3 / W_SUM, W4 / W_SUM, W5 / W_SUM};
 
-// Rows that a column of LOSS_ROWS outputs looks at, and texels that LOSS_TEXELS outputs of a row look at.
+// Rows that LOSS_ROWS outputs of a column read, and texels that LOSS_TEXELS outputs of a row read.
 const int COLUMN_SPAN = int(LOSS_ROWS) + 2 * RADIUS;
 const int ROW_SPAN = int(LOSS_TEXELS) + 4;
 
-// Output o of a column whose first value stands RADIUS rows above the first output.
+// Output o of a column. values[0] is RADIUS rows above output 0.
 vec4 blur_column(vec4 values[COLUMN_SPAN], int o) {
     vec4 sum = WINDOW[0] * values[o + RADIUS];
     [[unroll]] for (int d = 1; d <= RADIUS; ++d)
@@ -23,7 +22,7 @@ vec4 blur_column(vec4 values[COLUMN_SPAN], int o) {
     return sum;
 }
 
-// Output texel o of a row whose first texel stands two left of the first output.
+// Output texel o of a row. texels[0] is two texels left of output 0.
 vec4 blur_row(vec4 texels[ROW_SPAN], int o) {
     vec4 result;
     [[unroll]] for (int i = 0; i < 4; ++i) {
@@ -36,7 +35,7 @@ vec4 blur_row(vec4 texels[ROW_SPAN], int o) {
     return result;
 }
 
-// What a fetch outside the image would bring is zero.
+// The texel, or zero outside the image.
 vec4 fetch_or_zero(samplerBuffer source, bool inside, int at) {
     const vec4 value = texelFetch(source, inside ? at : 0);
     return inside ? value : vec4(0.0);

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// How far one step of the optimiser may go (docs/numerics.md, "Steps").
+// Longest step of the optimiser (docs/numerics.md, "Steps").
 #ifndef EWA_LIB_STEP_LIMITS
 #define EWA_LIB_STEP_LIMITS
 
-// Steps that would take a splat out of every view, or its shape out of float32's range, end short of that: a mean's at
-// STEP_DEPTH_SHARE of its depth, a quaternion's at STEP_NORM_SHARE of its norm, a scale's at the borders of what scales may
-// be. depth: of a splat that is drawn, else without bound. Returns whether it did.
-// The length of a step whose largest component is `longest`; squares of what is beyond 1e19 would overflow.
+// Length of a step whose largest component is `longest`. Squares of components above 1e19 would overflow.
 float step_length(vec4 step, float longest) { return longest * length(step / longest); }
 
+// Shortens a step that would move a splat out of every view, or its shape out of float32's range. Limits: STEP_DEPTH_SHARE
+// of the depth for a mean, STEP_NORM_SHARE of the norm for a quaternion, LOG_SCALE_MIN and LOG_SCALE_MAX for a scale.
+// depth: of a visible splat; unbounded otherwise. Returns whether the step was shortened.
 bool limit_step(uint plane, vec4 value, float depth, inout vec4 moved) {
     const vec4 step = moved - value;
     if (plane == 0u) {
@@ -27,7 +27,7 @@ bool limit_step(uint plane, vec4 value, float depth, inout vec4 moved) {
         return true;
     }
     if (plane == 2u) {
-        // A scale that is outside already may come back, and goes no further.
+        // A scale that is already outside may come back, but moves no further out.
         const vec3 low = min(vec3(LOG_SCALE_MIN), value.xyz), high = max(vec3(LOG_SCALE_MAX), value.xyz);
         const bool outside = any(lessThan(moved.xyz, low)) || any(greaterThan(moved.xyz, high));
         if (outside) moved.xyz = clamp(moved.xyz, low, high);

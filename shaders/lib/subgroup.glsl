@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sums over a subgroup by shuffles with constant distances, which cost next to nothing where subgroup arithmetic does not.
+// Sums over a subgroup by shuffles with constant distances. They cost next to nothing where
+// subgroup arithmetic is slow.
 #ifndef EWA_LIB_SUBGROUP
 #define EWA_LIB_SUBGROUP
 #extension GL_KHR_shader_subgroup_basic : require
@@ -7,8 +8,8 @@
 #extension GL_KHR_shader_subgroup_shuffle : require
 layout(constant_id = SPEC_SUBGROUP) const uint SUBGROUP = 8;
 
-// Steps of doubling distance up to 64 lanes. Counted up by one and cut by a constant condition: a loop that doubles its
-// counter stays a loop in some compilers, and its turns count towards a driver's limit.
+// Steps of doubling distance, up to 64 lanes. The loops below count up by one and stop by a constant condition: some
+// compilers do not unroll a loop that doubles its counter, and its iterations count towards a driver's limit.
 const uint DOUBLINGS = 6u;
 
 float subgroup_sum(float x) {
@@ -18,7 +19,7 @@ float subgroup_sum(float x) {
     return x;
 }
 
-// Sum over the lanes up to and including this one.
+// Sum over lanes 0 to this one, inclusive.
 uint subgroup_inclusive_sum(uint x) {
     const uint lane = gl_SubgroupInvocationID;
     [[unroll]] for (uint s = 0u; s < DOUBLINGS; ++s) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The nearest triangle on a ray, or whether there is one: two-child nodes, nearer child first, the farther one on a stack
-// that no hierarchy outgrows (mesh/hierarchy.h). The float64 twin is src/reference/tracing.cpp.
+// The nearest triangle on a ray, or whether there is one. Nodes have two children; the nearer is
+// visited first, the farther one goes on a stack that is deep enough for every hierarchy
+// (mesh/hierarchy.h). CPU reference: src/reference/tracing.cpp.
 #ifndef EWA_LIB_TRAVERSAL
 #define EWA_LIB_TRAVERSAL
 #include "lib/mesh.glsl"
@@ -10,10 +11,10 @@ const uint NO_TRIANGLE = 0xffffffffu;
 
 struct Ray {
     vec3 origin, direction;
-    float reach;       // in lengths of the direction
-    bool from_camera;  // does not see the back of one-sided surfaces
+    float reach;       // greatest distance, in lengths of the direction
+    bool from_camera;  // passes through the back of one-sided surfaces
     bool any_will_do;
-    float blend_threshold;  // < 0: blended surfaces stop it by chance, else where their opacity reaches this
+    float blend_threshold;  // < 0: blended surfaces stop the ray by chance; else if their opacity reaches this
     uint chance;            // seed of that chance
 };
 
@@ -22,10 +23,10 @@ struct Hit {
     float distance;    // in lengths of the direction
     vec2 barycentric;  // weights of corners 1 and 2
     uint material;
-    bool unfinished;   // the limit on steps ended the search
+    bool unfinished;   // the step limit ended the search
 };
 
-// Where the ray enters a box, or a distance behind its reach. The far side is moved out by two roundings (Ize 2013).
+// Distance at which the ray enters a box, or 3.4e38 if it misses. The far side is moved out by two roundings (Ize 2013).
 float enter_box(vec3 low, vec3 high, vec3 origin, vec3 inverse, float reach) {
     const vec3 a = (low - origin) * inverse, b = (high - origin) * inverse;
     const vec3 near = min(a, b), far = max(a, b);
@@ -44,7 +45,7 @@ bool stops(Ray ray, uint triangle, uint material, vec2 barycentric) {
     return float(pcg4d(uvec4(ray.chance, triangle, 0u, 0u)).x >> 8u) < opacity * 16777216.0;
 }
 
-// Moeller and Trumbore 1997; the edges reach out a little, so that neighbours leave no gap.
+// Moeller and Trumbore 1997. Triangles are slightly enlarged, so that neighbours leave no gap.
 void meet_triangle(Ray ray, uint triangle, inout Hit hit) {
     const int at = int(triangle * TRIANGLE_TEXELS);
     const uvec4 corner = texelFetch(triangles, at);
@@ -69,7 +70,7 @@ void meet_triangle(Ray ray, uint triangle, inout Hit hit) {
 Hit trace(Ray ray, uint max_steps) {
     Hit hit = Hit(NO_TRIANGLE, ray.reach, vec2(0.0), 0u, false);
     vec3 inverse;
-    // No component is zero, so that no product below is 0 times infinity.
+    // No component is zero: no product below is 0 times infinity.
     [[unroll]] for (int i = 0; i < 3; ++i) {
         const float d = ray.direction[i];
         inverse[i] = 1.0 / (abs(d) < 1e-18 ? (d < 0.0 ? -1e-18 : 1e-18) : d);
@@ -106,8 +107,8 @@ Hit trace(Ray ray, uint max_steps) {
     return hit;
 }
 
-// A point just off the surface on the side of the normal: as many roundings as its coordinates need (Waechter and Binder
-// 2019, "A Fast and Robust Method for Avoiding Self-Intersection").
+// Offsets a point from the surface to the side of the normal, by as many roundings as its coordinates need (Waechter and
+// Binder 2019, "A Fast and Robust Method for Avoiding Self-Intersection").
 vec3 leave_surface(vec3 point, vec3 normal) {
     const ivec3 steps = ivec3(256.0 * normal);
     const ivec3 signed_steps = mix(steps, -steps, lessThan(point, vec3(0.0)));

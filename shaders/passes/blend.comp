@@ -1,7 +1,8 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Blends the splats of a tile front to back into the image planes: C = sum c alpha T + T background. One workgroup is
-// one subgroup and owns one tile. SPEC_MODE: BLEND_*.
+// Blends the splats of each tile front to back: C = sum c alpha T + T background.
+// One workgroup is one subgroup and owns one tile. It reads the tile's range of the sorted splats and their records,
+// and writes the tile's pixels in the image planes. SPEC_MODE: BLEND_*.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"
@@ -18,7 +19,7 @@ layout(set = 0, binding = 2, scalar) readonly buffer TileStarts { uint tile_star
 layout(set = 0, binding = 3, scalar) writeonly buffer Planes { float planes[]; };
 layout(push_constant, scalar) uniform Push { BlendPush push; };
 
-// The splat as a solid: the first one that a pixel meets closes it. Lit from the camera, so darker towards its outline.
+// Draws the splat as a solid: the first hit closes the pixel. The light is at the camera, so the outline is darker.
 void meet_ellipsoid(LaneSplat s, uint p, inout float T, inout vec3 color) {
     const float u = s.u + s.u_step * float(p), v = s.v + s.v_step * float(p);
     const float height = 1.0 - (u * u + v * v) * float(2.0 / (ELLIPSOID_REACH * ELLIPSOID_REACH));
@@ -39,8 +40,8 @@ void main() {
     float T[PIXELS], depth[PIXELS], count[PIXELS];
     vec3 color[PIXELS];
     [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
-        // A pixel outside the image is closed from the start, so that it never keeps the tile going.
-        T[p] = px < push.size[0] && py + p * ROW_STEP < push.size[1] ? 1.0 : -1.0;
+        // A pixel outside the image starts closed, so that it never keeps the tile's loop running.
+        T[p] = px < push.image.size[0] && py + p * ROW_STEP < push.image.size[1] ? 1.0 : -1.0;
         color[p] = vec3(0.0);
         depth[p] = count[p] = 0.0;
     }
@@ -77,15 +78,15 @@ void main() {
     const vec3 background = vec3(push.background[0], push.background[1], push.background[2]);
     [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
         const uint y = py + p * ROW_STEP;
-        if (px < push.size[0] && y < push.size[1]) {
-            const uint at = y * push.stride + px;
+        if (px < push.image.size[0] && y < push.image.size[1]) {
+            const uint at = y * push.image.stride + px;
             const float left = abs(T[p]);
-            planes[PLANE_R * push.plane_floats + at] = color[p].r + left * background.r;
-            planes[PLANE_G * push.plane_floats + at] = color[p].g + left * background.g;
-            planes[PLANE_B * push.plane_floats + at] = color[p].b + left * background.b;
-            planes[PLANE_T * push.plane_floats + at] = left;
-            if (WITH_DEPTH) planes[PLANE_DEPTH * push.plane_floats + at] = depth[p];
-            if (WITH_COUNT) planes[PLANE_COUNT * push.plane_floats + at] = count[p];
+            planes[PLANE_R * push.image.plane_floats + at] = color[p].r + left * background.r;
+            planes[PLANE_G * push.image.plane_floats + at] = color[p].g + left * background.g;
+            planes[PLANE_B * push.image.plane_floats + at] = color[p].b + left * background.b;
+            planes[PLANE_T * push.image.plane_floats + at] = left;
+            if (WITH_DEPTH) planes[PLANE_DEPTH * push.image.plane_floats + at] = depth[p];
+            if (WITH_COUNT) planes[PLANE_COUNT * push.image.plane_floats + at] = count[p];
         }
     }
 }

@@ -1,10 +1,11 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Gradients of blending, front to back: with R = (what is blended behind a splat) . dL/dC,
-// dL/d(alpha) = T c . dL/dC - R / (1 - alpha); R starts as C . dL/dC and each splat takes its own share off, so nothing
-// is divided by 1 - alpha splat after splat. One workgroup is one subgroup and owns one tile, and the gradient slots
-// of its instances, which stand in the order of the sorted list: each is written once. SPEC_MODE 1: sums of absolute
-// gradients by the mean too.
+// Gradient of blending, front to back. With R = (what is blended behind a splat) . dL/dC,
+// dL/d(alpha) = T c . dL/dC - R / (1 - alpha). R starts as C . dL/dC, and each splat subtracts its own share.
+// So no value is divided by 1 - alpha again and again.
+// One workgroup is one subgroup and owns one tile. It reads the tile's sorted splats, their records, the image planes
+// and dL/d(image). It writes the gradient slots of the tile's instances, each slot once. Slots are in sorted order.
+// SPEC_MODE: BLEND_BACKWARD_* bits.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"
@@ -12,7 +13,7 @@
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_MODE) const uint MODE = 0;
-const bool ABSOLUTE = (MODE & 1u) != 0u;
+const bool ABSOLUTE = (MODE & BLEND_BACKWARD_ABSOLUTE) != 0u;
 const uint SUMS = ABSOLUTE ? 11u : 9u;
 layout(set = 0, binding = 0) uniform samplerBuffer records;
 layout(set = 0, binding = 1, scalar) readonly buffer Splats { uint splats[]; };
@@ -28,8 +29,8 @@ layout(push_constant, scalar) uniform Push { BlendPush push; };
 // Splats whose sums are transposed together.
 const uint BLOCK = SUBGROUP < 8u ? SUBGROUP : 8u;
 
-// Sums BLOCK values over the subgroup at once: at each step a lane keeps half of its values and sends the other half
-// away, so that lane l ends with the sum of value l % BLOCK. Lanes BLOCK apart then add up.
+// Sums BLOCK values over the subgroup at once. At each step a lane keeps half of its values and sends the other half, so
+// that lane l ends with the sum of value l % BLOCK. Then lanes BLOCK apart are added.
 float transposing_sum(float v[8]) {
     const uint lane = gl_SubgroupInvocationID;
     const bool b0 = (lane & 1u) != 0u, b1 = (lane & 2u) != 0u, b2 = (lane & 4u) != 0u;
@@ -60,15 +61,15 @@ void main() {
     vec3 gradient[PIXELS];
     [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
         const uint y = py + p * ROW_STEP;
-        const bool inside = px < push.size[0] && y < push.size[1];
-        const uint at = min(y, push.size[1] - 1u) * push.stride + min(px, push.size[0] - 1u);
+        const bool inside = px < push.image.size[0] && y < push.image.size[1];
+        const uint at = min(y, push.image.size[1] - 1u) * push.image.stride + min(px, push.image.size[0] - 1u);
         T[p] = inside ? 1.0 : -1.0;
-        gradient[p] = vec3(image_gradient[PLANE_R * push.plane_floats + at],
-                           image_gradient[PLANE_G * push.plane_floats + at],
-                           image_gradient[PLANE_B * push.plane_floats + at]);
-        rest[p] = dot(gradient[p], vec3(planes[PLANE_R * push.plane_floats + at],
-                                        planes[PLANE_G * push.plane_floats + at],
-                                        planes[PLANE_B * push.plane_floats + at]));
+        gradient[p] = vec3(image_gradient[PLANE_R * push.image.plane_floats + at],
+                           image_gradient[PLANE_G * push.image.plane_floats + at],
+                           image_gradient[PLANE_B * push.image.plane_floats + at]);
+        rest[p] = dot(gradient[p], vec3(planes[PLANE_R * push.image.plane_floats + at],
+                                        planes[PLANE_G * push.image.plane_floats + at],
+                                        planes[PLANE_B * push.image.plane_floats + at]));
     }
     const uint end = tile_starts[tile + 1u];
     uint k = tile_starts[tile];
@@ -86,8 +87,8 @@ void main() {
                 const LaneSplat s = lane_splat(record0, record1, record2, ratio_step, first + j, pixel);
                 float raw[PIXELS];
                 column_alphas(s, raw);
-                // u and v are affine along the lane's column, so three sums over it, with the pixel's number counted
-                // from the middle, give all six: products with constants, and a third of the registers.
+                // u and v are affine along the lane's column, so three sums over it give all six moments. The pixel's
+                // index is counted from the middle. This needs products with constants and a third of the registers.
                 float s0 = 0.0, s1 = 0.0, s2 = 0.0;
                 vec2 absolute = vec2(0.0);
                 vec3 color_sum = vec3(0.0);
@@ -97,7 +98,7 @@ void main() {
                     const float weight = composite(alpha, T[p], blended);
                     const float own = weight * dot(s.color, gradient[p]);
                     rest[p] -= own;
-                    // dL/d(power) = alpha dL/d(alpha); none where the clamp holds alpha.
+                    // dL/d(power) = alpha dL/d(alpha); zero where alpha is clamped.
                     const bool moves = blended && raw[p] <= float(ALPHA_MAX);
                     const float g = moves ? own - rest[p] * (alpha / (1.0 - alpha)) : 0.0;
                     const float step = float(p) - MIDDLE;
@@ -140,8 +141,8 @@ void main() {
             break;
         }
     }
-    // The last tile also answers for the instances that turned out not to exist: every slot of the list is written, so
-    // that none holds what an earlier frame left.
+    // The last tile also clears the slots of instances with the sentinel tile. Every slot of the list is written, so that
+    // none keeps values of an earlier frame.
     if (tile + 1u == push.tiles[0] * push.tiles[1]) {
         const uint all = tile_starts[tile + 2u];
         for (uint e = end; e < all; e += SUBGROUP) {
@@ -151,7 +152,7 @@ void main() {
             }
         }
     }
-    // Instances behind the last open pixel got nothing.
+    // Instances behind the last open pixel have gradient zero.
     for (; k < end; k += SUBGROUP) {
         if (k + lane < end) {
             const uint at = SLOT_FLOATS * (k + lane);

@@ -1,6 +1,7 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Decides how many splats each one becomes: 0, 1 or 2. One invocation owns splat i.
+// Decides how many splats each splat becomes: 0, 1 or 2.
+// One invocation owns splat i. It reads parameters and statistics, and writes outputs[i].
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/params.glsl"

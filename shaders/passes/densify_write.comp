@@ -1,9 +1,11 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Writes the splats of the next generation into new buffers. One invocation owns old splat i and writes what it
-// becomes, side by side in the old order. A kept splat and a clone's original keep their moments; what is new starts
-// with none. Children of a split are drawn from the parent's Gaussian and are SPLIT_SCALE times smaller; with revised
-// opacity, two children in one place are as opaque as the parent: 1 - (1 - o)^(1/2) (Rota Bulo et al. 2024, eq. 9).
+// Writes the next generation of splats into new buffers.
+// One invocation owns old splat i. It reads its parameters, moments and statistics, and the prefix sums of the outputs.
+// It writes what the splat becomes, side by side in the old order.
+// A kept splat and a clone's original keep their moments; new splats start with zero moments. Children of a split are
+// drawn from the parent's Gaussian and are SPLIT_SCALE times smaller. With revised opacity, two children in one place
+// are together as opaque as the parent: 1 - (1 - o)^(1/2) (Rota Bulo et al. 2024, eq. 9).
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/params.glsl"
@@ -12,7 +14,7 @@
 #include "lib/densify.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
-layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3; // the degree stored
+layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3; // stored
 layout(set = 0, binding = 0) uniform samplerBuffer params;
 layout(set = 0, binding = 1) uniform samplerBuffer moments1;
 layout(set = 0, binding = 2) uniform samplerBuffer moments2;

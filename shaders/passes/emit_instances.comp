@@ -1,9 +1,11 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Writes the (splat, tile) instances in depth order. One invocation owns the splat at one depth rank, and of its tile
-// rows the strip given by the workgroup's z (a strip bounds the loop: a splat may cover more tiles than some drivers
-// allow iterations). Instances of a splat are contiguous, in rows from top to bottom. SPEC_MODE 1 (gradients): also
-// tells where each splat's instances begin.
+// Writes the (splat, tile) instances in depth order.
+// One invocation owns the splat at one depth rank, and of its tile rows the strip given by workgroup.z. The strip
+// bounds the loop: a splat may cover more tiles than some drivers allow iterations.
+// It reads the splat's record, tile count and prefix sum, and writes the keys and splats of its instances. A splat's
+// instances are contiguous, in rows from top to bottom.
+// SPEC_MODE: EMIT_FIRST_INSTANCES also writes where each splat's instances begin.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/footprint.glsl"
@@ -33,14 +35,14 @@ void main() {
     const uint strip = gl_WorkGroupID.z;
     const uint begin = max(f.row_begin, strip * push.strip_rows), end = min(f.row_end, (strip + 1u) * push.strip_rows);
     const uint first = totals[rank / push.scan_block] + prefix[rank];
-    if (strip == 0u && MODE == 1u) first_instances[splat] = first;
+    if (strip == 0u && MODE == EMIT_FIRST_INSTANCES) first_instances[splat] = first;
     if (begin >= end) return;
 
     uint at = first + count_tiles(f, f.row_begin, begin, size);
     for (uint row = begin; row < end; ++row) {
         const uvec2 columns = columns_of(f, row, size);
-        // The count bounds the writes, so that nothing lands past the splat's own range even where another compiler
-        // rounds the footprint differently.
+        // The count bounds the writes: project's footprint may be rounded differently from this one, and no instance
+        // may land past the splat's own range.
         for (uint column = columns.x; column < columns.y; ++column) {
             if (at < first + count) {
                 keys[at] = row * push.tiles[0] + column;
@@ -49,7 +51,7 @@ void main() {
             ++at;
         }
     }
-    // And what it promised but did not reach stands behind the last tile.
+    // Pad the rest of the reserved range with the sentinel tile.
     for (; end == f.row_end && at < first + count; ++at) {
         keys[at] = push.tiles[0] * push.tiles[1];
         splats[at] = splat;

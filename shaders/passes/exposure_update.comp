@@ -1,9 +1,10 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Adam's step of one photograph's exposure: adds up its gradient's partial sums in a fixed order, and a weak pull towards
-// the identity, without which all exposures together could drift and the splats against them. One workgroup of one
-// subgroup. An update that is not finite is dropped and counted. Nothing happens in a frame whose instances did not fit
-// (the host repeats it).
+// One Adam step of one training image's exposure.
+// One workgroup of one subgroup does all of it. It reads the partial sums of the gradient and adds them in a fixed
+// order. It updates the exposure and its moments.
+// A weak pull towards the identity keeps all exposures together from drifting against the splats. An update that is not
+// finite is dropped and counted. A frame whose instances did not fit changes nothing: the host repeats it.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"
@@ -31,7 +32,7 @@ void main() {
         const vec4 v = mix(gradient * gradient, moments2[at], float(ADAM_BETA2));
         const vec4 moved = value - push.rate * (m * push.bias1) / (sqrt(v * push.bias2) + float(ADAM_EPSILON));
         const bool finite = is_finite(moved) && is_finite(m) && is_finite(v);
-        // No lane leaves the loop: the next row's sum wants them all.
+        // No lane leaves the loop: the next row's sum needs all of them.
         if (gl_SubgroupInvocationID == 0u && finite) {
             exposures[at] = moved;
             moments1[at] = m;

@@ -1,9 +1,10 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Second half of the way back, along the rows, and the gradient of the whole loss by the rendering:
-// dL/dx = ssim_scale (blur dS/d(mean x) + 2 x blur dS/d(mean x^2) + y blur dS/d(mean x y)) + l1_scale sign(x - y),
-// the first part where |x| is within SSIM_LIMIT.
-// One invocation owns LOSS_TEXELS texels of channel workgroup.z, one subgroup one partial sum of |x - y|.
+// Gradient of the SSIM window along the rows, and the gradient of the whole loss by the render x:
+// dL/dx = ssim_scale (blur dS/d(mean x) + 2 x blur dS/d(mean x^2) + y blur dS/d(mean x y)) + l1_scale sign(x - y).
+// The first term applies where |x| is within SSIM_LIMIT.
+// One invocation owns LOSS_TEXELS texels of channel workgroup.z; one subgroup owns one partial sum of |x - y|.
+// It reads the blurred derivatives, the render and the target, and writes dL/d(image) and the partial sums.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"
@@ -19,9 +20,9 @@ layout(push_constant, scalar) uniform Push { LossPush push; };
 
 void main() {
     const uint item = item_index();
-    const uint row_texels = push.stride / 4u, plane = push.plane_floats / 4u, channel = gl_WorkGroupID.z;
+    const uint row_texels = push.image.stride / 4u, plane = push.image.plane_floats / 4u, channel = gl_WorkGroupID.z;
     const uint row_items = (row_texels + LOSS_TEXELS - 1u) / LOSS_TEXELS;
-    const bool inside = item < row_items * push.size[1];
+    const bool inside = item < row_items * push.image.size[1];
     const int row = int(item / row_items) * int(row_texels), first = int(item % row_items * LOSS_TEXELS);
     vec4 m[DERIVATIVE_PLANES][LOSS_TEXELS];
     [[unroll]] for (uint q = 0; q < DERIVATIVE_PLANES; ++q) {

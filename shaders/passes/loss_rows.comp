@@ -1,9 +1,10 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Second half of the SSIM window, along the rows; then SSIM itself and its derivatives by the moments of the rendering:
+// Second half of the SSIM window, along the rows; then SSIM itself and its derivatives by the moments of the render:
 // S = A1 A2 / (B1 B2), A1 = 2 mx my + C1, A2 = 2 (mxy - mx my) + C2, B1 = mx^2 + my^2 + C1,
-// B2 = m(x^2 + y^2) - mx^2 - my^2 + C2. One invocation owns LOSS_TEXELS texels of channel workgroup.z, one subgroup one
-// partial sum of S.
+// B2 = m(x^2 + y^2) - mx^2 - my^2 + C2.
+// One invocation owns LOSS_TEXELS texels of channel workgroup.z; one subgroup owns one partial sum of S.
+// It reads the moments, and writes the derivatives and the partial sums.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"
@@ -17,9 +18,9 @@ layout(push_constant, scalar) uniform Push { LossPush push; };
 
 void main() {
     const uint item = item_index();
-    const uint row_texels = push.stride / 4u, plane = push.plane_floats / 4u, channel = gl_WorkGroupID.z;
+    const uint row_texels = push.image.stride / 4u, plane = push.image.plane_floats / 4u, channel = gl_WorkGroupID.z;
     const uint row_items = (row_texels + LOSS_TEXELS - 1u) / LOSS_TEXELS;
-    const bool inside = item < row_items * push.size[1];
+    const bool inside = item < row_items * push.image.size[1];
     const int row = int(item / row_items) * int(row_texels), first = int(item % row_items * LOSS_TEXELS);
     vec4 m[MOMENT_PLANES][LOSS_TEXELS];
     [[unroll]] for (uint q = 0; q < MOMENT_PLANES; ++q) {
@@ -38,9 +39,9 @@ void main() {
         const vec4 mean_squares = mx * mx + my * my;
         const vec4 b1 = mean_squares + float(SSIM_C1), b2 = max(m[2][o] - mean_squares, 0.0) + float(SSIM_C2);
         const vec4 inverse = 1.0 / (b1 * b2);
-        // Columns past the image's width stand in the last texel and count for nothing.
+        // Columns past the image's width are in the last texel and do not count.
         const uint x = 4u * uint(first + o);
-        const vec4 mask = inside ? vec4(lessThan(uvec4(x, x + 1u, x + 2u, x + 3u), uvec4(push.size[0]))) : vec4(0.0);
+        const vec4 mask = inside ? vec4(lessThan(uvec4(x, x + 1u, x + 2u, x + 3u), uvec4(push.image.size[0]))) : vec4(0.0);
         const vec4 s = mask * a1 * a2 * inverse;
         if (inside && first + o < int(row_texels)) {
             const uint at = DERIVATIVE_PLANES * channel * plane + uint(row + first + o);

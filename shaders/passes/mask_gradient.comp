@@ -1,19 +1,20 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// The way back through mask_pictures: the gradient by the rendering, times how much the pixel counts. One invocation owns
-// one pixel.
+// Gradient of mask_pictures: dL/d(image) times the pixel's weight.
+// One invocation owns one pixel. It reads the weight from the training image's alpha, and updates dL/d(image) in place.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
+#include "lib/image.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(set = 0, binding = 0) uniform samplerBuffer photo;
 layout(set = 0, binding = 1, scalar) buffer ImageGradient { float image_gradient[]; };
-layout(push_constant, scalar) uniform Push { MaskPush push; };
+layout(push_constant, scalar) uniform Push { ImageLayout push; };
 
 void main() {
     const uint i = item_index();
     if (i >= push.size[0] * push.size[1]) return;
     const float weight = texelFetch(photo, int(i)).a;
-    const uint at = (i / push.size[0]) * push.stride + i % push.size[0];
+    const uint at = pixel_offset(push, i);
     for (uint c = 0; c < 3; ++c) image_gradient[c * push.plane_floats + at] *= weight;
 }

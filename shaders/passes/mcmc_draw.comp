@@ -1,8 +1,8 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Draws the sources of the splats that are relocated or added: source e with probability weight[e] / total. One
-// invocation owns draw d; it looks the random number up in the prefix sums, and counts the hit. The counts are integer
-// sums, the same in any order.
+// Draws the sources of relocated and added splats: source e with probability weight[e] / total.
+// One invocation owns draw d. It looks its random number up in the prefix sums, writes sources[d] and counts the hit.
+// Hits are integer sums, so their order does not matter.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/random.glsl"
@@ -20,7 +20,7 @@ void main() {
     const uint random = pcg4d(uvec4(d, push.step, push.seed[0], push.seed[1] ^ MCMC_DRAW_STREAM)).x;
     uint target, low_bits;
     umulExtended(random, push.total, target, low_bits);
-    // The last block, then the last entry of it, whose sum before it is not above the target: one of weight above 0.
+    // The last block, then its last entry, whose prefix sum is at most the target. That entry's weight is above 0.
     uint low = 0u, high = (push.splats + push.scan_block - 1u) / push.scan_block;
     while (high - low > 1u) {
         const uint middle = (low + high) / 2u;

@@ -1,8 +1,8 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// How likely a splat is to be the source of another, and whether it is dead itself: too transparent to be seen, or
-// not finite. Weights are opacities as integers, so that their sum does not depend on its order. One invocation owns
-// splat i.
+// Writes each splat's weight as a source, and whether the splat is dead: too transparent to be seen, or not finite.
+// One invocation owns splat i. It reads the parameters, and writes weights[i] and dead[i].
+// Weights are opacities scaled to integers, so that their sum does not depend on its order.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/params.glsl"

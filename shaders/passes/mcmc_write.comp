@@ -1,8 +1,10 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Writes the splats of the next generation into new buffers. One invocation owns new splat j. A dead splat and one
-// past the old number become copies of their sources; a source and its copies share what it was (lib/mcmc.glsl) and
-// start without moments. With a spread, each of them stands where a normal draw of the source's Gaussian puts it.
+// Writes the next generation of splats into new buffers.
+// One invocation owns new splat j. It reads the parameters and moments of splat j or of its source, and writes
+// splat j. A dead splat, and one beyond the old number, becomes a copy of its source. A source and its copies share
+// what the source was (lib/mcmc.glsl) and start with zero moments. With a spread, each is placed by a normal draw
+// of the source's Gaussian.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/params.glsl"
@@ -11,7 +13,7 @@
 #include "lib/random.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
-layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3; // the degree stored
+layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3; // stored
 layout(set = 0, binding = 0) uniform samplerBuffer params;
 layout(set = 0, binding = 1) uniform samplerBuffer moments1;
 layout(set = 0, binding = 2) uniform samplerBuffer moments2;

@@ -1,7 +1,8 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Turns the colour planes into 8-bit RGBA, a word a pixel in rows of `stride`, rounded and clamped as save_image does it.
-// One invocation owns a texel of each plane, that is 4 pixels of a row.
+// Packs the colour planes into 8-bit RGBA, one word a pixel in rows of `stride`, rounded and clamped as
+// save_image does. One invocation owns one texel of each plane, which is 4 pixels of a row. It reads the planes
+// and writes the packed words.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 
@@ -10,7 +11,7 @@ layout(set = 0, binding = 0) uniform samplerBuffer planes;
 layout(set = 0, binding = 1, scalar) writeonly buffer Packed { uint packed[]; };
 layout(push_constant, scalar) uniform Push { PackPush push; };
 
-// Phrased so that NaN is 0.
+// NaN becomes 0.
 uvec4 to_byte(vec4 v) {
     precise const vec4 scaled = mix(vec4(0.0), min(v, vec4(1.0)), greaterThan(v, vec4(0.0))) * 255.0;
     return uvec4(scaled + 0.5);

@@ -1,9 +1,10 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Moves every mean by noise of its splat's own shape, the more the more transparent it is (Kheradmand et al. 2024,
-// eq. 8): mean += amplitude sigmoid(-MCMC_GATE_SLOPE (opacity - MCMC_GATE_OPACITY)) Sigma n, at most `reach` along each
-// axis of the splat. One invocation owns
-// splat i. Nothing happens in a frame whose instances did not fit (the host repeats it).
+// Adds noise of a splat's own shape to its mean; transparent splats move more (Kheradmand et al. 2024, eq. 8): mean
+// += amplitude sigmoid(-MCMC_GATE_SLOPE (opacity - MCMC_GATE_OPACITY)) Sigma n, at most `max_length` along each
+// axis of the splat.
+// One invocation owns splat i. It updates the splat's mean in place and counts shortened steps.
+// A frame whose instances did not fit changes nothing: the host repeats it.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/params.glsl"
@@ -26,11 +27,11 @@ void main() {
     const vec3 normal = normal3(uvec4(i, push.step, push.seed[0], push.seed[1] ^ MCMC_NOISE_STREAM));
     float norm;
     const mat3 rotation = rotation_of(normalize_quaternion(params[param_texel(push.planes, 1u, i)], norm));
-    // The noise is made shorter than the scene where a splat larger than it asks for more.
+    // Noise of a splat larger than the scene is shortened to the scene's size.
     const vec3 along = push.amplitude * gate * (scale * scale * (normal * rotation));
     const float longest = max(max(abs(along.x), abs(along.y)), abs(along.z));
-    const bool limited = longest > push.reach;
-    const vec3 moved = p0.xyz + rotation * (limited ? along * (push.reach / longest) : along);
+    const bool limited = longest > push.max_length;
+    const vec3 moved = p0.xyz + rotation * (limited ? along * (push.max_length / longest) : along);
     if (is_finite(moved)) {
         params[at] = vec4(moved, p0.w);
         if (limited) atomicAdd(counts.limited_steps, 1u);

@@ -1,8 +1,9 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Projects splats into pixels. One invocation owns splat i: it reads its parameters and the camera, and writes its
-// record, its depth key and the number of tiles it reaches. A splat that is not drawn gets count 0 and the last key.
-// SPEC_MODE 1 (inspection): scales are shifted, and the splats that are drawn are counted.
+// Projects splats into pixels.
+// One invocation owns splat i. It reads its parameters and the camera, and writes its record, its depth key and the
+// number of tiles that it reaches. A splat that is not visible gets count 0 and the last key.
+// SPEC_MODE: PROJECT_DEBUG shifts the scales and counts the visible splats.
 #extension GL_GOOGLE_include_directive : require
 #define BINDING_CAMERA 1
 #include "lib/prelude.glsl"
@@ -14,7 +15,7 @@
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3;
 layout(constant_id = SPEC_MODE) const uint MODE = 0;
-const bool INSPECTED = MODE == 1u;
+const bool DEBUG = MODE == PROJECT_DEBUG;
 
 layout(set = 0, binding = 0) uniform samplerBuffer params;
 layout(set = 0, binding = 2, scalar) writeonly buffer Records { vec4 records[]; };
@@ -28,7 +29,7 @@ vec4 param(uint plane, uint i) { return texelFetch(params, int(param_texel(push.
 const uint SH_FLOATS = 3 * (SH_DEGREE + 1) * (SH_DEGREE + 1);
 const uint PLANES = (PARAM_SH + SH_FLOATS + 3) / 4;
 
-// Colour seen along a direction; finite: whether it can be computed with.
+// Colour seen along a direction. finite: whether it is within COLOR_MAX.
 vec3 sh_color(uint i, vec4 plane2, vec3 direction, out bool finite) {
     float basis[16];
     sh_basis(SH_DEGREE, direction, basis);
@@ -41,7 +42,7 @@ vec3 sh_color(uint i, vec4 plane2, vec3 direction, out bool finite) {
                 sum[(f - PARAM_SH) % 3] += basis[(f - PARAM_SH) / 3] * value[c];
         }
     }
-    // Phrased so that NaN fails it.
+    // A NaN fails these comparisons.
     const vec3 size = abs(sum);
     finite = size.r <= float(COLOR_MAX) && size.g <= float(COLOR_MAX) && size.b <= float(COLOR_MAX);
     return max(vec3(0.0), sum + float(COLOR_OFFSET));
@@ -51,7 +52,7 @@ void main() {
     const uint i = item_index();
     if (i >= push.splats) return;
     const vec4 p0 = param(0, i), p1 = param(1, i), p2 = param(2, i);
-    const vec3 log_scale = INSPECTED ? p2.xyz + push.log_scale_shift : p2.xyz;
+    const vec3 log_scale = DEBUG ? p2.xyz + push.log_scale_shift : p2.xyz;
     const Projection p = project_splat(SplatShape(p0.xyz, p0.w, p1, log_scale));
     const float z = p.view.z.x;
     bool finite_color;
@@ -65,10 +66,10 @@ void main() {
     const bool stored_finite = is_finite(p0) && is_finite(p1) && is_finite(p2.xyz) && p.in_range;
     const bool in_front = z > float(NEAR_PLANE);
     const bool projected_finite = p.footprint_in_range && finite_color && is_finite(record0) && is_finite(record1) && p.ux > 0.0 && p.vy > 0.0;
-    const bool drawn = stored_finite && in_front && projected_finite;
+    const bool visible = stored_finite && in_front && projected_finite;
 
     uint count = 0u;
-    if (drawn) {
+    if (visible) {
         const Footprint f = footprint_of(record0, record1, size);
         count = count_tiles(f, f.row_begin, f.row_end, size);
     }
@@ -77,6 +78,6 @@ void main() {
     records[RECORD_TEXELS * i + 2] = vec4(color, z);
     depth_keys[i] = count > 0u ? floatBitsToUint(z) : 0xffffffffu;
     tile_counts[i] = count;
-    if (INSPECTED && count > 0u) atomicAdd(counts.drawn, 1u);
+    if (DEBUG && count > 0u) atomicAdd(counts.visible, 1u);
     if (!stored_finite || (in_front && !projected_finite)) atomicAdd(counts.skipped_nonfinite, 1u);
 }

@@ -1,7 +1,9 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Counts the digits of a radix pass. One invocation owns a contiguous chunk of the keys and a private row of counters,
-// counters[digit * lanes + lane], which stand at zero before. No atomics: the order of equal keys is kept.
+// Counts the digits of a radix pass.
+// One invocation owns a contiguous chunk of the keys and a private row of counters, counters[digit * lanes +
+// lane]. It reads the keys and increments the counters, which are zero before. There are no atomics, so equal
+// keys keep their order.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/sorting.glsl"

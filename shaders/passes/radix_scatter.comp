@@ -1,18 +1,18 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Moves the pairs of a radix pass. One invocation owns the same chunk as in radix_count, and walks it in order; its
-// counters now hold the position of its next item of each digit within that digit, and bases[digit] where the digit
-// begins. Stable. SPEC_MODE bit 0: the values are the items' own numbers; bit 1: nobody reads the keys again (last
-// pass); bit 2: the items' own numbers come along beside their values, and the last pass writes where each item went,
-// numbers_out[number] = place, instead; bit 3: first pass, where the numbers are not stored yet; bit 4: last pass.
+// Moves the pairs of a radix pass. The sort is stable.
+// One invocation owns the same chunk as in radix_count and goes through it in order. Its counters now hold the position
+// of its next item of each digit within that digit; bases[digit] is where the digit begins.
+// It reads keys, values and indices, updates its counters, and writes keys, values and indices in the new order.
+// SPEC_MODE: SORT_* bits.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/sorting.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_MODE) const uint MODE = 0;
-const bool IMPLICIT_VALUES = (MODE & 1u) != 0u, DROP_KEYS = (MODE & 2u) != 0u, NUMBERED = (MODE & 4u) != 0u,
-           FIRST = (MODE & 8u) != 0u, LAST = (MODE & 16u) != 0u;
+const bool OWN_INDICES = (MODE & SORT_OWN_INDICES) != 0u, DROP_KEYS = (MODE & SORT_DROP_KEYS) != 0u,
+           TRACKED = (MODE & SORT_TRACKED) != 0u, FIRST = (MODE & SORT_FIRST) != 0u, LAST = (MODE & SORT_LAST) != 0u;
 
 layout(set = 0, binding = 0) uniform usamplerBuffer keys;
 layout(set = 0, binding = 1) uniform usamplerBuffer values;
@@ -21,8 +21,8 @@ layout(set = 0, binding = 3, scalar) readonly buffer Bases { uint bases[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer CountsBlock { Counts counts; };
 layout(set = 0, binding = 5, scalar) writeonly buffer KeysOut { uint keys_out[]; };
 layout(set = 0, binding = 6, scalar) writeonly buffer ValuesOut { uint values_out[]; };
-layout(set = 0, binding = 7) uniform usamplerBuffer numbers;
-layout(set = 0, binding = 8, scalar) writeonly buffer NumbersOut { uint numbers_out[]; };
+layout(set = 0, binding = 7) uniform usamplerBuffer indices;
+layout(set = 0, binding = 8, scalar) writeonly buffer IndicesOut { uint indices_out[]; };
 layout(push_constant, scalar) uniform Push { SortPush push; };
 
 void main() {
@@ -34,8 +34,8 @@ void main() {
     for (uint t = begin; t < end; ++t) {
         const uvec4 four = texelFetch(keys, int(t));
         const uvec4 own = 4u * t + uvec4(0, 1, 2, 3);
-        const uvec4 carried = IMPLICIT_VALUES ? own : texelFetch(values, int(t));
-        const uvec4 number = FIRST ? own : texelFetch(numbers, int(t));
+        const uvec4 carried = OWN_INDICES ? own : texelFetch(values, int(t));
+        const uvec4 index = FIRST ? own : texelFetch(indices, int(t));
         [[unroll]] for (uint c = 0; c < 4; ++c) {
             if (4u * t + c < items) {
                 const uint digit = digit_of(four[c], push.shift);
@@ -45,7 +45,7 @@ void main() {
                 const uint to = bases[digit] + within;
                 if (!DROP_KEYS) keys_out[to] = four[c];
                 values_out[to] = carried[c];
-                if (NUMBERED) numbers_out[LAST ? number[c] : to] = LAST ? to : number[c];
+                if (TRACKED) indices_out[LAST ? index[c] : to] = LAST ? to : index[c];
             }
         }
     }

@@ -1,6 +1,8 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Adds up floats in a fixed order. One workgroup is one subgroup and owns one block of them.
+// Adds floats in a fixed order.
+// One workgroup is one subgroup and owns one block of the source. It writes the sum to sums[block]
+// or to Counts: REDUCE_TO_*.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"
@@ -18,7 +20,7 @@ void main() {
     for (uint e = begin + gl_SubgroupInvocationID; e < end; e += SUBGROUP) sum += source[e];
     sum = subgroup_sum(sum) * push.scale;
     if (gl_SubgroupInvocationID != 0u) return;
-    if (push.target == 0u) sums[block] = sum;
-    if (push.target == 1u) counts.l1 = sum;
-    if (push.target == 2u) counts.ssim = sum;
+    if (push.target == REDUCE_TO_SUMS) sums[block] = sum;
+    if (push.target == REDUCE_TO_L1) counts.l1 = sum;
+    if (push.target == REDUCE_TO_SSIM) counts.ssim = sum;
 }

@@ -1,7 +1,9 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Exclusive prefix sums within blocks. One workgroup is one subgroup and owns block b of `block` entries; it writes the
-// sum of the entries before each one in the block, and the block's total. SPEC_MODE 1: entry e is source[order[e]].
+// Exclusive prefix sums within blocks.
+// One workgroup is one subgroup and owns one block of `block` entries. It reads them, and writes for each entry
+// the sum of the entries before it in the block, and the block's total. SPEC_MODE: SCAN_GATHERED takes
+// source[order[e]] as entry e.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"
@@ -23,7 +25,7 @@ void main() {
     for (uint base = begin; base < end; base += SUBGROUP) {
         const uint e = base + gl_SubgroupInvocationID;
         uint value = 0u;
-        if (e < end) value = source[MODE == 1u ? order[e] : e];
+        if (e < end) value = source[MODE == SCAN_GATHERED ? order[e] : e];
         const uint sum = subgroup_inclusive_sum(value);
         if (e < end) prefix[e] = carry + sum - value;
         carry += subgroupShuffle(sum, SUBGROUP - 1u);

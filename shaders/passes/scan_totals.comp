@@ -1,7 +1,8 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Exclusive prefix sum of the blocks' totals, in place, by one subgroup; entry `blocks` gets the grand total.
-// Instances are also counted in halves that cannot wrap: a total past 32 bits is told as the largest number there is.
+// Exclusive prefix sum of the blocks' totals, in place; entry `blocks` becomes the grand total.
+// One workgroup of one subgroup does all of it. It may also write the grand total to Counts: TOTAL_*.
+// Instances are also counted in two 16-bit halves, which cannot wrap. A total above 32 bits is reported as 0xffffffff.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"
@@ -28,7 +29,7 @@ void main() {
     const bool wrapped = high + (low >> 16) > 0xffffu;
     if (gl_SubgroupInvocationID == 0u) {
         totals[push.blocks] = carry;
-        if (push.write_instances == 1u) counts.instances = wrapped ? 0xffffffffu : carry;
-        if (push.write_instances == 2u) counts.densified = carry;
+        if (push.total == TOTAL_INSTANCES) counts.instances = wrapped ? 0xffffffffu : carry;
+        if (push.total == TOTAL_SCAN) counts.scan_total = carry;
     }
 }

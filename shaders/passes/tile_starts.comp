@@ -1,8 +1,9 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Where each tile's instances begin in the sorted list. One invocation owns tile t of 0..tiles and searches its first
-// instance; entry `tiles` is the end of the last tile's, and one more the end of the list, where instances that turned
-// out not to exist stand.
+// Finds where each tile's instances begin in the sorted list.
+// One invocation owns entry t of 0..tiles + 1. It searches the keys and writes tile_starts[t], the first instance of
+// tile t. Entry `tiles` is the end of the last tile. Entry `tiles + 1` is the end of the list, behind instances with
+// the sentinel tile.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 

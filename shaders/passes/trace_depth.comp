@@ -1,7 +1,8 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// What the centre of each pixel sees. One invocation owns one pixel and writes the camera's z, the triangle and the weights
-// of its corners 1 and 2, floats by their bits; without a triangle z is 0.
+// Finds what the centre of each pixel sees.
+// One invocation owns one pixel. It reads the mesh and the view. It writes the camera's z, the triangle and the weights
+// of its corners 1 and 2, floats by their bits. Without a triangle, z is 0.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/traversal.glsl"
@@ -20,7 +21,7 @@ void main() {
     const vec3 row0 = vec3(view.rotation[0], view.rotation[1], view.rotation[2]);
     const vec3 row1 = vec3(view.rotation[3], view.rotation[4], view.rotation[5]);
     const vec3 row2 = vec3(view.rotation[6], view.rotation[7], view.rotation[8]);
-    // A direction of z 1: its lengths are depths.
+    // The direction has z = 1, so distances along it are depths.
     const Ray ray = Ray(vec3(view.position[0], view.position[1], view.position[2]), d.x * row0 + d.y * row1 + row2, 3e38,
                         true, false, DEPTH_ALPHA, 0u);
     const Hit hit = trace(ray, push.max_steps);

@@ -1,9 +1,11 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Light that reaches a camera, by path tracing. One invocation owns one pixel and adds `samples` paths to its sum of
-// radiance and coverage; when a path ends the next begins in the same turn of the loop, so that lanes of a subgroup wait for
-// each other only at the end. A path meets a surface, asks one light, and goes on in a direction sampled from the
-// reflection; what emits is found both ways, weighted by the balance heuristic (Veach and Guibas 1995).
+// Path tracing: light that reaches a camera.
+// One invocation owns one pixel. It reads the mesh, the lights and the view, and adds `samples` paths to the pixel's
+// sum of radiance and coverage. When a path ends, the next one begins in the same iteration: lanes of a subgroup wait
+// for each other at the end only.
+// A path hits a surface, samples one light, and continues in a direction sampled from the reflection. Emission is found
+// both ways, weighted by the balance heuristic (Veach and Guibas 1995).
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/traversal.glsl"
@@ -19,10 +21,10 @@ layout(push_constant, scalar) uniform Push { TracePush push; };
 
 struct Path {
     vec3 origin, direction, throughput, radiance;
-    float density;  // of the last direction; 0: the camera's
+    float density;  // of the last direction; 0: a camera ray
     float coverage;
-    float blur;     // of the widest reflection so far: sharper mirrors are seen as wide, so that no single path finds the
-                    // sun in one (Kaplanyan and Dachsbacher 2013, "Path Space Regularization")
+    float blur;     // width of the widest reflection so far. Sharper mirrors are widened to it, so that no single path
+                    // finds the sun in one (Kaplanyan and Dachsbacher 2013, "Path Space Regularization").
     uint turn;
 };
 
@@ -51,7 +53,7 @@ Hit search(vec3 origin, vec3 direction, float reach, bool from_camera, bool any_
     return hit;
 }
 
-// One light's share at the surface, with the weight of having found it this way.
+// Contribution of one sampled light at the surface, with its balance-heuristic weight.
 vec3 lit(Path path, uint pixel, uint sample_index, Reflector r, mat3 frame, vec3 point, vec3 side, uint chance) {
     const uint purpose = 4u * path.turn;
     const Incoming light = light_at(point, push.lights, pair(pixel, sample_index, purpose + 1u).y,
@@ -62,12 +64,12 @@ vec3 lit(Path path, uint pixel, uint sample_index, Reflector r, mat3 frame, vec3
     if (dot(light.direction, side) <= 0.0) arriving = vec3(0.0);
     if (light.density > 0.0) arriving *= light.density / (light.density + density);
     const bool asks = brightest(arriving) > 0.0;
-    // A ray of no reach ends at once.
+    // A ray of reach 0 ends at once.
     const Hit hit = search(leave_surface(point, side), light.direction, asks ? light.distance : 0.0, false, true, chance);
     return asks && hit.triangle == NO_TRIANGLE ? arriving : vec3(0.0);
 }
 
-// Whether the path goes on.
+// Extends the path by one surface. Returns whether the path continues.
 bool meet(inout Path path, uint pixel, uint sample_index) {
     const uvec4 chance = words(pixel ^ 0x5bd1e995u, sample_index * 32u + path.turn);
     const Hit hit = search(path.origin, path.direction, 3e38, path.turn == 0u, false, chance.x);
@@ -95,7 +97,7 @@ bool meet(inout Path path, uint pixel, uint sample_index) {
     }
     vec3 normal = front ? surface.normal : -surface.normal;
     const float size2 = dot(normal, normal);
-    // A normal that the ray sees from behind is none for it.
+    // A shading normal that points away from the ray is replaced by the geometric one.
     normal = size2 > 1e-12 && dot(normal, path.direction) < 0.0 ? normal * inversesqrt(size2) : side;
     const mat3 frame = frame_of(normal);
     const vec3 out_dir = -path.direction * frame;

@@ -1,8 +1,10 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Spreads a photograph's RGBA texels into planes, over the background where it is transparent. One invocation owns one pixel.
+// Unpacks a training image's RGBA texels into planes, over the background where it is transparent.
+// One invocation owns one pixel. It reads the pixel's texel and writes the target planes.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
+#include "lib/image.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(set = 0, binding = 0) uniform samplerBuffer photo;
@@ -11,12 +13,12 @@ layout(push_constant, scalar) uniform Push { UnpackPush push; };
 
 void main() {
     const uint i = item_index();
-    if (i >= push.size[0] * push.size[1]) return;
+    if (i >= push.image.size[0] * push.image.size[1]) return;
     const vec4 texel = texelFetch(photo, int(i));
     const vec3 background = vec3(push.background[0], push.background[1], push.background[2]);
     const vec3 color = texel.rgb * texel.a + background * (1.0 - texel.a);
-    const uint at = (i / push.size[0]) * push.stride + i % push.size[0];
-    planes[PLANE_R * push.plane_floats + at] = color.r;
-    planes[PLANE_G * push.plane_floats + at] = color.g;
-    planes[PLANE_B * push.plane_floats + at] = color.b;
+    const uint at = pixel_offset(push.image, i);
+    planes[PLANE_R * push.image.plane_floats + at] = color.r;
+    planes[PLANE_G * push.image.plane_floats + at] = color.g;
+    planes[PLANE_B * push.image.plane_floats + at] = color.b;
 }

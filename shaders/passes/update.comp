@@ -1,13 +1,11 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Gradient of the projection, and Adam in the same breath, so that no gradient buffer of the parameters' size exists.
-// One invocation owns splat i: it adds up the splat's slots in the order of its tiles, carries the sums back through
-// the projection, and moves its parameters and moments. A splat that was not drawn has gradient zero and still moves by
-// its moments. A step too long for its splat is shortened and counted, an update that is not finite dropped and counted.
-// Nothing happens in a frame whose instances did not fit (the host repeats it). SPEC_MODE bit 0: writes the gradient into moments1 and moves nothing. Bit 1: adds to the
-// densification statistics (norm of dL/d(mean) in normalised device coordinates, number of views drawn in). Bit 2: adds
-// the gradient of the regularisers, opacity_pull * opacity + scale_pull * (sum of the scales), drawn or not. Bit 3: the
-// norm is that of the pixels' absolute gradients (Ye et al. 2024, AbsGS, eq. 7), where pixels do not cancel.
+// Gradient of the projection, fused with Adam: no buffer holds the gradient of all parameters.
+// One invocation owns splat i. It reads the splat's slots in the order of its tiles, its record and its parameters. It
+// adds the slots, carries the sums back through the projection, and writes parameters and moments.
+// A splat that is not visible has gradient zero, and its moments still move it. A step that is too long for its splat
+// is shortened and counted. An update that is not finite is dropped and counted. A frame whose instances did not fit
+// changes nothing: the host repeats it. SPEC_MODE: UPDATE_* bits.
 #extension GL_GOOGLE_include_directive : require
 #define BINDING_CAMERA 1
 #include "lib/prelude.glsl"
@@ -20,8 +18,8 @@
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3;
 layout(constant_id = SPEC_MODE) const uint MODE = 0;
-const bool GRADIENT_ONLY = (MODE & 1u) != 0u, STATISTICS = (MODE & 2u) != 0u,
-           REGULARISED = (MODE & 4u) != 0u, ABSOLUTE = (MODE & 8u) != 0u;
+const bool GRADIENT_ONLY = (MODE & UPDATE_GRADIENT_ONLY) != 0u, STATISTICS = (MODE & UPDATE_STATISTICS) != 0u,
+           REGULARISED = (MODE & UPDATE_REGULARISED) != 0u, ABSOLUTE = (MODE & UPDATE_ABSOLUTE) != 0u;
 
 layout(set = 0, binding = 0) uniform samplerBuffer params;
 layout(set = 0, binding = 2) uniform samplerBuffer records;
@@ -35,20 +33,20 @@ layout(set = 0, binding = 9, scalar) writeonly buffer ParamsOut { vec4 params_ou
 layout(set = 0, binding = 10, scalar) writeonly buffer Moments1Out { vec4 moments1_out[]; };
 layout(set = 0, binding = 11, scalar) writeonly buffer Moments2Out { vec4 moments2_out[]; };
 layout(set = 0, binding = 12, scalar) buffer Statistics { vec2 statistics[]; };
-layout(set = 0, binding = 13, scalar) readonly buffer Places { uint places[]; };
+layout(set = 0, binding = 13, scalar) readonly buffer SortedIndices { uint sorted_indices[]; };
 layout(push_constant, scalar) uniform Push { UpdatePush push; };
 
 const uint SH_FLOATS = 3 * (SH_DEGREE + 1) * (SH_DEGREE + 1);
 const uint PLANES = (PARAM_SH + SH_FLOATS + 3) / 4;
 
-// Some drivers stop a loop after 65,535 turns, so a turn takes 8 slots.
+// Some drivers stop a loop after 65,535 iterations, so an iteration adds 8 slots.
 Sums sum_slots(uint first, uint count) {
     vec4 s0 = vec4(0.0), s1 = vec4(0.0);
     vec3 s2 = vec3(0.0);
     for (uint j = 0u; j < count; j += 8u) {
         [[unroll]] for (uint c = 0; c < 8; ++c) {
             const bool there = j + c < count;
-            const int slot = int(SLOT_TEXELS * places[there ? first + j + c : first]);
+            const int slot = int(SLOT_TEXELS * sorted_indices[there ? first + j + c : first]);
             const vec4 t0 = texelFetch(slots, slot), t1 = texelFetch(slots, slot + 1), t2 = texelFetch(slots, slot + 2);
             if (there) {
                 s0 += t0;
@@ -63,11 +61,11 @@ Sums sum_slots(uint first, uint count) {
 
 uint index_of(uint plane, uint i) { return param_texel(push.planes, plane, i); }
 
-// One texel of parameters with its gradient: Adam (Kingma and Ba 2015, algorithm 1).
+// Adam's step of one texel of parameters (Kingma and Ba 2015, algorithm 1).
 void move(uint plane, uint i, vec4 value, vec4 raw_gradient, vec4 rate, float depth) {
     const uint at = index_of(plane, i);
     if (GRADIENT_ONLY) {
-        // What is beyond float32 is its largest number, and what is no number zero, and counted.
+        // Infinities become the largest float32. NaN becomes zero and is counted.
         const bvec4 number = equal(raw_gradient, raw_gradient);
         moments1_out[at] = mix(vec4(0.0), clamp(raw_gradient, -3.402823466e38, 3.402823466e38), number);
         if (!all(number)) atomicAdd(counts.dropped_updates, 1u);
@@ -89,8 +87,8 @@ void move(uint plane, uint i, vec4 value, vec4 raw_gradient, vec4 rate, float de
     }
 }
 
-// All spherical harmonics but those of plane 2, which a splat's scales share; that one's gradient is returned.
-// direction_gradient: dL/d(unit direction).
+// Moves all spherical harmonics except the coefficient in plane 2, which it shares with the scales. Returns that one's
+// gradient. direction_gradient: dL/d(unit direction).
 float move_sh(uint i, vec3 color_gradient, vec3 direction, out vec3 direction_gradient) {
     float basis[16];
     vec3 slope[16];
@@ -117,16 +115,16 @@ void main() {
     const uint i = item_index();
     if (i >= push.splats || counts.instances > push.instance_capacity) return;
     const uint count = tile_counts[i];
-    const bool drawn = count > 0u;
+    const bool visible = count > 0u;
     const vec4 p0 = texelFetch(params, int(index_of(0, i))), p1 = texelFetch(params, int(index_of(1, i))),
                p2 = texelFetch(params, int(index_of(2, i)));
-    const Sums s = sum_slots(drawn ? first_instances[i] : 0u, count);
+    const Sums s = sum_slots(visible ? first_instances[i] : 0u, count);
     const Projection p = project_splat(SplatShape(p0.xyz, p0.w, p1, p2.xyz));
-    // Where nothing was drawn the mean may be anything: zero times a direction that is not finite were no zero gradient.
-    const vec3 direction = drawn ? normalize(p.view.offset) : vec3(0.0);
-    // max(0, .) passes no gradient where the colour stands at zero.
+    // The mean of an invisible splat may be anything. Zero times a direction that is not finite is not zero.
+    const vec3 direction = visible ? normalize(p.view.offset) : vec3(0.0);
+    // max(0, .) passes no gradient where the colour is zero.
     const vec3 shown = texelFetch(records, int(RECORD_TEXELS * i + 2u)).rgb;
-    const vec3 color_gradient = drawn ? s.color * vec3(greaterThan(shown, vec3(0.0))) : vec3(0.0);
+    const vec3 color_gradient = visible ? s.color * vec3(greaterThan(shown, vec3(0.0))) : vec3(0.0);
     vec3 direction_gradient;
     const float red_gradient = move_sh(i, color_gradient, direction, direction_gradient);
 
@@ -148,20 +146,20 @@ void main() {
     const vec3 direction_part =
         (direction_gradient - direction * dot(direction, direction_gradient)) / length(p.view.offset);
     const vec3 mean_gradient = to_world * view_gradient + direction_part;
-    // 1 - opacity, where the opacity is next to 1, has no digits left.
+    // 1 - opacity has no digits left where the opacity is close to 1.
     const float transparency = sigmoid(-p0.w);
     const float logit_gradient = s.g * transparency;
-    const float depth = drawn ? p.view.z.x : 3.4e38;
+    const float depth = visible ? p.view.z.x : 3.4e38;
 
     const vec4 zero = vec4(0.0);
-    const vec4 scale_pull = REGULARISED ? vec4(push.scale_pull * scale, 0.0) : zero;
-    const vec4 opacity_pull = REGULARISED ? vec4(vec3(0.0), push.opacity_pull * p.peak * transparency) : zero;
-    move(2, i, p2, (drawn ? vec4(f.log_scale, red_gradient) : zero) + scale_pull,
+    const vec4 scale_pull = REGULARISED ? vec4(push.scale_weight * scale, 0.0) : zero;
+    const vec4 opacity_pull = REGULARISED ? vec4(vec3(0.0), push.opacity_weight * p.peak * transparency) : zero;
+    move(2, i, p2, (visible ? vec4(f.log_scale, red_gradient) : zero) + scale_pull,
          vec4(vec3(push.scale_rate), push.sh0_rate), depth);
-    move(1, i, p1, drawn ? quaternion_gradient : zero, vec4(push.quaternion_rate), depth);
-    move(0, i, p0, (drawn ? vec4(mean_gradient, logit_gradient) : zero) + opacity_pull,
+    move(1, i, p1, visible ? quaternion_gradient : zero, vec4(push.quaternion_rate), depth);
+    move(0, i, p0, (visible ? vec4(mean_gradient, logit_gradient) : zero) + opacity_pull,
          vec4(vec3(push.mean_rate), push.opacity_rate), depth);
-    if (STATISTICS && drawn) {
+    if (STATISTICS && visible) {
         const float norm = length((ABSOLUTE ? f.absolute : f.mean) * vec2(push.half_size[0], push.half_size[1]));
         if (is_finite(norm)) statistics[i] += vec2(norm, 1.0);
     }

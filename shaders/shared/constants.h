@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every constant of the rendering model, defined once for the shaders, the host and the float64 twin.
+// Every constant of the rendering model, defined once for the shaders, the host and the CPU reference.
 // Values are those of gsplat 1.6 unless a line says otherwise.
 #ifndef EWA_SHARED_CONSTANTS_H
 #define EWA_SHARED_CONSTANTS_H
@@ -7,28 +7,26 @@
 EWA_BEGIN_SHARED
 
 // Projection.
-EWA_REAL(NEAR_PLANE, 0.01);  // a splat is drawn where view z > NEAR_PLANE (world units)
+EWA_REAL(NEAR_PLANE, 0.01);  // a splat is visible only where view z > NEAR_PLANE (world units)
 EWA_REAL(LOW_PASS, 0.3);     // added to both diagonal entries of the 2D covariance (px^2)
-EWA_REAL(
-    VIEW_MAX,
-    1e18);  // a splat is drawn where its mean is no farther from the camera along any axis (world units),
-EWA_REAL(FOOTPRINT_MAX, 1e18);  // the six entries of its M = J W R S add up to no more (px),
-EWA_REAL(COLOR_MAX, 1e30);      // and no channel of its colour is larger; else it is skipped and counted
-EWA_REAL(QUATERNION_MIN,
-         1.1754943508222875e-38);  // a quaternion whose components are all smaller counts as zero
-EWA_REAL(JACOBIAN_MARGIN, 0.3);    // x/z in J is clamped to this share of the half image beyond each border
+// A splat that exceeds one of the next three is skipped and counted.
+EWA_REAL(VIEW_MAX, 1e18);       // distance of the mean from the camera along each axis (world units)
+EWA_REAL(FOOTPRINT_MAX, 1e18);  // sum of the six entries of M = J W R S (px)
+EWA_REAL(COLOR_MAX, 1e30);      // each colour channel
+// A quaternion whose components are all smaller counts as zero.
+EWA_REAL(QUATERNION_MIN, 1.1754943508222875e-38);
+EWA_REAL(JACOBIAN_MARGIN, 0.3);  // x/z in J is clamped to this share of the half image beyond each border
 
 // Compositing.
 EWA_REAL(ALPHA_MAX, 0.99);         // alpha = min(ALPHA_MAX, opacity * exp(power))
 EWA_REAL(ALPHA_MIN, 1.0 / 255.0);  // a contribution below this is skipped
-EWA_REAL(TRANSMITTANCE_STOP,
-         1e-4);  // blending stops before T would fall to this or under, that splat excluded
+// Blending stops before the splat that would take T to this or below.
+EWA_REAL(TRANSMITTANCE_STOP, 1e-4);
 
-// Splats as solids, to look at a scene's make-up: out to so many standard deviations, those at least so
-// opaque.
-EWA_REAL(ELLIPSOID_REACH, 2.0);
-EWA_REAL(ELLIPSOID_OPACITY, 0.1);
-EWA_REAL(ELLIPSOID_RIM, 0.35);  // shade of the outline, of 1 in the middle
+// Splats drawn as solids, for a look at the structure of a scene.
+EWA_REAL(ELLIPSOID_REACH, 2.0);    // radius in standard deviations
+EWA_REAL(ELLIPSOID_OPACITY, 0.1);  // splats of a lower opacity are not drawn
+EWA_REAL(ELLIPSOID_RIM, 0.35);     // shade at the outline; 1 in the middle
 
 // Real spherical harmonics in INRIA's order and signs (3DGS, utils/sh_utils.py; Sloan 2013).
 EWA_REAL(SH_C0, 0.28209479177387814);
@@ -51,8 +49,8 @@ EWA_REAL(COLOR_OFFSET, 0.5);  // colour = max(0, SH sum + COLOR_OFFSET)
 EWA_REAL(SSIM_WEIGHT, 0.2);
 EWA_REAL(SSIM_C1, 0.01 * 0.01);
 EWA_REAL(SSIM_C2, 0.03 * 0.03);
-EWA_REAL(SSIM_LIMIT,
-         16.0);  // SSIM takes what is brighter as this bright: the square of it has digits left for SSIM_C2
+// SSIM clamps values to this: the square still has digits left for SSIM_C2.
+EWA_REAL(SSIM_LIMIT, 16.0);
 EWA_REAL(SSIM_SIGMA, 1.5);  // standard deviation of the window (px)
 EWA_UINT(SSIM_RADIUS, 5u);  // window of 2 * SSIM_RADIUS + 1 taps, zero padded
 
@@ -60,41 +58,44 @@ EWA_UINT(SSIM_RADIUS, 5u);  // window of 2 * SSIM_RADIUS + 1 taps, zero padded
 EWA_REAL(ADAM_BETA1, 0.9);
 EWA_REAL(ADAM_BETA2, 0.999);
 EWA_REAL(ADAM_EPSILON, 1e-15);
-EWA_REAL(GRADIENT_MAX,
-         1e18);  // a larger gradient counts as this large: Adam's step does not depend on its size
+// Larger gradients are clamped to this. Adam's step does not depend on the gradient's size.
+EWA_REAL(GRADIENT_MAX, 1e18);
 
-// How far one step may go (docs/numerics.md, "Steps").
+// Longest step of the optimiser (docs/numerics.md, "Steps").
 EWA_REAL(STEP_DEPTH_SHARE, 0.5);  // a mean moves by at most this share of its depth in the view
-EWA_REAL(STEP_NORM_SHARE, 0.5);   // a quaternion by at most this share of its norm
-EWA_REAL(LOG_SCALE_MIN,
-         -69.0);  // a step leaves the logarithm of a scale between these: 1e-30 to 1e18 world units
+EWA_REAL(STEP_NORM_SHARE, 0.5);   // a quaternion moves by at most this share of its norm
+// A step keeps the logarithm of a scale in this range, which is 1e-30 to 1e18 world units.
+EWA_REAL(LOG_SCALE_MIN, -69.0);
 EWA_REAL(LOG_SCALE_MAX, 41.0);
 
 // Adaptive density control (3DGS, section 5.2 and its published code).
 EWA_REAL(SPLIT_SCALE, 1.6);  // a split child's scales are the parent's divided by this
 
 // 3DGS as Markov chain Monte Carlo (Kheradmand et al. 2024, and its published code).
-EWA_REAL(MCMC_GATE_SLOPE,
-         100.0);  // noise moves a splat by the share sigmoid(-slope (opacity - gate opacity))
+// Noise is multiplied by sigmoid(-slope (opacity - gate opacity)).
+EWA_REAL(MCMC_GATE_SLOPE, 100.0);
 EWA_REAL(MCMC_GATE_OPACITY, 0.005);
-EWA_UINT(MCMC_DRAW_STREAM, 0x64726177u);  // keeps the random numbers of one use apart from those of another
+// Each use of random numbers has its own stream.
+EWA_UINT(MCMC_DRAW_STREAM, 0x64726177u);
 EWA_UINT(MCMC_NOISE_STREAM, 0x6e6f6973u);
 EWA_UINT(MCMC_SPREAD_STREAM, 0x73707264u);
 
-// Kernels: how a splat's opacity depends on its footprint.
-EWA_UINT(KERNEL_PEAK, 0u);  // 3DGS: the opacity is the peak of the footprint
-EWA_UINT(KERNEL_ANTIALIAS,
-         1u);  // Mip-Splatting (Yu et al. 2024, eq. 9): times sqrt(det before / det after low-pass)
-EWA_UINT(KERNEL_UNIT_MASS, 2u);  // EWA (Zwicker et al. 2001): times 1 / (2 pi sqrt(det)) per px^2
+// How a splat's opacity depends on its footprint. Values of SPEC_KERNEL and of ewa::Footprint.
+// 3DGS: the opacity is the peak of the footprint.
+EWA_UINT(KERNEL_PEAK, 0u);
+// Mip-Splatting (Yu et al. 2024, eq. 9): times sqrt(det before / det after low-pass).
+EWA_UINT(KERNEL_ANTIALIAS, 1u);
+// EWA (Zwicker et al. 2001): times 1 / (2 pi sqrt(det)) per px^2.
+EWA_UINT(KERNEL_UNIT_MASS, 2u);
 
-// SyntheticDataset of mesh scenes (docs/meshes.md says what the path tracer models).
-EWA_UINT(TRACE_STACK, 48u);         // deepest hierarchy: far children that wait while a ray goes down
+// The path tracer of mesh scenes (docs/meshes.md describes its model).
+EWA_UINT(TRACE_STACK, 48u);         // greatest depth of the hierarchy: children on the stack of a ray
 EWA_UINT(TRACE_LEAF_MAX, 4u);       // triangles a leaf
-EWA_UINT(TRACE_BOUNCES, 5u);        // a path turns at most this often
-EWA_UINT(TRACE_ROULETTE, 2u);       // from this turn on Russian roulette may end it
-EWA_REAL(TRACE_ALPHA_MIN, 0.0025);  // least GGX width (roughness^2): a mirror is this rough
-EWA_REAL(TRACE_SAMPLE_MAX, 2.0);    // a sample brighter than this many times white counts as this bright
-EWA_REAL(DEPTH_ALPHA, 0.5);         // a blended surface of this opacity is what depth sees
+EWA_UINT(TRACE_BOUNCES, 5u);        // most bounces of a path
+EWA_UINT(TRACE_ROULETTE, 2u);       // first bounce at which Russian roulette may end a path
+EWA_REAL(TRACE_ALPHA_MIN, 0.0025);  // least GGX width (roughness^2): mirrors are this rough
+EWA_REAL(TRACE_SAMPLE_MAX, 2.0);    // samples are clamped to this many times white
+EWA_REAL(DEPTH_ALPHA, 0.5);         // depth sees blended surfaces of at least this opacity
 
 EWA_END_SHARED
 #endif

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lets one text serve as GLSL and as C++. In C++ a constant is a double, so that the float64 twin computes
-// with the exact decimal value; in GLSL it is a float. Struct members use the scalar block layout, which is
-// C++'s own layout for these packed types.
+// Makes one header legal in both GLSL and C++. In C++ a constant is a double, so that the CPU reference
+// computes with the exact decimal value. In GLSL it is a float. Struct members use the scalar block layout,
+// which is C++'s own layout for these packed types.
 #ifndef EWA_SHARED_GLUE_H
 #define EWA_SHARED_GLUE_H
 

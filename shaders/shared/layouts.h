@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every block that host and shaders share, under the scalar block layout. src/passes/layout_checks.cpp
-// asserts sizes.
+// Every block that host and shaders share, under the scalar block layout, and every mode and target that both
+// name. src/passes/pass.cpp asserts the sizes of the blocks.
 #ifndef EWA_SHARED_LAYOUTS_H
 #define EWA_SHARED_LAYOUTS_H
 #include "glue.h"
@@ -11,16 +11,17 @@ EWA_UINT(SPEC_GROUP_SIZE, 0u);  // invocations a workgroup
 EWA_UINT(SPEC_SUBGROUP, 1u);    // lanes a subgroup
 EWA_UINT(SPEC_TILE_WIDTH, 2u);  // px; tile width * tile height is a multiple of the subgroup
 EWA_UINT(SPEC_TILE_HEIGHT, 3u);
-EWA_UINT(SPEC_SH_DEGREE, 4u);   // 0..3, the degree evaluated
-EWA_UINT(SPEC_KERNEL, 5u);      // KERNEL_*
-EWA_UINT(SPEC_MODE, 6u);        // per shader, see there
-EWA_UINT(SPEC_RADIX_BITS, 7u);  // bits a radix pass sorts by, 1..8
-EWA_UINT(SPEC_CUT_OFF, 8u);     // ALPHA_MIN, or another least contribution (a float)
+EWA_UINT(SPEC_SH_DEGREE, 4u);     // evaluated degree, 0 to 3
+EWA_UINT(SPEC_KERNEL, 5u);        // KERNEL_*
+EWA_UINT(SPEC_MODE, 6u);          // one of the shader's modes below, or a sum of its bits
+EWA_UINT(SPEC_RADIX_BITS, 7u);    // bits a radix pass sorts by, 1..8
+EWA_UINT(SPEC_CUT_OFF, 8u);       // float: contributions below it are skipped; normally ALPHA_MIN
+EWA_UINT(SPEC_ALPHA_TESTED, 9u);  // 1: some mesh material is masked or blended
 
-// ---- A splat's parameters: flat float f stands in component f % 4 of texel plane f / 4. Splats are stored
-// in blocks of PARAM_BLOCK, within a block plane after plane: one line of memory holds one plane of a block,
-// and all that a block has stands side by side (see lib/params.glsl). Adam's two moments and gradients have
-// the same layout. ----
+// ---- A splat's parameters ----
+// Flat float f is component f % 4 of texel plane f / 4. Splats are stored in blocks of PARAM_BLOCK. Within a
+// block, plane follows plane: a cache line holds one plane of a block, and a block is contiguous (see
+// lib/params.glsl). Adam's two moments and gradients have the same layout.
 EWA_UINT(PARAM_BLOCK, 8u);
 EWA_UINT(PARAM_MEAN, 0u);        // 3 floats, world units
 EWA_UINT(PARAM_OPACITY, 3u);     // logit
@@ -30,47 +31,89 @@ EWA_UINT(PARAM_SH, 11u);         // 3 (degree + 1)^2 floats: coefficient after c
 
 // ---- A projected splat: 3 texels at 3 * i ----
 // 0: mean in px, high parts x y, low parts x y (their sum is the mean to about 48 bits)
-// 1: ux, k, vy, opacity: with d = pixel - mean, u = ux (d.x - k d.y), v = vy d.y, alpha = opacity exp(-(u^2 +
-// v^2)).
-//    Of the covariance [a b; b c]: ux = sqrt(c / (2 det)), k = b / c, vy = 1 / sqrt(2 c).
+// 1: ux, k, vy, opacity. With d = pixel - mean:
+//    u = ux (d.x - k d.y), v = vy d.y, alpha = opacity exp(-(u^2 + v^2)).
+//    With the covariance [a b; b c]: ux = sqrt(c / (2 det)), k = b / c, vy = 1 / sqrt(2 c).
 // 2: colour r g b, view z
 EWA_UINT(RECORD_TEXELS, 3u);
 
-// ---- A gradient slot: what one tile adds to one splat, 12 floats (3 texels) ----
-// g = dL/d(power) of a pixel. 0: sum g; 1 2: sum g u, g v; 3 4 5: sum g u^2, g u v, g v^2; 6 7 8:
-// dL/d(colour); 9 10, where absolute gradients are asked for: sum |g u|, sum |g (vy v - k ux u)|
+// ---- A gradient slot: what one tile adds to one splat's gradient, 12 floats (3 texels) ----
+// With g = dL/d(power) of a pixel and sums over the tile's pixels:
+// 0: sum g; 1 2: sum g u, g v; 3 4 5: sum g u^2, g u v, g v^2; 6 7 8: dL/d(colour);
+// 9 10, with BLEND_BACKWARD_ABSOLUTE: sum |g u|, sum |g (vy v - k ux u)|
 EWA_UINT(SLOT_FLOATS, 12u);
 EWA_UINT(SLOT_TEXELS, 3u);
 
-// ---- Image planes: plane p of pixel (x, y) is float p * plane_floats + y * stride + x; stride is a multiple
-// of 4 ----
+// ---- Image planes ----
+// Plane p of pixel (x, y) is float p * plane_floats + y * stride + x.
+struct ImageLayout {
+    uint size[2];  // px
+    uint stride;   // floats a row, a multiple of 4
+    uint plane_floats;
+};
 EWA_UINT(PLANE_R, 0u);
 EWA_UINT(PLANE_G, 1u);
 EWA_UINT(PLANE_B, 2u);
 EWA_UINT(PLANE_T, 3u);      // transmittance that reaches the background
 EWA_UINT(PLANE_DEPTH, 4u);  // sum of z alpha T
-EWA_UINT(PLANE_COUNT, 4u);  // splats blended; a picture has one of the two at most
+EWA_UINT(PLANE_COUNT, 4u);  // splats blended; an image has depth or count, not both
 
-// ---- SPEC_MODE of blend.comp ----
+// ---- SPEC_MODE ----
+// project.comp
+EWA_UINT(PROJECT_DEBUG, 1u);  // shifts the scales, and counts the visible splats
+// emit_instances.comp
+EWA_UINT(EMIT_FIRST_INSTANCES, 1u);  // also writes where each splat's instances begin
+// scan_blocks.comp
+EWA_UINT(SCAN_GATHERED, 1u);  // entry e is source[order[e]]
+// blend.comp
 EWA_UINT(BLEND_COLOR, 0u);
-EWA_UINT(BLEND_DEPTH, 1u);       // writes PLANE_DEPTH also
-EWA_UINT(BLEND_COUNT, 2u);       // writes PLANE_COUNT also
-EWA_UINT(BLEND_ELLIPSOIDS, 3u);  // the nearest splat as a solid, in place of blending
+EWA_UINT(BLEND_DEPTH, 1u);       // also writes PLANE_DEPTH
+EWA_UINT(BLEND_COUNT, 2u);       // also writes PLANE_COUNT
+EWA_UINT(BLEND_ELLIPSOIDS, 3u);  // draws the nearest splat as a solid instead of blending
+// radix_scatter.comp, bits
+EWA_UINT(SORT_OWN_INDICES, 1u);  // the values are the items' own indices
+EWA_UINT(SORT_DROP_KEYS, 2u);    // last pass: the sorted keys are not needed
+// Each item's own index is moved with its value. The last pass writes each item's sorted index instead:
+// indices_out[index] = sorted index.
+EWA_UINT(SORT_TRACKED, 4u);
+EWA_UINT(SORT_FIRST, 8u);  // with SORT_TRACKED, first pass: the indices are not stored yet
+EWA_UINT(SORT_LAST, 16u);  // with SORT_TRACKED, last pass
+// blend_backward.comp, bits
+EWA_UINT(BLEND_BACKWARD_ABSOLUTE, 1u);  // also sums absolute gradients by the mean
+// update.comp, bits
+EWA_UINT(UPDATE_GRADIENT_ONLY, 1u);  // writes the gradient into moments1 and moves nothing
+// Adds to the densification statistics: norm of dL/d(mean) in normalised device coordinates, number of views
+// that the splat is visible in.
+EWA_UINT(UPDATE_STATISTICS, 2u);
+// Adds the gradient of the regularisers, opacity_weight * opacity + scale_weight * (sum of the scales).
+EWA_UINT(UPDATE_REGULARISED, 4u);
+// The norm is that of the pixels' absolute gradients (Ye et al. 2024, AbsGS, eq. 7), which do not cancel.
+EWA_UINT(UPDATE_ABSOLUTE, 8u);
 
-// ---- Loss: what one invocation owns. A pass down the columns: one texel (4 pixels) wide, LOSS_ROWS rows
-// high; a pass along the rows: LOSS_TEXELS texels of one row. Neighbouring outputs share most of their
-// window. ----
+// ---- Where a grand total or a sum is written ----
+// ScanTotalsPush.total
+EWA_UINT(TOTAL_NONE, 0u);
+EWA_UINT(TOTAL_INSTANCES, 1u);  // Counts.instances
+EWA_UINT(TOTAL_SCAN, 2u);       // Counts.scan_total
+// ReducePush.target
+EWA_UINT(REDUCE_TO_SUMS, 0u);  // sums[block]
+EWA_UINT(REDUCE_TO_L1, 1u);    // Counts.l1
+EWA_UINT(REDUCE_TO_SSIM, 2u);  // Counts.ssim
+
+// ---- Loss: what one invocation owns ----
+// A pass down the columns: one texel (4 pixels) of LOSS_ROWS rows. A pass along the rows: LOSS_TEXELS texels
+// of one row. Neighbouring outputs share most of their window.
 EWA_UINT(LOSS_ROWS, 4u);
 EWA_UINT(LOSS_TEXELS, 4u);
 // ---- Loss planes per colour channel c ----
 EWA_UINT(MOMENT_PLANES, 4u);      // of 4 c + 0: mean x; 1: mean y; 2: mean x^2 + y^2; 3: mean x y
 EWA_UINT(DERIVATIVE_PLANES, 3u);  // of 3 c + 0: dS/d(mean x); 1: dS/d(mean x^2); 2: dS/d(mean x y)
 
-// ---- Exposure: a photograph's affine map of colours, 3 texels of (row of the matrix, offset) at 3 *
-// photograph ----
+// ---- Exposure: a training image's affine map of colours ----
+// 3 texels of (row of the matrix, offset) at 3 * image.
 EWA_UINT(EXPOSURE_FLOATS, 12u);
 EWA_UINT(EXPOSURE_TEXELS, 3u);
-EWA_UINT(EXPOSURE_BLOCK, 4096u);  // pixels a subgroup sums its gradient over
+EWA_UINT(EXPOSURE_BLOCK, 4096u);  // pixels whose gradient one subgroup sums
 
 EWA_UINT(RADIX_DIGITS_MAX, 256u);
 
@@ -91,42 +134,42 @@ struct CameraBlock {
 
 // Written by the device, read back by the host after a submission.
 struct Counts {
-    uint instances;          // (splat, tile) pairs this frame needs; may exceed the capacity
-    uint skipped_nonfinite;  // splats left out because a value is not finite or the quaternion is zero
+    uint instances;          // (splat, tile) pairs that the frame needs; may exceed the capacity
+    uint skipped_nonfinite;  // splats skipped: a value is not finite, or the quaternion is zero
     uint dropped_updates;    // parameter updates that were not finite
-    uint densified;          // splats after densification
+    uint scan_total;         // grand total of a scan with TOTAL_SCAN
     float l1;                // mean |x - y|
     float ssim;              // mean SSIM
     uint limited_steps;      // steps of a mean, quaternion or scale that were shortened
-    uint drawn;              // splats that reach a tile; counted where the projection is one for inspection
+    uint visible;            // splats that reach a tile; counted with PROJECT_DEBUG
 };
 
 struct ProjectPush {
     uint splats;
-    uint planes;            // texel planes stored a splat
-    float log_scale_shift;  // inspection: added to every log scale
+    uint planes;            // texel planes a splat
+    float log_scale_shift;  // with PROJECT_DEBUG: added to every log scale
 };
 
 struct SortPush {
-    uint items;  // number of items, or 0: Counts.instances, where that does not exceed `capacity`
+    uint items;  // number of items; 0: Counts.instances, or none if that exceeds `capacity`
     uint capacity;
     uint lanes;  // lanes that share the items in contiguous chunks
     uint shift;  // first bit of the digit
 };
 
 struct ScanPush {
-    uint items;  // entries in all
+    uint items;  // all entries
     uint block;  // entries a subgroup scans
 };
 
 struct ScanTotalsPush {
     uint blocks;
-    uint write_instances;  // 1: the grand total is Counts.instances
+    uint total;  // TOTAL_*: where the grand total is written
 };
 
 struct EmitPush {
     uint splats;
-    uint capacity;  // instances there is room for
+    uint capacity;  // of instances
     uint scan_block;
     uint strip_rows;  // tile rows one lane walks
     uint size[2];     // px
@@ -140,51 +183,37 @@ struct TileStartsPush {
 
 struct BlendPush {
     float background[3];
-    uint size[2];  // px
-    uint stride;   // floats a row
-    uint plane_floats;
+    ImageLayout image;
     uint tiles[2];
     uint tile_step[2];  // tile = workgroup.x * step.x + workgroup.y * step.y
-    uint capacity;      // instances there is room for
+    uint capacity;      // of instances
 };
 
 struct UnpackPush {
     float background[3];
-    uint size[2];
-    uint stride;
-    uint plane_floats;
+    ImageLayout image;
 };
 
 struct PackPush {
     uint plane_floats;
 };
 
-struct MaskPush {
-    uint size[2];
-    uint stride;
-    uint plane_floats;
-};
-
 struct ExposurePush {
-    uint size[2];
-    uint stride;
-    uint plane_floats;
-    uint photo;  // whose exposure
+    ImageLayout image;
+    uint photo;  // index of the training image
 };
 
 struct ExposureUpdatePush {
     uint photo;
     uint blocks;  // of partial sums
     float rate;
-    float pull;          // d(loss)/d(value) of a value 1 away from that of the identity
-    float bias1, bias2;  // 1 / (1 - beta^visit): a photograph's own number of steps
+    float pull;          // d(loss)/d(value) for a value 1 away from the identity's
+    float bias1, bias2;  // 1 / (1 - beta^visit); each training image has its own number of steps
     uint instance_capacity;
 };
 
 struct LossPush {
-    uint size[2];
-    uint stride;
-    uint plane_floats;
+    ImageLayout image;
     float ssim_scale;  // d(loss)/d(SSIM of one pixel and channel)
     float l1_scale;    // d(loss)/d|x - y| of one pixel and channel
 };
@@ -192,85 +221,88 @@ struct LossPush {
 struct ReducePush {
     uint items;
     uint block;   // items a subgroup adds up
-    uint target;  // 0: sums[block number]; 1: Counts.l1; 2: Counts.ssim
+    uint target;  // REDUCE_*
     float scale;  // applied to the result
 };
 
 struct UpdatePush {
     uint splats;
-    uint planes;  // texel planes stored a splat
+    uint planes;  // texel planes a splat
     uint instance_capacity;
     float mean_rate, opacity_rate, quaternion_rate, scale_rate, sh0_rate, sh_rest_rate;
     float bias1, bias2;  // 1 / (1 - beta^step)
     float half_size[2];  // W / 2, H / 2: px to normalised device coordinates
-    float opacity_pull;  // regularisers: d(loss)/d(opacity), d(loss)/d(scale) of every splat
-    float scale_pull;
+    // With UPDATE_REGULARISED: d(loss)/d(opacity) and d(loss)/d(scale along one axis) of every splat.
+    float opacity_weight, scale_weight;
 };
 
 struct DensifyPush {
     uint splats;        // of the old buffers
-    uint planes;        // texel planes stored a splat
-    uint new_capacity;  // splats there is room for in the new buffers
+    uint planes;        // texel planes a splat
+    uint new_capacity;  // splats that the new buffers hold
     uint scan_block;
     float grow_gradient;  // threshold of the mean gradient norm
-    float split_scale;    // world units; larger than this: split, else clone
+    float split_scale;    // world units; a larger splat is split, another is cloned
     float prune_opacity;  // logit
-    float prune_scale;    // world units; 0: do not prune by scale
+    float prune_scale;    // world units; a larger splat is pruned; 0: none is
     uint seed[2];
     uint step;
-    uint revised_opacity;  // 1: what a split leaves in one place is as opaque as what it replaced
+    uint revised_opacity;  // 1: a split's two children in one place are together as opaque as their parent
 };
 
 struct ResetPush {
     uint splats;
-    uint planes;  // texel planes stored a splat
+    uint planes;  // texel planes a splat
     float logit;
 };
 
 struct McmcPush {
-    uint splats, planes;  // before; texel planes stored a splat
-    uint new_splats;
+    uint splats;      // of the old buffers
+    uint planes;      // texel planes a splat
+    uint new_splats;  // of the new buffers
     uint scan_block;
-    uint dead, draws, total;  // splats to relocate; sources to draw; sum of the weights
-    float weight_scale;       // weight of an opacity of 1
-    float dead_logit;         // at or under it a splat is dead
-    float least_opacity;      // of a splat that shares its source's
-    float spread;             // standard deviations of the source that it and its copies move apart
+    uint dead;            // splats to relocate
+    uint draws;           // sources to draw
+    uint total;           // sum of the weights
+    float weight_scale;   // weight of an opacity of 1
+    float dead_logit;     // a splat at or below it is dead
+    float least_opacity;  // lower bound of the opacity that a source and its copies share
+    float spread;         // standard deviations of the source by which it and its copies move apart
     uint seed[2];
     uint step;
 };
 
 struct PerturbPush {
-    uint splats, planes;
+    uint splats;
+    uint planes;  // texel planes a splat
     uint instance_capacity;
     float amplitude;
-    float reach;  // the longest noise (world units)
+    float max_length;  // of the noise along an axis of the splat (world units)
     uint seed[2];
     uint step;
 };
 
-// ---- A mesh scene as rays meet it: buffers of rgba32ui texels that hold floats by their bits ----
-// Positions are relative to an origin that the host subtracts in float64 first.
-// Node: of each of two children low x y z, reference; high x y z, 0. A reference is a node's number, or a
-// leaf's LEAF_FLAG, triangles - 1 in LEAF_COUNT_BITS bits and its first triangle. A child that is none has
-// low above high.
+// ---- A mesh scene for ray tracing: buffers of rgba32ui texels that hold floats by their bits ----
+// Positions are relative to an origin, which the host subtracts in float64.
+// Node: for each of two children low x y z, reference; high x y z, 0. A reference is the index of a
+// node, or of a leaf: LEAF_FLAG, triangles - 1 at LEAF_COUNT_SHIFT, and the first triangle. A missing
+// child has low above high.
 EWA_UINT(NODE_TEXELS, 4u);
 EWA_UINT(LEAF_FLAG, 0x80000000u);
 EWA_UINT(LEAF_COUNT_SHIFT, 28u);
 EWA_UINT(LEAF_FIRST_MASK, 0x0fffffffu);
-// Triangle: corner 0 x y z, material; corner 1 - corner 0, 0; corner 2 - corner 0, 1 where cameras see its
-// back.
+// Triangle: corner 0 x y z, material; corner 1 - corner 0, 0; corner 2 - corner 0, 1 if cameras see its back.
 EWA_UINT(TRIANGLE_TEXELS, 3u);
-// Surface: three normals (octahedral, 2 x snorm16), colour 0; uv 0, uv 1; uv 2, colour 1, colour 2 (RGBA, 4 x
-// unorm8).
+// Surface: three normals (octahedral, 2 x snorm16), colour 0; uv 0, uv 1; uv 2, colour 1, colour 2. Colours
+// are RGBA, 4 x unorm8.
 EWA_UINT(SURFACE_TEXELS, 3u);
-// Material: base r g b, opacity; metallic, roughness, F0 of the dielectric, F90 of it; emitted r g b, cut-off
-// or 0; textures of base, metal and roughness, emission (NO_TEXTURE: none), MATERIAL_* flags; density of
-// light sampling (per area) on its triangles, 0 0 0.
+// Material: base r g b, opacity; metallic, roughness, F0 and F90 of the dielectric; emitted r g b, cut-off or
+// 0; textures of base, metal and roughness, emission (NO_TEXTURE: none), MATERIAL_* flags; density of light
+// sampling per area of its triangles, 0 0 0.
 EWA_UINT(MATERIAL_TEXELS, 5u);
 EWA_UINT(NO_TEXTURE, 0xffffffffu);
 EWA_UINT(MATERIAL_TWO_SIDED, 1u);  // emits on both sides, and cameras see its back
-EWA_UINT(MATERIAL_MASKED, 2u);     // is there where its opacity reaches the cut-off
+EWA_UINT(MATERIAL_MASKED, 2u);     // exists only where its opacity reaches the cut-off
 EWA_UINT(MATERIAL_BLENDED, 4u);    // stops a ray with the probability of its opacity
 EWA_UINT(MATERIAL_UNLIT, 8u);      // emits its base colour, vertex colours included
 // Texture: first texel, width, height, TEXTURE_* flags.
@@ -279,14 +311,13 @@ EWA_UINT(WRAP_CLAMP, 1u);
 EWA_UINT(WRAP_MIRROR, 2u);
 EWA_UINT(TEXTURE_WRAP_T_SHIFT, 2u);
 EWA_UINT(TEXTURE_NEAREST, 16u);
-// Light: position (directional: direction to it; triangle: 0), LIGHT_* kind; r g b, probability to be drawn;
-// spot's direction, range or 0 (triangle: its number); spot's scale and offset, alias threshold, alias.
+// Light: position (directional: direction to it; triangle: 0), LIGHT_* kind; r g b, probability; spot's
+// direction, range or 0 (triangle: its index); spot's scale and offset, alias threshold, alias.
 EWA_UINT(LIGHT_TEXELS, 4u);
 EWA_UINT(LIGHT_DIRECTIONAL, 0u);
 EWA_UINT(LIGHT_POINT, 1u);
 EWA_UINT(LIGHT_SPOT, 2u);
 EWA_UINT(LIGHT_TRIANGLE, 3u);
-EWA_UINT(SPEC_ALPHA_TESTED, 9u);  // 1: some material is masked or blended
 
 struct TraceView {
     float rotation[9];                       // world to camera, rows
@@ -298,9 +329,9 @@ struct TraceView {
     float sample_max;                        // radiance
 };
 
-// Integer sums, the same in any order.
+// Integer sums: their order does not matter.
 struct TraceCounts {
-    uint unfinished_rays;  // ended by the limit on steps
+    uint unfinished_rays;  // ended by the step limit
     uint dropped_samples;  // not finite
 };
 

@@ -68,7 +68,7 @@ void take_error(const std::vector<glm::dvec3>& exact, const std::vector<glm::dve
 
 struct SplattingChoice {
     std::string series, name;
-    Kernel kernel = Kernel::peak;
+    Footprint kernel = Footprint::peak;
     int sh_degree = 3;
     double alpha_min = shared::ALPHA_MIN;
     uint32_t tile_height = 0;  // 0: the tile of the device
@@ -81,26 +81,31 @@ AccuracyPoint splat(const std::shared_ptr<gpu::Device>& device, const Gaussians&
     RenderOptions own = options;
     own.kernel = choice.kernel;
     own.sh_degree = choice.sh_degree;
-    passes::Shape shape = passes::shape_for(device->limits());
-    shape.cut_off = float(choice.alpha_min);
-    if (choice.tile_height > 0) shape.tile_height = choice.tile_height;
-    pipeline::Kernels kernels(*device, shape);
+    passes::KernelConfig config = passes::config_for(device->limits());
+    config.cut_off = float(choice.alpha_min);
+    if (choice.tile_height > 0) config.tile_height = choice.tile_height;
+    passes::PassCache cache(*device, config);
     gpu::Executor executor(*device);
-    const pipeline::Plan plan = pipeline::plan_picture(gaussians, own, false);
+    const pipeline::Plan plan = pipeline::plan_for(
+        {.scene_degree = gaussians.sh_degree, .present_degree = sh_degree_present(gaussians), .render = own});
     const pipeline::Model model = pipeline::upload_model(*device, gaussians, 0, false);
-    const shared::CameraBlock block = pipeline::camera_block(camera, shape, model.origin);
+    const shared::CameraBlock block = pipeline::camera_block(camera, config, model.origin);
     gpu::Buffer buffer(*device, "camera", sizeof(block), gpu::Texel::none, true);
     buffer.upload(std::span<const shared::CameraBlock>(&block, 1));
-    const pipeline::CameraUse use{&buffer, 0, uint32_t(camera.width), uint32_t(camera.height)};
-    pipeline::Frame frame;
+    const pipeline::FrameInputs inputs{
+        .camera = {.buffer = &buffer, .width = uint32_t(camera.width), .height = uint32_t(camera.height)},
+        .background = own.background,
+        .sh_degree = own.sh_degree};
+    pipeline::FrameBuffers frame;
     frame.instance_capacity = pipeline::first_capacity(model.splats);
     const auto draw = [&] {
         pipeline::run_until_it_fits(
-            kernels, executor, frame,
-            {model.splats, use.width, use.height, frame.instance_capacity, false, false},
-            [&](gpu::Recording& recording) {
-                pipeline::record_forward(recording, kernels, plan, model, frame, use, own.background);
-            });
+            cache, executor, frame,
+            {.splats = model.splats,
+             .width = inputs.camera.width,
+             .height = inputs.camera.height,
+             .instances = frame.instance_capacity},
+            [&](gpu::Recording& recording) { record_forward(recording, cache, plan, model, frame, inputs); });
     };
     AccuracyPoint point;
     point.name = choice.name;
@@ -120,17 +125,18 @@ std::vector<SplattingChoice> splatting_choices(const Gaussians& gaussians, const
     std::vector<SplattingChoice> choices;
     for (const int per : {16, 64, 255, 1024, 4096})
         choices.push_back(
-            {"splatting, cut-off", "1/" + std::to_string(per), Kernel::peak, degree, 1.0 / per, 0});
+            {"splatting, cut-off", "1/" + std::to_string(per), Footprint::peak, degree, 1.0 / per, 0});
     for (int d = 0; d <= degree; ++d)
-        choices.push_back({"splatting, SH degree", std::to_string(d), Kernel::peak, d, shared::ALPHA_MIN, 0});
-    const passes::Shape shape = passes::shape_for(limits);
+        choices.push_back(
+            {"splatting, SH degree", std::to_string(d), Footprint::peak, d, shared::ALPHA_MIN, 0});
+    const passes::KernelConfig config = passes::config_for(limits);
     for (const uint32_t height :
-         {shape.tile_height / 2, shape.tile_height, 2 * shape.tile_height, 4 * shape.tile_height})
-        choices.push_back({"splatting, tile", text_of("%ux%u", shape.tile_width, height), Kernel::peak,
+         {config.tile_height / 2, config.tile_height, 2 * config.tile_height, 4 * config.tile_height})
+        choices.push_back({"splatting, tile", text_of("%ux%u", config.tile_width, height), Footprint::peak,
                            degree, shared::ALPHA_MIN, height});
-    choices.push_back({"splatting, kernel", "peak", Kernel::peak, degree, shared::ALPHA_MIN, 0});
-    choices.push_back({"splatting, kernel", "antialias", Kernel::antialias, degree, shared::ALPHA_MIN, 0});
-    choices.push_back({"splatting, kernel", "unit mass", Kernel::unit_mass, degree, shared::ALPHA_MIN, 0});
+    choices.push_back({"splatting, kernel", "peak", Footprint::peak, degree, shared::ALPHA_MIN, 0});
+    choices.push_back({"splatting, kernel", "antialias", Footprint::antialias, degree, shared::ALPHA_MIN, 0});
+    choices.push_back({"splatting, kernel", "unit mass", Footprint::unit_mass, degree, shared::ALPHA_MIN, 0});
     return choices;
 }
 

@@ -22,12 +22,12 @@ namespace {
 struct Lists {
     std::vector<float> records;
     std::vector<uint32_t> tile_counts, order, prefix, totals;  // one per splat; totals: one per block
-    std::vector<uint32_t> keys, places, splats, tile_starts;   // one per instance; tile_starts: one per tile
+    std::vector<uint32_t> keys, indices, splats, tile_starts;  // one per instance; tile_starts: one per tile
     uint32_t scan_block = 1, tiles = 0, instances = 0;
 };
 
 Lists download(const FrameRun& run) {
-    const pipeline::Frame& frame = run.frame();
+    const pipeline::FrameBuffers& frame = run.frame();
     const pipeline::Sizes& sizes = frame.sizes;
     const size_t n = run.model().splats;
     Lists lists;
@@ -39,7 +39,7 @@ Lists download(const FrameRun& run) {
     lists.totals = frame.scan_totals.download<uint32_t>(size_t(sizes.scan_blocks) + 1);
     lists.instances = run.counts().instances;
     lists.keys = frame.instance_keys[sizes.tile_sort.passes & 1].download<uint32_t>(lists.instances);
-    if (run.plan().gradients) lists.places = run.sorted().places->download<uint32_t>(lists.instances);
+    if (run.plan().gradients) lists.indices = run.sorted().indices->download<uint32_t>(lists.instances);
     lists.splats = run.sorted_splats();
     lists.tile_starts = run.tile_starts();
     lists.scan_block = sizes.scan_block;
@@ -92,8 +92,8 @@ Check check_tile_order(const Lists& lists) {
         wrong += lists.keys[k - 1] > lists.keys[k] || (lists.keys[k - 1] == lists.keys[k] && !later);
     }
     for (size_t i = 0; i < n; ++i) wrong += times[i] != lists.tile_counts[i];
-    std::vector<uint32_t> taken(lists.places.size());
-    for (const uint32_t place : lists.places) wrong += place >= taken.size() || ++taken[place] != 1;
+    std::vector<uint32_t> taken(lists.indices.size());
+    for (const uint32_t index : lists.indices) wrong += index >= taken.size() || ++taken[index] != 1;
     return wrong_entries("tile order: wrong entries", wrong);
 }
 

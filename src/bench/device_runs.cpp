@@ -25,45 +25,49 @@ RenderOptions black_background(int sh_degree) {
 FrameRun::FrameRun(std::shared_ptr<gpu::Device> device, const BenchScene& scene, bool train,
                    const std::optional<RenderOptions>& options)
     : device_(std::move(device)),
-      kernels_(*device_),
+      cache_(*device_),
       executor_(*device_),
       options_(options.value_or(black_background(scene.gaussians.sh_degree))),
-      plan_(train ? plan_training(scene.gaussians.sh_degree, options_, false)
-                  : plan_picture(scene.gaussians, options_, false)),
+      plan_(plan_for({.purpose = train ? Purpose::training : Purpose::picture,
+                      .scene_degree = scene.gaussians.sh_degree,
+                      .present_degree = sh_degree_present(scene.gaussians),
+                      .render = options_})),
       model_(upload_model(*device_, scene.gaussians, train ? 2 : 0, false)),
       camera_(scene.camera),
       train_(train) {
-    const shared::CameraBlock block = camera_block(camera_, kernels_.shape(), model_.origin);
+    const shared::CameraBlock block = camera_block(camera_, cache_.config(), model_.origin);
     camera_buffer_ = gpu::Buffer(*device_, "camera", sizeof(block), gpu::Texel::none, true);
     camera_buffer_.upload(std::span<const shared::CameraBlock>(&block, 1));
-    camera_use_ = {&camera_buffer_, 0, uint32_t(camera_.width), uint32_t(camera_.height)};
+    inputs_ = {.camera = {.buffer = &camera_buffer_,
+                          .width = uint32_t(camera_.width),
+                          .height = uint32_t(camera_.height)},
+               .background = options_.background,
+               .sh_degree = options_.sh_degree};
     if (train_) photo_ = upload_photo(*device_, scene.photo);
     frame_.instance_capacity = first_capacity(model_.splats);
     run();
 }
 
 void FrameRun::record(gpu::Recording& recording) {
-    sorted_ = record_forward(recording, kernels_, plan_, model_, frame_, camera_use_, options_.background);
+    sorted_ = record_forward(recording, cache_, plan_, model_, frame_, inputs_);
     if (!train_) return;
-    record_loss(recording, kernels_, frame_, camera_use_, options_.background, photo_);
-    record_backward(recording, kernels_, plan_, model_, frame_, camera_use_, options_.background, sorted_,
-                    rates_);
+    record_loss(recording, cache_, frame_, inputs_, photo_);
+    record_backward(recording, cache_, plan_, model_, frame_, inputs_, sorted_, rates_);
 }
 
 void FrameRun::run() {
-    counts_ = run_until_it_fits(
-        kernels_, executor_, frame_,
-        {model_.splats, camera_use_.width, camera_use_.height, frame_.instance_capacity, train_, false},
-        [&](gpu::Recording& recording) { record(recording); });
+    counts_ = run_until_it_fits(cache_, executor_, frame_,
+                                {.splats = model_.splats,
+                                 .width = inputs_.camera.width,
+                                 .height = inputs_.camera.height,
+                                 .instances = frame_.instance_capacity,
+                                 .gradients = train_},
+                                [&](gpu::Recording& recording) { record(recording); });
 }
 
 gpu::Recording FrameRun::only(const gpu::Command& command) const {
     gpu::Recording alone(device_->limits());
-    const gpu::Use& target = command.uses.front();
-    if (command.kind == gpu::Command::Kind::fill)
-        alone.fill(*target.buffer, command.fill_value, command.target_offset, command.bytes);
-    else
-        alone.dispatch_bytes(*command.pipeline, command.name, command.uses, command.push, command.groups);
+    alone.append(command);
     return alone;
 }
 
@@ -97,11 +101,11 @@ std::vector<float> FrameRun::records() const {
 }
 
 SortRun::SortRun(std::shared_ptr<gpu::Device> device, uint32_t items)
-    : device_(std::move(device)), kernels_(*device_), executor_(*device_), items_(items), input_(items) {
+    : device_(std::move(device)), cache_(*device_), executor_(*device_), items_(items), input_(items) {
     pipeline::FrameRequest request;
     request.splats = items;
     request.width = request.height = 8;
-    const pipeline::Sizes sizes = pipeline::sizes_for(kernels_.shape(), request);
+    const pipeline::Sizes sizes = pipeline::sizes_for(cache_.config(), request);
     cut_ = sizes.depth_sort;
     for (uint32_t i = 0; i < items; ++i) input_[i] = core::pcg4d({i, 0x736f7274u, 0, 0})[0];
     source_ = gpu::Buffer(*device_, "input", sizes.splat_words);
@@ -117,16 +121,17 @@ SortRun::SortRun(std::shared_ptr<gpu::Device> device, uint32_t items)
 void SortRun::run() {
     gpu::Recording recording(device_->limits());
     recording.copy(source_, 0, keys_[0], 0, uint64_t(items_) * 4);
-    result_ = record_sort(recording, kernels_,
-                          {{&keys_[0], &keys_[1]},
-                           {&values_[0], &values_[1]},
-                           {},
-                           true,
-                           counters_,
-                           counter_prefix_,
-                           digit_totals_,
-                           counts_},
-                          cut_, items_, items_, true, "sort");
+    result_ =
+        record_sort(recording, cache_,
+                    {.keys = {&keys_[0], &keys_[1]},
+                     .values = {&values_[0], &values_[1]},
+                     .indices = {},
+                     .own_indices = true,
+                     .counters = counters_,
+                     .counter_prefix = counter_prefix_,
+                     .digit_totals = digit_totals_,
+                     .counts = counts_},
+                    {.cut = cut_, .items = items_, .capacity = items_, .keep_keys = true, .name = "sort"});
     executor_.run(recording, true);
 }
 

@@ -34,10 +34,10 @@ class FrameRun {
     void set_rates(const pipeline::Rates& rates) { rates_ = rates; }
 
     const std::vector<gpu::Timing>& timings() const { return executor_.timings(); }
-    const pipeline::Kernels& kernels() const { return kernels_; }
+    const passes::PassCache& cache() const { return cache_; }
     const pipeline::Plan& plan() const { return plan_; }
     const pipeline::Model& model() const { return model_; }
-    const pipeline::Frame& frame() const { return frame_; }
+    const pipeline::FrameBuffers& frame() const { return frame_; }
     const pipeline::Sorted& sorted() const { return sorted_; }
     const Camera& camera() const { return camera_; }
     const RenderOptions& options() const { return options_; }
@@ -50,19 +50,19 @@ class FrameRun {
 
   private:
     void record(gpu::Recording& recording);
-    gpu::Recording only(const gpu::Command& command) const;  // a dispatch or a fill
+    gpu::Recording only(const gpu::Command& command) const;
 
     std::shared_ptr<gpu::Device> device_;
-    pipeline::Kernels kernels_;
+    passes::PassCache cache_;
     gpu::Executor executor_;
     RenderOptions options_;
     pipeline::Plan plan_;
     pipeline::Model model_;
-    pipeline::Frame frame_;
+    pipeline::FrameBuffers frame_;
     pipeline::Rates rates_;
     Camera camera_;
     gpu::Buffer camera_buffer_, photo_;
-    pipeline::CameraUse camera_use_;
+    pipeline::FrameInputs inputs_;
     pipeline::Sorted sorted_;
     shared::Counts counts_{};
     bool train_ = false;
@@ -82,7 +82,7 @@ class SortRun {
 
   private:
     std::shared_ptr<gpu::Device> device_;
-    pipeline::Kernels kernels_;
+    passes::PassCache cache_;
     gpu::Executor executor_;
     pipeline::RadixCut cut_;
     uint32_t items_;

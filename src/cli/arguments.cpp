@@ -62,7 +62,7 @@ RenderOptions DrawArguments::options() const {
     set("kernel", kernel);
     RenderOptions render = drawn.train.render;
     if (antialias && kernel == "ewa") throw InputError("--antialias and --kernel ewa exclude each other");
-    if (antialias) render.kernel = Kernel::antialias;
+    if (antialias) render.kernel = Footprint::antialias;
     render.sh_degree = sh_degree;
     return render;
 }

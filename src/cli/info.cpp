@@ -16,6 +16,7 @@
 #include "ewa/renderer.h"
 #include "ewa/splat_files.h"
 #include "ewa/synthetic_dataset.h"
+#include "ewa/trainer.h"
 #include "report/summary.h"
 
 namespace ewa::cli {
@@ -64,8 +65,10 @@ void info_splats(const fs::path& path, bool json) {
     const SplatScene scene = read_splats(path);
     const Gaussians& gaussians = scene.gaussians;
     const SplatStatistics statistics = splat_statistics(gaussians);
-    const auto rendering = plan_lines(gaussians, RenderOptions{}, Purpose::picture);
-    const auto training = plan_lines(gaussians, RenderOptions{}, Purpose::densifying);
+    TrainOptions options;
+    options.strategy = strategy_for(options.steps);
+    const auto rendering = plan_lines(gaussians, RenderOptions{});
+    const auto training = plan_lines(gaussians, options);
     if (json) {
         const Json out = {{"kind", "splats"},
                           {"format", name_of(scene.format)},

@@ -73,9 +73,9 @@ void add_run_options(CLI::App& app, TrainArguments& arguments) {
 
 void settle_kernel(TrainArguments& arguments) {
     if (!arguments.antialias) return;
-    Kernel& kernel = arguments.run.train.render.kernel;
-    if (kernel == Kernel::unit_mass) throw InputError("--antialias and --kernel ewa exclude each other");
-    kernel = Kernel::antialias;
+    Footprint& kernel = arguments.run.train.render.kernel;
+    if (kernel == Footprint::unit_mass) throw InputError("--antialias and --kernel ewa exclude each other");
+    kernel = Footprint::antialias;
 }
 
 /// Renders a mesh scene into the run's folder, which becomes the dataset. Returns false if Ctrl-C ended that.

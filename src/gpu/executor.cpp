@@ -57,15 +57,16 @@ vk::DescriptorSet Executor::bind(const Command& command, vk::DescriptorPool pool
     std::deque<vk::BufferView> views;
     std::vector<vk::WriteDescriptorSet> updates;
     for (size_t i = 0; i < command.uses.size(); ++i) {
-        const Use& use = command.uses[i];
-        const BindingKind kind = command.pipeline->reflection().bindings[i].kind;
+        const BufferPart& part = command.uses[i].part;
+        const Binding& binding = command.pipeline->reflection().bindings[i];
         vk::WriteDescriptorSet update;
-        update.setDstSet(set).setDstBinding(use.binding).setDescriptorType(descriptor_type(kind));
-        if (kind == BindingKind::texel)
-            update.setTexelBufferView(views.emplace_back(use.buffer->view()));
+        update.setDstSet(set).setDstBinding(binding.binding).setDescriptorType(descriptor_type(binding.kind));
+        if (binding.kind == BindingKind::texel)
+            update.setTexelBufferView(views.emplace_back(part.buffer->view()));
         else
-            update.setBufferInfo(infos.emplace_back(
-                use.buffer->handle(), use.offset, use.bytes ? use.bytes : use.buffer->bytes() - use.offset));
+            update.setBufferInfo(
+                infos.emplace_back(part.buffer->handle(), part.offset,
+                                   part.bytes ? part.bytes : part.buffer->bytes() - part.offset));
         updates.push_back(update);
     }
     device_.handle().updateDescriptorSets(updates, {});
@@ -88,10 +89,10 @@ void Executor::record(const Recording& recording, vk::CommandBuffer commands, bo
         if (command.barrier_before)
             commands.pipelineBarrier(work, work, {}, vk::MemoryBarrier(written, used), {}, {});
         if (command.kind == Command::Kind::fill) {
-            commands.fillBuffer(command.uses[0].buffer->handle(), command.target_offset, command.bytes,
+            commands.fillBuffer(command.uses[0].part.buffer->handle(), command.target_offset, command.bytes,
                                 command.fill_value);
         } else if (command.kind == Command::Kind::copy) {
-            commands.copyBuffer(command.uses[0].buffer->handle(), command.uses[1].buffer->handle(),
+            commands.copyBuffer(command.uses[0].part.buffer->handle(), command.uses[1].part.buffer->handle(),
                                 vk::BufferCopy(command.source_offset, command.target_offset, command.bytes));
         } else {
             const vk::PipelineBindPoint compute = vk::PipelineBindPoint::eCompute;
@@ -105,7 +106,7 @@ void Executor::record(const Recording& recording, vk::CommandBuffer commands, bo
         }
         stamp();
     }
-    // The fence alone makes nothing visible to the host.
+    // The fence alone does not make writes visible to the host.
     commands.pipelineBarrier(work, Stage::eHost, {}, vk::MemoryBarrier(written, Flag::eHostRead), {}, {});
 }
 
@@ -126,8 +127,9 @@ void Executor::run(const Recording& recording, bool timed) {
             throw RunError("the device did not finish");
         if (timed) read_timings(recording);
     } catch (const vk::DeviceLostError&) {
-        throw RunError("device " + device_.info().name +
-                       " was lost: its driver has reset it, or it is gone; a training goes on with --resume");
+        throw RunError(
+            "device " + device_.info().name +
+            " was lost: its driver has reset it, or it is gone; --resume continues a training run");
     } catch (const vk::SystemError& error) {
         throw RunError("device " + device_.info().name + ": " + error.what());
     }

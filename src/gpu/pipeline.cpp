@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gpu/pipeline.h"
 
+#include <algorithm>
+#include <stdexcept>
+
 #include "ewa/error.h"
 
 namespace ewa::gpu {
@@ -19,6 +22,10 @@ vk::DescriptorType descriptor_type(BindingKind kind) {
 Pipeline::Pipeline(Device& device, std::string name, std::span<const uint32_t> spirv,
                    const std::vector<SpecConstant>& constants)
     : name_(std::move(name)), reflection_(reflect(spirv)) {
+    for (const uint32_t id : reflection_.constants)
+        if (std::none_of(constants.begin(), constants.end(), [&](const auto& c) { return c.id == id; }))
+            throw std::logic_error("shader " + name_ + ": specialisation constant " + std::to_string(id) +
+                                   " is not given");
     try {
         std::vector<vk::DescriptorSetLayoutBinding> bindings;
         for (const Binding& binding : reflection_.bindings)

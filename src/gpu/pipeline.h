@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// One compute shader with its specialisation constants, ready to be dispatched.
+// One compiled compute shader with its specialisation constants.
 #pragma once
+#include <compare>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -14,11 +15,13 @@ namespace ewa::gpu {
 struct SpecConstant {
     uint32_t id = 0;
     uint32_t value = 0;
+    auto operator<=>(const SpecConstant&) const = default;
 };
 
 class Pipeline {
   public:
-    /// Throws RunError with the shader's name when the driver refuses it.
+    /// constants: those that the shader does not declare are ignored. Throws std::logic_error if one that it
+    /// declares is missing, and RunError if the driver refuses the shader; both name the shader.
     Pipeline(Device& device, std::string name, std::span<const uint32_t> spirv,
              const std::vector<SpecConstant>& constants);
 

@@ -15,34 +15,26 @@ bool has(Access access, Access part) {
     throw std::logic_error("shader " + pipeline.name() + ": " + what);
 }
 
-void check_use(const Pipeline& pipeline, const Binding& declared, const Use& use) {
-    const std::string at = "binding " + std::to_string(use.binding) + " (" + use.buffer->name() + ")";
-    if (declared.access != use.access)
-        fail(pipeline, at + " is declared " + to_string(use.access) + " by the pass and " +
-                           to_string(declared.access) + " by the shader");
-    if (declared.kind == BindingKind::texel && use.buffer->texel() == Texel::none)
+void check_part(const Pipeline& pipeline, const Binding& binding, const BufferPart& part) {
+    const std::string at = "binding " + std::to_string(binding.binding) + " (" + part.buffer->name() + ")";
+    if (binding.kind == BindingKind::texel && part.buffer->texel() == Texel::none)
         fail(pipeline, at + " is fetched as texels, and the buffer has no texel format");
-    if (declared.kind == BindingKind::uniform && !use.buffer->uniform())
+    if (binding.kind == BindingKind::uniform && !part.buffer->uniform())
         fail(pipeline, at + " is a uniform block, and the buffer was not made for that");
-    if (declared.kind == BindingKind::texel && use.offset != 0)
+    if (binding.kind == BindingKind::texel && part.offset != 0)
         fail(pipeline, at + " is a part of a texel buffer");
-    if (use.offset + use.bytes > use.buffer->bytes()) fail(pipeline, at + " reaches past the buffer's end");
+    if (part.offset + part.bytes > part.buffer->bytes())
+        fail(pipeline, at + " reaches past the buffer's end");
 }
 
 }  // namespace
 
-void Recording::dispatch_bytes(const Pipeline& pipeline, std::string name, std::vector<Use> uses,
-                               std::span<const std::byte> push, std::array<uint32_t, 3> groups) {
+void Recording::dispatch(const Pipeline& pipeline, std::string name, std::span<const BufferPart> parts,
+                         std::span<const std::byte> push, std::array<uint32_t, 3> groups) {
     const Reflection& shader = pipeline.reflection();
-    std::sort(uses.begin(), uses.end(), [](const Use& a, const Use& b) { return a.binding < b.binding; });
-    if (uses.size() != shader.bindings.size())
+    if (parts.size() != shader.bindings.size())
         fail(pipeline, "declares " + std::to_string(shader.bindings.size()) + " bindings, the pass gives " +
-                           std::to_string(uses.size()));
-    for (size_t i = 0; i < uses.size(); ++i) {
-        if (uses[i].binding != shader.bindings[i].binding)
-            fail(pipeline, "has no binding " + std::to_string(uses[i].binding) + ", or it was given twice");
-        check_use(pipeline, shader.bindings[i], uses[i]);
-    }
+                           std::to_string(parts.size()));
     if (push.size() != shader.push_constant_bytes)
         fail(pipeline, "takes " + std::to_string(shader.push_constant_bytes) +
                            " bytes of push constants, the pass gives " + std::to_string(push.size()));
@@ -51,9 +43,12 @@ void Recording::dispatch_bytes(const Pipeline& pipeline, std::string name, std::
             fail(pipeline, "a dispatch of " + std::to_string(count) + " workgroups (1 to " +
                                std::to_string(limits_.max_groups) + " are possible)");
     Command command;
+    for (size_t i = 0; i < parts.size(); ++i) {
+        check_part(pipeline, shader.bindings[i], parts[i]);
+        command.uses.push_back({parts[i], shader.bindings[i].access});
+    }
     command.name = std::move(name);
     command.pipeline = &pipeline;
-    command.uses = std::move(uses);
     command.push.assign(push.begin(), push.end());
     command.groups = groups;
     append(std::move(command));
@@ -62,11 +57,12 @@ void Recording::dispatch_bytes(const Pipeline& pipeline, std::string name, std::
 void Recording::fill(const Buffer& target, uint32_t value, uint64_t offset, uint64_t bytes) {
     if (bytes == 0) return;
     if (offset % 4 || bytes % 4 || offset + bytes > target.bytes())
-        throw std::logic_error("fill of " + target.name() + " outside the buffer or off its 4 byte grid");
+        throw std::logic_error("fill of " + target.name() +
+                               " outside the buffer or not a multiple of 4 bytes");
     Command command;
     command.kind = Command::Kind::fill;
     command.name = "fill " + target.name();
-    command.uses = {writes(0, target)};
+    command.uses = {{target, Access::write}};
     command.fill_value = value;
     command.target_offset = offset;
     command.bytes = bytes;
@@ -81,7 +77,7 @@ void Recording::copy(const Buffer& source, uint64_t source_offset, const Buffer&
     Command command;
     command.kind = Command::Kind::copy;
     command.name = "copy " + source.name();
-    command.uses = {reads(0, source), writes(1, target)};
+    command.uses = {{source, Access::read}, {target, Access::write}};
     command.source_offset = source_offset;
     command.target_offset = target_offset;
     command.bytes = bytes;
@@ -93,17 +89,18 @@ void Recording::append(Command command) {
         return std::find_if(states_.begin(), states_.end(),
                             [&](const State& s) { return s.buffer == buffer; });
     };
-    // A command must wait when it reads what was written, or writes what was read or written, since the last
-    // barrier.
+    // A command needs a barrier if, since the last one, a buffer that it reads was written, or a buffer that
+    // it writes was read or written.
+    command.barrier_before = false;
     for (const Use& use : command.uses) {
-        const auto state = state_of(use.buffer);
+        const auto state = state_of(use.part.buffer);
         if (state == states_.end()) continue;
         if (state->written || (state->read && has(use.access, Access::write))) command.barrier_before = true;
     }
     if (command.barrier_before) states_.clear();
     for (const Use& use : command.uses) {
-        auto state = state_of(use.buffer);
-        if (state == states_.end()) state = states_.insert(states_.end(), {use.buffer, false, false});
+        auto state = state_of(use.part.buffer);
+        if (state == states_.end()) state = states_.insert(states_.end(), {use.part.buffer, false, false});
         state->read = state->read || has(use.access, Access::read);
         state->written = state->written || has(use.access, Access::write);
     }
@@ -116,7 +113,7 @@ std::string Recording::describe() const {
         if (command.barrier_before) text += "barrier\n";
         text += command.name + ":";
         for (const Use& use : command.uses)
-            text += " " + use.buffer->name() + (has(use.access, Access::read) ? ":r" : ":") +
+            text += " " + use.part.buffer->name() + (has(use.access, Access::read) ? ":r" : ":") +
                     (has(use.access, Access::write) ? "w" : "");
         text += "\n";
     }

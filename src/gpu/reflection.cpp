@@ -25,6 +25,7 @@ enum Op : uint32_t {
     kOpMemberDecorate = 72
 };
 enum Decoration : uint32_t {
+    kSpecId = 1,
     kDecorationArrayStride = 6,
     kNonWritable = 24,
     kNonReadable = 25,
@@ -35,7 +36,8 @@ enum Decoration : uint32_t {
 enum Storage : uint32_t { kUniformConstant = 0, kUniform = 2, kPushConstant = 9, kStorageBuffer = 12 };
 
 struct Module {
-    std::map<uint32_t, uint32_t> binding, set;                     // variable -> number
+    std::map<uint32_t, uint32_t> binding, set;  // variable -> number
+    std::set<uint32_t> spec_ids;
     std::map<uint32_t, std::set<uint32_t>> read_only, write_only;  // struct -> members
     std::set<uint32_t> variable_read_only, variable_write_only;
     std::map<uint32_t, std::map<uint32_t, uint32_t>> offsets;   // struct -> member -> byte offset
@@ -55,6 +57,7 @@ struct Module {
 void read_decoration(Module& module, uint32_t op, std::span<const uint32_t> words) {
     const uint32_t target = words[1];
     if (op == kOpDecorate) {
+        if (words[2] == kSpecId) module.spec_ids.insert(words[3]);
         if (words[2] == kDecorationBinding) module.binding[target] = words[3];
         if (words[2] == kDecorationSet) module.set[target] = words[3];
         if (words[2] == kNonWritable) module.variable_read_only.insert(target);
@@ -119,10 +122,6 @@ Access storage_access(const Module& module, uint32_t variable, uint32_t type) {
 
 }  // namespace
 
-std::string to_string(Access access) {
-    return access == Access::read ? "read" : access == Access::write ? "write" : "read and write";
-}
-
 Reflection reflect(std::span<const uint32_t> spirv) {
     const Module module = parse(spirv);
     Reflection result;
@@ -150,6 +149,9 @@ Reflection reflect(std::span<const uint32_t> spirv) {
     }
     std::sort(result.bindings.begin(), result.bindings.end(),
               [](const Binding& a, const Binding& b) { return a.binding < b.binding; });
+    for (uint32_t i = 0; i < result.bindings.size(); ++i)
+        if (result.bindings[i].binding != i) throw std::logic_error("bindings are not numbered without gaps");
+    result.constants.assign(module.spec_ids.begin(), module.spec_ids.end());
     return result;
 }
 

@@ -1,17 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a SPIR-V module declares about its bindings: the truth that a pass's own declaration is held against.
+// What a SPIR-V module declares: its bindings and how it accesses them, push constants, specialisation
+// constants. Recordings take every access from here.
 #pragma once
 #include <cstdint>
 #include <span>
-#include <string>
 #include <vector>
 
 namespace ewa::gpu {
 
 enum class Access : uint32_t { read = 1, write = 2, read_write = 3 };
 enum class BindingKind { storage, uniform, texel };
-
-std::string to_string(Access access);
 
 struct Binding {
     uint32_t binding = 0;
@@ -20,14 +18,15 @@ struct Binding {
 };
 
 struct Reflection {
-    std::vector<Binding> bindings;  // of set 0, ascending; every variable the module declares
+    std::vector<Binding> bindings;  // of set 0; entry i is binding i
     uint32_t push_constant_bytes = 0;
+    std::vector<uint32_t> constants;  // ids of the specialisation constants, ascending
 };
 
-/// Storage blocks: read where every member is NonWritable, write where every member is NonReadable, else
-/// read_write (GLSL readonly and writeonly). Uniform blocks and texel buffers: read. Push constants: bytes
-/// up to the end of the last member. Throws std::logic_error for a module this project
-/// does not produce.
+/// Access of a storage block: read if every member is NonWritable, write if every member is NonReadable
+/// (GLSL readonly and writeonly), else read_write. Uniform blocks and texel buffers: read. Push constants:
+/// bytes up to the end of the last member. Throws std::logic_error if bindings are not numbered from 0
+/// without gaps, or for a module of a kind that this project does not produce.
 Reflection reflect(std::span<const uint32_t> spirv);
 
 }  // namespace ewa::gpu

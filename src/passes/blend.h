@@ -1,35 +1,42 @@
 // SPDX-License-Identifier: Apache-2.0
-// Blends the splats of every tile into the image planes. mode: shared::BLEND_*.
+// Blending of splats into image planes, and its gradient.
 #pragma once
-#include "gpu/recording.h"
-#include "passes/shader_code.h"
-#include "passes/shape.h"
+#include "passes/pass.h"
 
 namespace ewa::passes {
 
-struct Blend {
-    gpu::Pipeline pipeline;
+/// One subgroup owns one tile.
+struct TilePass : SubgroupPass {
+    using Push = shared::BlendPush;
+    static Groups groups(const KernelConfig& c, const Push& push) { return tile_groups(c, push); }
+};
 
+/// Blends the splats of every tile into the image planes. Variant: SPEC_MODE (BLEND_*).
+struct Blend : TilePass {
+    static constexpr char shader[] = "blend";
     struct Buffers {
-        const gpu::Buffer& records;
-        const gpu::Buffer& splats;
-        const gpu::Buffer& tile_starts;
-        const gpu::Buffer& planes;
+        gpu::BufferPart records, splats, tile_starts, planes;
     };
+};
 
-    Blend(gpu::Device& device, const Shape& shape, uint32_t mode)
-        : pipeline(
-              device, "blend", shader_code("blend"),
-              {spec_float(shared::SPEC_CUT_OFF, shape.cut_off), spec(shared::SPEC_GROUP_SIZE, shape.subgroup),
-               spec(shared::SPEC_SUBGROUP, shape.subgroup), spec(shared::SPEC_TILE_WIDTH, shape.tile_width),
-               spec(shared::SPEC_TILE_HEIGHT, shape.tile_height), spec(shared::SPEC_MODE, mode)}) {}
+/// Gradient of blending, written to the slot of every (splat, tile) instance. Variant:
+/// SPEC_MODE (0 or BLEND_BACKWARD_ABSOLUTE).
+struct BlendBackward : TilePass {
+    static constexpr char shader[] = "blend_backward";
+    struct Buffers {
+        gpu::BufferPart records, splats, tile_starts, planes, image_gradient, slots;
+    };
+};
 
-    void record(gpu::Recording& recording, const Shape& shape, const Buffers& buffers,
-                const shared::BlendPush& push) const {
-        recording.dispatch(pipeline, "blend",
-                           {gpu::reads(0, buffers.records), gpu::reads(1, buffers.splats),
-                            gpu::reads(2, buffers.tile_starts), gpu::writes(3, buffers.planes)},
-                           push, tile_groups(shape, push));
+/// Packs the colour planes into 8-bit RGBA. packed: plane_floats words.
+struct Pack : ElementPass {
+    static constexpr char shader[] = "pack";
+    struct Buffers {
+        gpu::BufferPart planes, packed;
+    };
+    using Push = shared::PackPush;
+    static Groups groups(const KernelConfig& c, const Push& push) {
+        return element_groups(c, push.plane_floats / 4);
     }
 };
 

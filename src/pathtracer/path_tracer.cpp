@@ -12,9 +12,9 @@ namespace {
 
 /// The steps of one ray so that an invocation stays below the device's limit on loop iterations. Per bounce,
 /// a path has a ray, a shadow ray, and an iteration of the loop over bounces.
-uint32_t steps_for(const passes::Shape& shape, int samples) {
+uint32_t steps_for(const passes::KernelConfig& config, int samples) {
     const uint32_t surfaces = uint32_t(samples) * (shared::TRACE_BOUNCES + 1);
-    return (shape.loop_limit - surfaces - 1) / (2 * surfaces);
+    return (config.loop_limit - surfaces - 1) / (2 * surfaces);
 }
 
 }  // namespace
@@ -22,10 +22,9 @@ uint32_t steps_for(const passes::Shape& shape, int samples) {
 PathTracer::PathTracer(std::shared_ptr<gpu::Device> device, const pathtracer::PackedScene& scene,
                        const scene::Sky& sky)
     : device_(std::move(device)),
-      shape_(passes::shape_for(device_->limits())),
+      cache_(*device_),
+      variant_{{shared::SPEC_ALPHA_TESTED, scene.alpha_tested ? 1u : 0u}},
       executor_(*device_),
-      paths_(*device_, shape_, scene.alpha_tested),
-      depth_(*device_, shape_, scene.alpha_tested),
       nodes_(upload("mesh nodes", scene.nodes, gpu::Texel::rgba32ui)),
       triangles_(upload("mesh triangles", scene.triangles, gpu::Texel::rgba32ui)),
       surfaces_(upload("mesh surfaces", scene.surfaces, gpu::Texel::rgba32ui)),
@@ -38,6 +37,15 @@ PathTracer::PathTracer(std::shared_ptr<gpu::Device> device, const pathtracer::Pa
       origin_(scene.origin),
       unit_(scene.unit),
       light_count_(scene.light_count) {}
+
+passes::MeshBuffers PathTracer::mesh() const {
+    return {.nodes = nodes_,
+            .triangles = triangles_,
+            .surfaces = surfaces_,
+            .materials = materials_,
+            .textures = textures_,
+            .texels = texels_};
+}
 
 gpu::Buffer PathTracer::upload(const char* name, const std::vector<uint32_t>& words, gpu::Texel texel) {
     gpu::Buffer buffer(*device_, name, words.size() * sizeof(uint32_t), texel);
@@ -73,11 +81,13 @@ gpu::Buffer PathTracer::view_of(const Camera& camera, double brightest) {
 shared::TraceCounts PathTracer::trace_paths(const gpu::Buffer& view, uint64_t pixels, int samples,
                                             uint64_t seed) {
     shared::TracePush push{};
-    push.max_steps = steps_for(shape_, samples_at_once_);
+    push.max_steps = steps_for(cache_.config(), samples_at_once_);
     push.lights = light_count_;
     push.seed[0] = uint32_t(seed);
     push.seed[1] = uint32_t(seed >> 32);
-    const passes::TracePaths::Buffers buffers{mesh(), lights_, view, sums_, counts_};
+    const passes::TracePaths::Buffers buffers{
+        .mesh = mesh(), .lights = lights_, .view = view, .sums = sums_, .counts = counts_};
+    const passes::Groups groups = passes::element_groups(cache_.config(), pixels);
     for (int first = 0; first < samples; first += samples_at_once_) {
         push.first_sample = uint32_t(first);
         push.samples = uint32_t(std::min(samples_at_once_, samples - first));
@@ -87,7 +97,7 @@ shared::TraceCounts PathTracer::trace_paths(const gpu::Buffer& view, uint64_t pi
             recording.fill(sums_, 0, 0, pixels * 16);
             recording.fill(counts_, 0, 0, sizeof(shared::TraceCounts));
         }
-        paths_.record(recording, shape_, buffers, pixels, push);
+        cache_.get<passes::TracePaths>(variant_).record(recording, buffers, push, groups);
         executor_.run(recording);
     }
     return counts_.download<shared::TraceCounts>(1).front();
@@ -118,10 +128,12 @@ PathTracer::Seen PathTracer::seen(const Camera& camera) {
     const uint64_t pixels = uint64_t(camera.width) * uint64_t(camera.height);
     const gpu::Buffer found(*device_, "seen", pixels * 16);
     shared::TracePush push{};
-    push.max_steps = shape_.loop_limit - 1;
+    push.max_steps = cache_.config().loop_limit - 1;
     gpu::Recording recording(device_->limits());
     recording.fill(counts_, 0, 0, sizeof(shared::TraceCounts));
-    depth_.record(recording, shape_, {mesh(), view, found, counts_}, pixels, push);
+    cache_.get<passes::TraceDepth>(variant_).record(
+        recording, {.mesh = mesh(), .view = view, .seen = found, .counts = counts_}, push,
+        passes::element_groups(cache_.config(), pixels));
     executor_.run(recording);
     unfinished_ += counts_.download<shared::TraceCounts>(1).front().unfinished_rays;
 

@@ -9,8 +9,7 @@
 #include "ewa/device.h"
 #include "ewa/image.h"
 #include "gpu/executor.h"
-#include "passes/trace_depth.h"
-#include "passes/trace_paths.h"
+#include "passes/trace.h"
 #include "pathtracer/packing.h"
 
 namespace ewa::pathtracer {
@@ -40,15 +39,12 @@ class PathTracer {
     gpu::Buffer upload(const char* name, const std::vector<uint32_t>& words, gpu::Texel texel);
     gpu::Buffer view_of(const Camera& camera, double brightest);
     shared::TraceCounts trace_paths(const gpu::Buffer& view, uint64_t pixels, int samples, uint64_t seed);
-    passes::MeshBuffers mesh() const {
-        return {nodes_, triangles_, surfaces_, materials_, textures_, texels_};
-    }
+    passes::MeshBuffers mesh() const;
 
     std::shared_ptr<gpu::Device> device_;
-    passes::Shape shape_;
+    passes::PassCache cache_;
+    passes::Constants variant_;
     gpu::Executor executor_;
-    passes::TracePaths paths_;
-    passes::TraceDepth depth_;
     gpu::Buffer nodes_, triangles_, surfaces_, materials_, textures_, texels_, lights_, counts_, sums_;
     scene::Sky sky_;
     glm::dvec3 origin_;

@@ -3,20 +3,51 @@
 
 #include <cmath>
 
+#include "passes/blend.h"
+#include "passes/loss.h"
+#include "passes/project.h"
 #include "shared/constants.h"
 
 namespace ewa::pipeline {
 namespace {
 
-void record_mean(gpu::Recording& recording, Kernels& kernels, const Frame& frame, uint32_t target,
-                 float scale) {
-    const passes::Shape& shape = kernels.shape();
+/// Adds frame.partials, in two steps. target: shared::REDUCE_TO_*.
+void record_mean(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame,
+                 uint32_t target, float scale) {
     const Sizes& s = frame.sizes;
-    const auto& reduce = kernels.get<passes::Reduce>();
-    reduce.record(recording, shape, {frame.partials, frame.reduced, frame.counts},
-                  {s.partials, s.reduce_block, 0, 1});
-    reduce.record(recording, shape, {frame.reduced, frame.partials, frame.counts},
-                  {s.reduce_blocks, s.reduce_blocks, target, scale});
+    const auto reduce = cache.get<passes::Reduce>();
+    reduce.record(
+        recording, {.source = frame.partials, .sums = frame.reduced, .counts = frame.counts},
+        {.items = s.partials, .block = s.reduce_block, .target = shared::REDUCE_TO_SUMS, .scale = 1});
+    reduce.record(recording, {.source = frame.reduced, .sums = frame.partials, .counts = frame.counts},
+                  {.items = s.reduce_blocks, .block = s.reduce_blocks, .target = target, .scale = scale});
+}
+
+uint32_t update_mode(const Plan& plan) {
+    uint32_t mode = 0;
+    if (!plan.adam) mode |= shared::UPDATE_GRADIENT_ONLY;
+    if (plan.statistics) mode |= shared::UPDATE_STATISTICS;
+    if (plan.regularised) mode |= shared::UPDATE_REGULARISED;
+    if (plan.absolute) mode |= shared::UPDATE_ABSOLUTE;
+    return mode;
+}
+
+shared::UpdatePush update_push(const Model& model, const FrameBuffers& frame, const Rates& rates) {
+    const double step = rates.step;
+    return {.splats = model.splats,
+            .planes = model.planes(),
+            .instance_capacity = frame.instance_capacity,
+            .mean_rate = rates.mean,
+            .opacity_rate = rates.opacity,
+            .quaternion_rate = rates.quaternion,
+            .scale_rate = rates.scale,
+            .sh0_rate = rates.sh0,
+            .sh_rest_rate = rates.sh_rest,
+            .bias1 = float(1 / (1 - std::pow(shared::ADAM_BETA1, step))),
+            .bias2 = float(1 / (1 - std::pow(shared::ADAM_BETA2, step))),
+            .half_size = {0.5f * float(frame.sizes.width), 0.5f * float(frame.sizes.height)},
+            .opacity_weight = rates.opacity_weight,
+            .scale_weight = rates.scale_weight};
 }
 
 }  // namespace
@@ -25,79 +56,88 @@ double loss_of(const shared::Counts& counts) {
     return (1 - shared::SSIM_WEIGHT) * double(counts.l1) + shared::SSIM_WEIGHT * (1 - double(counts.ssim));
 }
 
-void record_loss(gpu::Recording& recording, Kernels& kernels, const Frame& frame, const CameraUse& camera,
-                 const std::array<float, 3>& background, const gpu::Buffer& photo, bool masked,
+void record_loss(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame,
+                 const FrameInputs& inputs, const gpu::Buffer& photo, bool masked,
                  const ExposureUse* exposure) {
-    const passes::Shape& shape = kernels.shape();
-    const Sizes& s = frame.sizes;
-    const double share = 1.0 / (3.0 * camera.width * camera.height);
-    const shared::LossPush push{{camera.width, camera.height},
-                                s.stride,
-                                s.plane_floats,
-                                float(-shared::SSIM_WEIGHT * share),
-                                float((1 - shared::SSIM_WEIGHT) * share)};
-    const shared::MaskPush mask{{camera.width, camera.height}, s.stride, s.plane_floats};
-    const gpu::Buffer& drawn = exposure ? frame.exposed : frame.planes;
-    const gpu::Buffer& image = masked ? frame.masked : drawn;
-    if (exposure) record_expose(recording, kernels, frame, camera.width, camera.height, *exposure);
+    const shared::ImageLayout layout = frame.sizes.image();
+    const double share = 1.0 / (3.0 * layout.size[0] * layout.size[1]);
+    const shared::LossPush push{.image = layout,
+                                .ssim_scale = float(-shared::SSIM_WEIGHT * share),
+                                .l1_scale = float((1 - shared::SSIM_WEIGHT) * share)};
+    const gpu::Buffer& render = exposure ? frame.exposed : frame.planes;
+    const gpu::Buffer& image = masked ? frame.masked : render;
+    if (exposure) record_expose(recording, cache, frame, *exposure);
     if (masked)
-        kernels.get<passes::MaskPictures>().record(recording, shape,
-                                                   {photo, drawn, frame.target, frame.masked}, mask);
+        cache.get<passes::MaskPictures>().record(
+            recording, {.photo = photo, .image = render, .target = frame.target, .masked = frame.masked},
+            layout);
     else
-        kernels.get<passes::UnpackTarget>().record(recording, shape, {photo, frame.target},
-                                                   {{background[0], background[1], background[2]},
-                                                    {camera.width, camera.height},
-                                                    s.stride,
-                                                    s.plane_floats});
-    kernels.get<passes::LossColumns>().record(recording, shape, {image, frame.target, frame.moments}, push);
-    kernels.get<passes::LossRows>().record(recording, shape,
-                                           {frame.moments, frame.derivatives, frame.partials}, push);
-    record_mean(recording, kernels, frame, 2, float(share));
-    kernels.get<passes::LossBackwardColumns>().record(recording, shape, {frame.derivatives, frame.blurred},
-                                                      push);
-    kernels.get<passes::LossBackwardRows>().record(
-        recording, shape, {frame.blurred, image, frame.target, frame.image_gradient, frame.partials}, push);
+        cache.get<passes::UnpackTarget>().record(
+            recording, {.photo = photo, .planes = frame.target},
+            {.background = {inputs.background[0], inputs.background[1], inputs.background[2]},
+             .image = layout});
+    cache.get<passes::LossColumns>().record(
+        recording, {.image = image, .target = frame.target, .moments = frame.moments}, push);
+    cache.get<passes::LossRows>().record(
+        recording, {.moments = frame.moments, .derivatives = frame.derivatives, .partials = frame.partials},
+        push);
+    record_mean(recording, cache, frame, shared::REDUCE_TO_SSIM, float(share));
+    cache.get<passes::LossBackwardColumns>().record(
+        recording, {.derivatives = frame.derivatives, .blurred = frame.blurred}, push);
+    cache.get<passes::LossBackwardRows>().record(recording,
+                                                 {.blurred = frame.blurred,
+                                                  .image = image,
+                                                  .target = frame.target,
+                                                  .image_gradient = frame.image_gradient,
+                                                  .partials = frame.partials},
+                                                 push);
     if (masked)
-        kernels.get<passes::MaskGradient>().record(recording, shape, {photo, frame.image_gradient}, mask);
-    record_mean(recording, kernels, frame, 1, float(share));
-    if (exposure) record_expose_backward(recording, kernels, frame, camera.width, camera.height, *exposure);
+        cache.get<passes::MaskGradient>().record(
+            recording, {.photo = photo, .image_gradient = frame.image_gradient}, layout);
+    record_mean(recording, cache, frame, shared::REDUCE_TO_L1, float(share));
+    if (exposure) record_expose_backward(recording, cache, frame, *exposure);
 }
 
-void record_backward(gpu::Recording& recording, Kernels& kernels, const Plan& plan, const Model& model,
-                     const Frame& frame, const CameraUse& camera, const std::array<float, 3>& background,
+void record_backward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
+                     const Model& model, const FrameBuffers& frame, const FrameInputs& inputs,
                      const Sorted& sorted, const Rates& rates) {
-    const passes::Shape& shape = kernels.shape();
-    kernels.get<passes::BlendBackward>(plan.absolute ? 1u : 0u)
-        .record(recording, shape,
-                {frame.records, *sorted.splats, frame.tile_starts, frame.planes, frame.image_gradient,
-                 frame.slots},
-                blend_push(kernels, frame, camera, background));
+    cache
+        .get<passes::BlendBackward>(
+            {{shared::SPEC_MODE, plan.absolute ? shared::BLEND_BACKWARD_ABSOLUTE : 0}})
+        .record(recording,
+                {.records = frame.records,
+                 .splats = *sorted.splats,
+                 .tile_starts = frame.tile_starts,
+                 .planes = frame.planes,
+                 .image_gradient = frame.image_gradient,
+                 .slots = frame.slots},
+                blend_push(cache.config(), frame, inputs.background));
 
-    // What a gradient alone does not have stands in for itself: the kernel leaves those bindings alone.
+    // A gradient alone has no second moments or statistics. It does not use those bindings, but
+    // they need a buffer.
     const gpu::Buffer& moments2 = plan.adam ? model.moments2 : model.moments1;
     const gpu::Buffer& statistics = plan.statistics ? model.statistics : frame.partials;
-    const uint32_t mode = (plan.adam ? 0u : 1u) | (plan.statistics ? 2u : 0u) | (plan.regularised ? 4u : 0u) |
-                          (plan.absolute ? 8u : 0u);
-    const double step = rates.step;
-    kernels.get<passes::Update>(uint32_t(plan.sh_degree), uint32_t(plan.kernel), mode)
-        .record(recording, shape,
-                {model.params, *camera.buffer, camera.offset, frame.records, frame.slots, model.moments1,
-                 moments2, frame.tile_counts, frame.first_instances, *sorted.places, frame.counts,
-                 model.params, model.moments1, moments2, statistics},
-                {model.splats,
-                 model.planes(),
-                 frame.instance_capacity,
-                 rates.mean,
-                 rates.opacity,
-                 rates.quaternion,
-                 rates.scale,
-                 rates.sh0,
-                 rates.sh_rest,
-                 float(1 / (1 - std::pow(shared::ADAM_BETA1, step))),
-                 float(1 / (1 - std::pow(shared::ADAM_BETA2, step))),
-                 {0.5f * float(camera.width), 0.5f * float(camera.height)},
-                 rates.opacity_pull,
-                 rates.scale_pull});
+    const CameraUse& camera = inputs.camera;
+    cache
+        .get<passes::Update>({{shared::SPEC_SH_DEGREE, plan.evaluated_degree(inputs.sh_degree)},
+                              {shared::SPEC_KERNEL, uint32_t(plan.kernel)},
+                              {shared::SPEC_MODE, update_mode(plan)}})
+        .record(recording,
+                {.params = model.params,
+                 .camera = {*camera.buffer, camera.offset, sizeof(shared::CameraBlock)},
+                 .records = frame.records,
+                 .slots = frame.slots,
+                 .moments1 = model.moments1,
+                 .moments2 = moments2,
+                 .tile_counts = frame.tile_counts,
+                 .first_instances = frame.first_instances,
+                 .counts = frame.counts,
+                 .params_out = model.params,
+                 .moments1_out = model.moments1,
+                 .moments2_out = moments2,
+                 .statistics = statistics,
+                 .sorted_indices = *sorted.indices},
+                update_push(model, frame, rates));
 }
 
 }  // namespace ewa::pipeline

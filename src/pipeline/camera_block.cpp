@@ -29,7 +29,8 @@ void check(const Camera& camera) {
 
 }  // namespace
 
-shared::CameraBlock camera_block(const Camera& camera, const passes::Shape& shape, const glm::dvec3& origin) {
+shared::CameraBlock camera_block(const Camera& camera, const passes::KernelConfig& config,
+                                 const glm::dvec3& origin) {
     check(camera);
     shared::CameraBlock block{};
     for (int row = 0; row < 3; ++row)
@@ -40,7 +41,7 @@ shared::CameraBlock camera_block(const Camera& camera, const passes::Shape& shap
     for (int i = 0; i < 3; ++i) split(position[i], block.position_hi[i], block.position_lo[i]);
     const double focal[2] = {camera.fx, camera.fy}, center[2] = {camera.cx, camera.cy};
     const int size[2] = {camera.width, camera.height};
-    const uint32_t tile[2] = {shape.tile_width, shape.tile_height};
+    const uint32_t tile[2] = {config.tile_width, config.tile_height};
     for (int i = 0; i < 2; ++i) {
         split(focal[i], block.focal_hi[i], block.focal_lo[i]);
         split(center[i], block.center_hi[i], block.center_lo[i]);

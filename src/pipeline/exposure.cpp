@@ -3,19 +3,16 @@
 
 #include <cmath>
 
+#include "passes/loss.h"
 #include "pipeline/model.h"
 #include "shared/constants.h"
 
 namespace ewa::pipeline {
 namespace {
 
-// Gradients of the loss by an exposure are of the order of 0.1: this decides nothing but the direction in
-// which the loss is flat, all exposures moving one way and the splats the other.
+// Gradients of the loss by an exposure are of the order of 0.1. The pull is too weak to matter, except in the
+// direction in which the loss is flat: all exposures change one way and the splats the other way.
 constexpr float kPull = 1e-3f;
-
-shared::ExposurePush push_of(const Frame& frame, uint32_t width, uint32_t height, const ExposureUse& use) {
-    return {{width, height}, frame.sizes.stride, frame.sizes.plane_floats, use.photo};
-}
 
 }  // namespace
 
@@ -34,25 +31,36 @@ std::vector<Exposure> Exposures::download() const {
     return values.download<Exposure>(photos);
 }
 
-void record_expose(gpu::Recording& recording, Kernels& kernels, const Frame& frame, uint32_t width,
-                   uint32_t height, const ExposureUse& use) {
-    kernels.get<passes::Expose>().record(recording, kernels.shape(),
-                                         {frame.planes, use.exposures->values, frame.exposed},
-                                         push_of(frame, width, height, use));
+void record_expose(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame,
+                   const ExposureUse& use) {
+    cache.get<passes::Expose>().record(
+        recording, {.image = frame.planes, .exposures = use.exposures->values, .exposed = frame.exposed},
+        {.image = frame.sizes.image(), .photo = use.photo});
 }
 
-void record_expose_backward(gpu::Recording& recording, Kernels& kernels, const Frame& frame, uint32_t width,
-                            uint32_t height, const ExposureUse& use) {
+void record_expose_backward(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame,
+                            const ExposureUse& use) {
     const Exposures& e = *use.exposures;
-    kernels.get<passes::ExposeBackward>().record(
-        recording, kernels.shape(), {frame.planes, e.values, frame.image_gradient, frame.exposure_sums},
-        push_of(frame, width, height, use));
+    cache.get<passes::ExposeBackward>().record(recording,
+                                               {.image = frame.planes,
+                                                .exposures = e.values,
+                                                .image_gradient = frame.image_gradient,
+                                                .sums = frame.exposure_sums},
+                                               {.image = frame.sizes.image(), .photo = use.photo});
     const double visit = use.visit;
-    kernels.get<passes::ExposureUpdate>().record(
-        recording, {frame.exposure_sums, e.values, e.moments1, e.moments2, frame.counts},
-        {use.photo, frame.sizes.exposure_blocks, use.rate, kPull,
-         float(1 / (1 - std::pow(shared::ADAM_BETA1, visit))),
-         float(1 / (1 - std::pow(shared::ADAM_BETA2, visit))), frame.instance_capacity});
+    cache.get<passes::ExposureUpdate>().record(recording,
+                                               {.sums = frame.exposure_sums,
+                                                .exposures = e.values,
+                                                .moments1 = e.moments1,
+                                                .moments2 = e.moments2,
+                                                .counts = frame.counts},
+                                               {.photo = use.photo,
+                                                .blocks = frame.sizes.exposure_blocks,
+                                                .rate = use.rate,
+                                                .pull = kPull,
+                                                .bias1 = float(1 / (1 - std::pow(shared::ADAM_BETA1, visit))),
+                                                .bias2 = float(1 / (1 - std::pow(shared::ADAM_BETA2, visit))),
+                                                .instance_capacity = frame.instance_capacity});
 }
 
 }  // namespace ewa::pipeline

@@ -1,18 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// What each photograph's exposure makes of a picture: an affine map of colours, learned beside the splats (as
-// the published code of 3DGS does for captures with automatic exposure; see include/ewa/exposure.h).
+// Exposure of each training image: an affine map of colours, learned beside the splats. The published code of
+// 3DGS does the same for captures with automatic exposure; see include/ewa/exposure.h.
 #pragma once
 #include <vector>
 
 #include "ewa/exposure.h"
 #include "gpu/buffer.h"
-#include "gpu/recording.h"
-#include "pipeline/frame.h"
-#include "pipeline/kernels.h"
+#include "passes/pass.h"
+#include "pipeline/frame_buffers.h"
 
 namespace ewa::pipeline {
 
-/// Of all photographs, with Adam's moments.
+/// Exposures of all training images, with Adam's moments.
 struct Exposures {
     uint32_t photos = 0;
     gpu::Buffer values, moments1, moments2;
@@ -23,21 +22,20 @@ struct Exposures {
     std::vector<Exposure> download() const;
 };
 
-/// A step of one photograph's exposure.
+/// A step of one training image's exposure.
 struct ExposureUse {
     const Exposures* exposures = nullptr;
     uint32_t photo = 0;
     float rate = 0;
-    uint32_t visit = 1;  // which step of this photograph it is, from 1
+    uint32_t visit = 1;  // number of this image's step, from 1
 };
 
-/// frame.planes through the exposure into frame.exposed.
-void record_expose(gpu::Recording& recording, Kernels& kernels, const Frame& frame, uint32_t width,
-                   uint32_t height, const ExposureUse& use);
+/// Writes frame.planes with the exposure applied to frame.exposed.
+void record_expose(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame,
+                   const ExposureUse& use);
 
-/// frame.image_gradient by the exposed picture becomes that by the picture; the exposure takes a step of
-/// Adam.
-void record_expose_backward(gpu::Recording& recording, Kernels& kernels, const Frame& frame, uint32_t width,
-                            uint32_t height, const ExposureUse& use);
+/// Turns frame.image_gradient from dL/d(exposed image) into dL/d(image). The exposure takes a step of Adam.
+void record_expose_backward(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame,
+                            const ExposureUse& use);
 
 }  // namespace ewa::pipeline

@@ -1,93 +1,150 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pipeline/forward.h"
 
+#include "passes/blend.h"
+#include "passes/project.h"
 #include "pipeline/sorting.h"
 
 namespace ewa::pipeline {
-
-shared::BlendPush blend_push(const Kernels& kernels, const Frame& frame, const CameraUse& camera,
-                             const std::array<float, 3>& background) {
-    const Sizes& s = frame.sizes;
-    const auto steps = passes::tile_steps(kernels.shape(), s.tiles);
-    return {{background[0], background[1], background[2]},
-            {camera.width, camera.height},
-            s.stride,
-            s.plane_floats,
-            {s.tiles_x, s.tiles_y},
-            {steps[0], steps[1]},
-            frame.instance_capacity};
-}
-
 namespace {
 
-uint32_t blend_mode(const Plan& plan) {
-    if (plan.ellipsoids) return shared::BLEND_ELLIPSOIDS;
-    if (plan.count) return shared::BLEND_COUNT;
-    return plan.depth ? shared::BLEND_DEPTH : shared::BLEND_COLOR;
+uint32_t blend_mode(Drawing drawing) {
+    switch (drawing) {
+        case Drawing::depth:
+            return shared::BLEND_DEPTH;
+        case Drawing::count:
+            return shared::BLEND_COUNT;
+        case Drawing::ellipsoids:
+            return shared::BLEND_ELLIPSOIDS;
+        default:
+            return shared::BLEND_COLOR;
+    }
+}
+
+void record_project(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan, const Model& model,
+                    const FrameBuffers& frame, const FrameInputs& inputs) {
+    const CameraUse& camera = inputs.camera;
+    cache
+        .get<passes::Project>({{shared::SPEC_SH_DEGREE, plan.evaluated_degree(inputs.sh_degree)},
+                               {shared::SPEC_KERNEL, uint32_t(plan.kernel)},
+                               {shared::SPEC_MODE, plan.debug ? shared::PROJECT_DEBUG : 0}})
+        .record(recording,
+                {.params = model.params,
+                 .camera = {*camera.buffer, camera.offset, sizeof(shared::CameraBlock)},
+                 .records = frame.records,
+                 .depth_keys = frame.depth_keys[0],
+                 .tile_counts = frame.tile_counts,
+                 .counts = frame.counts},
+                {.splats = model.splats, .planes = model.planes(), .log_scale_shift = plan.log_scale_shift});
+}
+
+/// The buffer of splats in depth order.
+const gpu::Buffer& record_depth_order(gpu::Recording& recording, passes::PassCache& cache, const Model& model,
+                                      const FrameBuffers& frame) {
+    const uint32_t result = record_sort(recording, cache,
+                                        {.keys = {&frame.depth_keys[0], &frame.depth_keys[1]},
+                                         .values = {&frame.order[0], &frame.order[1]},
+                                         .indices = {},
+                                         .own_indices = true,
+                                         .counters = frame.counters,
+                                         .counter_prefix = frame.counter_prefix,
+                                         .digit_totals = frame.digit_totals,
+                                         .counts = frame.counts},
+                                        {.cut = frame.sizes.depth_sort,
+                                         .items = model.splats,
+                                         .capacity = model.splats,
+                                         .keep_keys = false,
+                                         .name = "depth order"});
+    return frame.order[result];
+}
+
+void record_instances(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
+                      const Model& model, const FrameBuffers& frame, const gpu::Buffer& order) {
+    const Sizes& s = frame.sizes;
+    record_scan(recording, cache,
+                {.source = frame.tile_counts,
+                 .order = &order,
+                 .prefix = frame.prefix,
+                 .totals = frame.scan_totals,
+                 .counts = frame.counts},
+                {.items = model.splats,
+                 .block = s.scan_block,
+                 .total = shared::TOTAL_INSTANCES,
+                 .name = "instance offsets"});
+    cache.get<passes::EmitInstances>({{shared::SPEC_MODE, plan.gradients ? shared::EMIT_FIRST_INSTANCES : 0}})
+        .record(recording,
+                {.records = frame.records,
+                 .order = order,
+                 .tile_counts = frame.tile_counts,
+                 .prefix = frame.prefix,
+                 .totals = frame.scan_totals,
+                 .counts = frame.counts,
+                 .keys = frame.instance_keys[0],
+                 .splats = frame.instance_splats[0],
+                 .first_instances = frame.first_instances},
+                {.splats = model.splats,
+                 .capacity = frame.instance_capacity,
+                 .scan_block = s.scan_block,
+                 .strip_rows = s.strip_rows,
+                 .size = {s.width, s.height},
+                 .tiles = {s.tiles_x, s.tiles_y}});
+}
+
+/// Index of the buffers with the result.
+uint32_t record_tile_order(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
+                           const FrameBuffers& frame) {
+    // With gradients a splat must find its instances again: their slots are in sorted order.
+    const auto indices = [&](int i) { return plan.gradients ? &frame.sorted_indices[i] : nullptr; };
+    const uint32_t result = record_sort(recording, cache,
+                                        {.keys = {&frame.instance_keys[0], &frame.instance_keys[1]},
+                                         .values = {&frame.instance_splats[0], &frame.instance_splats[1]},
+                                         .indices = {indices(0), indices(1)},
+                                         .own_indices = false,
+                                         .counters = frame.counters,
+                                         .counter_prefix = frame.counter_prefix,
+                                         .digit_totals = frame.digit_totals,
+                                         .counts = frame.counts},
+                                        {.cut = frame.sizes.tile_sort,
+                                         .items = 0,
+                                         .capacity = frame.instance_capacity,
+                                         .keep_keys = true,
+                                         .name = "tile order"});
+    cache.get<passes::TileStarts>().record(
+        recording,
+        {.keys = frame.instance_keys[result], .counts = frame.counts, .tile_starts = frame.tile_starts},
+        {.tiles = frame.sizes.tiles, .capacity = frame.instance_capacity});
+    return result;
 }
 
 }  // namespace
 
-Sorted record_forward(gpu::Recording& recording, Kernels& kernels, const Plan& plan, const Model& model,
-                      const Frame& frame, const CameraUse& camera, const std::array<float, 3>& background) {
-    const passes::Shape& shape = kernels.shape();
+shared::BlendPush blend_push(const passes::KernelConfig& config, const FrameBuffers& frame,
+                             const std::array<float, 3>& background) {
     const Sizes& s = frame.sizes;
+    const auto steps = passes::tile_steps(config, s.tiles);
+    return {.background = {background[0], background[1], background[2]},
+            .image = s.image(),
+            .tiles = {s.tiles_x, s.tiles_y},
+            .tile_step = {steps[0], steps[1]},
+            .capacity = frame.instance_capacity};
+}
+
+Sorted record_forward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
+                      const Model& model, const FrameBuffers& frame, const FrameInputs& inputs) {
     recording.fill(frame.counts, 0, 0, sizeof(shared::Counts));
-
-    kernels.get<passes::Project>(uint32_t(plan.sh_degree), uint32_t(plan.kernel), uint32_t(plan.inspected))
-        .record(recording, shape,
-                {model.params, *camera.buffer, camera.offset, frame.records, frame.depth_keys[0],
-                 frame.tile_counts, frame.counts},
-                {model.splats, model.planes(), plan.log_scale_shift});
-
-    const uint32_t order_index = record_sort(recording, kernels,
-                                             {{&frame.depth_keys[0], &frame.depth_keys[1]},
-                                              {&frame.order[0], &frame.order[1]},
-                                              {},
-                                              true,
-                                              frame.counters,
-                                              frame.counter_prefix,
-                                              frame.digit_totals,
-                                              frame.counts},
-                                             s.depth_sort, model.splats, model.splats, false, "depth order");
-    const gpu::Buffer& order = frame.order[order_index];
-
-    record_scan(recording, kernels,
-                {frame.tile_counts, &order, frame.prefix, frame.scan_totals, frame.counts}, model.splats,
-                s.scan_block, Total::instances, "instance offsets");
-    kernels.get<passes::EmitInstances>(plan.gradients)
-        .record(recording, shape,
-                {frame.records, order, frame.tile_counts, frame.prefix, frame.scan_totals, frame.counts,
-                 frame.instance_keys[0], frame.instance_splats[0], frame.first_instances},
-                {model.splats,
-                 frame.instance_capacity,
-                 s.scan_block,
-                 s.strip_rows,
-                 {camera.width, camera.height},
-                 {s.tiles_x, s.tiles_y}});
-
-    // With gradients a splat must find its instances again: their slots stand in sorted order.
-    const gpu::Buffer* places[2] = {plan.gradients ? &frame.instance_places[0] : nullptr,
-                                    plan.gradients ? &frame.instance_places[1] : nullptr};
-    const uint32_t sorted = record_sort(recording, kernels,
-                                        {{&frame.instance_keys[0], &frame.instance_keys[1]},
-                                         {&frame.instance_splats[0], &frame.instance_splats[1]},
-                                         {places[0], places[1]},
-                                         false,
-                                         frame.counters,
-                                         frame.counter_prefix,
-                                         frame.digit_totals,
-                                         frame.counts},
-                                        s.tile_sort, 0, frame.instance_capacity, true, "tile order");
-    const gpu::Buffer& splats = frame.instance_splats[sorted];
-    kernels.get<passes::TileStarts>().record(recording, shape,
-                                             {frame.instance_keys[sorted], frame.counts, frame.tile_starts},
-                                             {s.tiles, frame.instance_capacity});
-
-    kernels.get<passes::Blend>(blend_mode(plan))
-        .record(recording, shape, {frame.records, splats, frame.tile_starts, frame.planes},
-                blend_push(kernels, frame, camera, background));
-    return {&splats, places[sorted]};
+    record_project(recording, cache, plan, model, frame, inputs);
+    const gpu::Buffer& order = record_depth_order(recording, cache, model, frame);
+    record_instances(recording, cache, plan, model, frame, order);
+    const uint32_t sorted = record_tile_order(recording, cache, plan, frame);
+    cache.get<passes::Blend>({{shared::SPEC_MODE, blend_mode(plan.drawing)}})
+        .record(recording,
+                {.records = frame.records,
+                 .splats = frame.instance_splats[sorted],
+                 .tile_starts = frame.tile_starts,
+                 .planes = frame.planes},
+                blend_push(cache.config(), frame, inputs.background));
+    return {.splats = &frame.instance_splats[sorted],
+            .indices = plan.gradients ? &frame.sorted_indices[sorted] : nullptr};
 }
 
 }  // namespace ewa::pipeline

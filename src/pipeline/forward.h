@@ -1,37 +1,41 @@
 // SPDX-License-Identifier: Apache-2.0
-// The forward frame: from parameters to image planes. The order of its passes is written here and nowhere
-// else.
+// The forward frame: from parameters to image planes. The order of its passes is written here only.
 #pragma once
 #include <array>
 
-#include "gpu/recording.h"
-#include "pipeline/frame.h"
-#include "pipeline/kernels.h"
+#include "passes/pass.h"
+#include "pipeline/frame_buffers.h"
 #include "pipeline/model.h"
+#include "pipeline/plan.h"
 
 namespace ewa::pipeline {
 
 struct CameraUse {
     const gpu::Buffer* buffer = nullptr;  // CameraBlocks
-    uint64_t offset = 0;                  // bytes, aligned as the device wants uniform blocks
+    uint64_t offset = 0;                  // bytes, aligned as the device requires for uniform blocks
     uint32_t width = 0, height = 0;       // px
+};
+
+/// What differs from frame to frame of one plan.
+struct FrameInputs {
+    CameraUse camera;
+    std::array<float, 3> background{0, 0, 0};
+    int sh_degree = kMaxShDegree;  // evaluated: at most this, and at most what the plan stores
 };
 
 /// Which of the ping-pong buffers hold the sorted instances after the forward frame.
 struct Sorted {
-    const gpu::Buffer* splats = nullptr;  // each instance's splat
-    const gpu::Buffer* places =
-        nullptr;  // with gradients: where each instance stands among the sorted, and its slot
+    const gpu::Buffer* splats = nullptr;   // each instance's splat
+    const gpu::Buffer* indices = nullptr;  // with gradients: each emitted instance's sorted index and slot
 };
 
-/// Records: project, depth order, instances, tile order, tile starts, blend. Frame must have been reserved
-/// for the model's splats and the camera's size. After the submission Counts.instances tells what was needed;
-/// where that is more than frame.instance_capacity nothing was drawn, and the frame is to be repeated with
-/// more room.
-Sorted record_forward(gpu::Recording& recording, Kernels& kernels, const Plan& plan, const Model& model,
-                      const Frame& frame, const CameraUse& camera, const std::array<float, 3>& background);
+/// Records: project, depth order, instances, tile order, tile starts, blend. `frame` must be reserved for the
+/// model's splats and the camera's size. After the submission, Counts.instances is the number of instances
+/// needed. If that exceeds frame.instance_capacity, the image is empty: repeat the frame with more capacity.
+Sorted record_forward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
+                      const Model& model, const FrameBuffers& frame, const FrameInputs& inputs);
 
-shared::BlendPush blend_push(const Kernels& kernels, const Frame& frame, const CameraUse& camera,
+shared::BlendPush blend_push(const passes::KernelConfig& config, const FrameBuffers& frame,
                              const std::array<float, 3>& background);
 
 }  // namespace ewa::pipeline

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A photograph as the loss reads it.
+// A training image as the loss reads it.
 #pragma once
 #include <cstdint>
 
@@ -8,11 +8,11 @@
 
 namespace ewa::pipeline {
 
-/// width * height RGBA texels: 8 bit where every value is one of 256 levels, or is to be rounded to one, else
-/// float32. A picture of 3 channels is opaque; what alpha means is for record_loss to say.
+/// width * height RGBA texels: 8-bit if every value is one of 256 levels, or with round_to_8_bit; else
+/// float32. An image of 3 channels is opaque. record_loss says what alpha means.
 gpu::Buffer upload_photo(gpu::Device& device, const Image& image, bool round_to_8_bit = false);
 
-/// At most what upload_photo takes.
+/// Upper bound of the bytes that upload_photo allocates.
 uint64_t photo_bytes(int width, int height, bool round_to_8_bit);
 
 }  // namespace ewa::pipeline

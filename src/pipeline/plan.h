@@ -1,41 +1,70 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a scene and a request need: which kernels run, with which constants, and which buffers exist. A pure
-// function.
+// What a scene and a request need: which passes run, with which constants, and which buffers exist. plan_for
+// is the only source of plans. Nobody changes a plan afterwards; another request gets another plan.
 #pragma once
 #include <cstdint>
 #include <vector>
 
 #include "ewa/gaussians.h"
+#include "ewa/plan.h"
 #include "ewa/render_options.h"
-#include "ewa/renderer.h"
 
 namespace ewa::pipeline {
 
-struct Plan {
-    int sh_degree = 0;      // evaluated
-    int stored_degree = 0;  // kept on the device
-    Kernel kernel = Kernel::peak;
-    bool gradients = false;    // loss, backward passes and their buffers
-    bool adam = false;         // both moments
-    bool statistics = false;   // densification statistics
-    bool absolute = false;     // of absolute gradients
-    bool regularised = false;  // opacity and scale regularisers in the loss
-    bool depth = false;
-    bool count = false;         // splats blended a pixel
-    bool ellipsoids = false;    // splats as solids, in place of blending
-    bool inspected = false;     // scales shifted, and the splats drawn counted
-    float log_scale_shift = 0;  // where inspected
-    bool masks = false;         // photographs in which not every pixel counts
-    bool exposure = false;      // photographs' exposures are learned
+enum class Purpose {
+    picture,   // image planes only
+    gradient,  // loss of one view and its gradient
+    training   // the gradient moves the splats
 };
 
-/// A picture: nothing of a degree the scene does not have, or that was not asked for, is stored or evaluated.
-Plan plan_picture(const Gaussians& gaussians, const RenderOptions& options, bool depth);
-/// A gradient: every stored coefficient gets one, so the stored degree stays.
-Plan plan_gradient(const Gaussians& gaussians, const RenderOptions& options);
-Plan plan_training(int sh_degree, const RenderOptions& options, bool densifies);
+struct PlanRequest {
+    Purpose purpose = Purpose::picture;
+    int scene_degree = 0;    // stored in the scene
+    int present_degree = 0;  // highest SH degree of the scene with a coefficient other than zero
+    RenderOptions render;
 
-/// What is left out, and what that saves for `splats` splats.
-std::vector<PlanLine> describe(const Plan& plan, int file_degree, uint64_t splats);
+    // Of a picture.
+    Drawing drawing = Drawing::color;
+    bool debug = false;      // splat_scale applies, and the visible splats are counted
+    double splat_scale = 1;  // factor of every splat's scales, above 0
+
+    // Of a gradient or a training.
+    bool masks = false;     // training images in which some pixels count less
+    bool exposure = false;  // each training image's exposure is learned
+
+    // Of a training.
+    bool statistics = false;          // the strategy reads densification statistics
+    bool absolute_gradients = false;  // of the statistics: absolute gradients of the pixels
+    bool regularised = false;         // opacity and scale regularisers in the loss
+};
+
+struct Plan {
+    int stored_degree = 0;  // SH degree in the device's parameters; a frame evaluates at most this
+    Footprint kernel = Footprint::peak;
+    Drawing drawing = Drawing::color;
+    bool debug = false;
+    float log_scale_shift = 0;  // with debug: added to every log scale
+    bool gradients = false;     // loss, backward passes and their buffers
+    bool adam = false;          // both moments
+    bool statistics = false;    // densification statistics
+    bool absolute = false;      // of absolute gradients
+    bool regularised = false;   // opacity and scale regularisers in the loss
+    bool masks = false;
+    bool exposure = false;
+
+    bool operator==(const Plan&) const = default;
+    /// Whether the image has a fifth plane: depth or count.
+    bool fifth_plane() const { return drawing == Drawing::depth || drawing == Drawing::count; }
+    /// The SH degree that a frame evaluates.
+    uint32_t evaluated_degree(int wanted) const;
+};
+
+/// A picture stores the degrees that are present and wanted (request.render.sh_degree). A gradient
+/// and a training store all: every stored coefficient has a gradient. Inputs that do not apply to
+/// the purpose are ignored.
+Plan plan_for(const PlanRequest& request);
+
+/// What a plan skips, and the bytes that this saves for `splats` splats of a scene with `scene_degree`.
+std::vector<PlanLine> describe(const Plan& plan, int scene_degree, uint64_t splats);
 
 }  // namespace ewa::pipeline

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures and gradients of a fixed scene: the public face of the forward and backward frames.
+// Images and gradients of a fixed scene: the public interface of the forward and backward frames.
 #include "ewa/renderer.h"
 
 #include <algorithm>
@@ -8,6 +8,7 @@
 
 #include "ewa/error.h"
 #include "gpu/executor.h"
+#include "passes/blend.h"
 #include "pipeline/backward.h"
 #include "pipeline/camera_block.h"
 #include "pipeline/capacity.h"
@@ -19,7 +20,7 @@ namespace {
 
 using namespace pipeline;
 
-/// The scene with no coefficient above a degree.
+/// The scene without coefficients above a degree.
 Gaussians with_degree(const Gaussians& gaussians, int degree) {
     if (degree >= gaussians.sh_degree) return gaussians;
     Gaussians result = gaussians;
@@ -31,15 +32,15 @@ Gaussians with_degree(const Gaussians& gaussians, int degree) {
     return result;
 }
 
-gpu::Buffer upload_camera(gpu::Device& device, const Camera& camera, const passes::Shape& shape,
+gpu::Buffer upload_camera(gpu::Device& device, const Camera& camera, const passes::KernelConfig& config,
                           const glm::dvec3& origin) {
-    const shared::CameraBlock block = camera_block(camera, shape, origin);
+    const shared::CameraBlock block = camera_block(camera, config, origin);
     gpu::Buffer buffer(device, "camera", sizeof(block), gpu::Texel::none, true);
     buffer.upload(std::span<const shared::CameraBlock>(&block, 1));
     return buffer;
 }
 
-/// One plane of an image, spread over channel c of a picture.
+/// Copies one plane into one channel of an image.
 void copy_plane(const std::vector<float>& planes, const Sizes& sizes, uint32_t plane, Image& image,
                 int channel) {
     const size_t step = size_t(image.channels);
@@ -50,79 +51,94 @@ void copy_plane(const std::vector<float>& planes, const Sizes& sizes, uint32_t p
     }
 }
 
+PlanRequest picture_request(const Gaussians& gaussians, const RenderOptions& options) {
+    return {.purpose = Purpose::picture,
+            .scene_degree = gaussians.sh_degree,
+            .present_degree = sh_degree_present(gaussians),
+            .render = options};
+}
+
 }  // namespace
+
+std::vector<PlanLine> plan_lines(const Gaussians& gaussians, const RenderOptions& options) {
+    const PlanRequest request = picture_request(gaussians, options);
+    return describe(plan_for(request), request.scene_degree, gaussians.size());
+}
 
 struct Renderer::State {
     std::shared_ptr<gpu::Device> device;
-    Kernels kernels;
+    passes::PassCache cache;
     gpu::Executor executor;
     RenderOptions options;
-    Plan plan;
+    PlanRequest request;  // of the scene; drawings ask for more
     Model model;
-    Frame frame;
+    FrameBuffers frame;
     shared::Counts counts{};
-    gpu::Buffer packed;  // host visible; only where 8 bits are asked for
+    gpu::Buffer packed;  // host visible; allocated at the first render_bytes
     std::vector<uint8_t> bytes;
 
     State(std::shared_ptr<gpu::Device> d, const Gaussians& gaussians, const RenderOptions& o)
         : device(std::move(d)),
-          kernels(*device),
+          cache(*device),
           executor(*device),
           options(o),
-          plan(plan_picture(gaussians, o, false)),
-          model(upload_model(*device, with_degree(gaussians, plan.stored_degree), 0, false)) {}
+          request(picture_request(gaussians, o)) {
+        upload(gaussians);
+    }
+    void upload(const Gaussians& gaussians) {
+        const int degree = plan_for(request).stored_degree;
+        model = upload_model(*device, with_degree(gaussians, degree), 0, false);
+    }
 
     Plan plan_of(const DrawOptions& options) const;
-    /// then: what to record behind the picture.
+    /// then: what to record after the image.
     template <class Record>
-    void submit(const Camera& camera, const Plan& picture, const std::array<float, 3>& background,
-                Record then);
-    Rendering draw(const Camera& camera, const Plan& picture, const std::array<float, 3>& background);
+    void submit(const Camera& camera, const Plan& plan, const RenderOptions& look, Record then);
+    Rendering draw(const Camera& camera, const Plan& plan, const RenderOptions& look);
 };
 
 template <class Record>
-void Renderer::State::submit(const Camera& camera, const Plan& picture,
-                             const std::array<float, 3>& background, Record then) {
-    const gpu::Buffer block = upload_camera(*device, camera, kernels.shape(), model.origin);
-    const CameraUse use{&block, 0, uint32_t(camera.width), uint32_t(camera.height)};
-    const uint32_t room = std::max(frame.instance_capacity, first_capacity(model.splats));
-    counts =
-        run_until_it_fits(kernels, executor, frame,
-                          {model.splats, use.width, use.height, room, false, picture.depth || picture.count},
-                          [&](gpu::Recording& recording) {
-                              record_forward(recording, kernels, picture, model, frame, use, background);
-                              then(recording);
-                          });
+void Renderer::State::submit(const Camera& camera, const Plan& plan, const RenderOptions& look, Record then) {
+    const gpu::Buffer block = upload_camera(*device, camera, cache.config(), model.origin);
+    const FrameInputs inputs{
+        .camera = {.buffer = &block, .width = uint32_t(camera.width), .height = uint32_t(camera.height)},
+        .background = look.background,
+        .sh_degree = look.sh_degree};
+    const FrameRequest size{.splats = model.splats,
+                            .width = inputs.camera.width,
+                            .height = inputs.camera.height,
+                            .instances = std::max(frame.instance_capacity, first_capacity(model.splats)),
+                            .fifth_plane = plan.fifth_plane()};
+    counts = run_until_it_fits(cache, executor, frame, size, [&](gpu::Recording& recording) {
+        record_forward(recording, cache, plan, model, frame, inputs);
+        then(recording);
+    });
 }
 
 Plan Renderer::State::plan_of(const DrawOptions& o) const {
     if (!(o.splat_scale > 0) || !std::isfinite(o.splat_scale))
         throw InputError("a splat scale of " + std::to_string(o.splat_scale) + ", not above zero");
-    Plan picture = plan;
-    picture.sh_degree = std::clamp(o.render.sh_degree, 0, plan.stored_degree);
-    picture.kernel = o.render.kernel;
-    picture.depth = o.drawing == Drawing::depth;
-    picture.count = o.drawing == Drawing::count;
-    picture.ellipsoids = o.drawing == Drawing::ellipsoids;
-    picture.inspected = true;
-    picture.log_scale_shift = float(std::log(o.splat_scale));
-    return picture;
+    PlanRequest drawing = request;
+    drawing.render.kernel = o.render.kernel;
+    drawing.drawing = o.drawing;
+    drawing.debug = true;
+    drawing.splat_scale = o.splat_scale;
+    return plan_for(drawing);
 }
 
-Rendering Renderer::State::draw(const Camera& camera, const Plan& picture,
-                                const std::array<float, 3>& background) {
-    submit(camera, picture, background, [](gpu::Recording&) {});
+Rendering Renderer::State::draw(const Camera& camera, const Plan& plan, const RenderOptions& look) {
+    submit(camera, plan, look, [](gpu::Recording&) {});
     const Sizes& sizes = frame.sizes;
     const auto planes = frame.planes.download<float>(sizes.planes / 4);
     Rendering result{Image(camera.width, camera.height, 3), Image(camera.width, camera.height, 1), {}, {}};
     for (int c = 0; c < 3; ++c) copy_plane(planes, sizes, shared::PLANE_R + uint32_t(c), result.color, c);
     copy_plane(planes, sizes, shared::PLANE_T, result.alpha, 0);
     for (float& value : result.alpha.pixels) value = 1.0f - value;
-    if (picture.count) {
+    if (plan.drawing == Drawing::count) {
         result.count = Image(camera.width, camera.height, 1);
         copy_plane(planes, sizes, shared::PLANE_COUNT, result.count, 0);
     }
-    if (picture.depth) {
+    if (plan.drawing == Drawing::depth) {
         result.depth = Image(camera.width, camera.height, 1);
         copy_plane(planes, sizes, shared::PLANE_DEPTH, result.depth, 0);
         for (size_t i = 0; i < result.depth.pixels.size(); ++i)
@@ -139,26 +155,26 @@ Renderer::Renderer(Renderer&&) noexcept = default;
 
 Rendering Renderer::render(const Camera& camera, bool with_depth) {
     State& s = *state_;
-    Plan plan = s.plan;
-    plan.depth = with_depth;
-    return s.draw(camera, plan, s.options.background);
+    PlanRequest request = s.request;
+    request.drawing = with_depth ? Drawing::depth : Drawing::color;
+    return s.draw(camera, plan_for(request), s.options);
 }
 
 Rendering Renderer::render(const Camera& camera, const DrawOptions& options) {
-    return state_->draw(camera, state_->plan_of(options), options.render.background);
+    return state_->draw(camera, state_->plan_of(options), options.render);
 }
 
 const std::vector<uint8_t>& Renderer::render_bytes(const Camera& camera, const DrawOptions& options) {
     State& s = *state_;
-    s.submit(camera, s.plan_of(options), options.render.background, [&](gpu::Recording& recording) {
+    s.submit(camera, s.plan_of(options), options.render, [&](gpu::Recording& recording) {
         const Sizes& sizes = s.frame.sizes;
         const uint64_t needed = uint64_t(sizes.plane_floats) * 4;
         if (!s.packed || s.packed.bytes() < needed) {
             s.packed = gpu::Buffer();
             s.packed = gpu::Buffer(*s.device, "packed", needed, gpu::Texel::none, false, true);
         }
-        s.kernels.get<passes::Pack>().record(recording, s.kernels.shape(), {s.frame.planes, s.packed},
-                                             {sizes.plane_floats});
+        s.cache.get<passes::Pack>().record(recording, {.planes = s.frame.planes, .packed = s.packed},
+                                           {.plane_floats = sizes.plane_floats});
     });
     const size_t row = size_t(camera.width) * 4, stride = size_t(s.frame.sizes.stride) * 4;
     s.bytes.resize(row * size_t(camera.height));
@@ -169,9 +185,9 @@ const std::vector<uint8_t>& Renderer::render_bytes(const Camera& camera, const D
 
 void Renderer::replace(const Gaussians& gaussians) {
     State& s = *state_;
-    s.model = {};  // its memory first
-    s.plan = plan_picture(gaussians, s.options, false);
-    s.model = upload_model(*s.device, with_degree(gaussians, s.plan.stored_degree), 0, false);
+    s.model = {};  // free its memory first
+    s.request = picture_request(gaussians, s.options);
+    s.upload(gaussians);
 }
 
 uint32_t Renderer::skipped_nonfinite() const {
@@ -179,7 +195,7 @@ uint32_t Renderer::skipped_nonfinite() const {
 }
 
 uint32_t Renderer::splats_drawn() const {
-    return state_->counts.drawn;
+    return state_->counts.visible;
 }
 
 std::vector<PassTime> Renderer::pass_times() const {
@@ -197,30 +213,38 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
                          std::to_string(target.height) + " with " + std::to_string(target.channels) +
                          " channels, the camera " + std::to_string(camera.width) + "x" +
                          std::to_string(camera.height) + " RGB");
-    Kernels kernels(*device);
+    passes::PassCache cache(*device);
     gpu::Executor executor(*device);
-    Plan plan = plan_gradient(gaussians, options);
-    plan.masks = alpha_is_weight && target.channels == 4;
+    const Plan plan = plan_for({.purpose = Purpose::gradient,
+                                .scene_degree = gaussians.sh_degree,
+                                .render = options,
+                                .masks = alpha_is_weight && target.channels == 4});
     const Model model = upload_model(*device, gaussians, 1, false);
-    const gpu::Buffer block = upload_camera(*device, camera, kernels.shape(), model.origin);
+    const gpu::Buffer block = upload_camera(*device, camera, cache.config(), model.origin);
     const gpu::Buffer photo = upload_photo(*device, target);
-    const CameraUse use{&block, 0, uint32_t(camera.width), uint32_t(camera.height)};
-    Frame frame;
-    const shared::Counts counts = run_until_it_fits(
-        kernels, executor, frame,
-        {model.splats, use.width, use.height, first_capacity(model.splats), true, false, plan.masks},
-        [&](gpu::Recording& recording) {
-            const Sorted sorted =
-                record_forward(recording, kernels, plan, model, frame, use, options.background);
-            record_loss(recording, kernels, frame, use, options.background, photo, plan.masks);
-            record_backward(recording, kernels, plan, model, frame, use, options.background, sorted, {});
+    const FrameInputs inputs{
+        .camera = {.buffer = &block, .width = uint32_t(camera.width), .height = uint32_t(camera.height)},
+        .background = options.background,
+        .sh_degree = options.sh_degree};
+    const FrameRequest size{.splats = model.splats,
+                            .width = inputs.camera.width,
+                            .height = inputs.camera.height,
+                            .instances = first_capacity(model.splats),
+                            .gradients = true,
+                            .masks = plan.masks};
+    FrameBuffers frame;
+    const shared::Counts counts =
+        run_until_it_fits(cache, executor, frame, size, [&](gpu::Recording& recording) {
+            const Sorted sorted = record_forward(recording, cache, plan, model, frame, inputs);
+            record_loss(recording, cache, frame, inputs, photo, plan.masks);
+            record_backward(recording, cache, plan, model, frame, inputs, sorted, {});
         });
     LossGradient result;
     result.l1 = counts.l1;
     result.ssim = counts.ssim;
     result.loss = loss_of(counts);
     result.gradient = download_model(model, model.moments1);
-    result.gradient.origin = glm::dvec3(0);  // a gradient stands nowhere
+    result.gradient.origin = glm::dvec3(0);  // a gradient has no origin
     result.skipped_nonfinite = counts.skipped_nonfinite;
     return result;
 }

@@ -6,7 +6,6 @@
 #include <string>
 
 #include "ewa/error.h"
-#include "passes/loss_items.h"
 #include "shared/layouts.h"
 
 namespace ewa::pipeline {
@@ -16,9 +15,9 @@ uint32_t divide_up(uint64_t a, uint64_t b) {
     return uint32_t((a + b - 1) / b);
 }
 
-RadixCut radix_cut(const passes::Shape& shape, uint32_t items, uint32_t key_bits) {
+RadixCut radix_cut(const passes::KernelConfig& config, uint32_t items, uint32_t key_bits) {
     RadixCut cut;
-    cut.lanes = std::clamp(divide_up(items, shape.sort_chunk), shape.subgroup, shape.sort_lanes_max);
+    cut.lanes = std::clamp(divide_up(items, config.sort_chunk), config.subgroup, config.sort_lanes_max);
     cut.passes = divide_up(key_bits, 8);
     cut.bits = divide_up(key_bits, cut.passes);
     return cut;
@@ -28,37 +27,40 @@ uint64_t counter_words(const RadixCut& cut) {
     return uint64_t(cut.lanes) << cut.bits;
 }
 
-void check_image(const passes::Shape& shape, const FrameRequest& request, const Sizes& sizes) {
+void check_image(const passes::KernelConfig& config, const FrameRequest& request, const Sizes& sizes) {
     const std::string size = std::to_string(request.width) + "x" + std::to_string(request.height);
     if (request.width == 0 || request.height == 0) throw InputError("an image of " + size + " pixels");
-    // The loops that bind: a splat's tile rows, and in training its instances, 8 a turn.
-    const uint64_t most_tiles = uint64_t(8) * shape.loop_limit;
-    if (sizes.tiles_x + sizes.tiles_y + 2 > shape.loop_limit || sizes.tiles > most_tiles)
+    // The loops that limit the size: over a splat's tile rows, and in training over its instances,
+    // 8 at a time.
+    const uint64_t most_tiles = uint64_t(8) * config.loop_limit;
+    if (sizes.tiles_x + sizes.tiles_y + 2 > config.loop_limit || sizes.tiles > most_tiles)
         throw InputError("an image of " + size + " pixels has more than the " + std::to_string(most_tiles) +
                          " tiles that can be drawn; --downscale makes it smaller");
 }
 
 }  // namespace
 
-Sizes sizes_for(const passes::Shape& shape, const FrameRequest& request) {
+Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request) {
     Sizes s;
     if (request.width > 1u << 20 || request.height > 1u << 20)
         throw InputError("an image of " + std::to_string(request.width) + "x" +
                          std::to_string(request.height) + " pixels; at most 1048576 a side can be drawn");
-    s.tiles_x = divide_up(request.width, shape.tile_width);
-    s.tiles_y = divide_up(request.height, shape.tile_height);
+    s.width = request.width;
+    s.height = request.height;
+    s.tiles_x = divide_up(request.width, config.tile_width);
+    s.tiles_y = divide_up(request.height, config.tile_height);
     const uint64_t tiles = uint64_t(s.tiles_x) * s.tiles_y;
     s.tiles = uint32_t(std::min<uint64_t>(tiles, 0xffffffffu));
-    check_image(shape, request, s);
+    check_image(config, request, s);
     s.stride = divide_up(request.width, 4) * 4;
     s.plane_floats = s.stride * request.height;
-    s.scan_block = 64 * shape.subgroup;
+    s.scan_block = 64 * config.subgroup;
     s.scan_blocks = divide_up(std::max(request.splats, 1u), s.scan_block);
-    s.depth_sort = radix_cut(shape, request.splats, 32);
-    // One number more than there are tiles, for instances that turn out not to exist.
-    s.tile_sort = radix_cut(shape, request.instances, uint32_t(std::bit_width(s.tiles)));
-    s.strip_rows = std::min(s.tiles_y, (shape.loop_limit - s.tiles_y) / (s.tiles_x + 2));
-    s.image_planes = request.depth ? 5 : 4;
+    s.depth_sort = radix_cut(config, request.splats, 32);
+    // One more than there are tiles: the sentinel tile.
+    s.tile_sort = radix_cut(config, request.instances, uint32_t(std::bit_width(s.tiles)));
+    s.strip_rows = std::min(s.tiles_y, (config.loop_limit - s.tiles_y) / (s.tiles_x + 2));
+    s.image_planes = request.fifth_plane ? 5 : 4;
 
     const uint64_t word = 4, texel = 16;
     s.records = std::max<uint64_t>(request.splats, 1) * shared::RECORD_TEXELS * texel;
@@ -71,9 +73,9 @@ Sizes sizes_for(const passes::Shape& shape, const FrameRequest& request) {
     s.planes = uint64_t(s.plane_floats) * s.image_planes * word;
     if (request.gradients) {
         const auto groups =
-            passes::element_groups(shape, passes::loss_row_items(s.stride, request.height), 3);
-        s.partials = groups[0] * groups[1] * groups[2] * (shape.group / shape.subgroup);
-        s.reduce_block = 64 * shape.subgroup;
+            passes::element_groups(config, passes::loss_row_items(s.stride, request.height), 3);
+        s.partials = groups[0] * groups[1] * groups[2] * (config.element_group / config.subgroup);
+        s.reduce_block = 64 * config.subgroup;
         s.reduce_blocks = divide_up(s.partials, s.reduce_block);
         s.target = uint64_t(s.plane_floats) * 3 * word;
         s.masked = request.masks ? s.target : 0;
@@ -92,10 +94,10 @@ Sizes sizes_for(const passes::Shape& shape, const FrameRequest& request) {
 
 uint64_t Sizes::total() const {
     const bool gradients = slots > 0;
-    // depth keys 2, order 2, tile counts, prefix, and in training the first instances
+    // 2 depth keys, 2 order, tile counts, prefix; in training also the first instances
     const uint64_t per_splat = records + splat_words * (gradients ? 7 : 6);
     const uint64_t sorting = scan_totals + 2 * counters + digit_totals;
-    // keys 2, splats 2, and in training their places 2
+    // 2 keys, 2 splats; in training also 2 sorted indices
     const uint64_t per_instance = instance_words * (gradients ? 6 : 4) + slots;
     return per_splat + sorting + per_instance + tile_starts + planes + target + masked + exposed + moments +
            2 * derivatives + image_gradient + partial_sums + exposure_sums + reduced;

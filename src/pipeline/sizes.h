@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// The size of every buffer of a frame and the cut of every dispatch over it: one pure function.
+// Sizes of all buffers and dispatches of a frame: one pure function.
 #pragma once
 #include <cstdint>
 
-#include "passes/shape.h"
+#include "passes/kernel_config.h"
 
 namespace ewa::pipeline {
 
 struct FrameRequest {
     uint32_t splats = 0;
     uint32_t width = 0, height = 0;  // px
-    uint32_t instances = 0;          // (splat, tile) pairs to make room for
+    uint32_t instances = 0;          // capacity for (splat, tile) pairs
     bool gradients = false;
-    bool depth = false;     // a fifth image plane: depth or count
-    bool masks = false;     // with gradients: pixels may count in part
-    bool exposure = false;  // with gradients: the loss sees the picture through a photograph's exposure
+    bool fifth_plane = false;  // of the image: depth or count
+    bool masks = false;        // with gradients: some pixels count less
+    bool exposure = false;     // with gradients: a training image's exposure is applied before the loss
 };
 
 struct RadixCut {
@@ -23,11 +23,12 @@ struct RadixCut {
 };
 
 struct Sizes {
+    uint32_t width = 0, height = 0;  // px
     uint32_t tiles_x = 0, tiles_y = 0, tiles = 0;
     uint32_t stride = 0, plane_floats = 0;     // of an image plane
     uint32_t scan_block = 0, scan_blocks = 0;  // of the prefix sum over tile counts
     RadixCut depth_sort, tile_sort;
-    uint32_t strip_rows = 0;  // tile rows an emitting lane walks
+    uint32_t strip_rows = 0;  // tile rows of an emitting lane
     uint32_t image_planes = 0;
     uint32_t partials = 0;  // partial sums of a loss kernel
     uint32_t reduce_block = 0, reduce_blocks = 0;
@@ -39,11 +40,13 @@ struct Sizes {
     uint64_t masked = 0, exposed = 0, moments = 0, derivatives = 0, image_gradient = 0, partial_sums = 0,
              exposure_sums = 0, reduced = 0, slots = 0;
 
-    uint64_t total() const;  // of all buffers a frame with this request holds
+    uint64_t total() const;  // of all buffers of a frame with this request
+
+    shared::ImageLayout image() const { return {{width, height}, stride, plane_floats}; }
 };
 
-/// Throws InputError where the image is empty, or larger than tile numbers and loop limits allow (the text
-/// says what the limit is).
-Sizes sizes_for(const passes::Shape& shape, const FrameRequest& request);
+/// Throws InputError that names the limit if the image is empty, or larger than tile indices
+/// and loop limits allow.
+Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request);
 
 }  // namespace ewa::pipeline

@@ -3,46 +3,72 @@
 
 namespace ewa::pipeline {
 
-void record_scan(gpu::Recording& recording, Kernels& kernels, const ScanBuffers& buffers, uint32_t items,
-                 uint32_t block, Total total, const char* name) {
-    const passes::Shape& shape = kernels.shape();
-    const gpu::Buffer& order = buffers.order ? *buffers.order : buffers.source;
-    kernels.get<passes::ScanBlocks>(buffers.order != nullptr)
-        .record(recording, shape, {buffers.source, order, buffers.prefix, buffers.totals}, {items, block},
-                name);
-    const uint32_t blocks = uint32_t((uint64_t(items) + block - 1) / block);
-    kernels.get<passes::ScanTotals>().record(recording, shape, {buffers.totals, buffers.counts},
-                                             {blocks, uint32_t(total)}, name);
+void record_scan(gpu::Recording& recording, passes::PassCache& cache, const ScanBuffers& buffers,
+                 const ScanWork& work) {
+    cache.get<passes::ScanBlocks>({{shared::SPEC_MODE, buffers.order ? shared::SCAN_GATHERED : 0}})
+        .record(recording,
+                {.source = buffers.source,
+                 .order = buffers.order ? *buffers.order : buffers.source,
+                 .prefix = buffers.prefix,
+                 .totals = buffers.totals},
+                {.items = work.items, .block = work.block}, work.name);
+    const uint32_t blocks = uint32_t((uint64_t(work.items) + work.block - 1) / work.block);
+    cache.get<passes::ScanTotals>().record(recording, {.totals = buffers.totals, .counts = buffers.counts},
+                                           {.blocks = blocks, .total = work.total}, work.name);
 }
 
-uint32_t record_sort(gpu::Recording& recording, Kernels& kernels, const SortBuffers& buffers,
-                     const RadixCut& cut, uint32_t items, uint32_t capacity, bool keys_sorted,
-                     const char* name) {
-    const passes::Shape& shape = kernels.shape();
+namespace {
+
+uint32_t scatter_mode(const SortBuffers& buffers, const SortWork& work, bool first, bool last) {
+    uint32_t mode = 0;
+    if (first && buffers.own_indices) mode |= shared::SORT_OWN_INDICES;
+    if (last && !work.keep_keys) mode |= shared::SORT_DROP_KEYS;
+    if (!buffers.indices[0]) return mode;
+    mode |= shared::SORT_TRACKED;
+    if (first) mode |= shared::SORT_FIRST;
+    if (last) mode |= shared::SORT_LAST;
+    return mode;
+}
+
+}  // namespace
+
+uint32_t record_sort(gpu::Recording& recording, passes::PassCache& cache, const SortBuffers& buffers,
+                     const SortWork& work) {
+    const RadixCut& cut = work.cut;
     const uint32_t counters = cut.lanes << cut.bits;
-    uint32_t from = 0;  // which keys and values hold the input of the pass
+    const gpu::SpecConstant bits{shared::SPEC_RADIX_BITS, cut.bits};
+    uint32_t from = 0;  // which of the two buffers holds a pass's input
     for (uint32_t pass = 0; pass < cut.passes; ++pass, from ^= 1) {
-        const bool first = pass == 0, last = pass + 1 == cut.passes;
-        const bool numbered = buffers.places[0] != nullptr;
-        const uint32_t mode = (first && buffers.own_numbers ? 1u : 0u) | (last && !keys_sorted ? 2u : 0u) |
-                              (numbered ? 4u | (first ? 8u : 0u) | (last ? 16u : 0u) : 0u);
-        const shared::SortPush push{items, capacity, cut.lanes, pass * cut.bits};
+        const uint32_t to = from ^ 1;
+        const bool first = pass == 0, last = pass + 1 == cut.passes, tracked = buffers.indices[0] != nullptr;
+        const shared::SortPush push{
+            .items = work.items, .capacity = work.capacity, .lanes = cut.lanes, .shift = pass * cut.bits};
         const gpu::Buffer& keys = *buffers.keys[from];
-        const gpu::Buffer& values = mode & 1u ? keys : *buffers.values[from];
-        // What a mode leaves alone stands in for itself.
-        const gpu::Buffer& numbers = numbered && !first ? *buffers.places[from] : values;
-        const gpu::Buffer& values_out = *buffers.values[from ^ 1];
+        // A binding that a mode does not use gets another binding's buffer.
+        const gpu::Buffer& values = first && buffers.own_indices ? keys : *buffers.values[from];
         recording.fill(buffers.counters, 0, 0, uint64_t(counters) * 4);
-        kernels.get<passes::RadixCount>(cut.bits).record(
-            recording, shape, {keys, buffers.counters, buffers.counts}, push, name);
-        record_scan(recording, kernels,
-                    {buffers.counters, nullptr, buffers.counter_prefix, buffers.digit_totals, buffers.counts},
-                    counters, cut.lanes, Total::none, name);
-        kernels.get<passes::RadixScatter>(cut.bits, mode)
-            .record(recording, shape,
-                    {keys, values, numbers, buffers.counter_prefix, buffers.digit_totals, buffers.counts,
-                     *buffers.keys[from ^ 1], values_out, numbered ? *buffers.places[from ^ 1] : values_out},
-                    push, name);
+        cache.get<passes::RadixCount>({bits}).record(
+            recording, {.keys = keys, .counters = buffers.counters, .counts = buffers.counts}, push,
+            work.name);
+        record_scan(recording, cache,
+                    {.source = buffers.counters,
+                     .order = nullptr,
+                     .prefix = buffers.counter_prefix,
+                     .totals = buffers.digit_totals,
+                     .counts = buffers.counts},
+                    {.items = counters, .block = cut.lanes, .total = shared::TOTAL_NONE, .name = work.name});
+        cache.get<passes::RadixScatter>({bits, {shared::SPEC_MODE, scatter_mode(buffers, work, first, last)}})
+            .record(recording,
+                    {.keys = keys,
+                     .values = values,
+                     .counters = buffers.counter_prefix,
+                     .bases = buffers.digit_totals,
+                     .counts = buffers.counts,
+                     .keys_out = *buffers.keys[to],
+                     .values_out = *buffers.values[to],
+                     .indices = tracked && !first ? *buffers.indices[from] : values,
+                     .indices_out = tracked ? *buffers.indices[to] : *buffers.values[to]},
+                    push, work.name);
     }
     return from;
 }

@@ -1,42 +1,50 @@
 // SPDX-License-Identifier: Apache-2.0
 // The device-wide building blocks of a frame: prefix sum, and stable radix sort of (key, value) pairs.
 #pragma once
-#include "gpu/recording.h"
-#include "pipeline/kernels.h"
+#include "passes/sort.h"
 #include "pipeline/sizes.h"
 
 namespace ewa::pipeline {
 
 struct ScanBuffers {
     const gpu::Buffer& source;  // items
-    const gpu::Buffer* order;   // where given, entry e is source[order[e]]
+    const gpu::Buffer* order;   // if given, entry e is source[order[e]]
     const gpu::Buffer& prefix;  // items: sum of the entries before, within the block
     const gpu::Buffer& totals;  // blocks + 1: sum of the blocks before; the grand total last
     const gpu::Buffer& counts;  // Counts
 };
-enum class Total : uint32_t { none = 0, instances = 1, densified = 2 };
+struct ScanWork {
+    uint32_t items;
+    uint32_t block;    // entries a subgroup scans
+    uint32_t total;    // shared::TOTAL_*: which of Counts receives the grand total
+    const char* name;  // of the timing
+};
 
-/// Exclusive prefix sum of entry e: totals[e / block] + prefix[e]. total: which of Counts receives the grand
-/// total.
-void record_scan(gpu::Recording& recording, Kernels& kernels, const ScanBuffers& buffers, uint32_t items,
-                 uint32_t block, Total total, const char* name);
+/// Exclusive prefix sum; that of entry e is totals[e / block] + prefix[e].
+void record_scan(gpu::Recording& recording, passes::PassCache& cache, const ScanBuffers& buffers,
+                 const ScanWork& work);
 
 struct SortBuffers {
-    const gpu::Buffer* keys[2];    // keys[0] holds the input
-    const gpu::Buffer* values[2];  // values[0] holds the input, unless own_numbers
-    const gpu::Buffer* places[2];  // scratch and result: where each item went. nullptr: nobody asks
-    bool own_numbers;              // the values are the items' own numbers
+    const gpu::Buffer* keys[2];     // keys[0] holds the input
+    const gpu::Buffer* values[2];   // values[0] holds the input, unless own_indices
+    const gpu::Buffer* indices[2];  // scratch and result: each item's sorted index; nullptr: not wanted
+    bool own_indices;               // the values are the items' own indices
     const gpu::Buffer& counters;
     const gpu::Buffer& counter_prefix;
     const gpu::Buffer& digit_totals;
     const gpu::Buffer& counts;
 };
+struct SortWork {
+    RadixCut cut;
+    uint32_t items;     // 0: Counts.instances, or none if that exceeds `capacity`
+    uint32_t capacity;  // of the buffers
+    bool keep_keys;     // also returns the sorted keys
+    const char* name;   // of the timing
+};
 
-/// Stable sort of `items` pairs (0: Counts.instances of them, none where that exceeds `capacity`) by the low
-/// cut.passes * cut.bits bits. Returns the index i of values[i] and places[i] with the result; keys_sorted:
-/// keep the sorted keys too, in keys[i].
-uint32_t record_sort(gpu::Recording& recording, Kernels& kernels, const SortBuffers& buffers,
-                     const RadixCut& cut, uint32_t items, uint32_t capacity, bool keys_sorted,
-                     const char* name);
+/// Stable sort of pairs by the low cut.passes * cut.bits bits of the key. Returns i such that values[i],
+/// indices[i] and, with keep_keys, keys[i] hold the result.
+uint32_t record_sort(gpu::Recording& recording, passes::PassCache& cache, const SortBuffers& buffers,
+                     const SortWork& work);
 
 }  // namespace ewa::pipeline

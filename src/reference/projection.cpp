@@ -102,13 +102,13 @@ void project_shape(const Splat& splat, const Camera& camera, ProjectionSteps& s)
     s.m = {(s.screen.x * s.rotation) * s.scale, (s.screen.y * s.rotation) * s.scale};
 }
 
-double kernel_factor(Kernel kernel, double det0, double det) {
+double kernel_factor(Footprint kernel, double det0, double det) {
     switch (kernel) {
-        case Kernel::peak:
+        case Footprint::peak:
             return 1;
-        case Kernel::antialias:
+        case Footprint::antialias:
             return std::sqrt(std::max(0.0, det0 / det));
-        case Kernel::unit_mass:
+        case Footprint::unit_mass:
             return 1 / (2 * std::numbers::pi * std::sqrt(det));
     }
     return 0;
@@ -181,16 +181,16 @@ struct DetGradient {
     double det0 = 0, trace = 0;
 };
 
-DetGradient kernel_backward(Kernel kernel, const ProjectionSteps& s, double det, double by_factor) {
+DetGradient kernel_backward(Footprint kernel, const ProjectionSteps& s, double det, double by_factor) {
     switch (kernel) {
-        case Kernel::peak:
+        case Footprint::peak:
             return {};
-        case Kernel::antialias: {
+        case Footprint::antialias: {
             // sqrt(det0 / det). det0 > 0, because otherwise the factor is zero and the splat invisible.
             const double by_det = -0.5 * s.kernel_factor / det;
             return {by_factor * (0.5 / std::sqrt(s.det0 * det) + by_det), by_factor * by_det * LOW_PASS};
         }
-        case Kernel::unit_mass: {
+        case Footprint::unit_mass: {
             const double by_det = -0.5 * s.kernel_factor / det;
             return {by_factor * by_det, by_factor * by_det * LOW_PASS};
         }

@@ -23,7 +23,7 @@ bool transparent(const Image& image) {
 
 }  // namespace
 
-ImageCache::ImageCache(gpu::Device& device, const passes::Shape& shape, const Dataset& dataset,
+ImageCache::ImageCache(gpu::Device& device, const passes::KernelConfig& config, const Dataset& dataset,
                        const std::vector<int>& frames, uint64_t cache_bytes, const glm::dvec3& origin,
                        int reduction)
     : device_(device), photos_(frames.size()) {
@@ -37,7 +37,7 @@ ImageCache::ImageCache(gpu::Device& device, const passes::Shape& shape, const Da
             frame.downscale *= reduction;
             frame.camera = downscale(frame.pinhole, frame.downscale);
         }
-        const shared::CameraBlock block = pipeline::camera_block(frame.camera, shape, origin);
+        const shared::CameraBlock block = pipeline::camera_block(frame.camera, config, origin);
         std::memcpy(&blocks[i * camera_stride_], &block, sizeof(block));
         const uint64_t bytes =
             pipeline::photo_bytes(frame.camera.width, frame.camera.height, frame.eight_bit);

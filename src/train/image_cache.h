@@ -6,7 +6,7 @@
 
 #include "ewa/dataset.h"
 #include "gpu/buffer.h"
-#include "passes/shape.h"
+#include "passes/kernel_config.h"
 #include "pipeline/forward.h"
 
 namespace ewa::train {
@@ -18,7 +18,7 @@ class ImageCache {
   public:
     /// Loads and uploads the cached images, with their sides divided by `reduction`. frames: indices into
     /// dataset.frames. origin: of the model's positions. Throws InputError that names the frame.
-    ImageCache(gpu::Device& device, const passes::Shape& shape, const Dataset& dataset,
+    ImageCache(gpu::Device& device, const passes::KernelConfig& config, const Dataset& dataset,
                const std::vector<int>& frames, uint64_t cache_bytes, const glm::dvec3& origin,
                int reduction = 1);
 

@@ -10,7 +10,6 @@
 #include <optional>
 
 #include "ewa/error.h"
-#include "image/openimageio.h"
 #include "pipeline/model.h"
 #include "report/pictures.h"
 #include "train/checkpoint.h"
@@ -46,11 +45,9 @@ PlanLine skipped_sh_degrees(uint32_t splats) {
             "the dataset says that no colour depends on the view", bytes};
 }
 
-std::vector<PlanLine> plan_of(const train::RunInput& input) {
-    const TrainOptions& options = input.options.train;
-    auto plan = plan_lines(input.start, options.render,
-                           options.strategy == Strategy::adc ? Purpose::densifying : Purpose::training,
-                           input.dataset.frames.front().masks == MaskUse::ignore, options.exposure);
+/// What the trainer skips, and what the choice of the SH degree saved before.
+std::vector<PlanLine> plan_of(const Trainer& trainer, const train::RunInput& input) {
+    std::vector<PlanLine> plan = trainer.plan();
     if (input.without_view_dependence()) plan.push_back(skipped_sh_degrees(uint32_t(input.start.size())));
     return plan;
 }
@@ -307,13 +304,11 @@ void Run::finish(const Trainer& trainer) {
 
 RunResult Run::run() {
     read_checkpoint();
-    image::openimageio();  // the report's images need it, even if the training images do not
     open_folder();
     start();
-    const std::vector<PlanLine> plan = plan_of(input_);
-    for (const PlanLine& line : plan) report_.plan.push_back({line.what, line.why, line.bytes_saved});
-
     Trainer trainer(device_, input_.dataset, input_.split.train, input_.start, options().train);
+    const std::vector<PlanLine> plan = plan_of(trainer, input_);
+    for (const PlanLine& line : plan) report_.plan.push_back({line.what, line.why, line.bytes_saved});
     input_.start = {};
     observer_.on_plan(plan);
     if (trainer.images_on_disk() > 0)

@@ -32,8 +32,8 @@ const Names<MaskUse> kMaskUses = {{"auto", MaskUse::automatic},
                                   {"ignore", MaskUse::ignore},
                                   {"cut", MaskUse::cut},
                                   {"none", MaskUse::none}};
-const Names<Kernel> kKernels = {
-    {"peak", Kernel::peak}, {"antialias", Kernel::antialias}, {"ewa", Kernel::unit_mass}};
+const Names<Footprint> kKernels = {
+    {"peak", Footprint::peak}, {"antialias", Footprint::antialias}, {"ewa", Footprint::unit_mass}};
 
 template <class T>
 const T& read(Member<T> member, const RunOptions& options) {
@@ -225,9 +225,9 @@ std::vector<RunOption> make_table() {
             [](RunOptions& o) -> uint64_t& { return o.train.seed; }, uint64_t(0), UINT64_MAX),
         image_cache_option(),
         background_option(),
-        choice<Kernel>(
+        choice<Footprint>(
             "kernel", "Footprint of a splat: peak (3DGS), antialias (Mip-Splatting) or ewa (unit mass)",
-            [](RunOptions& o) -> Kernel& { return o.train.render.kernel; }, kKernels),
+            [](RunOptions& o) -> Footprint& { return o.train.render.kernel; }, kKernels),
         number<int>(
             "eval-every", "N", "Evaluate the held-out views every N steps. 0: only at the end",
             kDoesNotDecide, [](RunOptions& o) -> int& { return o.eval_every; }, 0, kMostSteps),

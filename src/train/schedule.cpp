@@ -21,6 +21,17 @@ double decayed(double first, double last, double share) {
 
 }  // namespace
 
+pipeline::PlanRequest plan_request(const Gaussians& start, const TrainOptions& options, bool masks) {
+    return {.purpose = pipeline::Purpose::training,
+            .scene_degree = start.sh_degree,
+            .render = options.render,
+            .masks = masks,
+            .exposure = options.exposure,
+            .statistics = options.strategy == Strategy::adc,
+            .absolute_gradients = options.absolute_gradients,
+            .regularised = options.strategy == Strategy::mcmc};
+}
+
 bool Schedule::densifies(int step) const {
     return step > refine_start && step < refine_stop && (step - refine_start) % refine_every == 0;
 }

@@ -15,6 +15,7 @@
 #include <cstdint>
 
 #include "ewa/trainer.h"
+#include "pipeline/plan.h"
 
 namespace ewa::train {
 
@@ -55,5 +56,8 @@ struct Schedule {
 uint64_t cache_share(const TrainOptions& options, int halvings);
 
 Schedule schedule_for(const TrainOptions& options);
+
+/// The plan that a run asks for. masks: some training images have pixels that do not count.
+pipeline::PlanRequest plan_request(const Gaussians& start, const TrainOptions& options, bool masks);
 
 }  // namespace ewa::train

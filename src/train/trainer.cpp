@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The training loop's one step: which photograph, which rates, one submission, and what follows it on
-// schedule.
+// One training step: its training image, its rates, one submission, and what the schedule does after it.
 #include "ewa/trainer.h"
 
 #include <algorithm>
@@ -30,8 +29,8 @@ namespace {
 using namespace pipeline;
 using Clock = std::chrono::steady_clock;
 
-constexpr size_t kTimedSteps = 100;     // steps whose pass times the medians are taken over
-constexpr double kResetOpacity = 0.01;  // 3DGS: opacities after a reset are at most this
+constexpr size_t kTimedSteps = 100;     // number of steps for the medians of pass times
+constexpr double kResetOpacity = 0.01;  // 3DGS: upper bound of opacities after a reset
 
 double logit(double p) {
     return std::log(p / (1 - p));
@@ -42,8 +41,8 @@ std::array<float, 3> random_background(int step, uint64_t seed) {
     return {float(u[0]), float(u[1]), float(u[2])};
 }
 
-/// The length that rates and thresholds are shares of. Cameras that all stand in one place (a panorama, a
-/// single photograph) have no extent; there it is the median distance of what they see.
+/// The length that rates and thresholds are relative to: the extent of the cameras. Cameras in one place (a
+/// panorama, a single image) have no extent; then it is the median distance of the splats from them.
 double extent_for(const Dataset& dataset, const std::vector<int>& frames, const Gaussians& start) {
     const double extent = scene_extent(dataset, frames);
     if (extent > 0) return extent;
@@ -59,10 +58,10 @@ double extent_for(const Dataset& dataset, const std::vector<int>& frames, const 
     return *middle;
 }
 
-/// Splats that are neighbours in space become neighbours in memory: what a tile gathers stands together.
-/// ADC's later generations keep it so, since children stand beside their parent; MCMC's lose it bit by bit.
-/// Means are held relative to an origin near them, and quaternions of another length than about 1 are brought
-/// to it: the learning rate is for those.
+/// Sorts splats so that neighbours in space are neighbours in memory: a tile then reads contiguous splats.
+/// ADC keeps that order, since children are stored beside their parent; MCMC loses it gradually. Means become
+/// relative to an origin near them. Quaternions far from unit length are normalised: the learning rate
+/// assumes about 1.
 Gaussians prepared(Gaussians start) {
     select_splats(start, morton_order(start));
     settle_origin(start);
@@ -84,38 +83,35 @@ struct Trainer::State {
     TrainOptions options;
     train::Schedule schedule;
     double extent;
-    Kernels kernels;
+    passes::PassCache cache;
     gpu::Executor executor;
-    Plan plan;
-    Model model;
-    pipeline::Frame frame;
     train::ImageCache photographs;
-    std::vector<train::ImageCache> smaller;  // by halvings, from 1; what the schedule is past holds nothing
+    const Plan plan;
+    Model model;
+    FrameBuffers frame;
+    std::vector<train::ImageCache>
+        smaller;  // by downsample level, from 1; freed once the schedule is past it
     Exposures exposures;
-    uint32_t instance_room;
+    uint32_t instance_capacity;
     StepReport report;
     std::deque<std::vector<gpu::Timing>> timings;
 
     State(std::shared_ptr<gpu::Device> d, const Dataset& dataset, const std::vector<int>& frames,
-          const Gaussians& start, const TrainOptions& o)
+          const Gaussians& start, const Gaussians& ready, const TrainOptions& o)
         : device(std::move(d)),
           options(o),
           schedule(train::schedule_for(o)),
           extent(extent_for(dataset, frames, start)),
-          kernels(*device),
+          cache(*device),
           executor(*device),
-          plan(plan_training(start.sh_degree, o.render, o.strategy == Strategy::adc)),
-          model(upload_model(*device, prepared(start), 2, plan.statistics)),
-          photographs(*device, kernels.shape(), dataset, frames, train::cache_share(o, 0), model.origin),
-          instance_room(first_capacity(start.size())) {
+          photographs(*device, cache.config(), dataset, frames, train::cache_share(o, 0), ready.origin),
+          plan(plan_for(train::plan_request(start, o, photographs.any_masked()))),
+          model(upload_model(*device, ready, 2, plan.statistics)),
+          instance_capacity(first_capacity(start.size())) {
         for (int halvings = 1; halvings <= o.halvings; ++halvings)
-            smaller.emplace_back(*device, kernels.shape(), dataset, frames, train::cache_share(o, halvings),
+            smaller.emplace_back(*device, cache.config(), dataset, frames, train::cache_share(o, halvings),
                                  model.origin, 1 << halvings);
-        plan.masks = photographs.any_masked();
-        plan.exposure = o.exposure;
         if (plan.exposure) exposures = Exposures(*device, photographs.count());
-        plan.regularised = o.strategy == Strategy::mcmc;
-        plan.absolute = plan.statistics && o.absolute_gradients;
         report.splats = model.splats;
     }
 
@@ -129,13 +125,24 @@ struct Trainer::State {
         r.sh_rest = float(schedule.sh_rest_rate);
         r.step = uint32_t(step);
         if (plan.regularised) {
-            r.opacity_pull = float(options.opacity_weight / model.splats);
-            r.scale_pull = float(options.scale_weight / (3.0 * model.splats * extent));
+            r.opacity_weight = float(options.opacity_weight / model.splats);
+            r.scale_weight = float(options.scale_weight / (3.0 * model.splats * extent));
         }
         return r;
     }
 
-    /// At the resolution of this step. Resolutions rise: what is larger than this one's is still to come.
+    Noise noise(int step) const {
+        // Sigma is a square of lengths. Divided by the extent it is a length again, as in a
+        // scene of unit extent.
+        const double amplitude = options.noise_rate * schedule.mean_rate(step, 1) / extent;
+        return {.amplitude = float(amplitude),
+                .max_length = float(extent),
+                .seed = options.seed,
+                .step = uint32_t(step)};
+    }
+
+    /// The training images at this step's resolution. Frees those of lower
+    /// resolutions: resolutions only rise.
     train::ImageCache& photographs_at(int step) {
         const size_t halvings = size_t(schedule.halvings_at(step));
         while (smaller.size() > halvings) smaller.pop_back();
@@ -145,7 +152,6 @@ struct Trainer::State {
     void optimise(int step) {
         train::ImageCache& seen = photographs_at(step);
         const size_t index = train::frame_of_step(step, photographs.count(), options.seed);
-        const CameraUse camera = seen.camera(index);
         const auto photo = seen.photo(index);
         if (schedule.halvings_at(step + 1) == schedule.halvings_at(step))
             seen.prepare(train::frame_of_step(step + 1, photographs.count(), options.seed));
@@ -153,26 +159,25 @@ struct Trainer::State {
                                    uint32_t(size_t(step - 1) / photographs.count() + 1)};
         const auto background =
             options.random_background ? random_background(step, options.seed) : options.render.background;
-        plan.sh_degree = std::min(plan.stored_degree, schedule.degree(step));
-        const shared::Counts counts = run_until_it_fits(
-            kernels, executor, frame,
-            {model.splats, camera.width, camera.height, instance_room, true, false, plan.masks,
-             plan.exposure},
-            [&](gpu::Recording& recording) {
-                const Sorted sorted =
-                    record_forward(recording, kernels, plan, model, frame, camera, background);
-                record_loss(recording, kernels, frame, camera, background, photo.texels, photo.masked,
+        const FrameInputs inputs{
+            .camera = seen.camera(index), .background = background, .sh_degree = schedule.degree(step)};
+        const FrameRequest size{.splats = model.splats,
+                                .width = inputs.camera.width,
+                                .height = inputs.camera.height,
+                                .instances = instance_capacity,
+                                .gradients = true,
+                                .masks = plan.masks,
+                                .exposure = plan.exposure};
+        const shared::Counts counts =
+            run_until_it_fits(cache, executor, frame, size, [&](gpu::Recording& recording) {
+                const Sorted sorted = record_forward(recording, cache, plan, model, frame, inputs);
+                record_loss(recording, cache, frame, inputs, photo.texels, photo.masked,
                             plan.exposure ? &exposure : nullptr);
-                record_backward(recording, kernels, plan, model, frame, camera, background, sorted,
-                                rates(step));
-                // Sigma is a square of lengths: over the extent it is a length again, as in a scene of unit
-                // extent.
+                record_backward(recording, cache, plan, model, frame, inputs, sorted, rates(step));
                 if (options.strategy == Strategy::mcmc)
-                    record_noise(recording, kernels, model, frame,
-                                 float(options.noise_rate * schedule.mean_rate(step, 1) / extent),
-                                 float(extent), options.seed, uint32_t(step));
+                    record_noise(recording, cache, model, frame, noise(step));
             });
-        instance_room = frame.instance_capacity;
+        instance_capacity = frame.instance_capacity;
         report.loss = loss_of(counts);
         report.skipped_nonfinite = counts.skipped_nonfinite;
         report.dropped_updates += counts.dropped_updates;
@@ -184,9 +189,13 @@ struct Trainer::State {
     void follow_up(int step) {
         if (options.strategy == Strategy::adc) control_density(step);
         if (options.strategy != Strategy::mcmc || !schedule.relocates(step)) return;
-        refine_mcmc(kernels, executor, model, frame,
-                    {options.dead_opacity, schedule.growth, options.max_splats, schedule.copy_spread,
-                     options.seed, uint32_t(step)});
+        refine_mcmc(cache, executor, model, frame,
+                    {.dead_opacity = options.dead_opacity,
+                     .growth = schedule.growth,
+                     .max_splats = options.max_splats,
+                     .spread = schedule.copy_spread,
+                     .seed = options.seed,
+                     .step = uint32_t(step)});
     }
 
     void control_density(int step) {
@@ -201,11 +210,11 @@ struct Trainer::State {
             rules.seed = options.seed;
             rules.step = uint32_t(step);
             rules.max_splats = options.max_splats;
-            densify(kernels, executor, model, frame, rules);
+            densify(cache, executor, model, frame, rules);
         }
         if (schedule.resets_opacity(step)) {
             gpu::Recording recording(device->limits());
-            record_reset_opacity(recording, kernels, model, float(logit(kResetOpacity)));
+            record_reset_opacity(recording, cache, model, float(logit(kResetOpacity)));
             executor.run(recording);
         }
     }
@@ -216,8 +225,8 @@ Trainer::Trainer(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
     if (train_frames.empty())
         throw InputError("there is no training image; a larger --test-every leaves more of them");
     train::check_start(start.size(), options);
-    state_ =
-        std::make_unique<State>(std::move(device), dataset, train_frames, start, resolve(options, dataset));
+    state_ = std::make_unique<State>(std::move(device), dataset, train_frames, start, prepared(start),
+                                     resolve(options, dataset));
 }
 Trainer::~Trainer() = default;
 
@@ -242,7 +251,7 @@ struct NamedBuffer {
     gpu::Texel texel;
 };
 
-/// What a run of so many splats holds from step to step.
+/// The buffers that a run of `splats` splats keeps from step to step.
 std::vector<NamedBuffer> buffers_of(const Plan& plan, Model& model, Exposures& exposures, uint32_t splats) {
     const uint64_t bytes = parameter_bytes(splats, model.sh_degree);
     std::vector<NamedBuffer> buffers{{"params", &model.params, bytes, gpu::Texel::rgba32f},
@@ -290,7 +299,7 @@ void Trainer::restore(const TrainerState& state) {
         if (state.arrays[i].name != buffers[i].name || state.arrays[i].bytes.size() != buffers[i].bytes)
             throw InputError("the state does not fit this training: it lacks " +
                              std::string(buffers[i].name) + " of " + std::to_string(splats) + " splats");
-    s.model = {};  // its memory first
+    s.model = {};  // free its memory first
     s.model.splats = s.model.capacity = splats;
     s.model.sh_degree = state.sh_degree;
     s.model.origin = origin;
@@ -299,7 +308,7 @@ void Trainer::restore(const TrainerState& state) {
         buffers[i].buffer->upload(std::span<const std::byte>(state.arrays[i].bytes));
     }
     s.report = state.report;
-    s.instance_room = std::max(s.instance_room, first_capacity(splats));
+    s.instance_capacity = std::max(s.instance_capacity, first_capacity(splats));
 }
 
 std::vector<Exposure> Trainer::exposures() const {
@@ -316,6 +325,10 @@ size_t Trainer::images_on_disk() const {
 }
 int Trainer::steps_done() const {
     return state_->report.step;
+}
+
+std::vector<PlanLine> Trainer::plan() const {
+    return describe(state_->plan, state_->model.sh_degree, state_->model.splats);
 }
 
 std::vector<PassTime> Trainer::pass_times() const {

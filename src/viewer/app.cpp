@@ -71,7 +71,7 @@ std::filesystem::path free_name(const std::string& stem, const std::string& exte
 void SceneState::set_gaussians(std::shared_ptr<const Gaussians> gaussians) {
     scene.gaussians = std::move(gaussians);
     sh_degree = sh_degree_present(*scene.gaussians);
-    plan = plan_lines(*scene.gaussians, {}, Purpose::picture);
+    plan = plan_lines(*scene.gaussians, RenderOptions{});
 }
 
 bool Message::expire(Clock::time_point now) {

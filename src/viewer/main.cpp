@@ -149,7 +149,7 @@ Startup open(const Arguments& arguments) {
     startup.settings = arguments.settings;
     startup.settings.cameras = startup.scene.gaussians->size() == 0;
     Look& look = startup.settings.look;
-    look.kernel = arguments.antialias ? Kernel::antialias : startup.scene.look.kernel;
+    look.kernel = arguments.antialias ? Footprint::antialias : startup.scene.look.kernel;
     look.background =
         arguments.background.empty() ? startup.scene.look.background : parse_background(arguments.background);
     return startup;

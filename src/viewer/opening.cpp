@@ -66,8 +66,8 @@ std::string text_of(const nlohmann::json& config, const char* name) {
 Look look_of(const nlohmann::json& config) {
     Look look;
     const std::string kernel = text_of(config, "kernel");
-    if (kernel == "antialias") look.kernel = Kernel::antialias;
-    if (kernel == "ewa") look.kernel = Kernel::unit_mass;
+    if (kernel == "antialias") look.kernel = Footprint::antialias;
+    if (kernel == "ewa") look.kernel = Footprint::unit_mass;
     std::string colour = text_of(config, "background");
     std::replace(colour.begin(), colour.end(), ',', ' ');
     std::string_view rest = colour;
@@ -161,7 +161,7 @@ OpenedScene open_scene(const fs::path& path, const fs::path& cameras) {
         scene = open_dataset(path);
     } else {
         SplatScene splats = read_splats(path);
-        if (splats.antialiased) scene.look.kernel = Kernel::antialias;
+        if (splats.antialiased) scene.look.kernel = Footprint::antialias;
         if (!splats.remarks.empty()) scene.remark = splats.remarks.front();
         scene.gaussians = std::make_shared<const Gaussians>(std::move(splats.gaussians));
         if (!cameras.empty()) scene.dataset = load_cameras(cameras, 1, false);

@@ -54,7 +54,7 @@ void edit_look(const PanelFacts& facts, Look& look) {
     }
     int kernel = int(look.kernel);
     if (ImGui::Combo("kernel", &kernel, "peak (3DGS)\0antialias\0unit mass (EWA)\0"))
-        look.kernel = Kernel(kernel);
+        look.kernel = Footprint(kernel);
 }
 
 void choose_up(const PanelFacts& facts, PanelActions& actions) {

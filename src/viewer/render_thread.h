@@ -19,7 +19,7 @@ namespace ewa::viewer {
 struct Look {
     Mode mode = Mode::color;
     std::array<float, 3> background{0, 0, 0};
-    Kernel kernel = Kernel::peak;
+    Footprint kernel = Footprint::peak;
     int sh_degree = kMaxShDegree;
     float splat_scale = 1;
     bool operator==(const Look&) const = default;

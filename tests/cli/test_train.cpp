@@ -69,9 +69,15 @@ TEST_F(Train, QuietIsQuiet) {
 }
 
 TEST_F(Train, VerboseTellsThePlan) {
-    const Outcome outcome = train("o", {"--steps", "1", "--verbose"});
-    expect_success(outcome);
-    EXPECT_NE(outcome.out.find("left out:"), std::string::npos) << outcome.out;
+    const Outcome plain = train("o", {"--steps", "1", "--strategy", "adc", "--verbose"});
+    expect_success(plain);
+    EXPECT_NE(plain.out.find("left out: exposures"), std::string::npos) << plain.out;
+    EXPECT_EQ(plain.out.find("left out: densification statistics"), std::string::npos) << plain.out;
+    EXPECT_NE(read_file(folder / "o/report.html").find("exposures, their passes"), std::string::npos);
+    const Outcome other = train("p", {"--steps", "1", "--strategy", "mcmc", "--exposure", "--verbose"});
+    expect_success(other);
+    EXPECT_EQ(other.out.find("left out: exposures"), std::string::npos) << other.out;
+    EXPECT_NE(other.out.find("left out: densification statistics"), std::string::npos) << other.out;
 }
 
 TEST_F(Train, ConfigOfARunRepeatsIt) {

@@ -224,7 +224,7 @@ GoldenScene still_life() {
 
 }  // namespace
 
-GoldenScene sub_pixel_scene(Kernel kernel) {
+GoldenScene sub_pixel_scene(Footprint kernel) {
     GoldenScene s{"antialias", {}, plain_camera(), {}, Shown::color, 1, kEdges};
     s.options.kernel = kernel;
     Random random(5);
@@ -251,8 +251,8 @@ std::vector<GoldenScene> golden_scenes() {
         faint(),
         far_from_origin(),
         off_centre(),
-        sub_pixel_scene(Kernel::antialias),
-        sub_pixel_scene(Kernel::unit_mass),
+        sub_pixel_scene(Footprint::antialias),
+        sub_pixel_scene(Footprint::unit_mass),
         mode("mode_color", Shown::color, 0.25),
         mode("mode_depth", Shown::depth, 0.1),
         mode("mode_alpha", Shown::alpha, 1),
@@ -260,7 +260,7 @@ std::vector<GoldenScene> golden_scenes() {
         still_life(),
     };
     for (GoldenScene& scene : scenes)
-        if (scene.options.kernel == Kernel::unit_mass) scene.name = "unit_mass";
+        if (scene.options.kernel == Footprint::unit_mass) scene.name = "unit_mass";
     return scenes;
 }
 

@@ -32,6 +32,6 @@ inline void PrintTo(const GoldenScene& scene, std::ostream* out) {
 std::vector<GoldenScene> golden_scenes();
 
 /// Splats of sub-pixel size, for what anti-aliasing is for.
-GoldenScene sub_pixel_scene(Kernel kernel);
+GoldenScene sub_pixel_scene(Footprint kernel);
 
 }  // namespace ewa::test

@@ -78,15 +78,15 @@ TEST(GoldenOneSplat, ReferenceIsTheClosedForm) {
 /// splats too large.
 TEST(GoldenAntialias, IsNearerToSupersampling) {
     constexpr int kFactor = 8;
-    GoldenScene fine = sub_pixel_scene(Kernel::peak);
+    GoldenScene fine = sub_pixel_scene(Footprint::peak);
     fine.camera.width *= kFactor;
     fine.camera.height *= kFactor;
     for (double* length : {&fine.camera.fx, &fine.camera.fy, &fine.camera.cx, &fine.camera.cy})
         *length *= kFactor;
     for (const auto& device : all_devices()) {
         const Image truth = downscale(device_picture(device, fine), kFactor);
-        const double antialiased = psnr(device_picture(device, sub_pixel_scene(Kernel::antialias)), truth);
-        const double peak = psnr(device_picture(device, sub_pixel_scene(Kernel::peak)), truth);
+        const double antialiased = psnr(device_picture(device, sub_pixel_scene(Footprint::antialias)), truth);
+        const double peak = psnr(device_picture(device, sub_pixel_scene(Footprint::peak)), truth);
         printf("    against %d x %d rays a pixel: antialias %.2f dB, peak %.2f dB\n", kFactor, kFactor,
                antialiased, peak);
         EXPECT_GT(antialiased, 25);

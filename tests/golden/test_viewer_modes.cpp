@@ -41,7 +41,7 @@ Gaussians splats() {
 }
 
 std::vector<ViewerCase> cases() {
-    const auto look = [](Mode mode, int degree = 3, float scale = 1, Kernel kernel = Kernel::peak) {
+    const auto look = [](Mode mode, int degree = 3, float scale = 1, Footprint kernel = Footprint::peak) {
         return viewer::Look{mode, {0.1f, 0.3f, 0.5f}, kernel, degree, scale};
     };
     // A count is a whole number: where a splat's reach ends the two may differ by one of some twenty.
@@ -57,7 +57,7 @@ std::vector<ViewerCase> cases() {
             {"viewer_degree_1", look(Mode::color, 1)},
             {"viewer_degree_2", look(Mode::color, 2)},
             {"viewer_scale", look(Mode::color, 3, 0.4f)},
-            {"viewer_antialias", look(Mode::color, 3, 1, Kernel::antialias)}};
+            {"viewer_antialias", look(Mode::color, 3, 1, Footprint::antialias)}};
 }
 
 /// The value that a share of them is not above, as a rank of the sorted ones.

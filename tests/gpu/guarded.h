@@ -14,8 +14,8 @@
 #include "gpu/buffer.h"
 #include "gpu/executor.h"
 #include "gpu/test_device.h"
-#include "pipeline/frame.h"
-#include "pipeline/kernels.h"
+#include "passes/pass.h"
+#include "pipeline/frame_buffers.h"
 
 namespace ewa::test {
 
@@ -54,6 +54,7 @@ class Guarded {
         buffer_.upload(std::span<const T>(data));
     }
     operator const gpu::Buffer&() const { return buffer_; }
+    operator gpu::BufferPart() const { return buffer_; }
     const gpu::Buffer& buffer() const { return buffer_; }
     template <class T>
     std::vector<T> read() const {
@@ -70,11 +71,11 @@ inline void expect_intact(std::initializer_list<const Guarded*> buffers) {
     for (const Guarded* buffer : buffers) EXPECT_TRUE(buffer->intact());
 }
 
-/// All buffers of a frame, guarded. Frame::reserve keeps buffers that are large enough, so the frame runs
-/// with these as it would with its own.
+/// All buffers of a frame, guarded. FrameBuffers::reserve keeps buffers that are large enough, so the frame
+/// uses these.
 class GuardedFrame {
   public:
-    GuardedFrame(const passes::Shape& shape, const pipeline::FrameRequest& request) {
+    GuardedFrame(const passes::KernelConfig& shape, const pipeline::FrameRequest& request) {
         const pipeline::Sizes s = sizes_for(shape, request);
         using gpu::Texel;
         make(frame.counts, "counts", sizeof(shared::Counts), Texel::none, true);
@@ -105,8 +106,8 @@ class GuardedFrame {
             make(frame.image_gradient, "image gradient", s.image_gradient, Texel::rgba32f);
             make(frame.partials, "partials", s.partial_sums);
             make(frame.reduced, "reduced", s.reduced);
-            for (auto& buffer : frame.instance_places)
-                make(buffer, "instance places", s.instance_words, Texel::rgba32ui);
+            for (auto& buffer : frame.sorted_indices)
+                make(buffer, "sorted indices", s.instance_words, Texel::rgba32ui);
             make(frame.slots, "slots", s.slots, Texel::rgba32f);
         }
         frame.reserve(*device(), shape, request);  // zeroes planes and target, guards included
@@ -119,7 +120,7 @@ class GuardedFrame {
             if (auto result = guard_is_intact(*buffer, used); !result) return result;
         return testing::AssertionSuccess();
     }
-    pipeline::Frame frame;
+    pipeline::FrameBuffers frame;
 
   private:
     void make(gpu::Buffer& buffer, const char* name, uint64_t used, gpu::Texel texel = gpu::Texel::none,
@@ -131,12 +132,12 @@ class GuardedFrame {
     std::vector<std::pair<gpu::Buffer*, uint64_t>> buffers_;
 };
 
-/// Kernels and an executor on the test device, shared by the tests of a process.
+/// Passes and an executor on the test device, shared by the tests of a process.
 struct Rig {
-    pipeline::Kernels kernels{*device()};
+    passes::PassCache cache{*device()};
     gpu::Executor executor{*device()};
 
-    const passes::Shape& shape() const { return kernels.shape(); }
+    const passes::KernelConfig& config() const { return cache.config(); }
     gpu::Recording recording() const { return gpu::Recording(device()->limits()); }
     /// Runs what `record` puts into a recording.
     template <class Record>

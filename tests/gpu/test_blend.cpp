@@ -7,6 +7,7 @@
 
 #include "gpu/guarded.h"
 #include "gpu/twin_inputs.h"
+#include "passes/blend.h"
 #include "pipeline/sizes.h"
 #include "reference/blend.h"
 
@@ -22,8 +23,8 @@ struct Lists {
 
     explicit Lists(const Scene& s, size_t promised = 0)
         : scene(s),
-          twin(reference::render(s.gaussians, s.camera, s.options, twin_tiles(rig().shape()))),
-          sizes(pipeline::sizes_for(rig().shape(), request())),
+          twin(reference::render(s.gaussians, s.camera, s.options, twin_tiles(rig().config()))),
+          sizes(pipeline::sizes_for(rig().config(), request())),
           records("records", pack_records(twin.projected), gpu::Texel::rgba32f),
           splats("splats", words([&](size_t k) { return twin.instances.sorted[k].splat; })),
           starts("starts", bounds(twin.instances, promised)) {}
@@ -38,12 +39,10 @@ struct Lists {
                 true};
     }
     shared::BlendPush push() const {
-        const auto steps = passes::tile_steps(rig().shape(), sizes.tiles);
+        const auto steps = passes::tile_steps(rig().config(), sizes.tiles);
         const auto& b = scene.options.background;
         return {{b[0], b[1], b[2]},
-                {uint32_t(scene.camera.width), uint32_t(scene.camera.height)},
-                sizes.stride,
-                sizes.plane_floats,
+                sizes.image(),
                 {sizes.tiles_x, sizes.tiles_y},
                 {steps[0], steps[1]},
                 uint32_t(count())};
@@ -104,8 +103,10 @@ TEST_P(BlendPass, PlanesAreTheTwins) {
         const uint32_t planes = with_depth ? 5 : 4;
         Guarded out("planes", uint64_t(lists.sizes.plane_floats) * planes * 4);
         r.run([&](gpu::Recording& recording) {
-            r.kernels.get<passes::Blend>(with_depth)
-                .record(recording, r.shape(), {lists.records, lists.splats, lists.starts, out}, lists.push());
+            r.cache
+                .get<passes::Blend>(
+                    {{shared::SPEC_MODE, with_depth ? shared::BLEND_DEPTH : shared::BLEND_COLOR}})
+                .record(recording, {lists.records, lists.splats, lists.starts, out}, lists.push());
         });
         EXPECT_TRUE(out.intact());
         const auto actual = out.read<float>();
@@ -143,8 +144,8 @@ TEST_P(BlendPass, CountsAreTheTwins) {
     Rig& r = rig();
     Guarded out("planes", uint64_t(lists.sizes.plane_floats) * 5 * 4);
     r.run([&](gpu::Recording& recording) {
-        r.kernels.get<passes::Blend>(shared::BLEND_COUNT)
-            .record(recording, r.shape(), {lists.records, lists.splats, lists.starts, out}, lists.push());
+        r.cache.get<passes::Blend>({{shared::SPEC_MODE, shared::BLEND_COUNT}})
+            .record(recording, {lists.records, lists.splats, lists.starts, out}, lists.push());
     });
     EXPECT_TRUE(out.intact());
     const auto actual = out.read<float>();
@@ -165,8 +166,8 @@ TEST_P(BlendPass, EllipsoidsAreTheTwins) {
     Rig& r = rig();
     Guarded out("planes", uint64_t(lists.sizes.plane_floats) * 4 * 4);
     r.run([&](gpu::Recording& recording) {
-        r.kernels.get<passes::Blend>(shared::BLEND_ELLIPSOIDS)
-            .record(recording, r.shape(), {lists.records, lists.splats, lists.starts, out}, lists.push());
+        r.cache.get<passes::Blend>({{shared::SPEC_MODE, shared::BLEND_ELLIPSOIDS}})
+            .record(recording, {lists.records, lists.splats, lists.starts, out}, lists.push());
     });
     EXPECT_TRUE(out.intact());
     const reference::Raster expected =
@@ -202,9 +203,9 @@ TEST_P(BlendBackwardPass, SlotsAreTheTwinsMoments) {
         incoming("image gradient", pack_planes(gradient, 3, lists.sizes.stride), gpu::Texel::rgba32f),
         slots("slots", std::max<uint64_t>(lists.count(), 1) * shared::SLOT_FLOATS * 4, gpu::Texel::rgba32f);
     r.run([&](gpu::Recording& recording) {
-        r.kernels.get<passes::BlendBackward>(1u).record(
-            recording, r.shape(), {lists.records, lists.splats, lists.starts, planes, incoming, slots},
-            lists.push());
+        r.cache.get<passes::BlendBackward>({{shared::SPEC_MODE, shared::BLEND_BACKWARD_ABSOLUTE}})
+            .record(recording, {lists.records, lists.splats, lists.starts, planes, incoming, slots},
+                    lists.push());
     });
     EXPECT_TRUE(slots.intact());
     const auto expected =
@@ -255,11 +256,11 @@ TEST(BlendBackwardSlots, BehindTheLastTileAreZero) {
                  gpu::Texel::rgba32f),
         slots("slots", stale, gpu::Texel::rgba32f);
     r.run([&](gpu::Recording& recording) {
-        r.kernels.get<passes::Blend>(false).record(
-            recording, r.shape(), {lists.records, lists.splats, lists.starts, planes}, lists.push());
-        r.kernels.get<passes::BlendBackward>(0u).record(
-            recording, r.shape(), {lists.records, lists.splats, lists.starts, planes, incoming, slots},
-            lists.push());
+        r.cache.get<passes::Blend>({{shared::SPEC_MODE, shared::BLEND_COLOR}})
+            .record(recording, {lists.records, lists.splats, lists.starts, planes}, lists.push());
+        r.cache.get<passes::BlendBackward>({{shared::SPEC_MODE, 0}})
+            .record(recording, {lists.records, lists.splats, lists.starts, planes, incoming, slots},
+                    lists.push());
     });
     expect_intact({&slots});
     const auto written = slots.read<float>();
@@ -278,11 +279,11 @@ size_t check_one_tile(const Scene& scene) {
         incoming("image gradient", pack_planes(gradient, 3, lists.sizes.stride), gpu::Texel::rgba32f),
         slots("slots", lists.count() * shared::SLOT_FLOATS * 4, gpu::Texel::rgba32f);
     r.run([&](gpu::Recording& recording) {
-        r.kernels.get<passes::Blend>(false).record(
-            recording, r.shape(), {lists.records, lists.splats, lists.starts, planes}, lists.push());
-        r.kernels.get<passes::BlendBackward>(1u).record(
-            recording, r.shape(), {lists.records, lists.splats, lists.starts, planes, incoming, slots},
-            lists.push());
+        r.cache.get<passes::Blend>({{shared::SPEC_MODE, shared::BLEND_COLOR}})
+            .record(recording, {lists.records, lists.splats, lists.starts, planes}, lists.push());
+        r.cache.get<passes::BlendBackward>({{shared::SPEC_MODE, shared::BLEND_BACKWARD_ABSOLUTE}})
+            .record(recording, {lists.records, lists.splats, lists.starts, planes, incoming, slots},
+                    lists.push());
     });
     expect_intact({&planes, &slots});
     const auto actual = planes.read<float>();

@@ -19,7 +19,7 @@ struct Case {
     SplatKind kind;
     size_t splats;
     int width, height, sh_degree;
-    Kernel kernel;
+    Footprint kernel;
     uint64_t seed;
 };
 
@@ -106,17 +106,17 @@ std::vector<Case> cases() {
          {SplatKind::ordinary, SplatKind::needles, SplatKind::sub_pixel, SplatKind::off_screen_and_close,
           SplatKind::opacity_extremes, SplatKind::mixed})
         for (const size_t splats : {size_t(20), size_t(600)})
-            all.push_back({kind, splats, 61, 47, int(seed % 4), Kernel::peak, seed++});
-    for (const Kernel kernel : {Kernel::antialias, Kernel::unit_mass})
+            all.push_back({kind, splats, 61, 47, int(seed % 4), Footprint::peak, seed++});
+    for (const Footprint kernel : {Footprint::antialias, Footprint::unit_mass})
         all.push_back({SplatKind::mixed, 300, 53, 39, 3, kernel, seed++});
     for (const auto& [w, h] : {std::pair{1, 1}, {17, 3}, {3, 17}, {200, 150}, {257, 129}})
-        all.push_back({SplatKind::mixed, 400, w, h, 2, Kernel::peak, seed++});
+        all.push_back({SplatKind::mixed, 400, w, h, 2, Footprint::peak, seed++});
     // Where a pixel's position has few digits left behind the point.
     for (const auto& [w, h] : {std::pair{8192, 4}, {4, 8192}})
-        all.push_back({SplatKind::sub_pixel, 600, w, h, 0, Kernel::peak, seed++});
-    all.push_back({SplatKind::mixed, 3000, 160, 120, 1, Kernel::peak, seed++});
+        all.push_back({SplatKind::sub_pixel, 600, w, h, 0, Footprint::peak, seed++});
+    all.push_back({SplatKind::mixed, 3000, 160, 120, 1, Footprint::peak, seed++});
     for (const size_t splats : {size_t(0), size_t(1)})
-        all.push_back({SplatKind::ordinary, splats, 61, 47, 1, Kernel::peak, seed++});
+        all.push_back({SplatKind::ordinary, splats, 61, 47, 1, Footprint::peak, seed++});
     return all;
 }
 

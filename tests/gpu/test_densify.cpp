@@ -10,6 +10,7 @@
 #include "core/random.h"
 #include "gpu/guarded.h"
 #include "gpu/twin_inputs.h"
+#include "passes/strategy.h"
 #include "pipeline/densify.h"
 #include "pipeline/sizes.h"
 #include "pipeline/sorting.h"
@@ -110,8 +111,8 @@ Expected expected_of(const Start& start, const DensifyRules& rules) {
 
 pipeline::DensifyResult run_densify(pipeline::Model& model, const DensifyRules& rules) {
     Rig& r = rig();
-    GuardedFrame guarded(r.shape(), {model.splats, 16, 16, 1, true, false});
-    const auto result = densify(r.kernels, r.executor, model, guarded.frame, rules);
+    GuardedFrame guarded(r.config(), {model.splats, 16, 16, 1, true, false});
+    const auto result = densify(r.cache, r.executor, model, guarded.frame, rules);
     EXPECT_TRUE(guarded.intact());
     return result;
 }
@@ -171,8 +172,8 @@ INSTANTIATE_TEST_SUITE_P(Sizes, Densify,
 TEST(DensifyEdges, WritesNothingPastItsRoom) {
     Start start(2100, 500, 1);
     Rig& r = rig();
-    GuardedFrame guarded(r.shape(), {500, 16, 16, 1, true, false});
-    pipeline::Frame& frame = guarded.frame;
+    GuardedFrame guarded(r.config(), {500, 16, 16, 1, true, false});
+    pipeline::FrameBuffers& frame = guarded.frame;
     const DensifyRules rules = rules_for(0);
     const uint32_t room = 200;
     const auto push = [&](uint32_t new_capacity) {
@@ -191,18 +192,18 @@ TEST(DensifyEdges, WritesNothingPastItsRoom) {
     const uint64_t bytes = pipeline::parameter_bytes(room, 1);
     Guarded params("params", bytes), moments1("moments1", bytes), moments2("moments2", bytes);
     r.run([&](gpu::Recording& recording) {
-        r.kernels.get<passes::DensifyDecide>().record(
-            recording, r.shape(), {start.model.params, start.model.statistics, frame.tile_counts}, push(0));
-        record_scan(recording, r.kernels,
-                    {frame.tile_counts, nullptr, frame.prefix, frame.scan_totals, frame.counts}, 500,
-                    frame.sizes.scan_block, pipeline::Total::densified, "offsets");
-        r.kernels.get<passes::DensifyWrite>(1u).record(
-            recording, r.shape(),
-            {start.model.params, start.model.moments1, start.model.moments2, start.model.statistics,
-             frame.prefix, frame.scan_totals, params, moments1, moments2},
-            push(room));
+        r.cache.get<passes::DensifyDecide>().record(
+            recording, {start.model.params, start.model.statistics, frame.tile_counts}, push(0));
+        pipeline::record_scan(recording, r.cache,
+                              {frame.tile_counts, nullptr, frame.prefix, frame.scan_totals, frame.counts},
+                              {500, frame.sizes.scan_block, shared::TOTAL_SCAN, "offsets"});
+        r.cache.get<passes::DensifyWrite>({{shared::SPEC_SH_DEGREE, 1}})
+            .record(recording,
+                    {start.model.params, start.model.moments1, start.model.moments2, start.model.statistics,
+                     frame.prefix, frame.scan_totals, params, moments1, moments2},
+                    push(room));
     });
-    EXPECT_GT(frame.read_counts().densified, room);
+    EXPECT_GT(frame.read_counts().scan_total, room);
     expect_intact({&params, &moments1, &moments2});
     EXPECT_TRUE(guarded.intact());
     for (const uint32_t word : params.read<uint32_t>()) EXPECT_NE(word, kPoison);  // and all of it is filled
@@ -283,8 +284,8 @@ TEST(ResetOpacity, LowersWhatIsHigherAndForgetsItsMoments) {
     const auto before = params.read<float>();
     const float logit = float(std::log(0.01 / 0.99));
     r.run([&](gpu::Recording& recording) {
-        r.kernels.get<passes::ResetOpacity>().record(recording, r.shape(), {params, moments1, moments2},
-                                                     {129, start.model.planes(), logit});
+        r.cache.get<passes::ResetOpacity>().record(recording, {params, moments1, moments2},
+                                                   {129, start.model.planes(), logit});
     });
     expect_intact({&params, &moments1, &moments2});
     const auto after = params.read<float>(), m1 = moments1.read<float>(), m2 = moments2.read<float>();
@@ -306,16 +307,17 @@ TEST(ResetOpacity, LowersWhatIsHigherAndForgetsItsMoments) {
 /// More workgroups than one row of a dispatch may hold.
 TEST(ResetOpacity, ReachesEverySplatOverSeveralRowsOfWorkgroups) {
     Rig& r = rig();
-    passes::Shape narrow = r.shape();
+    passes::KernelConfig narrow = r.config();
     narrow.max_groups = 3;
-    const uint32_t splats = 7 * narrow.group + 5;
+    const uint32_t splats = 7 * narrow.element_group + 5;
+    passes::PassCache cache(*device(), narrow);
     Start start(2501, splats, 0);
     Guarded params("params", start.model.params.download<float>(start.moments1.size()), gpu::Texel::rgba32f),
         moments1("moments1", start.moments1, gpu::Texel::rgba32f),
         moments2("moments2", start.moments2, gpu::Texel::rgba32f);
     r.run([&](gpu::Recording& recording) {
-        r.kernels.get<passes::ResetOpacity>().record(recording, narrow, {params, moments1, moments2},
-                                                     {splats, start.model.planes(), -20.0f});
+        cache.get<passes::ResetOpacity>().record(recording, {params, moments1, moments2},
+                                                 {splats, start.model.planes(), -20.0f});
     });
     expect_intact({&params, &moments1, &moments2});
     const auto after = params.read<float>();

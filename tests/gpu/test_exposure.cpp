@@ -48,7 +48,7 @@ struct Inputs {
     }
 };
 
-void run(Inputs& s, pipeline::Frame& frame, uint32_t visit, uint32_t instances = 0) {
+void run(Inputs& s, pipeline::FrameBuffers& frame, uint32_t visit, uint32_t instances = 0) {
     Rig& r = rig();
     const auto planes = pack_planes(s.picture, 3, frame.sizes.stride);
     frame.planes.upload(std::span<const float>(planes));
@@ -59,7 +59,7 @@ void run(Inputs& s, pipeline::Frame& frame, uint32_t visit, uint32_t instances =
     const pipeline::CameraUse camera{nullptr, 0, uint32_t(s.picture.width), uint32_t(s.picture.height)};
     const pipeline::ExposureUse use{&s.exposures, kPhoto, kRate, visit};
     r.run([&](gpu::Recording& recording) {
-        record_loss(recording, r.kernels, frame, camera, {}, texels, false, &use);
+        record_loss(recording, r.cache, frame, {.camera = camera}, texels, false, &use);
     });
 }
 
@@ -68,8 +68,8 @@ class ExposedLoss : public testing::TestWithParam<std::pair<int, int>> {};
 TEST_P(ExposedLoss, GradientsAndAdamsStepAreTheTwins) {
     const auto [width, height] = GetParam();
     Inputs s(width, height);
-    GuardedFrame guarded(rig().shape(), {1, uint32_t(width), uint32_t(height), 1, true, false, false, true});
-    pipeline::Frame& frame = guarded.frame;
+    GuardedFrame guarded(rig().config(), {1, uint32_t(width), uint32_t(height), 1, true, false, false, true});
+    pipeline::FrameBuffers& frame = guarded.frame;
 
     reference::Exposure exposure = wide(s.start[kPhoto]);
     const reference::Exposure identity = wide(kIdentityExposure);
@@ -120,7 +120,7 @@ INSTANTIATE_TEST_SUITE_P(Sizes, ExposedLoss,
 /// A pixel that does not count says nothing of the exposure.
 TEST(Exposure, LearnsNothingFromWhatIsMasked) {
     Inputs s(40, 30);
-    GuardedFrame guarded(rig().shape(), {1, 40, 30, 1, true, false, true, true});
+    GuardedFrame guarded(rig().config(), {1, 40, 30, 1, true, false, true, true});
     Image masked(40, 30, 4);  // alpha 0 everywhere
     for (int y = 0; y < 30; ++y)
         for (int x = 0; x < 40; ++x) std::copy_n(s.photo.at(x, y), 3, masked.at(x, y));
@@ -135,7 +135,7 @@ TEST(Exposure, LearnsNothingFromWhatIsMasked) {
     const pipeline::ExposureUse use{&s.exposures, kPhoto, kRate, 1};
     Rig& r = rig();
     r.run([&](gpu::Recording& recording) {
-        record_loss(recording, r.kernels, guarded.frame, camera, {}, texels, true, &use);
+        record_loss(recording, r.cache, guarded.frame, {.camera = camera}, texels, true, &use);
     });
     EXPECT_TRUE(guarded.intact());
     EXPECT_EQ(s.exposures.download()[kPhoto], kIdentityExposure);
@@ -143,7 +143,7 @@ TEST(Exposure, LearnsNothingFromWhatIsMasked) {
 
 TEST(Exposure, AStepThatIsNotFiniteIsDroppedAndCounted) {
     Inputs s(16, 16);
-    GuardedFrame guarded(rig().shape(), {1, 16, 16, 1, true, false, false, true});
+    GuardedFrame guarded(rig().config(), {1, 16, 16, 1, true, false, false, true});
     s.picture.at(3, 3)[1] = std::numeric_limits<double>::infinity();
     run(s, guarded.frame, 1);
     EXPECT_EQ(guarded.frame.read_counts().dropped_updates, 3u);  // each row sees every channel
@@ -152,7 +152,7 @@ TEST(Exposure, AStepThatIsNotFiniteIsDroppedAndCounted) {
 
 TEST(Exposure, NothingMovesWhereTheInstancesDidNotFit) {
     Inputs s(16, 16);
-    GuardedFrame guarded(rig().shape(), {1, 16, 16, 1, true, false, false, true});
+    GuardedFrame guarded(rig().config(), {1, 16, 16, 1, true, false, false, true});
     run(s, guarded.frame, 1, guarded.frame.instance_capacity + 1);
     EXPECT_EQ(s.exposures.download()[kPhoto], s.start[kPhoto]);
     run(s, guarded.frame, 1, guarded.frame.instance_capacity);  // they just fit

@@ -32,21 +32,25 @@ Result run_frame(const Scene& scene, uint32_t capacity, bool gradients) {
     Rig& r = rig();
     const int width = scene.camera.width, height = scene.camera.height;
     const pipeline::Model model = pipeline::upload_model(*device(), scene.gaussians, 1, false);
-    const gpu::Buffer camera = camera_buffer(scene.camera, r.shape());
+    const gpu::Buffer camera = camera_buffer(scene.camera, r.config());
     const pipeline::CameraUse use{&camera, 0, uint32_t(width), uint32_t(height)};
     const gpu::Buffer photo = pipeline::upload_photo(*device(), random_target(9, width, height));
-    GuardedFrame guarded(r.shape(), {model.splats, use.width, use.height, capacity, gradients, !gradients});
-    pipeline::Frame& frame = guarded.frame;
-    pipeline::Plan plan = gradients ? pipeline::plan_gradient(scene.gaussians, scene.options)
-                                    : pipeline::plan_picture(scene.gaussians, scene.options, true);
-    plan.sh_degree = scene.gaussians.sh_degree;
+    GuardedFrame guarded(r.config(), {model.splats, use.width, use.height, capacity, gradients, !gradients});
+    pipeline::FrameBuffers& frame = guarded.frame;
+    const pipeline::Plan plan =
+        pipeline::plan_for({.purpose = gradients ? pipeline::Purpose::gradient : pipeline::Purpose::picture,
+                            .scene_degree = scene.gaussians.sh_degree,
+                            .present_degree = scene.gaussians.sh_degree,
+                            .render = scene.options,
+                            .drawing = Drawing::depth});
+    const pipeline::FrameInputs inputs{use, scene.options.background};
     Result out;
     pipeline::Sorted sorted;
     r.run([&](gpu::Recording& recording) {
-        sorted = record_forward(recording, r.kernels, plan, model, frame, use, scene.options.background);
+        sorted = record_forward(recording, r.cache, plan, model, frame, inputs);
         if (!gradients) return;
-        record_loss(recording, r.kernels, frame, use, scene.options.background, photo);
-        record_backward(recording, r.kernels, plan, model, frame, use, scene.options.background, sorted, {});
+        record_loss(recording, r.cache, frame, inputs, photo);
+        record_backward(recording, r.cache, plan, model, frame, inputs, sorted, {});
     });
     EXPECT_TRUE(guarded.intact());
     out.counts = frame.read_counts();
@@ -56,7 +60,7 @@ Result run_frame(const Scene& scene, uint32_t capacity, bool gradients) {
     const bool second = sorted.splats == &frame.instance_splats[1];
     out.keys = frame.instance_keys[second].download<uint32_t>(listed);
     out.splats = sorted.splats->download<uint32_t>(listed);
-    if (gradients) out.places = sorted.places->download<uint32_t>(listed);
+    if (gradients) out.places = sorted.indices->download<uint32_t>(listed);
     out.starts = frame.tile_starts.download<uint32_t>(frame.sizes.tiles + 1);
     out.tile_counts = frame.tile_counts.download<uint32_t>(model.splats);
     if (gradients) out.gradient = download_model(model, model.moments1);
@@ -100,7 +104,7 @@ TEST(DrawOptions, AreThoseOfARendererMadeForThem) {
     const Scene scene = random_scene(78, 400, SplatKind::mixed, 40, 33, 2);
     RenderOptions other;
     other.background = {0.1f, 0.2f, 0.3f};
-    other.kernel = Kernel::antialias;
+    other.kernel = Footprint::antialias;
     other.sh_degree = 1;
     Renderer renderer(device(), scene.gaussians, {}), made_for(device(), scene.gaussians, other);
     const Rendering a = renderer.render(scene.camera, DrawOptions{other, Drawing::depth, 1});
@@ -140,7 +144,7 @@ TEST(FrameLists, AreTheTwinsOrALittleMore) {
         const Result result = run_frame(scene, 200000, kind == SplatKind::mixed);
         ASSERT_LE(result.counts.instances, 200000u);
         const auto twin =
-            reference::render(scene.gaussians, scene.camera, scene.options, twin_tiles(rig().shape()));
+            reference::render(scene.gaussians, scene.camera, scene.options, twin_tiles(rig().config()));
         const auto& lists = twin.instances;
         ASSERT_EQ(lists.grid.count(), result.sizes.tiles);
         size_t missed = 0;
@@ -359,7 +363,7 @@ TEST(FrameEdges, ExtremeValuesMakeNoNaN) {
     for (size_t i = 0; i < g.means.size(); ++i) g.means[i] = often(i % 3 == 2 ? 4 : 0.1f, 12);
     // Squares of colours beyond 1e19 leave float32: the picture holds them, its loss cannot.
     for (const bool gradients : {false, true})
-        for (const Kernel kernel : {Kernel::peak, Kernel::antialias, Kernel::unit_mass}) {
+        for (const Footprint kernel : {Footprint::peak, Footprint::antialias, Footprint::unit_mass}) {
             for (float& value : g.sh) value = often(0.3f, gradients ? 9 : 12);
             scene.options.kernel = kernel;
             const Result result = run_frame(scene, 200000, gradients);

@@ -7,6 +7,7 @@
 
 #include "gpu/guarded.h"
 #include "gpu/twin_inputs.h"
+#include "passes/sort.h"
 #include "pipeline/sizes.h"
 
 namespace ewa::test {
@@ -39,9 +40,9 @@ Emitted run_emit(const Scene& scene, const reference::Picture& twin, const std::
         device_counts("counts", std::vector<shared::Counts>{needed}), keys("keys", capacity * 4),
         values("splats", capacity * 4), first("first", splats * 4);
     r.run([&](gpu::Recording& recording) {
-        r.kernels.get<passes::EmitInstances>(with_first)
-            .record(recording, r.shape(),
-                    {records, ranks, tiles, prefixes, bases, device_counts, keys, values, first},
+        r.cache
+            .get<passes::EmitInstances>({{shared::SPEC_MODE, with_first ? shared::EMIT_FIRST_INSTANCES : 0}})
+            .record(recording, {records, ranks, tiles, prefixes, bases, device_counts, keys, values, first},
                     {splats,
                      capacity,
                      block,
@@ -66,7 +67,7 @@ TEST_P(Emit, ListsEveryExactTileAndFewMore) {
     const Case& c = GetParam();
     const Scene scene = random_scene(1300 + c.splats, c.splats, c.kind, c.width, c.height);
     const auto twin =
-        reference::render(scene.gaussians, scene.camera, scene.options, twin_tiles(rig().shape()));
+        reference::render(scene.gaussians, scene.camera, scene.options, twin_tiles(rig().config()));
     const auto& grid = twin.instances.grid;
     // Each splat is promised a few tiles more than it has, which the pass must fill with the number behind
     // the last tile.
@@ -122,7 +123,7 @@ INSTANTIATE_TEST_SUITE_P(All, Emit,
 TEST(EmitEdges, NeverWritesPastAPromiseThatWasTooSmall) {
     const Scene scene = random_scene(1400, 200, SplatKind::ordinary, 160, 120);
     const auto twin =
-        reference::render(scene.gaussians, scene.camera, scene.options, twin_tiles(rig().shape()));
+        reference::render(scene.gaussians, scene.camera, scene.options, twin_tiles(rig().config()));
     std::vector<uint32_t> counts;
     for (const auto& projected : twin.projected) {
         const uint32_t n = uint32_t(covered_tiles(projected, twin.instances.grid).size());
@@ -139,7 +140,7 @@ TEST(EmitEdges, NeverWritesPastAPromiseThatWasTooSmall) {
 TEST(EmitEdges, WritesNothingWhereNotAllFit) {
     const Scene scene = random_scene(1401, 200, SplatKind::ordinary, 160, 120);
     const auto twin =
-        reference::render(scene.gaussians, scene.camera, scene.options, twin_tiles(rig().shape()));
+        reference::render(scene.gaussians, scene.camera, scene.options, twin_tiles(rig().config()));
     std::vector<uint32_t> counts;
     for (const auto& projected : twin.projected)
         counts.push_back(uint32_t(covered_tiles(projected, twin.instances.grid).size()));
@@ -165,8 +166,8 @@ TEST_P(Starts, AreTheLowerBounds) {
         needed.instances = items;
         Guarded counts("counts", std::vector<shared::Counts>{needed});
         r.run([&](gpu::Recording& recording) {
-            r.kernels.get<passes::TileStarts>().record(recording, r.shape(), {keys, counts, starts},
-                                                       {tiles, fits ? items : items - 1});
+            r.cache.get<passes::TileStarts>().record(recording, {keys, counts, starts},
+                                                     {tiles, fits ? items : items - 1});
         });
         if (!fits && items == 0) break;
         const auto actual = starts.read<uint32_t>();

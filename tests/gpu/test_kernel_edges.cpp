@@ -11,6 +11,8 @@
 #include "ewa/renderer.h"
 #include "gpu/guarded.h"
 #include "gpu/twin_inputs.h"
+#include "passes/sort.h"
+#include "passes/strategy.h"
 #include "pipeline/mcmc.h"
 #include "reference/strategy.h"
 
@@ -26,8 +28,8 @@ TEST(ScanEdges, ATotalPast32BitsIsTheLargestNumber) {
         Rig& r = rig();
         Guarded sums("totals", totals), counts = zero_counts();
         r.run([&](gpu::Recording& recording) {
-            r.kernels.get<passes::ScanTotals>().record(recording, r.shape(), {sums, counts}, {blocks, 1},
-                                                       "scan");
+            r.cache.get<passes::ScanTotals>().record(recording, {sums, counts},
+                                                     {blocks, shared::TOTAL_INSTANCES}, "scan");
         });
         expect_intact({&sums, &counts});
         return counts.read<shared::Counts>()[0].instances;
@@ -93,7 +95,7 @@ Weighed weigh(const Gaussians& gaussians, float dead_logit) {
     push.weight_scale = 1000;
     push.dead_logit = dead_logit;
     r.run([&](gpu::Recording& recording) {
-        r.kernels.get<passes::McmcWeigh>().record(recording, r.shape(), {model.params, weights, dead}, push);
+        r.cache.get<passes::McmcWeigh>().record(recording, {model.params, weights, dead}, push);
     });
     expect_intact({&weights, &dead});
     return {weights.read<uint32_t>(), dead.read<uint32_t>()};
@@ -133,8 +135,7 @@ TEST(RelocationEdges, ADrawOnABorderIsTheLaterSplats) {
     push.seed[0] = 77;
     push.step = 5;
     r.run([&](gpu::Recording& recording) {
-        r.kernels.get<passes::McmcDraw>().record(recording, r.shape(), {prefixes, bases, sources, hits},
-                                                 push);
+        r.cache.get<passes::McmcDraw>().record(recording, {prefixes, bases, sources, hits}, push);
     });
     expect_intact({&prefixes, &bases, &sources, &hits});
     std::vector<uint32_t> random;
@@ -155,8 +156,8 @@ TEST(RelocationEdges, BothMomentsOfASourceStartAnew) {
     rules.seed = 9;
     rules.step = 3;
     Rig& r = rig();
-    GuardedFrame guarded(r.shape(), {model.splats, 16, 16, 1, true, false});
-    ASSERT_EQ(refine_mcmc(r.kernels, r.executor, model, guarded.frame, rules).relocated, 6u);
+    GuardedFrame guarded(r.config(), {model.splats, 16, 16, 1, true, false});
+    ASSERT_EQ(refine_mcmc(r.cache, r.executor, model, guarded.frame, rules).relocated, 6u);
     const auto m1 = download_model(model, model.moments1).opacity_logits,
                m2 = download_model(model, model.moments2).opacity_logits;
     EXPECT_EQ(m1, m2);
@@ -172,7 +173,7 @@ TEST(Noise, StaysFiniteAndMovesWhatJustFitted) {
     g.opacity_logits = {-9, -9};
     std::fill_n(&g.log_scales[3], 3, 60.0f);  // squared beyond float32
     const pipeline::Model model = pipeline::upload_model(*device(), g, 0, false);
-    pipeline::Frame frame;
+    pipeline::FrameBuffers frame;
     frame.instance_capacity = 10;
     shared::Counts counts{};
     counts.instances = 10;
@@ -180,7 +181,8 @@ TEST(Noise, StaysFiniteAndMovesWhatJustFitted) {
     frame.counts.upload(std::span<const shared::Counts>(&counts, 1));
     Rig& r = rig();
     r.run([&](gpu::Recording& recording) {
-        record_noise(recording, r.kernels, model, frame, 5.0f, 1e9f, 1, 12);
+        record_noise(recording, r.cache, model, frame,
+                     {.amplitude = 5, .max_length = 1e9f, .seed = 1, .step = 12});
     });
     const Gaussians moved = download_model(model, model.params);
     EXPECT_NE(moved.means[0], g.means[0]);

@@ -6,6 +6,7 @@
 
 #include "gpu/guarded.h"
 #include "gpu/twin_inputs.h"
+#include "passes/loss.h"
 #include "pipeline/backward.h"
 #include "pipeline/photo.h"
 #include "reference/loss.h"
@@ -52,14 +53,14 @@ TEST_P(Loss, ValueAndGradientAreTheTwins) {
     const int width = GetParam().first, height = GetParam().second;
     const Inputs in = random_inputs(uint64_t(width * 1000 + height), width, height);
     Rig& r = rig();
-    GuardedFrame guarded(r.shape(), {1, uint32_t(width), uint32_t(height), 1, true, false});
-    pipeline::Frame& frame = guarded.frame;
+    GuardedFrame guarded(r.config(), {1, uint32_t(width), uint32_t(height), 1, true, false});
+    pipeline::FrameBuffers& frame = guarded.frame;
     const auto planes = pack_planes(in.image, 3, frame.sizes.stride);
     frame.planes.upload(std::span<const float>(planes));
     const gpu::Buffer photo = pipeline::upload_photo(*device(), in.photo);
     const pipeline::CameraUse camera{nullptr, 0, uint32_t(width), uint32_t(height)};
     r.run([&](gpu::Recording& recording) {
-        record_loss(recording, r.kernels, frame, camera, in.background, photo);
+        record_loss(recording, r.cache, frame, {camera, in.background}, photo);
     });
     EXPECT_TRUE(guarded.intact());
 
@@ -99,14 +100,14 @@ TEST_P(Loss, OfMaskedPicturesIsTheTwins) {
             for (int k = 0; k < 3; ++k) photo.at(x, y)[k] = in.photo.at(x, y)[k];
         }
     Rig& r = rig();
-    GuardedFrame guarded(r.shape(), {1, uint32_t(width), uint32_t(height), 1, true, false, true});
-    pipeline::Frame& frame = guarded.frame;
+    GuardedFrame guarded(r.config(), {1, uint32_t(width), uint32_t(height), 1, true, false, true});
+    pipeline::FrameBuffers& frame = guarded.frame;
     const auto planes = pack_planes(in.image, 3, frame.sizes.stride);
     frame.planes.upload(std::span<const float>(planes));
     const gpu::Buffer texels = pipeline::upload_photo(*device(), in.photo);
     const pipeline::CameraUse camera{nullptr, 0, uint32_t(width), uint32_t(height)};
     r.run([&](gpu::Recording& recording) {
-        record_loss(recording, r.kernels, frame, camera, in.background, texels, true);
+        record_loss(recording, r.cache, frame, {camera, in.background}, texels, true);
     });
     EXPECT_TRUE(guarded.intact());
 
@@ -137,17 +138,17 @@ TEST_P(Loss, MomentsAreBlurredDownTheColumns) {
     const int width = GetParam().first, height = GetParam().second;
     const Inputs in = random_inputs(uint64_t(width * 77 + height), width, height);
     Rig& r = rig();
-    const auto sizes = pipeline::sizes_for(r.shape(), {1, uint32_t(width), uint32_t(height), 1, true, false});
+    const auto sizes =
+        pipeline::sizes_for(r.config(), {1, uint32_t(width), uint32_t(height), 1, true, false});
     Guarded image("image", pack_planes(in.image, 3, sizes.stride), gpu::Texel::rgba32f),
         target("target", pack_planes(in.target, 3, sizes.stride), gpu::Texel::rgba32f),
         moments("moments", sizes.moments, gpu::Texel::rgba32f),
         blurred("blurred", sizes.derivatives, gpu::Texel::rgba32f);
     // Any nine planes do as derivatives: the moments' first nine.
     r.run([&](gpu::Recording& recording) {
-        const shared::LossPush push{
-            {uint32_t(width), uint32_t(height)}, sizes.stride, sizes.plane_floats, 0, 0};
-        r.kernels.get<passes::LossColumns>().record(recording, r.shape(), {image, target, moments}, push);
-        r.kernels.get<passes::LossBackwardColumns>().record(recording, r.shape(), {moments, blurred}, push);
+        const shared::LossPush push{sizes.image(), 0, 0};
+        r.cache.get<passes::LossColumns>().record(recording, {image, target, moments}, push);
+        r.cache.get<passes::LossBackwardColumns>().record(recording, {moments, blurred}, push);
     });
     expect_intact({&image, &target, &moments, &blurred});
     const std::vector<double> window = reference::ssim_window();
@@ -192,13 +193,13 @@ INSTANTIATE_TEST_SUITE_P(Sizes, Loss,
 TEST(LossEdges, EqualPicturesHaveNoLossAndNoGradient) {
     const Image picture = random_target(5, 40, 30);
     Rig& r = rig();
-    GuardedFrame guarded(r.shape(), {1, 40, 30, 1, true, false});
-    pipeline::Frame& frame = guarded.frame;
+    GuardedFrame guarded(r.config(), {1, 40, 30, 1, true, false});
+    pipeline::FrameBuffers& frame = guarded.frame;
     const auto planes = pack_planes(reference::to_double(picture), 3, frame.sizes.stride);
     frame.planes.upload(std::span<const float>(planes));
     const gpu::Buffer photo = pipeline::upload_photo(*device(), picture);
     r.run([&](gpu::Recording& recording) {
-        record_loss(recording, r.kernels, frame, {nullptr, 0, 40, 30}, {1, 1, 1}, photo);
+        record_loss(recording, r.cache, frame, {{nullptr, 0, 40, 30}, {1, 1, 1}}, photo);
     });
     EXPECT_EQ(frame.read_counts().l1, 0);
     EXPECT_NEAR(frame.read_counts().ssim, 1, 1e-6);
@@ -219,8 +220,8 @@ TEST(Photo, EightBitAndFloatPhotographsUnpackTheSame) {
         EXPECT_EQ(int(photo.texel()), int(texel));
         Guarded planes("planes", 12 * 5 * 3 * 4);
         r.run([&](gpu::Recording& recording) {
-            r.kernels.get<passes::UnpackTarget>().record(recording, r.shape(), {photo, planes},
-                                                         {{1, 0.5f, 0}, {9, 5}, 12, 60});
+            r.cache.get<passes::UnpackTarget>().record(recording, {photo, planes},
+                                                       {{1, 0.5f, 0}, {{9, 5}, 12, 60}});
         });
         expect_intact({&planes});
         return planes.read<float>();
@@ -260,10 +261,10 @@ TEST(Reduce, AddsUpInAFixedOrder) {
         Guarded source("source", values), sums("sums", blocks * 4), unused("unused", 4),
             counts = zero_counts();
         r.run([&](gpu::Recording& recording) {
-            const auto& reduce = r.kernels.get<passes::Reduce>();
-            reduce.record(recording, r.shape(), {source, sums, counts}, {items, block, 0, 1});
-            reduce.record(recording, r.shape(), {sums, unused, counts}, {blocks, blocks, 1, 0.5f});
-            reduce.record(recording, r.shape(), {sums, unused, counts}, {blocks, blocks, 2, 2.0f});
+            const auto reduce = r.cache.get<passes::Reduce>();
+            reduce.record(recording, {source, sums, counts}, {items, block, shared::REDUCE_TO_SUMS, 1});
+            reduce.record(recording, {sums, unused, counts}, {blocks, blocks, shared::REDUCE_TO_L1, 0.5f});
+            reduce.record(recording, {sums, unused, counts}, {blocks, blocks, shared::REDUCE_TO_SSIM, 2.0f});
         });
         expect_intact({&source, &sums, &unused, &counts});
         const auto read = counts.read<shared::Counts>()[0];

@@ -11,6 +11,7 @@
 #include "core/random.h"
 #include "gpu/guarded.h"
 #include "gpu/twin_inputs.h"
+#include "passes/strategy.h"
 #include "pipeline/mcmc.h"
 #include "reference/projection.h"
 #include "reference/strategy.h"
@@ -54,8 +55,8 @@ McmcRules rules_for(uint32_t max_splats) {
 
 pipeline::McmcResult run_refine(pipeline::Model& model, const McmcRules& rules) {
     Rig& r = rig();
-    GuardedFrame guarded(r.shape(), {model.splats, 16, 16, 1, true, false});
-    const auto result = refine_mcmc(r.kernels, r.executor, model, guarded.frame, rules);
+    GuardedFrame guarded(r.config(), {model.splats, 16, 16, 1, true, false});
+    const auto result = refine_mcmc(r.cache, r.executor, model, guarded.frame, rules);
     EXPECT_TRUE(guarded.intact());
     return result;
 }
@@ -71,8 +72,7 @@ std::vector<uint32_t> device_weights(const Start& start) {
     push.weight_scale = float(std::min(65535u, 0xffffffffu / n));
     push.dead_logit = float(std::log(0.005 / 0.995));
     r.run([&](gpu::Recording& recording) {
-        r.kernels.get<passes::McmcWeigh>().record(recording, r.shape(), {start.model.params, weights, dead},
-                                                  push);
+        r.cache.get<passes::McmcWeigh>().record(recording, {start.model.params, weights, dead}, push);
     });
     expect_intact({&weights, &dead});
     const auto result = weights.read<uint32_t>(), flags = dead.read<uint32_t>();
@@ -227,14 +227,15 @@ TEST(Noise, IsTheTwins) {
         for (size_t i = 0; i < 500; ++i) start.gaussians.opacity_logits[i] = float(-6 + 0.002 * double(i));
         start.model = pipeline::upload_model(*device(), start.gaussians, 2, false);
         Rig& r = rig();
-        pipeline::Frame frame;
+        pipeline::FrameBuffers frame;
         frame.instance_capacity = 10;
         shared::Counts counts{};
         frame.counts = gpu::Buffer(*device(), "counts", sizeof(counts));
         frame.counts.upload(std::span<const shared::Counts>(&counts, 1));
         const uint64_t seed = 0xabcdef0123456789ull;
         r.run([&](gpu::Recording& recording) {
-            record_noise(recording, r.kernels, start.model, frame, 5.0f, 1e9f, seed, 12);
+            record_noise(recording, r.cache, start.model, frame,
+                         {.amplitude = 5, .max_length = 1e9f, .seed = seed, .step = 12});
         });
         const Gaussians moved = download_model(start.model, start.model.params);
         const reference::Values old = reference::to_double(start.gaussians);
@@ -255,7 +256,8 @@ TEST(Noise, IsTheTwins) {
         counts.instances = 11;  // the frame is going to be repeated
         frame.counts.upload(std::span<const shared::Counts>(&counts, 1));
         r.run([&](gpu::Recording& recording) {
-            record_noise(recording, r.kernels, start.model, frame, 5.0f, 1e9f, seed, 13);
+            record_noise(recording, r.cache, start.model, frame,
+                         {.amplitude = 5, .max_length = 1e9f, .seed = seed, .step = 13});
         });
         EXPECT_EQ(download_model(start.model, start.model.params).means, moved.means);
     }
@@ -267,14 +269,15 @@ TEST(Noise, IsNoLongerThanItsReach) {
     for (float& logit : start.gaussians.opacity_logits) logit = -8;
     start.model = pipeline::upload_model(*device(), start.gaussians, 2, false);
     Rig& r = rig();
-    pipeline::Frame frame;
+    pipeline::FrameBuffers frame;
     frame.instance_capacity = 10;
     const shared::Counts counts{};
     frame.counts = gpu::Buffer(*device(), "counts", sizeof(counts));
     frame.counts.upload(std::span<const shared::Counts>(&counts, 1));
     const double reach = 0.1;
     r.run([&](gpu::Recording& recording) {
-        record_noise(recording, r.kernels, start.model, frame, 5.0f, float(reach), 77, 12);
+        record_noise(recording, r.cache, start.model, frame,
+                     {.amplitude = 5, .max_length = float(reach), .seed = 77, .step = 12});
     });
     const Gaussians moved = download_model(start.model, start.model.params);
     const reference::Values old = reference::to_double(start.gaussians);

@@ -8,6 +8,7 @@
 
 #include "gpu/guarded.h"
 #include "gpu/twin_inputs.h"
+#include "passes/project.h"
 
 namespace ewa::test {
 namespace {
@@ -18,19 +19,20 @@ struct Output {
     shared::Counts totals;
 };
 
-Output run_project(const Scene& scene, bool inspected = false, float log_scale_shift = 0) {
+Output run_project(const Scene& scene, bool debug = false, float log_scale_shift = 0) {
     Rig& r = rig();
     const uint32_t splats = uint32_t(scene.gaussians.size());
     const pipeline::Model model = pipeline::upload_model(*device(), scene.gaussians, 0, false);
-    const gpu::Buffer camera = camera_buffer(scene.camera, r.shape());
+    const gpu::Buffer camera = camera_buffer(scene.camera, r.config());
     const size_t room = std::max(splats, 1u);
     Guarded records("records", room * 48, gpu::Texel::rgba32f), keys("keys", room * 4),
         tile_counts("tile counts", room * 4), counts = zero_counts();
     r.run([&](gpu::Recording& recording) {
-        r.kernels
-            .get<passes::Project>(uint32_t(scene.gaussians.sh_degree), uint32_t(scene.options.kernel),
-                                  uint32_t(inspected))
-            .record(recording, r.shape(), {model.params, camera, 0, records, keys, tile_counts, counts},
+        r.cache
+            .get<passes::Project>({{shared::SPEC_SH_DEGREE, uint32_t(scene.gaussians.sh_degree)},
+                                   {shared::SPEC_KERNEL, uint32_t(scene.options.kernel)},
+                                   {shared::SPEC_MODE, debug ? shared::PROJECT_DEBUG : 0}})
+            .record(recording, {model.params, camera, records, keys, tile_counts, counts},
                     {model.splats, model.planes(), log_scale_shift});
     });
     expect_intact({&records, &keys, &tile_counts, &counts});
@@ -45,7 +47,7 @@ struct Case {
     SplatKind kind;
     size_t splats;
     int width, height, sh_degree;
-    Kernel kernel;
+    Footprint kernel;
 };
 
 class ProjectPass : public testing::TestWithParam<Case> {};
@@ -56,7 +58,7 @@ TEST_P(ProjectPass, RecordsAreTheTwins) {
                                      c.height, c.sh_degree, c.kernel);
     const Output out = run_project(scene);
     const reference::Picture twin =
-        reference::render(scene.gaussians, scene.camera, scene.options, twin_tiles(rig().shape()));
+        reference::render(scene.gaussians, scene.camera, scene.options, twin_tiles(rig().config()));
     double worst_mean = 0, worst_shape = 0, worst_opacity = 0, worst_color = 0;
     for (size_t i = 0; i < c.splats; ++i) {
         const reference::Projected& p = twin.projected[i];
@@ -97,7 +99,7 @@ TEST_P(ProjectPass, TileCountsNeverMissATile) {
         random_scene(950 + c.splats, c.splats, c.kind, c.width, c.height, c.sh_degree, c.kernel);
     const Output out = run_project(scene);
     const reference::Picture twin =
-        reference::render(scene.gaussians, scene.camera, scene.options, twin_tiles(rig().shape()));
+        reference::render(scene.gaussians, scene.camera, scene.options, twin_tiles(rig().config()));
     uint64_t exact = 0, actual = 0;
     for (size_t i = 0; i < c.splats; ++i) {
         const size_t tiles = reference::covered_tiles(twin.projected[i], twin.instances.grid).size();
@@ -121,7 +123,7 @@ std::string case_name(const testing::TestParamInfo<Case>& info) {
 TEST(ProjectInspection, ScalesAreShiftedAndTheDrawnCounted) {
     Scene scene = random_scene(910, 500, SplatKind::mixed, 61, 47, 1);
     const Output shifted = run_project(scene, true, std::log(0.5f)), plain = run_project(scene, false, 3);
-    EXPECT_EQ(plain.totals.drawn, 0u);
+    EXPECT_EQ(plain.totals.visible, 0u);
     EXPECT_EQ(plain.records, run_project(scene).records) << "without inspection the shift means nothing";
     for (float& scale : scene.gaussians.log_scales) scale += std::log(0.5f);
     const Output smaller = run_project(scene, true);
@@ -130,18 +132,19 @@ TEST(ProjectInspection, ScalesAreShiftedAndTheDrawnCounted) {
     size_t drawn = 0;
     for (const uint32_t count : shifted.counts) drawn += count > 0;
     EXPECT_GT(drawn, 50u);
-    EXPECT_EQ(shifted.totals.drawn, drawn);
+    EXPECT_EQ(shifted.totals.visible, drawn);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, ProjectPass,
-                         testing::Values(Case{SplatKind::ordinary, 1000, 160, 120, 0, Kernel::peak},
-                                         Case{SplatKind::needles, 1000, 161, 119, 1, Kernel::antialias},
-                                         Case{SplatKind::sub_pixel, 500, 61, 47, 2, Kernel::unit_mass},
-                                         Case{SplatKind::off_screen_and_close, 500, 61, 47, 3, Kernel::peak},
-                                         Case{SplatKind::opacity_extremes, 500, 17, 3, 3, Kernel::antialias},
-                                         Case{SplatKind::mixed, 257, 1, 1, 2, Kernel::peak},
-                                         Case{SplatKind::mixed, 1, 33, 33, 1, Kernel::peak}),
-                         case_name);
+INSTANTIATE_TEST_SUITE_P(
+    All, ProjectPass,
+    testing::Values(Case{SplatKind::ordinary, 1000, 160, 120, 0, Footprint::peak},
+                    Case{SplatKind::needles, 1000, 161, 119, 1, Footprint::antialias},
+                    Case{SplatKind::sub_pixel, 500, 61, 47, 2, Footprint::unit_mass},
+                    Case{SplatKind::off_screen_and_close, 500, 61, 47, 3, Footprint::peak},
+                    Case{SplatKind::opacity_extremes, 500, 17, 3, 3, Footprint::antialias},
+                    Case{SplatKind::mixed, 257, 1, 1, 2, Footprint::peak},
+                    Case{SplatKind::mixed, 1, 33, 33, 1, Footprint::peak}),
+    case_name);
 
 TEST(ProjectEdges, NoSplats) {
     Scene scene = random_scene(1, 0, SplatKind::ordinary, 17, 3);
@@ -241,7 +244,7 @@ TEST(ProjectEdges, GeoreferencedSceneKeepsItsSharpness) {
 
 /// Up to 1e18 px; beyond that, and beyond VIEW_MAX along any axis, a splat is skipped.
 TEST(ProjectEdges, SplatsOfAllSizesAndDistances) {
-    Scene scene = random_scene(6, 12, SplatKind::ordinary, 64, 48, 0, Kernel::antialias);
+    Scene scene = random_scene(6, 12, SplatKind::ordinary, 64, 48, 0, Footprint::antialias);
     scene.camera.rotation = glm::dmat3(1.0);
     scene.camera.translation = glm::dvec3(0.0);
     Gaussians& g = scene.gaussians;

@@ -20,57 +20,57 @@ namespace {
 
 using namespace pipeline;
 
-passes::Shape shape_of(uint32_t subgroup, bool cpu = true) {
+passes::KernelConfig config_of(uint32_t subgroup, bool cpu = true) {
     gpu::Limits limits;
     limits.subgroup_size = subgroup;
     limits.cpu = cpu;
-    return passes::shape_for(limits);
+    return passes::config_for(limits);
 }
 
-TEST(Shape, TilesAreWholeSubgroupsForEverySubgroupSize) {
+TEST(KernelConfig, TilesAreWholeSubgroupsForEverySubgroupSize) {
     for (const uint32_t subgroup : {1u, 2u, 4u, 8u, 16u, 32u, 64u})
         for (const bool cpu : {false, true}) {
-            const passes::Shape shape = shape_of(subgroup, cpu);
-            const uint32_t pixels = shape.tile_width * shape.tile_height;
+            const passes::KernelConfig config = config_of(subgroup, cpu);
+            const uint32_t pixels = config.tile_width * config.tile_height;
             EXPECT_EQ(pixels % subgroup, 0u);
             EXPECT_EQ(pixels, 64u);
-            EXPECT_EQ(subgroup % shape.tile_width, 0u);  // rows of lanes
-            EXPECT_EQ(shape.group % subgroup, 0u);
-            EXPECT_EQ(shape.sort_group % (cpu ? subgroup : 1), 0u);
+            EXPECT_EQ(subgroup % config.tile_width, 0u);  // rows of lanes
+            EXPECT_EQ(config.element_group % subgroup, 0u);
+            EXPECT_EQ(config.sort_group % (cpu ? subgroup : 1), 0u);
         }
-    for (const uint32_t subgroup : {0u, 3u, 128u}) EXPECT_THROW(shape_of(subgroup), std::logic_error);
+    for (const uint32_t subgroup : {0u, 3u, 128u}) EXPECT_THROW(config_of(subgroup), std::logic_error);
 }
 
-TEST(Shape, GroupsCoverTheItemsWithinTheLimit) {
-    passes::Shape shape = shape_of(8);
-    shape.max_groups = 10;
+TEST(KernelConfig, GroupsCoverTheItemsWithinTheLimit) {
+    passes::KernelConfig config = config_of(8);
+    config.max_groups = 10;
     for (const uint64_t items : {uint64_t(0), uint64_t(1), uint64_t(128), uint64_t(129), uint64_t(1280),
                                  uint64_t(1281), uint64_t(12800)}) {
-        const auto g = passes::element_groups(shape, items, 3);
-        EXPECT_GE(uint64_t(g[0]) * g[1] * shape.group, items);
+        const auto g = passes::element_groups(config, items, 3);
+        EXPECT_GE(uint64_t(g[0]) * g[1] * config.element_group, items);
         EXPECT_LE(g[0], 10u);
         EXPECT_LE(g[1], 10u);
         EXPECT_GE(g[0], 1u);
         EXPECT_EQ(g[2], 3u);
-        const auto s = passes::subgroup_groups(shape, items / 128);
+        const auto s = passes::block_groups(config, items, 128);
         EXPECT_GE(uint64_t(s[0]) * s[1], items / 128);
         EXPECT_LE(std::max(s[0], s[1]), 10u);
     }
 }
 
 /// Every tile is some workgroup's, once.
-TEST(Shape, EveryTileHasOneWorkgroup) {
+TEST(KernelConfig, EveryTileHasOneWorkgroup) {
     for (const bool cpu : {false, true})
         for (const uint32_t tiles : {1u, 15u, 16u, 17u, 999u, 70000u}) {
-            const passes::Shape shape = shape_of(8, cpu);
+            const passes::KernelConfig config = config_of(8, cpu);
             shared::BlendPush push{};
             push.tiles[0] = tiles;
             push.tiles[1] = 1;
-            const auto steps = passes::tile_steps(shape, tiles);
+            const auto steps = passes::tile_steps(config, tiles);
             push.tile_step[0] = steps[0];
             push.tile_step[1] = steps[1];
-            const auto groups = passes::tile_groups(shape, push);
-            EXPECT_LE(std::max(groups[0], groups[1]), shape.max_groups);
+            const auto groups = passes::tile_groups(config, push);
+            EXPECT_LE(std::max(groups[0], groups[1]), config.max_groups);
             std::vector<int> owners(tiles);
             for (uint32_t y = 0; y < groups[1]; ++y)
                 for (uint32_t x = 0; x < groups[0]; ++x)
@@ -80,7 +80,7 @@ TEST(Shape, EveryTileHasOneWorkgroup) {
 }
 
 TEST(SizesFor, OddImages) {
-    const Sizes one = sizes_for(shape_of(8), {1, 1, 1, 1, true, true});
+    const Sizes one = sizes_for(config_of(8), {1, 1, 1, 1, true, true});
     EXPECT_EQ(one.tiles, 1u);
     EXPECT_EQ(one.stride, 4u);
     EXPECT_EQ(one.plane_floats, 4u);
@@ -88,7 +88,7 @@ TEST(SizesFor, OddImages) {
     EXPECT_EQ(one.planes, 80u);
     EXPECT_EQ(one.tile_starts, 12u);  // a tile, the end, and where the stale slots end
     EXPECT_EQ(one.slots, 48u);
-    const Sizes odd = sizes_for(shape_of(8), {1000, 17, 3, 5000, false, false});
+    const Sizes odd = sizes_for(config_of(8), {1000, 17, 3, 5000, false, false});
     EXPECT_EQ(odd.tiles_x, 3u);
     EXPECT_EQ(odd.tiles_y, 1u);
     EXPECT_EQ(odd.stride, 20u);
@@ -102,7 +102,7 @@ TEST(SizesFor, OddImages) {
 }
 
 TEST(SizesFor, NothingHasNoBytes) {
-    const Sizes s = sizes_for(shape_of(8), {0, 17, 3, 0, true, false});
+    const Sizes s = sizes_for(config_of(8), {0, 17, 3, 0, true, false});
     for (const uint64_t bytes : {s.records, s.splat_words, s.instance_words, s.slots, s.counters})
         EXPECT_GT(bytes, 0u);
 }
@@ -110,7 +110,7 @@ TEST(SizesFor, NothingHasNoBytes) {
 TEST(SizesFor, SortsByAsManyBitsAsThereAreTiles) {
     // tiles is itself a key: what was promised and does not exist.
     const auto bits = [](uint32_t width, uint32_t height) {
-        const RadixCut cut = sizes_for(shape_of(8), {1, width, height, 1000, false, false}).tile_sort;
+        const RadixCut cut = sizes_for(config_of(8), {1, width, height, 1000, false, false}).tile_sort;
         return cut.passes * cut.bits;
     };
     EXPECT_EQ(bits(8, 8), 1u);
@@ -118,14 +118,14 @@ TEST(SizesFor, SortsByAsManyBitsAsThereAreTiles) {
     EXPECT_EQ(bits(32, 8), 3u);
     EXPECT_EQ(bits(8 * 255, 8), 8u);
     EXPECT_EQ(bits(8 * 256, 8), 10u);  // 9, in two passes of 5
-    const RadixCut depth = sizes_for(shape_of(8), {1, 8, 8, 1, false, false}).depth_sort;
+    const RadixCut depth = sizes_for(config_of(8), {1, 8, 8, 1, false, false}).depth_sort;
     EXPECT_EQ(depth.passes * depth.bits, 32u);
 }
 
 TEST(SizesFor, LanesAreBetweenASubgroupAndTheMost) {
-    const passes::Shape shape = shape_of(8);
+    const passes::KernelConfig config = config_of(8);
     const auto lanes = [&](uint32_t splats) {
-        return sizes_for(shape, {splats, 8, 8, 1, false, false}).depth_sort.lanes;
+        return sizes_for(config, {splats, 8, 8, 1, false, false}).depth_sort.lanes;
     };
     EXPECT_EQ(lanes(0), 8u);
     EXPECT_EQ(lanes(1), 8u);
@@ -134,9 +134,9 @@ TEST(SizesFor, LanesAreBetweenASubgroupAndTheMost) {
 }
 
 TEST(SizesFor, ImagesBeyondTheLimitsAreAnErrorThatNamesThem) {
-    const passes::Shape shape = shape_of(8);
+    const passes::KernelConfig config = config_of(8);
     const auto size = [&](uint32_t width, uint32_t height) {
-        return [&shape, width, height] { sizes_for(shape, {1, width, height, 1, false, false}); };
+        return [&config, width, height] { sizes_for(config, {1, width, height, 1, false, false}); };
     };
     expect_error<InputError>(size(0, 5), {"0x5"});
     expect_error<InputError>(size(5, 0), {"5x0"});
@@ -151,23 +151,23 @@ TEST(SizesFor, ImagesBeyondTheLimitsAreAnErrorThatNamesThem) {
 /// An emitting lane's loop runs over the tiles of its strip, a turn for each tile and each row; before it,
 /// over the rows above.
 TEST(SizesFor, StripsKeepLoopsUnderTheLimit) {
-    const passes::Shape shape = shape_of(8);
+    const passes::KernelConfig config = config_of(8);
     for (const auto& [width, height] :
          {std::pair{8u, 8u}, {800u, 600u}, {5792u, 5792u}, {480000u, 8u}, {8u, 480000u}, {64u, 65000u * 8}}) {
-        const Sizes s = sizes_for(shape, {1, width, height, 1, false, false});
+        const Sizes s = sizes_for(config, {1, width, height, 1, false, false});
         EXPECT_GE(s.strip_rows, 1u);
-        EXPECT_LE(uint64_t(s.strip_rows) * (s.tiles_x + 1), shape.loop_limit);
-        EXPECT_LE((s.tiles_y + s.strip_rows - 1) / s.strip_rows, shape.max_groups);
+        EXPECT_LE(uint64_t(s.strip_rows) * (s.tiles_x + 1), config.loop_limit);
+        EXPECT_LE((s.tiles_y + s.strip_rows - 1) / s.strip_rows, config.max_groups);
     }
 }
 
 TEST(SizesFor, TotalIsWhatAFrameHolds) {
-    const auto shape = passes::shape_for(device()->limits());
+    const auto config = passes::config_for(device()->limits());
     for (const bool gradients : {false, true})
         for (const bool depth : {false, true}) {
             const FrameRequest request{12345, 61, 47, 54321, gradients, depth, gradients};
-            pipeline::Frame frame;
-            frame.reserve(*device(), shape, request);
+            pipeline::FrameBuffers frame;
+            frame.reserve(*device(), config, request);
             uint64_t held = 0, count = 0;
             for (const gpu::Buffer* b : {&frame.records,
                                          &frame.depth_keys[0],
@@ -185,8 +185,8 @@ TEST(SizesFor, TotalIsWhatAFrameHolds) {
                                          &frame.instance_keys[1],
                                          &frame.instance_splats[0],
                                          &frame.instance_splats[1],
-                                         &frame.instance_places[0],
-                                         &frame.instance_places[1],
+                                         &frame.sorted_indices[0],
+                                         &frame.sorted_indices[1],
                                          &frame.tile_starts,
                                          &frame.planes,
                                          &frame.target,
@@ -208,16 +208,16 @@ TEST(SizesFor, TotalIsWhatAFrameHolds) {
 }
 
 TEST(FrameReserve, KeepsBuffersThatAreLargeEnough) {
-    const auto shape = passes::shape_for(device()->limits());
-    pipeline::Frame frame;
-    frame.reserve(*device(), shape, {1000, 61, 47, 5000, true, false});
+    const auto config = passes::config_for(device()->limits());
+    pipeline::FrameBuffers frame;
+    frame.reserve(*device(), config, {1000, 61, 47, 5000, true, false});
     const auto records = frame.records.handle();
     const auto slots = frame.slots.handle();
-    frame.reserve(*device(), shape, {900, 61, 47, 4000, true, false});
+    frame.reserve(*device(), config, {900, 61, 47, 4000, true, false});
     EXPECT_EQ(frame.records.handle(), records);
     EXPECT_EQ(frame.slots.handle(), slots);
     EXPECT_EQ(frame.instance_capacity, 4000u);
-    frame.reserve(*device(), shape, {900, 61, 47, 5001, true, false});
+    frame.reserve(*device(), config, {900, 61, 47, 5001, true, false});
     EXPECT_GE(frame.slots.bytes(), 5001u * 48);
 }
 
@@ -230,46 +230,109 @@ TEST(Capacity, GrowsPastWhatWasNeeded) {
     EXPECT_THROW(grown_capacity(0xf0000000u), RunError);
 }
 
-TEST(Plan, LeavesOutWhatTheSceneDoesNotHave) {
-    Gaussians g = random_gaussians(1, 10, SplatKind::ordinary, random_camera(1, 64, 48), 3);
-    const size_t stride = g.sh_stride();
-    for (size_t i = 0; i < g.sh.size(); ++i)
-        if (i % stride >= 12) g.sh[i] = 0;  // degrees 2 and 3
-    RenderOptions options;
-    options.kernel = Kernel::antialias;
-    const Plan picture = plan_picture(g, options, true);
-    EXPECT_EQ(picture.sh_degree, 1);
-    EXPECT_EQ(picture.stored_degree, 1);
-    EXPECT_TRUE(picture.depth);
-    EXPECT_FALSE(picture.gradients || picture.adam || picture.statistics);
-    EXPECT_EQ(picture.kernel, Kernel::antialias);
-    options.sh_degree = 0;
-    EXPECT_EQ(plan_picture(g, options, false).stored_degree, 0);
-    // A gradient is written for every stored coefficient.
-    const Plan gradient = plan_gradient(g, options);
-    EXPECT_EQ(gradient.sh_degree, 0);
-    EXPECT_EQ(gradient.stored_degree, 3);
-    EXPECT_TRUE(gradient.gradients);
-    EXPECT_FALSE(gradient.adam || gradient.statistics);
-    const Plan training = plan_training(2, options, false);
-    EXPECT_TRUE(training.gradients && training.adam);
-    EXPECT_FALSE(training.statistics);
-    EXPECT_TRUE(plan_training(2, options, true).statistics);
-    EXPECT_EQ(training.stored_degree, 2);
+PlanRequest request_for(Purpose purpose) {
+    PlanRequest request;
+    request.purpose = purpose;
+    request.scene_degree = 3;
+    request.present_degree = 1;
+    request.render.kernel = Footprint::antialias;
+    return request;
+}
 
-    const auto lines = describe(picture, 3, 10);
+TEST(Plan, OfAPictureStoresTheDegreesThatArePresentAndWanted) {
+    PlanRequest request = request_for(Purpose::picture);
+    request.drawing = Drawing::depth;
+    const Plan picture = plan_for(request);
+    EXPECT_EQ(picture.stored_degree, 1);
+    EXPECT_EQ(picture.evaluated_degree(3), 1u);
+    EXPECT_EQ(picture.evaluated_degree(0), 0u);
+    EXPECT_EQ(picture.evaluated_degree(-1), 0u);
+    EXPECT_EQ(picture.drawing, Drawing::depth);
+    EXPECT_TRUE(picture.fifth_plane());
+    EXPECT_FALSE(picture.gradients || picture.adam || picture.statistics || picture.debug);
+    EXPECT_EQ(picture.kernel, Footprint::antialias);
+    request.render.sh_degree = 0;
+    EXPECT_EQ(plan_for(request).stored_degree, 0);
+    request.drawing = Drawing::ellipsoids;
+    EXPECT_FALSE(plan_for(request).fifth_plane());
+    request.splat_scale = 2;
+    EXPECT_EQ(plan_for(request).log_scale_shift, 0);
+    request.debug = true;
+    EXPECT_EQ(plan_for(request).log_scale_shift, float(std::log(2.0)));
+}
+
+/// A gradient is written for every stored coefficient.
+TEST(Plan, OfAGradientStoresEveryDegree) {
+    PlanRequest request = request_for(Purpose::gradient);
+    request.render.sh_degree = 0;
+    request.masks = true;
+    const Plan gradient = plan_for(request);
+    EXPECT_EQ(gradient.stored_degree, 3);
+    EXPECT_TRUE(gradient.gradients && gradient.masks);
+    EXPECT_FALSE(gradient.adam || gradient.statistics || gradient.exposure);
+}
+
+TEST(Plan, OfATrainingHasWhatItsStrategyAndItsImagesNeed) {
+    PlanRequest request = request_for(Purpose::training);
+    const Plan plain = plan_for(request);
+    EXPECT_TRUE(plain.gradients && plain.adam);
+    EXPECT_FALSE(plain.statistics || plain.absolute || plain.regularised || plain.masks || plain.exposure);
+    EXPECT_EQ(plain.stored_degree, 3);
+    request.absolute_gradients = true;
+    EXPECT_EQ(plan_for(request), plain);  // nobody reads them without statistics
+    request.statistics = true;
+    EXPECT_TRUE(plan_for(request).statistics && plan_for(request).absolute);
+    request = request_for(Purpose::training);
+    request.regularised = request.masks = request.exposure = true;
+    const Plan other = plan_for(request);
+    EXPECT_TRUE(other.regularised && other.masks && other.exposure);
+    EXPECT_FALSE(other.statistics);
+}
+
+/// What does not apply to a purpose changes nothing.
+TEST(Plan, IgnoresTheInputsOfOtherPurposes) {
+    PlanRequest request = request_for(Purpose::picture);
+    const Plan picture = plan_for(request);
+    request.masks = request.exposure = request.statistics = request.regularised = true;
+    EXPECT_EQ(plan_for(request), picture);
+    request = request_for(Purpose::training);
+    const Plan training = plan_for(request);
+    request.drawing = Drawing::count;
+    request.debug = true;
+    EXPECT_EQ(plan_for(request), training);
+    request = request_for(Purpose::gradient);
+    const Plan gradient = plan_for(request);
+    request.statistics = request.regularised = true;
+    EXPECT_EQ(plan_for(request), gradient);
+}
+
+TEST(Plan, IsDescribedByWhatItSkips) {
+    const auto skips = [](const Plan& plan, const std::string& what) {
+        const auto lines = describe(plan, 3, 10);
+        return std::any_of(lines.begin(), lines.end(),
+                           [&](const PlanLine& line) { return line.what == what; });
+    };
+    const auto lines = describe(plan_for(request_for(Purpose::picture)), 3, 10);
     EXPECT_EQ(lines[0].what, "SH degrees 2 to 3");
     EXPECT_EQ(lines[0].bytes_saved,
               (15 - 6) * 16 * 16u);  // planes of 59 and of 23 floats, two blocks of 8 splats
-    Plan everything = plan_training(3, {}, true);
-    everything.masks = everything.exposure = true;
-    EXPECT_TRUE(describe(everything, 3, 10).size() < lines.size());
+    PlanRequest request = request_for(Purpose::training);
+    EXPECT_TRUE(skips(plan_for(request), "densification statistics"));
+    EXPECT_TRUE(skips(plan_for(request), "opacity and scale regularisers"));
+    EXPECT_FALSE(skips(plan_for(request), "Adam's moments"));
+    request.statistics = request.regularised = true;
+    EXPECT_TRUE(skips(plan_for(request), "sums of absolute gradients"));
+    request.masks = request.exposure = request.absolute_gradients = true;
+    for (const char* what :
+         {"densification statistics", "opacity and scale regularisers", "sums of absolute gradients",
+          "mask passes and the masked image", "exposures, their passes and the exposed image"})
+        EXPECT_FALSE(skips(plan_for(request), what)) << what;
 }
 
 TEST(CameraBlock, PairsOfFloatsHoldTheDoubles) {
     Camera camera = random_camera(2, 161, 119);
     camera.translation = {1e6 + 0.123456789, -2e6 + 1.0 / 3, 5e5};
-    const shared::CameraBlock block = camera_block(camera, shape_of(4));
+    const shared::CameraBlock block = camera_block(camera, config_of(4));
     const auto whole = [](float high, float low) { return double(high) + double(low); };
     const auto close = [](double actual, double expected) {
         // Two floats hold 48 bits.
@@ -300,7 +363,7 @@ TEST(CameraBlock, RefusesWhatIsNoCamera) {
     const auto refuses = [&](auto change) {
         Camera camera = good;
         change(camera);
-        EXPECT_THROW(camera_block(camera, shape_of(8)), InputError);
+        EXPECT_THROW(camera_block(camera, config_of(8)), InputError);
     };
     const double nan = std::nan(""), inf = std::numeric_limits<double>::infinity();
     refuses([](Camera& c) { c.width = 0; });
@@ -312,7 +375,7 @@ TEST(CameraBlock, RefusesWhatIsNoCamera) {
     refuses([&](Camera& c) { c.cy = inf; });
     refuses([&](Camera& c) { c.rotation[1][2] = nan; });
     refuses([&](Camera& c) { c.translation.z = inf; });
-    EXPECT_NO_THROW(camera_block(good, shape_of(8)));
+    EXPECT_NO_THROW(camera_block(good, config_of(8)));
 }
 
 }  // namespace

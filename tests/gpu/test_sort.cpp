@@ -16,7 +16,6 @@ namespace ewa::test {
 namespace {
 
 using pipeline::RadixCut;
-using pipeline::Total;
 
 class Scan : public testing::TestWithParam<std::pair<uint32_t, uint32_t>> {};
 
@@ -33,9 +32,9 @@ TEST_P(Scan, IsTheExclusivePrefixSum) {
         Guarded values("source", source), ranks("order", order), prefix("prefix", source.size() * 4),
             totals("totals", (blocks + 1) * 4), counts = zero_counts();
         r.run([&](gpu::Recording& recording) {
-            record_scan(recording, r.kernels,
-                        {values, gathered ? &ranks.buffer() : nullptr, prefix, totals, counts}, items, block,
-                        gathered ? Total::instances : Total::densified, "scan");
+            pipeline::record_scan(
+                recording, r.cache, {values, gathered ? &ranks.buffer() : nullptr, prefix, totals, counts},
+                {items, block, gathered ? shared::TOTAL_INSTANCES : shared::TOTAL_SCAN, "scan"});
         });
         const auto within = prefix.read<uint32_t>(), before = totals.read<uint32_t>();
         uint32_t sum = 0;
@@ -45,8 +44,8 @@ TEST_P(Scan, IsTheExclusivePrefixSum) {
         }
         EXPECT_EQ(before[blocks], sum);
         const auto read = counts.read<shared::Counts>()[0];
-        EXPECT_EQ(gathered ? read.instances : read.densified, sum);
-        EXPECT_EQ(gathered ? read.densified : read.instances, 0u);
+        EXPECT_EQ(gathered ? read.instances : read.scan_total, sum);
+        EXPECT_EQ(gathered ? read.scan_total : read.instances, 0u);
         expect_intact({&values, &prefix, &totals, &counts});
     }
 }
@@ -82,8 +81,8 @@ Sorted run_sort(const std::vector<uint32_t>& input, const RadixCut& cut, bool ow
     Guarded counts("counts", std::vector<shared::Counts>{start});
     uint32_t result = 0;
     r.run([&](gpu::Recording& recording) {
-        result = record_sort(
-            recording, r.kernels,
+        result = pipeline::record_sort(
+            recording, r.cache,
             {{&keys0.buffer(), &keys1.buffer()},
              {&values0.buffer(), &values1.buffer()},
              {own_numbers ? nullptr : &places0.buffer(), own_numbers ? nullptr : &places1.buffer()},
@@ -92,7 +91,7 @@ Sorted run_sort(const std::vector<uint32_t>& input, const RadixCut& cut, bool ow
              prefix,
              totals,
              counts},
-            cut, device_count ? 0 : items, capacity, keep_keys, "sort");
+            {cut, device_count ? 0 : items, capacity, keep_keys, "sort"});
     });
     expect_intact({&keys0, &keys1, &values0, &values1, &places0, &places1, &counters, &prefix, &totals});
     Sorted out{(result ? values1 : values0).read<uint32_t>(), (result ? keys1 : keys0).read<uint32_t>(),
@@ -107,7 +106,7 @@ RadixCut cut_for(uint32_t items, uint32_t bits) {
     RadixCut cut;
     cut.passes = (bits + 7) / 8;
     cut.bits = (bits + cut.passes - 1) / cut.passes;
-    cut.lanes = std::clamp((items + 255) / 256, rig().shape().subgroup, 512u);
+    cut.lanes = std::clamp((items + 255) / 256, rig().config().subgroup, 512u);
     return cut;
 }
 

@@ -9,6 +9,7 @@
 
 #include "gpu/guarded.h"
 #include "gpu/twin_inputs.h"
+#include "passes/project.h"
 #include "pipeline/backward.h"
 #include "reference/adam.h"
 #include "reference/strategy.h"
@@ -28,7 +29,7 @@ struct Slots {
 
     explicit Slots(const Scene& s) : scene(s) {
         const Image target = random_target(31, s.camera.width, s.camera.height);
-        twin = reference::loss_gradient(s.gaussians, s.camera, target, s.options, twin_tiles(rig().shape()));
+        twin = reference::loss_gradient(s.gaussians, s.camera, target, s.options, twin_tiles(rig().config()));
         const auto& sorted = twin.picture.instances.sorted;
         const size_t splats = s.gaussians.size();
         tile_counts.resize(splats);
@@ -56,7 +57,7 @@ struct Bench {
     Guarded records, slots, tile_counts, first, places, counts, statistics;
 
     explicit Bench(const Slots& s)
-        : camera(camera_buffer(s.scene.camera, rig().shape())),
+        : camera(camera_buffer(s.scene.camera, rig().config())),
           records("records", pack_records(s.twin.picture.projected), gpu::Texel::rgba32f),
           slots("slots", s.slots, gpu::Texel::rgba32f),
           tile_counts("tile counts", s.tile_counts),
@@ -71,10 +72,25 @@ struct Bench {
         Rig& r = rig();
         const int degree = evaluated_degree < 0 ? scene.gaussians.sh_degree : evaluated_degree;
         r.run([&](gpu::Recording& recording) {
-            r.kernels.get<passes::Update>(uint32_t(degree), uint32_t(scene.options.kernel), mode)
-                .record(recording, r.shape(),
-                        {model.params, camera, 0, records, slots, moments1, moments2, tile_counts, first,
-                         places, counts, model.params, moments1, moments2, statistics},
+            r.cache
+                .get<passes::Update>({{shared::SPEC_SH_DEGREE, uint32_t(degree)},
+                                      {shared::SPEC_KERNEL, uint32_t(scene.options.kernel)},
+                                      {shared::SPEC_MODE, mode}})
+                .record(recording,
+                        {.params = model.params,
+                         .camera = camera,
+                         .records = records,
+                         .slots = slots,
+                         .moments1 = moments1,
+                         .moments2 = moments2,
+                         .tile_counts = tile_counts,
+                         .first_instances = first,
+                         .counts = counts,
+                         .params_out = model.params,
+                         .moments1_out = moments1,
+                         .moments2_out = moments2,
+                         .statistics = statistics,
+                         .sorted_indices = places},
                         push);
         });
         expect_intact({&records, &slots, &tile_counts, &first, &places, &counts, &statistics});
@@ -117,7 +133,7 @@ struct Case {
     SplatKind kind;
     size_t splats;
     int sh_degree;
-    Kernel kernel;
+    Footprint kernel;
 };
 
 class UpdatePass : public testing::TestWithParam<Case> {};
@@ -145,13 +161,13 @@ TEST_P(UpdatePass, GradientIsTheTwins) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, UpdatePass,
-                         testing::Values(Case{SplatKind::ordinary, 200, 0, Kernel::peak},
-                                         Case{SplatKind::ordinary, 201, 3, Kernel::antialias},
-                                         Case{SplatKind::ordinary, 202, 2, Kernel::unit_mass},
-                                         Case{SplatKind::mixed, 300, 1, Kernel::peak},
-                                         Case{SplatKind::mixed, 301, 3, Kernel::antialias},
-                                         Case{SplatKind::needles, 150, 2, Kernel::peak},
-                                         Case{SplatKind::ordinary, 1, 3, Kernel::peak}),
+                         testing::Values(Case{SplatKind::ordinary, 200, 0, Footprint::peak},
+                                         Case{SplatKind::ordinary, 201, 3, Footprint::antialias},
+                                         Case{SplatKind::ordinary, 202, 2, Footprint::unit_mass},
+                                         Case{SplatKind::mixed, 300, 1, Footprint::peak},
+                                         Case{SplatKind::mixed, 301, 3, Footprint::antialias},
+                                         Case{SplatKind::needles, 150, 2, Footprint::peak},
+                                         Case{SplatKind::ordinary, 1, 3, Footprint::peak}),
                          [](const testing::TestParamInfo<Case>& tested) {
                              const Case& c = tested.param;
                              return std::string(name_of(c.kind)) + "_" + std::to_string(c.splats) + "_sh" +
@@ -262,8 +278,8 @@ TEST(UpdateRegularisers, PullAtEveryOpacityAndScale) {
     GuardedModel plain(scene.gaussians), pulled(scene.gaussians);
     Bench bench(slots);
     auto push = push_for(scene, 1);
-    push.opacity_pull = 0.7f;
-    push.scale_pull = 0.3f;
+    push.opacity_weight = 0.7f;
+    push.scale_weight = 0.3f;
     bench.run(scene, plain.model, plain.moments1, plain.moments2, kGradient, push);
     bench.run(scene, pulled.model, pulled.moments1, pulled.moments2, kGradient | kRegularised, push);
     const Gaussians a = plain.read(plain.moments1), b = pulled.read(pulled.moments1);
@@ -273,10 +289,10 @@ TEST(UpdateRegularisers, PullAtEveryOpacityAndScale) {
     };
     for (size_t i = 0; i < scene.gaussians.size(); ++i) {
         const double o = 1 / (1 + std::exp(-double(scene.gaussians.opacity_logits[i])));
-        near(b.opacity_logits[i], a.opacity_logits[i], push.opacity_pull * o * (1 - o));
+        near(b.opacity_logits[i], a.opacity_logits[i], push.opacity_weight * o * (1 - o));
         for (size_t k = 3 * i; k < 3 * i + 3; ++k)
             near(b.log_scales[k], a.log_scales[k],
-                 push.scale_pull * std::exp(double(scene.gaussians.log_scales[k])));
+                 push.scale_weight * std::exp(double(scene.gaussians.log_scales[k])));
     }
     EXPECT_EQ(a.means, b.means);
     EXPECT_EQ(a.quaternions, b.quaternions);
@@ -458,7 +474,7 @@ TEST(UpdateLimits, ScalesStayWithinTheirBorders) {
     for (const float sign : {1.0f, -1.0f}) {
         GuardedModel pulled(start);
         Bench again(slots);
-        push.scale_pull = sign * 1e9f;  // down, or up
+        push.scale_weight = sign * 1e9f;  // down, or up
         again.run(one_way, pulled.model, pulled.moments1, pulled.moments2, kRegularised, push);
         const Gaussians after = pulled.read(pulled.model.params);
         for (size_t i = 3; i < after.log_scales.size(); ++i)

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "gpu/test_device.h"
-#include "passes/shape.h"
+#include "passes/kernel_config.h"
 #include "pipeline/camera_block.h"
 #include "pipeline/model.h"
 #include "reference/render.h"
@@ -24,7 +24,7 @@ struct Scene {
 };
 
 inline Scene random_scene(uint64_t seed, size_t splats, SplatKind kind, int width, int height,
-                          int sh_degree = 0, Kernel kernel = Kernel::peak) {
+                          int sh_degree = 0, Footprint kernel = Footprint::peak) {
     Scene scene;
     scene.camera = random_camera(seed, width, height);
     scene.gaussians = random_gaussians(seed + 1, splats, kind, scene.camera, sh_degree);
@@ -34,7 +34,7 @@ inline Scene random_scene(uint64_t seed, size_t splats, SplatKind kind, int widt
 }
 
 /// The twin with the device's tiles, so that lists can be compared tile by tile.
-inline reference::ReferenceOptions twin_tiles(const passes::Shape& shape) {
+inline reference::ReferenceOptions twin_tiles(const passes::KernelConfig& shape) {
     reference::ReferenceOptions twin;
     twin.tile_width = int(shape.tile_width);
     twin.tile_height = int(shape.tile_height);
@@ -105,7 +105,7 @@ inline std::array<double, 11> slot_of(const reference::Moments& m, const referen
             m.absolute.y / 2};
 }
 
-inline gpu::Buffer camera_buffer(const Camera& camera, const passes::Shape& shape) {
+inline gpu::Buffer camera_buffer(const Camera& camera, const passes::KernelConfig& shape) {
     const shared::CameraBlock block = pipeline::camera_block(camera, shape);
     gpu::Buffer buffer(*device(), "camera", sizeof(block), gpu::Texel::none, true);
     buffer.upload(std::span<const shared::CameraBlock>(&block, 1));

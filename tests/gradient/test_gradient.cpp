@@ -18,7 +18,7 @@ struct Case {
     SplatKind kind;
     size_t splats;
     int width, height, sh_degree;
-    Kernel kernel;
+    Footprint kernel;
     uint64_t seed;
 };
 
@@ -70,11 +70,11 @@ TEST_P(Gradient, IsTheSlopeOfTheTwinsLoss) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Gradient,
-                         testing::Values(Case{SplatKind::ordinary, 5, 24, 17, 0, Kernel::peak, 5001},
-                                         Case{SplatKind::ordinary, 4, 23, 18, 3, Kernel::peak, 5012},
-                                         Case{SplatKind::ordinary, 5, 24, 17, 1, Kernel::antialias, 5023},
-                                         Case{SplatKind::ordinary, 5, 17, 24, 1, Kernel::unit_mass, 5034},
-                                         Case{SplatKind::ordinary, 20, 24, 17, 0, Kernel::peak, 5045}),
+                         testing::Values(Case{SplatKind::ordinary, 5, 24, 17, 0, Footprint::peak, 5001},
+                                         Case{SplatKind::ordinary, 4, 23, 18, 3, Footprint::peak, 5012},
+                                         Case{SplatKind::ordinary, 5, 24, 17, 1, Footprint::antialias, 5023},
+                                         Case{SplatKind::ordinary, 5, 17, 24, 1, Footprint::unit_mass, 5034},
+                                         Case{SplatKind::ordinary, 20, 24, 17, 0, Footprint::peak, 5045}),
                          [](const testing::TestParamInfo<Case>& tested) {
                              const Case& c = tested.param;
                              return std::string(name_of(c.kind)) + "_" + std::to_string(c.splats) + "_sh" +

@@ -226,7 +226,7 @@ TEST(RunOptions, TableReadsWhatItWrites) {
     for (const auto& [name, text] : other)
         EXPECT_EQ(train::value_text(train::run_option(name), all), text) << name;
     EXPECT_EQ(all.train.image_cache_bytes, uint64_t(9) << 20);
-    EXPECT_EQ(all.train.render.kernel, Kernel::unit_mass);
+    EXPECT_EQ(all.train.render.kernel, Footprint::unit_mass);
     EXPECT_EQ(config.begin().key(), "dataset");
 }
 

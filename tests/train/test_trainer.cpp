@@ -194,6 +194,32 @@ TEST(Trainer, RefusesWhatItCannotTrain) {
     expect_error<InputError>(make({0}, start, 39), {"40", "39"});
 }
 
+std::vector<std::string> names(const std::vector<PlanLine>& plan) {
+    std::vector<std::string> names;
+    for (const PlanLine& line : plan) names.push_back(line.what + " " + std::to_string(line.bytes_saved));
+    return names;
+}
+
+/// What a trainer says that it skips is what plan_lines says of its options and its images.
+TEST(Trainer, RunsThePlanThatItTells) {
+    const Spoilt spoilt;
+    const std::vector<int> frames = all_frames(spoilt.masked);
+    for (const Strategy strategy : {Strategy::none, Strategy::adc, Strategy::mcmc})
+        for (const bool exposure : {false, true}) {
+            TrainOptions options = quick(10);
+            options.strategy = strategy;
+            options.exposure = options.absolute_gradients = exposure;
+            const Gaussians start = shaken_start(spoilt.data, 0.05, 1, 0);
+            const Trainer masked(device(), spoilt.masked, frames, start, options);
+            const Trainer plain(device(), spoilt.unmasked, frames, start, options);
+            EXPECT_EQ(names(masked.plan()), names(plan_lines(start, options, true)));
+            EXPECT_EQ(names(plain.plan()), names(plan_lines(start, options, false)));
+            EXPECT_EQ(plain.plan().size(), masked.plan().size() + 1);
+            // A checkpoint has what the plan keeps from step to step.
+            EXPECT_EQ(plain.state().arrays.size(), 3u + (strategy == Strategy::adc) + (exposure ? 3 : 0));
+        }
+}
+
 TEST(Trainer, TimesEveryPass) {
     Trainer trainer(device(), small_capture().dataset, {0, 1}, shaken_start(small_capture(), 0.05, 1, 0),
                     quick(10));

@@ -69,7 +69,7 @@ TEST(ReferenceBlend, UnitMassKernelKeepsItsMass) {
     scene.log_scales = {-2, -2.5f, -3};
     scene.opacity_logits = {0.4f};
     RenderOptions options;
-    options.kernel = Kernel::unit_mass;
+    options.kernel = Footprint::unit_mass;
     ReferenceOptions twin;
     twin.smoothing.cut = AlphaCut::none;
     const Picture picture = render(scene, camera, options, twin);
@@ -157,7 +157,7 @@ glm::dvec3 plain_pixel(const Picture& picture, int x, int y, const std::array<fl
 }
 
 TEST(ReferenceBlend, TilesDoNotChangeThePicture) {
-    const RenderOptions options{{0.2f, 0.4f, 0.9f}, Kernel::peak, 3};
+    const RenderOptions options{{0.2f, 0.4f, 0.9f}, Footprint::peak, 3};
     for (uint64_t seed = 0; seed < 12; ++seed) {
         SCOPED_TRACE(test::seed_text(seed));
         const Camera camera = test::random_camera(seed);

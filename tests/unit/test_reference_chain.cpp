@@ -39,7 +39,7 @@ Values differences(Chain& chain, const Values& claimed) {
     return out;
 }
 
-Chain random_chain(uint64_t seed, test::SplatKind kind, size_t count, int degree, Kernel kernel) {
+Chain random_chain(uint64_t seed, test::SplatKind kind, size_t count, int degree, Footprint kernel) {
     Chain chain;
     chain.camera = test::random_camera(seed, 21, 17);
     chain.values = to_double(test::random_gaussians(seed, count, kind, chain.camera, degree));
@@ -63,21 +63,21 @@ TEST(ReferenceChain, EveryKernelAndDegree) {
             const uint64_t seed = uint64_t(10 * kernel + degree);
             SCOPED_TRACE(test::seed_text(seed) + ", kernel " + std::to_string(kernel) + ", degree " +
                          std::to_string(degree));
-            check(random_chain(seed, test::SplatKind::ordinary, 8, degree, Kernel(kernel)));
+            check(random_chain(seed, test::SplatKind::ordinary, 8, degree, Footprint(kernel)));
         }
 }
 
 TEST(ReferenceChain, OffTheScreenAndClose) {
     for (uint64_t seed = 40; seed < 44; ++seed) {
         SCOPED_TRACE(test::seed_text(seed));
-        check(random_chain(seed, test::SplatKind::off_screen_and_close, 12, 1, Kernel::peak));
+        check(random_chain(seed, test::SplatKind::off_screen_and_close, 12, 1, Footprint::peak));
     }
 }
 
 TEST(ReferenceChain, MixedWithTheRamp) {
     for (uint64_t seed = 60; seed < 63; ++seed) {
         SCOPED_TRACE(test::seed_text(seed));
-        Chain chain = random_chain(seed, test::SplatKind::ordinary, 20, 0, Kernel::antialias);
+        Chain chain = random_chain(seed, test::SplatKind::ordinary, 20, 0, Footprint::antialias);
         chain.twin.smoothing.cut = AlphaCut::ramp;
         check(chain);
     }
@@ -85,7 +85,7 @@ TEST(ReferenceChain, MixedWithTheRamp) {
 
 TEST(ReferenceChain, TheModelItselfWhereNothingJumps) {
     // With the hard cut the loss jumps wherever a pixel crosses the floor; small steps mostly meet no jump.
-    Chain chain = random_chain(80, test::SplatKind::ordinary, 8, 1, Kernel::peak);
+    Chain chain = random_chain(80, test::SplatKind::ordinary, 8, 1, Footprint::peak);
     chain.twin = {};
     check(chain);
 }
@@ -120,7 +120,7 @@ TEST(ReferenceChain, ExtremesStayFinite) {
             const Camera camera = test::random_camera(seed);
             const Gaussians scene = test::random_gaussians(seed, 50, test::SplatKind::mixed, camera, 3);
             RenderOptions options;
-            options.kernel = Kernel(kernel);
+            options.kernel = Footprint(kernel);
             const Image target = test::random_target(seed, camera.width, camera.height);
             const ReferenceGradient out = loss_gradient(scene, camera, target, options);
             EXPECT_TRUE(std::isfinite(out.loss));

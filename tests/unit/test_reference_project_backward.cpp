@@ -77,7 +77,7 @@ TEST(ReferenceProjectBackward, MatchesDifferencesForEachKernelAndDegree) {
                 SCOPED_TRACE(test::seed_text(seed) + ", kernel " + std::to_string(kernel) + ", degree " +
                              std::to_string(degree) + ", splat " + std::to_string(i));
                 Check c{read_splat(scene, i), camera, {}, {}};
-                c.options.kernel = Kernel(kernel);
+                c.options.kernel = Footprint(kernel);
                 ProjectionSteps steps;
                 const Projected p = project(c.splat, camera, c.options, &steps);
                 if (!p.visible) continue;

@@ -52,10 +52,10 @@ TEST(ReferenceProjection, RoundSplatOnTheAxis) {
 TEST(ReferenceProjection, KernelFactors) {
     const Splat splat = round_splat({0, 0, 4}, 0.2, 0.7);
     RenderOptions options;
-    options.kernel = Kernel::antialias;
+    options.kernel = Footprint::antialias;
     EXPECT_NEAR(project(splat, plain_camera(), options).opacity, 0.7 * std::sqrt(25.0 * 16.0 / (25.3 * 16.3)),
                 1e-12);
-    options.kernel = Kernel::unit_mass;
+    options.kernel = Footprint::unit_mass;
     EXPECT_NEAR(project(splat, plain_camera(), options).opacity,
                 0.7 / (2 * std::numbers::pi * std::sqrt(25.3 * 16.3)), 1e-12);
 }

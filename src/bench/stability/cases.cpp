@@ -107,7 +107,7 @@ Gaussians usual_scene(const Camera& camera, uint32_t count, int sh_degree = 1) {
 class Table {
   public:
     void add(std::string name, std::string what, Gaussians gaussians, const Camera& camera = usual_camera(),
-             Kernel kernel = Kernel::peak) {
+             Footprint kernel = Footprint::peak) {
         RenderOptions options;
         options.background = {0.2f, 0.5f, 0.8f};
         options.kernel = kernel;
@@ -119,8 +119,8 @@ class Table {
     std::vector<StabilityCase> cases_;
 };
 
-const std::pair<Kernel, const char*> kKernels[] = {
-    {Kernel::peak, ""}, {Kernel::antialias, "_antialias"}, {Kernel::unit_mass, "_unit_mass"}};
+const std::pair<Footprint, const char*> kKernels[] = {
+    {Footprint::peak, ""}, {Footprint::antialias, "_antialias"}, {Footprint::unit_mass, "_unit_mass"}};
 
 void add_ordinary(Table& table) {
     for (const auto& [kernel, suffix] : kKernels)
@@ -144,7 +144,7 @@ Gaussians thin_splats(double length, double ratio) {
 void add_axis_ratios(Table& table) {
     for (const double ratio : {1.0, 1e2, 1e4, 1e6, 1e7})
         for (const auto& [kernel, suffix] : kKernels)
-            if (kernel == Kernel::peak || ratio == 1e4)
+            if (kernel == Footprint::peak || ratio == 1e4)
                 table.add(text_of("axes_1:%.0e%s", ratio, suffix),
                           "needles and discs of 10 px at random orientations", thin_splats(0.15, ratio),
                           usual_camera(), kernel);
@@ -155,7 +155,7 @@ void add_axis_ratios(Table& table) {
 void add_scales(Table& table) {
     for (const double factor : {1e-12, 1e-6, 1e-3, 1e3, 1e6})
         for (const auto& [kernel, suffix] : kKernels) {
-            if (kernel != Kernel::peak && factor != 1e-6 && factor != 1e6) continue;
+            if (kernel != Footprint::peak && factor != 1e-6 && factor != 1e6) continue;
             const Camera camera = usual_camera();
             Builder builder(camera);
             for (uint32_t i = 0; i < 40; ++i) {
@@ -166,7 +166,7 @@ void add_scales(Table& table) {
             }
             // If none of them is visible, others are, which must not be affected.
             const bool unseen =
-                kernel == Kernel::antialias ? factor < 1 : kernel == Kernel::unit_mass && factor > 1;
+                kernel == Footprint::antialias ? factor < 1 : kernel == Footprint::unit_mass && factor > 1;
             for (uint32_t i = 0; unseen && i < 20; ++i) builder.add(usual_sketch(i, camera, usual_depth(i)));
             table.add(text_of("scale_%.0e%s", factor, suffix), "scales times this", builder.take(), camera,
                       kernel);

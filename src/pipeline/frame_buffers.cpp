@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "pipeline/frame.h"
+#include "pipeline/frame_buffers.h"
 
 #include <cstring>
 
@@ -13,19 +13,17 @@ using gpu::Texel;
 void grow(gpu::Device& device, gpu::Buffer& buffer, const char* name, uint64_t bytes,
           Texel texel = Texel::none) {
     if (bytes == 0 || (buffer && buffer.bytes() >= bytes)) return;
-    buffer = gpu::Buffer();  // the old one goes first: nothing in it is needed
+    buffer = gpu::Buffer();  // free the old one first: its contents are not needed
     buffer = gpu::Buffer(device, name, bytes, texel);
 }
 
 }  // namespace
 
-void Frame::reserve(gpu::Device& device, const passes::Shape& shape, const FrameRequest& request) {
+void FrameBuffers::reserve(gpu::Device& device, const passes::KernelConfig& config,
+                           const FrameRequest& request) {
     const Sizes old = sizes;
-    sizes = sizes_for(shape, request);
-    splats_capacity = request.splats;
+    sizes = sizes_for(config, request);
     instance_capacity = request.instances;
-    gradients = request.gradients;
-    depth = request.depth;
     if (!counts) counts = gpu::Buffer(device, "counts", sizeof(shared::Counts), Texel::none, false, true);
 
     grow(device, records, "records", sizes.records, Texel::rgba32f);
@@ -42,8 +40,7 @@ void Frame::reserve(gpu::Device& device, const passes::Shape& shape, const Frame
     for (auto& buffer : instance_splats)
         grow(device, buffer, "instance splats", sizes.instance_words, Texel::rgba32ui);
     grow(device, tile_starts, "tile starts", sizes.tile_starts);
-    // Outside gradients nobody reads where a splat's instances begin, but the kernel's binding wants a
-    // buffer.
+    // Without gradients no pass reads where a splat's instances begin, but the binding needs a buffer.
     grow(device, first_instances, "first instances", request.gradients ? sizes.splat_words : 16);
 
     grow(device, planes, "planes", sizes.planes, Texel::rgba32f);
@@ -58,11 +55,11 @@ void Frame::reserve(gpu::Device& device, const passes::Shape& shape, const Frame
         grow(device, partials, "partials", sizes.partial_sums);
         grow(device, exposure_sums, "exposure sums", sizes.exposure_sums);
         grow(device, reduced, "reduced", sizes.reduced);
-        for (auto& buffer : instance_places)
-            grow(device, buffer, "instance places", sizes.instance_words, Texel::rgba32ui);
+        for (auto& buffer : sorted_indices)
+            grow(device, buffer, "sorted indices", sizes.instance_words, Texel::rgba32ui);
         grow(device, slots, "slots", sizes.slots, Texel::rgba32f);
     }
-    // The columns between an image's width and its stride count as black in the loss; no kernel writes them.
+    // The loss reads the columns between an image's width and its stride as black. No pass writes them.
     if (old.plane_floats != sizes.plane_floats || old.stride != sizes.stride ||
         old.image_planes != sizes.image_planes) {
         zero(planes);
@@ -72,7 +69,7 @@ void Frame::reserve(gpu::Device& device, const passes::Shape& shape, const Frame
     }
 }
 
-shared::Counts Frame::read_counts() const {
+shared::Counts FrameBuffers::read_counts() const {
     shared::Counts result;
     std::memcpy(&result, counts.mapped(), sizeof(result));
     return result;

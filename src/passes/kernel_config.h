@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+// How kernels are sized for a device: workgroups, tiles, lanes of a sort. Every such choice is made here,
+// from the device's limits only.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+
+#include "gpu/device.h"
+#include "shared/constants.h"
+#include "shared/layouts.h"
+
+namespace ewa::passes {
+
+using Groups = std::array<uint32_t, 3>;  // workgroups along x, y and z
+
+struct KernelConfig {
+    uint32_t subgroup = 8;         // lanes
+    uint32_t element_group = 128;  // invocations of an element-wise workgroup, a multiple of subgroup
+    uint32_t tile_width = 8, tile_height = 8;  // px; one subgroup owns a tile
+    uint32_t sort_lanes_max = 512;             // lanes that share a radix sort
+    uint32_t sort_chunk = 256;                 // least number of items of a sorting lane
+    uint32_t sort_group = 64;                  // invocations of a sorting workgroup
+    uint32_t tile_interleave = 1;              // distance of the tiles of neighbouring workgroups
+    uint32_t max_groups = 65535;               // workgroups along one dimension
+    uint32_t loop_limit = 65535;               // iterations of a loop in one invocation
+    float cut_off =
+        float(shared::ALPHA_MIN);  // smaller contributions are skipped; other values compare speed
+};
+
+/// Throws std::logic_error unless the subgroup size is a power of two up to 64.
+inline KernelConfig config_for(const gpu::Limits& limits) {
+    KernelConfig config;
+    config.subgroup = limits.subgroup_size;
+    if (config.subgroup == 0 || config.subgroup > 64 || (config.subgroup & (config.subgroup - 1)) != 0)
+        throw std::logic_error("a subgroup of " + std::to_string(config.subgroup) + " lanes");
+    // Lanes are side by side in a tile row: a narrow subgroup gets a narrow, tall tile.
+    config.tile_width = config.subgroup < 8 ? config.subgroup : 8;
+    config.tile_height = 64 / config.tile_width;
+    config.max_groups = limits.max_groups;
+    if (limits.cpu) {
+        // Threads take contiguous parts of a dispatch. Neighbouring workgroups far apart balance these parts.
+        config.tile_interleave = 16;
+        // Small workgroups divide few lanes evenly between threads, and cost next to nothing to start.
+        config.sort_group = config.subgroup;
+    } else {
+        config.sort_lanes_max = 16384;
+        config.sort_chunk = 64;
+    }
+    return config;
+}
+
+/// Workgroups on x and y, at least one, within the device's limit along x.
+inline Groups grid_of(const KernelConfig& config, uint64_t groups, uint32_t z = 1) {
+    if (groups == 0) groups = 1;
+    const uint64_t rows = (groups + config.max_groups - 1) / config.max_groups;
+    return {uint32_t((groups + rows - 1) / rows), uint32_t(rows), z};
+}
+
+/// Workgroups of an element-wise kernel over `items`, for each of z layers.
+inline Groups element_groups(const KernelConfig& config, uint64_t items, uint32_t z = 1) {
+    return grid_of(config, (items + config.element_group - 1) / config.element_group, z);
+}
+
+/// One workgroup of a single subgroup for each block of `block` items.
+inline Groups block_groups(const KernelConfig& config, uint64_t items, uint32_t block) {
+    return grid_of(config, (items + block - 1) / block);
+}
+
+/// One workgroup a tile. The tile of workgroup (x, y) is x * push.tile_step[0] + y * push.tile_step[1].
+inline Groups tile_groups(const KernelConfig& config, const shared::BlendPush& push) {
+    const uint32_t tiles = push.tiles[0] * push.tiles[1];
+    const uint32_t rows =
+        push.tile_step[1] == 1 ? config.tile_interleave : (tiles + push.tile_step[1] - 1) / push.tile_step[1];
+    const uint32_t columns = push.tile_step[1] == 1 ? (tiles + rows - 1) / rows : push.tile_step[1];
+    return {columns, rows, 1};
+}
+
+/// Steps for tile_groups: interleaved, or in rows as long as the device's limit allows.
+inline std::array<uint32_t, 2> tile_steps(const KernelConfig& config, uint32_t tiles) {
+    if (config.tile_interleave > 1) return {config.tile_interleave, 1};
+    return {1, tiles < config.max_groups ? tiles : config.max_groups};
+}
+
+/// One invocation a pixel.
+inline Groups pixel_groups(const KernelConfig& config, const shared::ImageLayout& image) {
+    return element_groups(config, uint64_t(image.size[0]) * image.size[1]);
+}
+
+/// Items of a loss pass down the columns. stride: floats a row, a multiple of 4.
+inline uint64_t loss_column_items(uint32_t stride, uint32_t height) {
+    return uint64_t(stride / 4) * ((height + shared::LOSS_ROWS - 1) / shared::LOSS_ROWS);
+}
+/// Items of a loss pass along the rows.
+inline uint64_t loss_row_items(uint32_t stride, uint32_t height) {
+    return uint64_t((stride / 4 + shared::LOSS_TEXELS - 1) / shared::LOSS_TEXELS) * height;
+}
+
+}  // namespace ewa::passes

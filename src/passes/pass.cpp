@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "passes/pass.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "passes/shader_code.h"
+
+namespace ewa::shared {
+
+// The scalar block layout packs these structs without padding, and so does C++.
+static_assert(sizeof(CameraBlock) == 4 * (9 + 9 + 3 + 3 + 8 + 4 + 4));
+static_assert(offsetof(CameraBlock, size) == 4 * (9 + 9 + 3 + 3 + 8 + 4));
+static_assert(sizeof(Counts) == 32 && offsetof(Counts, l1) == 16);
+static_assert(sizeof(ProjectPush) == 12 && sizeof(SortPush) == 16 && sizeof(ScanPush) == 8);
+static_assert(sizeof(ScanTotalsPush) == 8 && sizeof(EmitPush) == 32 && sizeof(TileStartsPush) == 8);
+static_assert(sizeof(BlendPush) == 48 && offsetof(BlendPush, capacity) == 44);
+static_assert(sizeof(UnpackPush) == 28 && sizeof(LossPush) == 24 && sizeof(ReducePush) == 16);
+static_assert(sizeof(ImageLayout) == 16 && sizeof(PackPush) == 4 && sizeof(ExposurePush) == 20 &&
+              sizeof(ExposureUpdatePush) == 28);
+static_assert(sizeof(UpdatePush) == 60 && sizeof(DensifyPush) == 48 && sizeof(ResetPush) == 12);
+static_assert(sizeof(McmcPush) == 56 && sizeof(PerturbPush) == 32);
+static_assert(sizeof(TraceView) == 4 * (9 + 3 + 2 + 2 + 2 + 9 + 1) && sizeof(TraceCounts) == 8 &&
+              sizeof(TracePush) == 24);
+
+}  // namespace ewa::shared
+
+namespace ewa::passes {
+
+const gpu::Pipeline& PassCache::pipeline(std::string_view shader, uint32_t group_size,
+                                         const Constants& variant) {
+    const auto found = pipelines_.find({shader, variant});
+    if (found != pipelines_.end()) return found->second;
+    Constants constants = {{shared::SPEC_GROUP_SIZE, group_size},
+                           {shared::SPEC_SUBGROUP, config_.subgroup},
+                           {shared::SPEC_TILE_WIDTH, config_.tile_width},
+                           {shared::SPEC_TILE_HEIGHT, config_.tile_height},
+                           {shared::SPEC_CUT_OFF, std::bit_cast<uint32_t>(config_.cut_off)}};
+    constants.insert(constants.end(), variant.begin(), variant.end());
+    gpu::Pipeline made(device_, std::string(shader), shader_code(shader), constants);
+    const std::vector<uint32_t>& declared = made.reflection().constants;
+    for (const gpu::SpecConstant& constant : variant)
+        if (!std::binary_search(declared.begin(), declared.end(), constant.id))
+            throw std::logic_error("shader " + std::string(shader) + " has no specialisation constant " +
+                                   std::to_string(constant.id));
+    return pipelines_.emplace(std::pair(shader, variant), std::move(made)).first->second;
+}
+
+}  // namespace ewa::passes
