@@ -101,14 +101,15 @@ struct RunResult {
 };
 
 /// Trains, evaluates, and writes into the run's folder:
-///   config.json      the options, as `ewa train --config` takes them
-///   metrics.jsonl    a MetricsLine every 1 % of the steps and at each evaluation
-///   checkpoint.ewa   to resume from
-///   splats.ply       the splats
-///   exposures.json   with TrainOptions::exposure: three rows of four numbers for each training image
-///   test/*.png       renders of some test views (train/*.png without a test set)
-///   summary.json     the Summary
-///   report.html      all of this in one page
+/// - config.json: the options, as `ewa train --config` takes them.
+/// - metrics.jsonl: a MetricsLine every 1 % of the steps and at each evaluation.
+/// - checkpoint.ewa: the state to resume from.
+/// - splats.ply: the splats.
+/// - exposures.json, with TrainOptions::exposure: three rows of four numbers for each training image.
+/// - test/*.png: renders of some test views (train/*.png without a test set).
+/// - summary.json: the Summary.
+/// - report.html: all of this in one page.
+///
 /// One run at a time may use a folder. Each file but metrics.jsonl is replaced as a whole.
 /// If an image vanishes during training, the checkpoint is saved before the error is thrown.
 /// Throws InputError (options, dataset, start splats, a checkpoint of other options), RunError (device, memory,

@@ -66,9 +66,9 @@ struct TrainOptions {
     // 3DGS-MCMC (Kheradmand et al. 2024), with the values of its code and of gsplat. It shares refine_start
     // and refine_every.
     int relocate_stop = 25000;
-    double growth = 1.05;  // factor of the number of splats at each refinement, up to max_splats
-    /// Standard deviations between a copy and its source in a run of 0 steps, linearly down to 0 at 30,000
-    /// steps, where noise has the time to separate them (src/train/schedule.h).
+    double growth = 1.05;  // factor of the number of splats at each refinement, up to max_splats.
+    /// Distance of a copy from its source in standard deviations. It applies to a run of 0 steps and falls
+    /// linearly to 0 at 30,000 steps: long runs have time for noise to separate copies (src/train/schedule.h).
     double copy_spread = 1;
     double dead_opacity = 0.005;
     double noise_rate = 5e5;       // times the means' learning rate
