@@ -90,7 +90,7 @@ set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME ewa)
 set(CPACK_PACKAGE_CONTACT "The authors of ewa <ewa@localhost>")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "trains, renders and inspects 3D Gaussian splats on any Vulkan device")
-set(CPACK_PACKAGE_DESCRIPTION "Programs ewa, ewa-view and ewa-bench, and libewa with its headers. SyntheticDataset with cameras
+set(CPACK_PACKAGE_DESCRIPTION "Programs ewa, ewa-view and ewa-bench, and libewa with its headers. Images with cameras
 become a 3D Gaussian splat scene, on any Vulkan device, a plain CPU included.")
 set(CPACK_STRIP_FILES ON)
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)

@@ -110,7 +110,7 @@ TEST(SplatFormats, SaysWhatIsLost) {
     EXPECT_TRUE(read_splats(folder / "a.spz").antialiased);
     EXPECT_EQ(all("a.spz", g, {}).find("clamped to -1..1\n1"), std::string::npos);
     g.sh[3] = 1.5f;
-    EXPECT_NE(all("a.spz", g, {}).find("1 scales, colours and SH coefficients are beyond"),
+    EXPECT_NE(all("a.spz", g, {}).find("1 scales, colours and SH coefficients are outside SPZ's range"),
               std::string::npos);
     g.means[0] = NAN;
     g.quaternions[7] = g.quaternions[6] = g.quaternions[5] = g.quaternions[4] = 0;
