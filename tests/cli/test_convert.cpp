@@ -196,7 +196,7 @@ TEST(Convert, NamesTheBinOfAGltfAndLeavesOthersAlone) {
         expect_success(outcome);
         const auto bytes = fs::file_size(folder / "g.bin");
         EXPECT_EQ(bytes, 50u * (12 + 8 + 16 + 12 + 4 + 4 * 12));
-        EXPECT_NE(outcome.out.find((folder / "g.bin") + ": the values of that glTF, 5 kB"), std::string::npos)
+        EXPECT_NE(outcome.out.find((folder / "g.bin") + ": the values of this glTF, 5 kB"), std::string::npos)
             << outcome.out;
         EXPECT_EQ(read_json(folder / "g.json")["output"]["values"]["bytes"], bytes);
     }

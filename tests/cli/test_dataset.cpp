@@ -61,7 +61,7 @@ TEST(Dataset, GoesOnWhereItWasEnded) {
     fs::remove(folder / "d/transforms.json");
     const Outcome again = run_ewa(small("railing.gltf", folder / "d"));
     EXPECT_EQ(again.status, 0) << again.err;
-    EXPECT_NE(again.out.find("3 were there already"), std::string::npos) << again.out;
+    EXPECT_NE(again.out.find("3 existed already"), std::string::npos) << again.out;
     EXPECT_TRUE(read_file(folder / "d/images/view_002.png") == picture);
     EXPECT_TRUE(read_file(folder / "d/depth/view_002.exr") == depth);
     EXPECT_TRUE(read_file(folder / "d/transforms.json") == transforms);

@@ -81,7 +81,7 @@ TEST(Inputs, DatasetWithoutPoints) {
     const Outcome outcome = run_ewa({"train", folder / "data", "-o", folder / "out", "--max-splats", "100",
                                      "--steps", "2", "--strategy", "none"});
     EXPECT_EQ(outcome.status, 0) << outcome.err;
-    EXPECT_NE(outcome.out.find("there are no points"), std::string::npos) << outcome.out;
+    EXPECT_NE(outcome.out.find("the dataset has no points"), std::string::npos) << outcome.out;
     EXPECT_NE(outcome.out.find("100 splats to start from"), std::string::npos) << outcome.out;
 }
 

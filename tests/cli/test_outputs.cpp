@@ -212,10 +212,11 @@ TEST(Outputs, NoFileTakesAnothersPlace) {
     make_splats(folder / "s.ply");
     const std::string splats = folder / "s.ply", data = folder / "data", out = folder / "o.ply",
                       good = read_file(splats);
-    expect_failure(run_ewa({"eval", splats, data, "--json", splats}), 2, "is SPLATS too");
-    expect_failure(run_ewa({"grad", splats, data, "--frame", "0", "-o", splats}), 2, "is SPLATS too");
+    expect_failure(run_ewa({"eval", splats, data, "--json", splats}), 2, "is the same file as SPLATS");
+    expect_failure(run_ewa({"grad", splats, data, "--frame", "0", "-o", splats}), 2,
+                   "is the same file as SPLATS");
     expect_failure(run_ewa({"grad", splats, data, "--frame", "0", "-o", out, "--json", out}), 2,
-                   "is --output too");
+                   "is the same file as --output");
     expect_failure(run_ewa({"bench", "--accuracy", data, "--splats", splats, "--json", splats}), 2,
                    "is --splats too");
     expect_failure(run_ewa({"bench", "--accuracy", data, "--svg", out, "--json", out}), 2, "is --svg too");

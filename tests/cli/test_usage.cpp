@@ -65,7 +65,7 @@ TEST(Usage, HelpFits80ColumnsForEveryCommand) {
 #endif
     // Wrapping loses no words, and the rest of a description continues in its own column.
     const std::string train = run_ewa({"train", "--help"}).out;
-    const size_t from = train.find("--strategy"), to = train.find("--max-splats");
+    const size_t from = train.find("--strategy"), to = train.find("\n  --max-splats");
     ASSERT_TRUE(from < to && to != std::string::npos) << train;
     const std::string strategy = train.substr(from, to - from);
     EXPECT_NE(strategy.find("\n" + std::string(30, ' ')), std::string::npos) << strategy;
