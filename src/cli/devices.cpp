@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "cli/command.h"
+#include "core/messages.h"
 #include "core/text.h"
 #include "ewa/device.h"
 #include "report/summary.h"

@@ -10,6 +10,7 @@
 #include "cli/command.h"
 #include "cli/info_dataset.h"
 #include "cli/splat_statistics.h"
+#include "core/messages.h"
 #include "core/text.h"
 #include "ewa/dataset.h"
 #include "ewa/error.h"

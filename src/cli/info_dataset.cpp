@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "cli/dataset_argument.h"
+#include "core/messages.h"
 #include "core/text.h"
 #include "ewa/synthetic_dataset.h"
 #include "io/gltf/mesh.h"

@@ -6,6 +6,7 @@
 
 #include <cstdio>
 
+#include "core/messages.h"
 #include "core/text.h"
 
 namespace ewa::cli {

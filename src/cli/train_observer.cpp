@@ -3,6 +3,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "core/messages.h"
 #include "core/text.h"
 
 namespace ewa::cli {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Text: parsing of words and numbers, safe display of foreign text, and warnings.
+// Text: parsing of words and numbers, and safe display of foreign text.
 #pragma once
 #include <charconv>
 #include <cstdint>
@@ -34,15 +34,5 @@ std::optional<T> parse_integer(std::string_view word) {
     if (error != std::errc() || end != word.data() + word.size()) return std::nullopt;
     return value;
 }
-
-/// Bytes with three digits in powers of 1000, such as "850 B" or "12.3 MB".
-std::string bytes_text(uint64_t bytes);
-
-/// Seconds as "12 s", "3 min 05 s" or "2 h 10 min".
-std::string duration_text(double seconds);
-
-/// Prints a line on standard error through the spdlog logger named "ewa", whose level can silence it.
-/// Standard output is reserved for results.
-void warn(const std::string& text);
 
 }  // namespace ewa::core

@@ -9,7 +9,6 @@
 #include <numbers>
 
 #include "ewa/error.h"
-#include "image/image_files.h"
 #include "pathtracer/light_table.h"
 #include "scene/color.h"
 
@@ -193,14 +192,6 @@ glm::vec3 vector(const uint32_t* words) {
 }
 
 }  // namespace
-
-std::vector<Image> decode_images(const scene::MeshScene& scene) {
-    constexpr int kLargest = 8192;
-    std::vector<Image> images;
-    for (const scene::EncodedImage& encoded : scene.images)
-        images.push_back(image::decode(encoded.bytes, encoded.what, kLargest));
-    return images;
-}
 
 PackedScene pack(const scene::MeshScene& scene, const std::vector<Image>& images) {
     return Packer(scene, images).pack();

@@ -30,10 +30,6 @@ struct PackedScene {
     std::vector<uint32_t> order;  // the scene's triangle at each sorted index
 };
 
-/// The decoded images of the scene's textures: PNG and JPEG, as in glTF, of at most 8192 x 8192 pixels.
-/// Throws InputError that names the image.
-std::vector<Image> decode_images(const scene::MeshScene& scene);
-
 /// `images` are the scene's decoded images with 3 or 4 channels. An empty image is white. Throws InputError
 /// for a scene without triangles, or above kMostTriangles or kMostTexels.
 PackedScene pack(const scene::MeshScene& scene, const std::vector<Image>& images);

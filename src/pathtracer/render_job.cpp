@@ -10,6 +10,7 @@
 #include "core/json.h"
 #include "core/text.h"
 #include "ewa/error.h"
+#include "image/image_files.h"
 #include "io/gltf/mesh.h"
 #include "pathtracer/virtual_camera.h"
 
@@ -96,6 +97,14 @@ std::string RenderJob::depth_name(size_t view) const {
 
 bool RenderJob::rendered(const fs::path& folder, size_t view) const {
     return fs::exists(folder / image_name(view)) && fs::exists(folder / depth_name(view));
+}
+
+std::vector<Image> decode_images(const scene::MeshScene& scene) {
+    constexpr int kLargest = 8192;
+    std::vector<Image> images;
+    for (const scene::EncodedImage& encoded : scene.images)
+        images.push_back(image::decode(encoded.bytes, encoded.what, kLargest));
+    return images;
 }
 
 RenderJob read_render_job(const fs::path& path, const SyntheticOptions& options) {

@@ -17,6 +17,10 @@ namespace ewa::pathtracer {
 /// The record in a folder of renders. Folders of earlier versions have this name, so it stays.
 inline constexpr const char* kRecord = "photographs.json";
 
+/// The decoded images of the scene's textures: PNG and JPEG, as in glTF, of at most 8192 x 8192 pixels.
+/// Throws InputError that names the image.
+std::vector<Image> decode_images(const scene::MeshScene& scene);
+
 struct RenderJob {
     SyntheticOptions options;
     std::string name;  // of the scene's file

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/messages.h"
 #include "core/text.h"
 #include "report/chart.h"
 #include "report/pictures.h"

@@ -9,6 +9,7 @@
 #include "image/image_files.h"
 #include "io/gltf/mesh.h"
 #include "pathtracer/path_tracer.h"
+#include "pathtracer/render_job.h"
 #include "pathtracer/virtual_camera.h"
 #include "support/temp_folder.h"
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "core/messages.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"

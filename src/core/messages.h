@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// Text for people: sizes, durations and warnings. Apart from text.h, so that ewa-bench links neither spdlog nor fmt.
+#pragma once
+#include <cstdint>
+#include <string>
+
+namespace ewa::core {
+
+/// Bytes with three digits in powers of 1000, such as "850 B" or "12.3 MB".
+std::string bytes_text(uint64_t bytes);
+
+/// Seconds as "12 s", "3 min 05 s" or "2 h 10 min".
+std::string duration_text(double seconds);
+
+/// Prints a line on standard error through the spdlog logger named "ewa", whose level can silence it.
+/// Standard output is reserved for results.
+void warn(const std::string& text);
+
+}  // namespace ewa::core
