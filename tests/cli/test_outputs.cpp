@@ -218,8 +218,9 @@ TEST(Outputs, NoFileTakesAnothersPlace) {
     expect_failure(run_ewa({"grad", splats, data, "--frame", "0", "-o", out, "--json", out}), 2,
                    "is the same file as --output");
     expect_failure(run_ewa({"bench", "--accuracy", data, "--splats", splats, "--json", splats}), 2,
-                   "is --splats too");
-    expect_failure(run_ewa({"bench", "--accuracy", data, "--svg", out, "--json", out}), 2, "is --svg too");
+                   "is the same file as --splats");
+    expect_failure(run_ewa({"bench", "--accuracy", data, "--svg", out, "--json", out}), 2,
+                   "is the same file as --svg");
     EXPECT_EQ(read_file(splats), good);
     EXPECT_FALSE(fs::exists(out));
 }
