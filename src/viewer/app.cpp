@@ -158,6 +158,8 @@ void App::take_live() {
     if (const auto status = live_.failure(); status && message_.note.empty())
         say("the training ended with status " + std::to_string(*status) +
             "; see the terminal for the reason");
+    // A screenshot waits for its full frame, which new splats would start again.
+    if (capture_ && state_.framed) return;
     const LiveRun::News news = live_.take();
     if (news.any) redraw();
     if (!news.splats) return;
