@@ -5,6 +5,7 @@
 #include <link.h>
 #include <sys/auxv.h>
 
+#include <bit>
 #include <filesystem>
 #include <string_view>
 
@@ -35,7 +36,7 @@ fs::path own_file() {
     const char* name = found ? static_cast<const link_map*>(found)->l_name : "";  // empty for the program
     std::error_code unknown;
     // Not /proc/self/exe, which a bare chroot does not have.
-    return fs::canonical(*name ? name : reinterpret_cast<const char*>(getauxval(AT_EXECFN)), unknown);
+    return fs::canonical(*name ? name : std::bit_cast<const char*>(getauxval(AT_EXECFN)), unknown);
 }
 
 fs::path module_file() {

@@ -16,7 +16,7 @@ namespace {
 
 constexpr uint32_t kSpzMagic = 0x5053474e;                    // "NGSP"
 constexpr size_t kHeaderBytes = 16, kPackedHeaderBytes = 32;  // versions 1 to 3; version 4
-constexpr uint8_t kAntialiased = 1, kHasExtensions = 2;       // flags
+constexpr uint8_t kAntialiased = 1;                           // a flag
 constexpr int kMaxSpzDegree = 4;
 constexpr unsigned kMaxFractionalBits = 24;
 constexpr double kColorScale = 0.15 * 255, kColorOffset = 0.5 * 255;
