@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Eighty steps of training on the devices against eighty steps of the float64 twin.
+#include <algorithm>
 #include <glm/gtc/constants.hpp>
 #include <numeric>
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "gpu/test_device.h"
 #include "pathtracer/path_tracer.h"

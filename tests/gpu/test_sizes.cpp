@@ -2,6 +2,7 @@
 // The pure functions behind a frame: sizes, plans, camera blocks, workgroup counts.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // glTF with KHR_gaussian_splatting: what nodes, quantised values, colour spaces and damage come to.
+#include <cmath>
+#include <cstring>
 #include <ctime>
 #include <glm/gtc/matrix_transform.hpp>
 #include <nlohmann/json.hpp>

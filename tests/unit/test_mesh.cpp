@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 #include <glm/matrix.hpp>
 
+#include <algorithm>
+#include <cmath>
 #include <random>
 #include <set>
 

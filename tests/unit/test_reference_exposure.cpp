@@ -3,6 +3,7 @@
 #include "reference/loss.h"
 
 #include <gtest/gtest.h>
+#include <algorithm>
 
 #include "ewa/exposure.h"
 #include "support/random_scene.h"

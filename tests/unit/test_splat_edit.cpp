@@ -2,6 +2,8 @@
 // Moving, turning, selecting and ordering splats.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <numeric>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // ewa-view as a process, in a real window on a virtual display.
 #include <vulkan/vulkan_core.h>
+#include <algorithm>
 
 #include "viewer/window_test.h"
 
