@@ -11,6 +11,7 @@ namespace ewa::viewer {
 namespace {
 
 void check(VkResult result) {
+    if (result == VK_ERROR_DEVICE_LOST) throw vk::DeviceLostError("the panel cannot be drawn");
     if (result < 0) throw RunError("the panel cannot be drawn: " + vk::to_string(vk::Result(result)));
 }
 
@@ -20,6 +21,7 @@ Gui::Gui(const Window& window, const PresentDevice& device, Presenter& presenter
     const vk::DescriptorPoolSize size(vk::DescriptorType::eCombinedImageSampler, 1);
     vk::DescriptorPoolCreateInfo create;
     create.setMaxSets(1).setPoolSizes(size);
+    create.setFlags(vk::DescriptorPoolCreateFlagBits::eFreeDescriptorSet);  // ImGui 1.90 frees the font's set
     pool_ = device.handle().createDescriptorPoolUnique(create);
 
     ImGui::CreateContext();
