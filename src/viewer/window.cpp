@@ -5,6 +5,7 @@
 #include <GLFW/glfw3.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <utility>
 
 #include "ewa/error.h"
@@ -21,6 +22,12 @@ std::string glfw_reason() {
 }  // namespace
 
 WindowSystem::WindowSystem() {
+#ifdef GLFW_PLATFORM
+    // GLFW 3.4 tries Wayland first, and libwayland prints an error where there is none.
+    if (glfwPlatformSupported(GLFW_PLATFORM_X11) && !std::getenv("WAYLAND_DISPLAY") &&
+        !std::getenv("WAYLAND_SOCKET"))
+        glfwInitHint(GLFW_PLATFORM, GLFW_PLATFORM_X11);
+#endif
     if (!glfwInit())
         throw RunError("no window can be opened: " + glfw_reason() +
                        "; ewa-view needs a desktop session; ewa render does not");
