@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "cli/expect.h"
+#include "cli/faulty.h"
 #include "ewa/image.h"
 #include "ewa/splat_files.h"
 
@@ -242,8 +243,7 @@ TEST(Outputs, FullDiskLeavesNoHalfFile) {
     const Folder folder;
     make_dataset(folder / "data");
     make_splats(folder / "s.ply");
-    Circumstances full;
-    full.file_limit = 2048;
+    const Circumstances full = with_fault("EWA_FAULT_BYTES", "2048");
     expect_failure(
         run_ewa({"grad", folder / "s.ply", folder / "data", "--frame", "0", "-o", folder / "o/g.ply"}, full),
         1, "g.ply");

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "cli/expect.h"
+#include "cli/faulty.h"
 #include "ewa/splat_files.h"
 
 namespace {
@@ -134,8 +135,7 @@ TEST_F(Train, InterruptKeepsWhatIsThere) {
 TEST_F(Train, FullDiskKeepsTheEarlierSplats) {
     expect_success(train("o", {"--steps", "1", "--quiet"}));
     const std::string before = read_file(folder / "o/splats.ply");
-    Circumstances full;
-    full.file_limit = 4096;
+    const Circumstances full = with_fault("EWA_FAULT_BYTES", "4096");
     expect_failure(train("o", {"--steps", "2", "--quiet"}, full), 1, "splats.ply");
     EXPECT_EQ(read_file(folder / "o/splats.ply"), before);
     EXPECT_FALSE(fs::exists(folder / "o/summary.json"));
