@@ -81,6 +81,8 @@ void write(const std::filesystem::path& path, const Kind& kind, const Image& ima
     ASSERT_TRUE(output);
     OIIO::ImageSpec spec(image.width, image.height, image.channels, kind.type);
     spec.attribute("oiio:UnassociatedAlpha", 1);
+    spec.attribute("pnm:pfmflip",
+                   0);  // OpenImageIO 2.5 writes any PNM upside down that it is given as floats
     if (kind.value == "1")
         spec.attribute(kind.attribute, 1);
     else if (!kind.attribute.empty())
