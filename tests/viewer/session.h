@@ -56,6 +56,12 @@ class Session {
 
     bool found() const { return found_; }
 
+    /// Whether it has ended by itself, or by a fault.
+    bool ended() const {
+        siginfo_t info{};
+        return waitid(P_PID, id_t(child_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == child_;
+    }
+
     /// Commands of xdotool, such as "key F1 mousemove 10 20 click 1".
     bool send(const std::string& commands) {
         return std::system(("timeout 60 xdotool " + commands + " > /dev/null 2>&1").c_str()) == 0;
@@ -74,8 +80,7 @@ class Session {
     }
     bool awaited(const std::string& path) const {
         bool there = false;  // a file is whole when it has its name
-        soon([&] { return (there = std::filesystem::exists(path)) || kill(child_, 0) != 0; },
-             kSessionPatience);
+        soon([&] { return (there = std::filesystem::exists(path)) || ended(); }, kSessionPatience);
         return there;
     }
 
