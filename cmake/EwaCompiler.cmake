@@ -5,7 +5,7 @@ target_compile_features(ewa_compiler INTERFACE cxx_std_20)
 set(CMAKE_CXX_EXTENSIONS OFF)
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 target_compile_options(ewa_compiler INTERFACE -Wall -Wextra -Werror -Wshadow -Wnon-virtual-dtor
-    # The float64 twin and the host must round as written: no fused multiply-add behind the formulas.
+    # The float64 CPU reference and the host must round as written: no fused multiply-add behind the formulas.
     -ffp-contract=off
     # GCC 12's SLP vectoriser takes double(float(x)) for x at -O3: the low half of a split double came out zero
     # (CameraBlock.PairsOfFloatsHoldTheDoubles).
@@ -17,13 +17,13 @@ set(ewa_is_test $<BOOL:$<TARGET_PROPERTY:EWA_IS_TEST>>)
 set(ewa_is_cold $<BOOL:$<TARGET_PROPERTY:EWA_COLD>>)
 target_compile_options(ewa_compiler INTERFACE $<$<AND:$<CONFIG:Release>,$<OR:${ewa_is_test},${ewa_is_cold}>>:-O1>)
 if(EWA_SANITIZE)
-    # The tests too: of an inline function that a test and a room have, the test's is the one that is linked.
+    # The tests too: if a test and a module both have an inline function, the linker takes the test's.
     target_compile_options(ewa_compiler INTERFACE -fsanitize=address,undefined -fno-omit-frame-pointer)
     target_link_options(ewa_compiler INTERFACE -fsanitize=address,undefined)
 endif()
 if(EWA_COVERAGE)
-    # Threads lose counts of a line that they run at one moment, unless the counters are atomic. Those are most of the price of a
-    # short loop: rooms of short loops have plain ones, which still tell a line that ran from one that did not.
+    # Threads that run one line at the same time lose counts, unless the counters are atomic. Atomic counters slow short loops
+    # down most. Modules of short loops have plain counters, which still tell whether a line ran.
     set(ewa_update $<IF:$<BOOL:$<TARGET_PROPERTY:EWA_PLAIN_COUNTERS>>,single,atomic>)
     target_compile_options(ewa_compiler INTERFACE "$<$<NOT:${ewa_is_test}>:--coverage;-fprofile-update=${ewa_update}>")
     target_link_options(ewa_compiler INTERFACE --coverage)

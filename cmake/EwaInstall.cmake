@@ -2,13 +2,13 @@
 # What `cmake --install` puts where, and the package that find_package(ewa) reads.
 include(CMakePackageConfigHelpers)
 
-# libewa: the rooms of the house without its leaves, in one shared object, so that who links it needs none of what stands
-# behind it. The programs link the rooms themselves and run without it.
-set(ewa_library_rooms core image scene io gpu passes pipeline pathtracer report train)
+# libewa: the modules below the command line and the viewer, in one shared object. A program that links it needs none of the
+# libraries behind it. ewa's own programs link the modules themselves and run without it.
+set(ewa_library_modules core image scene io gpu passes pipeline pathtracer report train)
 set(ewa_objects $<TARGET_OBJECTS:ewa_shader_code>)
-foreach(room ${ewa_library_rooms})
-    if(TARGET ewa_${room})
-        list(APPEND ewa_objects $<TARGET_OBJECTS:ewa_${room}>)
+foreach(module ${ewa_library_modules})
+    if(TARGET ewa_${module})
+        list(APPEND ewa_objects $<TARGET_OBJECTS:ewa_${module}>)
     endif()
 endforeach()
 add_library(ewa_library SHARED ${ewa_objects})

@@ -138,7 +138,7 @@ testing::AssertionResult is_reference(const std::string& name, const Image& trut
         write_png16(path, truth);
     }
     // A unit in the last place: another compiler's exp may round the other way.
-    return matches_golden(name, truth, {2.1 / 65535, 2.1 / 65535, 0}, "float64 twin", folders);
+    return matches_golden(name, truth, {2.1 / 65535, 2.1 / 65535, 0}, "float64 CPU reference", folders);
 }
 
 }  // namespace ewa::test

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pictures under test against references that are kept in tests/golden/references.
 //
-// References are 16-bit PNGs of what the float64 twin, or a formula in the test, says; never of what the code
+// References are 16-bit PNGs of what the float64 CPU reference, or a formula in the test, says; never of what the code
 // under test made. scripts/golden-accept writes new ones. What fails leaves candidate, reference and
 // difference in build/release/golden, and index.html there shows them side by side.
 #pragma once

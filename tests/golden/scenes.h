@@ -28,7 +28,7 @@ inline void PrintTo(const GoldenScene& scene, std::ostream* out) {
     *out << scene.name;
 }
 
-/// References are the float64 twin's pictures of these.
+/// References are the float64 CPU reference's pictures of these.
 std::vector<GoldenScene> golden_scenes();
 
 /// Splats of sub-pixel size, for what anti-aliasing is for.

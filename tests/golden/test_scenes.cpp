@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The twin's pictures are the references; the devices' pictures are compared with them.
+// The CPU reference's pictures are the references; the devices' pictures are compared with them.
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -25,10 +25,10 @@ Image to_image(const reference::Raster& raster, double scale, bool one_minus = f
     return image;
 }
 
-Image twin_picture(const GoldenScene& scene) {
-    const auto twin = reference::render(scene.gaussians, scene.camera, scene.options);
-    if (scene.shown == Shown::alpha) return to_image(twin.blended.transmittance, scene.scale, true);
-    return to_image(scene.shown == Shown::depth ? twin.blended.depth : twin.blended.color, scene.scale);
+Image cpu_picture(const GoldenScene& scene) {
+    const auto rendered = reference::render(scene.gaussians, scene.camera, scene.options);
+    if (scene.shown == Shown::alpha) return to_image(rendered.blended.transmittance, scene.scale, true);
+    return to_image(scene.shown == Shown::depth ? rendered.blended.depth : twin.blended.color, scene.scale);
 }
 
 Image device_picture(std::shared_ptr<gpu::Device> device, const GoldenScene& scene) {
@@ -43,7 +43,7 @@ Image device_picture(std::shared_ptr<gpu::Device> device, const GoldenScene& sce
 class GoldenSceneTest : public testing::TestWithParam<GoldenScene> {};
 
 TEST_P(GoldenSceneTest, ReferenceIsTheTwins) {
-    EXPECT_TRUE(is_reference(GetParam().name, twin_picture(GetParam())));
+    EXPECT_TRUE(is_reference(GetParam().name, cpu_picture(GetParam())));
 }
 
 TEST_P(GoldenSceneTest, DevicesAgree) {
@@ -56,7 +56,7 @@ TEST_P(GoldenSceneTest, DevicesAgree) {
 INSTANTIATE_TEST_SUITE_P(Golden, GoldenSceneTest, testing::ValuesIn(golden_scenes()),
                          [](const auto& test) { return test.param.name; });
 
-/// On the axis a ball of radius s at depth z is a round footprint of variance (f s / z)^2 + LOW_PASS: no twin
+/// On the axis a ball of radius s at depth z is a round footprint of variance (f s / z)^2 + LOW_PASS: no CPU reference
 /// is needed to know the picture.
 TEST(GoldenOneSplat, ReferenceIsTheClosedForm) {
     const int width = 64, height = 48;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Eighty steps of training on the devices against eighty steps of the float64 twin.
+// Eighty steps of training on the devices against eighty steps of the float64 CPU reference.
 #include <algorithm>
 #include <glm/gtc/constants.hpp>
 #include <numeric>
@@ -66,10 +66,10 @@ Camera held_out_camera(const Synthetic& data) {
 }
 
 /// One step of Adam on each kind of value, with its own rate.
-struct TwinAdam {
+struct ReferenceAdam {
     reference::AdamState means, quaternions, scales, opacities, sh0, sh_rest;
 
-    explicit TwinAdam(const reference::Values& v)
+    explicit ReferenceAdam(const reference::Values& v)
         : means(v.means.size()),
           quaternions(v.quaternions.size()),
           scales(v.log_scales.size()),
@@ -110,26 +110,26 @@ std::vector<int> all_frames(const Dataset& dataset) {
     return frames;
 }
 
-reference::Values train_twin(const Synthetic& data, const TrainOptions& options) {
+reference::Values train_reference(const Synthetic& data, const TrainOptions& options) {
     Gaussians start = training_start(data);
     select_splats(start, morton_order(start));  // the trainer's order, which settles ties
     reference::Values values = reference::to_double(start);
     const train::Schedule schedule = train::schedule_for(options);
     const std::vector<int> frames = all_frames(data.dataset);
     const double extent = scene_extent(data.dataset, frames);
-    TwinAdam adam(values);
+    ReferenceAdam adam(values);
     for (int step = 1; step <= options.steps; ++step) {
         const Frame& frame =
             data.dataset.frames[train::frame_of_step(step, uint32_t(frames.size()), options.seed)];
         RenderOptions render = options.render;
         render.sh_degree = schedule.degree(step);
-        const auto twin = reference::loss_gradient(values, frame.camera, load_frame_image(frame), render);
-        adam.step(values, twin.gradient, options, schedule.mean_rate(step, extent), step);
+        const auto expected = reference::loss_gradient(values, frame.camera, load_frame_image(frame), render);
+        adam.step(values, expected.gradient, options, schedule.mean_rate(step, extent), step);
     }
     return values;
 }
 
-Image twin_image(const reference::Raster& raster) {
+Image reference_image(const reference::Raster& raster) {
     Image image(raster.width, raster.height, 3);
     for (size_t i = 0; i < image.pixels.size(); ++i)
         image.pixels[i] = float(std::clamp(raster.values[i], 0.0, 1.0));
@@ -141,24 +141,25 @@ TEST(GoldenTraining, EightySteps) {
     make_synthetic(data, 40, 8, 48, 36, 7);
     const TrainOptions options = training_options();
     const Camera camera = held_out_camera(data);
-    const reference::Values twin = train_twin(data, options);
-    EXPECT_TRUE(is_reference("training_80_steps",
-                             twin_image(reference::render(twin, camera, options.render).blended.color)));
+    const reference::Values expected = train_reference(data, options);
+    EXPECT_TRUE(
+        is_reference("training_80_steps",
+                     reference_image(reference::render(expected, camera, options.render).blended.color)));
     // It has moved: the start's picture is no candidate.
     const Tolerance tolerance{0.01, 2e-3, 60};
     const auto start = reference::render(training_start(data), camera, options.render);
     const Image reference = load_image(GoldenFolders{}.references / "training_80_steps.png");
-    EXPECT_GT(compare_images(twin_image(start.blended.color), reference).max_error, 0.2);
+    EXPECT_GT(compare_images(reference_image(start.blended.color), reference).max_error, 0.2);
 
     for (const auto& device : all_devices()) {
         Trainer trainer(device, data.dataset, all_frames(data.dataset), training_start(data), options);
         for (int step = 0; step < kSteps; ++step) trainer.step();
         const Gaussians trained = trainer.gaussians();
-        ASSERT_EQ(trained.size(), twin.size());
+        ASSERT_EQ(trained.size(), expected.size());
         double furthest = 0;
         for (size_t i = 0; i < trained.means.size(); ++i)
-            furthest = std::max(furthest, std::abs(trained.means[i] - twin.means[i]));
-        printf("    furthest mean from the twin's: %.2g\n", furthest);
+            furthest = std::max(furthest, std::abs(trained.means[i] - expected.means[i]));
+        printf("    furthest mean from the reference's: %.2g\n", furthest);
         EXPECT_LT(furthest, 0.01);
         Image picture = Renderer(device, trained, options.render).render(camera).color;
         for (float& v : picture.pixels) v = std::clamp(v, 0.0f, 1.0f);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the window shows in each of its modes, drawn by its own thread on every device, against the float64
-// twin.
+// CPU reference.
 #include <algorithm>
 #include <cmath>
 #include <exception>
@@ -70,9 +70,9 @@ Image shown_by_twin(const viewer::Look& look) {
     const Camera seen = camera();
     Gaussians scaled = splats();
     for (float& value : scaled.log_scales) value += std::log(look.splat_scale);
-    const auto twin = reference::render(scaled, seen, {look.background, look.kernel, look.sh_degree});
-    const reference::Blended& blended = twin.blended;
-    const auto solids = reference::ellipsoids(twin.projected, twin.instances, look.background);
+    const auto expected = reference::render(scaled, seen, {look.background, look.kernel, look.sh_degree});
+    const reference::Blended& blended = expected.blended;
+    const auto solids = reference::ellipsoids(expected.projected, expected.instances, look.background);
     std::vector<double> depths, counts;
     for (size_t i = 0; i < blended.blended.size(); ++i) {
         if (1 - blended.transmittance.values[i] >= 0.5) depths.push_back(blended.depth.values[i]);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Every stiff and extreme scene of the table that `ewa bench --stability` goes through, on the device against
-// the twin and as the start of a training, under the validation layer.
+// the CPU reference and as the start of a training, under the validation layer.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Each room of the house may include only what stands after its arrow (docs/ARCHITECTURE.md, "The house").
+// Each module of the program may include only what its entry below allows (docs/ARCHITECTURE.md).
 #include <algorithm>
 #include <fstream>
 #include <map>
@@ -10,10 +10,10 @@
 namespace {
 
 namespace fs = std::filesystem;
-using Rooms = std::set<std::string>;
+using Modules = std::set<std::string>;
 
-/// The arrows. What a room reaches is what stands here and what those reach in turn.
-const std::map<std::string, Rooms> kArrows = {
+/// What each module may include directly. It may also include what those may include.
+const std::map<std::string, Modules> kAllowed = {
     {"shaders/shared", {}},
     {"shaders/lib", {"shaders/shared"}},
     {"shaders/passes", {"shaders/lib", "shaders/shared"}},
@@ -34,9 +34,9 @@ const std::map<std::string, Rooms> kArrows = {
     {"src/reference", {"src/scene", "src/pathtracer"}},
     {"src/bench", {"src/pipeline", "src/reference", "src/scene"}},
 };
-const Rooms kLeaves = {"src/cli", "src/viewer"};
+const Modules kLeaves = {"src/cli", "src/viewer"};
 
-/// The room whose promises a public header declares; those not named here are plain values that any room may
+/// The module whose promises a public header declares; those not named here are plain values that any module may
 /// use.
 const std::map<std::string, std::string> kOwners = {{"image.h", "src/image"},
                                                     {"camera.h", "src/scene"},
@@ -51,8 +51,8 @@ const std::map<std::string, std::string> kOwners = {{"image.h", "src/image"},
                                                     {"run.h", "src/train"},
                                                     {"synthetic_dataset.h", "src/pathtracer"}};
 
-/// Libraries that only some rooms may know.
-const std::vector<std::pair<std::string, Rooms>> kLibraries = {
+/// Libraries that only some modules may know.
+const std::vector<std::pair<std::string, Modules>> kLibraries = {
     {"OpenImageIO/", {"src/openimageio"}},
     {"png.h", {"src/image"}},
     {"jpeglib.h", {"src/image"}},
@@ -70,12 +70,12 @@ const std::vector<std::pair<std::string, Rooms>> kLibraries = {
       "src/report", "src/live", "src/bench", "src/cli", "src/viewer"}},
     {"CLI/", {"src/cli", "src/viewer", "src/bench"}}};
 
-Rooms reached_from(const std::string& room) {
-    Rooms reached = {room}, next = {room};
+Modules reached_from(const std::string& module) {
+    Modules reached = {module}, next = {module};
     while (!next.empty()) {
-        Rooms found;
+        Modules found;
         for (const std::string& from : next)
-            for (const std::string& to : kArrows.at(from))
+            for (const std::string& to : kAllowed.at(from))
                 if (reached.insert(to).second) found.insert(to);
         next = found;
     }
@@ -84,11 +84,11 @@ Rooms reached_from(const std::string& room) {
 
 /// The folder whose dependencies count for a path in the source tree: its first two parts, e.g. "src/core", or
 /// three below src/io, e.g. "src/io/splats"; "include/ewa" for a public header.
-std::string room_of(const fs::path& path) {
+std::string module_of(const fs::path& path) {
     auto part = path.begin();
-    std::string room = part->string() + "/" + std::next(part)->string();
-    if (room == "src/io") room += "/" + std::next(part, 2)->string();
-    return room;
+    std::string module = part->string() + "/" + std::next(part)->string();
+    if (module == "src/io") module += "/" + std::next(part, 2)->string();
+    return module;
 }
 
 /// What the include names, as a path in the source tree; empty for a file of a library.
@@ -103,23 +103,25 @@ fs::path resolve(const fs::path& root, const fs::path& from, const std::string& 
 
 /// Why `from` may not include it, or nothing.
 std::string complaint(const fs::path& root, const fs::path& from, const std::string& included) {
-    const std::string room = room_of(from);
-    for (const auto& [library, rooms] : kLibraries)
-        if (included.starts_with(library) && !rooms.contains(room)) return room + " may not use " + included;
+    const std::string module = module_of(from);
+    for (const auto& [library, modules] : kLibraries)
+        if (included.starts_with(library) && !modules.contains(module))
+            return module + " may not use " + included;
     const fs::path target = resolve(root, from, included);
     if (target.empty()) return {};
-    std::string other = room_of(target);
-    if (kLeaves.contains(room))
-        return kLeaves.contains(other) && other != room ? room + " may not include " + target.string() : "";
-    if (room == "include/ewa")
-        return other == room ? "" : "a public header may not include " + target.string();
-    if (!kArrows.contains(room)) return "the room " + room + " has no arrow";
+    std::string other = module_of(target);
+    if (kLeaves.contains(module))
+        return kLeaves.contains(other) && other != module ? module + " may not include " + target.string()
+                                                          : "";
+    if (module == "include/ewa")
+        return other == module ? "" : "a public header may not include " + target.string();
+    if (!kAllowed.contains(module)) return "the module " + module + " has no entry in kAllowed";
     if (other == "include/ewa") {
         const auto owner = kOwners.find(target.filename().string());
         if (owner == kOwners.end()) return {};
         other = owner->second;
     }
-    return reached_from(room).contains(other) ? "" : room + " may not include " + target.string();
+    return reached_from(module).contains(other) ? "" : module + " may not include " + target.string();
 }
 
 std::vector<std::string> complaints(const fs::path& root, size_t& files) {
