@@ -43,4 +43,10 @@ DeviceInfo device_info(const gpu::Device& device);
 uint64_t device_bytes(const gpu::Device& device);
 uint64_t peak_device_bytes(const gpu::Device& device);
 
+/// The time that a device took for the commands of one name.
+struct PassTime {
+    std::string pass;
+    double milliseconds = 0;
+};
+
 }  // namespace ewa

@@ -59,18 +59,15 @@ Image over_background(const Image& image, const std::array<float, 3>& background
 /// An RGBA image from an RGB image and a one-channel image of the same size.
 Image with_alpha(const Image& color, const Image& alpha);
 
-/// 10 log10(1 / MSE) over RGB, with both images clamped to [0, 1]. +inf for equal images. Throws InputError
-/// if the sizes differ.
-double psnr(const Image& a, const Image& b);
-/// Weighs each pixel by one channel of the same size; an empty image means equal weights. NaN if all weights
-/// are zero.
-double psnr(const Image& a, const Image& b, const Image& weights);
+/// 10 log10(1 / MSE) over RGB, with both images clamped to [0, 1]. +inf for equal images. weights: of each
+/// pixel, one channel of the same size; an empty image means equal weights. NaN if all weights are zero. Throws
+/// InputError if the sizes differ.
+double psnr(const Image& a, const Image& b, const Image& weights = {});
 
 /// Mean SSIM over pixels and RGB (Wang et al. 2004), with an 11 x 11 Gaussian window, sigma 1.5 and zero
-/// padding. Both images are clamped to [0, 1]. Computed in float64. Throws InputError if the sizes differ.
-double ssim(const Image& a, const Image& b);
-/// The SSIM of w a + (1 - w) b and b, with each pixel weighted by w.
-double ssim(const Image& a, const Image& b, const Image& weights);
+/// padding. Both images are clamped to [0, 1]. Computed in float64. weights: as above; with weights w, the SSIM of
+/// w a + (1 - w) b and b, with each pixel weighted by w. Throws InputError if the sizes differ.
+double ssim(const Image& a, const Image& b, const Image& weights = {});
 
 /// The difference of two images.
 struct ImageDifference {

@@ -23,11 +23,6 @@ struct Rendering {
     Image count;  // one channel, splats blended; empty unless asked for
 };
 
-struct PassTime {
-    std::string pass;
-    double milliseconds = 0;  // of the last frame
-};
-
 class Renderer {
   public:
     /// Uploads the scene. Throws RunError when it does not fit in the device's memory (the text says how much
@@ -55,7 +50,7 @@ class Renderer {
     uint32_t skipped_nonfinite() const;
     /// Splats that reach a pixel's tile in the last picture that was drawn with DrawOptions.
     uint32_t splats_drawn() const;
-    std::vector<PassTime> pass_times() const;
+    std::vector<PassTime> pass_times() const;  // of the last frame
 
   private:
     struct State;

@@ -10,9 +10,9 @@
 #include "bench/report.h"
 #include "bench/statistics.h"
 #include "gpu/executor.h"
-#include "pipeline/camera_block.h"
-#include "pipeline/capacity.h"
 #include "pipeline/forward.h"
+#include "pipeline/frame_buffers.h"
+#include "pipeline/frame_inputs.h"
 #include "pipeline/plan.h"
 #include "reference/volume.h"
 #include "shared/constants.h"
@@ -89,13 +89,8 @@ AccuracyPoint splat(const std::shared_ptr<gpu::Device>& device, const Gaussians&
     const pipeline::Plan plan = pipeline::plan_for(
         {.scene_degree = gaussians.sh_degree, .present_degree = sh_degree_present(gaussians), .render = own});
     const pipeline::Model model = pipeline::upload_model(*device, gaussians, 0, false);
-    const shared::CameraBlock block = pipeline::camera_block(camera, config, model.origin);
-    gpu::Buffer buffer(*device, "camera", sizeof(block), gpu::Texel::none, true);
-    buffer.upload(std::span<const shared::CameraBlock>(&block, 1));
-    const pipeline::FrameInputs inputs{
-        .camera = {.buffer = &buffer, .width = uint32_t(camera.width), .height = uint32_t(camera.height)},
-        .background = own.background,
-        .sh_degree = own.sh_degree};
+    const gpu::Buffer block = pipeline::upload_camera(*device, camera, config, model.origin);
+    const pipeline::FrameInputs inputs = pipeline::inputs_of(block, camera, own);
     pipeline::FrameBuffers frame;
     frame.instance_capacity = pipeline::first_capacity(model.splats);
     const auto draw = [&] {

@@ -5,8 +5,7 @@
 #include <utility>
 
 #include "core/random.h"
-#include "pipeline/camera_block.h"
-#include "pipeline/photo.h"
+#include "pipeline/frame_inputs.h"
 #include "reference/sort.h"
 
 namespace ewa::bench {
@@ -35,14 +34,8 @@ FrameRun::FrameRun(std::shared_ptr<gpu::Device> device, const BenchScene& scene,
       model_(upload_model(*device_, scene.gaussians, train ? 2 : 0, false)),
       camera_(scene.camera),
       train_(train) {
-    const shared::CameraBlock block = camera_block(camera_, cache_.config(), model_.origin);
-    camera_buffer_ = gpu::Buffer(*device_, "camera", sizeof(block), gpu::Texel::none, true);
-    camera_buffer_.upload(std::span<const shared::CameraBlock>(&block, 1));
-    inputs_ = {.camera = {.buffer = &camera_buffer_,
-                          .width = uint32_t(camera_.width),
-                          .height = uint32_t(camera_.height)},
-               .background = options_.background,
-               .sh_degree = options_.sh_degree};
+    camera_buffer_ = upload_camera(*device_, camera_, cache_.config(), model_.origin);
+    inputs_ = inputs_of(camera_buffer_, camera_, options_);
     if (train_) photo_ = upload_photo(*device_, scene.photo);
     frame_.instance_capacity = first_capacity(model_.splats);
     run();

@@ -11,7 +11,7 @@
 #include "ewa/device.h"
 #include "gpu/executor.h"
 #include "pipeline/backward.h"
-#include "pipeline/capacity.h"
+#include "pipeline/frame_buffers.h"
 #include "pipeline/sorting.h"
 
 namespace ewa::bench {
@@ -33,7 +33,7 @@ class FrameRun {
     /// parameters.
     void set_rates(const pipeline::Rates& rates) { rates_ = rates; }
 
-    const std::vector<gpu::Timing>& timings() const { return executor_.timings(); }
+    const std::vector<PassTime>& timings() const { return executor_.timings(); }
     const passes::PassCache& cache() const { return cache_; }
     const pipeline::Plan& plan() const { return plan_; }
     const pipeline::Model& model() const { return model_; }
@@ -76,7 +76,7 @@ class SortRun {
     /// Copies the input and sorts the copy.
     void run();
     const pipeline::RadixCut& cut() const { return cut_; }
-    const std::vector<gpu::Timing>& timings() const { return executor_.timings(); }
+    const std::vector<PassTime>& timings() const { return executor_.timings(); }
     /// Compares with a stable sort on the host.
     Check check() const;
 

@@ -59,9 +59,9 @@ void time_passes(CaseResult& result, int runs, Work work, Timings timings) {
         work();
         watch.stop();
         double sum = 0;
-        for (const gpu::Timing& timing : timings()) {
-            samples.add(timing.name, timing.milliseconds);
-            sum += timing.milliseconds;
+        for (const PassTime& time : timings()) {
+            samples.add(time.pass, time.milliseconds);
+            sum += time.milliseconds;
         }
         samples.end_run();
         sums.push_back(sum);

@@ -20,7 +20,7 @@
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
-#include "io/splats/gltf_splats.h"
+#include "io/splats/formats.h"
 
 namespace ewa::cli {
 namespace {

@@ -10,17 +10,11 @@
 namespace ewa::gpu {
 namespace {
 
+/// Not for Texel::none.
 vk::Format format_of(Texel texel) {
-    switch (texel) {
-        case Texel::rgba32f:
-            return vk::Format::eR32G32B32A32Sfloat;
-        case Texel::rgba32ui:
-            return vk::Format::eR32G32B32A32Uint;
-        case Texel::rgba8:
-            return vk::Format::eR8G8B8A8Unorm;
-        default:
-            return vk::Format::eUndefined;
-    }
+    return texel == Texel::rgba32f    ? vk::Format::eR32G32B32A32Sfloat
+           : texel == Texel::rgba32ui ? vk::Format::eR32G32B32A32Uint
+                                      : vk::Format::eR8G8B8A8Unorm;
 }
 
 uint64_t texel_bytes(Texel texel) {
@@ -39,7 +33,7 @@ Buffer::Buffer(Device& device, std::string name, uint64_t bytes, Texel texel, bo
         throw RunError(
             "buffer " + name_ + " needs " + std::to_string(bytes_ >> 20) +
             " MiB, more than this device can fetch texels from; fewer splats or a smaller image need less");
-    // Software drivers report 128 MiB here and bind any size; there the limit is theirs on paper only.
+    // Software drivers report 128 MiB here, but bind buffers of any size.
     if (!device.limits().cpu && bytes_ > device.limits().max_storage_range)
         throw RunError("buffer " + name_ + " needs " + std::to_string(bytes_ >> 20) +
                        " MiB, and this device binds at most " +

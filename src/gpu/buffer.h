@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A buffer in device memory. It knows nothing of what it holds.
+// A buffer in device memory.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -11,15 +11,15 @@
 
 namespace ewa::gpu {
 
-/// How texelFetch sees the buffer; none: storage only.
+/// The format of texelFetch. none: the buffer is storage only.
 enum class Texel { none, rgba32f, rgba32ui, rgba8 };
 
 class Buffer {
   public:
     Buffer() = default;
-    /// name: for errors, timing and tests. bytes >= 1 is rounded up to whole 16 byte texels. uniform: may
-    /// also be bound as a uniform block. The contents are undefined until written. Throws RunError when
-    /// memory runs out or the device cannot address that many bytes through one binding.
+    /// name: for errors, timings and tests. bytes: rounded up to whole texels of 16 bytes, at least one.
+    /// uniform: the buffer may also be bound as a uniform block. The contents are undefined until they are
+    /// written. Throws RunError if memory runs out, or if one binding cannot address that many bytes.
     Buffer(Device& device, std::string name, uint64_t bytes, Texel texel = Texel::none, bool uniform = false,
            bool host_visible = false);
     ~Buffer();
@@ -34,9 +34,9 @@ class Buffer {
     vk::BufferView view() const { return *view_; }
     explicit operator bool() const { return bool(buffer_); }
 
-    /// Host address where the memory is host visible, else nullptr.
+    /// The host's address of the memory. Null if the host cannot map it.
     std::byte* mapped() const { return mapped_; }
-    /// Blocking copies, by a staging buffer where the memory is not host visible. The device must be idle.
+    /// Blocking copies. They use a staging buffer if the host cannot map the memory. The device must be idle.
     void upload(std::span<const std::byte> data, uint64_t offset = 0);
     void download(std::span<std::byte> data, uint64_t offset = 0) const;
 

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 
+#include "core/text.h"
 #include "ewa/error.h"
 
 namespace ewa {
@@ -26,18 +26,8 @@ std::string version_text(uint32_t version) {
 }
 
 std::string type_text(vk::PhysicalDeviceType type) {
-    switch (type) {
-        case vk::PhysicalDeviceType::eCpu:
-            return "cpu";
-        case vk::PhysicalDeviceType::eIntegratedGpu:
-            return "integrated";
-        case vk::PhysicalDeviceType::eDiscreteGpu:
-            return "discrete";
-        case vk::PhysicalDeviceType::eVirtualGpu:
-            return "virtual";
-        default:
-            return "other";
-    }
+    constexpr std::array kNames{"other", "integrated", "discrete", "virtual", "cpu"};  // in Vulkan's order
+    return size_t(type) < kNames.size() ? kNames[size_t(type)] : "other";
 }
 
 int compute_family(vk::PhysicalDevice device) {
@@ -47,7 +37,7 @@ int compute_family(vk::PhysicalDevice device) {
     return -1;
 }
 
-/// What the device lacks of the things every kernel needs; empty when it has them all.
+/// The first feature that kernels need and the device lacks. Empty if it lacks none.
 std::string missing_features(vk::PhysicalDevice device) {
     if (device.getProperties().apiVersion < kApiVersion) return "Vulkan 1.2";
     if (compute_family(device) < 0) return "a compute queue";
@@ -122,11 +112,9 @@ void Device::create_instance(bool validation) {
         layers.push_back("VK_LAYER_KHRONOS_validation");
         extensions.push_back(VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
         const auto available = vk::enumerateInstanceLayerProperties();
-        const bool found =
-            std::any_of(available.begin(), available.end(), [](const vk::LayerProperties& layer) {
+        if (std::none_of(available.begin(), available.end(), [](const vk::LayerProperties& layer) {
                 return std::string(layer.layerName.data()) == "VK_LAYER_KHRONOS_validation";
-            });
-        if (!found)
+            }))
             throw InputError(
                 "the Khronos validation layer is not installed (Debian: vulkan-validationlayers)");
     }
@@ -152,8 +140,7 @@ void Device::create_instance(bool validation) {
 
 void Device::create_device() {
     const auto chain =
-        physical_.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceSubgroupProperties,
-                                 vk::PhysicalDeviceMaintenance3Properties>();
+        physical_.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceSubgroupProperties>();
     const auto& properties = chain.get<vk::PhysicalDeviceProperties2>().properties;
     const auto available = physical_.enumerateDeviceExtensionProperties();
     subgroup_size_control_ = std::any_of(available.begin(), available.end(), [](const auto& extension) {
@@ -194,11 +181,9 @@ void Device::create_device() {
     limits_.cpu = properties.deviceType == vk::PhysicalDeviceType::eCpu;
     limits_.max_groups = *std::min_element(properties.limits.maxComputeWorkGroupCount.begin(),
                                            properties.limits.maxComputeWorkGroupCount.end());
-    limits_.max_group_size = properties.limits.maxComputeWorkGroupInvocations;
     limits_.max_storage_range = properties.limits.maxStorageBufferRange;
     limits_.max_texels = properties.limits.maxTexelBufferElements;
     limits_.uniform_alignment = properties.limits.minUniformBufferOffsetAlignment;
-    limits_.max_allocation = chain.get<vk::PhysicalDeviceMaintenance3Properties>().maxMemoryAllocationSize;
     const auto family = physical_.getQueueFamilyProperties()[queue_family_];
     limits_.timestamps = family.timestampValidBits > 0;
     limits_.timestamp_nanoseconds = properties.limits.timestampPeriod;
@@ -209,7 +194,8 @@ vk::UniqueDeviceMemory Device::allocate(const vk::MemoryRequirements& requiremen
     const auto memory = physical_.getMemoryProperties();
     using Flag = vk::MemoryPropertyFlagBits;
     const vk::MemoryPropertyFlags host = Flag::eHostVisible | Flag::eHostCoherent;
-    // Where one memory type is both (CPUs, integrated GPUs), no staging copy is needed anywhere.
+    // On CPUs and integrated GPUs, one memory type is local to the device and visible to the host. It needs no
+    // staging copies.
     std::vector<vk::MemoryPropertyFlags> wishes;
     if (host_visible) {
         wishes = {host | Flag::eHostCached, host};
@@ -228,8 +214,8 @@ vk::UniqueDeviceMemory Device::allocate(const vk::MemoryRequirements& requiremen
             try {
                 auto result = device_->allocateMemoryUnique(info);
                 mapped_kind = (flags & host) == host;
-                held_bytes_ += requirements.size;
-                peak_bytes_ = std::max(peak_bytes_, held_bytes_);
+                allocated_bytes_ += requirements.size;
+                peak_bytes_ = std::max(peak_bytes_, allocated_bytes_);
                 return result;
             } catch (const vk::OutOfDeviceMemoryError&) {
             } catch (const vk::OutOfHostMemoryError&) {
@@ -237,8 +223,8 @@ vk::UniqueDeviceMemory Device::allocate(const vk::MemoryRequirements& requiremen
         }
     }
     throw RunError("out of device memory on " + info_.name + ": " + std::to_string(requirements.size >> 20) +
-                   " MiB wanted beside " + std::to_string(held_bytes_ >> 20) +
-                   " MiB held; fewer splats, a lower SH degree or --downscale need less");
+                   " MiB are needed beside the " + std::to_string(allocated_bytes_ >> 20) +
+                   " MiB already allocated; fewer splats, a lower SH degree or --downscale need less");
 }
 
 void Device::add_validation_message(const std::string& message) {
@@ -277,16 +263,10 @@ std::vector<DeviceInfo> list_devices() {
 
 namespace {
 
-std::string lower(std::string text) {
-    std::transform(text.begin(), text.end(), text.begin(),
-                   [](unsigned char c) { return char(std::tolower(c)); });
-    return text;
-}
-
 bool matches(const DeviceInfo& info, const std::string& selector) {
     const bool number = selector.find_first_not_of("0123456789") == std::string::npos;
     return number ? selector == std::to_string(info.index)
-                  : lower(info.name).find(lower(selector)) != std::string::npos;
+                  : core::lower(info.name).find(core::lower(selector)) != std::string::npos;
 }
 
 }  // namespace
@@ -318,7 +298,7 @@ DeviceInfo device_info(const gpu::Device& device) {
     return device.info();
 }
 uint64_t device_bytes(const gpu::Device& device) {
-    return device.held_bytes();
+    return device.allocated_bytes();
 }
 uint64_t peak_device_bytes(const gpu::Device& device) {
     return device.peak_bytes();

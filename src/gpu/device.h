@@ -1,27 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
-// One logical device with one compute queue, its memory accounting and the properties kernels are shaped by.
+// One logical device with one compute queue. It counts the memory of its buffers, and states the limits that
+// kernels are sized for. Vulkan-Hpp is used with unique handles; it checks results in every build type.
 #pragma once
 #include <cstdint>
 #include <memory>
 #include <mutex>
 #include <string>
 #include <vector>
+#include <vulkan/vulkan.hpp>
 
 #include "ewa/device.h"
-#include "gpu/vulkan.h"
 
 namespace ewa::gpu {
 
-/// What kernel shapes and sizes are chosen from.
+/// The properties of a device that workgroups and buffers depend on.
 struct Limits {
-    bool cpu = false;                  // a software device: threads take contiguous halves of a dispatch
-    uint32_t subgroup_size = 0;        // lanes; what every pipeline of this device runs with
-    uint32_t max_groups = 65535;       // workgroups a dispatch, per dimension
-    uint32_t max_group_size = 0;       // invocations a workgroup
-    uint64_t max_storage_range = 0;    // bytes a storage binding may span
-    uint64_t max_texels = 0;           // elements a texel buffer view may span
+    bool cpu = false;                  // a software device: each thread takes a contiguous part of a dispatch
+    uint32_t subgroup_size = 0;        // lanes, the same for every pipeline of this device
+    uint32_t max_groups = 65535;       // workgroups of a dispatch, in each dimension
+    uint64_t max_storage_range = 0;    // bytes of a storage binding
+    uint64_t max_texels = 0;           // elements of a texel buffer view
     uint64_t uniform_alignment = 256;  // bytes
-    uint64_t max_allocation = 0;       // bytes
     bool timestamps = false;
     double timestamp_nanoseconds = 1.0;
 };
@@ -42,14 +41,15 @@ class Device {
     bool subgroup_size_control() const { return subgroup_size_control_; }
     vk::PipelineCache pipeline_cache() const { return *pipeline_cache_; }
 
-    /// Throws RunError with the bytes asked for and held when the driver is out of memory.
+    /// mapped_kind: whether the host can map the memory. Throws RunError if the driver is out of memory; it
+    /// states the bytes that are wanted and those that are allocated.
     vk::UniqueDeviceMemory allocate(const vk::MemoryRequirements& requirements, bool host_visible,
                                     bool& mapped_kind);
-    void released(uint64_t bytes) { held_bytes_ -= bytes; }
-    uint64_t held_bytes() const { return held_bytes_; }
+    void released(uint64_t bytes) { allocated_bytes_ -= bytes; }
+    uint64_t allocated_bytes() const { return allocated_bytes_; }
     uint64_t peak_bytes() const { return peak_bytes_; }
 
-    /// Throws RunError with the first message the validation layer has given since the last call.
+    /// Throws RunError with the validation layer's first message since the last call.
     void check_validation();
     void add_validation_message(const std::string& message);
 
@@ -67,7 +67,7 @@ class Device {
     vk::UniquePipelineCache pipeline_cache_;
     uint32_t queue_family_ = 0;
     bool subgroup_size_control_ = false;
-    uint64_t held_bytes_ = 0, peak_bytes_ = 0;
+    uint64_t allocated_bytes_ = 0, peak_bytes_ = 0;
     std::mutex message_mutex_;
     std::vector<std::string> messages_;
 };

@@ -146,7 +146,7 @@ void Executor::read_timings(const Recording& recording) {
         const std::string& name = recording.commands()[i].name;
         const double ticks = double(stamps.value[i + 1] - stamps.value[i]);
         auto found =
-            std::find_if(timings_.begin(), timings_.end(), [&](const Timing& t) { return t.name == name; });
+            std::find_if(timings_.begin(), timings_.end(), [&](const PassTime& t) { return t.pass == name; });
         if (found == timings_.end()) found = timings_.insert(timings_.end(), {name, 0});
         found->milliseconds += ticks * device_.limits().timestamp_nanoseconds * 1e-6;
     }

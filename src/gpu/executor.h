@@ -9,22 +9,17 @@
 
 namespace ewa::gpu {
 
-struct Timing {
-    std::string name;
-    double milliseconds = 0;
-};
-
 class Executor {
   public:
     explicit Executor(Device& device);
 
-    /// Submits and waits until the device is done; everything it wrote is then visible to the host. timed:
-    /// keep the time of each command. Throws RunError when the device is lost or the validation layer speaks.
+    /// Submits, and waits until the device is done. Then everything that it wrote is visible to the host. timed:
+    /// also measures each command. Throws RunError if the device is lost or the validation layer has a message.
     void run(const Recording& recording, bool timed = false);
 
-    /// Of the last timed run: one entry a name, in order of first appearance, times of equal names added up.
-    /// The time of a command reaches from the end of the one before it to its own end.
-    const std::vector<Timing>& timings() const { return timings_; }
+    /// The times of the last timed run: one entry a name, in the order of recording, with the sum of all commands
+    /// of that name. The time of a command begins at the end of the one before it.
+    const std::vector<PassTime>& timings() const { return timings_; }
 
   private:
     vk::DescriptorSet bind(const Command& command, vk::DescriptorPool pool);
@@ -40,7 +35,7 @@ class Executor {
     uint32_t pool_sets_ = 0, pool_bindings_ = 0;
     vk::UniqueQueryPool queries_;
     uint32_t query_count_ = 0;
-    std::vector<Timing> timings_;
+    std::vector<PassTime> timings_;
 };
 
 }  // namespace ewa::gpu

@@ -2,21 +2,140 @@
 #include "gpu/pipeline.h"
 
 #include <algorithm>
+#include <array>
+#include <map>
 #include <stdexcept>
 
 #include "ewa/error.h"
 
 namespace ewa::gpu {
+namespace {
+
+// Numbers of the SPIR-V specification, section 3.
+enum Op : uint32_t {
+    kOpTypeInt = 21,
+    kOpTypeFloat = 22,
+    kOpTypeVector = 23,
+    kOpTypeImage = 25,
+    kOpTypeSampledImage = 27,
+    kOpTypeArray = 28,
+    kOpTypeStruct = 30,
+    kOpTypePointer = 32,
+    kOpConstant = 43,
+    kOpVariable = 59,
+    kOpDecorate = 71,
+    kOpMemberDecorate = 72
+};
+enum Decoration : uint32_t {
+    kSpecId = 1,
+    kArrayStride = 6,
+    kNonWritable = 24,
+    kNonReadable = 25,
+    kBinding = 33,
+    kDescriptorSet = 34,
+    kOffset = 35
+};
+enum Storage : uint32_t { kUniformConstant = 0, kUniform = 2, kPushConstant = 9, kStorageBuffer = 12 };
+constexpr uint32_t kWhole = ~0u;  // in place of a member's number
+
+using Words = std::span<const uint32_t>;  // of an instruction; the first holds its op
+
+struct Module {
+    std::map<uint32_t, Words> declared;  // types and constants, by id
+    std::vector<Words> variables;
+    std::map<std::array<uint32_t, 3>, uint32_t> decorations;  // id, member, decoration -> operand, or 0
+};
+
+Module parse(Words spirv) {
+    if (spirv.size() < 5 || spirv[0] != 0x07230203) throw std::logic_error("not a SPIR-V module");
+    Module module;
+    for (size_t at = 5; at < spirv.size();) {
+        const uint32_t length = spirv[at] >> 16, op = spirv[at] & 0xffff;
+        if (length == 0 || at + length > spirv.size()) throw std::logic_error("damaged SPIR-V module");
+        const Words words = spirv.subspan(at, length);
+        if (op == kOpDecorate) module.decorations[{words[1], kWhole, words[2]}] = length > 3 ? words[3] : 0;
+        if (op == kOpMemberDecorate)
+            module.decorations[{words[1], words[2], words[3]}] = length > 4 ? words[4] : 0;
+        if (op >= kOpTypeInt && op <= kOpTypePointer) module.declared[words[1]] = words;
+        if (op == kOpConstant) module.declared[words[2]] = words;
+        if (op == kOpVariable) module.variables.push_back(words);
+        at += length;
+    }
+    return module;
+}
+
+/// Bytes up to the end of a type's last member.
+uint32_t size_of(const Module& module, uint32_t type) {
+    const Words words = module.declared.at(type);
+    uint32_t end = 0;
+    switch (words[0] & 0xffff) {
+        case kOpTypeInt:
+        case kOpTypeFloat:
+            return words[2] / 8;
+        case kOpTypeVector:
+            return words[3] * size_of(module, words[2]);
+        case kOpTypeArray:
+            return module.declared.at(words[3])[3] * module.decorations.at({type, kWhole, kArrayStride});
+        case kOpTypeStruct:
+            for (uint32_t member = 0; member + 2 < words.size(); ++member)
+                end = std::max(
+                    end, module.decorations.at({type, member, kOffset}) + size_of(module, words[member + 2]));
+            return end;
+        default:
+            throw std::logic_error("a push constant of a type this project does not use");
+    }
+}
+
+Access storage_access(const Module& module, uint32_t variable, uint32_t type) {
+    const auto members = uint32_t(module.declared.at(type).size() - 2);
+    const auto decorated = [&](uint32_t decoration) {
+        uint32_t count = 0;
+        for (uint32_t member = 0; member < members; ++member)
+            count += uint32_t(module.decorations.count({type, member, decoration}));
+        return (members > 0 && count == members) || module.decorations.count({variable, kWhole, decoration});
+    };
+    return decorated(kNonWritable)   ? Access::read
+           : decorated(kNonReadable) ? Access::write
+                                     : Access::read_write;
+}
+
+}  // namespace
+
+Reflection reflect(std::span<const uint32_t> spirv) {
+    const Module module = parse(spirv);
+    Reflection result;
+    for (const Words variable : module.variables) {
+        const uint32_t type = module.declared.at(variable[1])[3], id = variable[2], storage = variable[3];
+        if (storage == kPushConstant) result.push_constant_bytes = size_of(module, type);
+        const auto binding = module.decorations.find({id, kWhole, kBinding});
+        if (binding == module.decorations.end()) continue;
+        const auto set = module.decorations.find({id, kWhole, kDescriptorSet});
+        if (set != module.decorations.end() && set->second != 0)
+            throw std::logic_error("a binding outside set 0");
+        const uint32_t op = module.declared.at(type)[0] & 0xffff;
+        if (storage == kUniformConstant && (op == kOpTypeImage || op == kOpTypeSampledImage))
+            result.bindings.push_back({binding->second, BindingKind::texel, Access::read});
+        else if (storage == kUniform)
+            result.bindings.push_back({binding->second, BindingKind::uniform, Access::read});
+        else if (storage == kStorageBuffer)
+            result.bindings.push_back(
+                {binding->second, BindingKind::storage, storage_access(module, id, type)});
+        else
+            throw std::logic_error("a binding of a kind this project does not use");
+    }
+    std::ranges::sort(result.bindings, {}, &Binding::binding);
+    for (uint32_t i = 0; i < result.bindings.size(); ++i)
+        if (result.bindings[i].binding != i) throw std::logic_error("bindings are not numbered without gaps");
+    for (const auto& [key, operand] : module.decorations)
+        if (key[2] == kSpecId) result.constants.push_back(operand);
+    std::ranges::sort(result.constants);
+    return result;
+}
 
 vk::DescriptorType descriptor_type(BindingKind kind) {
-    switch (kind) {
-        case BindingKind::uniform:
-            return vk::DescriptorType::eUniformBuffer;
-        case BindingKind::texel:
-            return vk::DescriptorType::eUniformTexelBuffer;
-        default:
-            return vk::DescriptorType::eStorageBuffer;
-    }
+    return kind == BindingKind::uniform ? vk::DescriptorType::eUniformBuffer
+           : kind == BindingKind::texel ? vk::DescriptorType::eUniformTexelBuffer
+                                        : vk::DescriptorType::eStorageBuffer;
 }
 
 Pipeline::Pipeline(Device& device, std::string name, std::span<const uint32_t> spirv,

@@ -59,14 +59,12 @@ void Recording::fill(const Buffer& target, uint32_t value, uint64_t offset, uint
     if (offset % 4 || bytes % 4 || offset + bytes > target.bytes())
         throw std::logic_error("fill of " + target.name() +
                                " outside the buffer or not a multiple of 4 bytes");
-    Command command;
-    command.kind = Command::Kind::fill;
-    command.name = "fill " + target.name();
-    command.uses = {{target, Access::write}};
-    command.fill_value = value;
-    command.target_offset = offset;
-    command.bytes = bytes;
-    append(std::move(command));
+    append({.kind = Command::Kind::fill,
+            .name = "fill " + target.name(),
+            .uses = {{target, Access::write}},
+            .fill_value = value,
+            .target_offset = offset,
+            .bytes = bytes});
 }
 
 void Recording::copy(const Buffer& source, uint64_t source_offset, const Buffer& target,
@@ -74,14 +72,12 @@ void Recording::copy(const Buffer& source, uint64_t source_offset, const Buffer&
     if (bytes == 0) return;
     if (source_offset + bytes > source.bytes() || target_offset + bytes > target.bytes())
         throw std::logic_error("copy from " + source.name() + " to " + target.name() + " outside a buffer");
-    Command command;
-    command.kind = Command::Kind::copy;
-    command.name = "copy " + source.name();
-    command.uses = {{source, Access::read}, {target, Access::write}};
-    command.source_offset = source_offset;
-    command.target_offset = target_offset;
-    command.bytes = bytes;
-    append(std::move(command));
+    append({.kind = Command::Kind::copy,
+            .name = "copy " + source.name(),
+            .uses = {{source, Access::read}, {target, Access::write}},
+            .source_offset = source_offset,
+            .target_offset = target_offset,
+            .bytes = bytes});
 }
 
 void Recording::append(Command command) {

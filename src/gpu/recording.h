@@ -38,7 +38,7 @@ struct Command {
     std::string name;
     std::vector<Use> uses;  // dispatch: by binding; fill: the target; copy: source, then target
     const Pipeline* pipeline = nullptr;
-    std::vector<std::byte> push;
+    std::vector<std::byte> push{};
     std::array<uint32_t, 3> groups{1, 1, 1};
     uint32_t fill_value = 0;
     uint64_t source_offset = 0, target_offset = 0, bytes = 0;

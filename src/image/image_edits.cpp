@@ -60,12 +60,11 @@ Image downscale(const Image& image, int factor) {
 Image over_background(const Image& image, const std::array<float, 3>& background) {
     if (image.channels == 3) return image;
     Image result(image.width, image.height, 3);
-    for (int y = 0; y < image.height; ++y)
-        for (int x = 0; x < image.width; ++x) {
-            const float* from = image.at(x, y);
-            for (size_t c = 0; c < 3; ++c)
-                result.at(x, y)[c] = from[c] * from[3] + background[c] * (1 - from[3]);
-        }
+    for (size_t i = 0; 4 * i < image.pixels.size(); ++i) {
+        const float* from = &image.pixels[4 * i];
+        for (size_t c = 0; c < 3; ++c)
+            result.pixels[3 * i + c] = from[c] * from[3] + background[c] * (1 - from[3]);
+    }
     return result;
 }
 
@@ -73,11 +72,10 @@ Image with_alpha(const Image& color, const Image& alpha) {
     assert(color.channels == 3 && alpha.channels == 1);
     assert(color.width == alpha.width && color.height == alpha.height);
     Image result(color.width, color.height, 4);
-    for (int y = 0; y < result.height; ++y)
-        for (int x = 0; x < result.width; ++x) {
-            std::copy_n(color.at(x, y), 3, result.at(x, y));
-            result.at(x, y)[3] = *alpha.at(x, y);
-        }
+    for (size_t i = 0; i < alpha.pixels.size(); ++i) {
+        std::copy_n(&color.pixels[3 * i], 3, &result.pixels[4 * i]);
+        result.pixels[4 * i + 3] = alpha.pixels[i];
+    }
     return result;
 }
 

@@ -5,6 +5,7 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <iterator>
 #include <memory>
 #include <new>
 #include <stdexcept>
@@ -12,8 +13,6 @@
 #include "core/atomic_file.h"
 #include "core/text.h"
 #include "ewa/error.h"
-#include "image/codecs.h"
-#include "image/openimageio.h"
 
 namespace ewa {
 
@@ -29,9 +28,7 @@ using File = std::unique_ptr<std::FILE, CloseFile>;
 /// Calls `read`. Throws InputError "name: not a readable image: reason" for any reason that it throws.
 template <class Read>
 auto with_name(const std::string& name, const Read& read) {
-    const auto fail = [&](const std::string& reason) {
-        throw InputError(core::one_line(name + ": not a readable image: " + reason));
-    };
+    std::string reason;
     try {
         return read();
     } catch (const InputError&) {
@@ -39,13 +36,13 @@ auto with_name(const std::string& name, const Read& read) {
     } catch (const RunError& error) {
         throw RunError(core::one_line(name + ": " + error.what()));
     } catch (const std::runtime_error& error) {
-        fail(error.what());
+        reason = error.what();
     } catch (const std::bad_alloc&) {
-        fail("it is too large for this machine's memory");
+        reason = "it is too large for this machine's memory";
     } catch (const std::length_error&) {
-        fail("its header claims more than memory can hold");
+        reason = "its header claims more than memory can hold";
     }
-    throw std::logic_error("with_name");
+    throw InputError(core::one_line(name + ": not a readable image: " + reason));
 }
 
 File open_file(const fs::path& path) {
@@ -72,17 +69,11 @@ const image::Format& format_of(std::FILE* file) {
     return *format;
 }
 
-/// PNG or JPEG.
-image::StoredImage read_stream(std::FILE* file, uint64_t bytes, const image::Format& format, bool pixels) {
-    const auto read = format.name == "png" ? image::read_png : image::read_jpeg;
-    return read(file, bytes, pixels);
-}
-
 image::StoredImage read_file(const fs::path& path, bool pixels) {
     const File file = open_file(path);
     const image::Format& format = format_of(file.get());
     const uint64_t bytes = fs::file_size(path);
-    if (!format.by_openimageio()) return read_stream(file.get(), bytes, format, pixels);
+    if (format.read) return format.read(file.get(), bytes, pixels);
     if (format.probe) {
         core::FileReader reader(path);
         format.probe(reader);
@@ -144,22 +135,104 @@ void save_image(const fs::path& path, const Image& image) {
 
 namespace image {
 
+namespace {
+
+using namespace std::string_view_literals;
+
+// TIFF has either byte order. The version 43 instead of 42 means 64-bit offsets.
+constexpr Format kFormats[] = {
+    {"\x89PNG\r\n\x1a\n"sv, "png", read_png},
+    {"\xff\xd8\xff"sv, "jpeg", read_jpeg},
+    {"II\x2a\0"sv, "tiff", nullptr, probe_tiff},
+    {"MM\0\x2a"sv, "tiff", nullptr, probe_tiff},
+    {"II\x2b\0"sv, "tiff", nullptr, probe_tiff},
+    {"MM\0\x2b"sv, "tiff", nullptr, probe_tiff},
+    {"\x76\x2f\x31\x01"sv, "openexr", nullptr, probe_exr},
+    {"RIFF"sv, "webp", nullptr, probe_webp},
+    {"BM"sv, "bmp", nullptr, probe_bmp},
+    {"P5"sv, "pnm", nullptr, probe_pnm},
+    {"P6"sv, "pnm", nullptr, probe_pnm},
+    {"#?RADIANCE"sv, "hdr"},
+    {"#?RGBE"sv, "hdr"},
+};
+
+}  // namespace
+
+const Format* format_of(std::string_view first_bytes) {
+    const auto* found = std::find_if(std::begin(kFormats), std::end(kFormats), [&](const Format& format) {
+        return first_bytes.starts_with(format.signature);
+    });
+    if (found == std::end(kFormats)) return nullptr;
+    if (found->name == "webp" && (first_bytes.size() < 12 || first_bytes.substr(8, 4) != "WEBP"))
+        return nullptr;
+    return found;
+}
+
+void check_limits(const ImageHeader& header, uint64_t file_bytes) {
+    if (header.width < 1 || header.height < 1 || header.channels < 1)
+        throw std::runtime_error("its header describes a picture without pixels");
+    const auto refuse = [&](const std::string& reason) {
+        throw std::runtime_error("its header claims " + std::to_string(header.width) + " x " +
+                                 std::to_string(header.height) + " pixels of " +
+                                 std::to_string(header.channels) + " channels, " + reason);
+    };
+    if (header.width > kMaxSide || header.height > kMaxSide)
+        refuse("more than " + std::to_string(kMaxSide) + " in a direction");
+    const uint64_t pixels = header.width * header.height;
+    if (pixels > kMaxPixels)
+        refuse("more than " + std::to_string(kMaxPixels / 1'000'000) +
+               " million pixels; make the picture smaller");
+    if (header.channels > kMaxChannels ||
+        pixels * header.channels * header.bytes_per_value > kMaxDecodedBytes)
+        refuse("more than " + std::to_string(kMaxDecodedBytes >> 30) + " GiB or " +
+               std::to_string(kMaxChannels) + " channels; keep only its colour");
+    const uint64_t bytes = pixels * header.channels * sizeof(float);
+    if (bytes > kUncheckedBytes && bytes / kMaxCompression > file_bytes)
+        refuse("too many for its " + std::to_string(file_bytes) + " bytes");
+}
+
+uint64_t big_endian(const std::byte* bytes, int count) {
+    uint64_t value = 0;
+    for (int i = 0; i < count; ++i) value = value << 8 | std::to_integer<uint64_t>(bytes[i]);
+    return value;
+}
+
+uint64_t little_endian(const std::byte* bytes, int count) {
+    uint64_t value = 0;
+    for (int i = count; i-- > 0;) value = value << 8 | std::to_integer<uint64_t>(bytes[i]);
+    return value;
+}
+
+int exif_orientation(const void* exif, uint64_t size) {
+    constexpr uint64_t kTag = 274, kEntryBytes = 12;
+    const auto* bytes = static_cast<const std::byte*>(exif);
+    const auto number = [&](uint64_t at, int count) -> uint64_t {
+        if (at + uint64_t(count) > size) return 0;
+        return bytes[0] == std::byte('M') ? big_endian(bytes + at, count) : little_endian(bytes + at, count);
+    };
+    const uint64_t directory = number(4, 4), count = number(directory, 2);
+    for (uint64_t i = 0; i < count; ++i) {
+        const uint64_t entry = directory + 2 + i * kEntryBytes;
+        if (number(entry, 2) == kTag) return int(number(entry + 8, 2));
+    }
+    return 1;
+}
+
 Image decode(std::span<const unsigned char> bytes, const std::string& what, int largest) {
     const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     const Format* format = image::format_of(text);
-    if (!format || format->by_openimageio())
-        throw InputError(core::one_line(what + ": is neither PNG nor JPEG"));
+    if (!format || !format->read) throw InputError(core::one_line(what + ": is neither PNG nor JPEG"));
     return with_name(what, [&] {
         // fmemopen takes a pointer to non-const, and does not write through it in mode r.
         const File file(fmemopen(const_cast<unsigned char*>(bytes.data()), bytes.size(), "r"));
         if (!file) throw std::bad_alloc();
-        const ImageSize size = read_stream(file.get(), bytes.size(), *format, false).size;
+        const ImageSize size = format->read(file.get(), bytes.size(), false).size;
         if (size.width > largest || size.height > largest)
             throw std::runtime_error("it has " + std::to_string(size.width) + " x " +
                                      std::to_string(size.height) + " pixels, more than " +
                                      std::to_string(largest) + " in a direction");
         std::rewind(file.get());
-        return with_colour(read_stream(file.get(), bytes.size(), *format, true));
+        return with_colour(format->read(file.get(), bytes.size(), true));
     });
 }
 

@@ -11,7 +11,7 @@
 #include <cstring>
 #include <stdexcept>
 
-#include "image/codecs.h"
+#include "image/image_files.h"
 
 namespace ewa::image {
 
@@ -27,17 +27,22 @@ void cmyk_to_rgb(const JSAMPLE* cmyk, size_t pixels, float* rgb) {
         }
 }
 
-/// libjpeg's error handler must not return, so it leaves by longjmp. Each function that calls setjmp has no
-/// object with a destructor, and what must be released belongs to the class.
+/// libjpeg's error handler must not return, so it leaves by longjmp. Each call of libjpeg that may fail is in a
+/// step of `attempt`, which has no object with a destructor. What must be released belongs to the class.
 class JpegReader {
   public:
-    explicit JpegReader(std::FILE* file) : file_(file) {}
+    explicit JpegReader(std::FILE* file) : file_(file) {
+        jpeg_.err = jpeg_std_error(&errors_);
+        errors_.error_exit = on_error;
+        errors_.emit_message = on_message;
+        jpeg_.client_data = this;
+    }
     ~JpegReader() { jpeg_destroy_decompress(&jpeg_); }
     JpegReader(const JpegReader&) = delete;
     JpegReader& operator=(const JpegReader&) = delete;
 
     StoredImage read(uint64_t file_bytes, bool pixels) {
-        if (!read_header()) fail();
+        attempt([&] { read_header(); });
         const bool cmyk = jpeg_.jpeg_color_space == JCS_CMYK || jpeg_.jpeg_color_space == JCS_YCCK;
         const uint64_t channels = uint64_t(jpeg_.num_components);
         check_limits({jpeg_.image_width, jpeg_.image_height, channels, 1}, file_bytes);
@@ -51,8 +56,6 @@ class JpegReader {
     }
 
   private:
-    [[noreturn]] void fail() const { throw std::runtime_error(message_); }
-
     static JpegReader& self(j_common_ptr jpeg) { return *static_cast<JpegReader*>(jpeg->client_data); }
 
     [[noreturn]] static void on_error(j_common_ptr jpeg) {
@@ -88,56 +91,42 @@ class JpegReader {
         std::longjmp(self(jpeg).jump_, 1);
     }
 
-    bool read_header() {
-        jpeg_.err = jpeg_std_error(&errors_);
-        errors_.error_exit = on_error;
-        errors_.emit_message = on_message;
-        jpeg_.client_data = this;
-        if (setjmp(jump_)) return false;
+    /// Calls `step`. Throws if libjpeg reports an error in it.
+    template <class Step>
+    void attempt(Step step) {
+        if (setjmp(jump_)) throw std::runtime_error(message_);
+        step();
+    }
+
+    void read_header() {
         jpeg_create_decompress(&jpeg_);
         progress_.progress_monitor = on_progress;
         jpeg_.progress = &progress_;
         jpeg_stdio_src(&jpeg_, file_);
         jpeg_save_markers(&jpeg_, kExifMarker, 0xffff);
         jpeg_read_header(&jpeg_, TRUE);
-        return true;
-    }
-    bool start(J_COLOR_SPACE color_space) {
-        if (setjmp(jump_)) return false;
-        jpeg_.out_color_space = color_space;
-        jpeg_start_decompress(&jpeg_);
-        return true;
-    }
-    bool read_row(JSAMPROW row) {
-        if (setjmp(jump_)) return false;
-        jpeg_read_scanlines(&jpeg_, &row, 1);
-        return true;
-    }
-    /// Reads up to the end-of-image marker.
-    bool finish() {
-        if (setjmp(jump_)) return false;
-        jpeg_finish_decompress(&jpeg_);
-        return true;
     }
 
     void read_values(StoredImage& image, bool cmyk) {
-        if (!start(cmyk ? JCS_CMYK : jpeg_.out_color_space)) fail();
+        if (cmyk) jpeg_.out_color_space = JCS_CMYK;
+        attempt([&] { jpeg_start_decompress(&jpeg_); });
         const size_t width = size_t(image.size.width), channels = size_t(image.channels);
         const size_t components = size_t(jpeg_.output_components);
-        std::vector<JSAMPLE> row(width * components);
+        std::vector<JSAMPLE> samples(width * components);
+        JSAMPROW row = samples.data();
         image.values.resize(width * channels * size_t(image.size.height));
         for (size_t y = 0; y < size_t(image.size.height); ++y) {
-            if (!read_row(row.data())) fail();
+            attempt([&] { jpeg_read_scanlines(&jpeg_, &row, 1); });
             float* values = &image.values[y * width * channels];
             if (cmyk) {
-                cmyk_to_rgb(row.data(), width, values);
+                cmyk_to_rgb(row, width, values);
                 continue;
             }
             for (size_t x = 0; x < width; ++x)
                 for (size_t c = 0; c < channels; ++c)
                     values[x * channels + c] = float(row[x * components + c]) / 255.0f;
         }
-        if (!finish()) fail();
+        attempt([&] { jpeg_finish_decompress(&jpeg_); });  // up to the end-of-image marker
     }
 
     int orientation() const {

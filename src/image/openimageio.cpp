@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "image/openimageio.h"
 
 #include <dlfcn.h>
 #include <link.h>
@@ -10,6 +9,7 @@
 #include <string_view>
 
 #include "ewa/error.h"
+#include "image/image_files.h"
 
 namespace ewa::image {
 namespace {
@@ -55,7 +55,7 @@ const OpenImageIO& load() {
     void* library = dlopen(module_file().c_str(), RTLD_NOW | RTLD_LOCAL);
     if (!library) cannot_load(dlerror());
     const auto* module = static_cast<const OpenImageIO*>(dlsym(library, kModuleEntry));
-    if (!module) cannot_load(dlerror());
+    if (!module) cannot_load(std::string("it belongs to another build of ewa: ") + dlerror());
     if (module->version != std::string_view(EWA_VERSION))
         cannot_load(std::string("it belongs to ewa ") + module->version + ", and this is " EWA_VERSION);
     if (!module->limit(kMaxDecodedBytes, kMaxChannels))

@@ -10,7 +10,6 @@
 #include <stdexcept>
 
 #include "ewa/error.h"
-#include "image/codecs.h"
 #include "image/image_files.h"
 
 namespace ewa::image {
@@ -29,8 +28,8 @@ bool has_end_chunk(std::FILE* file, uint64_t file_bytes) {
     return false;
 }
 
-/// libpng reports errors by longjmp. So each function that calls setjmp has no object with a destructor, and
-/// what must be released belongs to the class.
+/// libpng reports errors by longjmp. So no call of libpng after the constructor leaves a function that has an
+/// object with a destructor: each is in a step of `attempt`, and what must be released belongs to the class.
 class PngReader {
   public:
     explicit PngReader(std::FILE* file) : file_(file) {
@@ -46,7 +45,7 @@ class PngReader {
     PngReader& operator=(const PngReader&) = delete;
 
     StoredImage read(uint64_t file_bytes, bool pixels) {
-        if (!read_header()) fail();
+        attempt([&] { read_header(); });
         StoredImage image;
         const uint64_t width = png_get_image_width(png_, info_), height = png_get_image_height(png_, info_);
         const bool eight_bit = png_get_bit_depth(png_, info_) <= 8;
@@ -54,7 +53,7 @@ class PngReader {
         const bool palette = png_get_color_type(png_, info_) == PNG_COLOR_TYPE_PALETTE;
         const uint64_t channels = palette ? 3 : png_get_channels(png_, info_);
         check_limits({width, height, channels, eight_bit ? uint64_t(1) : 2}, file_bytes);
-        if (!expand()) fail();
+        attempt([&] { expand(); });
         image.size = {int(width), int(height), orientation(), eight_bit};
         image.channels = png_get_channels(png_, info_);
         if (pixels) read_values(image);
@@ -73,8 +72,14 @@ class PngReader {
     }
     static void on_warning(png_structp, png_const_charp) {}
 
-    bool read_header() {
-        if (setjmp(png_jmpbuf(png_))) return false;
+    /// Calls `step`. Throws if libpng reports an error in it.
+    template <class Step>
+    void attempt(Step step) {
+        if (setjmp(png_jmpbuf(png_))) fail();
+        step();
+    }
+
+    void read_header() {
         png_init_io(png_, file_);
         png_set_crc_action(png_, PNG_CRC_ERROR_QUIT, PNG_CRC_ERROR_QUIT);
         // Colour spaces and texts are not read, so they cannot fail. EXIF has the orientation.
@@ -82,30 +87,12 @@ class PngReader {
         png_set_keep_unknown_chunks(png_, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
         png_set_keep_unknown_chunks(png_, PNG_HANDLE_CHUNK_AS_DEFAULT, kExif, 1);
         png_read_info(png_, info_);
-        return true;
     }
-    bool expand() {
-        if (setjmp(png_jmpbuf(png_))) return false;
+    void expand() {
         png_set_expand(png_);
         if (std::endian::native == std::endian::little) png_set_swap(png_);
         png_set_interlace_handling(png_);
         png_read_update_info(png_, info_);
-        return true;
-    }
-    bool read_all(png_bytepp rows) {
-        if (setjmp(png_jmpbuf(png_))) return false;
-        png_read_image(png_, rows);
-        return true;
-    }
-    bool read_row(png_bytep bytes) {
-        if (setjmp(png_jmpbuf(png_))) return false;
-        png_read_row(png_, bytes, nullptr);
-        return true;
-    }
-    bool read_end() {
-        if (setjmp(png_jmpbuf(png_))) return false;
-        png_read_end(png_, nullptr);
-        return true;
     }
 
     void read_values(StoredImage& image) {
@@ -115,15 +102,15 @@ class PngReader {
         std::vector<png_byte> bytes(row * (interlaced ? height : 1));
         std::vector<png_bytep> rows;
         for (size_t y = 0; interlaced && y < height; ++y) rows.push_back(&bytes[y * row]);
-        if (interlaced && !read_all(rows.data())) fail();
+        if (interlaced) attempt([&] { png_read_image(png_, rows.data()); });
         const size_t count = size_t(image.size.width) * size_t(image.channels);
         image.values.resize(count * height);
         for (size_t y = 0; y < height; ++y) {
-            if (!interlaced && !read_row(bytes.data())) fail();
+            if (!interlaced) attempt([&] { png_read_row(png_, bytes.data(), nullptr); });
             to_floats(interlaced ? rows[y] : bytes.data(), count, image.size.eight_bit,
                       &image.values[y * count]);
         }
-        if (!read_end()) fail();
+        attempt([&] { png_read_end(png_, nullptr); });
     }
 
     static void to_floats(const png_byte* row, size_t count, bool eight_bit, float* values) {

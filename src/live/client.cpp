@@ -9,7 +9,7 @@
 
 #include "core/text.h"
 #include "ewa/error.h"
-#include "io/splats/ply.h"
+#include "io/splats/formats.h"
 #include "live/wire.h"
 
 namespace ewa::live {

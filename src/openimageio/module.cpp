@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The module that src/image/openimageio.cpp loads: OpenImageIO behind the functions of image/openimageio.h.
+// The module that src/image/openimageio.cpp loads: OpenImageIO behind the functions of image/image_files.h.
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
@@ -7,7 +7,7 @@
 #include <memory>
 #include <stdexcept>
 
-#include "image/openimageio.h"
+#include "image/image_files.h"
 
 namespace {
 
@@ -91,5 +91,5 @@ std::vector<unsigned char> encode_exr(const Image& image) {
 
 }  // namespace
 
-extern "C" __attribute__((visibility("default"))) const OpenImageIO ewa_openimageio_module;
-const OpenImageIO ewa_openimageio_module = {EWA_VERSION, limit, read, encode_exr};
+extern "C" __attribute__((visibility("default"))) const OpenImageIO ewa_openimageio_layout_1;
+const OpenImageIO ewa_openimageio_layout_1 = {EWA_VERSION, limit, read, encode_exr};

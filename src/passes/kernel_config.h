@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 
 #include "gpu/device.h"
 #include "shared/constants.h"
@@ -83,18 +84,24 @@ inline std::array<uint32_t, 2> tile_steps(const KernelConfig& config, uint32_t t
     return {1, tiles < config.max_groups ? tiles : config.max_groups};
 }
 
-/// One invocation a pixel.
-inline Groups pixel_groups(const KernelConfig& config, const shared::ImageLayout& image) {
-    return element_groups(config, uint64_t(image.size[0]) * image.size[1]);
+/// Pixels of the image that the push constants describe.
+template <class Push>
+uint64_t pixels(const Push& push) {
+    if constexpr (std::is_same_v<Push, shared::ImageLayout>)
+        return uint64_t(push.size[0]) * push.size[1];
+    else
+        return pixels(push.image);
 }
 
-/// Items of a loss pass down the columns. stride: floats a row, a multiple of 4.
-inline uint64_t loss_column_items(uint32_t stride, uint32_t height) {
-    return uint64_t(stride / 4) * ((height + shared::LOSS_ROWS - 1) / shared::LOSS_ROWS);
+/// Items of a loss pass down the columns. The image's stride is a multiple of 4.
+inline uint64_t loss_column_items(const shared::LossPush& push) {
+    const uint32_t height = push.image.size[1];
+    return uint64_t(push.image.stride / 4) * ((height + shared::LOSS_ROWS - 1) / shared::LOSS_ROWS);
 }
 /// Items of a loss pass along the rows.
-inline uint64_t loss_row_items(uint32_t stride, uint32_t height) {
-    return uint64_t((stride / 4 + shared::LOSS_TEXELS - 1) / shared::LOSS_TEXELS) * height;
+inline uint64_t loss_row_items(const shared::LossPush& push) {
+    const uint32_t texels = push.image.stride / 4;
+    return uint64_t((texels + shared::LOSS_TEXELS - 1) / shared::LOSS_TEXELS) * push.image.size[1];
 }
 
 }  // namespace ewa::passes

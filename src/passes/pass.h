@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// What all passes share. A pass is a struct that describes one shader:
-// - shader: its file in shaders/passes without extension, which is also the name of its timing;
-// - group_size(config): invocations of its workgroup;
-// - Buffers: gpu::BufferPart members only, in the order of the shader's bindings;
-// - Push: its push constants;
-// - groups(config, push): its workgroups.
+// What all passes share. A pass is a struct that describes one shader (passes.h). It has
+// - shader: the file in shaders/passes without extension, which is also the name of the timing;
+// - Work: the push constants (Push), the invocations of a workgroup (group_size), and the workgroups (groups);
+// - data members: one gpu::BufferPart for each of the shader's bindings, in their order.
 // A pass does not say what it reads or writes: a recording derives that from the shader.
 #pragma once
 #include <array>
 #include <bit>
+#include <functional>
 #include <map>
 #include <string_view>
 #include <utility>
@@ -19,13 +18,55 @@
 
 namespace ewa::passes {
 
-/// One invocation owns one element.
-struct ElementPass {
+/// A workgroup of invocations that each own an element.
+template <class P>
+struct ElementGroup {
+    using Push = P;
     static uint32_t group_size(const KernelConfig& config) { return config.element_group; }
 };
-/// One workgroup is one subgroup.
-struct SubgroupPass {
+
+/// A workgroup that is a subgroup; there is one.
+template <class P>
+struct OneSubgroup {
+    using Push = P;
     static uint32_t group_size(const KernelConfig& config) { return config.subgroup; }
+    static Groups groups(const KernelConfig&, const Push&) { return {1, 1, 1}; }
+};
+
+template <class P>
+P push_of(uint32_t P::*);
+template <class P>
+P push_of(uint64_t (*)(const P&));
+
+/// One invocation an element, in each of kLayers layers. kItems: the member of the push constants that counts
+/// the elements, or a function of the push constants.
+template <auto kItems, uint32_t kLayers = 1>
+struct PerElement : ElementGroup<decltype(push_of(kItems))> {
+    static Groups groups(const KernelConfig& config, const decltype(push_of(kItems))& push) {
+        return element_groups(config, std::invoke(kItems, push), kLayers);
+    }
+};
+
+/// One subgroup for each block of push.block items.
+template <class P>
+struct PerBlock : OneSubgroup<P> {
+    static Groups groups(const KernelConfig& config, const P& push) {
+        return block_groups(config, push.items, push.block);
+    }
+};
+
+/// One subgroup a tile.
+struct PerTile : OneSubgroup<shared::BlendPush> {
+    static Groups groups(const KernelConfig& config, const Push& push) { return tile_groups(config, push); }
+};
+
+/// One invocation a lane of the radix sort.
+struct PerSortLane {
+    using Push = shared::SortPush;
+    static uint32_t group_size(const KernelConfig& config) { return config.sort_group; }
+    static Groups groups(const KernelConfig& config, const Push& push) {
+        return {(push.lanes + config.sort_group - 1) / config.sort_group, 1, 1};
+    }
 };
 
 using Constants = std::vector<gpu::SpecConstant>;
@@ -33,20 +74,19 @@ using Constants = std::vector<gpu::SpecConstant>;
 /// A compiled pass.
 template <class Definition>
 struct Pass {
-    using Buffers = typename Definition::Buffers;
-    using Push = typename Definition::Push;
+    using Push = typename Definition::Work::Push;
     const gpu::Pipeline& pipeline;
     const KernelConfig& config;
 
-    void record(gpu::Recording& recording, const Buffers& buffers, const Push& push,
+    void record(gpu::Recording& recording, const Definition& buffers, const Push& push,
                 const char* name = Definition::shader) const {
-        record(recording, buffers, push, Definition::groups(config, push), name);
+        record(recording, buffers, push, Definition::Work::groups(config, push), name);
     }
     /// groups: the dispatch's workgroups.
-    void record(gpu::Recording& recording, const Buffers& buffers, const Push& push, const Groups& groups,
+    void record(gpu::Recording& recording, const Definition& buffers, const Push& push, const Groups& groups,
                 const char* name = Definition::shader) const {
-        constexpr size_t kParts = sizeof(Buffers) / sizeof(gpu::BufferPart);
-        static_assert(sizeof(Buffers) == kParts * sizeof(gpu::BufferPart));
+        constexpr size_t kParts = sizeof(Definition) / sizeof(gpu::BufferPart);
+        static_assert(sizeof(Definition) == kParts * sizeof(gpu::BufferPart));
         recording.dispatch(pipeline, name, std::bit_cast<std::array<gpu::BufferPart, kParts>>(buffers),
                            std::as_bytes(std::span(&push, 1)), groups);
     }
@@ -66,7 +106,7 @@ class PassCache {
     /// std::logic_error if one is missing or the shader does not declare it.
     template <class Definition>
     Pass<Definition> get(const Constants& variant = {}) {
-        return {pipeline(Definition::shader, Definition::group_size(config_), variant), config_};
+        return {pipeline(Definition::shader, Definition::Work::group_size(config_), variant), config_};
     }
 
   private:

@@ -85,7 +85,7 @@ shared::TraceCounts PathTracer::trace_paths(const gpu::Buffer& view, uint64_t pi
     push.lights = light_count_;
     push.seed[0] = uint32_t(seed);
     push.seed[1] = uint32_t(seed >> 32);
-    const passes::TracePaths::Buffers buffers{
+    const passes::TracePaths buffers{
         .mesh = mesh(), .lights = lights_, .view = view, .sums = sums_, .counts = counts_};
     const passes::Groups groups = passes::element_groups(cache_.config(), pixels);
     for (int first = 0; first < samples; first += samples_at_once_) {

@@ -9,7 +9,7 @@
 #include "ewa/device.h"
 #include "ewa/image.h"
 #include "gpu/executor.h"
-#include "passes/trace.h"
+#include "passes/passes.h"
 #include "pathtracer/packing.h"
 
 namespace ewa::pathtracer {

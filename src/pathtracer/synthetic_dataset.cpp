@@ -13,7 +13,7 @@
 #include "core/random.h"
 #include "core/text.h"
 #include "ewa/error.h"
-#include "io/datasets/transforms.h"
+#include "io/datasets/image_records.h"
 #include "pathtracer/path_tracer.h"
 #include "pathtracer/render_job.h"
 #include "pathtracer/virtual_camera.h"

@@ -3,13 +3,55 @@
 
 #include <cmath>
 
-#include "passes/blend.h"
-#include "passes/loss.h"
-#include "passes/project.h"
+#include "passes/passes.h"
 #include "shared/constants.h"
 
 namespace ewa::pipeline {
 namespace {
+
+// Weight of the regulariser of exposures. Gradients of the loss by an exposure are of the order of 0.1. The pull is too weak to matter, except in the
+// direction in which the loss is flat: all exposures change one way and the splats the other way.
+constexpr float kPull = 1e-3f;
+
+/// Factors that correct the bias of Adam's two moments at a step.
+std::array<float, 2> adam_biases(double step) {
+    return {float(1 / (1 - std::pow(shared::ADAM_BETA1, step))),
+            float(1 / (1 - std::pow(shared::ADAM_BETA2, step)))};
+}
+
+/// Writes frame.planes with the exposure applied to frame.exposed.
+void record_expose(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame,
+                   const ExposureUse& use) {
+    cache.get<passes::Expose>().record(
+        recording, {.image = frame.planes, .exposures = use.exposures->values, .exposed = frame.exposed},
+        {.image = frame.sizes.image(), .photo = use.photo});
+}
+
+/// Turns frame.image_gradient from dL/d(exposed image) into dL/d(image). The exposure takes a step of Adam.
+void record_expose_backward(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame,
+                            const ExposureUse& use) {
+    const Exposures& e = *use.exposures;
+    cache.get<passes::ExposeBackward>().record(recording,
+                                               {.image = frame.planes,
+                                                .exposures = e.values,
+                                                .image_gradient = frame.image_gradient,
+                                                .sums = frame.exposure_sums},
+                                               {.image = frame.sizes.image(), .photo = use.photo});
+    const auto [bias1, bias2] = adam_biases(use.visit);
+    cache.get<passes::ExposureUpdate>().record(recording,
+                                               {.sums = frame.exposure_sums,
+                                                .exposures = e.values,
+                                                .moments1 = e.moments1,
+                                                .moments2 = e.moments2,
+                                                .counts = frame.counts},
+                                               {.photo = use.photo,
+                                                .blocks = frame.sizes.exposure_blocks,
+                                                .rate = use.rate,
+                                                .pull = kPull,
+                                                .bias1 = bias1,
+                                                .bias2 = bias2,
+                                                .instance_capacity = frame.instance_capacity});
+}
 
 /// Adds frame.partials, in two steps. target: shared::REDUCE_TO_*.
 void record_mean(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame,
@@ -33,7 +75,7 @@ uint32_t update_mode(const Plan& plan) {
 }
 
 shared::UpdatePush update_push(const Model& model, const FrameBuffers& frame, const Rates& rates) {
-    const double step = rates.step;
+    const auto [bias1, bias2] = adam_biases(rates.step);
     return {.splats = model.splats,
             .planes = model.planes(),
             .instance_capacity = frame.instance_capacity,
@@ -43,14 +85,29 @@ shared::UpdatePush update_push(const Model& model, const FrameBuffers& frame, co
             .scale_rate = rates.scale,
             .sh0_rate = rates.sh0,
             .sh_rest_rate = rates.sh_rest,
-            .bias1 = float(1 / (1 - std::pow(shared::ADAM_BETA1, step))),
-            .bias2 = float(1 / (1 - std::pow(shared::ADAM_BETA2, step))),
+            .bias1 = bias1,
+            .bias2 = bias2,
             .half_size = {0.5f * float(frame.sizes.width), 0.5f * float(frame.sizes.height)},
             .opacity_weight = rates.opacity_weight,
             .scale_weight = rates.scale_weight};
 }
 
 }  // namespace
+
+Exposures::Exposures(gpu::Device& device, size_t count)
+    : photos(uint32_t(count)),
+      values(device, "exposures", bytes()),
+      moments1(device, "exposure moments1", bytes()),
+      moments2(device, "exposure moments2", bytes()) {
+    const std::vector<Exposure> start(count, kIdentityExposure);
+    values.upload(std::span<const Exposure>(start));
+    zero(moments1);
+    zero(moments2);
+}
+
+std::vector<Exposure> Exposures::download() const {
+    return values.download<Exposure>(photos);
+}
 
 double loss_of(const shared::Counts& counts) {
     return (1 - shared::SSIM_WEIGHT) * double(counts.l1) + shared::SSIM_WEIGHT * (1 - double(counts.ssim));

@@ -1,25 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pipeline/forward.h"
 
-#include "passes/blend.h"
-#include "passes/project.h"
+#include "passes/passes.h"
 #include "pipeline/sorting.h"
 
 namespace ewa::pipeline {
 namespace {
 
-uint32_t blend_mode(Drawing drawing) {
-    switch (drawing) {
-        case Drawing::depth:
-            return shared::BLEND_DEPTH;
-        case Drawing::count:
-            return shared::BLEND_COUNT;
-        case Drawing::ellipsoids:
-            return shared::BLEND_ELLIPSOIDS;
-        default:
-            return shared::BLEND_COLOR;
-    }
-}
+/// In the order of Drawing.
+constexpr uint32_t kBlendModes[] = {shared::BLEND_COLOR, shared::BLEND_DEPTH, shared::BLEND_COUNT,
+                                    shared::BLEND_ELLIPSOIDS};
 
 void record_project(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan, const Model& model,
                     const FrameBuffers& frame, const FrameInputs& inputs) {
@@ -136,7 +126,7 @@ Sorted record_forward(gpu::Recording& recording, passes::PassCache& cache, const
     const gpu::Buffer& order = record_depth_order(recording, cache, model, frame);
     record_instances(recording, cache, plan, model, frame, order);
     const uint32_t sorted = record_tile_order(recording, cache, plan, frame);
-    cache.get<passes::Blend>({{shared::SPEC_MODE, blend_mode(plan.drawing)}})
+    cache.get<passes::Blend>({{shared::SPEC_MODE, kBlendModes[size_t(plan.drawing)]}})
         .record(recording,
                 {.records = frame.records,
                  .splats = frame.instance_splats[sorted],

@@ -3,25 +3,12 @@
 #pragma once
 #include <array>
 
-#include "passes/pass.h"
 #include "pipeline/frame_buffers.h"
+#include "pipeline/frame_inputs.h"
 #include "pipeline/model.h"
 #include "pipeline/plan.h"
 
 namespace ewa::pipeline {
-
-struct CameraUse {
-    const gpu::Buffer* buffer = nullptr;  // CameraBlocks
-    uint64_t offset = 0;                  // bytes, aligned as the device requires for uniform blocks
-    uint32_t width = 0, height = 0;       // px
-};
-
-/// What differs from frame to frame of one plan.
-struct FrameInputs {
-    CameraUse camera;
-    std::array<float, 3> background{0, 0, 0};
-    int sh_degree = kMaxShDegree;  // evaluated: at most this, and at most what the plan stores
-};
 
 /// Which of the ping-pong buffers hold the sorted instances after the forward frame.
 struct Sorted {

@@ -1,8 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pipeline/frame_buffers.h"
 
+#include <algorithm>
+#include <bit>
 #include <cstring>
+#include <span>
+#include <string>
+#include <vector>
 
+#include "ewa/error.h"
+#include "passes/passes.h"
 #include "pipeline/model.h"
 
 namespace ewa::pipeline {
@@ -10,14 +17,135 @@ namespace {
 
 using gpu::Texel;
 
-void grow(gpu::Device& device, gpu::Buffer& buffer, const char* name, uint64_t bytes,
-          Texel texel = Texel::none) {
-    if (bytes == 0 || (buffer && buffer.bytes() >= bytes)) return;
-    buffer = gpu::Buffer();  // free the old one first: its contents are not needed
-    buffer = gpu::Buffer(device, name, bytes, texel);
+uint32_t divide_up(uint64_t a, uint64_t b) {
+    return uint32_t((a + b - 1) / b);
+}
+
+RadixCut radix_cut(const passes::KernelConfig& config, uint32_t items, uint32_t key_bits) {
+    RadixCut cut;
+    cut.lanes = std::clamp(divide_up(items, config.sort_chunk), config.subgroup, config.sort_lanes_max);
+    cut.passes = divide_up(key_bits, 8);
+    cut.bits = divide_up(key_bits, cut.passes);
+    return cut;
+}
+
+uint64_t counter_words(const RadixCut& cut) {
+    return uint64_t(cut.lanes) << cut.bits;
+}
+
+void check_image(const passes::KernelConfig& config, const FrameRequest& request, const Sizes& sizes) {
+    const std::string size = std::to_string(request.width) + "x" + std::to_string(request.height);
+    if (request.width == 0 || request.height == 0) throw InputError("an image of " + size + " pixels");
+    // The loops that limit the size: over a splat's tile rows, and in training over its instances,
+    // 8 at a time.
+    const uint64_t most_tiles = uint64_t(8) * config.loop_limit;
+    if (sizes.tiles_x + sizes.tiles_y + 2 > config.loop_limit || sizes.tiles > most_tiles)
+        throw InputError("an image of " + size + " pixels has more than the " + std::to_string(most_tiles) +
+                         " tiles that can be drawn; --downscale makes it smaller");
+}
+
+/// Buffers of the same size.
+struct Allocation {
+    std::span<gpu::Buffer> buffers;
+    const char* name;
+    uint64_t bytes;
+    Texel texel = Texel::none;
+};
+
+/// All buffers of a frame but the counts. Those that a frame without gradients does not use have no bytes.
+std::vector<Allocation> allocations(FrameBuffers& f, const Sizes& s) {
+    const auto one = [](gpu::Buffer& buffer) { return std::span(&buffer, 1); };
+    const bool gradients = s.slots > 0;
+    const Texel floats = Texel::rgba32f, words = Texel::rgba32ui;
+    return {
+        {one(f.records), "records", s.records, floats},
+        {f.depth_keys, "depth keys", s.splat_words, words},
+        {f.order, "order", s.splat_words, words},
+        {one(f.tile_counts), "tile counts", s.splat_words},
+        {one(f.prefix), "prefix", s.splat_words},
+        {one(f.scan_totals), "scan totals", s.scan_totals},
+        {one(f.counters), "counters", s.counters},
+        {one(f.counter_prefix), "counter prefix", s.counters},
+        {one(f.digit_totals), "digit totals", s.digit_totals},
+        {f.instance_keys, "instance keys", s.instance_words, words},
+        {f.instance_splats, "instance splats", s.instance_words, words},
+        {one(f.tile_starts), "tile starts", s.tile_starts},
+        // Without gradients no pass reads where a splat's instances begin, but the binding needs a buffer.
+        {one(f.first_instances), "first instances", gradients ? s.splat_words : 16},
+        {one(f.planes), "planes", s.planes, floats},
+        {one(f.target), "target", s.target, floats},
+        {one(f.exposed), "exposed", s.exposed, floats},
+        {one(f.masked), "masked", s.masked, floats},
+        {one(f.moments), "moments", s.moments, floats},
+        {one(f.derivatives), "derivatives", s.derivatives, floats},
+        {one(f.blurred), "blurred", s.derivatives, floats},
+        {one(f.image_gradient), "image gradient", s.image_gradient, floats},
+        {one(f.partials), "partials", s.partial_sums},
+        {one(f.exposure_sums), "exposure sums", s.exposure_sums},
+        {one(f.reduced), "reduced", s.reduced},
+        {f.sorted_indices, "sorted indices", gradients ? s.instance_words : 0, words},
+        {one(f.slots), "slots", s.slots, floats}};
 }
 
 }  // namespace
+
+Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request) {
+    Sizes s;
+    if (request.width > 1u << 20 || request.height > 1u << 20)
+        throw InputError("an image of " + std::to_string(request.width) + "x" +
+                         std::to_string(request.height) + " pixels; at most 1048576 a side can be drawn");
+    s.width = request.width;
+    s.height = request.height;
+    s.tiles_x = divide_up(request.width, config.tile_width);
+    s.tiles_y = divide_up(request.height, config.tile_height);
+    const uint64_t tiles = uint64_t(s.tiles_x) * s.tiles_y;
+    s.tiles = uint32_t(std::min<uint64_t>(tiles, 0xffffffffu));
+    check_image(config, request, s);
+    s.stride = divide_up(request.width, 4) * 4;
+    s.plane_floats = s.stride * request.height;
+    s.scan_block = 64 * config.subgroup;
+    s.scan_blocks = divide_up(std::max(request.splats, 1u), s.scan_block);
+    s.depth_sort = radix_cut(config, request.splats, 32);
+    // One more than there are tiles: the sentinel tile.
+    s.tile_sort = radix_cut(config, request.instances, uint32_t(std::bit_width(s.tiles)));
+    s.strip_rows = std::min(s.tiles_y, (config.loop_limit - s.tiles_y) / (s.tiles_x + 2));
+    s.image_planes = request.fifth_plane ? 5 : 4;
+
+    const uint64_t word = 4, texel = 16;
+    s.records = std::max<uint64_t>(request.splats, 1) * shared::RECORD_TEXELS * texel;
+    s.splat_words = std::max<uint64_t>(request.splats, 1) * word;
+    s.scan_totals = (uint64_t(s.scan_blocks) + 1) * word;
+    s.counters = std::max(counter_words(s.depth_sort), counter_words(s.tile_sort)) * word;
+    s.digit_totals = (shared::RADIX_DIGITS_MAX + 1) * word;
+    s.instance_words = std::max<uint64_t>(request.instances, 1) * word;
+    s.tile_starts = (uint64_t(s.tiles) + 2) * word;
+    s.planes = uint64_t(s.plane_floats) * s.image_planes * word;
+    if (request.gradients) {
+        const auto groups = passes::LossRows::Work::groups(config, {s.image(), 0, 0});
+        s.partials = groups[0] * groups[1] * groups[2] * (config.element_group / config.subgroup);
+        s.reduce_block = 64 * config.subgroup;
+        s.reduce_blocks = divide_up(s.partials, s.reduce_block);
+        s.target = uint64_t(s.plane_floats) * 3 * word;
+        s.masked = request.masks ? s.target : 0;
+        s.exposed = request.exposure ? s.target : 0;
+        s.exposure_blocks = divide_up(request.width * request.height, shared::EXPOSURE_BLOCK);
+        s.exposure_sums = request.exposure ? uint64_t(s.exposure_blocks) * shared::EXPOSURE_FLOATS * word : 0;
+        s.moments = uint64_t(s.plane_floats) * 3 * shared::MOMENT_PLANES * word;
+        s.derivatives = uint64_t(s.plane_floats) * 3 * shared::DERIVATIVE_PLANES * word;
+        s.image_gradient = s.target;
+        s.partial_sums = uint64_t(s.partials) * word;
+        s.reduced = uint64_t(s.reduce_blocks) * word;
+        s.slots = std::max<uint64_t>(request.instances, 1) * shared::SLOT_FLOATS * word;
+    }
+    return s;
+}
+
+uint64_t Sizes::total() const {
+    FrameBuffers none;
+    uint64_t sum = 0;
+    for (const Allocation& each : allocations(none, *this)) sum += each.buffers.size() * each.bytes;
+    return sum;
+}
 
 void FrameBuffers::reserve(gpu::Device& device, const passes::KernelConfig& config,
                            const FrameRequest& request) {
@@ -26,39 +154,12 @@ void FrameBuffers::reserve(gpu::Device& device, const passes::KernelConfig& conf
     instance_capacity = request.instances;
     if (!counts) counts = gpu::Buffer(device, "counts", sizeof(shared::Counts), Texel::none, false, true);
 
-    grow(device, records, "records", sizes.records, Texel::rgba32f);
-    for (auto& buffer : depth_keys) grow(device, buffer, "depth keys", sizes.splat_words, Texel::rgba32ui);
-    for (auto& buffer : order) grow(device, buffer, "order", sizes.splat_words, Texel::rgba32ui);
-    grow(device, tile_counts, "tile counts", sizes.splat_words);
-    grow(device, prefix, "prefix", sizes.splat_words);
-    grow(device, scan_totals, "scan totals", sizes.scan_totals);
-    grow(device, counters, "counters", sizes.counters);
-    grow(device, counter_prefix, "counter prefix", sizes.counters);
-    grow(device, digit_totals, "digit totals", sizes.digit_totals);
-    for (auto& buffer : instance_keys)
-        grow(device, buffer, "instance keys", sizes.instance_words, Texel::rgba32ui);
-    for (auto& buffer : instance_splats)
-        grow(device, buffer, "instance splats", sizes.instance_words, Texel::rgba32ui);
-    grow(device, tile_starts, "tile starts", sizes.tile_starts);
-    // Without gradients no pass reads where a splat's instances begin, but the binding needs a buffer.
-    grow(device, first_instances, "first instances", request.gradients ? sizes.splat_words : 16);
-
-    grow(device, planes, "planes", sizes.planes, Texel::rgba32f);
-    if (request.gradients) {
-        grow(device, target, "target", sizes.target, Texel::rgba32f);
-        grow(device, exposed, "exposed", sizes.exposed, Texel::rgba32f);
-        grow(device, masked, "masked", sizes.masked, Texel::rgba32f);
-        grow(device, moments, "moments", sizes.moments, Texel::rgba32f);
-        grow(device, derivatives, "derivatives", sizes.derivatives, Texel::rgba32f);
-        grow(device, blurred, "blurred", sizes.derivatives, Texel::rgba32f);
-        grow(device, image_gradient, "image gradient", sizes.image_gradient, Texel::rgba32f);
-        grow(device, partials, "partials", sizes.partial_sums);
-        grow(device, exposure_sums, "exposure sums", sizes.exposure_sums);
-        grow(device, reduced, "reduced", sizes.reduced);
-        for (auto& buffer : sorted_indices)
-            grow(device, buffer, "sorted indices", sizes.instance_words, Texel::rgba32ui);
-        grow(device, slots, "slots", sizes.slots, Texel::rgba32f);
-    }
+    for (const Allocation& each : allocations(*this, sizes))
+        for (gpu::Buffer& buffer : each.buffers) {
+            if (each.bytes == 0 || (buffer && buffer.bytes() >= each.bytes)) continue;
+            buffer = gpu::Buffer();  // free the old one first: its contents are not needed
+            buffer = gpu::Buffer(device, each.name, each.bytes, each.texel);
+        }
     // The loss reads the columns between an image's width and its stride as black. No pass writes them.
     if (old.plane_floats != sizes.plane_floats || old.stride != sizes.stride ||
         old.image_planes != sizes.image_planes) {
@@ -73,6 +174,18 @@ shared::Counts FrameBuffers::read_counts() const {
     shared::Counts result;
     std::memcpy(&result, counts.mapped(), sizeof(result));
     return result;
+}
+
+uint32_t first_capacity(size_t splats) {
+    return uint32_t(std::min<size_t>(std::max<size_t>(8 * splats, 4096), 1u << 24));
+}
+
+uint32_t grown_capacity(uint32_t needed) {
+    constexpr uint32_t kMost = 0xe0000000u;
+    if (needed > kMost)
+        throw RunError(
+            "more than 3.7 billion (splat, tile) pairs in one picture; --downscale makes them fewer");
+    return uint32_t(std::min<uint64_t>(uint64_t(needed) + needed / 4, kMost));
 }
 
 }  // namespace ewa::pipeline

@@ -1,11 +1,55 @@
 // SPDX-License-Identifier: Apache-2.0
-// The device buffers of one frame, apart from the model.
+// The device buffers of one frame, apart from the model. The sizes of all buffers and dispatches come from one
+// pure function.
 #pragma once
-#include "gpu/buffer.h"
-#include "pipeline/sizes.h"
-#include "shared/layouts.h"
+#include <cstdint>
+
+#include "gpu/executor.h"
+#include "passes/pass.h"
 
 namespace ewa::pipeline {
+
+struct FrameRequest {
+    uint32_t splats = 0;
+    uint32_t width = 0, height = 0;  // px
+    uint32_t instances = 0;          // capacity for (splat, tile) pairs
+    bool gradients = false;
+    bool fifth_plane = false;  // of the image: depth or count
+    bool masks = false;        // with gradients: some pixels count less
+    bool exposure = false;     // with gradients: a training image's exposure is applied before the loss
+};
+
+struct RadixCut {
+    uint32_t lanes = 0;
+    uint32_t passes = 0, bits = 0;  // of each pass
+};
+
+struct Sizes {
+    uint32_t width = 0, height = 0;  // px
+    uint32_t tiles_x = 0, tiles_y = 0, tiles = 0;
+    uint32_t stride = 0, plane_floats = 0;     // of an image plane
+    uint32_t scan_block = 0, scan_blocks = 0;  // of the prefix sum over tile counts
+    RadixCut depth_sort, tile_sort;
+    uint32_t strip_rows = 0;  // tile rows of an emitting lane
+    uint32_t image_planes = 0;
+    uint32_t partials = 0;  // partial sums of a loss kernel
+    uint32_t reduce_block = 0, reduce_blocks = 0;
+    uint32_t exposure_blocks = 0;  // of pixels, for the gradient of the exposure
+
+    // Bytes.
+    uint64_t records = 0, splat_words = 0, scan_totals = 0, counters = 0, digit_totals = 0;
+    uint64_t instance_words = 0, tile_starts = 0, planes = 0, target = 0;
+    uint64_t masked = 0, exposed = 0, moments = 0, derivatives = 0, image_gradient = 0, partial_sums = 0,
+             exposure_sums = 0, reduced = 0, slots = 0;
+
+    uint64_t total() const;  // of all buffers of a frame with this request
+
+    shared::ImageLayout image() const { return {{width, height}, stride, plane_floats}; }
+};
+
+/// Throws InputError that names the limit if the image is empty, or larger than tile indices
+/// and loop limits allow.
+Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request);
 
 struct FrameBuffers {
     Sizes sizes;  // of the last request
@@ -25,5 +69,26 @@ struct FrameBuffers {
     /// The counts of the last submission.
     shared::Counts read_counts() const;
 };
+
+/// Capacity for (splat, tile) instances of a first try: most scenes have a few tiles a splat.
+uint32_t first_capacity(size_t splats);
+
+/// The next capacity if a frame needs `needed`. Throws RunError beyond what an image can have.
+uint32_t grown_capacity(uint32_t needed);
+
+/// Runs a frame, with more capacity each time, until its instances fit. record: fills a recording.
+template <class Record>
+shared::Counts run_until_it_fits(passes::PassCache& cache, gpu::Executor& executor, FrameBuffers& frame,
+                                 FrameRequest request, Record record) {
+    for (;;) {
+        frame.reserve(cache.device(), cache.config(), request);
+        gpu::Recording recording(cache.device().limits());
+        record(recording);
+        executor.run(recording, true);
+        const shared::Counts counts = frame.read_counts();
+        if (counts.instances <= frame.instance_capacity) return counts;
+        request.instances = grown_capacity(counts.instances);
+    }
+}
 
 }  // namespace ewa::pipeline

@@ -12,17 +12,16 @@ namespace {
 template <class Scene, class Visit>
 void for_each_value(Scene& g, Visit visit) {
     const uint32_t planes = parameter_planes(g.sh_degree);
-    const size_t sh = g.sh_stride();
+    const auto each = [&](size_t i, uint32_t first, size_t count, auto& values) {
+        for (size_t c = 0; c < count; ++c)
+            visit(parameter_index(planes, first + uint32_t(c), i), values[count * i + c]);
+    };
     for (size_t i = 0; i < g.size(); ++i) {
-        for (uint32_t c = 0; c < 3; ++c)
-            visit(parameter_index(planes, shared::PARAM_MEAN + c, i), g.means[3 * i + c]);
-        visit(parameter_index(planes, shared::PARAM_OPACITY, i), g.opacity_logits[i]);
-        for (uint32_t c = 0; c < 4; ++c)
-            visit(parameter_index(planes, shared::PARAM_QUATERNION + c, i), g.quaternions[4 * i + c]);
-        for (uint32_t c = 0; c < 3; ++c)
-            visit(parameter_index(planes, shared::PARAM_LOG_SCALE + c, i), g.log_scales[3 * i + c]);
-        for (uint32_t c = 0; c < sh; ++c)
-            visit(parameter_index(planes, shared::PARAM_SH + c, i), g.sh[sh * i + c]);
+        each(i, shared::PARAM_MEAN, 3, g.means);
+        each(i, shared::PARAM_OPACITY, 1, g.opacity_logits);
+        each(i, shared::PARAM_QUATERNION, 4, g.quaternions);
+        each(i, shared::PARAM_LOG_SCALE, 3, g.log_scales);
+        each(i, shared::PARAM_SH, g.sh_stride(), g.sh);
     }
 }
 

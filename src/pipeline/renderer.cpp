@@ -7,13 +7,7 @@
 #include <cstring>
 
 #include "ewa/error.h"
-#include "gpu/executor.h"
-#include "passes/blend.h"
 #include "pipeline/backward.h"
-#include "pipeline/camera_block.h"
-#include "pipeline/capacity.h"
-#include "pipeline/photo.h"
-#include "pipeline/plan.h"
 
 namespace ewa {
 namespace {
@@ -30,14 +24,6 @@ Gaussians with_degree(const Gaussians& gaussians, int degree) {
     for (size_t i = 0; i < gaussians.size(); ++i)
         std::copy_n(&gaussians.sh[i * from], to, &result.sh[i * to]);
     return result;
-}
-
-gpu::Buffer upload_camera(gpu::Device& device, const Camera& camera, const passes::KernelConfig& config,
-                          const glm::dvec3& origin) {
-    const shared::CameraBlock block = camera_block(camera, config, origin);
-    gpu::Buffer buffer(device, "camera", sizeof(block), gpu::Texel::none, true);
-    buffer.upload(std::span<const shared::CameraBlock>(&block, 1));
-    return buffer;
 }
 
 /// Copies one plane into one channel of an image.
@@ -100,10 +86,7 @@ struct Renderer::State {
 template <class Record>
 void Renderer::State::submit(const Camera& camera, const Plan& plan, const RenderOptions& look, Record then) {
     const gpu::Buffer block = upload_camera(*device, camera, cache.config(), model.origin);
-    const FrameInputs inputs{
-        .camera = {.buffer = &block, .width = uint32_t(camera.width), .height = uint32_t(camera.height)},
-        .background = look.background,
-        .sh_degree = look.sh_degree};
+    const FrameInputs inputs = inputs_of(block, camera, look);
     const FrameRequest size{.splats = model.splats,
                             .width = inputs.camera.width,
                             .height = inputs.camera.height,
@@ -130,17 +113,16 @@ Rendering Renderer::State::draw(const Camera& camera, const Plan& plan, const Re
     submit(camera, plan, look, [](gpu::Recording&) {});
     const Sizes& sizes = frame.sizes;
     const auto planes = frame.planes.download<float>(sizes.planes / 4);
-    Rendering result{Image(camera.width, camera.height, 3), Image(camera.width, camera.height, 1), {}, {}};
-    for (int c = 0; c < 3; ++c) copy_plane(planes, sizes, shared::PLANE_R + uint32_t(c), result.color, c);
-    copy_plane(planes, sizes, shared::PLANE_T, result.alpha, 0);
+    const auto image_of = [&](uint32_t first, int count) {
+        Image image(camera.width, camera.height, count);
+        for (int c = 0; c < count; ++c) copy_plane(planes, sizes, first + uint32_t(c), image, c);
+        return image;
+    };
+    Rendering result{image_of(shared::PLANE_R, 3), image_of(shared::PLANE_T, 1), {}, {}};
     for (float& value : result.alpha.pixels) value = 1.0f - value;
-    if (plan.drawing == Drawing::count) {
-        result.count = Image(camera.width, camera.height, 1);
-        copy_plane(planes, sizes, shared::PLANE_COUNT, result.count, 0);
-    }
+    if (plan.drawing == Drawing::count) result.count = image_of(shared::PLANE_COUNT, 1);
     if (plan.drawing == Drawing::depth) {
-        result.depth = Image(camera.width, camera.height, 1);
-        copy_plane(planes, sizes, shared::PLANE_DEPTH, result.depth, 0);
+        result.depth = image_of(shared::PLANE_DEPTH, 1);
         for (size_t i = 0; i < result.depth.pixels.size(); ++i)
             if (result.alpha.pixels[i] > 0) result.depth.pixels[i] /= result.alpha.pixels[i];
     }
@@ -199,17 +181,14 @@ uint32_t Renderer::splats_drawn() const {
 }
 
 std::vector<PassTime> Renderer::pass_times() const {
-    std::vector<PassTime> times;
-    for (const gpu::Timing& timing : state_->executor.timings())
-        times.push_back({timing.name, timing.milliseconds});
-    return times;
+    return state_->executor.timings();
 }
 
 LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians,
                            const Camera& camera, const Image& target, const RenderOptions& options,
                            bool alpha_is_weight) {
     if (target.width != camera.width || target.height != camera.height || target.channels < 3)
-        throw InputError("the photograph is " + std::to_string(target.width) + "x" +
+        throw InputError("the training image is " + std::to_string(target.width) + "x" +
                          std::to_string(target.height) + " with " + std::to_string(target.channels) +
                          " channels, the camera " + std::to_string(camera.width) + "x" +
                          std::to_string(camera.height) + " RGB");
@@ -222,10 +201,7 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
     const Model model = upload_model(*device, gaussians, 1, false);
     const gpu::Buffer block = upload_camera(*device, camera, cache.config(), model.origin);
     const gpu::Buffer photo = upload_photo(*device, target);
-    const FrameInputs inputs{
-        .camera = {.buffer = &block, .width = uint32_t(camera.width), .height = uint32_t(camera.height)},
-        .background = options.background,
-        .sh_degree = options.sh_degree};
+    const FrameInputs inputs = inputs_of(block, camera, options);
     const FrameRequest size{.splats = model.splats,
                             .width = inputs.camera.width,
                             .height = inputs.camera.height,

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The device-wide building blocks of a frame: prefix sum, and stable radix sort of (key, value) pairs.
 #pragma once
-#include "passes/sort.h"
-#include "pipeline/sizes.h"
+#include "pipeline/frame_buffers.h"
 
 namespace ewa::pipeline {
 

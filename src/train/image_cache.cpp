@@ -7,8 +7,7 @@
 
 #include "core/random.h"
 #include "ewa/error.h"
-#include "pipeline/camera_block.h"
-#include "pipeline/photo.h"
+#include "pipeline/frame_inputs.h"
 
 namespace ewa::train {
 

@@ -5,10 +5,9 @@
 #include "ewa/trainer.h"
 #include "gpu/device.h"
 #include "passes/kernel_config.h"
-#include "pipeline/capacity.h"
+#include "pipeline/frame_buffers.h"
+#include "pipeline/frame_inputs.h"
 #include "pipeline/model.h"
-#include "pipeline/photo.h"
-#include "pipeline/sizes.h"
 #include "train/schedule.h"
 
 namespace ewa {

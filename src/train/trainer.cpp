@@ -16,9 +16,8 @@
 #include "ewa/splat_edit.h"
 #include "gpu/executor.h"
 #include "pipeline/backward.h"
-#include "pipeline/capacity.h"
-#include "pipeline/densify.h"
-#include "pipeline/mcmc.h"
+#include "pipeline/frame_buffers.h"
+#include "pipeline/strategy.h"
 #include "train/image_cache.h"
 #include "train/initial_splats.h"
 #include "train/schedule.h"
@@ -94,7 +93,7 @@ struct Trainer::State {
     Exposures exposures;
     uint32_t instance_capacity;
     StepReport report;
-    std::deque<std::vector<gpu::Timing>> timings;
+    std::deque<std::vector<PassTime>> timings;
 
     State(std::shared_ptr<gpu::Device> d, const Dataset& dataset, const std::vector<int>& frames,
           const Gaussians& start, const Gaussians& ready, const TrainOptions& o)
@@ -335,10 +334,10 @@ std::vector<PassTime> Trainer::pass_times() const {
     std::vector<PassTime> result;
     std::map<std::string, std::vector<double>> samples;
     for (const auto& step : state_->timings)
-        for (const gpu::Timing& timing : step) {
-            auto& values = samples[timing.name];
-            if (values.empty()) result.push_back({timing.name, 0});
-            values.push_back(timing.milliseconds);
+        for (const PassTime& time : step) {
+            auto& values = samples[time.pass];
+            if (values.empty()) result.push_back({time.pass, 0});
+            values.push_back(time.milliseconds);
         }
     for (PassTime& time : result) {
         auto& values = samples[time.pass];

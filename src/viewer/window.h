@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "gpu/vulkan.h"
+#include "gpu/device.h"
 #include "viewer/byte_image.h"
 
 struct GLFWwindow;

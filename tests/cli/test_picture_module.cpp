@@ -119,7 +119,19 @@ TEST_F(PictureModule, OfAnotherVersionIsRefused) {
 
 TEST_F(PictureModule, WithoutItsEntryIsRefused) {
     std::filesystem::copy_file(EWA_FAULTS_LIBRARY, module_);
-    expect_failure(compare(), 1, "ewa_openimageio_module");
+    expect_failure(compare(), 1, "it belongs to another build of ewa");
+}
+
+/// The same version does not mean the same layout: both may be builds of one day's work.
+TEST_F(PictureModule, OfAnotherLayoutIsRefused) {
+    std::string bytes = read_file(EWA_OPENIMAGEIO_MODULE);
+    const std::string entry = "ewa_openimageio_layout_";
+    size_t found = 0;
+    for (size_t at = bytes.find(entry); at != std::string::npos; at = bytes.find(entry, at + 1), ++found)
+        bytes[at + entry.size()] = '0';
+    ASSERT_GT(found, 0u);
+    test::write_file(module_, bytes);
+    expect_failure(compare(), 1, "it belongs to another build of ewa");
 }
 
 }  // namespace

@@ -9,8 +9,7 @@
 #include "ewa/dataset.h"
 #include "ewa/error.h"
 #include "input.h"
-#include "io/datasets/colmap.h"
-#include "io/datasets/transforms.h"
+#include "io/datasets/image_records.h"
 
 namespace {
 

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "ewa/error.h"
-#include "image/codecs.h"
+#include "image/image_files.h"
 #include "input.h"
 
 namespace {
@@ -71,8 +71,7 @@ void decode(const std::string& bytes, const Read& read) {
 void read_picture(const std::string& path, const std::string& bytes) {
     const image::Format* format = image::format_of(bytes);
     if (!format) return;
-    if (!format->by_openimageio())
-        return decode(bytes, format->name == "png" ? image::read_png : image::read_jpeg);
+    if (format->read) return decode(bytes, format->read);
     if (!format->probe) return;
     // A probe takes no memory by what the file claims.
     fuzz::read_within(bytes.size(), 1, [&] {

@@ -1,35 +1,35 @@
 // SPDX-License-Identifier: Apache-2.0
-// Blending and its gradient alone, on records and tile lists from the twin.
+// Blending and its gradient alone, on records and tile lists from the CPU reference.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "gpu/guarded.h"
-#include "gpu/twin_inputs.h"
-#include "passes/blend.h"
-#include "pipeline/sizes.h"
+#include "gpu/reference_inputs.h"
+#include "passes/passes.h"
+#include "pipeline/frame_buffers.h"
 #include "reference/blend.h"
 
 namespace ewa::test {
 namespace {
 
-/// The twin's picture and its lists as the device's buffers hold them.
+/// The CPU reference's picture and its lists as the device's buffers hold them.
 struct Lists {
     Scene scene;
-    reference::Picture twin;
+    reference::Picture cpu;
     pipeline::Sizes sizes;
     Guarded records, splats, starts;
 
     explicit Lists(const Scene& s, size_t promised = 0)
         : scene(s),
-          twin(reference::render(s.gaussians, s.camera, s.options, twin_tiles(rig().config()))),
+          cpu(reference::render(s.gaussians, s.camera, s.options, reference_tiles(rig().config()))),
           sizes(pipeline::sizes_for(rig().config(), request())),
-          records("records", pack_records(twin.projected), gpu::Texel::rgba32f),
-          splats("splats", words([&](size_t k) { return twin.instances.sorted[k].splat; })),
-          starts("starts", bounds(twin.instances, promised)) {}
+          records("records", pack_records(cpu.projected), gpu::Texel::rgba32f),
+          splats("splats", words([&](size_t k) { return cpu.instances.sorted[k].splat; })),
+          starts("starts", bounds(cpu.instances, promised)) {}
 
-    size_t count() const { return twin.instances.sorted.size(); }
+    size_t count() const { return cpu.instances.sorted.size(); }
     pipeline::FrameRequest request() const {
         return {uint32_t(scene.gaussians.size()),
                 uint32_t(scene.camera.width),
@@ -94,7 +94,7 @@ struct Difference {
 
 class BlendPass : public testing::TestWithParam<Case> {};
 
-TEST_P(BlendPass, PlanesAreTheTwins) {
+TEST_P(BlendPass, PlanesMatchTheReference) {
     const Case& c = GetParam();
     const Lists lists(random_scene(1500 + c.splats, c.splats, c.kind, c.width, c.height));
     Rig& r = rig();
@@ -117,7 +117,7 @@ TEST_P(BlendPass, PlanesAreTheTwins) {
                     return double(
                         actual[p * lists.sizes.plane_floats + size_t(y) * lists.sizes.stride + size_t(x)]);
                 };
-                const reference::Blended& b = lists.twin.blended;
+                const reference::Blended& b = lists.cpu.blended;
                 for (int k = 0; k < 3; ++k)
                     color.add(std::abs(plane(uint32_t(k)) - b.color.at(x, y)[k]), 4e-6);
                 color.add(std::abs(plane(shared::PLANE_T) - b.transmittance.at(x, y)[0]), 4e-6);
@@ -138,7 +138,7 @@ TEST_P(BlendPass, PlanesAreTheTwins) {
     }
 }
 
-TEST_P(BlendPass, CountsAreTheTwins) {
+TEST_P(BlendPass, CountsMatchTheReference) {
     const Case& c = GetParam();
     const Lists lists(random_scene(1500 + c.splats, c.splats, c.kind, c.width, c.height));
     Rig& r = rig();
@@ -154,13 +154,13 @@ TEST_P(BlendPass, CountsAreTheTwins) {
         for (int x = 0; x < c.width; ++x) {
             const float count = actual[shared::PLANE_COUNT * lists.sizes.plane_floats +
                                        size_t(y) * lists.sizes.stride + size_t(x)];
-            different += count != float(lists.twin.blended.blended[size_t(y) * size_t(c.width) + size_t(x)]);
+            different += count != float(lists.cpu.blended.blended[size_t(y) * size_t(c.width) + size_t(x)]);
         }
     // Contributions that lie within rounding of the cut or of the stop.
     EXPECT_LE(different, size_t(c.width) * size_t(c.height) / 50);
 }
 
-TEST_P(BlendPass, EllipsoidsAreTheTwins) {
+TEST_P(BlendPass, EllipsoidsMatchTheReference) {
     const Case& c = GetParam();
     const Lists lists(random_scene(1500 + c.splats, c.splats, c.kind, c.width, c.height));
     Rig& r = rig();
@@ -171,7 +171,7 @@ TEST_P(BlendPass, EllipsoidsAreTheTwins) {
     });
     EXPECT_TRUE(out.intact());
     const reference::Raster expected =
-        reference::ellipsoids(lists.twin.projected, lists.twin.instances, lists.scene.options.background);
+        reference::ellipsoids(lists.cpu.projected, lists.cpu.instances, lists.scene.options.background);
     const auto actual = out.read<float>();
     Difference difference;
     for (int y = 0; y < c.height; ++y)
@@ -191,14 +191,14 @@ constexpr size_t kSums = 11;  // of a slot
 
 class BlendBackwardPass : public testing::TestWithParam<Case> {};
 
-TEST_P(BlendBackwardPass, SlotsAreTheTwinsMoments) {
+TEST_P(BlendBackwardPass, SlotsAreTheReferencesMoments) {
     const Case& c = GetParam();
     const Lists lists(random_scene(1600 + c.splats, c.splats, c.kind, c.width, c.height));
     Rig& r = rig();
     reference::Raster gradient(c.width, c.height, 3);
     Random random(c.splats);
     for (double& g : gradient.values) g = float(random.normal());
-    Guarded planes("planes", pack_planes(lists.twin.blended.color, 4, lists.sizes.stride),
+    Guarded planes("planes", pack_planes(lists.cpu.blended.color, 4, lists.sizes.stride),
                    gpu::Texel::rgba32f),
         incoming("image gradient", pack_planes(gradient, 3, lists.sizes.stride), gpu::Texel::rgba32f),
         slots("slots", std::max<uint64_t>(lists.count(), 1) * shared::SLOT_FLOATS * 4, gpu::Texel::rgba32f);
@@ -209,10 +209,10 @@ TEST_P(BlendBackwardPass, SlotsAreTheTwinsMoments) {
     });
     EXPECT_TRUE(slots.intact());
     const auto expected =
-        reference::blend_backward(lists.twin.projected, lists.twin.instances, lists.twin.blended, gradient);
+        reference::blend_backward(lists.cpu.projected, lists.cpu.instances, lists.cpu.blended, gradient);
     const auto actual = slots.read<float>();
     const auto splat_of = [&](size_t k) -> const reference::Projected& {
-        return lists.twin.projected[lists.twin.instances.sorted[k].splat];
+        return lists.cpu.projected[lists.cpu.instances.sorted[k].splat];
     };
     // Of each of the sums: largest error over the largest value in the picture.
     std::array<double, kSums> largest{}, error{};
@@ -268,7 +268,7 @@ TEST(BlendBackwardSlots, BehindTheLastTileAreZero) {
         for (size_t j = 0; j < 9; ++j) EXPECT_EQ(written[shared::SLOT_FLOATS * k + j], 0.0f) << k << ' ' << j;
 }
 
-/// A picture of 8 x 8 pixels and its gradient against the twin's. Returns how many slots hold nothing but
+/// A picture of 8 x 8 pixels and its gradient against the CPU reference's. Returns how many slots hold nothing but
 /// zero.
 size_t check_one_tile(const Scene& scene) {
     const Lists lists(scene);
@@ -292,7 +292,7 @@ size_t check_one_tile(const Scene& scene) {
         for (int x = 0; x < 8; ++x)
             for (int k = 0; k < 3; ++k)
                 worst = std::max(worst, std::abs(double(actual[size_t(k) * 64 + size_t(y) * 8 + size_t(x)]) -
-                                                 lists.twin.blended.color.at(x, y)[k]));
+                                                 lists.cpu.blended.color.at(x, y)[k]));
     printf("    %zu instances, worst %.1e\n", lists.count(), worst);
     EXPECT_LT(worst, 2e-5);  // a thousand products of T, each rounded
     const auto written = slots.read<float>();

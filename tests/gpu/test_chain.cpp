@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The whole chain on the device against the float64 twin: pictures, and gradients of the loss.
+// The whole chain on the device against the float64 CPU reference: pictures, and gradients of the loss.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -73,19 +73,19 @@ Errors compare(const Image& actual, const reference::Raster& expected, double bo
     return errors;
 }
 
-TEST_P(Chain, PictureIsTheTwins) {
+TEST_P(Chain, PictureMatchesTheReference) {
     Renderer renderer(device(), gaussians, options);
     const Rendering rendering = renderer.render(camera, true);
-    const reference::Picture twin = reference::render(gaussians, camera, options);
-    const Errors color = compare(rendering.color, twin.blended.color, 1e-5);
+    const reference::Picture cpu = reference::render(gaussians, camera, options);
+    const Errors color = compare(rendering.color, cpu.blended.color, 1e-5);
     RecordProperty("worst", std::to_string(color.worst));
     printf("    worst %.2e, over 1e-5: %zu of %zu\n", color.worst, color.over, color.pixels);
     EXPECT_LE(color.over, color.pixels / 1000);
     EXPECT_LT(color.worst, 1.0 / 255 + 1e-5);
-    EXPECT_EQ(renderer.skipped_nonfinite(), twin.skipped_nonfinite);
+    EXPECT_EQ(renderer.skipped_nonfinite(), cpu.skipped_nonfinite);
 }
 
-TEST_P(Chain, GradientIsTheTwins) {
+TEST_P(Chain, GradientMatchesTheReference) {
     const LossGradient actual = loss_gradient(device(), gaussians, camera, target, options);
     const auto expected = reference::loss_gradient(gaussians, camera, target, options);
     EXPECT_NEAR(actual.loss, expected.loss, 1e-6);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Adaptive density control and the opacity reset on the device against the twin.
+// Adaptive density control and the opacity reset on the device against the CPU reference.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,11 +9,11 @@
 
 #include "core/random.h"
 #include "gpu/guarded.h"
-#include "gpu/twin_inputs.h"
-#include "passes/strategy.h"
-#include "pipeline/densify.h"
-#include "pipeline/sizes.h"
+#include "gpu/reference_inputs.h"
+#include "passes/passes.h"
+#include "pipeline/frame_buffers.h"
 #include "pipeline/sorting.h"
+#include "pipeline/strategy.h"
 #include "reference/strategy.h"
 
 namespace ewa::test {
@@ -26,23 +26,23 @@ using reference::Decision;
 struct Start {
     Gaussians gaussians;
     std::vector<float> moments1, moments2, statistics;
-    reference::DensifyStatistics twin;
+    reference::DensifyStatistics cpu;
     pipeline::Model model;
 
     Start(uint64_t seed, size_t splats, int sh_degree) {
         const Camera camera = random_camera(seed, 64, 48);
         gaussians = random_gaussians(seed, splats, SplatKind::ordinary, camera, sh_degree);
         Random random(seed);
-        twin = reference::DensifyStatistics(splats);
+        cpu = reference::DensifyStatistics(splats);
         for (size_t i = 0; i < splats; ++i) {
             gaussians.opacity_logits[i] = float(random.uniform(-9, 3));
             const double scale = std::log(random.uniform(0.004, 0.4));
             for (size_t k = 0; k < 3; ++k)
                 gaussians.log_scales[3 * i + k] = float(scale - random.uniform(0, 1));
-            twin.views[i] = uint32_t(random.integer(0, 3));
-            const float sum = float(random.uniform(0, 5e-4)) * float(twin.views[i]);
-            twin.gradient_sum[i] = sum;
-            statistics.insert(statistics.end(), {sum, float(twin.views[i])});
+            cpu.views[i] = uint32_t(random.integer(0, 3));
+            const float sum = float(random.uniform(0, 5e-4)) * float(cpu.views[i]);
+            cpu.gradient_sum[i] = sum;
+            statistics.insert(statistics.end(), {sum, float(cpu.views[i])});
         }
         model = pipeline::upload_model(*device(), gaussians, 2, true);
         moments1.resize(model.moments1.bytes() / 4);
@@ -77,7 +77,7 @@ reference::DensifyOptions options_for(const DensifyRules& rules) {
     return options;
 }
 
-/// What the device is to write: the twin's decisions, what each splat becomes side by side in the old order.
+/// What the device is to write: the CPU reference's decisions, what each splat becomes side by side in the old order.
 struct Expected {
     reference::Values values;
     std::vector<uint32_t> source;
@@ -85,7 +85,7 @@ struct Expected {
 };
 Expected expected_of(const Start& start, const DensifyRules& rules) {
     const reference::Values old = reference::to_double(start.gaussians);
-    const auto decisions = decide(old, start.twin, options_for(rules));
+    const auto decisions = decide(old, start.cpu, options_for(rules));
     Expected out;
     std::vector<reference::Splat> splats;
     const auto add = [&](const reference::Splat& splat, size_t i, bool fresh) {
@@ -109,7 +109,7 @@ Expected expected_of(const Start& start, const DensifyRules& rules) {
     return out;
 }
 
-pipeline::DensifyResult run_densify(pipeline::Model& model, const DensifyRules& rules) {
+pipeline::Refinement run_densify(pipeline::Model& model, const DensifyRules& rules) {
     Rig& r = rig();
     GuardedFrame guarded(r.config(), {model.splats, 16, 16, 1, true, false});
     const auto result = densify(r.cache, r.executor, model, guarded.frame, rules);
@@ -124,7 +124,7 @@ struct DensifyCase {
 };
 class Densify : public testing::TestWithParam<DensifyCase> {};
 
-TEST_P(Densify, WritesTheTwinsNextGeneration) {
+TEST_P(Densify, WritesTheReferencesNextGeneration) {
     const auto [splats, degree, revised] = GetParam();
     Start start(2000 + splats, splats, degree);
     DensifyRules rules = rules_for(1u << 20);
@@ -168,14 +168,14 @@ INSTANTIATE_TEST_SUITE_P(Sizes, Densify,
                          testing::Values(DensifyCase{3, 0}, DensifyCase{1500, 0}, DensifyCase{777, 1},
                                          DensifyCase{300, 3}, DensifyCase{1500, 0, true}));
 
-/// The kernel that writes, on its own: nothing past the room it was given.
-TEST(DensifyEdges, WritesNothingPastItsRoom) {
+/// The kernel that writes, on its own: nothing past its capacity.
+TEST(DensifyEdges, WritesNothingPastItsCapacity) {
     Start start(2100, 500, 1);
     Rig& r = rig();
     GuardedFrame guarded(r.config(), {500, 16, 16, 1, true, false});
     pipeline::FrameBuffers& frame = guarded.frame;
     const DensifyRules rules = rules_for(0);
-    const uint32_t room = 200;
+    const uint32_t capacity = 200;
     const auto push = [&](uint32_t new_capacity) {
         return shared::DensifyPush{500,
                                    start.model.planes(),
@@ -189,7 +189,7 @@ TEST(DensifyEdges, WritesNothingPastItsRoom) {
                                    3,
                                    0};
     };
-    const uint64_t bytes = pipeline::parameter_bytes(room, 1);
+    const uint64_t bytes = pipeline::parameter_bytes(capacity, 1);
     Guarded params("params", bytes), moments1("moments1", bytes), moments2("moments2", bytes);
     r.run([&](gpu::Recording& recording) {
         r.cache.get<passes::DensifyDecide>().record(
@@ -201,9 +201,9 @@ TEST(DensifyEdges, WritesNothingPastItsRoom) {
             .record(recording,
                     {start.model.params, start.model.moments1, start.model.moments2, start.model.statistics,
                      frame.prefix, frame.scan_totals, params, moments1, moments2},
-                    push(room));
+                    push(capacity));
     });
-    EXPECT_GT(frame.read_counts().scan_total, room);
+    EXPECT_GT(frame.read_counts().scan_total, capacity);
     expect_intact({&params, &moments1, &moments2});
     EXPECT_TRUE(guarded.intact());
     for (const uint32_t word : params.read<uint32_t>()) EXPECT_NE(word, kPoison);  // and all of it is filled
@@ -217,7 +217,7 @@ TEST(DensifyEdges, TheCapIsReachedAndNotPassed) {
         auto options = options_for(rules);
         options.grow_gradient = 1e9;
         size_t kept = 0;
-        for (const Decision d : decide(old, start.twin, options)) kept += d != Decision::prune;
+        for (const Decision d : decide(old, start.cpu, options)) kept += d != Decision::prune;
         rules.max_splats = uint32_t(kept) + spare;
         const auto result = run_densify(start.model, rules);
         EXPECT_LE(result.after, rules.max_splats);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Exposures on the device against the twin: the picture the loss sees, the way back, and Adam's step.
+// Exposures on the device against the CPU reference: the picture the loss sees, the way back, and Adam's step.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -7,10 +7,9 @@
 #include <limits>
 
 #include "gpu/guarded.h"
-#include "gpu/twin_inputs.h"
+#include "gpu/reference_inputs.h"
 #include "pipeline/backward.h"
-#include "pipeline/exposure.h"
-#include "pipeline/photo.h"
+#include "pipeline/frame_inputs.h"
 #include "reference/adam.h"
 #include "reference/loss.h"
 
@@ -65,7 +64,7 @@ void run(Inputs& s, pipeline::FrameBuffers& frame, uint32_t visit, uint32_t inst
 
 class ExposedLoss : public testing::TestWithParam<std::pair<int, int>> {};
 
-TEST_P(ExposedLoss, GradientsAndAdamsStepAreTheTwins) {
+TEST_P(ExposedLoss, GradientsAndAdamsStepMatchTheReference) {
     const auto [width, height] = GetParam();
     Inputs s(width, height);
     GuardedFrame guarded(rig().config(), {1, uint32_t(width), uint32_t(height), 1, true, false, false, true});
@@ -79,7 +78,7 @@ TEST_P(ExposedLoss, GradientsAndAdamsStepAreTheTwins) {
         SCOPED_TRACE("visit " + std::to_string(visit));
         std::copy(values.begin(), values.end(), exposure.begin());
         const auto loss = reference::image_loss(reference::exposed(s.picture, exposure), s.target);
-        const auto twin = reference::exposed_backward(s.picture, exposure, loss.gradient);
+        const auto cpu = reference::exposed_backward(s.picture, exposure, loss.gradient);
         run(s, frame, visit);
         EXPECT_TRUE(guarded.intact());
         EXPECT_NEAR(frame.read_counts().l1, loss.l1, 1e-6);
@@ -90,7 +89,7 @@ TEST_P(ExposedLoss, GradientsAndAdamsStepAreTheTwins) {
         for (int c = 0; c < 3; ++c)
             for (int y = 0; y < height; ++y)
                 for (int x = 0; x < width; ++x) {
-                    const double e = twin.picture.at(x, y)[c];
+                    const double e = cpu.picture.at(x, y)[c];
                     const float a = gradient[size_t(c) * frame.sizes.plane_floats +
                                              size_t(y) * frame.sizes.stride + size_t(x)];
                     worst = std::max(worst, std::abs(a - e));
@@ -100,11 +99,11 @@ TEST_P(ExposedLoss, GradientsAndAdamsStepAreTheTwins) {
 
         std::vector<double> by_exposure(12);
         for (size_t k = 0; k < 12; ++k)
-            by_exposure[k] = twin.exposure[k] + kPull * (exposure[k] - identity[k]);
+            by_exposure[k] = cpu.exposure[k] + kPull * (exposure[k] - identity[k]);
         adam_step(values, by_exposure, adam, kRate, int(visit));
         const std::vector<Exposure> now = s.exposures.download();
         for (size_t k = 0; k < 12; ++k) EXPECT_NEAR(now[kPhoto][k], values[k], 2e-3 * kRate) << k;
-        EXPECT_EQ(now[0], s.start[0]);  // the other photographs'
+        EXPECT_EQ(now[0], s.start[0]);  // the other images'
         EXPECT_EQ(now[2], s.start[2]);
     }
     // The moments tell the gradient itself, where a step of Adam says little more than its sign.

@@ -11,10 +11,10 @@
 #include "ewa/error.h"
 #include "ewa/renderer.h"
 #include "gpu/guarded.h"
-#include "gpu/twin_inputs.h"
+#include "gpu/reference_inputs.h"
 #include "pipeline/backward.h"
-#include "pipeline/capacity.h"
-#include "pipeline/photo.h"
+#include "pipeline/frame_buffers.h"
+#include "pipeline/frame_inputs.h"
 
 namespace ewa::test {
 namespace {
@@ -27,7 +27,7 @@ struct Result {
     pipeline::Sizes sizes;
 };
 
-/// A picture, or a picture and the loss's gradient, with room for `capacity` instances.
+/// A picture, or a picture and the loss's gradient, with capacity for that many instances.
 Result run_frame(const Scene& scene, uint32_t capacity, bool gradients) {
     Rig& r = rig();
     const int width = scene.camera.width, height = scene.camera.height;
@@ -136,16 +136,16 @@ void expect_background(const Result& result, const Scene& scene) {
     EXPECT_EQ(worst_color(result, empty), 0);
 }
 
-/// Each tile's list: no tile of the twin's lists is missing, what they share stands in the same order, and
+/// Each tile's list: no tile of the CPU reference's lists is missing, what they share stands in the same order, and
 /// few are more.
-TEST(FrameLists, AreTheTwinsOrALittleMore) {
+TEST(FrameLists, AreTheReferencesOrALittleMore) {
     for (const SplatKind kind : {SplatKind::ordinary, SplatKind::mixed}) {
         const Scene scene = random_scene(3100, 1500, kind, 161, 119);
         const Result result = run_frame(scene, 200000, kind == SplatKind::mixed);
         ASSERT_LE(result.counts.instances, 200000u);
-        const auto twin =
-            reference::render(scene.gaussians, scene.camera, scene.options, twin_tiles(rig().config()));
-        const auto& lists = twin.instances;
+        const auto cpu =
+            reference::render(scene.gaussians, scene.camera, scene.options, reference_tiles(rig().config()));
+        const auto& lists = cpu.instances;
         ASSERT_EQ(lists.grid.count(), result.sizes.tiles);
         size_t missed = 0;
         for (uint32_t tile = 0; tile < result.sizes.tiles; ++tile) {
@@ -170,8 +170,8 @@ TEST(FrameEdges, NoSplatsOneSplatOddSizes) {
                 Scene scene = random_scene(3200 + splats, splats, SplatKind::ordinary, width, height, 1);
                 scene.gaussians.sh_degree = 1;
                 const Result result = run_frame(scene, 500, gradients);
-                const auto twin = reference::render(scene.gaussians, scene.camera, scene.options);
-                EXPECT_LT(worst_color(result, twin.blended.color), 1e-5);
+                const auto cpu = reference::render(scene.gaussians, scene.camera, scene.options);
+                EXPECT_LT(worst_color(result, cpu.blended.color), 1e-5);
                 EXPECT_EQ(result.counts.skipped_nonfinite, 0u);
                 if (gradients) expect_finite(result.gradient);
             }
@@ -194,9 +194,9 @@ TEST(FrameEdges, ThousandsOfTiles) {
     const Result result = run_frame(scene, 200000, false);
     ASSERT_LE(result.counts.instances, 200000u);
     EXPECT_GT(result.sizes.tiles, 10000u);
-    const auto twin = reference::render(scene.gaussians, scene.camera, scene.options);
+    const auto cpu = reference::render(scene.gaussians, scene.camera, scene.options);
     // One contribution at the cut is 1/255 of a colour of at most 3.
-    EXPECT_LT(worst_color(result, twin.blended.color), 3.0 / 255);
+    EXPECT_LT(worst_color(result, cpu.blended.color), 3.0 / 255);
 }
 
 TEST(FrameEdges, SplatsThatCoverTheImage) {
@@ -211,8 +211,8 @@ TEST(FrameEdges, SplatsThatCoverTheImage) {
     }
     const Result result = run_frame(scene, 20000, true);
     for (size_t i = 6; i < 12; ++i) EXPECT_EQ(result.tile_counts[i], result.sizes.tiles) << i;
-    const auto twin = reference::render(scene.gaussians, scene.camera, scene.options);
-    EXPECT_LT(worst_color(result, twin.blended.color), 1e-5);
+    const auto cpu = reference::render(scene.gaussians, scene.camera, scene.options);
+    EXPECT_LT(worst_color(result, cpu.blended.color), 1e-5);
     expect_finite(result.gradient);
 }
 
@@ -243,10 +243,10 @@ TEST(FrameEdges, RoomGrowsUntilTheInstancesFit) {
     ASSERT_LT(pipeline::first_capacity(3), 3 * 75 * 88u);
     Renderer renderer(device(), scene.gaussians, scene.options);
     const Rendering rendering = renderer.render(scene.camera);
-    const auto twin = reference::render(scene.gaussians, scene.camera, scene.options);
+    const auto cpu = reference::render(scene.gaussians, scene.camera, scene.options);
     double worst = 0;
     for (size_t i = 0; i < rendering.color.pixels.size(); ++i)
-        worst = std::max(worst, std::abs(rendering.color.pixels[i] - twin.blended.color.values[i]));
+        worst = std::max(worst, std::abs(rendering.color.pixels[i] - cpu.blended.color.values[i]));
     EXPECT_LT(worst, 1e-5);
 }
 
@@ -267,8 +267,8 @@ TEST(FrameEdges, EqualDepthsGoByIndex) {
             EXPECT_TRUE(before % 2 == after % 2 ? before < after : before % 2 == 0)
                 << before << " before " << after << " in tile " << tile;
         }
-    const auto twin = reference::render(scene.gaussians, scene.camera, scene.options);
-    EXPECT_LT(worst_color(result, twin.blended.color), 3.0 / 255);
+    const auto cpu = reference::render(scene.gaussians, scene.camera, scene.options);
+    EXPECT_LT(worst_color(result, cpu.blended.color), 3.0 / 255);
 }
 
 TEST(FrameEdges, TenThousandSplatsInOneTile) {
@@ -279,8 +279,8 @@ TEST(FrameEdges, TenThousandSplatsInOneTile) {
     }
     const Result result = run_frame(scene, 20000, true);
     EXPECT_GT(result.counts.instances, 5000u);
-    const auto twin = reference::render(scene.gaussians, scene.camera, scene.options);
-    EXPECT_LT(worst_color(result, twin.blended.color), 2e-4);  // a thousand rounded products of T
+    const auto cpu = reference::render(scene.gaussians, scene.camera, scene.options);
+    EXPECT_LT(worst_color(result, cpu.blended.color), 2e-4);  // a thousand rounded products of T
     expect_finite(result.gradient);
 }
 
@@ -330,8 +330,8 @@ TEST(FrameEdges, PoisonLeavesNoTrace) {
         EXPECT_EQ(actual.planes, expected.planes);
         EXPECT_EQ(actual.counts.instances, expected.counts.instances);
         // A colour that is not finite counts only where the splat is in front.
-        const auto twin = reference::render(g, poisoned.camera, poisoned.options);
-        EXPECT_EQ(actual.counts.skipped_nonfinite, twin.skipped_nonfinite);
+        const auto cpu = reference::render(g, poisoned.camera, poisoned.options);
+        EXPECT_EQ(actual.counts.skipped_nonfinite, cpu.skipped_nonfinite);
         EXPECT_GT(actual.counts.skipped_nonfinite, 180u);
         if (!gradients) continue;
         expect_finite(actual.gradient);

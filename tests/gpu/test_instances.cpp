@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Emission of (splat, tile) instances, and where each tile's begin, on inputs from the twin.
+// Emission of (splat, tile) instances, and where each tile's begin, on inputs from the CPU reference.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <numeric>
 
 #include "gpu/guarded.h"
-#include "gpu/twin_inputs.h"
-#include "passes/sort.h"
-#include "pipeline/sizes.h"
+#include "gpu/reference_inputs.h"
+#include "passes/passes.h"
+#include "pipeline/frame_buffers.h"
 
 namespace ewa::test {
 namespace {
@@ -17,14 +17,14 @@ struct Emitted {
     std::vector<uint32_t> keys, splats, first;
 };
 
-/// Runs the pass on the twin's records and order. counts: the tiles each splat is said to reach.
-Emitted run_emit(const Scene& scene, const reference::Picture& twin, const std::vector<uint32_t>& counts,
+/// Runs the pass on the CPU reference's records and order. counts: the tiles each splat is said to reach.
+Emitted run_emit(const Scene& scene, const reference::Picture& cpu, const std::vector<uint32_t>& counts,
                  bool with_first, uint32_t capacity, uint32_t strip_rows) {
     Rig& r = rig();
     const uint32_t splats = uint32_t(counts.size()), block = 100;
-    std::vector<uint32_t> order = twin.order;
+    std::vector<uint32_t> order = cpu.order;
     for (uint32_t i = 0; i < splats; ++i)
-        if (!twin.projected[i].visible) order.push_back(i);
+        if (!cpu.projected[i].visible) order.push_back(i);
     std::vector<uint32_t> prefix(splats), totals(splats / block + 2);
     uint32_t sum = 0;
     for (uint32_t rank = 0; rank < splats; ++rank) {
@@ -34,8 +34,8 @@ Emitted run_emit(const Scene& scene, const reference::Picture& twin, const std::
     }
     shared::Counts needed{};
     needed.instances = sum;
-    const auto& grid = twin.instances.grid;
-    Guarded records("records", pack_records(twin.projected), gpu::Texel::rgba32f), ranks("order", order),
+    const auto& grid = cpu.instances.grid;
+    Guarded records("records", pack_records(cpu.projected), gpu::Texel::rgba32f), ranks("order", order),
         tiles("tile counts", counts), prefixes("prefix", prefix), bases("totals", totals),
         device_counts("counts", std::vector<shared::Counts>{needed}), keys("keys", capacity * 4),
         values("splats", capacity * 4), first("first", splats * 4);
@@ -66,23 +66,23 @@ class Emit : public testing::TestWithParam<Case> {};
 TEST_P(Emit, ListsEveryExactTileAndFewMore) {
     const Case& c = GetParam();
     const Scene scene = random_scene(1300 + c.splats, c.splats, c.kind, c.width, c.height);
-    const auto twin =
-        reference::render(scene.gaussians, scene.camera, scene.options, twin_tiles(rig().config()));
-    const auto& grid = twin.instances.grid;
+    const auto cpu =
+        reference::render(scene.gaussians, scene.camera, scene.options, reference_tiles(rig().config()));
+    const auto& grid = cpu.instances.grid;
     // Each splat is promised a few tiles more than it has, which the pass must fill with the number behind
     // the last tile.
     std::vector<std::vector<uint32_t>> exact;
     std::vector<uint32_t> counts;
-    for (const auto& projected : twin.projected) {
+    for (const auto& projected : cpu.projected) {
         exact.push_back(covered_tiles(projected, grid));
         const uint32_t n = uint32_t(exact.back().size());
         counts.push_back(n ? n + n / 2 + 9 : 0);
     }
     const uint32_t capacity = std::accumulate(counts.begin(), counts.end(), 0u);
-    const Emitted out = run_emit(scene, twin, counts, true, capacity, c.strip_rows);
+    const Emitted out = run_emit(scene, cpu, counts, true, capacity, c.strip_rows);
     uint32_t at = 0;
     uint64_t exact_total = 0, listed_total = 0;
-    for (const uint32_t splat : twin.order) {
+    for (const uint32_t splat : cpu.order) {
         if (!counts[splat]) continue;
         EXPECT_EQ(out.first[splat], at) << "splat " << splat;
         std::vector<uint32_t> listed;
@@ -122,30 +122,30 @@ INSTANTIATE_TEST_SUITE_P(All, Emit,
 
 TEST(EmitEdges, NeverWritesPastAPromiseThatWasTooSmall) {
     const Scene scene = random_scene(1400, 200, SplatKind::ordinary, 160, 120);
-    const auto twin =
-        reference::render(scene.gaussians, scene.camera, scene.options, twin_tiles(rig().config()));
+    const auto cpu =
+        reference::render(scene.gaussians, scene.camera, scene.options, reference_tiles(rig().config()));
     std::vector<uint32_t> counts;
-    for (const auto& projected : twin.projected) {
-        const uint32_t n = uint32_t(covered_tiles(projected, twin.instances.grid).size());
+    for (const auto& projected : cpu.projected) {
+        const uint32_t n = uint32_t(covered_tiles(projected, cpu.instances.grid).size());
         counts.push_back(n > 1 ? n - 1 : n);
     }
     const uint32_t capacity = std::accumulate(counts.begin(), counts.end(), 0u);
-    const Emitted out = run_emit(scene, twin, counts, false, capacity, 2);
+    const Emitted out = run_emit(scene, cpu, counts, false, capacity, 2);
     uint32_t at = 0;
-    for (const uint32_t splat : twin.order)
+    for (const uint32_t splat : cpu.order)
         for (uint32_t j = 0; j < counts[splat]; ++j) ASSERT_EQ(out.splats[at++], splat);
     for (const uint32_t first : out.first) EXPECT_EQ(first, kPoison);  // asked for with gradients only
 }
 
 TEST(EmitEdges, WritesNothingWhereNotAllFit) {
     const Scene scene = random_scene(1401, 200, SplatKind::ordinary, 160, 120);
-    const auto twin =
-        reference::render(scene.gaussians, scene.camera, scene.options, twin_tiles(rig().config()));
+    const auto cpu =
+        reference::render(scene.gaussians, scene.camera, scene.options, reference_tiles(rig().config()));
     std::vector<uint32_t> counts;
-    for (const auto& projected : twin.projected)
-        counts.push_back(uint32_t(covered_tiles(projected, twin.instances.grid).size()));
+    for (const auto& projected : cpu.projected)
+        counts.push_back(uint32_t(covered_tiles(projected, cpu.instances.grid).size()));
     const uint32_t capacity = std::accumulate(counts.begin(), counts.end(), 0u) - 1;
-    const Emitted out = run_emit(scene, twin, counts, true, capacity, 100);
+    const Emitted out = run_emit(scene, cpu, counts, true, capacity, 100);
     for (const auto* words : {&out.keys, &out.splats, &out.first})
         for (const uint32_t word : *words) EXPECT_EQ(word, kPoison);
 }

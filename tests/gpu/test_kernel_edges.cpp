@@ -10,10 +10,9 @@
 #include "core/random.h"
 #include "ewa/renderer.h"
 #include "gpu/guarded.h"
-#include "gpu/twin_inputs.h"
-#include "passes/sort.h"
-#include "passes/strategy.h"
-#include "pipeline/mcmc.h"
+#include "gpu/reference_inputs.h"
+#include "passes/passes.h"
+#include "pipeline/strategy.h"
 #include "reference/strategy.h"
 
 namespace ewa::test {

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// The loss kernels against the twin, and the photograph's unpacking.
+// The loss kernels against the CPU reference, and the training image's unpacking.
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "gpu/guarded.h"
-#include "gpu/twin_inputs.h"
-#include "passes/loss.h"
+#include "gpu/reference_inputs.h"
+#include "passes/passes.h"
 #include "pipeline/backward.h"
-#include "pipeline/photo.h"
+#include "pipeline/frame_inputs.h"
 #include "reference/loss.h"
 
 namespace ewa::test {
@@ -16,7 +16,7 @@ namespace {
 
 struct Inputs {
     Image rendered, photo;            // RGB, beyond [0, 1] in places; RGBA
-    reference::Raster image, target;  // in double, the photograph over the background
+    reference::Raster image, target;  // in double, the training image over the background
     std::array<float, 3> background{0.2f, 0.5f, 0.8f};
 };
 
@@ -49,7 +49,7 @@ Inputs random_inputs(uint64_t seed, int width, int height) {
 
 class Loss : public testing::TestWithParam<std::pair<int, int>> {};
 
-TEST_P(Loss, ValueAndGradientAreTheTwins) {
+TEST_P(Loss, ValueAndGradientMatchTheReference) {
     const int width = GetParam().first, height = GetParam().second;
     const Inputs in = random_inputs(uint64_t(width * 1000 + height), width, height);
     Rig& r = rig();
@@ -64,12 +64,12 @@ TEST_P(Loss, ValueAndGradientAreTheTwins) {
     });
     EXPECT_TRUE(guarded.intact());
 
-    const reference::Loss twin = reference::image_loss(in.image, in.target);
+    const reference::Loss cpu = reference::image_loss(in.image, in.target);
     const shared::Counts counts = frame.read_counts();
     // A float32 sum in blocks of subgroups; the terms are of order one.
-    EXPECT_NEAR(counts.l1, twin.l1, 2e-7 + 1e-6 * twin.l1);
-    EXPECT_NEAR(counts.ssim, twin.ssim, 5e-7);  // each value divides small differences of moments
-    EXPECT_NEAR(pipeline::loss_of(counts), twin.loss, 1e-6);
+    EXPECT_NEAR(counts.l1, cpu.l1, 2e-7 + 1e-6 * cpu.l1);
+    EXPECT_NEAR(counts.ssim, cpu.ssim, 5e-7);  // each value divides small differences of moments
+    EXPECT_NEAR(pipeline::loss_of(counts), cpu.loss, 1e-6);
 
     const auto gradient = frame.image_gradient.download<float>(frame.sizes.image_gradient / 4);
     const auto target = frame.target.download<float>(frame.sizes.target / 4);
@@ -79,17 +79,17 @@ TEST_P(Loss, ValueAndGradientAreTheTwins) {
             for (int x = 0; x < width; ++x) {
                 const size_t at =
                     size_t(c) * frame.sizes.plane_floats + size_t(y) * frame.sizes.stride + size_t(x);
-                worst = std::max(worst, std::abs(gradient[at] - twin.gradient.at(x, y)[c]));
-                largest = std::max(largest, std::abs(twin.gradient.at(x, y)[c]));
+                worst = std::max(worst, std::abs(gradient[at] - cpu.gradient.at(x, y)[c]));
+                largest = std::max(largest, std::abs(cpu.gradient.at(x, y)[c]));
                 worst_target = std::max(worst_target, std::abs(target[at] - in.target.at(x, y)[c]));
             }
-    printf("    gradient %.1e of %.1e, ssim %.1e\n", worst, largest, std::abs(counts.ssim - twin.ssim));
+    printf("    gradient %.1e of %.1e, ssim %.1e\n", worst, largest, std::abs(counts.ssim - cpu.ssim));
     EXPECT_LT(worst_target, 2e-7);
     EXPECT_LT(worst, 1e-5 * largest);  // variances are float32 differences of moments
 }
 
-/// The photograph's alpha as the weight of a pixel.
-TEST_P(Loss, OfMaskedPicturesIsTheTwins) {
+/// The training image's alpha as the weight of a pixel.
+TEST_P(Loss, OfMaskedPicturesMatchesTheReference) {
     const int width = GetParam().first, height = GetParam().second;
     Inputs in = random_inputs(uint64_t(width * 31 + height), width, height);
     reference::Raster photo(width, height, 3), weights(width, height, 1);
@@ -111,10 +111,10 @@ TEST_P(Loss, OfMaskedPicturesIsTheTwins) {
     });
     EXPECT_TRUE(guarded.intact());
 
-    const reference::Loss twin = reference::image_loss(in.image, photo, weights);
+    const reference::Loss cpu = reference::image_loss(in.image, photo, weights);
     const shared::Counts counts = frame.read_counts();
-    EXPECT_NEAR(counts.l1, twin.l1, 2e-7 + 1e-6 * twin.l1);
-    EXPECT_NEAR(counts.ssim, twin.ssim, 5e-7);
+    EXPECT_NEAR(counts.l1, cpu.l1, 2e-7 + 1e-6 * cpu.l1);
+    EXPECT_NEAR(counts.ssim, cpu.ssim, 5e-7);
     const auto gradient = frame.image_gradient.download<float>(frame.sizes.image_gradient / 4);
     double worst = 0, largest = 0;
     for (int c = 0; c < 3; ++c)
@@ -125,8 +125,8 @@ TEST_P(Loss, OfMaskedPicturesIsTheTwins) {
                 if (weights.at(x, y)[0] == 0) {
                     EXPECT_EQ(g, 0);
                 }
-                worst = std::max(worst, std::abs(g - twin.gradient.at(x, y)[c]));
-                largest = std::max(largest, std::abs(twin.gradient.at(x, y)[c]));
+                worst = std::max(worst, std::abs(g - cpu.gradient.at(x, y)[c]));
+                largest = std::max(largest, std::abs(cpu.gradient.at(x, y)[c]));
             }
     EXPECT_LT(worst, 1e-5 * largest);
     // What was drawn is left alone: the way back through the blend needs it.
@@ -208,7 +208,7 @@ TEST(LossEdges, EqualPicturesHaveNoLossAndNoGradient) {
         ASSERT_NEAR(g, 0, 1e-8);
 }
 
-TEST(Photo, EightBitAndFloatPhotographsUnpackTheSame) {
+TEST(Photo, EightBitAndFloatImagesUnpackTheSame) {
     Image picture(9, 5, 4);
     Random random(6);
     for (float& value : picture.pixels) value = float(random.integer(0, 255)) / 255.0f;

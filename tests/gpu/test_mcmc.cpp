@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// 3DGS-MCMC on the device against the twin: relocation, growth, noise, regularisers.
+// 3DGS-MCMC on the device against the CPU reference: relocation, growth, noise, regularisers.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,9 +10,9 @@
 
 #include "core/random.h"
 #include "gpu/guarded.h"
-#include "gpu/twin_inputs.h"
-#include "passes/strategy.h"
-#include "pipeline/mcmc.h"
+#include "gpu/reference_inputs.h"
+#include "passes/passes.h"
+#include "pipeline/strategy.h"
 #include "reference/projection.h"
 #include "reference/strategy.h"
 
@@ -53,7 +53,7 @@ McmcRules rules_for(uint32_t max_splats) {
     return rules;
 }
 
-pipeline::McmcResult run_refine(pipeline::Model& model, const McmcRules& rules) {
+pipeline::Refinement run_refine(pipeline::Model& model, const McmcRules& rules) {
     Rig& r = rig();
     GuardedFrame guarded(r.config(), {model.splats, 16, 16, 1, true, false});
     const auto result = refine_mcmc(r.cache, r.executor, model, guarded.frame, rules);
@@ -91,7 +91,7 @@ struct RelocationCase {
 };
 class Relocation : public testing::TestWithParam<RelocationCase> {};
 
-TEST_P(Relocation, WritesTheTwinsNextGeneration) {
+TEST_P(Relocation, WritesTheReferencesNextGeneration) {
     const auto [splats, degree, spread] = GetParam();
     Start start(3000 + splats, splats, degree);
     McmcRules rules = rules_for(1u << 20);
@@ -221,7 +221,7 @@ TEST(RelocationEdges, WhatIsNotFiniteIsRelocated) {
         for (const float value : *values) EXPECT_TRUE(std::isfinite(value));
 }
 
-TEST(Noise, IsTheTwins) {
+TEST(Noise, MatchesTheReference) {
     for (const double least : {-9.0, -5.6}) {
         Start start(3400, 1000, 0, least);
         for (size_t i = 0; i < 500; ++i) start.gaussians.opacity_logits[i] = float(-6 + 0.002 * double(i));

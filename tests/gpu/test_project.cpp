@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The projection pass alone against the twin.
+// The projection pass alone against the CPU reference.
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -7,8 +7,8 @@
 #include <limits>
 
 #include "gpu/guarded.h"
-#include "gpu/twin_inputs.h"
-#include "passes/project.h"
+#include "gpu/reference_inputs.h"
+#include "passes/passes.h"
 
 namespace ewa::test {
 namespace {
@@ -24,9 +24,9 @@ Output run_project(const Scene& scene, bool debug = false, float log_scale_shift
     const uint32_t splats = uint32_t(scene.gaussians.size());
     const pipeline::Model model = pipeline::upload_model(*device(), scene.gaussians, 0, false);
     const gpu::Buffer camera = camera_buffer(scene.camera, r.config());
-    const size_t room = std::max(splats, 1u);
-    Guarded records("records", room * 48, gpu::Texel::rgba32f), keys("keys", room * 4),
-        tile_counts("tile counts", room * 4), counts = zero_counts();
+    const size_t capacity = std::max(splats, 1u);
+    Guarded records("records", capacity * 48, gpu::Texel::rgba32f), keys("keys", capacity * 4),
+        tile_counts("tile counts", capacity * 4), counts = zero_counts();
     r.run([&](gpu::Recording& recording) {
         r.cache
             .get<passes::Project>({{shared::SPEC_SH_DEGREE, uint32_t(scene.gaussians.sh_degree)},
@@ -52,16 +52,16 @@ struct Case {
 
 class ProjectPass : public testing::TestWithParam<Case> {};
 
-TEST_P(ProjectPass, RecordsAreTheTwins) {
+TEST_P(ProjectPass, RecordsMatchTheReference) {
     const Case& c = GetParam();
     const Scene scene = random_scene(900 + uint64_t(c.sh_degree) + c.splats, c.splats, c.kind, c.width,
                                      c.height, c.sh_degree, c.kernel);
     const Output out = run_project(scene);
-    const reference::Picture twin =
-        reference::render(scene.gaussians, scene.camera, scene.options, twin_tiles(rig().config()));
+    const reference::Picture cpu =
+        reference::render(scene.gaussians, scene.camera, scene.options, reference_tiles(rig().config()));
     double worst_mean = 0, worst_shape = 0, worst_opacity = 0, worst_color = 0;
     for (size_t i = 0; i < c.splats; ++i) {
-        const reference::Projected& p = twin.projected[i];
+        const reference::Projected& p = cpu.projected[i];
         if (!p.visible) {
             EXPECT_EQ(out.counts[i], 0u) << i;
             EXPECT_EQ(out.keys[i], 0xffffffffu) << i;
@@ -90,7 +90,7 @@ TEST_P(ProjectPass, RecordsAreTheTwins) {
     EXPECT_LT(worst_shape, 2e-5);    // float32; a needle's determinant takes its worst
     EXPECT_LT(worst_opacity, 5e-6);  // with antialiasing it follows a determinant through a logarithm
     EXPECT_LT(worst_color, 2e-6);    // 16 float32 products of a few units
-    EXPECT_EQ(out.totals.skipped_nonfinite, twin.skipped_nonfinite);
+    EXPECT_EQ(out.totals.skipped_nonfinite, cpu.skipped_nonfinite);
 }
 
 TEST_P(ProjectPass, TileCountsNeverMissATile) {
@@ -98,11 +98,11 @@ TEST_P(ProjectPass, TileCountsNeverMissATile) {
     const Scene scene =
         random_scene(950 + c.splats, c.splats, c.kind, c.width, c.height, c.sh_degree, c.kernel);
     const Output out = run_project(scene);
-    const reference::Picture twin =
-        reference::render(scene.gaussians, scene.camera, scene.options, twin_tiles(rig().config()));
+    const reference::Picture cpu =
+        reference::render(scene.gaussians, scene.camera, scene.options, reference_tiles(rig().config()));
     uint64_t exact = 0, actual = 0;
     for (size_t i = 0; i < c.splats; ++i) {
-        const size_t tiles = reference::covered_tiles(twin.projected[i], twin.instances.grid).size();
+        const size_t tiles = reference::covered_tiles(cpu.projected[i], cpu.instances.grid).size();
         EXPECT_GE(out.counts[i], tiles) << "splat " << i;
         exact += tiles;
         actual += out.counts[i];

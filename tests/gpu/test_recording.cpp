@@ -10,15 +10,11 @@
 #include <stdexcept>
 
 #include "gpu/guarded.h"
-#include "gpu/twin_inputs.h"
-#include "passes/blend.h"
-#include "passes/project.h"
+#include "gpu/reference_inputs.h"
+#include "passes/passes.h"
 #include "passes/shader_code.h"
-#include "passes/sort.h"
-#include "passes/strategy.h"
 #include "pipeline/backward.h"
-#include "pipeline/densify.h"
-#include "pipeline/mcmc.h"
+#include "pipeline/strategy.h"
 
 namespace ewa::test {
 namespace {

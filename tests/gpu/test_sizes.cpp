@@ -8,11 +8,10 @@
 
 #include "ewa/error.h"
 #include "gpu/test_device.h"
-#include "pipeline/camera_block.h"
-#include "pipeline/capacity.h"
+#include "pipeline/frame_buffers.h"
+#include "pipeline/frame_inputs.h"
 #include "pipeline/model.h"
 #include "pipeline/plan.h"
-#include "pipeline/sizes.h"
 #include "support/random_scene.h"
 #include "support/temp_folder.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The gradient of the projection and Adam, on slots from the twin.
+// The gradient of the projection and Adam, on slots from the CPU reference.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -8,8 +8,8 @@
 #include <set>
 
 #include "gpu/guarded.h"
-#include "gpu/twin_inputs.h"
-#include "passes/project.h"
+#include "gpu/reference_inputs.h"
+#include "passes/passes.h"
 #include "pipeline/backward.h"
 #include "reference/adam.h"
 #include "reference/strategy.h"
@@ -20,17 +20,18 @@ namespace {
 
 constexpr uint32_t kGradient = 1, kStatistics = 2, kRegularised = 4, kAbsolute = 8;
 
-/// A scene's way back up to the instances by the twin, in the device's buffers.
+/// A scene's way back up to the instances by the CPU reference, in the device's buffers.
 struct Slots {
     Scene scene;
-    reference::ReferenceGradient twin;
+    reference::ReferenceGradient cpu;
     std::vector<float> slots;
     std::vector<uint32_t> tile_counts, first, places;  // places run against the instances
 
     explicit Slots(const Scene& s) : scene(s) {
         const Image target = random_target(31, s.camera.width, s.camera.height);
-        twin = reference::loss_gradient(s.gaussians, s.camera, target, s.options, twin_tiles(rig().config()));
-        const auto& sorted = twin.picture.instances.sorted;
+        cpu = reference::loss_gradient(s.gaussians, s.camera, target, s.options,
+                                       reference_tiles(rig().config()));
+        const auto& sorted = cpu.picture.instances.sorted;
         const size_t splats = s.gaussians.size();
         tile_counts.resize(splats);
         for (const auto& instance : sorted) ++tile_counts[instance.splat];
@@ -43,7 +44,7 @@ struct Slots {
         slots.resize(std::max<size_t>(sum, 1) * shared::SLOT_FLOATS, std::nanf(""));
         std::vector<uint32_t> next = first;
         for (size_t k = 0; k < sorted.size(); ++k) {
-            const auto slot = slot_of(twin.blend.instances[k], twin.picture.projected[sorted[k].splat]);
+            const auto slot = slot_of(cpu.blend.instances[k], cpu.picture.projected[sorted[k].splat]);
             for (size_t j = 0; j < slot.size(); ++j)
                 slots[size_t(places[next[sorted[k].splat]]) * shared::SLOT_FLOATS + j] = float(slot[j]);
             ++next[sorted[k].splat];
@@ -58,7 +59,7 @@ struct Bench {
 
     explicit Bench(const Slots& s)
         : camera(camera_buffer(s.scene.camera, rig().config())),
-          records("records", pack_records(s.twin.picture.projected), gpu::Texel::rgba32f),
+          records("records", pack_records(s.cpu.picture.projected), gpu::Texel::rgba32f),
           slots("slots", s.slots, gpu::Texel::rgba32f),
           tile_counts("tile counts", s.tile_counts),
           first("first instances", s.first),
@@ -138,7 +139,7 @@ struct Case {
 
 class UpdatePass : public testing::TestWithParam<Case> {};
 
-TEST_P(UpdatePass, GradientIsTheTwins) {
+TEST_P(UpdatePass, GradientMatchesTheReference) {
     const Case& c = GetParam();
     const Slots slots(random_scene(1800 + c.splats, c.splats, c.kind, 61, 47, c.sh_degree, c.kernel));
     GuardedModel model(slots.scene.gaussians);
@@ -152,7 +153,7 @@ TEST_P(UpdatePass, GradientIsTheTwins) {
     tolerance.norm = 5e-5;
     tolerance.element_relative = 1e-3;
     tolerance.element_absolute = 2e-5;
-    EXPECT_TRUE(splat_gradients_agree(actual, slots.twin.gradient, tolerance));
+    EXPECT_TRUE(splat_gradients_agree(actual, slots.cpu.gradient, tolerance));
     EXPECT_EQ(bench.counts.read<shared::Counts>()[0].dropped_updates, 0u);
     for (const float value : bench.statistics.read<float>()) EXPECT_EQ(value, 0);  // not asked for
     const Gaussians params = model.read(model.model.params);
@@ -178,7 +179,7 @@ std::vector<double> wide(const std::vector<float>& values) {
     return {values.begin(), values.end()};
 }
 
-/// One of the groups that a learning rate belongs to, followed through several steps by the twin's Adam.
+/// One of the groups that a learning rate belongs to, followed through several steps by the CPU reference's Adam.
 struct Followed {
     const char* name;
     std::vector<double> values;
@@ -187,7 +188,7 @@ struct Followed {
         : name(n), values(wide(start)), state(start.size()) {}
 };
 
-TEST(UpdateAdam, FollowsTheTwinsAdamOverSeveralSteps) {
+TEST(UpdateAdam, FollowsTheReferencesAdamOverSeveralSteps) {
     const Scene scene = random_scene(1900, 150, SplatKind::mixed, 61, 47, 2);
     const Slots slots(scene);
     GuardedModel model(scene.gaussians), gradient(scene.gaussians);
@@ -219,7 +220,7 @@ TEST(UpdateAdam, FollowsTheTwinsAdamOverSeveralSteps) {
         compare(quaternions, g.quaternions, now.quaternions, push.quaternion_rate);
         compare(scales, g.log_scales, now.log_scales, push.scale_rate);
         compare(opacities, g.opacity_logits, now.opacity_logits, push.opacity_rate);
-        // Two rates: the twin takes them one after the other from the same state.
+        // Two rates: the CPU reference takes them one after the other from the same state.
         const size_t stride = start.sh_stride();
         reference::AdamState rest_state = sh.state;
         std::vector<double> rest = sh.values;
@@ -236,7 +237,7 @@ TEST(UpdateAdam, FollowsTheTwinsAdamOverSeveralSteps) {
 
     // Six steps of statistics from the same slots: six views each for what was drawn.
     reference::DensifyStatistics expected(start.size());
-    accumulate(expected, slots.twin.blend.splats, slots.twin.in_view, scene.camera);
+    accumulate(expected, slots.cpu.blend.splats, slots.cpu.in_view, scene.camera);
     const auto statistics = bench.statistics.read<float>();
     for (size_t i = 0; i < start.size(); ++i) {
         EXPECT_EQ(statistics[2 * i + 1], 6 * expected.views[i]) << i;
@@ -248,7 +249,7 @@ TEST(UpdateAdam, FollowsTheTwinsAdamOverSeveralSteps) {
 
 class UpdateStatistics : public testing::TestWithParam<bool> {};
 
-TEST_P(UpdateStatistics, AreTheTwins) {
+TEST_P(UpdateStatistics, MatchTheReference) {
     const bool absolute = GetParam();
     const Scene scene = random_scene(1901, 200, SplatKind::mixed, 61, 47);
     const Slots slots(scene);
@@ -257,7 +258,7 @@ TEST_P(UpdateStatistics, AreTheTwins) {
     bench.run(scene, model.model, model.moments1, model.moments2,
               kGradient | kStatistics | (absolute ? kAbsolute : 0), push_for(scene, 1));
     reference::DensifyStatistics expected(scene.gaussians.size());
-    accumulate(expected, slots.twin.blend.splats, slots.twin.in_view, scene.camera, absolute);
+    accumulate(expected, slots.cpu.blend.splats, slots.cpu.in_view, scene.camera, absolute);
     const auto actual = bench.statistics.read<float>();
     double largest = 0;
     for (const double sum : expected.gradient_sum) largest = std::max(largest, sum);
@@ -375,7 +376,7 @@ TEST(UpdateEdges, CoefficientsAboveTheDegreeInUseStay) {
     Bench bench(slots);
     bench.run(scene, model.model, gradient.moments1, gradient.moments2, kGradient, push_for(scene, 1), 1);
     GradientTolerance tolerance{1e-8, 5e-5, 1e-3, 2e-5};  // as above
-    EXPECT_TRUE(splat_gradients_agree(gradient.read(gradient.moments1), slots.twin.gradient, tolerance));
+    EXPECT_TRUE(splat_gradients_agree(gradient.read(gradient.moments1), slots.cpu.gradient, tolerance));
     bench.run(scene, model.model, model.moments1, model.moments2, 0, push_for(scene, 1), 1);
     const Gaussians now = model.read(model.model.params);
     const size_t stride = now.sh_stride();
@@ -388,7 +389,7 @@ TEST(UpdateEdges, CoefficientsAboveTheDegreeInUseStay) {
     EXPECT_GT(moved, 100u);
 }
 
-/// What the twin's Adam and the rule of docs/numerics.md ("Steps") make of one value's texel.
+/// What the CPU reference's Adam and the rule of docs/numerics.md ("Steps") make of one value's texel.
 struct Limited {
     std::array<double, 4> value{};
     bool limited = false;
@@ -433,7 +434,7 @@ TEST(UpdateLimits, StepsEndWhereTheRuleSays) {
             turned_to[k] = quaternions[4 * i + k];
             largest = std::max(largest, std::abs(turned[k]));
         }
-        const double depth = slots.twin.picture.projected[i].z;
+        const double depth = slots.cpu.picture.projected[i].z;
         const Limited mean = limited_step(from, to, 3, 0.5 * depth),
                       quaternion = limited_step(turned, turned_to, 4, 0.5 * largest);
         limited += mean.limited + quaternion.limited;

@@ -3,7 +3,7 @@
 #include <limits>
 
 #include "ewa/dataset.h"
-#include "io/datasets/colmap.h"
+#include "io/datasets/image_records.h"
 #include "support/temp_folder.h"
 
 namespace {

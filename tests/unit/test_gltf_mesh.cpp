@@ -256,7 +256,7 @@ TEST(GltfMesh, LightsAndSky) {
     gltf.refused({"\"sky\"", "\"zenith\""});
 }
 
-TEST(GltfMesh, WhatAPhotographDoesNotShowIsRemarked) {
+TEST(GltfMesh, WhatARenderDoesNotShowIsRemarked) {
     Gltf gltf;
     EXPECT_TRUE(gltf.read().remarks.empty());
     gltf.top["materials"] = {

@@ -6,7 +6,7 @@
 
 #include "ewa/splat_files.h"
 #include "io/datasets/image_records.h"
-#include "io/splats/ply.h"
+#include "io/splats/formats.h"
 #include "support/temp_folder.h"
 
 namespace {

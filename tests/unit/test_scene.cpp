@@ -173,7 +173,7 @@ TEST(Undistort, FormulaByHand) {
             }
 }
 
-/// Something smooth to photograph.
+/// Something smooth to render.
 double scenery(glm::dvec2 ray, int channel) {
     return 0.5 + 0.4 * std::sin(5 * ray.x + channel) * std::cos(4 * ray.y - channel);
 }

@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "ewa/dataset.h"
-#include "io/datasets/transforms.h"
+#include "io/datasets/image_records.h"
 #include "support/temp_folder.h"
 
 namespace {

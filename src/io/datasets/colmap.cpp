@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/datasets/colmap.h"
-
+// Binary and text files of COLMAP (colmap.github.io/format.html).
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -227,12 +226,6 @@ void read_binary_points(const std::filesystem::path& path, ColmapBuilder& builde
     }
 }
 
-void read_colmap_binary(const std::filesystem::path& model, ColmapBuilder& builder) {
-    read_binary_cameras(model / "cameras.bin", builder);
-    read_binary_images(model / "images.bin", builder);
-    if (std::filesystem::exists(model / "points3D.bin")) read_binary_points(model / "points3D.bin", builder);
-}
-
 constexpr size_t kMaxLine = size_t(1) << 28;  // the observations of one image are one line
 
 /// The lines of a file with their numbers, and the words of a line.
@@ -260,20 +253,18 @@ class Lines {
     std::string_view word() { return core::next_word(rest_); }
     std::string_view rest() const { return core::trim(rest_); }
 
-    double number(const char* what) {
-        const std::string_view text = word();
-        const std::optional<double> value = core::parse_number(text);
-        if (!value) fail(std::string(what) + ": \"" + std::string(text.substr(0, 60)) + "\" is not a number");
-        return *value;
-    }
-
+    /// The next word as a number of the type T.
     template <class T>
-    T integer(const char* what) {
+    T value(const char* what) {
         const std::string_view text = word();
-        const std::optional<T> value = core::parse_integer<T>(text);
+        std::optional<T> value;
+        if constexpr (std::is_same_v<T, double>)
+            value = core::parse_number(text);
+        else
+            value = core::parse_integer<T>(text);
         if (!value)
-            fail(std::string(what) + ": \"" + std::string(text.substr(0, 60)) +
-                 "\" is not an integer in range");
+            fail(std::string(what) + ": \"" + std::string(text.substr(0, 60)) + "\" is not " +
+                 (std::is_same_v<T, double> ? "a number" : "an integer in range"));
         return *value;
     }
 
@@ -292,7 +283,7 @@ void read_text_cameras(const std::filesystem::path& path, ColmapBuilder& builder
     Lines lines(path);
     const Fail fail = [&](const std::string& text) { lines.fail(text); };
     while (lines.next_entry()) {
-        const auto id = lines.integer<uint32_t>("camera id");
+        const auto id = lines.value<uint32_t>("camera id");
         const std::string_view name = lines.word();
         const ColmapLens* lens = colmap_lens(name);
         if (!lens) {
@@ -300,9 +291,9 @@ void read_text_cameras(const std::filesystem::path& path, ColmapBuilder& builder
                        "\"; undistort the images with `colmap image_undistorter` and use its output");
             return;
         }
-        const auto width = lines.integer<uint64_t>("width"), height = lines.integer<uint64_t>("height");
+        const auto width = lines.value<uint64_t>("width"), height = lines.value<uint64_t>("height");
         std::vector<double> parameters(lens->parameters());
-        for (double& parameter : parameters) parameter = lines.number("camera parameter");
+        for (double& parameter : parameters) parameter = lines.value<double>("camera parameter");
         if (!lines.rest().empty()) lines.fail("a " + std::string(name) + " camera has too many parameters");
         builder.add_camera(id, *lens, width, height, parameters, fail);
     }
@@ -313,10 +304,10 @@ void read_text_images(const std::filesystem::path& path, ColmapBuilder& builder)
     Lines lines(path);
     const Fail fail = [&](const std::string& text) { lines.fail(text); };
     while (lines.next_entry()) {
-        lines.integer<uint32_t>("image id");
+        lines.value<uint32_t>("image id");
         std::array<double, 7> pose;
-        for (double& value : pose) value = lines.number("pose");
-        const auto camera_id = lines.integer<uint32_t>("camera id");
+        for (double& value : pose) value = lines.value<double>("pose");
+        const auto camera_id = lines.value<uint32_t>("camera id");
         if (lines.rest().empty()) lines.fail("the image has no name");
         builder.add_image(pose, camera_id, std::string(lines.rest()), fail);
         lines.next();
@@ -327,20 +318,14 @@ void read_text_images(const std::filesystem::path& path, ColmapBuilder& builder)
 void read_text_points(const std::filesystem::path& path, ColmapBuilder& builder) {
     Lines lines(path);
     while (lines.next_entry()) {
-        lines.integer<uint64_t>("point id");
+        lines.value<uint64_t>("point id");
         glm::dvec3 position;
-        for (int axis = 0; axis < 3; ++axis) position[axis] = lines.number("coordinate");
+        for (int axis = 0; axis < 3; ++axis) position[axis] = lines.value<double>("coordinate");
         std::array<uint8_t, 3> color;
-        for (uint8_t& channel : color) channel = lines.integer<uint8_t>("colour");
-        lines.number("reprojection error");
+        for (uint8_t& channel : color) channel = lines.value<uint8_t>("colour");
+        lines.value<double>("reprojection error");
         builder.add_point(position, color, [&] { return lines.where(); });
     }
-}
-
-void read_colmap_text(const std::filesystem::path& model, ColmapBuilder& builder) {
-    read_text_cameras(model / "cameras.txt", builder);
-    read_text_images(model / "images.txt", builder);
-    if (std::filesystem::exists(model / "points3D.txt")) read_text_points(model / "points3D.txt", builder);
 }
 
 }  // namespace
@@ -357,10 +342,13 @@ std::optional<std::filesystem::path> find_colmap_model(const std::filesystem::pa
 
 ImageRecords read_colmap(const std::filesystem::path& model, const std::filesystem::path& images) {
     ColmapBuilder builder(images);
-    if (std::filesystem::exists(model / "cameras.bin") && std::filesystem::exists(model / "images.bin"))
-        read_colmap_binary(model, builder);
-    else
-        read_colmap_text(model, builder);
+    const bool binary =
+        std::filesystem::exists(model / "cameras.bin") && std::filesystem::exists(model / "images.bin");
+    const std::filesystem::path points = model / (binary ? "points3D.bin" : "points3D.txt");
+    (binary ? read_binary_cameras : read_text_cameras)(model / (binary ? "cameras.bin" : "cameras.txt"),
+                                                       builder);
+    (binary ? read_binary_images : read_text_images)(model / (binary ? "images.bin" : "images.txt"), builder);
+    if (std::filesystem::exists(points)) (binary ? read_binary_points : read_text_points)(points, builder);
     return builder.take();
 }
 

@@ -9,8 +9,7 @@
 #include "core/sandboxed_path.h"
 #include "core/text.h"
 #include "ewa/error.h"
-#include "io/datasets/colmap.h"
-#include "io/datasets/transforms.h"
+#include "io/datasets/image_records.h"
 #include "scene/camera.h"
 #include "scene/lens.h"
 

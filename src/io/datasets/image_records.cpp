@@ -27,15 +27,14 @@ PlyPoints read_points_ply(const std::filesystem::path& path) {
     const PlyElement& vertex = table.go_to("vertex");
     std::vector<size_t> columns;
     for (const char* name : {"x", "y", "z"}) {
-        const std::optional<size_t> found = vertex.find(name);
-        if (!found || vertex.properties[*found].list_count)
-            throw InputError(table.name() + ": the vertices have no number \"" + name + "\"");
+        const std::optional<size_t> found = vertex.find_number(name);
+        if (!found) throw InputError(table.name() + ": the vertices have no number \"" + name + "\"");
         columns.push_back(*found);
     }
     double color_scale = 1;
     for (const char* name : {"red", "green", "blue"}) {
-        const std::optional<size_t> found = vertex.find(name);
-        if (!found || vertex.properties[*found].list_count) break;
+        const std::optional<size_t> found = vertex.find_number(name);
+        if (!found) break;
         const PlyType type = vertex.properties[*found].type;
         if (type == PlyType::float32 || type == PlyType::float64) color_scale = 255;
         columns.push_back(*found);

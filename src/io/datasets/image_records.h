@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The content of a dataset's model file, before any image is read. The reader of each format returns these
-// types.
+// The content of a dataset's model file, before any image is read, and the readers of the formats: COLMAP's
+// sparse model, transforms.json (transforms.cpp describes its keys), and points as a PLY.
 #pragma once
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -51,5 +52,36 @@ PlyPoints read_points_ply(const std::filesystem::path& path);
 
 /// Writes a binary PLY of x y z (float32) and red green blue (8 bits). Throws RunError.
 void write_points_ply(const std::filesystem::path& path, const PointCloud& points);
+
+/// The folder below `root` that holds a model, that is cameras and images of one kind. Candidates in this
+/// order: sparse/0, sparse, root itself.
+std::optional<std::filesystem::path> find_colmap_model(const std::filesystem::path& root);
+
+/// Reads the model in a folder. Image names are relative to `images`. As in COLMAP, .bin is preferred.
+/// Without a points3D file there are no points. World and cameras are as in the file: COLMAP's axes are
+/// OpenCV's. Every lens model of COLMAP is supported except EQUIRECTANGULAR, which is no perspective image.
+/// Throws InputError that names the file and the byte (.bin) or line (.txt).
+ImageRecords read_colmap(const std::filesystem::path& model, const std::filesystem::path& images);
+
+/// Reads the file. Cameras get OpenCV's axes; the world frame stays the file's. nerfstudio's
+/// applied_transform is ignored, because it already applies to cameras and points alike. A rotation with a
+/// uniform factor or a little noise becomes orthonormal. `split` becomes each image's. with_points false
+/// skips the points. Throws InputError that names the file and the byte or frame.
+ImageRecords read_transforms(const std::filesystem::path& path, int split, bool with_points);
+
+struct TransformsFrame {
+    std::string image, depth;  // relative to the file's folder, with / between the parts
+    Camera camera;
+};
+
+struct TransformsFile {
+    std::vector<TransformsFrame> frames;
+    std::string points;                                        // relative; empty: none
+    bool color_depends_on_view = true;                         // false is written as "view_dependent": false
+    std::vector<std::pair<std::string, std::string>> remarks;  // further keys and texts at the top
+};
+
+/// Writes the intrinsics into each frame. The world frame stays. Throws RunError.
+void write_transforms(const std::filesystem::path& path, const TransformsFile& file);
 
 }  // namespace ewa::io

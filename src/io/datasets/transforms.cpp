@@ -1,6 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/datasets/transforms.h"
-
+// transforms.json in the dialects of instant-ngp, nerfstudio and Blender's synthetic scenes (NeRF).
+//
+// A key of a frame wins over the same key at the top of the file.
+//   fl_x fl_y cx cy w h            px; defaults: fl_y is fl_x, (cx, cy) the centre, w h the image's size
+//   camera_angle_x camera_angle_y  angles of view in radians, in place of fl_x and fl_y
+//   k1 k2 k3 p1 p2                 OpenCV's distortion
+//   camera_model, is_fisheye       OPENCV_FISHEYE: fisheye with k1 to k4; FULL_OPENCV: k1 to k6
+//   transform_matrix               camera to world; camera axes are OpenGL's (x right, y up, z back)
+//   file_path                      relative to the file's folder; may lack .png, .jpg or .jpeg
+//   mask_path                      the image's mask
+//   ply_file_path                  points, at the top of the file
+//   view_dependent                 at the top: false if no colour depends on the direction of view
 #include <algorithm>
 #include <cmath>
 #include <glm/matrix.hpp>

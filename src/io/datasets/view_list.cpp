@@ -46,10 +46,9 @@ NamedView parse_view(const Json& json) {
         if (!(value >= 1 && value <= 65536)) throw InputError(std::string(name) + " is not in 1..65536");
         *side = int(value);
     }
-    camera.fx = numbers(json, "fx", 1)[0];
-    camera.fy = numbers(json, "fy", 1)[0];
-    camera.cx = numbers(json, "cx", 1)[0];
-    camera.cy = numbers(json, "cy", 1)[0];
+    for (const auto& [name, value] :
+         {std::pair{"fx", &camera.fx}, {"fy", &camera.fy}, {"cx", &camera.cx}, {"cy", &camera.cy}})
+        *value = numbers(json, name, 1)[0];
     if (!(camera.fx > 0) || !(camera.fy > 0)) throw InputError("a focal length is not above zero");
     const auto rotation = numbers(json, "rotation", 9), translation = numbers(json, "translation", 3),
                pivot = numbers(json, "pivot", 3);

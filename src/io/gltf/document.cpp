@@ -17,7 +17,6 @@ namespace {
 
 using nlohmann::json;
 
-constexpr uint32_t kMagic = 0x46546c67, kJsonChunk = 0x4e4f534a, kBinChunk = 0x004e4942;
 constexpr size_t kLongestReason = 300;  // limits a library's error, which may quote the file at any length
 constexpr size_t kMostObjects = 1 << 15, kMostValues = 1 << 17;  // for splats; meshes have more nodes
 constexpr size_t kMeshFactor = 2;
@@ -36,7 +35,7 @@ Chunks read_chunks(core::FileReader& reader) {
     if (size >= 4) {
         uint32_t magic = 0;
         std::memcpy(&magic, reader.take(4, "the header"), 4);
-        chunks.binary = magic == kMagic;
+        chunks.binary = magic == kGlbMagic;
         if (!chunks.binary) chunks.json.assign(reinterpret_cast<const char*>(&magic), 4);
     }
     if (chunks.binary) {
@@ -47,8 +46,7 @@ Chunks read_chunks(core::FileReader& reader) {
             reader.fail("the header claims " + std::to_string(length) + " bytes, but the file has " +
                         std::to_string(reader.size()) + "; it is truncated");
         size = reader.read<uint32_t>("the first chunk");
-        if (reader.read<uint32_t>("the first chunk") != kJsonChunk)
-            reader.fail("the first chunk is not JSON");
+        if (reader.read<uint32_t>("the first chunk") != kGlbJson) reader.fail("the first chunk is not JSON");
         chunks.json_begin = reader.offset();
     } else {
         size -= chunks.json.size();
@@ -60,8 +58,7 @@ Chunks read_chunks(core::FileReader& reader) {
     chunks.json.append(reinterpret_cast<const char*>(text), size_t(size));
     if (chunks.binary && reader.remaining() > 0) {
         chunks.bin_size = reader.read<uint32_t>("the second chunk");
-        if (reader.read<uint32_t>("the second chunk") != kBinChunk)
-            reader.fail("the second chunk is not BIN");
+        if (reader.read<uint32_t>("the second chunk") != kGlbBin) reader.fail("the second chunk is not BIN");
         chunks.bin_begin = reader.offset();
         if (chunks.bin_size > reader.remaining())
             reader.fail("the second chunk claims " + std::to_string(chunks.bin_size) + " bytes, but only " +
@@ -111,29 +108,10 @@ std::string percent_decoded(const std::string& text) {
     return decoded;
 }
 
-size_t component_bytes(int type) {
-    switch (type) {
-        case TINYGLTF_COMPONENT_TYPE_BYTE:
-        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
-            return 1;
-        case TINYGLTF_COMPONENT_TYPE_SHORT:
-        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
-            return 2;
-        case TINYGLTF_COMPONENT_TYPE_FLOAT:
-        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
-            return 4;
-        default:
-            return 0;
-    }
-}
-
 size_t components(const tinygltf::Accessor& accessor) {
-    const int n = accessor.type == TINYGLTF_TYPE_SCALAR ? 1
-                  : accessor.type == TINYGLTF_TYPE_VEC2 || accessor.type == TINYGLTF_TYPE_VEC3 ||
-                          accessor.type == TINYGLTF_TYPE_VEC4
-                      ? accessor.type
-                      : 0;
-    return size_t(n);
+    if (accessor.type == TINYGLTF_TYPE_SCALAR) return 1;
+    return accessor.type >= TINYGLTF_TYPE_VEC2 && accessor.type <= TINYGLTF_TYPE_VEC4 ? size_t(accessor.type)
+                                                                                      : 0;
 }
 
 template <class T>
@@ -144,21 +122,24 @@ double value_of(const std::byte* bytes, bool normalized) {
     return std::max(double(value) / double(std::numeric_limits<T>::max()), -1.0);
 }
 
-double decode(int type, bool normalized, const std::byte* bytes) {
-    switch (type) {
-        case TINYGLTF_COMPONENT_TYPE_BYTE:
-            return value_of<int8_t>(bytes, normalized);
-        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
-            return value_of<uint8_t>(bytes, normalized);
-        case TINYGLTF_COMPONENT_TYPE_SHORT:
-            return value_of<int16_t>(bytes, normalized);
-        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
-            return value_of<uint16_t>(bytes, normalized);
-        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
-            return value_of<uint32_t>(bytes, normalized);
-        default:
-            return value_of<float>(bytes, false);
-    }
+struct Component {
+    int type;
+    size_t bytes;
+    double (*value)(const std::byte*, bool normalized);
+};
+constexpr Component kComponents[] = {
+    {TINYGLTF_COMPONENT_TYPE_BYTE, 1, value_of<int8_t>},
+    {TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE, 1, value_of<uint8_t>},
+    {TINYGLTF_COMPONENT_TYPE_SHORT, 2, value_of<int16_t>},
+    {TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT, 2, value_of<uint16_t>},
+    {TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT, 4, value_of<uint32_t>},
+    {TINYGLTF_COMPONENT_TYPE_FLOAT, 4, value_of<float>},
+};
+
+/// Null for a type that glTF's accessors do not have.
+const Component* component_of(const tinygltf::Accessor& accessor) {
+    const auto* found = std::ranges::find(kComponents, accessor.componentType, &Component::type);
+    return found == std::end(kComponents) ? nullptr : found;
 }
 
 /// The name of the missing property in tinygltf's errors that describe it in words.
@@ -169,6 +150,21 @@ std::string missing_property(const std::string& error) {
         if (error.find(std::string(words) + " description not found") != std::string::npos)
             return std::string(" (\"") + property + "\")";
     return {};
+}
+
+/// Calls visit(object, "kind 3: ", its "uri" or null) for each object of the list "kinds".
+template <class Visit>
+void for_each_source(const GltfDocument& document, const void* json_list, const std::string& kind,
+                     const Visit& visit) {
+    const json& list = *static_cast<const json*>(json_list);
+    if (!list.is_array()) document.fail("\"" + kind + "s\" is not a list");
+    for (size_t i = 0; i < list.size(); ++i) {
+        const std::string what = kind + " " + std::to_string(i) + ": ";
+        if (!list[i].is_object()) document.fail(what + "is not an object");
+        const auto uri = list[i].find("uri");
+        if (uri != list[i].end() && !uri->is_string()) document.fail(what + "\"uri\" is not a string");
+        visit(list[i], what, uri == list[i].end() ? nullptr : uri->get_ptr<const std::string*>());
+    }
 }
 
 const std::vector<int>& roots(const GltfDocument& document) {
@@ -225,8 +221,7 @@ GltfDocument::GltfDocument(const std::filesystem::path& path, GltfContent conten
     }
     if (!top.is_object()) fail("the JSON is not an object");
     if (!top.contains("asset")) fail("the JSON has no \"asset\", which every glTF has");
-    if (const auto list = top.find("buffers"); list != top.end())
-        add_buffers(path.parent_path(), &*list, bin_begin, bin_size);
+    if (const auto list = top.find("buffers"); list != top.end()) add_buffers(&*list, bin_begin, bin_size);
     if (const auto list = top.find("images"); list != top.end() && content == GltfContent::meshes)
         add_images(&*list);
     if (const auto list = top.find("animations"); list != top.end()) animated_ = !list->empty();
@@ -245,63 +240,57 @@ GltfDocument::GltfDocument(const std::filesystem::path& path, GltfContent conten
         fail("is not a valid glTF: " + error.substr(0, kLongestReason) + missing_property(error));
 }
 
-void GltfDocument::add_buffers(const std::filesystem::path& folder, const void* json_buffers,
-                               uint64_t chunk_begin, uint64_t chunk_size) {
-    const json& list = *static_cast<const json*>(json_buffers);
-    if (!list.is_array()) fail("\"buffers\" is not a list");
-    for (size_t i = 0; i < list.size(); ++i) {
-        const std::string what = "buffer " + std::to_string(i) + ": ";
-        if (!list[i].is_object()) fail(what + "is not an object");
-        const auto length = list[i].find("byteLength");
-        if (length == list[i].end() || !length->is_number_unsigned())
-            fail(what + "\"byteLength\" is not a whole number of 0 or more");
-        const auto uri = list[i].find("uri");
-        if (uri != list[i].end() && !uri->is_string()) fail(what + "\"uri\" is not a string");
-        Buffer buffer;
-        if (uri != list[i].end())
-            buffer = open_uri(folder, uri->get_ref<const std::string&>(), what);
-        else if (binary_ && i == 0)
-            buffer = {path_, chunk_begin, chunk_size, {}};
-        else
-            fail(what + "has no \"uri\", and is not the first of a .glb");
-        if (length->get<uint64_t>() > buffer.size)
-            fail(what + "\"byteLength\" is " + std::to_string(length->get<uint64_t>()) + ", but it holds " +
-                 std::to_string(buffer.size) + " bytes");
-        buffer.size = length->get<uint64_t>();
-        buffers_.push_back(std::move(buffer));
-    }
+void GltfDocument::add_buffers(const void* json_buffers, uint64_t chunk_begin, uint64_t chunk_size) {
+    for_each_source(*this, json_buffers, "buffer",
+                    [&](const json& object, const auto& what, const auto* uri) {
+                        const auto length = object.find("byteLength");
+                        if (length == object.end() || !length->is_number_unsigned())
+                            fail(what + "\"byteLength\" is not a whole number of 0 or more");
+                        Buffer buffer;
+                        if (uri)
+                            buffer = open_uri(*uri, what);
+                        else if (binary_ && buffers_.empty())
+                            buffer = {path_, chunk_begin, chunk_size, {}};
+                        else
+                            fail(what + "has no \"uri\", and is not the first of a .glb");
+                        if (length->get<uint64_t>() > buffer.size)
+                            fail(what + "\"byteLength\" is " + std::to_string(length->get<uint64_t>()) +
+                                 ", but it holds " + std::to_string(buffer.size) + " bytes");
+                        buffer.size = length->get<uint64_t>();
+                        buffers_.push_back(std::move(buffer));
+                    });
 }
 
 void GltfDocument::add_images(const void* json_images) {
-    const json& list = *static_cast<const json*>(json_images);
-    if (!list.is_array()) fail("\"images\" is not a list");
-    for (size_t i = 0; i < list.size(); ++i) {
-        const std::string what = "image " + std::to_string(i) + ": ";
-        if (!list[i].is_object()) fail(what + "is not an object");
+    for_each_source(*this, json_images, "image", [&](const json& object, const auto& what, const auto* uri) {
         ImageSource source;
-        if (const auto uri = list[i].find("uri"); uri != list[i].end()) {
-            if (!uri->is_string()) fail(what + "\"uri\" is not a string");
-            source.uri = uri->get<std::string>();
-        } else if (const auto view = list[i].find("bufferView"); view != list[i].end()) {
+        if (uri) {
+            source.uri = *uri;
+        } else if (const auto view = object.find("bufferView"); view != object.end()) {
             if (!view->is_number_unsigned() ||
                 view->get<uint64_t>() > uint64_t(std::numeric_limits<int>::max()))
                 fail(what + "\"bufferView\" is not a whole number of 0 or more");
             source.view = view->get<int>();
         }
         images_.push_back(std::move(source));
-    }
+    });
 }
 
-GltfDocument::Buffer GltfDocument::open_view(int index, const std::string& what) const {
+const tinygltf::BufferView& GltfDocument::buffer_view(int index, const std::string& what) const {
     if (index < 0 || size_t(index) >= model_.bufferViews.size())
         fail(what + "\"bufferView\" is missing or there is none of this number");
     const tinygltf::BufferView& view = model_.bufferViews[size_t(index)];
     if (view.buffer < 0 || size_t(view.buffer) >= buffers_.size())
-        fail(what + "its buffer view's \"buffer\" does not exist");
+        fail(what + "its buffer view's \"buffer\" is none of the file's");
+    const uint64_t size = buffers_[size_t(view.buffer)].size;
+    if (view.byteOffset > size || view.byteLength > size - view.byteOffset)
+        fail(what + "its buffer view ends after its buffer, which has " + std::to_string(size) + " bytes");
+    return view;
+}
+
+GltfDocument::Buffer GltfDocument::open_view(int index, const std::string& what) const {
+    const tinygltf::BufferView& view = buffer_view(index, what);
     const Buffer& buffer = buffers_[size_t(view.buffer)];
-    if (view.byteOffset > buffer.size || view.byteLength > buffer.size - view.byteOffset)
-        fail(what + "its buffer view ends after its buffer, which has " + std::to_string(buffer.size) +
-             " bytes");
     Buffer part{buffer.file, buffer.begin + view.byteOffset, view.byteLength, {}};
     if (buffer.file.empty())
         part.data.assign(buffer.data.begin() + std::ptrdiff_t(view.byteOffset),
@@ -312,8 +301,7 @@ GltfDocument::Buffer GltfDocument::open_view(int index, const std::string& what)
 std::vector<unsigned char> GltfDocument::image_bytes(size_t index) const {
     const ImageSource& source = images_[index];
     const std::string what = "image " + std::to_string(index) + ": ";
-    Buffer buffer =
-        source.uri.empty() ? open_view(source.view, what) : open_uri(path_.parent_path(), source.uri, what);
+    Buffer buffer = source.uri.empty() ? open_view(source.view, what) : open_uri(source.uri, what);
     if (buffer.size > kMostImageBytes)
         fail(what + "claims " + std::to_string(buffer.size) + " bytes, more than " +
              std::to_string(kMostImageBytes));
@@ -325,8 +313,7 @@ std::vector<unsigned char> GltfDocument::image_bytes(size_t index) const {
     return {begin, begin + buffer.size};
 }
 
-GltfDocument::Buffer GltfDocument::open_uri(const std::filesystem::path& folder, const std::string& uri,
-                                            const std::string& what) const {
+GltfDocument::Buffer GltfDocument::open_uri(const std::string& uri, const std::string& what) const {
     Buffer buffer;
     if (uri.starts_with("data:")) {
         std::string mime;
@@ -337,6 +324,7 @@ GltfDocument::Buffer GltfDocument::open_uri(const std::filesystem::path& folder,
     }
     constexpr size_t kLongestName = 1024;
     if (uri.size() > kLongestName) fail(what + "\"uri\" is longer than a file's name can be");
+    const std::filesystem::path folder = path_.parent_path();
     const auto relative = core::name_inside(percent_decoded(uri));
     if (uri.find("://") != std::string::npos || !relative || !core::links_stay_inside(folder, *relative))
         fail(what + "\"uri\" " + uri.substr(0, 200) +
@@ -370,43 +358,58 @@ uint64_t GltfDocument::bytes() const {
 }
 
 const tinygltf::Accessor& GltfDocument::accessor(int index, const std::string& what, bool indices) const {
-    const auto refuse = [&](const std::string& text) {
-        fail(what + ": accessor " + std::to_string(index) + ": " + text);
-    };
+    const std::string where = what + ": accessor " + std::to_string(index) + ": ";
+    const auto refuse = [&](const std::string& text) { fail(where + text); };
     if (index < 0 || size_t(index) >= model_.accessors.size()) refuse("there is none of this number");
     const tinygltf::Accessor& a = model_.accessors[size_t(index)];
     if (a.sparse.isSparse) refuse("\"sparse\" is not supported");
-    const uint64_t element = component_bytes(a.componentType) * components(a);
+    const Component* component = component_of(a);
+    const uint64_t element = component ? component->bytes * components(a) : 0;
     if (element == 0 || (a.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT && !indices))
         refuse("\"componentType\" or \"type\" is none that such an attribute has");
-    if (a.bufferView < 0 || size_t(a.bufferView) >= model_.bufferViews.size())
-        refuse("\"bufferView\" is missing or there is none of this number");
-    const tinygltf::BufferView& view = model_.bufferViews[size_t(a.bufferView)];
-    if (view.buffer < 0 || size_t(view.buffer) >= buffers_.size())
-        refuse("its buffer view's \"buffer\" is none of the file's");
-    const uint64_t size = buffers_[size_t(view.buffer)].size;
-    if (view.byteOffset > size || view.byteLength > size - view.byteOffset)
-        refuse("its buffer view ends after its buffer, which has " + std::to_string(size) + " bytes");
+    const tinygltf::BufferView& view = buffer_view(a.bufferView, where);
     const uint64_t stride = view.byteStride == 0 ? element : view.byteStride;
     if (stride < element) refuse("its buffer view's \"byteStride\" is smaller than an element");
-    const uint64_t room = view.byteLength < a.byteOffset ? 0 : view.byteLength - a.byteOffset;
-    if (a.count > 0 && (room < element || (room - element) / stride < a.count - 1))
+    const uint64_t space = view.byteLength < a.byteOffset ? 0 : view.byteLength - a.byteOffset;
+    if (a.count > 0 && (space < element || (space - element) / stride < a.count - 1))
         refuse("its " + std::to_string(a.count) + " elements do not fit its buffer view of " +
                std::to_string(view.byteLength) + " bytes");
     return a;
+}
+
+const tinygltf::Mesh& GltfDocument::mesh(int index, const std::string& node) const {
+    if (index < 0 || size_t(index) >= model_.meshes.size())
+        fail(node + ": \"mesh\" " + std::to_string(index) + ": there is none of this number");
+    return model_.meshes[size_t(index)];
+}
+
+const tinygltf::Accessor* GltfDocument::attribute(const tinygltf::Primitive& primitive,
+                                                  const std::string& name, std::initializer_list<int> types,
+                                                  size_t count, const std::string& where) const {
+    const auto found = primitive.attributes.find(name);
+    if (found == primitive.attributes.end()) return nullptr;
+    const std::string what = where + ", attribute " + name;
+    const tinygltf::Accessor& a = accessor(found->second, what);
+    if (std::ranges::find(types, a.type) == types.end())
+        fail(what + ": \"type\" is wrong for this attribute");
+    if (name != "POSITION" && a.count != count)
+        fail(what + ": has " + std::to_string(a.count) + " elements for " + std::to_string(count) +
+             " positions");
+    return &a;
 }
 
 void GltfDocument::read(const tinygltf::Accessor& accessor, const std::string& what,
                         const std::function<void(size_t, const double*)>& element) const {
     const tinygltf::BufferView& view = model_.bufferViews[size_t(accessor.bufferView)];
     const Buffer& buffer = buffers_[size_t(view.buffer)];
-    const size_t width = component_bytes(accessor.componentType), count = components(accessor);
+    const Component& component = *component_of(accessor);
+    const size_t width = component.bytes, count = components(accessor);
     const size_t stride = view.byteStride == 0 ? width * count : view.byteStride;
     const uint64_t begin = view.byteOffset + accessor.byteOffset;
     const auto each = [&](size_t i, const std::byte* bytes) {
         double values[4] = {};
         for (size_t k = 0; k < count; ++k)
-            values[k] = decode(accessor.componentType, accessor.normalized, bytes + k * width);
+            values[k] = component.value(bytes + k * width, accessor.normalized);
         element(i, values);
     };
     if (buffer.file.empty()) {

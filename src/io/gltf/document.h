@@ -11,6 +11,10 @@
 
 namespace ewa::io {
 
+/// The numbers of a .glb: its beginning, and the types of its chunks.
+constexpr uint32_t kGlbMagic = 0x46546c67, kGlbJson = 0x4e4f534a, kGlbBin = 0x004e4942;
+inline const std::string kSplatExtension = "KHR_gaussian_splatting";
+
 /// The sections of the file that a reader needs.
 enum class GltfContent {
     splats,  // scenes, nodes, meshes, accessors, buffer views; neither materials nor "extras"
@@ -38,6 +42,15 @@ class GltfDocument {
     /// `indices` allows 32-bit integers, which no attribute has.
     const tinygltf::Accessor& accessor(int index, const std::string& what, bool indices = false) const;
 
+    /// The accessor of a primitive's attribute, which has one of the types and, unless it is POSITION, `count`
+    /// elements. Null if the primitive lacks the attribute. `where` names the primitive in errors.
+    const tinygltf::Accessor* attribute(const tinygltf::Primitive& primitive, const std::string& name,
+                                        std::initializer_list<int> types, size_t count,
+                                        const std::string& where) const;
+
+    /// A node's mesh. `node` names the node in errors.
+    const tinygltf::Mesh& mesh(int index, const std::string& node) const;
+
     /// Calls element(index, values) for the elements in order. Normalised integers become 0..1 or -1..1.
     void read(const tinygltf::Accessor& accessor, const std::string& what,
               const std::function<void(size_t, const double*)>& element) const;
@@ -57,11 +70,11 @@ class GltfDocument {
         std::string uri;  // empty: the image is in the buffer view
         int view = -1;
     };
-    void add_buffers(const std::filesystem::path& folder, const void* json_buffers, uint64_t chunk_begin,
-                     uint64_t chunk_size);
+    void add_buffers(const void* json_buffers, uint64_t chunk_begin, uint64_t chunk_size);
     void add_images(const void* json_images);
-    Buffer open_uri(const std::filesystem::path& folder, const std::string& uri,
-                    const std::string& what) const;
+    Buffer open_uri(const std::string& uri, const std::string& what) const;
+    /// The buffer view, after a check that it is in its buffer.
+    const tinygltf::BufferView& buffer_view(int index, const std::string& what) const;
     Buffer open_view(int index, const std::string& what) const;
 
     std::string name_;

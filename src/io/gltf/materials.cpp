@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/gltf/materials.h"
-
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -9,6 +7,8 @@
 #include <numbers>
 
 #include "ewa/error.h"
+#include "io/gltf/document.h"
+#include "io/gltf/mesh.h"
 
 namespace ewa::io {
 
@@ -68,20 +68,27 @@ class MaterialReader {
     }
 
   private:
+    /// A number of the material from 0 to `high`.
+    double checked(double value, double high, const std::string& name) const {
+        return finite(document_, value, 0, high, where_ + ": \"" + name + "\"");
+    }
+    float factor(double value, double high, const std::string& name) const {
+        return float(checked(value, high, name));
+    }
+
     scene::Material material(const tinygltf::Material& source) {
         const auto& pbr = source.pbrMetallicRoughness;
         scene::Material m;
         const std::string base = where_ + ": \"baseColorFactor\"";
         m.base = color(document_, pbr.baseColorFactor, 1e6, base);
-        if (pbr.baseColorFactor.size() > 3)
-            m.opacity = float(finite(document_, pbr.baseColorFactor[3], 0, 1, base));
-        m.metallic = float(finite(document_, pbr.metallicFactor, 0, 1, where_ + ": \"metallicFactor\""));
-        m.roughness = float(finite(document_, pbr.roughnessFactor, 0, 1, where_ + ": \"roughnessFactor\""));
+        if (pbr.baseColorFactor.size() > 3) m.opacity = factor(pbr.baseColorFactor[3], 1, "baseColorFactor");
+        m.metallic = factor(pbr.metallicFactor, 1, "metallicFactor");
+        m.roughness = factor(pbr.roughnessFactor, 1, "roughnessFactor");
         m.emitted = color(document_, source.emissiveFactor, 1e6, where_ + ": \"emissiveFactor\"");
         m.two_sided = source.doubleSided;
         m.masked = source.alphaMode == "MASK";
         m.blended = source.alphaMode == "BLEND";
-        m.cutoff = float(finite(document_, source.alphaCutoff, 0, 1e6, where_ + ": \"alphaCutoff\""));
+        m.cutoff = factor(source.alphaCutoff, 1e6, "alphaCutoff");
         m.base_texture = texture(pbr.baseColorTexture);
         m.metal_texture = texture(pbr.metallicRoughnessTexture);
         m.emitted_texture = texture(source.emissiveTexture);
@@ -93,15 +100,12 @@ class MaterialReader {
     }
 
     void extend(const tinygltf::Material& source, scene::Material& m) {
-        const double strength =
-            number(extension(source.extensions, "KHR_materials_emissive_strength"), "emissiveStrength", 1);
-        m.emitted *= float(finite(document_, strength, 0, 1e9, where_ + ": \"emissiveStrength\""));
-        const double ior =
-            finite(document_, number(extension(source.extensions, "KHR_materials_ior"), "ior", 1.5), 0, 1e6,
-                   where_ + ": \"ior\"");
-        const double specular = finite(
-            document_, number(extension(source.extensions, "KHR_materials_specular"), "specularFactor", 1), 0,
-            1, where_ + ": \"specularFactor\"");
+        const auto* emission = extension(source.extensions, "KHR_materials_emissive_strength");
+        const auto* refraction = extension(source.extensions, "KHR_materials_ior");
+        const auto* fine = extension(source.extensions, "KHR_materials_specular");
+        m.emitted *= factor(number(emission, "emissiveStrength", 1), 1e9, "emissiveStrength");
+        const double ior = checked(number(refraction, "ior", 1.5), 1e6, "ior");
+        const double specular = checked(number(fine, "specularFactor", 1), 1, "specularFactor");
         const double edge = ior > 0 ? (ior - 1) / (ior + 1) : 1;  // 0 means an infinite index of refraction
         m.f0 = float(edge * edge * specular);
         m.f90 = float(specular);
@@ -112,7 +116,7 @@ class MaterialReader {
             m.base = glm::vec3(0);
             m.metallic = m.f0 = m.f90 = 0;
         }
-        if (const tinygltf::Value* fine = extension(source.extensions, "KHR_materials_specular"))
+        if (fine)
             for (const char* key : {"specularTexture", "specularColorTexture", "specularColorFactor"})
                 if (fine->IsObject() && fine->Has(key))
                     remark(scene_, std::string("KHR_materials_specular: ") + key + " is skipped");

@@ -10,13 +10,11 @@
 
 #include "ewa/error.h"
 #include "io/gltf/document.h"
-#include "io/gltf/materials.h"
 
 namespace ewa::io {
 
 namespace {
 
-const std::string kSplats = "KHR_gaussian_splatting";
 constexpr int kMostPlaced = 65536;
 constexpr size_t kMostNamed = 32;  // unknown extensions in remarks
 constexpr uint64_t kExpansion = 16, kAlways = uint64_t(20) << 20;
@@ -69,7 +67,7 @@ class MeshReader {
                                ", which is not supported");
         size_t named = 0;
         for (const std::string& name : model_.extensionsUsed)
-            if (!known(name) && name != kSplats && ++named <= kMostNamed)
+            if (!known(name) && name != kSplatExtension && ++named <= kMostNamed)
                 remark(scene_, name.substr(0, 100) + " is skipped");
         if (document_.animated())
             remark(scene_, "animations are skipped: the pose is the one the file stores");
@@ -77,7 +75,7 @@ class MeshReader {
 
     [[noreturn]] void refuse_empty() const {
         if (splats_)
-            document_.fail("the scene's nodes reach splats (" + kSplats +
+            document_.fail("the scene's nodes reach splats (" + kSplatExtension +
                            ") and no \"mesh\" of triangles to render");
         if (scene_.dropped_triangles > 0)
             document_.fail("none of the \"mesh\"es has a triangle whose corners are all finite");
@@ -85,16 +83,14 @@ class MeshReader {
     }
 
     void add_mesh(int index, const glm::dmat4& matrix) {
-        if (size_t(index) >= model_.meshes.size())
-            document_.fail(where_ + ": \"mesh\" " + std::to_string(index) + ": there is none of this number");
-        const tinygltf::Mesh& mesh = model_.meshes[size_t(index)];
+        const tinygltf::Mesh& mesh = document_.mesh(index, where_);
         for (size_t i = 0; i < mesh.primitives.size(); ++i) {
             const tinygltf::Primitive& primitive = mesh.primitives[i];
             if (++placed_ > kMostPlaced)
                 document_.fail(where_ + ": more than " + std::to_string(kMostPlaced) +
                                " primitives are placed in the scene");
             if (!is_triangles(primitive)) {
-                splats_ = splats_ || primitive.extensions.count(kSplats) > 0;
+                splats_ = splats_ || primitive.extensions.count(kSplatExtension) > 0;
                 remark(scene_, "points, lines and splats are skipped");
                 continue;
             }
@@ -107,24 +103,16 @@ class MeshReader {
     /// The cached vectors of an attribute's accessor. Null if the primitive lacks the attribute.
     const Vectors* attribute(const tinygltf::Primitive& primitive, const std::string& name,
                              std::initializer_list<int> types, size_t count) {
-        const auto found = primitive.attributes.find(name);
-        if (found == primitive.attributes.end()) return nullptr;
-        const std::string what = where_primitive_ + ", attribute " + name;
-        const tinygltf::Accessor& accessor = document_.accessor(found->second, what);
-        if (std::find(types.begin(), types.end(), accessor.type) == types.end())
-            document_.fail(what + ": \"type\" is wrong for this attribute");
-        if (name != "POSITION" && accessor.count != count)
-            document_.fail(what + ": has " + std::to_string(accessor.count) + " elements for " +
-                           std::to_string(count) + " positions");
-        const bool fresh = vectors_.count(found->second) == 0;
-        Vectors& read = vectors_[found->second];
-        if (fresh) {
-            read.resize(accessor.count);
-            document_.read(accessor, what, [&](size_t i, const double* v) {
-                read[i] = {v[0], v[1], v[2], accessor.type == TINYGLTF_TYPE_VEC4 ? v[3] : 1.0};
-            });
-        }
-        return &read;
+        const auto* accessor = document_.attribute(primitive, name, types, count, where_primitive_);
+        if (!accessor) return nullptr;
+        const auto [entry, fresh] = vectors_.try_emplace(accessor, accessor->count);
+        if (fresh)
+            document_.read(
+                *accessor, where_primitive_ + ", attribute " + name,
+                [&values = entry->second, accessor](size_t i, const double* v) {
+                    values[i] = {v[0], v[1], v[2], accessor->type == TINYGLTF_TYPE_VEC4 ? v[3] : 1.0};
+                });
+        return &entry->second;
     }
 
     Source source_of(const tinygltf::Primitive& primitive) {
@@ -252,7 +240,7 @@ class MeshReader {
     const tinygltf::Model& model_;
     scene::MeshScene scene_;
     std::vector<int> texture_sets_;
-    std::map<int, Vectors> vectors_;  // by accessor
+    std::map<const tinygltf::Accessor*, Vectors> vectors_;
     std::string where_, where_primitive_;
     int placed_ = 0;
     bool splats_ = false;
@@ -271,7 +259,7 @@ bool is_gltf_mesh(const std::filesystem::path& path) try {
     for (const tinygltf::Mesh& mesh : document.model().meshes)
         for (const tinygltf::Primitive& primitive : mesh.primitives) {
             triangles = triangles || is_triangles(primitive);
-            splats = splats || primitive.extensions.count(kSplats) > 0;
+            splats = splats || primitive.extensions.count(kSplatExtension) > 0;
         }
     return triangles && !splats;
 } catch (const InputError&) {

@@ -2,10 +2,15 @@
 // glTF 2.0 scenes of triangles, as .glb or .gltf. Buffers and images are files beside it or embedded.
 #pragma once
 #include <filesystem>
+#include <glm/mat4x4.hpp>
+#include <string>
+#include <vector>
 
 #include "scene/mesh_scene.h"
 
 namespace ewa::io {
+
+class GltfDocument;
 
 /// Reads the default scene in the file's world:
 ///   triangles   modes 4, 5 and 6, with or without indices of any integer type; vertex colours
@@ -22,5 +27,21 @@ scene::MeshScene read_gltf_mesh(const std::filesystem::path& path);
 
 /// Whether the file is a glTF whose meshes have triangles and no splats. False for anything else.
 bool is_gltf_mesh(const std::filesystem::path& path);
+
+// The parts of read_gltf_mesh that are not triangles.
+
+/// Fills materials, textures and images. The last material is the default of primitives that name none.
+/// texture_sets gets each material's TEXCOORD set. Throws InputError that names the material or texture.
+void read_materials(const GltfDocument& document, scene::MeshScene& scene, std::vector<int>& texture_sets);
+
+/// Adds a remark unless it is present.
+void remark(scene::MeshScene& scene, const std::string& text);
+
+/// Appends the camera or light of a node that `matrix` places in the world. Throws InputError.
+void add_camera(const GltfDocument& document, int node, const glm::dmat4& matrix, scene::MeshScene& scene);
+void add_light(const GltfDocument& document, int node, const glm::dmat4& matrix, scene::MeshScene& scene);
+
+/// The sky in the scene's "extras", or the default one. Throws InputError.
+scene::Sky read_sky(const GltfDocument& document);
 
 }  // namespace ewa::io

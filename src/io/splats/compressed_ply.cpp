@@ -1,12 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/splats/compressed_ply.h"
-
+// SuperSplat's compressed PLY (playcanvas/splat-transform, write-compressed-ply.ts): a PLY container with the
+// elements
+//   chunk    a box per 256 splats: float min_x..z max_x..z, min_scale_x..z max_scale_x..z (logarithms),
+//            min_r..b max_r..b (colours; older files lack them, which means 0..1)
+//   vertex   uint packed_position, packed_scale   11, 10 and 11 bits from the top, within the chunk's box
+//            uint packed_rotation                 2 bits: which of w x y z is the largest;
+//                                                 each other component c as c / sqrt(2) + 0.5 in 10 bits
+//            uint packed_color                    8 bits each: r g b within the chunk's box, opacity
+//   sh       uchar f_rest_i, channel-major: v = (byte + 0.5) / 32 - 4; the ends are -4 and 4
 #include <numbers>
 
 #include "core/atomic_file.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
+#include "io/splats/formats.h"
+#include "io/splats/ply_table.h"
 #include "io/splats/splat_values.h"
 
 namespace ewa::io {
@@ -78,8 +87,8 @@ std::vector<size_t> columns_of(const PlyTable& table, const PlyElement& element,
                                const std::vector<std::string>& names) {
     std::vector<size_t> columns;
     for (const std::string& name : names) {
-        const std::optional<size_t> found = element.find(name);
-        if (!found || element.properties[*found].list_count)
+        const std::optional<size_t> found = element.find_number(name);
+        if (!found)
             throw InputError(table.name() + ": the element \"" + element.name + "\" has no number \"" + name +
                              "\", which SuperSplat's compressed layout needs");
         columns.push_back(*found);
@@ -237,18 +246,14 @@ void write_chunks(core::AtomicFile& file, const Gaussians& gaussians, const std:
 
 void write_sh(core::AtomicFile& file, const Gaussians& gaussians, const std::vector<uint32_t>& order) {
     const size_t stride = gaussians.sh_stride();
-    std::vector<uint8_t> bytes;
-    constexpr size_t kFlushBytes = size_t(1) << 18;
-    for (const uint32_t i : order) {
-        for (size_t channel = 0; channel < 3; ++channel)
-            for (size_t k = 3; k < stride; k += 3)
-                bytes.push_back(pack_sh(gaussians.sh[stride * i + k + channel]));
-        if (bytes.size() >= kFlushBytes) {
-            file.write(bytes.data(), bytes.size());
-            bytes.clear();
-        }
-    }
-    file.write(bytes.data(), bytes.size());
+    encode_in_pieces(
+        order.size(), stride - 3,
+        [&](size_t i, std::byte* to) {
+            for (size_t channel = 0; channel < 3; ++channel)
+                for (size_t k = 3; k < stride; k += 3)
+                    *to++ = std::byte(pack_sh(gaussians.sh[stride * order[i] + k + channel]));
+        },
+        [&](const std::byte* bytes, size_t size, size_t) { file.write(bytes, size); });
 }
 
 }  // namespace

@@ -1,6 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/splats/gltf_splats.h"
-
+// glTF 2.0 with KHR_gaussian_splatting (Khronos; release candidate of 2026), as .glb, or as .gltf with a .bin
+// beside it.
+//
+// A primitive of mode POINTS has the attributes
+//   POSITION                                   metres, in the node's frame
+//   KHR_gaussian_splatting:ROTATION            unit quaternion x y z w
+//   KHR_gaussian_splatting:SCALE               linear standard deviations
+//   KHR_gaussian_splatting:OPACITY             linear, 0..1
+//   KHR_gaussian_splatting:SH_DEGREE_l_COEF_m  RGB, l = 0..3, m = 0..2l in INRIA's order
+//   COLOR_0                                    linear colour and opacity, for programs that draw points
+// glTF's world is LUF (x left, y up, z forward), which is PLY's turned by 180 degrees about z. The writer
+// keeps the stored values and adds that turn as a node's rotation. The reader applies the nodes' transforms,
+// to SH too.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -15,6 +26,7 @@
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
 #include "io/gltf/document.h"
+#include "io/splats/formats.h"
 #include "io/splats/splat_values.h"
 #include "scene/color.h"
 
@@ -24,8 +36,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-const std::string kExtension = "KHR_gaussian_splatting";
-const std::string kPrefix = kExtension + ":";
+const std::string kPrefix = kSplatExtension + ":";
 constexpr double kLeastOpacity = 1e-30, kMostOpacity = 1 - 0x1p-25;  // half a step below 1 in float32
 constexpr int kMostPlaced = 4096;                                    // each reads its attributes again
 
@@ -43,18 +54,12 @@ double srgb_slope(double v) {
 }
 
 double opacity_logit(int component_type, double opacity) {
-    switch (component_type) {
-        case TINYGLTF_COMPONENT_TYPE_BYTE:
-            return logit_of_steps(opacity, 127);
-        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
-            return logit_of_steps(opacity, 255);
-        case TINYGLTF_COMPONENT_TYPE_SHORT:
-            return logit_of_steps(opacity, 32767);
-        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
-            return logit_of_steps(opacity, 65535);
-        default:
-            return logit(opacity, kLeastOpacity, kMostOpacity);
-    }
+    const uint32_t steps = component_type == TINYGLTF_COMPONENT_TYPE_BYTE             ? 127
+                           : component_type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE  ? 255
+                           : component_type == TINYGLTF_COMPONENT_TYPE_SHORT          ? 32767
+                           : component_type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT ? 65535
+                                                                                      : 0;
+    return steps ? logit_of_steps(opacity, steps) : logit(opacity, kLeastOpacity, kMostOpacity);
 }
 
 class SplatReader {
@@ -70,7 +75,7 @@ class SplatReader {
             if (mesh >= 0) add_mesh(mesh, matrix, "node " + std::to_string(index));
         });
         if (primitives_ == 0)
-            document_.fail("the scene's nodes reach no primitive with the extension " + kExtension +
+            document_.fail("the scene's nodes reach no primitive with the extension " + kSplatExtension +
                            "; ewa train and ewa dataset render mesh scenes");
         scene_.file_sh_degree = std::max(scene_.file_sh_degree, scene_.gaussians.sh_degree);
         scene_.format = document_.binary() ? SplatFormat::glb : SplatFormat::gltf;
@@ -80,11 +85,9 @@ class SplatReader {
 
   private:
     void add_mesh(int index, const glm::dmat4& matrix, const std::string& node) {
-        if (size_t(index) >= model_.meshes.size())
-            document_.fail(node + ": \"mesh\" " + std::to_string(index) + ": there is none of this number");
-        const tinygltf::Mesh& mesh = model_.meshes[size_t(index)];
+        const tinygltf::Mesh& mesh = document_.mesh(index, node);
         for (size_t i = 0; i < mesh.primitives.size(); ++i) {
-            const auto extension = mesh.primitives[i].extensions.find(kExtension);
+            const auto extension = mesh.primitives[i].extensions.find(kSplatExtension);
             if (extension == mesh.primitives[i].extensions.end()) continue;
             if (++primitives_ > kMostPlaced)
                 document_.fail(node + ": more than " + std::to_string(kMostPlaced) +
@@ -144,21 +147,15 @@ class SplatReader {
 
     std::string text(const tinygltf::Value& extension, const char* property) const {
         if (!extension.IsObject() || !extension.Has(property) || !extension.Get(property).IsString())
-            document_.fail(where_ + ": the extension " + kExtension + " has no \"" + property + "\"");
+            document_.fail(where_ + ": the extension " + kSplatExtension + " has no \"" + property + "\"");
         return extension.Get(property).Get<std::string>();
     }
 
     const tinygltf::Accessor& attribute(const tinygltf::Primitive& primitive, const std::string& name,
                                         int type) const {
-        const std::string what = where_ + ", attribute " + name;
-        const auto found = primitive.attributes.find(name);
-        if (found == primitive.attributes.end()) document_.fail(what + ": is missing");
-        const tinygltf::Accessor& accessor = document_.accessor(found->second, what);
-        if (accessor.type != type) document_.fail(what + ": \"type\" is wrong for this attribute");
-        if (name != "POSITION" && accessor.count != count_)
-            document_.fail(what + ": has " + std::to_string(accessor.count) + " elements for " +
-                           std::to_string(count_) + " positions");
-        return accessor;
+        const auto* accessor = document_.attribute(primitive, name, {type}, count_, where_);
+        if (!accessor) document_.fail(where_ + ", attribute " + name + ": is missing");
+        return *accessor;
     }
 
     void require_fractions(const tinygltf::Accessor& accessor, const char* name) const {
@@ -234,15 +231,12 @@ class SplatReader {
 // Writing. The layout of the buffer is known before its values, so they go to the file without a copy in
 // memory.
 
-constexpr int kFloat = 5126, kUnsignedShort = 5123, kArrayBuffer = 34962, kPoints = 0;
-constexpr uint32_t kMagic = 0x46546c67, kJsonChunk = 0x4e4f534a, kBinChunk = 0x004e4942;
-
 struct Attribute {
     std::string name;
     const char* type;
     size_t bytes;                                                      // per element; a multiple of 4
     std::function<void(const Gaussians&, size_t, std::byte*)> encode;  // element i
-    int component = kFloat;
+    int component = TINYGLTF_COMPONENT_TYPE_FLOAT;
     bool normalized = false;
 };
 
@@ -253,7 +247,7 @@ Attribute floats(const std::string& name, const char* type, Value value) {
         for (size_t k = 0; k < n; ++k) values[k] = value(g, i, k);
         std::memcpy(to, values.data(), sizeof(values));
     };
-    return {name, type, sizeof(float) * n, encode, kFloat, false};
+    return {name, type, sizeof(float) * n, encode, TINYGLTF_COMPONENT_TYPE_FLOAT, false};
 }
 
 /// COLOR_0: the base colour in linear light, and opacity.
@@ -269,28 +263,26 @@ void encode_color(const Gaussians& g, size_t i, std::byte* to) {
 }
 
 std::vector<Attribute> attributes_of(const Gaussians& gaussians) {
-    const std::string prefix = "KHR_gaussian_splatting:";
     std::vector<Attribute> list;
     list.push_back(floats<3>("POSITION", "VEC3",
                              [](const Gaussians& g, size_t i, size_t k) { return g.means[3 * i + k]; }));
-    list.push_back({"COLOR_0", "VEC4", 8, encode_color, kUnsignedShort, true});
-    list.push_back(floats<4>(prefix + "ROTATION", "VEC4", [](const Gaussians& g, size_t i, size_t k) {
+    list.push_back({"COLOR_0", "VEC4", 8, encode_color, TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT, true});
+    list.push_back(floats<4>(kPrefix + "ROTATION", "VEC4", [](const Gaussians& g, size_t i, size_t k) {
         return float(unit_quaternion(&g.quaternions[4 * i])[(k + 1) % 4]);
     }));
-    list.push_back(floats<3>(prefix + "SCALE", "VEC3", [](const Gaussians& g, size_t i, size_t k) {
+    list.push_back(floats<3>(kPrefix + "SCALE", "VEC3", [](const Gaussians& g, size_t i, size_t k) {
         return scale_of_log(g.log_scales[3 * i + k]);
     }));
-    list.push_back(floats<1>(prefix + "OPACITY", "SCALAR", [](const Gaussians& g, size_t i, size_t) {
+    list.push_back(floats<1>(kPrefix + "OPACITY", "SCALAR", [](const Gaussians& g, size_t i, size_t) {
         return float(sigmoid(g.opacity_logits[i]));
     }));
     size_t first = 0;
     for (int degree = 0; degree <= gaussians.sh_degree; ++degree)
         for (int k = 0; k < 2 * degree + 1; ++k, first += 3)
             list.push_back(
-                floats<3>(prefix + "SH_DEGREE_" + std::to_string(degree) + "_COEF_" + std::to_string(k),
-                          "VEC3", [first](const Gaussians& g, size_t i, size_t channel) {
-                              return g.sh[g.sh_stride() * i + first + channel];
-                          }));
+                floats<3>(sh_name(degree, k), "VEC3", [first](const Gaussians& g, size_t i, size_t channel) {
+                    return g.sh[g.sh_stride() * i + first + channel];
+                }));
     return list;
 }
 
@@ -321,18 +313,21 @@ Json structure(const Gaussians& gaussians, const std::vector<Attribute>& attribu
         if (attribute.name == "POSITION") add_bounds(gaussians, accessor);
         names[attribute.name] = accessors.size();
         accessors.push_back(std::move(accessor));
-        views.push_back(
-            {{"buffer", 0}, {"byteOffset", offset}, {"byteLength", bytes}, {"target", kArrayBuffer}});
+        views.push_back({{"buffer", 0},
+                         {"byteOffset", offset},
+                         {"byteLength", bytes},
+                         {"target", TINYGLTF_TARGET_ARRAY_BUFFER}});
         offset += bytes;
     }
     const Json extension = {{"kernel", "ellipse"},
                             {"colorSpace", "srgb_rec709_display"},
                             {"projection", "perspective"},
                             {"sortingMethod", "cameraDistance"}};
-    const Json primitive = {
-        {"attributes", names}, {"mode", kPoints}, {"extensions", {{"KHR_gaussian_splatting", extension}}}};
+    const Json primitive = {{"attributes", names},
+                            {"mode", TINYGLTF_MODE_POINTS},
+                            {"extensions", {{kSplatExtension, extension}}}};
     return {{"asset", {{"version", "2.0"}, {"generator", "ewa " EWA_VERSION}}},
-            {"extensionsUsed", {"KHR_gaussian_splatting"}},
+            {"extensionsUsed", {kSplatExtension}},
             {"scene", 0},
             {"scenes", {{{"nodes", {0}}}}},
             {"nodes", {{{"mesh", 0}, {"rotation", {0, 0, 1, 0}}}}},
@@ -344,18 +339,11 @@ Json structure(const Gaussians& gaussians, const std::vector<Attribute>& attribu
 
 void write_values(core::AtomicFile& file, const Gaussians& gaussians,
                   const std::vector<Attribute>& attributes, const SaveOptions& options) {
-    constexpr size_t kSplatsAtOnce = 16384;
     const size_t n = gaussians.size();
-    std::vector<std::byte> bytes;
     for (size_t a = 0; a < attributes.size(); ++a) {
-        const Attribute& attribute = attributes[a];
-        bytes.resize(kSplatsAtOnce * attribute.bytes);
-        for (size_t begin = 0; begin < n; begin += kSplatsAtOnce) {
-            const size_t end = std::min(begin + kSplatsAtOnce, n);
-            for (size_t i = begin; i < end; ++i)
-                attribute.encode(gaussians, i, &bytes[(i - begin) * attribute.bytes]);
-            file.write(bytes.data(), (end - begin) * attribute.bytes);
-        }
+        encode_in_pieces(
+            n, attributes[a].bytes, [&](size_t i, std::byte* to) { attributes[a].encode(gaussians, i, to); },
+            [&](const std::byte* bytes, size_t size, size_t) { file.write(bytes, size); });
         if (options.progress) options.progress(n * uint64_t(a + 1) / attributes.size(), n);
     }
 }
@@ -383,10 +371,10 @@ void write_binary(const std::filesystem::path& path, const Gaussians& gaussians,
         throw InputError(path.string() + ": a .glb is limited to 4 GiB, and this one would have " +
                          std::to_string(total) + " bytes; write a .gltf");
     core::AtomicFile file(path);
-    const uint32_t head[5] = {kMagic, 2, uint32_t(total), uint32_t(text.size()), kJsonChunk};
+    const uint32_t head[5] = {kGlbMagic, 2, uint32_t(total), uint32_t(text.size()), kGlbJson};
     file.write(head, sizeof(head));
     file.write(text);
-    const uint32_t chunk[2] = {uint32_t(bytes), kBinChunk};
+    const uint32_t chunk[2] = {uint32_t(bytes), kGlbBin};
     file.write(chunk, sizeof(chunk));
     write_values(file, gaussians, attributes, options);
     file.commit();
@@ -433,13 +421,13 @@ void check_gltf_values(const std::filesystem::path& gltf) {
 }
 
 std::vector<std::string> write_gltf_splats(const std::filesystem::path& path, const Gaussians& gaussians,
-                                           const SaveOptions& options, bool binary) {
+                                           const SaveOptions& options) {
     if (gaussians.size() == 0) throw InputError(path.string() + ": glTF cannot store a scene without splats");
     const std::vector<Attribute> attributes = attributes_of(gaussians);
     uint64_t bytes = 0;
     for (const Attribute& attribute : attributes) bytes += uint64_t(attribute.bytes) * gaussians.size();
     const Json json = structure(gaussians, attributes, bytes);
-    if (binary)
+    if (core::lower(path.filename().string()).ends_with(".glb"))
         write_binary(path, gaussians, attributes, json, bytes, options);
     else
         write_pair(path, gaussians, attributes, json, options);

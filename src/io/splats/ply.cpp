@@ -1,6 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/splats/ply.h"
-
+// Splats in INRIA's PLY layout (3D Gaussian Splatting, scene/gaussian_model.py, save_ply).
+//
+// The element "vertex" has one row per splat. Properties are found by name:
+//   x y z            means
+//   nx ny nz         written as zero, ignored when read
+//   f_dc_0..2        SH coefficient 0 of R, G, B
+//   f_rest_0..3K-1   SH coefficients 1..K of R, then of G, then of B; K = 0, 3, 8, 15 for degree 0..3
+//   opacity          logit
+//   scale_0..2       natural logarithm
+//   rot_0..3         w x y z
+// In memory, SH is coefficient after coefficient with RGB inner. So f_rest is transposed here.
 #include <algorithm>
 #include <array>
 #include <cassert>
@@ -9,6 +18,7 @@
 #include "core/atomic_file.h"
 #include "core/text.h"
 #include "ewa/error.h"
+#include "io/splats/formats.h"
 #include "io/splats/ply_table.h"
 #include "io/splats/splat_values.h"
 

@@ -16,44 +16,29 @@ constexpr uint64_t kMaxHeaderBytes = uint64_t(1) << 22;
 constexpr size_t kMaxProperties = 1024;  // per element; each is compared with all before it
 constexpr size_t kMaxWord = 512;         // longer than any number that a program writes
 
-std::optional<PlyType> type_of(std::string_view name) {
-    struct Name {
-        std::string_view plain, sized;
-        PlyType type;
-    };
-    static constexpr Name kNames[] = {
-        {"char", "int8", PlyType::int8},        {"uchar", "uint8", PlyType::uint8},
-        {"short", "int16", PlyType::int16},     {"ushort", "uint16", PlyType::uint16},
-        {"int", "int32", PlyType::int32},       {"uint", "uint32", PlyType::uint32},
-        {"float", "float32", PlyType::float32}, {"double", "float64", PlyType::float64}};
-    for (const Name& entry : kNames)
-        if (name == entry.plain || name == entry.sized) return entry.type;
-    return std::nullopt;
-}
-
-size_t bytes_of(PlyType type) {
-    switch (type) {
-        case PlyType::int8:
-        case PlyType::uint8:
-            return 1;
-        case PlyType::int16:
-        case PlyType::uint16:
-            return 2;
-        case PlyType::int32:
-        case PlyType::uint32:
-        case PlyType::float32:
-            return 4;
-        case PlyType::float64:
-            return 8;
-    }
-    return 8;
-}
-
 template <class T>
 double as_double(const std::byte* bytes) {
     T value;
     std::memcpy(&value, bytes, sizeof(T));
     return static_cast<double>(value);
+}
+
+struct TypeInfo {
+    std::string_view plain, sized;  // names
+    size_t bytes;
+    double (*read)(const std::byte*);
+};
+/// In the order of PlyType.
+constexpr TypeInfo kTypes[] = {
+    {"char", "int8", 1, as_double<int8_t>},    {"uchar", "uint8", 1, as_double<uint8_t>},
+    {"short", "int16", 2, as_double<int16_t>}, {"ushort", "uint16", 2, as_double<uint16_t>},
+    {"int", "int32", 4, as_double<int32_t>},   {"uint", "uint32", 4, as_double<uint32_t>},
+    {"float", "float32", 4, as_double<float>}, {"double", "float64", 8, as_double<double>}};
+/// In the order of PlyTable::Format.
+constexpr std::string_view kFormats[] = {"ascii", "binary_little_endian", "binary_big_endian"};
+
+size_t bytes_of(PlyType type) {
+    return kTypes[size_t(type)].bytes;
 }
 
 }  // namespace
@@ -71,9 +56,14 @@ size_t PlyElement::row_bytes() const {
 }
 
 std::optional<size_t> PlyElement::find(std::string_view property) const {
-    for (size_t i = 0; i < properties.size(); ++i)
-        if (properties[i].name == property) return i;
-    return std::nullopt;
+    const auto found = std::ranges::find(properties, property, &PlyProperty::name);
+    if (found == properties.end()) return std::nullopt;
+    return size_t(found - properties.begin());
+}
+
+std::optional<size_t> PlyElement::find_number(std::string_view property) const {
+    const std::optional<size_t> found = find(property);
+    return found && !properties[*found].list_count ? found : std::nullopt;
 }
 
 PlyTable::PlyTable(const std::filesystem::path& path) : reader_(path) {
@@ -114,26 +104,13 @@ void PlyTable::parse_header() {
 
 void PlyTable::parse_format(std::string_view rest) {
     const std::string_view format = core::next_word(rest);
-    if (format == "ascii")
-        format_ = Format::ascii;
-    else if (format == "binary_little_endian")
-        format_ = Format::little_endian;
-    else if (format == "binary_big_endian")
-        format_ = Format::big_endian;
-    else
-        fail("the format \"" + std::string(format) + "\" is unknown in PLY");
+    const auto* found = std::ranges::find(kFormats, format);
+    if (found == std::end(kFormats)) fail("the format \"" + std::string(format) + "\" is unknown in PLY");
+    format_ = Format(found - kFormats);
 }
 
 std::string_view PlyTable::format_name() const {
-    switch (format_) {
-        case Format::ascii:
-            return "ascii";
-        case Format::little_endian:
-            return "binary_little_endian";
-        case Format::big_endian:
-            return "binary_big_endian";
-    }
-    return "";
+    return kFormats[size_t(format_)];
 }
 
 void PlyTable::parse_element(std::string_view rest) {
@@ -152,9 +129,11 @@ void PlyTable::parse_property(std::string_view rest) {
     PlyElement& element = elements_.back();
     const auto next_type = [&] {
         const std::string_view word = core::next_word(rest);
-        const std::optional<PlyType> type = type_of(word);
-        if (!type) fail("the property type \"" + std::string(word) + "\" is unknown in PLY");
-        return *type;
+        const auto* found = std::ranges::find_if(
+            kTypes, [&](const TypeInfo& type) { return word == type.plain || word == type.sized; });
+        if (found == std::end(kTypes))
+            fail("the property type \"" + std::string(word) + "\" is unknown in PLY");
+        return PlyType(found - kTypes);
     };
     PlyProperty property;
     property.offset = element.row_bytes();
@@ -175,18 +154,14 @@ void PlyTable::parse_property(std::string_view rest) {
     element.properties.push_back(std::move(property));
 }
 
-void PlyTable::check_room(const PlyElement& element) const {
-    // The shortest row of text is one digit and one separator per value. The last separator may be missing.
-    const uint64_t columns = element.properties.size();
-    const uint64_t least =
-        format_ == Format::ascii ? std::max<uint64_t>(2 * columns, 1) - 1 : element.row_bytes();
-    reader_.require_room(element.count, least, "rows of \"" + element.name + "\"");
-}
-
 const PlyElement& PlyTable::go_to(std::string_view name) {
     for (; next_element_ < elements_.size(); ++next_element_) {
         const PlyElement& element = elements_[next_element_];
-        check_room(element);
+        // The shortest row of text is one digit and one separator per value. The last separator may be missing.
+        const uint64_t columns = element.properties.size();
+        const uint64_t least =
+            format_ == Format::ascii ? std::max<uint64_t>(2 * columns, 1) - 1 : element.row_bytes();
+        reader_.require_room(element.count, least, "rows of \"" + element.name + "\"");
         if (element.name == name) return element;
         skip_rows(element);
     }
@@ -276,25 +251,7 @@ double PlyTable::decode(PlyType type, const std::byte* bytes) const {
         std::reverse_copy(bytes, bytes + bytes_of(type), swapped);
         bytes = swapped;
     }
-    switch (type) {
-        case PlyType::int8:
-            return as_double<int8_t>(bytes);
-        case PlyType::uint8:
-            return as_double<uint8_t>(bytes);
-        case PlyType::int16:
-            return as_double<int16_t>(bytes);
-        case PlyType::uint16:
-            return as_double<uint16_t>(bytes);
-        case PlyType::int32:
-            return as_double<int32_t>(bytes);
-        case PlyType::uint32:
-            return as_double<uint32_t>(bytes);
-        case PlyType::float32:
-            return as_double<float>(bytes);
-        case PlyType::float64:
-            return as_double<double>(bytes);
-    }
-    return 0;
+    return kTypes[size_t(type)].read(bytes);
 }
 
 }  // namespace ewa::io

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The PLY container (Turk 1994): a text header declares elements and their properties, and their rows follow.
-// ply.h, compressed_ply.h and datasets/image_records.h interpret the properties.
+// ply.cpp, compressed_ply.cpp and datasets/image_records.cpp interpret the properties.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -31,6 +31,7 @@ struct PlyElement {
     bool has_lists() const;
     size_t row_bytes() const;  // of a binary row with empty lists
     std::optional<size_t> find(std::string_view property) const;
+    std::optional<size_t> find_number(std::string_view property) const;  // not a list
 };
 
 /// Reads ascii, binary_little_endian and binary_big_endian. Throws InputError that names the byte.
@@ -62,7 +63,6 @@ class PlyTable {
     void parse_format(std::string_view rest);
     void parse_element(std::string_view rest);
     void parse_property(std::string_view rest);
-    void check_room(const PlyElement& element) const;
     void skip_rows(const PlyElement& element);
     void read_row(const PlyElement& element,
                   std::vector<double>& values);  // the value of a list is its length

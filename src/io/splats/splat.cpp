@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/splats/splat.h"
-
+// The format of antimatter15's viewer: 32 bytes per splat, without a header:
+//   byte 0    float32 x y z
+//   byte 12   float32 scales, linear
+//   byte 24   uint8 r g b, opacity
+//   byte 28   uint8 quaternion w x y z, each component q as 128 q + 128
+// rgb is the colour of SH coefficient 0, so there is no view dependence.
 #include "core/atomic_file.h"
 #include "core/file_reader.h"
+#include "io/splats/formats.h"
 #include "io/splats/splat_values.h"
 
 namespace ewa::io {
@@ -71,18 +76,17 @@ SplatScene read_splat(const std::filesystem::path& path) {
 std::vector<std::string> write_splat(const std::filesystem::path& path, const Gaussians& gaussians,
                                      const SaveOptions& options) {
     core::AtomicFile file(path);
-    constexpr size_t kSplatsAtOnce = 8192;
-    std::vector<std::byte> bytes(kSplatsAtOnce * kSplatBytes);
-    const size_t n = gaussians.size();
-    for (size_t begin = 0; begin < n; begin += kSplatsAtOnce) {
-        const size_t end = std::min(begin + kSplatsAtOnce, n);
-        for (size_t i = begin; i < end; ++i) encode(gaussians, i, &bytes[(i - begin) * kSplatBytes]);
-        file.write(bytes.data(), (end - begin) * kSplatBytes);
-        if (options.progress) options.progress(end, n);
-    }
+    encode_in_pieces(
+        gaussians.size(), kSplatBytes, [&](size_t i, std::byte* to) { encode(gaussians, i, to); },
+        [&](const std::byte* bytes, size_t size, size_t end) {
+            file.write(bytes, size);
+            if (options.progress) options.progress(end, gaussians.size());
+        });
     file.commit();
     std::vector<std::string> remarks;
-    remark_dropped_sh(gaussians, remarks);
+    if (gaussians.sh_degree > 0)
+        remarks.push_back("SH degrees 1 to " + std::to_string(gaussians.sh_degree) +
+                          " are dropped: the format has no view-dependent colour");
     remarks.push_back(
         "colours and opacities have 8 bits, clamped to 0..1; rotations have 8 bits per component");
     return remarks;

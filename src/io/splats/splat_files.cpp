@@ -3,6 +3,7 @@
 #include "ewa/splat_files.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 
@@ -10,13 +11,9 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
-#include "io/splats/compressed_ply.h"
-#include "io/splats/gltf_splats.h"
-#include "io/splats/ply.h"
+#include "io/splats/formats.h"
 #include "io/splats/ply_table.h"
-#include "io/splats/splat.h"
 #include "io/splats/splat_values.h"
-#include "io/splats/spz.h"
 
 namespace ewa {
 
@@ -25,14 +22,27 @@ namespace {
 struct Kind {
     SplatFormat format;
     std::string_view extension, name;
+    std::array<std::string_view, 2> beginnings;  // of a file; none where the first bytes do not tell
+    SplatScene (*read)(const std::filesystem::path&);
+    std::vector<std::string> (*write)(const std::filesystem::path&, const Gaussians&, const SaveOptions&);
 };
 /// An extension that is the end of another one comes after it.
-constexpr Kind kKinds[] = {{SplatFormat::compressed_ply, ".compressed.ply", "compressed PLY"},
-                           {SplatFormat::ply, ".ply", "PLY"},
-                           {SplatFormat::splat, ".splat", "splat"},
-                           {SplatFormat::spz, ".spz", "SPZ"},
-                           {SplatFormat::glb, ".glb", "GLB"},
-                           {SplatFormat::gltf, ".gltf", "glTF"}};
+constexpr Kind kKinds[] = {
+    {SplatFormat::compressed_ply,
+     ".compressed.ply",
+     "compressed PLY",
+     {},
+     io::read_compressed_ply,
+     io::write_compressed_ply},
+    {SplatFormat::ply, ".ply", "PLY", {"ply\n", "ply\r"}, io::read_ply, io::write_ply},
+    {SplatFormat::splat, ".splat", "splat", {}, io::read_splat, io::write_splat},
+    {SplatFormat::spz, ".spz", "SPZ", {"NGSP", "\x1f\x8b"}, io::read_spz, io::write_spz},
+    {SplatFormat::glb, ".glb", "GLB", {"glTF"}, io::read_gltf_splats, io::write_gltf_splats},
+    {SplatFormat::gltf, ".gltf", "glTF", {"{"}, io::read_gltf_splats, io::write_gltf_splats}};
+
+const Kind& kind_of(SplatFormat format) {
+    return *std::ranges::find(kKinds, format, &Kind::format);
+}
 
 const Kind* kind_of_name(const std::filesystem::path& path) {
     const std::string name = core::lower(path.filename().string());
@@ -47,22 +57,17 @@ const Kind* kind_of_name(const std::filesystem::path& path) {
                                     ".splat, .spz, .glb, .gltf"));
 }
 
-bool starts(std::string_view head, std::string_view magic) {
-    return head.substr(0, magic.size()) == magic;
+/// The kind that the first bytes identify, or null.
+const Kind* kind_of_head(std::string_view head) {
+    for (const Kind& kind : kKinds)
+        for (const std::string_view beginning : kind.beginnings)
+            if (!beginning.empty() && head.starts_with(beginning)) return &kind;
+    return nullptr;
 }
 
-/// The format that the first bytes identify, or null.
-const SplatFormat* format_of_head(std::string_view head) {
-    struct Magic {
-        std::string_view bytes;
-        SplatFormat format;
-    };
-    static constexpr Magic kMagics[] = {{"ply\n", SplatFormat::ply},    {"ply\r", SplatFormat::ply},
-                                        {"glTF", SplatFormat::glb},     {"NGSP", SplatFormat::spz},
-                                        {"\x1f\x8b", SplatFormat::spz}, {"{", SplatFormat::gltf}};
-    for (const Magic& magic : kMagics)
-        if (starts(head, magic.bytes)) return &magic.format;
-    return nullptr;
+void warn_of(const std::filesystem::path& path, const std::vector<std::string>& remarks) {
+    for (const std::string& remark : remarks)
+        core::warn(core::one_line(path.string()) + ": " + core::one_line(remark));
 }
 
 /// The scene without the splats that are never visible.
@@ -75,25 +80,6 @@ Gaussians drawable_only(const Gaussians& gaussians, std::vector<std::string>& re
     Gaussians selected = gaussians;
     select_splats(selected, kept);
     return selected;
-}
-
-std::vector<std::string> write(const std::filesystem::path& path, SplatFormat format,
-                               const Gaussians& gaussians, const SaveOptions& options) {
-    switch (format) {
-        case SplatFormat::ply:
-            return io::write_ply(path, gaussians, options);
-        case SplatFormat::compressed_ply:
-            return io::write_compressed_ply(path, gaussians, options);
-        case SplatFormat::splat:
-            return io::write_splat(path, gaussians, options);
-        case SplatFormat::spz:
-            return io::write_spz(path, gaussians, options);
-        case SplatFormat::glb:
-            return io::write_gltf_splats(path, gaussians, options, true);
-        case SplatFormat::gltf:
-            return io::write_gltf_splats(path, gaussians, options, false);
-    }
-    return {};
 }
 
 /// The scene with world positions as its means, rounded to float32.
@@ -121,9 +107,7 @@ std::string rounding_remark(const glm::dvec3& origin) {
 }  // namespace
 
 std::string_view name_of(SplatFormat format) {
-    for (const Kind& kind : kKinds)
-        if (kind.format == format) return kind.name;
-    return "";
+    return kind_of(format).name;
 }
 
 SplatFormat format_of_name(const std::filesystem::path& path) {
@@ -142,34 +126,19 @@ SplatFormat format_of_file(const std::filesystem::path& path) {
     constexpr uint64_t kHeadBytes = 4;
     const size_t size = size_t(std::min(reader.size(), kHeadBytes));
     const std::string head(reinterpret_cast<const char*>(reader.take(size, "the header")), size);
-    const SplatFormat* told = format_of_head(head);
-    if (!told && !kind) refuse(path);
-    const SplatFormat format = told ? *told : kind->format;
-    if (format != SplatFormat::ply) return format;
+    if (const Kind* told = kind_of_head(head)) kind = told;
+    if (!kind) refuse(path);
+    if (kind->format != SplatFormat::ply) return kind->format;
     return io::is_compressed_ply(io::PlyTable(path)) ? SplatFormat::compressed_ply : SplatFormat::ply;
 }
 
 SplatScene read_splats(const std::filesystem::path& path) {
-    switch (format_of_file(path)) {
-        case SplatFormat::ply:
-            return io::read_ply(path);
-        case SplatFormat::compressed_ply:
-            return io::read_compressed_ply(path);
-        case SplatFormat::splat:
-            return io::read_splat(path);
-        case SplatFormat::spz:
-            return io::read_spz(path);
-        case SplatFormat::glb:
-        case SplatFormat::gltf:
-            return io::read_gltf_splats(path);
-    }
-    refuse(path);
+    return kind_of(format_of_file(path)).read(path);
 }
 
 Gaussians load_splats(const std::filesystem::path& path) {
     SplatScene scene = read_splats(path);
-    for (const std::string& remark : scene.remarks)
-        core::warn(core::one_line(path.string()) + ": " + core::one_line(remark));
+    warn_of(path, scene.remarks);
     return std::move(scene.gaussians);
 }
 
@@ -185,10 +154,11 @@ std::vector<std::string> save_splats(const std::filesystem::path& path, const Ga
     }
     bool whole = true;
     for (size_t i = 0; i < gaussians.size() && whole && !ply; ++i) whole = drawable(gaussians, i);
+    const auto write = kind_of(format).write;
     if (whole)
-        more = write(path, format, gaussians, options);
+        more = write(path, gaussians, options);
     else
-        more = write(path, format, drawable_only(gaussians, remarks), options);
+        more = write(path, drawable_only(gaussians, remarks), options);
     remarks.insert(remarks.end(), more.begin(), more.end());
     if (options.antialiased && !ply && format != SplatFormat::spz)
         remarks.push_back("the mark that the scene was trained anti-aliased is dropped");
@@ -199,8 +169,7 @@ std::vector<std::string> save_splats(const std::filesystem::path& path, const Ga
 
 void save_splats(const std::filesystem::path& path, const Gaussians& gaussians,
                  const std::vector<std::string>& comments) {
-    for (const std::string& remark : save_splats(path, gaussians, SaveOptions{.comments = comments}))
-        core::warn(core::one_line(path.string()) + ": " + core::one_line(remark));
+    warn_of(path, save_splats(path, gaussians, SaveOptions{.comments = comments}));
 }
 
 }  // namespace ewa

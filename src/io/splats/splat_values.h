@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <limits>
 #include <string>
+
+#include "ewa/error.h"
 #include "ewa/splat_scene.h"
 #include "shared/constants.h"
 
@@ -80,10 +82,27 @@ inline constexpr uint64_t kPlainExpansion = 4, kPackedExpansion = 32;
 /// Throws InputError if `count` splats of a degree take more memory than `expansion` times the file plus 40
 /// MiB. No real scene repeats itself that much. Without this limit, a file of a few kB could claim all
 /// memory.
-void require_memory(const std::string& name, uint64_t file_bytes, uint64_t count, int sh_degree,
-                    uint64_t expansion = kPlainExpansion);
+inline void require_memory(const std::string& name, uint64_t file_bytes, uint64_t count, int sh_degree,
+                           uint64_t expansion = kPlainExpansion) {
+    constexpr uint64_t kAlways = uint64_t(40) << 20;
+    const uint64_t each = sizeof(float) * (11 + 3 * uint64_t(sh_coefficients(sh_degree)));
+    if (count <= (expansion * file_bytes + kAlways) / each) return;
+    throw InputError(name + ": claims " + std::to_string(count) + " splats of SH degree " +
+                     std::to_string(sh_degree) + " in " + std::to_string(file_bytes) +
+                     " bytes, which would unpack to more than " + std::to_string(expansion) +
+                     " times the file and 40 MiB; it is damaged, or its splats repeat each other");
+}
 
-/// Adds "SH degrees 1 to 3 are dropped: ..." if the scene has view-dependent colour.
-void remark_dropped_sh(const Gaussians& gaussians, std::vector<std::string>& remarks);
+/// Calls encode(i, bytes) for each i < count, and write(bytes, size, end) for each piece of these bytes.
+template <class Encode, class Write>
+void encode_in_pieces(size_t count, size_t bytes_each, const Encode& encode, const Write& write) {
+    constexpr size_t kAtOnce = 4096;
+    std::vector<std::byte> bytes(std::min(count, kAtOnce) * bytes_each);
+    for (size_t begin = 0; begin < count; begin += kAtOnce) {
+        const size_t end = std::min(begin + kAtOnce, count);
+        for (size_t i = begin; i < end; ++i) encode(i, &bytes[(i - begin) * bytes_each]);
+        write(bytes.data(), (end - begin) * bytes_each, end);
+    }
+}
 
 }  // namespace ewa::io

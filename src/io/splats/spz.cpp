@@ -1,12 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/splats/spz.h"
-
+// SPZ (nianticlabs/spz): one block per attribute, as a structure of arrays, quantised, then compressed.
+//   versions 1 to 3   one gzip stream: a header of 16 bytes, then the blocks
+//   version 4         a header of 32 bytes, extension records, a table of (compressed, decompressed) sizes,
+//                     then one Zstandard frame per block
+// The blocks, in this order, per splat:
+//   positions   3 x 24-bit signed fixed point with the header's fractional bits (version 1: 3 x float16)
+//   opacities   u8
+//   colours     3 x u8: 0.15 * 255 * (SH coefficient 0) + 127.5
+//   scales      3 x u8: 16 * (ln s + 10)
+//   rotations   4 bytes: index of the largest of x y z w, then sign and 9 bits of each other in 1/sqrt(2)
+//               (versions 1 and 2: x y z in 3 x u8: 127.5 q + 127.5, w >= 0)
+//   SH          3 x u8 per coefficient, RGB inner: 128 v + 128, in steps of 8 (degree 1) or 16 (others)
+// The file's frame is RUB (y up, z back). So y and z, their quaternion components, and the SH that are odd in
+// them change sign.
 #include <cmath>
+#include <glm/gtc/packing.hpp>
 #include <numbers>
 #include <numeric>
 
 #include "core/atomic_file.h"
 #include "ewa/error.h"
+#include "io/splats/formats.h"
 #include "io/splats/splat_values.h"
 #include "io/splats/unpacking.h"
 
@@ -70,19 +84,11 @@ Header parse_header(const std::byte* bytes, const core::FileReader& reader) {
     return header;
 }
 
-double half_to_double(uint16_t half) {
-    const int exponent = half >> 10 & 31, mantissa = half & 1023;
-    const double magnitude = exponent == 0    ? std::ldexp(mantissa, -24)
-                             : exponent == 31 ? (mantissa ? NAN : INFINITY)
-                                              : std::ldexp(mantissa + 1024, exponent - 25);
-    return half & 0x8000 ? -magnitude : magnitude;
-}
-
 void decode_position(const Header& header, const uint8_t* bytes, float* mean) {
     for (size_t k = 0; k < 3; ++k) {
         double v;
         if (header.version == 1) {
-            v = half_to_double(uint16_t(bytes[2 * k] | bytes[2 * k + 1] << 8));
+            v = glm::unpackHalf1x16(uint16_t(bytes[2 * k] | bytes[2 * k + 1] << 8));
         } else {
             const uint32_t raw = uint32_t(bytes[3 * k] | bytes[3 * k + 1] << 8 | bytes[3 * k + 2] << 16);
             const int32_t fixed = int32_t(raw << 8) >> 8;
@@ -347,13 +353,10 @@ class Encoder {
 
 void write_block(Block block, size_t bytes_each, Encoder& encoder, size_t count, Packer& packer) {
     if (bytes_each == 0) return;
-    constexpr size_t kSplatsAtOnce = 4096;
-    std::vector<uint8_t> bytes(kSplatsAtOnce * bytes_each);
-    for (size_t begin = 0; begin < count; begin += kSplatsAtOnce) {
-        const size_t n = std::min(kSplatsAtOnce, count - begin);
-        for (size_t i = 0; i < n; ++i) encoder.encode(block, begin + i, &bytes[i * bytes_each]);
-        packer.write(reinterpret_cast<const std::byte*>(bytes.data()), n * bytes_each);
-    }
+    encode_in_pieces(
+        count, bytes_each,
+        [&](size_t i, std::byte* to) { encoder.encode(block, i, reinterpret_cast<uint8_t*>(to)); },
+        [&](const std::byte* bytes, size_t size, size_t) { packer.write(bytes, size); });
 }
 
 std::vector<std::byte> header(const Gaussians& gaussians, const SaveOptions& options, int bits) {
@@ -412,11 +415,9 @@ void write_streams(core::AtomicFile& file, std::vector<std::byte> head, const Si
 
 SplatScene read_spz(const std::filesystem::path& path) {
     core::FileReader reader(path);
-    uint8_t first[2] = {};
-    if (reader.size() < sizeof(first)) reader.fail("this is not an SPZ file: it has less than 2 bytes");
-    std::memcpy(first, reader.take(sizeof(first), "the header"), sizeof(first));
+    if (reader.size() < 2) reader.fail("this is not an SPZ file: it has less than 2 bytes");
+    const bool gzipped = reader.read<uint16_t>("the header") == 0x8b1f;
     reader.go_to(0, "the header");
-    const bool gzipped = first[0] == 0x1f && first[1] == 0x8b;
     return gzipped ? read_gzipped(reader) : read_streams(reader);
 }
 

@@ -59,21 +59,14 @@ class GzipPacker final : public Packer {
     }
     ~GzipPacker() override { deflateEnd(&stream_); }
 
-    void write(const std::byte* bytes, size_t n) override {
-        while (n > 0) {
-            const size_t piece = std::min(n, size_t(1) << 30);
-            run(bytes, piece, Z_NO_FLUSH);
-            bytes += piece;
-            n -= piece;
-        }
-    }
+    void write(const std::byte* bytes, size_t n) override { run(bytes, n, Z_NO_FLUSH); }
     void finish() override { run(nullptr, 0, Z_FINISH); }
 
   private:
     void run(const std::byte* bytes, size_t n, int flush) {
         // zlib's interface has no const; it does not write to its input.
         stream_.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(bytes));
-        stream_.avail_in = uInt(n);
+        stream_.avail_in = uInt(n);  // zlib counts in 32 bits
         do {
             stream_.next_out = reinterpret_cast<Bytef*>(output_.data());
             stream_.avail_out = uInt(output_.size());

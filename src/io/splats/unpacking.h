@@ -45,7 +45,7 @@ class Packer {
   public:
     using Sink = std::function<void(const void*, size_t)>;
     virtual ~Packer() = default;
-    virtual void write(const std::byte* bytes, size_t n) = 0;
+    virtual void write(const std::byte* bytes, size_t n) = 0;  // n below 4 GiB
     /// Call once, last.
     virtual void finish() = 0;
 };

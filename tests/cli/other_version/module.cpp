@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The module of another version of ewa. Nobody may call its functions.
-#include "image/openimageio.h"
+#include "image/image_files.h"
 
-extern "C" const ewa::image::OpenImageIO ewa_openimageio_module;
-const ewa::image::OpenImageIO ewa_openimageio_module = {"0.0.0", nullptr, nullptr, nullptr};
+extern "C" const ewa::image::OpenImageIO ewa_openimageio_layout_1;
+const ewa::image::OpenImageIO ewa_openimageio_layout_1 = {"0.0.0", nullptr, nullptr, nullptr};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The twin's results in the device's layouts: inputs for a pass that runs alone.
+// The CPU reference's results in the device's layouts: inputs for a pass that runs alone.
 #pragma once
 #include <array>
 #include <cmath>
@@ -9,7 +9,7 @@
 
 #include "gpu/test_device.h"
 #include "passes/kernel_config.h"
-#include "pipeline/camera_block.h"
+#include "pipeline/frame_inputs.h"
 #include "pipeline/model.h"
 #include "reference/render.h"
 #include "shared/layouts.h"
@@ -33,12 +33,12 @@ inline Scene random_scene(uint64_t seed, size_t splats, SplatKind kind, int widt
     return scene;
 }
 
-/// The twin with the device's tiles, so that lists can be compared tile by tile.
-inline reference::ReferenceOptions twin_tiles(const passes::KernelConfig& shape) {
-    reference::ReferenceOptions twin;
-    twin.tile_width = int(shape.tile_width);
-    twin.tile_height = int(shape.tile_height);
-    return twin;
+/// The CPU reference with the device's tiles, so that lists can be compared tile by tile.
+inline reference::ReferenceOptions reference_tiles(const passes::KernelConfig& shape) {
+    reference::ReferenceOptions cpu;
+    cpu.tile_width = int(shape.tile_width);
+    cpu.tile_height = int(shape.tile_height);
+    return cpu;
 }
 
 /// The third and fourth float of the record: see RECORD_TEXELS.
@@ -87,8 +87,8 @@ inline std::vector<float> pack_planes(const reference::Raster& raster, uint32_t 
     return out;
 }
 
-/// A slot's floats of an instance's moments. The device's u and v are the twin's over sqrt(2): its power is
-/// -(u^2 + v^2), the twin's -(u^2 + v^2) / 2.
+/// A slot's floats of an instance's moments. The device's u and v are the CPU reference's over sqrt(2): its power is
+/// -(u^2 + v^2), the CPU reference's -(u^2 + v^2) / 2.
 inline std::array<double, 11> slot_of(const reference::Moments& m, const reference::Projected& splat) {
     const double r = std::sqrt(0.5);
     const double ux = r * reference::whitener(splat).ux;
@@ -106,10 +106,7 @@ inline std::array<double, 11> slot_of(const reference::Moments& m, const referen
 }
 
 inline gpu::Buffer camera_buffer(const Camera& camera, const passes::KernelConfig& shape) {
-    const shared::CameraBlock block = pipeline::camera_block(camera, shape);
-    gpu::Buffer buffer(*device(), "camera", sizeof(block), gpu::Texel::none, true);
-    buffer.upload(std::span<const shared::CameraBlock>(&block, 1));
-    return buffer;
+    return pipeline::upload_camera(*device(), camera, shape);
 }
 
 }  // namespace ewa::test

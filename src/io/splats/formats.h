@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+// The readers and writers of the splat formats. Each source describes the layout of its format.
+//
+// Readers throw InputError that names the file and the byte or property. Writers write a temporary file and
+// rename it, return a line for each thing that the format does not store, and throw RunError.
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "ewa/splat_scene.h"
+
+namespace ewa::io {
+
+class PlyTable;
+
+/// INRIA's PLY. Accepts any property order and scalar type, ascii and binary of either byte order. Other
+/// properties and elements are ignored. Values stay as they are, finite or not. Positions in double far from
+/// the world's origin become means relative to an origin of the scene. A comment "SplatRenderMode: mip"
+/// (Brush) or "antialiased 1" (Postshot) sets SplatScene::antialiased.
+SplatScene read_ply(const std::filesystem::path& path);
+
+/// Writes binary_little_endian and float32. If the scene has an origin, x y z are world positions in double.
+/// The anti-aliased mark is Brush's.
+std::vector<std::string> write_ply(const std::filesystem::path& path, const Gaussians& gaussians,
+                                   const SaveOptions& options);
+
+/// The bytes that write_ply would write, in pieces: the header, then the rows of the splats.
+std::string ply_header(const Gaussians& gaussians, const SaveOptions& options);
+size_t ply_row_bytes(const Gaussians& gaussians);
+/// Appends the row of splat i, ply_row_bytes() / 4 floats, to `rows`.
+void append_ply_row(const Gaussians& gaussians, size_t i, std::vector<float>& rows);
+
+/// SuperSplat's compressed PLY. is_compressed_ply: whether the header declares this layout.
+bool is_compressed_ply(const PlyTable& table);
+SplatScene read_compressed_ply(const std::filesystem::path& path);
+
+/// Writes the splats in Morton order, which keeps the boxes of the chunks small.
+std::vector<std::string> write_compressed_ply(const std::filesystem::path& path, const Gaussians& gaussians,
+                                              const SaveOptions& options);
+
+/// The format of antimatter15's viewer, without view dependence. The size must be a multiple of 32 bytes.
+SplatScene read_splat(const std::filesystem::path& path);
+
+/// Writes the splats in the order of the scene.
+std::vector<std::string> write_splat(const std::filesystem::path& path, const Gaussians& gaussians,
+                                     const SaveOptions& options);
+
+/// SPZ (nianticlabs/spz), versions 1 to 4. SH degree 4 is cut to degree 3, and extension records are skipped.
+SplatScene read_spz(const std::filesystem::path& path);
+
+/// Writes version 3 or 4, as options.spz_version states. Positions have 12 fractional bits, or fewer if a
+/// coordinate does not fit. Throws InputError for a coordinate beyond +-8388607 or more than 2^32 - 1 splats.
+std::vector<std::string> write_spz(const std::filesystem::path& path, const Gaussians& gaussians,
+                                   const SaveOptions& options);
+
+/// glTF with KHR_gaussian_splatting. Reads every primitive with the extension that the scene's nodes reach, in
+/// the order of the nodes, into one scene. Accepts float32 and the quantised component types, with or without
+/// stride, in both colour spaces. Colours in linear light become sRGB values; their view dependence is
+/// converted to first order. Buffers may be the .glb's own, data URIs, or files in or below the file's folder.
+/// Refuses kernels other than "ellipse", sparse and compressed accessors. Errors name the byte, or the mesh,
+/// node or accessor and its property.
+SplatScene read_gltf_splats(const std::filesystem::path& path);
+
+/// The .bin of the same stem that holds a .gltf's values.
+std::filesystem::path gltf_values_path(const std::filesystem::path& gltf);
+
+/// Throws InputError if that .bin exists but the .gltf does not, or does not refer to it. Then it belongs to
+/// another file.
+void check_gltf_values(const std::filesystem::path& gltf);
+
+/// Writes float32 throughout and sRGB colours. The extension .glb makes one file, any other one a .gltf and
+/// its .bin. Throws InputError for a scene without splats, more than 4 GiB in a .glb, or as check_gltf_values
+/// does.
+std::vector<std::string> write_gltf_splats(const std::filesystem::path& path, const Gaussians& gaussians,
+                                           const SaveOptions& options);
+
+}  // namespace ewa::io

@@ -1,0 +1,269 @@
+// SPDX-License-Identifier: Apache-2.0
+// All passes. pass.h says what each member means.
+#pragma once
+#include "passes/pass.h"
+
+namespace ewa::passes {
+
+// Projection, and its gradient with the optimiser's step.
+
+/// Projects every splat into pixels. Adds to Counts.skipped_nonfinite. Variant: SPEC_SH_DEGREE, SPEC_KERNEL,
+/// SPEC_MODE (0 or PROJECT_DEBUG).
+struct Project {
+    static constexpr char shader[] = "project";
+    using Work = PerElement<&shared::ProjectPush::splats>;
+    gpu::BufferPart params, camera, records, depth_keys, tile_counts, counts;
+};
+
+/// Gradient of the projection, fused with Adam. Variant: SPEC_SH_DEGREE, SPEC_KERNEL, SPEC_MODE (UPDATE_*
+/// bits).
+struct Update {
+    static constexpr char shader[] = "update";
+    using Work = PerElement<&shared::UpdatePush::splats>;
+    gpu::BufferPart params, camera, records, slots, moments1, moments2, tile_counts, first_instances, counts,
+        params_out, moments1_out, moments2_out, statistics, sorted_indices;
+};
+
+// Prefix sums, radix sort, and the lists of (splat, tile) instances built with them.
+
+/// Exclusive prefix sums within blocks. Variant: SPEC_MODE (0 or SCAN_GATHERED).
+struct ScanBlocks {
+    static constexpr char shader[] = "scan_blocks";
+    using Work = PerBlock<shared::ScanPush>;
+    gpu::BufferPart source, order, prefix, totals;
+};
+
+/// Exclusive prefix sum of the blocks' totals, in place, followed by the grand total.
+struct ScanTotals {
+    static constexpr char shader[] = "scan_totals";
+    using Work = OneSubgroup<shared::ScanTotalsPush>;
+    gpu::BufferPart totals, counts;
+};
+
+/// Counts the digits of a radix pass. Variant: SPEC_RADIX_BITS.
+struct RadixCount {
+    static constexpr char shader[] = "radix_count";
+    using Work = PerSortLane;
+    gpu::BufferPart keys, counters, counts;
+};
+
+/// Moves the pairs of a radix pass. Variant: SPEC_RADIX_BITS, SPEC_MODE (SORT_* bits).
+struct RadixScatter {
+    static constexpr char shader[] = "radix_scatter";
+    using Work = PerSortLane;
+    gpu::BufferPart keys, values, counters, bases, counts, keys_out, values_out, indices, indices_out;
+};
+
+/// Writes the (splat, tile) instances in depth order, each layer for a strip of tile rows. Variant: SPEC_MODE
+/// (0 or EMIT_FIRST_INSTANCES).
+struct EmitInstances {
+    static constexpr char shader[] = "emit_instances";
+    struct Work : ElementGroup<shared::EmitPush> {
+        static Groups groups(const KernelConfig& config, const Push& push) {
+            return element_groups(config, push.splats,
+                                  (push.tiles[1] + push.strip_rows - 1) / push.strip_rows);
+        }
+    };
+    gpu::BufferPart records, order, tile_counts, prefix, totals, counts, keys, splats, first_instances;
+};
+
+/// Finds where each tile's instances begin in the sorted list.
+struct TileStarts {
+    static constexpr char shader[] = "tile_starts";
+    struct Work : ElementGroup<shared::TileStartsPush> {
+        static Groups groups(const KernelConfig& config, const Push& push) {
+            return element_groups(config, uint64_t(push.tiles) + 2);
+        }
+    };
+    gpu::BufferPart keys, counts, tile_starts;
+};
+
+// Blending of splats into image planes, and its gradient.
+
+/// Blends the splats of every tile into the image planes. Variant: SPEC_MODE (BLEND_*).
+struct Blend {
+    static constexpr char shader[] = "blend";
+    using Work = PerTile;
+    gpu::BufferPart records, splats, tile_starts, planes;
+};
+
+/// Gradient of blending, written to the slot of every (splat, tile) instance. Variant: SPEC_MODE (0 or
+/// BLEND_BACKWARD_ABSOLUTE).
+struct BlendBackward {
+    static constexpr char shader[] = "blend_backward";
+    using Work = PerTile;
+    gpu::BufferPart records, splats, tile_starts, planes, image_gradient, slots;
+};
+
+/// Packs the colour planes into 8-bit RGBA. packed: plane_floats words.
+struct Pack {
+    static constexpr char shader[] = "pack";
+    struct Work : ElementGroup<shared::PackPush> {
+        static Groups groups(const KernelConfig& config, const Push& push) {
+            return element_groups(config, push.plane_floats / 4);
+        }
+    };
+    gpu::BufferPart planes, packed;
+};
+
+// The loss of a render against a training image, its gradient, and the training image's mask and exposure.
+
+/// Unpacks a training image into planes, over the background.
+struct UnpackTarget {
+    static constexpr char shader[] = "unpack_target";
+    using Work = PerElement<pixels<shared::UnpackPush>>;
+    gpu::BufferPart photo, planes;
+};
+
+/// Unpacks a masked training image, and moves a copy of the render towards it where pixels count less.
+struct MaskPictures {
+    static constexpr char shader[] = "mask_pictures";
+    using Work = PerElement<pixels<shared::ImageLayout>>;
+    gpu::BufferPart photo, image, target, masked;
+};
+
+/// Gradient of MaskPictures, in place.
+struct MaskGradient {
+    static constexpr char shader[] = "mask_gradient";
+    using Work = PerElement<pixels<shared::ImageLayout>>;
+    gpu::BufferPart photo, image_gradient;
+};
+
+/// The moments of the SSIM window, blurred down the columns.
+struct LossColumns {
+    static constexpr char shader[] = "loss_columns";
+    using Work = PerElement<loss_column_items, 3>;
+    gpu::BufferPart image, target, moments;
+};
+
+/// SSIM, its derivatives by the moments, and partial sums of SSIM.
+struct LossRows {
+    static constexpr char shader[] = "loss_rows";
+    using Work = PerElement<loss_row_items, 3>;
+    gpu::BufferPart moments, derivatives, partials;
+};
+
+/// The derivatives of SSIM, blurred down the columns.
+struct LossBackwardColumns {
+    static constexpr char shader[] = "loss_backward_columns";
+    using Work = PerElement<loss_column_items, 9>;
+    gpu::BufferPart derivatives, blurred;
+};
+
+/// Gradient of the whole loss by the render, and partial sums of the L1 loss.
+struct LossBackwardRows {
+    static constexpr char shader[] = "loss_backward_rows";
+    using Work = PerElement<loss_row_items, 3>;
+    gpu::BufferPart blurred, image, target, image_gradient, partials;
+};
+
+/// Adds floats in a fixed order.
+struct Reduce {
+    static constexpr char shader[] = "reduce";
+    using Work = PerBlock<shared::ReducePush>;
+    gpu::BufferPart source, sums, counts;
+};
+
+/// Applies a training image's exposure to the render.
+struct Expose {
+    static constexpr char shader[] = "expose";
+    using Work = PerElement<pixels<shared::ExposurePush>>;
+    gpu::BufferPart image, exposures, exposed;
+};
+
+/// Gradient of Expose: by the render in place, by the exposure as partial sums.
+struct ExposeBackward {
+    static constexpr char shader[] = "expose_backward";
+    struct Work : OneSubgroup<shared::ExposurePush> {
+        static Groups groups(const KernelConfig& config, const Push& push) {
+            return block_groups(config, pixels(push), shared::EXPOSURE_BLOCK);
+        }
+    };
+    gpu::BufferPart image, exposures, image_gradient, sums;
+};
+
+/// Adam's step of one training image's exposure.
+struct ExposureUpdate {
+    static constexpr char shader[] = "exposure_update";
+    using Work = OneSubgroup<shared::ExposureUpdatePush>;
+    gpu::BufferPart sums, exposures, moments1, moments2, counts;
+};
+
+// Strategies that change the number of splats: adaptive density control and MCMC.
+
+/// Decides how many splats each splat becomes.
+struct DensifyDecide {
+    static constexpr char shader[] = "densify_decide";
+    using Work = PerElement<&shared::DensifyPush::splats>;
+    gpu::BufferPart params, statistics, outputs;
+};
+
+/// Writes the next generation of splats. Variant: SPEC_SH_DEGREE (stored).
+struct DensifyWrite {
+    static constexpr char shader[] = "densify_write";
+    using Work = PerElement<&shared::DensifyPush::splats>;
+    gpu::BufferPart params, moments1, moments2, statistics, prefix, totals, params_out, moments1_out,
+        moments2_out;
+};
+
+/// Lowers every opacity to at most a given one and zeroes its moments.
+struct ResetOpacity {
+    static constexpr char shader[] = "reset_opacity";
+    using Work = PerElement<&shared::ResetPush::splats>;
+    gpu::BufferPart params, moments1, moments2;
+};
+
+/// Writes each splat's weight as a source, and whether it is dead.
+struct McmcWeigh {
+    static constexpr char shader[] = "mcmc_weigh";
+    using Work = PerElement<&shared::McmcPush::splats>;
+    gpu::BufferPart params, weights, dead;
+};
+
+/// Draws the sources of relocated and added splats, and counts their hits.
+struct McmcDraw {
+    static constexpr char shader[] = "mcmc_draw";
+    using Work = PerElement<&shared::McmcPush::draws>;
+    gpu::BufferPart prefix, totals, sources, hits;
+};
+
+/// Writes the next generation of splats. prefix, totals: of dead. Variant: SPEC_SH_DEGREE (stored).
+struct McmcWrite {
+    static constexpr char shader[] = "mcmc_write";
+    using Work = PerElement<&shared::McmcPush::new_splats>;
+    gpu::BufferPart params, moments1, moments2, dead, prefix, totals, sources, hits, params_out, moments1_out,
+        moments2_out;
+};
+
+/// Adds noise to the means.
+struct Perturb {
+    static constexpr char shader[] = "perturb";
+    using Work = PerElement<&shared::PerturbPush::splats>;
+    gpu::BufferPart params, counts;
+};
+
+// Ray tracing of mesh scenes. Variant of each: SPEC_ALPHA_TESTED. The number of workgroups follows from the
+// view's pixels, so record takes it.
+
+/// A mesh scene's buffers, bindings 0 to 5; shared/layouts.h describes their contents.
+struct MeshBuffers {
+    gpu::BufferPart nodes, triangles, surfaces, materials, textures, texels;
+};
+
+/// Path tracing: light that reaches a camera.
+struct TracePaths {
+    static constexpr char shader[] = "trace_paths";
+    using Work = ElementGroup<shared::TracePush>;
+    MeshBuffers mesh;
+    gpu::BufferPart lights, view, sums, counts;
+};
+
+/// What the centre of each pixel sees.
+struct TraceDepth {
+    static constexpr char shader[] = "trace_depth";
+    using Work = ElementGroup<shared::TracePush>;
+    MeshBuffers mesh;
+    gpu::BufferPart view, seen, counts;
+};
+
+}  // namespace ewa::passes

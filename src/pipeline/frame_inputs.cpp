@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pipeline/frame_inputs.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "ewa/error.h"
+
+namespace ewa::pipeline {
+namespace {
+
+void split(double value, float& high, float& low) {
+    high = float(value);
+    low = float(value - double(high));
+}
+
+void check(const Camera& camera) {
+    bool good = camera.width > 0 && camera.height > 0 && camera.fx > 0 && camera.fy > 0 &&
+                std::isfinite(camera.fx) && std::isfinite(camera.fy) && std::isfinite(camera.cx) &&
+                std::isfinite(camera.cy);
+    for (int i = 0; i < 3; ++i) {
+        good = good && std::isfinite(camera.translation[i]);
+        for (int j = 0; j < 3; ++j) good = good && std::isfinite(camera.rotation[i][j]);
+    }
+    if (!good)
+        throw InputError(
+            "a camera with a value that is not finite, or a size or focal length not above zero");
+}
+
+template <class Value, class Convert>
+gpu::Buffer upload_texels(gpu::Device& device, const Image& image, gpu::Texel texel, Value opaque,
+                          Convert convert) {
+    const size_t pixels = size_t(image.width) * size_t(image.height), channels = size_t(image.channels);
+    std::vector<Value> texels(4 * pixels, opaque);
+    for (size_t i = 0; i < pixels; ++i)
+        for (size_t c = 0; c < channels; ++c) texels[4 * i + c] = convert(image.pixels[i * channels + c]);
+    gpu::Buffer buffer(device, "photo", texels.size() * sizeof(Value), texel);
+    buffer.upload(std::span<const Value>(texels));
+    return buffer;
+}
+
+}  // namespace
+
+shared::CameraBlock camera_block(const Camera& camera, const passes::KernelConfig& config,
+                                 const glm::dvec3& origin) {
+    check(camera);
+    shared::CameraBlock block{};
+    for (int row = 0; row < 3; ++row)
+        for (int column = 0; column < 3; ++column)
+            split(camera.rotation[column][row], block.rotation_hi[3 * row + column],
+                  block.rotation_lo[3 * row + column]);
+    const glm::dvec3 position = camera.position() - origin;
+    for (int i = 0; i < 3; ++i) split(position[i], block.position_hi[i], block.position_lo[i]);
+    const double focal[2] = {camera.fx, camera.fy}, center[2] = {camera.cx, camera.cy};
+    const int size[2] = {camera.width, camera.height};
+    const uint32_t tile[2] = {config.tile_width, config.tile_height};
+    for (int i = 0; i < 2; ++i) {
+        split(focal[i], block.focal_hi[i], block.focal_lo[i]);
+        split(center[i], block.center_hi[i], block.center_lo[i]);
+        const double margin = shared::JACOBIAN_MARGIN * size[i] / (2.0 * focal[i]);
+        block.tan_min[i] = float(-(center[i] / focal[i] + margin));
+        block.tan_max[i] = float((size[i] - center[i]) / focal[i] + margin);
+        block.size[i] = uint32_t(size[i]);
+        block.tiles[i] = (uint32_t(size[i]) + tile[i] - 1) / tile[i];
+    }
+    return block;
+}
+
+gpu::Buffer upload_camera(gpu::Device& device, const Camera& camera, const passes::KernelConfig& config,
+                          const glm::dvec3& origin) {
+    const shared::CameraBlock block = camera_block(camera, config, origin);
+    gpu::Buffer buffer(device, "camera", sizeof(block), gpu::Texel::none, true);
+    buffer.upload(std::span<const shared::CameraBlock>(&block, 1));
+    return buffer;
+}
+
+FrameInputs inputs_of(const gpu::Buffer& block, const Camera& camera, const RenderOptions& options) {
+    return {.camera = {.buffer = &block, .width = uint32_t(camera.width), .height = uint32_t(camera.height)},
+            .background = options.background,
+            .sh_degree = options.sh_degree};
+}
+
+gpu::Buffer upload_photo(gpu::Device& device, const Image& image, bool round_to_8_bit) {
+    const auto level = [](float value) { return std::round(std::clamp(value, 0.0f, 1.0f) * 255.0f); };
+    bool eight_bit = true;
+    if (!round_to_8_bit)
+        for (const float value : image.pixels)
+            eight_bit = eight_bit && value >= 0 && value <= 1 && level(value) / 255.0f == value;
+    if (eight_bit)
+        return upload_texels<uint8_t>(device, image, gpu::Texel::rgba8, 255,
+                                      [&](float value) { return uint8_t(level(value)); });
+    return upload_texels<float>(device, image, gpu::Texel::rgba32f, 1.0f, [](float value) { return value; });
+}
+
+uint64_t photo_bytes(int width, int height, bool round_to_8_bit) {
+    return uint64_t(width) * uint64_t(height) * 4 * (round_to_8_bit ? sizeof(uint8_t) : sizeof(float));
+}
+
+}  // namespace ewa::pipeline

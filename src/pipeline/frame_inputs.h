@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// What differs from frame to frame of one plan: the camera, and the training image that the loss reads.
+#pragma once
+#include <array>
+#include <cstdint>
+
+#include "ewa/camera.h"
+#include "ewa/gaussians.h"
+#include "ewa/image.h"
+#include "ewa/render_options.h"
+#include "gpu/buffer.h"
+#include "passes/kernel_config.h"
+
+namespace ewa::pipeline {
+
+struct CameraUse {
+    const gpu::Buffer* buffer = nullptr;  // CameraBlocks
+    uint64_t offset = 0;                  // bytes, aligned as the device requires for uniform blocks
+    uint32_t width = 0, height = 0;       // px
+};
+
+struct FrameInputs {
+    CameraUse camera;
+    std::array<float, 3> background{0, 0, 0};
+    int sh_degree = kMaxShDegree;  // evaluated: at most this, and at most what the plan stores
+};
+
+/// A camera as the shaders read it: each float64 value in two floats. origin: of the scene's means, world
+/// units. Throws InputError if a value is not finite, or a size or focal length is not positive.
+shared::CameraBlock camera_block(const Camera& camera, const passes::KernelConfig& config,
+                                 const glm::dvec3& origin = glm::dvec3(0));
+
+/// A buffer of one such block.
+gpu::Buffer upload_camera(gpu::Device& device, const Camera& camera, const passes::KernelConfig& config,
+                          const glm::dvec3& origin = glm::dvec3(0));
+
+/// The inputs of a frame whose camera was uploaded to `block`.
+FrameInputs inputs_of(const gpu::Buffer& block, const Camera& camera, const RenderOptions& options);
+
+/// A training image as the loss reads it: width * height RGBA texels, 8-bit if every value is one of 256
+/// levels, or with round_to_8_bit; else float32. An image of 3 channels is opaque. record_loss says what
+/// alpha means.
+gpu::Buffer upload_photo(gpu::Device& device, const Image& image, bool round_to_8_bit = false);
+
+/// Upper bound of the bytes that upload_photo allocates.
+uint64_t photo_bytes(int width, int height, bool round_to_8_bit);
+
+}  // namespace ewa::pipeline

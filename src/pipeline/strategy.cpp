@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pipeline/strategy.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "passes/passes.h"
+#include "pipeline/sorting.h"
+
+namespace ewa::pipeline {
+namespace {
+
+/// Records the prefix sums of a value a splat, runs the recording, and returns the sum of all values.
+uint32_t run_scan(gpu::Recording& recording, passes::PassCache& cache, gpu::Executor& executor,
+                  const FrameBuffers& frame, const ScanBuffers& buffers, uint32_t splats, const char* name) {
+    record_scan(
+        recording, cache, buffers,
+        {.items = splats, .block = frame.sizes.scan_block, .total = shared::TOTAL_SCAN, .name = name});
+    executor.run(recording);
+    return frame.read_counts().scan_total;
+}
+
+shared::DensifyPush densify_push(const Model& model, const FrameBuffers& frame, const DensifyRules& rules,
+                                 float threshold, uint32_t new_capacity) {
+    return {.splats = model.splats,
+            .planes = model.planes(),
+            .new_capacity = new_capacity,
+            .scan_block = frame.sizes.scan_block,
+            .grow_gradient = threshold,
+            .split_scale = rules.split_scale,
+            .prune_opacity = rules.prune_logit,
+            .prune_scale = rules.prune_scale,
+            .seed = {uint32_t(rules.seed), uint32_t(rules.seed >> 32)},
+            .step = rules.step,
+            .revised_opacity = rules.revised_opacity ? 1u : 0u};
+}
+
+/// The lowest threshold, at least that of the rules, whose generation fits under the cap; infinity if none
+/// does. count: the splats of the next generation at a threshold.
+float fitting_threshold(const DensifyRules& rules, const std::function<uint32_t(float)>& count) {
+    if (count(rules.grow_gradient) <= rules.max_splats) return rules.grow_gradient;
+    float low = rules.grow_gradient, high = 1e4f * rules.grow_gradient;
+    if (count(high) > rules.max_splats) return std::numeric_limits<float>::infinity();
+    // Bisection of the exponent: the interval shrinks from 1e4 to 1e4^(1/2^12), a step of 0.2 percent.
+    for (int turn = 0; turn < 12; ++turn) {
+        const float middle = std::sqrt(low * high);
+        (count(middle) <= rules.max_splats ? high : low) = middle;
+    }
+    return high;
+}
+
+/// Values of all splats with their prefix sums.
+struct Scanned {
+    gpu::Buffer values, prefix, totals;
+
+    Scanned(gpu::Device& device, const char* name, const Model& model, const FrameBuffers& frame)
+        : values(device, name, 4ull * model.splats),
+          prefix(device, name, 4ull * model.splats),
+          totals(device, name, frame.sizes.scan_totals) {}
+};
+
+uint32_t grown(uint32_t splats, const McmcRules& rules) {
+    const double target = std::floor(rules.growth * splats);
+    return uint32_t(std::max<double>(splats, std::min<double>(target, rules.max_splats)));
+}
+
+}  // namespace
+
+Refinement densify(passes::PassCache& cache, gpu::Executor& executor, Model& model, const FrameBuffers& frame,
+                   const DensifyRules& rules) {
+    gpu::Device& device = cache.device();
+    // Leaves the offsets of the next generation in frame.prefix and frame.scan_totals.
+    const auto count = [&](float threshold) {
+        gpu::Recording recording(device.limits());
+        cache.get<passes::DensifyDecide>().record(
+            recording, {.params = model.params, .statistics = model.statistics, .outputs = frame.tile_counts},
+            densify_push(model, frame, rules, threshold, 0));
+        return run_scan(recording, cache, executor, frame,
+                        {.source = frame.tile_counts,
+                         .order = nullptr,
+                         .prefix = frame.prefix,
+                         .totals = frame.scan_totals,
+                         .counts = frame.counts},
+                        model.splats, "densify offsets");
+    };
+    const float threshold = fitting_threshold(rules, count);
+    const uint32_t after = count(threshold);
+    const Refinement result{model.splats, after, 0};
+    if (after == 0) return {model.splats, model.splats, 0};
+
+    Model next = next_generation(device, model, after);
+    gpu::Recording recording(device.limits());
+    cache.get<passes::DensifyWrite>({{shared::SPEC_SH_DEGREE, uint32_t(model.sh_degree)}})
+        .record(recording,
+                {.params = model.params,
+                 .moments1 = model.moments1,
+                 .moments2 = model.moments2,
+                 .statistics = model.statistics,
+                 .prefix = frame.prefix,
+                 .totals = frame.scan_totals,
+                 .params_out = next.params,
+                 .moments1_out = next.moments1,
+                 .moments2_out = next.moments2},
+                densify_push(model, frame, rules, threshold, after));
+    executor.run(recording);
+    next.statistics = gpu::Buffer(device, "statistics", uint64_t(after) * 8);
+    zero(next.statistics);
+    model = std::move(next);
+    return result;
+}
+
+void record_reset_opacity(gpu::Recording& recording, passes::PassCache& cache, const Model& model,
+                          float logit) {
+    cache.get<passes::ResetOpacity>().record(
+        recording, {.params = model.params, .moments1 = model.moments1, .moments2 = model.moments2},
+        {.splats = model.splats, .planes = model.planes(), .logit = logit});
+}
+
+Refinement refine_mcmc(passes::PassCache& cache, gpu::Executor& executor, Model& model,
+                       const FrameBuffers& frame, const McmcRules& rules) {
+    gpu::Device& device = cache.device();
+    shared::McmcPush push{.splats = model.splats,
+                          .planes = model.planes(),
+                          .new_splats = 0,
+                          .scan_block = frame.sizes.scan_block,
+                          .dead = 0,
+                          .draws = 0,
+                          .total = 0,
+                          .weight_scale = float(std::min(65535u, 0xffffffffu / std::max(model.splats, 1u))),
+                          .dead_logit = float(std::log(rules.dead_opacity / (1 - rules.dead_opacity))),
+                          .least_opacity = float(rules.dead_opacity),
+                          .spread = float(rules.spread),
+                          .seed = {uint32_t(rules.seed), uint32_t(rules.seed >> 32)},
+                          .step = rules.step};
+
+    Scanned weights(device, "weights", model, frame), dead(device, "dead", model, frame);
+    gpu::Recording weigh(device.limits());
+    cache.get<passes::McmcWeigh>().record(
+        weigh, {.params = model.params, .weights = weights.values, .dead = dead.values}, push);
+    executor.run(weigh);
+    const auto sum = [&](const Scanned& scanned) {
+        gpu::Recording recording(device.limits());
+        return run_scan(recording, cache, executor, frame,
+                        {.source = scanned.values,
+                         .order = nullptr,
+                         .prefix = scanned.prefix,
+                         .totals = scanned.totals,
+                         .counts = frame.counts},
+                        model.splats, "relocation offsets");
+    };
+    push.total = sum(weights);
+    push.dead = sum(dead);
+    push.new_splats = grown(model.splats, rules);
+    push.draws = push.dead + (push.new_splats - model.splats);
+    if (push.draws == 0 || push.total == 0) return {model.splats, model.splats, 0};
+
+    gpu::Buffer sources(device, "sources", 4ull * push.draws), hits(device, "hits", 4ull * model.splats);
+    Model next = next_generation(device, model, push.new_splats);
+    gpu::Recording recording(device.limits());
+    recording.fill(hits, 0, 0, 4ull * model.splats);
+    cache.get<passes::McmcDraw>().record(
+        recording, {.prefix = weights.prefix, .totals = weights.totals, .sources = sources, .hits = hits},
+        push);
+    cache.get<passes::McmcWrite>({{shared::SPEC_SH_DEGREE, uint32_t(model.sh_degree)}})
+        .record(recording,
+                {.params = model.params,
+                 .moments1 = model.moments1,
+                 .moments2 = model.moments2,
+                 .dead = dead.values,
+                 .prefix = dead.prefix,
+                 .totals = dead.totals,
+                 .sources = sources,
+                 .hits = hits,
+                 .params_out = next.params,
+                 .moments1_out = next.moments1,
+                 .moments2_out = next.moments2},
+                push);
+    executor.run(recording);
+    const Refinement result{model.splats, push.new_splats, push.dead};
+    model = std::move(next);
+    return result;
+}
+
+void record_noise(gpu::Recording& recording, passes::PassCache& cache, const Model& model,
+                  const FrameBuffers& frame, const Noise& noise) {
+    cache.get<passes::Perturb>().record(recording, {.params = model.params, .counts = frame.counts},
+                                        {.splats = model.splats,
+                                         .planes = model.planes(),
+                                         .instance_capacity = frame.instance_capacity,
+                                         .amplitude = noise.amplitude,
+                                         .max_length = noise.max_length,
+                                         .seed = {uint32_t(noise.seed), uint32_t(noise.seed >> 32)},
+                                         .step = noise.step});
+}
+
+}  // namespace ewa::pipeline
