@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures of mesh scenes whose answer is known in closed form, and rays against the float64 twin.
+// Renders of mesh scenes whose answer is known in closed form, and rays against the float64 CPU reference.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -25,9 +25,9 @@ struct Shot {
 
 Shot shoot(const scene::MeshScene& scene, const Camera& camera, int samples,
            const std::vector<Image>& images = {}, double brightest = kUnclamped) {
-    PathTracer photographer(test::device(), pathtracer::pack(scene, images), scene.sky);
-    Image image = photographer.radiance(camera, samples, 1, brightest);
-    return {std::move(image), photographer.unfinished_rays(), photographer.dropped_samples()};
+    PathTracer tracer(test::device(), pathtracer::pack(scene, images), scene.sky);
+    Image image = tracer.radiance(camera, samples, 1, brightest);
+    return {std::move(image), tracer.unfinished_rays(), tracer.dropped_samples()};
 }
 
 scene::MeshScene floor_scene(const glm::vec3& albedo, double half = 10) {
@@ -265,9 +265,9 @@ TEST(PathTracer, DepthOfATiltedPlane) {
         // z = -4 + x / 2
         test::add_quad(scene, at + glm::dvec3(-20, -20, -14), at + glm::dvec3(20, -20, 6),
                        at + glm::dvec3(20, 20, 6), at + glm::dvec3(-20, 20, -14));
-        PathTracer photographer(test::device(), pathtracer::pack(scene, {}), scene.sky);
+        PathTracer tracer(test::device(), pathtracer::pack(scene, {}), scene.sky);
         const Camera camera = test::camera_down_z(at, 32, 24, 40);
-        const Image depth = photographer.seen(camera).depth;
+        const Image depth = tracer.seen(camera).depth;
         for (int y = 0; y < 24; ++y)
             for (int x = 0; x < 32; ++x) {
                 const double slope = (x + 0.5 - 16) / 40;  // of x over depth
@@ -358,13 +358,13 @@ TEST(PathTracer, SidesMasksAndBlends) {
     scene.materials[0].blended = true;
     EXPECT_EQ(coverage(front, false), 1.0);
     EXPECT_NEAR(coverage(front, true), 0.2, 0.01);
-    PathTracer photographer(test::device(), pathtracer::pack(scene, {opacity}), scene.sky);
-    const Image depth = photographer.seen(front).depth;
+    PathTracer tracer(test::device(), pathtracer::pack(scene, {opacity}), scene.sky);
+    const Image depth = tracer.seen(front).depth;
     EXPECT_NEAR(double(depth.at(8, 16)[0]), 2, 1e-6);
     EXPECT_EQ(depth.at(24, 16)[0], 0.0f);
 }
 
-TEST(PathTracer, RaysAgreeWithTheTwin) {
+TEST(PathTracer, RaysAgreeWithTheCpuReference) {
     const pathtracer::PackedScene packed = pathtracer::pack(
         [] {
             scene::MeshScene scene = test::random_triangles(4, 4000);
@@ -373,9 +373,9 @@ TEST(PathTracer, RaysAgreeWithTheTwin) {
         }(),
         {});
     const Camera camera = test::camera_down_z({0.5, 0.25, 30}, 64, 48, 60);
-    PathTracer photographer(test::device(), packed, {});
-    const auto seen = photographer.seen(camera);
-    EXPECT_EQ(photographer.unfinished_rays(), 0u);
+    PathTracer tracer(test::device(), packed, {});
+    const auto seen = tracer.seen(camera);
+    EXPECT_EQ(tracer.unfinished_rays(), 0u);
     const auto triangles = pathtracer::device_triangles(packed);
     const auto nodes = pathtracer::device_nodes(packed);
     int same = 0, hits = 0;
