@@ -7,17 +7,50 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <numbers>
+#include <numeric>
 
 #include "ewa/error.h"
-#include "pathtracer/light_table.h"
 #include "scene/color.h"
 
 namespace ewa::pathtracer {
-
 namespace {
 
-uint32_t word(float value) {
-    return std::bit_cast<uint32_t>(value);
+uint32_t word(double value) {
+    return std::bit_cast<uint32_t>(float(value));
+}
+
+double mean(const glm::dvec3& v) {
+    return (v.r + v.g + v.b) / 3;
+}
+
+/// Of the table of lights.
+struct Entry {
+    std::array<uint32_t, 4 * shared::LIGHT_TEXELS> words{};
+    double power = 0;
+};
+
+Entry entry_of(const scene::Light& light, const glm::dvec3& origin, double unit, double scene_radius) {
+    Entry entry;
+    auto& w = entry.words;
+    const bool directional = light.kind == shared::LIGHT_DIRECTIONAL;
+    const glm::dvec3 direction = glm::normalize(light.direction);
+    const glm::dvec3 place = directional ? -direction : (light.position - origin) / unit;
+    // Irradiance falls with the square of the distance, which is in device units.
+    const glm::dvec3 strength = directional ? light.intensity : light.intensity / (unit * unit);
+    // The cone's linear ramp in the cosine, as in KHR_lights_punctual.
+    const double scale = 1 / std::max(0.001, std::cos(light.inner) - std::cos(light.outer));
+    for (size_t i = 0; i < 3; ++i) {
+        w[i] = word(place[int(i)]);
+        w[4 + i] = word(strength[int(i)]);
+        w[8 + i] = word(direction[int(i)]);
+    }
+    w[3] = light.kind;
+    w[11] = word(light.range / unit);
+    w[12] = word(scale);
+    w[13] = word(-std::cos(light.outer) * scale);
+    const double spread = directional ? std::numbers::pi * scene_radius * scene_radius : 4 * std::numbers::pi;
+    entry.power = spread * mean(strength);
+    return entry;
 }
 
 void append(std::vector<uint32_t>& words, const glm::vec3& v, uint32_t last) {
@@ -49,11 +82,7 @@ class Packer {
         place();
         pack_triangles();
         pack_textures();
-        const LightTable lights =
-            light_table(scene_, packed_.origin, packed_.unit, packed_.order, emission());
-        pack_materials(lights.triangle_density);
-        packed_.lights = lights.words;
-        packed_.light_count = lights.count;
+        pack_materials(pack_lights());
         // A buffer needs at least one texel.
         for (std::vector<uint32_t>* words : {&packed_.textures, &packed_.lights, &packed_.texels})
             if (words->empty()) words->resize(4);
@@ -160,6 +189,50 @@ class Packer {
         return count > 0 ? glm::max(sum / count, glm::dvec3(1e-3)) : glm::dvec3(1);
     }
 
+    /// The table from which a path samples a light in proportion to its power: the punctual lights, then the
+    /// emitting triangles by their sorted index. The power, averaged over the channels, is 4 pi times the
+    /// intensity of a point light, a directional light's irradiance on the scene's disc, and pi times area and
+    /// radiance of a triangle. Returns for each material the probability per area (device units) on its
+    /// triangles.
+    std::vector<double> pack_lights() {
+        const std::vector<double> radiances = emission();
+        const double unit = packed_.unit, radius = scene::bounds_of(scene_).radius() / unit;
+        std::vector<Entry> entries;
+        for (const scene::Light& light : scene_.lights)
+            if (Entry entry = entry_of(light, packed_.origin, unit, radius); entry.power > 0)
+                entries.push_back(entry);
+        for (uint32_t index = 0; index < packed_.order.size(); ++index) {
+            const scene::Triangle& t = scene_.triangles[packed_.order[index]];
+            const double radiance = radiances[t.material];
+            if (!(radiance > 0)) continue;
+            const glm::dvec3 normal = glm::cross(t.corners[1] - t.corners[0], t.corners[2] - t.corners[0]);
+            const double area = 0.5 * glm::length(normal) / (unit * unit);
+            if (!(area > 0)) continue;
+            Entry entry;
+            entry.words[3] = shared::LIGHT_TRIANGLE;
+            entry.words[11] = index;
+            entry.power = std::numbers::pi * area * radiance;
+            entries.push_back(entry);
+        }
+        double total = 0;
+        for (const Entry& entry : entries) total += entry.power;
+        std::vector<double> probabilities, triangle_density(scene_.materials.size());
+        if (total > 0)
+            for (size_t i = 0; i < radiances.size(); ++i)
+                triangle_density[i] = std::numbers::pi * radiances[i] / total;
+        for (const Entry& entry : entries) probabilities.push_back(entry.power / total);
+        const AliasTable alias = alias_table(probabilities);
+        for (size_t i = 0; i < entries.size(); ++i) {
+            auto& w = entries[i].words;
+            w[7] = word(probabilities[i]);
+            w[14] = word(alias.threshold[i]);
+            w[15] = alias.alias[i];
+            packed_.lights.insert(packed_.lights.end(), w.begin(), w.end());
+        }
+        packed_.light_count = uint32_t(entries.size());
+        return triangle_density;
+    }
+
     void pack_materials(const std::vector<double>& triangle_density) {
         const auto texture = [](int index) { return index < 0 ? shared::NO_TEXTURE : uint32_t(index); };
         for (size_t i = 0; i < scene_.materials.size(); ++i) {
@@ -174,7 +247,7 @@ class Packer {
             packed_.materials.insert(
                 packed_.materials.end(),
                 {texture(m.base_texture), texture(m.metal_texture), texture(m.emitted_texture), flags});
-            packed_.materials.insert(packed_.materials.end(), {word(float(triangle_density[i])), 0, 0, 0});
+            packed_.materials.insert(packed_.materials.end(), {word(triangle_density[i]), 0, 0, 0});
         }
     }
 
@@ -192,6 +265,30 @@ glm::vec3 vector(const uint32_t* words) {
 }
 
 }  // namespace
+
+AliasTable alias_table(const std::vector<double>& probabilities) {
+    const size_t n = probabilities.size();
+    AliasTable table{std::vector<double>(n, 1.0), std::vector<uint32_t>(n)};
+    std::iota(table.alias.begin(), table.alias.end(), 0u);
+    std::vector<double> shares(n);
+    std::vector<uint32_t> small, large;
+    for (size_t i = 0; i < n; ++i) {
+        shares[i] = probabilities[i] * double(n);
+        (shares[i] < 1 ? small : large).push_back(uint32_t(i));
+    }
+    while (!small.empty() && !large.empty()) {
+        const uint32_t poor = small.back(), rich = large.back();
+        small.pop_back();
+        table.threshold[poor] = shares[poor];
+        table.alias[poor] = rich;
+        shares[rich] -= 1 - shares[poor];
+        if (shares[rich] < 1) {
+            large.pop_back();
+            small.push_back(rich);
+        }
+    }
+    return table;
+}
 
 PackedScene pack(const scene::MeshScene& scene, const std::vector<Image>& images) {
     return Packer(scene, images).pack();

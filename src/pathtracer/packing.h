@@ -34,6 +34,14 @@ struct PackedScene {
 /// for a scene without triangles, or above kMostTriangles or kMostTexels.
 PackedScene pack(const scene::MeshScene& scene, const std::vector<Image>& images);
 
+/// Vose's alias method (1991): for a random number in [0, 1), entry i selects i below threshold[i], else
+/// alias[i].
+struct AliasTable {
+    std::vector<double> threshold;
+    std::vector<uint32_t> alias;
+};
+AliasTable alias_table(const std::vector<double>& probabilities);
+
 /// The triangles in device coordinates and in sorted order, for the CPU reference.
 struct DeviceTriangle {
     glm::vec3 corner, edge1, edge2;

@@ -1,42 +1,160 @@
 // SPDX-License-Identifier: Apache-2.0
 // Renders a mesh scene to a dataset: read, pack, find cameras and exposure, render each view, sample points,
 // and write transforms.json last.
-#include "ewa/synthetic_dataset.h"
+#include "pathtracer/synthetic_dataset.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <glm/matrix.hpp>
 #include <nlohmann/json.hpp>
 
 #include "core/atomic_file.h"
+#include "core/hash.h"
+#include "core/json.h"
+#include "core/output.h"
 #include "core/random.h"
 #include "core/text.h"
 #include "ewa/error.h"
+#include "ewa/synthetic_dataset.h"
+#include "image/image_files.h"
 #include "io/datasets/image_records.h"
+#include "io/gltf/mesh.h"
 #include "pathtracer/path_tracer.h"
-#include "pathtracer/render_job.h"
 #include "pathtracer/virtual_camera.h"
+#include "scene/camera.h"
 #include "shared/constants.h"
 
 namespace ewa {
-
 namespace {
 
 namespace fs = std::filesystem;
 using pathtracer::PathTracer;
 
-void make_folder(const fs::path& folder) {
-    std::error_code error;
-    fs::create_directories(folder, error);
-    if (error || !fs::is_directory(folder))
-        throw RunError(
-            core::one_line(folder.string() + ": the folder cannot be created: " + error.message()));
+/// The record in a folder of renders. Folders of earlier versions have this name, so it stays.
+constexpr const char* kRecord = "photographs.json";
+constexpr int kDomeViews = 48, kEnoughCameras = 8, kMostViews = 100000;
+
+void check(const SyntheticOptions& o) {
+    const auto within = [](const char* what, int64_t value, int64_t low, int64_t high) {
+        if (value < low || value > high)
+            throw InputError(std::string(what) + ": " + std::to_string(value) + " is not in " +
+                             std::to_string(low) + " .. " + std::to_string(high));
+    };
+    within("views", o.views.value_or(0), 0, kMostViews);
+    within("width", o.width, 1, 16384);
+    within("height", o.height, 1, 16384);
+    within("samples", o.samples, 1, 65536);
+    within("points", o.points, 0, 10000000);
+    if (o.exposure && !(std::abs(*o.exposure) <= 60)) throw InputError("exposure: is not in -60 .. 60 stops");
+}
+
+std::vector<Camera> cameras_for(const scene::MeshScene& scene, const SyntheticOptions& o,
+                                const std::string& name) {
+    const size_t in_file = scene.cameras.size();
+    const bool from_file = o.views ? *o.views == 0 : in_file >= kEnoughCameras;
+    if (!from_file)
+        return pathtracer::dome_cameras(scene::bounds_of(scene), o.views.value_or(kDomeViews), o.width,
+                                        o.height);
+    if (in_file == 0)
+        throw InputError(name + ": has no perspective cameras; --views N places N on a dome over the scene");
+    std::vector<Camera> cameras;
+    for (const scene::FileCamera& camera : scene.cameras)
+        cameras.push_back(pathtracer::pinhole_of(camera, o.width, o.height));
+    return cameras;
+}
+
+std::string stem(size_t view, size_t views) {
+    const std::string number = std::to_string(view);
+    const size_t width = std::max<size_t>(3, std::to_string(views - 1).size());
+    return "view_" + std::string(width - number.size(), '0') + number;
+}
+
+struct RenderJob {
+    SyntheticOptions options;
+    std::string name;  // of the scene's file
+    scene::MeshScene scene;
+    pathtracer::PackedScene packed;
+    std::vector<Camera> cameras;
+
+    /// A hash of everything that the images depend on.
+    std::string fingerprint() const;
+    /// Paths relative to the dataset's folder.
+    std::string image_name(size_t view) const { return "images/" + stem(view, cameras.size()) + ".png"; }
+    std::string depth_name(size_t view) const { return "depth/" + stem(view, cameras.size()) + ".exr"; }
+    /// Whether image and depth of a view exist. The depth is written last.
+    bool rendered(const fs::path& folder, size_t view) const {
+        return fs::exists(folder / image_name(view)) && fs::exists(folder / depth_name(view));
+    }
+};
+
+std::string RenderJob::fingerprint() const {
+    core::Hash hash;
+    hash.add(std::string("photographs of ewa " EWA_VERSION));
+    for (const auto* words : {&packed.nodes, &packed.triangles, &packed.surfaces, &packed.materials,
+                              &packed.textures, &packed.lights, &packed.texels})
+        hash.add(words->data(), words->size() * sizeof(uint32_t));
+    for (const glm::vec3& v : {scene.sky.zenith, scene.sky.horizon, scene.sky.ground})
+        for (int i = 0; i < 3; ++i) hash.add(v[i]);
+    for (int i = 0; i < 3; ++i) hash.add(packed.origin[i]);
+    hash.add(packed.unit);
+    for (const Camera& camera : cameras) {
+        for (const double x :
+             {double(camera.width), double(camera.height), camera.fx, camera.fy, camera.cx, camera.cy})
+            hash.add(x);
+        for (int i = 0; i < 3; ++i) {
+            hash.add(camera.translation[i]);
+            for (int j = 0; j < 3; ++j) hash.add(camera.rotation[i][j]);
+        }
+    }
+    hash.add(options.samples);
+    hash.add(options.points);
+    hash.add(options.seed);
+    hash.add(options.exposure.value_or(1e9));
+    char text[17];
+    std::snprintf(text, sizeof(text), "%016llx", static_cast<unsigned long long>(hash.value()));
+    return text;
+}
+
+/// Reads and packs the scene. Throws InputError as io::read_gltf_mesh does, for options out of range, and if
+/// the options ask for the file's cameras but it has none.
+RenderJob read_render_job(const fs::path& path, const SyntheticOptions& options) {
+    check(options);
+    RenderJob job{.options = options,
+                  .name = path.filename().string(),
+                  .scene = io::read_gltf_mesh(path),
+                  .packed = {},
+                  .cameras = {}};
+    job.packed = pathtracer::pack(job.scene, pathtracer::decode_images(job.scene));
+    job.cameras = cameras_for(job.scene, options, core::one_line(path.string()));
+    return job;
+}
+
+/// The contents of a folder's record. Empty if the record is missing or unreadable.
+struct Record {
+    std::string fingerprint;
+    std::optional<double> exposure;  // stops
+};
+
+std::optional<Record> read_record(const fs::path& folder) {
+    std::error_code none;
+    if (!fs::exists(folder / kRecord, none)) return std::nullopt;
+    nlohmann::json json;
+    try {
+        json = core::read_json_file<nlohmann::json>(folder / kRecord);
+    } catch (const InputError&) {
+        return std::nullopt;  // truncated, or not a record of ewa
+    }
+    if (!json.is_object() || !json.contains("fingerprint") || !json["fingerprint"].is_string())
+        return std::nullopt;
+    Record record{.fingerprint = json["fingerprint"].get<std::string>(), .exposure = std::nullopt};
+    if (json.contains("exposure") && json["exposure"].is_number())
+        record.exposure = json["exposure"].get<double>();
+    return record;
 }
 
 class Run {
   public:
-    Run(const std::shared_ptr<gpu::Device>& device, pathtracer::RenderJob job, const fs::path& folder)
+    Run(const std::shared_ptr<gpu::Device>& device, RenderJob job, const fs::path& folder)
         : job_(std::move(job)), folder_(folder), tracer_(device, job_.packed, job_.scene.sky) {
         record_ = {{"scene", job_.name},
                    {"views", cameras_.size()},
@@ -84,10 +202,9 @@ class Run {
 
     /// Continues an earlier run if its record matches, else removes its files.
     void prepare_folder() {
-        make_folder(folder_);
-        const auto earlier = pathtracer::read_record(folder_);
-        for (const char* name :
-             {pathtracer::kRecord, "transforms.json", "points.ply", "images", "depth", "sparse"})
+        core::make_folder(folder_);
+        const auto earlier = read_record(folder_);
+        for (const char* name : {kRecord, "transforms.json", "points.ply", "images", "depth", "sparse"})
             if (!earlier && fs::exists(folder_ / name))
                 throw InputError(
                     core::one_line(folder_.string() + ": holds \"" + name +
@@ -99,9 +216,9 @@ class Run {
         result_.exposure = same ? *earlier->exposure : options_.exposure ? *options_.exposure : measured();
         record_["exposure"] = result_.exposure;
         // Written before the folders, which without it would count as another program's.
-        core::write_text_file(folder_ / pathtracer::kRecord, record_.dump(1) + "\n");
+        core::write_text_file(folder_ / kRecord, record_.dump(1) + "\n");
         for (const char* name : {"images", "depth"}) {
-            make_folder(folder_ / name);
+            core::make_folder(folder_ / name);
             core::remove_abandoned_files(folder_ / name);
         }
     }
@@ -145,9 +262,7 @@ class Run {
                 const int x = int(u[0] * camera.width), y = int(u[1] * camera.height);
                 const double z = double(depth.at(x, y)[0]);
                 if (!(z > 0) || (image.channels == 4 && image.at(x, y)[3] < 0.5f)) continue;
-                const glm::dvec3 seen((x + 0.5 - camera.cx) / camera.fx * z,
-                                      (y + 0.5 - camera.cy) / camera.fy * z, z);
-                cloud.positions.push_back(glm::transpose(camera.rotation) * (seen - camera.translation));
+                cloud.positions.push_back(world_point(camera, x + 0.5, y + 0.5, z));
                 std::array<uint8_t, 3> color;
                 for (size_t c = 0; c < 3; ++c)
                     color[c] = uint8_t(std::lround(double(image.at(x, y)[c]) * 255));
@@ -174,7 +289,7 @@ class Run {
         io::write_transforms(folder_ / "transforms.json", file);
     }
 
-    pathtracer::RenderJob job_;
+    RenderJob job_;
     const SyntheticOptions& options_ = job_.options;
     const std::vector<Camera>& cameras_ = job_.cameras;
     fs::path folder_;
@@ -185,10 +300,49 @@ class Run {
 
 }  // namespace
 
+std::vector<Image> pathtracer::decode_images(const scene::MeshScene& scene) {
+    constexpr int kLargest = 8192;
+    std::vector<Image> images;
+    for (const scene::EncodedImage& encoded : scene.images)
+        images.push_back(image::decode(encoded.bytes, encoded.what, kLargest));
+    return images;
+}
+
+bool is_mesh_scene(const fs::path& path) {
+    return io::is_gltf_mesh(path);
+}
+
+bool is_rendered(const fs::path& scene, const fs::path& folder, const SyntheticOptions& options) {
+    std::error_code none;
+    const auto record = read_record(folder);
+    if (!record || !fs::exists(folder / "transforms.json", none)) return false;
+    const RenderJob job = read_render_job(scene, options);
+    if (record->fingerprint != job.fingerprint()) return false;
+    for (size_t i = 0; i < job.cameras.size(); ++i)
+        if (!job.rendered(folder, i)) return false;
+    return true;
+}
+
+Dataset scene_cameras(const fs::path& path, const SyntheticOptions& options) {
+    check(options);
+    const scene::MeshScene scene = io::read_gltf_mesh(path);
+    const std::vector<Camera> cameras = cameras_for(scene, options, core::one_line(path.string()));
+    Dataset dataset;
+    dataset.root = path;
+    dataset.color_depends_on_view = scene::color_depends_on_view(scene);
+    for (size_t i = 0; i < cameras.size(); ++i) {
+        Frame frame;
+        frame.name = "images/" + stem(i, cameras.size()) + ".png";
+        frame.camera = frame.source = frame.pinhole = cameras[i];
+        dataset.frames.push_back(frame);
+    }
+    return dataset;
+}
+
 SyntheticDataset render_dataset(const std::shared_ptr<gpu::Device>& device, const fs::path& scene,
                                 const fs::path& folder, const SyntheticOptions& options,
                                 const std::function<bool(int, int)>& progress) {
-    return Run(device, pathtracer::read_render_job(scene, options), folder).run(progress);
+    return Run(device, read_render_job(scene, options), folder).run(progress);
 }
 
 }  // namespace ewa

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "scene/color.h"
+#include "scene/statistics.h"
 
 namespace ewa::pathtracer {
 
@@ -88,11 +89,8 @@ double automatic_exposure(const std::vector<Image>& radiances) {
             const float* pixel = &image.pixels[i];
             if (pixel[3] >= 0.5f) values.push_back(std::max({pixel[0], pixel[1], pixel[2]}) / pixel[3]);
         }
-    if (values.empty()) return 0;
-    const auto place = values.begin() + std::ptrdiff_t(double(values.size() - 1) * 0.95);
-    std::nth_element(values.begin(), place, values.end());
-    if (!(*place > 0)) return 0;
-    return std::round(10 * std::log2(0.8 / double(*place))) / 10;
+    const float bright = scene::quantile(values, 0.95);
+    return bright > 0 ? std::round(10 * std::log2(0.8 / double(bright))) / 10 : 0;
 }
 
 }  // namespace ewa::pathtracer

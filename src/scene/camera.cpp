@@ -11,7 +11,6 @@
 #include <glm/matrix.hpp>
 #include <stdexcept>
 
-#include "ewa/camera.h"
 #include "shared/constants.h"
 
 namespace ewa {
@@ -42,6 +41,14 @@ glm::dmat3 between(const glm::dmat3& a, const glm::dmat3& b, double t) {
     return glm::dmat3(glm::normalize(glm::slerp(p, q, t)));
 }
 
+glm::dvec3 view_of(const glm::dvec3& point, const Camera& camera) {
+    return camera.rotation * point + camera.translation;
+}
+
+glm::dvec2 pixel_of(const glm::dvec3& view, const Camera& camera) {
+    return {camera.fx * view.x / view.z + camera.cx, camera.fy * view.y / view.z + camera.cy};
+}
+
 }  // namespace
 
 Camera along_path(std::span<const Camera> keys, double time) {
@@ -70,25 +77,14 @@ Camera along_path(std::span<const Camera> keys, double time) {
     return camera;
 }
 
-namespace {
-
-glm::dvec3 view_of(const glm::dvec3& point, const Camera& camera) {
-    return camera.rotation * point + camera.translation;
+glm::dvec3 world_point(const Camera& camera, double x, double y, double depth) {
+    const glm::dvec3 view((x - camera.cx) / camera.fx * depth, (y - camera.cy) / camera.fy * depth, depth);
+    return glm::transpose(camera.rotation) * (view - camera.translation);
 }
-
-glm::dvec2 pixel_of(const glm::dvec3& view, const Camera& camera) {
-    return {camera.fx * view.x / view.z + camera.cx, camera.fy * view.y / view.z + camera.cy};
-}
-
-}  // namespace
 
 std::array<Segment, 10> frustum_segments(const Camera& camera, double depth) {
     const glm::dvec3 eye = camera.position();
-    const auto world = [&](double x, double y) {
-        const glm::dvec3 view((x - camera.cx) / camera.fx * depth, (y - camera.cy) / camera.fy * depth,
-                              depth);
-        return eye + glm::transpose(camera.rotation) * view;
-    };
+    const auto world = [&](double x, double y) { return world_point(camera, x, y, depth); };
     const double w = camera.width, h = camera.height;
     const std::array corners{world(0, 0), world(w, 0), world(w, h), world(0, h)};
     const glm::dvec3 roof = world(w / 2, -h / 5);

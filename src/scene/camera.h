@@ -17,6 +17,9 @@ namespace ewa {
 /// relative to the width. Size and relative principal point are the first key's.
 Camera along_path(std::span<const Camera> keys, double time);
 
+/// The world position at pixel coordinates x, y (pixel centres at +0.5) and camera z `depth` in world units.
+glm::dvec3 world_point(const Camera& camera, double x, double y, double depth);
+
 /// A line in world units.
 struct Segment {
     glm::dvec3 from{0}, to{0};

@@ -6,7 +6,7 @@
 
 #include "ewa/dataset.h"
 #include "ewa/error.h"
-#include "scene/neighbors.h"
+#include "scene/statistics.h"
 #include "shared/constants.h"
 
 namespace ewa {
@@ -27,12 +27,8 @@ glm::dvec3 origin_for(const std::vector<glm::dvec3>& positions) {
         for (const glm::dvec3& p : positions)
             if (std::isfinite(p[axis])) values.push_back(p[axis]);
         if (values.empty()) return glm::dvec3(0);
-        const auto quantile = [&](double share) {
-            const auto at = values.begin() + std::ptrdiff_t(share * double(values.size() - 1));
-            std::nth_element(values.begin(), at, values.end());
-            return *at;
-        };
-        const double low = quantile(kOutermost), high = quantile(1 - kOutermost);
+        const double low = scene::quantile(values, kOutermost),
+                     high = scene::quantile(values, 1 - kOutermost);
         middle[axis] = low / 2 + high / 2;
         size = std::max(size, high - low);
         distance = std::max(distance, std::abs(middle[axis]));

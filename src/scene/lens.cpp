@@ -109,27 +109,6 @@ bool step_towards(const Distortion& d, glm::dvec2 point, glm::dvec2& q, double& 
     return false;
 }
 
-}  // namespace
-
-glm::dvec2 distort(const Distortion& lens, glm::dvec2 ray) {
-    return bend(lens, plane_of_ray(lens, ray));
-}
-
-std::optional<glm::dvec2> undistort(const Distortion& lens, glm::dvec2 point) {
-    glm::dvec2 q(0.0);
-    double distance = glm::length(point);
-    const double near = 1e-13 * (1 + distance);
-    for (int i = 0; i < 200 && !(distance <= near); ++i)
-        if (!step_towards(lens, point, q, distance)) return std::nullopt;
-    return distance <= near ? ray_of_plane(lens, q) : std::nullopt;
-}
-
-bool one_to_one(const Distortion& lens, glm::dvec2 ray) {
-    return glm::determinant(jacobian(lens, plane_of_ray(lens, ray))) > 0;
-}
-
-namespace {
-
 // COLMAP's bounds of the new size relative to the old.
 constexpr double kMinScale = 0.2, kMaxScale = 2.0;
 constexpr double kShrink = 0.98;
@@ -238,6 +217,23 @@ bool covers(const Camera& source, const Distortion& distortion, const Camera& ca
 }
 
 }  // namespace
+
+glm::dvec2 distort(const Distortion& lens, glm::dvec2 ray) {
+    return bend(lens, plane_of_ray(lens, ray));
+}
+
+std::optional<glm::dvec2> undistort(const Distortion& lens, glm::dvec2 point) {
+    glm::dvec2 q(0.0);
+    double distance = glm::length(point);
+    const double near = 1e-13 * (1 + distance);
+    for (int i = 0; i < 200 && !(distance <= near); ++i)
+        if (!step_towards(lens, point, q, distance)) return std::nullopt;
+    return distance <= near ? ray_of_plane(lens, q) : std::nullopt;
+}
+
+bool one_to_one(const Distortion& lens, glm::dvec2 ray) {
+    return glm::determinant(jacobian(lens, plane_of_ray(lens, ray))) > 0;
+}
 
 Camera undistorted_camera(const Camera& source, const Distortion& distortion) {
     if (distortion.none()) return source;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
@@ -41,7 +42,7 @@ uint64_t spread_bits(uint64_t v) {
 }
 
 struct Bounds {
-    std::array<double, 3> low{}, high{};
+    glm::dvec3 low{std::numeric_limits<double>::infinity()}, high{-std::numeric_limits<double>::infinity()};
 };
 
 bool finite_mean(const Gaussians& g, size_t i) {
@@ -51,13 +52,12 @@ bool finite_mean(const Gaussians& g, size_t i) {
 
 Bounds bounds_of(const Gaussians& g) {
     Bounds bounds;
-    bounds.low.fill(std::numeric_limits<double>::infinity());
-    bounds.high.fill(-std::numeric_limits<double>::infinity());
-    for (size_t i = 0; i < g.size(); ++i)
-        for (size_t axis = 0; axis < 3 && finite_mean(g, i); ++axis) {
-            bounds.low[axis] = std::min(bounds.low[axis], double(g.means[3 * i + axis]));
-            bounds.high[axis] = std::max(bounds.high[axis], double(g.means[3 * i + axis]));
-        }
+    for (size_t i = 0; i < g.size(); ++i) {
+        if (!finite_mean(g, i)) continue;
+        const glm::dvec3 mean(g.means[3 * i], g.means[3 * i + 1], g.means[3 * i + 2]);
+        bounds.low = glm::min(bounds.low, mean);
+        bounds.high = glm::max(bounds.high, mean);
+    }
     return bounds;
 }
 
@@ -279,15 +279,13 @@ std::vector<uint32_t> morton_order(const Gaussians& gaussians) {
     std::vector<Entry> entries(gaussians.size());
     constexpr double kLargest = double((1u << kMortonBits) - 1);
     for (size_t i = 0; i < gaussians.size(); ++i) {
-        uint64_t code = 0;
-        for (size_t axis = 0; axis < 3 && finite_mean(gaussians, i); ++axis) {
+        entries[i] = {finite_mean(gaussians, i) ? 0 : std::numeric_limits<uint64_t>::max(), uint32_t(i)};
+        for (int axis = 0; axis < 3 && finite_mean(gaussians, i); ++axis) {
             const double range = bounds.high[axis] - bounds.low[axis];
-            const double place =
-                range > 0 ? (double(gaussians.means[3 * i + axis]) - bounds.low[axis]) / range : 0;
-            code |= spread_bits(uint64_t(place * kLargest)) << axis;
+            const double share =
+                range > 0 ? (double(gaussians.means[3 * i + size_t(axis)]) - bounds.low[axis]) / range : 0;
+            entries[i].code |= spread_bits(uint64_t(share * kLargest)) << axis;
         }
-        if (!finite_mean(gaussians, i)) code = std::numeric_limits<uint64_t>::max();
-        entries[i] = {code, uint32_t(i)};
     }
     std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
         return a.code != b.code ? a.code < b.code : a.index < b.index;

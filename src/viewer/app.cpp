@@ -8,7 +8,6 @@
 #include <cmath>
 
 #include "ewa/error.h"
-#include "viewer/framing.h"
 
 namespace ewa::viewer {
 namespace {
@@ -27,11 +26,12 @@ Size window_size(const Startup& startup, const WindowSystem& system) {
         size = {camera.width, camera.height};
     }
     if (startup.picture) return size;
-    const Size room = system.room();
-    if (room.width <= 0 || room.height <= 0) return size;
+    const Size desktop = system.work_area();
+    if (desktop.width <= 0 || desktop.height <= 0) return size;
     const double grow = std::max(
         1.0, std::min(double(kUsualSize.width) / size.width, double(kUsualSize.height) / size.height));
-    const double scale = std::min({grow, double(room.width) / size.width, double(room.height) / size.height});
+    const double scale =
+        std::min({grow, double(desktop.width) / size.width, double(desktop.height) / size.height});
     return {std::max(1, int(std::lround(size.width * scale))),
             std::max(1, int(std::lround(size.height * scale)))};
 }
@@ -68,12 +68,6 @@ std::filesystem::path free_name(const std::string& stem, const std::string& exte
     }
 }
 
-void SceneState::set_gaussians(std::shared_ptr<const Gaussians> gaussians) {
-    scene.gaussians = std::move(gaussians);
-    sh_degree = sh_degree_present(*scene.gaussians);
-    plan = plan_lines(*scene.gaussians, RenderOptions{});
-}
-
 bool Message::expire(Clock::time_point now) {
     bool expired = false;
     for (Clock::time_point* until : {&hint_until, &note_until}) {
@@ -103,29 +97,25 @@ App::App(const Startup& startup)
     settings_.look = startup.settings.look;
     if (startup.film) start_film();
     if (startup.watch) live_.watch(*startup.watch);
-    times_.window_is_open();
-}
-
-void App::redraw(int frames) {
-    redraws_ = std::max(redraws_, frames);
+    times_.window_open = times_.now();
 }
 
 void App::adopt(OpenedScene scene, std::optional<int> frame) {
-    state_.scene = std::move(scene);
-    state_.set_gaussians(state_.scene.gaussians);
-    renders_.set_scene(state_.scene.gaussians);
-    settings_.look.kernel = state_.scene.look.kernel;
-    settings_.look.background = state_.scene.look.background;
-    settings_.look.sh_degree = state_.sh_degree;
+    scene_ = std::move(scene);
+    scene_.set_gaussians(scene_.gaussians);
+    renders_.set_scene(scene_.gaussians);
+    settings_.look.kernel = scene_.look.kernel;
+    settings_.look.background = scene_.look.background;
+    settings_.look.sh_degree = scene_.sh_degree;
     message_.note.clear();
-    if (!state_.scene.remark.empty()) say(state_.scene.remark);
-    state_.framed = state_.scene.gaussians->size() > 0;
-    comparison_.set_scene(++state_.number);
+    if (!scene_.remark.empty()) say(scene_.remark);
+    framed_ = scene_.gaussians->size() > 0;
+    comparison_.forget_scene();
     leave_camera();
-    state_.start_frame.reset();
-    if (state_.scene.dataset) {
-        state_.camera_size = camera_size(*state_.scene.dataset, view_.radius());
-        state_.start_frame = at_camera_ = frame.value_or(0);
+    start_frame_.reset();
+    if (scene_.dataset) {
+        camera_size_ = camera_size(*scene_.dataset, view_.radius());
+        start_frame_ = at_camera_ = frame.value_or(0);
     }
     redraw(kRedraws);
 }
@@ -147,7 +137,7 @@ void App::take_opened() {
         window_.set_title(scene.title + " - ewa");
         adopt(std::move(scene), {});
         live_.stop();
-        if (!state_.scene.run.empty()) live_.watch({state_.scene.run, {}, {}, state_.scene.splats_time});
+        if (!scene_.run.empty()) live_.watch({scene_.run, {}, {}, scene_.splats_time});
     } catch (const std::exception& error) {
         say(error.what());
     }
@@ -159,18 +149,18 @@ void App::take_live() {
         say("the training ended with status " + std::to_string(*status) +
             "; see the terminal for the reason");
     // A screenshot waits for its full frame, which new splats would start again.
-    if (capture_ && state_.framed) return;
+    if (capture_ && framed_) return;
     const LiveRun::News news = live_.take();
     if (news.any) redraw();
     if (!news.splats) return;
-    const int degree_before = state_.sh_degree;
-    state_.set_gaussians(news.splats);
+    const int degree_before = scene_.sh_degree;
+    scene_.set_gaussians(news.splats);
     renders_.set_scene(news.splats);
-    if (settings_.look.sh_degree == degree_before) settings_.look.sh_degree = state_.sh_degree;
+    if (settings_.look.sh_degree == degree_before) settings_.look.sh_degree = scene_.sh_degree;
     // The first splats tell what to look at, unless the user has moved the camera.
-    if (!state_.framed && (!state_.scene.dataset || at_camera_ == state_.start_frame))
-        view_.restart(start_view(state_.scene, state_.start_frame, window_.framebuffer()));
-    state_.framed = true;
+    if (!framed_ && (!scene_.dataset || at_camera_ == start_frame_))
+        view_.restart(start_view(scene_, start_frame_, window_.framebuffer()));
+    framed_ = true;
 }
 
 void App::run() {
@@ -193,7 +183,7 @@ void App::run() {
         take_live();
         if (film_) continue_film();
         if (redraws_ > 0) draw();
-        ask();
+        if (const auto camera = requested_camera()) renders_.ask(*camera, settings_.look, scripted());
     }
     if (startup_.verbose) times_.print(renders_.shown().get());
     if (scripted() && !done_)
@@ -213,11 +203,12 @@ void App::say(const std::string& note) {
     redraw(kRedraws);
 }
 
-void App::ask() {
+/// Empty while the window is minimised, and while a film has cameras of its own.
+std::optional<Camera> App::requested_camera() const {
     const Size size = window_.framebuffer();
-    if (size.width == 0 || size.height == 0 || film_) return;
+    if (size.width == 0 || size.height == 0 || film_) return std::nullopt;
     const Rectangle place = arrangement().rendering;
-    renders_.ask(view_.camera(place.width, place.height), settings_.look, scripted());
+    return view_.camera(place.width, place.height);
 }
 
 void App::take_renders() {
@@ -243,16 +234,12 @@ void App::take_renders() {
 }
 
 void App::take_comparison() {
-    switch (comparison_.take()) {
-        case ImageComparison::News::image:
-            if (comparison_.image()->failure.empty())
-                screen_->presenter.set_picture(Layer::image, comparison_.image()->picture);
-            return redraw(kRedraws);
-        case ImageComparison::News::comparison:
-            return redraw(2);
-        case ImageComparison::News::none:
-            return;
-    }
+    const ImageComparison::News news = comparison_.take();
+    if (news == ImageComparison::News::none) return;
+    if (news == ImageComparison::News::comparison) return redraw(2);
+    if (comparison_.image()->failure.empty())
+        screen_->presenter.set_picture(Layer::image, comparison_.image()->picture);
+    redraw(kRedraws);
 }
 
 }  // namespace ewa::viewer

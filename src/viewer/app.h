@@ -1,24 +1,42 @@
 // SPDX-License-Identifier: Apache-2.0
 // The viewer's window thread: turns input into requests, and finished frames into what the window shows.
 #pragma once
+#include <algorithm>
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <future>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
-#include "viewer/gui.h"
-#include "viewer/image_comparison.h"
-#include "viewer/opening.h"
-#include "viewer/pace.h"
-#include "viewer/panel.h"
+#include "io/datasets/view_list.h"
+#include "viewer/overlay.h"
 #include "viewer/renders.h"
+#include "viewer/screen.h"
 #include "viewer/training.h"
 #include "viewer/view_camera.h"
-#include "viewer/views.h"
 
 namespace ewa::viewer {
+
+/// A film that is being written: frames along the path through saved views, one file each.
+struct Film {
+    static constexpr int kRate = 30;  // frames per second
+
+    std::filesystem::path folder;
+    std::vector<Camera> keys;  // at least one
+    Size size;                 // of every frame, also if the window changes
+    int frames = 0, next = 0;
+    uint64_t waits_for = 0;  // serial of the frame that is being written; 0: none
+
+    /// The keys are kRate * seconds frames apart; the first and last key are frames.
+    Film(const std::vector<io::NamedView>& views, const std::filesystem::path& folder, Size size,
+         double seconds);
+    bool finished() const { return next >= frames; }
+    Camera camera() const;
+    std::filesystem::path file() const;
+};
 
 /// What the command line asks for.
 struct Startup {
@@ -34,20 +52,7 @@ struct Startup {
     std::optional<live::WhatToWatch> watch;  // a training run
     TrainProcess* trainer = nullptr;         // the viewer's own; outlives the App
     bool verbose = false;                    // print times on standard error
-    StartTimes times;
-};
-
-/// What App knows of the open scene.
-struct SceneState {
-    OpenedScene scene;
-    uint64_t number = 0;  // scenes opened so far
-    int sh_degree = 0;    // the highest that changes the image
-    std::vector<PlanLine> plan;
-    double camera_size = 1;          // of a drawn camera, world units
-    std::optional<int> start_frame;  // the frame that "reset" returns to
-    bool framed = false;             // the first view was chosen when there were splats
-
-    void set_gaussians(std::shared_ptr<const Gaussians> gaussians);
+    SessionTimes times;
 };
 
 /// The text over the image.
@@ -78,27 +83,26 @@ class App {
     void take_renders();
     void take_comparison();
     void take_live();
-    void ask();
+    std::optional<Camera> requested_camera() const;
     bool scripted() const { return startup_.picture || startup_.film; }
     double patience() const;
-    void redraw(int frames = 1);
+    void redraw(int frames = 1) { redraws_ = std::max(redraws_, frames); }
     void say(const std::string& note);
 
-    // app_input.cpp: keys and the mouse.
+    // app_input.cpp: keys, the mouse, the dataset's cameras, saved views, and the film.
     void handle_key(const KeyPress& press);
     void handle_number(int number, const KeyPress& press);
     void handle_mouse();
     void handle_drag(double right, double down);
     void move_by_itself(double seconds);
     bool flying() const;
-
-    // app_views.cpp: the dataset's cameras, saved views, and the film.
     void go_to_camera(int frame);
     void go_to_nearest_camera();
     void step_camera(int step);
     void leave_camera() { at_camera_.reset(); }
     void reset_view();
     void change_comparison();
+    std::vector<io::NamedView>::iterator find_view(size_t number);
     void save_view(size_t number);
     void go_to_view(const io::NamedView& view);
     void go_to_number(size_t number);
@@ -111,9 +115,10 @@ class App {
     bool present(ImDrawData* drawn, Image* capture);
     void panel();
     void obey(const PanelActions& actions);
-    void overlays();
+    void draw_overlays();
     void load_image();
     void choose_picture();
+    Comparison comparison() const { return at_camera_ ? settings_.comparison : Comparison::none; }
     bool comparing() const;  // the image of the camera is shown or compared
     std::optional<ComparisonRequest> comparison_wanted() const;
     Arrangement arrangement() const;
@@ -124,11 +129,14 @@ class App {
     WindowSystem system_;
     Window window_;
     std::unique_ptr<Screen> screen_;
-    SceneState state_;
+    OpenedScene scene_;
+    double camera_size_ = 1;          // of a drawn camera, world units
+    std::optional<int> start_frame_;  // the frame that "reset" returns to
+    bool framed_ = false;             // the first view was chosen when there were splats
     ViewCamera view_;
     std::optional<int> at_camera_;  // the frame of the dataset whose camera the view is at
     PanelSettings settings_;
-    SavedViews views_;
+    std::vector<io::NamedView> views_;  // saved under a number, which is the name
     std::optional<Film> film_;
     SessionTimes times_;
     std::string device_name_;

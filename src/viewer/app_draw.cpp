@@ -7,7 +7,6 @@
 
 #include "ewa/error.h"
 #include "viewer/app.h"
-#include "viewer/overlay.h"
 
 namespace ewa::viewer {
 namespace {
@@ -17,28 +16,23 @@ constexpr int kMostDevicesLost = 5;  // a device that is lost more often is brok
 }  // namespace
 
 void App::panel() {
-    PanelFacts facts;
-    facts.title = state_.scene.title;
-    facts.device = device_name_;
-    facts.splats = state_.scene.gaussians->size();
-    facts.scene_sh_degree = state_.sh_degree;
-    facts.dataset = state_.scene.dataset.get();
-    facts.picture = renders_.shown().get();
-    facts.plan = &state_.plan;
-    facts.views = &views_.all();
-    facts.drawing = !renders_.settled();
-    facts.note = message_.note;
-    if (at_camera_) facts.image_failure = comparison_.failure_of(*at_camera_);
-    if (comparing() && comparison_.compared()) facts.psnr = comparison_.compared()->psnr;
-    facts.pictures_a_second = times_.rate();
-    facts.first_picture = times_.first_frame();
-    if (film_) {
-        facts.film_frame = film_->next;
-        facts.film_frames = film_->frames;
-    }
-    facts.run = live_.update();
-    facts.up = view_.up();
-    facts.at_camera = at_camera_;
+    const auto compared = comparing() ? comparison_.compared() : nullptr;
+    const PanelFacts facts{
+        .scene = scene_,
+        .device = device_name_,
+        .picture = renders_.shown().get(),
+        .views = views_,
+        .run = live_.update(),
+        .drawing = !renders_.settled(),
+        .note = message_.note,
+        .image_failure = at_camera_ ? comparison_.failure_of(*at_camera_) : std::string(),
+        .psnr = compared ? std::optional(compared->psnr) : std::nullopt,
+        .pictures_a_second = times_.rate(),
+        .first_picture = times_.first_frame(),
+        .film = film_ ? std::optional(float(film_->next) / float(film_->frames)) : std::nullopt,
+        .up = view_.up(),
+        .at_camera = at_camera_,
+    };
     const PanelActions actions = draw_panel(facts, settings_);
     panel_right_ = int(actions.right * ImGui::GetIO().DisplayFramebufferScale.x);
     obey(actions);
@@ -51,46 +45,49 @@ void App::obey(const PanelActions& actions) {
     if (actions.frame) go_to_camera(*actions.frame);
     if (actions.command) live_.command(*actions.command);
     if (actions.up) view_.set_up(*actions.up);
-    if (actions.save_view) save_view(views_.free_number());
-    if (actions.view && *actions.view < views_.size()) go_to_view(views_.all()[*actions.view]);
-    if (actions.forget) views_.erase(*actions.forget);
+    if (actions.save_view) {
+        size_t free = 1;
+        while (find_view(free) != views_.end()) ++free;
+        save_view(free);
+    }
+    if (actions.view && *actions.view < views_.size()) go_to_view(views_[*actions.view]);
+    if (actions.forget && *actions.forget < views_.size())
+        views_.erase(views_.begin() + std::ptrdiff_t(*actions.forget));
     if (actions.film && views_.size() >= 2) start_film();
     if (actions.stop_film) film_.reset();
     if (actions.write_views) write_views();
 }
 
-void App::overlays() {
+void App::draw_overlays() {
     const Arrangement places = arrangement();
     pointed_camera_.reset();
-    if (settings_.cameras && state_.scene.dataset) {
+    if (settings_.cameras && scene_.dataset) {
         const Camera seen = view_.camera(places.rendering.width, places.rendering.height);
-        pointed_camera_ =
-            draw_cameras({*state_.scene.dataset, seen, places.rendering, state_.camera_size, at_camera_});
+        pointed_camera_ = draw_cameras({*scene_.dataset, seen, places.rendering, camera_size_, at_camera_});
     }
     if (comparing()) draw_comparison(settings_.comparison, places, settings_.wipe);
-    if (Clock::now() < message_.hint_until && !show_help_) draw_hint(state_.scene.dataset != nullptr);
+    if (Clock::now() < message_.hint_until && !show_help_) draw_hint(scene_.dataset != nullptr);
 }
 
 Arrangement App::arrangement() const {
-    const Comparison comparison = at_camera_ ? settings_.comparison : Comparison::none;
     Size image{1, 1};
     if (at_camera_) {
-        const Camera& camera = state_.scene.dataset->frames[size_t(*at_camera_)].camera;
+        const Camera& camera = scene_.dataset->frames[size_t(*at_camera_)].camera;
         image = {camera.width, camera.height};
     }
     const Size window = window_.framebuffer();
-    return arrange(comparison, {std::max(1, window.width), std::max(1, window.height)}, image, panel_right_);
+    return arrange(comparison(), {std::max(1, window.width), std::max(1, window.height)}, image,
+                   panel_right_);
 }
 
 bool App::comparing() const {
-    return settings_.comparison != Comparison::none && at_camera_ && comparison_.image_of(*at_camera_);
+    return comparison() != Comparison::none && comparison_.image_of(*at_camera_);
 }
 
 void App::load_image() {
-    if (settings_.comparison == Comparison::none || !at_camera_) return;
-    const Rectangle place = arrangement().image;
-    comparison_.load(*at_camera_, state_.scene.dataset->frames[size_t(*at_camera_)],
-                     {place.width, place.height}, settings_.look.background);
+    if (comparison() == Comparison::none) return;
+    comparison_.load(*at_camera_, scene_.dataset->frames[size_t(*at_camera_)], arrangement().image.size(),
+                     settings_.look.background);
 }
 
 /// The full frame can be compared if it shows colours from the camera of the image.
@@ -102,7 +99,7 @@ std::optional<ComparisonRequest> App::comparison_wanted() const {
         return std::nullopt;
     const bool difference = settings_.comparison == Comparison::difference;
     return ComparisonRequest{shown, comparison_.image_of(*at_camera_),
-                             fitted({image.width, image.height}, {0, 0, rendering.width, rendering.height}),
+                             fitted(image.size(), {0, 0, rendering.width, rendering.height}),
                              difference ? settings_.gain : 0};
 }
 
@@ -131,7 +128,7 @@ void App::draw() {
     load_image();
     const Comparison before = settings_.comparison;
     screen_->gui.begin_frame();
-    if (!scripted()) overlays();
+    if (!scripted()) draw_overlays();
     const int covered = std::exchange(panel_right_, 0);
     if (show_panel_ && !scripted()) panel();
     if (panel_right_ != covered) redraw();
@@ -142,8 +139,7 @@ void App::draw() {
     if (settings_.comparison != before) redraw(kRedraws);
     choose_picture();
 
-    const bool image_ready =
-        settings_.comparison == Comparison::none || !at_camera_ || comparison_.loaded(*at_camera_);
+    const bool image_ready = comparison() == Comparison::none || comparison_.loaded(*at_camera_);
     const auto& requested = comparison_.requested();
     const bool difference_ready = !requested || requested->gain == 0 || comparison_.compared();
     const bool capture =
@@ -212,10 +208,8 @@ void App::save(Image&& image) {
 
 /// Writes the render alone, in floating point.
 void App::save_exr() {
-    const Size size = window_.framebuffer();
-    if (size.width == 0 || size.height == 0 || film_) return;
-    const Rectangle place = arrangement().rendering;
-    renders_.write(view_.camera(place.width, place.height), settings_.look, free_name("ewa-view", ".exr"));
+    if (const auto camera = requested_camera())
+        renders_.write(*camera, settings_.look, free_name("ewa-view", ".exr"));
 }
 
 }  // namespace ewa::viewer

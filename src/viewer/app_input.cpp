@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// Keys and the mouse.
+// Keys and the mouse, and what they ask for: the dataset's cameras, saved views, and the film through them.
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 #include <imgui.h>
 
 #include <algorithm>
+#include <cstdio>
 
+#include "core/output.h"
+#include "ewa/error.h"
+#include "scene/camera.h"
 #include "viewer/app.h"
-#include "viewer/overlay.h"
 
 namespace ewa::viewer {
 namespace {
@@ -31,17 +34,17 @@ void App::handle_number(int number, const KeyPress& press) {
 
 void App::handle_key(const KeyPress& press) {
     const int key = press.key;
+    const auto toggle = [](bool& setting) { setting = !setting; };
     // A text field does not use these keys, so they act while one is edited. The other keys belong to the
     // field.
     if (key == GLFW_KEY_Q && press.control) return window_.close();
     switch (key) {
         case GLFW_KEY_F1:
-            show_help_ = !show_help_;
+            toggle(show_help_);
             message_.hint_until = {};
             return;
         case GLFW_KEY_F2:
-            show_panel_ = !show_panel_;
-            return;
+            return toggle(show_panel_);
         case GLFW_KEY_F12:
             return press.shift ? save_exr() : void(capture_ = true);
         default:
@@ -64,14 +67,11 @@ void App::handle_key(const KeyPress& press) {
             scale = std::min(kMostScale, scale * kScaleStep);
             return;
         case GLFW_KEY_T:
-            settings_.turntable = !settings_.turntable;
-            return;
+            return toggle(settings_.turntable);
         case GLFW_KEY_U:
-            view_.set_up(next_up(view_.up()));
-            return;
+            return view_.set_up(next_up(view_.up()));
         case GLFW_KEY_C:
-            settings_.cameras = !settings_.cameras;
-            return;
+            return toggle(settings_.cameras);
         case GLFW_KEY_G:
             return go_to_nearest_camera();
         case GLFW_KEY_LEFT:
@@ -161,6 +161,126 @@ void App::handle_mouse() {
     if (pointed_camera_ && ImGui::IsMouseReleased(ImGuiMouseButton_Left) &&
         io.MouseDragMaxDistanceSqr[ImGuiMouseButton_Left] < kStillPixels * kStillPixels)
         go_to_camera(*pointed_camera_);
+}
+
+void App::go_to_camera(int frame) {
+    view_.stand(dataset_view(*scene_.gaussians, *scene_.dataset, frame));
+    at_camera_ = frame;
+    settings_.turntable = false;
+    redraw();
+}
+
+void App::go_to_nearest_camera() {
+    if (!scene_.dataset) return say("there are no cameras; --cameras DATASET shows a dataset's");
+    const Size size = window_.framebuffer();
+    go_to_camera(nearest_frame(*scene_.dataset, view_.camera(size.width, size.height), view_.radius()));
+}
+
+void App::step_camera(int step) {
+    if (!scene_.dataset || !at_camera_) return go_to_nearest_camera();
+    const int count = int(scene_.dataset->frames.size());
+    go_to_camera((*at_camera_ + step + count) % count);
+}
+
+void App::reset_view() {
+    view_.reset();
+    at_camera_ = start_frame_;
+}
+
+void App::change_comparison() {
+    if (!scene_.dataset) return go_to_nearest_camera();
+    settings_.comparison = Comparison((int(settings_.comparison) + 1) % 4);
+    if (settings_.comparison != Comparison::none && !at_camera_) go_to_nearest_camera();
+}
+
+std::vector<io::NamedView>::iterator App::find_view(size_t number) {
+    return std::find_if(
+        views_.begin(), views_.end(),
+        [name = std::to_string(number)](const io::NamedView& view) { return view.name == name; });
+}
+
+void App::save_view(size_t number) {
+    const Size size = window_.framebuffer();
+    const std::string name = std::to_string(number);
+    const io::NamedView view{name, view_.camera(std::max(1, size.width), std::max(1, size.height)),
+                             view_.pivot()};
+    if (const auto same = find_view(number); same != views_.end())
+        *same = view;
+    else
+        views_.push_back(view);
+    say("view " + name + " is saved; Shift + " + name + " goes to it");
+}
+
+void App::go_to_view(const io::NamedView& view) {
+    view_.stand({view.camera, view.pivot, view_.up(), view_.radius()});
+    leave_camera();
+}
+
+void App::go_to_number(size_t number) {
+    if (const auto view = find_view(number); view != views_.end()) return go_to_view(*view);
+    const std::string name = std::to_string(number);
+    say("there is no view " + name + "; Ctrl + " + name + " saves one");
+}
+
+void App::write_views() {
+    try {
+        const std::filesystem::path file = free_name("ewa-views", ".json");
+        io::write_views(file, views_);
+        say("wrote " + std::filesystem::absolute(file).string() + "; --views opens it");
+    } catch (const RunError& error) {
+        say(error.what());
+    }
+}
+
+void App::start_film() {
+    const Size window = window_.framebuffer();
+    Film film(views_, startup_.film.value_or(free_name("ewa-film", "")),
+              {std::max(1, window.width), std::max(1, window.height)}, double(settings_.film_seconds));
+    try {
+        core::make_folder(film.folder);
+    } catch (const RunError& error) {
+        if (startup_.film) throw;
+        return say(error.what());
+    }
+    settings_.turntable = false;
+    leave_camera();
+    film_ = std::move(film);
+}
+
+/// Asks for the next frame once the last one is written.
+void App::continue_film() {
+    if (film_->waits_for != 0) {
+        if (!renders_.shown() || renders_.shown()->request.serial < film_->waits_for) return;
+        ++film_->next;
+        redraw();
+    }
+    if (film_->finished()) {
+        say("wrote " + std::to_string(film_->frames) + " pictures to " +
+            std::filesystem::absolute(film_->folder).string());
+        film_.reset();
+        done_ = startup_.film.has_value();
+        return;
+    }
+    view_.stand({film_->camera(), view_.pivot(), view_.up(), view_.radius()});
+    film_->waits_for =
+        renders_.write(view_.camera(film_->size.width, film_->size.height), settings_.look, film_->file());
+}
+
+Film::Film(const std::vector<io::NamedView>& views, const std::filesystem::path& into, Size frame_size,
+           double seconds)
+    : folder(into), size(frame_size) {
+    for (const io::NamedView& view : views) keys.push_back(view.camera);
+    frames = int((double(keys.size()) - 1) * kRate * seconds + 0.5) + 1;
+}
+
+Camera Film::camera() const {
+    return along_path(keys, frames > 1 ? double(next) * double(keys.size() - 1) / (frames - 1) : 0);
+}
+
+std::filesystem::path Film::file() const {
+    char name[32];
+    std::snprintf(name, sizeof(name), "%05d.png", next);
+    return folder / name;
 }
 
 }  // namespace ewa::viewer

@@ -2,7 +2,9 @@
 #include "viewer/byte_image.h"
 
 #include <algorithm>
-#include <cmath>
+#include <iterator>
+
+#include "scene/statistics.h"
 
 namespace ewa::viewer {
 namespace {
@@ -10,27 +12,6 @@ namespace {
 /// Rounds as save_image does; NaN becomes zero.
 uint8_t to_byte(float v) {
     return v > 0.0f ? uint8_t(std::min(v, 1.0f) * 255.0f + 0.5f) : uint8_t(0);
-}
-
-float quantile(std::vector<float>& values, double share) {
-    if (values.empty()) return 0;
-    const auto at = values.begin() + std::ptrdiff_t(share * double(values.size() - 1));
-    std::nth_element(values.begin(), at, values.end());
-    return *at;
-}
-
-std::vector<float> solid_depths(const Rendering& rendering) {
-    std::vector<float> depths;
-    for (size_t i = 0; i < rendering.depth.pixels.size(); ++i)
-        if (rendering.alpha.pixels[i] >= 0.5f) depths.push_back(rendering.depth.pixels[i]);
-    return depths;
-}
-
-float white_count_of(const Rendering& rendering) {
-    std::vector<float> counts;
-    for (const float count : rendering.count.pixels)
-        if (count > 0) counts.push_back(count);
-    return quantile(counts, 0.99);
 }
 
 /// rgb(i): the three values of pixel i.
@@ -43,17 +24,17 @@ void fill(ByteImage& picture, Values rgb) {
     }
 }
 
+void fill(ByteImage& picture, const Image& rgb) {
+    fill(picture, [values = rgb.pixels.data()](size_t i) {
+        return std::array<float, 3>{values[3 * i], values[3 * i + 1], values[3 * i + 2]};
+    });
+}
+
 ByteImage empty_picture(int width, int height) {
     return {width, height, std::vector<uint8_t>(size_t(width) * size_t(height) * 4), 0};
 }
 
 }  // namespace
-
-Drawing drawing_for(Mode mode) {
-    if (mode == Mode::depth) return Drawing::depth;
-    if (mode == Mode::count) return Drawing::count;
-    return mode == Mode::ellipsoids ? Drawing::ellipsoids : Drawing::color;
-}
 
 std::array<float, 3> heat(float share) {
     return {std::clamp(3 * share, 0.0f, 1.0f), std::clamp(3 * share - 1, 0.0f, 1.0f),
@@ -64,9 +45,11 @@ ByteImage picture_of(const Rendering& rendering, Mode mode) {
     ByteImage picture = empty_picture(rendering.color.width, rendering.color.height);
     const auto grey = [](float v) { return std::array<float, 3>{v, v, v}; };
     if (mode == Mode::depth) {
-        std::vector<float> depths = solid_depths(rendering);
-        picture.dark = quantile(depths, 0.02);
-        picture.white = quantile(depths, 0.98);
+        std::vector<float> depths;
+        for (size_t i = 0; i < rendering.depth.pixels.size(); ++i)
+            if (rendering.alpha.pixels[i] >= 0.5f) depths.push_back(rendering.depth.pixels[i]);
+        picture.dark = scene::quantile(depths, 0.02);
+        picture.white = scene::quantile(depths, 0.98);
         const float range = picture.white - picture.dark;
         fill(picture, [&](size_t i) {
             const float depth = rendering.depth.pixels[i];
@@ -76,16 +59,16 @@ ByteImage picture_of(const Rendering& rendering, Mode mode) {
                         (1 - kDarkestDepth) * std::clamp((depth - picture.dark) / range, 0.0f, 1.0f));
         });
     } else if (mode == Mode::count) {
-        picture.white = white_count_of(rendering);
+        std::vector<float> counts;
+        std::copy_if(rendering.count.pixels.begin(), rendering.count.pixels.end(), std::back_inserter(counts),
+                     [](float count) { return count > 0; });
+        picture.white = scene::quantile(counts, 0.99);
         const float scale = picture.white > 0 ? 1.0f / picture.white : 0.0f;
         fill(picture, [&](size_t i) { return heat(rendering.count.pixels[i] * scale); });
     } else if (mode == Mode::opacity) {
         fill(picture, [&](size_t i) { return grey(rendering.alpha.pixels[i]); });
     } else {
-        const float* values = rendering.color.pixels.data();
-        fill(picture, [&](size_t i) {
-            return std::array<float, 3>{values[3 * i], values[3 * i + 1], values[3 * i + 2]};
-        });
+        fill(picture, rendering.color);
     }
     return picture;
 }
@@ -93,10 +76,7 @@ ByteImage picture_of(const Rendering& rendering, Mode mode) {
 ByteImage picture_of(const Image& image, const std::array<float, 3>& background) {
     const Image opaque = over_background(image, background);
     ByteImage picture = empty_picture(opaque.width, opaque.height);
-    fill(picture, [&](size_t i) {
-        const float* values = &opaque.pixels[3 * i];
-        return std::array<float, 3>{values[0], values[1], values[2]};
-    });
+    fill(picture, opaque);
     return picture;
 }
 

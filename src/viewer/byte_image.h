@@ -11,9 +11,6 @@ namespace ewa::viewer {
 
 enum class Mode { color, depth, opacity, count, ellipsoids };
 
-/// The values that the renderer computes for a mode.
-Drawing drawing_for(Mode mode);
-
 /// Width and height in px.
 struct Size {
     int width = 0, height = 0;

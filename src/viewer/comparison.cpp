@@ -23,17 +23,12 @@ float bilinear(const ByteImage& picture, double x, double y, size_t c) {
 
 }  // namespace
 
-Rectangle fitted(Size shape, const Rectangle& room) {
-    Rectangle result = room;
-    if (shape.width <= 0 || shape.height <= 0) return result;
-    if (shape != Size{room.width, room.height}) {
-        const double scale = std::min(double(room.width) / shape.width, double(room.height) / shape.height);
-        result.width = std::clamp(int(std::lround(shape.width * scale)), 1, std::max(1, room.width));
-        result.height = std::clamp(int(std::lround(shape.height * scale)), 1, std::max(1, room.height));
-    }
-    result.x = room.x + (room.width - result.width) / 2;
-    result.y = room.y + (room.height - result.height) / 2;
-    return result;
+Rectangle fitted(Size shape, const Rectangle& space) {
+    if (shape.width <= 0 || shape.height <= 0 || shape == space.size()) return space;
+    const double scale = std::min(double(space.width) / shape.width, double(space.height) / shape.height);
+    const int width = std::clamp(int(std::lround(shape.width * scale)), 1, std::max(1, space.width));
+    const int height = std::clamp(int(std::lround(shape.height * scale)), 1, std::max(1, space.height));
+    return {space.x + (space.width - width) / 2, space.y + (space.height - height) / 2, width, height};
 }
 
 Arrangement arrange(Comparison comparison, Size window, Size image, int covered) {
@@ -56,8 +51,8 @@ ByteImage difference(const ByteImage& rendering, const ByteImage& image, const R
             const int inner_x = x - place.x, inner_y = y - place.y;
             if (inner_x < 0 || inner_y < 0 || inner_x >= place.width || inner_y >= place.height) continue;
             for (size_t c = 0; c < 3; ++c) {
-                const float photo = bilinear(image, (inner_x + 0.5) * scale_x, (inner_y + 0.5) * scale_y, c);
-                result.rgba[at + c] = uint8_t(std::abs(float(rendering.rgba[at + c]) - photo) + 0.5f);
+                const float value = bilinear(image, (inner_x + 0.5) * scale_x, (inner_y + 0.5) * scale_y, c);
+                result.rgba[at + c] = uint8_t(std::abs(float(rendering.rgba[at + c]) - value) + 0.5f);
             }
         }
     return result;
@@ -81,6 +76,68 @@ double psnr_of_difference(const ByteImage& difference, const Rectangle& place) {
             }
     if (count == 0) return std::numeric_limits<double>::quiet_NaN();
     return 10 * std::log10(double(count) / sum);
+}
+
+CameraImage load_camera_image(const ImageRequest& request) {
+    CameraImage loaded{.scene = request.scene, .frame = request.index, .picture = {}, .failure = {}};
+    try {
+        const Image image = load_frame_image(request.frame);
+        const int factor = std::max(1, std::min(image.width / std::max(1, 2 * request.size.width),
+                                                image.height / std::max(1, 2 * request.size.height)));
+        loaded.picture = picture_of(factor > 1 ? downscale(image, factor) : image, request.background);
+    } catch (const std::exception& error) {
+        loaded.failure = error.what();
+    }
+    return loaded;
+}
+
+Compared compare_with_image(const ComparisonRequest& request) {
+    Compared compared;
+    compared.of = request;
+    compared.difference = difference(request.rendering->picture, request.image->picture, request.place);
+    compared.psnr = psnr_of_difference(compared.difference, request.place);
+    if (request.gain > 0)
+        amplify(compared.difference, request.gain);
+    else
+        compared.difference = {};
+    return compared;
+}
+
+void ImageComparison::forget_scene() {
+    ++scene_;
+    image_.reset();
+    image_requested_.reset();
+}
+
+void ImageComparison::load(int index, const Frame& frame, Size place,
+                           const std::array<float, 3>& background) {
+    if (image_requested_ && image_requested_->index == index &&
+        place.width <= 2 * image_requested_->size.width && image_requested_->background == background)
+        return;
+    image_requested_ = ImageRequest{scene_, index, frame, place, background};
+    images_.ask(*image_requested_);
+}
+
+void ImageComparison::compare(const std::optional<ComparisonRequest>& request) {
+    if (request && requested_ != request) comparisons_.ask(*request);
+    requested_ = request;
+}
+
+ImageComparison::News ImageComparison::take() {
+    News news = News::none;
+    if (const auto compared = comparisons_.result(); compared != compared_) {
+        compared_ = compared;
+        news = News::comparison;
+    }
+    if (const auto image = images_.result(); image != image_ && image && image->scene == scene_) {
+        image_ = image;
+        news = News::image;
+    }
+    return news;
+}
+
+std::shared_ptr<const Compared> ImageComparison::compared() const {
+    return compared_ && requested_ && compared_->of == *requested_ ? compared_ : nullptr;
 }
 
 }  // namespace ewa::viewer

@@ -24,15 +24,11 @@ constexpr int kLargestSide = 16384;  // px
 
 struct Arguments {
     std::filesystem::path path, cameras, picture, views, film, output;
-    std::string connect, token;
-    bool train = false;
+    std::string connect, token, size, background;
+    bool train = false, antialias = false;
     std::vector<std::string> train_options;
-    std::optional<int> frame;
-    std::string size, background;
-    PanelSettings settings;
-    bool antialias = false;
     DeviceOptions device;
-    bool verbose = false;
+    Startup startup;
 };
 
 const std::map<std::string, Mode> kModes = {{"color", Mode::color},
@@ -53,30 +49,13 @@ int fail(const std::string& what, int status) {
 Size parse_size(const std::string& text) {
     const size_t cross = text.find('x');
     const auto side = [&](size_t from, size_t count) {
-        return core::parse_integer<int>(std::string_view(text).substr(std::min(from, text.size()), count))
-            .value_or(0);
+        return core::parse_integer<int>(std::string_view(text).substr(from, count)).value_or(0);
     };
     const Size size{side(0, cross), cross == std::string::npos ? 0 : side(cross + 1, std::string::npos)};
     if (size.width < 1 || size.height < 1 || size.width > kLargestSide || size.height > kLargestSide)
         throw InputError("--size: '" + text + "' is not a size such as 1280x720, of at most " +
                          std::to_string(kLargestSide) + " a side");
     return size;
-}
-
-std::array<float, 3> parse_background(const std::string& text) {
-    std::string words = text;
-    std::replace(words.begin(), words.end(), ',', ' ');
-    std::string_view rest = words;
-    std::array<float, 3> color{};
-    bool good = true;
-    for (float& value : color) {
-        const double number = core::parse_number(core::next_word(rest)).value_or(-1);
-        good = good && number >= 0 && number <= 1;
-        value = float(number);
-    }
-    if (!good || !core::trim(rest).empty())
-        throw InputError("--background: '" + text + "' is not r,g,b with each in 0..1, such as 1,1,1");
-    return color;
 }
 
 void check_frame(const Startup& startup) {
@@ -100,12 +79,9 @@ std::filesystem::path output_of(const Arguments& arguments) {
 
 OpenedScene open_what(const Arguments& arguments, Startup& startup) {
     if (!arguments.connect.empty()) {
-        startup.watch = live::WhatToWatch{};
-        startup.watch->address = live::parse_address(arguments.connect);
-        startup.watch->token = arguments.token;
+        startup.watch = live::WhatToWatch{{}, live::parse_address(arguments.connect), arguments.token};
         const std::filesystem::path& what = arguments.path.empty() ? arguments.cameras : arguments.path;
         OpenedScene scene = what.empty() ? OpenedScene() : open_scene(what, {});
-        if (!scene.gaussians) scene.gaussians = std::make_shared<const Gaussians>();
         scene.title = arguments.connect;
         return scene;
     }
@@ -116,22 +92,16 @@ OpenedScene open_what(const Arguments& arguments, Startup& startup) {
         if (!scene.dataset || !scene.run.empty())
             throw InputError("--train needs a dataset, and " + arguments.path.string() + " is not one");
         scene.remark.clear();
-        startup.watch = live::WhatToWatch{};
-        startup.watch->folder = output_of(arguments);
-        startup.watch->splats_after = startup.watch->metrics_after =
-            std::filesystem::file_time_type::clock::now();
+        const auto now = std::filesystem::file_time_type::clock::now();
+        startup.watch = live::WhatToWatch{output_of(arguments), {}, {}, now, now};
     } else if (!scene.run.empty() && arguments.picture.empty() && arguments.film.empty()) {
-        startup.watch = live::WhatToWatch{};
-        startup.watch->folder = scene.run;
-        startup.watch->splats_after = scene.splats_time;
+        startup.watch = live::WhatToWatch{scene.run, {}, {}, scene.splats_time};
     }
     return scene;
 }
 
 Startup open(const Arguments& arguments) {
-    Startup startup;
-    startup.frame = arguments.frame;
-    startup.verbose = arguments.verbose;
+    Startup startup = arguments.startup;
     if (!arguments.size.empty()) startup.size = parse_size(arguments.size);
     if (!arguments.picture.empty()) {
         if (core::lower(arguments.picture.extension().string()) != ".png")
@@ -146,99 +116,67 @@ Startup open(const Arguments& arguments) {
     }
     startup.scene = open_what(arguments, startup);
     check_frame(startup);
-    startup.settings = arguments.settings;
     startup.settings.cameras = startup.scene.gaussians->size() == 0;
     Look& look = startup.settings.look;
     look.kernel = arguments.antialias ? Footprint::antialias : startup.scene.look.kernel;
-    look.background =
-        arguments.background.empty() ? startup.scene.look.background : parse_background(arguments.background);
+    look.background = startup.scene.look.background;
+    if (arguments.background.empty()) return startup;
+    const auto background = parse_background(arguments.background);
+    if (!background)
+        throw InputError("--background: '" + arguments.background +
+                         "' is not r,g,b with each in 0..1, such as 1,1,1");
+    look.background = *background;
     return startup;
 }
 
 void add_options(CLI::App& app, Arguments& arguments) {
-    app.add_option(
-           "PATH", arguments.path,
-           "Splat file (.ply .compressed.ply .splat .spz .glb .gltf), dataset, or folder of a training run")
-        ->type_name("");
+    Startup& startup = arguments.startup;
+    const auto option = [&](const char* name, auto& value, const char* type, const char* help) {
+        return app.add_option(name, value, help)->type_name(type);
+    };
+    option("PATH", arguments.path, "",
+           "Splat file (.ply .compressed.ply .splat .spz .glb .gltf), dataset, or folder of a training run");
     CLI::Option* train = app.add_flag(
         "--train", arguments.train,
         "Train on the dataset and watch. Other options are passed to ewa train, such as --steps");
-    app.add_option("-o,--output", arguments.output,
-                   "With --train: folder of the run [out/<name of the dataset>]")
-        ->needs(train)
-        ->type_name("DIR");
-    app.add_option("--connect", arguments.connect, "Show a training that runs with --serve")
-        ->excludes(train)
-        ->type_name("HOST:PORT");
-    app.add_option("--token", arguments.token,
-                   "With --connect: allows pause and save. live.json in the folder of the run holds it")
-        ->type_name("TEXT");
-    app.add_option("--cameras", arguments.cameras, "Dataset whose cameras to show and to look through")
-        ->type_name("DATASET");
-    app.add_option("--frame", arguments.frame, "Index of the camera to start from, in name order (0)")
-        ->type_name("I");
-    app.add_option("--mode", arguments.settings.look.mode,
-                   "What to show: color, depth, alpha, count (splats per pixel) or ellipsoids")
-        ->transform(CLI::CheckedTransformer(kModes).description(""))
-        ->type_name("MODE");
-    app.add_option("--compare", arguments.settings.comparison,
-                   "Comparison with the image of the camera: none, beside, wipe or difference")
-        ->transform(CLI::CheckedTransformer(kComparisons).description(""))
-        ->type_name("HOW");
-    app.add_option("--background", arguments.background, "Background colour: r,g,b in 0..1")
-        ->type_name("COLOUR");
+    option("-o,--output", arguments.output, "DIR",
+           "With --train: folder of the run [out/<name of the dataset>]")
+        ->needs(train);
+    option("--connect", arguments.connect, "HOST:PORT", "Show a training that runs with --serve")
+        ->excludes(train);
+    option("--token", arguments.token, "TEXT",
+           "With --connect: allows pause and save. live.json in the folder of the run holds it");
+    option("--cameras", arguments.cameras, "DATASET", "Dataset whose cameras to show and to look through");
+    option("--frame", startup.frame, "I", "Index of the camera to start from, in name order (0)");
+    option("--mode", startup.settings.look.mode, "MODE",
+           "What to show: color, depth, alpha, count (splats per pixel) or ellipsoids")
+        ->transform(CLI::CheckedTransformer(kModes).description(""));
+    option("--compare", startup.settings.comparison, "HOW",
+           "Comparison with the image of the camera: none, beside, wipe or difference")
+        ->transform(CLI::CheckedTransformer(kComparisons).description(""));
+    option("--background", arguments.background, "COLOUR", "Background colour: r,g,b in 0..1");
     app.add_flag("--antialias", arguments.antialias, "Render with the filter of Mip-Splatting");
-    app.add_option("--size", arguments.size,
-                   "Size of the window in px [the shape of the camera, as large as fits]")
-        ->type_name("WxH");
-    app.add_option("--screenshot", arguments.picture,
-                   "Write what the window shows, without the panel, as a PNG, and exit")
-        ->type_name("FILE");
-    app.add_option("--views", arguments.views, "Saved views, in the format that the window writes")
-        ->type_name("FILE");
-    app.add_option("--film", arguments.film,
-                   "Write a film through the saved views, one PNG per frame, and exit")
-        ->type_name("DIR");
-    app.add_option("--film-seconds", arguments.settings.film_seconds,
-                   "Duration of the film from view to view (2)")
-        ->check(CLI::Range(0.04f, 3600.0f).description(""))
-        ->type_name("S");
-    app.add_option("--device", arguments.device.selector,
-                   "Number of the device that renders, or part of its name (see ewa devices)")
-        ->type_name("NAME|N");
-    app.add_flag("--verbose", arguments.verbose,
+    option("--size", arguments.size, "WxH",
+           "Size of the window in px [the shape of the camera, as large as fits]");
+    option("--screenshot", arguments.picture, "FILE",
+           "Write what the window shows, without the panel, as a PNG, and exit");
+    option("--views", arguments.views, "FILE", "Saved views, in the format that the window writes");
+    option("--film", arguments.film, "DIR",
+           "Write a film through the saved views, one PNG per frame, and exit");
+    option("--film-seconds", startup.settings.film_seconds, "S", "Duration of the film from view to view (2)")
+        ->check(CLI::Range(0.04f, 3600.0f).description(""));
+    option("--device", arguments.device.selector, "NAME|N",
+           "Number of the device that renders, or part of its name (see ewa devices)");
+    app.add_flag("--verbose", startup.verbose,
                  "At the end, print the time of the first frame and the frame rate of the moving camera");
 }
 
-/// Opens the device while the scene is being read. function() returns that device first; later calls open it
-/// again.
-class DeviceOpener {
-  public:
-    explicit DeviceOpener(const DeviceOptions& options)
-        : options_(options),
-          opening_(std::async(std::launch::async, [options] { return open_device(options); })) {}
-    std::string name() {
-        *first_ = opening_.get();
-        return device_info(**first_).name;
-    }
-    OpenDevice function() const {
-        return [options = options_, first = first_] {
-            return *first ? std::exchange(*first, nullptr) : open_device(options);
-        };
-    }
-
-  private:
-    DeviceOptions options_;
-    std::future<std::shared_ptr<gpu::Device>> opening_;
-    std::shared_ptr<std::shared_ptr<gpu::Device>> first_ = std::make_shared<std::shared_ptr<gpu::Device>>();
-};
-
 int run(const Arguments& arguments) {
-    const auto started = std::chrono::steady_clock::now();
     try {
-        DeviceOpener opener(arguments.device);
+        // The device opens while the scene is being read. A lost device is opened again.
+        auto opening =
+            std::async(std::launch::async, [options = arguments.device] { return open_device(options); });
         Startup startup = open(arguments);
-        startup.times.started = started;
         startup.times.scene_read = startup.times.now();
         std::optional<TrainProcess> trainer;
         if (arguments.train) {
@@ -246,9 +184,12 @@ int run(const Arguments& arguments) {
             options.insert(options.end(), arguments.train_options.begin(), arguments.train_options.end());
             startup.trainer = &trainer.emplace(options, startup.watch->folder);
         }
-        startup.device_name = opener.name();
+        const auto first = std::make_shared<std::shared_ptr<gpu::Device>>(opening.get());
+        startup.device_name = device_info(**first).name;
         startup.times.device_open = startup.times.now();
-        startup.open_device = opener.function();
+        startup.open_device = [options = arguments.device, first] {
+            return *first ? std::exchange(*first, nullptr) : open_device(options);
+        };
         App(startup).run();
         return kDone;
     } catch (const InputError& error) {

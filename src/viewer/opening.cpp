@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "core/folders.h"
 #include "core/json.h"
 #include "core/text.h"
 #include "ewa/error.h"
@@ -68,11 +69,7 @@ Look look_of(const nlohmann::json& config) {
     const std::string kernel = text_of(config, "kernel");
     if (kernel == "antialias") look.kernel = Footprint::antialias;
     if (kernel == "ewa") look.kernel = Footprint::unit_mass;
-    std::string colour = text_of(config, "background");
-    std::replace(colour.begin(), colour.end(), ',', ' ');
-    std::string_view rest = colour;
-    for (float& value : look.background)
-        value = float(std::clamp(core::parse_number(core::next_word(rest)).value_or(0), 0.0, 1.0));
+    look.background = parse_background(text_of(config, "background")).value_or(look.background);
     return look;
 }
 
@@ -93,6 +90,12 @@ fs::path dataset_of(const fs::path& run, const nlohmann::json& config) {
     return {};
 }
 
+/// Whether the folder is that of a training run, also of one that has just begun.
+bool is_run(const fs::path& path) {
+    const auto present = [&](const char* name) { return core::is_file(path / name); };
+    return present("config.json") || present("splats.ply") || present("metrics.jsonl");
+}
+
 OpenedScene open_run(const fs::path& run, const fs::path& cameras) {
     OpenedScene scene;
     scene.run = run;
@@ -100,9 +103,10 @@ OpenedScene open_run(const fs::path& run, const fs::path& cameras) {
     scene.look = look_of(config);
     std::error_code error;
     const bool splats = fs::exists(run / "splats.ply", error);
-    if (splats) scene.splats_time = fs::last_write_time(run / "splats.ply", error);
-    scene.gaussians =
-        std::make_shared<const Gaussians>(splats ? load_splats(run / "splats.ply") : Gaussians());
+    if (splats) {
+        scene.splats_time = fs::last_write_time(run / "splats.ply", error);
+        scene.gaussians = std::make_shared<const Gaussians>(load_splats(run / "splats.ply"));
+    }
     const fs::path dataset = cameras.empty() ? dataset_of(run, config) : cameras;
     const auto downscale = config.find("downscale");
     const int factor = downscale != config.end() && downscale->is_number_integer()
@@ -136,11 +140,23 @@ OpenedScene open_dataset(const fs::path& path) {
 
 }  // namespace
 
-bool is_run(const fs::path& path) {
-    std::error_code error;
-    for (const char* name : {"config.json", "splats.ply", "metrics.jsonl"})
-        if (fs::is_regular_file(path / name, error)) return true;
-    return false;
+void OpenedScene::set_gaussians(std::shared_ptr<const Gaussians> splats) {
+    gaussians = std::move(splats);
+    sh_degree = sh_degree_present(*gaussians);
+    plan = plan_lines(*gaussians, RenderOptions{});
+}
+
+std::optional<std::array<float, 3>> parse_background(const std::string& text) {
+    std::string words = text;
+    std::replace(words.begin(), words.end(), ',', ' ');
+    std::string_view rest = words;
+    std::array<float, 3> color{};
+    for (float& value : color) {
+        const double number = core::parse_number(core::next_word(rest)).value_or(-1);
+        if (!(number >= 0 && number <= 1)) return std::nullopt;
+        value = float(number);
+    }
+    return core::trim(rest).empty() ? std::optional(color) : std::nullopt;
 }
 
 Gaussians splats_of_points(const PointCloud& points) {

@@ -3,6 +3,7 @@
 #pragma once
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "ewa/dataset.h"
@@ -12,13 +13,18 @@ namespace ewa::viewer {
 
 struct OpenedScene {
     std::string title;
-    std::shared_ptr<const Gaussians> gaussians;  // never null; empty if a run has none yet
-    std::shared_ptr<const Dataset> dataset;      // null: no cameras
-    std::filesystem::path run;                   // folder of the run; empty: no run
-    std::filesystem::file_time_type splats_time =
-        std::filesystem::file_time_type::min();  // of the run's splats.ply
-    Look look;                                   // as the file or the run asks for
-    std::string remark;                          // one line: what is missing
+    /// Never null; empty if a run has none yet. set_gaussians() also sets the next two.
+    std::shared_ptr<const Gaussians> gaussians = std::make_shared<const Gaussians>();
+    int sh_degree = 0;                       // the highest that changes the image
+    std::vector<PlanLine> plan;              // what rendering skips
+    std::shared_ptr<const Dataset> dataset;  // null: no cameras
+    std::filesystem::path run;               // folder of the run; empty: no run
+    /// Of the run's splats.ply.
+    std::filesystem::file_time_type splats_time = std::filesystem::file_time_type::min();
+    Look look;           // as the file or the run asks for
+    std::string remark;  // one line: what is missing
+
+    void set_gaussians(std::shared_ptr<const Gaussians> splats);
 };
 
 /// Opens a splat file; a dataset, shown by its points; or the folder of a run (config.json, splats.ply,
@@ -26,8 +32,8 @@ struct OpenedScene {
 /// empty: none. Throws InputError.
 OpenedScene open_scene(const std::filesystem::path& path, const std::filesystem::path& cameras);
 
-/// Whether the folder is that of a training run, also of one that has just begun.
-bool is_run(const std::filesystem::path& path);
+/// "r,g,b" with each in 0..1; empty for other text.
+std::optional<std::array<float, 3>> parse_background(const std::string& text);
 
 /// Converts points to small opaque splats.
 Gaussians splats_of_points(const PointCloud& points);

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "ewa/error.h"
+#include "scene/camera.h"
 
 namespace ewa::viewer {
 namespace {
@@ -15,6 +16,13 @@ constexpr int kProbeSide = 256;  // px of the depth image that a point is read f
 
 RenderOptions options_of(const Look& look) {
     return {look.background, look.kernel, look.sh_degree};
+}
+
+/// The values that the renderer computes for a mode.
+Drawing drawing_for(Mode mode) {
+    if (mode == Mode::depth) return Drawing::depth;
+    if (mode == Mode::count) return Drawing::count;
+    return mode == Mode::ellipsoids ? Drawing::ellipsoids : Drawing::color;
 }
 
 /// Writes a file as `ewa render` does: EXR holds the values with alpha, PNG what the window shows.
@@ -34,16 +42,9 @@ void save(const std::filesystem::path& file, const Rendering& rendering, const B
 }  // namespace
 
 RenderThread::RenderThread(OpenDevice open, std::function<void()> on_news)
-    : open_(std::move(open)), on_news_(std::move(on_news)), thread_([this] { work(); }) {}
-
-RenderThread::~RenderThread() {
-    {
-        const std::lock_guard lock(mutex_);
-        stop_ = true;
-    }
-    wake_.notify_one();
-    thread_.join();
-}
+    : open_(std::move(open)),
+      on_news_(std::move(on_news)),
+      thread_([this](const std::stop_token& stop) { work(stop); }) {}
 
 uint64_t RenderThread::set_scene(std::shared_ptr<const Gaussians> gaussians) {
     const std::lock_guard lock(mutex_);
@@ -81,10 +82,10 @@ void RenderThread::report(const std::function<void(News&)>& change) {
     on_news_();
 }
 
-bool RenderThread::next(Work& work) {
+bool RenderThread::next(const std::stop_token& stop, Work& work) {
     std::unique_lock lock(mutex_);
-    wake_.wait(lock, [this] { return stop_ || probe_ || !waiting_.empty() || next_scene_; });
-    if (stop_) return false;
+    wake_.wait(lock, stop, [this] { return probe_ || !waiting_.empty() || next_scene_; });
+    if (stop.stop_requested()) return false;
     work.scene = std::exchange(next_scene_, nullptr);
     work.scene_number = scene_number_;
     work.probe = std::exchange(probe_, std::nullopt);
@@ -165,9 +166,7 @@ std::optional<glm::dvec3> RenderThread::point_at(const Probe& probe) {
     const int x = std::clamp(int(probe.pixel.x * camera.width / full.width), 0, camera.width - 1);
     const int y = std::clamp(int(probe.pixel.y * camera.height / full.height), 0, camera.height - 1);
     if (!(*rendering.alpha.at(x, y) >= 0.5f)) return std::nullopt;
-    const double z = *rendering.depth.at(x, y);
-    const glm::dvec3 view((x + 0.5 - camera.cx) / camera.fx * z, (y + 0.5 - camera.cy) / camera.fy * z, z);
-    return camera.position() + glm::transpose(camera.rotation) * view;
+    return world_point(camera, x + 0.5, y + 0.5, *rendering.depth.at(x, y));
 }
 
 /// Of the exception that is being handled.
@@ -179,10 +178,10 @@ void RenderThread::fail(const Work& work) {
     });
 }
 
-void RenderThread::work() {
+void RenderThread::work(const std::stop_token& stop) {
     for (;;) {
         Work work;
-        if (!next(work)) return;
+        if (!next(stop, work)) return;
         for (const bool again : {true, false}) {
             try {
                 carry_out(work);

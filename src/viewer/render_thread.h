@@ -30,8 +30,7 @@ struct RenderRequest {
     Look look;
     int divisor = 1;  // the frame has 1/divisor of that size
     uint64_t serial = 0;
-    std::filesystem::path
-        file;  // also write it here, as `ewa render` does for this extension; empty: no file
+    std::filesystem::path file;  // written as by `ewa render` with this extension; empty: no file
 };
 
 struct RenderedFrame {
@@ -52,7 +51,6 @@ class RenderThread {
     /// on_news is called on the thread when take_news() has something new. A lost device is opened again,
     /// once for each frame that fails.
     RenderThread(OpenDevice open, std::function<void()> on_news);
-    ~RenderThread();
 
     /// Sets the scene of all frames requested from now on. Returns the number that RenderedFrame::scene will
     /// have.
@@ -85,8 +83,8 @@ class RenderThread {
         std::optional<Probe> probe;
         uint64_t scene_number = 0;
     };
-    void work();
-    bool next(Work& work);
+    void work(const std::stop_token& stop);
+    bool next(const std::stop_token& stop, Work& work);
     void carry_out(const Work& work);
     void fail(const Work& work);
     void prepare(const Work& work);
@@ -103,14 +101,13 @@ class RenderThread {
     bool scene_is_up_ = false;
 
     mutable std::mutex mutex_;
-    std::condition_variable wake_;
+    std::condition_variable_any wake_;
     std::vector<RenderRequest> waiting_;  // in order; only the last may have no file
     std::optional<Probe> probe_;
     std::shared_ptr<const Gaussians> next_scene_;
     uint64_t scene_number_ = 0, probes_ = 0;
     News news_;
-    bool stop_ = false;
-    std::thread thread_;
+    std::jthread thread_;
 };
 
 }  // namespace ewa::viewer

@@ -1,13 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "viewer/renders.h"
 
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
 #include <utility>
 
 namespace ewa::viewer {
 namespace {
 
+constexpr double kGoal = 40;    // ms of a frame
+constexpr double kWorth = 1.3;  // a frame this many times slower than the smallest one is fast enough
+constexpr double kSlack = 1.2;  // ratio by which equal frames may differ
+constexpr int kMost = 8;        // divisor
+
+double pixels(int divisor) {
+    return 1.0 / (divisor * divisor);
+}
+
 constexpr double kRestSeconds = 0.2;  // without a change, until the full resolution is requested
 constexpr int kFirstDivisor = 2;      // of the first frame, which should appear soon
+
+bool same_pose(const Camera& a, const Camera& b) {
+    return a.rotation == b.rotation && a.translation == b.translation;
+}
 
 bool same_view(const RenderRequest& a, const RenderRequest& b) {
     const Camera &p = a.camera, &q = b.camera;
@@ -17,8 +33,72 @@ bool same_view(const RenderRequest& a, const RenderRequest& b) {
 
 }  // namespace
 
-bool same_pose(const Camera& a, const Camera& b) {
-    return a.rotation == b.rotation && a.translation == b.translation;
+double Pace::share(int divisor) const {
+    return fixed_ + (1 - fixed_) * pixels(divisor);
+}
+
+void Pace::drawn(int with_divisor, double milliseconds) {
+    learn(with_divisor, milliseconds);
+    const double full = milliseconds / share(with_divisor);
+    const auto expected = [&](int divisor) { return full * share(divisor); };
+    const double goal = std::max(kGoal, kWorth * expected(kMost));
+    if (expected(divisor_) > kSlack * goal) {
+        while (divisor_ < kMost && expected(divisor_) > goal) ++divisor_;
+    } else if (divisor_ > 1 && expected(divisor_ - 1) * kSlack < goal) {
+        --divisor_;
+    }
+}
+
+/// Two frames of nearly the same view at different resolutions tell the fixed part.
+void Pace::learn(int divisor, double milliseconds) {
+    const double a = pixels(last_divisor_), b = pixels(divisor);
+    if (last_ > 0 && divisor != last_divisor_) {
+        const double ratio = milliseconds / last_, below = ratio * (1 - a) - (1 - b);
+        const double fixed = below != 0 ? (b - ratio * a) / below : 0;
+        if (std::isfinite(fixed)) fixed_ = (fixed_ + std::clamp(fixed, 0.0, 1.0)) / 2;
+    }
+    last_divisor_ = divisor;
+    last_ = milliseconds;
+}
+
+void Fluency::shown(double time, bool moved, int divisor) {
+    const double pause = time - last_;
+    last_ = time;
+    if (!moved || !(pause < kRest)) {
+        rate_ = 0;
+        return;
+    }
+    ++count_;
+    ++by_divisor_[divisor];
+    seconds_ += pause;
+    // Smooth over about ten frames.
+    const double rate = 1 / std::max(pause, 1e-4);
+    rate_ = rate_ > 0 ? 1 / (0.9 / rate_ + 0.1 / rate) : rate;
+}
+
+void SessionTimes::count(const std::shared_ptr<const RenderedFrame>& frame) {
+    if (!frame || frame == counted_) return;
+    const double time = now();
+    if (!first_frame_) first_frame_ = time;
+    const bool moved = counted_ && !same_pose(frame->request.camera, counted_->request.camera);
+    fluency_.shown(time, moved, frame->request.divisor);
+    counted_ = frame;
+}
+
+void SessionTimes::print(const RenderedFrame* last) const {
+    if (first_frame_)
+        std::fprintf(stderr, "first picture after %.0f ms: scene read %.0f, device open %.0f, window %.0f\n",
+                     1000 * *first_frame_, 1000 * scene_read, 1000 * device_open, 1000 * window_open);
+    if (last)
+        std::fprintf(stderr, "last picture: %d x %d px in %.1f ms\n", last->picture.width,
+                     last->picture.height, last->milliseconds);
+    if (fluency_.count() == 0) return;
+    std::fprintf(stderr, "moving: %llu pictures in %.1f s, %.1f a second;",
+                 static_cast<unsigned long long>(fluency_.count()), fluency_.seconds(),
+                 double(fluency_.count()) / fluency_.seconds());
+    for (const auto& [divisor, count] : fluency_.by_divisor())
+        std::fprintf(stderr, " %llu at 1/%d", static_cast<unsigned long long>(count), divisor);
+    std::fprintf(stderr, "\n");
 }
 
 void Renders::set_scene(std::shared_ptr<const Gaussians> gaussians) {
@@ -55,16 +135,14 @@ void Renders::ask_point(const Camera& camera, const glm::dvec2& pixel) {
 }
 
 Renders::News Renders::take() {
-    RenderThread::News news = thread_.take_news();
-    News result{false,      news.failure,           std::move(news.device), news.points > points_,
-                news.point, std::move(news.written)};
-    points_ = news.points;
-    if (news.picture != shown_) {
+    News news{thread_.take_news()};
+    news.point_answered = std::exchange(points_, news.points) < news.points;
+    news.frame = news.picture != shown_;
+    if (news.frame) {
         shown_ = news.picture;
         pace_.drawn(shown_->request.divisor, shown_->milliseconds);
-        result.frame = true;
     }
-    return result;
+    return news;
 }
 
 bool Renders::settled() const {

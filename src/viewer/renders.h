@@ -1,13 +1,76 @@
 // SPDX-License-Identifier: Apache-2.0
 // The frames that the window asks the render thread for: at reduced resolution while the view changes, then
-// in full.
+// in full. The times of frames that the viewer reports.
 #pragma once
 #include <chrono>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
 
-#include "viewer/pace.h"
 #include "viewer/render_thread.h"
 
 namespace ewa::viewer {
+
+/// Chooses the resolution of a moving camera. A frame's time has a part that its splats cost at any
+/// resolution, and a part per pixel: t(d) = full (fixed + (1 - fixed) / d^2) at divisor d. Resolution is
+/// lowered only as far as that helps.
+class Pace {
+  public:
+    /// What to divide the width and height by while the camera moves.
+    int divisor() const { return divisor_; }
+
+    /// Learns from a finished frame.
+    void drawn(int with_divisor, double milliseconds);
+
+  private:
+    double share(int divisor) const;  // t(divisor) / full
+    void learn(int divisor, double milliseconds);
+
+    int divisor_ = 1, last_divisor_ = 1;
+    double last_ = 0, fixed_ = 0;
+};
+
+/// The frame rate of a moving camera, counted when frames are shown.
+class Fluency {
+  public:
+    /// A frame is shown at this time (s, of a steady clock). moved: its camera differs from that of the last
+    /// frame.
+    void shown(double time, bool moved, int divisor);
+    /// Frames per second; 0 while the camera rests.
+    double rate(double time) const { return time - last_ < kRest ? rate_ : 0; }
+
+    // Totals since the start.
+    uint64_t count() const { return count_; }
+    double seconds() const { return seconds_; }
+    const std::map<int, uint64_t>& by_divisor() const { return by_divisor_; }
+
+  private:
+    static constexpr double kRest = 1;  // s; after a longer pause the camera has rested
+    double last_ = -kRest, rate_ = 0, seconds_ = 0;
+    uint64_t count_ = 0;
+    std::map<int, uint64_t> by_divisor_;
+};
+
+/// The times of a session in seconds after the start of the program, for the panel and for --verbose.
+class SessionTimes {
+  public:
+    double scene_read = 0, device_open = 0, window_open = 0;
+    double now() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+
+    /// The frame is on the screen now. Counts each frame once.
+    void count(const std::shared_ptr<const RenderedFrame>& frame);
+    std::optional<double> first_frame() const { return first_frame_; }
+    double rate() const { return fluency_.rate(now()); }
+    void print(const RenderedFrame* last) const;  // on standard error
+
+  private:
+    using Clock = std::chrono::steady_clock;
+    Clock::time_point start_ = Clock::now();
+    Fluency fluency_;
+    std::optional<double> first_frame_;
+    std::shared_ptr<const RenderedFrame> counted_;
+};
 
 class Renders {
   public:
@@ -23,13 +86,9 @@ class Renders {
     /// Asks for the point under a pixel; News::point has the answer.
     void ask_point(const Camera& camera, const glm::dvec2& pixel);
 
-    struct News {
-        bool frame = false;          // shown() is another one
-        std::exception_ptr failure;  // why the last request failed, if it did
-        std::optional<std::string> device;
-        bool point_answered = false;
-        std::optional<glm::dvec3> point;  // world; empty where no splat is at least half opaque
-        std::vector<std::filesystem::path> written;
+    struct News : RenderThread::News {
+        bool frame = false;           // shown() is another one
+        bool point_answered = false;  // since the last take()
     };
     News take();
 
@@ -52,8 +111,5 @@ class Renders {
     Pace pace_;
     RenderThread thread_;
 };
-
-/// Whether both cameras have the same position and direction.
-bool same_pose(const Camera& a, const Camera& b);
 
 }  // namespace ewa::viewer

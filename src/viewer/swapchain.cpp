@@ -11,13 +11,35 @@ namespace {
 
 using Usage = vk::ImageUsageFlagBits;
 
+/// A queue family that supports graphics and presents to the surface, or -1.
+int showing_family(vk::PhysicalDevice device, vk::SurfaceKHR surface) {
+    const auto extensions = device.enumerateDeviceExtensionProperties();
+    const bool swapchains = std::any_of(extensions.begin(), extensions.end(), [](const auto& extension) {
+        return std::string(extension.extensionName.data()) == VK_KHR_SWAPCHAIN_EXTENSION_NAME;
+    });
+    if (!swapchains) return -1;
+    const auto families = device.getQueueFamilyProperties();
+    for (uint32_t i = 0; i < families.size(); ++i)
+        if ((families[i].queueFlags & vk::QueueFlagBits::eGraphics) &&
+            device.getSurfaceSupportKHR(i, surface))
+            return int(i);
+    return -1;
+}
+
+int rank(const vk::PhysicalDeviceProperties& properties, const std::string& preferred_name) {
+    using Type = vk::PhysicalDeviceType;
+    constexpr std::array order{Type::eDiscreteGpu, Type::eIntegratedGpu, Type::eVirtualGpu, Type::eCpu};
+    if (properties.deviceName.data() == preferred_name) return -1;
+    return int(std::find(order.begin(), order.end(), properties.deviceType) - order.begin());
+}
+
 // ns. A hidden window may get no image as long as it is hidden, and must still handle events.
 constexpr uint64_t kPatience = 100'000'000;
 
-[[noreturn]] void fail(VkResult result) {
-    const std::string what = "the window cannot show images any more: " + vk::to_string(vk::Result(result));
-    if (result == VK_ERROR_DEVICE_LOST) throw vk::DeviceLostError(what);
-    if (result == VK_ERROR_SURFACE_LOST_KHR) throw vk::SurfaceLostKHRError(what);
+[[noreturn]] void fail(vk::Result result) {
+    const std::string what = "the window cannot show images any more: " + vk::to_string(result);
+    if (result == vk::Result::eErrorDeviceLost) throw vk::DeviceLostError(what);
+    if (result == vk::Result::eErrorSurfaceLostKHR) throw vk::SurfaceLostKHRError(what);
     throw RunError(what);
 }
 
@@ -40,6 +62,81 @@ Size extent_of(const vk::SurfaceCapabilitiesKHR& surface, Size window) {
 }
 
 }  // namespace
+
+PresentDevice::PresentDevice(const WindowSystem& system, const Window& window,
+                             const std::string& preferred_name) {
+    vk::ApplicationInfo application;
+    application.setPApplicationName("ewa-view").setApiVersion(VK_API_VERSION_1_1);
+    const std::vector<const char*> instance_extensions = system.vulkan_extensions();
+    vk::InstanceCreateInfo instance;
+    instance.setPApplicationInfo(&application).setPEnabledExtensionNames(instance_extensions);
+    instance_ = vk::createInstanceUnique(instance);
+    surface_ = window.surface(*instance_);
+    choose(preferred_name);
+
+    const float priority = 1.0f;
+    vk::DeviceQueueCreateInfo queue;
+    queue.setQueueFamilyIndex(queue_family_).setQueuePriorities(priority);
+    const std::array extensions{VK_KHR_SWAPCHAIN_EXTENSION_NAME};
+    vk::DeviceCreateInfo create;
+    create.setQueueCreateInfos(queue).setPEnabledExtensionNames(extensions);
+    device_ = physical_.createDeviceUnique(create);
+    queue_ = device_->getQueue(queue_family_, 0);
+}
+
+PresentDevice::~PresentDevice() {
+    if (device_) (void)vkDeviceWaitIdle(*device_);
+}
+
+void PresentDevice::choose(const std::string& preferred_name) {
+    int best = 0;
+    for (const vk::PhysicalDevice& device : instance_->enumeratePhysicalDevices()) {
+        const int family = showing_family(device, *surface_);
+        const int place = rank(device.getProperties(), preferred_name);
+        if (family < 0 || (physical_ && place >= best)) continue;
+        physical_ = device;
+        queue_family_ = uint32_t(family);
+        best = place;
+    }
+    if (!physical_) throw RunError("no Vulkan device of this machine can show images in this window");
+}
+
+vk::UniqueDeviceMemory PresentDevice::allocate(const vk::MemoryRequirements& needs,
+                                               vk::MemoryPropertyFlags wanted) const {
+    const auto memory = physical_.getMemoryProperties();
+    for (uint32_t i = 0; i < memory.memoryTypeCount; ++i)
+        if ((needs.memoryTypeBits & (1u << i)) && (memory.memoryTypes[i].propertyFlags & wanted) == wanted)
+            return device_->allocateMemoryUnique(vk::MemoryAllocateInfo(needs.size, i));
+    throw RunError("the device has no suitable memory for the images of the window");
+}
+
+HostBuffer PresentDevice::host_buffer(vk::DeviceSize bytes, vk::BufferUsageFlags usage) const {
+    using Flag = vk::MemoryPropertyFlagBits;
+    HostBuffer result;
+    result.bytes = bytes;
+    result.buffer = device_->createBufferUnique(vk::BufferCreateInfo({}, bytes, usage));
+    result.memory = allocate(device_->getBufferMemoryRequirements(*result.buffer),
+                             Flag::eHostVisible | Flag::eHostCoherent);
+    device_->bindBufferMemory(*result.buffer, *result.memory, 0);
+    result.mapped = device_->mapMemory(*result.memory, 0, VK_WHOLE_SIZE);
+    return result;
+}
+
+DeviceImage PresentDevice::image(Size size, vk::Format format, vk::ImageUsageFlags usage) const {
+    vk::ImageCreateInfo create;
+    create.setImageType(vk::ImageType::e2D)
+        .setFormat(format)
+        .setExtent({uint32_t(size.width), uint32_t(size.height), 1})
+        .setMipLevels(1)
+        .setArrayLayers(1)
+        .setUsage(usage);
+    DeviceImage result;
+    result.size = size;
+    result.image = device_->createImageUnique(create);
+    result.memory = allocate(device_->getImageMemoryRequirements(*result.image), {});
+    device_->bindImageMemory(*result.image, *result.memory, 0);
+    return result;
+}
 
 Swapchain::Swapchain(const PresentDevice& device) : device_(device) {
     const auto surface = device_.physical().getSurfaceCapabilitiesKHR(device_.surface());
@@ -74,8 +171,6 @@ void Swapchain::create_overlay_pass() {
     color.setFormat(format())
         .setLoadOp(vk::AttachmentLoadOp::eLoad)
         .setStoreOp(vk::AttachmentStoreOp::eStore)
-        .setStencilLoadOp(vk::AttachmentLoadOp::eDontCare)
-        .setStencilStoreOp(vk::AttachmentStoreOp::eDontCare)
         .setInitialLayout(vk::ImageLayout::eColorAttachmentOptimal)
         .setFinalLayout(vk::ImageLayout::ePresentSrcKHR);
     const vk::AttachmentReference reference(0, vk::ImageLayout::eColorAttachmentOptimal);
@@ -138,29 +233,21 @@ void Swapchain::create_targets() {
 }
 
 Swapchain::Acquired Swapchain::acquire() {
-    // The C function: Vulkan-Hpp would throw when the window has changed, which is no error here.
+    // Only the overloads with pointers do not throw when the window has changed, which is no error here.
     uint32_t index = 0;
-    const VkResult result =
-        vkAcquireNextImageKHR(device_.handle(), *swapchain_, kPatience, *acquired_, VK_NULL_HANDLE, &index);
-    if (result == VK_SUCCESS || result == VK_SUBOPTIMAL_KHR) return {index, false};
-    if (result == VK_TIMEOUT || result == VK_NOT_READY) return {std::nullopt, false};
-    if (result == VK_ERROR_OUT_OF_DATE_KHR) return {std::nullopt, true};
+    const vk::Result result =
+        device_.handle().acquireNextImageKHR(*swapchain_, kPatience, *acquired_, nullptr, &index);
+    if (result == vk::Result::eSuccess || result == vk::Result::eSuboptimalKHR) return {index, false};
+    if (result == vk::Result::eTimeout || result == vk::Result::eNotReady) return {std::nullopt, false};
+    if (result == vk::Result::eErrorOutOfDateKHR) return {std::nullopt, true};
     fail(result);
 }
 
 bool Swapchain::present(uint32_t index) {
-    const VkSemaphore wait = *drawn_[index];
-    const VkSwapchainKHR swapchain = *swapchain_;
-    VkPresentInfoKHR present{};
-    present.sType = VK_STRUCTURE_TYPE_PRESENT_INFO_KHR;
-    present.waitSemaphoreCount = 1;
-    present.pWaitSemaphores = &wait;
-    present.swapchainCount = 1;
-    present.pSwapchains = &swapchain;
-    present.pImageIndices = &index;
-    const VkResult result = vkQueuePresentKHR(device_.queue(), &present);
-    if (result == VK_SUCCESS) return true;
-    if (result == VK_SUBOPTIMAL_KHR || result == VK_ERROR_OUT_OF_DATE_KHR) return false;
+    const vk::PresentInfoKHR present(*drawn_[index], *swapchain_, index);
+    const vk::Result result = device_.queue().presentKHR(&present);
+    if (result == vk::Result::eSuccess) return true;
+    if (result == vk::Result::eSuboptimalKHR || result == vk::Result::eErrorOutOfDateKHR) return false;
     fail(result);
 }
 

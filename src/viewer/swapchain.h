@@ -1,12 +1,59 @@
 // SPDX-License-Identifier: Apache-2.0
-// The swapchain: images that the window cycles through, recreated when the window changes.
+// The Vulkan device that shows images in a window, and its swapchain. The device that renders is opened
+// without a window.
 #pragma once
 #include <optional>
 
-#include "viewer/present_device.h"
+#include "viewer/window.h"
 
 namespace ewa::viewer {
 
+/// A buffer that the host writes or reads.
+struct HostBuffer {
+    vk::UniqueBuffer buffer;
+    vk::UniqueDeviceMemory memory;
+    void* mapped = nullptr;
+    vk::DeviceSize bytes = 0;
+};
+
+struct DeviceImage {
+    vk::UniqueImage image;
+    vk::UniqueDeviceMemory memory;
+    Size size;
+};
+
+class PresentDevice {
+  public:
+    /// Prefers the device of this name, then a discrete, integrated, virtual and CPU device. Throws RunError
+    /// if none can show images in the window.
+    PresentDevice(const WindowSystem& system, const Window& window, const std::string& preferred_name);
+    ~PresentDevice();
+
+    vk::Instance instance() const { return *instance_; }
+    vk::SurfaceKHR surface() const { return *surface_; }
+    vk::PhysicalDevice physical() const { return physical_; }
+    vk::Device handle() const { return *device_; }
+    vk::Queue queue() const { return queue_; }
+    uint32_t queue_family() const { return queue_family_; }
+
+    HostBuffer host_buffer(vk::DeviceSize bytes, vk::BufferUsageFlags usage) const;
+    DeviceImage image(Size size, vk::Format format, vk::ImageUsageFlags usage) const;
+
+  private:
+    void choose(const std::string& preferred_name);
+    vk::UniqueDeviceMemory allocate(const vk::MemoryRequirements& needs,
+                                    vk::MemoryPropertyFlags wanted) const;
+
+    // Declared in the order of creation: each is destroyed before its parent.
+    vk::UniqueInstance instance_;
+    vk::UniqueSurfaceKHR surface_;
+    vk::PhysicalDevice physical_;
+    vk::UniqueDevice device_;
+    vk::Queue queue_;
+    uint32_t queue_family_ = 0;
+};
+
+/// The images that the window cycles through, recreated when the window changes.
 class Swapchain {
   public:
     explicit Swapchain(const PresentDevice& device);
@@ -31,7 +78,6 @@ class Swapchain {
     bool srgb() const;                           // the surface has only formats that encode to sRGB
     bool readable() const { return readable_; }  // images can be copied to the host
     uint32_t least_images() const { return least_images_; }
-    uint32_t image_count() const { return uint32_t(images_.size()); }
     vk::RenderPass overlay_pass() const { return *overlay_pass_; }  // keeps the content of the image
 
     vk::Image image(uint32_t index) const { return images_[index]; }
@@ -55,8 +101,8 @@ class Swapchain {
     std::vector<vk::UniqueImageView> views_;
     std::vector<vk::UniqueFramebuffer> framebuffers_;
     vk::UniqueSemaphore acquired_;
-    std::vector<vk::UniqueSemaphore>
-        drawn_;  // one per image: presentation may still wait on the previous one
+    // One per image: presentation may still wait on the previous one.
+    std::vector<vk::UniqueSemaphore> drawn_;
 };
 
 }  // namespace ewa::viewer

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A training run that the window watches: its panel, its news, and the trainer that the viewer starts.
+// A training run that the window watches, and the trainer that the viewer starts.
 #pragma once
 #include <sys/types.h>
 
@@ -13,9 +13,6 @@
 #include "live/watcher.h"
 
 namespace ewa::viewer {
-
-/// Draws the panel. Returns what the user asked for in it: pause, resume or save.
-std::optional<std::string> draw_training(const live::Update& run);
 
 /// `ewa train` from beside this program, with `--serve 0`. It never waits for the window.
 class TrainProcess {

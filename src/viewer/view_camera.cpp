@@ -6,14 +6,29 @@
 #include <glm/ext/matrix_transform.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat4x4.hpp>
+#include <limits>
 #include <numbers>
+#include <vector>
+
+#include "scene/statistics.h"
 
 namespace ewa::viewer {
 namespace {
 
 constexpr double kPoleMargin =
-    std::numbers::pi / 90;         // least angle between view and `up` that orbiting reaches
-constexpr double kClosest = 1e-3;  // distance to the pivot, in scene radii
+    std::numbers::pi / 90;           // least angle between view and `up` that orbiting reaches
+constexpr double kClosest = 1e-3;    // distance to the pivot, in scene radii
+constexpr size_t kSamples = 200000;  // of the means; more do not change the percentiles visibly
+
+/// The camera's x, y or z axis in world coordinates.
+glm::dvec3 axis_of(const Camera& camera, int row) {
+    return {camera.rotation[0][row], camera.rotation[1][row], camera.rotation[2][row]};
+}
+
+/// The rotation of a camera with these axes in world coordinates, which are unit vectors.
+glm::dmat3 facing(const glm::dvec3& forward, const glm::dvec3& right) {
+    return glm::transpose(glm::dmat3(right, glm::cross(forward, right), forward));
+}
 
 glm::dmat3 rotation_about(const glm::dvec3& axis, double angle) {
     return glm::dmat3(glm::rotate(glm::dmat4(1.0), angle, axis));
@@ -23,8 +38,41 @@ glm::dmat3 rotation_about(const glm::dvec3& axis, double angle) {
 glm::dmat3 orthonormal(const glm::dmat3& rotation) {
     const glm::dmat3 rows = glm::transpose(rotation);
     const glm::dvec3 forward = glm::normalize(rows[2]);
-    const glm::dvec3 right = glm::normalize(rows[0] - forward * glm::dot(forward, rows[0]));
-    return glm::transpose(glm::dmat3(right, glm::cross(forward, right), forward));
+    return facing(forward, glm::normalize(rows[0] - forward * glm::dot(forward, rows[0])));
+}
+
+std::vector<glm::dvec3> sampled_means(const Gaussians& gaussians, float least_logit) {
+    std::vector<glm::dvec3> means;
+    const size_t stride = std::max<size_t>(1, gaussians.size() / kSamples);
+    for (size_t i = 0; i < gaussians.size(); i += stride) {
+        const glm::dvec3 mean = gaussians.world_mean(i);
+        if (!(gaussians.opacity_logits[i] >= least_logit)) continue;
+        if (std::isfinite(mean[0]) && std::isfinite(mean[1]) && std::isfinite(mean[2])) means.push_back(mean);
+    }
+    return means;
+}
+
+/// The median view z of the splats in the middle third of the image that are at least half opaque; 0 if there
+/// are too few.
+double middle_depth(const Gaussians& gaussians, const Camera& camera) {
+    std::vector<double> depths;
+    for (const glm::dvec3& mean : sampled_means(gaussians, 0.0f)) {
+        const glm::dvec3 p = camera.rotation * mean + camera.translation;
+        if (!(p.z > 0)) continue;
+        const double x = camera.fx * p.x / p.z + camera.cx, y = camera.fy * p.y / p.z + camera.cy;
+        if (std::abs(x - camera.width / 2.0) < camera.width / 6.0 &&
+            std::abs(y - camera.height / 2.0) < camera.height / 6.0)
+            depths.push_back(p.z);
+    }
+    return depths.size() < 10 ? 0 : scene::quantile(depths, 0.5);
+}
+
+glm::dvec3 mean_up(const Dataset& dataset) {
+    glm::dvec3 sum(0);
+    for (const Frame& frame : dataset.frames) sum -= axis_of(frame.camera, 1);
+    // Cameras with all orientations have no common up.
+    if (!(glm::length(sum) > 0.1 * double(dataset.frames.size()))) return {0, -1, 0};
+    return glm::normalize(sum);
 }
 
 }  // namespace
@@ -42,92 +90,146 @@ Camera fitted(const Camera& camera, int width, int height) {
     return result;
 }
 
-glm::dvec3 ViewCamera::axis(int row) const {
-    return {camera_.rotation[0][row], camera_.rotation[1][row], camera_.rotation[2][row]};
-}
-
 double ViewCamera::distance() const {
-    return glm::length(pivot_ - camera_.position());
+    return glm::length(now_.pivot - now_.camera.position());
 }
 
 void ViewCamera::place(const glm::dmat3& rotation, const glm::dvec3& position) {
-    camera_.rotation = rotation;
-    camera_.translation = -(rotation * position);
+    now_.camera.rotation = rotation;
+    now_.camera.translation = -(rotation * position);
 }
 
 void ViewCamera::turn(double yaw, double pitch, const glm::dvec3& center) {
-    const glm::dvec3 forward = axis(2);
-    const double angle = std::acos(std::clamp(glm::dot(forward, up_), -1.0, 1.0));
+    const glm::dvec3 forward = axis_of(now_.camera, 2);
+    const double angle = std::acos(std::clamp(glm::dot(forward, now_.up), -1.0, 1.0));
     // A view that starts closer to a pole than the margin may stay there but not come closer.
     const double lowest = std::min(kPoleMargin, angle);
     const double highest = std::max(std::numbers::pi - kPoleMargin, angle);
     pitch = angle - std::clamp(angle - pitch, lowest, highest);
-    glm::dvec3 side = glm::cross(forward, up_);
-    side = glm::length(side) > 1e-6 ? glm::normalize(side) : axis(0);
+    glm::dvec3 side = glm::cross(forward, now_.up);
+    side = glm::length(side) > 1e-6 ? glm::normalize(side) : axis_of(now_.camera, 0);
 
-    const glm::dmat3 turned = rotation_about(up_, yaw) * rotation_about(side, pitch);
-    const glm::dvec3 position = center + turned * (camera_.position() - center);
-    pivot_ = center + turned * (pivot_ - center);
-    place(orthonormal(camera_.rotation * glm::transpose(turned)), position);
+    const glm::dmat3 turned = rotation_about(now_.up, yaw) * rotation_about(side, pitch);
+    const glm::dvec3 position = center + turned * (now_.camera.position() - center);
+    now_.pivot = center + turned * (now_.pivot - center);
+    place(orthonormal(now_.camera.rotation * glm::transpose(turned)), position);
 }
 
 void ViewCamera::orbit(double right, double down) {
-    turn(-right, -down, pivot_);
+    turn(-right, -down, now_.pivot);
 }
 
 void ViewCamera::look(double right, double down) {
-    turn(right, down, camera_.position());
+    turn(right, down, now_.camera.position());
 }
 
 void ViewCamera::pan(double right, double down, int width, int height) {
     const Camera shown = camera(width, height);
     const glm::dvec3 moved =
-        -(axis(0) * (right / shown.fx) + axis(1) * (down / shown.fy)) * std::max(distance(), 1e-9);
-    pivot_ += moved;
-    place(camera_.rotation, camera_.position() + moved);
+        -(axis_of(now_.camera, 0) * (right / shown.fx) + axis_of(now_.camera, 1) * (down / shown.fy)) *
+        std::max(distance(), 1e-9);
+    now_.pivot += moved;
+    place(now_.camera.rotation, now_.camera.position() + moved);
 }
 
 void ViewCamera::zoom(double steps) {
     const double from = distance();
     const double to = std::max(from * std::pow(0.9, steps), kClosest * start_.radius);
     if (!(from > 0) || !std::isfinite(to)) return;
-    place(camera_.rotation, pivot_ + (camera_.position() - pivot_) * (to / from));
+    place(now_.camera.rotation, now_.pivot + (now_.camera.position() - now_.pivot) * (to / from));
 }
 
 void ViewCamera::fly(const glm::dvec3& amount) {
-    const glm::dvec3 moved = (axis(0) * amount.x + axis(1) * amount.y + axis(2) * amount.z) * distance();
-    pivot_ += moved;
-    place(camera_.rotation, camera_.position() + moved);
+    const glm::dvec3 moved = (axis_of(now_.camera, 0) * amount.x + axis_of(now_.camera, 1) * amount.y +
+                              axis_of(now_.camera, 2) * amount.z) *
+                             distance();
+    now_.pivot += moved;
+    place(now_.camera.rotation, now_.camera.position() + moved);
 }
 
 void ViewCamera::focus(const glm::dvec3& point) {
-    const glm::dvec3 position = camera_.position(), way = point - position;
+    const glm::dvec3 position = now_.camera.position(), way = point - position;
     const double length = glm::length(way);
     if (!(length > 0) || !std::isfinite(length)) return;
-    pivot_ = point;
+    now_.pivot = point;
     const glm::dvec3 forward = way / length;
-    glm::dvec3 right = glm::cross(forward, up_);
-    right = glm::length(right) > 1e-3 ? glm::normalize(right) : axis(0);
-    place(orthonormal(glm::transpose(glm::dmat3(right, glm::cross(forward, right), forward))), position);
+    glm::dvec3 right = glm::cross(forward, now_.up);
+    right = glm::length(right) > 1e-3 ? glm::normalize(right) : axis_of(now_.camera, 0);
+    place(orthonormal(facing(forward, right)), position);
 }
 
-void ViewCamera::stand(const Viewpoint& place) {
-    camera_ = place.camera;
-    pivot_ = place.pivot;
-    up_ = place.up;
+SceneBounds scene_bounds(const Gaussians& gaussians) {
+    const std::vector<glm::dvec3> means = sampled_means(gaussians, -std::numeric_limits<float>::infinity());
+    SceneBounds bounds;
+    if (means.empty()) return bounds;
+    glm::dvec3 low(0), high(0);
+    std::vector<double> values(means.size());
+    for (int axis = 0; axis < 3; ++axis) {
+        for (size_t i = 0; i < means.size(); ++i) values[i] = means[i][axis];
+        low[axis] = scene::quantile(values, 0.05);
+        high[axis] = scene::quantile(values, 0.95);
+    }
+    bounds.center = (low + high) / 2.0;
+    const double radius = glm::length(high - low) / 2.0;
+    if (radius > 0 && std::isfinite(radius)) bounds.radius = radius;
+    return bounds;
 }
 
-void ViewCamera::reset() {
-    stand(start_);
+Viewpoint framing_view(const Gaussians& gaussians, int width, int height) {
+    const SceneBounds bounds = scene_bounds(gaussians);
+    constexpr double kFieldOfView = 50 * std::numbers::pi / 180;  // of the shorter side
+    Viewpoint view;
+    view.radius = bounds.radius;
+    view.pivot = bounds.center;
+
+    const glm::dvec3 forward = glm::normalize(glm::dvec3(0, 0.25, 1));
+    Camera& camera = view.camera;
+    camera.width = width;
+    camera.height = height;
+    camera.fx = camera.fy = std::min(width, height) / 2.0 / std::tan(kFieldOfView / 2);
+    camera.cx = width / 2.0;
+    camera.cy = height / 2.0;
+    camera.rotation = facing(forward, {1, 0, 0});
+    const glm::dvec3 position = bounds.center - forward * (bounds.radius / std::sin(kFieldOfView / 2));
+    camera.translation = -(camera.rotation * position);
+    return view;
 }
 
-void ViewCamera::restart(const Viewpoint& start) {
-    start_ = start;
-    reset();
+int nearest_frame(const Dataset& dataset, const Camera& camera, double radius) {
+    int nearest = -1;
+    double least = std::numeric_limits<double>::infinity();
+    for (size_t i = 0; i < dataset.frames.size(); ++i) {
+        const Camera& other = dataset.frames[i].camera;
+        const double turn = 1 - glm::dot(axis_of(camera, 2), axis_of(other, 2));
+        const double distance = glm::length(camera.position() - other.position()) + radius * turn;
+        if (!(distance < least)) continue;
+        least = distance;
+        nearest = int(i);
+    }
+    return nearest;
 }
 
-void ViewCamera::set_up(const glm::dvec3& up) {
-    up_ = glm::normalize(up);
+double camera_size(const Dataset& dataset, double radius) {
+    std::vector<double> steps;
+    for (size_t i = 1; i < dataset.frames.size(); ++i)
+        steps.push_back(
+            glm::length(dataset.frames[i].camera.position() - dataset.frames[i - 1].camera.position()));
+    const double step = scene::quantile(steps, 0.5);
+    return step > 0 && std::isfinite(step) ? 0.3 * step : 0.05 * radius;
+}
+
+Viewpoint dataset_view(const Gaussians& gaussians, const Dataset& dataset, int frame) {
+    const SceneBounds bounds = scene_bounds(gaussians);
+    Viewpoint view;
+    view.camera = dataset.frames.at(size_t(frame)).camera;
+    view.up = mean_up(dataset);
+    view.radius = bounds.radius;
+    const glm::dvec3 forward = axis_of(view.camera, 2), position = view.camera.position();
+    double depth = middle_depth(gaussians, view.camera);
+    if (!(depth > 0)) depth = glm::dot(bounds.center - position, forward);
+    if (!(depth > 0)) depth = bounds.radius;
+    view.pivot = position + forward * depth;
+    return view;
 }
 
 }  // namespace ewa::viewer

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The camera that mouse and keys move: around a pivot, towards it, or freely. Independent of the window.
+// Where the window looks from: the first view of a scene, and the camera that mouse and keys move around a
+// pivot, towards it, or freely. Independent of the window.
 #pragma once
-#include <glm/vec3.hpp>
+#include <glm/geometric.hpp>
 
 #include "ewa/camera.h"
+#include "ewa/dataset.h"
+#include "ewa/gaussians.h"
 
 namespace ewa::viewer {
 
@@ -34,26 +37,46 @@ class ViewCamera {
     void fly(const glm::dvec3& amount);
     /// Turns to a point and makes it the pivot.
     void focus(const glm::dvec3& point);
-    void reset();
-    void restart(const Viewpoint& start);
-    void set_up(const glm::dvec3& up);
+    void reset() { now_ = start_; }
+    void restart(const Viewpoint& start) { now_ = start_ = start; }
+    void set_up(const glm::dvec3& up) { now_.up = glm::normalize(up); }
 
     /// Moves to another place. reset() still returns to the start.
-    void stand(const Viewpoint& place);
-    Viewpoint place() const { return {camera_, pivot_, up_, start_.radius}; }
-    const glm::dvec3& up() const { return up_; }
+    void stand(const Viewpoint& place) { now_ = place; }
+    const glm::dvec3& pivot() const { return now_.pivot; }
+    const glm::dvec3& up() const { return now_.up; }
     double radius() const { return start_.radius; }
     double distance() const;
-    Camera camera(int width, int height) const { return fitted(camera_, width, height); }
+    Camera camera(int width, int height) const { return fitted(now_.camera, width, height); }
 
   private:
     void turn(double yaw, double pitch, const glm::dvec3& center);
     void place(const glm::dmat3& rotation, const glm::dvec3& position);
-    glm::dvec3 axis(int row) const;  // the camera's x, y or z axis in world coordinates
 
-    Viewpoint start_;
-    Camera camera_;
-    glm::dvec3 pivot_{0}, up_{0, -1, 0};
+    Viewpoint start_, now_;
 };
+
+/// The box between the 5th and the 95th percentile of each coordinate, which excludes the few distant splats
+/// of most trainings. Means that are not finite are skipped.
+struct SceneBounds {
+    glm::dvec3 center{0};
+    double radius = 1;  // half the box's diagonal, above zero
+};
+SceneBounds scene_bounds(const Gaussians& gaussians);
+
+/// Shows the whole scene from the front and slightly above, with y down, as in most COLMAP captures.
+Viewpoint framing_view(const Gaussians& gaussians, int width, int height);
+
+/// The frame whose camera is closest in position and direction; -1 without frames. A turn of 90 degrees
+/// counts as much as a distance of `radius` (world units).
+int nearest_frame(const Dataset& dataset, const Camera& camera, double radius);
+
+/// The size of drawn cameras in world units, above zero: a share of the median distance between neighbours in
+/// name order, or of the scene's radius if all are in one place.
+double camera_size(const Dataset& dataset, double radius);
+
+/// The camera of a frame. Up is the mean up direction of all cameras; the pivot is at the median depth of the
+/// splats in the middle of the image.
+Viewpoint dataset_view(const Gaussians& gaussians, const Dataset& dataset, int frame);
 
 }  // namespace ewa::viewer

@@ -43,7 +43,7 @@ WindowSystem::~WindowSystem() {
     glfwTerminate();
 }
 
-Size WindowSystem::room() const {
+Size WindowSystem::work_area() const {
     Size size;
     int x = 0, y = 0;
     if (GLFWmonitor* monitor = glfwGetPrimaryMonitor())
@@ -85,18 +85,18 @@ void Window::watch() {
             of(window).pressed_.push_back(
                 {key, (mods & GLFW_MOD_SHIFT) != 0, (mods & GLFW_MOD_CONTROL) != 0});
     });
-    glfwSetCursorPosCallback(window_, [](GLFWwindow* window, double, double) { of(window).stirred_ = true; });
-    glfwSetMouseButtonCallback(window_,
-                               [](GLFWwindow* window, int, int, int) { of(window).stirred_ = true; });
-    glfwSetScrollCallback(window_, [](GLFWwindow* window, double, double) { of(window).stirred_ = true; });
-    glfwSetCharCallback(window_, [](GLFWwindow* window, unsigned) { of(window).stirred_ = true; });
     glfwSetDropCallback(window_, [](GLFWwindow* window, int count, const char** paths) {
         of(window).stirred_ = true;
         if (count > 0) of(window).dropped_ = paths[0];
     });
-    glfwSetFramebufferSizeCallback(window_, [](GLFWwindow* window, int, int) { of(window).stirred_ = true; });
-    glfwSetWindowRefreshCallback(window_, [](GLFWwindow* window) { of(window).stirred_ = true; });
-    glfwSetWindowFocusCallback(window_, [](GLFWwindow* window, int) { of(window).stirred_ = true; });
+    const auto stir = [](GLFWwindow* window, auto...) { of(window).stirred_ = true; };
+    glfwSetCursorPosCallback(window_, stir);
+    glfwSetMouseButtonCallback(window_, stir);
+    glfwSetScrollCallback(window_, stir);
+    glfwSetCharCallback(window_, stir);
+    glfwSetFramebufferSizeCallback(window_, stir);
+    glfwSetWindowRefreshCallback(window_, stir);
+    glfwSetWindowFocusCallback(window_, stir);
 }
 
 vk::UniqueSurfaceKHR Window::surface(vk::Instance instance) const {

@@ -23,7 +23,7 @@ class WindowSystem {
     WindowSystem& operator=(const WindowSystem&) = delete;
 
     /// The free size for a window on the main monitor, px; zero if unknown.
-    Size room() const;
+    Size work_area() const;
     std::vector<const char*> vulkan_extensions() const;
     /// Makes Window::wait() return. Any thread may call it.
     void wake() const;

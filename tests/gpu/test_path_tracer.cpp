@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures of mesh scenes whose answer is known in closed form, and rays against the float64 CPU reference.
+// Renders of mesh scenes whose answer is known in closed form, and rays against the float64 CPU reference.
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "gpu/test_device.h"
 #include "pathtracer/path_tracer.h"
@@ -365,7 +364,7 @@ TEST(PathTracer, SidesMasksAndBlends) {
     EXPECT_EQ(depth.at(24, 16)[0], 0.0f);
 }
 
-TEST(PathTracer, RaysAgreeWithTheReference) {
+TEST(PathTracer, RaysAgreeWithTheCpuReference) {
     const pathtracer::PackedScene packed = pathtracer::pack(
         [] {
             scene::MeshScene scene = test::random_triangles(4, 4000);

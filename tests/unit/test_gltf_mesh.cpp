@@ -9,7 +9,7 @@
 #include "image/image_files.h"
 #include "io/gltf/mesh.h"
 #include "pathtracer/path_tracer.h"
-#include "pathtracer/render_job.h"
+#include "pathtracer/synthetic_dataset.h"
 #include "pathtracer/virtual_camera.h"
 #include "support/temp_folder.h"
 
@@ -256,7 +256,7 @@ TEST(GltfMesh, LightsAndSky) {
     gltf.refused({"\"sky\"", "\"zenith\""});
 }
 
-TEST(GltfMesh, WhatARenderDoesNotShowIsRemarked) {
+TEST(GltfMesh, ContentsThatARenderDoesNotShowAreRemarked) {
     Gltf gltf;
     EXPECT_TRUE(gltf.read().remarks.empty());
     gltf.top["materials"] = {

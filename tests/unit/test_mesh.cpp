@@ -10,7 +10,6 @@
 
 #include "core/random.h"
 #include "ewa/error.h"
-#include "pathtracer/light_table.h"
 #include "pathtracer/packing.h"
 #include "pathtracer/virtual_camera.h"
 #include "reference/tracing.h"

@@ -5,7 +5,7 @@
 
 #include "ewa/dataset.h"
 #include "scene/lens.h"
-#include "scene/neighbors.h"
+#include "scene/statistics.h"
 #include "shared/constants.h"
 #include "support/temp_folder.h"
 
@@ -173,7 +173,7 @@ TEST(Undistort, FormulaByHand) {
             }
 }
 
-/// Something smooth to render.
+/// A smooth scene for images.
 double scenery(glm::dvec2 ray, int channel) {
     return 0.5 + 0.4 * std::sin(5 * ray.x + channel) * std::cos(4 * ray.y - channel);
 }
@@ -181,16 +181,16 @@ double scenery(glm::dvec2 ray, int channel) {
 TEST(Undistort, ResamplesToThePinholePicture) {
     const Camera source = wide_camera();
     for (const Distortion& lens : kLenses) {
-        Image photo(source.width, source.height, 4);
-        for (int y = 0; y < photo.height; ++y)
-            for (int x = 0; x < photo.width; ++x) {
+        Image image(source.width, source.height, 4);
+        for (int y = 0; y < image.height; ++y)
+            for (int x = 0; x < image.width; ++x) {
                 const auto ray = scene::undistort(
                     lens, {(x + 0.5 - source.cx) / source.fx, (y + 0.5 - source.cy) / source.fy});
                 ASSERT_TRUE(ray);
-                for (int c = 0; c < 4; ++c) photo.at(x, y)[c] = float(scenery(*ray, c));
+                for (int c = 0; c < 4; ++c) image.at(x, y)[c] = float(scenery(*ray, c));
             }
         const Camera camera = scene::undistorted_camera(source, lens);
-        const Image result = scene::undistort_image(photo, source, lens, camera);
+        const Image result = scene::undistort_image(image, source, lens, camera);
         double largest = 0;
         for (int y = 0; y < result.height; ++y)
             for (int x = 0; x < result.width; ++x)

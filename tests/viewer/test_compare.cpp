@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The photograph against the splats, and the thread that such work is done on.
+// The comparison of a render with the image of its camera, and the thread that does it.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -10,8 +10,6 @@
 
 #include "support/soon.h"
 #include "viewer/comparison.h"
-#include "viewer/image_comparison.h"
-#include "viewer/latest.h"
 
 namespace ewa::viewer {
 namespace {
@@ -22,9 +20,9 @@ ByteImage flat(int width, int height, uint8_t value) {
 
 TEST(Compare, TheDifferenceOfEqualSizesIsPixelByPixel) {
     ByteImage rendering = flat(4, 2, 100);
-    const ByteImage photo = flat(4, 2, 90);
+    const ByteImage image = flat(4, 2, 90);
     rendering.rgba[4] = 30;  // the second pixel's red
-    ByteImage result = difference(rendering, photo, {0, 0, 4, 2});
+    ByteImage result = difference(rendering, image, {0, 0, 4, 2});
     EXPECT_EQ(result.rgba[0], 10);
     EXPECT_EQ(result.rgba[4], 60);
     EXPECT_EQ(result.rgba[3], 255);
@@ -36,7 +34,7 @@ TEST(Compare, TheDifferenceOfEqualSizesIsPixelByPixel) {
     EXPECT_EQ(result.rgba[3], 255);
 }
 
-TEST(Compare, BeyondThePhotographIsBlack) {
+TEST(Compare, OutsideOfTheImageIsBlack) {
     const ByteImage result = difference(flat(6, 4, 100), flat(2, 4, 0), {2, 0, 2, 4});
     EXPECT_EQ(result.rgba[4 * 1], 0);
     EXPECT_EQ(result.rgba[4 * 2], 100);
@@ -44,16 +42,16 @@ TEST(Compare, BeyondThePhotographIsBlack) {
     EXPECT_TRUE(std::isnan(psnr_of_difference(result, {9, 9, 0, 0})));
 }
 
-TEST(Compare, APhotographOfAnotherSizeIsSampled) {
-    ByteImage photo = flat(2, 1, 0);
-    for (size_t c = 0; c < 3; ++c) photo.rgba[4 + c] = 200;
-    const ByteImage result = difference(flat(4, 2, 0), photo, {0, 0, 4, 2});
+TEST(Compare, AnImageOfAnotherSizeIsSampled) {
+    ByteImage image = flat(2, 1, 0);
+    for (size_t c = 0; c < 3; ++c) image.rgba[4 + c] = 200;
+    const ByteImage result = difference(flat(4, 2, 0), image, {0, 0, 4, 2});
     EXPECT_EQ(result.rgba[0], 0);   // at 0.25 of the first pixel: the border goes on
     EXPECT_EQ(result.rgba[4], 50);  // a quarter of the way to the second pixel's centre
     EXPECT_EQ(result.rgba[4 * 3], 200);
 }
 
-TEST(Compare, PlacesKeepThePhotographsShape) {
+TEST(Compare, PlacesKeepTheImagesAspectRatio) {
     const Arrangement beside = arrange(Comparison::beside, {801, 300}, {200, 100});
     EXPECT_EQ(beside.rendering, (Rectangle{0, 0, 400, 300}));
     EXPECT_EQ(beside.image, (Rectangle{400, 49, 401, 201}));
@@ -66,12 +64,12 @@ TEST(Compare, PlacesKeepThePhotographsShape) {
     EXPECT_EQ(wipe.image, (Rectangle{100, 0, 600, 300}));
 }
 
-TEST(Compare, APictureOfItIsMadeWhereOneIsWanted) {
+TEST(Compare, ADifferenceImageIsMadeOnRequest) {
     auto rendering = std::make_shared<RenderedFrame>();
     rendering->picture = flat(4, 2, 100);
-    auto photo = std::make_shared<CameraImage>();
-    photo->picture = flat(4, 2, 90);
-    ComparisonRequest request{rendering, photo, {0, 0, 4, 2}, 0};
+    auto image = std::make_shared<CameraImage>();
+    image->picture = flat(4, 2, 90);
+    ComparisonRequest request{rendering, image, {0, 0, 4, 2}, 0};
     const Compared number = compare_with_image(request);
     EXPECT_NEAR(number.psnr, 20 * std::log10(25.5), 1e-9);
     EXPECT_TRUE(number.difference.rgba.empty());

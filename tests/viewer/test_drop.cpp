@@ -63,7 +63,7 @@ TEST_F(Drop, OpensFolders) {
     const Image cameras = dropped(session, cameras_, "views");
     EXPECT_EQ(largest_difference(cameras, alone(cameras_)), 0);
     session.send("key v key Right");
-    EXPECT_GT(range_of(screenshot(session)), 0.3f) << "the dropped dataset's photograph";
+    EXPECT_GT(range_of(screenshot(session)), 0.3f) << "the image of the dropped dataset";
     EXPECT_EQ(largest_difference(dropped(session, splats_, "splats.ply"), alone(splats_)), 0);
     expect_silent(session.quit());
 }

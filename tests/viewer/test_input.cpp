@@ -151,13 +151,13 @@ TEST_F(Input, AFieldOfThePanelTakesDigitsAndLeavesFunctionKeys) {
     expect_silent(session.quit());
 }
 
-TEST_F(Input, ComparesWithThePhotographByKey) {
+TEST_F(Input, ComparesWithTheImageByKey) {
     Session session(shots_, {splats_, "--cameras", cameras_, "--frame", "1", "--size", "96x32"});
     ASSERT_TRUE(session.found());
     session.send("key F2 key v");
-    const Image beside = screenshot(session), photo = load_image(cameras_ + "/images/1.png");
-    for (int x = 0; x < 48; ++x) EXPECT_NEAR(beside.at(48 + x, 16)[1], photo.at(x, 16)[1], kRounding);
-    // A turn leaves the camera, and with it the photograph; G comes back.
+    const Image beside = screenshot(session), image = load_image(cameras_ + "/images/1.png");
+    for (int x = 0; x < 48; ++x) EXPECT_NEAR(beside.at(48 + x, 16)[1], image.at(x, 16)[1], kRounding);
+    // A turn leaves the camera, and with it the image; G comes back.
     act(session, {"mousemove 20 20", "mousedown 1", "mousemove 30 20", "mousemove 40 20", "mouseup 1"});
     EXPECT_GT(largest_difference(screenshot(session), beside), 0.1f);
     session.send("key g");

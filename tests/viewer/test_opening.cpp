@@ -20,7 +20,7 @@ TEST(Opening, AMeshSceneIsItsViews) {
     EXPECT_NE(scene.remark.find("mesh scene"), std::string::npos) << scene.remark;
 }
 
-TEST(Opening, ARunOnAMeshSceneHasThePhotographsThatWereMade) {
+TEST(Opening, ARunOnAMeshSceneHasTheRenderedImages) {
     const test::Folder folder;
     std::filesystem::create_directories(folder / "run");
     test::write_file(folder / "run/config.json", "{\"dataset\": \"" + kMesh + "\"}");

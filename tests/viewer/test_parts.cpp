@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The parts of the viewer that know of no window: the camera, the first view, the picture, the pace.
+// The parts of the viewer that are independent of the window: camera, first view, modes, resolution.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -8,8 +8,8 @@
 #include <numbers>
 
 #include "viewer/byte_image.h"
-#include "viewer/framing.h"
-#include "viewer/pace.h"
+#include "viewer/renders.h"
+#include "viewer/view_camera.h"
 
 namespace ewa::viewer {
 namespace {
@@ -254,10 +254,10 @@ TEST(Picture, EmptyDepthIsBlack) {
     EXPECT_EQ(picture_of(nothing, Mode::count).rgba, (std::vector<uint8_t>{0, 0, 0, 255}));
 }
 
-TEST(Picture, ATransparentPhotographLiesOverTheBackground) {
-    Image photo(1, 1, 4);
-    photo.pixels = {1, 0, 0, 0.5f};
-    EXPECT_EQ(picture_of(photo, {0, 1, 1}).rgba, (std::vector<uint8_t>{128, 128, 128, 255}));
+TEST(Picture, ATransparentImageIsBlendedOverTheBackground) {
+    Image image(1, 1, 4);
+    image.pixels = {1, 0, 0, 0.5f};
+    EXPECT_EQ(picture_of(image, {0, 1, 1}).rgba, (std::vector<uint8_t>{128, 128, 128, 255}));
 }
 
 TEST(Pace, GivesUpResolutionUntilPicturesAreFast) {

@@ -41,8 +41,8 @@ TEST_F(Window, EveryModeShowsSomethingElse) {
     }
 }
 
-TEST_F(Window, ThePhotographStandsWhereItsCameraSawIt) {
-    const Image photo = load_image(cameras_ + "/images/1.png"), splats = rendered("1");
+TEST_F(Window, TheImageIsWhereItsCameraSawIt) {
+    const Image image = load_image(cameras_ + "/images/1.png"), splats = rendered("1");
     const Image beside = shown({"--frame", "1", "--size", "96x32", "--compare", "beside"});
     const Image wipe = shown({"--frame", "1", "--compare", "wipe"});
     const Image difference = shown({"--frame", "1", "--compare", "difference"});
@@ -50,9 +50,9 @@ TEST_F(Window, ThePhotographStandsWhereItsCameraSawIt) {
         for (int x = 0; x < 48; ++x)
             for (int c = 0; c < 3; ++c) {
                 EXPECT_NEAR(beside.at(x, y)[c], splats.at(x, y)[c], kRounding);
-                EXPECT_NEAR(beside.at(48 + x, y)[c], photo.at(x, y)[c], kRounding);
-                EXPECT_NEAR(wipe.at(x, y)[c], x < 24 ? photo.at(x, y)[c] : splats.at(x, y)[c], kRounding);
-                const float error = std::min(1.0f, 4 * std::abs(splats.at(x, y)[c] - photo.at(x, y)[c]));
+                EXPECT_NEAR(beside.at(48 + x, y)[c], image.at(x, y)[c], kRounding);
+                EXPECT_NEAR(wipe.at(x, y)[c], x < 24 ? image.at(x, y)[c] : splats.at(x, y)[c], kRounding);
+                const float error = std::min(1.0f, 4 * std::abs(splats.at(x, y)[c] - image.at(x, y)[c]));
                 EXPECT_NEAR(difference.at(x, y)[c], error, 5 * kRounding);
             }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shows images and the panel in the window.
+// What shows images and Dear ImGui in the window.
 #pragma once
 #include <array>
 #include <span>
@@ -19,6 +19,7 @@ struct Layer {
     double left = 0, right = 1;  // shares of the image's width; the height is complete
 };
 
+/// Copies images and the panel to the window.
 class Presenter {
   public:
     explicit Presenter(const PresentDevice& device);
@@ -68,6 +69,30 @@ class Presenter {
     bool pending_ = false;  // a submission whose fence has not been waited for
     HostBuffer readback_;
     std::array<Slot, 2> pictures_;  // by slot
+};
+
+/// Dear ImGui on one window.
+class Gui {
+  public:
+    /// The window's own callbacks must be set before: those of ImGui call them.
+    Gui(const Window& window, const PresentDevice& device, Presenter& presenter);
+    ~Gui();
+
+    void begin_frame();
+    ImDrawData* end_frame();
+
+  private:
+    const PresentDevice& device_;
+    vk::UniqueDescriptorPool pool_;
+};
+
+/// Created again if its device is lost.
+struct Screen {
+    Screen(const WindowSystem& system, Window& window, const std::string& device_name)
+        : device(system, window, device_name), presenter(device), gui(window, device, presenter) {}
+    PresentDevice device;
+    Presenter presenter;
+    Gui gui;
 };
 
 }  // namespace ewa::viewer

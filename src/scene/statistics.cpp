@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "scene/neighbors.h"
+#include "scene/statistics.h"
 
 #include <algorithm>
 #include <array>

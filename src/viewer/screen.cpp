@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "viewer/presenter.h"
+#include "viewer/screen.h"
 
+#include <backends/imgui_impl_glfw.h>
 #include <backends/imgui_impl_vulkan.h>
-
+#include <imgui.h>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -28,15 +29,8 @@ struct Use {
 };
 
 void change(vk::CommandBuffer commands, vk::Image image, const Use& from, const Use& to) {
-    vk::ImageMemoryBarrier barrier;
-    barrier.setSrcAccessMask(from.access)
-        .setDstAccessMask(to.access)
-        .setOldLayout(from.layout)
-        .setNewLayout(to.layout)
-        .setSrcQueueFamilyIndex(VK_QUEUE_FAMILY_IGNORED)
-        .setDstQueueFamilyIndex(VK_QUEUE_FAMILY_IGNORED)
-        .setImage(image)
-        .setSubresourceRange(kWhole);
+    const vk::ImageMemoryBarrier barrier(from.access, to.access, from.layout, to.layout,
+                                         VK_QUEUE_FAMILY_IGNORED, VK_QUEUE_FAMILY_IGNORED, image, kWhole);
     commands.pipelineBarrier(from.stage, to.stage, {}, {}, {}, barrier);
 }
 
@@ -48,10 +42,21 @@ const Use kDrawnOn{Stage::eColorAttachmentOutput,
                    Layout::eColorAttachmentOptimal};
 
 /// Clips to the window, so that a blit stays inside the image.
-Rectangle clipped(const Rectangle& rectangle, Size room) {
-    const int left = std::clamp(rectangle.x, 0, room.width), top = std::clamp(rectangle.y, 0, room.height);
-    return {left, top, std::clamp(rectangle.x + rectangle.width, left, room.width) - left,
-            std::clamp(rectangle.y + rectangle.height, top, room.height) - top};
+Rectangle clipped(const Rectangle& rectangle, Size window) {
+    const int left = std::clamp(rectangle.x, 0, window.width),
+              top = std::clamp(rectangle.y, 0, window.height);
+    return {left, top, std::clamp(rectangle.x + rectangle.width, left, window.width) - left,
+            std::clamp(rectangle.y + rectangle.height, top, window.height) - top};
+}
+
+/// Between a whole image and tightly packed bytes.
+vk::BufferImageCopy whole_copy(Size size) {
+    return {0, 0, 0, kLayer, {}, {uint32_t(size.width), uint32_t(size.height), 1}};
+}
+
+void check(VkResult result) {
+    if (result == VK_ERROR_DEVICE_LOST) throw vk::DeviceLostError("the panel cannot be drawn");
+    if (result < 0) throw RunError("the panel cannot be drawn: " + vk::to_string(vk::Result(result)));
 }
 
 }  // namespace
@@ -113,11 +118,8 @@ void Presenter::set_picture(Layer::Slot slot, const ByteImage& picture) {
 
 void Presenter::record_upload(Slot& slot_data) {
     change(*commands_, *slot_data.image.image, kNothingYet, kWritten);
-    vk::BufferImageCopy copy;
-    copy.setImageSubresource(kLayer).setImageExtent(
-        {uint32_t(slot_data.image.size.width), uint32_t(slot_data.image.size.height), 1});
     commands_->copyBufferToImage(*slot_data.staging.buffer, *slot_data.image.image,
-                                 Layout::eTransferDstOptimal, copy);
+                                 Layout::eTransferDstOptimal, whole_copy(slot_data.image.size));
     change(*commands_, *slot_data.image.image, kWritten, kRead);
     slot_data.fresh = false;
 }
@@ -152,9 +154,7 @@ void Presenter::record_capture(vk::Image target) {
         readback_ = {};
         readback_ = device_.host_buffer(bytes, vk::BufferUsageFlagBits::eTransferDst);
     }
-    vk::BufferImageCopy copy;
-    copy.setImageSubresource(kLayer).setImageExtent({uint32_t(size.width), uint32_t(size.height), 1});
-    commands_->copyImageToBuffer(target, Layout::eTransferSrcOptimal, *readback_.buffer, copy);
+    commands_->copyImageToBuffer(target, Layout::eTransferSrcOptimal, *readback_.buffer, whole_copy(size));
     const vk::MemoryBarrier to_host(Access::eTransferWrite, Access::eHostRead);
     commands_->pipelineBarrier(Stage::eTransfer, Stage::eHost, {}, to_host, {}, {});
 }
@@ -203,10 +203,8 @@ bool Presenter::draw(Size window, std::span<const Layer> layers, ImDrawData* pan
     if (capture) {
         change(*commands_, target, kWritten, kRead);
         record_capture(target);
-        change(*commands_, target, kRead, kDrawnOn);
-    } else {
-        change(*commands_, target, kWritten, kDrawnOn);
     }
+    change(*commands_, target, capture ? kRead : kWritten, kDrawnOn);
     record_panel(*index, panel);
     commands_->end();
     const vk::Semaphore acquired = swapchain_.acquired(), drawn = swapchain_.drawn(*index);
@@ -217,6 +215,63 @@ bool Presenter::draw(Size window, std::span<const Layer> layers, ImDrawData* pan
         *capture = captured();
     }
     return true;
+}
+
+Gui::Gui(const Window& window, const PresentDevice& device, Presenter& presenter) : device_(device) {
+    const vk::DescriptorPoolSize size(vk::DescriptorType::eCombinedImageSampler, 1);
+    vk::DescriptorPoolCreateInfo create;
+    create.setMaxSets(1).setPoolSizes(size);
+    create.setFlags(vk::DescriptorPoolCreateFlagBits::eFreeDescriptorSet);  // ImGui 1.90 frees the font's set
+    pool_ = device.handle().createDescriptorPoolUnique(create);
+
+    ImGui::CreateContext();
+    ImGui::GetIO().IniFilename = nullptr;  // write no settings file
+    ImGui::StyleColorsDark();
+    ImGui::GetStyle().ScaleAllSizes(window.scale());
+    ImFontConfig font;
+    font.SizePixels = 13.0f * window.scale();
+    ImGui::GetIO().Fonts->AddFontDefault(&font);
+
+    ImGui_ImplGlfw_InitForVulkan(window.handle(), true);
+    ImGui_ImplVulkan_InitInfo info{};
+    info.Instance = device.instance();
+    info.PhysicalDevice = device.physical();
+    info.Device = device.handle();
+    info.QueueFamily = device.queue_family();
+    info.Queue = device.queue();
+    info.DescriptorPool = *pool_;
+    info.MinImageCount = presenter.swapchain().least_images();
+    // ImGui cycles its vertex buffers over this many frames. Only one frame is in flight, so the minimum is
+    // enough.
+    info.ImageCount = info.MinImageCount;
+    info.MSAASamples = VK_SAMPLE_COUNT_1_BIT;
+    info.CheckVkResultFn = check;
+    ImGui_ImplVulkan_Init(&info, presenter.swapchain().overlay_pass());
+    // Before the first frame: the upload waits for the device.
+#if IMGUI_VERSION_NUM < 19000
+    presenter.run_once([](vk::CommandBuffer commands) { ImGui_ImplVulkan_CreateFontsTexture(commands); });
+    ImGui_ImplVulkan_DestroyFontUploadObjects();
+#else
+    ImGui_ImplVulkan_CreateFontsTexture();  // has command buffers of its own
+#endif
+}
+
+Gui::~Gui() {
+    (void)vkDeviceWaitIdle(device_.handle());  // the last frame may still be in flight
+    ImGui_ImplVulkan_Shutdown();
+    ImGui_ImplGlfw_Shutdown();
+    ImGui::DestroyContext();
+}
+
+void Gui::begin_frame() {
+    ImGui_ImplVulkan_NewFrame();
+    ImGui_ImplGlfw_NewFrame();
+    ImGui::NewFrame();
+}
+
+ImDrawData* Gui::end_frame() {
+    ImGui::Render();
+    return ImGui::GetDrawData();
 }
 
 }  // namespace ewa::viewer

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// Statistics of values and of points.
+#pragma once
+#include <algorithm>
+#include <cstddef>
+#include <glm/vec3.hpp>
+#include <vector>
+
+namespace ewa::scene {
+
+/// The value at `share` (0 to 1) of the sorted values, at an index that is rounded down. 0 without values.
+/// Reorders the values. O(n).
+template <class T>
+T quantile(std::vector<T>& values, double share) {
+    if (values.empty()) return T{0};
+    const auto at = values.begin() + std::ptrdiff_t(share * double(values.size() - 1));
+    std::nth_element(values.begin(), at, values.end());
+    return *at;
+}
+
+/// The mean squared distance of each point to its 3 nearest other points, or to all others if there are
+/// fewer. -1 for a single point. Points at the same position are neighbours at distance 0. All coordinates
+/// must be finite. O(n log n).
+std::vector<double> mean_squared_neighbor_distance(const std::vector<glm::dvec3>& positions);
+
+}  // namespace ewa::scene
