@@ -152,7 +152,7 @@ Accuracy measure_accuracy(const std::shared_ptr<gpu::Device>& device, const Gaus
     say(text_of("integrals along %d rays in float64, %u threads", result.pixels, result.threads));
     RenderOptions whole = options;
     whole.sh_degree = kMaxShDegree;
-    const reference::Volume volume(reference::to_double(gaussians), camera, whole);
+    const reference::Volume volume(gaussians, camera, whole);
     std::vector<glm::dvec3> exact, actual;
     result.exact_seconds =
         evaluate_pixels(pixels, exact, [&](double x, double y) { return volume.exact(x, y); });

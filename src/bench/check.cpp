@@ -8,11 +8,10 @@
 #include <span>
 
 #include "ewa/renderer.h"
-#include "reference/adam.h"
-#include "reference/instances.h"
+#include "reference/training.h"
+#include "reference/blend.h"
 #include "reference/projection.h"
 #include "reference/render.h"
-#include "reference/sort.h"
 #include "shared/constants.h"
 
 namespace ewa::bench {

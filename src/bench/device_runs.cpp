@@ -7,7 +7,7 @@
 #include "core/random.h"
 #include "pipeline/camera_block.h"
 #include "pipeline/photo.h"
-#include "reference/sort.h"
+#include "reference/blend.h"
 
 namespace ewa::bench {
 namespace {

@@ -8,7 +8,7 @@
 #include "bench/scene.h"
 #include "core/random.h"
 #include "reference/render.h"
-#include "reference/sort.h"
+#include "reference/blend.h"
 
 namespace ewa::test {
 namespace {

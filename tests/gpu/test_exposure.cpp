@@ -11,7 +11,7 @@
 #include "pipeline/backward.h"
 #include "pipeline/exposure.h"
 #include "pipeline/photo.h"
-#include "reference/adam.h"
+#include "reference/training.h"
 #include "reference/loss.h"
 
 namespace ewa::test {

@@ -14,7 +14,7 @@
 #include "passes/sort.h"
 #include "passes/strategy.h"
 #include "pipeline/mcmc.h"
-#include "reference/strategy.h"
+#include "reference/training.h"
 
 namespace ewa::test {
 namespace {

@@ -10,7 +10,6 @@
 #include <set>
 
 #include "reference/render.h"
-#include "reference/sort.h"
 #include "support/random_scene.h"
 
 namespace ewa::reference {

@@ -42,7 +42,7 @@ Values differences(Chain& chain, const Values& claimed) {
 Chain random_chain(uint64_t seed, test::SplatKind kind, size_t count, int degree, Footprint kernel) {
     Chain chain;
     chain.camera = test::random_camera(seed, 21, 17);
-    chain.values = to_double(test::random_gaussians(seed, count, kind, chain.camera, degree));
+    chain.values = test::random_gaussians(seed, count, kind, chain.camera, degree);
     chain.target = test::random_target(seed, 21, 17);
     chain.options = {{0.2f, 0.5f, 0.1f}, kernel, degree};
     chain.twin.smoothing = {AlphaCut::none, false};

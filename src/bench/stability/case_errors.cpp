@@ -9,7 +9,7 @@
 #include "core/random.h"
 #include "ewa/renderer.h"
 #include "reference/render.h"
-#include "reference/sort.h"
+#include "reference/blend.h"
 #include "shared/constants.h"
 
 namespace ewa::bench {
@@ -127,7 +127,7 @@ double norm_of(const std::vector<double>& v) {
 /// a rotation does not change; then this share of the gradient of the scales replaces it.
 double least_quaternion_norm(const StabilityCase& one, const Values& gradient) {
     constexpr double kShare = 1e-3;
-    const Values values = reference::to_double(one.gaussians);
+    const Values values = one.gaussians;
     double largest = 0;
     for (size_t i = 0; i < values.size(); ++i) {
         const double norm = reference::robust_norm(reference::read_splat(values, i).quaternion);
@@ -176,7 +176,7 @@ struct Conditions {
 /// largest of several.
 Conditions conditions_of(const StabilityCase& one, const Image& photo, const ReferenceGradient& expected,
                          const std::vector<uint8_t>& excluded, double scale) {
-    const Values values = reference::to_double(one.gaussians);
+    const Values values = one.gaussians;
     const std::vector<double> least = least_norms(one, expected.gradient);
     Conditions k;
     for (uint32_t draw = 0; draw < kPerturbations; ++draw) {
