@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/output.h"
+#include "core/folders.h"
 #include "report/pictures.h"
 
 namespace ewa::train {
