@@ -202,9 +202,14 @@ BlendGradients blend_backward(std::span<const Projected> projected, const Instan
                 const double u = c.sample.u, v = c.sample.v;
                 const auto [ux, uy, vy] = whiteners[c.splat];
                 const glm::dvec2 by_mean = g * glm::dvec2(ux * u, uy * u + vy * v);
-                out.instances[c.instance] += {g,         g * u,     g * v,
-                                              g * u * u, g * u * v, g * v * v,
-                                              weight * pixel_gradient, glm::abs(by_mean)};
+                out.instances[c.instance] += {g,
+                                              g * u,
+                                              g * v,
+                                              g * u * u,
+                                              g * u * v,
+                                              g * v * v,
+                                              weight * pixel_gradient,
+                                              glm::abs(by_mean)};
             });
         }
     }
@@ -228,8 +233,7 @@ Raster ellipsoids(std::span<const Projected> projected, const Instances& instanc
             for (size_t k = instances.first_of_tile[tile]; k < instances.first_of_tile[tile + 1]; ++k) {
                 const uint32_t splat = instances.sorted[k].splat;
                 const Sample s = sample(projected[splat], whiteners[splat], pixel_centre(x, y));
-                const double height =
-                    1 - (s.u * s.u + s.v * s.v) / (ELLIPSOID_REACH * ELLIPSOID_REACH);
+                const double height = 1 - (s.u * s.u + s.v * s.v) / (ELLIPSOID_REACH * ELLIPSOID_REACH);
                 if (height < 0 || projected[splat].opacity < ELLIPSOID_OPACITY) continue;
                 const double shade = ELLIPSOID_RIM + (1 - ELLIPSOID_RIM) * std::sqrt(height);
                 for (int c = 0; c < 3; ++c) out.at(x, y)[c] = shade * projected[splat].color[c];

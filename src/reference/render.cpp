@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "reference/render.h"
 
-#include "reference/projection.h"
 #include "reference/blend.h"
+#include "reference/projection.h"
 
 namespace ewa::reference {
 
