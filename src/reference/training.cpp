@@ -81,13 +81,13 @@ std::vector<Decision> decide(const Values& values, const DensifyStatistics& stat
         decisions.push_back(decide(read_splat(values, i), mean, options));
         if (decisions.back() != Decision::prune) ++left;
     }
-    uint64_t room = options.max_splats > left ? options.max_splats - left : 0;
+    uint64_t capacity = options.max_splats > left ? options.max_splats - left : 0;
     for (Decision& decision : decisions) {
         if (decision != Decision::clone && decision != Decision::split) continue;
-        if (room == 0)
+        if (capacity == 0)
             decision = Decision::keep;
         else
-            --room;
+            --capacity;
     }
     return decisions;
 }

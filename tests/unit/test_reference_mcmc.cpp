@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The twin of 3DGS-MCMC against what its formulas promise.
+// The CPU reference of 3DGS-MCMC against the properties that its formulas promise.
 #include "reference/training.h"
 
 #include <gtest/gtest.h>
