@@ -5,7 +5,6 @@
 #include <new>
 
 #include "bench/bench.h"
-#include "core/help_text.h"
 #include "core/text.h"
 #include "ewa/error.h"
 

@@ -5,15 +5,9 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
-#include <thread>
 
-#include "bench/report.h"
-#include "bench/statistics.h"
-#include "gpu/executor.h"
-#include "pipeline/forward.h"
-#include "pipeline/frame_buffers.h"
-#include "pipeline/frame_inputs.h"
-#include "pipeline/plan.h"
+#include "bench/ceiling/ceiling.h"
+#include "bench/device_runs.h"
 #include "reference/volume.h"
 #include "shared/constants.h"
 
@@ -40,22 +34,18 @@ template <class Evaluate>
 double evaluate_pixels(const std::vector<Pixel>& pixels, std::vector<glm::dvec3>& out, Evaluate evaluate) {
     out.resize(pixels.size());
     std::atomic<size_t> next{0};
-    const auto work = [&] {
+    const auto start = Clock::now();
+    on_threads(host_threads(), [&](unsigned) {
         constexpr size_t kAtOnce = 16;
         for (size_t begin; (begin = next.fetch_add(kAtOnce)) < pixels.size();)
             for (size_t i = begin; i < std::min(begin + kAtOnce, pixels.size()); ++i)
                 out[i] = evaluate(pixels[i].x + 0.5, pixels[i].y + 0.5);
-    };
-    const auto start = Clock::now();
-    std::vector<std::thread> threads;
-    for (unsigned t = 1; t < host_threads(); ++t) threads.emplace_back(work);
-    work();
-    for (std::thread& t : threads) t.join();
+    });
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
 void take_error(const std::vector<glm::dvec3>& exact, const std::vector<glm::dvec3>& actual,
-                AccuracyPoint& point) {
+                report::WorkPoint& point) {
     double sum = 0;
     for (size_t i = 0; i < exact.size(); ++i)
         for (int c = 0; c < 3; ++c) {
@@ -63,7 +53,7 @@ void take_error(const std::vector<glm::dvec3>& exact, const std::vector<glm::dve
             sum += e * e;
             point.worst = std::max(point.worst, e);
         }
-    point.rms = std::sqrt(sum / (3.0 * double(exact.size())));
+    point.error = std::sqrt(sum / (3.0 * double(exact.size())));
 }
 
 struct SplattingChoice {
@@ -74,37 +64,20 @@ struct SplattingChoice {
     uint32_t tile_height = 0;  // 0: the tile of the device
 };
 
-/// Renders the frame several times. Returns its pixels and the median time.
-AccuracyPoint splat(const std::shared_ptr<gpu::Device>& device, const Gaussians& gaussians,
-                    const Camera& camera, const RenderOptions& options, const SplattingChoice& choice,
-                    const std::vector<Pixel>& pixels, const std::vector<glm::dvec3>& exact) {
-    RenderOptions own = options;
-    own.kernel = choice.kernel;
-    own.sh_degree = choice.sh_degree;
+/// Renders the frame several times. Returns its error and the median time.
+report::WorkPoint splat(const std::shared_ptr<gpu::Device>& device, const BenchScene& scene,
+                        RenderOptions options, const SplattingChoice& choice,
+                        const std::vector<Pixel>& pixels, const std::vector<glm::dvec3>& exact) {
+    options.kernel = choice.kernel;
+    options.sh_degree = choice.sh_degree;
     passes::KernelConfig config = passes::config_for(device->limits());
     config.cut_off = float(choice.alpha_min);
     if (choice.tile_height > 0) config.tile_height = choice.tile_height;
-    passes::PassCache cache(*device, config);
-    gpu::Executor executor(*device);
-    const pipeline::Plan plan = pipeline::plan_for(
-        {.scene_degree = gaussians.sh_degree, .present_degree = sh_degree_present(gaussians), .render = own});
-    const pipeline::Model model = pipeline::upload_model(*device, gaussians, 0, false);
-    const gpu::Buffer block = pipeline::upload_camera(*device, camera, config, model.origin);
-    const pipeline::FrameInputs inputs = pipeline::inputs_of(block, camera, own);
-    pipeline::FrameBuffers frame;
-    frame.instance_capacity = pipeline::first_capacity(model.splats);
-    const auto draw = [&] {
-        pipeline::run_until_it_fits(
-            cache, executor, frame,
-            {.splats = model.splats,
-             .width = inputs.camera.width,
-             .height = inputs.camera.height,
-             .instances = frame.instance_capacity},
-            [&](gpu::Recording& recording) { record_forward(recording, cache, plan, model, frame, inputs); });
-    };
-    AccuracyPoint point;
+    FrameRun run(device, scene, false, options, config);
+    report::WorkPoint point;
     point.name = choice.name;
-    point.milliseconds = time_repeated(kRuns, draw).wall.median;
+    point.time = time_repeated(kRuns, [&] { run.run(); }).wall.median;
+    const pipeline::FrameBuffers& frame = run.frame();
     const auto planes = frame.planes.download<float>(frame.sizes.planes / 4);
     std::vector<glm::dvec3> actual;
     for (const Pixel& p : pixels) {
@@ -147,27 +120,27 @@ Accuracy measure_accuracy(const std::shared_ptr<gpu::Device>& device, const Gaus
     say(text_of("integrals along %d rays in float64, %u threads", result.pixels, result.threads));
     RenderOptions whole = options;
     whole.sh_degree = kMaxShDegree;
-    const reference::Volume volume(reference::to_double(gaussians), camera, whole);
+    const reference::Volume volume(gaussians, camera, whole);
     std::vector<glm::dvec3> exact, actual;
     result.exact_seconds =
         evaluate_pixels(pixels, exact, [&](double x, double y) { return volume.exact(x, y); });
 
     say("splatting on the device");
+    const BenchScene scene{gaussians, camera, {}};
     for (const SplattingChoice& choice : splatting_choices(gaussians, device->limits())) {
         if (result.series.empty() || result.series.back().name != choice.series)
             result.series.push_back({choice.series, choice.series == "splatting, cut-off", {}});
-        result.series.back().points.push_back(
-            splat(device, gaussians, camera, options, choice, pixels, exact));
+        result.series.back().points.push_back(splat(device, scene, options, choice, pixels, exact));
     }
     say("ray-marching on the host");
-    AccuracySeries marcher{"ray-marcher (host)", true, {}};
+    report::WorkSeries marcher{"ray-marcher (host)", true, {}};
     const double share = double(camera.width) * camera.height / double(pixels.size());
     for (int samples = 4; samples <= 1024; samples *= 2) {
-        AccuracyPoint point;
+        report::WorkPoint point;
         point.name = std::to_string(samples) + " samples";
-        point.milliseconds = 1000 * share * evaluate_pixels(pixels, actual, [&](double x, double y) {
-                                 return volume.marched(x, y, samples);
-                             });
+        point.time = 1000 * share * evaluate_pixels(pixels, actual, [&](double x, double y) {
+                         return volume.marched(x, y, samples);
+                     });
         take_error(exact, actual, point);
         marcher.points.push_back(point);
     }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Error against run time of rendering: splatting and ray-marching, compared with the integral that both
-// approximate (reference/volume.h).
+// Error against run time of splatting and ray-marching. Both approximate the integral in reference/volume.h.
 #pragma once
 #include <functional>
 #include <memory>
@@ -11,21 +10,13 @@
 #include "ewa/device.h"
 #include "ewa/gaussians.h"
 #include "ewa/render_options.h"
+#include "report/chart.h"
 
 namespace ewa::bench {
 
-struct AccuracyPoint {
-    std::string name;
-    double milliseconds = 0;  // per frame: median of the whole frame on the device, or of all host threads
-    double rms = 0, worst = 0;
-};
-struct AccuracySeries {
-    std::string name;
-    bool line = false;  // one method with increasing effort
-    std::vector<AccuracyPoint> points;
-};
 struct Accuracy {
-    std::vector<AccuracySeries> series;
+    /// RMS error against milliseconds per frame: the median of the device's whole frame, or of all host threads.
+    std::vector<report::WorkSeries> series;
     int pixels = 0;            // where the error is measured, evenly spread
     double exact_seconds = 0;  // time of computing their integrals
     unsigned threads = 0;      // of the host

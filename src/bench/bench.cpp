@@ -2,16 +2,15 @@
 #include "bench/bench.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <fstream>
+#include <functional>
 #include <nlohmann/json.hpp>
 
 #include "bench/ceiling/ceiling.h"
-#include "bench/measure.h"
-#include "bench/report.h"
-#include "bench/stability/cases.h"
+#include "bench/result.h"
 #include "bench/stability/stability.h"
-#include "core/atomic_file.h"
 #include "core/json.h"
 #include "ewa/device.h"
 #include "ewa/error.h"
@@ -41,16 +40,8 @@ int list_cases(bool stability) {
     return 0;
 }
 
-bool all_good(const Result& result) {
-    for (const CaseResult& one : result.cases)
-        for (const Check& check : one.checks)
-            if (!check.good()) return false;
-    return true;
-}
-
-void print(const std::string& text) {
-    std::fputs(text.c_str(), stdout);
-    std::fflush(stdout);  // a run takes minutes: show each case when it is done
+bool all_good(const CaseResult& result) {
+    return std::all_of(result.checks.begin(), result.checks.end(), std::mem_fn(&Check::good));
 }
 
 Result measure_all(const Options& options, const std::vector<std::string>& program) {
@@ -62,11 +53,11 @@ Result measure_all(const Options& options, const std::vector<std::string>& progr
     result.device = device_info(*device);
     print(header_text(result));
 
-    MeasureOptions measuring{options.runs, options.check, program};
+    MeasureOptions measuring{options.runs, options.check, result.host.copies, program};
     measuring.first_step_command.insert(measuring.first_step_command.end(),
                                         {"--first-step", "--device", std::to_string(result.device.index)});
     for (const Case& one : cases) {
-        result.cases.push_back(measure(device, one, measuring, result.host.copies));
+        result.cases.push_back(measure(device, one, measuring));
         print(case_text(result.cases.back()));
     }
     result.scaling = fit_scaling(result.cases);
@@ -112,9 +103,7 @@ void add_options(CLI::App& app, Options& options) {
 
 int run(const Options& options, const std::vector<std::string>& program) {
     if (options.list) return list_cases(options.stability);
-    if (options.stability)
-        return run_stability({options.cases, options.training_steps, options.device, options.json,
-                              options.scene, options.read_splats});
+    if (options.stability) return run_stability(options);
     if (!options.scene.empty()) throw InputError(options.scene.string() + ": a file needs --stability");
     if (options.first_step) return run_first_step(options.device);
     if (!options.results.empty() && options.compare.empty())
@@ -125,12 +114,11 @@ int run(const Options& options, const std::vector<std::string>& program) {
         return 0;
     }
     const Result result = measure_all(options, program);
-    const Json json = to_json(result);
-    if (!options.json.empty())
-        core::write_text_file(options.json, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+    const Json json = result;
+    if (!options.json.empty()) core::write_json(options.json, json);
     if (!options.compare.empty())
         print("\nagainst " + options.compare.string() + "\n" + compare_text(before, json));
-    return all_good(result) ? 0 : 1;
+    return std::all_of(result.cases.begin(), result.cases.end(), all_good) ? 0 : 1;
 }
 
 }  // namespace ewa::bench

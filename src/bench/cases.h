@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// The fixed set of cases. The name of a case describes it completely: results of two machines or commits are
-// compared by name.
+// The fixed set of cases and their synthetic scenes. The name of a case describes it completely: results of two
+// machines or commits are compared by name.
 #pragma once
 #include <cstdint>
 #include <string>
 #include <vector>
+
+#include "ewa/camera.h"
+#include "ewa/gaussians.h"
+#include "ewa/image.h"
 
 namespace ewa::bench {
 
@@ -33,14 +37,26 @@ struct Case {
     bool large = false;  // only with --large: takes gigabytes or many seconds on a CPU
 };
 
+const char* name_of(Kind kind);
+
 std::vector<Case> all_cases();
 
 /// Whether a name matches patterns in the form of select_cases.
 bool name_matches(const std::string& name, const std::string& patterns);
 
 /// Selects by patterns separated by commas. A pattern with * or ? must match the whole name, any other a part
-/// of it. Empty: all cases, without the large ones unless `large`. Patterns also select large cases. Throws
-/// InputError if none match.
+/// of it; large cases too. Empty: all cases, the large ones only if `large`. Throws InputError if none match.
 std::vector<Case> select_cases(const std::string& patterns, bool large);
+
+struct BenchScene {
+    Gaussians gaussians;
+    Camera camera;
+    Image image;  // RGB in 256 levels; only for cases that train
+};
+
+/// A pure function of the case, equal on all machines up to the last bits of log, cos and exp. Splats lie flat
+/// on ellipsoids before a backdrop. Their sizes are log-normal around their spacing on these surfaces. So more
+/// splats make the surfaces finer, not thicker.
+BenchScene make_scene(const Case& one);
 
 }  // namespace ewa::bench

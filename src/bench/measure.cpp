@@ -1,75 +1,73 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "bench/measure.h"
+#include <fcntl.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "bench/ceiling/ceiling.h"
-#include "bench/check.h"
 #include "bench/device_runs.h"
+#include "bench/result.h"
+#include "core/folders.h"
+#include "ewa/error.h"
+
+extern char** environ;
 
 namespace ewa::bench {
 namespace {
 
-/// Samples per pass, in order of first appearance. Times of one name within one run are added.
-class PassSamples {
-  public:
-    void add(const std::string& name, double milliseconds) { running(name) += milliseconds; }
-    void end_run() {
-        for (Samples& one : samples_) {
-            one.times.push_back(one.running);
-            one.running = 0;
-        }
-    }
-    template <class Visit>
-    void visit(Visit visit) const {
-        for (const Samples& one : samples_) visit(one.name, spread_of(one.times));
-    }
+/// Times per pass and run, in order of first appearance. Times of one name within one run are added.
+struct PassSamples {
+    std::vector<std::pair<std::string, std::vector<double>>> passes;
+    size_t runs = 0;
 
-  private:
-    struct Samples {
-        std::string name;
-        double running = 0;
-        std::vector<double> times;
-    };
-    double& running(const std::string& name) {
-        for (Samples& one : samples_)
-            if (one.name == name) return one.running;
-        return samples_.emplace_back(Samples{name, 0, {}}).running;
+    void add(const std::string& name, double milliseconds) {
+        auto found =
+            std::find_if(passes.begin(), passes.end(), [&](const auto& p) { return p.first == name; });
+        if (found == passes.end()) found = passes.insert(found, {name, {}});
+        found->second.resize(runs + 1);
+        found->second.back() += milliseconds;
     }
-    std::vector<Samples> samples_;
 };
 
-PassResult& pass_of(CaseResult& result, const std::string& name) {
-    for (PassResult& pass : result.passes)
-        if (pass.name == name) return pass;
-    result.passes.push_back({name, {}, 0, {}});
-    return result.passes.back();
+PassResult* find_pass(CaseResult& result, const std::string& name) {
+    const auto named = [&](const PassResult& pass) { return pass.name == name; };
+    const auto found = std::find_if(result.passes.begin(), result.passes.end(), named);
+    return found == result.passes.end() ? nullptr : &*found;
 }
 
-/// work() runs once; timings() returns the device's pass times of that run.
-template <class Work, class Timings>
-void time_passes(CaseResult& result, int runs, Work work, Timings timings) {
+PassResult& pass_of(CaseResult& result, const std::string& name) {
+    if (PassResult* pass = find_pass(result, name)) return *pass;
+    return result.passes.emplace_back(PassResult{name, {}, 0, {}});
+}
+
+/// Times work() and, in it, the device's passes.
+template <class Run>
+void time_passes(CaseResult& result, int runs, Run& run, void (Run::*work)()) {
     PassSamples samples;
     Stopwatch watch;
     std::vector<double> sums;
     repeat(runs, [&] {
         watch.start();
-        work();
+        (run.*work)();
         watch.stop();
-        double sum = 0;
-        for (const PassTime& time : timings()) {
+        sums.push_back(0);
+        for (const PassTime& time : run.timings()) {
             samples.add(time.pass, time.milliseconds);
-            sum += time.milliseconds;
+            sums.back() += time.milliseconds;
         }
-        samples.end_run();
-        sums.push_back(sum);
+        ++samples.runs;
     });
     result.total = watch.timed();
     result.device = spread_of(sums);
-    samples.visit(
-        [&](const std::string& name, const Spread& spread) { pass_of(result, name).time.wall = spread; });
+    for (const auto& [name, times] : samples.passes) pass_of(result, name).time.wall = spread_of(times);
 }
 
 /// The CPU time of each pass, from separate submissions.
@@ -83,16 +81,9 @@ void time_passes_apart(CaseResult& result, FrameRun& run, int runs) {
             watch.stop();
             samples.add(name, watch.timed().cpu.median);
         });
-        samples.end_run();
+        ++samples.runs;
     });
-    samples.visit(
-        [&](const std::string& name, const Spread& spread) { pass_of(result, name).time.cpu = spread; });
-}
-
-PassResult* find_pass(CaseResult& result, const std::string& name) {
-    for (PassResult& pass : result.passes)
-        if (pass.name == name) return &pass;
-    return nullptr;
+    for (const auto& [name, times] : samples.passes) pass_of(result, name).time.cpu = spread_of(times);
 }
 
 void set_ceiling(CaseResult& result, const std::string& name, const Timed& ceiling) {
@@ -154,51 +145,25 @@ void add_ceilings(CaseResult& result, const FrameRun& run, int runs) {
     set_ceiling(result, "tile order", time_sort(result.instances, tile_bits, runs));
 }
 
-void check_frame(CaseResult& result, const std::shared_ptr<gpu::Device>& device, const FrameRun& run,
-                 const BenchScene& scene) {
-    const auto add = [&](const std::vector<Check>& checks) {
-        result.checks.insert(result.checks.end(), checks.begin(), checks.end());
-    };
-    add(check_lists(run, scene));
-    if (!reference_is_feasible(result.one)) {
-        result.note = "picture and gradient not checked: the CPU reference would take minutes";
-        return;
-    }
-    add(check_picture(run, scene));
-    if (result.one.kind == Kind::train) add(check_gradient(device, scene));
-    if (result.one.kind == Kind::update) add(check_update(device, scene));
-}
-
-/// CPU time is meaningful only for a device that runs on the CPU.
-void drop_cpu_times_of_gpus(CaseResult& result, const gpu::Device& device) {
-    if (device.limits().cpu) return;
-    result.total.cpu = {};
-    for (PassResult& pass : result.passes) pass.time.cpu = {};
-}
-
 CaseResult measure_frame(const std::shared_ptr<gpu::Device>& device, const Case& one,
-                         const MeasureOptions& options, const Bandwidth& copies) {
+                         const MeasureOptions& options) {
     CaseResult result;
     result.one = one;
     const BenchScene scene = make_scene(one);
     FrameRun run(device, scene, one.kind != Kind::forward);
     run.run();
-    const auto timings = [&] { return run.timings(); };
     if (one.kind == Kind::update) {
-        time_passes(
-            result, options.runs, [&] { run.run_update(); }, timings);
+        time_passes(result, options.runs, run, &FrameRun::run_update);
         pass_of(result, "update").time.cpu = result.total.cpu;
     } else {
-        time_passes(
-            result, options.runs, [&] { run.run(); }, timings);
+        time_passes(result, options.runs, run, &FrameRun::run);
         if (device->limits().cpu) time_passes_apart(result, run, options.runs);
     }
     result.instances = run.counts().instances;
     result.device_bytes = device_bytes(*device);
-    add_bytes(result, run, copies);
+    add_bytes(result, run, options.copies);
     if (one.kind != Kind::update) add_ceilings(result, run, options.runs);
     if (options.check) check_frame(result, device, run, scene);
-    drop_cpu_times_of_gpus(result, *device);
     return result;
 }
 
@@ -208,29 +173,112 @@ CaseResult measure_sort(const std::shared_ptr<gpu::Device>& device, const Case& 
     result.one = one;
     SortRun run(device, one.splats);
     run.run();
-    time_passes(
-        result, options.runs, [&] { run.run(); }, [&] { return run.timings(); });
+    time_passes(result, options.runs, run, &SortRun::run);
     pass_of(result, "sort").time.cpu = result.total.cpu;
     result.device_bytes = device_bytes(*device);
     set_bytes(result, "sort", sort_bytes(one.splats, run.cut()));
     set_ceiling(result, "sort", time_sort(one.splats, 32, options.runs));
     if (options.check) result.checks.push_back(run.check());
-    drop_cpu_times_of_gpus(result, *device);
+    return result;
+}
+
+// The time from the start of a process to the end of its first training step. Drivers keep shader caches per
+// process, so a new process is needed.
+
+int64_t now_nanoseconds() {
+    using namespace std::chrono;
+    return duration_cast<nanoseconds>(steady_clock::now().time_since_epoch()).count();
+}
+
+/// The environment of this process with the shader caches of Mesa and NVIDIA in a folder.
+std::vector<std::string> environment_with_cache(const std::string& folder) {
+    std::vector<std::string> result;
+    for (char** entry = environ; *entry; ++entry) {
+        const std::string text = *entry;
+        if (!text.starts_with("MESA_SHADER_CACHE") && !text.starts_with("__GL_SHADER_DISK_CACHE"))
+            result.push_back(text);
+    }
+    result.push_back("MESA_SHADER_CACHE_DIR=" + folder);
+    result.push_back("__GL_SHADER_DISK_CACHE=1");
+    result.push_back("__GL_SHADER_DISK_CACHE_PATH=" + folder);
+    return result;
+}
+
+std::vector<char*> pointers(std::vector<std::string>& texts) {
+    std::vector<char*> result;
+    for (std::string& text : texts) result.push_back(text.data());
+    result.push_back(nullptr);
+    return result;
+}
+
+/// The standard output of a command. Throws RunError unless it exits with status 0.
+std::string output_of(std::vector<std::string> command, std::vector<std::string> environment) {
+    int ends[2];
+    if (pipe2(ends, O_CLOEXEC) != 0) throw RunError("cannot create a pipe");
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
+    pid_t child = 0;
+    const int failed = posix_spawn(&child, command[0].c_str(), &actions, nullptr, pointers(command).data(),
+                                   pointers(environment).data());
+    posix_spawn_file_actions_destroy(&actions);
+    close(ends[1]);
+    std::string text;
+    char piece[256];
+    for (ssize_t n = 0; !failed && (n = read(ends[0], piece, sizeof(piece))) > 0;)
+        text.append(piece, size_t(n));
+    close(ends[0]);
+    int status = 0;
+    if (failed || waitpid(child, &status, 0) != child || status != 0)
+        throw RunError("the process of the first step failed: " + command[0]);
+    return text;
+}
+
+double start_to_first_step(const std::vector<std::string>& command, const std::string& cache) {
+    const int64_t start = now_nanoseconds();
+    const int64_t end = std::strtoll(output_of(command, environment_with_cache(cache)).c_str(), nullptr, 10);
+    if (end <= start) throw RunError("the process of the first step did not print a time");
+    return double(end - start) * 1e-6;
+}
+
+/// Runs the command in a new process, first with an empty shader cache, then with the cache of that run.
+CaseResult measure_first_step(const Case& one, const MeasureOptions& options) {
+    std::vector<double> cold, warm;
+    for (int run = 0; run < (options.runs > 0 ? std::min(options.runs, 3) : 3); ++run) {
+        const core::TemporaryFolder cache("ewa-bench-");
+        cold.push_back(start_to_first_step(options.first_step_command, cache.path().string()));
+        warm.push_back(start_to_first_step(options.first_step_command, cache.path().string()));
+    }
+    CaseResult result;
+    result.one = one;
+    result.passes = {{"shader cache cold", {spread_of(cold), {}}, 0, {}},
+                     {"shader cache warm", {spread_of(warm), {}}, 0, {}}};
+    result.total = result.passes[1].time;
     return result;
 }
 
 }  // namespace
 
-CaseResult measure(const std::shared_ptr<gpu::Device>& device, const Case& one, const MeasureOptions& options,
-                   const Bandwidth& copies) {
-    switch (one.kind) {
-        case Kind::sort:
-            return measure_sort(device, one, options);
-        case Kind::first_step:
-            return measure_first_step(one, options);
-        default:
-            return measure_frame(device, one, options, copies);
+CaseResult measure(const std::shared_ptr<gpu::Device>& device, const Case& one,
+                   const MeasureOptions& options) {
+    if (one.kind == Kind::first_step) return measure_first_step(one, options);
+    CaseResult result =
+        one.kind == Kind::sort ? measure_sort(device, one, options) : measure_frame(device, one, options);
+    if (device->limits().cpu) return result;
+    // CPU time is meaningful only for a device that runs on the CPU.
+    result.total.cpu = {};
+    for (PassResult& pass : result.passes) pass.time.cpu = {};
+    return result;
+}
+
+int run_first_step(const std::string& device) {
+    for (const Case& one : all_cases()) {
+        if (one.kind != Kind::first_step) continue;
+        // The constructor runs the step.
+        const FrameRun run(open_device({.selector = device}), make_scene(one), true);
+        std::printf("%lld\n", static_cast<long long>(now_nanoseconds()));
     }
+    return 0;
 }
 
 }  // namespace ewa::bench

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The results of a benchmark run.
+// The results of a benchmark run: how they are measured and shown. bench/README.md describes the JSON.
 #pragma once
 #include <cstdint>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -65,8 +67,39 @@ struct Result {
     std::vector<Scaling> scaling;
 };
 
-/// Fits time against splats for each image size and layout with at least three cases, and against evaluated
-/// pairs for all forward cases.
+struct MeasureOptions {
+    int runs = 0;  // 0: see repeat()
+    bool check = false;
+    Bandwidth copies;                             // of the host
+    std::vector<std::string> first_step_command;  // the command that calls run_first_step() for a device
+};
+
+CaseResult measure(const std::shared_ptr<gpu::Device>& device, const Case& one,
+                   const MeasureOptions& options);
+
+/// Opens a device, uploads a scene, trains one step and prints the time of its end (steady clock, ns).
+int run_first_step(const std::string& device);
+
+/// Fits time against splats for each image size and layout with at least three cases, and
+/// against evaluated pairs.
 std::vector<Scaling> fit_scaling(const std::vector<CaseResult>& cases);
+
+using Json = nlohmann::ordered_json;
+
+void to_json(Json& json, const Result& result);
+
+std::string header_text(const Result& result);
+std::string case_text(const CaseResult& result);
+std::string scaling_text(const std::vector<Scaling>& scaling);
+
+/// The ratio of new to old times per case and pass, with the noise of both; larger changes are marked. Throws
+/// InputError if `old_results` is not a results file.
+std::string compare_text(const Json& old_results, const Json& new_results);
+
+/// printf into a string. ewa-bench links no formatting library.
+[[gnu::format(printf, 1, 2)]] std::string text_of(const char* format, ...);
+
+/// Prints on standard output at once, because a run takes minutes.
+void print(const std::string& text);
 
 }  // namespace ewa::bench

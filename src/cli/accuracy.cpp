@@ -94,12 +94,7 @@ report::WorkPrecision rendering_diagram(const std::shared_ptr<gpu::Device>& devi
     const bench::Accuracy accuracy = bench::measure_accuracy(device, gaussians, camera, options, say);
     report::WorkPrecision diagram;
     diagram.title = "Rendering: error against run time";
-    for (const bench::AccuracySeries& series : accuracy.series) {
-        report::WorkSeries out{series.name, series.line, {}};
-        for (const bench::AccuracyPoint& p : series.points)
-            out.points.push_back({p.name, p.milliseconds, p.rms, p.worst});
-        diagram.series.push_back(std::move(out));
-    }
+    diagram.series = accuracy.series;
     diagram.notes.push_back(
         fmt::format("{} splats, {}x{}, on {}. The error is measured at {} pixels against the "
                     "emission-absorption integral of the splats as 3D Gaussians, computed in float64 along "

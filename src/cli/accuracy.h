@@ -8,7 +8,7 @@
 #include "ewa/device.h"
 #include "ewa/gaussians.h"
 #include "ewa/render_options.h"
-#include "report/work_precision.h"
+#include "report/chart.h"
 
 namespace ewa::cli {
 

@@ -9,7 +9,6 @@
 
 #include "cli/command.h"
 #include "cli/interrupt.h"
-#include "core/help_text.h"
 #include "core/text.h"
 #include "ewa/error.h"
 

@@ -5,7 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "core/output.h"
+#include "core/folders.h"
+#include "core/json.h"
 #include "report/summary.h"
 
 namespace ewa::cli {

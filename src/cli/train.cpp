@@ -15,7 +15,7 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/run.h"
-#include "report/work_precision.h"
+#include "report/chart.h"
 #include "train/run_options.h"
 
 namespace ewa::cli {

@@ -52,10 +52,14 @@ void FileReader::fill(size_t n) {
     }
 }
 
-const std::byte* FileReader::take(size_t n, std::string_view what) {
+void FileReader::require_bytes(uint64_t n, std::string_view what) const {
     if (n > remaining())
         fail("the file ends inside " + std::string(what) + " (" + std::to_string(n) + " bytes needed, " +
              std::to_string(remaining()) + " left)");
+}
+
+const std::byte* FileReader::take(size_t n, std::string_view what) {
+    require_bytes(n, what);
     fill(n);
     const std::byte* bytes = buffer_.data() + begin_;
     begin_ += n;
@@ -64,9 +68,7 @@ const std::byte* FileReader::take(size_t n, std::string_view what) {
 }
 
 void FileReader::skip(uint64_t n, std::string_view what) {
-    if (n > remaining())
-        fail("the file ends inside " + std::string(what) + " (" + std::to_string(n) + " bytes needed, " +
-             std::to_string(remaining()) + " left)");
+    require_bytes(n, what);
     const size_t buffered = static_cast<size_t>(std::min<uint64_t>(n, end_ - begin_));
     begin_ += buffered;
     if (n > buffered && lseek(descriptor_, static_cast<off_t>(n - buffered), SEEK_CUR) < 0)

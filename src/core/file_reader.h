@@ -59,6 +59,7 @@ class FileReader {
     [[noreturn]] void fail(std::string_view text) const;
 
   private:
+    void require_bytes(uint64_t n, std::string_view what) const;
     void fill(size_t n);  // makes at least n bytes available in the buffer
 
     std::string name_;

@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
+#include <system_error>
 
 #include "core/text.h"
 #include "ewa/error.h"
@@ -22,6 +23,14 @@ bool is_file(const std::filesystem::path& path) {
 bool is_folder(const std::filesystem::path& path) {
     std::error_code ignored;
     return std::filesystem::is_directory(path, ignored);
+}
+
+void make_folder(const std::filesystem::path& folder) {
+    if (folder.empty()) return;
+    std::error_code error;
+    std::filesystem::create_directories(folder, error);
+    if (!error && !is_folder(folder)) error = std::make_error_code(std::errc::not_a_directory);
+    if (error) throw RunError("cannot make the folder " + folder.string() + ": " + error.message());
 }
 
 FolderLock::FolderLock(const std::filesystem::path& folder) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Folders: tests for files and folders, a lock between processes, and temporary folders.
+// Folders: tests for files and folders, creation, a lock between processes, and temporary folders.
 #pragma once
 #include <filesystem>
 #include <string>
@@ -9,6 +9,10 @@ namespace ewa::core {
 /// Whether the path is a regular file or a folder. False on any error.
 bool is_file(const std::filesystem::path& path);
 bool is_folder(const std::filesystem::path& path);
+
+/// Creates the folder and its parents. An empty path names no folder. Throws RunError if the folder cannot be
+/// created, or if the path names something else.
+void make_folder(const std::filesystem::path& folder);
 
 /// Locks a folder until the object or the process ends. Nothing is left on disk. Throws RunError if another
 /// process holds the lock. On a file system without locks, this does nothing.

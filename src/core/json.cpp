@@ -5,7 +5,9 @@
 #include <type_traits>
 #include <vector>
 
+#include "core/atomic_file.h"
 #include "core/file_reader.h"
+#include "core/folders.h"
 #include "core/text.h"
 #include "ewa/error.h"
 
@@ -153,5 +155,10 @@ template nlohmann::json parse_json(std::string_view, const std::string&, const J
 template nlohmann::ordered_json parse_json(std::string_view, const std::string&, const JsonLimits&);
 template nlohmann::json read_json_file(const std::filesystem::path&, const JsonLimits&);
 template nlohmann::ordered_json read_json_file(const std::filesystem::path&, const JsonLimits&);
+
+void write_json(const std::filesystem::path& path, const nlohmann::ordered_json& json) {
+    make_folder(path.parent_path());
+    write_text_file(path, json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+}
 
 }  // namespace ewa::core

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// JSON from untrusted sources, with limits.
+// JSON: reads it from untrusted sources with limits, and writes files.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -23,9 +23,9 @@ struct JsonLimits {
 
 /// Parses the text in one pass and without recursion. The time is linear in the length, times the logarithm
 /// of a key's lookup. The last of duplicate keys wins, as in nlohmann's parser. ordered_json compares each
-/// key with all others, so its objects are limited to 1024 keys. `name` is the file or the sender of the
-/// text. Throws InputError "name: byte N: ..." for invalid JSON, anything after the value, and an exceeded
-/// limit.
+/// key with all others, so its objects are limited to 1024 keys. `name` is the file or the sender of the text.
+/// Throws InputError "name: byte N: ..." if the JSON is invalid, continues after the value, or exceeds a limit.
+/// Json is nlohmann::json or ordered_json.
 template <class Json>
 Json parse_json(std::string_view text, const std::string& name, const JsonLimits& limits = {});
 
@@ -33,9 +33,8 @@ Json parse_json(std::string_view text, const std::string& name, const JsonLimits
 template <class Json>
 Json read_json_file(const std::filesystem::path& path, const JsonLimits& limits = {});
 
-extern template nlohmann::json parse_json(std::string_view, const std::string&, const JsonLimits&);
-extern template nlohmann::ordered_json parse_json(std::string_view, const std::string&, const JsonLimits&);
-extern template nlohmann::json read_json_file(const std::filesystem::path&, const JsonLimits&);
-extern template nlohmann::ordered_json read_json_file(const std::filesystem::path&, const JsonLimits&);
+/// Writes the value with two spaces of indentation, as write_text_file does. Creates the file's folder. Bytes
+/// that are not UTF-8 become U+FFFD. Throws RunError.
+void write_json(const std::filesystem::path& path, const nlohmann::ordered_json& json);
 
 }  // namespace ewa::core

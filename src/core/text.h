@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Text: parsing of words and numbers, and safe display of foreign text.
+// Text: parsing of words and numbers, safe display of foreign text, and help text.
 #pragma once
 #include <charconv>
 #include <cstdint>
@@ -33,6 +33,22 @@ std::optional<T> parse_integer(std::string_view word) {
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
     if (error != std::errc() || end != word.data() + word.size()) return std::nullopt;
     return value;
+}
+
+/// The help text of a command line parser for a terminal of 80 columns. Breaks lines between words, and turns
+/// "-o,--output" into "-o, --output". column: where the descriptions of options begin.
+std::string help_text(std::string_view text, size_t column);
+
+/// Makes a CLI11 parser and the sub-commands that are added later print their help in this way. A template, so
+/// that this module does not need CLI11: Formatter is CLI::Formatter.
+template <class Formatter, class App>
+void use_help_text(App& app) {
+    app.formatter_fn([](const App* shown, const std::string& name, auto mode) {
+        constexpr size_t kColumn = 30;
+        Formatter formatter;
+        formatter.column_width(kColumn);
+        return help_text(formatter.make_help(shown, name, mode), kColumn);
+    });
 }
 
 }  // namespace ewa::core

@@ -1,4 +1,132 @@
 // SPDX-License-Identifier: Apache-2.0
+// Blending: the alpha of a splat at a pixel, the list of splats of each tile, and a pixel's colour from that list.
+#pragma once
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <numeric>
+#include <span>
+#include <vector>
+
+#include "reference/projection.h"
+#include "reference/values.h"
+#include "shared/constants.h"
+
+namespace ewa::reference {
+
+/// The permutation that sorts: keys[result[0]] <= keys[result[1]] <= ..., with equal keys in their old order.
+template <class Key>
+std::vector<uint32_t> stable_order(std::span<const Key> keys) {
+    std::vector<uint32_t> order(keys.size());
+    std::iota(order.begin(), order.end(), 0u);
+    std::stable_sort(order.begin(), order.end(), [&](uint32_t i, uint32_t j) { return keys[i] < keys[j]; });
+    return order;
+}
+
+/// The indices of the visible splats, nearest first, ties by index. The key is the view depth in float32, as
+/// on the device. So depths that differ by less than a float32 step are ties on both.
+inline std::vector<uint32_t> depth_order(std::span<const Projected> projected) {
+    std::vector<uint32_t> visible;
+    std::vector<float> keys;
+    for (size_t i = 0; i < projected.size(); ++i) {
+        if (!projected[i].visible) continue;
+        visible.push_back(uint32_t(i));
+        keys.push_back(float(projected[i].z));
+    }
+    std::vector<uint32_t> order;
+    for (uint32_t rank : stable_order<float>(keys)) order.push_back(visible[rank]);
+    return order;
+}
+
+/// The exclusive prefix sum: out[i] = in[0] + ... + in[i - 1]. It has in.size() + 1 elements, the last is the total.
+inline std::vector<uint64_t> exclusive_scan(std::span<const uint32_t> counts) {
+    std::vector<uint64_t> sums(counts.size() + 1, 0);
+    for (size_t i = 0; i < counts.size(); ++i) sums[i + 1] = sums[i] + counts[i];
+    return sums;
+}
+
+// The alpha of a splat at a pixel:
+//   d = pixel centre - mean2d
+//   u = (c d.x - b d.y) / sqrt(c det),  v = d.y / sqrt(c),  power = -(u^2 + v^2) / 2
+//   raw alpha = opacity exp(power),  alpha = min(ALPHA_MAX, raw), 0 below ALPHA_MIN
+//
+// (u, v) = L d, where L is the Cholesky factor of the inverse covariance L^T L. So the power equals the
+// quadratic form of Kerbl et al. 2023, eq. 4, but as a sum of squares it cannot cancel.
+
+/// The cut of alpha at ALPHA_MIN. The model's hard cut makes an image jump as a splat moves, which a central
+/// difference cannot distinguish from a gradient. The other two are for such tests.
+enum class AlphaCut {
+    hard,  // 0 below ALPHA_MIN
+    ramp,  // times a C1 step from 0 at ALPHA_MIN to 1 at 2 ALPHA_MIN
+    none,  // 0 below 1e-18
+};
+
+struct Smoothing {
+    AlphaCut cut = AlphaCut::hard;
+    bool transmittance_stop = true;  // blending stops at TRANSMITTANCE_STOP
+};
+
+/// The smallest raw alpha of a contribution.
+double alpha_floor(const Smoothing& smoothing);
+
+struct Alpha {
+    bool kept = false;
+    double value = 0;
+    double slope = 0;  // d value / d raw: zero where the clamp to ALPHA_MAX is active
+};
+Alpha alpha_of(double raw, const Smoothing& smoothing);
+
+/// L = [ux uy; 0 vy].
+struct Whitener {
+    double ux = 0, uy = 0, vy = 0;
+};
+Whitener whitener(const Projected& splat);
+
+struct Sample {
+    double u = 0, v = 0;
+    double raw = 0;  // raw alpha
+};
+inline glm::dvec2 pixel_centre(int x, int y) {
+    return {x + 0.5, y + 0.5};
+}
+Sample sample(const Projected& splat, const Whitener& whitener, const glm::dvec2& pixel);
+
+// Tiles list a splat if at least one of their pixel centres has a raw alpha of ALPHA_MIN or more. A shorter
+// list would change the image, and a longer one would only cost time. The tiles are found by testing the pixels
+// in the footprint's box: |d.x| <= r sqrt(a), |d.y| <= r sqrt(c), r = sqrt(2 ln(opacity / ALPHA_MIN)).
+
+struct TileGrid {
+    int image_width = 0, image_height = 0;  // px
+    int tile_width = 16, tile_height = 16;  // px; the last column and row may exceed the image
+
+    int columns() const { return (image_width + tile_width - 1) / tile_width; }
+    int rows() const { return (image_height + tile_height - 1) / tile_height; }
+    uint32_t count() const { return uint32_t(columns() * rows()); }
+    uint32_t tile_of(int x, int y) const { return uint32_t((y / tile_height) * columns() + x / tile_width); }
+};
+
+/// The tiles of a splat in ascending order, row by row. Empty if the splat is invisible or outside the image.
+std::vector<uint32_t> covered_tiles(const Projected& splat, const TileGrid& grid,
+                                    const Smoothing& smoothing = {});
+
+struct Instance {
+    uint32_t tile = 0, splat = 0;
+    bool operator==(const Instance&) const = default;
+};
+
+struct Instances {
+    TileGrid grid;
+    std::vector<uint64_t> first_of_rank;  // first instance of each splat before the sort, in depth order
+    std::vector<Instance> sorted;         // by tile, front to back within a tile
+    std::vector<uint64_t> first_of_tile;  // count() + 1 bounds into sorted
+};
+
+/// `order` is depth_order's result.
+Instances make_instances(std::span<const Projected> projected, std::span<const uint32_t> order,
+                         const TileGrid& grid, const Smoothing& smoothing = {});
+
 // Front-to-back compositing of each pixel over its tile's list (Kerbl et al. 2023, eq. 3):
 //   colour = sum_i c_i alpha_i T_i + T background,  T_i = prod_{j < i} (1 - alpha_j)
 //   depth  = sum_i z_i alpha_i T_i
@@ -6,18 +134,6 @@
 // ALPHA_MAX)^2, which equals TRANSMITTANCE_STOP, so the second is skipped: 0.01 of its colour. Float32 has
 // this result, as T * (1 - alpha). In float64, the product rounds to slightly above, hence kStopMargin.
 #pragma once
-#include <array>
-#include <cstdint>
-#include <glm/vec2.hpp>
-#include <glm/vec3.hpp>
-#include <span>
-#include <vector>
-
-#include "reference/instances.h"
-#include "reference/values.h"
-#include "shared/constants.h"
-
-namespace ewa::reference {
 
 struct Blended {
     Raster color;                     // RGB with background, not clamped
@@ -79,7 +195,7 @@ std::vector<Whitener> whiteners_of(std::span<const Projected> projected);
 //   g           = dL/dpower = dL/dalpha alpha                  zero where alpha is clamped at ALPHA_MAX
 // S comes from front-to-back prefixes, so T is never divided out.
 //
-// With w = (u, v)^T = L d (see instances.h), the power -w.w/2 has
+// With w = (u, v)^T = L d, the power -w.w/2 has
 //   dpower/dmean2d = L^T w,  dpower/dSigma = L^T w w^T L / 2,  dpower/dopacity = 1 / opacity
 // So a splat's gradient needs only the moments of g over its pixels, which add up over tiles:
 //   dL/dmean2d = L^T (Su, Sv),  dL/dSigma = L^T [Suu Suv; Suv Svv] L / 2,  dL/dopacity = S0 / opacity
@@ -99,17 +215,15 @@ struct BlendGradients {
     std::vector<ScreenGradient> splats;  // per splat; its tiles are added in ascending order
 };
 
-/// `blended` is blend()'s result for the same arguments, `picture_gradient` is dL/dcolour of each pixel
-/// (RGB).
+/// `blended` is blend()'s result for the same arguments, `picture_gradient` is dL/d(RGB) of each pixel.
 BlendGradients blend_backward(std::span<const Projected> projected, const Instances& instances,
                               const Blended& blended, const Raster& picture_gradient,
                               const Smoothing& smoothing = {});
 
 /// Renders splats as solids. A pixel shows the nearest splat, by its mean's depth, with an opacity of at
 /// least ELLIPSOID_OPACITY whose ellipse contains the pixel. The ellipse has ELLIPSOID_REACH standard
-/// deviations, including the low-pass. With the distance d in standard deviations, the colour is multiplied
-/// by ELLIPSOID_RIM + (1 - ELLIPSOID_RIM) sqrt(1 - (d / reach)^2), a sphere lit from the eye. The result is
-/// RGB.
+/// deviations, including the low-pass. With the distance d in standard deviations, the RGB colour is multiplied
+/// by ELLIPSOID_RIM + (1 - ELLIPSOID_RIM) sqrt(1 - (d / reach)^2), a sphere lit from the eye.
 Raster ellipsoids(std::span<const Projected> projected, const Instances& instances,
                   const std::array<float, 3>& background);
 

@@ -166,14 +166,6 @@ Projected project(const Splat& splat, const Camera& camera, const RenderOptions&
     return out;
 }
 
-Projected project(const Gaussians& gaussians, size_t i, const Camera& camera, const RenderOptions& options) {
-    return project(read_splat(gaussians, i), camera, options);
-}
-
-Projected project(const Values& values, size_t i, const Camera& camera, const RenderOptions& options) {
-    return project(read_splat(values, i), camera, options);
-}
-
 namespace {
 
 /// dL/ddet0 and dL/dtrace given dL/dfactor, where det = det0 + LOW_PASS * trace + LOW_PASS^2.
@@ -182,20 +174,11 @@ struct DetGradient {
 };
 
 DetGradient kernel_backward(Footprint kernel, const ProjectionSteps& s, double det, double by_factor) {
-    switch (kernel) {
-        case Footprint::peak:
-            return {};
-        case Footprint::antialias: {
-            // sqrt(det0 / det). det0 > 0, because otherwise the factor is zero and the splat invisible.
-            const double by_det = -0.5 * s.kernel_factor / det;
-            return {by_factor * (0.5 / std::sqrt(s.det0 * det) + by_det), by_factor * by_det * LOW_PASS};
-        }
-        case Footprint::unit_mass: {
-            const double by_det = -0.5 * s.kernel_factor / det;
-            return {by_factor * by_det, by_factor * by_det * LOW_PASS};
-        }
-    }
-    return {};
+    if (kernel == Footprint::peak) return {};
+    const double by_det = -0.5 * s.kernel_factor / det;
+    // Antialias is sqrt(det0 / det). det0 > 0, because otherwise the factor is zero and the splat invisible.
+    const double direct = kernel == Footprint::antialias ? 0.5 / std::sqrt(s.det0 * det) : 0;
+    return {by_factor * (direct + by_det), by_factor * by_det * LOW_PASS};
 }
 
 Rows m_gradient(const ProjectionSteps& s, const ScreenGradient& g, const DetGradient& det) {

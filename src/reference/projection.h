@@ -73,8 +73,11 @@ struct ProjectionSteps {
 /// `steps` is set if it is given and the splat is visible.
 Projected project(const Splat& splat, const Camera& camera, const RenderOptions& options,
                   ProjectionSteps* steps = nullptr);
-Projected project(const Gaussians& gaussians, size_t i, const Camera& camera, const RenderOptions& options);
-Projected project(const Values& values, size_t i, const Camera& camera, const RenderOptions& options);
+/// The same for splat i of Gaussians or Values.
+template <class Scene>
+Projected project(const Scene& scene, size_t i, const Camera& camera, const RenderOptions& options) {
+    return project(read_splat(scene, i), camera, options);
+}
 
 /// The columns are the rotated axes. The quaternion (w x y z) must have unit norm.
 glm::dmat3 rotation_matrix(const std::array<double, 4>& unit_quaternion);

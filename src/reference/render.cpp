@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "reference/render.h"
 
+#include "reference/blend.h"
 #include "reference/projection.h"
-#include "reference/sort.h"
 
 namespace ewa::reference {
 
@@ -18,11 +18,6 @@ Picture render(const Values& values, const Camera& camera, const RenderOptions& 
     out.instances = make_instances(out.projected, out.order, grid, reference.smoothing);
     out.blended = blend(out.projected, out.instances, options.background, reference.smoothing);
     return out;
-}
-
-Picture render(const Gaussians& gaussians, const Camera& camera, const RenderOptions& options,
-               const ReferenceOptions& reference) {
-    return render(to_double(gaussians), camera, options, reference);
 }
 
 ReferenceGradient loss_gradient(const Values& values, const Camera& camera, const Image& target,
@@ -43,11 +38,6 @@ ReferenceGradient loss_gradient(const Values& values, const Camera& camera, cons
     out.in_view.assign(values.size(), 0);
     for (const Instance& instance : out.picture.instances.sorted) out.in_view[instance.splat] = 1;
     return out;
-}
-
-ReferenceGradient loss_gradient(const Gaussians& gaussians, const Camera& camera, const Image& target,
-                                const RenderOptions& options, const ReferenceOptions& reference) {
-    return loss_gradient(to_double(gaussians), camera, target, options, reference);
 }
 
 }  // namespace ewa::reference

@@ -5,11 +5,9 @@
 #include <vector>
 
 #include "ewa/camera.h"
-#include "ewa/gaussians.h"
 #include "ewa/image.h"
 #include "ewa/render_options.h"
 #include "reference/blend.h"
-#include "reference/instances.h"
 #include "reference/loss.h"
 #include "reference/values.h"
 
@@ -31,8 +29,6 @@ struct Picture {
 
 Picture render(const Values& values, const Camera& camera, const RenderOptions& options,
                const ReferenceOptions& reference = {});
-Picture render(const Gaussians& gaussians, const Camera& camera, const RenderOptions& options,
-               const ReferenceOptions& reference = {});
 
 struct ReferenceGradient {
     double loss = 0, l1 = 0, ssim = 0;
@@ -45,8 +41,6 @@ struct ReferenceGradient {
 
 /// `target` is RGB of the camera's size. Further channels are ignored.
 ReferenceGradient loss_gradient(const Values& values, const Camera& camera, const Image& target,
-                                const RenderOptions& options, const ReferenceOptions& reference = {});
-ReferenceGradient loss_gradient(const Gaussians& gaussians, const Camera& camera, const Image& target,
                                 const RenderOptions& options, const ReferenceOptions& reference = {});
 
 }  // namespace ewa::reference

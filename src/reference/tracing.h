@@ -21,8 +21,7 @@ struct Hit {
     glm::dvec2 barycentric{0.0};  // weights of corners 1 and 2
 };
 
-/// The intersection of the ray and the triangle (Moeller and Trumbore 1997), from either side, including the
-/// edges.
+/// The intersection of a ray and a triangle, from either side, edges included (Moeller and Trumbore 1997).
 std::optional<Hit> meet(const Ray& ray, const pathtracer::DeviceTriangle& triangle);
 
 /// The nearest hit, by testing every triangle.

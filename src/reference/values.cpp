@@ -13,16 +13,14 @@ void Values::resize(size_t n) {
     sh.resize(n * sh_stride());
 }
 
-Values to_double(const Gaussians& gaussians) {
-    Values values;
-    values.sh_degree = gaussians.sh_degree;
-    values.means.assign(gaussians.means.begin(), gaussians.means.end());
-    for (size_t i = 0; i < values.means.size(); ++i) values.means[i] += gaussians.origin[int(i % 3)];
-    values.quaternions.assign(gaussians.quaternions.begin(), gaussians.quaternions.end());
-    values.log_scales.assign(gaussians.log_scales.begin(), gaussians.log_scales.end());
-    values.opacity_logits.assign(gaussians.opacity_logits.begin(), gaussians.opacity_logits.end());
-    values.sh.assign(gaussians.sh.begin(), gaussians.sh.end());
-    return values;
+Values::Values(const Gaussians& g)
+    : sh_degree(g.sh_degree),
+      means(g.means.begin(), g.means.end()),
+      quaternions(g.quaternions.begin(), g.quaternions.end()),
+      log_scales(g.log_scales.begin(), g.log_scales.end()),
+      opacity_logits(g.opacity_logits.begin(), g.opacity_logits.end()),
+      sh(g.sh.begin(), g.sh.end()) {
+    for (size_t i = 0; i < means.size(); ++i) means[i] += g.origin[int(i % 3)];
 }
 
 Values zeros_like(const Values& values) {

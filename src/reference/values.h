@@ -18,6 +18,8 @@ struct Values {
     int sh_degree = 0;
     std::vector<double> means, quaternions, log_scales, opacity_logits, sh;
 
+    Values() = default;
+    Values(const Gaussians& gaussians);  // with means in world coordinates
     size_t size() const { return opacity_logits.size(); }
     size_t sh_stride() const { return size_t(sh_coefficients(sh_degree)) * 3; }
     void resize(size_t n);
@@ -33,7 +35,6 @@ struct Splat {
     std::array<glm::dvec3, kMaxCoefficients> sh{};  // RGB per coefficient; zero above sh_degree
 };
 
-Values to_double(const Gaussians& gaussians);
 Values zeros_like(const Values& values);
 
 Splat read_splat(const Gaussians& gaussians, size_t i);

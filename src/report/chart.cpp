@@ -5,22 +5,54 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 namespace ewa::report {
 namespace {
 
-// Units of the drawing; the page scales it.
-constexpr double kWidth = 400, kHeight = 240;
-constexpr double kLeft = 48, kRight = 16, kTop = 12, kBottom = 44;
+/// One axis of a diagram: linear, or in powers of ten.
+struct Axis {
+    bool logarithmic = false;
+    double low = 0, high = 1, tick = 1;  // of a logarithmic axis: exponents
 
-/// A tick distance of 1, 2 or 5 times a power of ten that gives about `wanted` ticks.
-Axis make_axis(double low, double high, int wanted, bool round_out) {
+    double place(double value) const { return logarithmic ? std::log10(value) : value; }
+    /// The position of a value: 0 at the start of the axis, 1 at its end.
+    double share(double value) const { return (place(value) - low) / (high - low); }
+    std::vector<double> ticks() const {
+        std::vector<double> at;
+        for (double i = std::ceil(low / tick - 1e-9); i * tick <= high + 1e-9 * tick; ++i)
+            at.push_back(logarithmic ? std::pow(10, i * tick) : i * tick);
+        return at;
+    }
+};
+
+/// A drawing and its margins, in units that the page scales.
+struct Drawing {
+    double width, height, left, right, top, bottom;
+};
+constexpr Drawing kChart{400, 240, 48, 16, 12, 44}, kWork{720, 420, 64, 190, 36, 52};
+
+/// The axes of a diagram.
+struct Axes {
+    Drawing drawing;
+    Axis x, y;
+
+    double px(double v) const {
+        return drawing.left + x.share(v) * (drawing.width - drawing.left - drawing.right);
+    }
+    double py(double v) const {
+        return drawing.height - drawing.bottom - y.share(v) * (drawing.height - drawing.top - drawing.bottom);
+    }
+};
+
+/// A tick distance of 1, 2 or 5 times a power of ten that gives about 4 ticks.
+Axis make_axis(double low, double high, bool round_out) {
     if (!(high > low)) {
         const double margin = low == 0 ? 1 : std::abs(low) * 0.05;
         low -= margin;
         high += margin;
     }
-    const double raw = (high - low) / wanted;
+    const double raw = (high - low) / 4;
     const double power = std::pow(10, std::floor(std::log10(raw)));
     const double share = raw / power;
     Axis axis;
@@ -37,24 +69,24 @@ std::string polyline(const Axes& axes, const std::vector<ChartPoint>& points, co
     return fmt::format("<polyline class=\"{}\" points=\"{}\"/>\n", css, path);
 }
 
-std::string grid(const Axes& axes, const Chart& chart) {
+std::string chart_grid(const Axes& axes, const Chart& chart) {
     std::string svg;
-    const double bottom = kHeight - kBottom;
+    const double left = kChart.left, right = kChart.width - kChart.right;
+    const double bottom = kChart.height - kChart.bottom;
     for (double v : axes.y.ticks())
         svg += fmt::format(
             "<line class=\"grid\" x1=\"{0}\" x2=\"{1}\" y1=\"{2:.1f}\" y2=\"{2:.1f}\"/>"
             "<text class=\"tick\" text-anchor=\"end\" x=\"{3}\" y=\"{4:.1f}\">{5}</text>\n",
-            kLeft, kWidth - kRight, axes.py(v), kLeft - 6, axes.py(v) + 4, short_number(v, 4));
+            left, right, axes.py(v), left - 6, axes.py(v) + 4, short_number(v, 4));
     for (double v : axes.x.ticks())
         svg += fmt::format(
             "<line class=\"axis\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1}\" y2=\"{2}\"/>"
             "<text class=\"tick\" text-anchor=\"middle\" x=\"{0:.1f}\" y=\"{3}\">{4}</text>\n",
             axes.px(v), bottom, bottom + 4, bottom + 17, short_number(v, 4));
-    svg += fmt::format("<line class=\"axis\" x1=\"{0}\" x2=\"{1}\" y1=\"{2}\" y2=\"{2}\"/>\n", kLeft,
-                       kWidth - kRight, bottom);
-    svg += fmt::format("<text class=\"label\" text-anchor=\"middle\" x=\"{}\" y=\"{}\">{}</text>\n",
-                       (kLeft + kWidth - kRight) / 2, kHeight - 6, escape_html(chart.x_label));
-    return svg;
+    svg += fmt::format("<line class=\"axis\" x1=\"{0}\" x2=\"{1}\" y1=\"{2}\" y2=\"{2}\"/>\n", left, right,
+                       bottom);
+    return svg + fmt::format("<text class=\"label\" text-anchor=\"middle\" x=\"{}\" y=\"{}\">{}</text>\n",
+                             (left + right) / 2, kChart.height - 6, escape_html(chart.x_label));
 }
 
 /// The mean over a centred window of a tenth of the points: losses differ much between views.
@@ -70,42 +102,87 @@ std::vector<ChartPoint> running_mean(const std::vector<ChartPoint>& points) {
     return mean;
 }
 
+// Distinct for readers who cannot tell red from green (Okabe and Ito 2008).
+constexpr const char* kColors[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
+                                   "#e69f00", "#56b4e9", "#8c6d31"};
+
+bool shown(const WorkPoint& p) {
+    return std::isfinite(p.time) && std::isfinite(p.error) && p.time > 0 && p.error > 0;
+}
+
+/// An axis from whole step to whole step around the values, at least one step long.
+Axis whole_steps(const std::vector<double>& values, Axis axis) {
+    const auto [least, most] = std::minmax_element(values.begin(), values.end());
+    axis.low = axis.tick * std::floor(axis.place(*least) / axis.tick);
+    axis.high = axis.tick * std::ceil(axis.place(*most) / axis.tick);
+    if (axis.high == axis.low) axis.high += axis.tick;
+    return axis;
+}
+
+std::string work_grid(const Axes& axes, const WorkPrecision& diagram) {
+    const double left = kWork.left, right = kWork.width - kWork.right;
+    const double top = kWork.top, bottom = kWork.height - kWork.bottom;
+    std::string svg = fmt::format("<text x=\"{}\" y=\"20\" font-weight=\"600\" font-size=\"15\">{}</text>\n",
+                                  left, escape_html(diagram.title));
+    const auto line = [](double x1, double y1, double x2, double y2) {
+        return fmt::format(
+            "<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"#8a8f94\" "
+            "stroke-opacity=\"0.4\"/>",
+            x1, y1, x2, y2);
+    };
+    for (const double tick : axes.x.ticks()) {
+        const double x = axes.px(tick);
+        svg += line(x, top, x, bottom) +
+               fmt::format("<text x=\"{:.1f}\" y=\"{}\" text-anchor=\"middle\">{:g}</text>\n", x, bottom + 18,
+                           tick);
+    }
+    for (const double tick : axes.y.ticks()) {
+        const double y = axes.py(tick);
+        svg += line(left, y, right, y) +
+               fmt::format("<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"end\">{:g}</text>\n", left - 6, y + 4,
+                           tick);
+    }
+    return svg + fmt::format(
+                     "<text x=\"{}\" y=\"{}\" text-anchor=\"middle\">{}</text>\n"
+                     "<text transform=\"translate(16 {}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
+                     (left + right) / 2, kWork.height - 10, escape_html(diagram.x_label), (top + bottom) / 2,
+                     escape_html(diagram.y_label));
+}
+
+std::string series_svg(const Axes& axes, const WorkSeries& series, size_t number) {
+    const char* color = kColors[number % std::size(kColors)];
+    std::string path, dots;
+    for (const WorkPoint& p : series.points) {
+        if (!shown(p)) continue;
+        const double x = axes.px(p.time), y = axes.py(p.error);
+        path += fmt::format("{:.1f},{:.1f} ", x, y);
+        dots += fmt::format(
+            "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"4\" fill=\"{}\"><title>{}: {:.3g}, {:.3g}</title>"
+            "</circle>\n",
+            x, y, color, escape_html(series.name + ", " + p.name), p.time, p.error);
+    }
+    std::string svg;
+    if (series.line)
+        svg += fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"2\"/>\n", path,
+                           color);
+    const double x = kWork.width - kWork.right, y = kWork.top + 14 + 22 * double(number);
+    return svg + dots +
+           fmt::format("<circle cx=\"{}\" cy=\"{}\" r=\"4\" fill=\"{}\"/><text x=\"{}\" y=\"{}\">{}</text>\n",
+                       x + 18, y - 4, color, x + 28, y, escape_html(series.name));
+}
+
 }  // namespace
 
-double Axis::place(double value) const {
-    return logarithmic ? std::log10(value) : value;
-}
-
-std::vector<double> Axis::ticks() const {
-    std::vector<double> at;
-    for (double i = std::ceil(low / tick - 1e-9); i * tick <= high + 1e-9 * tick; ++i)
-        at.push_back(logarithmic ? std::pow(10, i * tick) : i * tick);
-    return at;
-}
-
 std::string escape_html(std::string_view text) {
+    constexpr std::string_view kSpecial = "&<>\"'";
+    constexpr const char* kEscaped[] = {"&amp;", "&lt;", "&gt;", "&quot;", "&#39;"};
     std::string out;
-    out.reserve(text.size());
     for (const char c : text) {
-        switch (c) {
-            case '&':
-                out += "&amp;";
-                break;
-            case '<':
-                out += "&lt;";
-                break;
-            case '>':
-                out += "&gt;";
-                break;
-            case '"':
-                out += "&quot;";
-                break;
-            case '\'':
-                out += "&#39;";
-                break;
-            default:
-                if (static_cast<unsigned char>(c) >= 0x20 || c == '\n' || c == '\t') out += c;
-        }
+        const size_t special = kSpecial.find(c);
+        if (special != std::string_view::npos)
+            out += kEscaped[special];
+        else if (static_cast<unsigned char>(c) >= 0x20 || c == '\n' || c == '\t')
+            out += c;
     }
     return out;
 }
@@ -114,10 +191,7 @@ std::string short_number(double value, int digits) {
     if (!std::isfinite(value)) return std::isnan(value) ? "n/a" : value > 0 ? "∞" : "-∞";
     static constexpr const char* kSuffix[] = {"", "k", "M", "G", "T"};
     int thousands = 0;
-    while (std::abs(value) >= 1000 && thousands < 4) {
-        value /= 1000;
-        ++thousands;
-    }
+    for (; std::abs(value) >= 1000 && thousands < 4; ++thousands) value /= 1000;
     return fmt::format("{:.{}g}{}", value == 0 ? 0.0 : value, digits, kSuffix[thousands]);
 }
 
@@ -129,17 +203,15 @@ std::string chart_svg(const Chart& chart) {
 
     const auto [low, high] =
         std::minmax_element(points.begin(), points.end(), [](auto& a, auto& b) { return a.y < b.y; });
-    Axes axes{{}, {}, kWidth, kHeight, kLeft, kRight, kTop, kBottom};
-    axes.x = make_axis(std::min(0.0, points.front().x), points.back().x, 4, false);
-    axes.y = make_axis(chart.zero_based ? std::min(0.0, low->y) : low->y, high->y, 4, true);
-
+    const Axes axes{kChart, make_axis(std::min(0.0, points.front().x), points.back().x, false),
+                    make_axis(chart.zero_based ? std::min(0.0, low->y) : low->y, high->y, true)};
     std::string svg = fmt::format(
-        "<figure class=\"chart\"><figcaption>{}{}</figcaption>\n"
-        "<svg viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">\n",
+        "<figure class=\"chart\"><figcaption>{0}{1}</figcaption>\n"
+        "<svg viewBox=\"0 0 {2} {3}\" role=\"img\" aria-label=\"{0}\">\n",
         escape_html(chart.title),
-        chart.y_label.empty() ? "" : " <span>" + escape_html(chart.y_label) + "</span>", kWidth, kHeight,
-        escape_html(chart.title));
-    svg += grid(axes, chart);
+        chart.y_label.empty() ? "" : " <span>" + escape_html(chart.y_label) + "</span>", kChart.width,
+        kChart.height);
+    svg += chart_grid(axes, chart);
     svg += polyline(axes, points, chart.smooth ? "raw" : "line");
     if (chart.smooth) svg += polyline(axes, running_mean(points), "line");
     if (points.size() <= 30 && !chart.smooth)
@@ -147,6 +219,60 @@ std::string chart_svg(const Chart& chart) {
             svg += fmt::format("<circle class=\"dot\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3\"/>", axes.px(p.x),
                                axes.py(p.y));
     return svg + "</svg></figure>\n";
+}
+
+std::string work_precision_svg(const WorkPrecision& diagram) {
+    std::vector<double> times, errors;
+    for (const WorkSeries& series : diagram.series)
+        for (const WorkPoint& p : series.points) {
+            if (!shown(p)) continue;
+            times.push_back(p.time);
+            errors.push_back(p.error);
+        }
+    if (times.size() < 2) return "";
+    const Axis powers{true, 0, 1, 1}, decibels{false, 0, 1, 2};
+    const Axes axes{kWork, whole_steps(times, powers),
+                    whole_steps(errors, diagram.decibels ? decibels : powers)};
+    std::string svg = fmt::format(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" "
+        "role=\"img\" aria-label=\"{2}\" font-family=\"system-ui, DejaVu Sans, sans-serif\" font-size=\"12\" "
+        "fill=\"#70777d\">\n",
+        kWork.width, kWork.height, escape_html(diagram.title));
+    svg += work_grid(axes, diagram);
+    for (size_t i = 0; i < diagram.series.size(); ++i) svg += series_svg(axes, diagram.series[i], i);
+    return svg + "</svg>\n";
+}
+
+std::string work_precision_html(const WorkPrecision& diagram) {
+    const std::string svg = work_precision_svg(diagram);
+    if (svg.empty()) return "";
+    std::string html = "<h2>Error against run time</h2>\n" + svg;
+    for (const std::string& note : diagram.notes) html += "<p class=\"soft\">" + escape_html(note) + "</p>\n";
+    html += fmt::format(
+        "<table><tr><th>method</th><th></th><th class=\"number\">{}</th><th class=\"number\">{}</th>"
+        "<th class=\"number\">worst</th></tr>\n",
+        escape_html(diagram.x_label), escape_html(diagram.y_label));
+    for (const WorkSeries& series : diagram.series)
+        for (const WorkPoint& p : series.points)
+            html += fmt::format(
+                "<tr><td>{}</td><td>{}</td><td class=\"number\">{:.3g}</td><td class=\"number\">{:.2e}</td>"
+                "<td class=\"number\">{:.2e}</td></tr>\n",
+                escape_html(series.name), escape_html(p.name), p.time, p.error, p.worst);
+    return html + "</table>\n";
+}
+
+nlohmann::ordered_json work_precision_json(const WorkPrecision& diagram) {
+    nlohmann::ordered_json json{
+        {"schema", "ewa-work-precision-1"}, {"title", diagram.title},
+        {"time", diagram.x_label},          {"error", diagram.y_label},
+        {"notes", diagram.notes},           {"series", nlohmann::ordered_json::array()}};
+    for (const WorkSeries& series : diagram.series) {
+        nlohmann::ordered_json points = nlohmann::ordered_json::array();
+        for (const WorkPoint& p : series.points)
+            points.push_back({{"name", p.name}, {"time", p.time}, {"error", p.error}, {"worst", p.worst}});
+        json["series"].push_back({{"name", series.name}, {"points", points}});
+    }
+    return json;
 }
 
 }  // namespace ewa::report

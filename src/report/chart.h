@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Line charts as inline SVG in the colours of the page around them, and the axes that all diagrams use.
+// Diagrams as inline SVG: line charts in the colours of the page around them, and error against run time, which
+// compares methods of different cost.
 #pragma once
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,26 +14,6 @@ std::string escape_html(std::string_view text);
 
 /// A number with at most `digits` significant digits, and k, M, G above a thousand.
 std::string short_number(double value, int digits = 3);
-
-/// One axis of a diagram: linear, or in powers of ten.
-struct Axis {
-    bool logarithmic = false;
-    double low = 0, high = 1, tick = 1;  // of a logarithmic axis: exponents
-
-    /// The position of a value: 0 at the start of the axis, 1 at its end.
-    double share(double value) const { return (place(value) - low) / (high - low); }
-    std::vector<double> ticks() const;
-    double place(double value) const;
-};
-
-/// The axes of a diagram, and the rectangle that they span in a drawing of this size.
-struct Axes {
-    Axis x, y;
-    double width = 0, height = 0, left = 0, right = 0, top = 0, bottom = 0;  // margins
-
-    double px(double v) const { return left + x.share(v) * (width - left - right); }
-    double py(double v) const { return height - bottom - y.share(v) * (height - top - bottom); }
-};
 
 struct ChartPoint {
     double x = 0, y = 0;
@@ -46,5 +28,34 @@ struct Chart {
 
 /// A <figure> with one chart; empty if fewer than two points are finite.
 std::string chart_svg(const Chart& chart);
+
+struct WorkPoint {
+    std::string name;  // e.g. "16 samples"
+    double time = 0;   // in the unit of x_label
+    double error = 0;  // in the unit of y_label
+    double worst = 0;  // the largest error of a pixel; 0: unknown
+};
+
+struct WorkSeries {
+    std::string name;   // e.g. "ray-marcher"
+    bool line = false;  // connect the points: one method with increasing effort
+    std::vector<WorkPoint> points;
+};
+
+struct WorkPrecision {
+    std::string title, x_label = "ms a frame", y_label = "RMS error";
+    bool decibels = false;           // the error is a PSNR on a linear axis; else both axes are logarithmic
+    std::vector<std::string> notes;  // one line each: what was measured, and how
+    std::vector<WorkSeries> series;
+};
+
+/// An SVG file with colours for light and dark pages; each point shows its name under the pointer. Points
+/// whose time or error is not positive and finite are skipped. Empty if fewer than two points remain.
+std::string work_precision_svg(const WorkPrecision& diagram);
+
+/// The diagram with its notes and a table of its points, for the report.
+std::string work_precision_html(const WorkPrecision& diagram);
+
+nlohmann::ordered_json work_precision_json(const WorkPrecision& diagram);
 
 }  // namespace ewa::report

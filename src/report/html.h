@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 // The report of a training run: one self-contained HTML file.
 #pragma once
-#include <cstdint>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "ewa/image.h"
+#include "ewa/plan.h"
 #include "report/summary.h"
 
 namespace ewa::report {
 
 struct ReportPicture {
     std::string name;
-    Image photograph, rendering;  // RGB, of equal size
+    Image original, rendering;  // RGB, of equal size
     double psnr = 0, ssim = 0;
 };
 
@@ -22,17 +22,12 @@ struct NamedTime {
     double milliseconds = 0;
 };
 
-struct LeftOut {
-    std::string what, why;
-    uint64_t bytes_saved = 0;
-};
-
 struct ReportData {
     std::string title;  // the dataset's name
     Summary summary;
     std::vector<MetricsLine> metrics;
     std::vector<NamedTime> pass_times;  // of one step, in order
-    std::vector<LeftOut> plan;
+    std::vector<PlanLine> plan;
     std::vector<std::string> remarks;                           // e.g. "3 images are missing"
     std::vector<std::pair<std::string, std::string>> settings;  // name, value
     std::vector<ReportPicture> pictures;
@@ -42,5 +37,8 @@ struct ReportData {
 
 /// Escapes every string but `section`. A part without data is skipped.
 std::string html_report(const ReportData& data);
+
+/// A page in the style of the report. Escapes the title; `body` is HTML.
+std::string html_page(const std::string& title, const std::string& body);
 
 }  // namespace ewa::report

@@ -25,36 +25,33 @@ Json figure(double value) {
 }  // namespace
 
 Json to_json(const Summary& s) {
-    Json json;
-    json["steps"] = s.steps;
-    json["seconds"] = figure(s.seconds);
-    json["seconds_per_step"] = s.steps > 0 ? figure(s.seconds / s.steps) : Json(nullptr);
-    json["wall_seconds"] = figure(s.wall_seconds);
-    json["splats"] = s.splats;
-    json["test_psnr"] = figure(s.test_psnr);
-    json["test_ssim"] = figure(s.test_ssim);
-    json["train_psnr"] = figure(s.train_psnr);
-    json["device"] = s.device;
-    json["peak_device_bytes"] = s.peak_device_bytes;
-    json["peak_host_bytes"] = s.peak_host_bytes;
-    json["seed"] = s.seed;
-    json["skipped_nonfinite"] = s.skipped_nonfinite;
-    json["dropped_updates"] = s.dropped_updates;
-    json["limited_steps"] = s.limited_steps;
-    json["strategy"] = s.strategy;
-    json["interrupted"] = s.interrupted;
-    json["version"] = s.version;
-    json["command"] = s.command;
-    return json;
+    return {{"steps", s.steps},
+            {"seconds", figure(s.seconds)},
+            {"seconds_per_step", s.steps > 0 ? figure(s.seconds / s.steps) : Json(nullptr)},
+            {"wall_seconds", figure(s.wall_seconds)},
+            {"splats", s.splats},
+            {"test_psnr", figure(s.test_psnr)},
+            {"test_ssim", figure(s.test_ssim)},
+            {"train_psnr", figure(s.train_psnr)},
+            {"device", s.device},
+            {"peak_device_bytes", s.peak_device_bytes},
+            {"peak_host_bytes", s.peak_host_bytes},
+            {"seed", s.seed},
+            {"skipped_nonfinite", s.skipped_nonfinite},
+            {"dropped_updates", s.dropped_updates},
+            {"limited_steps", s.limited_steps},
+            {"strategy", s.strategy},
+            {"interrupted", s.interrupted},
+            {"version", s.version},
+            {"command", s.command}};
 }
 
 Json to_json(const MetricsLine& line) {
-    Json json;
-    json["step"] = line.step;
-    json["seconds"] = figure(line.seconds);
-    json["wall_seconds"] = figure(line.wall_seconds);
-    json["loss"] = figure(line.loss);
-    json["splats"] = line.splats;
+    Json json{{"step", line.step},
+              {"seconds", figure(line.seconds)},
+              {"wall_seconds", figure(line.wall_seconds)},
+              {"loss", figure(line.loss)},
+              {"splats", line.splats}};
     if (line.test_psnr) json["test_psnr"] = figure(line.test_psnr);
     if (line.test_ssim) json["test_ssim"] = figure(line.test_ssim);
     return json;

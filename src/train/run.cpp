@@ -307,10 +307,9 @@ RunResult Run::run() {
     open_folder();
     start();
     Trainer trainer(device_, input_.dataset, input_.split.train, input_.start, options().train);
-    const std::vector<PlanLine> plan = plan_of(trainer, input_);
-    for (const PlanLine& line : plan) report_.plan.push_back({line.what, line.why, line.bytes_saved});
+    report_.plan = plan_of(trainer, input_);
     input_.start = {};
-    observer_.on_plan(plan);
+    observer_.on_plan(report_.plan);
     if (trainer.images_on_disk() > 0)
         observer_.on_note(
             fmt::format("{} training images exceed --image-cache {} MiB and are read again for each step",

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/output.h"
+#include "core/folders.h"
 #include "report/pictures.h"
 
 namespace ewa::train {
@@ -53,11 +53,11 @@ std::vector<report::ReportPicture> render_report_images(const RunOutcome& outcom
         report::ReportPicture image;
         image.name = frame.name;
         TrainingImage target = load_training_image(frame, options.background);
-        image.photograph = std::move(target.picture);
+        image.original = std::move(target.picture);
         image.rendering = renderer.render(frame.camera).color;
-        image.psnr = psnr(image.rendering, image.photograph, target.weights);
+        image.psnr = psnr(image.rendering, image.original, target.weights);
         if (std::isnan(image.psnr)) continue;  // no pixel counts
-        image.ssim = ssim(image.rendering, image.photograph, target.weights);
+        image.ssim = ssim(image.rendering, image.original, target.weights);
         const std::filesystem::path file = folder / (names[size_t(index)].string() + ".png");
         core::make_folder(file.parent_path());
         save_image(file, image.rendering);

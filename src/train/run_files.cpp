@@ -8,7 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "core/atomic_file.h"
-#include "core/output.h"
+#include "core/folders.h"
+#include "core/json.h"
 #include "ewa/splat_files.h"
 
 namespace ewa::train {

@@ -9,7 +9,6 @@
 #include <new>
 #include <utility>
 
-#include "core/help_text.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "viewer/app.h"

@@ -4,11 +4,10 @@
 
 #include <cmath>
 
+#include "bench/cases.h"
 #include "bench/ceiling/ceiling.h"
-#include "bench/scene.h"
 #include "core/random.h"
 #include "reference/render.h"
-#include "reference/sort.h"
 
 namespace ewa::test {
 namespace {
@@ -27,7 +26,7 @@ TEST(Ceiling, SortsStablyByTheLowBits) {
         }
 }
 
-/// A tiny case as the twin draws it, and its lists as the device would hand them over.
+/// A tiny case as the CPU reference renders it, and its lists as the device would hand them over.
 struct Drawn {
     bench::BenchScene scene;
     reference::Picture picture;
@@ -82,7 +81,7 @@ struct Drawn {
     }
 };
 
-TEST(Ceiling, BlendsAndCountsAsTheTwinDoes) {
+TEST(Ceiling, BlendsAndCountsAsTheReferenceDoes) {
     for (const int tile_width : {4, 8}) {
         const Drawn drawn(tile_width);
         const uint32_t tiles = drawn.picture.instances.grid.count();

@@ -14,8 +14,8 @@
 
 #include "core/atomic_file.h"
 #include "report/chart.h"
+#include "report/html.h"
 #include "report/pictures.h"
-#include "report/style.h"
 
 namespace ewa::test {
 namespace {
@@ -60,11 +60,7 @@ void write_page(const fs::path& folder) {
     for (const auto& entry : fs::directory_iterator(folder))
         if (fs::exists(entry.path() / "told.txt")) cases.push_back(entry.path().filename());
     std::sort(cases.begin(), cases.end());
-    std::string html =
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Golden "
-        "images</title>\n<style>" +
-        std::string(report::kStyle) +
-        ".trio img { image-rendering: pixelated; }</style></head>\n<body><main><h1>Golden images</h1>\n";
+    std::string html = "<style>.trio img { image-rendering: pixelated; }</style><h1>Golden images</h1>\n";
     html += cases.empty() ? "<p>All pass.</p>\n" : fmt::format("<p class=\"soft\">{}</p>\n", kHowToAccept);
     for (const fs::path& name : cases) {
         std::ifstream file(folder / name / "told.txt");
@@ -79,7 +75,7 @@ void write_page(const fs::path& folder) {
                 fmt::format("<div><img alt=\"{0}\" src=\"{1}/{0}.png\">{0}</div>\n", picture, name.string());
         html += "</div></figure>\n";
     }
-    core::write_text_file(folder / "index.html", html + "</main></body></html>\n");
+    core::write_text_file(folder / "index.html", report::html_page("Golden images", html));
 }
 
 void leave_pictures(const fs::path& folder, const Image& candidate, const Image* reference, double scale,

@@ -8,7 +8,7 @@
 #include "ewa/trainer.h"
 #include "golden/devices.h"
 #include "golden/golden.h"
-#include "reference/adam.h"
+#include "reference/training.h"
 #include "reference/render.h"
 #include "train/image_cache.h"
 #include "train/schedule.h"
@@ -113,7 +113,7 @@ std::vector<int> all_frames(const Dataset& dataset) {
 reference::Values train_reference(const Synthetic& data, const TrainOptions& options) {
     Gaussians start = training_start(data);
     select_splats(start, morton_order(start));  // the trainer's order, which settles ties
-    reference::Values values = reference::to_double(start);
+    reference::Values values = start;
     const train::Schedule schedule = train::schedule_for(options);
     const std::vector<int> frames = all_frames(data.dataset);
     const double extent = scene_extent(data.dataset, frames);

@@ -14,7 +14,7 @@
 #include "pipeline/frame_buffers.h"
 #include "pipeline/sorting.h"
 #include "pipeline/strategy.h"
-#include "reference/strategy.h"
+#include "reference/training.h"
 
 namespace ewa::test {
 namespace {
@@ -84,7 +84,7 @@ struct Expected {
     std::vector<bool> fresh;
 };
 Expected expected_of(const Start& start, const DensifyRules& rules) {
-    const reference::Values old = reference::to_double(start.gaussians);
+    const reference::Values old = start.gaussians;
     const auto decisions = decide(old, start.cpu, options_for(rules));
     Expected out;
     std::vector<reference::Splat> splats;
@@ -213,7 +213,7 @@ TEST(DensifyEdges, TheCapIsReachedAndNotPassed) {
     for (const uint32_t spare : {0u, 1u, 37u}) {
         Start start(2200, 1000, 0);
         DensifyRules rules = rules_for(1u << 20);
-        reference::Values old = reference::to_double(start.gaussians);
+        reference::Values old = start.gaussians;
         auto options = options_for(rules);
         options.grow_gradient = 1e9;
         size_t kept = 0;

@@ -10,8 +10,8 @@
 #include "gpu/reference_inputs.h"
 #include "pipeline/backward.h"
 #include "pipeline/frame_inputs.h"
-#include "reference/adam.h"
 #include "reference/loss.h"
+#include "reference/training.h"
 
 namespace ewa::test {
 namespace {

@@ -13,7 +13,7 @@
 #include "gpu/reference_inputs.h"
 #include "passes/passes.h"
 #include "pipeline/strategy.h"
-#include "reference/strategy.h"
+#include "reference/training.h"
 
 namespace ewa::test {
 namespace {

@@ -14,7 +14,7 @@
 #include "passes/passes.h"
 #include "pipeline/strategy.h"
 #include "reference/projection.h"
-#include "reference/strategy.h"
+#include "reference/training.h"
 
 namespace ewa::test {
 namespace {
@@ -123,7 +123,7 @@ TEST_P(Relocation, WritesTheReferencesNextGeneration) {
     const uint32_t planes = pipeline::parameter_planes(degree);
     const auto moments1 = start.model.moments1.download<float>(pipeline::parameter_bytes(after, degree) / 4);
     const size_t sh = old.sh_stride();
-    const reference::Values wide = reference::to_double(old);
+    const reference::Values wide = old;
     for (uint32_t j = 0; j < after; ++j) {
         const uint32_t s = source[j];
         const auto n3 = core::normal3(
@@ -238,7 +238,7 @@ TEST(Noise, MatchesTheReference) {
                          {.amplitude = 5, .max_length = 1e9f, .seed = seed, .step = 12});
         });
         const Gaussians moved = download_model(start.model, start.model.params);
-        const reference::Values old = reference::to_double(start.gaussians);
+        const reference::Values old = start.gaussians;
         double largest = 0;
         for (size_t i = 0; i < 1000; ++i) {
             const auto n = core::normal3(
@@ -280,7 +280,7 @@ TEST(Noise, IsNoLongerThanItsReach) {
                      {.amplitude = 5, .max_length = float(reach), .seed = 77, .step = 12});
     });
     const Gaussians moved = download_model(start.model, start.model.params);
-    const reference::Values old = reference::to_double(start.gaussians);
+    const reference::Values old = start.gaussians;
     uint32_t limited = 0;
     for (size_t i = 0; i < old.size(); ++i) {
         const auto n = core::normal3({uint32_t(i), 12, 77, shared::MCMC_NOISE_STREAM});

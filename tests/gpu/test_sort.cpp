@@ -9,7 +9,7 @@
 
 #include "gpu/guarded.h"
 #include "pipeline/sorting.h"
-#include "reference/sort.h"
+#include "reference/blend.h"
 #include "support/random_scene.h"
 
 namespace ewa::test {

@@ -11,8 +11,7 @@
 #include "gpu/reference_inputs.h"
 #include "passes/passes.h"
 #include "pipeline/backward.h"
-#include "reference/adam.h"
-#include "reference/strategy.h"
+#include "reference/training.h"
 #include "support/gradient_check.h"
 
 namespace ewa::test {

@@ -37,7 +37,7 @@ TEST_P(Gradient, IsTheSlopeOfTheReferencesLoss) {
     const reference::ReferenceGradient cpu = reference::loss_gradient(gaussians, camera, target, options);
 
     // The loss jumps where a contribution crosses 1/255; the best of several steps is one that crosses none.
-    reference::Values values = reference::to_double(gaussians);
+    reference::Values values = gaussians;
     const auto loss = [&] { return reference::loss_gradient(values, camera, target, options).loss; };
     const auto differences = [&](std::vector<double>& group, const std::vector<double>& claimed) {
         std::vector<double> out;

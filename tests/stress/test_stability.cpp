@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every stiff and extreme scene of the table that `ewa bench --stability` goes through, on the device against
-// the CPU reference and as the start of a training, under the validation layer.
+// Every stiff and extreme scene of `ewa bench --stability`, under the validation layer: on the device against the CPU
+// reference, and as the start of a training.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 #include <functional>
 #include <string>
 
-#include "bench/stability/case_errors.h"
+#include "bench/stability/stability.h"
 #include "gpu/test_device.h"
 
 namespace ewa::test {
@@ -23,9 +23,9 @@ const std::vector<bench::StabilityCase>& cases() {
 class Stability : public testing::TestWithParam<size_t> {};
 
 TEST_P(Stability, PictureAndGradientAreWithinTheirBounds) {
-    const bench::StabilityResult result = bench::compare_with_twin(device(), cases()[GetParam()]);
+    const bench::StabilityResult result = bench::compare_with_reference(device(), cases()[GetParam()]);
     EXPECT_TRUE(result.finite);
-    EXPECT_EQ(result.skipped, result.skipped_by_twin);
+    EXPECT_EQ(result.skipped, result.skipped_by_reference);
     EXPECT_GT(result.drawn, 0u);
     EXPECT_LE(result.pixels_at_threshold, std::max<uint64_t>(4, result.pixels / 200));
     for (const bench::Comparison& c : result.comparisons)
@@ -67,7 +67,7 @@ bench::StabilityCase named(const std::string& name) {
 
 TEST(StabilityOrdinary, IsWithinTheTightBounds) {
     for (const char* name : {"ordinary", "ordinary_antialias", "ordinary_unit_mass"}) {
-        const bench::StabilityResult result = bench::compare_with_twin(device(), named(name));
+        const bench::StabilityResult result = bench::compare_with_reference(device(), named(name));
         for (const bench::Comparison& c : result.comparisons)
             EXPECT_LE(c.error, c.of == "picture" || c.of == "loss" ? 5e-6 : 1e-4) << name << ' ' << c.of;
     }
@@ -75,7 +75,7 @@ TEST(StabilityOrdinary, IsWithinTheTightBounds) {
 
 TEST(StabilityNeedles, KeepTheirDigitsWhereAPlainDeterminantLosesThem) {
     for (const char* name : {"long_axes_1:1e+04", "long_axes_1:1e+07"}) {
-        const bench::StabilityResult result = bench::compare_with_twin(device(), named(name));
+        const bench::StabilityResult result = bench::compare_with_reference(device(), named(name));
         for (const bench::Comparison& c : result.comparisons) EXPECT_LE(c.error, 1e-3) << name << ' ' << c.of;
         EXPECT_GT(result.plain_determinant, 20 * result.comparisons.front().error) << name;
     }
@@ -85,13 +85,13 @@ TEST(StabilityNeedles, KeepTheirDigitsWhereAPlainDeterminantLosesThem) {
 /// gradient.
 TEST(StabilityComparison, FindsAWrongScene) {
     bench::StabilityCase one = named("ordinary");
-    bench::StabilityResult result = bench::compare_with_twin(device(), one);
+    bench::StabilityResult result = bench::compare_with_reference(device(), one);
     ASSERT_TRUE(result.good());
     const auto comparisons_broken_by = [&](const std::function<void(Gaussians&)>& change) {
         Gaussians other = one.gaussians;
         change(other);
         std::string broken;
-        for (const bench::Comparison& c : bench::compare_with_twin(device(), one, other).comparisons)
+        for (const bench::Comparison& c : bench::compare_with_reference(device(), one, &other).comparisons)
             if (!c.good()) broken += c.of + ",";
         return broken;
     };

@@ -32,7 +32,7 @@ const std::map<std::string, Modules> kAllowed = {
     {"src/report", {"src/scene", "src/image"}},
     {"src/live", {"src/report", "src/io/splats"}},
     {"src/reference", {"src/scene", "src/pathtracer"}},
-    {"src/bench", {"src/pipeline", "src/reference", "src/scene"}},
+    {"src/bench", {"src/pipeline", "src/reference", "src/report", "src/scene"}},
 };
 const Modules kLeaves = {"src/cli", "src/viewer"};
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Adam against the recurrence written out for one number.
-#include "reference/adam.h"
+#include "reference/training.h"
 
 #include <gtest/gtest.h>
 

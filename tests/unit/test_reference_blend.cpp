@@ -10,7 +10,6 @@
 #include <set>
 
 #include "reference/render.h"
-#include "reference/sort.h"
 #include "support/random_scene.h"
 
 namespace ewa::reference {
@@ -70,9 +69,9 @@ TEST(ReferenceBlend, UnitMassKernelKeepsItsMass) {
     scene.opacity_logits = {0.4f};
     RenderOptions options;
     options.kernel = Footprint::unit_mass;
-    ReferenceOptions twin;
-    twin.smoothing.cut = AlphaCut::none;
-    const Picture picture = render(scene, camera, options, twin);
+    ReferenceOptions reference;
+    reference.smoothing.cut = AlphaCut::none;
+    const Picture picture = render(scene, camera, options, reference);
     double total = 0;
     for (double t : picture.blended.transmittance.values) total += 1 - t;
     EXPECT_NEAR(total, 1 / (1 + std::exp(-0.4)), 1e-6);

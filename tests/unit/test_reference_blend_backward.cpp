@@ -8,7 +8,6 @@
 #include <cmath>
 #include <glm/common.hpp>
 
-#include "reference/sort.h"
 #include "support/gradient_check.h"
 #include "support/random_scene.h"
 

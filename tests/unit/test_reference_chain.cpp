@@ -16,10 +16,10 @@ struct Chain {
     Values values;
     Image target;
     RenderOptions options;
-    ReferenceOptions twin;
+    ReferenceOptions reference;
 
     double loss() const {
-        const Picture picture = render(values, camera, options, twin);
+        const Picture picture = render(values, camera, options, reference);
         return image_loss(picture.blended.color, to_double(target)).loss;
     }
 };
@@ -42,16 +42,16 @@ Values differences(Chain& chain, const Values& claimed) {
 Chain random_chain(uint64_t seed, test::SplatKind kind, size_t count, int degree, Footprint kernel) {
     Chain chain;
     chain.camera = test::random_camera(seed, 21, 17);
-    chain.values = to_double(test::random_gaussians(seed, count, kind, chain.camera, degree));
+    chain.values = test::random_gaussians(seed, count, kind, chain.camera, degree);
     chain.target = test::random_target(seed, 21, 17);
     chain.options = {{0.2f, 0.5f, 0.1f}, kernel, degree};
-    chain.twin.smoothing = {AlphaCut::none, false};
+    chain.reference.smoothing = {AlphaCut::none, false};
     return chain;
 }
 
 void check(Chain chain) {
     const ReferenceGradient result =
-        loss_gradient(chain.values, chain.camera, chain.target, chain.options, chain.twin);
+        loss_gradient(chain.values, chain.camera, chain.target, chain.options, chain.reference);
     EXPECT_NEAR(result.loss, chain.loss(), 1e-14);
     EXPECT_TRUE(test::splat_gradients_agree(result.gradient, differences(chain, result.gradient),
                                             {1e-6, 1e-3, 1e-3, 1e-4}));
@@ -78,7 +78,7 @@ TEST(ReferenceChain, MixedWithTheRamp) {
     for (uint64_t seed = 60; seed < 63; ++seed) {
         SCOPED_TRACE(test::seed_text(seed));
         Chain chain = random_chain(seed, test::SplatKind::ordinary, 20, 0, Footprint::antialias);
-        chain.twin.smoothing.cut = AlphaCut::ramp;
+        chain.reference.smoothing.cut = AlphaCut::ramp;
         check(chain);
     }
 }
@@ -86,7 +86,7 @@ TEST(ReferenceChain, MixedWithTheRamp) {
 TEST(ReferenceChain, TheModelItselfWhereNothingJumps) {
     // With the hard cut the loss jumps wherever a pixel crosses the floor; small steps mostly meet no jump.
     Chain chain = random_chain(80, test::SplatKind::ordinary, 8, 1, Footprint::peak);
-    chain.twin = {};
+    chain.reference = {};
     check(chain);
 }
 

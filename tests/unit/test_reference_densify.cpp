@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Adaptive density control: each decision at its threshold, and what comes of it.
-#include "reference/strategy.h"
+#include "reference/training.h"
 
 #include <gtest/gtest.h>
 
@@ -97,7 +97,7 @@ TEST(ReferenceDensify, TheCapHoldsAndPrunedSplatsMakeRoom) {
 
 TEST(ReferenceDensify, WhatComesOfEachDecision) {
     const Camera camera = test::random_camera(1);
-    const Values values = to_double(test::random_gaussians(1, 4, test::SplatKind::ordinary, camera, 1));
+    const Values values = test::random_gaussians(1, 4, test::SplatKind::ordinary, camera, 1);
     const std::vector<Decision> decisions = {Decision::split, Decision::clone, Decision::prune,
                                              Decision::keep};
     const std::vector<glm::dvec3> normals = {{1, 0, 0}, {0, -2, 0.5}};

@@ -45,16 +45,16 @@ TEST(ReferenceExposure, GradientIsTheDifference) {
     }
 }
 
-TEST(ReferenceExposure, IsWhatAPhotographShows) {
+TEST(ReferenceExposure, MatchesTheExposureOfAnImage) {
     const Image picture = test::random_target(8, 6, 5);
     ewa::Exposure e{0.5f, 0.1f, 0, 0.2f, 0, 2, 0, -0.1f, 0.3f, 0, 1, 0};
     Exposure wide;
     std::copy(e.begin(), e.end(), wide.begin());
-    const Image photo = ewa::exposed(picture, e);
-    const Raster twin = exposed(to_double(picture), wide);
+    const Image actual = ewa::exposed(picture, e);
+    const Raster expected = exposed(to_double(picture), wide);
     for (int y = 0; y < 5; ++y)
         for (int x = 0; x < 6; ++x)
-            for (int c = 0; c < 3; ++c) EXPECT_NEAR(photo.at(x, y)[c], twin.at(x, y)[c], 1e-6);
+            for (int c = 0; c < 3; ++c) EXPECT_NEAR(actual.at(x, y)[c], expected.at(x, y)[c], 1e-6);
     EXPECT_EQ(ewa::exposed(picture, kIdentityExposure).pixels, picture.pixels);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The twin of 3DGS-MCMC against what its formulas promise.
-#include "reference/strategy.h"
+// The CPU reference of 3DGS-MCMC against the properties that its formulas promise.
+#include "reference/training.h"
 
 #include <gtest/gtest.h>
 

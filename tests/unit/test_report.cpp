@@ -114,7 +114,7 @@ ReportData made_up_data() {
     data.settings = {{"steps", "100"}};
     ReportPicture picture;
     picture.name = "a\"b.jpg";
-    picture.photograph = Image(16, 12, 3);
+    picture.original = Image(16, 12, 3);
     picture.rendering = Image(16, 12, 3);
     picture.psnr = 23.456;
     data.pictures.push_back(picture);

@@ -3,8 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include "core/help_text.h"
-
 namespace {
 
 using ewa::core::one_line;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The diagram of error against run time.
-#include "report/work_precision.h"
+#include "report/chart.h"
 
 #include <gtest/gtest.h>
 

@@ -27,8 +27,7 @@ Timed time_sort(uint32_t items, uint32_t bits, int runs);
 /// The timed sort, for its test. Sorts keys and values in place.
 void sort_pairs(std::vector<uint32_t>& keys, std::vector<uint32_t>& values, uint32_t bits);
 
-/// The best rate of copying between blocks much larger than the caches: bytes read and written, in 1e9 per
-/// second.
+/// The best rate of copying between blocks beyond the caches' size: bytes read and written, in 1e9 per second.
 struct Bandwidth {
     double wall = 0, cpu = 0;  // see Timed
 };

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "bench/stability/cases.h"
-
 #include <algorithm>
 #include <cfloat>
 #include <cmath>
+#include <functional>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <iterator>
 #include <limits>
 
-#include "bench/report.h"
+#include "bench/result.h"
+#include "bench/stability/stability.h"
 #include "core/random.h"
 
 namespace ewa::bench {
@@ -33,16 +33,8 @@ glm::dmat3 turned(double angle_x, double angle_y) {
 
 /// The default camera: a small image from a generic position.
 Camera usual_camera() {
-    Camera camera;
-    camera.width = 64;
-    camera.height = 48;
-    camera.fx = 70;
-    camera.fy = 66;
-    camera.cx = 31.3;
-    camera.cy = 24.8;
-    camera.rotation = turned(0.4, -0.7);
-    camera.translation = -(camera.rotation * glm::dvec3(0.7, -0.4, 0.2));
-    return camera;
+    const glm::dmat3 rotation = turned(0.4, -0.7);
+    return {64, 48, 70, 66, 31.3, 24.8, rotation, -(rotation * glm::dvec3(0.7, -0.4, 0.2))};
 }
 
 struct Sketch {
@@ -52,7 +44,7 @@ struct Sketch {
     double logit = 0;
 };
 
-/// A splat at a relative position in the image, `pixels` wide.
+/// A splat at a random position in the image, 2 to 12 % of the image's size wide.
 Sketch usual_sketch(uint32_t i, const Camera& camera, double z) {
     const auto a = uniform(i, 1), b = uniform(i, 2), c = uniform(i, 3);
     Sketch s;
@@ -70,6 +62,8 @@ Sketch usual_sketch(uint32_t i, const Camera& camera, double z) {
 double usual_depth(uint32_t i) {
     return between(uniform(i, 5)[0], 2, 8);
 }
+
+using Change = std::function<void(Sketch&, uint32_t index)>;
 
 class Builder {
   public:
@@ -91,6 +85,14 @@ class Builder {
             out_.sh.push_back(float(k < 3 ? between(u, -1.5, 1.7) : between(u, -0.3, 0.3)));
         }
     }
+    /// Adds splats at the usual depths times `depth`.
+    void add_usual(uint32_t count, const Change& change = {}, double depth = 1) {
+        for (uint32_t i = 0; i < count; ++i) {
+            Sketch sketch = usual_sketch(i, camera_, depth * usual_depth(i));
+            if (change) change(sketch, i);
+            add(sketch);
+        }
+    }
     Gaussians take() { return std::move(out_); }
 
   private:
@@ -98,25 +100,24 @@ class Builder {
     Gaussians out_;
 };
 
-Gaussians usual_scene(const Camera& camera, uint32_t count, int sh_degree = 1) {
+Gaussians usual_scene(const Camera& camera, uint32_t count, int sh_degree = 1, const Change& change = {},
+                      double depth = 1) {
     Builder builder(camera, sh_degree);
-    for (uint32_t i = 0; i < count; ++i) builder.add(usual_sketch(i, camera, usual_depth(i)));
+    builder.add_usual(count, change, depth);
     return builder.take();
 }
 
-class Table {
-  public:
+struct Table {
+    std::vector<StabilityCase> cases;
+
     void add(std::string name, std::string what, Gaussians gaussians, const Camera& camera = usual_camera(),
              Footprint kernel = Footprint::peak) {
-        RenderOptions options;
-        options.background = {0.2f, 0.5f, 0.8f};
-        options.kernel = kernel;
-        cases_.push_back({std::move(name), std::move(what), std::move(gaussians), camera, options});
+        cases.push_back({std::move(name),
+                         std::move(what),
+                         std::move(gaussians),
+                         camera,
+                         {.background = {0.2f, 0.5f, 0.8f}, .kernel = kernel}});
     }
-    std::vector<StabilityCase> take() { return std::move(cases_); }
-
-  private:
-    std::vector<StabilityCase> cases_;
 };
 
 const std::pair<Footprint, const char*> kKernels[] = {
@@ -130,15 +131,10 @@ void add_ordinary(Table& table) {
 
 /// Half of them needles (one long axis), half discs (two).
 Gaussians thin_splats(double length, double ratio) {
-    const Camera camera = usual_camera();
-    Builder builder(camera);
-    for (uint32_t i = 0; i < 48; ++i) {
-        Sketch s = usual_sketch(i, camera, usual_depth(i));
+    return usual_scene(usual_camera(), 48, 1, [&](Sketch& s, uint32_t i) {
         const double along = length * s.view.z, across = along / ratio;
         s.scale = {along, i % 2 == 0 ? across : along, across};
-        builder.add(s);
-    }
-    return builder.take();
+    });
 }
 
 void add_axis_ratios(Table& table) {
@@ -156,20 +152,17 @@ void add_scales(Table& table) {
     for (const double factor : {1e-12, 1e-6, 1e-3, 1e3, 1e6})
         for (const auto& [kernel, suffix] : kKernels) {
             if (kernel != Footprint::peak && factor != 1e-6 && factor != 1e6) continue;
-            const Camera camera = usual_camera();
-            Builder builder(camera);
-            for (uint32_t i = 0; i < 40; ++i) {
-                Sketch s = usual_sketch(i, camera, usual_depth(i));
+            Builder builder(usual_camera());
+            builder.add_usual(40, [&](Sketch& s, uint32_t i) {
                 s.scale *= factor;
                 if (factor > 1) s.logit = between(uniform(i, 6)[0], -3, -1);  // transparent
-                builder.add(s);
-            }
+            });
             // If none of them is visible, others are, which must not be affected.
             const bool unseen =
                 kernel == Footprint::antialias ? factor < 1 : kernel == Footprint::unit_mass && factor > 1;
-            for (uint32_t i = 0; unseen && i < 20; ++i) builder.add(usual_sketch(i, camera, usual_depth(i)));
-            table.add(text_of("scale_%.0e%s", factor, suffix), "scales times this", builder.take(), camera,
-                      kernel);
+            if (unseen) builder.add_usual(20);
+            table.add(text_of("scale_%.0e%s", factor, suffix), "scales times this", builder.take(),
+                      usual_camera(), kernel);
         }
 }
 
@@ -196,7 +189,7 @@ void add_depths(Table& table) {
         Builder at(camera);
         for (uint32_t i = 0; i < 40; ++i) at.add(usual_sketch(i, camera, distance * usual_depth(i) / 5));
         // Splats behind the near plane are invisible; the others are not.
-        for (uint32_t i = 0; distance < 0.01 && i < 20; ++i) at.add(usual_sketch(i, camera, usual_depth(i)));
+        if (distance < 0.01) at.add_usual(20);
         table.add(text_of("distance_%.0e", distance), "so far from the camera", at.take());
     }
     Camera straight = camera;
@@ -211,13 +204,8 @@ void add_far_from_origin(Table& table) {
     Camera camera = usual_camera();
     const glm::dvec3 place(1e7, -8e6, 300);
     camera.translation = -(camera.rotation * (camera.position() + place));
-    Builder stored(camera);
-    for (uint32_t i = 0; i < 60; ++i) {
-        Sketch s = usual_sketch(i, camera, 1000 * usual_depth(i));
-        stored.add(s);
-    }
-    table.add("offset_1e7", "a scene of 5 km, 1e7 from the origin, positions in float32", stored.take(),
-              camera);
+    table.add("offset_1e7", "a scene of 5 km, 1e7 from the origin, positions in float32",
+              usual_scene(camera, 60, 1, {}, 1000), camera);
 
     // Stored as a georeferenced capture: float32 positions relative to a float64 origin.
     Camera near = usual_camera();
@@ -229,16 +217,13 @@ void add_far_from_origin(Table& table) {
 }
 
 void add_opacities(Table& table) {
-    const Camera camera = usual_camera();
     const double logits[] = {-1e30, -100, -20, -6, -5.4, -4, 4, 4.7, 6, 10, 16, 20, 88, 100, 1e30};
-    Builder builder(camera);
-    for (uint32_t i = 0; i < 60; ++i) {
-        Sketch s = usual_sketch(i, camera, usual_depth(i));
+    const auto change = [&](Sketch& s, uint32_t i) {
         s.logit = logits[i % std::size(logits)];
         s.scale *= 0.5;
-        builder.add(s);
-    }
-    table.add("opacity_0_and_1", "opacity logits of -1e30 to 1e30", builder.take());
+    };
+    table.add("opacity_0_and_1", "opacity logits of -1e30 to 1e30",
+              usual_scene(usual_camera(), 60, 1, change));
 }
 
 void add_stacks(Table& table) {
@@ -273,13 +258,8 @@ void add_images(Table& table) {
     strip.cx = 8000.3;
     strip.cy = 2.1;
     strip.fx = strip.fy = 9000;
-    Builder builder(strip);
-    for (uint32_t i = 0; i < 40; ++i) {
-        Sketch s = usual_sketch(i, strip, usual_depth(i));
-        s.scale *= 0.05;
-        builder.add(s);
-    }
-    table.add("image_16384x4", "a strip", builder.take(), strip);
+    const auto small = [](Sketch& s, uint32_t) { s.scale *= 0.05; };
+    table.add("image_16384x4", "a strip", usual_scene(strip, 40, 1, small), strip);
 }
 
 void add_focal_lengths(Table& table) {
@@ -292,16 +272,13 @@ void add_focal_lengths(Table& table) {
 
 void add_quaternions(Table& table) {
     for (const double norm : {1e-37, 1e-20, 1e20, 1e38}) {
-        const Camera camera = usual_camera();
-        Builder builder(camera);
-        for (uint32_t i = 0; i < 50; ++i) {
-            Sketch s = usual_sketch(i, camera, usual_depth(i));
+        const auto change = [&](Sketch& s, uint32_t) {
             double sum = 0;
             for (const double q : s.quaternion) sum += q * q;
             for (double& q : s.quaternion) q *= norm / std::sqrt(sum);
-            builder.add(s);
-        }
-        table.add(text_of("quaternion_%.0e", norm), "norm of the quaternions", builder.take());
+        };
+        table.add(text_of("quaternion_%.0e", norm), "norm of the quaternions",
+                  usual_scene(usual_camera(), 50, 1, change));
     }
 }
 
@@ -323,8 +300,7 @@ float& stored_value(Gaussians& g, size_t splat, size_t value) {
     return g.sh[g.sh_stride() * splat + value - 11];
 }
 
-/// Replaces value i of splat 2 i, so that each value of a splat is bad once. The splats between are good and
-/// must not be affected.
+/// Replaces value i of splat 2 i, so that each value of a splat is bad once. This must not affect the splats between.
 void add_replaced(Table& table) {
     constexpr float inf = std::numeric_limits<float>::infinity();
     const std::pair<const char*, float> bad[] = {{"nan", std::numeric_limits<float>::quiet_NaN()},
@@ -346,19 +322,11 @@ void add_replaced(Table& table) {
 
 std::vector<StabilityCase> stability_cases() {
     Table table;
-    add_ordinary(table);
-    add_axis_ratios(table);
-    add_scales(table);
-    add_depths(table);
-    add_far_from_origin(table);
-    add_opacities(table);
-    add_stacks(table);
-    add_images(table);
-    add_focal_lengths(table);
-    add_quaternions(table);
-    add_colors(table);
-    add_replaced(table);
-    return table.take();
+    for (const auto add :
+         {add_ordinary, add_axis_ratios, add_scales, add_depths, add_far_from_origin, add_opacities,
+          add_stacks, add_images, add_focal_lengths, add_quaternions, add_colors, add_replaced})
+        add(table);
+    return std::move(table.cases);
 }
 
 StabilityCase stability_case_of(const std::string& name, const Gaussians& gaussians) {
@@ -375,32 +343,22 @@ StabilityCase stability_case_of(const std::string& name, const Gaussians& gaussi
         high[k] = values[values.size() * 3 / 4];
     }
     const double radius = std::max(0.5 * glm::length(high - low), 1e-3);
-    StabilityCase one;
-    one.name = name;
-    one.what = "the scene of this file";
-    one.gaussians = gaussians;
-    one.camera.width = 320;
-    one.camera.height = 240;
-    one.camera.fx = one.camera.fy = 300;
-    one.camera.cx = 160;
-    one.camera.cy = 120;
-    one.camera.rotation = turned(0.3, 0.5);
-    const glm::dvec3 eye =
-        0.5 * (low + high) - glm::transpose(one.camera.rotation) * glm::dvec3(0, 0, 3 * radius);
-    one.camera.translation = -(one.camera.rotation * eye);
-    return one;
+    const glm::dmat3 rotation = turned(0.3, 0.5);
+    const glm::dvec3 eye = 0.5 * (low + high) - glm::transpose(rotation) * glm::dvec3(0, 0, 3 * radius);
+    const Camera camera{320, 240, 300, 300, 160, 120, rotation, -(rotation * eye)};
+    return {name, "the scene of this file", gaussians, camera, {}};
 }
 
-Image stability_photo(int width, int height) {
-    Image photo(width, height, 3);
+Image stability_target(int width, int height) {
+    Image target(width, height, 3);
     for (int y = 0; y < height; ++y)
         for (int x = 0; x < width; ++x) {
             const auto noise = uniform(uint32_t(x), 1000 + uint32_t(y));
             for (int c = 0; c < 3; ++c)
-                photo.at(x, y)[c] =
+                target.at(x, y)[c] =
                     float(0.5 + 0.3 * std::sin(0.21 * x + 0.13 * y + 2 * c) + 0.2 * (noise[size_t(c)] - 0.5));
         }
-    return photo;
+    return target;
 }
 
 }  // namespace ewa::bench

@@ -2,20 +2,199 @@
 #include "bench/stability/stability.h"
 
 #include <algorithm>
+#include <cfloat>
 #include <cmath>
-#include <cstdio>
+#include <functional>
 #include <nlohmann/json.hpp>
 
-#include "bench/cases.h"
 #include "bench/device_runs.h"
-#include "bench/report.h"
-#include "bench/stability/case_errors.h"
-#include "bench/stability/cases.h"
-#include "core/atomic_file.h"
+#include "core/json.h"
+#include "core/random.h"
 #include "ewa/error.h"
+#include "ewa/renderer.h"
+#include "reference/render.h"
+#include "shared/constants.h"
 
 namespace ewa::bench {
 namespace {
+
+using reference::Picture;
+using reference::Raster;
+using reference::ReferenceGradient;
+using reference::Values;
+
+constexpr double kUnit = 0x1p-24;       // half a float32 step, relative
+constexpr double kPictureFloor = 5e-6;  // of a well-conditioned scene
+constexpr double kGradientFloor = 1e-4;
+constexpr double kRoundings = 32;      // of a chain of float32 operations on each stored value
+constexpr double kAtThreshold = 2e-4;  // relative distance at which float32 may decide differently
+constexpr double kPerturbation = 1e-10;
+constexpr int kPerturbations = 3;
+constexpr double kLargest = FLT_MAX;
+constexpr uint64_t kFewPixels = 4, kPixelsEach = 200;  // that may be close to a threshold
+
+/// Moves each stored value by a relative kPerturbation, up or down.
+Values perturbed(const Values& values, const glm::dvec3& eye, uint32_t draw) {
+    Values out = values;
+    uint32_t counter = 0;
+    const auto sign = [&] {
+        return core::pcg4d({counter++, draw, 0x636f6e64u, 0})[0] & 1 ? kPerturbation : -kPerturbation;
+    };
+    const auto relative = [&](std::vector<double>& group) {
+        for (double& v : group) v += v * sign();
+    };
+    const auto absolute = [&](std::vector<double>& group) {
+        for (double& v : group) v += std::clamp(std::abs(v), 1.0, 100.0) * sign();
+    };
+    relative(out.quaternions);
+    relative(out.sh);
+    absolute(out.log_scales);
+    absolute(out.opacity_logits);
+    for (size_t i = 0; i < out.size(); ++i) {
+        const double s = sign();
+        for (size_t k = 0; k < 3; ++k) out.means[3 * i + k] += s * (out.means[3 * i + k] - eye[int(k)]);
+    }
+    return out;
+}
+
+/// Pixels where a decision of the model (1/255, 0.99, the stop) is within kAtThreshold of its threshold.
+std::vector<uint8_t> pixels_at_threshold(const Picture& picture) {
+    const auto whiteners = reference::whiteners_of(picture.projected);
+    const reference::Instances& lists = picture.instances;
+    const int width = lists.grid.image_width, height = lists.grid.image_height;
+    std::vector<uint8_t> at(size_t(width) * size_t(height));
+    const auto near = [](double value, double threshold) {
+        return std::abs(value - threshold) <= kAtThreshold * threshold;
+    };
+    for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x) {
+            const uint32_t tile = lists.grid.tile_of(x, y);
+            double transmittance = 1;
+            bool hangs = false;
+            for (size_t k = lists.first_of_tile[tile]; k < lists.first_of_tile[tile + 1]; ++k) {
+                const uint32_t splat = lists.sorted[k].splat;
+                const double raw = reference::sample(picture.projected[splat], whiteners[splat],
+                                                     reference::pixel_centre(x, y))
+                                       .raw;
+                const double alpha = raw >= shared::ALPHA_MIN ? std::min(raw, shared::ALPHA_MAX) : 0;
+                const double next = transmittance * (1 - alpha);
+                // At exactly (1 - ALPHA_MAX)^2 both sides decide equally.
+                const bool exact = reference::stops(next) && raw > shared::ALPHA_MAX;
+                hangs = hangs || near(raw, shared::ALPHA_MIN) || near(raw, shared::ALPHA_MAX) ||
+                        (alpha > 0 && !exact && near(next, shared::TRANSMITTANCE_STOP));
+                if (reference::stops(next)) break;
+                transmittance = next;
+            }
+            at[size_t(y) * size_t(width) + size_t(x)] = hangs;
+        }
+    return at;
+}
+
+/// What the reference computes of a case, and how errors against it are measured.
+struct Expected {
+    ReferenceGradient reference;
+    std::vector<uint8_t> excluded;  // pixels_at_threshold
+    double scale = 1;               // of the image's errors
+    double least_quaternions = 0;   // see least_quaternion_norm
+};
+
+/// The largest error of a pixel that is not excluded. color: an Image or a Raster.
+template <class Pixels>
+double picture_error(const Expected& expected, const Pixels& color) {
+    const Raster& right = expected.reference.picture.blended.color;
+    double largest = 0;
+    for (int y = 0; y < right.height; ++y)
+        for (int x = 0; x < right.width; ++x)
+            for (int c = 0; c < 3; ++c) {
+                if (expected.excluded[size_t(y) * size_t(right.width) + size_t(x)]) continue;
+                const double e = std::abs(double(color.at(x, y)[c]) - right.at(x, y)[c]) / expected.scale;
+                if (!(e <= largest)) largest = e;
+            }
+    return largest;
+}
+
+/// The errors of image, loss and each group of the gradient, without bounds.
+template <class Pixels, class Gradient>
+std::vector<Comparison> errors_of(const Expected& expected, const Pixels& color, double loss,
+                                  const Gradient& gradient) {
+    const double right = expected.reference.loss;
+    std::vector<Comparison> errors{{"picture", picture_error(expected, color)},
+                                   {"loss", std::abs(loss - right) / std::max(1.0, right)}};
+    for_each_group(gradient, expected.reference.gradient,
+                   [&](const std::string& name, const auto& a, const auto& b) {
+                       const double least = name == "quaternions" ? expected.least_quaternions : 0;
+                       errors.push_back({name, relative_distance(a, b, least)});
+                   });
+    return errors;
+}
+
+/// The norm of the values clamped to the range of float32, with squares that cannot overflow.
+double norm_of(const std::vector<double>& v) {
+    double largest = 0, sum = 0;
+    for (const double x : v) largest = std::max(largest, std::min(std::abs(x), kLargest));
+    for (const double x : v) sum += largest > 0 ? std::pow(std::min(std::abs(x), kLargest) / largest, 2) : 0;
+    return largest * std::sqrt(sum);
+}
+
+/// The least norm of the quaternion gradient to measure an error against. It is zero for round splats, which
+/// a rotation does not change; then this share of the gradient of the scales replaces it.
+double least_quaternion_norm(const StabilityCase& one, const Values& gradient) {
+    constexpr double kShare = 1e-3;
+    const Values values = one.gaussians;
+    double largest = 0;
+    for (size_t i = 0; i < values.size(); ++i) {
+        const double norm = reference::robust_norm(reference::read_splat(values, i).quaternion);
+        if (std::isfinite(norm)) largest = std::max(largest, norm);
+    }
+    return largest > 0 ? kShare * norm_of(gradient.log_scales) / largest : 0;
+}
+
+bool all_finite(const std::vector<float>& values) {
+    return std::all_of(values.begin(), values.end(), [](float x) { return std::isfinite(x); });
+}
+
+/// The error of the reference image if each determinant is a c - b^2 in float32, which is why the pipeline does not.
+double plain_determinant_error(const Expected& expected, const RenderOptions& options) {
+    const Picture& picture = expected.reference.picture;
+    std::vector<reference::Projected> plain = picture.projected;
+    for (reference::Projected& p : plain) {
+        const float a = float(p.a), b = float(p.b), c = float(p.c);
+        p.det = double(a * c - b * b);
+        if (!(p.det > 0)) p.visible = false;  // as renderers do that compute it this way
+    }
+    const auto order = reference::depth_order(plain);
+    const auto lists = reference::make_instances(plain, order, picture.instances.grid);
+    return picture_error(expected, reference::blend(plain, lists, options.background).color);
+}
+
+Expected expected_of(const StabilityCase& one, const Image& target) {
+    Expected expected{reference::loss_gradient(one.gaussians, one.camera, target, one.options), {}};
+    expected.excluded = pixels_at_threshold(expected.reference.picture);
+    for (const double v : expected.reference.picture.blended.color.values)
+        expected.scale = std::max(expected.scale, std::abs(v));
+    expected.least_quaternions = least_quaternion_norm(one, expected.reference.gradient);
+    return expected;
+}
+
+/// The errors of the reference under changes of each stored value, divided by the size of the change: the largest
+/// of several.
+std::vector<double> conditions_of(const StabilityCase& one, const Image& target, const Expected& expected) {
+    std::vector<double> largest;
+    for (uint32_t draw = 0; draw < kPerturbations; ++draw) {
+        const ReferenceGradient moved = reference::loss_gradient(
+            perturbed(one.gaussians, one.camera.position(), draw), one.camera, target, one.options);
+        const auto errors = errors_of(expected, moved.picture.blended.color, moved.loss, moved.gradient);
+        largest.resize(errors.size());
+        for (size_t i = 0; i < errors.size(); ++i)
+            largest[i] = std::max(largest[i], errors[i].error / kPerturbation);
+    }
+    return largest;
+}
+
+/// Without a finite condition number, the floor is the bound.
+double bound(double floor, double condition) {
+    return std::isfinite(condition) ? std::max(floor, kRoundings * condition * kUnit) : floor;
+}
 
 /// The comparison that is closest to its bound.
 const Comparison& tightest(const StabilityResult& result) {
@@ -38,7 +217,8 @@ std::string stability_line(const StabilityResult& r) {
                 r.splats, r.drawn, r.skipped, picture.error, picture.bound, picture.condition,
                 r.plain_determinant, worst.of.c_str(), worst.error, worst.bound, worst.condition);
     if (!r.finite) line += "  NOT FINITE";
-    if (r.skipped != r.skipped_by_twin) line += text_of("  SKIPPED, the reference %u", r.skipped_by_twin);
+    if (r.skipped != r.skipped_by_reference)
+        line += text_of("  SKIPPED, the reference %u", r.skipped_by_reference);
     for (const Comparison& c : r.comparisons)
         if (!c.good()) line += "  WRONG " + c.of;
     return line + "\n";
@@ -55,54 +235,6 @@ std::string stability_training_line(const StabilityTraining& t) {
                    static_cast<unsigned long long>(t.limited_steps), t.finite ? "" : "  NOT FINITE");
 }
 
-Json stability_json(const std::vector<StabilityResult>& results,
-                    const std::vector<StabilityTraining>& trainings) {
-    Json json{{"schema", "ewa-stability-1"}, {"cases", Json::array()}, {"training", Json::array()}};
-    for (const StabilityResult& r : results) {
-        Json one{{"name", r.name},
-                 {"what", r.what},
-                 {"splats", r.splats},
-                 {"drawn", r.drawn},
-                 {"skipped", r.skipped},
-                 {"skipped_by_twin", r.skipped_by_twin},
-                 {"pixels_at_threshold", r.pixels_at_threshold},
-                 {"finite", r.finite},
-                 {"plain_determinant_error", r.plain_determinant},
-                 {"good", r.good()},
-                 {"comparisons", Json::array()}};
-        for (const Comparison& c : r.comparisons)
-            one["comparisons"].push_back({{"of", c.of},
-                                          {"error", c.error},
-                                          {"bound", c.bound},
-                                          {"condition", c.condition},
-                                          {"good", c.good()}});
-        json["cases"].push_back(std::move(one));
-    }
-    for (const StabilityTraining& t : trainings)
-        json["training"].push_back({{"name", t.name},
-                                    {"steps", t.steps},
-                                    {"first_loss", t.first_loss},
-                                    {"last_loss", t.last_loss},
-                                    {"skipped", t.skipped},
-                                    {"dropped_updates", t.dropped_updates},
-                                    {"limited_steps", t.limited_steps},
-                                    {"finite", t.finite}});
-    return json;
-}
-
-/// The rates of 3DGS for a scene of unit extent.
-pipeline::Rates rates(int step) {
-    pipeline::Rates r;
-    r.mean = 1.6e-4f;
-    r.opacity = 0.025f;
-    r.quaternion = 1e-3f;
-    r.scale = 5e-3f;
-    r.sh0 = 2.5e-3f;
-    r.sh_rest = 1.25e-4f;
-    r.step = uint32_t(step);
-    return r;
-}
-
 /// Whether all values that were finite still are.
 bool stayed_finite(const std::vector<float>& before, const std::vector<float>& after) {
     for (size_t i = 0; i < before.size(); ++i)
@@ -110,19 +242,14 @@ bool stayed_finite(const std::vector<float>& before, const std::vector<float>& a
     return before.size() == after.size();
 }
 
-void print(const std::string& text) {
-    std::fputs(text.c_str(), stdout);
-    std::fflush(stdout);
-}
-
-std::vector<StabilityCase> chosen_cases(const StabilityOptions& options) {
-    if (!options.file.empty()) {
-        if (!options.read)
-            throw InputError(options.file.string() +
+std::vector<StabilityCase> chosen_cases(const Options& options) {
+    if (!options.scene.empty()) {
+        if (!options.read_splats)
+            throw InputError(options.scene.string() +
                              ": this program reads no splat files; ewa bench --stability does");
-        const Gaussians gaussians = options.read(options.file);
-        if (gaussians.size() == 0) throw InputError(options.file.string() + ": has no splats");
-        return {stability_case_of(options.file.filename().string(), gaussians)};
+        const Gaussians gaussians = options.read_splats(options.scene);
+        if (gaussians.size() == 0) throw InputError(options.scene.string() + ": has no splats");
+        return {stability_case_of(options.scene.filename().string(), gaussians)};
     }
     std::vector<StabilityCase> chosen;
     for (StabilityCase& one : stability_cases())
@@ -133,17 +260,95 @@ std::vector<StabilityCase> chosen_cases(const StabilityOptions& options) {
 
 }  // namespace
 
+void to_json(Json& json, const Comparison& c) {
+    json = {
+        {"of", c.of}, {"error", c.error}, {"bound", c.bound}, {"condition", c.condition}, {"good", c.good()}};
+}
+
+void to_json(Json& json, const StabilityResult& r) {
+    json = {{"name", r.name},
+            {"what", r.what},
+            {"splats", r.splats},
+            {"drawn", r.drawn},
+            {"skipped", r.skipped},
+            {"skipped_by_twin", r.skipped_by_reference},
+            {"pixels_at_threshold", r.pixels_at_threshold},
+            {"finite", r.finite},
+            {"plain_determinant_error", r.plain_determinant},
+            {"good", r.good()},
+            {"comparisons", r.comparisons}};
+}
+
+void to_json(Json& json, const StabilityTraining& t) {
+    json = {{"name", t.name},
+            {"steps", t.steps},
+            {"first_loss", t.first_loss},
+            {"last_loss", t.last_loss},
+            {"skipped", t.skipped},
+            {"dropped_updates", t.dropped_updates},
+            {"limited_steps", t.limited_steps},
+            {"finite", t.finite}};
+}
+
+bool StabilityResult::good() const {
+    return finite && skipped == skipped_by_reference &&
+           pixels_at_threshold <= std::max(kFewPixels, pixels / kPixelsEach) &&
+           std::all_of(comparisons.begin(), comparisons.end(), std::mem_fn(&Comparison::good));
+}
+
+StabilityResult compare_with_reference(const std::shared_ptr<gpu::Device>& device, const StabilityCase& one,
+                                       const Gaussians* drawn) {
+    const Image target = stability_target(one.camera.width, one.camera.height);
+    const Expected expected = expected_of(one, target);
+    const std::vector<uint8_t>& excluded = expected.excluded;
+
+    StabilityResult result;
+    result.name = one.name;
+    result.what = one.what;
+    result.splats = uint32_t(one.gaussians.size());
+    result.drawn = uint32_t(expected.reference.picture.order.size());
+    result.skipped_by_reference = expected.reference.picture.skipped_nonfinite;
+    result.pixels = excluded.size();
+    result.pixels_at_threshold = uint64_t(std::count(excluded.begin(), excluded.end(), 1));
+    result.plain_determinant = plain_determinant_error(expected, one.options);
+
+    if (!drawn) drawn = &one.gaussians;
+    Renderer renderer(device, *drawn, one.options);
+    const Image color = renderer.render(one.camera).color;
+    result.skipped = renderer.skipped_nonfinite();
+    const LossGradient actual = loss_gradient(device, *drawn, one.camera, target, one.options);
+    result.loss = actual.loss;
+    result.finite = all_finite(color.pixels) && std::isfinite(actual.loss);
+    for_each_group(actual.gradient, actual.gradient, [&](const char*, const auto& group, const auto&) {
+        result.finite = result.finite && all_finite(group);
+    });
+    result.comparisons = errors_of(expected, color, actual.loss, actual.gradient);
+    const std::vector<double> conditions = conditions_of(one, target, expected);
+    for (size_t i = 0; i < conditions.size(); ++i) {
+        result.comparisons[i].condition = conditions[i];
+        result.comparisons[i].bound = bound(i < 2 ? kPictureFloor : kGradientFloor, conditions[i]);
+    }
+    return result;
+}
+
 StabilityTraining train_from(const std::shared_ptr<gpu::Device>& device, const StabilityCase& one,
                              int steps) {
     StabilityTraining result;
     result.name = one.name;
     result.steps = steps;
     // The first run changes nothing: its rates are zero.
-    FrameRun run(device, {one.gaussians, one.camera, stability_photo(one.camera.width, one.camera.height)},
+    FrameRun run(device, {one.gaussians, one.camera, stability_target(one.camera.width, one.camera.height)},
                  true, one.options);
     result.first_loss = pipeline::loss_of(run.counts());
-    for (int step = 1; step <= steps; ++step) {
-        run.set_rates(rates(step));
+    for (uint32_t step = 1; step <= uint32_t(steps); ++step) {
+        // The rates of 3DGS for a scene of unit extent.
+        run.set_rates({.mean = 1.6e-4f,
+                       .opacity = 0.025f,
+                       .quaternion = 1e-3f,
+                       .scale = 5e-3f,
+                       .sh0 = 2.5e-3f,
+                       .sh_rest = 1.25e-4f,
+                       .step = step});
         run.run();
         result.last_loss = pipeline::loss_of(run.counts());
         result.finite = result.finite && std::isfinite(result.last_loss);
@@ -152,25 +357,22 @@ StabilityTraining train_from(const std::shared_ptr<gpu::Device>& device, const S
     }
     result.skipped = run.counts().skipped_nonfinite;
     const Gaussians end = pipeline::download_model(run.model(), run.model().params);
-    const Gaussians& g = one.gaussians;
-    result.finite = result.finite && stayed_finite(g.means, end.means) &&
-                    stayed_finite(g.quaternions, end.quaternions) &&
-                    stayed_finite(g.log_scales, end.log_scales) &&
-                    stayed_finite(g.opacity_logits, end.opacity_logits) && stayed_finite(g.sh, end.sh);
+    for_each_group(one.gaussians, end, [&](const char*, const auto& before, const auto& after) {
+        result.finite = result.finite && stayed_finite(before, after);
+    });
     const auto planes = run.frame().planes.download<float>(run.frame().sizes.planes / 4);
-    result.finite =
-        result.finite && std::all_of(planes.begin(), planes.end(), [](float v) { return std::isfinite(v); });
+    result.finite = result.finite && all_finite(planes);
     return result;
 }
 
-int run_stability(const StabilityOptions& options) {
+int run_stability(const Options& options) {
     const std::vector<StabilityCase> cases = chosen_cases(options);
     const auto device = open_device({.selector = options.device});
     print("device: " + device_info(*device).name + "\n" + stability_header());
     std::vector<StabilityResult> results;
     std::vector<StabilityTraining> trainings;
     for (const StabilityCase& one : cases) {
-        results.push_back(compare_with_twin(device, one));
+        results.push_back(compare_with_reference(device, one));
         print(stability_line(results.back()));
     }
     if (options.training_steps > 0) print(stability_training_header());
@@ -180,9 +382,10 @@ int run_stability(const StabilityOptions& options) {
         print(stability_training_line(trainings.back()));
     }
     if (!options.json.empty())
-        core::write_text_file(options.json, stability_json(results, trainings).dump(2) + "\n");
-    const bool good = std::all_of(results.begin(), results.end(), [](const auto& r) { return r.good(); }) &&
-                      std::all_of(trainings.begin(), trainings.end(), [](const auto& t) { return t.good(); });
+        core::write_json(options.json,
+                         {{"schema", "ewa-stability-1"}, {"cases", results}, {"training", trainings}});
+    const bool good = std::all_of(results.begin(), results.end(), std::mem_fn(&StabilityResult::good)) &&
+                      std::all_of(trainings.begin(), trainings.end(), std::mem_fn(&StabilityTraining::good));
     return good ? 0 : 1;
 }
 

@@ -1,26 +1,79 @@
 // SPDX-License-Identifier: Apache-2.0
-// The stability suite as a command: compares each case with the CPU reference, then trains from it.
+// Stiff and extreme scenes: their error on the device against the CPU reference, its bound, and training from them.
 #pragma once
-#include <filesystem>
-#include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
+#include "bench/bench.h"
+#include "ewa/camera.h"
 #include "ewa/device.h"
 #include "ewa/gaussians.h"
+#include "ewa/image.h"
+#include "ewa/render_options.h"
 
 namespace ewa::bench {
 
-struct StabilityOptions {
-    std::string cases;           // names or patterns as --cases takes them; empty: all
-    int training_steps = 500;    // 0: none
-    std::string device;          // as in DeviceOptions
-    std::filesystem::path json;  // empty: none
-    std::filesystem::path file;  // a user's scene instead of the built-in cases
-    std::function<Gaussians(const std::filesystem::path&)> read;  // reads that file
+struct StabilityCase {
+    std::string name;  // family_value
+    std::string what;  // one line: what is extreme
+    Gaussians gaussians;
+    Camera camera;
+    RenderOptions options;
 };
 
-/// Prints the table. Returns 1 if a bound is exceeded or a value is not finite. Throws InputError, RunError.
-int run_stability(const StabilityOptions& options);
+/// All cases in the order of their families. Equal on all machines up to the last bits of exp and log.
+std::vector<StabilityCase> stability_cases();
+
+/// A user's scene, seen from a distance at which it fills the image.
+StabilityCase stability_case_of(const std::string& name, const Gaussians& gaussians);
+
+/// The target image of the loss, RGB in [0, 1]: smooth waves and noise.
+Image stability_target(int width, int height);
+
+/// Errors are relative: the largest of an image over max(1, its largest value), the norm of a gradient's
+/// error over that of the reference gradient. condition: the same error of the CPU reference under a relative
+/// change of each stored value, over the size of that change. Quaternions, SH and distances change relatively,
+/// log-scales and logits absolutely; a few random changes estimate it. docs/numerics.md derives the bound.
+struct Comparison {
+    std::string of;
+    double error = 0, bound = 0, condition = 0;
+    bool good() const { return error <= bound; }  // NaN is not
+};
+
+struct StabilityResult {
+    std::string name, what;
+    uint32_t splats = 0, drawn = 0;                  // drawn: by the reference
+    uint32_t skipped = 0, skipped_by_reference = 0;  // splats that cannot be drawn
+    uint64_t pixels = 0;
+    uint64_t pixels_at_threshold = 0;     // where a contribution is close to a threshold of the model
+    bool finite = true;                   // image, loss and gradient
+    std::vector<Comparison> comparisons;  // image, loss, and each group of the gradient
+    double plain_determinant = 0;         // image error of the reference if det = a c - b^2 in float32
+    double loss = 0;
+    /// Also requires that at most 4 pixels, or one in 200, are excluded for being close to a threshold.
+    bool good() const;
+};
+
+/// The device renders `drawn`, by default the splats of the case. With others, a test sees the bounds fail.
+StabilityResult compare_with_reference(const std::shared_ptr<gpu::Device>& device, const StabilityCase& one,
+                                       const Gaussians* drawn = nullptr);
+
+struct StabilityTraining {
+    std::string name;
+    int steps = 0;
+    uint32_t skipped = 0;                             // splats skipped in the last step
+    uint64_t dropped_updates = 0, limited_steps = 0;  // of all steps
+    bool finite = true;  // all losses, and at the end parameters and image, unless not finite at first
+    double first_loss = 0, last_loss = 0;
+    bool good() const { return finite; }
+};
+
+/// Trains with Adam at the rates of 3DGS, without densification.
+StabilityTraining train_from(const std::shared_ptr<gpu::Device>& device, const StabilityCase& one, int steps);
+
+/// Compares and trains from each case that the options choose. Prints the table and writes the JSON. Returns 1 if
+/// a bound is exceeded or a value is not finite. Throws InputError, RunError.
+int run_stability(const Options& options);
 
 }  // namespace ewa::bench

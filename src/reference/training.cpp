@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "reference/strategy.h"
+#include "reference/training.h"
 
 #include <algorithm>
 #include <cassert>
@@ -10,6 +10,31 @@
 #include "shared/constants.h"
 
 namespace ewa::reference {
+
+using namespace shared;
+
+uint64_t adam_step(std::span<double> values, std::span<const double> gradient, AdamState& state, double rate,
+                   int step) {
+    assert(step >= 1);
+    assert(gradient.size() == values.size() && state.m.size() == values.size() &&
+           state.v.size() == values.size());
+    const double correction1 = 1 - std::pow(ADAM_BETA1, step), correction2 = 1 - std::pow(ADAM_BETA2, step);
+    uint64_t dropped = 0;
+    for (size_t i = 0; i < values.size(); ++i) {
+        const double g = gradient[i];
+        const double m = ADAM_BETA1 * state.m[i] + (1 - ADAM_BETA1) * g;
+        const double v = ADAM_BETA2 * state.v[i] + (1 - ADAM_BETA2) * g * g;
+        const double x = values[i] - rate * (m / correction1) / (std::sqrt(v / correction2) + ADAM_EPSILON);
+        if (!(std::isfinite(m) && std::isfinite(v) && std::isfinite(x))) {
+            ++dropped;
+            continue;
+        }
+        state.m[i] = m;
+        state.v[i] = v;
+        values[i] = x;
+    }
+    return dropped;
+}
 
 namespace {
 
@@ -40,7 +65,7 @@ Decision decide(const Splat& splat, double mean_gradient, const DensifyOptions& 
     const double scale = std::exp(std::max({splat.log_scale.x, splat.log_scale.y, splat.log_scale.z}));
     const bool grows = mean_gradient >= options.grow_gradient;
     const bool splits = grows && scale > options.split_scale * options.extent;
-    const double left = splits ? scale / shared::SPLIT_SCALE : scale;
+    const double left = splits ? scale / SPLIT_SCALE : scale;
     if (options.prune_large && left > options.prune_scale * options.extent) return Decision::prune;
     if (splits) return Decision::split;
     return grows ? Decision::clone : Decision::keep;
@@ -56,13 +81,13 @@ std::vector<Decision> decide(const Values& values, const DensifyStatistics& stat
         decisions.push_back(decide(read_splat(values, i), mean, options));
         if (decisions.back() != Decision::prune) ++left;
     }
-    uint64_t room = options.max_splats > left ? options.max_splats - left : 0;
+    uint64_t capacity = options.max_splats > left ? options.max_splats - left : 0;
     for (Decision& decision : decisions) {
         if (decision != Decision::clone && decision != Decision::split) continue;
-        if (room == 0)
+        if (capacity == 0)
             decision = Decision::keep;
         else
-            --room;
+            --capacity;
     }
     return decisions;
 }
@@ -72,7 +97,7 @@ Splat split_child(const Splat& parent, const glm::dvec3& normal, bool revised_op
     glm::dvec3 step(0);
     for (int k = 0; k < 3; ++k) {
         step[k] = std::exp(parent.log_scale[k]) * normal[k];
-        child.log_scale[k] = parent.log_scale[k] - std::log(shared::SPLIT_SCALE);
+        child.log_scale[k] = parent.log_scale[k] - std::log(SPLIT_SCALE);
     }
     child.mean += rotation_of(parent) * step;
     if (revised_opacity) {
@@ -159,7 +184,7 @@ glm::dvec3 noise(const Splat& splat, const glm::dvec3& normal, double amplitude)
     glm::dvec3 along = normal * rotation;
     for (int k = 0; k < 3; ++k) along[k] *= std::exp(2 * splat.log_scale[k]);
     const double opacity = 1 / (1 + std::exp(-splat.opacity_logit));
-    const double gate = 1 / (1 + std::exp(shared::MCMC_GATE_SLOPE * (opacity - shared::MCMC_GATE_OPACITY)));
+    const double gate = 1 / (1 + std::exp(MCMC_GATE_SLOPE * (opacity - MCMC_GATE_OPACITY)));
     return amplitude * gate * (rotation * along);
 }
 

@@ -1,19 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Strategies that add, move and remove splats: adaptive density control (ADC) and Markov chain Monte Carlo
-// (MCMC).
-//
-// ADC (Kerbl et al. 2023, section 5.2, and its published code, scene/gaussian_model.py:
-// add_densification_stats, densify_and_clone, densify_and_split, densify_and_prune, reset_opacity):
-// - A splat grows if the mean over views of |dL/d(mean in normalised device coordinates)| reaches the
-//   threshold.
-// - It is cloned if its largest scale is at most split_scale * extent, else split in two.
-// - It is pruned if its opacity is below prune_opacity.
-// - Once opacity has been reset, it is also pruned if its largest scale is above prune_scale * extent.
-// - The published code prunes after it grows, so this applies to a split's children with their smaller
-//   scales.
-//
-// MCMC (Kheradmand et al. 2024): the values of a splat that several share, the choice of sources, the noise
-// of the means.
+// The changes that training makes to splats: Adam, and the strategies that add, move and remove splats.
 #pragma once
 #include <cstdint>
 #include <glm/vec3.hpp>
@@ -25,6 +11,30 @@
 #include "reference/values.h"
 
 namespace ewa::reference {
+
+// Adam (Kingma and Ba 2015, algorithm 1) in the form of PyTorch and 3DGS:
+//   m <- BETA1 m + (1 - BETA1) g,  v <- BETA2 v + (1 - BETA2) g^2
+//   x <- x - rate (m / (1 - BETA1^t)) / (sqrt(v / (1 - BETA2^t)) + EPSILON),  t = 1, 2, ...
+// As in 3DGS, a value of a splat that this step does not see is updated with g = 0.
+
+struct AdamState {
+    std::vector<double> m, v;  // per value, initially zero
+    explicit AdamState(size_t n = 0) : m(n, 0.0), v(n, 0.0) {}
+};
+
+/// `step` counts from 1. A value whose new m, v or x is not finite keeps all three; returns how many do.
+uint64_t adam_step(std::span<double> values, std::span<const double> gradient, AdamState& state, double rate,
+                   int step);
+
+// ADC (Kerbl et al. 2023, section 5.2, and its published code, scene/gaussian_model.py:
+// add_densification_stats, densify_and_clone, densify_and_split, densify_and_prune, reset_opacity):
+// - A splat grows if the mean over views of |dL/d(mean in device coordinates)| reaches the threshold.
+// - It is cloned if its largest scale is at most split_scale * extent, else split in two.
+// - It is pruned if its opacity is below prune_opacity.
+// - Once opacity has been reset, it is also pruned if its largest scale is above prune_scale * extent.
+// - The published code prunes after it grows, so this applies to a split's children with smaller scales.
+//
+// MCMC (Kheradmand et al. 2024): values of a splat that several share, choice of sources, noise of the means.
 
 struct DensifyStatistics {
     /// Sums of the norm, in normalised device coordinates (width and height are 2).
@@ -73,20 +83,17 @@ struct Densified {
 Densified densify(const Values& values, std::span<const Decision> decisions,
                   std::span<const glm::dvec3> normals);
 
-/// logit <- min(logit, logit of ceiling). 3DGS uses 0.01. The optimiser moments of the opacities restart at
-/// zero.
+/// logit <- min(logit, logit of ceiling). 3DGS uses 0.01. Adam's moments of the opacities restart at zero.
 void reset_opacity(Values& values, double ceiling);
 
 /// Eq. 9: the values of each of N splats that replace one of opacity o: opacity 1 - (1 - o)^(1/N) and the
-/// factor of the scales. Up to N = 20, it is the paper's double sum, whose terms cancel (to 1e-9); beyond, an
-/// integral.
+/// factor of the scales. Up to N = 20, it is the paper's double sum (exact to 1e-9); beyond, an integral.
 struct Share {
     double opacity = 0, scale_factor = 1;
 };
 Share share_of(double opacity, int parts);
 
-/// The source of each draw: the splat whose interval of the cumulative weights contains
-/// floor(random * total / 2^32).
+/// The source of each draw: floor(random * total / 2^32) is in its interval of the cumulative weights.
 std::vector<uint32_t> draw_sources(std::span<const uint32_t> weights, std::span<const uint32_t> random);
 
 /// The mean of a source or a copy, moved by `spread` standard deviations times a normal draw. World units.

@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// The body of a blend_tile_* function. Each translation unit defines EWA_BENCH_LANES and includes it once. All of it has
-// internal linkage and it includes no standard header. Otherwise the linker could keep an inline function that was
-// compiled for AVX-512, and run it on a CPU without.
+// A blend_tile_* function. CMake compiles it again for CPUs with wider vectors, under other names and with fused
+// multiply-add. All else has internal linkage, and this includes no standard header. Otherwise the linker could keep
+// an inline function that was compiled for AVX-512, and run it on a CPU without.
 #include "bench/ceiling/blend_loop.h"
+
+#ifndef EWA_BENCH_BLEND_TILE  // for the oldest CPU that the program runs on; also counts the pairs
+#define EWA_BENCH_BLEND_TILE blend_tile_portable
+#define EWA_BENCH_LANES 8  // pixels of a vector
+#define EWA_BENCH_COUNT_TILE
+#endif
 
 namespace ewa::bench {
 namespace {
@@ -122,7 +128,9 @@ inline void store_pixels(const Pixels& pixels, const BlendLists& lists, unsigned
     }
 }
 
-inline void blend_whole_tile(const BlendLists& lists, unsigned tile, float* planes) {
+}  // namespace
+
+void EWA_BENCH_BLEND_TILE(const BlendLists& lists, std::uint32_t tile, float* planes) {
     Int unused = {};
     for (unsigned first = 0; first < kTilePixels; first += kVectors * kLanes) {
         Pixels pixels;
@@ -132,5 +140,21 @@ inline void blend_whole_tile(const BlendLists& lists, unsigned tile, float* plan
     }
 }
 
-}  // namespace
+#ifdef EWA_BENCH_COUNT_TILE
+PairCounts count_tile(const BlendLists& lists, std::uint32_t tile) {
+    PairCounts counts;
+    for (unsigned first = 0; first < kTilePixels; first += kVectors * kLanes) {
+        Pixels pixels;
+        Int evaluated = {}, blended = {};
+        open_pixels(pixels, lists, tile, first);
+        walk<true>(pixels, lists, tile, evaluated, blended);
+        for (unsigned l = 0; l < kLanes; ++l) {
+            counts.evaluated += std::uint64_t(evaluated[l]);
+            counts.blended += std::uint64_t(blended[l]);
+        }
+    }
+    return counts;
+}
+#endif
+
 }  // namespace ewa::bench
