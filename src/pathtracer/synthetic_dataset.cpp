@@ -9,9 +9,9 @@
 #include <nlohmann/json.hpp>
 
 #include "core/atomic_file.h"
+#include "core/folders.h"
 #include "core/hash.h"
 #include "core/json.h"
-#include "core/output.h"
 #include "core/random.h"
 #include "core/text.h"
 #include "ewa/error.h"

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "core/output.h"
+#include "core/folders.h"
 #include "ewa/error.h"
 #include "scene/camera.h"
 #include "viewer/app.h"
