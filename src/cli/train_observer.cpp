@@ -13,11 +13,6 @@
 #include "live/watcher.h"
 
 namespace ewa::cli {
-namespace {
-
-constexpr auto kPausedLook = std::chrono::milliseconds(20);
-
-}  // namespace
 
 /// The server of --serve.
 class TrainObserver::Served {
@@ -54,6 +49,7 @@ class TrainObserver::Served {
     /// Takes splats and saves if somebody asked for it. Returns late if somebody pauses the training: after the
     /// pause, or at an interruption.
     void attend(const Trainer& trainer, const StepReport& step, const std::function<void()>& save) {
+        constexpr auto kPausedLook = std::chrono::milliseconds(20);
         report(step, live::State::running);
         for (;;) {
             if (server_->wants_splats(step.step)) {
