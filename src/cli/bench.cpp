@@ -31,7 +31,7 @@ constexpr int kEvaluations = 6;
 struct BenchArguments {
     bench::Options options;
     bool accuracy = false;
-    // With accuracy alone.
+    // Used only with --accuracy.
     fs::path splats, svg;  // splats empty: the result of the training. svg empty: not written
     int steps = 600;       // of each training; 0: no training
 };

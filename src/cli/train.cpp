@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// ewa train: its options, a dataset from a mesh scene where one is given, and the run.
+// ewa train: its options, the dataset of a mesh scene, and the run.
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <memory>
