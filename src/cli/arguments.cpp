@@ -2,51 +2,81 @@
 #include "cli/arguments.h"
 
 #include <spdlog/fmt/fmt.h>
-#include <CLI/CLI.hpp>
 
 #include <algorithm>
-#include <charconv>
 
-#include "cli/checks.h"
+#include "cli/interrupt.h"
+#include "cli/output.h"
+#include "core/text.h"
 #include "ewa/error.h"
-#include "train/run_options.h"
 
 namespace ewa::cli {
 namespace {
 
-std::vector<std::string> comma_separated(const std::string& text) {
-    std::vector<std::string> parts(1);
-    for (const char c : text) {
-        if (c == ',')
-            parts.emplace_back();
-        else
-            parts.back() += c;
-    }
-    return parts;
-}
-
-template <typename T>
-bool parse_number(const std::string& text, T& value) {
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    return error == std::errc() && end == text.data() + text.size();
-}
+namespace fs = std::filesystem;
 
 std::vector<int> listed_frames(const Dataset& dataset, const std::string& list) {
     std::vector<int> frames;
-    for (const std::string& part : comma_separated(list)) {
-        int index = 0;
-        if (!parse_number(part, index))
-            throw InputError("'" + list + "' is not all, train, test or frame indices such as 0,3,7");
-        if (index < 0 || index >= static_cast<int>(dataset.frames.size()))
+    for (size_t begin = 0, end = 0; begin <= list.size(); begin = end + 1) {
+        end = std::min(list.find(',', begin), list.size());
+        const auto index = core::parse_integer<int>(std::string_view(list).substr(begin, end - begin));
+        if (!index) throw InputError("'" + list + "' is not all, train, test or frame indices such as 0,3,7");
+        if (*index < 0 || *index >= std::ssize(dataset.frames))
             throw InputError(
-                fmt::format("there is no frame {}: {} has {} frames, numbered from 0 in name order", index,
+                fmt::format("there is no frame {}: {} has {} frames, numbered from 0 in name order", *index,
                             dataset.root.string(), dataset.frames.size()));
-        if (std::find(frames.begin(), frames.end(), index) == frames.end()) frames.push_back(index);
+        if (std::find(frames.begin(), frames.end(), *index) == frames.end()) frames.push_back(*index);
     }
     return frames;
 }
 
+/// Whether the path names a glTF file of meshes: by its extension, else by its content.
+bool names_mesh_scene(const fs::path& path) {
+    std::error_code error;
+    if (fs::is_directory(path, error)) return false;
+    const std::string extension = core::lower(path.extension().string());
+    return extension == ".gltf" || extension == ".glb" || is_mesh_scene(path);
+}
+
+void print_notes(const SyntheticDataset& made, const fs::path& folder) {
+    for (const std::string& remark : made.remarks) fmt::print("note: {}\n", core::one_line(remark));
+    if (made.dropped_triangles > 0)
+        fmt::print("{} triangles with a corner that is not finite are skipped\n", made.dropped_triangles);
+    if (made.unfinished_rays > 0)
+        fmt::print("{} rays exceeded the step limit of the device and see nothing\n", made.unfinished_rays);
+    if (made.dropped_samples > 0)
+        fmt::print("{} paths were not finite and count as black\n", made.dropped_samples);
+    if (made.interrupted)
+        fmt::print("interrupted; the same command continues\n");
+    else
+        fmt::print("{} views are in {}{}, exposure {:+.1f} stops; {}\n", made.views,
+                   core::one_line(folder.string()),
+                   made.kept > 0 ? fmt::format(" ({} existed already)", made.kept) : "", made.exposure,
+                   made.color_depends_on_view ? "colours depend on the view"
+                                              : "every material is diffuse: SH degree 0 suffices");
+}
+
 }  // namespace
+
+CLI::Validator accepted_by(const train::RunOption& option) {
+    return CLI::Validator(
+        [&option](std::string& text) {
+            try {
+                RunOptions scratch;
+                option.set(scratch, text);
+                return std::string();
+            } catch (const InputError& error) {
+                return std::string(error.what());
+            }
+        },
+        "");
+}
+
+Footprint settled_kernel(Footprint kernel, bool antialias) {
+    if (antialias && kernel == Footprint::unit_mass)
+        throw InputError("--antialias and --kernel ewa exclude each other");
+    return antialias ? Footprint::antialias : kernel;
+}
 
 RenderOptions DrawArguments::options() const {
     RunOptions drawn;
@@ -61,8 +91,7 @@ RenderOptions DrawArguments::options() const {
     set("background", background);
     set("kernel", kernel);
     RenderOptions render = drawn.train.render;
-    if (antialias && kernel == "ewa") throw InputError("--antialias and --kernel ewa exclude each other");
-    if (antialias) render.kernel = Footprint::antialias;
+    render.kernel = settled_kernel(render.kernel, antialias);
     render.sh_degree = sh_degree;
     return render;
 }
@@ -82,35 +111,11 @@ void add_draw_options(CLI::App& app, DrawArguments& arguments) {
         ->capture_default_str();
 }
 
-CLI::Validator without_sign() {
-    return CLI::Validator(
-        [](std::string& text) {
-            return text.find_first_not_of("0123456789") == std::string::npos
-                       ? ""
-                       : text + " is not a whole number from 0";
-        },
-        "");
-}
-
 void add_device_options(CLI::App& app, DeviceOptions& options) {
     const train::RunOption& device = train::run_option("device");
     app.add_option("--device", options.selector, device.help)->type_name(device.value);
     app.add_flag("--validation", options.validation, "Enable the Vulkan validation layer")
         ->group("For developers");
-}
-
-void add_masks_option(CLI::App& app, MaskUse& masks) {
-    const train::RunOption& option = train::run_option("masks");
-    app.add_option_function<std::string>(
-           "--masks",
-           [&option, &masks](const std::string& text) {
-               RunOptions run;
-               option.set(run, text);
-               masks = run.masks;
-           },
-           option.help)
-        ->check(CLI::IsMember(option.choices))
-        ->default_str("auto");
 }
 
 void add_downscale_option(CLI::App& app, int& downscale) {
@@ -127,17 +132,8 @@ void add_test_every_option(CLI::App& app, int& test_every) {
         ->capture_default_str();
 }
 
-void add_splats(CLI::App& app, std::filesystem::path& splats) {
+void add_splats(CLI::App& app, fs::path& splats) {
     app.add_option("SPLATS", splats, "Splat file (.ply .compressed.ply .splat .spz .glb .gltf)")
-        ->required()
-        ->type_name("");
-}
-
-void add_dataset(CLI::App& app, std::filesystem::path& dataset) {
-    app.add_option(
-           "DATASET", dataset,
-           "Images with cameras: a COLMAP folder or transforms.json. Or a glTF file of meshes, which is "
-           "rendered as in ewa train")
         ->required()
         ->type_name("");
 }
@@ -166,6 +162,81 @@ std::vector<int> select_frames(const Dataset& dataset, const std::string& which,
         throw InputError(fmt::format("no frame of {} is in the {} split with --test-every {}",
                                      dataset.root.string(), which, test_every));
     return frames;
+}
+
+Dataset load_cameras_as_trained(const fs::path& path, int downscale) {
+    if (names_mesh_scene(path)) {
+        Dataset dataset = scene_cameras(path, {});
+        for (Frame& frame : dataset.frames) frame.camera = ewa::downscale(frame.camera, downscale);
+        return dataset;
+    }
+    Dataset dataset = load_dataset(path, {.downscale = downscale, .need_images = false});
+    auto missing = [](const Frame& frame) { return !frame.image_exists; };
+    const auto count = std::count_if(dataset.frames.begin(), dataset.frames.end(), missing);
+    dataset.missing_images = static_cast<int>(count);
+    if (count < std::ssize(dataset.frames)) std::erase_if(dataset.frames, missing);
+    return dataset;
+}
+
+void render_with_progress(const DeviceOptions& device, const fs::path& scene, const fs::path& folder,
+                          const SyntheticOptions& options, bool quiet) {
+    const InterruptWatch watch;
+    std::unique_ptr<Progress> progress;
+    const SyntheticDataset made =
+        render_dataset(open_device(device), scene, folder, options, [&](int done, int total) {
+            if (!progress) progress = std::make_unique<Progress>("rendered", total, "views", quiet);
+            if (done > 0) progress->update(done);
+            return !interrupted();
+        });
+    progress.reset();
+    if (!quiet) print_notes(made, folder);
+    if (made.interrupted) throw Interrupted();
+}
+
+void add_view_positionals(CLI::App& app, ViewArguments& arguments) {
+    add_splats(app, arguments.splats);
+    app.add_option(
+           "DATASET", arguments.dataset,
+           "Images with cameras: a COLMAP folder or transforms.json. Or a glTF file of meshes, which is "
+           "rendered as in ewa train")
+        ->required()
+        ->type_name("");
+}
+
+void add_view_options(CLI::App& app, ViewArguments& arguments) {
+    add_draw_options(app, arguments.draw);
+    add_downscale_option(app, arguments.downscale);
+    const train::RunOption& masks = train::run_option("masks");
+    app.add_option_function<std::string>(
+           "--masks",
+           [&masks, &arguments](const std::string& text) {
+               RunOptions run;
+               masks.set(run, text);
+               arguments.masks = run.masks;
+           },
+           masks.help)
+        ->check(CLI::IsMember(masks.choices))
+        ->default_str("auto");
+    add_device_options(app, arguments.device);
+}
+
+Views load_views(const ViewArguments& arguments, const std::string& which, int test_every) {
+    fs::path folder = arguments.dataset;
+    std::unique_ptr<core::TemporaryFolder> rendered;
+    if (names_mesh_scene(arguments.dataset)) {
+        select_frames(scene_cameras(arguments.dataset, {}), which, test_every);
+        folder = arguments.splats.parent_path() / "dataset";
+        if (!is_rendered(arguments.dataset, folder, {})) {
+            rendered = std::make_unique<core::TemporaryFolder>("ewa-images-");
+            folder = rendered->path();
+            // A signal after the last view is noticed here: the watch of the rendering has ended.
+            render_with_progress(arguments.device, arguments.dataset, folder, {}, false);
+            if (interrupted()) throw Interrupted();
+        }
+    }
+    Dataset dataset = load_dataset(folder, {.downscale = arguments.downscale, .masks = arguments.masks});
+    std::vector<int> frames = select_frames(dataset, which, test_every);
+    return {std::move(dataset), std::move(frames), std::move(rendered)};
 }
 
 }  // namespace ewa::cli

@@ -1,18 +1,32 @@
 // SPDX-License-Identifier: Apache-2.0
-// Arguments that several commands share, with the same names, ranges and help texts.
+// Arguments that several commands share, with the same names, ranges and help texts. Also the datasets that they name.
 #pragma once
+#include <CLI/CLI.hpp>
+
+#include <memory>
 #include <string>
 #include <vector>
 
+#include "core/folders.h"
 #include "ewa/dataset.h"
 #include "ewa/device.h"
 #include "ewa/render_options.h"
-
-namespace CLI {
-class App;
-}
+#include "ewa/synthetic_dataset.h"
+#include "train/run_options.h"
 
 namespace ewa::cli {
+
+/// Accepts a number from low to high. The help shows the option's type name instead of the range.
+template <typename T>
+CLI::Validator in_range(T low, T high) {
+    return CLI::Range(low, high).description("");
+}
+
+/// The option's own check, which names neither the option nor where it was read.
+CLI::Validator accepted_by(const train::RunOption& option);
+
+/// The kernel, or that of --antialias if it is given. Throws InputError if they exclude each other.
+Footprint settled_kernel(Footprint kernel, bool antialias);
 
 /// How a scene is rendered: --background, --kernel, --antialias, --sh-degree.
 struct DrawArguments {
@@ -26,15 +40,11 @@ struct DrawArguments {
 };
 void add_draw_options(CLI::App& app, DrawArguments& arguments);
 
-/// The required positionals SPLATS and DATASET.
+/// The required positional SPLATS.
 void add_splats(CLI::App& app, std::filesystem::path& splats);
-void add_dataset(CLI::App& app, std::filesystem::path& dataset);
 
 /// --device and --validation.
 void add_device_options(CLI::App& app, DeviceOptions& options);
-
-/// --masks
-void add_masks_option(CLI::App& app, MaskUse& masks);
 
 void add_downscale_option(CLI::App& app, int& downscale);
 /// --frames and --test-every.
@@ -45,5 +55,40 @@ void add_test_every_option(CLI::App& app, int& test_every);
 /// The indices of the frames that --frames names: "all", "train", "test", or a list such as "0,3,7" in name
 /// order. Throws InputError, also if there are none.
 std::vector<int> select_frames(const Dataset& dataset, const std::string& which, int test_every);
+
+// A DATASET is what load_dataset reads, or a glTF file of meshes.
+
+/// The cameras of a dataset, whose images may be missing. If only some are, their frames are skipped as in
+/// training, so that the same frames are held out; Dataset::missing_images counts them. Of a mesh scene: the
+/// views that `ewa train` renders.
+Dataset load_cameras_as_trained(const std::filesystem::path& path, int downscale);
+
+/// Renders a mesh scene into a dataset, with progress, and prints its notes. Throws InputError, RunError, and
+/// Interrupted if Ctrl-C ended it.
+void render_with_progress(const DeviceOptions& device, const std::filesystem::path& scene,
+                          const std::filesystem::path& folder, const SyntheticOptions& options, bool quiet);
+
+/// A splat scene and a dataset whose images it is compared with.
+struct ViewArguments {
+    std::filesystem::path splats, dataset;
+    int downscale = 1;
+    MaskUse masks = MaskUse::automatic;
+    DrawArguments draw;
+    DeviceOptions device;
+};
+/// SPLATS and DATASET.
+void add_view_positionals(CLI::App& app, ViewArguments& arguments);
+/// The options of the other members.
+void add_view_options(CLI::App& app, ViewArguments& arguments);
+
+struct Views {
+    Dataset dataset;
+    std::vector<int> frames;                        // those that were asked for
+    std::unique_ptr<core::TemporaryFolder> folder;  // of the images, or null
+};
+/// Loads a dataset with its images. Of a mesh scene: the images that `ewa train` left in `dataset` beside the
+/// splats, if they show this scene. Else renders it into a temporary folder. which, test_every: as in
+/// select_frames, whose error comes before the rendering. Throws Interrupted if Ctrl-C ended the rendering.
+Views load_views(const ViewArguments& arguments, const std::string& which, int test_every);
 
 }  // namespace ewa::cli

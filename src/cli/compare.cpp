@@ -10,11 +10,8 @@
 #include <memory>
 #include <optional>
 
-#include "cli/arguments.h"
 #include "cli/command.h"
-#include "cli/compare_figures.h"
 #include "cli/compare_inputs.h"
-#include "cli/dataset_argument.h"
 #include "cli/output.h"
 #include "core/text.h"
 #include "ewa/error.h"
@@ -25,50 +22,104 @@ namespace ewa::cli {
 namespace {
 
 namespace fs = std::filesystem;
+using report::Json;
 
 constexpr int kTooFarApart = 1;
 
 struct CompareArguments {
-    fs::path a, b, json, heat_map;
-    CompareLimits limits;
+    CompareInputs inputs;
+    fs::path json, heat_map;
+    // The limits that each pair must meet; empty: none.
+    std::optional<double> threshold;  // dB: the least PSNR
+    std::optional<double> max_error;  // the largest difference of two values, alpha included
     double heat_scale = 0.25;
-
-    // How splat scenes are rendered.
-    fs::path cameras;
-    std::string frames = "all";
-    int test_every = 8, downscale = 1;
-    DrawArguments draw;
-    DeviceOptions device;
 };
 
-struct Sides {
-    std::unique_ptr<ComparedSide> a, b;
-    Dataset cameras;  // for splat scenes
-    RenderOptions options;
+struct Compared {
+    std::string name;
+    ImageDifference difference;
+    std::vector<std::string> failed = {};  // names of the figures that exceed their limit
+    std::string reasons = {};              // the same for the user
 };
 
-Sides open_sides(const CompareArguments& arguments) {
-    Sides sides;
-    const bool scene_a = names_splat_scene(arguments.a), scene_b = names_splat_scene(arguments.b);
-    const bool scene = scene_a || scene_b;
-    if (!scene && !arguments.cameras.empty())
-        throw InputError("--cameras: neither " + arguments.a.string() + " nor " + arguments.b.string() +
-                         " is a splat scene");
-    if (scene && arguments.cameras.empty())
-        throw InputError((scene_a ? arguments.a : arguments.b).string() +
-                         " is a splat scene; --cameras DATASET names the cameras to render it through");
-    // Images first: their errors are found without rendering.
-    if (!scene_a) sides.a = image_side(arguments.a);
-    if (!scene_b) sides.b = image_side(arguments.b);
-    if (!scene) return sides;
-    sides.options = arguments.draw.options();
-    sides.cameras = load_cameras_as_trained(arguments.cameras, arguments.downscale);
-    const SceneViews views{sides.cameras,
-                           select_frames(sides.cameras, arguments.frames, arguments.test_every),
-                           sides.options, open_device(arguments.device)};
-    if (scene_a) sides.a = scene_side(arguments.a, views);
-    if (scene_b) sides.b = scene_side(arguments.b, views);
-    return sides;
+/// Means and extremes over the pairs.
+struct CompareTotals {
+    double psnr = 0, ssim = 0;        // means
+    double max_error = 0, rms = 0;    // largest
+    const Compared* worst = nullptr;  // the pair with the lowest PSNR, or RMS over all values in dB
+    bool passed = true;
+};
+
+/// Fills `failed` and `reasons`. NaN exceeds every limit. PSNR is of RGB clamped to [0, 1], as everywhere. The
+/// threshold also limits the RMS error over all values, so that alpha and values above white count too.
+void judge(Compared& pair, const CompareArguments& arguments) {
+    constexpr double kRounding = 1 + 1e-9;  // the same figure, computed in two ways
+    const ImageDifference& d = pair.difference;
+    if (arguments.threshold) {
+        const double threshold = *arguments.threshold;
+        const double most = std::pow(10.0, -threshold / 20);  // the RMS error that has this PSNR
+        const bool over = !(d.rms_error <= most * kRounding);
+        if (!(d.psnr >= threshold)) {
+            pair.failed.emplace_back("psnr");
+            pair.reasons = fmt::format("  under {:g} dB", threshold);
+        } else if (over) {
+            pair.reasons = fmt::format(
+                "  under {:g} dB (RMS over {:.3g}) with alpha and values outside [0, 1]", threshold, most);
+        }
+        if (over) pair.failed.emplace_back("rms");
+    }
+    if (arguments.max_error && !(d.max_error <= *arguments.max_error)) {
+        pair.failed.emplace_back("max_error");
+        pair.reasons += fmt::format("  max error over {:g}", *arguments.max_error);
+    }
+}
+
+/// In dB: the lower of the PSNR and the RMS error over all values.
+double nearness(const ImageDifference& d) {
+    if (std::isnan(d.psnr) || std::isnan(d.rms_error)) return std::nan("");
+    return std::min(d.psnr, -20 * std::log10(d.rms_error));
+}
+
+/// JSON has no number for an infinite PSNR, which equal images have: null.
+Json number(double value) {
+    return std::isfinite(value) ? Json(value) : Json();
+}
+
+Json to_json(const Compared& compared) {
+    const ImageDifference& d = compared.difference;
+    return {{"name", compared.name},
+            {"psnr", number(d.psnr)},
+            {"ssim", number(d.ssim)},
+            {"max_error", number(d.max_error)},
+            {"max_error_at", {d.max_x, d.max_y}},
+            {"mean_error", number(d.mean_error)},
+            {"rms", number(d.rms_error)},
+            {"identical", d.max_error == 0},
+            {"passed", compared.failed.empty()},
+            {"failed", compared.failed}};
+}
+
+void print(const Compared& one) {
+    const ImageDifference& d = one.difference;
+    fmt::print("{}{}PSNR {:.3f} dB  SSIM {:.5f}  RMS {:.6g}  max error {:.6g}{}{}\n",
+               core::one_line(one.name), one.name.empty() ? "" : "  ", d.psnr, d.ssim, d.rms_error,
+               d.max_error, d.max_error > 0 ? fmt::format(" at {},{}", d.max_x, d.max_y) : "", one.reasons);
+    std::fflush(stdout);
+}
+
+CompareTotals totals_of(const std::vector<Compared>& all) {
+    CompareTotals out;
+    for (const Compared& one : all) {
+        out.psnr += one.difference.psnr / double(all.size());
+        out.ssim += one.difference.ssim / double(all.size());
+        out.max_error = std::max(out.max_error, one.difference.max_error);
+        // NaN is the worst, and stays.
+        if (!std::isnan(out.rms) && !(one.difference.rms_error <= out.rms))
+            out.rms = one.difference.rms_error;
+        out.passed = out.passed && one.failed.empty();
+        if (!out.worst || !(nearness(one.difference) >= nearness(out.worst->difference))) out.worst = &one;
+    }
+    return out;
 }
 
 /// The file of the pair's heat map; empty: none.
@@ -79,30 +130,30 @@ fs::path heat_map_file(const ImagePair& pair, const CompareArguments& arguments)
 
 /// Throws if an output is also an input, or cannot be written.
 void check_outputs(const CompareArguments& arguments, const Sides& sides, const ImagePairs& pairs) {
+    const CompareInputs& inputs = arguments.inputs;
     std::vector<NamedFile> written = {{"--json", arguments.json}};
-    std::vector<NamedFile> read = {{"A", arguments.a}, {"B", arguments.b}, {"--cameras", arguments.cameras}};
+    std::vector<NamedFile> read = {{"A", inputs.a}, {"B", inputs.b}, {"--cameras", inputs.cameras}};
     for (const ImagePair& pair : pairs.pairs) {
         written.push_back({"--heat-map", heat_map_file(pair, arguments)});
-        if (!sides.a->names().is_scene) read.push_back({"an image of A", sides.a->place(pair.a)});
-        if (!sides.b->names().is_scene) read.push_back({"an image of B", sides.b->place(pair.b)});
+        if (!sides.a->is_scene) read.push_back({"an image of A", sides.a->place(pair.a)});
+        if (!sides.b->is_scene) read.push_back({"an image of B", sides.b->place(pair.b)});
     }
     for (const Frame& frame : sides.cameras.frames) {
         read.push_back({"an image of --cameras", frame.image_path});
         read.push_back({"a mask of --cameras", frame.mask_path});
     }
     for (const char* name : {"transforms.json", "transforms_train.json", "transforms_test.json"})
-        if (!arguments.cameras.empty()) read.push_back({"a file of --cameras", arguments.cameras / name});
+        if (!inputs.cameras.empty()) read.push_back({"a file of --cameras", inputs.cameras / name});
     keep_apart(written, read);
-    for (const NamedFile& file : written)
-        if (!file.path.empty()) check_writable(file.path, Folder::made);
+    for (const NamedFile& file : written) check_writable(file.path, Folder::made);
 }
 
 Compared compare(const ImagePair& pair, const Sides& sides, const CompareArguments& arguments) {
     ComparedImage a = sides.a->picture(pair.a), b = sides.b->picture(pair.b);
-    const bool drawn_a = sides.a->names().is_scene, drawn_b = sides.b->names().is_scene;
+    const bool drawn_a = sides.a->is_scene, drawn_b = sides.b->is_scene;
     if (drawn_a && !drawn_b) match_format(a, b, sides.options.background);
     if (drawn_b && !drawn_a) match_format(b, a, sides.options.background);
-    Compared out{pair.name, {}, {}};
+    Compared out{pair.name, {}};
     try {
         out.difference = compare_images(a.image, b.image);
     } catch (const InputError& error) {
@@ -111,7 +162,7 @@ Compared compare(const ImagePair& pair, const Sides& sides, const CompareArgumen
                                                "--downscale (ewa eval compares with the dataset's images)"
                                              : ""));
     }
-    out.failed = exceeded(out.difference, arguments.limits);
+    judge(out, arguments);
     if (const fs::path file = heat_map_file(pair, arguments); !file.empty()) {
         make_folder(file.parent_path());
         save_image(file, report::value_error_map(a.image, b.image, arguments.heat_scale));
@@ -129,14 +180,13 @@ void print(const CompareTotals& totals, size_t pictures) {
 }
 
 int run(const CompareArguments& arguments) {
-    const Sides sides = open_sides(arguments);
-    const ImagePairs pairs = pair_images(sides.a->names(), sides.b->names());
+    const Sides sides = open_sides(arguments.inputs);
+    const ImagePairs pairs = pair_images(*sides.a, *sides.b);
     check_outputs(arguments, sides, pairs);
     std::vector<Compared> all;
     for (const ImagePair& pair : pairs.pairs) {
         all.push_back(compare(pair, sides, arguments));
-        fmt::print("{}\n", line_of(all.back(), arguments.limits));
-        std::fflush(stdout);
+        print(all.back());
     }
     std::vector<std::string> unpaired;
     for (const fs::path& name : pairs.only_a) unpaired.push_back(sides.a->place(name));
@@ -147,24 +197,24 @@ int run(const CompareArguments& arguments) {
     for (const std::string& picture : unpaired)
         fmt::print("{}  has no image of this name on the other side\n", core::one_line(picture));
     for (const ComparedSide* side : {sides.a.get(), sides.b.get()})
-        if (side->skipped_splats() > 0)
+        if (side->skipped_splats > 0)
             fmt::print("{}: {} splats with a value that is not finite were skipped\n",
-                       core::one_line(side->names().side), side->skipped_splats());
+                       core::one_line(side->side), side->skipped_splats);
     // A missing image is the largest difference of all.
-    const bool judged = arguments.limits.threshold || arguments.limits.max_error;
+    const bool judged = arguments.threshold || arguments.max_error;
     const bool passed = !judged || (totals.passed && unpaired.empty());
     if (!arguments.json.empty()) {
-        report::Json json = {{"psnr", number(totals.psnr)},
-                             {"ssim", number(totals.ssim)},
-                             {"max_error", number(totals.max_error)},
-                             {"rms", number(totals.rms)},
-                             {"worst", to_json(*totals.worst)},
-                             {"passed", passed},
-                             {"pictures", report::Json::array()},
-                             {"unpaired", unpaired},
-                             {"skipped_nonfinite", {sides.a->skipped_splats(), sides.b->skipped_splats()}}};
-        if (arguments.limits.threshold) json["threshold"] = *arguments.limits.threshold;
-        if (arguments.limits.max_error) json["max_error_allowed"] = *arguments.limits.max_error;
+        Json json = {{"psnr", number(totals.psnr)},
+                     {"ssim", number(totals.ssim)},
+                     {"max_error", number(totals.max_error)},
+                     {"rms", number(totals.rms)},
+                     {"worst", to_json(*totals.worst)},
+                     {"passed", passed},
+                     {"pictures", Json::array()},
+                     {"unpaired", unpaired},
+                     {"skipped_nonfinite", {sides.a->skipped_splats, sides.b->skipped_splats}}};
+        if (arguments.threshold) json["threshold"] = *arguments.threshold;
+        if (arguments.max_error) json["max_error_allowed"] = *arguments.max_error;
         for (const Compared& one : all) json["pictures"].push_back(to_json(one));
         write_json(arguments.json, json);
     }
@@ -175,19 +225,21 @@ int run(const CompareArguments& arguments) {
 
 Action add_compare(CLI::App& app) {
     const auto arguments = std::make_shared<CompareArguments>();
-    app.add_option("A", arguments->a, "Image, folder of images, or splat file")->required()->type_name("");
-    app.add_option("B", arguments->b, "What A is compared with: image, folder or splat file")
+    app.add_option("A", arguments->inputs.a, "Image, folder of images, or splat file")
         ->required()
         ->type_name("");
-    app.add_option("--threshold", arguments->limits.threshold,
+    app.add_option("B", arguments->inputs.b, "What A is compared with: image, folder or splat file")
+        ->required()
+        ->type_name("");
+    app.add_option("--threshold", arguments->threshold,
                    "Exit with status 1 if the PSNR of an image is lower, over RGB in 0..1 or over all values "
                    "with alpha, or if an image has no partner")
-        ->check(CLI::Range(0.0, 1000.0).description(""))
+        ->check(in_range(0.0, 1000.0))
         ->type_name("PSNR");
     app.add_option(
-           "--max-error", arguments->limits.max_error,
+           "--max-error", arguments->max_error,
            "Exit with status 1 if two values, alpha included, differ by more, or if an image has no partner")
-        ->check(CLI::Range(0.0, 1e9).description(""))
+        ->check(in_range(0.0, 1e9))
         ->type_name("E");
     app.add_option("--json", arguments->json, "Write the results to this file")->type_name("FILE");
     app.add_option(
@@ -195,21 +247,21 @@ Action add_compare(CLI::App& app) {
            "Write the error as an image (.png, .exr); for folders: one image per pair into this folder")
         ->type_name("OUT");
     app.add_option("--heat-scale", arguments->heat_scale, "Error that the heat map shows brightest")
-        ->check(CLI::Range(1e-9, 1e9).description(""))
+        ->check(in_range(1e-9, 1e9))
         ->type_name("E")
         ->capture_default_str();
     CLI::Option* cameras =
         app.add_option(
-               "--cameras", arguments->cameras,
+               "--cameras", arguments->inputs.cameras,
                "Dataset whose cameras render splat files. Each render is compared with that of the other "
                "splat file, or with the image that has the name ewa render would give it, rounded like that "
                "image")
             ->type_name("DATASET");
     const std::vector<CLI::Option*> before = app.get_options();
-    add_frames_options(app, arguments->frames, arguments->test_every);
-    add_draw_options(app, arguments->draw);
-    add_downscale_option(app, arguments->downscale);
-    add_device_options(app, arguments->device);
+    add_frames_options(app, arguments->inputs.frames, arguments->inputs.test_every);
+    add_draw_options(app, arguments->inputs.draw);
+    add_downscale_option(app, arguments->inputs.downscale);
+    add_device_options(app, arguments->inputs.device);
     for (CLI::Option* option : app.get_options())
         if (std::find(before.begin(), before.end(), option) == before.end()) option->needs(cameras);
     return [arguments] { return run(*arguments); };

@@ -18,18 +18,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class ImageSide : public ComparedSide {
-  public:
+struct ImageSide : ComparedSide {
     explicit ImageSide(const fs::path& path) : path_(path) {
         std::error_code ignored;
-        names_.side = path.string();
-        names_.one_image = !fs::is_directory(path, ignored);
-        if (names_.one_image)
+        side = path.string();
+        one_image = !fs::is_directory(path, ignored);
+        if (one_image)
             read_image_size(path);  // throws if there is no such image
         else
-            names_.asked = image::images_below(path);
+            asked = image::images_below(path);
     }
-    const SideNames& names() const override { return names_; }
     std::string place(const fs::path& name) const override { return file(name).string(); }
     ComparedImage picture(const fs::path& name) override {
         ComparedImage picture{load_image(file(name))};
@@ -41,45 +39,40 @@ class ImageSide : public ComparedSide {
         picture.transparent = picture.image.channels == 4 && format != "openexr";
         return picture;
     }
-    uint32_t skipped_splats() const override { return 0; }
 
   private:
     fs::path file(const fs::path& name) const { return name.empty() ? path_ : path_ / name; }
 
     fs::path path_;
-    SideNames names_;
 };
 
-class SceneSide : public ComparedSide {
-  public:
-    SceneSide(const fs::path& splats, const SceneViews& views)
-        : renderer_(views.device, load_splats(splats), views.options) {
-        names_.side = splats.string();
-        names_.is_scene = true;
-        const std::vector<fs::path> stems = report::picture_names(views.cameras.frames);
-        const std::set<int> asked(views.frames.begin(), views.frames.end());
+struct SceneSide : ComparedSide {
+    /// frames: indices of sides.cameras.frames.
+    SceneSide(const fs::path& splats, const Sides& sides, const std::vector<int>& frames,
+              const std::shared_ptr<gpu::Device>& device)
+        : renderer_(device, load_splats(splats), sides.options) {
+        side = splats.string();
+        is_scene = true;
+        const std::vector<fs::path> stems = report::picture_names(sides.cameras.frames);
+        const std::set<int> wanted(frames.begin(), frames.end());
         for (int frame = 0; frame < int(stems.size()); ++frame) {
-            const fs::path name = stems[frame].string() + ".exr";
-            (asked.contains(frame) ? names_.asked : names_.other).push_back(name);
-            cameras_[name] = views.cameras.frames[frame].camera;
+            const fs::path name = stems[size_t(frame)].string() + ".exr";
+            (wanted.contains(frame) ? asked : other).push_back(name);
+            cameras_[name] = sides.cameras.frames[size_t(frame)].camera;
         }
     }
-    const SideNames& names() const override { return names_; }
     std::string place(const fs::path& name) const override {
-        return names_.side + ", image " + fs::path(name).replace_extension().string();
+        return side + ", image " + fs::path(name).replace_extension().string();
     }
     ComparedImage picture(const fs::path& name) override {
         const Rendering rendering = renderer_.render(cameras_.at(name));
-        skipped_ = std::max(skipped_, renderer_.skipped_nonfinite());
+        skipped_splats = std::max(skipped_splats, renderer_.skipped_nonfinite());
         return {with_alpha(rendering.color, rendering.alpha)};
     }
-    uint32_t skipped_splats() const override { return skipped_; }
 
   private:
-    SideNames names_;
     Renderer renderer_;
     std::map<fs::path, Camera> cameras_;
-    uint32_t skipped_ = 0;
 };
 
 Image without_alpha(const Image& image) {
@@ -108,36 +101,22 @@ void match(std::set<fs::path>& a, std::set<fs::path>& b, const Key& key,
     }
 }
 
-std::set<fs::path> all_names(const SideNames& side) {
+std::set<fs::path> all_names(const ComparedSide& side) {
     std::set<fs::path> names(side.asked.begin(), side.asked.end());
     names.insert(side.other.begin(), side.other.end());
     return names;
 }
 
-bool is_asked(const SideNames& side, const fs::path& name) {
+bool is_asked(const ComparedSide& side, const fs::path& name) {
     return std::find(side.other.begin(), side.other.end(), name) == side.other.end();
 }
 
 /// The side with its number of images and the name of one.
-std::string described(const SideNames& side) {
+std::string described(const ComparedSide& side) {
     const size_t count = side.asked.size();
     return side.side + " (" + std::to_string(count) + (count == 1 ? " image" : " images") +
            (count == 0 ? "" : ", " + without_extension(side.asked[0]).string()) + ")";
 }
-
-ImagePairs pair_one(const SideNames& a, const SideNames& b) {
-    if (a.one_image && b.one_image) return {{{"", {}, {}}}, {}, {}};
-    const SideNames &one = a.one_image ? a : b, &several = a.one_image ? b : a;
-    if (!several.is_scene || several.asked.size() != 1)
-        throw InputError(one.side + " is one image and " + several.side + " has " +
-                         std::to_string(several.asked.size()) +
-                         (several.is_scene ? "; choose one with --frames"
-                                           : " in a folder; compare takes two images or two folders"));
-    const fs::path& name = several.asked[0];
-    return {{{"", a.one_image ? fs::path() : name, a.one_image ? name : fs::path()}}, {}, {}};
-}
-
-}  // namespace
 
 bool names_splat_scene(const fs::path& path) try {
     std::error_code ignored;
@@ -152,12 +131,41 @@ bool names_splat_scene(const fs::path& path) try {
     return false;
 }
 
-std::unique_ptr<ComparedSide> image_side(const fs::path& path) {
-    return std::make_unique<ImageSide>(path);
+ImagePairs pair_one(const ComparedSide& a, const ComparedSide& b) {
+    if (a.one_image && b.one_image) return {{{"", {}, {}}}, {}, {}};
+    const ComparedSide &one = a.one_image ? a : b, &several = a.one_image ? b : a;
+    if (!several.is_scene || several.asked.size() != 1)
+        throw InputError(one.side + " is one image and " + several.side + " has " +
+                         std::to_string(several.asked.size()) +
+                         (several.is_scene ? "; choose one with --frames"
+                                           : " in a folder; compare takes two images or two folders"));
+    const fs::path& name = several.asked[0];
+    return {{{"", a.one_image ? fs::path() : name, a.one_image ? name : fs::path()}}, {}, {}};
 }
 
-std::unique_ptr<ComparedSide> scene_side(const fs::path& splats, const SceneViews& views) {
-    return std::make_unique<SceneSide>(splats, views);
+}  // namespace
+
+Sides open_sides(const CompareInputs& inputs) {
+    Sides sides;
+    const bool scene_a = names_splat_scene(inputs.a), scene_b = names_splat_scene(inputs.b);
+    const bool scene = scene_a || scene_b;
+    if (!scene && !inputs.cameras.empty())
+        throw InputError("--cameras: neither " + inputs.a.string() + " nor " + inputs.b.string() +
+                         " is a splat scene");
+    if (scene && inputs.cameras.empty())
+        throw InputError((scene_a ? inputs.a : inputs.b).string() +
+                         " is a splat scene; --cameras DATASET names the cameras to render it through");
+    // Images first: their errors are found without rendering.
+    if (!scene_a) sides.a = std::make_unique<ImageSide>(inputs.a);
+    if (!scene_b) sides.b = std::make_unique<ImageSide>(inputs.b);
+    if (!scene) return sides;
+    sides.options = inputs.draw.options();
+    sides.cameras = load_cameras_as_trained(inputs.cameras, inputs.downscale);
+    const std::vector<int> frames = select_frames(sides.cameras, inputs.frames, inputs.test_every);
+    const auto device = open_device(inputs.device);
+    if (scene_a) sides.a = std::make_unique<SceneSide>(inputs.a, sides, frames, device);
+    if (scene_b) sides.b = std::make_unique<SceneSide>(inputs.b, sides, frames, device);
+    return sides;
 }
 
 void match_format(ComparedImage& drawn, ComparedImage& other, const std::array<float, 3>& background) {
@@ -169,7 +177,7 @@ void match_format(ComparedImage& drawn, ComparedImage& other, const std::array<f
     for (float& value : image.pixels) value = std::round(std::clamp(value, 0.0f, 1.0f) * levels) / levels;
 }
 
-ImagePairs pair_images(const SideNames& a, const SideNames& b) {
+ImagePairs pair_images(const ComparedSide& a, const ComparedSide& b) {
     if (a.one_image || b.one_image) return pair_one(a, b);
     std::set<fs::path> left_a = all_names(a), left_b = all_names(b);
     std::vector<std::pair<fs::path, fs::path>> matched;

@@ -1,17 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // The inputs of ewa compare: an image, a folder of images or a splat scene on each side, and their pairs.
 #pragma once
-#include <array>
-#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "ewa/dataset.h"
-#include "ewa/device.h"
+#include "cli/arguments.h"
 #include "ewa/image.h"
-#include "ewa/render_options.h"
 
 namespace ewa::cli {
 
@@ -22,49 +18,42 @@ struct ComparedImage {
     bool transparent = false;  // 4 channels whose colour is not multiplied by alpha, as in PNG
 };
 
-/// The names of a side's images.
-struct SideNames {
+/// The images of one side.
+struct ComparedSide {
+    virtual ~ComparedSide() = default;
+    /// The name of an image in messages.
+    virtual std::string place(const std::filesystem::path& name) const = 0;
+    /// One of `asked`. Throws InputError.
+    virtual ComparedImage picture(const std::filesystem::path& name) = 0;
+
     std::string side;  // its name in messages
     bool one_image = false;
     bool is_scene = false;                     // its images are rendered
     std::vector<std::filesystem::path> asked;  // relative to the side, with extension; empty for one image
     std::vector<std::filesystem::path> other;  // images it has that --frames does not select
+    uint32_t skipped_splats = 0;  // the most that a render skipped so far because a value was not finite
 };
 
-class ComparedSide {
-  public:
-    virtual ~ComparedSide() = default;
-
-    virtual const SideNames& names() const = 0;
-
-    /// The name of an image in messages.
-    virtual std::string place(const std::filesystem::path& name) const = 0;
-
-    /// One of SideNames::asked. Throws InputError.
-    virtual ComparedImage picture(const std::filesystem::path& name) = 0;
-
-    /// The most splats that a render skipped so far because a value was not finite.
-    virtual uint32_t skipped_splats() const = 0;
+struct CompareInputs {
+    std::filesystem::path a, b;
+    // How splat scenes are rendered.
+    std::filesystem::path cameras;
+    std::string frames = "all";
+    int test_every = 8, downscale = 1;
+    DrawArguments draw;
+    DeviceOptions device;
 };
 
-/// Whether the path names a splat scene: by the first bytes of the file, else by its name.
-bool names_splat_scene(const std::filesystem::path& path);
-
-/// Throws InputError if there is no such image or folder.
-std::unique_ptr<ComparedSide> image_side(const std::filesystem::path& path);
-
-/// How splat scenes are rendered.
-struct SceneViews {
-    Dataset cameras;
-    std::vector<int> frames;  // indices of cameras.frames
+struct Sides {
+    std::unique_ptr<ComparedSide> a, b;
+    Dataset cameras;  // for splat scenes
     RenderOptions options;
-    std::shared_ptr<gpu::Device> device;
 };
 
-/// The scene as `ewa render --format exr` writes it: float32 with alpha, under the same names. Renders an
-/// image when it is asked for. Throws InputError if the file is no splat scene, RunError if it exceeds the
-/// device's memory.
-std::unique_ptr<ComparedSide> scene_side(const std::filesystem::path& splats, const SceneViews& views);
+/// A path names a splat scene by the first bytes of the file, else by its name. A scene is rendered when an image
+/// is asked for, as `ewa render --format exr` writes it: float32 with alpha, under the same names. Throws
+/// InputError (no such image or folder, a scene without --cameras), RunError if a scene exceeds the device's memory.
+Sides open_sides(const CompareInputs& inputs);
 
 /// Converts a render to what the file of the other image could store: without alpha if the other has none,
 /// clamped and rounded if the other holds integers. A transparent other image is blended over the background.
@@ -84,6 +73,6 @@ struct ImagePairs {
 /// Pairs images of equal names, then images whose names differ in the extension only. An image that --frames
 /// does not select is skipped together with its partner. A single image pairs with a single image, or with
 /// the only selected image of a scene. Throws InputError if no pair remains.
-ImagePairs pair_images(const SideNames& a, const SideNames& b);
+ImagePairs pair_images(const ComparedSide& a, const ComparedSide& b);
 
 }  // namespace ewa::cli

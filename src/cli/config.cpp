@@ -37,16 +37,11 @@ bool given(CLI::App& app, const std::string& name) {
     return find_option(app, name)->count() > 0;
 }
 
-Json parse(const std::filesystem::path& file) {
-    Json json = core::read_json_file<Json>(file);
-    if (!json.is_object()) throw InputError(file.string() + ": not a JSON object of options");
-    return json;
-}
-
 }  // namespace
 
 void apply_config(CLI::App& app, const std::filesystem::path& file) {
-    const Json json = parse(file);
+    const Json json = core::read_json_file<Json>(file);
+    if (!json.is_object()) throw InputError(file.string() + ": not a JSON object of options");
     std::vector<std::pair<CLI::Option*, std::string>> values;
     for (const auto& [name, value] : json.items()) {
         const std::string where = file.string() + ": \"" + name + "\"";

@@ -9,7 +9,7 @@ class App;
 
 namespace ewa::cli {
 
-/// Gives each option of `app` the file's value where the command line has none. --kernel and --antialias
+/// Gives each option of `app` the file's value if the command line has none. --kernel and --antialias
 /// count as one option. Throws InputError for a file that is not a JSON object of known names, CLI::Error for
 /// a value that its option refuses.
 void apply_config(CLI::App& app, const std::filesystem::path& file);

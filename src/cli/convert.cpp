@@ -9,11 +9,9 @@
 #include <set>
 
 #include "cli/arguments.h"
-#include "cli/checks.h"
 #include "cli/command.h"
 #include "cli/convert_edits.h"
 #include "cli/output.h"
-#include "cli/progress.h"
 #include "cli/splat_statistics.h"
 #include "core/messages.h"
 #include "core/text.h"
@@ -104,19 +102,14 @@ fs::path values_path(const ConvertArguments& arguments) {
 void check_outputs(const ConvertArguments& arguments) {
     const fs::path& out = arguments.files.back();
     const fs::path values = values_path(arguments);
-    std::vector<NamedFile> others = {{"OUT", out}, {"the .bin of OUT", values}};
-    for (size_t i = 0; i + 1 < arguments.files.size(); ++i) {
-        const NamedFile input{"an input", arguments.files[i]};
-        keep_apart({"the .bin of OUT", values}, {input});
-        others.push_back(input);
-    }
-    keep_apart({"--json", arguments.json}, others);
+    std::vector<NamedFile> others = {{"OUT", out}};
+    for (size_t i = 0; i + 1 < arguments.files.size(); ++i)
+        others.push_back({"an input", arguments.files[i]});
+    keep_apart({{"the .bin of OUT", values}, {"--json", arguments.json}}, others);
     check_writable(out, Folder::there);
-    if (!values.empty()) {
-        io::check_gltf_values(out);
-        check_writable(values, Folder::there);
-    }
-    if (!arguments.json.empty()) check_writable(arguments.json, Folder::made);
+    if (!values.empty()) io::check_gltf_values(out);
+    check_writable(values, Folder::there);
+    check_writable(arguments.json, Folder::made);
 }
 
 Json output_json(const ConvertArguments& arguments, const Gaussians& gaussians) {

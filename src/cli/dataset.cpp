@@ -3,14 +3,10 @@
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
 
-#include <charconv>
 #include <memory>
 
 #include "cli/arguments.h"
-#include "cli/checks.h"
 #include "cli/command.h"
-#include "cli/dataset_argument.h"
-#include "cli/interrupt.h"
 #include "core/text.h"
 #include "ewa/error.h"
 
@@ -29,14 +25,13 @@ struct DatasetArguments {
 };
 
 void parse_size(const std::string& text, SyntheticOptions& options) {
-    const char* const end = text.data() + text.size();
-    const auto [cross, error] = std::from_chars(text.data(), end, options.width);
-    bool good = error == std::errc() && cross != end && *cross == 'x';
-    if (good) {
-        const auto [last, second] = std::from_chars(cross + 1, end, options.height);
-        good = second == std::errc() && last == end;
-    }
-    if (!good || options.width < 1 || options.height < 1)
+    const size_t cross = std::min(text.find('x'), text.size());
+    const auto width = core::parse_integer<int>(std::string_view(text).substr(0, cross));
+    const auto height =
+        core::parse_integer<int>(std::string_view(text).substr(std::min(cross + 1, text.size())));
+    options.width = width.value_or(0);
+    options.height = height.value_or(0);
+    if (options.width < 1 || options.height < 1)
         throw InputError("--size: '" + text + "' is not WxH in pixels, such as 256x256");
 }
 
@@ -50,9 +45,8 @@ int run(const DatasetArguments& arguments) {
             throw InputError("--exposure: '" + arguments.exposure +
                              "' is neither auto nor a number of stops");
     }
-    const SyntheticDataset made =
-        render_with_progress(arguments.device, arguments.scene, arguments.output, options, arguments.quiet);
-    return made.interrupted ? kInterruptedStatus : 0;
+    render_with_progress(arguments.device, arguments.scene, arguments.output, options, arguments.quiet);
+    return 0;
 }
 
 }  // namespace
@@ -89,7 +83,7 @@ Action add_dataset(CLI::App& app) {
         ->capture_default_str();
     app.add_option("--seed", options.seed,
                    "Seed of random numbers. The same seed on the same device gives the same bytes")
-        ->check(without_sign())
+        ->check(accepted_by(train::run_option("seed")))
         ->type_name("S")
         ->capture_default_str();
     add_device_options(app, arguments->device);

@@ -7,10 +7,10 @@
 #include <memory>
 
 #include "cli/command.h"
+#include "cli/output.h"
 #include "core/messages.h"
 #include "core/text.h"
 #include "ewa/device.h"
-#include "report/summary.h"
 
 namespace ewa::cli {
 namespace {
@@ -31,7 +31,7 @@ int run(bool json) {
     if (json) {
         report::Json list = report::Json::array();
         for (const DeviceInfo& device : devices) list.push_back(to_json(device));
-        fmt::print("{}\n", list.dump(2, ' ', false, report::Json::error_handler_t::replace));
+        print_json(list);
         return 0;
     }
     if (devices.empty())

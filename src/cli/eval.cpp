@@ -8,8 +8,6 @@
 
 #include "cli/arguments.h"
 #include "cli/command.h"
-#include "cli/dataset_argument.h"
-#include "cli/interrupt.h"
 #include "cli/output.h"
 #include "core/text.h"
 #include "ewa/evaluation.h"
@@ -19,12 +17,10 @@ namespace ewa::cli {
 namespace {
 
 struct EvalArguments {
-    std::filesystem::path splats, dataset, json;
+    ViewArguments views;
+    std::filesystem::path json;
     std::string split = "test";
-    int test_every = 8, downscale = 1;
-    MaskUse masks = MaskUse::automatic;
-    DrawArguments draw;
-    DeviceOptions device;
+    int test_every = 8;
 };
 
 report::Json to_json(const Evaluation& evaluation) {
@@ -38,20 +34,14 @@ report::Json to_json(const Evaluation& evaluation) {
 }
 
 int run(const EvalArguments& arguments) {
-    const RenderOptions options = arguments.draw.options();
-    keep_apart({"--json", arguments.json}, {{"SPLATS", arguments.splats}});
-    if (!arguments.json.empty()) check_writable(arguments.json, Folder::made);
-    const Gaussians gaussians = load_splats(arguments.splats);
-    check_frames(arguments.dataset, arguments.split, arguments.test_every);
-    const auto loaded =
-        load_with_images(arguments.dataset, arguments.splats,
-                         {.downscale = arguments.downscale, .masks = arguments.masks}, arguments.device);
-    if (!loaded) return kInterruptedStatus;
-    const Dataset& dataset = loaded->dataset;
-    const std::vector<int> frames = select_frames(dataset, arguments.split, arguments.test_every);
+    const RenderOptions options = arguments.views.draw.options();
+    keep_apart({{"--json", arguments.json}}, {{"SPLATS", arguments.views.splats}});
+    check_writable(arguments.json, Folder::made);
+    const Gaussians gaussians = load_splats(arguments.views.splats);
+    const auto [dataset, frames, folder] = load_views(arguments.views, arguments.split, arguments.test_every);
 
     const Evaluation evaluation =
-        evaluate(open_device(arguments.device), gaussians, dataset, frames, options);
+        evaluate(open_device(arguments.views.device), gaussians, dataset, frames, options);
     for (const EvalFrame& frame : evaluation.frames)
         fmt::print("{}  PSNR {:.3f} dB  SSIM {:.5f}\n", core::one_line(frame.name), frame.psnr, frame.ssim);
     if (dataset.missing_images > 0) fmt::print("{} images are missing and skipped\n", dataset.missing_images);
@@ -65,17 +55,13 @@ int run(const EvalArguments& arguments) {
 
 Action add_eval(CLI::App& app) {
     const auto arguments = std::make_shared<EvalArguments>();
-    add_splats(app, arguments->splats);
-    add_dataset(app, arguments->dataset);
+    add_view_positionals(app, arguments->views);
     app.add_option("--split", arguments->split, "Frames to evaluate: test, train or all")
         ->check(CLI::IsMember({"test", "train", "all"}))
         ->capture_default_str();
     add_test_every_option(app, arguments->test_every);
     app.add_option("--json", arguments->json, "Write the results to this file")->type_name("FILE");
-    add_draw_options(app, arguments->draw);
-    add_downscale_option(app, arguments->downscale);
-    add_masks_option(app, arguments->masks);
-    add_device_options(app, arguments->device);
+    add_view_options(app, arguments->views);
     return [arguments] { return run(*arguments); };
 }
 

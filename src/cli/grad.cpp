@@ -7,10 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/arguments.h"
-#include "cli/checks.h"
 #include "cli/command.h"
-#include "cli/dataset_argument.h"
-#include "cli/interrupt.h"
 #include "cli/output.h"
 #include "core/text.h"
 #include "ewa/error.h"
@@ -21,39 +18,31 @@ namespace ewa::cli {
 namespace {
 
 struct GradArguments {
-    std::filesystem::path splats, dataset, output, json;
-    int frame = 0, downscale = 1;
-    MaskUse masks = MaskUse::automatic;
-    DrawArguments draw;
-    DeviceOptions device;
+    ViewArguments views;
+    std::filesystem::path output, json;
+    int frame = 0;
 };
 
 int run(const GradArguments& arguments) {
-    const RenderOptions options = arguments.draw.options();
+    const RenderOptions options = arguments.views.draw.options();
     if (format_of_name(arguments.output) != SplatFormat::ply)
         throw InputError("--output " + arguments.output.string() +
                          ": a gradient is written as .ply; the other formats cannot store it");
     if (arguments.output.extension() != ".ply")
         throw InputError("the gradient is written as a PLY: -o " + arguments.output.string() +
                          " does not end in .ply");
-    keep_apart({"--output", arguments.output}, {{"SPLATS", arguments.splats}});
-    keep_apart({"--json", arguments.json}, {{"SPLATS", arguments.splats}, {"--output", arguments.output}});
+    keep_apart({{"--output", arguments.output}, {"--json", arguments.json}},
+               {{"SPLATS", arguments.views.splats}});
     check_writable(arguments.output, Folder::made);
-    if (!arguments.json.empty()) check_writable(arguments.json, Folder::made);
-    const Gaussians gaussians = load_splats(arguments.splats);
-    const std::string frame_index = std::to_string(arguments.frame);
-    check_frames(arguments.dataset, frame_index, 0);
-    const auto loaded =
-        load_with_images(arguments.dataset, arguments.splats,
-                         {.downscale = arguments.downscale, .masks = arguments.masks}, arguments.device);
-    if (!loaded) return kInterruptedStatus;
-    const Dataset& dataset = loaded->dataset;
-    const int index = select_frames(dataset, frame_index, 0).front();
-    const Frame& frame = dataset.frames[index];
+    check_writable(arguments.json, Folder::made);
+    const Gaussians gaussians = load_splats(arguments.views.splats);
+    const auto [dataset, frames, folder] = load_views(arguments.views, std::to_string(arguments.frame), 0);
+    const int index = frames.front();
+    const Frame& frame = dataset.frames[size_t(index)];
     make_folder(arguments.output.parent_path());
 
     const LossGradient result =
-        loss_gradient(open_device(arguments.device), gaussians, frame.camera, load_frame_image(frame),
+        loss_gradient(open_device(arguments.views.device), gaussians, frame.camera, load_frame_image(frame),
                       options, frame.masks == MaskUse::ignore);
     save_splats(arguments.output, result.gradient,
                 {"ewa " EWA_VERSION, fmt::format("gradient of the training loss of frame {}", index)});
@@ -76,8 +65,7 @@ int run(const GradArguments& arguments) {
 
 Action add_grad(CLI::App& app) {
     const auto arguments = std::make_shared<GradArguments>();
-    add_splats(app, arguments->splats);
-    add_dataset(app, arguments->dataset);
+    add_view_positionals(app, arguments->views);
     app.add_option("--frame", arguments->frame, "Index of the view over all frames, in name order from 0")
         ->required()
         ->check(in_range(0, 1000000000))
@@ -88,10 +76,7 @@ Action add_grad(CLI::App& app) {
         ->type_name("OUT.ply");
     app.add_option("--json", arguments->json, "Write loss, l1, ssim, frame (index) and name to this file")
         ->type_name("FILE");
-    add_draw_options(app, arguments->draw);
-    add_downscale_option(app, arguments->downscale);
-    add_masks_option(app, arguments->masks);
-    add_device_options(app, arguments->device);
+    add_view_options(app, arguments->views);
     return [arguments] { return run(*arguments); };
 }
 

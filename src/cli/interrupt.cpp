@@ -63,10 +63,6 @@ bool interrupted() {
     return signalled;
 }
 
-void stop_if_interrupted() {
-    if (interrupted()) throw Interrupted();
-}
-
 void remove_temporary_files_on_signals() {
     for (const int signal : kSignals) {
         const struct sigaction before = handle(signal, remove_files_and_end);

@@ -25,20 +25,8 @@ class InterruptWatch {
 /// Whether a signal has arrived during a watch.
 bool interrupted();
 
-/// Thrown by stop_if_interrupted() in work that has no other way to end early.
+/// Thrown when a signal ended work that a command needs. The exit status is then kInterruptedStatus.
 struct Interrupted {};
-void stop_if_interrupted();
-/// Runs the work, unless a signal has arrived before. Returns whether it ran to its end.
-template <class Work>
-bool done_uninterrupted(Work&& work) {
-    try {
-        stop_if_interrupted();
-        work();
-        return true;
-    } catch (const Interrupted&) {
-        return false;
-    }
-}
 
 /// Outside a watch: the same signals delete the temporary files, then end the program. Ignored signals stay
 /// ignored.

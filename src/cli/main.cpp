@@ -4,7 +4,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
-#include <memory>
+#include <functional>
 #include <new>
 
 #include "cli/command.h"
@@ -20,8 +20,10 @@ using namespace ewa::cli;
 enum ExitStatus { kDone = 0, kFailed = 1, kWrongUse = 2 };
 
 struct Command {
-    CLI::App* app;
-    Action action;
+    const char *name, *description;
+    std::function<Action(CLI::App&)> add;
+    CLI::App* app = nullptr;
+    Action action = {};
 };
 
 int fail(const std::string& who, const std::string& what, int status) {
@@ -30,11 +32,19 @@ int fail(const std::string& who, const std::string& what, int status) {
     return status;
 }
 
+int status_of(const Action& action) {
+    try {
+        return action();
+    } catch (const Interrupted&) {
+        return kInterruptedStatus;
+    }
+}
+
 int run(const Command& command) {
-    const std::string who = "ewa " + command.app->get_name();
+    const std::string who = std::string("ewa ") + command.name;
     try {
         remove_temporary_files_on_signals();
-        const int status = command.action();
+        const int status = status_of(command.action);
         // If output is redirected to a full disk, only this flush fails.
         if (std::fflush(stdout) != 0)
             return fail(who, std::string("cannot write to standard output: ") + std::strerror(errno),
@@ -79,31 +89,23 @@ int main(int argc, char** argv) {
     app.set_version_flag("--version", "ewa " EWA_VERSION);
     app.require_subcommand(1);
     core::use_help_text<CLI::Formatter>(app);
+    const auto add_train_here = [&](CLI::App& train) { return add_train(train, command_line(argc, argv)); };
     Command commands[] = {
-        {app.add_subcommand("train", "Trains splats from images with known cameras"), {}},
-        {app.add_subcommand("render", "Renders a splat scene through the cameras of a dataset"), {}},
-        {app.add_subcommand("eval", "Measures PSNR and SSIM of a splat scene against images"), {}},
-        {app.add_subcommand("grad", "Writes the gradient of the training loss for one view"), {}},
-        {app.add_subcommand("convert", "Converts, joins and edits splat files"), {}},
-        {app.add_subcommand("info", "Shows what a splat file or a dataset holds, and what rendering skips"),
-         {}},
-        {app.add_subcommand("devices", "Lists the Vulkan devices of this machine"), {}},
-        {app.add_subcommand("dataset", "Renders a mesh scene (glTF) into a dataset to train on"), {}},
-        {app.add_subcommand("bench",
-                            "Measures the speed of each pass, and its error against the CPU reference"),
-         {}},
-        {app.add_subcommand("compare", "Compares two images, folders of images, or splat scenes"), {}},
+        {"train", "Trains splats from images with known cameras", add_train_here},
+        {"render", "Renders a splat scene through the cameras of a dataset", add_render},
+        {"eval", "Measures PSNR and SSIM of a splat scene against images", add_eval},
+        {"grad", "Writes the gradient of the training loss for one view", add_grad},
+        {"convert", "Converts, joins and edits splat files", add_convert},
+        {"info", "Shows what a splat file or a dataset holds, and what rendering skips", add_info},
+        {"devices", "Lists the Vulkan devices of this machine", add_devices},
+        {"dataset", "Renders a mesh scene (glTF) into a dataset to train on", add_dataset},
+        {"bench", "Measures the speed of each pass, and its error against the CPU reference", add_bench},
+        {"compare", "Compares two images, folders of images, or splat scenes", add_compare},
     };
-    commands[0].action = add_train(*commands[0].app, command_line(argc, argv));
-    commands[1].action = add_render(*commands[1].app);
-    commands[2].action = add_eval(*commands[2].app);
-    commands[3].action = add_grad(*commands[3].app);
-    commands[4].action = add_convert(*commands[4].app);
-    commands[5].action = add_info(*commands[5].app);
-    commands[6].action = add_devices(*commands[6].app);
-    commands[7].action = add_dataset(*commands[7].app);
-    commands[8].action = add_bench(*commands[8].app);
-    commands[9].action = add_compare(*commands[9].app);
+    for (Command& command : commands) {
+        command.app = app.add_subcommand(command.name, command.description);
+        command.action = command.add(*command.app);
+    }
 
     try {
         app.parse(argc, argv);
@@ -111,7 +113,7 @@ int main(int argc, char** argv) {
         if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) return app.exit(error);
         std::string who = "ewa";
         for (const Command& command : commands)
-            if (command.app->parsed()) who += " " + command.app->get_name();
+            if (command.app->parsed()) who += std::string(" ") + command.name;
         std::string what = error.what();
         // CLI11 asks for a sub-command without naming the unknown one.
         if (who == "ewa" && argc > 1 && argv[1][0] != '-') what = "unknown command " + shell_quoted(argv[1]);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writing files that the user asked for.
+// What a command writes: files that the user asked for, JSON, and the progress of long work.
 #pragma once
+#include <chrono>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -17,7 +18,8 @@ using core::write_json;
 /// Whether a missing folder of an output file is created.
 enum class Folder { there, made };
 
-/// Throws RunError if the file could not be written, before long work instead of after it. Changes nothing.
+/// Throws RunError if the file could not be written, before long work instead of after it. Changes nothing. An
+/// empty path names no file.
 void check_writable(const std::filesystem::path& file, Folder folder);
 
 /// A file with the argument or option that names it.
@@ -26,9 +28,42 @@ struct NamedFile {
     std::filesystem::path path;  // empty: none
 };
 
-/// Throws InputError if `written` is the same file as one of the others, however the paths are spelled.
-void keep_apart(const NamedFile& written, const std::vector<NamedFile>& others);
-/// The same for several files, which must also differ from each other.
+/// Throws InputError if one of `written` is the same file as another of them or as one of the others, however the
+/// paths are spelled.
 void keep_apart(const std::vector<NamedFile>& written, const std::vector<NamedFile>& others);
+
+/// Prints the value with indentation. Bytes that are not UTF-8 become U+FFFD: text from a file may hold some.
+void print_json(const report::Json& json);
+
+/// Progress of long work: one line that is redrawn on a terminal, or a line per tenth of the work in a file.
+class Progress {
+  public:
+    /// what: a verb such as "rendered". unit: the plural of a unit of work, such as "steps". quiet: print
+    /// nothing.
+    Progress(std::string what, int total, std::string unit, bool quiet);
+    ~Progress();
+
+    /// details: more text for the line, such as the loss.
+    void update(int done, const std::string& details = "");
+
+    /// Prints a line that stays, above the progress line.
+    void note(const std::string& line);
+
+    /// Whether update(done) would print: details may be costly to compute.
+    bool due(int done) const;
+
+  private:
+    using Clock = std::chrono::steady_clock;
+    std::string what_, unit_;
+    int total_, next_tenth_ = 1;
+    bool quiet_, terminal_, drawn_ = false;
+    Clock::time_point start_ = Clock::now(), printed_{};
+    // Start of the interval that the rate is measured over.
+    Clock::time_point window_start_ = start_;
+    int window_done_ = 0;
+    double rate_ = 0;
+
+    void clear_line();
+};
 
 }  // namespace ewa::cli

@@ -8,10 +8,8 @@
 
 #include "cli/arguments.h"
 #include "cli/command.h"
-#include "cli/dataset_argument.h"
 #include "cli/interrupt.h"
 #include "cli/output.h"
-#include "cli/progress.h"
 #include "ewa/error.h"
 #include "ewa/renderer.h"
 #include "ewa/splat_files.h"

@@ -1,22 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-// ewa train: its options, a dataset from a mesh scene where one is given, and the run.
+// ewa train: its options, the dataset of a mesh scene, and the run.
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <memory>
 
-#include "cli/accuracy.h"
 #include "cli/arguments.h"
-#include "cli/checks.h"
+#include "cli/bench.h"
 #include "cli/command.h"
 #include "cli/config.h"
-#include "cli/dataset_argument.h"
 #include "cli/train_observer.h"
 #include "core/folders.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/run.h"
 #include "report/chart.h"
-#include "train/run_options.h"
 
 namespace ewa::cli {
 namespace {
@@ -30,21 +27,6 @@ struct TrainArguments {
     fs::path config;
     bool antialias = false, accuracy = false;
 };
-
-/// The option's own check, which names neither the option nor where it was read.
-CLI::Validator accepted_by(const train::RunOption& option) {
-    return CLI::Validator(
-        [&option](std::string& text) {
-            try {
-                RunOptions scratch;
-                option.set(scratch, text);
-                return std::string();
-            } catch (const InputError& error) {
-                return std::string(error.what());
-            }
-        },
-        "");
-}
 
 void add_run_option(CLI::App& app, const train::RunOption& option, RunOptions& options) {
     const bool positional = option.name == "dataset";
@@ -71,27 +53,19 @@ void add_run_options(CLI::App& app, TrainArguments& arguments) {
     }
 }
 
-void settle_kernel(TrainArguments& arguments) {
-    if (!arguments.antialias) return;
-    Footprint& kernel = arguments.run.train.render.kernel;
-    if (kernel == Footprint::unit_mass) throw InputError("--antialias and --kernel ewa exclude each other");
-    kernel = Footprint::antialias;
-}
-
-/// Renders a mesh scene into the run's folder, which becomes the dataset. Returns false if Ctrl-C ended that.
-bool render_scene(TrainArguments& arguments) {
+/// Renders a mesh scene into the run's folder, which becomes the dataset. Throws Interrupted if Ctrl-C ended that.
+void render_scene(TrainArguments& arguments) {
     RunOptions& run = arguments.run;
     const std::string extension = core::lower(run.dataset.extension().string());
-    if (extension != ".gltf" && extension != ".glb") return true;
+    if (extension != ".gltf" && extension != ".glb") return;
     run.scene = run.dataset;
     run.output = output_folder(run);
     run.dataset = run.output / "dataset";
     // Another training may be reading the images that are there.
     std::unique_ptr<core::FolderLock> lock;
     if (fs::is_directory(run.output)) lock = std::make_unique<core::FolderLock>(run.output);
-    const SyntheticDataset made =
-        render_with_progress(run.device, run.scene, run.dataset, {}, arguments.output.quiet);
-    return !made.interrupted && !interrupted();
+    render_with_progress(run.device, run.scene, run.dataset, {}, arguments.output.quiet);
+    if (interrupted()) throw Interrupted();
 }
 
 std::string accuracy_section(const RunScene& scene) {
@@ -104,9 +78,10 @@ int run(CLI::App& app, TrainArguments& arguments) {
     RunOptions& options = arguments.run;
     if (!arguments.config.empty()) apply_config(app, arguments.config);
     if (options.dataset.empty()) throw InputError("DATASET is required (see ewa train --help)");
-    settle_kernel(arguments);
+    Footprint& kernel = options.train.render.kernel;
+    kernel = settled_kernel(kernel, arguments.antialias);
     check_options(options);  // before the images of a mesh scene are rendered
-    if (!render_scene(arguments)) return kInterruptedStatus;
+    render_scene(arguments);
     if (arguments.accuracy) options.report_section = accuracy_section;
     options.seconds_before = std::chrono::duration<double>(Clock::now() - begin).count();
     TrainObserver observer(arguments.output, options.train.steps);

@@ -3,10 +3,91 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <chrono>
+#include <thread>
+
 #include "core/messages.h"
 #include "core/text.h"
+#include "ewa/error.h"
+#include "live/server.h"
+#include "live/watcher.h"
 
 namespace ewa::cli {
+
+/// The server of --serve.
+class TrainObserver::Served {
+  public:
+    /// where: [ADDRESS:]PORT. steps: of the whole training. folder/live.json holds the token while this lives.
+    /// Throws InputError, RunError.
+    Served(const std::string& where, const std::filesystem::path& folder, int steps)
+        : steps_(steps), folder_(folder) {
+        const size_t colon = where.rfind(':');
+        if (colon != std::string::npos && colon > 0) address_ = where.substr(0, colon);
+        if (address_.size() > 2 && address_.front() == '[')
+            address_ = address_.substr(1, address_.size() - 2);
+        const auto port = core::parse_integer<uint16_t>(std::string_view(where).substr(colon + 1));
+        if (!port.has_value())
+            throw InputError("--serve: '" + where +
+                             "' is not a port, or address:port; 0 takes any free port");
+        const std::string token = live::random_token();
+        server_ = std::make_unique<live::Server>(address_, *port, token);
+        live::write_live_file(folder_, {server_->port(), token});
+    }
+    ~Served() {
+        std::error_code absent;
+        std::filesystem::remove(folder_ / live::kLiveFile, absent);
+    }
+
+    /// One line that says how to watch.
+    std::string announcement() const {
+        const bool v6 = address_.find(':') != std::string::npos;
+        const std::string where = fmt::format("{}:{}", v6 ? "[" + address_ + "]" : address_, server_->port());
+        return fmt::format("to watch: ewa-view {}, ewa-view --connect {}, or curl http://{}/status",
+                           folder_.string(), where, where);
+    }
+    void add_metrics(const MetricsLine& line) { server_->add_metrics(line); }
+    /// Takes splats and saves if somebody asked for it. Returns late if somebody pauses the training: after the
+    /// pause, or at an interruption.
+    void attend(const Trainer& trainer, const StepReport& step, const std::function<void()>& save) {
+        constexpr auto kPausedLook = std::chrono::milliseconds(20);
+        report(step, live::State::running);
+        for (;;) {
+            if (server_->wants_splats(step.step)) {
+                const auto start = std::chrono::steady_clock::now();
+                live::Snapshot snapshot{step.step, trainer.gaussians()};
+                const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
+                server_->offer(std::move(snapshot), taken.count());
+            }
+            if (server_->take_save()) save();
+            if (!server_->paused() || interrupted()) return;
+            std::this_thread::sleep_for(kPausedLook);
+        }
+    }
+    /// Shows the last splats, and that the training is done.
+    void finish(const StepReport& step, const Gaussians& gaussians) {
+        server_->offer({step.step, gaussians}, 0);
+        report(step, live::State::done);
+    }
+
+  private:
+    void report(const StepReport& report, live::State state) {
+        server_->report({.step = report.step,
+                         .steps = steps_,
+                         .splats = report.splats,
+                         .loss = report.loss,
+                         .seconds = report.seconds,
+                         .state = state});
+    }
+
+    int steps_;
+    std::filesystem::path folder_;
+    std::string address_ = "127.0.0.1";
+    std::unique_ptr<live::Server> server_;
+};
+
+TrainObserver::TrainObserver(const TrainOutput& output, int steps) : output_(output), steps_(steps) {}
+
+TrainObserver::~TrainObserver() = default;
 
 void TrainObserver::on_note(const std::string& line) {
     if (progress_)
@@ -40,9 +121,11 @@ void TrainObserver::on_plan(const std::vector<PlanLine>& plan) {
 }
 
 void TrainObserver::on_begin(const std::filesystem::path& folder, const std::vector<MetricsLine>& metrics) {
-    server_.emplace(output_.serve, folder, steps_);
-    for (const MetricsLine& line : metrics) server_->add_metrics(line);
-    if (const std::string line = server_->announcement(); !line.empty()) on_note(line);
+    if (!output_.serve.empty()) {
+        served_ = std::make_unique<Served>(output_.serve, folder, steps_);
+        for (const MetricsLine& line : metrics) served_->add_metrics(line);
+        on_note(served_->announcement());
+    }
     progress_.emplace("trained", steps_, "steps", output_.quiet);
 }
 
@@ -57,12 +140,12 @@ void TrainObserver::on_evaluation(int step, const Evaluation& evaluation) {
 }
 
 void TrainObserver::on_metrics(const MetricsLine& line) {
-    server_->add_metrics(line);
+    if (served_) served_->add_metrics(line);
 }
 
 void TrainObserver::between_steps(const StepReport& step, const Trainer& trainer,
                                   const std::function<void()>& save) {
-    server_->attend(trainer, step, save);
+    if (served_) served_->attend(trainer, step, save);
 }
 
 void TrainObserver::on_saved(const StepReport&) {
@@ -70,7 +153,7 @@ void TrainObserver::on_saved(const StepReport&) {
 }
 
 void TrainObserver::on_evaluated(const StepReport& step, const Gaussians& gaussians) {
-    server_->finish(step, gaussians);
+    if (served_) served_->finish(step, gaussians);
 }
 
 void TrainObserver::print(const RunResult& result) {

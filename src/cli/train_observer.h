@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// A training run as `ewa train` shows it: lines on the terminal, signals, and those who watch by --serve.
+// A training run as `ewa train` shows it: lines on the terminal, signals, and a server for --serve.
 #pragma once
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "cli/interrupt.h"
-#include "cli/progress.h"
-#include "cli/train_serve.h"
+#include "cli/output.h"
 #include "ewa/run.h"
 
 namespace ewa::cli {
@@ -21,7 +21,8 @@ struct TrainOutput {
 class TrainObserver : public RunObserver {
   public:
     /// steps: of the whole training.
-    TrainObserver(const TrainOutput& output, int steps) : output_(output), steps_(steps) {}
+    TrainObserver(const TrainOutput& output, int steps);
+    ~TrainObserver() override;
 
     bool should_stop() override { return interrupted(); }
     void on_note(const std::string& line) override;
@@ -39,10 +40,11 @@ class TrainObserver : public RunObserver {
     void print(const RunResult& result);
 
   private:
+    class Served;
     TrainOutput output_;
     int steps_;
     std::optional<InterruptWatch> watch_;
-    std::optional<TrainServer> server_;
+    std::unique_ptr<Served> served_;  // null without --serve
     std::optional<Progress> progress_;
 };
 

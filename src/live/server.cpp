@@ -1,16 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
+// cpp-httplib parses requests and writes answers. Who may connect, for how long and with how many bytes is
+// limited here.
 #include "live/server.h"
 
 #include <arpa/inet.h>
+#include <httplib.h>
 #include <sys/random.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <future>
+#include <list>
+#include <thread>
 #include <utility>
 
 #include "core/text.h"
 #include "ewa/error.h"
 #include "io/splats/formats.h"
-#include "live/http_server.h"
+#include "live/wire.h"
 
 namespace ewa::live {
 namespace {
@@ -18,8 +29,10 @@ namespace {
 using httplib::Request;
 using httplib::Response;
 
-constexpr double kShare = 0.05;      // of the time that taking splats may cost
-constexpr double kLeastPause = 0.2;  // seconds between splats
+constexpr size_t kMostConnections = 64;
+constexpr size_t kMostRequest = 4096;  // bytes of request line and headers
+constexpr double kShare = 0.05;        // of the time that taking splats may cost
+constexpr double kLeastPause = 0.2;    // seconds between splats
 constexpr std::chrono::seconds kFreshWait(5);
 constexpr size_t kRowsAtOnce = 4096;
 
@@ -31,8 +44,8 @@ bool same_secret(const std::string& a, const std::string& b) {
     return difference == 0;
 }
 
-/// Whether "HOST[:PORT]" is an address in numbers or localhost. A page whose name was made to lead here has
-/// its own name there.
+/// Whether "HOST[:PORT]" is an address in numbers or localhost. A web page whose name was made to lead here
+/// sends its own name.
 bool own_host(const std::string& text) {
     unsigned char address[16];
     if (text.starts_with('[')) {
@@ -87,7 +100,251 @@ void give_ply(Response& response, std::shared_ptr<const Snapshot> splats, std::s
         });
 }
 
+/// cpp-httplib gives each connection to this. It runs on the listening thread, and its jobs only start another.
+class AtOnce final : public httplib::TaskQueue {
+    // void before cpp-httplib 0.14, bool since
+    using Taken = decltype(std::declval<httplib::TaskQueue&>().enqueue({}));
+
+  public:
+    Taken enqueue(std::function<void()> job) override {
+        job();
+        return Taken(true);
+    }
+    void shutdown() override {}
+};
+
 }  // namespace
+
+/// cpp-httplib's constructor makes the whole process ignore SIGPIPE, which Wire does not need.
+struct SigpipeBefore {
+    struct sigaction action {};
+    SigpipeBefore() { sigaction(SIGPIPE, nullptr, &action); }
+};
+
+/// Its threads answer several requests at a time.
+class Server::Http final : private SigpipeBefore, private httplib::Server {
+  public:
+    Http(live::Server& server, const std::string& address, uint16_t port, std::chrono::milliseconds patience)
+        : server_(server), patience_(patience) {
+        sigaction(SIGPIPE, &action, nullptr);
+        // cpp-httplib's default would let a second server listen on the same port.
+        set_socket_options([](int socket) {
+            const int yes = 1;
+            setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
+        });
+        set_tcp_nodelay(true);
+        set_default_headers({{"Server", "ewa/" EWA_VERSION},
+                             {"Accept-Ranges", "none"},
+                             {"Cache-Control", "no-store"},
+                             {"Cross-Origin-Resource-Policy", "same-origin"},
+                             {"X-Content-Type-Options", "nosniff"}});
+        // Answers every request before cpp-httplib's own routing, which would read a body.
+        set_pre_routing_handler([this](const Request& request, Response& response) {
+            answer(request, response);
+            return HandlerResponse::Handled;
+        });
+        errno = 0;
+        const int bound = port == 0 ? bind_to_any_port(address) : bind_to_port(address, port) ? port : -1;
+        if (bound <= 0)
+            throw RunError("cannot listen on " + address + ":" + std::to_string(port) + ": " +
+                           (errno ? std::strerror(errno) : "there is no such address"));
+        port_ = uint16_t(bound);
+        new_task_queue = [this] {
+            listening_.set_value();
+            return new AtOnce;
+        };
+        thread_ = std::thread([this] { listen_after_bind(); });
+        listening_.get_future().wait();  // before this, stop() would do nothing
+    }
+
+    /// Ends every connection. No answer may still wait for news of the server.
+    ~Http() override {
+        stop();
+        thread_.join();
+        {
+            const std::lock_guard lock(mutex_);
+            for (const Connection& connection : connections_)
+                if (!connection.done) ::shutdown(connection.socket, SHUT_RDWR);
+        }
+        for (Connection& connection : connections_) connection.thread.join();
+    }
+
+    uint16_t port() const { return port_; }
+
+  private:
+    struct Connection {
+        int socket = -1;
+        std::thread thread;
+        bool asked = false;  // its request has come
+        bool cut = false;    // another connection replaces it
+        bool done = false;
+    };
+
+    bool process_and_close_socket(int socket) override {
+        std::unique_lock lock(mutex_);
+        if (!make_place(lock)) {
+            ::close(socket);
+            return false;
+        }
+        Connection& connection = connections_.emplace_back();
+        connection.socket = socket;
+        try {
+            connection.thread = std::thread([this, &connection] { serve(connection); });
+        } catch (const std::system_error&) {  // the system has no more threads: the training goes on
+            ::close(socket);
+            connections_.pop_back();
+        }
+        return true;
+    }
+
+    bool make_place(std::unique_lock<std::mutex>& lock) {
+        connections_.remove_if([](Connection& connection) {
+            if (connection.done) connection.thread.join();
+            return connection.done;
+        });
+        if (connections_.size() < kMostConnections) return true;
+        const auto silent = std::find_if(connections_.begin(), connections_.end(),
+                                         [](const Connection& connection) { return !connection.asked; });
+        if (silent == connections_.end()) return false;
+        silent->cut = true;
+        if (!silent->done) ::shutdown(silent->socket, SHUT_RDWR);
+        lock.unlock();
+        silent->thread.join();
+        lock.lock();
+        connections_.erase(silent);
+        return true;
+    }
+
+    void serve(Connection& connection) {
+        try {
+            Wire wire(connection.socket, kMostRequest, patience_);
+            process(*this, wire, [&](Request& request) {
+                const std::lock_guard lock(mutex_);
+                if (connection.cut) throw RunError("the connection was cut");
+                connection.asked = true;
+                // One short request could ask for the splats thousands of times.
+                request.ranges.clear();
+            });
+        } catch (const std::exception&) {
+            // Out of memory, for one client: its connection ends, the training does not.
+        }
+        const std::lock_guard lock(mutex_);
+        ::shutdown(connection.socket, SHUT_RDWR);
+        ::close(connection.socket);
+        connection.done = true;
+    }
+
+    template <class Self>
+    static void process(Self& self, httplib::Stream& stream, const std::function<void(Request&)>& begin) {
+        bool closed = true;
+        if constexpr (requires { self.process_request(stream, true, closed, begin); })
+            self.process_request(stream, true, closed, begin);
+        else  // since cpp-httplib 0.17
+            self.process_request(stream, std::string(), 0, std::string(), 0, true, closed, begin);
+    }
+
+    void answer(const Request& request, Response& response) {
+        if (request.get_header_value_count("Host") != 1 || !own_host(request.get_header_value("Host")))
+            return refuse(response, 403, "the Host header must be localhost or an address in numbers");
+        if (of_a_web_page(request)) return refuse(response, 403, "requests from web pages are refused");
+        if (has_body(request)) return refuse(response, 413, "a request has no body here");
+        const std::string shown = request.get_header_value("Authorization");
+        const bool trusted = !server_.token_.empty() && same_secret(shown, "Bearer " + server_.token_);
+        if (!shown.empty() && !trusted) return refuse(response, 401, "this is not the run's token");
+        const auto guest = enter(trusted);
+        if (!guest) return refuse(response, 503, "too many clients without the token; try again");
+
+        const bool get = request.method == "GET" || request.method == "HEAD";
+        const std::string& path = request.path;
+        if (get && path == "/status") {
+            const bool lines = request.has_param("metrics");
+            const auto first =
+                core::parse_integer<uint32_t>(lines ? request.get_param_value("metrics") : "0");
+            if (!first) return refuse(response, 400, "metrics wants the number of the first line");
+            const std::string status = status_from(lines ? *first : SIZE_MAX, trusted);
+            return give_text(response, status, "application/json", guest);
+        }
+        if (get && path == "/splats") return give_splats(request, response, trusted, guest);
+        if (request.method != "POST" || (path != "/pause" && path != "/resume" && path != "/save"))
+            return refuse(response, 404, "there is GET /status, /splats and POST /pause, /resume, /save");
+        if (!trusted) {
+            response.set_header("WWW-Authenticate", "Bearer");
+            return refuse(response, 401, "this needs the token: Authorization: Bearer TOKEN (see live.json)");
+        }
+        {
+            const std::lock_guard lock(server_.mutex_);
+            if (path == "/save")
+                server_.save_ = true;
+            else
+                server_.paused_ = path == "/pause";
+        }
+        give_text(response, "done\n", "text/plain", guest);
+    }
+
+    /// Counts a request until the pointer is gone. Null: there are too many without the token.
+    std::shared_ptr<void> enter(bool trusted) {
+        const std::lock_guard lock(server_.mutex_);
+        size_t& count = trusted ? server_.trusted_ : server_.strangers_;
+        if (!trusted && count >= kMostStrangers) return nullptr;
+        ++count;
+        return {this, [&server = server_, &count](Http*) {
+                    const std::lock_guard leaving(server.mutex_);
+                    --count;
+                    if (&count == &server.trusted_) server.lease_end_ = Clock::now() + server.lease_;
+                }};
+    }
+
+    std::string status_from(size_t line, bool trusted) {
+        std::unique_lock lock(server_.mutex_);
+        const Status& now = server_.status_;
+        Status status{server_.run_, now.step,    now.steps, now.splats,
+                      now.loss,     now.seconds, now.state, trusted};
+        for (size_t i = line; i < now.metrics.size() && i - line < kMostLines; ++i)
+            status.metrics.push_back(now.metrics[i]);
+        if (status.state == State::running && server_.paused_now()) status.state = State::paused;
+        lock.unlock();
+        return encode(status);
+    }
+
+    /// The newest splats, or null. fresh: waits for those of the present step, a limited time.
+    std::shared_ptr<const Snapshot> splats_for(bool trusted, bool fresh) {
+        std::unique_lock lock(server_.mutex_);
+        server_.wanted_ = true;
+        if (fresh)
+            server_.news_.wait_for(lock, kFreshWait, [&server = server_, step = server_.status_.step] {
+                return server.stop_ || (server.splats_ && server.splats_->step >= step);
+            });
+        if (trusted) return server_.splats_;
+        auto given = server_.given_.lock();
+        if (!given) server_.given_ = given = server_.splats_;
+        return given;
+    }
+
+    void give_splats(const Request& request, Response& response, bool trusted, std::shared_ptr<void> guest) {
+        const std::string known = request.get_header_value("If-None-Match");
+        const auto splats = splats_for(trusted, known.empty());
+        const std::string tag = splats ? "\"" + server_.run_ + "-" + std::to_string(splats->step) + "\"" : "";
+        if (!known.empty() && (!splats || known == tag)) {
+            response.status = 304;
+            return;
+        }
+        if (!splats) {
+            response.set_header("Retry-After", "1");
+            return refuse(response, 503, "no splats have been taken yet; ask again");
+        }
+        response.set_header("ETag", tag);
+        response.set_header("Ewa-Step", std::to_string(splats->step));
+        give_ply(response, splats, std::move(guest));
+    }
+
+    live::Server& server_;
+    const std::chrono::milliseconds patience_;
+    uint16_t port_ = 0;
+    std::mutex mutex_;  // of the connections
+    std::list<Connection> connections_;
+    std::promise<void> listening_;
+    std::thread thread_;  // last
+};
 
 std::string random_token() {
     unsigned char bytes[16] = {};
@@ -105,9 +362,7 @@ Server::Server(const std::string& address, uint16_t port, std::string token, std
                std::chrono::milliseconds request_patience)
     : token_(std::move(token)),
       lease_(lease),
-      http_(std::make_unique<HttpServer>(
-          address, port, request_patience,
-          [this](const Request& request, Response& response) { answer(request, response); })) {}
+      http_(std::make_unique<Http>(*this, address, port, request_patience)) {}
 
 Server::~Server() {
     {
@@ -164,101 +419,6 @@ bool Server::paused() {
 bool Server::take_save() {
     const std::lock_guard lock(mutex_);
     return std::exchange(save_, false);
-}
-
-std::shared_ptr<void> Server::enter(bool trusted) {
-    const std::lock_guard lock(mutex_);
-    size_t& count = trusted ? trusted_ : strangers_;
-    if (!trusted && count >= kMostStrangers) return nullptr;
-    ++count;
-    return {this, [&count, this](Server*) {
-                const std::lock_guard leaving(mutex_);
-                --count;
-                if (&count == &trusted_) lease_end_ = Clock::now() + lease_;
-            }};
-}
-
-std::string Server::status_from(size_t line, bool trusted) {
-    Status status;
-    {
-        const std::lock_guard lock(mutex_);
-        status = {run_,         status_.step,    status_.steps, status_.splats,
-                  status_.loss, status_.seconds, status_.state, trusted};
-        const auto& lines = status_.metrics;
-        for (size_t i = line; i < lines.size() && i - line < kMostLines; ++i)
-            status.metrics.push_back(lines[i]);
-        if (status.state == State::running && paused_now()) status.state = State::paused;
-    }
-    return encode(status);
-}
-
-std::shared_ptr<const Snapshot> Server::splats_for(bool trusted, bool fresh) {
-    std::unique_lock lock(mutex_);
-    wanted_ = true;
-    if (fresh)
-        news_.wait_for(lock, kFreshWait,
-                       [this, step = status_.step] { return stop_ || (splats_ && splats_->step >= step); });
-    if (trusted) return splats_;
-    auto given = given_.lock();
-    if (!given) given_ = given = splats_;
-    return given;
-}
-
-void Server::give_splats(const Request& request, Response& response, bool trusted,
-                         std::shared_ptr<void> guest) {
-    const std::string known = request.get_header_value("If-None-Match");
-    const auto splats = splats_for(trusted, known.empty());
-    const std::string tag = splats ? "\"" + run_ + "-" + std::to_string(splats->step) + "\"" : "";
-    if (!known.empty() && (!splats || known == tag)) {
-        response.status = 304;
-        return;
-    }
-    if (!splats) {
-        response.set_header("Retry-After", "1");
-        return refuse(response, 503, "no splats have been taken yet; ask again");
-    }
-    response.set_header("ETag", tag);
-    response.set_header("Ewa-Step", std::to_string(splats->step));
-    give_ply(response, splats, std::move(guest));
-}
-
-void Server::command(const std::string& path) {
-    const std::lock_guard lock(mutex_);
-    if (path == "/save")
-        save_ = true;
-    else
-        paused_ = path == "/pause";
-}
-
-void Server::answer(const Request& request, Response& response) {
-    if (request.get_header_value_count("Host") != 1 || !own_host(request.get_header_value("Host")))
-        return refuse(response, 403, "the Host header must be localhost or an address in numbers");
-    if (of_a_web_page(request)) return refuse(response, 403, "requests from web pages are refused");
-    if (has_body(request)) return refuse(response, 413, "a request has no body here");
-    const std::string shown = request.get_header_value("Authorization");
-    const bool trusted = !token_.empty() && same_secret(shown, "Bearer " + token_);
-    if (!shown.empty() && !trusted) return refuse(response, 401, "this is not the run's token");
-    const auto guest = enter(trusted);
-    if (!guest) return refuse(response, 503, "too many clients without the token; try again");
-
-    const bool get = request.method == "GET" || request.method == "HEAD";
-    const std::string& path = request.path;
-    if (get && path == "/status") {
-        const bool lines = request.has_param("metrics");
-        const auto first = core::parse_integer<uint32_t>(lines ? request.get_param_value("metrics") : "0");
-        if (!first) return refuse(response, 400, "metrics wants the number of the first line");
-        return give_text(response, status_from(lines ? *first : SIZE_MAX, trusted), "application/json",
-                         guest);
-    }
-    if (get && path == "/splats") return give_splats(request, response, trusted, guest);
-    if (request.method != "POST" || (path != "/pause" && path != "/resume" && path != "/save"))
-        return refuse(response, 404, "there is GET /status, /splats and POST /pause, /resume, /save");
-    if (!trusted) {
-        response.set_header("WWW-Authenticate", "Bearer");
-        return refuse(response, 401, "this needs the token: Authorization: Bearer TOKEN (see live.json)");
-    }
-    command(path);
-    give_text(response, "done\n", "text/plain", guest);
 }
 
 }  // namespace ewa::live

@@ -1,28 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 // The trainer's side: an HTTP server through which others watch and command a training run.
 //
-//   GET /status[?metrics=N]  JSON: see status.h. "metrics" are the lines of metrics.jsonl from the N-th on,
-//   at
-//                            most kMostLines of them, and none without ?metrics.
-//   GET /splats              The splats as PLY (io/ply.h). ETag names them, Ewa-Step is their step. Asking
-//                            makes the trainer take newer ones. 304 where If-None-Match names the newest.
-//                            Without If-None-Match the answer waits up to 5 seconds for splats of the step
-//                            at which it was asked, and is 503 where none have ever been taken.
-//   POST /pause              Holds the training before its next step, while requests with the token keep
-//                            coming: 10 seconds after the last one it continues by itself.
+//   GET /status[?metrics=N]  JSON: see status.h. "metrics" are at most kMostLines lines of metrics.jsonl, from
+//                            the N-th on. There are none without ?metrics.
+//   GET /splats              The splats as PLY (io/splats/ply.h). ETag names them, and Ewa-Step is their step.
+//                            A request makes the trainer take newer ones. The status is 304 if If-None-Match
+//                            names the newest. Without If-None-Match the answer waits up to 5 seconds for
+//                            splats of the present step. It is 503 if none have ever been taken.
+//   POST /pause              Holds the training before its next step. It continues by itself 10 seconds after
+//                            the last request with the token.
 //   POST /resume, /save      Continue; save splats and checkpoint.
 //
-// A POST needs "Authorization: Bearer TOKEN". GET works without; a wrong token is refused everywhere.
+// A POST needs "Authorization: Bearer TOKEN". GET works without it. A wrong token is refused everywhere.
 // An error is one line of text.
 //
 // Strangers reach the port. The server therefore
-// - refuses a Host that is neither an address in numbers nor localhost (DNS rebinding), and whatever a web
-//   page sends (Origin, Sec-Fetch-Site);
-// - reads 4 KiB of request line and headers at most, within 2 seconds, and never a body;
-// - answers one request a connection, 64 at a time; a newcomer takes the place of the connection that has
-//   waited longest without a request (http_server.h);
-// - answers kMostStrangers without the token at a time, and gives those one set of splats, so that slow
-//   readers keep no other sets in memory;
+// - refuses a Host that is neither an address in numbers nor localhost (DNS rebinding);
+// - refuses every request of a web page (Origin, Sec-Fetch-Site);
+// - reads at most 4 KiB of request line and headers, within 2 seconds, and never a body;
+// - answers one request a connection and 64 connections at a time. A new connection replaces the one that has
+//   waited longest without a request;
+// - answers kMostStrangers requests without the token at a time. All of these get one set of splats, so slow
+//   readers hold no other sets in memory;
 // - ends an answer that is read slower than 16 KB/s (wire.h).
 #pragma once
 #include <chrono>
@@ -34,14 +33,7 @@
 #include "ewa/gaussians.h"
 #include "live/status.h"
 
-namespace httplib {
-struct Request;
-struct Response;
-}  // namespace httplib
-
 namespace ewa::live {
-
-class HttpServer;
 
 inline constexpr size_t kMostStrangers = 8;
 inline constexpr std::chrono::seconds kLease{10}, kRequestPatience{2};
@@ -58,7 +50,8 @@ std::string random_token();
 class Server {
   public:
     /// Listens at once. port 0: any free one. token: empty refuses all commands. lease: how long a pause
-    /// outlasts the last request with the token. Throws RunError where the address cannot be listened on.
+    /// outlasts the last request with the token. request_patience: for a whole request. Throws RunError if
+    /// nothing can listen on the address.
     Server(const std::string& address, uint16_t port, std::string token,
            std::chrono::milliseconds lease = kLease,
            std::chrono::milliseconds request_patience = kRequestPatience);
@@ -85,15 +78,7 @@ class Server {
   private:
     using Clock = std::chrono::steady_clock;
 
-    void answer(const httplib::Request& request, httplib::Response& response);
-    void give_splats(const httplib::Request& request, httplib::Response& response, bool trusted,
-                     std::shared_ptr<void> guest);
-    std::string status_from(size_t line, bool trusted);
-    /// The newest splats, or null. fresh: waits for those of the present step, a bounded time.
-    std::shared_ptr<const Snapshot> splats_for(bool trusted, bool fresh);
-    void command(const std::string& path);
-    /// Counts a request until the pointer is gone. Null: there are too many without the token.
-    std::shared_ptr<void> enter(bool trusted);
+    class Http;         // accepts connections and answers requests
     bool paused_now();  // under mutex_
 
     const std::string token_, run_ = random_token();
@@ -106,7 +91,7 @@ class Server {
     Clock::time_point next_splats_, lease_end_;
     size_t trusted_ = 0, strangers_ = 0;  // requests that are being answered
     bool wanted_ = false, paused_ = false, save_ = false, stop_ = false;
-    std::unique_ptr<HttpServer> http_;  // last: its threads use the rest
+    std::unique_ptr<Http> http_;  // last: its threads use the rest
 };
 
 }  // namespace ewa::live

@@ -14,10 +14,10 @@ inline constexpr size_t kMostLines = 2000;  // of metrics in one answer
 enum class State { running, paused, done };
 
 struct Status {
-    std::string run = {};  // a name drawn for each run: a new run may answer at an old run's address
+    std::string run = {};  // a random name: a new run may answer at the address of an old one
     int step = 0, steps = 0;
     uint32_t splats = 0;
-    double loss = 0, seconds = 0;  // loss: NaN before the first step; seconds: of training alone
+    double loss = 0, seconds = 0;  // loss: NaN before the first step; seconds: only of training
     State state = State::running;
     bool commands = false;  // whether this client may give commands
     std::vector<report::MetricsLine> metrics = {};

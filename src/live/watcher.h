@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Follows a training run: over HTTP while its trainer serves, else by the files that the run writes.
+// Follows a training run: over HTTP (server.h) while its trainer serves, else by the files that the run writes.
 #pragma once
 #include <atomic>
 #include <condition_variable>
@@ -11,24 +11,63 @@
 #include <string>
 #include <thread>
 
-#include "live/client.h"
+#include "ewa/gaussians.h"
+#include "live/status.h"
 
 namespace ewa::live {
 
-/// In the folder of a run that is served: {"port", "token"}, readable by its owner alone.
+struct Address {
+    std::string host;
+    uint16_t port = 0;
+};
+/// "host:port", "[v6]:port" or ":port" (this machine). Throws InputError.
+Address parse_address(const std::string& text);
+
+/// Splats of a run, and the server's tag for them.
+struct TaggedSplats {
+    int step = 0;
+    std::string tag;
+    Gaussians gaussians;
+};
+
+/// Each request has its own connection. Anybody may answer: sizes are limited, and only bytes that have come take
+/// memory.
+class Client {
+  public:
+    /// Does not connect yet. token: empty for watching without commands. stop: may be null. Once it is true,
+    /// every wait ends at once with an error.
+    Client(const Address& address, const std::string& token, const std::atomic<bool>* stop = nullptr);
+    ~Client();
+
+    // Each throws InputError for a refusal, or an answer that is not a trainer's. Each throws RunError if nobody
+    // answers or the connection ends.
+
+    /// With the metrics from line `first_line` on.
+    Status status(size_t first_line);
+    /// Splats with another tag than this, or nothing if there are none. tag: empty for any splats.
+    std::optional<TaggedSplats> splats(const std::string& tag);
+    /// pause, resume or save.
+    void command(const std::string& name);
+
+  private:
+    class Http;
+    std::unique_ptr<Http> http_;
+};
+
+/// In the folder of a run that is served: {"port", "token"}, readable only by its owner.
 inline constexpr const char* kLiveFile = "live.json";
 struct LiveFile {
     uint16_t port = 0;
     std::string token;
 };
-/// Nothing where the folder has none that can be read.
+/// Nothing if the folder has none that can be read.
 std::optional<LiveFile> read_live_file(const std::filesystem::path& folder);
 /// Throws RunError.
 void write_live_file(const std::filesystem::path& folder, const LiveFile& live);
 
 struct WhatToWatch {
     std::filesystem::path folder;    // of the run; may be empty
-    std::optional<Address> address;  // of the trainer; without one, the folder's live file has it
+    std::optional<Address> address;  // of the trainer; else the folder's live file has it
     std::string token;
     // Files that have not changed since then are ignored.
     std::filesystem::file_time_type splats_after = std::filesystem::file_time_type::min();
@@ -37,7 +76,7 @@ struct WhatToWatch {
 
 struct Update {
     Status status;                            // with all metrics
-    std::shared_ptr<const Gaussians> splats;  // the newest; null where there are none yet
+    std::shared_ptr<const Gaussians> splats;  // the newest; null if there are none yet
     int splats_step = -1;
     uint64_t number = 0;     // grows with every change
     bool connected = false;  // to the trainer, not only to its files

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The socket of one HTTP exchange, as cpp-httplib reads and writes it. cpp-httplib bounds the time of single
-// reads and writes and the length of single headers; this bounds the whole.
+// The socket of one HTTP exchange, as cpp-httplib reads and writes it. cpp-httplib limits the time of single reads
+// and writes, and the length of single headers. This limits the whole.
 #pragma once
 #include <httplib.h>
 
@@ -11,20 +11,20 @@ namespace ewa::live {
 
 class Wire final : public httplib::Stream {
   public:
-    /// socket: not owned. bytes: that may come, all within `patience`. stop: may be null; once it is true
+    /// socket: not owned. bytes: how many may come, all within `patience`. stop: may be null. Once it is true,
     /// every wait ends as if the other side had gone.
     Wire(int socket, uint64_t bytes, std::chrono::milliseconds patience,
          const std::atomic<bool>* stop = nullptr,
          std::chrono::milliseconds write_grace = std::chrono::seconds(30));
 
-    /// So many bytes more may come, and `patience` now bounds each wait for some of them.
+    /// So many bytes more may come. `patience` now limits each wait for some of them.
     void allow(uint64_t bytes);
 
     bool is_readable() const override { return left_ > 0; }
     bool is_writable() const override { return true; }
-    /// The bytes that came, or -1 at any bound.
+    /// Returns the number of bytes that came, or -1 at any limit.
     ssize_t read(char* to, size_t size) override;
-    /// All or -1. Writing may take write_grace, and a second more for each 16 KB.
+    /// Writes all or returns -1. Writing may take write_grace, and a second more for each 16 KB.
     ssize_t write(const char* from, size_t size) override;
     void get_remote_ip_and_port(std::string&, int&) const override {}
     void get_local_ip_and_port(std::string&, int&) const override {}

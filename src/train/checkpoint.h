@@ -33,8 +33,4 @@ void write_checkpoint(const std::filesystem::path& path, const Checkpoint& check
 /// Throws InputError, with the byte, if the file is cut short, damaged, of another version or no checkpoint.
 Checkpoint read_checkpoint(const std::filesystem::path& path);
 
-/// 16 hexadecimal digits that differ between datasets. They are a hash of the name, split and camera of each frame,
-/// and of the size and the first 64 KiB of its image and mask. A frame without a file counts with name and camera.
-std::string dataset_fingerprint(const Dataset& dataset, const Split& split);
-
 }  // namespace ewa::train

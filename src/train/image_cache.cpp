@@ -10,7 +10,6 @@
 #include "pipeline/frame_inputs.h"
 
 namespace ewa::train {
-
 namespace {
 
 bool transparent(const Image& image) {
@@ -29,7 +28,7 @@ ImageCache::ImageCache(gpu::Device& device, const passes::KernelConfig& config, 
     const uint64_t align = std::max<uint64_t>(device.limits().uniform_alignment, 16);
     camera_stride_ = (sizeof(shared::CameraBlock) + align - 1) / align * align;
     std::vector<std::byte> blocks(camera_stride_ * std::max<size_t>(frames.size(), 1));
-    uint64_t held_bytes = 0;
+    uint64_t cached_bytes = 0;
     for (size_t i = 0; i < frames.size(); ++i) {
         Frame& frame = frames_.emplace_back(dataset.frames[size_t(frames[i])]);
         if (reduction > 1) {
@@ -40,32 +39,31 @@ ImageCache::ImageCache(gpu::Device& device, const passes::KernelConfig& config, 
         std::memcpy(&blocks[i * camera_stride_], &block, sizeof(block));
         const uint64_t bytes =
             pipeline::photo_bytes(frame.camera.width, frame.camera.height, frame.eight_bit);
-        const bool held = held_bytes + bytes <= cache_bytes;
-        on_disk_ += !held;
-        if (held) {
-            held_bytes += bytes;
+        const bool cached = cached_bytes + bytes <= cache_bytes;
+        on_disk_ += !cached;
+        if (cached) {
+            cached_bytes += bytes;
             photos_[i] = upload(frame, load_frame_image(frame));
         }
-        any_masked_ = any_masked_ || photos_[i].masked || (!held && frame.masks == MaskUse::ignore);
+        any_masked_ = any_masked_ || photos_[i].masked || (!cached && frame.masks == MaskUse::ignore);
     }
     cameras_ = gpu::Buffer(device, "cameras", blocks.size(), gpu::Texel::none, true);
     cameras_.upload(std::span<const std::byte>(blocks));
 }
 
-ImageCache::Held ImageCache::upload(const Frame& frame, const Image& image) const {
+ImageCache::Photo ImageCache::upload(const Frame& frame, const Image& image) const {
     if (image.width != frame.camera.width || image.height != frame.camera.height)
         throw InputError("frame " + frame.name + " changed its size while it was read");
     return {pipeline::upload_photo(device_, image, frame.eight_bit),
             frame.masks == MaskUse::ignore && transparent(image)};
 }
 
-ImageCache::Photo ImageCache::photo(size_t i) {
-    if (photos_[i].texels) return {photos_[i].texels, photos_[i].masked};
+const ImageCache::Photo& ImageCache::photo(size_t i) {
+    if (photos_[i].texels) return photos_[i];
     prepare(i);
     const Image image = reading_.get();
     visitor_ = {};  // frees its memory first
-    visitor_ = upload(frames_[i], image);
-    return {visitor_.texels, visitor_.masked};
+    return visitor_ = upload(frames_[i], image);
 }
 
 void ImageCache::prepare(size_t i) {

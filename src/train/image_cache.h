@@ -27,11 +27,11 @@ class ImageCache {
 
     /// An image as the loss reads it. Valid until the next call of photo.
     struct Photo {
-        const gpu::Buffer& texels;
-        bool masked;  // its alpha weights the pixels, and some weigh less than 1
+        gpu::Buffer texels;   // empty: on disk
+        bool masked = false;  // its alpha weights the pixels, and some weigh less than 1
     };
     /// Reads image i if it is not cached. The device must be idle. Throws InputError.
-    Photo photo(size_t i);
+    const Photo& photo(size_t i);
     /// Starts reading image i in the background for the next call of photo, if it is not cached.
     void prepare(size_t i);
 
@@ -40,18 +40,14 @@ class ImageCache {
     pipeline::CameraUse camera(size_t i) const;
 
   private:
-    struct Held {
-        gpu::Buffer texels;  // empty: on disk
-        bool masked = false;
-    };
-    Held upload(const Frame& frame, const Image& image) const;
+    Photo upload(const Frame& frame, const Image& image) const;
 
     gpu::Device& device_;
     std::vector<Frame> frames_;
-    std::vector<Held> photos_;
+    std::vector<Photo> photos_;
     size_t on_disk_ = 0;
     bool any_masked_ = false;
-    Held visitor_;  // the last one from disk
+    Photo visitor_;  // the last one from disk
     size_t coming_ = 0;
     std::future<Image> reading_;
     gpu::Buffer cameras_;

@@ -10,6 +10,10 @@
 
 namespace ewa::train {
 
+/// 16 hexadecimal digits that differ between datasets. They are a hash of the name, split and camera of each frame,
+/// and of the size and the first 64 KiB of its image and mask. A frame without a file counts with name and camera.
+std::string dataset_fingerprint(const Dataset& dataset, const Split& split);
+
 /// The settings of a checkpoint: version, the dataset's fingerprint, and the options that decide the result.
 /// The run adds the device.
 nlohmann::ordered_json checkpoint_settings(const RunOptions& options, const std::string& fingerprint);

@@ -6,15 +6,17 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "core/folders.h"
 #include "ewa/error.h"
+#include "ewa/renderer.h"
 #include "pipeline/model.h"
 #include "report/pictures.h"
 #include "train/checkpoint.h"
 #include "train/resume.h"
-#include "train/run_evaluation.h"
 #include "train/run_files.h"
 #include "train/run_input.h"
 #include "train/run_options.h"
@@ -25,12 +27,25 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using Json = nlohmann::ordered_json;
 
+// Their mean says enough. All views of a large set would take longer than its training.
+constexpr size_t kTrainViewsEvaluated = 40;
+constexpr size_t kReportImages = 4;
+
 double seconds_since(Clock::time_point begin) {
     return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
 bool at(int step, int every) {
     return every > 0 && step % every == 0;
+}
+
+/// `count` of the values, evenly spread, with the first among them. All of them if there are fewer.
+template <class T>
+std::vector<T> spread_out(const std::vector<T>& values, size_t count) {
+    if (values.size() <= count) return values;
+    std::vector<T> some;
+    for (size_t i = 0; i < count; ++i) some.push_back(values[i * values.size() / count]);
+    return some;
 }
 
 /// Thrown out of an evaluation that the observer stops.
@@ -78,7 +93,6 @@ class Run {
     void stop_if_asked() const;
     template <class Work>
     bool done_unless_stopped(Work&& work) const;
-    train::RunOutcome outcome(const Gaussians& gaussians) const;
     void evaluate_result(const Trainer& trainer, const Gaussians& gaussians);
     void render_result(const Gaussians& gaussians);
     void finish(const Trainer& trainer);
@@ -110,8 +124,7 @@ void Run::read_checkpoint() {
 
 /// Writes config.json, which tells before the training whether the folder takes files.
 void Run::open_folder() {
-    const Json config = train::to_config(options());
-    folder_.begin(config);
+    folder_.begin(train::to_config(options()));
     for (const train::RunOption& option : train::run_options())
         report_.settings.emplace_back(option.name, train::value_text(option, options()));
 }
@@ -178,12 +191,7 @@ void Run::save_checkpoint(const Trainer& trainer) {
 }
 
 void Run::log(const std::optional<Evaluation>& evaluation) {
-    MetricsLine line;
-    line.step = last_.step;
-    line.seconds = last_.seconds;
-    line.wall_seconds = wall_seconds();
-    line.loss = last_.loss;
-    line.splats = last_.splats;
+    MetricsLine line{last_.step, last_.seconds, wall_seconds(), last_.loss, last_.splats, {}, {}};
     if (evaluation) {
         line.test_psnr = evaluation->psnr;
         line.test_ssim = evaluation->ssim;
@@ -244,30 +252,53 @@ bool Run::done_unless_stopped(Work&& work) const {
     }
 }
 
-train::RunOutcome Run::outcome(const Gaussians& gaussians) const {
-    return {device_, input_, gaussians, [this] { stop_if_asked(); }};
-}
-
 void Run::evaluate_result(const Trainer& trainer, const Gaussians& gaussians) {
     observer_.on_note("evaluating");
+    const auto evaluated = [&](const std::vector<int>& frames, const std::vector<Exposure>& exposures) {
+        return evaluate(device_, gaussians, input_.dataset, frames, options().train.render, exposures,
+                        [this] { stop_if_asked(); });
+    };
     if (!input_.split.test.empty()) {
-        last_evaluation_ = train::evaluate_test(outcome(gaussians));
+        last_evaluation_ = evaluated(input_.split.test, {});
         report_.summary.test_psnr = last_evaluation_->psnr;
         report_.summary.test_ssim = last_evaluation_->ssim;
     }
-    report_.summary.train_psnr = train::train_psnr(outcome(gaussians), trainer.exposures());
+    report_.summary.train_psnr = evaluated(spread_out(input_.split.train, kTrainViewsEvaluated),
+                                           spread_out(trainer.exposures(), kTrainViewsEvaluated))
+                                     .psnr;
 }
 
+/// Renders a few test views, or training views without a test set. Saves each beside the report, which shows them.
 void Run::render_result(const Gaussians& gaussians) {
-    const std::vector<int> frames = train::report_frames(input_.split);
-    const auto subfolder = folder_.path() / (report_.held_out ? "test" : "train");
-    report_.pictures = train::render_report_images(outcome(gaussians), frames, subfolder);
-    const auto names = report::picture_names(input_.dataset.frames);
-    first_render_ = subfolder / (names[size_t(frames.front())].string() + ".png");
+    const std::vector<Frame>& all = input_.dataset.frames;
+    const RenderOptions& render = options().train.render;
+    const auto names = report::picture_names(all);
+    const auto file_of = [&](int index) {
+        return folder_.path() / (report_.held_out ? "test" : "train") /
+               (names[size_t(index)].string() + ".png");
+    };
+    const std::vector<int> frames =
+        spread_out(report_.held_out ? input_.split.test : input_.split.train, kReportImages);
+    Renderer renderer(device_, gaussians, render);
+    std::vector<report::ReportPicture> images;
+    for (const int index : frames) {
+        stop_if_asked();
+        const Frame& frame = all[size_t(index)];
+        auto [target, weights] = load_training_image(frame, render.background);
+        Image rendering = renderer.render(frame.camera).color;
+        const double db = psnr(rendering, target, weights);
+        if (std::isnan(db)) continue;  // no pixel counts
+        core::make_folder(file_of(index).parent_path());
+        save_image(file_of(index), rendering);
+        const double similarity = ssim(rendering, target, weights);
+        images.push_back({frame.name, std::move(target), std::move(rendering), db, similarity});
+    }
+    report_.pictures = std::move(images);
+    first_render_ = file_of(frames.front());
     if (!options().report_section) return;
     stop_if_asked();
-    const Camera& camera = input_.dataset.frames[size_t(frames.front())].camera;
-    report_.section = options().report_section({device_, gaussians, camera, options().train.render});
+    report_.section =
+        options().report_section({device_, gaussians, all[size_t(frames.front())].camera, render});
 }
 
 void Run::fill_summary(const Trainer& trainer) {

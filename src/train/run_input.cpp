@@ -3,8 +3,182 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+#include <numbers>
+
+#include "core/random.h"
 #include "ewa/error.h"
-#include "train/initial_splats.h"
+#include "ewa/splat_edit.h"
+#include "ewa/splat_files.h"
+
+namespace ewa::train {
+namespace {
+
+constexpr uint32_t kRandomSplats = 50000;
+
+/// Four numbers of (0, 1) for each seed, splat and use of it.
+std::array<double, 4> uniform(uint64_t seed, uint32_t index, uint32_t use) {
+    return core::uniform4({static_cast<uint32_t>(seed), static_cast<uint32_t>(seed >> 32), index, use});
+}
+
+glm::dvec3 viewing_direction(const Camera& camera) {
+    return glm::normalize(glm::transpose(camera.rotation) * glm::dvec3(0, 0, 1));
+}
+
+glm::dvec3 point_in_sphere(const Sphere& sphere, const std::array<double, 4>& u) {
+    const double z = 2 * u[0] - 1;
+    const double angle = 2 * std::numbers::pi * u[1];
+    const double radius = sphere.radius * std::cbrt(u[2]);
+    const double flat = std::sqrt(1 - z * z);
+    return sphere.center + radius * glm::dvec3(flat * std::cos(angle), flat * std::sin(angle), z);
+}
+
+bool sees(const Camera& camera, const glm::dvec3& point) {
+    const glm::dvec3 p = camera.rotation * point + camera.translation;
+    if (!(p.z > 0)) return false;
+    const double x = camera.fx * p.x / p.z + camera.cx, y = camera.fy * p.y / p.z + camera.cy;
+    return x >= 0 && x <= camera.width && y >= 0 && y <= camera.height;
+}
+
+glm::dvec3 point_on_a_ray(const Camera& camera, double depth, const std::array<double, 4>& u) {
+    const glm::dvec3 ray((u[0] * camera.width - camera.cx) / camera.fx,
+                         (u[1] * camera.height - camera.cy) / camera.fy, 1);
+    return camera.position() + glm::transpose(camera.rotation) * (depth * u[2] * glm::normalize(ray));
+}
+
+/// A point of the sphere that at least one camera sees.
+glm::dvec3 seen_point(const Dataset& dataset, const std::vector<int>& frames, const Sphere& sphere,
+                      uint64_t seed, uint32_t index) {
+    // The frustums of a forward-facing capture fill a few hundredths of the sphere.
+    constexpr uint32_t kAttempts = 64;
+    for (uint32_t attempt = 0; attempt < kAttempts; ++attempt) {
+        const glm::dvec3 point = point_in_sphere(sphere, uniform(seed, index, 2 * attempt));
+        if (std::any_of(frames.begin(), frames.end(),
+                        [&](int i) { return sees(dataset.frames[size_t(i)].camera, point); }))
+            return point;
+    }
+    const auto u = uniform(seed, index, 2 * kAttempts);
+    const auto which = std::min(size_t(u[3] * double(frames.size())), frames.size() - 1);
+    return point_on_a_ray(dataset.frames[size_t(frames[which])].camera, sphere.radius, u);
+}
+
+void add_remarks(RunInput& input) {
+    const Dataset& dataset = input.dataset;
+    if (input.without_view_dependence())
+        input.remarks.push_back("the dataset says that no colour depends on the view: SH degree 0");
+    if (input.options.init == "sfm" && dataset.points.positions.empty())
+        input.remarks.push_back("the dataset has no points: training starts from random splats");
+    if (dataset.missing_images > 0)
+        input.remarks.push_back(fmt::format("{} images are missing and are skipped", dataset.missing_images));
+    if (dataset.dropped_points > 0)
+        input.remarks.push_back(fmt::format("{} points have a coordinate that is not finite and are skipped",
+                                            dataset.dropped_points));
+}
+
+}  // namespace
+
+Sphere viewed_sphere(const Dataset& dataset, const std::vector<int>& frames) {
+    glm::dvec3 mean(0.0);
+    for (const int i : frames) mean += dataset.frames[i].camera.position() / double(frames.size());
+
+    // The sum of squared distances from the axes is least where sum(I - d d^T) (p - o) = 0. Positions are
+    // relative to their mean, so a scene far from the origin loses no digits.
+    glm::dmat3 normal(0.0);
+    glm::dvec3 right(0.0);
+    for (const int i : frames) {
+        const glm::dvec3 d = viewing_direction(dataset.frames[i].camera);
+        const glm::dmat3 across = glm::dmat3(1.0) - glm::outerProduct(d, d);
+        normal += across;
+        right += across * (dataset.frames[i].camera.position() - mean);
+    }
+    const double count = double(frames.size());
+    // The determinant is near 0 if the axes are nearly parallel. Its largest value is 8/27 of the cubed count,
+    // for directions in all of space.
+    if (glm::determinant(normal) > 1e-4 * count * count * count) {
+        const glm::dvec3 offset = glm::inverse(normal) * right;
+        double distance = 0, towards = 0;
+        for (const int i : frames) {
+            const glm::dvec3 to_center = mean + offset - dataset.frames[i].camera.position();
+            distance += glm::length(to_center) / count;
+            towards += glm::dot(to_center, viewing_direction(dataset.frames[i].camera));
+        }
+        if (towards > 0.5 * distance * count) return {mean + offset, distance};
+    }
+    double farthest = 0;
+    for (const int i : frames)
+        farthest = std::max(farthest, glm::length(dataset.frames[i].camera.position() - mean));
+    return {mean, farthest > 0 ? 4 * farthest : 1};
+}
+
+Gaussians random_gaussians(const Dataset& dataset, const std::vector<int>& frames, int count, uint64_t seed,
+                           int sh_degree) {
+    const Sphere sphere = viewed_sphere(dataset, frames);
+    PointCloud points;
+    for (int i = 0; i < count; ++i) {
+        const auto index = static_cast<uint32_t>(i);
+        points.positions.push_back(seen_point(dataset, frames, sphere, seed, index));
+        const auto shade = uniform(seed, index, 1);
+        std::array<uint8_t, 3> color;
+        for (size_t c = 0; c < 3; ++c) color[c] = static_cast<uint8_t>(96 + 64 * shade[c]);
+        points.colors.push_back(color);
+    }
+    return gaussians_from_points(points, sh_degree);
+}
+
+Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, const std::vector<int>& frames) {
+    const int degree = options.train.sh_degree;
+    Gaussians start;
+    if (options.init == "sfm") {
+        if (dataset.dropped_points > 0)
+            throw InputError(
+                fmt::format("{}: a coordinate is not finite ({} such points in all); remove them, or start "
+                            "from --init random",
+                            dataset.first_dropped_point, dataset.dropped_points));
+        if (!dataset.points.positions.empty()) start = gaussians_from_points(dataset.points, degree);
+    }
+    if (options.init == "random" || (options.init == "sfm" && start.size() == 0)) {
+        const uint32_t count = std::min(kRandomSplats, options.train.max_splats);
+        start = random_gaussians(dataset, frames, static_cast<int>(count), options.train.seed, degree);
+    } else if (options.init != "sfm") {
+        start = load_splats(options.init);
+        set_sh_degree(start, degree);
+    }
+    check_start(start.size(), options.train);
+    return start;
+}
+
+void check_start(size_t splats, const TrainOptions& options) {
+    if (splats == 0) throw InputError("there are no splats to start from; --init random makes some");
+    if (splats > options.max_splats)
+        throw InputError(fmt::format("there are {} splats to start from, more than --max-splats {}", splats,
+                                     options.max_splats));
+}
+
+RunInput load_run(const RunOptions& options) {
+    RunInput input;
+    input.options = options;
+    input.name = run_name(options);
+    input.dataset = load_dataset(options.dataset, {.downscale = options.downscale, .masks = options.masks});
+    input.split = split_frames(input.dataset, options.test_every);
+    if (input.split.train.empty())
+        throw InputError(fmt::format("{}: of {} images ({} missing) none is left to train on",
+                                     options.dataset.string(), input.dataset.frames.size(),
+                                     input.dataset.missing_images));
+    TrainOptions& train = input.options.train;
+    train = resolve(train, input.dataset);
+    train.render.sh_degree = train.sh_degree;
+    input.options.output = output_folder(options);
+    input.start = initial_splats(input.options, input.dataset, input.split.train);
+    add_remarks(input);
+    return input;
+}
+
+}  // namespace ewa::train
 
 namespace ewa {
 namespace fs = std::filesystem;
@@ -30,49 +204,4 @@ void check_options(const RunOptions& options) {
         throw InputError("--absgrad and --revised-opacity are options of --strategy adc");
 }
 
-namespace train {
-namespace {
-
-void add_remarks(RunInput& input) {
-    const Dataset& dataset = input.dataset;
-    if (input.without_view_dependence())
-        input.remarks.push_back("the dataset says that no colour depends on the view: SH degree 0");
-    if (input.options.init == "sfm" && dataset.points.positions.empty())
-        input.remarks.push_back("the dataset has no points: training starts from random splats");
-    if (dataset.missing_images > 0)
-        input.remarks.push_back(fmt::format("{} images are missing and are skipped", dataset.missing_images));
-    if (dataset.dropped_points > 0)
-        input.remarks.push_back(fmt::format("{} points have a coordinate that is not finite and are skipped",
-                                            dataset.dropped_points));
-}
-
-}  // namespace
-
-RunInput load_run(const RunOptions& options) {
-    RunInput input;
-    input.options = options;
-    input.name = run_name(options);
-    input.dataset = load_dataset(options.dataset, {.downscale = options.downscale, .masks = options.masks});
-    input.split = split_frames(input.dataset, options.test_every);
-    if (input.split.train.empty())
-        throw InputError(fmt::format("{}: of {} images ({} missing) none is left to train on",
-                                     options.dataset.string(), input.dataset.frames.size(),
-                                     input.dataset.missing_images));
-    TrainOptions& train = input.options.train;
-    train = resolve(train, input.dataset);
-    train.render.sh_degree = train.sh_degree;
-    input.options.output = output_folder(options);
-    input.start = initial_splats(input.options, input.dataset, input.split.train);
-    add_remarks(input);
-    return input;
-}
-
-std::vector<int> spread_out(const std::vector<int>& indices, size_t count) {
-    if (indices.size() <= count) return indices;
-    std::vector<int> some;
-    for (size_t i = 0; i < count; ++i) some.push_back(indices[i * indices.size() / count]);
-    return some;
-}
-
-}  // namespace train
 }  // namespace ewa

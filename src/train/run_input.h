@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a training run reads before it begins.
+// What a training run begins with: its dataset and its first splats.
 #pragma once
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -25,7 +26,29 @@ struct RunInput {
 /// Loads the dataset and the first splats. Throws InputError.
 RunInput load_run(const RunOptions& options);
 
-/// `count` of the indices, evenly spread, with the first among them. All of them if there are fewer.
-std::vector<int> spread_out(const std::vector<int>& indices, size_t count);
+/// The first splats that the options ask for. frames: indices of the training frames. options: with a concrete
+/// SH degree. Throws InputError (a point that is not finite, a splat file that cannot be read, too many splats).
+Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, const std::vector<int>& frames);
+
+/// Throws InputError if a training cannot start from so many splats.
+void check_start(size_t splats, const TrainOptions& options);
+
+/// The sphere that the cameras look at. Its centre is the point nearest to all optical axes in the
+/// least-squares sense. Its radius is the mean distance of the cameras from it.
+/// There is no such point if the axes are parallel, and it is not seen if the cameras look away from it. Then
+/// the centre is the cameras' mean position, and the radius is four times the distance of the farthest camera
+/// from it (1 if all cameras coincide).
+struct Sphere {
+    glm::dvec3 center{0.0};  // world
+    double radius = 1;       // world units, positive
+};
+Sphere viewed_sphere(const Dataset& dataset, const std::vector<int>& frames);
+
+/// `count` splats, spread evenly over the part of viewed_sphere(frames) that lies in at least one frustum. If
+/// that part is too small to hit, a splat lies on a random ray of a camera, at most the sphere's radius away.
+/// Colours are grey with a little noise, and scales are as in gaussians_from_points. Each splat is a pure
+/// function of seed and index. frames must not be empty.
+Gaussians random_gaussians(const Dataset& dataset, const std::vector<int>& frames, int count, uint64_t seed,
+                           int sh_degree);
 
 }  // namespace ewa::train

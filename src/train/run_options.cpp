@@ -55,123 +55,102 @@ const char* name_among(const Names<T>& names, T value) {
     return found == names.end() ? "" : found->first;
 }
 
+/// An option that is one member, whose value `parse` reads from a text.
+template <class T, class Parse>
+RunOption member_option(const char* name, const char* value, const char* help, bool decides, Member<T> member,
+                        const Parse& parse) {
+    RunOption option{name, value, help, decides};
+    option.get = [=](const RunOptions& options) { return Json(read(member, options)); };
+    option.set = [=](RunOptions& options, const std::string& text) { member(options) = parse(text); };
+    return option;
+}
+
 template <class T>
 RunOption number(const char* name, const char* value, const char* help, bool decides, Member<T> member, T low,
                  T high) {
-    return {name,
-            value,
-            help,
-            decides,
-            {},
-            [=](const RunOptions& options) { return Json(read(member, options)); },
-            [=](RunOptions& options, const std::string& text) {
-                member(options) = parse_within(text, low, high);
-            }};
+    return member_option(name, value, help, decides, member,
+                         [=](const std::string& text) { return parse_within(text, low, high); });
 }
 
 RunOption flag(const char* name, const char* help, Member<bool> member) {
-    return {name,
-            "",
-            help,
-            kDecides,
-            {},
-            [=](const RunOptions& options) { return Json(read(member, options)); },
-            [=](RunOptions& options, const std::string& text) {
-                if (text != "true" && text != "false")
-                    throw InputError("'" + text + "' is neither true nor false");
-                member(options) = text == "true";
-            },
-            member};
+    RunOption option = member_option(name, "", help, kDecides, member, [](const std::string& text) {
+        if (text != "true" && text != "false") throw InputError("'" + text + "' is neither true nor false");
+        return text == "true";
+    });
+    option.flag = member;
+    return option;
 }
 
 template <class T>
 RunOption choice(const char* name, const char* help, Member<T> member, const Names<T>& names) {
-    std::vector<std::string> choices;
-    for (const auto& [known, value] : names) choices.emplace_back(known);
-    return {name,
-            "TEXT",
-            help,
-            kDecides,
-            choices,
-            [=, &names](const RunOptions& options) { return Json(name_among(names, read(member, options))); },
-            [=, &names](RunOptions& options, const std::string& text) {
-                for (const auto& [known, value] : names)
-                    if (text == known) {
-                        member(options) = value;
-                        return;
-                    }
-                throw InputError(fmt::format("'{}' is not one of {}", text, fmt::join(choices, ", ")));
-            }};
+    RunOption option{name, "TEXT", help, kDecides};
+    for (const auto& [known, value] : names) option.choices.emplace_back(known);
+    option.get = [=, &names](const RunOptions& options) { return name_among(names, read(member, options)); };
+    option.set = [=, &names, choices = option.choices](RunOptions& options, const std::string& text) {
+        const auto found = std::find(choices.begin(), choices.end(), text);
+        if (found == choices.end())
+            throw InputError(fmt::format("'{}' is not one of {}", text, fmt::join(choices, ", ")));
+        member(options) = names[size_t(found - choices.begin())].second;
+    };
+    return option;
 }
 
 RunOption words(const char* name, const char* value, const char* help, bool decides,
                 Member<std::string> member) {
-    return {name,
-            value,
-            help,
-            decides,
-            {},
-            [=](const RunOptions& options) { return Json(read(member, options)); },
-            [=](RunOptions& options, const std::string& text) { member(options) = text; }};
+    return member_option(name, value, help, decides, member, [](const std::string& text) { return text; });
 }
 
 RunOption dataset_option() {
-    return {"dataset",
-            "PATH",
-            "Images with cameras: a COLMAP folder or transforms.json. Or a glTF file with meshes, which is "
-            "first rendered into DIR/dataset",
-            kDoesNotDecide,
-            {},
-            [](const RunOptions& options) {
-                return Json((options.scene.empty() ? options.dataset : options.scene).string());
-            },
-            [](RunOptions& options, const std::string& text) { options.dataset = text; }};
+    RunOption option{"dataset", "PATH",
+                     "Images with cameras: a COLMAP folder or transforms.json. Or a glTF file with meshes, "
+                     "which is first rendered into DIR/dataset",
+                     kDoesNotDecide};
+    option.get = [](const RunOptions& options) {
+        return (options.scene.empty() ? options.dataset : options.scene).string();
+    };
+    option.set = [](RunOptions& options, const std::string& text) { options.dataset = text; };
+    return option;
 }
 
 RunOption sh_degree_option() {
-    return {"sh-degree",
-            "auto|0..3",
-            "Highest SH degree of view-dependent colour. auto: 3, or 0 if the dataset says that no colour "
-            "depends on the view",
-            kDecides,
-            {},
-            [](const RunOptions& options) {
-                const int degree = options.train.sh_degree;
-                return degree == kAutomaticShDegree ? Json("auto") : Json(degree);
-            },
-            [](RunOptions& options, const std::string& text) {
-                options.train.sh_degree =
-                    text == "auto" ? kAutomaticShDegree : parse_within(text, 0, kMaxShDegree);
-            }};
+    const Member<int> member = [](RunOptions& o) -> int& { return o.train.sh_degree; };
+    RunOption option = member_option(
+        "sh-degree", "auto|0..3",
+        "Highest SH degree of view-dependent colour. auto: 3, or 0 if the dataset says that no colour "
+        "depends on the view",
+        kDecides, member, [](const std::string& text) {
+            return text == "auto" ? kAutomaticShDegree : parse_within(text, 0, kMaxShDegree);
+        });
+    option.get = [](const RunOptions& options) {
+        const int degree = options.train.sh_degree;
+        return degree == kAutomaticShDegree ? Json("auto") : Json(degree);
+    };
+    return option;
 }
 
 RunOption image_cache_option() {
-    return {"image-cache",
-            "MiB",
-            "Device memory for decoded training images. Images beyond it are read again for each step",
-            kDoesNotDecide,
-            {},
-            [](const RunOptions& options) { return Json(options.train.image_cache_bytes >> 20); },
-            [](RunOptions& options, const std::string& text) {
-                options.train.image_cache_bytes = parse_within(text, uint64_t(0), uint64_t(1) << 40) << 20;
-            }};
+    const Member<uint64_t> member = [](RunOptions& o) -> uint64_t& { return o.train.image_cache_bytes; };
+    RunOption option = member_option(
+        "image-cache", "MiB",
+        "Device memory for decoded training images. Images beyond it are read again for each step",
+        kDoesNotDecide, member,
+        [](const std::string& text) { return parse_within(text, uint64_t(0), uint64_t(1) << 40) << 20; });
+    option.get = [](const RunOptions& options) { return options.train.image_cache_bytes >> 20; };
+    return option;
 }
 
 RunOption background_option() {
-    return {"background",
-            "COLOUR",
-            "Colour behind the splats: r,g,b in 0..1, or random (a new one each step)",
-            kDecides,
-            {},
-            [](const RunOptions& options) {
-                const auto& [r, g, b] = options.train.render.background;
-                return Json(options.train.random_background ? "random" : fmt::format("{},{},{}", r, g, b));
-            },
-            [](RunOptions& options, const std::string& text) {
-                options.train.random_background = text == "random";
-                options.train.render.background =
-                    text == "random" ? std::array<float, 3>{} : parse_colour(text);
-            }};
+    RunOption option{"background", "COLOUR",
+                     "Colour behind the splats: r,g,b in 0..1, or random (a new one each step)", kDecides};
+    option.get = [](const RunOptions& options) {
+        const auto& [r, g, b] = options.train.render.background;
+        return options.train.random_background ? "random" : fmt::format("{},{},{}", r, g, b);
+    };
+    option.set = [](RunOptions& options, const std::string& text) {
+        options.train.random_background = text == "random";
+        options.train.render.background = text == "random" ? std::array<float, 3>{} : parse_colour(text);
+    };
+    return option;
 }
 
 std::vector<RunOption> make_table() {

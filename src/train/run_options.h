@@ -18,11 +18,11 @@ struct RunOption {
     std::string value;  // how the help shows the value, e.g. "N"; empty: a flag
     std::string help;
     bool decides_result;  // else it decides only when files are written, where it runs, or memory
-    std::vector<std::string> choices;  // the values there are; empty: many
+    std::vector<std::string> choices = {};  // the values there are; empty: many
 
-    std::function<nlohmann::ordered_json(const RunOptions&)> get;
+    std::function<nlohmann::ordered_json(const RunOptions&)> get = {};
     /// From the text on the command line. Throws InputError, which does not name the option.
-    std::function<void(RunOptions&, const std::string&)> set;
+    std::function<void(RunOptions&, const std::string&)> set = {};
     bool& (*flag)(RunOptions&) = nullptr;  // the member of a flag
 };
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One training step: its training image, its rates, one submission, and what the schedule does after it.
+// One training step: its training image, its rates, one submission, and what the schedule does after it. Also what
+// a training needs before it begins: its plan and an estimate of its memory.
 #include "ewa/trainer.h"
 
 #include <algorithm>
@@ -19,7 +20,7 @@
 #include "pipeline/frame_buffers.h"
 #include "pipeline/strategy.h"
 #include "train/image_cache.h"
-#include "train/initial_splats.h"
+#include "train/run_input.h"
 #include "train/schedule.h"
 
 namespace ewa {
@@ -84,12 +85,11 @@ struct Trainer::State {
     double extent;
     passes::PassCache cache;
     gpu::Executor executor;
-    train::ImageCache photographs;
+    train::ImageCache images;
     const Plan plan;
     Model model;
     FrameBuffers frame;
-    std::vector<train::ImageCache>
-        smaller;  // by downsample level, from 1; freed once the schedule is past it
+    std::vector<train::ImageCache> smaller;  // by downsample level, from 1; freed after its last step
     Exposures exposures;
     uint32_t instance_capacity;
     StepReport report;
@@ -103,14 +103,14 @@ struct Trainer::State {
           extent(extent_for(dataset, frames, start)),
           cache(*device),
           executor(*device),
-          photographs(*device, cache.config(), dataset, frames, train::cache_share(o, 0), ready.origin),
-          plan(plan_for(train::plan_request(start, o, photographs.any_masked()))),
+          images(*device, cache.config(), dataset, frames, train::cache_share(o, 0), ready.origin),
+          plan(plan_for(train::plan_request(start, o, images.any_masked()))),
           model(upload_model(*device, ready, 2, plan.statistics)),
           instance_capacity(first_capacity(start.size())) {
         for (int halvings = 1; halvings <= o.halvings; ++halvings)
             smaller.emplace_back(*device, cache.config(), dataset, frames, train::cache_share(o, halvings),
                                  model.origin, 1 << halvings);
-        if (plan.exposure) exposures = Exposures(*device, photographs.count());
+        if (plan.exposure) exposures = Exposures(*device, images.count());
         report.splats = model.splats;
     }
 
@@ -131,8 +131,7 @@ struct Trainer::State {
     }
 
     Noise noise(int step) const {
-        // Sigma is a square of lengths. Divided by the extent it is a length again, as in a
-        // scene of unit extent.
+        // Sigma is a square of lengths. Divided by the extent it is a length again, as in a scene of unit extent.
         const double amplitude = options.noise_rate * schedule.mean_rate(step, 1) / extent;
         return {.amplitude = float(amplitude),
                 .max_length = float(extent),
@@ -140,22 +139,21 @@ struct Trainer::State {
                 .step = uint32_t(step)};
     }
 
-    /// The training images at this step's resolution. Frees those of lower
-    /// resolutions: resolutions only rise.
-    train::ImageCache& photographs_at(int step) {
+    /// The training images at this step's resolution. Frees those of lower resolutions: resolutions only rise.
+    train::ImageCache& images_at(int step) {
         const size_t halvings = size_t(schedule.halvings_at(step));
         while (smaller.size() > halvings) smaller.pop_back();
-        return halvings == 0 ? photographs : smaller.back();
+        return halvings == 0 ? images : smaller.back();
     }
 
     void optimise(int step) {
-        train::ImageCache& seen = photographs_at(step);
-        const size_t index = train::frame_of_step(step, photographs.count(), options.seed);
-        const auto photo = seen.photo(index);
+        train::ImageCache& seen = images_at(step);
+        const size_t index = train::frame_of_step(step, images.count(), options.seed);
+        const auto& photo = seen.photo(index);
         if (schedule.halvings_at(step + 1) == schedule.halvings_at(step))
-            seen.prepare(train::frame_of_step(step + 1, photographs.count(), options.seed));
+            seen.prepare(train::frame_of_step(step + 1, images.count(), options.seed));
         const ExposureUse exposure{&exposures, uint32_t(index), float(schedule.exposure_rate(step)),
-                                   uint32_t(size_t(step - 1) / photographs.count() + 1)};
+                                   uint32_t(size_t(step - 1) / images.count() + 1)};
         const auto background =
             options.random_background ? random_background(step, options.seed) : options.render.background;
         const FrameInputs inputs{
@@ -320,7 +318,7 @@ uint32_t Trainer::splats() const {
     return state_->model.splats;
 }
 size_t Trainer::images_on_disk() const {
-    return state_->photographs.on_disk();
+    return state_->images.on_disk();
 }
 int Trainer::steps_done() const {
     return state_->report.step;
@@ -346,6 +344,48 @@ std::vector<PassTime> Trainer::pass_times() const {
         time.milliseconds = *middle;
     }
     return result;
+}
+
+MemoryEstimate estimate_memory(const gpu::Device& device, const Dataset& dataset,
+                               const std::vector<int>& train_frames, const Gaussians& start,
+                               const TrainOptions& given) {
+    const TrainOptions options = resolve(given, dataset);
+    MemoryEstimate estimate;
+    const bool grows = options.strategy != Strategy::none;
+    estimate.splats = grows ? std::max(options.max_splats, uint32_t(start.size())) : uint32_t(start.size());
+    const Plan plan = plan_for(train::plan_request(start, options, false));
+    const uint64_t statistics = plan.statistics ? 8ull * estimate.splats : 0;
+    const uint64_t generation = 3 * parameter_bytes(estimate.splats, start.sh_degree) + statistics;
+    estimate.model = grows ? 2 * generation : generation;
+
+    std::vector<uint64_t> cached_at(size_t(options.halvings) + 1);
+    const passes::KernelConfig config = passes::config_for(device.limits());
+    for (const int index : train_frames) {
+        const Frame& frame = dataset.frames[size_t(index)];
+        const auto width = uint32_t(frame.camera.width), height = uint32_t(frame.camera.height);
+        const auto pairs = std::max(first_capacity(estimate.splats),
+                                    uint32_t(std::min<uint64_t>(8ull * estimate.splats, 0xe0000000u)));
+        const FrameRequest request{.splats = estimate.splats,
+                                   .width = width,
+                                   .height = height,
+                                   .instances = pairs,
+                                   .gradients = true,
+                                   .masks = frame.masks == MaskUse::ignore,
+                                   .exposure = plan.exposure};
+        estimate.frame = std::max(estimate.frame, sizes_for(config, request).total());
+        const uint64_t photo = photo_bytes(int(width), int(height), frame.eight_bit);
+        for (int h = 0; h <= options.halvings; ++h) {
+            uint64_t& cached = cached_at[size_t(h)];
+            if (cached + (photo >> 2 * h) <= train::cache_share(options, h)) cached += photo >> 2 * h;
+        }
+    }
+    for (const uint64_t cached : cached_at) estimate.images += cached;
+    return estimate;
+}
+
+std::vector<PlanLine> plan_lines(const Gaussians& start, const TrainOptions& options, bool masks) {
+    const Plan plan = plan_for(train::plan_request(start, options, masks));
+    return describe(plan, start.sh_degree, start.size());
 }
 
 }  // namespace ewa

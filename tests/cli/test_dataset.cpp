@@ -141,7 +141,7 @@ std::string leaf() {
     return scene.dump();
 }
 
-TEST(Dataset, TrainPhotographsAMeshSceneFirst) {
+TEST(Dataset, TrainRendersAMeshSceneFirst) {
     const Folder folder;
     write_file(folder / "leaf.gltf", leaf());
     const Outcome outcome = run_ewa({"train", folder / "leaf.gltf", "-o", folder / "out", "--steps", "2"});
@@ -185,7 +185,7 @@ TEST(Dataset, EveryCommandTakesAMeshScene) {
     EXPECT_EQ(of_scene["psnr"], read_json(folder / "dataset.json")["psnr"]);
     EXPECT_EQ(of_scene["frames"], read_json(folder / "dataset.json")["frames"]);
 
-    // As others would find them: without the photographs that the training made.
+    // As others would find them: without the images that the training rendered.
     fs::remove(folder / "out/dataset/depth/view_003.exr");
     const Outcome anew = run_ewa(eval);
     ASSERT_EQ(anew.status, 0) << anew.err;
@@ -221,7 +221,7 @@ TEST(Dataset, EveryCommandSaysWhatIsWrongWithAMeshScene) {
     expect_failure(run_ewa({"eval", splats, folder / "text.txt"}), 2, "glTF of meshes");
 }
 
-TEST(Dataset, FramesThatAreNotThereAreMissedBeforePhotographing) {
+TEST(Dataset, FramesThatAreNotThereAreMissedBeforeRendering) {
     const Folder folder;
     make_splats(folder / "s.ply");
     const std::string scene = folder / "leaf.gltf", splats = folder / "s.ply";

@@ -126,13 +126,13 @@ TEST_F(Faults, FullDisk) {
     expect_failure(train("p", {}, with_fault("EWA_FAULT_BYTES", "100")), 1, "No space left");
     expect_goes_on("o");
     // With --serve there is a file more, which comes after the settings and is not to stay.
-    const auto room = std::to_string(fs::file_size(folder / "o/config.json") + 5);
-    const Outcome served = train("s", {"--serve", "0"}, with_fault("EWA_FAULT_BYTES", room));
+    const auto limit = std::to_string(fs::file_size(folder / "o/config.json") + 5);
+    const Outcome served = train("s", {"--serve", "0"}, with_fault("EWA_FAULT_BYTES", limit));
     expect_failure(served, 1, "s/live.json: cannot be written: No space left");
     EXPECT_EQ(files_below(folder / "s"), (Names{"config.json", "metrics.jsonl"}));
 }
 
-/// A quota, or a disk across a network, may say only then that there is no room.
+/// A quota, or a disk across a network, may report only then that it is full.
 class LateFaults : public FaultsTest, public testing::WithParamInterface<const char*> {};
 
 TEST_P(LateFaults, KeepWhatWasThere) {
@@ -187,7 +187,7 @@ TEST_F(Faults, ReadOnlyFolder) {
                    1, "Read-only");
 }
 
-TEST_F(Faults, APhotographVanishes) {
+TEST_F(Faults, AnImageVanishes) {
     const Names more{"--image-cache", "0", "--save-every", "0"};
     const Circumstances vanishing = held_at(
         20, folder / "held", 0, [&] { fs::rename(folder / "data/images/2.png", folder / "away.png"); });

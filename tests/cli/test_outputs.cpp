@@ -32,7 +32,7 @@ TEST(Outputs, RenderNamesPicturesByStem) {
     EXPECT_EQ(files("all", {}), (Names{"0.png", "1.png", "2.png", "3.png"}));
     EXPECT_EQ(files("test", {"--frames", "test", "--test-every", "2"}), (Names{"0.png", "2.png"}));
     EXPECT_EQ(files("list", {"--frames", "3,1", "--format", "exr"}), (Names{"1.exr", "3.exr"}));
-    // The photographs are not needed.
+    // The images are not needed.
     fs::remove_all(folder / "data/images");
     EXPECT_EQ(files("bare", {"--frames", "train", "--test-every", "2"}), (Names{"1.png", "3.png"}));
 }

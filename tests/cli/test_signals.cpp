@@ -97,18 +97,18 @@ TEST_F(Signals, EndARenderingBetweenPictures) {
     EXPECT_EQ(files_below(folder / "r").size(), 4u);
 }
 
-TEST_F(Signals, EndPhotographingBetweenViews) {
-    const auto photograph = [&](const std::string& out, const Circumstances& circumstances) {
+TEST_F(Signals, EndRenderingADatasetBetweenViews) {
+    const auto render = [&](const std::string& out, const Circumstances& circumstances) {
         return run_ewa({"dataset", std::string(EWA_SOURCE_DIR) + "/scenes/plaster.gltf", "-o", folder / out,
                         "--views", "4", "--size", "24x16", "--samples", "2", "--points", "200", "--quiet"},
                        circumstances)
             .status;
     };
-    ASSERT_EQ(photograph("d", storm(12, SIGINT)), 130);
+    ASSERT_EQ(render("d", storm(12, SIGINT)), 130);
     EXPECT_FALSE(fs::exists(folder / "d/transforms.json"));
     expect_no_traces("d");
-    ASSERT_EQ(photograph("d", {}), 0);
-    ASSERT_EQ(photograph("whole", {}), 0);
+    ASSERT_EQ(render("d", {}), 0);
+    ASSERT_EQ(render("whole", {}), 0);
     EXPECT_EQ(files_below(folder / "d"), files_below(folder / "whole"));
     for (const std::string& file : files_below(folder / "d"))
         EXPECT_EQ(read_file(folder / ("d/" + file)), read_file(folder / ("whole/" + file))) << file;

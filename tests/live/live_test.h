@@ -5,8 +5,8 @@
 #include <string>
 #include <thread>
 
-#include "live/client.h"
 #include "live/server.h"
+#include "live/watcher.h"
 
 namespace ewa::live {
 

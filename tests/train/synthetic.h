@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A dataset made in the test: splats at known places, photographed by the float64 twin.
+// A dataset made in the test: splats at known places, rendered by the CPU reference.
 #pragma once
 #include <cmath>
 #include <filesystem>
@@ -50,10 +50,10 @@ inline void make_synthetic(Synthetic& out, size_t splats, int views, int width, 
         camera.cy = 0.5 * height;
         camera.rotation = glm::transpose(glm::dmat3(right, down, forward));
         camera.translation = -(camera.rotation * position);
-        const auto twin = reference::render(out.truth, camera, {});
+        const auto render = reference::render(out.truth, camera, {});
         Image picture(width, height, 3);
         for (size_t i = 0; i < picture.pixels.size(); ++i)
-            picture.pixels[i] = float(twin.blended.color.values[i]);
+            picture.pixels[i] = float(render.blended.color.values[i]);
         const std::string name = "view_" + std::to_string(100 + view) + ".png";
         std::filesystem::create_directories(out.folder / "images");
         save_image(out.folder / "images" / name, picture);

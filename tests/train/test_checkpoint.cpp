@@ -6,6 +6,7 @@
 
 #include "ewa/error.h"
 #include "gpu/test_device.h"
+#include "train/resume.h"
 #include "train/synthetic.h"
 
 namespace ewa::test {

@@ -106,7 +106,7 @@ TEST(FarFromTheOrigin, JoiningScenesKeepsBothInPlace) {
         EXPECT_LT(glm::length(joined.world_mean(n + i) - other.world_mean(i)), 1e-4);
 }
 
-/// Formats without room for double positions say what they cost.
+/// Formats that cannot store positions as doubles say what they cost.
 TEST(FarFromTheOrigin, AnotherFormatSaysWhatItRounds) {
     const Gaussians g = gaussians_from_points(moved(small_capture().dataset, kPlace).points, 0);
     const TempFolder folder;

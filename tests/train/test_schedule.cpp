@@ -12,7 +12,7 @@
 namespace ewa::train {
 namespace {
 
-TEST(FrameOfStep, VisitsEachPhotographOnceAnEpochInAnOrderOfItsOwn) {
+TEST(FrameOfStep, VisitsEachImageOnceAnEpochInAnOrderOfItsOwn) {
     for (const size_t count : {size_t(1), size_t(2), size_t(7), size_t(48)}) {
         std::vector<std::vector<size_t>> epochs;
         for (int epoch = 0; epoch < 5; ++epoch) {

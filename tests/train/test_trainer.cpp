@@ -31,7 +31,7 @@ TrainOptions quick(int steps) {
     return options;
 }
 
-/// The same capture with a stripe of garbage across every photograph, which masks leave out.
+/// The same capture with a stripe of garbage across every training image, which masks exclude.
 struct Spoilt {
     Synthetic data;
     Dataset masked, unmasked;
@@ -83,7 +83,7 @@ double train_psnr(const Gaussians& gaussians) {
 TEST(Dataset, IsReadAsItWasMade) {
     ASSERT_EQ(small_capture().dataset.frames.size(), 8u);
     ASSERT_EQ(small_capture().dataset.points.positions.size(), 40u);
-    // The photographs are the twin's, rounded to 8 bit and clamped: the truth itself scores about 59 dB.
+    // The training images are those of the CPU reference, rounded to 8 bit and clamped. The truth scores about 59 dB.
     EXPECT_GT(train_psnr(small_capture().truth), 57);
 }
 
@@ -244,7 +244,7 @@ TEST(Trainer, LearnsNothingFromWhatIsMasked) {
         return trainer.gaussians();
     };
     const Gaussians with = learn(spoilt.masked), without = learn(spoilt.unmasked);
-    // Against the photographs before they were spoilt.
+    // Against the training images before they were spoilt.
     const auto clean = [&](const Gaussians& g) {
         return evaluate(device(), g, small_capture().dataset, all_frames(small_capture().dataset), {}).psnr;
     };
@@ -256,7 +256,7 @@ TEST(Trainer, LearnsNothingFromWhatIsMasked) {
     EXPECT_GT(masked.psnr, evaluate(device(), with, spoilt.unmasked, {0, 3}, {}).psnr + 3);
 }
 
-/// The same capture by a camera that exposes each photograph in its own way; the first one as it is.
+/// The same capture by a camera that exposes each image but the first one in its own way.
 Dataset exposed_by_itself(Synthetic& made) {
     make_synthetic(made, 40, 8, 48, 36, 7);
     Random random(5);
@@ -269,14 +269,14 @@ Dataset exposed_by_itself(Synthetic& made) {
     return load_dataset(made.folder.path(), {});
 }
 
-TEST(Trainer, LearnsWhatEachPhotographsExposureWas) {
+TEST(Trainer, LearnsTheExposureOfEachImage) {
     Synthetic made;
     const Dataset dataset = exposed_by_itself(made);
     const Gaussians start = shaken_start(made, 0.05, 11, 0);
     const auto learn = [&](bool exposure) {
         TrainOptions options = quick(400);
         options.exposure = exposure;
-        options.exposure_rate = 0.03;  // a photograph is visited 50 times
+        options.exposure_rate = 0.03;  // each training image is used 50 times
         Trainer trainer(device(), dataset, all_frames(dataset), start, options);
         for (int step = 0; step < 400; ++step) trainer.step();
         const auto exposures = trainer.exposures();
@@ -333,7 +333,7 @@ TEST(Trainer, TheMemoryEstimateHoldsForARun) {
     EXPECT_GT(peak, 0.5 * estimate.total());
 }
 
-TEST(Trainer, PhotographsOnDiskChangeNoResult) {
+TEST(Trainer, ImagesOnDiskChangeNoResult) {
     const Spoilt spoilt;
     const Gaussians start = shaken_start(spoilt.data, 0.05, 11, 0);
     const uint64_t photo = 48 * 36 * 4;
@@ -353,7 +353,7 @@ TEST(Trainer, PhotographsOnDiskChangeNoResult) {
     }
 }
 
-TEST(Trainer, SaysWhichPhotographVanished) {
+TEST(Trainer, SaysWhichImageVanished) {
     Synthetic capture;
     make_synthetic(capture, 10, 4, 24, 18, 7);
     TrainOptions options = quick(20);
@@ -368,7 +368,7 @@ TEST(Trainer, SaysWhichPhotographVanished) {
         {"view_10"});
 }
 
-TEST(Trainer, TakesPhotographsOfSeveralSizes) {
+TEST(Trainer, TakesImagesOfSeveralSizes) {
     Synthetic mixed;
     make_synthetic(mixed, 40, 8, 48, 36, 7);
     for (size_t i = 0; i < mixed.dataset.frames.size(); i += 2) {

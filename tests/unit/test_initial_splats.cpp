@@ -9,7 +9,7 @@
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
 #include "support/temp_folder.h"
-#include "train/initial_splats.h"
+#include "train/run_input.h"
 
 namespace {
 
