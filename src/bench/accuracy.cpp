@@ -2,7 +2,6 @@
 #include "bench/accuracy.h"
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cmath>
 
@@ -33,14 +32,9 @@ std::vector<Pixel> spread_pixels(const Camera& camera) {
 template <class Evaluate>
 double evaluate_pixels(const std::vector<Pixel>& pixels, std::vector<glm::dvec3>& out, Evaluate evaluate) {
     out.resize(pixels.size());
-    std::atomic<size_t> next{0};
     const auto start = Clock::now();
-    on_threads(host_threads(), [&](unsigned) {
-        constexpr size_t kAtOnce = 16;
-        for (size_t begin; (begin = next.fetch_add(kAtOnce)) < pixels.size();)
-            for (size_t i = begin; i < std::min(begin + kAtOnce, pixels.size()); ++i)
-                out[i] = evaluate(pixels[i].x + 0.5, pixels[i].y + 0.5);
-    });
+    for_all(uint32_t(pixels.size()),
+            [&](uint32_t i) { out[i] = evaluate(pixels[i].x + 0.5, pixels[i].y + 0.5); });
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
@@ -89,22 +83,25 @@ report::WorkPoint splat(const std::shared_ptr<gpu::Device>& device, const BenchS
 }
 
 std::vector<SplattingChoice> splatting_choices(const Gaussians& gaussians, const gpu::Limits& limits) {
-    const int degree = sh_degree_present(gaussians);
+    SplattingChoice plain;
+    plain.sh_degree = sh_degree_present(gaussians);
     std::vector<SplattingChoice> choices;
+    const auto add = [&](const char* series, const std::string& name) -> SplattingChoice& {
+        choices.push_back(plain);
+        choices.back().series = series;
+        choices.back().name = name;
+        return choices.back();
+    };
     for (const int per : {16, 64, 255, 1024, 4096})
-        choices.push_back(
-            {"splatting, cut-off", "1/" + std::to_string(per), Footprint::peak, degree, 1.0 / per, 0});
-    for (int d = 0; d <= degree; ++d)
-        choices.push_back(
-            {"splatting, SH degree", std::to_string(d), Footprint::peak, d, shared::ALPHA_MIN, 0});
+        add("splatting, cut-off", "1/" + std::to_string(per)).alpha_min = 1.0 / per;
+    for (int d = 0; d <= plain.sh_degree; ++d) add("splatting, SH degree", std::to_string(d)).sh_degree = d;
     const passes::KernelConfig config = passes::config_for(limits);
     for (const uint32_t height :
          {config.tile_height / 2, config.tile_height, 2 * config.tile_height, 4 * config.tile_height})
-        choices.push_back({"splatting, tile", text_of("%ux%u", config.tile_width, height), Footprint::peak,
-                           degree, shared::ALPHA_MIN, height});
-    choices.push_back({"splatting, kernel", "peak", Footprint::peak, degree, shared::ALPHA_MIN, 0});
-    choices.push_back({"splatting, kernel", "antialias", Footprint::antialias, degree, shared::ALPHA_MIN, 0});
-    choices.push_back({"splatting, kernel", "unit mass", Footprint::unit_mass, degree, shared::ALPHA_MIN, 0});
+        add("splatting, tile", text_of("%ux%u", config.tile_width, height)).tile_height = height;
+    add("splatting, kernel", "peak");
+    add("splatting, kernel", "antialias").kernel = Footprint::antialias;
+    add("splatting, kernel", "unit mass").kernel = Footprint::unit_mass;
     return choices;
 }
 

@@ -15,7 +15,7 @@
 namespace ewa::bench {
 
 struct Accuracy {
-    /// RMS error against milliseconds per frame: the median of the device's whole frame, or of all host threads.
+    /// RMS error against ms per frame: the median of the device's whole frame, or of all host threads.
     std::vector<report::WorkSeries> series;
     int pixels = 0;            // where the error is measured, evenly spread
     double exact_seconds = 0;  // time of computing their integrals

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The fixed set of cases and their synthetic scenes. The name of a case describes it completely: results of two
-// machines or commits are compared by name.
+// The fixed set of cases and their synthetic scenes. The name of a case describes it completely: results of
+// two machines or commits are compared by name.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -54,9 +54,9 @@ struct BenchScene {
     Image image;  // RGB in 256 levels; only for cases that train
 };
 
-/// A pure function of the case, equal on all machines up to the last bits of log, cos and exp. Splats lie flat
-/// on ellipsoids before a backdrop. Their sizes are log-normal around their spacing on these surfaces. So more
-/// splats make the surfaces finer, not thicker.
+/// A pure function of the case, equal on all machines up to the last bits of log, cos and exp. Splats lie
+/// flat on ellipsoids before a backdrop. Their sizes are log-normal around their spacing on these surfaces.
+/// So more splats make the surfaces finer, not thicker.
 BenchScene make_scene(const Case& one);
 
 }  // namespace ewa::bench

@@ -254,7 +254,7 @@ constexpr double kPixelShare = 1e-3;     // share of pixels that may exceed it
 constexpr double kGradientBound = 1e-3;  // |actual - expected| / |expected|
 constexpr double kAdamBound = 1e-3;      // in learning rates
 
-/// Wrong entries in the depth order, scan, instances, tile order and tile starts, and errors of the records.
+/// Wrong entries in depth order, scan, instances, tile order and tile starts; errors of the records.
 std::vector<Check> check_lists(const FrameRun& run, const BenchScene& scene) {
     const Lists lists = download(run);
     std::vector<Check> checks = check_project(lists, run, scene);
@@ -265,8 +265,8 @@ std::vector<Check> check_lists(const FrameRun& run, const BenchScene& scene) {
     return checks;
 }
 
-/// In float32, a contribution at the 1/255 threshold may be skipped or not. Therefore one bound limits the share
-/// of deviating pixels, and another the worst pixel.
+/// In float32, a contribution at the 1/255 threshold may be skipped or not. Therefore one bound limits the
+/// share of deviating pixels, and another the worst pixel.
 std::vector<Check> check_picture(const FrameRun& run, const BenchScene& scene) {
     const auto expected = reference::render(scene.gaussians, scene.camera, run.options());
     const Sizes& sizes = run.frame().sizes;

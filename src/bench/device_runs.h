@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Work that the benchmark repeats on the device: a frame or training step of a scene, and a sort. Checks compare its
-// results with the CPU reference, and with the rules of sorts and scans.
+// Work that the benchmark repeats on the device: a frame or training step of a scene, and a sort. Checks
+// compare its results with the CPU reference, and with the rules of sorts and scans.
 #pragma once
 #include <algorithm>
 #include <cfloat>
@@ -94,8 +94,8 @@ class SortRun {
     uint32_t result_ = 0;
 };
 
-/// Adds checks of the last run to result.checks. The CPU reference blends pixel by pixel in float64. It checks
-/// image, gradient and update of small cases only; result.note names what was skipped.
+/// Adds checks of the last run to result.checks. The CPU reference blends pixel by pixel in float64. It
+/// checks image, gradient and update of small cases only; result.note names what was skipped.
 void check_frame(CaseResult& result, const std::shared_ptr<gpu::Device>& device, const FrameRun& run,
                  const BenchScene& scene);
 

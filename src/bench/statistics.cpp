@@ -34,25 +34,25 @@ double cpu_milliseconds_a_thread() {
 constexpr int kFewest = 5, kMost = 25;
 constexpr double kBudgetMilliseconds = 1000;
 
-struct Points {
-    std::vector<double> x, y;
+/// Logarithms of a number and of the time that it takes.
+struct Point {
+    double x = 0, y = 0;
 };
 
-Scaling fit(const std::string& of, const std::string& against, const Points& points) {
-    const size_t n = points.x.size();
+Scaling fit(const std::string& of, const std::string& against, const std::vector<Point>& points) {
+    const double n = double(points.size());
     double mx = 0, my = 0, xx = 0, xy = 0;
-    for (size_t i = 0; i < n; ++i)
-        mx += std::log(points.x[i]) / double(n), my += std::log(points.y[i]) / double(n);
-    for (size_t i = 0; i < n; ++i) {
-        const double dx = std::log(points.x[i]) - mx, dy = std::log(points.y[i]) - my;
-        xx += dx * dx;
-        xy += dx * dy;
+    for (const Point& p : points) {
+        mx += p.x / n;
+        my += p.y / n;
+    }
+    for (const Point& p : points) {
+        xx += (p.x - mx) * (p.x - mx);
+        xy += (p.x - mx) * (p.y - my);
     }
     Scaling scaling{of, against, xy / xx, 0, int(n)};
-    for (size_t i = 0; i < n; ++i) {
-        const double dx = std::log(points.x[i]) - mx, dy = std::log(points.y[i]) - my;
-        scaling.residual += std::pow(dy - scaling.exponent * dx, 2) / double(n);
-    }
+    for (const Point& p : points)
+        scaling.residual += std::pow(p.y - my - scaling.exponent * (p.x - mx), 2) / n;
     scaling.residual = std::sqrt(scaling.residual);
     return scaling;
 }
@@ -123,24 +123,21 @@ void Stopwatch::stop() {
 }
 
 std::vector<Scaling> fit_scaling(const std::vector<CaseResult>& cases) {
-    std::map<std::string, Points> by_splats;
-    Points by_pairs;
+    std::map<std::string, std::vector<Point>> by_splats;
+    std::vector<Point> by_pairs;
     for (const CaseResult& c : cases) {
         const bool frame = c.one.kind == Kind::forward || c.one.kind == Kind::train;
         // CPU time, if known, is independent of the other work of the machine.
         const double time = c.total.cpu.samples > 0 ? c.total.cpu.median : c.total.wall.median;
         if (!frame || c.one.splats < kFewestSplats || !(time > 0)) continue;
-        Points& series = by_splats[series_of(c.one)];
-        series.x.push_back(double(c.one.splats));
-        series.y.push_back(time);
-        if (c.one.kind != Kind::forward || c.pairs_evaluated == 0) continue;
-        by_pairs.x.push_back(double(c.pairs_evaluated));
-        by_pairs.y.push_back(time);
+        by_splats[series_of(c.one)].push_back({std::log(double(c.one.splats)), std::log(time)});
+        if (c.one.kind == Kind::forward && c.pairs_evaluated > 0)
+            by_pairs.push_back({std::log(double(c.pairs_evaluated)), std::log(time)});
     }
     std::vector<Scaling> scaling;
     for (const auto& [name, points] : by_splats)
-        if (points.x.size() >= kFewestPoints) scaling.push_back(fit(name, "splats", points));
-    if (by_pairs.x.size() >= kFewestPoints)
+        if (points.size() >= kFewestPoints) scaling.push_back(fit(name, "splats", points));
+    if (by_pairs.size() >= kFewestPoints)
         scaling.push_back(fit("all forward cases", "pairs evaluated", by_pairs));
     return scaling;
 }

@@ -23,9 +23,9 @@ struct JsonLimits {
 
 /// Parses the text in one pass and without recursion. The time is linear in the length, times the logarithm
 /// of a key's lookup. The last of duplicate keys wins, as in nlohmann's parser. ordered_json compares each
-/// key with all others, so its objects are limited to 1024 keys. `name` is the file or the sender of the text.
-/// Throws InputError "name: byte N: ..." if the JSON is invalid, continues after the value, or exceeds a limit.
-/// Json is nlohmann::json or ordered_json.
+/// key with all others, so its objects are limited to 1024 keys. `name` is the file or the sender of the
+/// text. Throws InputError "name: byte N: ..." if the JSON is invalid, continues after the value, or exceeds
+/// a limit. Json is nlohmann::json or ordered_json.
 template <class Json>
 Json parse_json(std::string_view text, const std::string& name, const JsonLimits& limits = {});
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Text for people: sizes, durations and warnings. Apart from text.h, so that ewa-bench links neither spdlog nor fmt.
+// Text for people: sizes, durations and warnings. Not in text.h, so that ewa-bench needs no spdlog or fmt.
 #pragma once
 #include <cstdint>
 #include <string>

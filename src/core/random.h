@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Counter-based random numbers: pure functions of a counter. Their integers equal those of shaders/lib/random.glsl.
+// Random numbers as pure functions of a counter. Their integers equal those of shaders/lib/random.glsl.
 #pragma once
 #include <array>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sandboxed paths: names inside untrusted models and scenes may only refer to files in or below their own folder.
+// Sandboxed paths: names inside untrusted files may only refer to files in or below their own folder.
 #pragma once
 #include <filesystem>
 #include <optional>

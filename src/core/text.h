@@ -39,8 +39,8 @@ std::optional<T> parse_integer(std::string_view word) {
 /// "-o,--output" into "-o, --output". column: where the descriptions of options begin.
 std::string help_text(std::string_view text, size_t column);
 
-/// Makes a CLI11 parser and the sub-commands that are added later print their help in this way. A template, so
-/// that this module does not need CLI11: Formatter is CLI::Formatter.
+/// Makes a CLI11 parser and the sub-commands that are added later print their help in this way. A template,
+/// so that this module does not need CLI11: Formatter is CLI::Formatter.
 template <class Formatter, class App>
 void use_help_text(App& app) {
     app.formatter_fn([](const App* shown, const std::string& name, auto mode) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Blending: the alpha of a splat at a pixel, the list of splats of each tile, and a pixel's colour from that list.
+// Blending: the alpha of a splat at a pixel, the splats of each tile, and a pixel's colour from them.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -40,7 +40,7 @@ inline std::vector<uint32_t> depth_order(std::span<const Projected> projected) {
     return order;
 }
 
-/// The exclusive prefix sum: out[i] = in[0] + ... + in[i - 1]. It has in.size() + 1 elements, the last is the total.
+/// The exclusive prefix sum: out[i] = in[0] + ... + in[i - 1]. One more element at the end is the total.
 inline std::vector<uint64_t> exclusive_scan(std::span<const uint32_t> counts) {
     std::vector<uint64_t> sums(counts.size() + 1, 0);
     for (size_t i = 0; i < counts.size(); ++i) sums[i + 1] = sums[i] + counts[i];
@@ -94,8 +94,8 @@ inline glm::dvec2 pixel_centre(int x, int y) {
 Sample sample(const Projected& splat, const Whitener& whitener, const glm::dvec2& pixel);
 
 // Tiles list a splat if at least one of their pixel centres has a raw alpha of ALPHA_MIN or more. A shorter
-// list would change the image, and a longer one would only cost time. The tiles are found by testing the pixels
-// in the footprint's box: |d.x| <= r sqrt(a), |d.y| <= r sqrt(c), r = sqrt(2 ln(opacity / ALPHA_MIN)).
+// list would change the image, and a longer one would only cost time. The tiles are found by testing the
+// pixels in the footprint's box: |d.x| <= r sqrt(a), |d.y| <= r sqrt(c), r = sqrt(2 ln(opacity / ALPHA_MIN)).
 
 struct TileGrid {
     int image_width = 0, image_height = 0;  // px
@@ -222,8 +222,8 @@ BlendGradients blend_backward(std::span<const Projected> projected, const Instan
 
 /// Renders splats as solids. A pixel shows the nearest splat, by its mean's depth, with an opacity of at
 /// least ELLIPSOID_OPACITY whose ellipse contains the pixel. The ellipse has ELLIPSOID_REACH standard
-/// deviations, including the low-pass. With the distance d in standard deviations, the RGB colour is multiplied
-/// by ELLIPSOID_RIM + (1 - ELLIPSOID_RIM) sqrt(1 - (d / reach)^2), a sphere lit from the eye.
+/// deviations, including the low-pass. With the distance d in standard deviations, the RGB colour is
+/// multiplied by ELLIPSOID_RIM + (1 - ELLIPSOID_RIM) sqrt(1 - (d / reach)^2), a sphere lit from the eye.
 Raster ellipsoids(std::span<const Projected> projected, const Instances& instances,
                   const std::array<float, 3>& background);
 

@@ -30,7 +30,7 @@ double density(const RayGaussian& g, double t) {
                : g.depth * std::exp(-0.5 * u * u) / (g.sigma * std::sqrt(2 * std::numbers::pi));
 }
 
-/// Borders of the quadrature's intervals: the integrand changes its shape a few standard deviations from a splat.
+/// Borders of the quadrature's intervals: the integrand changes shape a few deviations from a splat.
 std::vector<double> borders_of(const std::vector<RayGaussian>& line, double near) {
     std::vector<double> borders{near};
     for (const RayGaussian& g : line)
@@ -68,7 +68,7 @@ Volume::Volume(const Values& values, const Camera& camera, const RenderOptions& 
 }
 
 void Volume::list(uint32_t member, const Projected& p, double size) {
-    // If perspective bends a splat's outline, its linear footprint is too small. Every tile lists such a splat.
+    // If perspective bends a splat's outline, its linear footprint is too small. Every tile lists it.
     const bool bent = kReach * size > 0.25 * p.z;
     const double x = 1.35 * kReach * std::sqrt(p.a) + 1, y = 1.35 * kReach * std::sqrt(p.c) + 1;
     const auto tile = [](double px, int count) {

@@ -33,18 +33,18 @@ struct RayGaussian {
     glm::dvec3 color{0};
 };
 
-/// The visible splats of a camera, prepared for its rays. Pixels have coordinates in px from the top left corner.
+/// The visible splats of a camera, prepared for its rays. x and y are in px from the top left corner.
 class Volume {
   public:
     Volume(const Values& values, const Camera& camera, const RenderOptions& options);
 
-    /// The splats with an optical depth above `least` on the ray through (x, y), in the order of their middles.
+    /// The splats with an optical depth above `least` on the ray through (x, y), sorted by their middles.
     std::vector<RayGaussian> along(double x, double y, double least = 1e-7) const;
 
     /// The ray's colour by Gauss-Legendre quadrature between the splats' borders, relative error below 1e-6.
     glm::dvec3 exact(double x, double y) const;
 
-    /// The same by ray marching, with `samples` evenly spaced midpoints from the nearest to the farthest splat.
+    /// The same by ray marching, with `samples` midpoints evenly from the nearest to the farthest splat.
     glm::dvec3 marched(double x, double y, int samples) const;
 
   private:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Diagrams as inline SVG: line charts in the colours of the page around them, and error against run time, which
-// compares methods of different cost.
+// Diagrams as inline SVG: line charts in the colours of the page around them, and error against run time,
+// which compares methods of different cost.
 #pragma once
 #include <nlohmann/json_fwd.hpp>
 #include <string>

@@ -16,8 +16,8 @@ namespace ewa::report {
 /// stems (1.jpg, 1.png) keep their extension, then a number is added.
 std::vector<std::filesystem::path> picture_names(const std::vector<Frame>& frames);
 
-/// |a - b| averaged over RGB, both clamped to [0, 1], from dark (0) to bright (`full_scale` or more). The sizes
-/// must be equal.
+/// |a - b| averaged over RGB, both clamped to [0, 1], from dark (0) to bright (`full_scale` or more). The
+/// sizes must be equal.
 Image error_map(const Image& a, const Image& b, double full_scale);
 
 /// The largest |a - b| of a pixel's values, not clamped, in the same colours. Alpha counts too; it is 1 where

@@ -33,8 +33,8 @@ MetricsLine metrics_line(const Json& json);
 std::vector<MetricsLine> parse_metrics(const std::string& text);
 std::string metrics_text(const std::vector<MetricsLine>& lines);
 
-/// Writes one JSON object a line. Each reaches the operating system at once, so a run can be watched, and a killed
-/// run keeps its lines. The file begins with the lines of the earlier run.
+/// Writes one JSON object a line. Each reaches the operating system at once, so a run can be watched, and a
+/// killed run keeps its lines. The file begins with the lines of the earlier run.
 class MetricsLog {
   public:
     /// Creates the file with the earlier lines. Throws RunError.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A blend_tile_* function. CMake compiles it again for CPUs with wider vectors, under other names and with fused
-// multiply-add. All else has internal linkage, and this includes no standard header. Otherwise the linker could keep
-// an inline function that was compiled for AVX-512, and run it on a CPU without.
+// A blend_tile_* function. CMake compiles it again for CPUs with wider vectors, under other names and with
+// fused multiply-add. All else has internal linkage, and this includes no standard header. Otherwise the
+// linker could keep an inline function that was compiled for AVX-512, and run it on a CPU without.
 #include "bench/ceiling/blend_loop.h"
 
 #ifndef EWA_BENCH_BLEND_TILE  // for the oldest CPU that the program runs on; also counts the pairs

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Blending in plain C++ with CPU vectors: the loop of shaders/passes/blend.comp, whose time the pass is compared with. It
-// uses the records and sorted lists of the device, so that both do the same work.
+// Blending in plain C++ with CPU vectors: the loop of shaders/passes/blend.comp, whose time the pass is
+// compared with. It uses the records and sorted lists of the device, so that both do the same work.
 #pragma once
 #include <cstdint>
 
@@ -16,7 +16,7 @@ struct BlendLists {
     float background[3] = {0, 0, 0};
 };
 
-/// Numbers of (pixel, splat) pairs. evaluated: the list entries that pixels read, including the one that saturates them.
+/// Numbers of (pixel, splat) pairs. evaluated: the list entries that pixels read, the saturating one included.
 struct PairCounts {
     std::uint64_t evaluated = 0, blended = 0;
 };

@@ -2,7 +2,6 @@
 #include "bench/ceiling/ceiling.h"
 
 #include <algorithm>
-#include <atomic>
 #include <barrier>
 #include <cstring>
 #include <mutex>
@@ -13,8 +12,6 @@
 
 namespace ewa::bench {
 namespace {
-
-constexpr uint32_t kTilesATurn = 16;
 
 struct BlendVariant {
     BlendTile blend;
@@ -29,20 +26,6 @@ BlendVariant best_variant() {
         return {blend_tile_avx2, "AVX2 and FMA"};
 #endif
     return {blend_tile_portable, "portable"};
-}
-
-/// Calls visit(tile) for each tile. All threads take the next tiles when they are free.
-template <class Visit>
-void for_all_tiles(uint32_t tiles, Visit visit) {
-    std::atomic<uint32_t> next{0};
-    on_threads(host_threads(), [&](unsigned thread) {
-        for (;;) {
-            const uint32_t begin = next.fetch_add(kTilesATurn);
-            if (begin >= tiles) return;
-            for (uint32_t tile = begin; tile < std::min(begin + kTilesATurn, tiles); ++tile)
-                visit(tile, thread);
-        }
-    });
 }
 
 constexpr uint32_t kDigitBits = 11;
@@ -110,9 +93,8 @@ void on_threads(unsigned count, const std::function<void(unsigned)>& work) {
 Timed time_blend(const BlendLists& lists, uint32_t tiles, int runs, std::vector<float>& planes) {
     planes.assign(size_t(4) * lists.width * lists.height, 0.0f);
     const BlendTile blend = best_variant().blend;
-    return time_repeated(runs, [&] {
-        for_all_tiles(tiles, [&](uint32_t tile, unsigned) { blend(lists, tile, planes.data()); });
-    });
+    return time_repeated(runs,
+                         [&] { for_all(tiles, [&](uint32_t tile) { blend(lists, tile, planes.data()); }); });
 }
 
 PairCounts count_pairs(const BlendLists& lists, uint32_t tiles) {

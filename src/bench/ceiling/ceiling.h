@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The same work in plain C++ on the host's cores: the ceiling that passes are compared with.
 #pragma once
+#include <algorithm>
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -17,6 +19,17 @@ std::string vector_text();
 /// Runs work(index) on that many threads, including the caller's, and waits for all.
 void on_threads(unsigned threads, const std::function<void(unsigned)>& work);
 
+/// Calls visit(index) for each index below `count`. All threads take the next indices when they are free.
+template <class Visit>
+void for_all(uint32_t count, Visit visit) {
+    constexpr uint32_t kAtOnce = 16;
+    std::atomic<uint32_t> next{0};
+    on_threads(host_threads(), [&](unsigned) {
+        for (uint32_t begin; (begin = next.fetch_add(kAtOnce)) < count;)
+            for (uint32_t i = begin; i < std::min(begin + kAtOnce, count); ++i) visit(i);
+    });
+}
+
 /// Blends a whole image on all threads. planes: 4 * width * height floats.
 Timed time_blend(const BlendLists& lists, uint32_t tiles, int runs, std::vector<float>& planes);
 PairCounts count_pairs(const BlendLists& lists, uint32_t tiles);
@@ -27,7 +40,7 @@ Timed time_sort(uint32_t items, uint32_t bits, int runs);
 /// The timed sort, for its test. Sorts keys and values in place.
 void sort_pairs(std::vector<uint32_t>& keys, std::vector<uint32_t>& values, uint32_t bits);
 
-/// The best rate of copying between blocks beyond the caches' size: bytes read and written, in 1e9 per second.
+/// The best rate of copying between blocks beyond the caches' size: bytes read and written, GB/s.
 struct Bandwidth {
     double wall = 0, cpu = 0;  // see Timed
 };

@@ -300,7 +300,7 @@ float& stored_value(Gaussians& g, size_t splat, size_t value) {
     return g.sh[g.sh_stride() * splat + value - 11];
 }
 
-/// Replaces value i of splat 2 i, so that each value of a splat is bad once. This must not affect the splats between.
+/// Replaces value i of splat 2 i: each value is bad once. This must not affect the splats between.
 void add_replaced(Table& table) {
     constexpr float inf = std::numeric_limits<float>::infinity();
     const std::pair<const char*, float> bad[] = {{"nan", std::numeric_limits<float>::quiet_NaN()},

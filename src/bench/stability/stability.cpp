@@ -153,7 +153,7 @@ bool all_finite(const std::vector<float>& values) {
     return std::all_of(values.begin(), values.end(), [](float x) { return std::isfinite(x); });
 }
 
-/// The error of the reference image if each determinant is a c - b^2 in float32, which is why the pipeline does not.
+/// The error of the reference image if each determinant is a c - b^2 in float32, unlike in the pipeline.
 double plain_determinant_error(const Expected& expected, const RenderOptions& options) {
     const Picture& picture = expected.reference.picture;
     std::vector<reference::Projected> plain = picture.projected;
@@ -176,8 +176,8 @@ Expected expected_of(const StabilityCase& one, const Image& target) {
     return expected;
 }
 
-/// The errors of the reference under changes of each stored value, divided by the size of the change: the largest
-/// of several.
+/// The errors of the reference under changes of each stored value, divided by the size of the change: the
+/// largest of several.
 std::vector<double> conditions_of(const StabilityCase& one, const Image& target, const Expected& expected) {
     std::vector<double> largest;
     for (uint32_t draw = 0; draw < kPerturbations; ++draw) {

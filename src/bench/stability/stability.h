@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Stiff and extreme scenes: their error on the device against the CPU reference, its bound, and training from them.
+// Stiff and extreme scenes: the device's error against the CPU reference, its bound, and training.
 #pragma once
 #include <memory>
 #include <string>
@@ -33,8 +33,8 @@ Image stability_target(int width, int height);
 
 /// Errors are relative: the largest of an image over max(1, its largest value), the norm of a gradient's
 /// error over that of the reference gradient. condition: the same error of the CPU reference under a relative
-/// change of each stored value, over the size of that change. Quaternions, SH and distances change relatively,
-/// log-scales and logits absolutely; a few random changes estimate it. docs/numerics.md derives the bound.
+/// change of each stored value, over the size of that change. Quaternions, SH and distances change
+/// relatively, log-scales and logits absolutely; a few random changes estimate it. bound: docs/numerics.md.
 struct Comparison {
     std::string of;
     double error = 0, bound = 0, condition = 0;
@@ -72,8 +72,8 @@ struct StabilityTraining {
 /// Trains with Adam at the rates of 3DGS, without densification.
 StabilityTraining train_from(const std::shared_ptr<gpu::Device>& device, const StabilityCase& one, int steps);
 
-/// Compares and trains from each case that the options choose. Prints the table and writes the JSON. Returns 1 if
-/// a bound is exceeded or a value is not finite. Throws InputError, RunError.
+/// Compares and trains from each case that the options choose. Prints the table and writes the JSON. Returns
+/// 1 if a bound is exceeded or a value is not finite. Throws InputError, RunError.
 int run_stability(const Options& options);
 
 }  // namespace ewa::bench
