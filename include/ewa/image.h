@@ -39,8 +39,8 @@ Image oriented(const Image& image, int orientation);
 /// Reads PNG, JPEG, TIFF, EXR, WebP, BMP, binary PPM and PGM, and Radiance HDR, recognised by their first
 /// bytes. The result has 3 channels (RGB), or 4 (RGBA, colour not multiplied by alpha). Grey becomes RGB.
 /// 16-bit integers become value / 65535, and floating-point values stay. Pixels are as stored: EXIF's
-/// orientation is not applied. CMYK becomes RGB: each colour times K. The limits are 200 million pixels and 65,535 px per side. Throws InputError,
-/// also for a truncated file.
+/// orientation is not applied. CMYK becomes RGB: each colour times K. The limits are 200 million pixels and
+/// 65,535 px per side. Throws InputError, also for a truncated file.
 Image load_image(const std::filesystem::path& path);
 
 /// Writes .png (8 bit, rounded, clamped to [0, 1], NaN as 0) or .exr (float32, not clamped). Colour is not
@@ -60,13 +60,13 @@ Image over_background(const Image& image, const std::array<float, 3>& background
 Image with_alpha(const Image& color, const Image& alpha);
 
 /// 10 log10(1 / MSE) over RGB, with both images clamped to [0, 1]. +inf for equal images. weights: of each
-/// pixel, one channel of the same size; an empty image means equal weights. NaN if all weights are zero. Throws
-/// InputError if the sizes differ.
+/// pixel, one channel of the same size; an empty image means equal weights. NaN if all weights are zero.
+/// Throws InputError if the sizes differ.
 double psnr(const Image& a, const Image& b, const Image& weights = {});
 
 /// Mean SSIM over pixels and RGB (Wang et al. 2004), with an 11 x 11 Gaussian window, sigma 1.5 and zero
-/// padding. Both images are clamped to [0, 1]. Computed in float64. weights: as above; with weights w, the SSIM of
-/// w a + (1 - w) b and b, with each pixel weighted by w. Throws InputError if the sizes differ.
+/// padding. Both images are clamped to [0, 1]. Computed in float64. weights: as above; with weights w, the
+/// SSIM of w a + (1 - w) b and b, with each pixel weighted by w. Throws InputError if the sizes differ.
 double ssim(const Image& a, const Image& b, const Image& weights = {});
 
 /// The difference of two images.

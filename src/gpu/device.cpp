@@ -194,8 +194,8 @@ vk::UniqueDeviceMemory Device::allocate(const vk::MemoryRequirements& requiremen
     const auto memory = physical_.getMemoryProperties();
     using Flag = vk::MemoryPropertyFlagBits;
     const vk::MemoryPropertyFlags host = Flag::eHostVisible | Flag::eHostCoherent;
-    // On CPUs and integrated GPUs, one memory type is local to the device and visible to the host. It needs no
-    // staging copies.
+    // On CPUs and integrated GPUs, one memory type is local to the device and visible to the host. It needs
+    // no staging copies.
     std::vector<vk::MemoryPropertyFlags> wishes;
     if (host_visible) {
         wishes = {host | Flag::eHostCached, host};

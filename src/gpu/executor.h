@@ -13,12 +13,13 @@ class Executor {
   public:
     explicit Executor(Device& device);
 
-    /// Submits, and waits until the device is done. Then everything that it wrote is visible to the host. timed:
-    /// also measures each command. Throws RunError if the device is lost or the validation layer has a message.
+    /// Submits, and waits until the device is done. Then everything that it wrote is visible to the host.
+    /// timed: also measures each command. Throws RunError if the device is lost or the validation layer has a
+    /// message.
     void run(const Recording& recording, bool timed = false);
 
-    /// The times of the last timed run: one entry a name, in the order of recording, with the sum of all commands
-    /// of that name. The time of a command begins at the end of the one before it.
+    /// The times of the last timed run: one entry a name, in the order of recording, with the sum of all
+    /// commands of that name. The time of a command begins at the end of the one before it.
     const std::vector<PassTime>& timings() const { return timings_; }
 
   private:

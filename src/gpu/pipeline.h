@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One compiled compute shader with its specialisation constants, and what its SPIR-V module declares: bindings,
-// accesses, push constants. Recordings take every access from here.
+// One compiled compute shader with its specialisation constants, and what its SPIR-V module declares:
+// bindings, accesses, push constants. Recordings take every access from here.
 #pragma once
 #include <compare>
 #include <cstdint>

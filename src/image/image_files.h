@@ -32,9 +32,9 @@ std::string_view format_name(const std::filesystem::path& path);
 /// sorted. Links to folders are not followed. Throws InputError where a folder cannot be read.
 std::vector<std::filesystem::path> images_below(const std::filesystem::path& folder);
 
-// Codecs. Images come from strangers, so each codec checks what the header says against the limits below before it
-// takes memory or decodes. Every function from here on throws std::runtime_error with the reason alone; its caller
-// knows the file's name.
+// Codecs. Images come from strangers, so each codec checks what the header says against the limits below
+// before it takes memory or decodes. Every function from here on throws std::runtime_error with the reason
+// alone; its caller knows the file's name.
 
 /// The largest sensors of cameras have 150 to 200 million pixels. As floats, three channels of them take 2.4
 /// GB.
@@ -105,8 +105,9 @@ void probe_webp(core::FileReader& reader);
 void probe_bmp(core::FileReader& reader);
 void probe_pnm(core::FileReader& reader);
 
-// OpenImageIO is in a module that is loaded with the first image that is neither PNG nor JPEG. It brings some two
-// hundred libraries, whose start takes longer than most commands. A machine without it still has PNG and JPEG.
+// OpenImageIO is in a module that is loaded with the first image that is neither PNG nor JPEG. It brings some
+// two hundred libraries, whose start takes longer than most commands. A machine without it still has PNG and
+// JPEG.
 
 /// What the module exports under the name kModuleEntry. The functions may run on several threads at once.
 /// They throw std::runtime_error with OpenImageIO's reason, without the file's name, and std::bad_alloc.
@@ -123,8 +124,8 @@ struct OpenImageIO {
     std::vector<unsigned char> (*encode_exr)(const Image& image);
 };
 constexpr const char* kModuleFile = "libewa_openimageio.so";
-/// Ends in the number of the layout. Count it up whenever a type above changes: a module of another layout then
-/// has no such entry, and is refused.
+/// Ends in the number of the layout. Count it up whenever a type above changes: a module of another layout
+/// then has no such entry, and is refused.
 constexpr const char* kModuleEntry = "ewa_openimageio_layout_1";
 static_assert(sizeof(void*) != 8 || (sizeof(OpenImageIO) == 32 && sizeof(StoredImage) == 48 &&
                                      sizeof(ImageHeader) == 32 && sizeof(Image) == 40));

@@ -27,8 +27,8 @@ void cmyk_to_rgb(const JSAMPLE* cmyk, size_t pixels, float* rgb) {
         }
 }
 
-/// libjpeg's error handler must not return, so it leaves by longjmp. Each call of libjpeg that may fail is in a
-/// step of `attempt`, which has no object with a destructor. What must be released belongs to the class.
+/// libjpeg's error handler must not return, so it leaves by longjmp. Each call of libjpeg that may fail is in
+/// a step of `attempt`, which has no object with a destructor. What must be released belongs to the class.
 class JpegReader {
   public:
     explicit JpegReader(std::FILE* file) : file_(file) {

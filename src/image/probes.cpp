@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The probes of the formats that OpenImageIO reads. Radiance HDR needs none: OpenImageIO opens it without taking
-// memory for its pixels.
+// The probes of the formats that OpenImageIO reads. Radiance HDR needs none: OpenImageIO opens it without
+// taking memory for its pixels.
 #include <algorithm>
 #include <array>
 #include <cstdlib>
@@ -21,9 +21,9 @@ void check_tile(const core::FileReader& reader, const std::string& format, uint6
                     std::to_string(height) + " pixels");
 }
 
-// TIFF 6.0 and BigTIFF: the entries of the first directory, and where its strips or tiles are. OpenImageIO takes
-// a tile beyond the end of a file for one that is there. A codec reports too few bytes in a compressed strip
-// itself.
+// TIFF 6.0 and BigTIFF: the entries of the first directory, and where its strips or tiles are. OpenImageIO
+// takes a tile beyond the end of a file for one that is there. A codec reports too few bytes in a compressed
+// strip itself.
 
 enum Tag : uint64_t {
     kWidth = 256,
@@ -148,8 +148,9 @@ void check_parts(const core::FileReader& reader, Directory& directory, const Ima
     }
 }
 
-// OpenEXR: magic, version and flags, attributes (name, type, size, value) up to an empty name, table of chunks,
-// chunks. OpenEXR takes memory for its tables and tiles when it opens a file. It reports missing chunks itself.
+// OpenEXR: magic, version and flags, attributes (name, type, size, value) up to an empty name, table of
+// chunks, chunks. OpenEXR takes memory for its tables and tiles when it opens a file. It reports missing
+// chunks itself.
 
 constexpr uint32_t kLongNames = 0x400, kDeep = 0x800, kParts = 0x1000;
 constexpr size_t kMaxName = 255;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // What all passes share. A pass is a struct that describes one shader (passes.h). It has
 // - shader: the file in shaders/passes without extension, which is also the name of the timing;
-// - Work: the push constants (Push), the invocations of a workgroup (group_size), and the workgroups (groups);
+// - Work: the push constants (Push), the invocations of a workgroup (group_size), and the workgroups
+//   (groups);
 // - data members: one gpu::BufferPart for each of the shader's bindings, in their order.
 // A pass does not say what it reads or writes: a recording derives that from the shader.
 #pragma once

@@ -9,8 +9,8 @@
 namespace ewa::pipeline {
 namespace {
 
-// Weight of the regulariser of exposures. Gradients of the loss by an exposure are of the order of 0.1. The pull is too weak to matter, except in the
-// direction in which the loss is flat: all exposures change one way and the splats the other way.
+// Weight of the regulariser of exposures. The loss has gradients of the order of 0.1, so this is too weak to
+// matter, except where the loss is flat: all exposures change one way, and the splats the other way.
 constexpr float kPull = 1e-3f;
 
 /// Factors that correct the bias of Adam's two moments at a step.

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Loss and backward passes: from image planes to moved parameters, or to their gradient.
 //
-// Each training image may have an exposure: an affine map of colours, learned beside the splats. The published
-// code of 3DGS does the same for captures with automatic exposure; see include/ewa/exposure.h.
+// Each training image may have an exposure: an affine map of colours, learned beside the splats. The
+// published code of 3DGS does the same for captures with automatic exposure; see include/ewa/exposure.h.
 #pragma once
 #include <vector>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The device buffers of one frame, apart from the model. The sizes of all buffers and dispatches come from one
-// pure function.
+// The device buffers of one frame, apart from the model. The sizes of all buffers and dispatches come from
+// one pure function.
 #pragma once
 #include <cstdint>
 

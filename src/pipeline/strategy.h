@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Strategies that change the number of splats, on the device. Each replaces the model's buffers by those of the
-// next generation. frame: provides sizes, counts and scratch buffers.
+// Strategies that change the number of splats, on the device. Each replaces the model's buffers by those of
+// the next generation. frame: provides sizes, counts and scratch buffers.
 #pragma once
 #include <cstdint>
 
@@ -37,8 +37,8 @@ Refinement densify(passes::PassCache& cache, gpu::Executor& executor, Model& mod
 void record_reset_opacity(gpu::Recording& recording, passes::PassCache& cache, const Model& model,
                           float logit);
 
-/// Of 3DGS as Markov chain Monte Carlo (Kheradmand et al. 2024). Dead splats move to living ones, the number of
-/// splats grows by a share, and noise lets transparent splats explore.
+/// Of 3DGS as Markov chain Monte Carlo (Kheradmand et al. 2024). Dead splats move to living ones, the number
+/// of splats grows by a share, and noise lets transparent splats explore.
 struct McmcRules {
     double dead_opacity = 0.005;  // a splat at or below it is dead
     double growth = 1.05;         // number of splats after a refinement over that before, up to max_splats

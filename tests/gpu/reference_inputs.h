@@ -87,8 +87,8 @@ inline std::vector<float> pack_planes(const reference::Raster& raster, uint32_t 
     return out;
 }
 
-/// A slot's floats of an instance's moments. The device's u and v are the CPU reference's over sqrt(2): its power is
-/// -(u^2 + v^2), the CPU reference's -(u^2 + v^2) / 2.
+/// A slot's floats of an instance's moments. The device's u and v are the CPU reference's over sqrt(2): its
+/// power is -(u^2 + v^2), the CPU reference's -(u^2 + v^2) / 2.
 inline std::array<double, 11> slot_of(const reference::Moments& m, const reference::Projected& splat) {
     const double r = std::sqrt(0.5);
     const double ux = r * reference::whitener(splat).ux;

@@ -268,8 +268,8 @@ TEST(BlendBackwardSlots, BehindTheLastTileAreZero) {
         for (size_t j = 0; j < 9; ++j) EXPECT_EQ(written[shared::SLOT_FLOATS * k + j], 0.0f) << k << ' ' << j;
 }
 
-/// A picture of 8 x 8 pixels and its gradient against the CPU reference's. Returns how many slots hold nothing but
-/// zero.
+/// A picture of 8 x 8 pixels and its gradient against the CPU reference's. Returns how many slots hold
+/// nothing but zero.
 size_t check_one_tile(const Scene& scene) {
     const Lists lists(scene);
     Rig& r = rig();

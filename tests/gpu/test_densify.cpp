@@ -77,7 +77,8 @@ reference::DensifyOptions options_for(const DensifyRules& rules) {
     return options;
 }
 
-/// What the device is to write: the CPU reference's decisions, what each splat becomes side by side in the old order.
+/// What the device is to write: the CPU reference's decisions, what each splat becomes side by side in the
+/// old order.
 struct Expected {
     reference::Values values;
     std::vector<uint32_t> source;

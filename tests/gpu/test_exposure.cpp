@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Exposures on the device against the CPU reference: the picture the loss sees, the way back, and Adam's step.
+// Exposures on the device against the CPU reference: the picture the loss sees, the way back, and Adam's
+// step.
 #include <gtest/gtest.h>
 
 #include <algorithm>

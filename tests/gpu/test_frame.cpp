@@ -136,8 +136,8 @@ void expect_background(const Result& result, const Scene& scene) {
     EXPECT_EQ(worst_color(result, empty), 0);
 }
 
-/// Each tile's list: no tile of the CPU reference's lists is missing, what they share stands in the same order, and
-/// few are more.
+/// Each tile's list: no tile of the CPU reference's lists is missing, what they share stands in the same
+/// order, and few are more.
 TEST(FrameLists, AreTheReferencesOrALittleMore) {
     for (const SplatKind kind : {SplatKind::ordinary, SplatKind::mixed}) {
         const Scene scene = random_scene(3100, 1500, kind, 161, 119);

@@ -178,7 +178,8 @@ std::vector<double> wide(const std::vector<float>& values) {
     return {values.begin(), values.end()};
 }
 
-/// One of the groups that a learning rate belongs to, followed through several steps by the CPU reference's Adam.
+/// One of the groups that a learning rate belongs to, followed through several steps by the CPU reference's
+/// Adam.
 struct Followed {
     const char* name;
     std::vector<double> values;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The device's gradient of the loss against central differences of the CPU reference's loss, a parameter group at a
-// time: neither side knows the other's formulas.
+// The device's gradient of the loss against central differences of the CPU reference's loss, a parameter
+// group at a time: neither side knows the other's formulas.
 #include <gtest/gtest.h>
 
 #include <cmath>

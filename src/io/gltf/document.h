@@ -42,8 +42,8 @@ class GltfDocument {
     /// `indices` allows 32-bit integers, which no attribute has.
     const tinygltf::Accessor& accessor(int index, const std::string& what, bool indices = false) const;
 
-    /// The accessor of a primitive's attribute, which has one of the types and, unless it is POSITION, `count`
-    /// elements. Null if the primitive lacks the attribute. `where` names the primitive in errors.
+    /// The accessor of a primitive's attribute, which has one of the types and, unless it is POSITION,
+    /// `count` elements. Null if the primitive lacks the attribute. `where` names the primitive in errors.
     const tinygltf::Accessor* attribute(const tinygltf::Primitive& primitive, const std::string& name,
                                         std::initializer_list<int> types, size_t count,
                                         const std::string& where) const;

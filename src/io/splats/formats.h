@@ -54,12 +54,12 @@ SplatScene read_spz(const std::filesystem::path& path);
 std::vector<std::string> write_spz(const std::filesystem::path& path, const Gaussians& gaussians,
                                    const SaveOptions& options);
 
-/// glTF with KHR_gaussian_splatting. Reads every primitive with the extension that the scene's nodes reach, in
-/// the order of the nodes, into one scene. Accepts float32 and the quantised component types, with or without
-/// stride, in both colour spaces. Colours in linear light become sRGB values; their view dependence is
-/// converted to first order. Buffers may be the .glb's own, data URIs, or files in or below the file's folder.
-/// Refuses kernels other than "ellipse", sparse and compressed accessors. Errors name the byte, or the mesh,
-/// node or accessor and its property.
+/// glTF with KHR_gaussian_splatting. Reads every primitive with the extension that the scene's nodes reach,
+/// in the order of the nodes, into one scene. Accepts float32 and the quantised component types, with or
+/// without stride, in both colour spaces. Colours in linear light become sRGB values; their view dependence
+/// is converted to first order. Buffers may be the .glb's own, data URIs, or files in or below the file's
+/// folder. Refuses kernels other than "ellipse", sparse and compressed accessors. Errors name the byte, or
+/// the mesh, node or accessor and its property.
 SplatScene read_gltf_splats(const std::filesystem::path& path);
 
 /// The .bin of the same stem that holds a .gltf's values.

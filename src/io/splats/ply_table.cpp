@@ -157,7 +157,8 @@ void PlyTable::parse_property(std::string_view rest) {
 const PlyElement& PlyTable::go_to(std::string_view name) {
     for (; next_element_ < elements_.size(); ++next_element_) {
         const PlyElement& element = elements_[next_element_];
-        // The shortest row of text is one digit and one separator per value. The last separator may be missing.
+        // The shortest row of text is one digit and one separator per value. The last separator may be
+        // missing.
         const uint64_t columns = element.properties.size();
         const uint64_t least =
             format_ == Format::ascii ? std::max<uint64_t>(2 * columns, 1) - 1 : element.row_bytes();
