@@ -152,13 +152,13 @@ std::vector<std::string> complaints(const fs::path& root, size_t& files) {
     return found;
 }
 
-TEST(IncludeArrow, EveryRoomKeepsToItsArrow) {
+TEST(Modules, IncludeOnlyWhatTheyMay) {
     size_t files = 0;
     for (const std::string& text : complaints(EWA_SOURCE_DIR, files)) ADD_FAILURE() << text;
     EXPECT_GT(files, 30u);
 }
 
-TEST(IncludeArrow, BreachesAreFound) {
+TEST(Modules, ForbiddenIncludesAreFound) {
     const ewa::test::TempFolder folder;
     folder.write("include/ewa/image.h", "#include <vector>\n");
     folder.write("include/ewa/trainer.h", "#include \"ewa/image.h\"\n");
