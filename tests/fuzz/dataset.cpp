@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Any bytes as the files of a dataset, which "@@@" and a line feed part: cameras that can be used and names
-// that stay in the folder, or an InputError of one line. There are no photographs.
+// that stay in the folder, or an InputError of one line. There are no images.
 #include <algorithm>
 #include <cmath>
 #include <fstream>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A pattern photographed through each kind of lens, and undistorted: what comes out is the pattern itself, as
-// the pinhole camera sees it. The photograph is made by inverting the lens's formula, written out here once
+// A pattern seen through each kind of lens, and undistorted: the result is the pattern itself, as
+// the pinhole camera sees it. The image is made by inverting the lens's formula, written out here once
 // more.
 #include <cmath>
 #include <functional>
