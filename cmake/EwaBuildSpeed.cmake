@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# What files include takes longer to compile than what they hold. A unity build shares the includes between the files of a
-# target: a whole build is fastest, a changed file compiles with its group. Without EWA_UNITY, precompiled headers hold the
-# includes: one changed file compiles fastest.
+# What files include takes longer to compile than what they hold. Precompiled headers hold the largest includes of a target. A
+# unity build also shares the others between the files of a target: a whole build is fastest, but a changed file compiles with
+# its group.
 
 # ewa_compile_together(TARGET [APART FILE...])
 # Neighbours in the list (the parsers of two formats, say) use one name for two things, so each goes into another group. The
@@ -33,9 +33,6 @@ endfunction()
 # ewa_precompile(OWNER HEADER... [FOR TARGET...]): OWNER and the targets share one precompiled header. All have the same
 # compiler options.
 function(ewa_precompile owner)
-    if(EWA_UNITY)
-        return()
-    endif()
     cmake_parse_arguments(shared "" "" FOR ${ARGN})
     target_precompile_headers(${owner} PRIVATE ${shared_UNPARSED_ARGUMENTS} <algorithm> <array> <cmath> <cstdint> <filesystem>
                               <functional> <memory> <optional> <span> <string> <string_view> <vector>)
