@@ -25,9 +25,11 @@ function(ewa_compile_together target)
     set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
 endfunction()
 
-# ewa_compile_with(OPTION FILE...): compiles these files with OPTION where the build is optimised.
+# ewa_compile_with(OPTION FILE...): compiles these files with OPTION where the build is optimised, without the target's
+# precompiled header: GCC 12 crashes on one of another -O.
 function(ewa_compile_with option)
-    set_source_files_properties(${ARGN} PROPERTIES COMPILE_OPTIONS $<$<CONFIG:Release>:${option}>)
+    set_source_files_properties(${ARGN} PROPERTIES COMPILE_OPTIONS $<$<CONFIG:Release>:${option}>
+                                                   SKIP_PRECOMPILE_HEADERS ON)
 endfunction()
 
 # ewa_precompile(OWNER HEADER... [FOR TARGET...]): OWNER and the targets share one precompiled header. All have the same

@@ -28,7 +28,8 @@ Image to_image(const reference::Raster& raster, double scale, bool one_minus = f
 Image cpu_picture(const GoldenScene& scene) {
     const auto rendered = reference::render(scene.gaussians, scene.camera, scene.options);
     if (scene.shown == Shown::alpha) return to_image(rendered.blended.transmittance, scene.scale, true);
-    return to_image(scene.shown == Shown::depth ? rendered.blended.depth : rendered.blended.color, scene.scale);
+    return to_image(scene.shown == Shown::depth ? rendered.blended.depth : rendered.blended.color,
+                    scene.scale);
 }
 
 Image device_picture(std::shared_ptr<gpu::Device> device, const GoldenScene& scene) {
