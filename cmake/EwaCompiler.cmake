@@ -15,8 +15,7 @@ target_compile_definitions(ewa_compiler INTERFACE EWA_VERSION="${PROJECT_VERSION
 # targets whose property EWA_COLD says that no loop over splats or pixels is in them.
 set(ewa_is_test $<BOOL:$<TARGET_PROPERTY:EWA_IS_TEST>>)
 set(ewa_is_cold $<BOOL:$<TARGET_PROPERTY:EWA_COLD>>)
-target_compile_options(ewa_compiler INTERFACE $<$<AND:$<CONFIG:Release>,${ewa_is_test}>:-O0>
-                                              $<$<AND:$<CONFIG:Release>,${ewa_is_cold}>:-O1>)
+target_compile_options(ewa_compiler INTERFACE $<$<AND:$<CONFIG:Release>,$<OR:${ewa_is_test},${ewa_is_cold}>>:-O1>)
 if(EWA_SANITIZE)
     # The tests too: if a test and a module both have an inline function, the linker takes the test's.
     target_compile_options(ewa_compiler INTERFACE -fsanitize=address,undefined -fno-omit-frame-pointer)
