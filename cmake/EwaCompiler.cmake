@@ -16,8 +16,6 @@ target_compile_definitions(ewa_compiler INTERFACE EWA_VERSION="${PROJECT_VERSION
 set(ewa_is_test $<BOOL:$<TARGET_PROPERTY:EWA_IS_TEST>>)
 set(ewa_is_cold $<BOOL:$<TARGET_PROPERTY:EWA_COLD>>)
 target_compile_options(ewa_compiler INTERFACE $<$<AND:$<CONFIG:Release>,$<OR:${ewa_is_test},${ewa_is_cold}>>:-O1>)
-# With a precompiled header, GCC 12 warns of std::string(count, character) at -O1 for sizes that no call has.
-target_compile_options(ewa_compiler INTERFACE $<$<AND:$<CXX_COMPILER_ID:GNU>,${ewa_is_test}>:-Wno-stringop-overflow>)
 if(EWA_SANITIZE)
     # The tests too: if a test and a module both have an inline function, the linker takes the test's.
     target_compile_options(ewa_compiler INTERFACE -fsanitize=address,undefined -fno-omit-frame-pointer)
