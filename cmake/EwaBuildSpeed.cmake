@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # What files include takes longer to compile than what they hold. A unity build shares the includes between the files of a
 # target: a whole build is fastest, a changed file compiles with its group. Without EWA_UNITY, precompiled headers hold the
-# includes: one changed file compiles fastest. Many targets with the same includes, as the tests are, gain from both.
+# includes: one changed file compiles fastest. Both together gain little, and GCC 12 then gives false warnings in the tests.
 
 # ewa_compile_together(TARGET [APART FILE...])
 # Neighbours in the list (the parsers of two formats, say) use one name for two things, so each goes into another group. The
@@ -32,13 +32,13 @@ function(ewa_compile_with option)
                                                    SKIP_PRECOMPILE_HEADERS ON)
 endfunction()
 
-# ewa_precompile(OWNER [IN_UNITY] HEADER... [FOR TARGET...]): OWNER and the targets share one precompiled header, in unity builds
-# too with IN_UNITY. All have the same compiler options.
+# ewa_precompile(OWNER HEADER... [FOR TARGET...]): OWNER and the targets share one precompiled header. All have the same
+# compiler options.
 function(ewa_precompile owner)
-    cmake_parse_arguments(shared "IN_UNITY" "" "FOR" ${ARGN})
-    if(EWA_UNITY AND NOT shared_IN_UNITY)
+    if(EWA_UNITY)
         return()
     endif()
+    cmake_parse_arguments(shared "" "" "FOR" ${ARGN})
     target_precompile_headers(${owner} PRIVATE ${shared_UNPARSED_ARGUMENTS} <algorithm> <array> <cmath> <cstdint> <filesystem>
                               <functional> <memory> <optional> <span> <string> <string_view> <vector>)
     foreach(target ${shared_FOR})
