@@ -17,7 +17,7 @@ namespace ewa::test {
 namespace {
 
 using Vec = glm::dvec2;
-constexpr int kWidth = 64, kHeight = 48;
+constexpr int kLensWidth = 64, kLensHeight = 48;
 
 struct LensCase {
     std::string name, model;
@@ -108,16 +108,16 @@ TEST_P(GoldenLensTest, Undistorted) {
     const std::vector<double>& p = lens.parameters;
     const bool one_focal = lens.model == "SIMPLE_DIVISION";
     const Vec focal(p[0], p[one_focal ? 0 : 1]), centre(p[one_focal ? 1 : 2], p[one_focal ? 2 : 3]);
-    Image photo(kWidth, kHeight, 3);
-    for (int y = 0; y < kHeight; ++y)
-        for (int x = 0; x < kWidth; ++x) {
+    Image photo(kLensWidth, kLensHeight, 3);
+    for (int y = 0; y < kLensHeight; ++y)
+        for (int x = 0; x < kLensWidth; ++x) {
             const Vec ray = ray_of(lens.bend, (Vec(x + 0.5, y + 0.5) - centre) / focal);
             const auto color = pattern(ray);
             for (int c = 0; c < 3; ++c) photo.at(x, y)[c] = float(color[size_t(c)]);
         }
     const TempFolder folder;
     std::ostringstream camera;
-    camera << "1 " << lens.model << " " << kWidth << " " << kHeight;
+    camera << "1 " << lens.model << " " << kLensWidth << " " << kLensHeight;
     for (const double value : p) camera << " " << value;
     folder.write("sparse/0/cameras.txt", camera.str() + "\n");
     folder.write("sparse/0/images.txt", "1 1 0 0 0 0 0 0 1 a.exr\n\n");

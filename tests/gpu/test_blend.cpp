@@ -65,21 +65,21 @@ struct Lists {
     }
 };
 
-struct Case {
+struct BlendCase {
     SplatKind kind;
     size_t splats;
     int width, height;
 };
-std::string case_name(const testing::TestParamInfo<Case>& info) {
-    const Case& c = info.param;
+std::string blend_case_name(const testing::TestParamInfo<BlendCase>& info) {
+    const BlendCase& c = info.param;
     return std::string(name_of(c.kind)) + "_" + std::to_string(c.splats) + "_" + std::to_string(c.width) +
            "x" + std::to_string(c.height);
 }
-const auto kCases =
-    testing::Values(Case{SplatKind::ordinary, 0, 33, 21}, Case{SplatKind::ordinary, 1, 33, 21},
-                    Case{SplatKind::ordinary, 400, 1, 1}, Case{SplatKind::mixed, 400, 17, 3},
-                    Case{SplatKind::mixed, 600, 61, 47}, Case{SplatKind::needles, 300, 61, 47},
-                    Case{SplatKind::opacity_extremes, 900, 40, 40}, Case{SplatKind::mixed, 800, 260, 131});
+const auto kCases = testing::Values(
+    BlendCase{SplatKind::ordinary, 0, 33, 21}, BlendCase{SplatKind::ordinary, 1, 33, 21},
+    BlendCase{SplatKind::ordinary, 400, 1, 1}, BlendCase{SplatKind::mixed, 400, 17, 3},
+    BlendCase{SplatKind::mixed, 600, 61, 47}, BlendCase{SplatKind::needles, 300, 61, 47},
+    BlendCase{SplatKind::opacity_extremes, 900, 40, 40}, BlendCase{SplatKind::mixed, 800, 260, 131});
 
 /// Pixels over a bound, and the largest error of all. In float32 a contribution that lies within rounding of
 /// 1/255, or a transmittance within rounding of the stop, may fall to the other side.
@@ -92,10 +92,10 @@ struct Difference {
     }
 };
 
-class BlendPass : public testing::TestWithParam<Case> {};
+class BlendPass : public testing::TestWithParam<BlendCase> {};
 
 TEST_P(BlendPass, PlanesMatchTheReference) {
-    const Case& c = GetParam();
+    const BlendCase& c = GetParam();
     const Lists lists(random_scene(1500 + c.splats, c.splats, c.kind, c.width, c.height));
     Rig& r = rig();
     for (const bool with_depth : {false, true}) {
@@ -139,7 +139,7 @@ TEST_P(BlendPass, PlanesMatchTheReference) {
 }
 
 TEST_P(BlendPass, CountsMatchTheReference) {
-    const Case& c = GetParam();
+    const BlendCase& c = GetParam();
     const Lists lists(random_scene(1500 + c.splats, c.splats, c.kind, c.width, c.height));
     Rig& r = rig();
     Guarded out("planes", uint64_t(lists.sizes.plane_floats) * 5 * 4);
@@ -161,7 +161,7 @@ TEST_P(BlendPass, CountsMatchTheReference) {
 }
 
 TEST_P(BlendPass, EllipsoidsMatchTheReference) {
-    const Case& c = GetParam();
+    const BlendCase& c = GetParam();
     const Lists lists(random_scene(1500 + c.splats, c.splats, c.kind, c.width, c.height));
     Rig& r = rig();
     Guarded out("planes", uint64_t(lists.sizes.plane_floats) * 4 * 4);
@@ -185,14 +185,14 @@ TEST_P(BlendPass, EllipsoidsMatchTheReference) {
     EXPECT_LE(difference.over, size_t(c.width) * size_t(c.height) / 50);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, BlendPass, kCases, case_name);
+INSTANTIATE_TEST_SUITE_P(All, BlendPass, kCases, blend_case_name);
 
 constexpr size_t kSums = 11;  // of a slot
 
-class BlendBackwardPass : public testing::TestWithParam<Case> {};
+class BlendBackwardPass : public testing::TestWithParam<BlendCase> {};
 
 TEST_P(BlendBackwardPass, SlotsAreTheReferencesMoments) {
-    const Case& c = GetParam();
+    const BlendCase& c = GetParam();
     const Lists lists(random_scene(1600 + c.splats, c.splats, c.kind, c.width, c.height));
     Rig& r = rig();
     reference::Raster gradient(c.width, c.height, 3);
@@ -242,7 +242,7 @@ TEST_P(BlendBackwardPass, SlotsAreTheReferencesMoments) {
     printf("\n");
 }
 
-INSTANTIATE_TEST_SUITE_P(All, BlendBackwardPass, kCases, case_name);
+INSTANTIATE_TEST_SUITE_P(All, BlendBackwardPass, kCases, blend_case_name);
 
 /// Instances that projection promised and no tile has keep nothing of what stood in their slots before.
 TEST(BlendBackwardSlots, BehindTheLastTileAreZero) {

@@ -15,7 +15,7 @@
 namespace ewa::test {
 namespace {
 
-struct Case {
+struct ChainCase {
     SplatKind kind;
     size_t splats;
     int width, height, sh_degree;
@@ -23,21 +23,21 @@ struct Case {
     uint64_t seed;
 };
 
-void PrintTo(const Case& c, std::ostream* out) {
+void PrintTo(const ChainCase& c, std::ostream* out) {
     *out << name_of(c.kind) << " seed " << c.seed;
 }
 
-std::string case_name(const testing::TestParamInfo<Case>& info) {
-    const Case& c = info.param;
+std::string chain_case_name(const testing::TestParamInfo<ChainCase>& info) {
+    const ChainCase& c = info.param;
     return std::string(name_of(c.kind)) + "_" + std::to_string(c.splats) + "_" + std::to_string(c.width) +
            "x" + std::to_string(c.height) + "_sh" + std::to_string(c.sh_degree) + "_kernel" +
            std::to_string(int(c.kernel)) + "_seed" + std::to_string(c.seed);
 }
 
-class Chain : public testing::TestWithParam<Case> {
+class Chain : public testing::TestWithParam<ChainCase> {
   protected:
     void SetUp() override {
-        const Case& c = GetParam();
+        const ChainCase& c = GetParam();
         camera = random_camera(c.seed, c.width, c.height);
         gaussians = random_gaussians(c.seed + 1, c.splats, c.kind, camera, c.sh_degree);
         target = random_target(c.seed + 2, c.width, c.height);
@@ -99,8 +99,8 @@ TEST_P(Chain, GradientMatchesTheReference) {
     EXPECT_TRUE(splat_gradients_agree(actual.gradient, expected.gradient, tolerance));
 }
 
-std::vector<Case> cases() {
-    std::vector<Case> all;
+std::vector<ChainCase> cases() {
+    std::vector<ChainCase> all;
     uint64_t seed = 200;  // scenes without a contribution that rounding takes across the 1/255 cut
     for (const SplatKind kind :
          {SplatKind::ordinary, SplatKind::needles, SplatKind::sub_pixel, SplatKind::off_screen_and_close,
@@ -143,7 +143,7 @@ TEST(Instances, MoreThanCanBeCountedAreAnErrorAndNoPicture) {
     EXPECT_THROW(renderer.render(camera), RunError);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, Chain, testing::ValuesIn(cases()), case_name);
+INSTANTIATE_TEST_SUITE_P(All, Chain, testing::ValuesIn(cases()), chain_case_name);
 
 }  // namespace
 }  // namespace ewa::test

@@ -54,17 +54,17 @@ Emitted run_emit(const Scene& scene, const reference::Picture& cpu, const std::v
     return {keys.read<uint32_t>(), values.read<uint32_t>(), first.read<uint32_t>()};
 }
 
-struct Case {
+struct InstanceCase {
     SplatKind kind;
     size_t splats;
     int width, height;
     uint32_t strip_rows;
 };
 
-class Emit : public testing::TestWithParam<Case> {};
+class Emit : public testing::TestWithParam<InstanceCase> {};
 
 TEST_P(Emit, ListsEveryExactTileAndFewMore) {
-    const Case& c = GetParam();
+    const InstanceCase& c = GetParam();
     const Scene scene = random_scene(1300 + c.splats, c.splats, c.kind, c.width, c.height);
     const auto cpu =
         reference::render(scene.gaussians, scene.camera, scene.options, reference_tiles(rig().config()));
@@ -107,14 +107,14 @@ TEST_P(Emit, ListsEveryExactTileAndFewMore) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Emit,
-                         testing::Values(Case{SplatKind::ordinary, 700, 160, 120, 1000},
-                                         Case{SplatKind::ordinary, 701, 161, 121, 3},
-                                         Case{SplatKind::needles, 700, 160, 120, 1},
-                                         Case{SplatKind::mixed, 300, 17, 3, 1000},
-                                         Case{SplatKind::mixed, 129, 1, 1, 1},
-                                         Case{SplatKind::off_screen_and_close, 300, 130, 70, 4},
-                                         Case{SplatKind::ordinary, 1, 33, 33, 2}),
-                         [](const testing::TestParamInfo<Case>& tested) {
+                         testing::Values(InstanceCase{SplatKind::ordinary, 700, 160, 120, 1000},
+                                         InstanceCase{SplatKind::ordinary, 701, 161, 121, 3},
+                                         InstanceCase{SplatKind::needles, 700, 160, 120, 1},
+                                         InstanceCase{SplatKind::mixed, 300, 17, 3, 1000},
+                                         InstanceCase{SplatKind::mixed, 129, 1, 1, 1},
+                                         InstanceCase{SplatKind::off_screen_and_close, 300, 130, 70, 4},
+                                         InstanceCase{SplatKind::ordinary, 1, 33, 33, 2}),
+                         [](const testing::TestParamInfo<InstanceCase>& tested) {
                              return std::string(name_of(tested.param.kind)) + "_" +
                                     std::to_string(tested.param.splats) + "_strips" +
                                     std::to_string(tested.param.strip_rows);

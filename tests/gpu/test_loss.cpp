@@ -14,15 +14,15 @@
 namespace ewa::test {
 namespace {
 
-struct Inputs {
+struct LossInputs {
     Image rendered, photo;            // RGB, beyond [0, 1] in places; RGBA
     reference::Raster image, target;  // in double, the training image over the background
     std::array<float, 3> background{0.2f, 0.5f, 0.8f};
 };
 
-Inputs random_inputs(uint64_t seed, int width, int height) {
+LossInputs random_inputs(uint64_t seed, int width, int height) {
     Random random(seed);
-    Inputs in;
+    LossInputs in;
     in.rendered = random_target(seed, width, height);
     for (float& value : in.rendered.pixels)
         if (random.bits() % 8 == 0) value = float(random.uniform(-0.5, 1.5));
@@ -51,7 +51,7 @@ class Loss : public testing::TestWithParam<std::pair<int, int>> {};
 
 TEST_P(Loss, ValueAndGradientMatchTheReference) {
     const int width = GetParam().first, height = GetParam().second;
-    const Inputs in = random_inputs(uint64_t(width * 1000 + height), width, height);
+    const LossInputs in = random_inputs(uint64_t(width * 1000 + height), width, height);
     Rig& r = rig();
     GuardedFrame guarded(r.config(), {1, uint32_t(width), uint32_t(height), 1, true, false});
     pipeline::FrameBuffers& frame = guarded.frame;
@@ -91,7 +91,7 @@ TEST_P(Loss, ValueAndGradientMatchTheReference) {
 /// The training image's alpha as the weight of a pixel.
 TEST_P(Loss, OfMaskedPicturesMatchesTheReference) {
     const int width = GetParam().first, height = GetParam().second;
-    Inputs in = random_inputs(uint64_t(width * 31 + height), width, height);
+    LossInputs in = random_inputs(uint64_t(width * 31 + height), width, height);
     reference::Raster photo(width, height, 3), weights(width, height, 1);
     for (int y = 0; y < height; ++y)
         for (int x = 0; x < width; ++x) {
@@ -136,7 +136,7 @@ TEST_P(Loss, OfMaskedPicturesMatchesTheReference) {
 /// The window's first half: exact up to float32 rounding of eleven products.
 TEST_P(Loss, MomentsAreBlurredDownTheColumns) {
     const int width = GetParam().first, height = GetParam().second;
-    const Inputs in = random_inputs(uint64_t(width * 77 + height), width, height);
+    const LossInputs in = random_inputs(uint64_t(width * 77 + height), width, height);
     Rig& r = rig();
     const auto sizes =
         pipeline::sizes_for(r.config(), {1, uint32_t(width), uint32_t(height), 1, true, false});

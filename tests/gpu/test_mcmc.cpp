@@ -25,12 +25,12 @@ double sigmoid(double x) {
     return 1 / (1 + std::exp(-x));
 }
 
-struct Start {
+struct McmcStart {
     Gaussians gaussians;
     std::vector<float> moments1, moments2;
     pipeline::Model model;
 
-    Start(uint64_t seed, size_t splats, int sh_degree, double least_logit = -9) {
+    McmcStart(uint64_t seed, size_t splats, int sh_degree, double least_logit = -9) {
         gaussians =
             random_gaussians(seed, splats, SplatKind::ordinary, random_camera(seed, 64, 48), sh_degree);
         Random random(seed);
@@ -45,7 +45,7 @@ struct Start {
     }
 };
 
-McmcRules rules_for(uint32_t max_splats) {
+McmcRules mcmc_rules_for(uint32_t max_splats) {
     McmcRules rules;
     rules.max_splats = max_splats;
     rules.seed = 0x123456789abcdefull;
@@ -62,7 +62,7 @@ pipeline::Refinement run_refine(pipeline::Model& model, const McmcRules& rules) 
 }
 
 /// The integer weights, from the device: their last bit hangs on its exponential. Checked to that bit here.
-std::vector<uint32_t> device_weights(const Start& start) {
+std::vector<uint32_t> device_weights(const McmcStart& start) {
     Rig& r = rig();
     const uint32_t n = uint32_t(start.gaussians.size());
     Guarded weights("weights", 4ull * n), dead("dead", 4ull * n);
@@ -93,8 +93,8 @@ class Relocation : public testing::TestWithParam<RelocationCase> {};
 
 TEST_P(Relocation, WritesTheReferencesNextGeneration) {
     const auto [splats, degree, spread] = GetParam();
-    Start start(3000 + splats, splats, degree);
-    McmcRules rules = rules_for(1u << 20);
+    McmcStart start(3000 + splats, splats, degree);
+    McmcRules rules = mcmc_rules_for(1u << 20);
     rules.spread = spread;
     const auto weights = device_weights(start);
     const uint32_t n = uint32_t(splats), after = uint32_t(std::floor(rules.growth * n));
@@ -158,11 +158,11 @@ TEST_P(Relocation, WritesTheReferencesNextGeneration) {
 /// One splat alive among 30,000: it and its copies share what it was, each a 30,000th of its optical depth.
 TEST(RelocationOfMany, ThousandsOfCopiesShareOneSplat) {
     const size_t splats = 30000;
-    Start start(3777, splats, 0);
+    McmcStart start(3777, splats, 0);
     std::fill(start.gaussians.opacity_logits.begin(), start.gaussians.opacity_logits.end(), -9.0f);
     start.gaussians.opacity_logits[17] = 3.0f;
     start.model = pipeline::upload_model(*device(), start.gaussians, 2, false);
-    const auto result = run_refine(start.model, rules_for(uint32_t(splats)));
+    const auto result = run_refine(start.model, mcmc_rules_for(uint32_t(splats)));
     ASSERT_EQ(result.relocated, splats - 1);
     const Gaussians actual = download_model(start.model, start.model.params);
     const auto share = reference::share_of(sigmoid(3.0), int(splats));
@@ -178,8 +178,8 @@ INSTANTIATE_TEST_SUITE_P(Sizes, Relocation,
                                          RelocationCase{1000, 1, 0.8}));
 
 TEST(RelocationEdges, SourcesAreDrawnInProportionToTheirOpacity) {
-    Start start(3100, 40, 0, -2);
-    McmcRules rules = rules_for(40 + 40000);
+    McmcStart start(3100, 40, 0, -2);
+    McmcRules rules = mcmc_rules_for(40 + 40000);
     rules.growth = 1001;
     run_refine(start.model, rules);
     const Gaussians after = download_model(start.model, start.model.params);
@@ -195,26 +195,27 @@ TEST(RelocationEdges, SourcesAreDrawnInProportionToTheirOpacity) {
 }
 
 TEST(RelocationEdges, TheCapHoldsAndNothingDeadOrLivingMeansNothingDone) {
-    Start alive(3200, 500, 0, -4);
-    EXPECT_EQ(run_refine(alive.model, rules_for(510)).after, 510u);
-    EXPECT_EQ(run_refine(alive.model, rules_for(510)).after, 510u);
-    Start full(3201, 500, 0, -4);
+    McmcStart alive(3200, 500, 0, -4);
+    EXPECT_EQ(run_refine(alive.model, mcmc_rules_for(510)).after, 510u);
+    EXPECT_EQ(run_refine(alive.model, mcmc_rules_for(510)).after, 510u);
+    McmcStart full(3201, 500, 0, -4);
     const auto params = full.model.params.handle();
-    EXPECT_EQ(run_refine(full.model, rules_for(100)).after, 500u);  // a start above the cap does not shrink
+    EXPECT_EQ(run_refine(full.model, mcmc_rules_for(100)).after,
+              500u);  // a start above the cap does not shrink
     EXPECT_EQ(full.model.params.handle(), params);
-    Start dead(3202, 500, 0);
+    McmcStart dead(3202, 500, 0);
     for (float& logit : dead.gaussians.opacity_logits) logit = -8;
     dead.model = pipeline::upload_model(*device(), dead.gaussians, 2, false);
-    EXPECT_EQ(run_refine(dead.model, rules_for(1000)).after, 500u);
+    EXPECT_EQ(run_refine(dead.model, mcmc_rules_for(1000)).after, 500u);
 }
 
 TEST(RelocationEdges, WhatIsNotFiniteIsRelocated) {
-    Start start(3300, 60, 1, -3);
+    McmcStart start(3300, 60, 1, -3);
     start.gaussians.means[3 * 7] = std::nanf("");
     start.gaussians.log_scales[3 * 9 + 2] = std::numeric_limits<float>::infinity();
     start.gaussians.opacity_logits[11] = std::nanf("");
     start.model = pipeline::upload_model(*device(), start.gaussians, 2, false);
-    const auto result = run_refine(start.model, rules_for(60));
+    const auto result = run_refine(start.model, mcmc_rules_for(60));
     EXPECT_EQ(result.relocated, 3u);
     const Gaussians after = download_model(start.model, start.model.params);
     for (const auto* values : {&after.means, &after.log_scales, &after.opacity_logits})
@@ -223,7 +224,7 @@ TEST(RelocationEdges, WhatIsNotFiniteIsRelocated) {
 
 TEST(Noise, MatchesTheReference) {
     for (const double least : {-9.0, -5.6}) {
-        Start start(3400, 1000, 0, least);
+        McmcStart start(3400, 1000, 0, least);
         for (size_t i = 0; i < 500; ++i) start.gaussians.opacity_logits[i] = float(-6 + 0.002 * double(i));
         start.model = pipeline::upload_model(*device(), start.gaussians, 2, false);
         Rig& r = rig();
@@ -265,7 +266,7 @@ TEST(Noise, MatchesTheReference) {
 
 /// Along each axis of the splat the noise is `reach` at most, in the direction that it has; such are counted.
 TEST(Noise, IsNoLongerThanItsReach) {
-    Start start(3500, 400, 0, -9.0);
+    McmcStart start(3500, 400, 0, -9.0);
     for (float& logit : start.gaussians.opacity_logits) logit = -8;
     start.model = pipeline::upload_model(*device(), start.gaussians, 2, false);
     Rig& r = rig();

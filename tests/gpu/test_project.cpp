@@ -43,17 +43,17 @@ Output run_project(const Scene& scene, bool debug = false, float log_scale_shift
     return out;
 }
 
-struct Case {
+struct ProjectCase {
     SplatKind kind;
     size_t splats;
     int width, height, sh_degree;
     Footprint kernel;
 };
 
-class ProjectPass : public testing::TestWithParam<Case> {};
+class ProjectPass : public testing::TestWithParam<ProjectCase> {};
 
 TEST_P(ProjectPass, RecordsMatchTheReference) {
-    const Case& c = GetParam();
+    const ProjectCase& c = GetParam();
     const Scene scene = random_scene(900 + uint64_t(c.sh_degree) + c.splats, c.splats, c.kind, c.width,
                                      c.height, c.sh_degree, c.kernel);
     const Output out = run_project(scene);
@@ -94,7 +94,7 @@ TEST_P(ProjectPass, RecordsMatchTheReference) {
 }
 
 TEST_P(ProjectPass, TileCountsNeverMissATile) {
-    const Case& c = GetParam();
+    const ProjectCase& c = GetParam();
     const Scene scene =
         random_scene(950 + c.splats, c.splats, c.kind, c.width, c.height, c.sh_degree, c.kernel);
     const Output out = run_project(scene);
@@ -113,8 +113,8 @@ TEST_P(ProjectPass, TileCountsNeverMissATile) {
     printf("    tiles: exact %zu, listed %zu\n", size_t(exact), size_t(actual));
 }
 
-std::string case_name(const testing::TestParamInfo<Case>& info) {
-    const Case& c = info.param;
+std::string project_case_name(const testing::TestParamInfo<ProjectCase>& info) {
+    const ProjectCase& c = info.param;
     return std::string(name_of(c.kind)) + "_" + std::to_string(c.splats) + "_" + std::to_string(c.width) +
            "x" + std::to_string(c.height) + "_sh" + std::to_string(c.sh_degree) + "_kernel" +
            std::to_string(int(c.kernel));
@@ -137,14 +137,14 @@ TEST(ProjectInspection, ScalesAreShiftedAndTheDrawnCounted) {
 
 INSTANTIATE_TEST_SUITE_P(
     All, ProjectPass,
-    testing::Values(Case{SplatKind::ordinary, 1000, 160, 120, 0, Footprint::peak},
-                    Case{SplatKind::needles, 1000, 161, 119, 1, Footprint::antialias},
-                    Case{SplatKind::sub_pixel, 500, 61, 47, 2, Footprint::unit_mass},
-                    Case{SplatKind::off_screen_and_close, 500, 61, 47, 3, Footprint::peak},
-                    Case{SplatKind::opacity_extremes, 500, 17, 3, 3, Footprint::antialias},
-                    Case{SplatKind::mixed, 257, 1, 1, 2, Footprint::peak},
-                    Case{SplatKind::mixed, 1, 33, 33, 1, Footprint::peak}),
-    case_name);
+    testing::Values(ProjectCase{SplatKind::ordinary, 1000, 160, 120, 0, Footprint::peak},
+                    ProjectCase{SplatKind::needles, 1000, 161, 119, 1, Footprint::antialias},
+                    ProjectCase{SplatKind::sub_pixel, 500, 61, 47, 2, Footprint::unit_mass},
+                    ProjectCase{SplatKind::off_screen_and_close, 500, 61, 47, 3, Footprint::peak},
+                    ProjectCase{SplatKind::opacity_extremes, 500, 17, 3, 3, Footprint::antialias},
+                    ProjectCase{SplatKind::mixed, 257, 1, 1, 2, Footprint::peak},
+                    ProjectCase{SplatKind::mixed, 1, 33, 33, 1, Footprint::peak}),
+    project_case_name);
 
 TEST(ProjectEdges, NoSplats) {
     Scene scene = random_scene(1, 0, SplatKind::ordinary, 17, 3);

@@ -129,17 +129,17 @@ struct GuardedModel {
     Gaussians read(const gpu::Buffer& buffer) const { return download_model(model, buffer); }
 };
 
-struct Case {
+struct UpdateCase {
     SplatKind kind;
     size_t splats;
     int sh_degree;
     Footprint kernel;
 };
 
-class UpdatePass : public testing::TestWithParam<Case> {};
+class UpdatePass : public testing::TestWithParam<UpdateCase> {};
 
 TEST_P(UpdatePass, GradientMatchesTheReference) {
-    const Case& c = GetParam();
+    const UpdateCase& c = GetParam();
     const Slots slots(random_scene(1800 + c.splats, c.splats, c.kind, 61, 47, c.sh_degree, c.kernel));
     GuardedModel model(slots.scene.gaussians);
     Bench bench(slots);
@@ -161,15 +161,15 @@ TEST_P(UpdatePass, GradientMatchesTheReference) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, UpdatePass,
-                         testing::Values(Case{SplatKind::ordinary, 200, 0, Footprint::peak},
-                                         Case{SplatKind::ordinary, 201, 3, Footprint::antialias},
-                                         Case{SplatKind::ordinary, 202, 2, Footprint::unit_mass},
-                                         Case{SplatKind::mixed, 300, 1, Footprint::peak},
-                                         Case{SplatKind::mixed, 301, 3, Footprint::antialias},
-                                         Case{SplatKind::needles, 150, 2, Footprint::peak},
-                                         Case{SplatKind::ordinary, 1, 3, Footprint::peak}),
-                         [](const testing::TestParamInfo<Case>& tested) {
-                             const Case& c = tested.param;
+                         testing::Values(UpdateCase{SplatKind::ordinary, 200, 0, Footprint::peak},
+                                         UpdateCase{SplatKind::ordinary, 201, 3, Footprint::antialias},
+                                         UpdateCase{SplatKind::ordinary, 202, 2, Footprint::unit_mass},
+                                         UpdateCase{SplatKind::mixed, 300, 1, Footprint::peak},
+                                         UpdateCase{SplatKind::mixed, 301, 3, Footprint::antialias},
+                                         UpdateCase{SplatKind::needles, 150, 2, Footprint::peak},
+                                         UpdateCase{SplatKind::ordinary, 1, 3, Footprint::peak}),
+                         [](const testing::TestParamInfo<UpdateCase>& tested) {
+                             const UpdateCase& c = tested.param;
                              return std::string(name_of(c.kind)) + "_" + std::to_string(c.splats) + "_sh" +
                                     std::to_string(c.sh_degree) + "_kernel" + std::to_string(int(c.kernel));
                          });

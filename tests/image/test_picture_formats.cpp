@@ -63,13 +63,13 @@ std::vector<Kind> kinds() {
             {"a.hdr", kFloat, "", "", 3, false, 0.01}};
 }
 
-constexpr int kWidth = 33, kHeight = 21;
+constexpr int kPictureWidth = 33, kPictureHeight = 21;
 
 /// Smooth enough for the codecs that lose something; alpha is nowhere 0.
 Image picture(int channels) {
-    Image image(kWidth, kHeight, channels);
-    for (int y = 0; y < kHeight; ++y)
-        for (int x = 0; x < kWidth; ++x)
+    Image image(kPictureWidth, kPictureHeight, channels);
+    for (int y = 0; y < kPictureHeight; ++y)
+        for (int x = 0; x < kPictureWidth; ++x)
             for (int c = 0; c < channels; ++c)
                 image.at(x, y)[c] =
                     float(std::lround((0.5 + 0.3 * std::sin(0.2 * x + 0.15 * y + c)) * 255)) / 255;
@@ -102,19 +102,19 @@ TEST_P(PictureFormat, KeepsItsPixels) {
     const Image image = picture(GetParam().channels);
     write(path, GetParam(), image);
     const Image loaded = load_image(path);
-    ASSERT_EQ(loaded.width, kWidth);
-    ASSERT_EQ(loaded.height, kHeight);
+    ASSERT_EQ(loaded.width, kPictureWidth);
+    ASSERT_EQ(loaded.height, kPictureHeight);
     ASSERT_EQ(loaded.channels, GetParam().channels == 4 ? 4 : 3);
     double largest = 0;
-    for (int y = 0; y < kHeight; ++y)
-        for (int x = 0; x < kWidth; ++x)
+    for (int y = 0; y < kPictureHeight; ++y)
+        for (int x = 0; x < kPictureWidth; ++x)
             for (int c = 0; c < loaded.channels; ++c)
                 largest = std::max(largest, std::abs(double(loaded.at(x, y)[c]) -
                                                      double(image.at(x, y)[image.channels == 1 ? 0 : c])));
     EXPECT_LE(largest, GetParam().error + 1e-6);
     const ImageSize size = read_image_size(path);
-    EXPECT_EQ(size.width, kWidth);
-    EXPECT_EQ(size.height, kHeight);
+    EXPECT_EQ(size.width, kPictureWidth);
+    EXPECT_EQ(size.height, kPictureHeight);
     EXPECT_EQ(size.eight_bit, GetParam().type == kByte);
 }
 

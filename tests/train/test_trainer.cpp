@@ -55,14 +55,14 @@ struct Spoilt {
     }
 };
 
-struct Trained {
+struct TrainedScene {
     Gaussians gaussians;
     StepReport report;
     double first_loss = 0;
 };
-Trained train(const TrainOptions& options, const Gaussians& start, int steps) {
+TrainedScene train(const TrainOptions& options, const Gaussians& start, int steps) {
     Trainer trainer(device(), small_capture().dataset, all_frames(small_capture().dataset), start, options);
-    Trained run;
+    TrainedScene run;
     for (int step = 1; step <= steps; ++step) {
         run.report = trainer.step();
         if (step == 1) run.first_loss = run.report.loss;
@@ -90,7 +90,7 @@ TEST(Dataset, IsReadAsItWasMade) {
 TEST(Trainer, OverfitsASmallScene) {
     const Gaussians start = shaken_start(small_capture(), 0.05, 1, 0);
     const double before = train_psnr(start);
-    const Trained run = train(quick(200), start, 200);
+    const TrainedScene run = train(quick(200), start, 200);
     const double after = train_psnr(run.gaussians);
     printf("    psnr %.2f -> %.2f dB, loss %.4f -> %.4f, %.2f s\n", before, after, run.first_loss,
            run.report.loss, run.report.seconds);
@@ -111,7 +111,7 @@ TEST(Trainer, TheSameSeedWritesTheSameBytesAndAnotherDoesNot) {
         options.refine_stop = 30000;
         options.random_background = true;
         options.seed = seed;
-        const Trained run = train(options, start, 160);
+        const TrainedScene run = train(options, start, 160);
         EXPECT_GT(run.gaussians.size(), start.size());  // densification took part
         const auto path = small_capture().folder / "out.ply";
         save_splats(path, run.gaussians);
@@ -151,7 +151,7 @@ TEST(Trainer, WithoutAStrategyTheNumberStays) {
 TEST(Trainer, ASplatThatIsNotFiniteStaysOutAndTheRestLearns) {
     Gaussians start = shaken_start(small_capture(), 0.05, 1, 0);
     start.means[3 * 5] = std::nanf("");
-    const Trained run = train(quick(60), start, 60);
+    const TrainedScene run = train(quick(60), start, 60);
     EXPECT_EQ(run.report.skipped_nonfinite, 1u);
     EXPECT_EQ(run.report.dropped_updates, 0u);  // nothing was tried with it
     EXPECT_LT(run.report.loss, run.first_loss);

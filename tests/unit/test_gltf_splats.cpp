@@ -24,9 +24,9 @@ using test::TempFolder;
 const std::string kPrefix = "KHR_gaussian_splatting:";
 
 /// A .gltf and its buffer, to be changed and read.
-class Gltf {
+class GltfFile {
   public:
-    explicit Gltf(const Gaussians& g) {
+    explicit GltfFile(const Gaussians& g) {
         save_splats(folder_ / "a.gltf", g);
         top = json::parse(test::file_bytes(folder_ / "a.gltf"));
         buffer = test::file_bytes(folder_ / "a.bin");
@@ -66,7 +66,7 @@ class Gltf {
 };
 
 TEST(GltfSplats, SaysWhatTheExtensionAsks) {
-    Gltf gltf(storable_splats(1, 30, 3));
+    GltfFile gltf(storable_splats(1, 30, 3));
     EXPECT_EQ(gltf.top["extensionsUsed"], json::array({"KHR_gaussian_splatting"}));
     EXPECT_EQ(gltf.primitive()["mode"], 0);
     EXPECT_EQ(gltf.extension()["kernel"], "ellipse");
@@ -90,7 +90,7 @@ TEST(GltfSplats, FallbackColourIsInLinearLight) {
     Gaussians g = storable_splats(1, 1, 0);
     g.sh = {0, 100, -100};  // 0.5, above 1, below 0
     g.opacity_logits = {0};
-    Gltf gltf(g);
+    GltfFile gltf(g);
     const size_t at =
         gltf.top["bufferViews"][gltf.accessor("COLOR_0")["bufferView"].get<size_t>()]["byteOffset"];
     uint16_t color[4];
@@ -115,7 +115,7 @@ void expect_near(const Gaussians& a, const Gaussians& b, double tolerance = 1e-5
 
 TEST(GltfSplats, NodesTransformWithTheirParents) {
     const Gaussians g = storable_splats(1, 30, 3);
-    Gltf gltf(g);
+    GltfFile gltf(g);
     const double c = std::sqrt(0.5);
     gltf.top["nodes"] = {{{"children", {1}}, {"translation", {1, 2, 3}}, {"rotation", {0, c, 0, c}}},
                          {{"mesh", 0}, {"matrix", {2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0, 5, 6, 7, 1}}}};
@@ -138,7 +138,7 @@ TEST(GltfSplats, NodesTransformWithTheirParents) {
 
 TEST(GltfSplats, SeveralNodesAndPrimitives) {
     const Gaussians g = storable_splats(1, 10, 1);
-    Gltf gltf(g);
+    GltfFile gltf(g);
     json plain = gltf.primitive();
     for (int k = 0; k < 3; ++k) plain["attributes"].erase(kPrefix + "SH_DEGREE_1_COEF_" + std::to_string(k));
     gltf.top["meshes"][0]["primitives"].push_back(plain);
@@ -181,7 +181,7 @@ TEST(GltfSplats, QuantisedAccessors) {
     };
     const auto scale = [&](size_t i) { return std::exp(double(g.log_scales[i])); };
     constexpr int kByte = 5120, kUbyte = 5121, kShort = 5122, kUshort = 5123;
-    Gltf gltf(g);
+    GltfFile gltf(g);
     gltf.replace(kPrefix + "ROTATION", kByte, true, quantised<int8_t>(160, rotation(127)));
     gltf.replace(kPrefix + "OPACITY", kUbyte, true, quantised<uint8_t>(40, opacity(255)));
     gltf.replace(kPrefix + "SCALE", kUbyte, false, quantised<uint8_t>(120, scale));
@@ -211,7 +211,7 @@ TEST(GltfSplats, QuantisedAccessors) {
 TEST(GltfSplats, OpacitiesOfZeroAndOneStayFinite) {
     Gaussians g = storable_splats(1, 2, 0);
     g.opacity_logits = {-90, 40};
-    Gltf gltf(g);
+    GltfFile gltf(g);
     const Gaussians back = gltf.read().gaussians;
     EXPECT_LT(back.opacity_logits[0], -60);
     EXPECT_GT(back.opacity_logits[1], 16);
@@ -222,7 +222,7 @@ TEST(GltfSplats, LinearColoursBecomeSrgb) {
     Gaussians g = storable_splats(1, 3, 1);
     for (size_t i = 0; i < 3; ++i)
         for (size_t k = 0; k < 3; ++k) g.sh[12 * i + k] = float((0.21404 - 0.5) / 0.28209479177387814);
-    Gltf gltf(g);
+    GltfFile gltf(g);
     gltf.extension()["colorSpace"] = "lin_rec709_display";
     const SplatScene scene = gltf.read();
     ASSERT_EQ(scene.remarks.size(), 1u);
@@ -234,7 +234,7 @@ TEST(GltfSplats, LinearColoursBecomeSrgb) {
 
 TEST(GltfSplats, BuffersInsideAndBelowTheFolder) {
     const Gaussians g = storable_splats(1, 3, 0);
-    Gltf gltf(g);
+    GltfFile gltf(g);
     gltf.folder().write("below/some name.bin", gltf.buffer);
     gltf.top["buffers"][0]["uri"] = "below/some%20name.bin";
     expect_near(gltf.read().gaussians, g);
@@ -255,7 +255,7 @@ TEST(GltfSplats, BuffersInsideAndBelowTheFolder) {
 }
 
 TEST(GltfSplats, DataUri) {
-    Gltf gltf(storable_splats(1, 1, 0));
+    GltfFile gltf(storable_splats(1, 1, 0));
     gltf.primitive()["attributes"].erase("COLOR_0");
     // 56 zero bytes: 75 characters of base64 make 56.25, so 57.
     gltf.buffer = std::string(57, '\0');
@@ -271,50 +271,52 @@ TEST(GltfSplats, DataUri) {
 
 TEST(GltfSplats, NamesWhatIsWrong) {
     const Gaussians g = storable_splats(1, 5, 2);
-    const auto refuse = [&](const std::function<void(Gltf&)>& change,
+    const auto refuse = [&](const std::function<void(GltfFile&)>& change,
                             std::initializer_list<std::string> parts) {
         SCOPED_TRACE(*(parts.end() - 1));
-        Gltf gltf(g);
+        GltfFile gltf(g);
         change(gltf);
         gltf.refused(parts);
     };
     const auto erase = [&](const std::string& name) {
-        return [name](Gltf& f) { f.primitive()["attributes"].erase(name); };
+        return [name](GltfFile& f) { f.primitive()["attributes"].erase(name); };
     };
     for (const char* name : {"ROTATION", "SCALE", "OPACITY", "SH_DEGREE_0_COEF_0"})
         refuse(erase(kPrefix + name), {"mesh 0, primitive 0", name, "missing"});
     refuse(erase("POSITION"), {"POSITION"});
     refuse(erase(kPrefix + "SH_DEGREE_1_COEF_1"), {"SH degree 1", "missing"});
     refuse(erase(kPrefix + "SH_DEGREE_2_COEF_4"), {"SH degree 2", "missing"});
-    refuse([](Gltf& f) { f.extension()["kernel"] = "box"; }, {"kernel", "box"});
-    refuse([](Gltf& f) { f.extension().erase("colorSpace"); }, {"colorSpace"});
-    refuse([](Gltf& f) { f.extension()["colorSpace"] = "xyz"; }, {"xyz"});
-    refuse([](Gltf& f) { f.primitive().erase("extensions"); }, {"no primitive with the extension"});
-    refuse([](Gltf& f) { f.accessor("POSITION")["count"] = 6; }, {"POSITION", "6 elements do not fit"});
-    refuse([](Gltf& f) { f.accessor("POSITION")["count"] = 4; }, {"ROTATION", "5 elements for 4 positions"});
-    refuse([](Gltf& f) { f.accessor("POSITION")["type"] = "VEC2"; }, {"POSITION", "type"});
-    refuse([](Gltf& f) { f.accessor("POSITION")["bufferView"] = 99; }, {"POSITION", "bufferView"});
-    refuse([](Gltf& f) { f.accessor("POSITION").erase("bufferView"); }, {"POSITION", "bufferView"});
-    refuse([](Gltf& f) { f.accessor("POSITION")["componentType"] = 5130; }, {"componentType"});
-    refuse([](Gltf& f) { f.top["bufferViews"][0]["byteOffset"] = 1000000000000000; },
+    refuse([](GltfFile& f) { f.extension()["kernel"] = "box"; }, {"kernel", "box"});
+    refuse([](GltfFile& f) { f.extension().erase("colorSpace"); }, {"colorSpace"});
+    refuse([](GltfFile& f) { f.extension()["colorSpace"] = "xyz"; }, {"xyz"});
+    refuse([](GltfFile& f) { f.primitive().erase("extensions"); }, {"no primitive with the extension"});
+    refuse([](GltfFile& f) { f.accessor("POSITION")["count"] = 6; }, {"POSITION", "6 elements do not fit"});
+    refuse([](GltfFile& f) { f.accessor("POSITION")["count"] = 4; },
+           {"ROTATION", "5 elements for 4 positions"});
+    refuse([](GltfFile& f) { f.accessor("POSITION")["type"] = "VEC2"; }, {"POSITION", "type"});
+    refuse([](GltfFile& f) { f.accessor("POSITION")["bufferView"] = 99; }, {"POSITION", "bufferView"});
+    refuse([](GltfFile& f) { f.accessor("POSITION").erase("bufferView"); }, {"POSITION", "bufferView"});
+    refuse([](GltfFile& f) { f.accessor("POSITION")["componentType"] = 5130; }, {"componentType"});
+    refuse([](GltfFile& f) { f.top["bufferViews"][0]["byteOffset"] = 1000000000000000; },
            {"POSITION", "ends after its buffer"});
-    refuse([](Gltf& f) { f.top["bufferViews"][0]["byteStride"] = 4; }, {"POSITION", "byteStride"});
-    refuse([](Gltf& f) { f.top["buffers"][0]["byteLength"] = 1000000000000000; }, {"buffer 0", "byteLength"});
-    refuse([](Gltf& f) { f.top["nodes"][0]["mesh"] = 5; }, {"node 0", "mesh"});
-    refuse([](Gltf& f) { f.top["nodes"][0]["children"] = {0}; }, {"node 0", "own ancestor"});
-    refuse([](Gltf& f) { f.top["scene"] = 3; }, {"scene", "3"});
-    refuse([](Gltf& f) { f.top.erase("asset"); }, {"asset"});
-    refuse([](Gltf& f) { f.buffer.pop_back(); }, {"buffer 0", "byteLength"});
-    refuse([](Gltf& f) { f.primitive()["attributes"]["POSITION"] = -4; }, {"POSITION", "accessor -4"});
+    refuse([](GltfFile& f) { f.top["bufferViews"][0]["byteStride"] = 4; }, {"POSITION", "byteStride"});
+    refuse([](GltfFile& f) { f.top["buffers"][0]["byteLength"] = 1000000000000000; },
+           {"buffer 0", "byteLength"});
+    refuse([](GltfFile& f) { f.top["nodes"][0]["mesh"] = 5; }, {"node 0", "mesh"});
+    refuse([](GltfFile& f) { f.top["nodes"][0]["children"] = {0}; }, {"node 0", "own ancestor"});
+    refuse([](GltfFile& f) { f.top["scene"] = 3; }, {"scene", "3"});
+    refuse([](GltfFile& f) { f.top.erase("asset"); }, {"asset"});
+    refuse([](GltfFile& f) { f.buffer.pop_back(); }, {"buffer 0", "byteLength"});
+    refuse([](GltfFile& f) { f.primitive()["attributes"]["POSITION"] = -4; }, {"POSITION", "accessor -4"});
 }
 
 TEST(GltfSplats, ClaimsAreBounded) {
     const Gaussians g = storable_splats(1, 5, 0);
-    Gltf gltf(g);
+    GltfFile gltf(g);
     // Every attribute on the same bytes again and again.
     for (json& accessor : gltf.top["accessors"]) accessor["count"] = 4000000000u;
     gltf.refused({"4000000000 elements do not fit"});
-    Gltf nested(g);
+    GltfFile nested(g);
     std::string deep;
     for (int i = 0; i < 100000; ++i) deep += "[";
     expect_error<InputError>([&] { load_splats(nested.folder().write("deep.gltf", "{\"extras\":" + deep)); },
@@ -334,7 +336,7 @@ TEST(GltfSplats, ClaimsAreBounded) {
     expect_error<InputError>([&] { load_splats(nested.folder().write("keys.gltf", keys + "\"\":0}}")); },
                              {"keys.gltf"});
     EXPECT_LT(double(std::clock() - begin) / CLOCKS_PER_SEC, 10);
-    Gltf instanced(g);
+    GltfFile instanced(g);
     instanced.top["nodes"] = json::array();
     instanced.top["scenes"][0]["nodes"] = json::array();
     for (int i = 0; i < 5000; ++i) {

@@ -11,11 +11,11 @@
 namespace ewa::reference {
 namespace {
 
-struct Case {
+struct ExposureCase {
     Raster picture, weights;  // L = sum weights * exposed picture
     Exposure exposure{};
 
-    Case() : picture(to_double(test::random_target(5, 7, 4))), weights(7, 4, 3) {
+    ExposureCase() : picture(to_double(test::random_target(5, 7, 4))), weights(7, 4, 3) {
         test::Random random(6);
         for (double& w : weights.values) w = random.normal();
         for (double& e : exposure) e = random.normal();
@@ -30,16 +30,16 @@ struct Case {
 
 // The map is linear in either argument: a difference is exact but for rounding.
 TEST(ReferenceExposure, GradientIsTheDifference) {
-    Case c;
+    ExposureCase c;
     const ExposureGradient gradient = exposed_backward(c.picture, c.exposure, c.weights);
     const double before = c.value();
     for (size_t k = 0; k < 12; ++k) {
-        Case moved = c;
+        ExposureCase moved = c;
         moved.exposure[k] += 1;
         EXPECT_NEAR(moved.value() - before, gradient.exposure[k], 1e-10) << k;
     }
     for (size_t i = 0; i < c.picture.values.size(); i += 5) {
-        Case moved = c;
+        ExposureCase moved = c;
         moved.picture.values[i] += 1;
         EXPECT_NEAR(moved.value() - before, gradient.picture.values[i], 1e-10) << i;
     }

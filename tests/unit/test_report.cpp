@@ -25,24 +25,24 @@ TEST(Report, SummaryHasTheKeysThatScriptsRead) {
     summary.seconds = 4;
     summary.test_psnr = 21.5;
     summary.seed = std::numeric_limits<uint64_t>::max();
-    const Json json = to_json(summary);
+    const Json written = to_json(summary);
     for (const char* key :
          {"steps", "seconds", "seconds_per_step", "splats", "test_psnr", "test_ssim", "train_psnr", "device",
           "peak_device_bytes", "peak_host_bytes", "seed", "skipped_nonfinite", "wall_seconds",
           "dropped_updates", "version", "command", "strategy"})
-        EXPECT_TRUE(json.contains(key)) << key;
-    EXPECT_DOUBLE_EQ(json["seconds_per_step"].get<double>(), 0.02);
-    EXPECT_EQ(json["seed"].get<uint64_t>(), std::numeric_limits<uint64_t>::max());
-    EXPECT_TRUE(json["test_ssim"].is_null());
+        EXPECT_TRUE(written.contains(key)) << key;
+    EXPECT_DOUBLE_EQ(written["seconds_per_step"].get<double>(), 0.02);
+    EXPECT_EQ(written["seed"].get<uint64_t>(), std::numeric_limits<uint64_t>::max());
+    EXPECT_TRUE(written["test_ssim"].is_null());
 }
 
 TEST(Report, FiguresThatDoNotExistAreNull) {
     Summary summary;
     summary.test_psnr = std::numeric_limits<double>::infinity();
-    const Json json = to_json(summary);
-    EXPECT_TRUE(json["test_psnr"].is_null());
-    EXPECT_TRUE(json["seconds_per_step"].is_null());
-    EXPECT_EQ(Json::parse(json.dump()), json);
+    const Json written = to_json(summary);
+    EXPECT_TRUE(written["test_psnr"].is_null());
+    EXPECT_TRUE(written["seconds_per_step"].is_null());
+    EXPECT_EQ(Json::parse(written.dump()), written);
 }
 
 TEST(Report, MetricsHaveTestFiguresOnlyWhereEvaluated) {

@@ -34,7 +34,7 @@ std::string gzipped(const std::string& bytes) {
     return out;
 }
 
-struct Case {
+struct SplatFileCase {
     const char* name;
     int spz_version;
     Largest quantum;  // SH in that of the formats' own units
@@ -42,7 +42,7 @@ struct Case {
 };
 
 /// Half a step of each, as the layouts say; a compressed PLY's box is at most the scene.
-const Case kCases[] = {
+const SplatFileCase kSplatFileCases[] = {
     {"a.ply", 3, {0, 2e-7, 0, 0, 0, 0}, false, true},
     {"a.glb", 3, {0, 2e-7, 1e-6, 1e-7, 0, 0}, false, true},
     {"a.gltf", 3, {0, 2e-7, 1e-6, 1e-7, 0, 0}, false, true},
@@ -65,7 +65,7 @@ const Case kCases[] = {
 
 TEST(SplatFormats, RoundTripWithinTheQuantum) {
     TempFolder folder;
-    for (const Case& c : kCases)
+    for (const SplatFileCase& c : kSplatFileCases)
         for (int degree = 0; degree <= 3; ++degree) {
             SCOPED_TRACE(std::string(c.name) + " version " + std::to_string(c.spz_version) + " degree " +
                          std::to_string(degree));
@@ -173,7 +173,7 @@ TEST(SplatFormats, OtherExtensionsAreRefused) {
 TEST(SplatFormats, EveryCutIsAnError) {
     TempFolder folder;
     const Gaussians g = storable_splats(3, 3, 1);
-    for (const Case& c : kCases) {
+    for (const SplatFileCase& c : kSplatFileCases) {
         if (std::string(c.name) == "a.gltf") continue;  // text; its buffer is a file of its own
         save_splats(folder / c.name, g, SaveOptions{.spz_version = c.spz_version});
         const std::string whole = test::file_bytes(folder / c.name);
@@ -187,7 +187,7 @@ TEST(SplatFormats, EveryCutIsAnError) {
 TEST(SplatFormats, FlippedBytesAreReadOrRefused) {
     TempFolder folder;
     const Gaussians g = storable_splats(3, 5, 1);
-    for (const Case& c : kCases) {
+    for (const SplatFileCase& c : kSplatFileCases) {
         save_splats(folder / c.name, g, SaveOptions{.spz_version = c.spz_version});
         const std::string whole = test::file_bytes(folder / c.name);
         for (size_t i = 0; i < whole.size(); i += 5)
