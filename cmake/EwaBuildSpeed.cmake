@@ -17,7 +17,7 @@ function(ewa_compile_together target)
     endforeach()
     # A test file is mostly the includes that the group shares; a source file has more of its own.
     get_target_property(is_test ${target} EWA_IS_TEST)
-    set(files_in_group 10)
+    set(files_in_group 12)
     if(is_test)
         set(files_in_group 16)
     endif()

@@ -13,11 +13,14 @@ target_compile_options(ewa_compiler INTERFACE -Wall -Wextra -Werror -Wshadow -Wn
     # GCC collects its garbage from 0.5 GB on: 7 to 10 % less time for 30 % more memory, 0.9 GB for the largest file.
     "$<$<CXX_COMPILER_ID:GNU>:SHELL:--param ggc-min-heapsize=500000>")
 target_compile_definitions(ewa_compiler INTERFACE EWA_VERSION="${PROJECT_VERSION}")
-# Optimising costs most of the time of these targets' compilation and gains nothing when they run: the tests' own code, and
-# targets whose property EWA_COLD says that no loop over splats or pixels is in them.
+# Optimising costs much of the time of these targets' compilation and gains little when they run: the tests' own code, and
+# targets whose property EWA_COLD says that no loop over splats or pixels is in them. Tests that mostly wait for other processes
+# (EWA_WAITS) are not optimised at all.
 set(ewa_is_test $<BOOL:$<TARGET_PROPERTY:EWA_IS_TEST>>)
 set(ewa_is_cold $<BOOL:$<TARGET_PROPERTY:EWA_COLD>>)
-target_compile_options(ewa_compiler INTERFACE $<$<AND:$<CONFIG:Release>,$<OR:${ewa_is_test},${ewa_is_cold}>>:-O1>)
+set(ewa_waits $<BOOL:$<TARGET_PROPERTY:EWA_WAITS>>)
+target_compile_options(ewa_compiler INTERFACE
+    $<$<AND:$<CONFIG:Release>,$<OR:${ewa_is_test},${ewa_is_cold}>>:$<IF:${ewa_waits},-O0,-O1>>)
 if(EWA_SANITIZE)
     # The tests too: if a test and a module both have an inline function, the linker takes the test's.
     target_compile_options(ewa_compiler INTERFACE -fsanitize=address,undefined -fno-omit-frame-pointer)

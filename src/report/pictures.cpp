@@ -40,16 +40,16 @@ size_t shared_folders(const std::vector<std::vector<std::string>>& names) {
 
 /// Dark violet over orange to pale yellow, with even lightness: five samples of matplotlib's inferno.
 std::array<float, 3> heat(double t) {
-    static constexpr double kColors[5][3] = {{0.001, 0.000, 0.014},
-                                             {0.342, 0.062, 0.429},
-                                             {0.736, 0.216, 0.330},
-                                             {0.978, 0.557, 0.035},
-                                             {0.988, 0.998, 0.645}};
+    static constexpr double kHeat[5][3] = {{0.001, 0.000, 0.014},
+                                           {0.342, 0.062, 0.429},
+                                           {0.736, 0.216, 0.330},
+                                           {0.978, 0.557, 0.035},
+                                           {0.988, 0.998, 0.645}};
     const double at = std::clamp(t, 0.0, 1.0) * 4;
     const int i = std::min(3, static_cast<int>(at));
     const double f = at - i;
     std::array<float, 3> color;
-    for (int c = 0; c < 3; ++c) color[c] = float(kColors[i][c] * (1 - f) + kColors[i + 1][c] * f);
+    for (int c = 0; c < 3; ++c) color[c] = float(kHeat[i][c] * (1 - f) + kColors[i + 1][c] * f);
     return color;
 }
 

@@ -18,8 +18,8 @@ using Json = nlohmann::ordered_json;
 constexpr uint64_t kLargestFile = 16u << 20;  // bytes
 constexpr double kRotationTolerance = 1e-6;
 
-std::vector<double> numbers(const Json& json, const char* name, size_t count) {
-    const Json& list = json.at(name);
+std::vector<double> numbers(const Json& object, const char* name, size_t count) {
+    const Json& list = object.at(name);
     std::vector<double> values =
         list.is_array() ? list.get<std::vector<double>>() : std::vector{list.get<double>()};
     if (values.size() != count)
@@ -37,21 +37,21 @@ bool is_rotation(const glm::dmat3& r) {
     return glm::determinant(r) > 0;
 }
 
-NamedView parse_view(const Json& json) {
+NamedView parse_view(const Json& object) {
     NamedView view;
-    view.name = json.value("name", std::string());
+    view.name = object.value("name", std::string());
     Camera& camera = view.camera;
     for (const auto& [name, side] : {std::pair{"width", &camera.width}, {"height", &camera.height}}) {
-        const double value = numbers(json, name, 1)[0];
+        const double value = numbers(object, name, 1)[0];
         if (!(value >= 1 && value <= 65536)) throw InputError(std::string(name) + " is not in 1..65536");
         *side = int(value);
     }
     for (const auto& [name, value] :
          {std::pair{"fx", &camera.fx}, {"fy", &camera.fy}, {"cx", &camera.cx}, {"cy", &camera.cy}})
-        *value = numbers(json, name, 1)[0];
+        *value = numbers(object, name, 1)[0];
     if (!(camera.fx > 0) || !(camera.fy > 0)) throw InputError("a focal length is not above zero");
-    const auto rotation = numbers(json, "rotation", 9), translation = numbers(json, "translation", 3),
-               pivot = numbers(json, "pivot", 3);
+    const auto rotation = numbers(object, "rotation", 9), translation = numbers(object, "translation", 3),
+               pivot = numbers(object, "pivot", 3);
     for (int row = 0; row < 3; ++row) {
         for (int column = 0; column < 3; ++column)
             camera.rotation[column][row] = rotation[size_t(3 * row + column)];

@@ -15,7 +15,7 @@ namespace ewa::io {
 
 namespace {
 
-constexpr int kMostPlaced = 65536;
+constexpr int kMostPlacedMeshes = 65536;
 constexpr size_t kMostNamed = 32;  // unknown extensions in remarks
 constexpr uint64_t kExpansion = 16, kAlways = uint64_t(20) << 20;
 
@@ -86,8 +86,8 @@ class MeshReader {
         const tinygltf::Mesh& mesh = document_.mesh(index, where_);
         for (size_t i = 0; i < mesh.primitives.size(); ++i) {
             const tinygltf::Primitive& primitive = mesh.primitives[i];
-            if (++placed_ > kMostPlaced)
-                document_.fail(where_ + ": more than " + std::to_string(kMostPlaced) +
+            if (++placed_ > kMostPlacedMeshes)
+                document_.fail(where_ + ": more than " + std::to_string(kMostPlacedMeshes) +
                                " primitives are placed in the scene");
             if (!is_triangles(primitive)) {
                 splats_ = splats_ || primitive.extensions.count(kSplatExtension) > 0;

@@ -38,7 +38,7 @@ using Json = nlohmann::ordered_json;
 
 const std::string kPrefix = kSplatExtension + ":";
 constexpr double kLeastOpacity = 1e-30, kMostOpacity = 1 - 0x1p-25;  // half a step below 1 in float32
-constexpr int kMostPlaced = 4096;                                    // each reads its attributes again
+constexpr int kMostPlacedPrimitives = 4096;                          // each reads its attributes again
 
 std::string sh_name(int degree, int coefficient) {
     return kPrefix + "SH_DEGREE_" + std::to_string(degree) + "_COEF_" + std::to_string(coefficient);
@@ -89,8 +89,8 @@ class SplatReader {
         for (size_t i = 0; i < mesh.primitives.size(); ++i) {
             const auto extension = mesh.primitives[i].extensions.find(kSplatExtension);
             if (extension == mesh.primitives[i].extensions.end()) continue;
-            if (++primitives_ > kMostPlaced)
-                document_.fail(node + ": more than " + std::to_string(kMostPlaced) +
+            if (++primitives_ > kMostPlacedPrimitives)
+                document_.fail(node + ": more than " + std::to_string(kMostPlacedPrimitives) +
                                " primitives are placed in the scene");
             where_ = "mesh " + std::to_string(index) + ", primitive " + std::to_string(i);
             Gaussians part = read_primitive(mesh.primitives[i], extension->second);
@@ -362,9 +362,9 @@ std::string percent_encoded(const std::string& text) {
 }
 
 void write_binary(const std::filesystem::path& path, const Gaussians& gaussians,
-                  const std::vector<Attribute>& attributes, const Json& json, uint64_t bytes,
+                  const std::vector<Attribute>& attributes, const Json& root, uint64_t bytes,
                   const SaveOptions& options) {
-    std::string text = json.dump();
+    std::string text = root.dump();
     text.resize((text.size() + 3) / 4 * 4, ' ');
     const uint64_t total = 12 + 8 + text.size() + 8 + bytes;
     if (total > std::numeric_limits<uint32_t>::max())
@@ -389,13 +389,13 @@ bool refers_to(const std::filesystem::path& gltf, const std::filesystem::path& v
 /// Both files are on disk before either is renamed. The values are renamed first, so a .gltf never lacks
 /// them.
 void write_pair(const std::filesystem::path& path, const Gaussians& gaussians,
-                const std::vector<Attribute>& attributes, Json json, const SaveOptions& options) {
+                const std::vector<Attribute>& attributes, Json root, const SaveOptions& options) {
     check_gltf_values(path);
     const std::filesystem::path buffer = gltf_values_path(path);
-    json["buffers"][0]["uri"] = percent_encoded(buffer.filename().string());
+    root["buffers"][0]["uri"] = percent_encoded(buffer.filename().string());
     core::AtomicFile values(buffer), file(path);
     write_values(values, gaussians, attributes, options);
-    file.write(json.dump(1) + "\n");
+    file.write(root.dump(1) + "\n");
     values.commit();
     file.commit();
 }
