@@ -14,8 +14,8 @@ target_compile_options(ewa_compiler INTERFACE -Wall -Wextra -Werror -Wshadow -Wn
     "$<$<CXX_COMPILER_ID:GNU>:SHELL:--param ggc-min-heapsize=500000>")
 target_compile_definitions(ewa_compiler INTERFACE EWA_VERSION="${PROJECT_VERSION}")
 # Optimising costs much of the time of these targets' compilation and gains little when they run: the tests' own code, and
-# targets whose property EWA_COLD says that no loop over splats or pixels is in them. Tests that mostly wait for other processes
-# (EWA_WAITS) are not optimised at all.
+# targets whose property EWA_COLD says that no loop over splats or pixels is in them. Tests that compute
+# little themselves (EWA_WAITS) are not optimised at all.
 set(ewa_is_test $<BOOL:$<TARGET_PROPERTY:EWA_IS_TEST>>)
 set(ewa_is_cold $<BOOL:$<TARGET_PROPERTY:EWA_COLD>>)
 set(ewa_waits $<BOOL:$<TARGET_PROPERTY:EWA_WAITS>>)

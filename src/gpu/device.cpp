@@ -6,6 +6,7 @@
 
 #include "core/text.h"
 #include "ewa/error.h"
+#include "gpu/pipeline.h"
 
 namespace ewa {
 namespace gpu {
@@ -177,6 +178,7 @@ void Device::create_device() {
     device_ = physical_.createDeviceUnique(create);
     queue_ = device_->getQueue(queue_family_, 0);
     pipeline_cache_ = device_->createPipelineCacheUnique({});
+    pipelines_ = std::make_unique<PipelineStore>();
 
     limits_.cpu = properties.deviceType == vk::PhysicalDeviceType::eCpu;
     limits_.max_groups = *std::min_element(properties.limits.maxComputeWorkGroupCount.begin(),

@@ -25,6 +25,8 @@ struct Limits {
     double timestamp_nanoseconds = 1.0;
 };
 
+class PipelineStore;
+
 class Device {
   public:
     Device(const DeviceInfo& info, bool validation);
@@ -40,6 +42,7 @@ class Device {
     vk::PhysicalDevice physical() const { return physical_; }
     bool subgroup_size_control() const { return subgroup_size_control_; }
     vk::PipelineCache pipeline_cache() const { return *pipeline_cache_; }
+    PipelineStore& pipelines() { return *pipelines_; }
 
     /// mapped_kind: whether the host can map the memory. Throws RunError if the driver is out of memory; it
     /// states the bytes that are wanted and those that are allocated.
@@ -65,6 +68,7 @@ class Device {
     vk::UniqueDevice device_;
     vk::Queue queue_;
     vk::UniquePipelineCache pipeline_cache_;
+    std::unique_ptr<PipelineStore> pipelines_;
     uint32_t queue_family_ = 0;
     bool subgroup_size_control_ = false;
     uint64_t allocated_bytes_ = 0, peak_bytes_ = 0;

@@ -184,4 +184,13 @@ Pipeline::Pipeline(Device& device, std::string name, std::span<const uint32_t> s
     }
 }
 
+const Pipeline& PipelineStore::get(Device& device, const std::string& name, std::span<const uint32_t> spirv,
+                                   const std::vector<SpecConstant>& constants) {
+    const std::lock_guard lock(mutex_);
+    const std::pair key(spirv.data(), constants);
+    const auto found = pipelines_.find(key);
+    if (found != pipelines_.end()) return found->second;
+    return pipelines_.emplace(key, Pipeline(device, name, spirv, constants)).first->second;
+}
+
 }  // namespace ewa::gpu

@@ -4,8 +4,11 @@
 #pragma once
 #include <compare>
 #include <cstdint>
+#include <map>
+#include <mutex>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "gpu/device.h"
@@ -58,6 +61,19 @@ class Pipeline {
     vk::UniqueDescriptorSetLayout set_layout_;
     vk::UniquePipelineLayout layout_;
     vk::UniquePipeline pipeline_;
+};
+
+/// The pipelines of a device, which live as long as it. Each is compiled at its first use, for all who share the device. Calls
+/// may come from any thread.
+class PipelineStore {
+  public:
+    /// spirv: a module that outlives the device; its address stands for it. Throws as Pipeline's constructor does.
+    const Pipeline& get(Device& device, const std::string& name, std::span<const uint32_t> spirv,
+                        const std::vector<SpecConstant>& constants);
+
+  private:
+    std::mutex mutex_;
+    std::map<std::pair<const uint32_t*, std::vector<SpecConstant>>, Pipeline> pipelines_;
 };
 
 vk::DescriptorType descriptor_type(BindingKind kind);

@@ -30,20 +30,22 @@ namespace ewa::passes {
 const gpu::Pipeline& PassCache::pipeline(std::string_view shader, uint32_t group_size,
                                          const Constants& variant) {
     const auto found = pipelines_.find({shader, variant});
-    if (found != pipelines_.end()) return found->second;
+    if (found != pipelines_.end()) return *found->second;
     Constants constants = {{shared::SPEC_GROUP_SIZE, group_size},
                            {shared::SPEC_SUBGROUP, config_.subgroup},
                            {shared::SPEC_TILE_WIDTH, config_.tile_width},
                            {shared::SPEC_TILE_HEIGHT, config_.tile_height},
                            {shared::SPEC_CUT_OFF, std::bit_cast<uint32_t>(config_.cut_off)}};
     constants.insert(constants.end(), variant.begin(), variant.end());
-    gpu::Pipeline made(device_, std::string(shader), shader_code(shader), constants);
+    const gpu::Pipeline& made =
+        device_.pipelines().get(device_, std::string(shader), shader_code(shader), constants);
     const std::vector<uint32_t>& declared = made.reflection().constants;
     for (const gpu::SpecConstant& constant : variant)
         if (!std::binary_search(declared.begin(), declared.end(), constant.id))
             throw std::logic_error("shader " + std::string(shader) + " has no specialisation constant " +
                                    std::to_string(constant.id));
-    return pipelines_.emplace(std::pair(shader, variant), std::move(made)).first->second;
+    pipelines_.emplace(std::pair(shader, variant), &made);
+    return made;
 }
 
 }  // namespace ewa::passes

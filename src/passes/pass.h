@@ -93,7 +93,7 @@ struct Pass {
     }
 };
 
-/// The compiled passes of a device. Each is compiled at its first use.
+/// The passes of a device for one configuration. The device compiles each at its first use, and keeps it.
 class PassCache {
   public:
     explicit PassCache(gpu::Device& device) : PassCache(device, config_for(device.limits())) {}
@@ -115,7 +115,7 @@ class PassCache {
 
     gpu::Device& device_;
     KernelConfig config_;
-    std::map<std::pair<std::string_view, Constants>, gpu::Pipeline> pipelines_;
+    std::map<std::pair<std::string_view, Constants>, const gpu::Pipeline*> pipelines_;
 };
 
 }  // namespace ewa::passes

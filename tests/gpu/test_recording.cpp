@@ -258,6 +258,18 @@ TEST(Constants, AreCompleteAndDeclaredByTheShader) {
               "shader blend has no specialisation constant 4");
 }
 
+/// Renderers and trainers come and go on one device; only the first compiles.
+TEST(PassCache, SharesWhatTheDeviceCompiled) {
+    passes::PassCache one(*device()), two(*device());
+    const auto scan = one.get<passes::ScanBlocks>();
+    EXPECT_EQ(&scan.pipeline, &two.get<passes::ScanBlocks>().pipeline);
+    passes::KernelConfig other = one.config();
+    other.element_group *= 2;
+    passes::PassCache three(*device(), other);
+    EXPECT_NE(one.get<passes::TileStarts>().pipeline.handle(),
+              three.get<passes::TileStarts>().pipeline.handle());
+}
+
 TEST(Reflection, FindsTheBindingsOfEveryShader) {
     for (const std::string_view name : passes::shader_names()) {
         SCOPED_TRACE(std::string(name));
