@@ -261,8 +261,7 @@ TEST(Constants, AreCompleteAndDeclaredByTheShader) {
 /// Renderers and trainers come and go on one device; only the first compiles.
 TEST(PassCache, SharesWhatTheDeviceCompiled) {
     passes::PassCache one(*device()), two(*device());
-    const auto scan = one.get<passes::ScanBlocks>();
-    EXPECT_EQ(&scan.pipeline, &two.get<passes::ScanBlocks>().pipeline);
+    EXPECT_EQ(&one.get<passes::TileStarts>().pipeline, &two.get<passes::TileStarts>().pipeline);
     passes::KernelConfig other = one.config();
     other.element_group *= 2;
     passes::PassCache three(*device(), other);
