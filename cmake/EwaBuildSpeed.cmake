@@ -4,8 +4,9 @@
 # includes: one changed file compiles fastest. Both together gain little, and GCC 12 then gives false warnings in the tests.
 
 # ewa_compile_together(TARGET [APART FILE...])
-# Neighbours in the list (the parsers of two formats, say) use one name for two things, so each goes into another group. The
-# files that find no group without such a namesake, and those with options of their own, are compiled APART.
+# Files of a group share one unnamed namespace, so a name stands for one thing within a target. Neighbours in the list, which
+# resemble each other most, go into different groups. APART are the files with options of their own, and those that need a library
+# which not every program of the target links.
 function(ewa_compile_together target)
     if(NOT EWA_UNITY)
         return()

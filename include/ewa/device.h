@@ -34,6 +34,7 @@ struct DeviceOptions {
         false;  // turn the Khronos validation layer on; its messages become RunError at the next submit
 };
 
+/// Renderers and trainers of one device share the shaders that it has compiled: the second starts faster.
 /// Throws InputError when the selector names no usable device (the text lists those there are), RunError when
 /// the driver fails.
 std::shared_ptr<gpu::Device> open_device(const DeviceOptions& options);
