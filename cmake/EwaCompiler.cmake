@@ -9,9 +9,11 @@ target_compile_options(ewa_compiler INTERFACE -Wall -Wextra -Werror -Wshadow -Wn
     -ffp-contract=off
     # GCC 12's SLP vectoriser takes double(float(x)) for x at -O3: the low half of a split double came out zero
     # (CameraBlock.PairsOfFloatsHoldTheDoubles).
-    $<$<CXX_COMPILER_ID:GNU>:-fno-tree-slp-vectorize>
-    # GCC collects its garbage from 0.5 GB on: 7 to 10 % less time for 30 % more memory, 0.9 GB for the largest file.
-    "$<$<CXX_COMPILER_ID:GNU>:SHELL:--param ggc-min-heapsize=500000>")
+    $<$<CXX_COMPILER_ID:GNU>:-fno-tree-slp-vectorize>)
+if(EWA_UNITY)
+    # GCC collects its garbage from 0.5 GB on: 7 to 10 % less time for 30 % more memory, 0.9 GB for the largest group.
+    target_compile_options(ewa_compiler INTERFACE "$<$<CXX_COMPILER_ID:GNU>:SHELL:--param ggc-min-heapsize=500000>")
+endif()
 target_compile_definitions(ewa_compiler INTERFACE EWA_VERSION="${PROJECT_VERSION}")
 # Optimising costs much of the time of these targets' compilation and gains little when they run: the tests' own code, and
 # targets whose property EWA_COLD says that no loop over splats or pixels is in them. Tests that compute
