@@ -83,6 +83,9 @@ void Executor::record(const Recording& recording, vk::CommandBuffer commands, bo
     const auto stamp = [&] {
         if (timed) commands.writeTimestamp(Stage::eBottomOfPipe, *queries_, query++);
     };
+    // What earlier submissions wrote is seen here: their fence orders the host alone.
+    commands.pipelineBarrier(Stage::eAllCommands, work, {}, vk::MemoryBarrier(Flag::eMemoryWrite, used), {},
+                             {});
     if (timed) commands.resetQueryPool(*queries_, 0, uint32_t(recording.commands().size()) + 1);
     stamp();
     for (const Command& command : recording.commands()) {
