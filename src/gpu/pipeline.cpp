@@ -22,6 +22,7 @@ enum Op : uint32_t {
     kOpTypeStruct = 30,
     kOpTypePointer = 32,
     kOpConstant = 43,
+    kOpSpecConstant = 50,
     kOpVariable = 59,
     kOpDecorate = 71,
     kOpMemberDecorate = 72
@@ -132,6 +133,20 @@ Reflection reflect(std::span<const uint32_t> spirv) {
     return result;
 }
 
+std::vector<uint32_t> with_values(std::span<const uint32_t> spirv,
+                                  const std::vector<SpecConstant>& constants) {
+    const Module module = parse(spirv);
+    std::vector<uint32_t> code(spirv.begin(), spirv.end());
+    for (size_t at = 5; at < code.size(); at += code[at] >> 16) {
+        if ((code[at] & 0xffff) != kOpSpecConstant) continue;
+        const auto id = module.decorations.find({code[at + 2], kWhole, kSpecId});
+        if (id == module.decorations.end()) continue;
+        for (const SpecConstant& constant : constants)
+            if (constant.id == id->second) code[at + 3] = constant.value;
+    }
+    return code;
+}
+
 vk::DescriptorType descriptor_type(BindingKind kind) {
     return kind == BindingKind::uniform ? vk::DescriptorType::eUniformBuffer
            : kind == BindingKind::texel ? vk::DescriptorType::eUniformTexelBuffer
@@ -161,7 +176,8 @@ Pipeline::Pipeline(Device& device, std::string name, std::span<const uint32_t> s
         layout_ = device.handle().createPipelineLayoutUnique(layout);
 
         vk::ShaderModuleCreateInfo code;
-        code.setCodeSize(spirv.size_bytes()).setPCode(spirv.data());
+        const std::vector<uint32_t> words = with_values(spirv, constants);
+        code.setCode(words);
         const auto module = device.handle().createShaderModuleUnique(code);
         std::vector<vk::SpecializationMapEntry> entries;
         for (uint32_t i = 0; i < constants.size(); ++i)

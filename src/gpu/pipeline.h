@@ -42,6 +42,11 @@ struct SpecConstant {
     auto operator<=>(const SpecConstant&) const = default;
 };
 
+/// The module with these values as its constants' defaults. MoltenVK before 1.3 sizes arrays by the defaults whatever a
+/// pipeline says. All constants are 32 bits wide.
+std::vector<uint32_t> with_values(std::span<const uint32_t> spirv,
+                                  const std::vector<SpecConstant>& constants);
+
 class Pipeline {
   public:
     /// constants: those that the shader does not declare are ignored. Throws std::logic_error if one that it

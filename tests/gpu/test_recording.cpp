@@ -269,6 +269,23 @@ TEST(PassCache, SharesWhatTheDeviceCompiled) {
               three.get<passes::TileStarts>().pipeline.handle());
 }
 
+TEST(WithValues, ChangesTheDefaultsOfConstantsAndNothingElse) {
+    for (const std::string_view name : passes::shader_names()) {
+        SCOPED_TRACE(std::string(name));
+        const auto spirv = passes::shader_code(name);
+        passes::Constants given;
+        for (const uint32_t id : gpu::reflect(spirv).constants) given.push_back({id, 0x5eed0000 + id});
+        const std::vector<uint32_t> changed = gpu::with_values(spirv, given);
+        ASSERT_EQ(changed.size(), spirv.size());
+        std::vector<uint32_t> values;
+        for (size_t i = 0; i < spirv.size(); ++i)
+            if (changed[i] != spirv[i]) values.push_back(changed[i] - 0x5eed0000);
+        std::ranges::sort(values);
+        EXPECT_EQ(values, gpu::reflect(spirv).constants);
+        EXPECT_EQ(gpu::with_values(spirv, {}), std::vector<uint32_t>(spirv.begin(), spirv.end()));
+    }
+}
+
 TEST(Reflection, FindsTheBindingsOfEveryShader) {
     for (const std::string_view name : passes::shader_names()) {
         SCOPED_TRACE(std::string(name));
