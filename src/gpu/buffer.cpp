@@ -47,11 +47,12 @@ Buffer::Buffer(Device& device, std::string name, uint64_t bytes, Texel texel, bo
     try {
         buffer_ = device.handle().createBufferUnique(create);
         const auto requirements = device.handle().getBufferMemoryRequirements(*buffer_);
-        bool mappable = false;
-        memory_ = device.allocate(requirements, host_visible, mappable);
+        HostAccess access = HostAccess::none;
+        memory_ = device.allocate(requirements, host_visible, access);
+        reads_fast_ = access == HostAccess::read_write;
         allocated_ = requirements.size;
         device.handle().bindBufferMemory(*buffer_, *memory_, 0);
-        if (mappable)
+        if (access != HostAccess::none)
             mapped_ = static_cast<std::byte*>(device.handle().mapMemory(*memory_, 0, VK_WHOLE_SIZE));
         if (texel != Texel::none) {
             vk::BufferViewCreateInfo view;
@@ -84,6 +85,7 @@ Buffer& Buffer::operator=(Buffer&& other) noexcept {
     buffer_ = std::move(other.buffer_);
     memory_ = std::move(other.memory_);
     mapped_ = std::exchange(other.mapped_, nullptr);
+    reads_fast_ = other.reads_fast_;
     return *this;
 }
 
@@ -99,7 +101,7 @@ void Buffer::upload(std::span<const std::byte> data, uint64_t offset) {
 void Buffer::download(std::span<std::byte> data, uint64_t offset) const {
     assert(offset + data.size() <= bytes_);
     if (data.empty()) return;
-    if (mapped_)
+    if (mapped_ && reads_fast_)
         std::memcpy(data.data(), mapped_ + offset, data.size());
     else
         copy_through_staging({}, data, offset);

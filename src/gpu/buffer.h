@@ -64,6 +64,7 @@ class Buffer {
     vk::UniqueBuffer buffer_;
     vk::UniqueBufferView view_;
     std::byte* mapped_ = nullptr;
+    bool reads_fast_ = false;  // the host caches what is mapped
 };
 
 }  // namespace ewa::gpu

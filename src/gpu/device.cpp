@@ -3,6 +3,10 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
+#include <cstdlib>
+#include <filesystem>
+#include <string_view>
 
 #include "core/text.h"
 #include "ewa/error.h"
@@ -12,12 +16,29 @@ namespace ewa {
 namespace gpu {
 namespace {
 
-constexpr uint32_t kApiVersion = VK_API_VERSION_1_2;
+constexpr uint32_t kNeededVersion = VK_API_VERSION_1_2;
+constexpr uint32_t kUsedVersion = VK_API_VERSION_1_3;  // of what a device has
 
-vk::ApplicationInfo application_info() {
-    vk::ApplicationInfo info;
-    info.setPApplicationName("ewa").setApiVersion(kApiVersion);
-    return info;
+template <class Properties>
+bool lists(const Properties& available, const char* name) {
+    return std::any_of(available.begin(), available.end(),
+                       [&](const auto& one) { return std::string_view(one.extensionName.data()) == name; });
+}
+
+/// The loader hides drivers for portable subsets of Vulkan (MoltenVK) from who does not ask for them.
+vk::UniqueInstance make_instance(const std::vector<const char*>& layers,
+                                 std::vector<const char*> extensions) {
+    vk::ApplicationInfo application;
+    application.setPApplicationName("ewa").setApiVersion(kUsedVersion);
+    vk::InstanceCreateInfo create;
+    if (lists(vk::enumerateInstanceExtensionProperties(), VK_KHR_PORTABILITY_ENUMERATION_EXTENSION_NAME)) {
+        extensions.push_back(VK_KHR_PORTABILITY_ENUMERATION_EXTENSION_NAME);
+        create.setFlags(vk::InstanceCreateFlagBits::eEnumeratePortabilityKHR);
+    }
+    create.setPApplicationInfo(&application)
+        .setPEnabledLayerNames(layers)
+        .setPEnabledExtensionNames(extensions);
+    return vk::createInstanceUnique(create);
 }
 
 std::string version_text(uint32_t version) {
@@ -38,9 +59,39 @@ int compute_family(vk::PhysicalDevice device) {
     return -1;
 }
 
+struct Subgroups {
+    uint32_t lanes = 0;
+    bool controlled = false;  // a pipeline can ask for this size
+    bool extension = false;   // what asks for it is no part of the device's version of Vulkan
+};
+
+Subgroups subgroups_of(vk::PhysicalDevice device) {
+    const auto natural =
+        device.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceSubgroupProperties>();
+    Subgroups result{natural.get<vk::PhysicalDeviceSubgroupProperties>().subgroupSize};
+    const bool core =
+        natural.get<vk::PhysicalDeviceProperties2>().properties.apiVersion >= VK_API_VERSION_1_3;
+    result.extension = !core && lists(device.enumerateDeviceExtensionProperties(),
+                                      VK_EXT_SUBGROUP_SIZE_CONTROL_EXTENSION_NAME);
+    if (core || result.extension) {
+        const auto features =
+            device.getFeatures2<vk::PhysicalDeviceFeatures2, vk::PhysicalDeviceSubgroupSizeControlFeatures>()
+                .get<vk::PhysicalDeviceSubgroupSizeControlFeatures>();
+        const auto sizes = device
+                               .getProperties2<vk::PhysicalDeviceProperties2,
+                                               vk::PhysicalDeviceSubgroupSizeControlProperties>()
+                               .get<vk::PhysicalDeviceSubgroupSizeControlProperties>();
+        result.controlled = features.subgroupSizeControl && features.computeFullSubgroups &&
+                            (sizes.requiredSubgroupSizeStages & vk::ShaderStageFlagBits::eCompute);
+        if (result.controlled)
+            result.lanes = subgroup_lanes(result.lanes, sizes.minSubgroupSize, sizes.maxSubgroupSize);
+    }
+    return result;
+}
+
 /// The first feature that kernels need and the device lacks. Empty if it lacks none.
 std::string missing_features(vk::PhysicalDevice device) {
-    if (device.getProperties().apiVersion < kApiVersion) return "Vulkan 1.2";
+    if (device.getProperties().apiVersion < kNeededVersion) return "Vulkan 1.2";
     if (compute_family(device) < 0) return "a compute queue";
     const auto features =
         device.getFeatures2<vk::PhysicalDeviceFeatures2, vk::PhysicalDeviceVulkan12Features>()
@@ -54,13 +105,14 @@ std::string missing_features(vk::PhysicalDevice device) {
     if ((subgroup.supportedOperations & needed) != needed ||
         !(subgroup.supportedStages & vk::ShaderStageFlagBits::eCompute))
         return "subgroup shuffles in compute shaders";
+    if (const uint32_t lanes = subgroups_of(device).lanes; lanes > kMostLanes || !std::has_single_bit(lanes))
+        return "subgroups of " + std::to_string(kMostLanes) + " lanes or fewer";
     return "";
 }
 
 DeviceInfo describe(vk::PhysicalDevice device, int index) {
     const auto chain =
-        device.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceDriverProperties,
-                              vk::PhysicalDeviceSubgroupProperties>();
+        device.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceDriverProperties>();
     const auto& properties = chain.get<vk::PhysicalDeviceProperties2>().properties;
     const auto& driver = chain.get<vk::PhysicalDeviceDriverProperties>();
     DeviceInfo info;
@@ -69,13 +121,33 @@ DeviceInfo describe(vk::PhysicalDevice device, int index) {
     info.type = type_text(properties.deviceType);
     info.driver = std::string(driver.driverName.data()) + " " + driver.driverInfo.data();
     info.api_version = version_text(properties.apiVersion);
-    info.subgroup_size = chain.get<vk::PhysicalDeviceSubgroupProperties>().subgroupSize;
+    info.subgroup_size = subgroups_of(device).lanes;
     const auto memory = device.getMemoryProperties();
     for (uint32_t i = 0; i < memory.memoryHeapCount; ++i)
         if (memory.memoryHeaps[i].flags & vk::MemoryHeapFlagBits::eDeviceLocal)
             info.memory_bytes = std::max<uint64_t>(info.memory_bytes, memory.memoryHeaps[i].size);
     info.unusable = missing_features(device);
     return info;
+}
+
+/// Which drivers the loader was told of, where it looks (its LoaderDriverInterface document), and what to install.
+std::string what_would_help() {
+    constexpr const char* kInstall =
+        "a CPU device comes with Mesa (Debian: mesa-vulkan-drivers), that of a GPU with its vendor's driver";
+    for (const char* variable : {"VK_DRIVER_FILES", "VK_ICD_FILENAMES"})
+        if (const char* files = std::getenv(variable))
+            return std::string(variable) + " names " + core::one_line(files) + " alone; " + kInstall;
+    const char* home = std::getenv("HOME");
+    std::string found;
+    for (const std::string& folder :
+         {std::string("/usr/local/etc"), std::string("/usr/local/share"), std::string("/etc"),
+          std::string("/usr/share"), std::string(home ? home : "") + "/.local/share"}) {
+        std::error_code none;
+        for (const auto& entry : std::filesystem::directory_iterator(folder + "/vulkan/icd.d", none))
+            found += (found.empty() ? "" : ", ") + core::one_line(entry.path().string());
+    }
+    return (found.empty() ? "no driver is installed in the vulkan/icd.d folders" : "drivers: " + found) +
+           "; " + kInstall;
 }
 
 VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT,
@@ -86,6 +158,10 @@ VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT
 }
 
 }  // namespace
+
+uint32_t subgroup_lanes(uint32_t natural, uint32_t least, uint32_t most) {
+    return std::clamp(std::min(natural, kMostLanes), least, most);
+}
 
 Device::Device(const DeviceInfo& info, bool validation) : info_(info) {
     try {
@@ -107,7 +183,6 @@ Device::~Device() {
 }
 
 void Device::create_instance(bool validation) {
-    const vk::ApplicationInfo application = application_info();
     std::vector<const char*> layers, extensions;
     if (validation) {
         layers.push_back("VK_LAYER_KHRONOS_validation");
@@ -119,11 +194,7 @@ void Device::create_instance(bool validation) {
             throw InputError(
                 "the Khronos validation layer is not installed (Debian: vulkan-validationlayers)");
     }
-    vk::InstanceCreateInfo create;
-    create.setPApplicationInfo(&application)
-        .setPEnabledLayerNames(layers)
-        .setPEnabledExtensionNames(extensions);
-    instance_ = vk::createInstanceUnique(create);
+    instance_ = make_instance(layers, extensions);
     if (!validation) return;
     VkDebugUtilsMessengerCreateInfoEXT messenger{};
     messenger.sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT;
@@ -140,36 +211,22 @@ void Device::create_instance(bool validation) {
 }
 
 void Device::create_device() {
-    const auto chain =
-        physical_.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceSubgroupProperties>();
-    const auto& properties = chain.get<vk::PhysicalDeviceProperties2>().properties;
-    const auto available = physical_.enumerateDeviceExtensionProperties();
-    subgroup_size_control_ = std::any_of(available.begin(), available.end(), [](const auto& extension) {
-        return std::string(extension.extensionName.data()) == VK_EXT_SUBGROUP_SIZE_CONTROL_EXTENSION_NAME;
-    });
-    limits_.subgroup_size = chain.get<vk::PhysicalDeviceSubgroupProperties>().subgroupSize;
-    vk::PhysicalDeviceSubgroupSizeControlFeaturesEXT wanted_sizes;
-    if (subgroup_size_control_) {
-        const auto features =
-            physical_
-                .getFeatures2<vk::PhysicalDeviceFeatures2, vk::PhysicalDeviceSubgroupSizeControlFeaturesEXT>()
-                .get<vk::PhysicalDeviceSubgroupSizeControlFeaturesEXT>();
-        const auto sizes = physical_
-                               .getProperties2<vk::PhysicalDeviceProperties2,
-                                               vk::PhysicalDeviceSubgroupSizeControlPropertiesEXT>()
-                               .get<vk::PhysicalDeviceSubgroupSizeControlPropertiesEXT>();
-        subgroup_size_control_ = features.subgroupSizeControl && features.computeFullSubgroups &&
-                                 bool(sizes.requiredSubgroupSizeStages & vk::ShaderStageFlagBits::eCompute);
-        limits_.subgroup_size =
-            std::clamp(limits_.subgroup_size, sizes.minSubgroupSize, sizes.maxSubgroupSize);
-        wanted_sizes.setSubgroupSizeControl(true).setComputeFullSubgroups(true);
-    }
+    const auto properties = physical_.getProperties();
+    const Subgroups subgroups = subgroups_of(physical_);
+    subgroup_size_control_ = subgroups.controlled;
+    limits_.subgroup_size = subgroups.lanes;
+    vk::PhysicalDeviceSubgroupSizeControlFeatures wanted_sizes;
+    wanted_sizes.setSubgroupSizeControl(true).setComputeFullSubgroups(true);
     queue_family_ = uint32_t(compute_family(physical_));
     const float priority = 1.0f;
     vk::DeviceQueueCreateInfo queue;
     queue.setQueueFamilyIndex(queue_family_).setQueuePriorities(priority);
     std::vector<const char*> extensions;
-    if (subgroup_size_control_) extensions.push_back(VK_EXT_SUBGROUP_SIZE_CONTROL_EXTENSION_NAME);
+    if (subgroups.controlled && subgroups.extension)
+        extensions.push_back(VK_EXT_SUBGROUP_SIZE_CONTROL_EXTENSION_NAME);
+    // A driver for a subset of Vulkan wants its users to say that they know.
+    if (lists(physical_.enumerateDeviceExtensionProperties(), "VK_KHR_portability_subset"))
+        extensions.push_back("VK_KHR_portability_subset");
     vk::PhysicalDeviceVulkan12Features features;
     features.setScalarBlockLayout(true);
     if (subgroup_size_control_) features.setPNext(&wanted_sizes);
@@ -192,7 +249,7 @@ void Device::create_device() {
 }
 
 vk::UniqueDeviceMemory Device::allocate(const vk::MemoryRequirements& requirements, bool host_visible,
-                                        bool& mapped_kind) {
+                                        HostAccess& mapped) {
     const auto memory = physical_.getMemoryProperties();
     using Flag = vk::MemoryPropertyFlagBits;
     const vk::MemoryPropertyFlags host = Flag::eHostVisible | Flag::eHostCoherent;
@@ -215,7 +272,10 @@ vk::UniqueDeviceMemory Device::allocate(const vk::MemoryRequirements& requiremen
             info.setAllocationSize(requirements.size).setMemoryTypeIndex(i);
             try {
                 auto result = device_->allocateMemoryUnique(info);
-                mapped_kind = (flags & host) == host;
+                mapped = (flags & host) != host      ? HostAccess::none
+                         : flags & Flag::eHostCached ? HostAccess::read_write
+                                                     : HostAccess::write;
+                if (!host_visible) mapped = std::min(mapped, most_access_);
                 allocated_bytes_ += requirements.size;
                 peak_bytes_ = std::max(peak_bytes_, allocated_bytes_);
                 return result;
@@ -247,19 +307,16 @@ void Device::check_validation() {
 
 std::vector<DeviceInfo> list_devices() {
     try {
-        const vk::ApplicationInfo application = gpu::application_info();
-        vk::InstanceCreateInfo create;
-        create.setPApplicationInfo(&application);
-        const auto instance = vk::createInstanceUnique(create);
+        const auto instance = gpu::make_instance({}, {});
         std::vector<DeviceInfo> infos;
         int index = 0;
         for (const auto& device : instance->enumeratePhysicalDevices())
             infos.push_back(gpu::describe(device, index++));
-        if (infos.empty())
-            throw RunError("no Vulkan device; a CPU device comes with Mesa (Debian: mesa-vulkan-drivers)");
+        if (infos.empty()) throw RunError("no Vulkan device; " + gpu::what_would_help());
         return infos;
     } catch (const vk::SystemError& error) {
-        throw RunError(std::string("no Vulkan driver (Debian: mesa-vulkan-drivers): ") + error.what());
+        throw RunError("no Vulkan driver works: " + std::string(error.what()) + "; " +
+                       gpu::what_would_help());
     }
 }
 

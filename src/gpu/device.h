@@ -27,6 +27,13 @@ struct Limits {
 
 class PipelineStore;
 
+/// Memory that the host does not cache can be written fast, but is read a hundred times slower.
+enum class HostAccess { none, write, read_write };
+
+constexpr uint32_t kMostLanes = 64;  // of a subgroup: a tile's pixels
+/// The size that pipelines ask for: a device's own, within its limits, and at most kMostLanes where they allow it.
+uint32_t subgroup_lanes(uint32_t natural, uint32_t least, uint32_t most);
+
 class Device {
   public:
     Device(const DeviceInfo& info, bool validation);
@@ -44,10 +51,12 @@ class Device {
     vk::PipelineCache pipeline_cache() const { return *pipeline_cache_; }
     PipelineStore& pipelines() { return *pipelines_; }
 
-    /// mapped_kind: whether the host can map the memory. Throws RunError if the driver is out of memory; it
-    /// states the bytes that are wanted and those that are allocated.
+    /// mapped: what the host can do with the memory once it is mapped. Throws RunError if the driver is out of
+    /// memory; it states the bytes that are wanted and those that are allocated.
     vk::UniqueDeviceMemory allocate(const vk::MemoryRequirements& requirements, bool host_visible,
-                                    bool& mapped_kind);
+                                    HostAccess& mapped);
+    /// Device memory is mapped for no more than this from now on, as on other devices. For tests.
+    void limit_host_access(HostAccess most) { most_access_ = most; }
     void released(uint64_t bytes) { allocated_bytes_ -= bytes; }
     uint64_t allocated_bytes() const { return allocated_bytes_; }
     uint64_t peak_bytes() const { return peak_bytes_; }
@@ -71,6 +80,7 @@ class Device {
     std::unique_ptr<PipelineStore> pipelines_;
     uint32_t queue_family_ = 0;
     bool subgroup_size_control_ = false;
+    HostAccess most_access_ = HostAccess::read_write;
     uint64_t allocated_bytes_ = 0, peak_bytes_ = 0;
     std::mutex message_mutex_;
     std::vector<std::string> messages_;

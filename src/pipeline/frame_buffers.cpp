@@ -152,7 +152,12 @@ void FrameBuffers::reserve(gpu::Device& device, const passes::KernelConfig& conf
     const Sizes old = sizes;
     sizes = sizes_for(config, request);
     instance_capacity = request.instances;
-    if (!counts) counts = gpu::Buffer(device, "counts", sizeof(shared::Counts), Texel::none, false, true);
+    if (!counts) {
+        counts = gpu::Buffer(device, "counts", sizeof(shared::Counts));
+        if (!counts.mapped())
+            counts_copy =
+                gpu::Buffer(device, "counts copy", sizeof(shared::Counts), Texel::none, false, true);
+    }
 
     for (const Allocation& each : allocations(*this, sizes))
         for (gpu::Buffer& buffer : each.buffers) {
@@ -170,9 +175,13 @@ void FrameBuffers::reserve(gpu::Device& device, const passes::KernelConfig& conf
     }
 }
 
+void FrameBuffers::record_counts(gpu::Recording& recording) const {
+    if (counts_copy) recording.copy(counts, 0, counts_copy, 0, sizeof(shared::Counts));
+}
+
 shared::Counts FrameBuffers::read_counts() const {
     shared::Counts result;
-    std::memcpy(&result, counts.mapped(), sizeof(result));
+    std::memcpy(&result, (counts_copy ? counts_copy : counts).mapped(), sizeof(result));
     return result;
 }
 

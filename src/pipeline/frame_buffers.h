@@ -55,7 +55,8 @@ struct FrameBuffers {
     Sizes sizes;  // of the last request
     uint32_t instance_capacity = 0;
 
-    gpu::Buffer counts;  // host visible
+    gpu::Buffer counts;       // every splat adds to them: they lie in device memory
+    gpu::Buffer counts_copy;  // host visible; empty where the host can read the counts themselves
     gpu::Buffer records, depth_keys[2], order[2], tile_counts, prefix, scan_totals, first_instances;
     gpu::Buffer counters, counter_prefix, digit_totals;
     gpu::Buffer instance_keys[2], instance_splats[2], sorted_indices[2], tile_starts;
@@ -66,7 +67,9 @@ struct FrameBuffers {
     /// layout changes. Throws what sizes_for and Buffer throw.
     void reserve(gpu::Device& device, const passes::KernelConfig& config, const FrameRequest& request);
 
-    /// The counts of the last submission.
+    /// The last command of a frame: lets the host read the counts.
+    void record_counts(gpu::Recording& recording) const;
+    /// The counts of the last submission with record_counts.
     shared::Counts read_counts() const;
 };
 
@@ -84,6 +87,7 @@ shared::Counts run_until_it_fits(passes::PassCache& cache, gpu::Executor& execut
         frame.reserve(cache.device(), cache.config(), request);
         gpu::Recording recording(cache.device().limits());
         record(recording);
+        frame.record_counts(recording);
         executor.run(recording, true);
         const shared::Counts counts = frame.read_counts();
         if (counts.instances <= frame.instance_capacity) return counts;

@@ -18,6 +18,7 @@ uint32_t run_scan(gpu::Recording& recording, passes::PassCache& cache, gpu::Exec
     record_scan(
         recording, cache, buffers,
         {.items = splats, .block = frame.sizes.scan_block, .total = shared::TOTAL_SCAN, .name = name});
+    frame.record_counts(recording);
     executor.run(recording);
     return frame.read_counts().scan_total;
 }

@@ -183,6 +183,16 @@ TEST(Outputs, Devices) {
     expect_success(run_ewa({"devices"}));
 }
 
+/// Who has a driver that fails, or none, learns which files were tried and what to install.
+TEST(Devices, WithoutADriverNameWhatWasTried) {
+    for (const char* file : {"/dev/null", "/nowhere/driver.json"}) {
+        const Outcome outcome =
+            run_ewa({"devices"}, {.environment = {{"VK_DRIVER_FILES", file}, {"VK_ICD_FILENAMES", file}}});
+        expect_failure(outcome, 1, "VK_DRIVER_FILES names " + std::string(file) + " alone");
+        EXPECT_NE(outcome.err.find("mesa-vulkan-drivers"), std::string::npos) << outcome.err;
+    }
+}
+
 TEST(Outputs, PlacesThatCannotBeWritten) {
     const Folder folder;
     make_dataset(folder / "data");

@@ -60,8 +60,9 @@ struct TrainedScene {
     StepReport report;
     double first_loss = 0;
 };
-TrainedScene train(const TrainOptions& options, const Gaussians& start, int steps) {
-    Trainer trainer(device(), small_capture().dataset, all_frames(small_capture().dataset), start, options);
+TrainedScene train(const TrainOptions& options, const Gaussians& start, int steps,
+                   const std::shared_ptr<gpu::Device>& on = device()) {
+    Trainer trainer(on, small_capture().dataset, all_frames(small_capture().dataset), start, options);
     TrainedScene run;
     for (int step = 1; step <= steps; ++step) {
         run.report = trainer.step();
@@ -120,6 +121,25 @@ TEST(Trainer, TheSameSeedWritesTheSameBytesAndAnotherDoesNot) {
     const std::string first = bytes(1);
     EXPECT_EQ(first, bytes(1));
     EXPECT_NE(first, bytes(2));
+}
+
+/// GPUs with memory of their own: the host maps none of it, or reads what it maps slowly.
+TEST(Trainer, MemoryThatTheHostCannotReadChangesNoByte) {
+    const Gaussians start = shaken_start(small_capture(), 0.05, 1, 1);
+    const auto bytes = [&](gpu::HostAccess most) {
+        const std::shared_ptr<gpu::Device> other = open_test_device(true);
+        other->limit_host_access(most);
+        TrainOptions options = quick(130);
+        options.strategy = Strategy::adc;
+        options.grow_gradient = 1e-5;
+        options.refine_stop = 30000;
+        const auto path = small_capture().folder / "out.ply";
+        save_splats(path, train(options, start, 130, other).gaussians);
+        return file_bytes(path);
+    };
+    const std::string mapped = bytes(gpu::HostAccess::read_write);
+    EXPECT_TRUE(mapped == bytes(gpu::HostAccess::none));
+    EXPECT_TRUE(mapped == bytes(gpu::HostAccess::write));
 }
 
 TEST(Trainer, GrowsUpToTheCapAndNotPastIt) {
