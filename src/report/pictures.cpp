@@ -49,7 +49,7 @@ std::array<float, 3> heat(double t) {
     const int i = std::min(3, static_cast<int>(at));
     const double f = at - i;
     std::array<float, 3> color;
-    for (int c = 0; c < 3; ++c) color[c] = float(kHeat[i][c] * (1 - f) + kColors[i + 1][c] * f);
+    for (int c = 0; c < 3; ++c) color[c] = float(kHeat[i][c] * (1 - f) + kHeat[i + 1][c] * f);
     return color;
 }
 
