@@ -164,6 +164,17 @@ TEST(Report, ErrorMapIsDarkWhereEqualAndBrightWhereNot) {
     EXPECT_GT(map.at(1, 0)[1], 0.9f);
 }
 
+TEST(Report, ErrorMapsBlendNeighbouringColours) {
+    const Image black(1, 1, 3);
+    Image grey(1, 1, 3);
+    for (int c = 0; c < 3; ++c)
+        grey.at(0, 0)[c] = 0.125f;  // half way between the first two of the five colours
+    const Image map = value_error_map(black, grey, 1);
+    EXPECT_NEAR(map.at(0, 0)[0], (0.001 + 0.342) / 2, 1e-6);
+    EXPECT_NEAR(map.at(0, 0)[1], (0.000 + 0.062) / 2, 1e-6);
+    EXPECT_NEAR(map.at(0, 0)[2], (0.014 + 0.429) / 2, 1e-6);
+}
+
 TEST(Report, ValueErrorMapLooksAtAlphaAndBeyondWhite) {
     Image a(5, 1, 4), b(5, 1, 3);
     for (int x = 0; x < 5; ++x) a.at(x, 0)[3] = 1;
