@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "ewa/error.h"
+#include "passes/passes.h"
 #include "pipeline/backward.h"
 
 namespace ewa {

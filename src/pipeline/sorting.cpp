@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pipeline/sorting.h"
 
+#include "passes/passes.h"
+
 namespace ewa::pipeline {
 
 void record_scan(gpu::Recording& recording, passes::PassCache& cache, const ScanBuffers& buffers,

@@ -70,9 +70,9 @@ glm::dvec3 seen_point(const Dataset& dataset, const std::vector<int>& frames, co
 void add_remarks(RunInput& input) {
     const Dataset& dataset = input.dataset;
     if (input.without_view_dependence())
-        input.remarks.push_back("the dataset says that no colour depends on the view: SH degree 0");
+        input.remarks.emplace_back("the dataset says that no colour depends on the view: SH degree 0");
     if (input.options.init == "sfm" && dataset.points.positions.empty())
-        input.remarks.push_back("the dataset has no points: training starts from random splats");
+        input.remarks.emplace_back("the dataset has no points: training starts from random splats");
     if (dataset.missing_images > 0)
         input.remarks.push_back(fmt::format("{} images are missing and are skipped", dataset.missing_images));
     if (dataset.dropped_points > 0)

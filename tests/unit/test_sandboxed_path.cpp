@@ -5,7 +5,7 @@
 
 namespace {
 
-using namespace ewa::core;
+namespace core = ewa::core;
 using ewa::test::TempFolder;
 namespace fs = std::filesystem;
 
