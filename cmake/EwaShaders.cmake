@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# Compiles shaders/passes/*.comp to SPIR-V and embeds every module in one library.
+# Compiles shaders/passes/*.comp to SPIR-V and embeds every module in one library. Each shader is compiled twice, with
+# texel buffers and with storage buffers in their place (shaders/lib/fetch.glsl).
 # One shader that does not compile fails the build; a changed include rebuilds what includes it (depfiles).
 find_program(GLSLANG glslangValidator REQUIRED)
 
@@ -10,18 +11,24 @@ set(ewa_shader_declarations "")
 set(ewa_shader_table "")
 foreach(shader ${ewa_shaders})
     cmake_path(GET shader STEM name)
-    set(header ${ewa_spirv_dir}/${name}.spv.h)
-    add_custom_command(
-        OUTPUT ${header}
-        COMMAND ${CMAKE_COMMAND} -E make_directory ${ewa_spirv_dir}
-        COMMAND ${GLSLANG} --quiet --target-env vulkan1.2 -I${PROJECT_SOURCE_DIR}/shaders --depfile ${header}.d
-                --vn ${name}_spv -o ${header} ${shader}
-        DEPENDS ${shader}
-        DEPFILE ${header}.d
-        COMMENT "Compiling shader ${name}" VERBATIM)
-    list(APPEND ewa_spirv ${header})
-    string(APPEND ewa_shader_declarations "#include \"${name}.spv.h\"\n")
-    string(APPEND ewa_shader_table "    {\"${name}\", ${name}_spv},\n")
+    foreach(fetches texels storage)
+        set(header ${ewa_spirv_dir}/${name}.${fetches}.spv.h)
+        set(texels "")
+        if(fetches STREQUAL texels)
+            set(texels -DEWA_TEXEL_BUFFERS)
+        endif()
+        add_custom_command(
+            OUTPUT ${header}
+            COMMAND ${CMAKE_COMMAND} -E make_directory ${ewa_spirv_dir}
+            COMMAND ${GLSLANG} --quiet --target-env vulkan1.2 -I${PROJECT_SOURCE_DIR}/shaders ${texels}
+                    --depfile ${header}.d --vn ${name}_${fetches} -o ${header} ${shader}
+            DEPENDS ${shader}
+            DEPFILE ${header}.d
+            COMMENT "Compiling shader ${name} (${fetches})" VERBATIM)
+        list(APPEND ewa_spirv ${header})
+        string(APPEND ewa_shader_declarations "#include \"${name}.${fetches}.spv.h\"\n")
+    endforeach()
+    string(APPEND ewa_shader_table "    {\"${name}\", ${name}_texels, ${name}_storage},\n")
 endforeach()
 
 set(ewa_shader_table_cpp ${ewa_spirv_dir}/shader_table.cpp)
@@ -35,15 +42,15 @@ namespace {
 @ewa_shader_declarations@
 struct Entry {
     std::string_view name;
-    std::span<const std::uint32_t> words;
+    std::span<const std::uint32_t> texels, storage;
 };
 const Entry table[] = {
 @ewa_shader_table@};
 }  // namespace
 
-std::span<const std::uint32_t> ewa::passes::shader_code(std::string_view name) {
+std::span<const std::uint32_t> ewa::passes::shader_code(std::string_view name, bool texel_buffers) {
     for (const Entry& entry : table)
-        if (entry.name == name) return entry.words;
+        if (entry.name == name) return texel_buffers ? entry.texels : entry.storage;
     throw std::logic_error("no shader of the name " + std::string(name));
 }
 std::vector<std::string_view> ewa::passes::shader_names() {

@@ -4,7 +4,7 @@
 // reflection finds it well.
 #ifndef EWA_LIB_LIGHTS
 #define EWA_LIB_LIGHTS
-layout(set = 0, binding = 6) uniform usamplerBuffer lights;
+WORD_TEXELS(6, lights);
 
 struct Incoming {
     vec3 direction;    // to the light
@@ -18,11 +18,11 @@ Incoming light_at(vec3 point, uint count, float choice, vec2 u) {
     if (count == 0u) return none;
     const float place = choice * float(count);
     uint index = min(uint(place), count - 1u);
-    const uvec4 alias = texelFetch(lights, int(index * LIGHT_TEXELS) + 3);
+    const uvec4 alias = fetch(lights, int(index * LIGHT_TEXELS) + 3);
     if (place - float(index) >= uintBitsToFloat(alias.z)) index = alias.w;
     const int at = int(index * LIGHT_TEXELS);
-    const uvec4 a = texelFetch(lights, at), c = texelFetch(lights, at + 2), d = texelFetch(lights, at + 3);
-    const vec4 b = uintBitsToFloat(texelFetch(lights, at + 1));
+    const uvec4 a = fetch(lights, at), c = fetch(lights, at + 2), d = fetch(lights, at + 3);
+    const vec4 b = uintBitsToFloat(fetch(lights, at + 1));
     const vec3 position = uintBitsToFloat(a.xyz);
     if (a.w == LIGHT_DIRECTIONAL) return Incoming(position, 3e38, b.rgb / b.a, 0.0);
     if (a.w != LIGHT_TRIANGLE) {
@@ -41,9 +41,9 @@ Incoming light_at(vec3 point, uint count, float choice, vec2 u) {
         return Incoming(direction, distance, b.rgb * (window / (distance * distance * b.a)), 0.0);
     }
     const int triangle = int(c.w * TRIANGLE_TEXELS);
-    const uvec4 corner = texelFetch(triangles, triangle);
-    const vec3 e1 = uintBitsToFloat(texelFetch(triangles, triangle + 1).xyz);
-    const vec3 e2 = uintBitsToFloat(texelFetch(triangles, triangle + 2).xyz);
+    const uvec4 corner = fetch(triangles, triangle);
+    const vec3 e1 = uintBitsToFloat(fetch(triangles, triangle + 1).xyz);
+    const vec3 e2 = uintBitsToFloat(fetch(triangles, triangle + 2).xyz);
     const float root = sqrt(u.x);
     const vec2 w = vec2(root * (1.0 - u.y), root * u.y);
     const vec3 to = uintBitsToFloat(corner.xyz) + w.x * e1 + w.y * e2 - point;

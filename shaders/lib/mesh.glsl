@@ -5,12 +5,12 @@
 #define EWA_LIB_MESH
 
 layout(constant_id = SPEC_ALPHA_TESTED) const uint ALPHA_TESTED = 0u;
-layout(set = 0, binding = 0) uniform usamplerBuffer nodes;
-layout(set = 0, binding = 1) uniform usamplerBuffer triangles;
-layout(set = 0, binding = 2) uniform usamplerBuffer surfaces;
-layout(set = 0, binding = 3) uniform usamplerBuffer materials;
-layout(set = 0, binding = 4) uniform usamplerBuffer textures;
-layout(set = 0, binding = 5) uniform samplerBuffer texels;
+WORD_TEXELS(0, nodes);
+WORD_TEXELS(1, triangles);
+WORD_TEXELS(2, surfaces);
+WORD_TEXELS(3, materials);
+WORD_TEXELS(4, textures);
+COLOR_TEXELS(5, texels);
 
 struct Surface {
     vec3 normal;     // shading normal, world axes, on the front side; zero if the file has none
@@ -34,7 +34,7 @@ vec3 unpack_normal(uint bits) {
 
 Surface surface_at(uint triangle, vec2 barycentric) {
     const int at = int(triangle * SURFACE_TEXELS);
-    const uvec4 a = texelFetch(surfaces, at), b = texelFetch(surfaces, at + 1), c = texelFetch(surfaces, at + 2);
+    const uvec4 a = fetch(surfaces, at), b = fetch(surfaces, at + 1), c = fetch(surfaces, at + 2);
     const vec3 w = vec3(1.0 - barycentric.x - barycentric.y, barycentric);
     Surface s;
     // This word marks a missing normal; no direction packs to it.
@@ -60,7 +60,7 @@ vec3 linear_of_srgb(vec3 v) {
 
 // Bilinear, of linearised values. It uses the finest level only: paths take many samples.
 vec4 sample_texture(uint index, vec2 uv, bool srgb) {
-    const uvec4 t = texelFetch(textures, int(index));
+    const uvec4 t = fetch(textures, index);
     const ivec2 size = ivec2(t.yz);
     // uv beyond this range is noise at any size. NaN becomes 0.
     const vec2 p = clamp(uv, vec2(-1048576.0), vec2(1048576.0)) * vec2(size) -
@@ -72,7 +72,7 @@ vec4 sample_texture(uint index, vec2 uv, bool srgb) {
         const ivec2 step = ivec2(k & 1, k >> 1);
         const int x = wrapped(int(corner.x) + step.x, size.x, t.w & 3u);
         const int y = wrapped(int(corner.y) + step.y, size.y, (t.w >> TEXTURE_WRAP_T_SHIFT) & 3u);
-        vec4 value = texelFetch(texels, int(t.x) + y * size.x + x);
+        vec4 value = fetch_color(texels, int(t.x) + y * size.x + x);
         if (srgb) value.rgb = linear_of_srgb(value.rgb);
         sum += (step.x == 0 ? 1.0 - f.x : f.x) * (step.y == 0 ? 1.0 - f.y : f.y) * value;
     }
@@ -81,9 +81,9 @@ vec4 sample_texture(uint index, vec2 uv, bool srgb) {
 
 Material material_at(uint index, Surface s) {
     const int at = int(index * MATERIAL_TEXELS);
-    const vec4 a = uintBitsToFloat(texelFetch(materials, at)), b = uintBitsToFloat(texelFetch(materials, at + 1)),
-               c = uintBitsToFloat(texelFetch(materials, at + 2));
-    const uvec4 d = texelFetch(materials, at + 3);
+    const vec4 a = uintBitsToFloat(fetch(materials, at)), b = uintBitsToFloat(fetch(materials, at + 1)),
+               c = uintBitsToFloat(fetch(materials, at + 2));
+    const uvec4 d = fetch(materials, at + 3);
     Material m;
     m.base = a.rgb * s.color.rgb;
     m.opacity = a.a * s.color.a;
@@ -94,7 +94,7 @@ Material material_at(uint index, Surface s) {
     m.emitted = c.rgb;
     m.cutoff = c.a;
     m.flags = d.w;
-    m.light_density = uintBitsToFloat(texelFetch(materials, at + 4).x);
+    m.light_density = uintBitsToFloat(fetch(materials, at + 4).x);
     if (d.x != NO_TEXTURE) {
         const vec4 texel = sample_texture(d.x, s.uv, true);
         m.base *= texel.rgb;
@@ -114,11 +114,11 @@ Material material_at(uint index, Surface s) {
 float opacity_at(uint triangle, uint material, vec2 barycentric, out uint flags, out float cutoff) {
     const Surface s = surface_at(triangle, barycentric);
     const int at = int(material * MATERIAL_TEXELS);
-    const uvec4 d = texelFetch(materials, at + 3);
-    float opacity = uintBitsToFloat(texelFetch(materials, at).w) * s.color.a;
+    const uvec4 d = fetch(materials, at + 3);
+    float opacity = uintBitsToFloat(fetch(materials, at).w) * s.color.a;
     if (d.x != NO_TEXTURE) opacity *= sample_texture(d.x, s.uv, false).a;
     flags = d.w;
-    cutoff = uintBitsToFloat(texelFetch(materials, at + 2).w);
+    cutoff = uintBitsToFloat(fetch(materials, at + 2).w);
     return opacity;
 }
 #endif

@@ -6,6 +6,7 @@
 #extension GL_EXT_control_flow_attributes : require
 #include "shared/constants.h"
 #include "shared/layouts.h"
+#include "lib/fetch.glsl"
 
 layout(constant_id = SPEC_GROUP_SIZE) const uint GROUP_SIZE = 64;
 layout(constant_id = SPEC_CUT_OFF) const float CUT_OFF = float(ALPHA_MIN);

@@ -36,8 +36,6 @@ vec4 blur_row(vec4 texels[ROW_SPAN], int o) {
 }
 
 // The texel, or zero outside the image.
-vec4 fetch_or_zero(samplerBuffer source, bool inside, int at) {
-    const vec4 value = texelFetch(source, inside ? at : 0);
-    return inside ? value : vec4(0.0);
-}
+vec4 or_zero(bool inside, vec4 value) { return inside ? value : vec4(0.0); }
+#define fetch_or_zero(SOURCE, INSIDE, AT) or_zero(INSIDE, fetch(SOURCE, (INSIDE) ? (AT) : 0))
 #endif

@@ -48,9 +48,9 @@ bool stops(Ray ray, uint triangle, uint material, vec2 barycentric) {
 // Moeller and Trumbore 1997. Triangles are slightly enlarged, so that neighbours leave no gap.
 void meet_triangle(Ray ray, uint triangle, inout Hit hit) {
     const int at = int(triangle * TRIANGLE_TEXELS);
-    const uvec4 corner = texelFetch(triangles, at);
-    const vec3 e1 = uintBitsToFloat(texelFetch(triangles, at + 1).xyz);
-    const uvec4 last = texelFetch(triangles, at + 2);
+    const uvec4 corner = fetch(triangles, at);
+    const vec3 e1 = uintBitsToFloat(fetch(triangles, at + 1).xyz);
+    const uvec4 last = fetch(triangles, at + 2);
     const vec3 e2 = uintBitsToFloat(last.xyz);
     const vec3 p = cross(ray.direction, e2), s = ray.origin - uintBitsToFloat(corner.xyz), q = cross(s, e1);
     const float determinant = dot(e1, p), inverse = 1.0 / determinant;
@@ -82,9 +82,9 @@ Hit trace(Ray ray, uint max_steps) {
         bool pop = false;
         if ((current & LEAF_FLAG) == 0u) {
             const int at = int(current * NODE_TEXELS);
-            const uvec4 low0 = texelFetch(nodes, at), low1 = texelFetch(nodes, at + 2);
-            const vec3 high0 = uintBitsToFloat(texelFetch(nodes, at + 1).xyz);
-            const vec3 high1 = uintBitsToFloat(texelFetch(nodes, at + 3).xyz);
+            const uvec4 low0 = fetch(nodes, at), low1 = fetch(nodes, at + 2);
+            const vec3 high0 = uintBitsToFloat(fetch(nodes, at + 1).xyz);
+            const vec3 high1 = uintBitsToFloat(fetch(nodes, at + 3).xyz);
             const float t0 = enter_box(uintBitsToFloat(low0.xyz), high0, ray.origin, inverse, hit.distance);
             const float t1 = enter_box(uintBitsToFloat(low1.xyz), high1, ray.origin, inverse, hit.distance);
             const bool first = t0 <= t1;

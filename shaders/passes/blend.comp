@@ -13,7 +13,7 @@ layout(constant_id = SPEC_MODE) const uint MODE = 0;
 const bool WITH_DEPTH = MODE == BLEND_DEPTH;
 const bool WITH_COUNT = MODE == BLEND_COUNT;
 
-layout(set = 0, binding = 0) uniform samplerBuffer records;
+TEXELS(0, records);
 layout(set = 0, binding = 1, scalar) readonly buffer Splats { uint splats[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer TileStarts { uint tile_starts[]; };
 layout(set = 0, binding = 3, scalar) writeonly buffer Planes { float planes[]; };
@@ -47,10 +47,10 @@ void main() {
     }
     const uint end = tile_starts[tile + 1u];
     for (uint k = tile_starts[tile]; k < end; k += SUBGROUP) {
-        const int splat = int(RECORD_TEXELS * splats[min(k + lane, end - 1u)]);
-        const vec4 record0 = texelFetch(records, splat);
-        vec4 record1 = texelFetch(records, splat + 1);
-        const vec4 record2 = texelFetch(records, splat + 2);
+        const uint splat = RECORD_TEXELS * splats[min(k + lane, end - 1u)];
+        const vec4 record0 = fetch(records, splat);
+        vec4 record1 = fetch(records, splat + 1u);
+        const vec4 record2 = fetch(records, splat + 2u);
         record1.w = k + lane < end ? record1.w : 0.0;
         const float ratio_step = ratio_step_of(record1);
         [[unroll]] for (uint j = 0; j < SUBGROUP; ++j) {

@@ -15,7 +15,7 @@ layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_MODE) const uint MODE = 0;
 const bool ABSOLUTE = (MODE & BLEND_BACKWARD_ABSOLUTE) != 0u;
 const uint SUMS = ABSOLUTE ? 11u : 9u;
-layout(set = 0, binding = 0) uniform samplerBuffer records;
+TEXELS(0, records);
 layout(set = 0, binding = 1, scalar) readonly buffer Splats { uint splats[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer TileStarts { uint tile_starts[]; };
 layout(set = 0, binding = 3, scalar) readonly buffer Planes { float planes[]; };
@@ -74,10 +74,10 @@ void main() {
     const uint end = tile_starts[tile + 1u];
     uint k = tile_starts[tile];
     for (; k < end; k += SUBGROUP) {
-        const int splat = int(RECORD_TEXELS * splats[min(k + lane, end - 1u)]);
-        const vec4 record0 = texelFetch(records, splat);
-        vec4 record1 = texelFetch(records, splat + 1);
-        const vec4 record2 = texelFetch(records, splat + 2);
+        const uint splat = RECORD_TEXELS * splats[min(k + lane, end - 1u)];
+        const vec4 record0 = fetch(records, splat);
+        vec4 record1 = fetch(records, splat + 1u);
+        const vec4 record2 = fetch(records, splat + 2u);
         record1.w = k + lane < end ? record1.w : 0.0;
         const float ratio_step = ratio_step_of(record1);
         float slot[11];

@@ -8,7 +8,7 @@
 #include "lib/densify.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
-layout(set = 0, binding = 0) uniform samplerBuffer params;
+TEXELS(0, params);
 layout(set = 0, binding = 1, scalar) readonly buffer Statistics { vec2 statistics[]; };
 layout(set = 0, binding = 2, scalar) writeonly buffer Outputs { uint outputs[]; };
 layout(push_constant, scalar) uniform Push { DensifyPush push; };
@@ -18,6 +18,6 @@ void main() {
     if (i >= push.splats) return;
     vec4 p[3];
     [[unroll]] for (uint plane = 0; plane < 3; ++plane)
-        p[plane] = texelFetch(params, int(param_texel(push.planes, plane, i)));
+        p[plane] = fetch(params, param_texel(push.planes, plane, i));
     outputs[i] = outputs_of(action_of(push, p[0], p[1], p[2], statistics[i]));
 }

@@ -15,9 +15,9 @@
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3; // stored
-layout(set = 0, binding = 0) uniform samplerBuffer params;
-layout(set = 0, binding = 1) uniform samplerBuffer moments1;
-layout(set = 0, binding = 2) uniform samplerBuffer moments2;
+TEXELS(0, params);
+TEXELS(1, moments1);
+TEXELS(2, moments2);
 layout(set = 0, binding = 3, scalar) readonly buffer Statistics { vec2 statistics[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer Prefix { uint prefix[]; };
 layout(set = 0, binding = 5, scalar) readonly buffer Totals { uint totals[]; };
@@ -33,7 +33,7 @@ void main() {
     if (i >= push.splats) return;
     vec4 p[3];
     [[unroll]] for (uint plane = 0; plane < 3; ++plane)
-        p[plane] = texelFetch(params, int(param_texel(PLANES, plane, i)));
+        p[plane] = fetch(params, param_texel(PLANES, plane, i));
     const vec4 p0 = p[0], p1 = p[1], p2 = p[2];
     const uint action = action_of(push, p0, p1, p2, statistics[i]);
     const uint first = totals[i / push.scan_block] + prefix[i];
@@ -52,11 +52,11 @@ void main() {
         }
         [[unroll]] for (uint plane = 0; plane < PLANES; ++plane) {
             const int from = int(param_texel(PLANES, plane, i));
-            vec4 value = texelFetch(params, from);
+            vec4 value = fetch(params, from);
             if (plane == 0u) value = vec4(mean, logit);
             if (plane == 2u) value.xyz = log_scale;
-            const vec4 m1 = keeps_moments ? texelFetch(moments1, from) : vec4(0.0);
-            const vec4 m2 = keeps_moments ? texelFetch(moments2, from) : vec4(0.0);
+            const vec4 m1 = keeps_moments ? fetch(moments1, from) : vec4(0.0);
+            const vec4 m2 = keeps_moments ? fetch(moments2, from) : vec4(0.0);
             if (written) {
                 const uint at = param_texel(PLANES, plane, to);
                 params_out[at] = value;

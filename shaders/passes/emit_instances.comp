@@ -12,7 +12,7 @@
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_MODE) const uint MODE = 0;
-layout(set = 0, binding = 0) uniform samplerBuffer records;
+TEXELS(0, records);
 layout(set = 0, binding = 1, scalar) readonly buffer Order { uint order[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer TileCounts { uint tile_counts[]; };
 layout(set = 0, binding = 3, scalar) readonly buffer Prefix { uint prefix[]; };
@@ -30,8 +30,8 @@ void main() {
     const uint count = tile_counts[splat];
     if (count == 0u) return;
     const uvec2 size = uvec2(push.size[0], push.size[1]);
-    const Footprint f = footprint_of(texelFetch(records, int(RECORD_TEXELS * splat)),
-                                     texelFetch(records, int(RECORD_TEXELS * splat + 1u)), size);
+    const Footprint f = footprint_of(fetch(records, RECORD_TEXELS * splat),
+                                     fetch(records, RECORD_TEXELS * splat + 1u), size);
     const uint strip = gl_WorkGroupID.z;
     const uint begin = max(f.row_begin, strip * push.strip_rows), end = min(f.row_end, (strip + 1u) * push.strip_rows);
     const uint first = totals[rank / push.scan_block] + prefix[rank];

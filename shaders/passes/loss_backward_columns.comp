@@ -7,7 +7,7 @@
 #include "lib/ssim.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
-layout(set = 0, binding = 0) uniform samplerBuffer derivatives;
+TEXELS(0, derivatives);
 layout(set = 0, binding = 1, scalar) writeonly buffer Blurred { vec4 blurred[]; };
 layout(push_constant, scalar) uniform Push { LossPush push; };
 

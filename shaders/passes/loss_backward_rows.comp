@@ -11,9 +11,9 @@
 #include "lib/ssim.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
-layout(set = 0, binding = 0) uniform samplerBuffer blurred;
-layout(set = 0, binding = 1) uniform samplerBuffer image;
-layout(set = 0, binding = 2) uniform samplerBuffer target;
+TEXELS(0, blurred);
+TEXELS(1, image);
+TEXELS(2, target);
 layout(set = 0, binding = 3, scalar) writeonly buffer ImageGradient { vec4 image_gradient[]; };
 layout(set = 0, binding = 4, scalar) writeonly buffer Partials { float partials[]; };
 layout(push_constant, scalar) uniform Push { LossPush push; };

@@ -9,8 +9,8 @@
 #include "lib/ssim.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
-layout(set = 0, binding = 0) uniform samplerBuffer image;
-layout(set = 0, binding = 1) uniform samplerBuffer target;
+TEXELS(0, image);
+TEXELS(1, target);
 layout(set = 0, binding = 2, scalar) writeonly buffer Moments { vec4 moments[]; };
 layout(push_constant, scalar) uniform Push { LossPush push; };
 

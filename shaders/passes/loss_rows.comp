@@ -11,7 +11,7 @@
 #include "lib/ssim.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
-layout(set = 0, binding = 0) uniform samplerBuffer moments;
+TEXELS(0, moments);
 layout(set = 0, binding = 1, scalar) writeonly buffer Derivatives { vec4 derivatives[]; };
 layout(set = 0, binding = 2, scalar) writeonly buffer Partials { float partials[]; };
 layout(push_constant, scalar) uniform Push { LossPush push; };

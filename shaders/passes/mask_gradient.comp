@@ -7,14 +7,14 @@
 #include "lib/image.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
-layout(set = 0, binding = 0) uniform samplerBuffer photo;
+COLOR_TEXELS(0, photo);
 layout(set = 0, binding = 1, scalar) buffer ImageGradient { float image_gradient[]; };
 layout(push_constant, scalar) uniform Push { ImageLayout push; };
 
 void main() {
     const uint i = item_index();
     if (i >= push.size[0] * push.size[1]) return;
-    const float weight = texelFetch(photo, int(i)).a;
+    const float weight = fetch_color(photo, i).a;
     const uint at = pixel_offset(push, i);
     for (uint c = 0; c < 3; ++c) image_gradient[c * push.plane_floats + at] *= weight;
 }

@@ -8,7 +8,7 @@
 #include "lib/image.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
-layout(set = 0, binding = 0) uniform samplerBuffer photo;
+COLOR_TEXELS(0, photo);
 layout(set = 0, binding = 1, scalar) readonly buffer Image { float image[]; };
 layout(set = 0, binding = 2, scalar) writeonly buffer Target { float target[]; };
 layout(set = 0, binding = 3, scalar) writeonly buffer Masked { float masked[]; };
@@ -17,7 +17,7 @@ layout(push_constant, scalar) uniform Push { ImageLayout push; };
 void main() {
     const uint i = item_index();
     if (i >= push.size[0] * push.size[1]) return;
-    const vec4 texel = texelFetch(photo, int(i));
+    const vec4 texel = fetch_color(photo, i);
     const uint at = pixel_offset(push, i);
     for (uint c = 0; c < 3; ++c) {
         const uint k = c * push.plane_floats + at;

@@ -8,7 +8,7 @@
 #include "lib/params.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
-layout(set = 0, binding = 0) uniform samplerBuffer params;
+TEXELS(0, params);
 layout(set = 0, binding = 1, scalar) writeonly buffer Weights { uint weights[]; };
 layout(set = 0, binding = 2, scalar) writeonly buffer Dead { uint dead[]; };
 layout(push_constant, scalar) uniform Push { McmcPush push; };
@@ -16,8 +16,8 @@ layout(push_constant, scalar) uniform Push { McmcPush push; };
 void main() {
     const uint i = item_index();
     if (i >= push.splats) return;
-    const vec4 p0 = texelFetch(params, int(param_texel(push.planes, 0u, i))), p1 = texelFetch(params, int(param_texel(push.planes, 1u, i))),
-               p2 = texelFetch(params, int(param_texel(push.planes, 2u, i)));
+    const vec4 p0 = fetch(params, param_texel(push.planes, 0u, i)), p1 = fetch(params, param_texel(push.planes, 1u, i)),
+               p2 = fetch(params, param_texel(push.planes, 2u, i));
     const bool alive = is_finite(p0) && is_finite(p1) && is_finite(p2) && p0.w > push.dead_logit;
     weights[i] = alive ? uint(push.weight_scale / (1.0 + exp(-p0.w))) : 0u;
     dead[i] = alive ? 0u : 1u;

@@ -14,9 +14,9 @@
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3; // stored
-layout(set = 0, binding = 0) uniform samplerBuffer params;
-layout(set = 0, binding = 1) uniform samplerBuffer moments1;
-layout(set = 0, binding = 2) uniform samplerBuffer moments2;
+TEXELS(0, params);
+TEXELS(1, moments1);
+TEXELS(2, moments2);
 layout(set = 0, binding = 3, scalar) readonly buffer Dead { uint dead[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer Prefix { uint prefix[]; }; // of dead
 layout(set = 0, binding = 5, scalar) readonly buffer Totals { uint totals[]; };
@@ -36,25 +36,25 @@ void main() {
     if (j >= push.splats) source = sources[push.dead + j - push.splats];
     else if (dead[j] != 0u) source = sources[totals[j / push.scan_block] + prefix[j]];
     const uint copies = hits[source];
-    const float logit = texelFetch(params, int(param_texel(PLANES, 0u, source))).w;
+    const float logit = fetch(params, param_texel(PLANES, 0u, source)).w;
     const vec2 part = relocated(logit, copies + 1u);
     const float opacity = clamp(part.x, push.least_opacity, 1.0 - 1e-6);
     vec3 offset = vec3(0.0);
     if (push.spread > 0.0) {
         float norm;
         const vec3 normal = normal3(uvec4(j, push.step, push.seed[0], push.seed[1] ^ MCMC_SPREAD_STREAM));
-        const vec3 scale = exp(texelFetch(params, int(param_texel(PLANES, 2u, source))).xyz);
-        const mat3 rotation = rotation_of(normalize_quaternion(texelFetch(params, int(param_texel(PLANES, 1u, source))), norm));
+        const vec3 scale = exp(fetch(params, param_texel(PLANES, 2u, source)).xyz);
+        const mat3 rotation = rotation_of(normalize_quaternion(fetch(params, param_texel(PLANES, 1u, source)), norm));
         offset = push.spread * (rotation * (scale * normal));
     }
     [[unroll]] for (uint plane = 0; plane < PLANES; ++plane) {
         const int from = int(param_texel(PLANES, plane, source));
         const uint to = param_texel(PLANES, plane, j);
-        vec4 value = texelFetch(params, from);
+        vec4 value = fetch(params, from);
         if (plane == 0u && copies > 0u) value = vec4(value.xyz + offset, log(opacity / (1.0 - opacity)));
         if (plane == 2u && copies > 0u) value.xyz += log(part.y);
         params_out[to] = value;
-        moments1_out[to] = copies > 0u ? vec4(0.0) : texelFetch(moments1, from);
-        moments2_out[to] = copies > 0u ? vec4(0.0) : texelFetch(moments2, from);
+        moments1_out[to] = copies > 0u ? vec4(0.0) : fetch(moments1, from);
+        moments2_out[to] = copies > 0u ? vec4(0.0) : fetch(moments2, from);
     }
 }

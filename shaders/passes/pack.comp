@@ -7,7 +7,7 @@
 #include "lib/prelude.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
-layout(set = 0, binding = 0) uniform samplerBuffer planes;
+TEXELS(0, planes);
 layout(set = 0, binding = 1, scalar) writeonly buffer Packed { uint packed[]; };
 layout(push_constant, scalar) uniform Push { PackPush push; };
 
@@ -20,9 +20,9 @@ uvec4 to_byte(vec4 v) {
 void main() {
     const uint i = item_index(), texels = push.plane_floats / 4u;
     if (i >= texels) return;
-    const uvec4 r = to_byte(texelFetch(planes, int(PLANE_R * texels + i)));
-    const uvec4 g = to_byte(texelFetch(planes, int(PLANE_G * texels + i)));
-    const uvec4 b = to_byte(texelFetch(planes, int(PLANE_B * texels + i)));
+    const uvec4 r = to_byte(fetch(planes, PLANE_R * texels + i));
+    const uvec4 g = to_byte(fetch(planes, PLANE_G * texels + i));
+    const uvec4 b = to_byte(fetch(planes, PLANE_B * texels + i));
     const uvec4 words = r | (g << 8) | (b << 16) | uvec4(0xff000000u);
     for (uint p = 0; p < 4; ++p) packed[4 * i + p] = words[p];
 }

@@ -17,14 +17,14 @@ layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3;
 layout(constant_id = SPEC_MODE) const uint MODE = 0;
 const bool DEBUG = MODE == PROJECT_DEBUG;
 
-layout(set = 0, binding = 0) uniform samplerBuffer params;
+TEXELS(0, params);
 layout(set = 0, binding = 2, scalar) writeonly buffer Records { vec4 records[]; };
 layout(set = 0, binding = 3, scalar) writeonly buffer DepthKeys { uint depth_keys[]; };
 layout(set = 0, binding = 4, scalar) writeonly buffer TileCounts { uint tile_counts[]; };
 layout(set = 0, binding = 5, scalar) buffer CountsBlock { Counts counts; };
 layout(push_constant, scalar) uniform Push { ProjectPush push; };
 
-vec4 param(uint plane, uint i) { return texelFetch(params, int(param_texel(push.planes, plane, i))); }
+vec4 param(uint plane, uint i) { return fetch(params, param_texel(push.planes, plane, i)); }
 
 const uint SH_FLOATS = 3 * (SH_DEGREE + 1) * (SH_DEGREE + 1);
 const uint PLANES = (PARAM_SH + SH_FLOATS + 3) / 4;

@@ -9,7 +9,7 @@
 #include "lib/sorting.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
-layout(set = 0, binding = 0) uniform usamplerBuffer keys;
+WORD_TEXELS(0, keys);
 layout(set = 0, binding = 1, scalar) buffer Counters { uint counters[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer CountsBlock { Counts counts; };
 layout(push_constant, scalar) uniform Push { SortPush push; };
@@ -21,7 +21,7 @@ void main() {
     const uint texels = (items + 3u) / 4u, chunk = chunk_texels(items, push.lanes);
     const uint begin = min(lane * chunk, texels), end = min(begin + chunk, texels);
     for (uint t = begin; t < end; ++t) {
-        const uvec4 four = texelFetch(keys, int(t));
+        const uvec4 four = fetch(keys, t);
         [[unroll]] for (uint c = 0; c < 4; ++c) {
             if (4u * t + c < items) counters[digit_of(four[c], push.shift) * push.lanes + lane] += 1u;
         }

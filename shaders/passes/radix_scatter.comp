@@ -14,14 +14,14 @@ layout(constant_id = SPEC_MODE) const uint MODE = 0;
 const bool OWN_INDICES = (MODE & SORT_OWN_INDICES) != 0u, DROP_KEYS = (MODE & SORT_DROP_KEYS) != 0u,
            TRACKED = (MODE & SORT_TRACKED) != 0u, FIRST = (MODE & SORT_FIRST) != 0u, LAST = (MODE & SORT_LAST) != 0u;
 
-layout(set = 0, binding = 0) uniform usamplerBuffer keys;
-layout(set = 0, binding = 1) uniform usamplerBuffer values;
+WORD_TEXELS(0, keys);
+WORD_TEXELS(1, values);
 layout(set = 0, binding = 2, scalar) buffer Counters { uint counters[]; };
 layout(set = 0, binding = 3, scalar) readonly buffer Bases { uint bases[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer CountsBlock { Counts counts; };
 layout(set = 0, binding = 5, scalar) writeonly buffer KeysOut { uint keys_out[]; };
 layout(set = 0, binding = 6, scalar) writeonly buffer ValuesOut { uint values_out[]; };
-layout(set = 0, binding = 7) uniform usamplerBuffer indices;
+WORD_TEXELS(7, indices);
 layout(set = 0, binding = 8, scalar) writeonly buffer IndicesOut { uint indices_out[]; };
 layout(push_constant, scalar) uniform Push { SortPush push; };
 
@@ -32,10 +32,10 @@ void main() {
     const uint texels = (items + 3u) / 4u, chunk = chunk_texels(items, push.lanes);
     const uint begin = min(lane * chunk, texels), end = min(begin + chunk, texels);
     for (uint t = begin; t < end; ++t) {
-        const uvec4 four = texelFetch(keys, int(t));
+        const uvec4 four = fetch(keys, t);
         const uvec4 own = 4u * t + uvec4(0, 1, 2, 3);
-        const uvec4 carried = OWN_INDICES ? own : texelFetch(values, int(t));
-        const uvec4 index = FIRST ? own : texelFetch(indices, int(t));
+        const uvec4 carried = OWN_INDICES ? own : fetch(values, t);
+        const uvec4 index = FIRST ? own : fetch(indices, t);
         [[unroll]] for (uint c = 0; c < 4; ++c) {
             if (4u * t + c < items) {
                 const uint digit = digit_of(four[c], push.shift);

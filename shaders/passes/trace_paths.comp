@@ -79,9 +79,9 @@ bool meet(inout Path path, uint pixel, uint sample_index) {
     }
     if (path.turn == 0u) path.coverage = 1.0;
     const int at = int(hit.triangle * TRIANGLE_TEXELS);
-    const vec3 corner = uintBitsToFloat(texelFetch(triangles, at).xyz);
-    const vec3 e1 = uintBitsToFloat(texelFetch(triangles, at + 1).xyz);
-    const vec3 e2 = uintBitsToFloat(texelFetch(triangles, at + 2).xyz);
+    const vec3 corner = uintBitsToFloat(fetch(triangles, at).xyz);
+    const vec3 e1 = uintBitsToFloat(fetch(triangles, at + 1).xyz);
+    const vec3 e2 = uintBitsToFloat(fetch(triangles, at + 2).xyz);
     const vec3 point = corner + hit.barycentric.x * e1 + hit.barycentric.y * e2;
     const vec3 outward = normalize(cross(e1, e2));
     const bool front = dot(outward, path.direction) < 0.0;

@@ -7,14 +7,14 @@
 #include "lib/image.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
-layout(set = 0, binding = 0) uniform samplerBuffer photo;
+COLOR_TEXELS(0, photo);
 layout(set = 0, binding = 1, scalar) writeonly buffer Planes { float planes[]; };
 layout(push_constant, scalar) uniform Push { UnpackPush push; };
 
 void main() {
     const uint i = item_index();
     if (i >= push.image.size[0] * push.image.size[1]) return;
-    const vec4 texel = texelFetch(photo, int(i));
+    const vec4 texel = fetch_color(photo, i);
     const vec3 background = vec3(push.background[0], push.background[1], push.background[2]);
     const vec3 color = texel.rgb * texel.a + background * (1.0 - texel.a);
     const uint at = pixel_offset(push.image, i);

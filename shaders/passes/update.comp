@@ -21,11 +21,11 @@ layout(constant_id = SPEC_MODE) const uint MODE = 0;
 const bool GRADIENT_ONLY = (MODE & UPDATE_GRADIENT_ONLY) != 0u, STATISTICS = (MODE & UPDATE_STATISTICS) != 0u,
            REGULARISED = (MODE & UPDATE_REGULARISED) != 0u, ABSOLUTE = (MODE & UPDATE_ABSOLUTE) != 0u;
 
-layout(set = 0, binding = 0) uniform samplerBuffer params;
-layout(set = 0, binding = 2) uniform samplerBuffer records;
-layout(set = 0, binding = 3) uniform samplerBuffer slots;
-layout(set = 0, binding = 4) uniform samplerBuffer moments1;
-layout(set = 0, binding = 5) uniform samplerBuffer moments2;
+TEXELS(0, params);
+TEXELS(2, records);
+TEXELS(3, slots);
+TEXELS(4, moments1);
+TEXELS(5, moments2);
 layout(set = 0, binding = 6, scalar) readonly buffer TileCounts { uint tile_counts[]; };
 layout(set = 0, binding = 7, scalar) readonly buffer FirstInstances { uint first_instances[]; };
 layout(set = 0, binding = 8, scalar) buffer CountsBlock { Counts counts; };
@@ -47,7 +47,7 @@ Sums sum_slots(uint first, uint count) {
         [[unroll]] for (uint c = 0; c < 8; ++c) {
             const bool there = j + c < count;
             const int slot = int(SLOT_TEXELS * sorted_indices[there ? first + j + c : first]);
-            const vec4 t0 = texelFetch(slots, slot), t1 = texelFetch(slots, slot + 1), t2 = texelFetch(slots, slot + 2);
+            const vec4 t0 = fetch(slots, slot), t1 = fetch(slots, slot + 1), t2 = fetch(slots, slot + 2);
             if (there) {
                 s0 += t0;
                 s1 += t1;
@@ -73,8 +73,8 @@ void move(uint plane, uint i, vec4 value, vec4 raw_gradient, vec4 rate, float de
     }
     const vec4 largest = vec4(GRADIENT_MAX);
     const vec4 gradient = mix(raw_gradient, clamp(raw_gradient, -largest, largest), greaterThan(abs(raw_gradient), largest));
-    const vec4 m = mix(gradient, texelFetch(moments1, int(at)), float(ADAM_BETA1));
-    const vec4 v = mix(gradient * gradient, texelFetch(moments2, int(at)), float(ADAM_BETA2));
+    const vec4 m = mix(gradient, fetch(moments1, at), float(ADAM_BETA1));
+    const vec4 v = mix(gradient * gradient, fetch(moments2, at), float(ADAM_BETA2));
     vec4 moved = value - rate * (m * push.bias1) / (sqrt(v * push.bias2) + float(ADAM_EPSILON));
     const bool limited = limit_step(plane, value, depth, moved);
     if (is_finite(moved) && is_finite(m) && is_finite(v)) {
@@ -96,7 +96,7 @@ float move_sh(uint i, vec3 color_gradient, vec3 direction, out vec3 direction_gr
     sh_basis_gradient(SH_DEGREE, direction, slope);
     direction_gradient = vec3(0.0);
     [[unroll]] for (uint plane = PARAM_SH / 4 + 1; plane < PLANES; ++plane) {
-        const vec4 value = texelFetch(params, int(index_of(plane, i)));
+        const vec4 value = fetch(params, index_of(plane, i));
         vec4 gradient = vec4(0.0), rate = vec4(0.0);
         [[unroll]] for (uint c = 0; c < 4; ++c) {
             const uint s = 4 * plane + c - PARAM_SH;
@@ -116,14 +116,14 @@ void main() {
     if (i >= push.splats || counts.instances > push.instance_capacity) return;
     const uint count = tile_counts[i];
     const bool visible = count > 0u;
-    const vec4 p0 = texelFetch(params, int(index_of(0, i))), p1 = texelFetch(params, int(index_of(1, i))),
-               p2 = texelFetch(params, int(index_of(2, i)));
+    const vec4 p0 = fetch(params, index_of(0, i)), p1 = fetch(params, index_of(1, i)),
+               p2 = fetch(params, index_of(2, i));
     const Sums s = sum_slots(visible ? first_instances[i] : 0u, count);
     const Projection p = project_splat(SplatShape(p0.xyz, p0.w, p1, p2.xyz));
     // The mean of an invisible splat may be anything. Zero times a direction that is not finite is not zero.
     const vec3 direction = visible ? normalize(p.view.offset) : vec3(0.0);
     // max(0, .) passes no gradient where the colour is zero.
-    const vec3 shown = texelFetch(records, int(RECORD_TEXELS * i + 2u)).rgb;
+    const vec3 shown = fetch(records, RECORD_TEXELS * i + 2u).rgb;
     const vec3 color_gradient = visible ? s.color * vec3(greaterThan(shown, vec3(0.0))) : vec3(0.0);
     vec3 direction_gradient;
     const float red_gradient = move_sh(i, color_gradient, direction, direction_gradient);

@@ -17,6 +17,7 @@ EWA_UINT(SPEC_MODE, 6u);          // one of the shader's modes below, or a sum o
 EWA_UINT(SPEC_RADIX_BITS, 7u);    // bits a radix pass sorts by, 1..8
 EWA_UINT(SPEC_CUT_OFF, 8u);       // float: contributions below it are skipped; normally ALPHA_MIN
 EWA_UINT(SPEC_ALPHA_TESTED, 9u);  // 1: some mesh material is masked or blended
+EWA_UINT(SPEC_COLOR_FLOATS, 10u);  // a buffer of colours holds 0: 4 bytes a colour; 1: 4 floats
 
 // ---- A splat's parameters ----
 // Flat float f is component f % 4 of texel plane f / 4. Splats are stored in blocks of PARAM_BLOCK. Within a

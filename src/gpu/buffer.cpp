@@ -29,7 +29,8 @@ Buffer::Buffer(Device& device, std::string name, uint64_t bytes, Texel texel, bo
       bytes_((std::max<uint64_t>(bytes, 1) + 15) / 16 * 16),
       texel_(texel),
       uniform_(uniform) {
-    if (texel != Texel::none && bytes_ / texel_bytes(texel) > device.limits().max_texels)
+    const bool fetched = texel != Texel::none && device.limits().texel_buffers;
+    if (fetched && bytes_ / texel_bytes(texel) > device.limits().max_texels)
         throw RunError(
             "buffer " + name_ + " needs " + std::to_string(bytes_ >> 20) +
             " MiB, more than this device can fetch texels from; fewer splats or a smaller image need less");
@@ -42,7 +43,7 @@ Buffer::Buffer(Device& device, std::string name, uint64_t bytes, Texel texel, bo
     using Usage = vk::BufferUsageFlagBits;
     vk::BufferCreateInfo create;
     create.setSize(bytes_).setUsage(Usage::eStorageBuffer | Usage::eTransferSrc | Usage::eTransferDst);
-    if (texel != Texel::none) create.usage |= Usage::eUniformTexelBuffer;
+    if (fetched) create.usage |= Usage::eUniformTexelBuffer;
     if (uniform) create.usage |= Usage::eUniformBuffer;
     try {
         buffer_ = device.handle().createBufferUnique(create);
@@ -54,7 +55,7 @@ Buffer::Buffer(Device& device, std::string name, uint64_t bytes, Texel texel, bo
         device.handle().bindBufferMemory(*buffer_, *memory_, 0);
         if (access != HostAccess::none)
             mapped_ = static_cast<std::byte*>(device.handle().mapMemory(*memory_, 0, VK_WHOLE_SIZE));
-        if (texel != Texel::none) {
+        if (fetched) {
             vk::BufferViewCreateInfo view;
             view.setBuffer(*buffer_).setFormat(format_of(texel)).setRange(bytes_);
             view_ = device.handle().createBufferViewUnique(view);

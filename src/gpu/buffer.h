@@ -11,7 +11,7 @@
 
 namespace ewa::gpu {
 
-/// The format of texelFetch. none: the buffer is storage only.
+/// The format of the texels that shaders fetch. none: the buffer is not for fetches.
 enum class Texel { none, rgba32f, rgba32ui, rgba8 };
 
 class Buffer {

@@ -17,6 +17,7 @@ namespace gpu {
 namespace {
 
 constexpr uint32_t kNeededVersion = VK_API_VERSION_1_2;
+constexpr uint64_t kManyTexels = 1 << 27;              // lavapipe's. Its fetches from texel buffers are fast
 constexpr uint32_t kUsedVersion = VK_API_VERSION_1_3;  // of what a device has
 
 template <class Properties>
@@ -242,6 +243,7 @@ void Device::create_device() {
                                            properties.limits.maxComputeWorkGroupCount.end());
     limits_.max_storage_range = properties.limits.maxStorageBufferRange;
     limits_.max_texels = properties.limits.maxTexelBufferElements;
+    limits_.texel_buffers = limits_.cpu && limits_.max_texels >= kManyTexels;
     limits_.uniform_alignment = properties.limits.minUniformBufferOffsetAlignment;
     const auto family = physical_.getQueueFamilyProperties()[queue_family_];
     limits_.timestamps = family.timestampValidBits > 0;

@@ -20,6 +20,7 @@ struct Limits {
     uint32_t max_groups = 65535;       // workgroups of a dispatch, in each dimension
     uint64_t max_storage_range = 0;    // bytes of a storage binding
     uint64_t max_texels = 0;           // elements of a texel buffer view
+    bool texel_buffers = true;         // buffers with a texel format are fetched by views; else from storage
     uint64_t uniform_alignment = 256;  // bytes
     bool timestamps = false;
     double timestamp_nanoseconds = 1.0;
@@ -55,6 +56,8 @@ class Device {
     /// memory; it states the bytes that are wanted and those that are allocated.
     vk::UniqueDeviceMemory allocate(const vk::MemoryRequirements& requirements, bool host_visible,
                                     HostAccess& mapped);
+    /// Kernels and buffers that are made from now on suit a device of these limits. For tests.
+    void pretend(const Limits& limits) { limits_ = limits; }
     /// Device memory is mapped for no more than this from now on, as on other devices. For tests.
     void limit_host_access(HostAccess most) { most_access_ = most; }
     void released(uint64_t bytes) { allocated_bytes_ -= bytes; }

@@ -17,7 +17,7 @@ bool has(Access access, Access part) {
 
 void check_part(const Pipeline& pipeline, const Binding& binding, const BufferPart& part) {
     const std::string at = "binding " + std::to_string(binding.binding) + " (" + part.buffer->name() + ")";
-    if (binding.kind == BindingKind::texel && part.buffer->texel() == Texel::none)
+    if (binding.kind == BindingKind::texel && !part.buffer->view())
         fail(pipeline, at + " is fetched as texels, and the buffer has no texel format");
     if (binding.kind == BindingKind::uniform && !part.buffer->uniform())
         fail(pipeline, at + " is a uniform block, and the buffer was not made for that");

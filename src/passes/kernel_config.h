@@ -26,6 +26,7 @@ struct KernelConfig {
     uint32_t tile_interleave = 1;              // distance of the tiles of neighbouring workgroups
     uint32_t max_groups = 65535;               // workgroups along one dimension
     uint32_t loop_limit = 65535;               // iterations of a loop in one invocation
+    bool texel_buffers = true;                 // read-only buffers are texel buffers, or storage buffers
     float cut_off =
         float(shared::ALPHA_MIN);  // smaller contributions are skipped; other values compare speed
 };
@@ -40,6 +41,7 @@ inline KernelConfig config_for(const gpu::Limits& limits) {
     config.tile_width = config.subgroup < 8 ? config.subgroup : 8;
     config.tile_height = 64 / config.tile_width;
     config.max_groups = limits.max_groups;
+    config.texel_buffers = limits.texel_buffers;
     if (limits.cpu) {
         // Threads take contiguous parts of a dispatch. Neighbouring workgroups far apart balance these parts.
         config.tile_interleave = 16;

@@ -38,7 +38,7 @@ const gpu::Pipeline& PassCache::pipeline(std::string_view shader, uint32_t group
                            {shared::SPEC_CUT_OFF, std::bit_cast<uint32_t>(config_.cut_off)}};
     constants.insert(constants.end(), variant.begin(), variant.end());
     const gpu::Pipeline& made =
-        device_.pipelines().get(device_, std::string(shader), shader_code(shader), constants);
+        device_.pipelines().get(device_, std::string(shader), shader_code(shader, config_.texel_buffers), constants);
     const std::vector<uint32_t>& declared = made.reflection().constants;
     for (const gpu::SpecConstant& constant : variant)
         if (!std::binary_search(declared.begin(), declared.end(), constant.id))

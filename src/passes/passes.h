@@ -108,7 +108,7 @@ struct Pack {
 
 // The loss of a render against a training image, its gradient, and the training image's mask and exposure.
 
-/// Unpacks a training image into planes, over the background.
+/// Unpacks a training image into planes, over the background. Variant: SPEC_COLOR_FLOATS.
 struct UnpackTarget {
     static constexpr char shader[] = "unpack_target";
     using Work = PerElement<pixels<shared::UnpackPush>>;
@@ -116,13 +116,14 @@ struct UnpackTarget {
 };
 
 /// Unpacks a masked training image, and moves a copy of the render towards it where pixels count less.
+/// Variant: SPEC_COLOR_FLOATS.
 struct MaskPictures {
     static constexpr char shader[] = "mask_pictures";
     using Work = PerElement<pixels<shared::ImageLayout>>;
     gpu::BufferPart photo, image, target, masked;
 };
 
-/// Gradient of MaskPictures, in place.
+/// Gradient of MaskPictures, in place. Variant: SPEC_COLOR_FLOATS.
 struct MaskGradient {
     static constexpr char shader[] = "mask_gradient";
     using Work = PerElement<pixels<shared::ImageLayout>>;
@@ -242,7 +243,8 @@ struct Perturb {
     gpu::BufferPart params, counts;
 };
 
-// Ray tracing of mesh scenes. Variant of each: SPEC_ALPHA_TESTED. The number of workgroups follows from the
+// Ray tracing of mesh scenes. Variant of each: SPEC_ALPHA_TESTED,
+// SPEC_COLOR_FLOATS. The number of workgroups follows from the
 // view's pixels, so record takes it.
 
 /// A mesh scene's buffers, bindings 0 to 5; shared/layouts.h describes their contents.

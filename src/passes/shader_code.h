@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The SPIR-V modules embedded at build time, by the file name of their GLSL source without extension.
+// texel_buffers: the build with texel buffers, or that with storage buffers in their place.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -9,7 +10,7 @@
 
 namespace ewa::passes {
 
-std::span<const std::uint32_t> shader_code(std::string_view name);
+std::span<const std::uint32_t> shader_code(std::string_view name, bool texel_buffers);
 std::vector<std::string_view> shader_names();
 
 }  // namespace ewa::passes

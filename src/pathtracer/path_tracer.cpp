@@ -23,7 +23,7 @@ PathTracer::PathTracer(std::shared_ptr<gpu::Device> device, const pathtracer::Pa
                        const scene::Sky& sky)
     : device_(std::move(device)),
       cache_(*device_),
-      variant_{{shared::SPEC_ALPHA_TESTED, scene.alpha_tested ? 1u : 0u}},
+      variant_{{shared::SPEC_ALPHA_TESTED, scene.alpha_tested ? 1u : 0u}, {shared::SPEC_COLOR_FLOATS, 0}},
       executor_(*device_),
       nodes_(upload("mesh nodes", scene.nodes, gpu::Texel::rgba32ui)),
       triangles_(upload("mesh triangles", scene.triangles, gpu::Texel::rgba32ui)),

@@ -123,13 +123,15 @@ void record_loss(gpu::Recording& recording, passes::PassCache& cache, const Fram
                                 .l1_scale = float((1 - shared::SSIM_WEIGHT) * share)};
     const gpu::Buffer& render = exposure ? frame.exposed : frame.planes;
     const gpu::Buffer& image = masked ? frame.masked : render;
+    const passes::Constants colors{
+        {shared::SPEC_COLOR_FLOATS, photo.texel() == gpu::Texel::rgba32f ? 1u : 0u}};
     if (exposure) record_expose(recording, cache, frame, *exposure);
     if (masked)
-        cache.get<passes::MaskPictures>().record(
+        cache.get<passes::MaskPictures>(colors).record(
             recording, {.photo = photo, .image = render, .target = frame.target, .masked = frame.masked},
             layout);
     else
-        cache.get<passes::UnpackTarget>().record(
+        cache.get<passes::UnpackTarget>(colors).record(
             recording, {.photo = photo, .planes = frame.target},
             {.background = {inputs.background[0], inputs.background[1], inputs.background[2]},
              .image = layout});
@@ -149,7 +151,7 @@ void record_loss(gpu::Recording& recording, passes::PassCache& cache, const Fram
                                                   .partials = frame.partials},
                                                  push);
     if (masked)
-        cache.get<passes::MaskGradient>().record(
+        cache.get<passes::MaskGradient>(colors).record(
             recording, {.photo = photo, .image_gradient = frame.image_gradient}, layout);
     record_mean(recording, cache, frame, shared::REDUCE_TO_L1, float(share));
     if (exposure) record_expose_backward(recording, cache, frame, *exposure);

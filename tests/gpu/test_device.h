@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The device of the GPU tests: opened once, with the validation layer listening, so that every test also
-// fails on what the layer says. EWA_TEST_DEVICE chooses another than the default.
+// fails on what the layer says. EWA_TEST_DEVICE chooses another than the default. With EWA_TEST_KERNELS=gpu it runs the
+// kernels and buffers that a GPU gets.
 #pragma once
 #include <cstdlib>
 #include <memory>
+#include <string_view>
 
 #include "ewa/device.h"
 #include "gpu/device.h"
@@ -15,11 +17,23 @@ using SharedDevice = SharedByTests<std::shared_ptr<gpu::Device>>;
 inline SharedDevice* const checked_device_of_all = SharedDevice::add();
 inline SharedDevice* const unchecked_device_of_all = SharedDevice::add();
 
+/// From now on, this device gets what a GPU with separate memory gets. Call it before anything is made on the device.
+inline void pretend_gpu(gpu::Device& device) {
+    gpu::Limits limits = device.limits();
+    limits.cpu = limits.texel_buffers = false;
+    limits.max_storage_range = ~0u;
+    device.pretend(limits);
+    device.limit_host_access(gpu::HostAccess::none);
+}
+
 inline std::shared_ptr<gpu::Device> open_test_device(bool validation) {
     DeviceOptions options;
     if (const char* name = std::getenv("EWA_TEST_DEVICE")) options.selector = name;
     options.validation = validation;
-    return open_device(options);
+    std::shared_ptr<gpu::Device> opened = open_device(options);
+    const char* kernels = std::getenv("EWA_TEST_KERNELS");
+    if (kernels && std::string_view(kernels) == "gpu") pretend_gpu(*opened);
+    return opened;
 }
 
 inline std::shared_ptr<gpu::Device> device() {

@@ -220,8 +220,8 @@ TEST(Photo, EightBitAndFloatImagesUnpackTheSame) {
         EXPECT_EQ(int(photo.texel()), int(texel));
         Guarded planes("planes", 12 * 5 * 3 * 4);
         r.run([&](gpu::Recording& recording) {
-            r.cache.get<passes::UnpackTarget>().record(recording, {photo, planes},
-                                                       {{1, 0.5f, 0}, {{9, 5}, 12, 60}});
+            r.cache.get<passes::UnpackTarget>({{shared::SPEC_COLOR_FLOATS, texel == gpu::Texel::rgba32f}})
+                .record(recording, {photo, planes}, {{1, 0.5f, 0}, {{9, 5}, 12, 60}});
         });
         expect_intact({&planes});
         return planes.read<float>();

@@ -159,11 +159,11 @@ TEST_F(Barriers, AreWrittenInTheDescription) {
 
 struct Dispatches : testing::Test {
     static std::vector<gpu::SpecConstant> constants() {
-        return {{shared::SPEC_GROUP_SIZE, 64}, {shared::SPEC_CUT_OFF, 0}};
+        return {{shared::SPEC_GROUP_SIZE, 64}, {shared::SPEC_CUT_OFF, 0}, {shared::SPEC_COLOR_FLOATS, 0}};
     }
     gpu::Buffer a = words("a"), b = words("b"), c = words("c"), texels = words("texels", gpu::Texel::rgba32f);
-    gpu::Pipeline starts{*device(), "tile_starts", passes::shader_code("tile_starts"), constants()};
-    gpu::Pipeline unpack{*device(), "unpack_target", passes::shader_code("unpack_target"), constants()};
+    gpu::Pipeline starts{*device(), "tile_starts", passes::shader_code("tile_starts", true), constants()};
+    gpu::Pipeline unpack{*device(), "unpack_target", passes::shader_code("unpack_target", true), constants()};
     gpu::Recording recording = rig().recording();
     const shared::TileStartsPush push{1, 1};
 
@@ -258,6 +258,16 @@ TEST(Constants, AreCompleteAndDeclaredByTheShader) {
               "shader blend has no specialisation constant 4");
 }
 
+/// Calls visit(module) for both builds of every shader.
+template <class Visit>
+void for_each_module(Visit visit) {
+    for (const std::string_view name : passes::shader_names())
+        for (const bool texel_buffers : {true, false}) {
+            SCOPED_TRACE(std::string(name) + (texel_buffers ? "" : " (storage)"));
+            visit(passes::shader_code(name, texel_buffers));
+        }
+}
+
 /// Renderers and trainers come and go on one device; only the first compiles.
 TEST(PassCache, SharesWhatTheDeviceCompiled) {
     passes::PassCache one(*device()), two(*device());
@@ -270,9 +280,7 @@ TEST(PassCache, SharesWhatTheDeviceCompiled) {
 }
 
 TEST(WithValues, ChangesTheDefaultsOfConstantsAndNothingElse) {
-    for (const std::string_view name : passes::shader_names()) {
-        SCOPED_TRACE(std::string(name));
-        const auto spirv = passes::shader_code(name);
+    for_each_module([](std::span<const uint32_t> spirv) {
         passes::Constants given;
         for (const uint32_t id : gpu::reflect(spirv).constants) given.push_back({id, 0x5eed0000 + id});
         const std::vector<uint32_t> changed = gpu::with_values(spirv, given);
@@ -283,13 +291,12 @@ TEST(WithValues, ChangesTheDefaultsOfConstantsAndNothingElse) {
         std::ranges::sort(values);
         EXPECT_EQ(values, gpu::reflect(spirv).constants);
         EXPECT_EQ(gpu::with_values(spirv, {}), std::vector<uint32_t>(spirv.begin(), spirv.end()));
-    }
+    });
 }
 
 TEST(Reflection, FindsTheBindingsOfEveryShader) {
-    for (const std::string_view name : passes::shader_names()) {
-        SCOPED_TRACE(std::string(name));
-        const gpu::Reflection shader = gpu::reflect(passes::shader_code(name));
+    for_each_module([](std::span<const uint32_t> code) {
+        const gpu::Reflection shader = gpu::reflect(code);
         ASSERT_GE(shader.bindings.size(), 2u);
         size_t written = 0;
         for (size_t i = 0; i < shader.bindings.size(); ++i) {
@@ -299,11 +306,12 @@ TEST(Reflection, FindsTheBindingsOfEveryShader) {
         EXPECT_GE(written, 1u);
         EXPECT_GT(shader.push_constant_bytes, 0u);
         EXPECT_LE(shader.push_constant_bytes, 128u);  // what every Vulkan device has
-    }
-    const gpu::Reflection update = gpu::reflect(passes::shader_code("update"));
+    });
+    const gpu::Reflection update = gpu::reflect(passes::shader_code("update", true));
     EXPECT_EQ(update.push_constant_bytes, sizeof(shared::UpdatePush));
     EXPECT_EQ(update.bindings[1].kind, gpu::BindingKind::uniform);
     EXPECT_EQ(update.bindings[0].kind, gpu::BindingKind::texel);
+    EXPECT_EQ(gpu::reflect(passes::shader_code("update", false)).bindings[0].kind, gpu::BindingKind::storage);
     EXPECT_EQ(update.bindings[6].access, Access::read);
     EXPECT_EQ(update.bindings[8].access, Access::read_write);
     EXPECT_EQ(update.bindings[9].access, Access::write);
@@ -313,11 +321,10 @@ TEST(Reflection, FindsTheBindingsOfEveryShader) {
 /// Barriers are minimal and safe only if each buffer's decorations say what the shader does: a buffer that is
 /// only read is readonly, and one that is only written is writeonly.
 TEST(Reflection, EveryBufferIsDecoratedAsItIsUsed) {
-    for (const std::string_view name : passes::shader_names()) {
-        const auto code = passes::shader_code(name);
+    for_each_module([](std::span<const uint32_t> code) {
         const auto used = instruction_accesses(code);
         for (const gpu::Binding& binding : gpu::reflect(code).bindings) {
-            SCOPED_TRACE(std::string(name) + ", binding " + std::to_string(binding.binding));
+            SCOPED_TRACE("binding " + std::to_string(binding.binding));
             const auto found = used.find(binding.binding);
             ASSERT_NE(found, used.end()) << "no instruction uses it";
             const auto [read, write] = found->second;
@@ -326,7 +333,7 @@ TEST(Reflection, EveryBufferIsDecoratedAsItIsUsed) {
                                       : read        ? Access::read
                                                     : Access::write);
         }
-    }
+    });
 }
 
 // ---- Hazards of a whole frame, found from the instructions of the shaders ----
@@ -341,7 +348,8 @@ std::vector<Touch> touches(const Command& command) {
     if (command.kind == Command::Kind::fill) return {{command.uses[0].part.buffer, false, true}};
     if (command.kind == Command::Kind::copy)
         return {{command.uses[0].part.buffer, true, false}, {command.uses[1].part.buffer, false, true}};
-    const auto accesses = instruction_accesses(passes::shader_code(command.pipeline->name()));
+    const auto accesses =
+        instruction_accesses(passes::shader_code(command.pipeline->name(), device()->limits().texel_buffers));
     std::vector<Touch> out;
     for (const auto& [binding, access] : accesses)
         out.push_back({command.uses.at(binding).part.buffer, access.read, access.write});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The SPIR-V modules of the folder $EWA_SHADER_FOLDER, <name>.spv each, in the place of the embedded ones.
+// The SPIR-V modules of the folder $EWA_SHADER_FOLDER, <name>.spv and <name>.storage.spv, in the place of the embedded ones.
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -30,14 +30,14 @@ const std::map<std::string, Words, std::less<>>& modules() {
 
 }  // namespace
 
-std::span<const std::uint32_t> ewa::passes::shader_code(std::string_view name) {
-    const auto found = modules().find(name);
+std::span<const std::uint32_t> ewa::passes::shader_code(std::string_view name, bool texel_buffers) {
+    const auto found = modules().find(std::string(name) + (texel_buffers ? "" : ".storage"));
     if (found == modules().end()) throw std::logic_error("no shader of the name " + std::string(name));
     return found->second;
 }
 
 std::vector<std::string_view> ewa::passes::shader_names() {
     std::vector<std::string_view> names;
-    for (const auto& [name, words] : modules()) names.push_back(name);
+    for (const auto& [name, words] : modules()) if (!name.ends_with(".storage")) names.push_back(name);
     return names;
 }
