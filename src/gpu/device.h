@@ -49,8 +49,9 @@ class Device {
     vk::PipelineCache pipeline_cache() const { return *pipeline_cache_; }
     PipelineStore& pipelines() { return *pipelines_; }
 
-    /// What pipelines ask of 32-bit floats.
-    const FloatModes& float_modes() const { return float_modes_; }
+    /// What pipelines ask of 32-bit floats: what there is. A CPU device is asked for nothing: lavapipe keeps NaN
+    /// anyway, and gives other bytes when asked.
+    FloatModes float_modes() const { return limits_.cpu ? FloatModes{} : float_modes_; }
 
     /// Throws out_of_memory if the driver has no memory left.
     Memory allocate(const vk::MemoryRequirements& requirements, bool host_visible);

@@ -6,6 +6,7 @@
 
 #include "gpu/capabilities.h"
 #include "gpu/pipeline.h"
+#include "gpu/test_device.h"
 #include "passes/shader_code.h"
 
 namespace ewa::test {
@@ -44,6 +45,21 @@ TEST(FloatModesOf, AskForWhatTheDeviceHasAlone) {
     EXPECT_EQ(gpu::float_modes_of(properties), (gpu::FloatModes{true, false}));
 }
 
+TEST(FloatModesOf, AreAskedOfGpusAlone) {
+    const auto own = open_test_device(false);
+    gpu::Limits limits = own->limits();
+    limits.cpu = true;
+    own->pretend(limits);
+    EXPECT_EQ(own->float_modes(), gpu::FloatModes{});
+    limits.cpu = false;
+    own->pretend(limits);
+    const auto there =
+        own->physical()
+            .getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceFloatControlsProperties>()
+            .get<vk::PhysicalDeviceFloatControlsProperties>();
+    EXPECT_EQ(own->float_modes(), gpu::float_modes_of(there));
+}
+
 /// The instructions of a module with an opcode, each without its first word.
 std::vector<std::vector<uint32_t>> instructions(std::span<const uint32_t> spirv, uint32_t opcode) {
     std::vector<std::vector<uint32_t>> found;
@@ -53,7 +69,7 @@ std::vector<std::vector<uint32_t>> instructions(std::span<const uint32_t> spirv,
     return found;
 }
 
-// The validation layer, which listens in the other tests, checks where the instructions stand.
+// With EWA_TEST_KERNELS=gpu, the validation layer of the other tests checks where the instructions stand.
 TEST(WithFloatModes, AddsACapabilityAndAnExecutionModeEach) {
     constexpr uint32_t kEntryPoint = 15, kExecutionMode = 16, kCapability = 17, kSpirv14 = 0x00010400;
     for (const std::string_view name : passes::shader_names()) {
