@@ -48,6 +48,11 @@ OptionalParts optional_parts_of(vk::PhysicalDevice device) {
     OptionalParts parts;
     parts.cpu = device.getProperties().deviceType == vk::PhysicalDeviceType::eCpu;
     parts.subgroups = subgroups_of(device);
+    parts.ballots =
+        bool(device.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceSubgroupProperties>()
+                 .get<vk::PhysicalDeviceSubgroupProperties>()
+                 .supportedOperations &
+             vk::SubgroupFeatureFlagBits::eBallot);
     parts.floats = float_modes_of(
         device.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceFloatControlsProperties>()
             .get<vk::PhysicalDeviceFloatControlsProperties>());
@@ -120,6 +125,7 @@ std::vector<std::string> lacks_of(const OptionalParts& parts) {
     std::vector<std::string> lacks;
     if (!parts.subgroups.controlled)
         lacks.push_back("subgroup size control (kernels run with the lanes that the driver reports)");
+    if (!parts.ballots && !parts.cpu) lacks.push_back("subgroup ballots (sorting is slower)");
     if (!parts.floats.special_values)
         lacks.push_back("exact infinities and NaN (broken splats may not be recognised)");
     if (!parts.floats.denormals)

@@ -43,12 +43,14 @@ FloatModes float_modes_of(const vk::PhysicalDeviceFloatControlsProperties& prope
 struct OptionalParts {
     bool cpu = false;
     Subgroups subgroups;
+    bool ballots = false;  // of subgroups
     FloatModes floats;
     bool timestamps = false;
     bool own_queue = false;      // a compute queue without graphics
     bool cached_memory = false;  // that the host can map
 };
-/// What is not there, each with what follows from it. A shared queue has no consequence on a CPU device.
+/// What is not there, each with what follows from it. Ballots and a queue of its own have no
+/// consequence on a CPU device.
 std::vector<std::string> lacks_of(const OptionalParts& parts);
 
 DeviceInfo describe(vk::PhysicalDevice device, int index);

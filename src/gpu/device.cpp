@@ -16,6 +16,7 @@ namespace ewa {
 namespace gpu {
 namespace {
 
+constexpr uint32_t kVendorAmd = 0x1002;
 constexpr uint64_t kManyTexels = 1 << 27;              // lavapipe's. Its fetches from texel buffers are fast
 constexpr uint32_t kUsedVersion = VK_API_VERSION_1_3;  // of what a device has
 
@@ -147,6 +148,15 @@ void Device::create_device(bool own_queue) {
     limits_.cpu = properties.deviceType == vk::PhysicalDeviceType::eCpu;
     limits_.max_groups = *std::min_element(properties.limits.maxComputeWorkGroupCount.begin(),
                                            properties.limits.maxComputeWorkGroupCount.end());
+    limits_.max_invocations = std::min(properties.limits.maxComputeWorkGroupInvocations,
+                                       properties.limits.maxComputeWorkGroupSize[0]);
+    limits_.shared_bytes = properties.limits.maxComputeSharedMemorySize;
+    const auto operations =
+        physical_.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceSubgroupProperties>()
+            .get<vk::PhysicalDeviceSubgroupProperties>()
+            .supportedOperations;
+    limits_.scalar_loads = properties.vendorID == kVendorAmd;
+    limits_.ballots = bool(operations & vk::SubgroupFeatureFlagBits::eBallot);
     limits_.max_storage_range = properties.limits.maxStorageBufferRange;
     limits_.max_texels = properties.limits.maxTexelBufferElements;
     limits_.texel_buffers = limits_.cpu && limits_.max_texels >= kManyTexels;

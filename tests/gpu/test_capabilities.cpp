@@ -97,6 +97,7 @@ TEST(WithFloatModes, AddsACapabilityAndAnExecutionModeEach) {
 TEST(LacksOf, NamesEachPartOnceWithItsConsequence) {
     const gpu::OptionalParts whole{.cpu = false,
                                    .subgroups = {.lanes = 32, .controlled = true},
+                                   .ballots = true,
                                    .floats = {true, true},
                                    .timestamps = true,
                                    .own_queue = true,
@@ -110,6 +111,8 @@ TEST(LacksOf, NamesEachPartOnceWithItsConsequence) {
     };
     EXPECT_EQ(lacks([](auto& p) { p.subgroups.controlled = false; }),
               "subgroup size control (kernels run with the lanes that the driver reports)");
+    EXPECT_EQ(lacks([](auto& p) { p.ballots = false; }), "subgroup ballots (sorting is slower)");
+    EXPECT_EQ(lacks([](auto& p) { p.ballots = false, p.cpu = true; }), "");
     EXPECT_EQ(lacks([](auto& p) { p.floats.special_values = false; }),
               "exact infinities and NaN (broken splats may not be recognised)");
     EXPECT_EQ(lacks([](auto& p) { p.floats.denormals = false; }),
@@ -120,7 +123,7 @@ TEST(LacksOf, NamesEachPartOnceWithItsConsequence) {
     EXPECT_EQ(lacks([](auto& p) { p.own_queue = false, p.cpu = true; }), "");
     EXPECT_EQ(lacks([](auto& p) { p.cached_memory = false; }),
               "memory that the host caches (reading results back is slow)");
-    EXPECT_EQ(gpu::lacks_of({}).size(), 6u);
+    EXPECT_EQ(gpu::lacks_of({}).size(), 7u);
 }
 
 }  // namespace
