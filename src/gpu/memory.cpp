@@ -57,7 +57,7 @@ Memory& Memory::operator=(Memory&& other) noexcept {
     block_ = std::exchange(other.block_, nullptr);
     offset_ = other.offset_;
     bytes_ = other.bytes_;
-    access_ = other.access_;
+    access_ = std::exchange(other.access_, HostAccess::none);
     return *this;
 }
 
