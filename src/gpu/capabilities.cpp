@@ -76,6 +76,8 @@ bool has_extension(std::span<const vk::ExtensionProperties> available, std::stri
 }
 
 uint32_t subgroup_lanes(uint32_t natural, uint32_t least, uint32_t most) {
+    constexpr uint32_t kNarrow = 8, kWide = 32, kBetween = 16;
+    if (least <= kNarrow && natural >= kWide) return kBetween;
     return std::clamp(std::min(natural, kMostLanes), least, most);
 }
 

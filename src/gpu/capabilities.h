@@ -17,7 +17,8 @@ namespace ewa::gpu {
 bool has_extension(std::span<const vk::ExtensionProperties> available, std::string_view name);
 
 constexpr uint32_t kMostLanes = 64;  // of a subgroup: a tile's pixels
-/// The size that pipelines ask for: a device's own, within its limits, and at most kMostLanes where they allow it.
+/// The size that pipelines with subgroup operations ask for: a device's own, within its limits, and at most kMostLanes
+/// where they allow it. A device that can run 8 lanes as well as 32 (Intel) gets 16: a lane then has twice the registers.
 uint32_t subgroup_lanes(uint32_t natural, uint32_t least, uint32_t most);
 
 struct Subgroups {

@@ -44,13 +44,15 @@ struct FloatMode {
     uint32_t capability, execution_mode;
 };
 constexpr FloatMode kDenormPreserve{4464, 4459}, kSignedZeroInfNanPreserve{4466, 4461};
-constexpr uint32_t kWhole = ~0u;  // in place of a member's number
+constexpr uint32_t kGroupNonUniform = 61;  // the capability of all subgroup operations
+constexpr uint32_t kWhole = ~0u;           // in place of a member's number
 
 using Words = std::span<const uint32_t>;  // of an instruction; the first holds its op
 
 struct Module {
     std::map<uint32_t, Words> declared;  // types and constants, by id
     std::vector<Words> variables;
+    bool uses_subgroups = false;
     std::map<std::array<uint32_t, 3>, uint32_t> decorations;  // id, member, decoration -> operand, or 0
 };
 
@@ -66,6 +68,7 @@ Module parse(Words spirv) {
             module.decorations[{words[1], words[2], words[3]}] = length > 4 ? words[4] : 0;
         if (op >= kOpTypeInt && op <= kOpTypePointer) module.declared[words[1]] = words;
         if (op == kOpConstant) module.declared[words[2]] = words;
+        if (op == kOpCapability && words[1] == kGroupNonUniform) module.uses_subgroups = true;
         if (op == kOpVariable) module.variables.push_back(words);
         at += length;
     }
@@ -137,6 +140,7 @@ Reflection reflect(std::span<const uint32_t> spirv) {
     for (const auto& [key, operand] : module.decorations)
         if (key[2] == kSpecId) result.constants.push_back(operand);
     std::ranges::sort(result.constants);
+    result.uses_subgroups = module.uses_subgroups;
     return result;
 }
 
@@ -219,7 +223,8 @@ Pipeline::Pipeline(Device& device, std::string name, std::span<const uint32_t> s
         vk::ComputePipelineCreateInfo create;
         create.stage.setStage(vk::ShaderStageFlagBits::eCompute).setModule(*module).setPName("main");
         create.stage.setPSpecializationInfo(&specialization);
-        if (device.subgroup_size_control()) {
+        // Without subgroup operations, the driver knows best how wide the shader runs.
+        if (device.subgroup_size_control() && reflection_.uses_subgroups) {
             create.stage.setPNext(&size);
             create.stage.setFlags(vk::PipelineShaderStageCreateFlagBits::eRequireFullSubgroupsEXT);
         }
