@@ -126,16 +126,16 @@ FloatModes float_modes_of(const vk::PhysicalDeviceFloatControlsProperties& prope
 std::vector<std::string> lacks_of(const OptionalParts& parts) {
     std::vector<std::string> lacks;
     if (!parts.subgroups.controlled)
-        lacks.push_back("subgroup size control (kernels run with the lanes that the driver reports)");
-    if (!parts.ballots && !parts.cpu) lacks.push_back("subgroup ballots (sorting is slower)");
+        lacks.emplace_back("subgroup size control (kernels run with the lanes that the driver reports)");
+    if (!parts.ballots && !parts.cpu) lacks.emplace_back("subgroup ballots (sorting is slower)");
     if (!parts.floats.special_values)
-        lacks.push_back("exact infinities and NaN (broken splats may not be recognised)");
+        lacks.emplace_back("exact infinities and NaN (broken splats may not be recognised)");
     if (!parts.floats.denormals)
-        lacks.push_back("exact denormal numbers (values under 1.2e-38 may count as zero)");
-    if (!parts.timestamps) lacks.push_back("timestamps (no times of single passes)");
+        lacks.emplace_back("exact denormal numbers (values under 1.2e-38 may count as zero)");
+    if (!parts.timestamps) lacks.emplace_back("timestamps (no times of single passes)");
     if (!parts.own_queue && !parts.cpu)
-        lacks.push_back("a queue for compute alone (training and the desktop wait for each other)");
-    if (!parts.cached_memory) lacks.push_back("memory that the host caches (reading results back is slow)");
+        lacks.emplace_back("a queue for compute alone (training and the desktop wait for each other)");
+    if (!parts.cached_memory) lacks.emplace_back("memory that the host caches (reading results back is slow)");
     return lacks;
 }
 
