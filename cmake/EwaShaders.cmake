@@ -13,14 +13,14 @@ foreach(shader ${ewa_shaders})
     cmake_path(GET shader STEM name)
     foreach(fetches texels storage)
         set(header ${ewa_spirv_dir}/${name}.${fetches}.spv.h)
-        set(texels "")
-        if(fetches STREQUAL texels)
-            set(texels -DEWA_TEXEL_BUFFERS)
+        set(define "")
+        if("${fetches}" STREQUAL "texels")
+            set(define -DEWA_TEXEL_BUFFERS)
         endif()
         add_custom_command(
             OUTPUT ${header}
             COMMAND ${CMAKE_COMMAND} -E make_directory ${ewa_spirv_dir}
-            COMMAND ${GLSLANG} --quiet --target-env vulkan1.2 -I${PROJECT_SOURCE_DIR}/shaders ${texels}
+            COMMAND ${GLSLANG} --quiet --target-env vulkan1.2 -I${PROJECT_SOURCE_DIR}/shaders ${define}
                     --depfile ${header}.d --vn ${name}_${fetches} -o ${header} ${shader}
             DEPENDS ${shader}
             DEPFILE ${header}.d
