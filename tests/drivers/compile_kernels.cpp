@@ -80,12 +80,18 @@ void compile_splatting(Compiler& compiler) {
                                         UPDATE_STATISTICS | UPDATE_ABSOLUTE}}});
     compiler.compile<passes::ScanBlocks>({{SPEC_MODE, {0, SCAN_GATHERED}}});
     compiler.compile<passes::ScanTotals>();
+    const Values scatter_modes = {0,
+                                  SORT_OWN_INDICES,
+                                  SORT_DROP_KEYS,
+                                  SORT_OWN_INDICES | SORT_DROP_KEYS,
+                                  SORT_TRACKED,
+                                  SORT_TRACKED | SORT_FIRST,
+                                  SORT_TRACKED | SORT_LAST,
+                                  SORT_TRACKED | SORT_FIRST | SORT_LAST};
     compiler.compile<passes::RadixCount>({{SPEC_RADIX_BITS, kBits}});
-    compiler.compile<passes::RadixScatter>(
-        {{SPEC_RADIX_BITS, kBits},
-         {SPEC_MODE,
-          {0, SORT_OWN_INDICES, SORT_DROP_KEYS, SORT_OWN_INDICES | SORT_DROP_KEYS, SORT_TRACKED,
-           SORT_TRACKED | SORT_FIRST, SORT_TRACKED | SORT_LAST, SORT_TRACKED | SORT_FIRST | SORT_LAST}}});
+    compiler.compile<passes::RadixScatter>({{SPEC_RADIX_BITS, kBits}, {SPEC_MODE, scatter_modes}});
+    compiler.compile<passes::RadixCountRanked>({{SPEC_RADIX_BITS, kBits}});
+    compiler.compile<passes::RadixScatterRanked>({{SPEC_RADIX_BITS, kBits}, {SPEC_MODE, scatter_modes}});
     compiler.compile<passes::EmitInstances>({{SPEC_MODE, {0, EMIT_FIRST_INSTANCES}}});
     compiler.compile<passes::TileStarts>();
     compiler.compile<passes::Blend>({{SPEC_MODE, {BLEND_COLOR, BLEND_DEPTH, BLEND_COUNT, BLEND_ELLIPSOIDS}}});
