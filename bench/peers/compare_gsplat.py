@@ -11,7 +11,8 @@ as gsplat's example trainer and docs/training.md state them. Times are means ove
 gsplat needs a CUDA device, and the packages gsplat, torch, numpy and pillow. fused_ssim is used where it is installed. Without them
 the script prints one line and its exit status is 2.
 
-Not run so far: everything on CUDA, since no such machine was there. The reading of datasets, and ewa's half, were run.
+Not run so far: all that needs CUDA, for want of such a machine. Its calls follow the sources of gsplat 1.5.3. The reading of
+datasets and ewa's half were run.
 """
 import argparse, collections, json, math, pathlib, random, struct, subprocess, sys, tempfile, time
 
@@ -273,6 +274,8 @@ class GsplatTrainer:
     def run(self):
         training = [view for i, view in enumerate(self.views) if i % TEST_EVERY]
         held_out, order, chance = self.views[::TEST_EVERY], [], random.Random(self.options.seed)
+        with self.torch.no_grad():
+            self.render(held_out[0], SH_DEGREE)  # gsplat may compile its kernels at the first use
         self.torch.cuda.synchronize()
         start = time.monotonic()
         for number in range(self.options.steps):
