@@ -17,6 +17,7 @@ EWA_UINT(SPEC_MODE, 6u);          // one of the shader's modes below, or a sum o
 EWA_UINT(SPEC_RADIX_BITS, 7u);    // bits a radix pass sorts by, 1..8
 EWA_UINT(SPEC_CUT_OFF, 8u);       // float: contributions below it are skipped; normally ALPHA_MIN
 EWA_UINT(SPEC_ALPHA_TESTED, 9u);  // 1: some mesh material is masked or blended
+EWA_UINT(SPEC_BROADCAST, 11u);     // BROADCAST_*: how the lanes of a tile read a batch of splats
 EWA_UINT(SPEC_COLOR_FLOATS, 10u);  // a buffer of colours holds 0: 4 bytes a colour; 1: 4 floats
 
 // ---- A splat's parameters ----
@@ -90,6 +91,11 @@ EWA_UINT(UPDATE_STATISTICS, 2u);
 EWA_UINT(UPDATE_REGULARISED, 4u);
 // The norm is that of the pixels' absolute gradients (Ye et al. 2024, AbsGS, eq. 7), which do not cancel.
 EWA_UINT(UPDATE_ABSOLUTE, 8u);
+
+// ---- SPEC_BROADCAST ----
+EWA_UINT(BROADCAST_SHUFFLES, 0u);  // one splat a lane, in registers
+EWA_UINT(BROADCAST_SHARED, 1u);    // in shared memory
+EWA_UINT(BROADCAST_UNIFORM, 2u);   // every lane loads every splat: free where uniform loads are scalar
 
 // ---- Where a grand total or a sum is written ----
 // ScanTotalsPush.total

@@ -17,6 +17,7 @@ namespace gpu {
 namespace {
 
 constexpr uint32_t kNeededVersion = VK_API_VERSION_1_2;
+constexpr uint32_t kVendorAmd = 0x1002;
 constexpr uint64_t kManyTexels = 1 << 27;              // lavapipe's. Its fetches from texel buffers are fast
 constexpr uint32_t kUsedVersion = VK_API_VERSION_1_3;  // of what a device has
 
@@ -248,6 +249,7 @@ void Device::create_device() {
         physical_.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceSubgroupProperties>()
             .get<vk::PhysicalDeviceSubgroupProperties>()
             .supportedOperations;
+    limits_.scalar_loads = properties.vendorID == kVendorAmd;
     limits_.ballots = bool(operations & vk::SubgroupFeatureFlagBits::eBallot);
     limits_.max_storage_range = properties.limits.maxStorageBufferRange;
     limits_.max_texels = properties.limits.maxTexelBufferElements;

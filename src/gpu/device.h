@@ -25,6 +25,7 @@ struct Limits {
     uint32_t max_invocations = 128;    // of a workgroup along x
     uint32_t shared_bytes = 16384;     // of a workgroup's shared memory
     bool ballots = false;              // of subgroups
+    bool scalar_loads = false;         // a load from the same address in all lanes costs next to nothing
     bool timestamps = false;
     double timestamp_nanoseconds = 1.0;
 };

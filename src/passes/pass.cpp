@@ -35,6 +35,7 @@ const gpu::Pipeline& PassCache::pipeline(std::string_view shader, uint32_t group
                            {shared::SPEC_SUBGROUP, config_.subgroup},
                            {shared::SPEC_TILE_WIDTH, config_.tile_width},
                            {shared::SPEC_TILE_HEIGHT, config_.tile_height},
+                           {shared::SPEC_BROADCAST, config_.broadcast},
                            {shared::SPEC_CUT_OFF, std::bit_cast<uint32_t>(config_.cut_off)}};
     constants.insert(constants.end(), variant.begin(), variant.end());
     const gpu::Pipeline& made =

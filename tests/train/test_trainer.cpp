@@ -123,12 +123,17 @@ TEST(Trainer, TheSameSeedWritesTheSameBytesAndAnotherDoesNot) {
     EXPECT_NE(first, bytes(2));
 }
 
-/// GPUs with memory of their own: the host maps none of it, or reads what it maps slowly.
-TEST(Trainer, MemoryThatTheHostCannotReadChangesNoByte) {
+/// GPUs with memory of their own: the host maps none of it, or reads what it maps slowly. Their kernels sort and blend in
+/// other ways.
+TEST(Trainer, MemoryAndKernelsOfAGpuChangeNoByte) {
     const Gaussians start = shaken_start(small_capture(), 0.05, 1, 1);
-    const auto bytes = [&](gpu::HostAccess most) {
+    const auto bytes = [&](gpu::HostAccess most, bool cpu_kernels = true) {
         const std::shared_ptr<gpu::Device> other = open_test_device(true);
         other->limit_host_access(most);
+        gpu::Limits limits = other->limits();
+        limits.cpu = cpu_kernels;
+        limits.max_storage_range = ~0u;
+        other->pretend(limits);
         TrainOptions options = quick(130);
         options.strategy = Strategy::adc;
         options.grow_gradient = 1e-5;
@@ -140,6 +145,7 @@ TEST(Trainer, MemoryThatTheHostCannotReadChangesNoByte) {
     const std::string mapped = bytes(gpu::HostAccess::read_write);
     EXPECT_TRUE(mapped == bytes(gpu::HostAccess::none));
     EXPECT_TRUE(mapped == bytes(gpu::HostAccess::write));
+    EXPECT_TRUE(mapped == bytes(gpu::HostAccess::none, false));
 }
 
 TEST(Trainer, GrowsUpToTheCapAndNotPastIt) {
