@@ -11,12 +11,12 @@ EWA_UINT(SPEC_GROUP_SIZE, 0u);  // invocations a workgroup
 EWA_UINT(SPEC_SUBGROUP, 1u);    // lanes a subgroup
 EWA_UINT(SPEC_TILE_WIDTH, 2u);  // px; tile width * tile height is a multiple of the subgroup
 EWA_UINT(SPEC_TILE_HEIGHT, 3u);
-EWA_UINT(SPEC_SH_DEGREE, 4u);     // evaluated degree, 0 to 3
-EWA_UINT(SPEC_KERNEL, 5u);        // KERNEL_*
-EWA_UINT(SPEC_MODE, 6u);          // one of the shader's modes below, or a sum of its bits
-EWA_UINT(SPEC_RADIX_BITS, 7u);    // bits a radix pass sorts by, 1..8
-EWA_UINT(SPEC_CUT_OFF, 8u);       // float: contributions below it are skipped; normally ALPHA_MIN
-EWA_UINT(SPEC_ALPHA_TESTED, 9u);  // 1: some mesh material is masked or blended
+EWA_UINT(SPEC_SH_DEGREE, 4u);      // evaluated degree, 0 to 3
+EWA_UINT(SPEC_KERNEL, 5u);         // KERNEL_*
+EWA_UINT(SPEC_MODE, 6u);           // one of the shader's modes below, or a sum of its bits
+EWA_UINT(SPEC_RADIX_BITS, 7u);     // bits a radix pass sorts by, 1..8
+EWA_UINT(SPEC_CUT_OFF, 8u);        // float: contributions below it are skipped; normally ALPHA_MIN
+EWA_UINT(SPEC_ALPHA_TESTED, 9u);   // 1: some mesh material is masked or blended
 EWA_UINT(SPEC_BROADCAST, 11u);     // BROADCAST_*: how the lanes of a tile read a batch of splats
 EWA_UINT(SPEC_COLOR_FLOATS, 10u);  // a buffer of colours holds 0: 4 bytes a colour; 1: 4 floats
 
@@ -153,6 +153,9 @@ struct Counts {
     float ssim;              // mean SSIM
     uint limited_steps;      // steps of a mean, quaternion or scale that were shortened
     uint visible;            // splats that reach a tile; counted with PROJECT_DEBUG
+    // Not cleared by a frame that may begin before the host has read the counts of the one before. Once a frame
+    // has too many instances, this is 1, later frames report 2^32 - 1 instances, and no pass changes the model.
+    uint overflowed;
 };
 
 struct ProjectPush {
@@ -175,7 +178,8 @@ struct ScanPush {
 
 struct ScanTotalsPush {
     uint blocks;
-    uint total;  // TOTAL_*: where the grand total is written
+    uint total;     // TOTAL_*: where the grand total is written
+    uint capacity;  // with TOTAL_INSTANCES: of instances
 };
 
 struct EmitPush {

@@ -48,53 +48,40 @@ Buffer::Buffer(Device& device, std::string name, uint64_t bytes, Texel texel, bo
     try {
         buffer_ = device.handle().createBufferUnique(create);
         const auto requirements = device.handle().getBufferMemoryRequirements(*buffer_);
-        HostAccess access = HostAccess::none;
-        memory_ = device.allocate(requirements, host_visible, access);
-        reads_fast_ = access == HostAccess::read_write;
-        allocated_ = requirements.size;
-        device.handle().bindBufferMemory(*buffer_, *memory_, 0);
-        if (access != HostAccess::none)
-            mapped_ = static_cast<std::byte*>(device.handle().mapMemory(*memory_, 0, VK_WHOLE_SIZE));
+        memory_ = device.allocate(requirements, host_visible);
+        device.handle().bindBufferMemory(*buffer_, memory_.handle(), memory_.offset());
         if (fetched) {
             vk::BufferViewCreateInfo view;
             view.setBuffer(*buffer_).setFormat(format_of(texel)).setRange(bytes_);
             view_ = device.handle().createBufferViewUnique(view);
         }
+    } catch (const vk::OutOfDeviceMemoryError&) {
+        throw device.out_of_memory(bytes_);
+    } catch (const vk::OutOfHostMemoryError&) {
+        throw device.out_of_memory(bytes_);
     } catch (const vk::SystemError& error) {
         throw RunError("buffer " + name_ + " of " + std::to_string(bytes_ >> 20) + " MiB: " + error.what());
     }
 }
 
-Buffer::~Buffer() {
-    if (memory_) device_->released(allocated_);
-}
-
-Buffer::Buffer(Buffer&& other) noexcept {
-    *this = std::move(other);
-}
-
 Buffer& Buffer::operator=(Buffer&& other) noexcept {
     if (this == &other) return *this;
-    if (memory_) device_->released(allocated_);
     device_ = other.device_;
     name_ = std::move(other.name_);
     bytes_ = std::exchange(other.bytes_, 0);
-    allocated_ = std::exchange(other.allocated_, 0);
     texel_ = other.texel_;
     uniform_ = other.uniform_;
     view_ = std::move(other.view_);
     buffer_ = std::move(other.buffer_);
     memory_ = std::move(other.memory_);
-    mapped_ = std::exchange(other.mapped_, nullptr);
-    reads_fast_ = other.reads_fast_;
     return *this;
 }
 
 void Buffer::upload(std::span<const std::byte> data, uint64_t offset) {
     assert(offset + data.size() <= bytes_);
     if (data.empty()) return;
-    if (mapped_)
-        std::memcpy(mapped_ + offset, data.data(), data.size());
+    if (mapped())
+        std::memcpy(mapped() + offset, data.data(), data.size());
     else
         copy_through_staging(data, {}, offset);
 }
@@ -102,8 +89,8 @@ void Buffer::upload(std::span<const std::byte> data, uint64_t offset) {
 void Buffer::download(std::span<std::byte> data, uint64_t offset) const {
     assert(offset + data.size() <= bytes_);
     if (data.empty()) return;
-    if (mapped_ && reads_fast_)
-        std::memcpy(data.data(), mapped_ + offset, data.size());
+    if (memory_.access() == HostAccess::read_write)
+        std::memcpy(data.data(), mapped() + offset, data.size());
     else
         copy_through_staging({}, data, offset);
 }
@@ -120,7 +107,7 @@ void Buffer::copy_through_staging(std::span<const std::byte> source, std::span<s
     const auto pool = device.createCommandPoolUnique(pool_info);
     for (size_t done = 0; done < total; done += kPiece) {
         const size_t size = std::min(kPiece, total - done);
-        if (up) std::memcpy(staging.mapped_, source.data() + done, size);
+        if (up) std::memcpy(staging.mapped(), source.data() + done, size);
         vk::CommandBufferAllocateInfo allocate;
         allocate.setCommandPool(*pool).setCommandBufferCount(1);
         auto commands = std::move(device.allocateCommandBuffersUnique(allocate).front());
@@ -140,7 +127,7 @@ void Buffer::copy_through_staging(std::span<const std::byte> source, std::span<s
         submit.setCommandBuffers(*commands);
         device_->queue().submit(submit);
         device_->queue().waitIdle();
-        if (!up) std::memcpy(target.data() + done, staging.mapped_, size);
+        if (!up) std::memcpy(target.data() + done, staging.mapped(), size);
     }
 }
 

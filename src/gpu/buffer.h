@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "gpu/device.h"
@@ -22,8 +23,7 @@ class Buffer {
     /// written. Throws RunError if memory runs out, or if one binding cannot address that many bytes.
     Buffer(Device& device, std::string name, uint64_t bytes, Texel texel = Texel::none, bool uniform = false,
            bool host_visible = false);
-    ~Buffer();
-    Buffer(Buffer&& other) noexcept;
+    Buffer(Buffer&& other) noexcept { *this = std::move(other); }
     Buffer& operator=(Buffer&& other) noexcept;
 
     const std::string& name() const { return name_; }
@@ -35,7 +35,7 @@ class Buffer {
     explicit operator bool() const { return bool(buffer_); }
 
     /// The host's address of the memory. Null if the host cannot map it.
-    std::byte* mapped() const { return mapped_; }
+    std::byte* mapped() const { return memory_.mapped(); }
     /// Blocking copies. They use a staging buffer if the host cannot map the memory. The device must be idle.
     void upload(std::span<const std::byte> data, uint64_t offset = 0);
     void download(std::span<std::byte> data, uint64_t offset = 0) const;
@@ -57,14 +57,12 @@ class Buffer {
 
     Device* device_ = nullptr;
     std::string name_;
-    uint64_t bytes_ = 0, allocated_ = 0;
+    uint64_t bytes_ = 0;
     Texel texel_ = Texel::none;
     bool uniform_ = false;
-    vk::UniqueDeviceMemory memory_;
+    Memory memory_;
     vk::UniqueBuffer buffer_;
     vk::UniqueBufferView view_;
-    std::byte* mapped_ = nullptr;
-    bool reads_fast_ = false;  // the host caches what is mapped
 };
 
 }  // namespace ewa::gpu

@@ -13,6 +13,9 @@ namespace {
 
 // Numbers of the SPIR-V specification, section 3.
 enum Op : uint32_t {
+    kOpEntryPoint = 15,
+    kOpExecutionMode = 16,
+    kOpCapability = 17,
     kOpTypeInt = 21,
     kOpTypeFloat = 22,
     kOpTypeVector = 23,
@@ -37,13 +40,19 @@ enum Decoration : uint32_t {
     kOffset = 35
 };
 enum Storage : uint32_t { kUniformConstant = 0, kUniform = 2, kPushConstant = 9, kStorageBuffer = 12 };
-constexpr uint32_t kWhole = ~0u;  // in place of a member's number
+struct FloatMode {
+    uint32_t capability, execution_mode;
+};
+constexpr FloatMode kDenormPreserve{4464, 4459}, kSignedZeroInfNanPreserve{4466, 4461};
+constexpr uint32_t kGroupNonUniform = 61;  // the capability of all subgroup operations
+constexpr uint32_t kWhole = ~0u;           // in place of a member's number
 
 using Words = std::span<const uint32_t>;  // of an instruction; the first holds its op
 
 struct Module {
     std::map<uint32_t, Words> declared;  // types and constants, by id
     std::vector<Words> variables;
+    bool uses_subgroups = false;
     std::map<std::array<uint32_t, 3>, uint32_t> decorations;  // id, member, decoration -> operand, or 0
 };
 
@@ -59,6 +68,7 @@ Module parse(Words spirv) {
             module.decorations[{words[1], words[2], words[3]}] = length > 4 ? words[4] : 0;
         if (op >= kOpTypeInt && op <= kOpTypePointer) module.declared[words[1]] = words;
         if (op == kOpConstant) module.declared[words[2]] = words;
+        if (op == kOpCapability && words[1] == kGroupNonUniform) module.uses_subgroups = true;
         if (op == kOpVariable) module.variables.push_back(words);
         at += length;
     }
@@ -130,6 +140,7 @@ Reflection reflect(std::span<const uint32_t> spirv) {
     for (const auto& [key, operand] : module.decorations)
         if (key[2] == kSpecId) result.constants.push_back(operand);
     std::ranges::sort(result.constants);
+    result.uses_subgroups = module.uses_subgroups;
     return result;
 }
 
@@ -143,6 +154,28 @@ std::vector<uint32_t> with_values(std::span<const uint32_t> spirv,
         if (id == module.decorations.end()) continue;
         for (const SpecConstant& constant : constants)
             if (constant.id == id->second) code[at + 3] = constant.value;
+    }
+    return code;
+}
+
+std::vector<uint32_t> with_float_modes(std::span<const uint32_t> spirv, const FloatModes& modes) {
+    std::vector<FloatMode> asked;
+    if (modes.special_values) asked.push_back(kSignedZeroInfNanPreserve);
+    if (modes.denormals) asked.push_back(kDenormPreserve);
+    std::vector<uint32_t> code(spirv.begin(), spirv.begin() + 5);
+    // A module begins with its capabilities. Execution modes follow the entry points.
+    for (const FloatMode& mode : asked) code.insert(code.end(), {2u << 16 | kOpCapability, mode.capability});
+    uint32_t entry = 0;
+    for (size_t at = 5; at < spirv.size(); at += spirv[at] >> 16) {
+        const Words words = spirv.subspan(at, spirv[at] >> 16);
+        const bool is_entry = (words[0] & 0xffff) == kOpEntryPoint;
+        if (entry && !is_entry) {
+            for (const FloatMode& mode : asked)
+                code.insert(code.end(), {4u << 16 | kOpExecutionMode, entry, mode.execution_mode, 32u});
+            entry = 0;
+        }
+        if (is_entry) entry = words[2];
+        code.insert(code.end(), words.begin(), words.end());
     }
     return code;
 }
@@ -176,7 +209,8 @@ Pipeline::Pipeline(Device& device, std::string name, std::span<const uint32_t> s
         layout_ = device.handle().createPipelineLayoutUnique(layout);
 
         vk::ShaderModuleCreateInfo code;
-        const std::vector<uint32_t> words = with_values(spirv, constants);
+        const std::vector<uint32_t> words =
+            with_float_modes(with_values(spirv, constants), device.float_modes());
         code.setCode(words);
         const auto module = device.handle().createShaderModuleUnique(code);
         std::vector<vk::SpecializationMapEntry> entries;
@@ -189,7 +223,8 @@ Pipeline::Pipeline(Device& device, std::string name, std::span<const uint32_t> s
         vk::ComputePipelineCreateInfo create;
         create.stage.setStage(vk::ShaderStageFlagBits::eCompute).setModule(*module).setPName("main");
         create.stage.setPSpecializationInfo(&specialization);
-        if (device.subgroup_size_control()) {
+        // Without subgroup operations, the driver knows best how wide the shader runs.
+        if (device.subgroup_size_control() && reflection_.uses_subgroups) {
             create.stage.setPNext(&size);
             create.stage.setFlags(vk::PipelineShaderStageCreateFlagBits::eRequireFullSubgroupsEXT);
         }

@@ -28,6 +28,7 @@ struct Reflection {
     std::vector<Binding> bindings;  // of set 0; entry i is binding i
     uint32_t push_constant_bytes = 0;
     std::vector<uint32_t> constants;  // ids of the specialisation constants, ascending
+    bool uses_subgroups = false;      // by shuffles, votes or ballots
 };
 
 /// Access of a storage block: read if every member is NonWritable, write if every member is NonReadable
@@ -46,6 +47,9 @@ struct SpecConstant {
 /// pipeline says. All constants are 32 bits wide.
 std::vector<uint32_t> with_values(std::span<const uint32_t> spirv,
                                   const std::vector<SpecConstant>& constants);
+
+/// The module with an entry point that asks for these modes of its 32-bit floats. SPIR-V has them from 1.4 on.
+std::vector<uint32_t> with_float_modes(std::span<const uint32_t> spirv, const FloatModes& modes);
 
 class Pipeline {
   public:

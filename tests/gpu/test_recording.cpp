@@ -196,7 +196,7 @@ TEST_F(Dispatches, RefuseTooFewOrTooManyBuffers) {
 }
 
 TEST_F(Dispatches, RefusePushConstantsOfAnotherSize) {
-    expect_parts(error(starts, {a, b, c}, shared::ScanTotalsPush{}), {"no error"});
+    expect_parts(error(starts, {a, b, c}, shared::ScanPush{}), {"no error"});
     recording = rig().recording();
     expect_parts(error(starts, {a, b, c}, shared::ResetPush{}), {"tile_starts", "8 bytes", "12"});
 }
