@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "golden/golden.h"
 
-#include <OpenImageIO/imageio.h>
+#include <png.h>
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <memory>
 #include <sstream>
 #include <stdexcept>
 #include <vector>
@@ -32,15 +35,39 @@ Image as_rgb(const Image& image) {
     return out;
 }
 
+/// libpng ends an error with longjmp, so no object with a destructor is made here.
+bool write_png16(std::FILE* file, int width, int height, int channels, const uint16_t* words) {
+    constexpr int kTypes[] = {PNG_COLOR_TYPE_GRAY, PNG_COLOR_TYPE_GRAY_ALPHA, PNG_COLOR_TYPE_RGB,
+                              PNG_COLOR_TYPE_RGB_ALPHA};
+    png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
+    png_infop info = png ? png_create_info_struct(png) : nullptr;
+    if (!info || setjmp(png_jmpbuf(png))) {
+        png_destroy_write_struct(&png, &info);
+        return false;
+    }
+    png_init_io(png, file);
+    png_set_compression_level(png, 9);
+    png_set_compression_strategy(png, 0);  // zlib's default
+    png_set_filter(png, 0, PNG_NO_FILTERS);
+    png_set_IHDR(png, info, png_uint_32(width), png_uint_32(height), 16, kTypes[channels - 1],
+                 PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+    png_set_oFFs(png, info, 0, 0, PNG_OFFSET_PIXEL);
+    png_write_info(png, info);
+    if (std::endian::native == std::endian::little) png_set_swap(png);
+    for (int y = 0; y < height; ++y)
+        png_write_row(png, reinterpret_cast<png_const_bytep>(words + size_t(y) * size_t(width * channels)));
+    png_write_end(png, info);
+    png_destroy_write_struct(&png, &info);
+    return true;
+}
+
 void write_png16(const fs::path& path, const Image& image) {
     std::vector<uint16_t> words(image.pixels.size());
     std::transform(image.pixels.begin(), image.pixels.end(), words.begin(),
                    [](float v) { return uint16_t(std::lround(65535 * std::clamp(double(v), 0.0, 1.0))); });
-    const auto output = OIIO::ImageOutput::create("png");
-    OIIO::ImageSpec spec(image.width, image.height, image.channels, OIIO::TypeDesc::UINT16);
-    spec.attribute("png:compressionLevel", 9);
-    if (!output || !output->open(path.string(), spec) ||
-        !output->write_image(OIIO::TypeDesc::UINT16, words.data()) || !output->close())
+    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "wb"), std::fclose);
+    if (!file || !write_png16(file.get(), image.width, image.height, image.channels, words.data()) ||
+        std::fflush(file.get()) != 0)
         throw std::runtime_error(path.string() + ": cannot be written");
 }
 
@@ -92,6 +119,16 @@ void leave_pictures(const fs::path& folder, const Image& candidate, const Image*
 }
 
 }  // namespace
+
+fs::path source_folder() {
+    const char* elsewhere = std::getenv("EWA_TEST_SOURCE");
+    return elsewhere ? elsewhere : EWA_SOURCE_DIR;
+}
+
+GoldenFolders::GoldenFolders()
+    : references(source_folder() / "tests/golden/references"),
+      failures((std::getenv("EWA_TEST_SOURCE") ? source_folder() / "build" : fs::path(EWA_BINARY_DIR)) /
+               "golden") {}
 
 testing::AssertionResult matches_golden(const std::string& name, const Image& candidate,
                                         const Tolerance& tolerance, const std::string& maker,

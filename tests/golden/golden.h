@@ -23,9 +23,15 @@ struct Tolerance {
     uint64_t over = 0;  // px
 };
 
+/// The source tree: $EWA_TEST_SOURCE, for tests that run on another machine, or where the tests were built from.
+std::filesystem::path source_folder();
+
 struct GoldenFolders {
-    std::filesystem::path references = std::filesystem::path(EWA_SOURCE_DIR) / "tests/golden/references";
-    std::filesystem::path failures = std::filesystem::path(EWA_BINARY_DIR) / "golden";
+    GoldenFolders();  // those of the source tree and the build folder
+    GoldenFolders(std::filesystem::path references_, std::filesystem::path failures_)
+        : references(std::move(references_)), failures(std::move(failures_)) {}
+
+    std::filesystem::path references, failures;
 };
 
 /// values in [0, 1], RGB or one channel. maker: who made the candidate, e.g. the device's name.

@@ -210,8 +210,7 @@ GoldenScene poisoned() {
 
 /// The points of the scene that comes with ewa, as training starts from them.
 GoldenScene still_life() {
-    const Dataset dataset =
-        load_dataset(std::filesystem::path(EWA_SOURCE_DIR) / "scenes/still_life", {.downscale = 4});
+    const Dataset dataset = load_dataset(source_folder() / "scenes/still_life", {.downscale = 4});
     GoldenScene s{"still_life_points",
                   gaussians_from_points(dataset.points, 0),
                   dataset.frames.at(5).camera,

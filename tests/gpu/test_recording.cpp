@@ -274,7 +274,7 @@ TEST(PassCache, SharesWhatTheDeviceCompiled) {
     passes::PassCache one(*device()), two(*device());
     EXPECT_EQ(&one.get<passes::TileStarts>().pipeline, &two.get<passes::TileStarts>().pipeline);
     passes::KernelConfig other = one.config();
-    other.element_group *= 2;
+    other.element_group /= 2;  // with 4 lanes, devices may take no more than 128 invocations
     passes::PassCache three(*device(), other);
     EXPECT_NE(one.get<passes::TileStarts>().pipeline.handle(),
               three.get<passes::TileStarts>().pipeline.handle());

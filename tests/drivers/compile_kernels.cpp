@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+// Compiles every variant of every kernel that the device gets, and runs none. scripts/check-drivers runs it on RADV's
+// null device, whose statistics of each kernel follow the name that is printed here.
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <set>
+#include <string>
+#include <string_view>
+
+#include "ewa/device.h"
+#include "gpu/device.h"
+#include "passes/passes.h"
+#include "passes/shader_code.h"
+
+namespace {
+
+using namespace ewa;
+using Values = std::vector<uint32_t>;
+
+/// Every combination of one value of each constant.
+std::vector<passes::Constants> combinations(const std::vector<std::pair<uint32_t, Values>>& choices) {
+    std::vector<passes::Constants> result{{}};
+    for (const auto& [id, values] : choices) {
+        std::vector<passes::Constants> longer;
+        for (const passes::Constants& one : result)
+            for (const uint32_t value : values) {
+                longer.push_back(one);
+                longer.back().push_back({id, value});
+            }
+        result = std::move(longer);
+    }
+    return result;
+}
+
+class Compiler {
+  public:
+    explicit Compiler(gpu::Device& device) : cache_(device) {}
+
+    template <class Definition>
+    void compile(const std::vector<std::pair<uint32_t, Values>>& choices = {}) {
+        for (const passes::Constants& variant : combinations(choices)) {
+            std::fprintf(stderr, "kernel %s", Definition::shader);
+            for (const gpu::SpecConstant& constant : variant) std::fprintf(stderr, " %u", constant.value);
+            std::fputc('\n', stderr);
+            cache_.get<Definition>(variant);
+        }
+        compiled_.insert(Definition::shader);
+    }
+
+    /// Whether no shader was forgotten. Names those that were.
+    bool complete() const {
+        bool complete = true;
+        for (const std::string_view name : passes::shader_names()) {
+            if (compiled_.contains(name)) continue;
+            complete = false;
+            std::fprintf(stderr, "compile_kernels: its source does not name the shader %s\n",
+                         std::string(name).c_str());
+        }
+        return complete;
+    }
+
+  private:
+    passes::PassCache cache_;
+    std::set<std::string_view> compiled_;
+};
+
+const Values kDegrees = {0, 1, 2, 3};
+const Values kFootprints = {shared::KERNEL_PEAK, shared::KERNEL_ANTIALIAS, shared::KERNEL_UNIT_MASS};
+const Values kBits = {1, 2, 3, 4, 5, 6, 7, 8};
+
+void compile_splatting(Compiler& compiler) {
+    using namespace shared;
+    compiler.compile<passes::Project>(
+        {{SPEC_SH_DEGREE, kDegrees}, {SPEC_KERNEL, kFootprints}, {SPEC_MODE, {0, PROJECT_DEBUG}}});
+    compiler.compile<passes::Update>({{SPEC_SH_DEGREE, kDegrees},
+                                      {SPEC_KERNEL, kFootprints},
+                                      {SPEC_MODE,
+                                       {0, UPDATE_GRADIENT_ONLY, UPDATE_STATISTICS, UPDATE_REGULARISED,
+                                        UPDATE_STATISTICS | UPDATE_ABSOLUTE}}});
+    compiler.compile<passes::ScanBlocks>({{SPEC_MODE, {0, SCAN_GATHERED}}});
+    compiler.compile<passes::ScanTotals>();
+    const Values scatter_modes = {0,
+                                  SORT_OWN_INDICES,
+                                  SORT_DROP_KEYS,
+                                  SORT_OWN_INDICES | SORT_DROP_KEYS,
+                                  SORT_TRACKED,
+                                  SORT_TRACKED | SORT_FIRST,
+                                  SORT_TRACKED | SORT_LAST,
+                                  SORT_TRACKED | SORT_FIRST | SORT_LAST};
+    compiler.compile<passes::RadixCount>({{SPEC_RADIX_BITS, kBits}});
+    compiler.compile<passes::RadixScatter>({{SPEC_RADIX_BITS, kBits}, {SPEC_MODE, scatter_modes}});
+    compiler.compile<passes::RadixCountRanked>({{SPEC_RADIX_BITS, kBits}});
+    compiler.compile<passes::RadixScatterRanked>({{SPEC_RADIX_BITS, kBits}, {SPEC_MODE, scatter_modes}});
+    compiler.compile<passes::EmitInstances>({{SPEC_MODE, {0, EMIT_FIRST_INSTANCES}}});
+    compiler.compile<passes::TileStarts>();
+    compiler.compile<passes::Blend>({{SPEC_MODE, {BLEND_COLOR, BLEND_DEPTH, BLEND_COUNT, BLEND_ELLIPSOIDS}}});
+    compiler.compile<passes::BlendBackward>({{SPEC_MODE, {0, BLEND_BACKWARD_ABSOLUTE}}});
+    compiler.compile<passes::Pack>();
+}
+
+void compile_training(Compiler& compiler) {
+    using namespace shared;
+    compiler.compile<passes::UnpackTarget>({{SPEC_COLOR_FLOATS, {0, 1}}});
+    compiler.compile<passes::MaskPictures>({{SPEC_COLOR_FLOATS, {0, 1}}});
+    compiler.compile<passes::MaskGradient>({{SPEC_COLOR_FLOATS, {0, 1}}});
+    compiler.compile<passes::LossColumns>();
+    compiler.compile<passes::LossRows>();
+    compiler.compile<passes::LossBackwardColumns>();
+    compiler.compile<passes::LossBackwardRows>();
+    compiler.compile<passes::Reduce>();
+    compiler.compile<passes::Expose>();
+    compiler.compile<passes::ExposeBackward>();
+    compiler.compile<passes::ExposureUpdate>();
+    compiler.compile<passes::DensifyDecide>();
+    compiler.compile<passes::DensifyWrite>({{SPEC_SH_DEGREE, kDegrees}});
+    compiler.compile<passes::ResetOpacity>();
+    compiler.compile<passes::McmcWeigh>();
+    compiler.compile<passes::McmcDraw>();
+    compiler.compile<passes::McmcWrite>({{SPEC_SH_DEGREE, kDegrees}});
+    compiler.compile<passes::Perturb>();
+}
+
+void compile_path_tracer(Compiler& compiler) {
+    using namespace shared;
+    const std::vector<std::pair<uint32_t, Values>> choices = {{SPEC_ALPHA_TESTED, {0, 1}},
+                                                              {SPEC_COLOR_FLOATS, {0, 1}}};
+    compiler.compile<passes::TracePaths>(choices);
+    compiler.compile<passes::TraceDepth>(choices);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    try {
+        const auto device = open_device({.selector = argc > 1 ? argv[1] : ""});
+        std::fprintf(stderr, "device %s, %u lanes\n", device->info().name.c_str(),
+                     device->info().subgroup_size);
+        Compiler compiler(*device);
+        compile_splatting(compiler);
+        compile_training(compiler);
+        compile_path_tracer(compiler);
+        if (!compiler.complete()) return 1;
+        std::fprintf(stderr, "compiled\n");
+        std::_Exit(0);  // RADV's null device crashes when it is closed
+    } catch (const std::exception& error) {
+        std::fprintf(stderr, "compile_kernels: %s\n", error.what());
+        return 1;
+    }
+}

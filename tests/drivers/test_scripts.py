@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""scripts/check-drivers finds what it is made to find, and scripts/gpu-check reads what ewa-bench prints.
+
+    test_scripts.py EWA_BENCH      the program, whose output is read; without it only the rest is tested
+"""
+import importlib.machinery, importlib.util, pathlib, subprocess, sys, unittest
+
+PROJECT = pathlib.Path(__file__).resolve().parents[2]
+sys.dont_write_bytecode = True  # no cache beside a script
+loader = importlib.machinery.SourceFileLoader("check_drivers", str(PROJECT / "scripts/check-drivers"))
+drivers = importlib.util.module_from_spec(importlib.util.spec_from_loader("check_drivers", loader))
+loader.exec_module(drivers)
+BENCH = sys.argv[1] if len(sys.argv) > 1 else None
+
+
+def row(psnr, images="whole"):
+    return drivers.Row("Mesa", 8, images, psnr, "", True)
+
+
+def kernel(name, spilled=0, code=100):
+    return (f"kernel {name} 0 1\n*** SHADER STATS ***\nSGPRs: 128\nVGPRs: 60\nSpilled SGPRs: 0\nSpilled VGPRs: {spilled}\n"
+            f"Code size: {code}\nScratch size: 0\n")
+
+
+class Drivers(unittest.TestCase):
+    def problems(self, output, family="RDNA3"):
+        return list(drivers.kernel_problems(family, drivers.kernel_statistics(output)))
+
+    def test_psnr_must_agree_on_the_same_images(self):
+        self.assertEqual(list(drivers.psnr_problems([row(20.481), row(20.4815), row(17.0, "half"), row(None)])), [])
+        self.assertEqual(len(list(drivers.psnr_problems([row(20.481), row(20.492)]))), 1)
+        self.assertEqual(len(list(drivers.psnr_problems([row(20.481), row(float("nan"))]))), 1)
+
+    def test_spills_and_long_code_are_problems(self):
+        self.assertEqual(self.problems(kernel("project") + kernel("blend_backward", code=10240)), [])
+        self.assertIn("Spilled VGPRs 3", self.problems(kernel("project") + kernel("project", spilled=3))[0])
+        self.assertEqual(len(self.problems(kernel("blend_backward", code=10244))), 1)
+        self.assertEqual(self.problems(kernel("blend_backward", code=10244), "RDNA1"), [])
+
+    def test_a_kernel_without_statistics_fails(self):
+        with self.assertRaises(drivers.Failure):
+            drivers.kernel_statistics("kernel project 0 1\nkernel update 0 1\n" + kernel("blend"))
+
+    def test_tests_are_counted_only_at_their_end(self):
+        self.assertIsNone(drivers.count_tests("[  FAILED  ] Sort.IsStable (3 ms)\n"))
+        self.assertEqual(drivers.count_tests("[  FAILED  ] Sort.IsStable (3 ms)\n[  PASSED  ] 5 tests.\n"), (5, ["Sort.IsStable"]))
+
+
+class GpuCheck(unittest.TestCase):
+    @unittest.skipUnless(BENCH, "without ewa-bench")
+    def test_each_prediction_finds_its_passes(self):
+        said = subprocess.run([BENCH, "--cases", "capture_2k*train", "--runs", "1"], stdout=subprocess.PIPE, text=True, check=True).stdout
+        script = f'source {PROJECT}/scripts/gpu-check; here={PROJECT}/bench; pass_times <(cat)'
+        rows = subprocess.run(["bash", "-c", script], input=said, stdout=subprocess.PIPE, text=True, check=True).stdout
+        times = {line.split("|")[0]: float(line.split("|")[1]) for line in rows.splitlines()}
+        *passes, other, whole, _ = times
+        self.assertEqual((other, whole), ("other passes", "all passes"))
+        for name in passes:
+            self.assertGreater(times[name], 0, f"no pass of '{name}' in bench/predictions.txt is one of:\n{said}")
+        # What no row names are fills of buffers.
+        self.assertLess(times["other passes"], 0.1 * times["all passes"])
+        self.assertAlmostEqual(sum(times[name] for name in (*passes, other)), times["all passes"], delta=0.1 * times["all passes"])
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
