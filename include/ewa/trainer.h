@@ -56,7 +56,7 @@ struct TrainerArray {
 struct TrainerState {
     StepReport report;
     int sh_degree = 0;  // of the stored coefficients
-    /// params, moments1, moments2 and what the strategy gathers, in the device's layout
+    /// params, moments1, with 32 bits a moment also moments2, and what the strategy gathers, in the device's layout
     /// (shaders/shared/layouts.h).
     std::vector<TrainerArray> arrays;
 };
@@ -66,9 +66,9 @@ struct TrainerState {
 class Trainer {
   public:
     /// train_frames: indices into dataset.frames. start: the first splats, at most options.max_splats.
-    /// Throws InputError (no frame, no or too many splats, an image that cannot be read), RunError (memory).
+    /// Pass an rvalue to spare a copy of them. Throws InputError (no frame, no or too many splats, an image that cannot be read), RunError (memory).
     Trainer(std::shared_ptr<gpu::Device> device, const Dataset& dataset, const std::vector<int>& train_frames,
-            const Gaussians& start, const TrainOptions& options);
+            Gaussians start, const TrainOptions& options);
     ~Trainer();
 
     /// Does one optimisation step, and changes the number of splats if the schedule says so. Throws InputError

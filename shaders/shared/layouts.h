@@ -11,18 +11,19 @@ EWA_UINT(SPEC_GROUP_SIZE, 0u);  // invocations a workgroup
 EWA_UINT(SPEC_SUBGROUP, 1u);    // lanes a subgroup
 EWA_UINT(SPEC_TILE_WIDTH, 2u);  // px; tile width * tile height is a multiple of the subgroup
 EWA_UINT(SPEC_TILE_HEIGHT, 3u);
-EWA_UINT(SPEC_SH_DEGREE, 4u);     // evaluated degree, 0 to 3
-EWA_UINT(SPEC_KERNEL, 5u);        // KERNEL_*
-EWA_UINT(SPEC_MODE, 6u);          // one of the shader's modes below, or a sum of its bits
-EWA_UINT(SPEC_RADIX_BITS, 7u);    // bits a radix pass sorts by, 1..8
-EWA_UINT(SPEC_CUT_OFF, 8u);       // float: contributions below it are skipped; normally ALPHA_MIN
-EWA_UINT(SPEC_ALPHA_TESTED, 9u);  // 1: some mesh material is masked or blended
+EWA_UINT(SPEC_SH_DEGREE, 4u);      // evaluated degree, 0 to 3
+EWA_UINT(SPEC_KERNEL, 5u);         // KERNEL_*
+EWA_UINT(SPEC_MODE, 6u);           // one of the shader's modes below, or a sum of its bits
+EWA_UINT(SPEC_RADIX_BITS, 7u);     // bits a radix pass sorts by, 1..8
+EWA_UINT(SPEC_CUT_OFF, 8u);        // float: contributions below it are skipped; normally ALPHA_MIN
+EWA_UINT(SPEC_ALPHA_TESTED, 9u);   // 1: some mesh material is masked or blended
 EWA_UINT(SPEC_COLOR_FLOATS, 10u);  // a buffer of colours holds 0: 4 bytes a colour; 1: 4 floats
 
 // ---- A splat's parameters ----
 // Flat float f is component f % 4 of texel plane f / 4. Splats are stored in blocks of PARAM_BLOCK. Within a
 // block, plane follows plane: a cache line holds one plane of a block, and a block is contiguous (see
-// lib/params.glsl). Adam's two moments and gradients have the same layout.
+// lib/params.glsl). Gradients and Adam's moments have the same layout, in words: both moments of a value in one word
+// (lib/moments.glsl), or a float32 in each of two buffers.
 EWA_UINT(PARAM_BLOCK, 8u);
 EWA_UINT(PARAM_MEAN, 0u);        // 3 floats, world units
 EWA_UINT(PARAM_OPACITY, 3u);     // logit
@@ -90,6 +91,10 @@ EWA_UINT(UPDATE_STATISTICS, 2u);
 EWA_UINT(UPDATE_REGULARISED, 4u);
 // The norm is that of the pixels' absolute gradients (Ye et al. 2024, AbsGS, eq. 7), which do not cancel.
 EWA_UINT(UPDATE_ABSOLUTE, 8u);
+EWA_UINT(UPDATE_PACKED_MOMENTS, 16u);  // moments1 holds both moments in 16 bits each
+// densify_write.comp, mcmc_write.comp: the array of the next generation that is written
+EWA_UINT(WRITE_PARAMS, 0u);
+EWA_UINT(WRITE_MOMENTS, 1u);  // one of the two in float32, or both in one
 
 // ---- Where a grand total or a sum is written ----
 // ScanTotalsPush.total
@@ -235,6 +240,9 @@ struct UpdatePush {
     float half_size[2];  // W / 2, H / 2: px to normalised device coordinates
     // With UPDATE_REGULARISED: d(loss)/d(opacity) and d(loss)/d(scale along one axis) of every splat.
     float opacity_weight, scale_weight;
+    // With UPDATE_PACKED_MOMENTS: of the rounding.
+    uint seed[2];
+    uint step;
 };
 
 struct DensifyPush {

@@ -3,6 +3,7 @@
 
 #include <cassert>
 #include <cstring>
+#include <stdexcept>
 #include <utility>
 
 #include "ewa/error.h"
@@ -10,11 +11,15 @@
 namespace ewa::gpu {
 namespace {
 
-/// Not for Texel::none.
+/// Not for Texel::none and Texel::any.
 vk::Format format_of(Texel texel) {
     return texel == Texel::rgba32f    ? vk::Format::eR32G32B32A32Sfloat
            : texel == Texel::rgba32ui ? vk::Format::eR32G32B32A32Uint
                                       : vk::Format::eR8G8B8A8Unorm;
+}
+
+uint64_t whole_texels(uint64_t bytes) {
+    return (std::max<uint64_t>(bytes, 1) + 15) / 16 * 16;
 }
 
 uint64_t texel_bytes(Texel texel) {
@@ -23,51 +28,89 @@ uint64_t texel_bytes(Texel texel) {
 
 }  // namespace
 
+/// Device memory, given back when the last buffer in it goes.
+struct Buffer::Memory {
+    Device& device;
+    vk::UniqueDeviceMemory handle;
+    uint64_t bytes;
+
+    Memory(Device& of, vk::UniqueDeviceMemory memory, uint64_t size)
+        : device(of), handle(std::move(memory)), bytes(size) {}
+    ~Memory() { device.released(bytes); }
+};
+
 Buffer::Buffer(Device& device, std::string name, uint64_t bytes, Texel texel, bool uniform, bool host_visible)
     : device_(&device),
       name_(std::move(name)),
-      bytes_((std::max<uint64_t>(bytes, 1) + 15) / 16 * 16),
+      bytes_(whole_texels(bytes)),
       texel_(texel),
       uniform_(uniform) {
-    const bool fetched = texel != Texel::none && device.limits().texel_buffers;
-    if (fetched && bytes_ / texel_bytes(texel) > device.limits().max_texels)
-        throw RunError(
-            "buffer " + name_ + " needs " + std::to_string(bytes_ >> 20) +
-            " MiB, more than this device can fetch texels from; fewer splats or a smaller image need less");
-    // Software drivers report 128 MiB here, but bind buffers of any size.
-    if (!device.limits().cpu && bytes_ > device.limits().max_storage_range)
-        throw RunError("buffer " + name_ + " needs " + std::to_string(bytes_ >> 20) +
-                       " MiB, and this device binds at most " +
-                       std::to_string(device.limits().max_storage_range >> 20) +
-                       " MiB at once; fewer splats or a smaller image need less");
-    using Usage = vk::BufferUsageFlagBits;
-    vk::BufferCreateInfo create;
-    create.setSize(bytes_).setUsage(Usage::eStorageBuffer | Usage::eTransferSrc | Usage::eTransferDst);
-    if (fetched) create.usage |= Usage::eUniformTexelBuffer;
-    if (uniform) create.usage |= Usage::eUniformBuffer;
     try {
-        buffer_ = device.handle().createBufferUnique(create);
+        create_buffer();
         const auto requirements = device.handle().getBufferMemoryRequirements(*buffer_);
         HostAccess access = HostAccess::none;
-        memory_ = device.allocate(requirements, host_visible, access);
+        memory_ = std::make_shared<Memory>(device, device.allocate(requirements, host_visible, access),
+                                           requirements.size);
         reads_fast_ = access == HostAccess::read_write;
-        allocated_ = requirements.size;
-        device.handle().bindBufferMemory(*buffer_, *memory_, 0);
+        device.handle().bindBufferMemory(*buffer_, *memory_->handle, 0);
         if (access != HostAccess::none)
-            mapped_ = static_cast<std::byte*>(device.handle().mapMemory(*memory_, 0, VK_WHOLE_SIZE));
-        if (fetched) {
-            vk::BufferViewCreateInfo view;
-            view.setBuffer(*buffer_).setFormat(format_of(texel)).setRange(bytes_);
-            view_ = device.handle().createBufferViewUnique(view);
-        }
+            mapped_ = static_cast<std::byte*>(device.handle().mapMemory(*memory_->handle, 0, VK_WHOLE_SIZE));
+        create_view();
     } catch (const vk::SystemError& error) {
         throw RunError("buffer " + name_ + " of " + std::to_string(bytes_ >> 20) + " MiB: " + error.what());
     }
 }
 
-Buffer::~Buffer() {
-    if (memory_) device_->released(allocated_);
+Buffer::Buffer(const Buffer& memory, uint64_t offset, std::string name, uint64_t bytes, Texel texel)
+    : device_(memory.device_),
+      name_(std::move(name)),
+      bytes_(whole_texels(bytes)),
+      texel_(texel),
+      memory_(memory.memory_),
+      memory_offset_(offset),
+      mapped_(memory.mapped_ ? memory.mapped_ + offset : nullptr),
+      reads_fast_(memory.reads_fast_) {
+    if (memory.texel_ != Texel::any || offset % kPlacement != 0 || offset + bytes_ > memory.bytes_)
+        throw std::logic_error("buffer " + name_ + " in memory that is not for it");
+    try {
+        create_buffer();
+        device_->handle().bindBufferMemory(*buffer_, *memory_->handle, offset);
+        create_view();
+    } catch (const vk::SystemError& error) {
+        throw RunError("buffer " + name_ + " of " + std::to_string(bytes_ >> 20) + " MiB: " + error.what());
+    }
 }
+
+void Buffer::create_buffer() {
+    const Limits& limits = device_->limits();
+    const bool bound = texel_ != Texel::any;
+    const bool fetched = texel_ != Texel::none && limits.texel_buffers;
+    if (bound && fetched && bytes_ / texel_bytes(texel_) > limits.max_texels)
+        throw RunError(
+            "buffer " + name_ + " needs " + std::to_string(bytes_ >> 20) +
+            " MiB, more than this device can fetch texels from; fewer splats or a smaller image need less");
+    // Software drivers report 128 MiB here, but bind buffers of any size.
+    if (bound && !limits.cpu && bytes_ > limits.max_storage_range)
+        throw RunError("buffer " + name_ + " needs " + std::to_string(bytes_ >> 20) +
+                       " MiB, and this device binds at most " +
+                       std::to_string(limits.max_storage_range >> 20) +
+                       " MiB at once; fewer splats or a smaller image need less");
+    using Usage = vk::BufferUsageFlagBits;
+    vk::BufferCreateInfo create;
+    create.setSize(bytes_).setUsage(Usage::eStorageBuffer | Usage::eTransferSrc | Usage::eTransferDst);
+    if (fetched) create.usage |= Usage::eUniformTexelBuffer;
+    if (uniform_) create.usage |= Usage::eUniformBuffer;
+    buffer_ = device_->handle().createBufferUnique(create);
+}
+
+void Buffer::create_view() {
+    if (texel_ == Texel::none || texel_ == Texel::any || !device_->limits().texel_buffers) return;
+    vk::BufferViewCreateInfo view;
+    view.setBuffer(*buffer_).setFormat(format_of(texel_)).setRange(bytes_);
+    view_ = device_->handle().createBufferViewUnique(view);
+}
+
+Buffer::~Buffer() = default;
 
 Buffer::Buffer(Buffer&& other) noexcept {
     *this = std::move(other);
@@ -75,19 +118,28 @@ Buffer::Buffer(Buffer&& other) noexcept {
 
 Buffer& Buffer::operator=(Buffer&& other) noexcept {
     if (this == &other) return *this;
-    if (memory_) device_->released(allocated_);
     device_ = other.device_;
     name_ = std::move(other.name_);
     bytes_ = std::exchange(other.bytes_, 0);
-    allocated_ = std::exchange(other.allocated_, 0);
     texel_ = other.texel_;
     uniform_ = other.uniform_;
     view_ = std::move(other.view_);
     buffer_ = std::move(other.buffer_);
     memory_ = std::move(other.memory_);
+    memory_offset_ = other.memory_offset_;
     mapped_ = std::exchange(other.mapped_, nullptr);
     reads_fast_ = other.reads_fast_;
     return *this;
+}
+
+bool Buffer::lies_at(const Buffer& memory, uint64_t offset, uint64_t bytes) const {
+    return memory_ && memory_ == memory.memory_ && memory_offset_ == offset && bytes_ == whole_texels(bytes);
+}
+
+bool Buffer::overlaps(const Buffer& other) const {
+    if (this == &other) return true;
+    return memory_ && memory_ == other.memory_ && memory_offset_ < other.memory_offset_ + other.bytes_ &&
+           other.memory_offset_ < memory_offset_ + bytes_;
 }
 
 void Buffer::upload(std::span<const std::byte> data, uint64_t offset) {

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <utility>
 
 #include "core/folders.h"
 #include "ewa/error.h"
@@ -52,10 +53,11 @@ std::vector<T> spread_out(const std::vector<T>& values, size_t count) {
 struct Stopped {};
 
 /// What training a scene without view-dependent colour skips, besides what its plan says.
-PlanLine skipped_sh_degrees(uint32_t splats) {
+PlanLine skipped_sh_degrees(uint32_t splats, int moment_bits) {
     // Parameters and both of Adam's moments.
     const uint64_t bytes =
-        3 * (pipeline::parameter_bytes(splats, kMaxShDegree) - pipeline::parameter_bytes(splats, 0));
+        (1 + 2 * uint64_t(moment_bits) / 32) *
+        (pipeline::parameter_bytes(splats, kMaxShDegree) - pipeline::parameter_bytes(splats, 0));
     return {fmt::format("SH degrees 1 to {}", kMaxShDegree),
             "the dataset says that no colour depends on the view", bytes};
 }
@@ -63,7 +65,8 @@ PlanLine skipped_sh_degrees(uint32_t splats) {
 /// What the trainer skips, and what the choice of the SH degree saved before.
 std::vector<PlanLine> plan_of(const Trainer& trainer, const train::RunInput& input) {
     std::vector<PlanLine> plan = trainer.plan();
-    if (input.without_view_dependence()) plan.push_back(skipped_sh_degrees(uint32_t(input.start.size())));
+    if (input.without_view_dependence())
+        plan.push_back(skipped_sh_degrees(trainer.splats(), input.options.train.moment_bits));
     return plan;
 }
 
@@ -337,9 +340,9 @@ RunResult Run::run() {
     read_checkpoint();
     open_folder();
     start();
-    Trainer trainer(device_, input_.dataset, input_.split.train, input_.start, options().train);
+    Trainer trainer(device_, input_.dataset, input_.split.train, std::exchange(input_.start, {}),
+                    options().train);
     report_.plan = plan_of(trainer, input_);
-    input_.start = {};
     observer_.on_plan(report_.plan);
     if (trainer.images_on_disk() > 0)
         observer_.on_note(

@@ -96,17 +96,17 @@ struct Trainer::State {
     std::deque<std::vector<PassTime>> timings;
 
     State(std::shared_ptr<gpu::Device> d, const Dataset& dataset, const std::vector<int>& frames,
-          const Gaussians& start, const Gaussians& ready, const TrainOptions& o)
+          const Gaussians& ready, double length, const TrainOptions& o)
         : device(std::move(d)),
           options(o),
           schedule(train::schedule_for(o)),
-          extent(extent_for(dataset, frames, start)),
+          extent(length),
           cache(*device),
           executor(*device),
           images(*device, cache.config(), dataset, frames, train::cache_share(o, 0), ready.origin),
-          plan(plan_for(train::plan_request(start, o, images.any_masked()))),
-          model(upload_model(*device, ready, 2, plan.statistics)),
-          instance_capacity(first_capacity(start.size())) {
+          plan(plan_for(train::plan_request(ready, o, images.any_masked()))),
+          model(upload_model(*device, ready, plan.moment_buffers(), plan.statistics)),
+          instance_capacity(first_capacity(ready.size())) {
         for (int halvings = 1; halvings <= o.halvings; ++halvings)
             smaller.emplace_back(*device, cache.config(), dataset, frames, train::cache_share(o, halvings),
                                  model.origin, 1 << halvings);
@@ -123,6 +123,7 @@ struct Trainer::State {
         r.sh0 = float(options.sh0_rate);
         r.sh_rest = float(schedule.sh_rest_rate);
         r.step = uint32_t(step);
+        r.seed = options.seed;
         if (plan.regularised) {
             r.opacity_weight = float(options.opacity_weight / model.splats);
             r.scale_weight = float(options.scale_weight / (3.0 * model.splats * extent));
@@ -164,7 +165,8 @@ struct Trainer::State {
                                 .instances = instance_capacity,
                                 .gradients = true,
                                 .masks = plan.masks,
-                                .exposure = plan.exposure};
+                                .exposure = plan.exposure,
+                                .overlaid = true};
         const shared::Counts counts =
             run_until_it_fits(cache, executor, frame, size, [&](gpu::Recording& recording) {
                 const Sorted sorted = record_forward(recording, cache, plan, model, frame, inputs);
@@ -186,6 +188,7 @@ struct Trainer::State {
     void follow_up(int step) {
         if (options.strategy == Strategy::adc) control_density(step);
         if (options.strategy != Strategy::mcmc || !schedule.relocates(step)) return;
+        frame.free_instances();  // the second copy of an array takes its place
         refine_mcmc(cache, executor, model, frame,
                     {.dead_opacity = options.dead_opacity,
                      .growth = schedule.growth,
@@ -207,6 +210,7 @@ struct Trainer::State {
             rules.seed = options.seed;
             rules.step = uint32_t(step);
             rules.max_splats = options.max_splats;
+            frame.free_instances();  // the second copy of an array takes its place
             densify(cache, executor, model, frame, rules);
         }
         if (schedule.resets_opacity(step)) {
@@ -218,12 +222,13 @@ struct Trainer::State {
 };
 
 Trainer::Trainer(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
-                 const std::vector<int>& train_frames, const Gaussians& start, const TrainOptions& options) {
+                 const std::vector<int>& train_frames, Gaussians start, const TrainOptions& options) {
     if (train_frames.empty())
         throw InputError("there is no training image; a larger --test-every leaves more of them");
     train::check_start(start.size(), options);
-    state_ = std::make_unique<State>(std::move(device), dataset, train_frames, start, prepared(start),
-                                     resolve(options, dataset));
+    const double extent = extent_for(dataset, train_frames, start);
+    state_ = std::make_unique<State>(std::move(device), dataset, train_frames, prepared(std::move(start)),
+                                     extent, resolve(options, dataset));
 }
 Trainer::~Trainer() = default;
 
@@ -252,8 +257,9 @@ struct NamedBuffer {
 std::vector<NamedBuffer> buffers_of(const Plan& plan, Model& model, Exposures& exposures, uint32_t splats) {
     const uint64_t bytes = parameter_bytes(splats, model.sh_degree);
     std::vector<NamedBuffer> buffers{{"params", &model.params, bytes, gpu::Texel::rgba32f},
-                                     {"moments1", &model.moments1, bytes, gpu::Texel::rgba32f},
-                                     {"moments2", &model.moments2, bytes, gpu::Texel::rgba32f}};
+                                     {"moments1", &model.moments1, bytes, gpu::Texel::rgba32ui}};
+    if (plan.moment_buffers() > 1)
+        buffers.push_back({"moments2", &model.moments2, bytes, gpu::Texel::rgba32ui});
     if (plan.statistics)
         buffers.push_back({"statistics", &model.statistics, 8ull * splats, gpu::Texel::none});
     if (plan.exposure)
@@ -291,7 +297,8 @@ void Trainer::restore(const TrainerState& state) {
     if (origin != s.model.origin)
         throw InputError("the state does not fit this training: its means are relative to another origin");
     if (state.arrays.size() != buffers.size() + moved)
-        throw InputError("the state does not fit this training: it is of another strategy");
+        throw InputError(
+            "the state does not fit this training: it is of another strategy or has moments of other bits");
     for (size_t i = 0; i < buffers.size(); ++i)
         if (state.arrays[i].name != buffers[i].name || state.arrays[i].bytes.size() != buffers[i].bytes)
             throw InputError("the state does not fit this training: it lacks " +
