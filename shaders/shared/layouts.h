@@ -122,6 +122,10 @@ EWA_UINT(EXPOSURE_TEXELS, 3u);
 EWA_UINT(EXPOSURE_BLOCK, 4096u);  // pixels whose gradient one subgroup sums
 
 EWA_UINT(RADIX_DIGITS_MAX, 256u);
+// A radix sort that ranks in shared memory: a workgroup has RANKED_SUBGROUPS subgroups, and an invocation
+// RANKED_LANE_KEYS keys, or half of that with more than 32 lanes a subgroup.
+EWA_UINT(RANKED_SUBGROUPS, 8u);
+EWA_UINT(RANKED_LANE_KEYS, 16u);
 
 struct CameraBlock {
     float rotation_hi[9];  // world to camera, rows; high and low parts of the float64 values
@@ -159,7 +163,7 @@ struct ProjectPush {
 struct SortPush {
     uint items;  // number of items; 0: Counts.instances, or none if that exceeds `capacity`
     uint capacity;
-    uint lanes;  // lanes that share the items in contiguous chunks
+    uint lanes;  // lanes, or workgroups that rank in shared memory, which share the items
     uint shift;  // first bit of the digit
 };
 

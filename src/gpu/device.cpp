@@ -241,6 +241,14 @@ void Device::create_device() {
     limits_.cpu = properties.deviceType == vk::PhysicalDeviceType::eCpu;
     limits_.max_groups = *std::min_element(properties.limits.maxComputeWorkGroupCount.begin(),
                                            properties.limits.maxComputeWorkGroupCount.end());
+    limits_.max_invocations = std::min(properties.limits.maxComputeWorkGroupInvocations,
+                                       properties.limits.maxComputeWorkGroupSize[0]);
+    limits_.shared_bytes = properties.limits.maxComputeSharedMemorySize;
+    const auto operations =
+        physical_.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceSubgroupProperties>()
+            .get<vk::PhysicalDeviceSubgroupProperties>()
+            .supportedOperations;
+    limits_.ballots = bool(operations & vk::SubgroupFeatureFlagBits::eBallot);
     limits_.max_storage_range = properties.limits.maxStorageBufferRange;
     limits_.max_texels = properties.limits.maxTexelBufferElements;
     limits_.texel_buffers = limits_.cpu && limits_.max_texels >= kManyTexels;

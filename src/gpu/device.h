@@ -22,6 +22,9 @@ struct Limits {
     uint64_t max_texels = 0;           // elements of a texel buffer view
     bool texel_buffers = true;         // buffers with a texel format are fetched by views; else from storage
     uint64_t uniform_alignment = 256;  // bytes
+    uint32_t max_invocations = 128;    // of a workgroup along x
+    uint32_t shared_bytes = 16384;     // of a workgroup's shared memory
+    bool ballots = false;              // of subgroups
     bool timestamps = false;
     double timestamp_nanoseconds = 1.0;
 };

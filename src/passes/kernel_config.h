@@ -23,6 +23,7 @@ struct KernelConfig {
     uint32_t sort_lanes_max = 512;             // lanes that share a radix sort
     uint32_t sort_chunk = 256;                 // least number of items of a sorting lane
     uint32_t sort_group = 64;                  // invocations of a sorting workgroup
+    bool ranked_sort = false;                  // keys are ranked in shared memory; sort_lanes_max is not used
     uint32_t tile_interleave = 1;              // distance of the tiles of neighbouring workgroups
     uint32_t max_groups = 65535;               // workgroups along one dimension
     uint32_t loop_limit = 65535;               // iterations of a loop in one invocation
@@ -30,6 +31,8 @@ struct KernelConfig {
     float cut_off =
         float(shared::ALPHA_MIN);  // smaller contributions are skipped; other values compare speed
 };
+
+constexpr uint32_t kRankedBytes = 32768;  // of shared memory, at most, in radix_scatter_ranked.comp
 
 /// Throws std::logic_error unless the subgroup size is a power of two up to 64.
 inline KernelConfig config_for(const gpu::Limits& limits) {
@@ -50,6 +53,8 @@ inline KernelConfig config_for(const gpu::Limits& limits) {
     } else {
         config.sort_lanes_max = 16384;
         config.sort_chunk = 64;
+        config.ranked_sort = limits.ballots && limits.shared_bytes >= kRankedBytes &&
+                             limits.max_invocations >= shared::RANKED_SUBGROUPS * config.subgroup;
     }
     return config;
 }
@@ -84,6 +89,14 @@ inline Groups tile_groups(const KernelConfig& config, const shared::BlendPush& p
 inline std::array<uint32_t, 2> tile_steps(const KernelConfig& config, uint32_t tiles) {
     if (config.tile_interleave > 1) return {config.tile_interleave, 1};
     return {1, tiles < config.max_groups ? tiles : config.max_groups};
+}
+
+/// Invocations of a workgroup that ranks keys in shared memory, and its keys.
+inline uint32_t ranked_group(const KernelConfig& config) {
+    return shared::RANKED_SUBGROUPS * config.subgroup;
+}
+inline uint32_t ranked_keys(const KernelConfig& config) {
+    return shared::RANKED_LANE_KEYS / (config.subgroup > 32 ? 2 : 1) * ranked_group(config);
 }
 
 /// Pixels of the image that the push constants describe.

@@ -70,6 +70,13 @@ struct PerSortLane {
     }
 };
 
+/// One workgroup for each block of keys that are ranked in shared memory.
+struct PerRankedBlock {
+    using Push = shared::SortPush;
+    static uint32_t group_size(const KernelConfig& config) { return ranked_group(config); }
+    static Groups groups(const KernelConfig& config, const Push& push) { return grid_of(config, push.lanes); }
+};
+
 using Constants = std::vector<gpu::SpecConstant>;
 
 /// A compiled pass.

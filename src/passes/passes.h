@@ -54,6 +54,20 @@ struct RadixScatter {
     gpu::BufferPart keys, values, counters, bases, counts, keys_out, values_out, indices, indices_out;
 };
 
+/// RadixCount with the counting in shared memory. Variant: SPEC_RADIX_BITS.
+struct RadixCountRanked {
+    static constexpr char shader[] = "radix_count_ranked";
+    using Work = PerRankedBlock;
+    gpu::BufferPart keys, counters, counts;
+};
+
+/// RadixScatter with the ranking in shared memory. Variant: SPEC_RADIX_BITS, SPEC_MODE (SORT_* bits).
+struct RadixScatterRanked {
+    static constexpr char shader[] = "radix_scatter_ranked";
+    using Work = PerRankedBlock;
+    gpu::BufferPart keys, values, counters, bases, counts, keys_out, values_out, indices, indices_out;
+};
+
 /// Writes the (splat, tile) instances in depth order, each layer for a strip of tile rows. Variant: SPEC_MODE
 /// (0 or EMIT_FIRST_INSTANCES).
 struct EmitInstances {

@@ -21,14 +21,6 @@ uint32_t divide_up(uint64_t a, uint64_t b) {
     return uint32_t((a + b - 1) / b);
 }
 
-RadixCut radix_cut(const passes::KernelConfig& config, uint32_t items, uint32_t key_bits) {
-    RadixCut cut;
-    cut.lanes = std::clamp(divide_up(items, config.sort_chunk), config.subgroup, config.sort_lanes_max);
-    cut.passes = divide_up(key_bits, 8);
-    cut.bits = divide_up(key_bits, cut.passes);
-    return cut;
-}
-
 uint64_t counter_words(const RadixCut& cut) {
     return uint64_t(cut.lanes) << cut.bits;
 }
@@ -125,6 +117,16 @@ std::vector<Allocation> allocations(FrameBuffers& f, const Sizes& s) {
 }
 
 }  // namespace
+
+RadixCut radix_cut(const passes::KernelConfig& config, uint32_t items, uint32_t key_bits) {
+    RadixCut cut;
+    cut.lanes = config.ranked_sort
+                    ? std::max(divide_up(items, ranked_keys(config)), 1u)
+                    : std::clamp(divide_up(items, config.sort_chunk), config.subgroup, config.sort_lanes_max);
+    cut.passes = divide_up(key_bits, 8);
+    cut.bits = divide_up(key_bits, cut.passes);
+    return cut;
+}
 
 Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request) {
     Sizes s;

@@ -21,10 +21,12 @@ struct FrameRequest {
     bool overlaid = false;
 };
 
+/// How a radix sort is divided.
 struct RadixCut {
-    uint32_t lanes = 0;
+    uint32_t lanes = 0;             // lanes, or workgroups that rank in shared memory: SortPush
     uint32_t passes = 0, bits = 0;  // of each pass
 };
+RadixCut radix_cut(const passes::KernelConfig& config, uint32_t items, uint32_t key_bits);
 
 struct Sizes {
     uint32_t width = 0, height = 0;  // px

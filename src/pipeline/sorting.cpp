@@ -37,6 +37,7 @@ uint32_t scatter_mode(const SortBuffers& buffers, const SortWork& work, bool fir
 uint32_t record_sort(gpu::Recording& recording, passes::PassCache& cache, const SortBuffers& buffers,
                      const SortWork& work) {
     const RadixCut& cut = work.cut;
+    const bool ranked = cache.config().ranked_sort;
     const uint32_t counters = cut.lanes << cut.bits;
     const gpu::SpecConstant bits{shared::SPEC_RADIX_BITS, cut.bits};
     uint32_t from = 0;  // which of the two buffers holds a pass's input
@@ -48,10 +49,16 @@ uint32_t record_sort(gpu::Recording& recording, passes::PassCache& cache, const 
         const gpu::Buffer& keys = *buffers.keys[from];
         // A binding that a mode does not use gets another binding's buffer.
         const gpu::Buffer& values = first && buffers.own_indices ? keys : *buffers.values[from];
-        recording.fill(buffers.counters, 0, 0, uint64_t(counters) * 4);
-        cache.get<passes::RadixCount>({bits}).record(
-            recording, {.keys = keys, .counters = buffers.counters, .counts = buffers.counts}, push,
-            work.name);
+        if (ranked) {
+            cache.get<passes::RadixCountRanked>({bits}).record(
+                recording, {.keys = keys, .counters = buffers.counters, .counts = buffers.counts}, push,
+                work.name);
+        } else {
+            recording.fill(buffers.counters, 0, 0, uint64_t(counters) * 4);
+            cache.get<passes::RadixCount>({bits}).record(
+                recording, {.keys = keys, .counters = buffers.counters, .counts = buffers.counts}, push,
+                work.name);
+        }
         record_scan(recording, cache,
                     {.source = buffers.counters,
                      .order = nullptr,
@@ -59,18 +66,24 @@ uint32_t record_sort(gpu::Recording& recording, passes::PassCache& cache, const 
                      .totals = buffers.digit_totals,
                      .counts = buffers.counts},
                     {.items = counters, .block = cut.lanes, .total = shared::TOTAL_NONE, .name = work.name});
-        cache.get<passes::RadixScatter>({bits, {shared::SPEC_MODE, scatter_mode(buffers, work, first, last)}})
-            .record(recording,
-                    {.keys = keys,
-                     .values = values,
-                     .counters = buffers.counter_prefix,
-                     .bases = buffers.digit_totals,
-                     .counts = buffers.counts,
-                     .keys_out = *buffers.keys[to],
-                     .values_out = *buffers.values[to],
-                     .indices = tracked && !first ? *buffers.indices[from] : values,
-                     .indices_out = tracked ? *buffers.indices[to] : *buffers.values[to]},
-                    push, work.name);
+        const passes::Constants variant{bits, {shared::SPEC_MODE, scatter_mode(buffers, work, first, last)}};
+        const auto scatter = [&]<class Scatter>(const passes::Pass<Scatter>& compiled) {
+            compiled.record(recording,
+                            {.keys = keys,
+                             .values = values,
+                             .counters = buffers.counter_prefix,
+                             .bases = buffers.digit_totals,
+                             .counts = buffers.counts,
+                             .keys_out = *buffers.keys[to],
+                             .values_out = *buffers.values[to],
+                             .indices = tracked && !first ? *buffers.indices[from] : values,
+                             .indices_out = tracked ? *buffers.indices[to] : *buffers.values[to]},
+                            push, work.name);
+        };
+        if (ranked)
+            scatter(cache.get<passes::RadixScatterRanked>(variant));
+        else
+            scatter(cache.get<passes::RadixScatter>(variant));
     }
     return from;
 }

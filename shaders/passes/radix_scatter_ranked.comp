@@ -1,0 +1,133 @@
+#version 460
+// SPDX-License-Identifier: Apache-2.0
+// Moves the pairs of a radix pass, for devices with fast shared memory. The sort is stable.
+// One workgroup owns the same block of keys as in radix_count_ranked, and each of its subgroups a contiguous part. Lanes
+// with the same digit find each other by ballots, so a key knows its rank among the block's keys of its digit. The block is
+// sorted in shared memory first: neighbouring invocations then write to neighbouring places.
+// counters[digit * blocks + block] is the block's first place within the digit; bases[digit] is where the digit begins.
+// SPEC_MODE: SORT_* bits.
+#extension GL_GOOGLE_include_directive : require
+#extension GL_KHR_shader_subgroup_ballot : require
+#include "lib/prelude.glsl"
+#include "lib/subgroup.glsl"
+#include "lib/sorting.glsl"
+
+layout(local_size_x_id = SPEC_GROUP_SIZE) in;
+layout(constant_id = SPEC_MODE) const uint MODE = 0;
+const bool OWN_INDICES = (MODE & SORT_OWN_INDICES) != 0u, DROP_KEYS = (MODE & SORT_DROP_KEYS) != 0u,
+           TRACKED = (MODE & SORT_TRACKED) != 0u, FIRST = (MODE & SORT_FIRST) != 0u, LAST = (MODE & SORT_LAST) != 0u;
+
+WORD_TEXELS(0, keys);
+WORD_TEXELS(1, values);
+layout(set = 0, binding = 2, scalar) readonly buffer Counters { uint counters[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer Bases { uint bases[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer CountsBlock { Counts counts; };
+layout(set = 0, binding = 5, scalar) writeonly buffer KeysOut { uint keys_out[]; };
+layout(set = 0, binding = 6, scalar) writeonly buffer ValuesOut { uint values_out[]; };
+WORD_TEXELS(7, indices);
+layout(set = 0, binding = 8, scalar) writeonly buffer IndicesOut { uint indices_out[]; };
+layout(push_constant, scalar) uniform Push { SortPush push; };
+
+shared uint own_counts[GROUP_SIZE / SUBGROUP * DIGITS];  // of each subgroup: keys of a digit; later, those of the subgroups before
+shared uint digit_starts[DIGITS];                        // where a digit begins in the sorted block
+shared uint exchange[RANKED_KEYS];
+
+// Position of round `round` of this invocation: in the block as it was read, and in the sorted block.
+uint read_at(uint round) { return (gl_SubgroupID * RANKED_ROUNDS + round) * SUBGROUP + gl_SubgroupInvocationID; }
+uint write_at(uint round) { return round * GROUP_SIZE + gl_SubgroupID * SUBGROUP + gl_SubgroupInvocationID; }
+
+// Number of keys of this digit in the subgroup's rounds so far, and in the lanes below. Counts this round's keys.
+uint rank_of(uint digit, bool present) {
+    uvec4 same = subgroupBallot(present);
+    [[unroll]] for (uint b = 0u; b < RADIX_BITS; ++b) {
+        const bool set = ((digit >> b) & 1u) != 0u;
+        const uvec4 votes = subgroupBallot(set);
+        same &= set ? votes : ~votes;
+    }
+    const uint below = subgroupBallotExclusiveBitCount(same), counter = gl_SubgroupID * DIGITS + digit;
+    const uint before = own_counts[counter];
+    subgroupMemoryBarrierShared();
+    subgroupBarrier();
+    if (present && below == 0u) own_counts[counter] = before + subgroupBallotBitCount(same);
+    subgroupMemoryBarrierShared();
+    subgroupBarrier();
+    return before + below;
+}
+
+// Turns own_counts into sums over the subgroups before, and fills digit_starts.
+void scan_counts() {
+    const uint lane = gl_SubgroupInvocationID;
+    for (uint d = gl_SubgroupID * SUBGROUP + lane; d < DIGITS; d += GROUP_SIZE) {
+        uint sum = 0u;
+        for (uint s = 0u; s < GROUP_SIZE / SUBGROUP; ++s) {
+            const uint own = own_counts[s * DIGITS + d];
+            own_counts[s * DIGITS + d] = sum;
+            sum += own;
+        }
+        digit_starts[d] = sum;
+    }
+    barrier();
+    if (gl_SubgroupID == 0u) {
+        uint carry = 0u;
+        for (uint base = 0u; base < DIGITS; base += SUBGROUP) {
+            const uint value = base + lane < DIGITS ? digit_starts[base + lane] : 0u;
+            const uint sum = subgroup_inclusive_sum(value);
+            if (base + lane < DIGITS) digit_starts[base + lane] = carry + sum - value;
+            carry += subgroupShuffle(sum, SUBGROUP - 1u);
+        }
+    }
+    barrier();
+}
+
+void main() {
+    const uint block = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+    if (block >= push.lanes) return;
+    const uint begin = block * RANKED_KEYS, all = item_count(push, counts.instances);
+    const uint items = all > begin ? min(all - begin, RANKED_KEYS) : 0u;  // of this block
+    for (uint c = gl_LocalInvocationID.x; c < GROUP_SIZE / SUBGROUP * DIGITS; c += GROUP_SIZE) own_counts[c] = 0u;
+    barrier();
+    uint key[RANKED_ROUNDS], place[RANKED_ROUNDS];
+    [[unroll]] for (uint r = 0; r < RANKED_ROUNDS; ++r) {
+        const uint at = begin + min(read_at(r), max(items, 1u) - 1u);
+        key[r] = fetch(keys, at / 4u)[at % 4u];
+        place[r] = rank_of(digit_of(key[r], push.shift), read_at(r) < items);
+    }
+    barrier();
+    scan_counts();
+    [[unroll]] for (uint r = 0; r < RANKED_ROUNDS; ++r) {
+        const uint digit = digit_of(key[r], push.shift);
+        place[r] += digit_starts[digit] + own_counts[gl_SubgroupID * DIGITS + digit];
+        if (read_at(r) < items) exchange[place[r]] = key[r];
+    }
+    barrier();
+    uint to[RANKED_ROUNDS];
+    [[unroll]] for (uint r = 0; r < RANKED_ROUNDS; ++r) {
+        if (write_at(r) < items) {
+            const uint sorted = exchange[write_at(r)], digit = digit_of(sorted, push.shift);
+            to[r] = bases[digit] + counters[digit * push.lanes + block] + write_at(r) - digit_starts[digit];
+            if (!DROP_KEYS) keys_out[to[r]] = sorted;
+        }
+    }
+    barrier();
+    [[unroll]] for (uint r = 0; r < RANKED_ROUNDS; ++r) {
+        const uint at = begin + read_at(r);
+        if (read_at(r) < items) exchange[place[r]] = OWN_INDICES ? at : fetch(values, at / 4u)[at % 4u];
+    }
+    barrier();
+    [[unroll]] for (uint r = 0; r < RANKED_ROUNDS; ++r) {
+        if (write_at(r) < items) values_out[to[r]] = exchange[write_at(r)];
+    }
+    if (!TRACKED) return;
+    barrier();
+    [[unroll]] for (uint r = 0; r < RANKED_ROUNDS; ++r) {
+        const uint at = begin + read_at(r);
+        if (read_at(r) < items) exchange[place[r]] = FIRST ? at : fetch(indices, at / 4u)[at % 4u];
+    }
+    barrier();
+    [[unroll]] for (uint r = 0; r < RANKED_ROUNDS; ++r) {
+        if (write_at(r) < items) {
+            const uint index = exchange[write_at(r)];
+            indices_out[LAST ? index : to[r]] = LAST ? to[r] : index;
+        }
+    }
+}
