@@ -19,11 +19,13 @@ namespace ewa {
 /// The options with concrete values for Strategy::automatic and kAutomaticShDegree.
 TrainOptions resolve(TrainOptions options, const Dataset& dataset);
 
-/// An upper estimate of the device memory of a training, in bytes.
+/// An estimate of the device memory of a training at its peak, in bytes. For the splats that it names it is within
+/// 10 % on usual captures (docs/performance.md).
 struct MemoryEstimate {
-    uint32_t splats = 0;  // the number of splats that it is for
-    uint64_t model = 0;   // parameters, moments, statistics; twice if the strategy writes new generations
-    uint64_t frame = 0;   // images, sort buffers, gradient slots, for the (splat, tile) pairs of most scenes
+    uint32_t splats =
+        0;  // at the end; with adc the most there can be, since their number depends on the images
+    uint64_t model = 0;   // parameters, moments, statistics
+    uint64_t frame = 0;   // images, sort buffers, gradient slots; or what a refinement needs beside the model
     uint64_t images = 0;  // cached training images
     uint64_t total() const { return model + frame + images; }
 };

@@ -353,43 +353,6 @@ std::vector<PassTime> Trainer::pass_times() const {
     return result;
 }
 
-MemoryEstimate estimate_memory(const gpu::Device& device, const Dataset& dataset,
-                               const std::vector<int>& train_frames, const Gaussians& start,
-                               const TrainOptions& given) {
-    const TrainOptions options = resolve(given, dataset);
-    MemoryEstimate estimate;
-    const bool grows = options.strategy != Strategy::none;
-    estimate.splats = grows ? std::max(options.max_splats, uint32_t(start.size())) : uint32_t(start.size());
-    const Plan plan = plan_for(train::plan_request(start, options, false));
-    const uint64_t statistics = plan.statistics ? 8ull * estimate.splats : 0;
-    const uint64_t generation = 3 * parameter_bytes(estimate.splats, start.sh_degree) + statistics;
-    estimate.model = grows ? 2 * generation : generation;
-
-    std::vector<uint64_t> cached_at(size_t(options.halvings) + 1);
-    const passes::KernelConfig config = passes::config_for(device.limits());
-    for (const int index : train_frames) {
-        const Frame& frame = dataset.frames[size_t(index)];
-        const auto width = uint32_t(frame.camera.width), height = uint32_t(frame.camera.height);
-        const auto pairs = std::max(first_capacity(estimate.splats),
-                                    uint32_t(std::min<uint64_t>(8ull * estimate.splats, 0xe0000000u)));
-        const FrameRequest request{.splats = estimate.splats,
-                                   .width = width,
-                                   .height = height,
-                                   .instances = pairs,
-                                   .gradients = true,
-                                   .masks = frame.masks == MaskUse::ignore,
-                                   .exposure = plan.exposure};
-        estimate.frame = std::max(estimate.frame, sizes_for(config, request).total());
-        const uint64_t photo = photo_bytes(int(width), int(height), frame.eight_bit);
-        for (int h = 0; h <= options.halvings; ++h) {
-            uint64_t& cached = cached_at[size_t(h)];
-            if (cached + (photo >> 2 * h) <= train::cache_share(options, h)) cached += photo >> 2 * h;
-        }
-    }
-    for (const uint64_t cached : cached_at) estimate.images += cached;
-    return estimate;
-}
-
 std::vector<PlanLine> plan_lines(const Gaussians& start, const TrainOptions& options, bool masks) {
     const Plan plan = plan_for(train::plan_request(start, options, masks));
     return describe(plan, start.sh_degree, start.size());
