@@ -28,7 +28,7 @@ constexpr size_t kSplats = 20000, kViews = 24;  // samples; more change the esti
 // is higher (fox_270, fox_540, still_life).
 constexpr double kLeastOpacity = 0.5;
 // Fitted to the same trainings. 0.5 would keep the covered area.
-constexpr double kAdcShrink = 0.4, kMcmcShrink = 0.2;
+constexpr double kAdcShrink = 0.4, kMcmcShrink = 0.16;
 // The capacity grows to 9/8 of what a frame needs, whenever one needs more than there is.
 constexpr double kCapacity = 17.0 / 16;
 constexpr uint64_t kMostPairs = 0xe0000000u;

@@ -386,7 +386,9 @@ TEST_P(MemoryOf, ARunIsEstimatedAndAKilobyteASplat) {
     // The splats of these images of noise grow less than those of a capture: see docs/performance.md for some.
     const uint64_t peak = expect_estimated(capture, capture.start, options, 0.2);
     // Besides the splats there are planes of 160x120 pixels, the images, and the counters of the sorts.
-    if (bits == 16) EXPECT_LT(peak, options.max_splats * 1000 + 5000000);
+    if (bits == 16) {
+        EXPECT_LT(peak, options.max_splats * 1000 + 5000000);
+    }
 }
 
 INSTANTIATE_TEST_SUITE_P(Strategies, MemoryOf,

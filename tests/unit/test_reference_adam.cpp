@@ -63,7 +63,9 @@ TEST(PackedMoments, KeepWhatTheyCanHoldExactly) {
         for (const double value : {1.0, -1.5, 127.0 / 128, -std::ldexp(3, 50), std::ldexp(1, -126)}) {
             const AdamMoments back = unpacked_moments(packed_moments(value, value * value, random));
             EXPECT_EQ(back.first, value);
-            if (std::abs(value) > 1e-18) EXPECT_EQ(back.second, value * value);
+            if (std::abs(value) > 1e-18) {
+                EXPECT_EQ(back.second, value * value);
+            }
         }
         // A root below 2^-63 is none.
         EXPECT_EQ(unpacked_moments(packed_moments(0, std::ldexp(0.99, -126), random)).second, 0);
