@@ -41,7 +41,7 @@ std::vector<PlanLine> plan_lines(const Gaussians& start, const TrainOptions& opt
 struct StepReport {
     int step = 0;        // steps done
     double seconds = 0;  // wall time in Trainer::step so far
-    double loss = 0;     // of the last step
+    double loss = 0;     // of the last step that the device has finished; a GPU may be a step behind
     uint32_t splats = 0;
     uint64_t dropped_updates = 0;    // parameter updates so far that were not finite and were dropped
     uint32_t skipped_nonfinite = 0;  // splats skipped in the last step: a value is not finite
@@ -64,7 +64,8 @@ struct TrainerState {
 };
 
 /// Owns the model and the cached training images on the device. A cached image takes 4 bytes a pixel if its
-/// file has at most 256 levels, else 16. Each step is one submission.
+/// file has at most 256 levels, else 16. Each step is one submission. On a GPU, step() may return before the device is done;
+/// all other functions wait for it.
 class Trainer {
   public:
     /// train_frames: indices into dataset.frames. start: the first splats, at most options.max_splats.

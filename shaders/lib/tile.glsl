@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // One subgroup owns one tile. Lane l has column l % TILE_WIDTH and PIXELS pixels of it, ROW_STEP rows apart.
-// A batch of SUBGROUP splats is in registers, one splat a lane, and is broadcast by shuffles with constant lanes.
-// Needs subgroup.glsl. The including pass declares `push` (BlendPush), records, splats and tile_starts.
+// A batch is SUBGROUP splats of the tile's list. Each lane loads one; SPEC_BROADCAST says how all lanes come to read it.
+// A batch is evaluated in blocks of BLOCK splats. A block is unrolled; unrolling more would outgrow instruction caches.
+// Needs subgroup.glsl. The including pass declares `push` (BlendPush), records, splats and tile_starts before this file.
 #ifndef EWA_LIB_TILE
 #define EWA_LIB_TILE
 layout(constant_id = SPEC_TILE_WIDTH) const uint TILE_WIDTH = 8;
@@ -17,36 +18,103 @@ const uint SEGMENT = PIXELS < 8u / ROW_STEP ? PIXELS : 8u / ROW_STEP;
 const uint SEGMENT_BASE = (SEGMENT - 1u) / 2u;
 const bool BY_RATIO = SEGMENT >= 4u;
 
+layout(constant_id = SPEC_BROADCAST) const uint BROADCAST = BROADCAST_SHUFFLES;
+const uint BLOCK = SUBGROUP < 8u ? SUBGROUP : 8u;
+shared vec4 shared_batch[BROADCAST == BROADCAST_SHARED ? RECORD_TEXELS * SUBGROUP : 1u];
+
+// The splat that this lane loaded.
+struct Loaded {
+    uint first, end;  // of the batch, and of the tile's list
+    vec4 record0, record1, record2;
+    float ratio_step;
+};
+
+// Forward and backward passes must agree on the pixels that a splat reaches. A GPU's compiler may contract one of them and
+// not the other, so what decides that is precise there. CPU drivers contract neither.
+#ifdef EWA_TEXEL_BUFFERS
+#define EXACT
+#else
+#define EXACT precise
+#endif
+
 // A splat as one lane evaluates it: u and v at the lane's first pixel, and their steps from pixel to pixel.
 struct LaneSplat {
     float u, u_step, v, v_step;
     float ratio_step;   // exp(-2 (u_step^2 + v_step^2))
     float opacity;
     vec3 color;
+    float z;  // depth
 };
 
-// Ratio step of the splat that a lane loads for the batch. record1: as projected.
+// exp(-2 (u_step^2 + v_step^2)). record1: as projected.
 float ratio_step_of(vec4 record1) {
     const float u_step = record1.x * record1.y * float(ROW_STEP), v_step = record1.z * float(ROW_STEP);
     return exp(-2.0 * (u_step * u_step + v_step * v_step));
 }
 
-// Splat j of the batch, from the records in the lanes. pixel: centre of the lane's first pixel.
-LaneSplat lane_splat(vec4 record0, vec4 record1, vec4 record2, float ratio_step, uint j, vec2 pixel) {
-    const float dx = (pixel.x - subgroupShuffle(record0.x, j)) - subgroupShuffle(record0.z, j);
-    const float dy = (pixel.y - subgroupShuffle(record0.y, j)) - subgroupShuffle(record0.w, j);
-    const float ux = subgroupShuffle(record1.x, j);
-    const float k = subgroupShuffle(record1.y, j);
-    const float vy = subgroupShuffle(record1.z, j);
+// Loads the batch that begins at instance `first`. Every lane of the subgroup takes part.
+Loaded load_batch(uint first, uint end) {
+    Loaded own;
+    own.first = first;
+    own.end = end;
+    if (BROADCAST == BROADCAST_UNIFORM) return own;
+    const uint lane = gl_SubgroupInvocationID;
+    const uint at = RECORD_TEXELS * splats[min(first + lane, end - 1u)];
+    own.record0 = fetch(records, at);
+    own.record1 = fetch(records, at + 1u);
+    own.record2 = fetch(records, at + 2u);
+    own.record1.w = first + lane < end ? own.record1.w : 0.0;
+    if (BROADCAST == BROADCAST_SHARED) {
+        subgroupBarrier();  // the last batch has been read
+        shared_batch[RECORD_TEXELS * lane] = own.record0;
+        shared_batch[RECORD_TEXELS * lane + 1u] = own.record1;
+        shared_batch[RECORD_TEXELS * lane + 2u] = own.record2;
+        subgroupMemoryBarrierShared();
+        subgroupBarrier();
+    } else {
+        own.ratio_step = ratio_step_of(own.record1);
+    }
+    return own;
+}
+
+LaneSplat lane_splat_of(vec4 record0, vec4 record1, vec4 record2, float ratio_step, vec2 pixel) {
+    EXACT const float dx = (pixel.x - record0.x) - record0.z;
+    EXACT const float dy = (pixel.y - record0.y) - record0.w;
+    EXACT const float u = record1.x * (dx - record1.y * dy);
     LaneSplat s;
-    s.u = ux * (dx - k * dy);
-    s.u_step = -ux * k * float(ROW_STEP);
-    s.v = vy * dy;
-    s.v_step = vy * float(ROW_STEP);
-    s.ratio_step = subgroupShuffle(ratio_step, j);
-    s.opacity = subgroupShuffle(record1.w, j);
-    s.color = vec3(subgroupShuffle(record2.x, j), subgroupShuffle(record2.y, j), subgroupShuffle(record2.z, j));
+    s.u = u;
+    s.u_step = -record1.x * record1.y * float(ROW_STEP);
+    s.v = record1.z * dy;
+    s.v_step = record1.z * float(ROW_STEP);
+    s.ratio_step = ratio_step;
+    s.opacity = record1.w;
+    s.color = record2.rgb;
+    s.z = record2.w;
     return s;
+}
+
+vec4 shuffled(vec4 v, uint lane) {
+    return vec4(subgroupShuffle(v.x, lane), subgroupShuffle(v.y, lane), subgroupShuffle(v.z, lane), subgroupShuffle(v.w, lane));
+}
+
+// Splat j of the batch. pixel: centre of the lane's first pixel.
+LaneSplat lane_splat(Loaded own, uint j, vec2 pixel) {
+    if (BROADCAST == BROADCAST_SHUFFLES)
+        return lane_splat_of(shuffled(own.record0, j), shuffled(own.record1, j), shuffled(own.record2, j),
+                             subgroupShuffle(own.ratio_step, j), pixel);
+    vec4 record0, record1, record2;
+    if (BROADCAST == BROADCAST_SHARED) {
+        record0 = shared_batch[RECORD_TEXELS * j];
+        record1 = shared_batch[RECORD_TEXELS * j + 1u];
+        record2 = shared_batch[RECORD_TEXELS * j + 2u];
+    } else {
+        const uint at = RECORD_TEXELS * splats[min(own.first + j, own.end - 1u)];
+        record0 = fetch(records, at);
+        record1 = fetch(records, at + 1u);
+        record2 = fetch(records, at + 2u);
+        record1.w = own.first + j < own.end ? record1.w : 0.0;
+    }
+    return lane_splat_of(record0, record1, record2, BY_RATIO ? ratio_step_of(record1) : 0.0, pixel);
 }
 
 // opacity exp(-(u^2 + v^2)) at each of the lane's pixels.
@@ -54,8 +122,8 @@ void column_alphas(LaneSplat s, out float raw[PIXELS]) {
     float ratio = 0.0;
     [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
         if (!BY_RATIO || p % SEGMENT == SEGMENT_BASE) {
-            const float u = s.u + s.u_step * float(p), v = s.v + s.v_step * float(p);
-            raw[p] = s.opacity * exp(-(u * u + v * v));
+            EXACT const float u = s.u + s.u_step * float(p), v = s.v + s.v_step * float(p), power = u * u + v * v;
+            raw[p] = s.opacity * exp(-power);
             ratio = exp(-(s.u_step * (2.0 * u + s.u_step) + s.v_step * (2.0 * v + s.v_step)));
         } else if (p % SEGMENT > SEGMENT_BASE) {
             raw[p] = raw[p - 1u] * ratio;
@@ -81,7 +149,7 @@ float alpha_of(float raw) { return raw >= CUT_OFF ? min(float(ALPHA_MAX), raw) :
 // below: one float is both value and flag.
 // Returns the splat's weight alpha * T (0 if it is skipped), and updates T. alpha: as blended, before the stop.
 float composite(float alpha, inout float T, out bool blended) {
-    const float next = T - T * alpha;
+    EXACT const float next = T - T * alpha;
     blended = next > float(TRANSMITTANCE_STOP);
     const float weight = blended ? alpha * T : 0.0;
     T = blended ? next : -abs(T);

@@ -6,7 +6,6 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"
-#include "lib/tile.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_MODE) const uint MODE = 0;
@@ -18,6 +17,7 @@ layout(set = 0, binding = 1, scalar) readonly buffer Splats { uint splats[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer TileStarts { uint tile_starts[]; };
 layout(set = 0, binding = 3, scalar) writeonly buffer Planes { float planes[]; };
 layout(push_constant, scalar) uniform Push { BlendPush push; };
+#include "lib/tile.glsl"
 
 // Draws the splat as a solid: the first hit closes the pixel. The light is at the camera, so the outline is darker.
 void meet_ellipsoid(LaneSplat s, uint p, inout float T, inout vec3 color) {
@@ -47,28 +47,24 @@ void main() {
     }
     const uint end = tile_starts[tile + 1u];
     for (uint k = tile_starts[tile]; k < end; k += SUBGROUP) {
-        const uint splat = RECORD_TEXELS * splats[min(k + lane, end - 1u)];
-        const vec4 record0 = fetch(records, splat);
-        vec4 record1 = fetch(records, splat + 1u);
-        const vec4 record2 = fetch(records, splat + 2u);
-        record1.w = k + lane < end ? record1.w : 0.0;
-        const float ratio_step = ratio_step_of(record1);
-        [[unroll]] for (uint j = 0; j < SUBGROUP; ++j) {
-            const LaneSplat s = lane_splat(record0, record1, record2, ratio_step, j, pixel);
-            if (MODE == BLEND_ELLIPSOIDS) {
-                [[unroll]] for (uint p = 0; p < PIXELS; ++p) meet_ellipsoid(s, p, T[p], color[p]);
-                continue;
-            }
-            float raw[PIXELS];
-            column_alphas(s, raw);
-            const float z = WITH_DEPTH ? subgroupShuffle(record2.w, j) : 0.0;
-            [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
-                bool blended;
-                const float alpha = alpha_of(raw[p]);
-                const float weight = composite(alpha, T[p], blended);
-                color[p] += weight * s.color;
-                if (WITH_DEPTH) depth[p] += weight * z;
-                if (WITH_COUNT) count[p] += blended && alpha > 0.0 ? 1.0 : 0.0;
+        const Loaded batch = load_batch(k, end);
+        for (uint first = 0; first < SUBGROUP; first += BLOCK) {
+            [[unroll]] for (uint j = 0; j < BLOCK; ++j) {
+                const LaneSplat s = lane_splat(batch, first + j, pixel);
+                if (MODE == BLEND_ELLIPSOIDS) {
+                    [[unroll]] for (uint p = 0; p < PIXELS; ++p) meet_ellipsoid(s, p, T[p], color[p]);
+                    continue;
+                }
+                float raw[PIXELS];
+                column_alphas(s, raw);
+                [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
+                    bool blended;
+                    const float alpha = alpha_of(raw[p]);
+                    const float weight = composite(alpha, T[p], blended);
+                    color[p] += weight * s.color;
+                    if (WITH_DEPTH) depth[p] += weight * s.z;
+                    if (WITH_COUNT) count[p] += blended && alpha > 0.0 ? 1.0 : 0.0;
+                }
             }
         }
         bool open = false;

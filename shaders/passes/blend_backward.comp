@@ -9,7 +9,6 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"
-#include "lib/tile.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_MODE) const uint MODE = 0;
@@ -20,14 +19,13 @@ layout(set = 0, binding = 1, scalar) readonly buffer Splats { uint splats[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer TileStarts { uint tile_starts[]; };
 layout(set = 0, binding = 3, scalar) readonly buffer Planes { float planes[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer ImageGradient { float image_gradient[]; };
-layout(set = 0, binding = 5, scalar) writeonly buffer Slots { float slots[]; };
+layout(set = 0, binding = 5, scalar) writeonly buffer Slots { vec4 slots[]; };
 layout(push_constant, scalar) uniform Push { BlendPush push; };
+#include "lib/tile.glsl"
+const bool WIDE_STORES = BROADCAST != BROADCAST_SHUFFLES;
 
 // The middle of a lane's pixels, in pixels of its column.
 #define MIDDLE (0.5 * float(PIXELS - 1u))
-
-// Splats whose sums are transposed together.
-const uint BLOCK = SUBGROUP < 8u ? SUBGROUP : 8u;
 
 // Sums BLOCK values over the subgroup at once. At each step a lane keeps half of its values and sends the other half, so
 // that lane l ends with the sum of value l % BLOCK. Then lanes BLOCK apart are added.
@@ -47,6 +45,19 @@ float transposing_sum(float v[8]) {
         if ((1u << s) < SUBGROUP) sum += subgroupShuffleXor(sum, 1u << s);
     }
     return sum;
+}
+
+// Whole texels take fewer memory transactions; without them the unused floats are not written.
+void write_slot(uint index, float slot[12]) {
+    [[unroll]] for (uint t = 0; t < SLOT_TEXELS; ++t) {
+        if (WIDE_STORES) {
+            slots[SLOT_TEXELS * index + t] = vec4(slot[4 * t], slot[4 * t + 1], slot[4 * t + 2], slot[4 * t + 3]);
+            continue;
+        }
+        [[unroll]] for (uint c = 0; c < 4; ++c) {
+            if (4 * t + c < SUMS) slots[SLOT_TEXELS * index + t][c] = slot[4 * t + c];
+        }
+    }
 }
 
 void main() {
@@ -71,20 +82,16 @@ void main() {
                                         planes[PLANE_G * push.image.plane_floats + at],
                                         planes[PLANE_B * push.image.plane_floats + at]));
     }
+    const float none[12] = float[](0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     const uint end = tile_starts[tile + 1u];
     uint k = tile_starts[tile];
     for (; k < end; k += SUBGROUP) {
-        const uint splat = RECORD_TEXELS * splats[min(k + lane, end - 1u)];
-        const vec4 record0 = fetch(records, splat);
-        vec4 record1 = fetch(records, splat + 1u);
-        const vec4 record2 = fetch(records, splat + 2u);
-        record1.w = k + lane < end ? record1.w : 0.0;
-        const float ratio_step = ratio_step_of(record1);
-        float slot[11];
-        [[unroll]] for (uint first = 0; first < SUBGROUP; first += BLOCK) {
+        const Loaded batch = load_batch(k, end);
+        float slot[12] = none;
+        for (uint first = 0; first < SUBGROUP; first += BLOCK) {
             float sums[11][8];
             [[unroll]] for (uint j = 0; j < BLOCK; ++j) {
-                const LaneSplat s = lane_splat(record0, record1, record2, ratio_step, first + j, pixel);
+                const LaneSplat s = lane_splat(batch, first + j, pixel);
                 float raw[PIXELS];
                 column_alphas(s, raw);
                 // u and v are affine along the lane's column, so three sums over it give all six moments. The pixel's
@@ -130,10 +137,7 @@ void main() {
                 slot[i] = first == 0u || lane / BLOCK == first / BLOCK ? sum : slot[i];
             }
         }
-        if (k + lane < end) {
-            const uint at = SLOT_FLOATS * (k + lane);
-            [[unroll]] for (uint i = 0; i < SUMS; ++i) slots[at + i] = slot[i];
-        }
+        if (k + lane < end) write_slot(k + lane, slot);
         bool open = false;
         [[unroll]] for (uint p = 0; p < PIXELS; ++p) open = open || T[p] > 0.0;
         if (subgroupAll(!open)) {
@@ -146,17 +150,11 @@ void main() {
     if (tile + 1u == push.tiles[0] * push.tiles[1]) {
         const uint all = tile_starts[tile + 2u];
         for (uint e = end; e < all; e += SUBGROUP) {
-            if (e + lane < all) {
-                const uint at = SLOT_FLOATS * (e + lane);
-                [[unroll]] for (uint i = 0; i < SUMS; ++i) slots[at + i] = 0.0;
-            }
+            if (e + lane < all) write_slot(e + lane, none);
         }
     }
     // Instances behind the last open pixel have gradient zero.
     for (; k < end; k += SUBGROUP) {
-        if (k + lane < end) {
-            const uint at = SLOT_FLOATS * (k + lane);
-            [[unroll]] for (uint i = 0; i < SUMS; ++i) slots[at + i] = 0.0;
-        }
+        if (k + lane < end) write_slot(k + lane, none);
     }
 }

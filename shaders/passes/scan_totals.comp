@@ -9,7 +9,7 @@
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(set = 0, binding = 0, scalar) buffer Totals { uint totals[]; };
-layout(set = 0, binding = 1, scalar) writeonly buffer CountsBlock { Counts counts; };
+layout(set = 0, binding = 1, scalar) buffer CountsBlock { Counts counts; };
 layout(push_constant, scalar) uniform Push { ScanTotalsPush push; };
 
 void main() {
@@ -29,7 +29,12 @@ void main() {
     const bool wrapped = high + (low >> 16) > 0xffffu;
     if (gl_SubgroupInvocationID == 0u) {
         totals[push.blocks] = carry;
-        if (push.total == TOTAL_INSTANCES) counts.instances = wrapped ? 0xffffffffu : carry;
+        if (push.total == TOTAL_INSTANCES) {
+            const bool overflowed = counts.overflowed != 0u;
+            const uint needed = wrapped || overflowed ? 0xffffffffu : carry;
+            counts.instances = needed;
+            counts.overflowed = needed > push.capacity ? 1u : 0u;
+        }
         if (push.total == TOTAL_SCAN) counts.scan_total = carry;
     }
 }

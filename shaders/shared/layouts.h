@@ -17,6 +17,7 @@ EWA_UINT(SPEC_MODE, 6u);           // one of the shader's modes below, or a sum 
 EWA_UINT(SPEC_RADIX_BITS, 7u);     // bits a radix pass sorts by, 1..8
 EWA_UINT(SPEC_CUT_OFF, 8u);        // float: contributions below it are skipped; normally ALPHA_MIN
 EWA_UINT(SPEC_ALPHA_TESTED, 9u);   // 1: some mesh material is masked or blended
+EWA_UINT(SPEC_BROADCAST, 11u);     // BROADCAST_*: how the lanes of a tile read a batch of splats
 EWA_UINT(SPEC_COLOR_FLOATS, 10u);  // a buffer of colours holds 0: 4 bytes a colour; 1: 4 floats
 
 // ---- A splat's parameters ----
@@ -96,6 +97,11 @@ EWA_UINT(UPDATE_PACKED_MOMENTS, 16u);  // moments1 holds both moments in 16 bits
 EWA_UINT(WRITE_PARAMS, 0u);
 EWA_UINT(WRITE_MOMENTS, 1u);  // one of the two in float32, or both in one
 
+// ---- SPEC_BROADCAST ----
+EWA_UINT(BROADCAST_SHUFFLES, 0u);  // one splat a lane, in registers
+EWA_UINT(BROADCAST_SHARED, 1u);    // in shared memory
+EWA_UINT(BROADCAST_UNIFORM, 2u);   // every lane loads every splat: free where uniform loads are scalar
+
 // ---- Where a grand total or a sum is written ----
 // ScanTotalsPush.total
 EWA_UINT(TOTAL_NONE, 0u);
@@ -152,6 +158,9 @@ struct Counts {
     float ssim;              // mean SSIM
     uint limited_steps;      // steps of a mean, quaternion or scale that were shortened
     uint visible;            // splats that reach a tile; counted with PROJECT_DEBUG
+    // Not cleared by a frame that may begin before the host has read the counts of the one before. Once a frame
+    // has too many instances, this is 1, later frames report 2^32 - 1 instances, and no pass changes the model.
+    uint overflowed;
 };
 
 struct ProjectPush {
@@ -174,7 +183,8 @@ struct ScanPush {
 
 struct ScanTotalsPush {
     uint blocks;
-    uint total;  // TOTAL_*: where the grand total is written
+    uint total;     // TOTAL_*: where the grand total is written
+    uint capacity;  // with TOTAL_INSTANCES: of instances
 };
 
 struct EmitPush {

@@ -17,6 +17,7 @@ namespace gpu {
 namespace {
 
 constexpr uint32_t kNeededVersion = VK_API_VERSION_1_2;
+constexpr uint32_t kVendorAmd = 0x1002;
 constexpr uint64_t kManyTexels = 1 << 27;              // lavapipe's. Its fetches from texel buffers are fast
 constexpr uint32_t kUsedVersion = VK_API_VERSION_1_3;  // of what a device has
 
@@ -161,6 +162,8 @@ VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT
 }  // namespace
 
 uint32_t subgroup_lanes(uint32_t natural, uint32_t least, uint32_t most) {
+    constexpr uint32_t kNarrow = 8, kWide = 32, kBetween = 16;
+    if (least <= kNarrow && natural >= kWide) return kBetween;
     return std::clamp(std::min(natural, kMostLanes), least, most);
 }
 
@@ -248,6 +251,7 @@ void Device::create_device() {
         physical_.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceSubgroupProperties>()
             .get<vk::PhysicalDeviceSubgroupProperties>()
             .supportedOperations;
+    limits_.scalar_loads = properties.vendorID == kVendorAmd;
     limits_.ballots = bool(operations & vk::SubgroupFeatureFlagBits::eBallot);
     limits_.max_storage_range = properties.limits.maxStorageBufferRange;
     limits_.max_texels = properties.limits.maxTexelBufferElements;

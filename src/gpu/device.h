@@ -25,6 +25,7 @@ struct Limits {
     uint32_t max_invocations = 128;    // of a workgroup along x
     uint32_t shared_bytes = 16384;     // of a workgroup's shared memory
     bool ballots = false;              // of subgroups
+    bool scalar_loads = false;         // a load from the same address in all lanes costs next to nothing
     bool timestamps = false;
     double timestamp_nanoseconds = 1.0;
 };
@@ -35,7 +36,8 @@ class PipelineStore;
 enum class HostAccess { none, write, read_write };
 
 constexpr uint32_t kMostLanes = 64;  // of a subgroup: a tile's pixels
-/// The size that pipelines ask for: a device's own, within its limits, and at most kMostLanes where they allow it.
+/// The size that pipelines with subgroup operations ask for: a device's own, within its limits, and at most kMostLanes
+/// where they allow it. A device that can run 8 lanes as well as 32 (Intel) gets 16: a lane then has twice the registers.
 uint32_t subgroup_lanes(uint32_t natural, uint32_t least, uint32_t most);
 
 class Device {

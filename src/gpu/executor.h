@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Turns recordings into submissions, and times every command by its name.
+// Turns recordings into submissions, and times every command by its name. The device runs submissions one after
+// the other; the host may be a few ahead of it.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -11,31 +12,48 @@ namespace ewa::gpu {
 
 class Executor {
   public:
-    explicit Executor(Device& device);
+    /// ahead: submissions that may be unfinished at one time, at least 1.
+    explicit Executor(Device& device, uint32_t ahead = 1);
+    /// Waits for all submissions.
+    ~Executor();
+    Executor(const Executor&) = delete;
 
-    /// Submits, and waits until the device is done. Then everything that it wrote is visible to the host.
-    /// timed: also measures each command. Throws RunError if the device is lost or the validation layer has a
-    /// message.
+    /// Submits. What the recording refers to must live until wait() has returned for it. timed: also measures
+    /// each command. Throws RunError if the device is lost, std::logic_error if too many are unfinished.
+    void submit(const Recording& recording, bool timed = false);
+    /// Submissions that wait() has not returned for.
+    uint32_t unfinished() const { return unfinished_; }
+    /// Waits until the oldest unfinished submission is done. Then everything that it wrote is visible to the
+    /// host. Throws RunError if the device is lost or the validation layer has a message.
+    void wait();
+    /// Submits, and waits for this and all before it.
     void run(const Recording& recording, bool timed = false);
 
-    /// The times of the last timed run: one entry a name, in the order of recording, with the sum of all
-    /// commands of that name. The time of a command begins at the end of the one before it.
+    /// The times of the last timed submission that is done: one entry a name, in the order of recording, with
+    /// the sum of all commands of that name. The time of a command begins at the end of the one before it.
     const std::vector<PassTime>& timings() const { return timings_; }
 
   private:
+    /// What a submission needs until it is done.
+    struct Slot {
+        vk::UniqueCommandBuffer commands;
+        vk::UniqueFence fence;
+        vk::UniqueDescriptorPool descriptor_pool;
+        uint32_t pool_sets = 0, pool_bindings = 0;
+        vk::UniqueQueryPool queries;
+        uint32_t query_count = 0;
+        std::vector<std::string> timed_names;  // of the commands; empty: not timed
+    };
+
     vk::DescriptorSet bind(const Command& command, vk::DescriptorPool pool);
-    void record(const Recording& recording, vk::CommandBuffer commands, bool timed);
-    void read_timings(const Recording& recording);
-    void reserve(const Recording& recording, bool timed);
+    void record(const Recording& recording, const Slot& slot, bool timed);
+    void read_timings(const Slot& slot);
+    void reserve(Slot& slot, const Recording& recording, bool timed);
 
     Device& device_;
     vk::UniqueCommandPool command_pool_;
-    vk::UniqueCommandBuffer commands_;
-    vk::UniqueFence fence_;
-    vk::UniqueDescriptorPool descriptor_pool_;
-    uint32_t pool_sets_ = 0, pool_bindings_ = 0;
-    vk::UniqueQueryPool queries_;
-    uint32_t query_count_ = 0;
+    std::vector<Slot> slots_;
+    uint32_t next_ = 0, unfinished_ = 0;
     std::vector<PassTime> timings_;
 };
 

@@ -13,6 +13,7 @@ namespace {
 
 // Numbers of the SPIR-V specification, section 3.
 enum Op : uint32_t {
+    kOpCapability = 17,
     kOpTypeInt = 21,
     kOpTypeFloat = 22,
     kOpTypeVector = 23,
@@ -37,13 +38,15 @@ enum Decoration : uint32_t {
     kOffset = 35
 };
 enum Storage : uint32_t { kUniformConstant = 0, kUniform = 2, kPushConstant = 9, kStorageBuffer = 12 };
-constexpr uint32_t kWhole = ~0u;  // in place of a member's number
+constexpr uint32_t kGroupNonUniform = 61;  // the capability of all subgroup operations
+constexpr uint32_t kWhole = ~0u;           // in place of a member's number
 
 using Words = std::span<const uint32_t>;  // of an instruction; the first holds its op
 
 struct Module {
     std::map<uint32_t, Words> declared;  // types and constants, by id
     std::vector<Words> variables;
+    bool uses_subgroups = false;
     std::map<std::array<uint32_t, 3>, uint32_t> decorations;  // id, member, decoration -> operand, or 0
 };
 
@@ -59,6 +62,7 @@ Module parse(Words spirv) {
             module.decorations[{words[1], words[2], words[3]}] = length > 4 ? words[4] : 0;
         if (op >= kOpTypeInt && op <= kOpTypePointer) module.declared[words[1]] = words;
         if (op == kOpConstant) module.declared[words[2]] = words;
+        if (op == kOpCapability && words[1] == kGroupNonUniform) module.uses_subgroups = true;
         if (op == kOpVariable) module.variables.push_back(words);
         at += length;
     }
@@ -130,6 +134,7 @@ Reflection reflect(std::span<const uint32_t> spirv) {
     for (const auto& [key, operand] : module.decorations)
         if (key[2] == kSpecId) result.constants.push_back(operand);
     std::ranges::sort(result.constants);
+    result.uses_subgroups = module.uses_subgroups;
     return result;
 }
 
@@ -189,7 +194,8 @@ Pipeline::Pipeline(Device& device, std::string name, std::span<const uint32_t> s
         vk::ComputePipelineCreateInfo create;
         create.stage.setStage(vk::ShaderStageFlagBits::eCompute).setModule(*module).setPName("main");
         create.stage.setPSpecializationInfo(&specialization);
-        if (device.subgroup_size_control()) {
+        // Without subgroup operations, the driver knows best how wide the shader runs.
+        if (device.subgroup_size_control() && reflection_.uses_subgroups) {
             create.stage.setPNext(&size);
             create.stage.setFlags(vk::PipelineShaderStageCreateFlagBits::eRequireFullSubgroupsEXT);
         }

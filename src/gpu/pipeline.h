@@ -28,6 +28,7 @@ struct Reflection {
     std::vector<Binding> bindings;  // of set 0; entry i is binding i
     uint32_t push_constant_bytes = 0;
     std::vector<uint32_t> constants;  // ids of the specialisation constants, ascending
+    bool uses_subgroups = false;      // by shuffles, votes or ballots
 };
 
 /// Access of a storage block: read if every member is NonWritable, write if every member is NonReadable

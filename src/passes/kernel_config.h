@@ -27,7 +27,9 @@ struct KernelConfig {
     uint32_t tile_interleave = 1;              // distance of the tiles of neighbouring workgroups
     uint32_t max_groups = 65535;               // workgroups along one dimension
     uint32_t loop_limit = 65535;               // iterations of a loop in one invocation
-    bool texel_buffers = true;                 // read-only buffers are texel buffers, or storage buffers
+    uint32_t broadcast = shared::BROADCAST_SHUFFLES;  // of blending: SPEC_BROADCAST
+    uint32_t frames_in_flight = 1;  // training steps that the host may be ahead of the device, plus one
+    bool texel_buffers = true;      // read-only buffers are texel buffers, or storage buffers
     float cut_off =
         float(shared::ALPHA_MIN);  // smaller contributions are skipped; other values compare speed
 };
@@ -53,6 +55,8 @@ inline KernelConfig config_for(const gpu::Limits& limits) {
     } else {
         config.sort_lanes_max = 16384;
         config.sort_chunk = 64;
+        config.frames_in_flight = 2;
+        config.broadcast = limits.scalar_loads ? shared::BROADCAST_UNIFORM : shared::BROADCAST_SHARED;
         config.ranked_sort = limits.ballots && limits.shared_bytes >= kRankedBytes &&
                              limits.max_invocations >= shared::RANKED_SUBGROUPS * config.subgroup;
     }

@@ -11,9 +11,9 @@ namespace ewa::shared {
 // The scalar block layout packs these structs without padding, and so does C++.
 static_assert(sizeof(CameraBlock) == 4 * (9 + 9 + 3 + 3 + 8 + 4 + 4));
 static_assert(offsetof(CameraBlock, size) == 4 * (9 + 9 + 3 + 3 + 8 + 4));
-static_assert(sizeof(Counts) == 32 && offsetof(Counts, l1) == 16);
+static_assert(sizeof(Counts) == 36 && offsetof(Counts, l1) == 16);
 static_assert(sizeof(ProjectPush) == 12 && sizeof(SortPush) == 16 && sizeof(ScanPush) == 8);
-static_assert(sizeof(ScanTotalsPush) == 8 && sizeof(EmitPush) == 32 && sizeof(TileStartsPush) == 8);
+static_assert(sizeof(ScanTotalsPush) == 12 && sizeof(EmitPush) == 32 && sizeof(TileStartsPush) == 8);
 static_assert(sizeof(BlendPush) == 48 && offsetof(BlendPush, capacity) == 44);
 static_assert(sizeof(UnpackPush) == 28 && sizeof(LossPush) == 24 && sizeof(ReducePush) == 16);
 static_assert(sizeof(ImageLayout) == 16 && sizeof(PackPush) == 4 && sizeof(ExposurePush) == 20 &&
@@ -35,10 +35,11 @@ const gpu::Pipeline& PassCache::pipeline(std::string_view shader, uint32_t group
                            {shared::SPEC_SUBGROUP, config_.subgroup},
                            {shared::SPEC_TILE_WIDTH, config_.tile_width},
                            {shared::SPEC_TILE_HEIGHT, config_.tile_height},
+                           {shared::SPEC_BROADCAST, config_.broadcast},
                            {shared::SPEC_CUT_OFF, std::bit_cast<uint32_t>(config_.cut_off)}};
     constants.insert(constants.end(), variant.begin(), variant.end());
-    const gpu::Pipeline& made =
-        device_.pipelines().get(device_, std::string(shader), shader_code(shader, config_.texel_buffers), constants);
+    const gpu::Pipeline& made = device_.pipelines().get(
+        device_, std::string(shader), shader_code(shader, config_.texel_buffers), constants);
     const std::vector<uint32_t>& declared = made.reflection().constants;
     for (const gpu::SpecConstant& constant : variant)
         if (!std::binary_search(declared.begin(), declared.end(), constant.id))

@@ -60,7 +60,8 @@ void record_instances(gpu::Recording& recording, passes::PassCache& cache, const
                 {.items = model.splats,
                  .block = s.scan_block,
                  .total = shared::TOTAL_INSTANCES,
-                 .name = "instance offsets"});
+                 .name = "instance offsets",
+                 .capacity = frame.instance_capacity});
     cache.get<passes::EmitInstances>({{shared::SPEC_MODE, plan.gradients ? shared::EMIT_FIRST_INSTANCES : 0}})
         .record(recording,
                 {.records = frame.records,
@@ -120,7 +121,8 @@ shared::BlendPush blend_push(const passes::KernelConfig& config, const FrameBuff
 
 Sorted record_forward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
                       const Model& model, const FrameBuffers& frame, const FrameInputs& inputs) {
-    recording.fill(frame.counts, 0, 0, sizeof(shared::Counts));
+    recording.fill(frame.counts, 0, 0,
+                   inputs.keep_overflow ? offsetof(shared::Counts, overflowed) : sizeof(shared::Counts));
     record_project(recording, cache, plan, model, frame, inputs);
     const gpu::Buffer& order = record_depth_order(recording, cache, model, frame);
     record_instances(recording, cache, plan, model, frame, order);

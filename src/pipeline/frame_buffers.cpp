@@ -194,9 +194,9 @@ void FrameBuffers::reserve(gpu::Device& device, const passes::KernelConfig& conf
     instance_capacity = request.instances;
     if (!counts) {
         counts = gpu::Buffer(device, "counts", sizeof(shared::Counts));
-        if (!counts.mapped())
-            counts_copy =
-                gpu::Buffer(device, "counts copy", sizeof(shared::Counts), Texel::none, false, true);
+        if (!counts.mapped() || config.frames_in_flight > 1)
+            counts_copy = gpu::Buffer(device, "counts copy", config.frames_in_flight * sizeof(shared::Counts),
+                                      Texel::none, false, true);
     }
 
     for (const Allocation& each : allocations(*this, sizes)) {
@@ -230,13 +230,15 @@ void FrameBuffers::free_instances() {
     sorted_indices[1] = gpu::Buffer();
 }
 
-void FrameBuffers::record_counts(gpu::Recording& recording) const {
-    if (counts_copy) recording.copy(counts, 0, counts_copy, 0, sizeof(shared::Counts));
+void FrameBuffers::record_counts(gpu::Recording& recording, uint32_t slot) const {
+    if (counts_copy)
+        recording.copy(counts, 0, counts_copy, slot * sizeof(shared::Counts), sizeof(shared::Counts));
 }
 
-shared::Counts FrameBuffers::read_counts() const {
+shared::Counts FrameBuffers::read_counts(uint32_t slot) const {
     shared::Counts result;
-    std::memcpy(&result, (counts_copy ? counts_copy : counts).mapped(), sizeof(result));
+    const gpu::Buffer& readable = counts_copy ? counts_copy : counts;
+    std::memcpy(&result, readable.mapped() + slot * sizeof(result), sizeof(result));
     return result;
 }
 

@@ -60,8 +60,9 @@ struct FrameBuffers {
     Sizes sizes;  // of the last request
     uint32_t instance_capacity = 0;
 
-    gpu::Buffer counts;       // every splat adds to them: they lie in device memory
-    gpu::Buffer counts_copy;  // host visible; empty where the host can read the counts themselves
+    gpu::Buffer counts;  // every splat adds to them: they lie in device memory
+    gpu::Buffer
+        counts_copy;  // host visible, for frames_in_flight frames; empty where the host can read counts
     gpu::Buffer records, depth_keys[2], order[2], tile_counts, prefix, scan_totals, first_instances;
     gpu::Buffer counters, counter_prefix, digit_totals;
     gpu::Buffer instance_keys[2], instance_splats[2], sorted_indices[2], tile_starts;
@@ -84,10 +85,10 @@ struct FrameBuffers {
 
     /// Frees the memory of overlaid buffers and these buffers, or the same buffers that lie alone.
     void free_overlaid();
-    /// The last command of a frame: lets the host read the counts.
-    void record_counts(gpu::Recording& recording) const;
-    /// The counts of the last submission with record_counts.
-    shared::Counts read_counts() const;
+    /// The last command of a frame: lets the host read the counts. slot: which of the frames in flight it is.
+    void record_counts(gpu::Recording& recording, uint32_t slot = 0) const;
+    /// The counts of the last submission with record_counts for this slot, which must be done.
+    shared::Counts read_counts(uint32_t slot = 0) const;
 };
 
 /// Capacity for (splat, tile) instances of a first try. The first frame tells how many there are.

@@ -22,6 +22,7 @@ struct CameraUse {
 struct FrameInputs {
     CameraUse camera;
     std::array<float, 3> background{0, 0, 0};
+    bool keep_overflow = false;    // the frame before may not be done: if it overflows, this one does nothing
     int sh_degree = kMaxShDegree;  // evaluated: at most this, and at most what the plan stores
 };
 

@@ -16,7 +16,8 @@ void record_scan(gpu::Recording& recording, passes::PassCache& cache, const Scan
                 {.items = work.items, .block = work.block}, work.name);
     const uint32_t blocks = uint32_t((uint64_t(work.items) + work.block - 1) / work.block);
     cache.get<passes::ScanTotals>().record(recording, {.totals = buffers.totals, .counts = buffers.counts},
-                                           {.blocks = blocks, .total = work.total}, work.name);
+                                           {.blocks = blocks, .total = work.total, .capacity = work.capacity},
+                                           work.name);
 }
 
 namespace {

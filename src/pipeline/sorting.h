@@ -14,9 +14,10 @@ struct ScanBuffers {
 };
 struct ScanWork {
     uint32_t items;
-    uint32_t block;    // entries a subgroup scans
-    uint32_t total;    // shared::TOTAL_*: which of Counts receives the grand total
-    const char* name;  // of the timing
+    uint32_t block;           // entries a subgroup scans
+    uint32_t total;           // shared::TOTAL_*: which of Counts receives the grand total
+    const char* name;         // of the timing
+    uint32_t capacity = ~0u;  // of instances, with TOTAL_INSTANCES
 };
 
 /// Exclusive prefix sum; that of entry e is totals[e / block] + prefix[e].

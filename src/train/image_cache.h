@@ -23,6 +23,8 @@ class ImageCache {
                int reduction = 1);
 
     size_t count() const { return photos_.size(); }
+    /// Whether photo(i) returns at once.
+    bool cached(size_t i) const { return bool(photos_[i].texels); }
     size_t on_disk() const { return on_disk_; }
 
     /// An image as the loss reads it. Valid until the next call of photo.

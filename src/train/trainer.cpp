@@ -11,6 +11,7 @@
 #include <glm/geometric.hpp>
 #include <map>
 #include <span>
+#include <utility>
 
 #include "core/random.h"
 #include "ewa/error.h"
@@ -30,6 +31,7 @@ using namespace pipeline;
 using Clock = std::chrono::steady_clock;
 
 constexpr size_t kTimedSteps = 100;     // number of steps for the medians of pass times
+constexpr int kTimedEvery = 100;        // steps, where several are in flight
 constexpr double kResetOpacity = 0.01;  // 3DGS: upper bound of opacities after a reset
 
 double logit(double p) {
@@ -92,6 +94,7 @@ struct Trainer::State {
     std::vector<train::ImageCache> smaller;  // by downsample level, from 1; freed after its last step
     Exposures exposures;
     uint32_t instance_capacity;
+    std::deque<int> in_flight;  // steps that are submitted and not finished
     StepReport report;
     std::deque<std::vector<PassTime>> timings;
 
@@ -102,7 +105,7 @@ struct Trainer::State {
           schedule(train::schedule_for(o)),
           extent(length),
           cache(*device),
-          executor(*device),
+          executor(*device, cache.config().frames_in_flight),
           images(*device, cache.config(), dataset, frames, train::cache_share(o, 0), ready.origin),
           plan(plan_for(train::plan_request(ready, o, images.any_masked()))),
           model(upload_model(*device, ready, plan.moment_buffers(), plan.statistics)),
@@ -143,46 +146,104 @@ struct Trainer::State {
     /// The training images at this step's resolution. Frees those of lower resolutions: resolutions only rise.
     train::ImageCache& images_at(int step) {
         const size_t halvings = size_t(schedule.halvings_at(step));
+        if (smaller.size() > halvings) finish_all();
         while (smaller.size() > halvings) smaller.pop_back();
         return halvings == 0 ? images : smaller.back();
     }
 
-    void optimise(int step) {
+    /// The inputs of a step, which are pure functions of its number, and the recording of its commands.
+    FrameRequest request_of(const CameraUse& camera) const {
+        return {.splats = model.splats,
+                .width = camera.width,
+                .height = camera.height,
+                .instances = instance_capacity,
+                .gradients = true,
+                .masks = plan.masks,
+                .exposure = plan.exposure,
+                .overlaid = true};
+    }
+
+    void record_step(gpu::Recording& recording, int step, size_t index, const train::ImageCache::Photo& photo,
+                     const CameraUse& camera) {
+        const ExposureUse exposure{&exposures, uint32_t(index), float(schedule.exposure_rate(step)),
+                                   uint32_t(size_t(step - 1) / images.count() + 1)};
+        const FrameInputs inputs{.camera = camera,
+                                 .background = options.random_background
+                                                   ? random_background(step, options.seed)
+                                                   : options.render.background,
+                                 .keep_overflow = !in_flight.empty(),
+                                 .sh_degree = schedule.degree(step)};
+        const Sorted sorted = record_forward(recording, cache, plan, model, frame, inputs);
+        record_loss(recording, cache, frame, inputs, photo.texels, photo.masked,
+                    plan.exposure ? &exposure : nullptr);
+        record_backward(recording, cache, plan, model, frame, inputs, sorted, rates(step));
+        if (options.strategy == Strategy::mcmc) record_noise(recording, cache, model, frame, noise(step));
+    }
+
+    /// Submits a step. Afterwards at most frames_in_flight steps are in flight.
+    void submit(int step) {
         train::ImageCache& seen = images_at(step);
         const size_t index = train::frame_of_step(step, images.count(), options.seed);
+        const CameraUse camera = seen.camera(index);
+        // Buffers of another size, and an image from disk, take the place of what a step in flight reads.
+        if (!seen.cached(index) || camera.width != frame.sizes.width || camera.height != frame.sizes.height)
+            finish_all();
+        while (in_flight.size() >= cache.config().frames_in_flight) finish_oldest();
         const auto& photo = seen.photo(index);
         if (schedule.halvings_at(step + 1) == schedule.halvings_at(step))
             seen.prepare(train::frame_of_step(step + 1, images.count(), options.seed));
-        const ExposureUse exposure{&exposures, uint32_t(index), float(schedule.exposure_rate(step)),
-                                   uint32_t(size_t(step - 1) / images.count() + 1)};
-        const auto background =
-            options.random_background ? random_background(step, options.seed) : options.render.background;
-        const FrameInputs inputs{
-            .camera = seen.camera(index), .background = background, .sh_degree = schedule.degree(step)};
-        const FrameRequest size{.splats = model.splats,
-                                .width = inputs.camera.width,
-                                .height = inputs.camera.height,
-                                .instances = instance_capacity,
-                                .gradients = true,
-                                .masks = plan.masks,
-                                .exposure = plan.exposure,
-                                .overlaid = true};
-        const shared::Counts counts =
-            run_until_it_fits(cache, executor, frame, size, [&](gpu::Recording& recording) {
-                const Sorted sorted = record_forward(recording, cache, plan, model, frame, inputs);
-                record_loss(recording, cache, frame, inputs, photo.texels, photo.masked,
-                            plan.exposure ? &exposure : nullptr);
-                record_backward(recording, cache, plan, model, frame, inputs, sorted, rates(step));
-                if (options.strategy == Strategy::mcmc)
-                    record_noise(recording, cache, model, frame, noise(step));
-            });
-        instance_capacity = frame.instance_capacity;
+        if (in_flight.empty()) frame.reserve(cache.device(), cache.config(), request_of(camera));
+        gpu::Recording recording(device->limits());
+        record_step(recording, step, index, photo, camera);
+        frame.record_counts(recording, slot_of(step));
+        executor.submit(recording, is_timed(step));
+        in_flight.push_back(step);
+    }
+
+    /// Where steps overlap, the queries between the commands would cost time.
+    bool is_timed(int step) const { return cache.config().frames_in_flight == 1 || step % kTimedEvery == 1; }
+    uint32_t slot_of(int step) const { return uint32_t(step) % cache.config().frames_in_flight; }
+
+    /// Waits for the oldest step. If it had too many instances, neither it nor later ones have changed the model: they are
+    /// all repeated, one by one, with more capacity.
+    void finish_oldest() {
+        const int step = in_flight.front();
+        executor.wait();
+        const shared::Counts counts = frame.read_counts(slot_of(step));
+        if (counts.instances > frame.instance_capacity) {
+            const std::deque<int> again = std::exchange(in_flight, {});
+            while (executor.unfinished()) executor.wait();
+            instance_capacity = grown_capacity(counts.instances);
+            for (const int repeated : again) {
+                submit(repeated);
+                finish_all();
+            }
+            return;
+        }
+        in_flight.pop_front();
         report.loss = loss_of(counts);
         report.skipped_nonfinite = counts.skipped_nonfinite;
         report.dropped_updates += counts.dropped_updates;
         report.limited_steps += counts.limited_steps;
+        if (!is_timed(step)) return;
         timings.push_back(executor.timings());
         if (timings.size() > kTimedSteps) timings.pop_front();
+    }
+
+    void finish_all() {
+        while (!in_flight.empty()) finish_oldest();
+    }
+
+    /// Whether something happens after a step that needs its result.
+    bool must_finish(int step) const {
+        return step == options.steps || (options.strategy == Strategy::mcmc && schedule.relocates(step)) ||
+               (options.strategy == Strategy::adc &&
+                (schedule.densifies(step) || schedule.resets_opacity(step)));
+    }
+
+    void optimise(int step) {
+        submit(step);
+        if (must_finish(step) || cache.config().frames_in_flight == 1) finish_all();
     }
 
     void follow_up(int step) {
@@ -274,6 +335,7 @@ std::vector<NamedBuffer> buffers_of(const Plan& plan, Model& model, Exposures& e
 
 TrainerState Trainer::state() const {
     State& s = *state_;
+    s.finish_all();
     TrainerState state{s.report, s.model.sh_degree, {}};
     for (const NamedBuffer& named : buffers_of(s.plan, s.model, s.exposures, s.model.capacity))
         state.arrays.push_back({named.name, named.buffer->download<std::byte>(named.bytes)});
@@ -303,6 +365,7 @@ void Trainer::restore(const TrainerState& state) {
         if (state.arrays[i].name != buffers[i].name || state.arrays[i].bytes.size() != buffers[i].bytes)
             throw InputError("the state does not fit this training: it lacks " +
                              std::string(buffers[i].name) + " of " + std::to_string(splats) + " splats");
+    s.finish_all();
     s.model = {};  // free its memory first
     s.model.splats = s.model.capacity = splats;
     s.model.sh_degree = state.sh_degree;
@@ -316,9 +379,11 @@ void Trainer::restore(const TrainerState& state) {
 }
 
 std::vector<Exposure> Trainer::exposures() const {
+    state_->finish_all();
     return state_->plan.exposure ? state_->exposures.download() : std::vector<Exposure>();
 }
 Gaussians Trainer::gaussians() const {
+    state_->finish_all();
     return download_model(state_->model, state_->model.params);
 }
 uint32_t Trainer::splats() const {

@@ -28,7 +28,7 @@ TEST(ScanEdges, ATotalPast32BitsIsTheLargestNumber) {
         Guarded sums("totals", totals), counts = zero_counts();
         r.run([&](gpu::Recording& recording) {
             r.cache.get<passes::ScanTotals>().record(recording, {sums, counts},
-                                                     {blocks, shared::TOTAL_INSTANCES}, "scan");
+                                                     {blocks, shared::TOTAL_INSTANCES, ~0u}, "scan");
         });
         expect_intact({&sums, &counts});
         return counts.read<shared::Counts>()[0].instances;

@@ -10,6 +10,7 @@
 #include "ewa/splat_files.h"
 #include "ewa/trainer.h"
 #include "gpu/test_device.h"
+#include "shared/layouts.h"
 #include "support/shared_by_tests.h"
 #include "train/synthetic.h"
 
@@ -124,12 +125,17 @@ TEST(Trainer, TheSameSeedWritesTheSameBytesAndAnotherDoesNot) {
     EXPECT_NE(first, bytes(2));
 }
 
-/// GPUs with memory of their own: the host maps none of it, or reads what it maps slowly.
-TEST(Trainer, MemoryThatTheHostCannotReadChangesNoByte) {
+/// GPUs with memory of their own: the host maps none of it, or reads what it maps slowly. Their kernels sort and blend in
+/// other ways.
+TEST(Trainer, MemoryAndKernelsOfAGpuChangeNoByte) {
     const Gaussians start = shaken_start(small_capture(), 0.05, 1, 1);
-    const auto bytes = [&](gpu::HostAccess most) {
+    const auto bytes = [&](gpu::HostAccess most, bool cpu_kernels = true) {
         const std::shared_ptr<gpu::Device> other = open_test_device(true);
         other->limit_host_access(most);
+        gpu::Limits limits = other->limits();
+        limits.cpu = cpu_kernels;
+        limits.max_storage_range = ~0u;
+        other->pretend(limits);
         TrainOptions options = quick(130);
         options.strategy = Strategy::adc;
         options.grow_gradient = 1e-5;
@@ -141,6 +147,42 @@ TEST(Trainer, MemoryThatTheHostCannotReadChangesNoByte) {
     const std::string mapped = bytes(gpu::HostAccess::read_write);
     EXPECT_TRUE(mapped == bytes(gpu::HostAccess::none));
     EXPECT_TRUE(mapped == bytes(gpu::HostAccess::write));
+    EXPECT_TRUE(mapped == bytes(gpu::HostAccess::none, false));
+}
+
+/// With several steps in flight, those behind a step that has too many instances are in vain and are repeated.
+TEST(Trainer, AnOverflowWithStepsInFlightChangesNoByte) {
+    PointCloud points = small_capture().dataset.points;
+    for (int doubling = 0; doubling < 4; ++doubling) {
+        const PointCloud once = points;
+        points.positions.insert(points.positions.end(), once.positions.begin(), once.positions.end());
+        points.colors.insert(points.colors.end(), once.colors.begin(), once.colors.end());
+    }
+    // All cameras see the first 40 splats. Those that look away from the first camera do not see the others, which are large:
+    // one step has too many instances, and the next one has few.
+    const glm::dvec3 away = -3.0 * small_capture().dataset.frames[0].camera.position();
+    Random random(5);
+    for (size_t i = 0; i < points.positions.size(); ++i)
+        for (int k = 0; k < 3; ++k) points.positions[i][k] += 0.05 * random.normal() + (i < 40 ? 0 : away[k]);
+    Gaussians start = gaussians_from_points(points, 1);
+    for (size_t i = 3 * 40; i < start.log_scales.size(); ++i) start.log_scales[i] += 4;
+    std::shared_ptr<gpu::Device> other;
+    const auto bytes = [&](bool cpu_kernels) {
+        other = open_test_device(true);
+        gpu::Limits limits = other->limits();
+        limits.cpu = cpu_kernels;
+        limits.max_storage_range = ~0u;
+        other->pretend(limits);
+        const auto path = small_capture().folder / "out.ply";
+        TrainOptions options = quick(7);
+        options.seed = 4;  // step 2 has 6,085 instances, step 3 has 662
+        const TrainedScene run = train(options, start, 7, other);
+        EXPECT_EQ(run.report.step, 7);
+        save_splats(path, run.gaussians);
+        return file_bytes(path);
+    };
+    const std::string expected = bytes(true);
+    EXPECT_TRUE(expected == bytes(false));
 }
 
 TEST(Trainer, GrowsUpToTheCapAndNotPastIt) {
