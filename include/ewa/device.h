@@ -13,14 +13,15 @@ class Device;
 }
 
 struct DeviceInfo {
-    int index = 0;               // the N of --device N
-    std::string name;            // as the driver names it
-    std::string type;            // "cpu", "integrated", "discrete", "virtual", "other"
-    std::string driver;          // driver name and version text
-    std::string api_version;     // "1.3.230"
-    uint32_t subgroup_size = 0;  // lanes
-    uint64_t memory_bytes = 0;   // of the largest device-local heap
-    std::string unusable;        // empty, or what it lacks
+    int index = 0;                   // the N of --device N
+    std::string name;                // as the driver names it
+    std::string type;                // "cpu", "integrated", "discrete", "virtual", "other"
+    std::string driver;              // driver name and version text
+    std::string api_version;         // "1.3.230"
+    uint32_t subgroup_size = 0;      // lanes
+    uint64_t memory_bytes = 0;       // of the largest device-local heap
+    std::string unusable;            // empty, or what it lacks
+    std::vector<std::string> lacks;  // of a usable device: what ewa does without, and what follows from it
 };
 
 /// Every Vulkan device of this machine, in the loader's order. Throws RunError when there is no Vulkan
@@ -32,6 +33,8 @@ struct DeviceOptions {
                            // a number: that index; else a case-insensitive part of the name
     bool validation =
         false;  // turn the Khronos validation layer on; its messages become RunError at the next submit
+    bool own_queue = true;  // take a queue without graphics where there is one: work and desktop do not
+                            // wait for each other
 };
 
 /// Renderers and trainers of one device share the shaders that it has compiled: the second starts faster.

@@ -3,10 +3,39 @@
 // subgroup arithmetic is slow.
 #ifndef EWA_LIB_SUBGROUP
 #define EWA_LIB_SUBGROUP
+layout(constant_id = SPEC_SUBGROUP) const uint SUBGROUP = 8;
+
+#ifdef EWA_EMULATE_SUBGROUPS
+// For tests of more lanes than the device has: a subgroup is SUBGROUP neighbouring invocations of a workgroup, which meet in
+// shared memory. All invocations of the workgroup must take part.
+#define LANE (gl_LocalInvocationID.x % SUBGROUP)
+#define SUBGROUP_INDEX (gl_LocalInvocationID.x / SUBGROUP)
+shared uint meeting[GROUP_SIZE];
+uint met(uint x, uint lane) {
+    barrier();
+    meeting[gl_LocalInvocationID.x] = x;
+    barrier();
+    return meeting[SUBGROUP_INDEX * SUBGROUP + lane];
+}
+float met(float x, uint lane) { return uintBitsToFloat(met(floatBitsToUint(x), lane)); }
+bool all_met(bool x) {
+    bool all = true;
+    met(uint(x), 0u);
+    for (uint lane = 0u; lane < SUBGROUP; ++lane) all = all && meeting[SUBGROUP_INDEX * SUBGROUP + lane] != 0u;
+    return all;
+}
+#define subgroupShuffle(X, OTHER) met(X, OTHER)
+#define subgroupShuffleXor(X, MASK) met(X, LANE ^ (MASK))
+#define subgroupAll(X) all_met(X)
+#define subgroupBarrier() barrier()
+#define subgroupMemoryBarrierShared() memoryBarrierShared()
+#else
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_vote : require
 #extension GL_KHR_shader_subgroup_shuffle : require
-layout(constant_id = SPEC_SUBGROUP) const uint SUBGROUP = 8;
+#define LANE gl_SubgroupInvocationID
+#define SUBGROUP_INDEX gl_SubgroupID
+#endif
 
 // Steps of doubling distance, up to 64 lanes. The loops below count up by one and stop by a constant condition: some
 // compilers do not unroll a loop that doubles its counter, and its iterations count towards a driver's limit.
@@ -21,7 +50,7 @@ float subgroup_sum(float x) {
 
 // Sum over lanes 0 to this one, inclusive.
 uint subgroup_inclusive_sum(uint x) {
-    const uint lane = gl_SubgroupInvocationID;
+    const uint lane = LANE;
     [[unroll]] for (uint s = 0u; s < DOUBLINGS; ++s) {
         if ((1u << s) < SUBGROUP) {
             const uint below = subgroupShuffle(x, lane >= (1u << s) ? lane - (1u << s) : lane);

@@ -58,7 +58,7 @@ Loaded load_batch(uint first, uint end) {
     own.first = first;
     own.end = end;
     if (BROADCAST == BROADCAST_UNIFORM) return own;
-    const uint lane = gl_SubgroupInvocationID;
+    const uint lane = LANE;
     const uint at = RECORD_TEXELS * splats[min(first + lane, end - 1u)];
     own.record0 = fetch(records, at);
     own.record1 = fetch(records, at + 1u);

@@ -32,7 +32,7 @@ void meet_ellipsoid(LaneSplat s, uint p, inout float T, inout vec3 color) {
 void main() {
     const uint tile = gl_WorkGroupID.x * push.tile_step[0] + gl_WorkGroupID.y * push.tile_step[1];
     if (tile >= push.tiles[0] * push.tiles[1]) return;
-    const uint lane = gl_SubgroupInvocationID;
+    const uint lane = LANE;
     const uint px = (tile % push.tiles[0]) * TILE_WIDTH + lane % TILE_WIDTH;
     const uint py = (tile / push.tiles[0]) * TILE_HEIGHT + lane / TILE_WIDTH;
     const vec2 pixel = vec2(px, py) + 0.5;

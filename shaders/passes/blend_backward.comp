@@ -30,7 +30,7 @@ const bool WIDE_STORES = BROADCAST != BROADCAST_SHUFFLES;
 // Sums BLOCK values over the subgroup at once. At each step a lane keeps half of its values and sends the other half, so
 // that lane l ends with the sum of value l % BLOCK. Then lanes BLOCK apart are added.
 float transposing_sum(float v[8]) {
-    const uint lane = gl_SubgroupInvocationID;
+    const uint lane = LANE;
     const bool b0 = (lane & 1u) != 0u, b1 = (lane & 2u) != 0u, b2 = (lane & 4u) != 0u;
     float four[4], two[2];
     if (BLOCK == 1u) return v[0];
@@ -63,7 +63,7 @@ void write_slot(uint index, float slot[12]) {
 void main() {
     const uint tile = gl_WorkGroupID.x * push.tile_step[0] + gl_WorkGroupID.y * push.tile_step[1];
     if (tile >= push.tiles[0] * push.tiles[1]) return;
-    const uint lane = gl_SubgroupInvocationID;
+    const uint lane = LANE;
     const uint px = (tile % push.tiles[0]) * TILE_WIDTH + lane % TILE_WIDTH;
     const uint py = (tile / push.tiles[0]) * TILE_HEIGHT + lane / TILE_WIDTH;
     const vec2 pixel = vec2(px, py) + 0.5;

@@ -24,7 +24,7 @@ void main() {
     const uint first = EXPOSURE_TEXELS * push.photo;
     const vec3 matrix_rows[3] = {exposures[first].xyz, exposures[first + 1u].xyz, exposures[first + 2u].xyz};
     vec4 sum[3] = {vec4(0.0), vec4(0.0), vec4(0.0)};
-    for (uint i = begin + gl_SubgroupInvocationID; i < end; i += SUBGROUP) {
+    for (uint i = begin + LANE; i < end; i += SUBGROUP) {
         const uint at = pixel_offset(push.image, i);
         const uvec3 planes = uvec3(PLANE_R, PLANE_G, PLANE_B) * push.image.plane_floats + at;
         const vec4 color = vec4(image[planes.r], image[planes.g], image[planes.b], 1.0);
@@ -38,6 +38,6 @@ void main() {
     }
     [[unroll]] for (uint c = 0; c < 3; ++c) {
         const vec4 total = vec4(subgroup_sum(sum[c].x), subgroup_sum(sum[c].y), subgroup_sum(sum[c].z), subgroup_sum(sum[c].w));
-        if (gl_SubgroupInvocationID == 0u) sums[EXPOSURE_TEXELS * block + c] = total;
+        if (LANE == 0u) sums[EXPOSURE_TEXELS * block + c] = total;
     }
 }

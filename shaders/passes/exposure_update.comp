@@ -22,7 +22,7 @@ void main() {
     if (counts.instances > push.instance_capacity) return;
     [[unroll]] for (uint row = 0; row < 3; ++row) {
         vec4 sum = vec4(0.0);
-        for (uint b = gl_SubgroupInvocationID; b < push.blocks; b += SUBGROUP) sum += sums[EXPOSURE_TEXELS * b + row];
+        for (uint b = LANE; b < push.blocks; b += SUBGROUP) sum += sums[EXPOSURE_TEXELS * b + row];
         sum = vec4(subgroup_sum(sum.x), subgroup_sum(sum.y), subgroup_sum(sum.z), subgroup_sum(sum.w));
         const uint at = EXPOSURE_TEXELS * push.photo + row;
         const vec4 value = exposures[at];
@@ -33,11 +33,11 @@ void main() {
         const vec4 moved = value - push.rate * (m * push.bias1) / (sqrt(v * push.bias2) + float(ADAM_EPSILON));
         const bool finite = is_finite(moved) && is_finite(m) && is_finite(v);
         // No lane leaves the loop: the next row's sum needs all of them.
-        if (gl_SubgroupInvocationID == 0u && finite) {
+        if (LANE == 0u && finite) {
             exposures[at] = moved;
             moments1[at] = m;
             moments2[at] = v;
         }
-        if (gl_SubgroupInvocationID == 0u && !finite) atomicAdd(counts.dropped_updates, 1u);
+        if (LANE == 0u && !finite) atomicAdd(counts.dropped_updates, 1u);
     }
 }

@@ -48,5 +48,5 @@ void main() {
     }
     const float sum = subgroup_sum(differences.x + differences.y + differences.z + differences.w);
     const uint group = (gl_WorkGroupID.z * gl_NumWorkGroups.y + gl_WorkGroupID.y) * gl_NumWorkGroups.x + gl_WorkGroupID.x;
-    if (gl_SubgroupInvocationID == 0u) partials[group * (GROUP_SIZE / SUBGROUP) + gl_SubgroupID] = sum;
+    if (LANE == 0u) partials[group * (GROUP_SIZE / SUBGROUP) + SUBGROUP_INDEX] = sum;
 }

@@ -53,5 +53,5 @@ void main() {
     }
     const float sum = subgroup_sum(sums.x + sums.y + sums.z + sums.w);
     const uint group = (gl_WorkGroupID.z * gl_NumWorkGroups.y + gl_WorkGroupID.y) * gl_NumWorkGroups.x + gl_WorkGroupID.x;
-    if (gl_SubgroupInvocationID == 0u) partials[group * (GROUP_SIZE / SUBGROUP) + gl_SubgroupID] = sum;
+    if (LANE == 0u) partials[group * (GROUP_SIZE / SUBGROUP) + SUBGROUP_INDEX] = sum;
 }

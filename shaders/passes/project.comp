@@ -11,6 +11,7 @@
 #include "lib/projection.glsl"
 #include "lib/footprint.glsl"
 #include "lib/sh.glsl"
+#include "lib/subgroup.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3;
@@ -48,9 +49,8 @@ vec3 sh_color(uint i, vec4 plane2, vec3 direction, out bool finite) {
     return max(vec3(0.0), sum + float(COLOR_OFFSET));
 }
 
-void main() {
-    const uint i = item_index();
-    if (i >= push.splats) return;
+// Whether splat i reaches a tile.
+bool project(uint i) {
     const vec4 p0 = param(0, i), p1 = param(1, i), p2 = param(2, i);
     const vec3 log_scale = DEBUG ? p2.xyz + push.log_scale_shift : p2.xyz;
     const Projection p = project_splat(SplatShape(p0.xyz, p0.w, p1, log_scale));
@@ -78,6 +78,17 @@ void main() {
     records[RECORD_TEXELS * i + 2] = vec4(color, z);
     depth_keys[i] = count > 0u ? floatBitsToUint(z) : 0xffffffffu;
     tile_counts[i] = count;
-    if (DEBUG && count > 0u) atomicAdd(counts.visible, 1u);
     if (!stored_finite || (in_front && !projected_finite)) atomicAdd(counts.skipped_nonfinite, 1u);
+    return count > 0u;
+}
+
+void main() {
+    const uint i = item_index();
+    bool visible = false;
+    if (i < push.splats) visible = project(i);
+    if (DEBUG) {
+        // One atomic a subgroup. All lanes take part in the sum, with or without a splat.
+        const uint sum = subgroup_inclusive_sum(visible ? 1u : 0u);
+        if (gl_SubgroupInvocationID == SUBGROUP - 1u && sum > 0u) atomicAdd(counts.visible, sum);
+    }
 }

@@ -33,8 +33,8 @@ shared uint digit_starts[DIGITS];                        // where a digit begins
 shared uint exchange[RANKED_KEYS];
 
 // Position of round `round` of this invocation: in the block as it was read, and in the sorted block.
-uint read_at(uint round) { return (gl_SubgroupID * RANKED_ROUNDS + round) * SUBGROUP + gl_SubgroupInvocationID; }
-uint write_at(uint round) { return round * GROUP_SIZE + gl_SubgroupID * SUBGROUP + gl_SubgroupInvocationID; }
+uint read_at(uint round) { return (SUBGROUP_INDEX * RANKED_ROUNDS + round) * SUBGROUP + LANE; }
+uint write_at(uint round) { return round * GROUP_SIZE + SUBGROUP_INDEX * SUBGROUP + LANE; }
 
 // Number of keys of this digit in the subgroup's rounds so far, and in the lanes below. Counts this round's keys.
 uint rank_of(uint digit, bool present) {
@@ -44,7 +44,7 @@ uint rank_of(uint digit, bool present) {
         const uvec4 votes = subgroupBallot(set);
         same &= set ? votes : ~votes;
     }
-    const uint below = subgroupBallotExclusiveBitCount(same), counter = gl_SubgroupID * DIGITS + digit;
+    const uint below = subgroupBallotExclusiveBitCount(same), counter = SUBGROUP_INDEX * DIGITS + digit;
     const uint before = own_counts[counter];
     subgroupMemoryBarrierShared();
     subgroupBarrier();
@@ -56,8 +56,8 @@ uint rank_of(uint digit, bool present) {
 
 // Turns own_counts into sums over the subgroups before, and fills digit_starts.
 void scan_counts() {
-    const uint lane = gl_SubgroupInvocationID;
-    for (uint d = gl_SubgroupID * SUBGROUP + lane; d < DIGITS; d += GROUP_SIZE) {
+    const uint lane = LANE;
+    for (uint d = SUBGROUP_INDEX * SUBGROUP + lane; d < DIGITS; d += GROUP_SIZE) {
         uint sum = 0u;
         for (uint s = 0u; s < GROUP_SIZE / SUBGROUP; ++s) {
             const uint own = own_counts[s * DIGITS + d];
@@ -67,7 +67,7 @@ void scan_counts() {
         digit_starts[d] = sum;
     }
     barrier();
-    if (gl_SubgroupID == 0u) {
+    if (SUBGROUP_INDEX == 0u) {
         uint carry = 0u;
         for (uint base = 0u; base < DIGITS; base += SUBGROUP) {
             const uint value = base + lane < DIGITS ? digit_starts[base + lane] : 0u;
@@ -96,7 +96,7 @@ void main() {
     scan_counts();
     [[unroll]] for (uint r = 0; r < RANKED_ROUNDS; ++r) {
         const uint digit = digit_of(key[r], push.shift);
-        place[r] += digit_starts[digit] + own_counts[gl_SubgroupID * DIGITS + digit];
+        place[r] += digit_starts[digit] + own_counts[SUBGROUP_INDEX * DIGITS + digit];
         if (read_at(r) < items) exchange[place[r]] = key[r];
     }
     barrier();

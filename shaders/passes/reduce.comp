@@ -17,9 +17,9 @@ void main() {
     const uint block = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     const uint begin = block * push.block, end = min(begin + push.block, push.items);
     float sum = 0.0;
-    for (uint e = begin + gl_SubgroupInvocationID; e < end; e += SUBGROUP) sum += source[e];
+    for (uint e = begin + LANE; e < end; e += SUBGROUP) sum += source[e];
     sum = subgroup_sum(sum) * push.scale;
-    if (gl_SubgroupInvocationID != 0u) return;
+    if (LANE != 0u) return;
     if (push.target == REDUCE_TO_SUMS) sums[block] = sum;
     if (push.target == REDUCE_TO_L1) counts.l1 = sum;
     if (push.target == REDUCE_TO_SSIM) counts.ssim = sum;

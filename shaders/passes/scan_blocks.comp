@@ -23,12 +23,12 @@ void main() {
     const uint end = min(begin + push.block, push.items);
     uint carry = 0u;
     for (uint base = begin; base < end; base += SUBGROUP) {
-        const uint e = base + gl_SubgroupInvocationID;
+        const uint e = base + LANE;
         uint value = 0u;
         if (e < end) value = source[MODE == SCAN_GATHERED ? order[e] : e];
         const uint sum = subgroup_inclusive_sum(value);
         if (e < end) prefix[e] = carry + sum - value;
         carry += subgroupShuffle(sum, SUBGROUP - 1u);
     }
-    if (gl_SubgroupInvocationID == 0u) totals[block] = carry;
+    if (LANE == 0u) totals[block] = carry;
 }

@@ -15,7 +15,7 @@ layout(push_constant, scalar) uniform Push { ScanTotalsPush push; };
 void main() {
     uint carry = 0u, low = 0u, high = 0u;
     for (uint base = 0u; base < push.blocks; base += SUBGROUP) {
-        const uint e = base + gl_SubgroupInvocationID;
+        const uint e = base + LANE;
         uint value = 0u;
         if (e < push.blocks) value = totals[e];
         low += value & 0xffffu;
@@ -27,7 +27,7 @@ void main() {
     low = subgroupShuffle(subgroup_inclusive_sum(low), SUBGROUP - 1u);
     high = subgroupShuffle(subgroup_inclusive_sum(high), SUBGROUP - 1u);
     const bool wrapped = high + (low >> 16) > 0xffffu;
-    if (gl_SubgroupInvocationID == 0u) {
+    if (LANE == 0u) {
         totals[push.blocks] = carry;
         if (push.total == TOTAL_INSTANCES) {
             const bool overflowed = counts.overflowed != 0u;

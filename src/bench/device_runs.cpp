@@ -108,7 +108,7 @@ SortRun::SortRun(std::shared_ptr<gpu::Device> device, uint32_t items)
     counters_ = gpu::Buffer(*device_, "counters", sizes.counters);
     counter_prefix_ = gpu::Buffer(*device_, "counter prefix", sizes.counters);
     digit_totals_ = gpu::Buffer(*device_, "digit totals", sizes.digit_totals);
-    counts_ = gpu::Buffer(*device_, "counts", sizeof(shared::Counts), gpu::Texel::none, false, true);
+    counts_ = gpu::Buffer(*device_, "counts", sizeof(shared::Counts));
 }
 
 void SortRun::run() {

@@ -23,7 +23,8 @@ report::Json to_json(const DeviceInfo& device) {
             {"api_version", device.api_version},
             {"subgroup_size", device.subgroup_size},
             {"memory_bytes", device.memory_bytes},
-            {"unusable", device.unusable}};
+            {"unusable", device.unusable},
+            {"lacks", device.lacks}};
 }
 
 int run(bool json) {
@@ -36,11 +37,13 @@ int run(bool json) {
     }
     if (devices.empty())
         fmt::print("no Vulkan device; the package mesa-vulkan-drivers contains one for the CPU\n");
-    for (const DeviceInfo& device : devices)
+    for (const DeviceInfo& device : devices) {
         fmt::print("{}  {} ({}, {}, Vulkan {}, {} lanes, {}){}\n", device.index, device.name, device.type,
                    device.driver, device.api_version, device.subgroup_size,
                    core::bytes_text(device.memory_bytes),
                    device.unusable.empty() ? "" : "  unusable: " + device.unusable);
+        if (!device.lacks.empty()) fmt::print("   lacks: {}\n", fmt::join(device.lacks, "; "));
+    }
     return 0;
 }
 

@@ -28,37 +28,16 @@ uint64_t texel_bytes(Texel texel) {
 
 }  // namespace
 
-/// Device memory, given back when the last buffer in it goes.
-struct Buffer::Memory {
-    Device& device;
-    vk::UniqueDeviceMemory handle;
-    uint64_t bytes;
-
-    Memory(Device& of, vk::UniqueDeviceMemory memory, uint64_t size)
-        : device(of), handle(std::move(memory)), bytes(size) {}
-    ~Memory() { device.released(bytes); }
-};
-
 Buffer::Buffer(Device& device, std::string name, uint64_t bytes, Texel texel, bool uniform, bool host_visible)
     : device_(&device),
       name_(std::move(name)),
       bytes_(whole_texels(bytes)),
       texel_(texel),
       uniform_(uniform) {
-    try {
-        create_buffer();
+    create([&] {
         const auto requirements = device.handle().getBufferMemoryRequirements(*buffer_);
-        HostAccess access = HostAccess::none;
-        memory_ = std::make_shared<Memory>(device, device.allocate(requirements, host_visible, access),
-                                           requirements.size);
-        reads_fast_ = access == HostAccess::read_write;
-        device.handle().bindBufferMemory(*buffer_, *memory_->handle, 0);
-        if (access != HostAccess::none)
-            mapped_ = static_cast<std::byte*>(device.handle().mapMemory(*memory_->handle, 0, VK_WHOLE_SIZE));
-        create_view();
-    } catch (const vk::SystemError& error) {
-        throw RunError("buffer " + name_ + " of " + std::to_string(bytes_ >> 20) + " MiB: " + error.what());
-    }
+        memory_ = std::make_shared<Memory>(device.allocate(requirements, host_visible));
+    });
 }
 
 Buffer::Buffer(const Buffer& memory, uint64_t offset, std::string name, uint64_t bytes, Texel texel)
@@ -66,22 +45,15 @@ Buffer::Buffer(const Buffer& memory, uint64_t offset, std::string name, uint64_t
       name_(std::move(name)),
       bytes_(whole_texels(bytes)),
       texel_(texel),
-      memory_(memory.memory_),
-      memory_offset_(offset),
-      mapped_(memory.mapped_ ? memory.mapped_ + offset : nullptr),
-      reads_fast_(memory.reads_fast_) {
+      memory_offset_(offset) {
     if (memory.texel_ != Texel::any || offset % kPlacement != 0 || offset + bytes_ > memory.bytes_)
         throw std::logic_error("buffer " + name_ + " in memory that is not for it");
-    try {
-        create_buffer();
-        device_->handle().bindBufferMemory(*buffer_, *memory_->handle, offset);
-        create_view();
-    } catch (const vk::SystemError& error) {
-        throw RunError("buffer " + name_ + " of " + std::to_string(bytes_ >> 20) + " MiB: " + error.what());
-    }
+    create([&] { memory_ = memory.memory_; });
 }
 
-void Buffer::create_buffer() {
+/// find_memory: sets memory_ when there is a buffer that tells what it needs.
+template <class FindMemory>
+void Buffer::create(FindMemory find_memory) {
     const Limits& limits = device_->limits();
     const bool bound = texel_ != Texel::any;
     const bool fetched = texel_ != Texel::none && limits.texel_buffers;
@@ -96,24 +68,25 @@ void Buffer::create_buffer() {
                        std::to_string(limits.max_storage_range >> 20) +
                        " MiB at once; fewer splats or a smaller image need less");
     using Usage = vk::BufferUsageFlagBits;
-    vk::BufferCreateInfo create;
-    create.setSize(bytes_).setUsage(Usage::eStorageBuffer | Usage::eTransferSrc | Usage::eTransferDst);
-    if (fetched) create.usage |= Usage::eUniformTexelBuffer;
-    if (uniform_) create.usage |= Usage::eUniformBuffer;
-    buffer_ = device_->handle().createBufferUnique(create);
-}
-
-void Buffer::create_view() {
-    if (texel_ == Texel::none || texel_ == Texel::any || !device_->limits().texel_buffers) return;
-    vk::BufferViewCreateInfo view;
-    view.setBuffer(*buffer_).setFormat(format_of(texel_)).setRange(bytes_);
-    view_ = device_->handle().createBufferViewUnique(view);
-}
-
-Buffer::~Buffer() = default;
-
-Buffer::Buffer(Buffer&& other) noexcept {
-    *this = std::move(other);
+    vk::BufferCreateInfo info;
+    info.setSize(bytes_).setUsage(Usage::eStorageBuffer | Usage::eTransferSrc | Usage::eTransferDst);
+    if (fetched) info.usage |= Usage::eUniformTexelBuffer;
+    if (uniform_) info.usage |= Usage::eUniformBuffer;
+    try {
+        buffer_ = device_->handle().createBufferUnique(info);
+        find_memory();
+        device_->handle().bindBufferMemory(*buffer_, memory_->handle(), memory_->offset() + memory_offset_);
+        if (!fetched || !bound) return;
+        vk::BufferViewCreateInfo view;
+        view.setBuffer(*buffer_).setFormat(format_of(texel_)).setRange(bytes_);
+        view_ = device_->handle().createBufferViewUnique(view);
+    } catch (const vk::OutOfDeviceMemoryError&) {
+        throw device_->out_of_memory(bytes_);
+    } catch (const vk::OutOfHostMemoryError&) {
+        throw device_->out_of_memory(bytes_);
+    } catch (const vk::SystemError& error) {
+        throw RunError("buffer " + name_ + " of " + std::to_string(bytes_ >> 20) + " MiB: " + error.what());
+    }
 }
 
 Buffer& Buffer::operator=(Buffer&& other) noexcept {
@@ -127,8 +100,6 @@ Buffer& Buffer::operator=(Buffer&& other) noexcept {
     buffer_ = std::move(other.buffer_);
     memory_ = std::move(other.memory_);
     memory_offset_ = other.memory_offset_;
-    mapped_ = std::exchange(other.mapped_, nullptr);
-    reads_fast_ = other.reads_fast_;
     return *this;
 }
 
@@ -145,8 +116,8 @@ bool Buffer::overlaps(const Buffer& other) const {
 void Buffer::upload(std::span<const std::byte> data, uint64_t offset) {
     assert(offset + data.size() <= bytes_);
     if (data.empty()) return;
-    if (mapped_)
-        std::memcpy(mapped_ + offset, data.data(), data.size());
+    if (mapped())
+        std::memcpy(mapped() + offset, data.data(), data.size());
     else
         copy_through_staging(data, {}, offset);
 }
@@ -154,8 +125,8 @@ void Buffer::upload(std::span<const std::byte> data, uint64_t offset) {
 void Buffer::download(std::span<std::byte> data, uint64_t offset) const {
     assert(offset + data.size() <= bytes_);
     if (data.empty()) return;
-    if (mapped_ && reads_fast_)
-        std::memcpy(data.data(), mapped_ + offset, data.size());
+    if (memory_->access() == HostAccess::read_write)
+        std::memcpy(data.data(), mapped() + offset, data.size());
     else
         copy_through_staging({}, data, offset);
 }
@@ -172,7 +143,7 @@ void Buffer::copy_through_staging(std::span<const std::byte> source, std::span<s
     const auto pool = device.createCommandPoolUnique(pool_info);
     for (size_t done = 0; done < total; done += kPiece) {
         const size_t size = std::min(kPiece, total - done);
-        if (up) std::memcpy(staging.mapped_, source.data() + done, size);
+        if (up) std::memcpy(staging.mapped(), source.data() + done, size);
         vk::CommandBufferAllocateInfo allocate;
         allocate.setCommandPool(*pool).setCommandBufferCount(1);
         auto commands = std::move(device.allocateCommandBuffersUnique(allocate).front());
@@ -192,7 +163,7 @@ void Buffer::copy_through_staging(std::span<const std::byte> source, std::span<s
         submit.setCommandBuffers(*commands);
         device_->queue().submit(submit);
         device_->queue().waitIdle();
-        if (!up) std::memcpy(target.data() + done, staging.mapped_, size);
+        if (!up) std::memcpy(target.data() + done, staging.mapped(), size);
     }
 }
 

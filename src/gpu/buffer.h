@@ -6,6 +6,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "gpu/device.h"
@@ -28,8 +29,7 @@ class Buffer {
     /// The memory stays as long as a buffer in it.
     Buffer(const Buffer& memory, uint64_t offset, std::string name, uint64_t bytes, Texel texel);
     static constexpr uint64_t kPlacement = 4096;  // bytes
-    ~Buffer();
-    Buffer(Buffer&& other) noexcept;
+    Buffer(Buffer&& other) noexcept { *this = std::move(other); }
     Buffer& operator=(Buffer&& other) noexcept;
 
     const std::string& name() const { return name_; }
@@ -45,7 +45,9 @@ class Buffer {
     bool overlaps(const Buffer& other) const;
 
     /// The host's address of the memory. Null if the host cannot map it.
-    std::byte* mapped() const { return mapped_; }
+    std::byte* mapped() const {
+        return memory_ && memory_->mapped() ? memory_->mapped() + memory_offset_ : nullptr;
+    }
     /// Blocking copies. They use a staging buffer if the host cannot map the memory. The device must be idle.
     void upload(std::span<const std::byte> data, uint64_t offset = 0);
     void download(std::span<std::byte> data, uint64_t offset = 0) const;
@@ -62,9 +64,8 @@ class Buffer {
     }
 
   private:
-    struct Memory;
-    void create_buffer();
-    void create_view();
+    template <class FindMemory>
+    void create(FindMemory find_memory);
     void copy_through_staging(std::span<const std::byte> source, std::span<std::byte> target,
                               uint64_t offset) const;
 
@@ -77,8 +78,6 @@ class Buffer {
     uint64_t memory_offset_ = 0;
     vk::UniqueBuffer buffer_;
     vk::UniqueBufferView view_;
-    std::byte* mapped_ = nullptr;
-    bool reads_fast_ = false;  // the host caches what is mapped
 };
 
 }  // namespace ewa::gpu

@@ -3,29 +3,22 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cstdlib>
 #include <filesystem>
-#include <string_view>
+#include <utility>
 
 #include "core/text.h"
 #include "ewa/error.h"
+#include "gpu/capabilities.h"
 #include "gpu/pipeline.h"
 
 namespace ewa {
 namespace gpu {
 namespace {
 
-constexpr uint32_t kNeededVersion = VK_API_VERSION_1_2;
 constexpr uint32_t kVendorAmd = 0x1002;
 constexpr uint64_t kManyTexels = 1 << 27;              // lavapipe's. Its fetches from texel buffers are fast
 constexpr uint32_t kUsedVersion = VK_API_VERSION_1_3;  // of what a device has
-
-template <class Properties>
-bool lists(const Properties& available, const char* name) {
-    return std::any_of(available.begin(), available.end(),
-                       [&](const auto& one) { return std::string_view(one.extensionName.data()) == name; });
-}
 
 /// The loader hides drivers for portable subsets of Vulkan (MoltenVK) from who does not ask for them.
 vk::UniqueInstance make_instance(const std::vector<const char*>& layers,
@@ -33,7 +26,8 @@ vk::UniqueInstance make_instance(const std::vector<const char*>& layers,
     vk::ApplicationInfo application;
     application.setPApplicationName("ewa").setApiVersion(kUsedVersion);
     vk::InstanceCreateInfo create;
-    if (lists(vk::enumerateInstanceExtensionProperties(), VK_KHR_PORTABILITY_ENUMERATION_EXTENSION_NAME)) {
+    if (has_extension(vk::enumerateInstanceExtensionProperties(),
+                      VK_KHR_PORTABILITY_ENUMERATION_EXTENSION_NAME)) {
         extensions.push_back(VK_KHR_PORTABILITY_ENUMERATION_EXTENSION_NAME);
         create.setFlags(vk::InstanceCreateFlagBits::eEnumeratePortabilityKHR);
     }
@@ -41,95 +35,6 @@ vk::UniqueInstance make_instance(const std::vector<const char*>& layers,
         .setPEnabledLayerNames(layers)
         .setPEnabledExtensionNames(extensions);
     return vk::createInstanceUnique(create);
-}
-
-std::string version_text(uint32_t version) {
-    return std::to_string(VK_API_VERSION_MAJOR(version)) + "." +
-           std::to_string(VK_API_VERSION_MINOR(version)) + "." +
-           std::to_string(VK_API_VERSION_PATCH(version));
-}
-
-std::string type_text(vk::PhysicalDeviceType type) {
-    constexpr std::array kNames{"other", "integrated", "discrete", "virtual", "cpu"};  // in Vulkan's order
-    return size_t(type) < kNames.size() ? kNames[size_t(type)] : "other";
-}
-
-int compute_family(vk::PhysicalDevice device) {
-    const auto families = device.getQueueFamilyProperties();
-    for (size_t i = 0; i < families.size(); ++i)
-        if (families[i].queueFlags & vk::QueueFlagBits::eCompute) return int(i);
-    return -1;
-}
-
-struct Subgroups {
-    uint32_t lanes = 0;
-    bool controlled = false;  // a pipeline can ask for this size
-    bool extension = false;   // what asks for it is no part of the device's version of Vulkan
-};
-
-Subgroups subgroups_of(vk::PhysicalDevice device) {
-    const auto natural =
-        device.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceSubgroupProperties>();
-    Subgroups result{natural.get<vk::PhysicalDeviceSubgroupProperties>().subgroupSize};
-    const bool core =
-        natural.get<vk::PhysicalDeviceProperties2>().properties.apiVersion >= VK_API_VERSION_1_3;
-    result.extension = !core && lists(device.enumerateDeviceExtensionProperties(),
-                                      VK_EXT_SUBGROUP_SIZE_CONTROL_EXTENSION_NAME);
-    if (core || result.extension) {
-        const auto features =
-            device.getFeatures2<vk::PhysicalDeviceFeatures2, vk::PhysicalDeviceSubgroupSizeControlFeatures>()
-                .get<vk::PhysicalDeviceSubgroupSizeControlFeatures>();
-        const auto sizes = device
-                               .getProperties2<vk::PhysicalDeviceProperties2,
-                                               vk::PhysicalDeviceSubgroupSizeControlProperties>()
-                               .get<vk::PhysicalDeviceSubgroupSizeControlProperties>();
-        result.controlled = features.subgroupSizeControl && features.computeFullSubgroups &&
-                            (sizes.requiredSubgroupSizeStages & vk::ShaderStageFlagBits::eCompute);
-        if (result.controlled)
-            result.lanes = subgroup_lanes(result.lanes, sizes.minSubgroupSize, sizes.maxSubgroupSize);
-    }
-    return result;
-}
-
-/// The first feature that kernels need and the device lacks. Empty if it lacks none.
-std::string missing_features(vk::PhysicalDevice device) {
-    if (device.getProperties().apiVersion < kNeededVersion) return "Vulkan 1.2";
-    if (compute_family(device) < 0) return "a compute queue";
-    const auto features =
-        device.getFeatures2<vk::PhysicalDeviceFeatures2, vk::PhysicalDeviceVulkan12Features>()
-            .get<vk::PhysicalDeviceVulkan12Features>();
-    if (!features.scalarBlockLayout) return "scalarBlockLayout";
-    const auto subgroup =
-        device.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceSubgroupProperties>()
-            .get<vk::PhysicalDeviceSubgroupProperties>();
-    const auto needed = vk::SubgroupFeatureFlagBits::eBasic | vk::SubgroupFeatureFlagBits::eVote |
-                        vk::SubgroupFeatureFlagBits::eShuffle;
-    if ((subgroup.supportedOperations & needed) != needed ||
-        !(subgroup.supportedStages & vk::ShaderStageFlagBits::eCompute))
-        return "subgroup shuffles in compute shaders";
-    if (const uint32_t lanes = subgroups_of(device).lanes; lanes > kMostLanes || !std::has_single_bit(lanes))
-        return "subgroups of " + std::to_string(kMostLanes) + " lanes or fewer";
-    return "";
-}
-
-DeviceInfo describe(vk::PhysicalDevice device, int index) {
-    const auto chain =
-        device.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceDriverProperties>();
-    const auto& properties = chain.get<vk::PhysicalDeviceProperties2>().properties;
-    const auto& driver = chain.get<vk::PhysicalDeviceDriverProperties>();
-    DeviceInfo info;
-    info.index = index;
-    info.name = properties.deviceName.data();
-    info.type = type_text(properties.deviceType);
-    info.driver = std::string(driver.driverName.data()) + " " + driver.driverInfo.data();
-    info.api_version = version_text(properties.apiVersion);
-    info.subgroup_size = subgroups_of(device).lanes;
-    const auto memory = device.getMemoryProperties();
-    for (uint32_t i = 0; i < memory.memoryHeapCount; ++i)
-        if (memory.memoryHeaps[i].flags & vk::MemoryHeapFlagBits::eDeviceLocal)
-            info.memory_bytes = std::max<uint64_t>(info.memory_bytes, memory.memoryHeaps[i].size);
-    info.unusable = missing_features(device);
-    return info;
 }
 
 /// Which drivers the loader was told of, where it looks (its LoaderDriverInterface document), and what to install.
@@ -161,17 +66,11 @@ VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT
 
 }  // namespace
 
-uint32_t subgroup_lanes(uint32_t natural, uint32_t least, uint32_t most) {
-    constexpr uint32_t kNarrow = 8, kWide = 32, kBetween = 16;
-    if (least <= kNarrow && natural >= kWide) return kBetween;
-    return std::clamp(std::min(natural, kMostLanes), least, most);
-}
-
-Device::Device(const DeviceInfo& info, bool validation) : info_(info) {
+Device::Device(const DeviceInfo& info, bool validation, bool own_queue) : info_(info) {
     try {
         create_instance(validation);
         physical_ = instance_->enumeratePhysicalDevices().at(size_t(info.index));
-        create_device();
+        create_device(own_queue);
     } catch (const vk::SystemError& error) {
         throw RunError("cannot open Vulkan device " + info.name + ": " + error.what());
     }
@@ -214,14 +113,15 @@ void Device::create_instance(bool validation) {
         throw RunError("cannot listen to the validation layer");
 }
 
-void Device::create_device() {
+void Device::create_device(bool own_queue) {
     const auto properties = physical_.getProperties();
+    const auto families = physical_.getQueueFamilyProperties();
     const Subgroups subgroups = subgroups_of(physical_);
     subgroup_size_control_ = subgroups.controlled;
     limits_.subgroup_size = subgroups.lanes;
     vk::PhysicalDeviceSubgroupSizeControlFeatures wanted_sizes;
     wanted_sizes.setSubgroupSizeControl(true).setComputeFullSubgroups(true);
-    queue_family_ = uint32_t(compute_family(physical_));
+    queue_family_ = *compute_family(families, own_queue);
     const float priority = 1.0f;
     vk::DeviceQueueCreateInfo queue;
     queue.setQueueFamilyIndex(queue_family_).setQueuePriorities(priority);
@@ -229,7 +129,7 @@ void Device::create_device() {
     if (subgroups.controlled && subgroups.extension)
         extensions.push_back(VK_EXT_SUBGROUP_SIZE_CONTROL_EXTENSION_NAME);
     // A driver for a subset of Vulkan wants its users to say that they know.
-    if (lists(physical_.enumerateDeviceExtensionProperties(), "VK_KHR_portability_subset"))
+    if (has_extension(physical_.enumerateDeviceExtensionProperties(), "VK_KHR_portability_subset"))
         extensions.push_back("VK_KHR_portability_subset");
     vk::PhysicalDeviceVulkan12Features features;
     features.setScalarBlockLayout(true);
@@ -240,6 +140,10 @@ void Device::create_device() {
     queue_ = device_->getQueue(queue_family_, 0);
     pipeline_cache_ = device_->createPipelineCacheUnique({});
     pipelines_ = std::make_unique<PipelineStore>();
+
+    float_modes_ = float_modes_of(
+        physical_.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceFloatControlsProperties>()
+            .get<vk::PhysicalDeviceFloatControlsProperties>());
 
     limits_.cpu = properties.deviceType == vk::PhysicalDeviceType::eCpu;
     limits_.max_groups = *std::min_element(properties.limits.maxComputeWorkGroupCount.begin(),
@@ -257,50 +161,21 @@ void Device::create_device() {
     limits_.max_texels = properties.limits.maxTexelBufferElements;
     limits_.texel_buffers = limits_.cpu && limits_.max_texels >= kManyTexels;
     limits_.uniform_alignment = properties.limits.minUniformBufferOffsetAlignment;
-    const auto family = physical_.getQueueFamilyProperties()[queue_family_];
-    limits_.timestamps = family.timestampValidBits > 0;
+    limits_.timestamps = families[queue_family_].timestampValidBits > 0;
     limits_.timestamp_nanoseconds = properties.limits.timestampPeriod;
+    memory_ = std::make_unique<MemoryPool>(physical_, *device_, limits_.cpu || info_.type == "integrated");
 }
 
-vk::UniqueDeviceMemory Device::allocate(const vk::MemoryRequirements& requirements, bool host_visible,
-                                        HostAccess& mapped) {
-    const auto memory = physical_.getMemoryProperties();
-    using Flag = vk::MemoryPropertyFlagBits;
-    const vk::MemoryPropertyFlags host = Flag::eHostVisible | Flag::eHostCoherent;
-    // On CPUs and integrated GPUs, one memory type is local to the device and visible to the host. It needs
-    // no staging copies.
-    std::vector<vk::MemoryPropertyFlags> wishes;
-    if (host_visible) {
-        wishes = {host | Flag::eHostCached, host};
-    } else {
-        if (limits_.cpu || info_.type == "integrated")
-            wishes.push_back(Flag::eDeviceLocal | host | Flag::eHostCached);
-        wishes.push_back(Flag::eDeviceLocal);
-        wishes.push_back({});
-    }
-    for (const auto& wish : wishes) {
-        for (uint32_t i = 0; i < memory.memoryTypeCount; ++i) {
-            const auto flags = memory.memoryTypes[i].propertyFlags;
-            if (!(requirements.memoryTypeBits & (1u << i)) || (flags & wish) != wish) continue;
-            vk::MemoryAllocateInfo info;
-            info.setAllocationSize(requirements.size).setMemoryTypeIndex(i);
-            try {
-                auto result = device_->allocateMemoryUnique(info);
-                mapped = (flags & host) != host      ? HostAccess::none
-                         : flags & Flag::eHostCached ? HostAccess::read_write
-                                                     : HostAccess::write;
-                if (!host_visible) mapped = std::min(mapped, most_access_);
-                allocated_bytes_ += requirements.size;
-                peak_bytes_ = std::max(peak_bytes_, allocated_bytes_);
-                return result;
-            } catch (const vk::OutOfDeviceMemoryError&) {
-            } catch (const vk::OutOfHostMemoryError&) {
-            }
-        }
-    }
-    throw RunError("out of device memory on " + info_.name + ": " + std::to_string(requirements.size >> 20) +
-                   " MiB are needed beside the " + std::to_string(allocated_bytes_ >> 20) +
-                   " MiB already allocated; fewer splats, a lower SH degree or --downscale need less");
+Memory Device::allocate(const vk::MemoryRequirements& requirements, bool host_visible) {
+    auto memory = memory_->allocate(requirements, host_visible);
+    if (!memory) throw out_of_memory(requirements.size);
+    return std::move(*memory);
+}
+
+RunError Device::out_of_memory(uint64_t bytes) const {
+    return RunError("out of device memory on " + info_.name + ": " + std::to_string(bytes >> 20) +
+                    " MiB are needed beside the " + std::to_string(allocated_bytes() >> 20) +
+                    " MiB already allocated; fewer splats, a lower SH degree or --downscale need less");
 }
 
 void Device::add_validation_message(const std::string& message) {
@@ -364,7 +239,7 @@ std::shared_ptr<gpu::Device> open_device(const DeviceOptions& options) {
                               ? "no usable Vulkan device"
                               : "no usable Vulkan device matches '" + options.selector + "'") +
                          "; present: " + present);
-    return std::make_shared<gpu::Device>(*best, options.validation);
+    return std::make_shared<gpu::Device>(*best, options.validation, options.own_queue);
 }
 
 DeviceInfo device_info(const gpu::Device& device) {

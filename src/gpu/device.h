@@ -10,6 +10,9 @@
 #include <vulkan/vulkan.hpp>
 
 #include "ewa/device.h"
+#include "ewa/error.h"
+#include "gpu/capabilities.h"
+#include "gpu/memory.h"
 
 namespace ewa::gpu {
 
@@ -32,17 +35,10 @@ struct Limits {
 
 class PipelineStore;
 
-/// Memory that the host does not cache can be written fast, but is read a hundred times slower.
-enum class HostAccess { none, write, read_write };
-
-constexpr uint32_t kMostLanes = 64;  // of a subgroup: a tile's pixels
-/// The size that pipelines with subgroup operations ask for: a device's own, within its limits, and at most kMostLanes
-/// where they allow it. A device that can run 8 lanes as well as 32 (Intel) gets 16: a lane then has twice the registers.
-uint32_t subgroup_lanes(uint32_t natural, uint32_t least, uint32_t most);
-
 class Device {
   public:
-    Device(const DeviceInfo& info, bool validation);
+    /// own_queue: as in DeviceOptions.
+    Device(const DeviceInfo& info, bool validation, bool own_queue = true);
     ~Device();
     Device(const Device&) = delete;
     Device& operator=(const Device&) = delete;
@@ -57,17 +53,21 @@ class Device {
     vk::PipelineCache pipeline_cache() const { return *pipeline_cache_; }
     PipelineStore& pipelines() { return *pipelines_; }
 
-    /// mapped: what the host can do with the memory once it is mapped. Throws RunError if the driver is out of
-    /// memory; it states the bytes that are wanted and those that are allocated.
-    vk::UniqueDeviceMemory allocate(const vk::MemoryRequirements& requirements, bool host_visible,
-                                    HostAccess& mapped);
+    /// What pipelines ask of 32-bit floats: what there is. A CPU device is asked for nothing: lavapipe keeps NaN
+    /// anyway, and gives other bytes when asked.
+    FloatModes float_modes() const { return limits_.cpu ? FloatModes{} : float_modes_; }
+
+    /// Throws out_of_memory if the driver has no memory left.
+    Memory allocate(const vk::MemoryRequirements& requirements, bool host_visible);
+    /// States the bytes that are wanted and those that are allocated.
+    RunError out_of_memory(uint64_t bytes) const;
     /// Kernels and buffers that are made from now on suit a device of these limits. For tests.
     void pretend(const Limits& limits) { limits_ = limits; }
     /// Device memory is mapped for no more than this from now on, as on other devices. For tests.
-    void limit_host_access(HostAccess most) { most_access_ = most; }
-    void released(uint64_t bytes) { allocated_bytes_ -= bytes; }
-    uint64_t allocated_bytes() const { return allocated_bytes_; }
-    uint64_t peak_bytes() const { return peak_bytes_; }
+    void limit_host_access(HostAccess most) { memory_->limit_host_access(most); }
+    MemoryUse memory_use() const { return memory_->use(); }
+    uint64_t allocated_bytes() const { return memory_use().used; }
+    uint64_t peak_bytes() const { return memory_use().peak; }
 
     /// Throws RunError with the validation layer's first message since the last call.
     void check_validation();
@@ -75,7 +75,7 @@ class Device {
 
   private:
     void create_instance(bool validation);
-    void create_device();
+    void create_device(bool own_queue);
 
     DeviceInfo info_;
     Limits limits_;
@@ -83,13 +83,13 @@ class Device {
     VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
     vk::PhysicalDevice physical_;
     vk::UniqueDevice device_;
+    std::unique_ptr<MemoryPool> memory_;
     vk::Queue queue_;
     vk::UniquePipelineCache pipeline_cache_;
     std::unique_ptr<PipelineStore> pipelines_;
     uint32_t queue_family_ = 0;
     bool subgroup_size_control_ = false;
-    HostAccess most_access_ = HostAccess::read_write;
-    uint64_t allocated_bytes_ = 0, peak_bytes_ = 0;
+    FloatModes float_modes_;
     std::mutex message_mutex_;
     std::vector<std::string> messages_;
 };

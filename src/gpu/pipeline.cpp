@@ -13,6 +13,8 @@ namespace {
 
 // Numbers of the SPIR-V specification, section 3.
 enum Op : uint32_t {
+    kOpEntryPoint = 15,
+    kOpExecutionMode = 16,
     kOpCapability = 17,
     kOpTypeInt = 21,
     kOpTypeFloat = 22,
@@ -38,6 +40,10 @@ enum Decoration : uint32_t {
     kOffset = 35
 };
 enum Storage : uint32_t { kUniformConstant = 0, kUniform = 2, kPushConstant = 9, kStorageBuffer = 12 };
+struct FloatMode {
+    uint32_t capability, execution_mode;
+};
+constexpr FloatMode kDenormPreserve{4464, 4459}, kSignedZeroInfNanPreserve{4466, 4461};
 constexpr uint32_t kGroupNonUniform = 61;  // the capability of all subgroup operations
 constexpr uint32_t kWhole = ~0u;           // in place of a member's number
 
@@ -152,6 +158,28 @@ std::vector<uint32_t> with_values(std::span<const uint32_t> spirv,
     return code;
 }
 
+std::vector<uint32_t> with_float_modes(std::span<const uint32_t> spirv, const FloatModes& modes) {
+    std::vector<FloatMode> asked;
+    if (modes.special_values) asked.push_back(kSignedZeroInfNanPreserve);
+    if (modes.denormals) asked.push_back(kDenormPreserve);
+    std::vector<uint32_t> code(spirv.begin(), spirv.begin() + 5);
+    // A module begins with its capabilities. Execution modes follow the entry points.
+    for (const FloatMode& mode : asked) code.insert(code.end(), {2u << 16 | kOpCapability, mode.capability});
+    uint32_t entry = 0;
+    for (size_t at = 5; at < spirv.size(); at += spirv[at] >> 16) {
+        const Words words = spirv.subspan(at, spirv[at] >> 16);
+        const bool is_entry = (words[0] & 0xffff) == kOpEntryPoint;
+        if (entry && !is_entry) {
+            for (const FloatMode& mode : asked)
+                code.insert(code.end(), {4u << 16 | kOpExecutionMode, entry, mode.execution_mode, 32u});
+            entry = 0;
+        }
+        if (is_entry) entry = words[2];
+        code.insert(code.end(), words.begin(), words.end());
+    }
+    return code;
+}
+
 vk::DescriptorType descriptor_type(BindingKind kind) {
     return kind == BindingKind::uniform ? vk::DescriptorType::eUniformBuffer
            : kind == BindingKind::texel ? vk::DescriptorType::eUniformTexelBuffer
@@ -181,7 +209,8 @@ Pipeline::Pipeline(Device& device, std::string name, std::span<const uint32_t> s
         layout_ = device.handle().createPipelineLayoutUnique(layout);
 
         vk::ShaderModuleCreateInfo code;
-        const std::vector<uint32_t> words = with_values(spirv, constants);
+        const std::vector<uint32_t> words =
+            with_float_modes(with_values(spirv, constants), device.float_modes());
         code.setCode(words);
         const auto module = device.handle().createShaderModuleUnique(code);
         std::vector<vk::SpecializationMapEntry> entries;

@@ -48,6 +48,9 @@ struct SpecConstant {
 std::vector<uint32_t> with_values(std::span<const uint32_t> spirv,
                                   const std::vector<SpecConstant>& constants);
 
+/// The module with an entry point that asks for these modes of its 32-bit floats. SPIR-V has them from 1.4 on.
+std::vector<uint32_t> with_float_modes(std::span<const uint32_t> spirv, const FloatModes& modes);
+
 class Pipeline {
   public:
     /// constants: those that the shader does not declare are ignored. Throws std::logic_error if one that it

@@ -32,7 +32,7 @@ PathTracer::PathTracer(std::shared_ptr<gpu::Device> device, const pathtracer::Pa
       textures_(upload("mesh textures", scene.textures, gpu::Texel::rgba32ui)),
       texels_(upload("mesh texels", scene.texels, gpu::Texel::rgba8)),
       lights_(upload("mesh lights", scene.lights, gpu::Texel::rgba32ui)),
-      counts_(*device_, "trace counts", sizeof(shared::TraceCounts)),
+      counts_(*device_, "trace counts"),
       sky_(sky),
       origin_(scene.origin),
       unit_(scene.unit),
@@ -86,7 +86,7 @@ shared::TraceCounts PathTracer::trace_paths(const gpu::Buffer& view, uint64_t pi
     push.seed[0] = uint32_t(seed);
     push.seed[1] = uint32_t(seed >> 32);
     const passes::TracePaths buffers{
-        .mesh = mesh(), .lights = lights_, .view = view, .sums = sums_, .counts = counts_};
+        .mesh = mesh(), .lights = lights_, .view = view, .sums = sums_, .counts = counts_.buffer()};
     const passes::Groups groups = passes::element_groups(cache_.config(), pixels);
     for (int first = 0; first < samples; first += samples_at_once_) {
         push.first_sample = uint32_t(first);
@@ -95,12 +95,13 @@ shared::TraceCounts PathTracer::trace_paths(const gpu::Buffer& view, uint64_t pi
         gpu::Recording recording(device_->limits());
         if (first == 0) {
             recording.fill(sums_, 0, 0, pixels * 16);
-            recording.fill(counts_, 0, 0, sizeof(shared::TraceCounts));
+            counts_.clear(recording);
         }
         cache_.get<passes::TracePaths>(variant_).record(recording, buffers, push, groups);
+        if (first + samples_at_once_ >= samples) counts_.record(recording);
         executor_.run(recording);
     }
-    return counts_.download<shared::TraceCounts>(1).front();
+    return counts_.read();
 }
 
 Image PathTracer::radiance(const Camera& camera, int samples, uint64_t seed, double brightest) {
@@ -130,12 +131,13 @@ PathTracer::Seen PathTracer::seen(const Camera& camera) {
     shared::TracePush push{};
     push.max_steps = cache_.config().loop_limit - 1;
     gpu::Recording recording(device_->limits());
-    recording.fill(counts_, 0, 0, sizeof(shared::TraceCounts));
+    counts_.clear(recording);
     cache_.get<passes::TraceDepth>(variant_).record(
-        recording, {.mesh = mesh(), .view = view, .seen = found, .counts = counts_}, push,
+        recording, {.mesh = mesh(), .view = view, .seen = found, .counts = counts_.buffer()}, push,
         passes::element_groups(cache_.config(), pixels));
+    counts_.record(recording);
     executor_.run(recording);
-    unfinished_ += counts_.download<shared::TraceCounts>(1).front().unfinished_rays;
+    unfinished_ += counts_.read().unfinished_rays;
 
     struct Pixel {
         float z;

@@ -9,6 +9,7 @@
 #include "ewa/device.h"
 #include "ewa/image.h"
 #include "gpu/executor.h"
+#include "gpu/read_back.h"
 #include "passes/passes.h"
 #include "pathtracer/packing.h"
 
@@ -45,7 +46,8 @@ class PathTracer {
     passes::PassCache cache_;
     passes::Constants variant_;
     gpu::Executor executor_;
-    gpu::Buffer nodes_, triangles_, surfaces_, materials_, textures_, texels_, lights_, counts_, sums_;
+    gpu::Buffer nodes_, triangles_, surfaces_, materials_, textures_, texels_, lights_, sums_;
+    gpu::ReadBack<shared::TraceCounts> counts_;
     scene::Sky sky_;
     glm::dvec3 origin_;
     double unit_;

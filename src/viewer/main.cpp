@@ -26,7 +26,7 @@ struct Arguments {
     std::string connect, token, size, background;
     bool train = false, antialias = false;
     std::vector<std::string> train_options;
-    DeviceOptions device;
+    DeviceOptions device{.selector = {}, .own_queue = false};  // the window shows what this queue renders
     Startup startup;
 };
 

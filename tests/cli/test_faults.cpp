@@ -36,6 +36,7 @@ TEST_F(Faults, OutOfDeviceMemory) {
         EXPECT_NE(outcome.err.find("MiB"), std::string::npos) << outcome.err;
     }
     EXPECT_GT(failed, 3);
+    expect_failure(train("o", {}, with_fault("EWA_FAULT_BLOCKS", "1")), 1, "out of device memory");
     expect_goes_on("o");
 }
 

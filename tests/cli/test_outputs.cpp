@@ -180,7 +180,14 @@ TEST(Outputs, Devices) {
     const auto json = nlohmann::json::parse(outcome.out);
     ASSERT_FALSE(json.empty());
     EXPECT_TRUE(json[0]["name"].is_string());
-    expect_success(run_ewa({"devices"}));
+    const Outcome text = run_ewa({"devices"});
+    expect_success(text);
+    size_t lacking = 0;
+    for (const auto& one : json) {
+        lacking += !one["lacks"].empty();
+        for (const std::string lack : one["lacks"]) EXPECT_NE(text.out.find(lack), std::string::npos) << lack;
+    }
+    EXPECT_EQ(size_t(std::count(text.out.begin(), text.out.end(), '\n')), json.size() + lacking);
 }
 
 /// Who has a driver that fails, or none, learns which files were tried and what to install.

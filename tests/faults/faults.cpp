@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Loaded in front of the system's libraries (LD_PRELOAD), so that a program meets faults at chosen moments:
-//   EWA_FAULT_ALLOCATIONS=N  from the N-th on, device memory cannot be allocated
+//   EWA_FAULT_ALLOCATIONS=N  from the N-th on, there is no memory for a buffer or a block of device memory
+//   EWA_FAULT_BLOCKS=N       from the N-th on, the driver allows no further block of device memory
 //   EWA_FAULT_SUBMITS=N      the N-th submission and those after it find the device lost
 //   EWA_FAULT_WAITS=N        the same of waiting for one
 //   EWA_FAULT_ACQUIRE=N,R    the N-th picture of a window cannot be had: the VkResult R
@@ -47,6 +48,11 @@ int second_number(const char* variable) {
     const char* comma = std::strchr(std::getenv(variable), ',');
     if (!comma) std::abort();
     return int(std::atol(comma + 1));
+}
+
+bool out_of_memory() {
+    static std::atomic<long> calls{0};
+    return due("EWA_FAULT_ALLOCATIONS", calls);
 }
 
 /// The result that this call of those that `variable` counts is to have, or the one it has.
@@ -115,8 +121,15 @@ extern "C" {
 VkResult vkAllocateMemory(VkDevice device, const VkMemoryAllocateInfo* info,
                           const VkAllocationCallbacks* callbacks, VkDeviceMemory* memory) {
     static std::atomic<long> calls{0};
-    if (due("EWA_FAULT_ALLOCATIONS", calls)) return VK_ERROR_OUT_OF_DEVICE_MEMORY;
+    if (due("EWA_FAULT_BLOCKS", calls)) return VK_ERROR_TOO_MANY_OBJECTS;
+    if (out_of_memory()) return VK_ERROR_OUT_OF_DEVICE_MEMORY;
     return next<PFN_vkAllocateMemory>("vkAllocateMemory")(device, info, callbacks, memory);
+}
+
+VkResult vkCreateBuffer(VkDevice device, const VkBufferCreateInfo* info,
+                        const VkAllocationCallbacks* callbacks, VkBuffer* buffer) {
+    if (out_of_memory()) return VK_ERROR_OUT_OF_DEVICE_MEMORY;
+    return next<PFN_vkCreateBuffer>("vkCreateBuffer")(device, info, callbacks, buffer);
 }
 
 VkResult vkQueueSubmit(VkQueue queue, uint32_t count, const VkSubmitInfo* submits, VkFence fence) {

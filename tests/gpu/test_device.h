@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The device of the GPU tests: opened once, with the validation layer listening, so that every test also
 // fails on what the layer says. EWA_TEST_DEVICE chooses another than the default. With EWA_TEST_KERNELS=gpu it runs the
-// kernels and buffers that a GPU gets.
+// kernels and buffers that a GPU gets; EWA_TEST_LANES is then its subgroup size, for shaders that emulate subgroups.
 #pragma once
 #include <cstdlib>
 #include <memory>
@@ -22,6 +22,10 @@ inline void pretend_gpu(gpu::Device& device) {
     gpu::Limits limits = device.limits();
     limits.cpu = limits.texel_buffers = false;
     limits.max_storage_range = ~0u;
+    if (const char* lanes = std::getenv("EWA_TEST_LANES")) {
+        limits.subgroup_size = uint32_t(std::atoi(lanes));
+        limits.ballots = false;  // not emulated
+    }
     device.pretend(limits);
     device.limit_host_access(gpu::HostAccess::none);
 }

@@ -409,6 +409,16 @@ TEST(PathTracer, RaysThatTakeTooManyStepsAreCounted) {
     EXPECT_EQ(few.unfinished, 0u);
     EXPECT_NEAR(double(few.radiance.at(4, 4)[0]), 0.5, 1e-4);
     EXPECT_GT(shoot(stack(8000), camera, 2).unfinished, 0u);
+    // Also where the host reads a copy of the counts, and where several submissions add to them.
+    const auto other = test::open_test_device(true);
+    other->limit_host_access(gpu::HostAccess::none);
+    PathTracer tracer(other, pathtracer::pack(stack(8000), {}), test::even_sky(1));
+    tracer.radiance(camera, 2, 1, kUnclamped);
+    const uint64_t two = tracer.unfinished_rays();
+    EXPECT_GT(two, 0u);
+    tracer.radiance(camera, 2, 1, kUnclamped);
+    EXPECT_EQ(tracer.unfinished_rays(), 2 * two);
+    EXPECT_GT(tracer.seen(camera).triangles.size(), 0u);
 }
 
 TEST(PathTracer, BrightPathsAreCutAndTheSameSeedGivesTheSameBytes) {

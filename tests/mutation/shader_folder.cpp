@@ -18,6 +18,7 @@ const std::map<std::string, Words, std::less<>>& modules() {
         if (!folder) throw std::runtime_error("EWA_SHADER_FOLDER is not set");
         std::map<std::string, Words, std::less<>> found;
         for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+            if (entry.path().extension() != ".spv") continue;
             Words words(entry.file_size() / sizeof(std::uint32_t));
             std::ifstream(entry.path(), std::ios::binary)
                 .read(reinterpret_cast<char*>(words.data()), std::streamsize(entry.file_size()));
@@ -38,6 +39,7 @@ std::span<const std::uint32_t> ewa::passes::shader_code(std::string_view name, b
 
 std::vector<std::string_view> ewa::passes::shader_names() {
     std::vector<std::string_view> names;
-    for (const auto& [name, words] : modules()) if (!name.ends_with(".storage")) names.push_back(name);
+    for (const auto& [name, words] : modules())
+        if (!name.ends_with(".storage")) names.push_back(name);
     return names;
 }

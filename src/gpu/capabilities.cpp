@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gpu/capabilities.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <string_view>
+
+namespace ewa::gpu {
+namespace {
+
+constexpr uint32_t kNeededVersion = VK_API_VERSION_1_2;
+
+std::string version_text(uint32_t version) {
+    return std::to_string(VK_API_VERSION_MAJOR(version)) + "." +
+           std::to_string(VK_API_VERSION_MINOR(version)) + "." +
+           std::to_string(VK_API_VERSION_PATCH(version));
+}
+
+std::string type_text(vk::PhysicalDeviceType type) {
+    constexpr std::array kNames{"other", "integrated", "discrete", "virtual", "cpu"};  // in Vulkan's order
+    return size_t(type) < kNames.size() ? kNames[size_t(type)] : "other";
+}
+
+/// The first feature that kernels need and the device lacks. Empty if it lacks none.
+std::string missing_features(vk::PhysicalDevice device) {
+    if (device.getProperties().apiVersion < kNeededVersion) return "Vulkan 1.2";
+    if (!compute_family(device.getQueueFamilyProperties(), false)) return "a compute queue";
+    const auto features =
+        device.getFeatures2<vk::PhysicalDeviceFeatures2, vk::PhysicalDeviceVulkan12Features>()
+            .get<vk::PhysicalDeviceVulkan12Features>();
+    if (!features.scalarBlockLayout) return "scalarBlockLayout";
+    const auto subgroup =
+        device.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceSubgroupProperties>()
+            .get<vk::PhysicalDeviceSubgroupProperties>();
+    const auto needed = vk::SubgroupFeatureFlagBits::eBasic | vk::SubgroupFeatureFlagBits::eVote |
+                        vk::SubgroupFeatureFlagBits::eShuffle;
+    if ((subgroup.supportedOperations & needed) != needed ||
+        !(subgroup.supportedStages & vk::ShaderStageFlagBits::eCompute))
+        return "subgroup shuffles in compute shaders";
+    if (const uint32_t lanes = subgroups_of(device).lanes; lanes > kMostLanes || !std::has_single_bit(lanes))
+        return "subgroups of " + std::to_string(kMostLanes) + " lanes or fewer";
+    return "";
+}
+
+OptionalParts optional_parts_of(vk::PhysicalDevice device) {
+    using Flag = vk::MemoryPropertyFlagBits;
+    OptionalParts parts;
+    parts.cpu = device.getProperties().deviceType == vk::PhysicalDeviceType::eCpu;
+    parts.subgroups = subgroups_of(device);
+    parts.ballots =
+        bool(device.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceSubgroupProperties>()
+                 .get<vk::PhysicalDeviceSubgroupProperties>()
+                 .supportedOperations &
+             vk::SubgroupFeatureFlagBits::eBallot);
+    parts.floats = float_modes_of(
+        device.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceFloatControlsProperties>()
+            .get<vk::PhysicalDeviceFloatControlsProperties>());
+    const auto families = device.getQueueFamilyProperties();
+    const vk::QueueFamilyProperties& family = families[*compute_family(families, true)];
+    parts.timestamps = family.timestampValidBits > 0;
+    parts.own_queue = !(family.queueFlags & vk::QueueFlagBits::eGraphics);
+    const auto memory = device.getMemoryProperties();
+    const auto cached = Flag::eHostVisible | Flag::eHostCoherent | Flag::eHostCached;
+    for (uint32_t i = 0; i < memory.memoryTypeCount; ++i)
+        parts.cached_memory |= (memory.memoryTypes[i].propertyFlags & cached) == cached;
+    return parts;
+}
+
+}  // namespace
+
+bool has_extension(std::span<const vk::ExtensionProperties> available, std::string_view name) {
+    return std::any_of(available.begin(), available.end(), [&](const vk::ExtensionProperties& one) {
+        return std::string_view(one.extensionName.data()) == name;
+    });
+}
+
+uint32_t subgroup_lanes(uint32_t natural, uint32_t least, uint32_t most) {
+    constexpr uint32_t kNarrow = 8, kWide = 32, kBetween = 16;
+    if (least <= kNarrow && natural >= kWide) return kBetween;
+    return std::clamp(std::min(natural, kMostLanes), least, most);
+}
+
+Subgroups subgroups_of(vk::PhysicalDevice device) {
+    const auto natural =
+        device.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceSubgroupProperties>();
+    Subgroups result{natural.get<vk::PhysicalDeviceSubgroupProperties>().subgroupSize};
+    const bool core =
+        natural.get<vk::PhysicalDeviceProperties2>().properties.apiVersion >= VK_API_VERSION_1_3;
+    result.extension = !core && has_extension(device.enumerateDeviceExtensionProperties(),
+                                              VK_EXT_SUBGROUP_SIZE_CONTROL_EXTENSION_NAME);
+    if (core || result.extension) {
+        const auto features =
+            device.getFeatures2<vk::PhysicalDeviceFeatures2, vk::PhysicalDeviceSubgroupSizeControlFeatures>()
+                .get<vk::PhysicalDeviceSubgroupSizeControlFeatures>();
+        const auto sizes = device
+                               .getProperties2<vk::PhysicalDeviceProperties2,
+                                               vk::PhysicalDeviceSubgroupSizeControlProperties>()
+                               .get<vk::PhysicalDeviceSubgroupSizeControlProperties>();
+        result.controlled = features.subgroupSizeControl && features.computeFullSubgroups &&
+                            (sizes.requiredSubgroupSizeStages & vk::ShaderStageFlagBits::eCompute);
+        if (result.controlled)
+            result.lanes = subgroup_lanes(result.lanes, sizes.minSubgroupSize, sizes.maxSubgroupSize);
+    }
+    return result;
+}
+
+std::optional<uint32_t> compute_family(std::span<const vk::QueueFamilyProperties> families, bool own_queue) {
+    std::optional<uint32_t> first;
+    for (uint32_t i = 0; i < families.size(); ++i) {
+        const vk::QueueFlags flags = families[i].queueFlags;
+        if (!(flags & vk::QueueFlagBits::eCompute) || families[i].queueCount == 0) continue;
+        if (!own_queue || !(flags & vk::QueueFlagBits::eGraphics)) return i;
+        if (!first) first = i;
+    }
+    return first;
+}
+
+FloatModes float_modes_of(const vk::PhysicalDeviceFloatControlsProperties& properties) {
+    // Without independence, a mode of 32-bit floats needs the same mode of the other sizes.
+    const bool alone = properties.denormBehaviorIndependence != vk::ShaderFloatControlsIndependence::eNone;
+    return {.special_values = bool(properties.shaderSignedZeroInfNanPreserveFloat32),
+            .denormals = alone && properties.shaderDenormPreserveFloat32};
+}
+
+std::vector<std::string> lacks_of(const OptionalParts& parts) {
+    std::vector<std::string> lacks;
+    if (!parts.subgroups.controlled)
+        lacks.push_back("subgroup size control (kernels run with the lanes that the driver reports)");
+    if (!parts.ballots && !parts.cpu) lacks.push_back("subgroup ballots (sorting is slower)");
+    if (!parts.floats.special_values)
+        lacks.push_back("exact infinities and NaN (broken splats may not be recognised)");
+    if (!parts.floats.denormals)
+        lacks.push_back("exact denormal numbers (values under 1.2e-38 may count as zero)");
+    if (!parts.timestamps) lacks.push_back("timestamps (no times of single passes)");
+    if (!parts.own_queue && !parts.cpu)
+        lacks.push_back("a queue for compute alone (training and the desktop wait for each other)");
+    if (!parts.cached_memory) lacks.push_back("memory that the host caches (reading results back is slow)");
+    return lacks;
+}
+
+DeviceInfo describe(vk::PhysicalDevice device, int index) {
+    const auto chain =
+        device.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceDriverProperties>();
+    const auto& properties = chain.get<vk::PhysicalDeviceProperties2>().properties;
+    const auto& driver = chain.get<vk::PhysicalDeviceDriverProperties>();
+    DeviceInfo info;
+    info.index = index;
+    info.name = properties.deviceName.data();
+    info.type = type_text(properties.deviceType);
+    info.driver = std::string(driver.driverName.data()) + " " + driver.driverInfo.data();
+    info.api_version = version_text(properties.apiVersion);
+    info.subgroup_size = subgroups_of(device).lanes;
+    const auto memory = device.getMemoryProperties();
+    for (uint32_t i = 0; i < memory.memoryHeapCount; ++i)
+        if (memory.memoryHeaps[i].flags & vk::MemoryHeapFlagBits::eDeviceLocal)
+            info.memory_bytes = std::max<uint64_t>(info.memory_bytes, memory.memoryHeaps[i].size);
+    info.unusable = missing_features(device);
+    if (info.unusable.empty()) info.lacks = lacks_of(optional_parts_of(device));
+    return info;
+}
+
+}  // namespace ewa::gpu

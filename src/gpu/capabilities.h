@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a physical device has: what kernels need, and what ewa uses where there is it.
+#pragma once
+#include <compare>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+#include <vulkan/vulkan.hpp>
+
+#include "ewa/device.h"
+
+namespace ewa::gpu {
+
+bool has_extension(std::span<const vk::ExtensionProperties> available, std::string_view name);
+
+constexpr uint32_t kMostLanes = 64;  // of a subgroup: a tile's pixels
+/// The size that pipelines with subgroup operations ask for: a device's own, within its limits, and at most kMostLanes
+/// where they allow it. A device that can run 8 lanes as well as 32 (Intel) gets 16: a lane then has twice the registers.
+uint32_t subgroup_lanes(uint32_t natural, uint32_t least, uint32_t most);
+
+struct Subgroups {
+    uint32_t lanes = 0;
+    bool controlled = false;  // a pipeline can ask for this size
+    bool extension = false;   // what asks for it is no part of the device's version of Vulkan
+};
+Subgroups subgroups_of(vk::PhysicalDevice device);
+
+/// The first queue family with compute. own_queue: one without graphics if there is one. Its work and the
+/// desktop's do not wait for each other.
+std::optional<uint32_t> compute_family(std::span<const vk::QueueFamilyProperties> families, bool own_queue);
+
+/// What kernels can ask of 32-bit floats.
+struct FloatModes {
+    bool special_values = false;  // signed zeros, infinities and NaN are kept: comparisons with NaN fail
+    bool denormals = false;       // numbers below 1.2e-38 are kept
+    auto operator<=>(const FloatModes&) const = default;
+};
+FloatModes float_modes_of(const vk::PhysicalDeviceFloatControlsProperties& properties);
+
+/// What a usable device may have or not.
+struct OptionalParts {
+    bool cpu = false;
+    Subgroups subgroups;
+    bool ballots = false;  // of subgroups
+    FloatModes floats;
+    bool timestamps = false;
+    bool own_queue = false;      // a compute queue without graphics
+    bool cached_memory = false;  // that the host can map
+};
+/// What is not there, each with what follows from it. Ballots and a queue of its own have no
+/// consequence on a CPU device.
+std::vector<std::string> lacks_of(const OptionalParts& parts);
+
+DeviceInfo describe(vk::PhysicalDevice device, int index);
+
+}  // namespace ewa::gpu

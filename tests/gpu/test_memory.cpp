@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+// Blocks of device memory: buffers share them without overlap, they stay few and full, and free ones go back.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <numeric>
+
+#include "core/random.h"
+#include "gpu/executor.h"
+#include "gpu/read_back.h"
+#include "gpu/test_device.h"
+
+namespace ewa::test {
+namespace {
+
+constexpr uint64_t kMiB = uint64_t(1) << 20;
+
+uint32_t random_word(uint32_t i) {
+    return core::pcg4d({i, 0x6d656du, 0, 0})[0];
+}
+
+TEST(FreeRanges, NeverGiveAByteTwiceAndJoinAgain) {
+    constexpr uint64_t kBytes = 4096;
+    gpu::FreeRanges free(kBytes);
+    std::map<uint64_t, uint64_t> taken;
+    std::vector<bool> used(kBytes);
+    for (uint32_t i = 0; i < 4000; ++i) {
+        if (i % 8 < 5 || taken.empty()) {
+            const uint64_t bytes = 1 + random_word(2 * i) % 300, alignment = 1u << random_word(2 * i + 1) % 8;
+            const auto offset = free.take(bytes, alignment);
+            if (!offset) continue;
+            EXPECT_EQ(*offset % alignment, 0u);
+            ASSERT_LE(*offset + bytes, kBytes);
+            for (uint64_t at = *offset; at < *offset + bytes; ++at) {
+                ASSERT_FALSE(used[at]);
+                used[at] = true;
+            }
+            taken[*offset] = bytes;
+        } else {
+            const auto one = std::next(taken.begin(), random_word(2 * i) % taken.size());
+            for (uint64_t at = one->first; at < one->first + one->second; ++at) used[at] = false;
+            free.give_back(one->first, one->second);
+            taken.erase(one);
+        }
+        EXPECT_EQ(free.all_free(), taken.empty());
+    }
+    EXPECT_GT(taken.size(), 5u);
+    for (const auto& [offset, bytes] : taken) free.give_back(offset, bytes);
+    EXPECT_TRUE(free.all_free());
+    EXPECT_EQ(free.take(kBytes, 64), 0u);
+    EXPECT_FALSE(free.take(1, 1));
+}
+
+TEST(BlockBytes, AreWholeBuffersAndASixteenthOfWhatThereIs) {
+    const uint64_t heap = uint64_t(64) << 30;
+    EXPECT_EQ(gpu::block_bytes(1024, 0, heap), kMiB);
+    EXPECT_EQ(gpu::block_bytes(1000, 0, heap), 1048 * 1000);
+    EXPECT_EQ(gpu::block_bytes(100 * kMiB, 0, heap), 100 * kMiB);  // a block of its own
+    EXPECT_EQ(gpu::block_bytes(3 * kMiB, 160 * kMiB, heap), 9 * kMiB);
+    EXPECT_EQ(gpu::block_bytes(kMiB, uint64_t(1) << 40, heap), 256 * kMiB);
+    EXPECT_EQ(gpu::block_bytes(kMiB, uint64_t(1) << 40, 256 * kMiB), 4 * kMiB);  // a small heap
+}
+
+std::vector<uint32_t> contents(uint32_t i) {
+    return {i, random_word(i), ~i, 1};
+}
+
+TEST(DeviceMemory, ThousandsOfBuffersShareAFewBlocks) {
+    const auto own = open_test_device(true);
+    const gpu::MemoryUse before = own->memory_use();
+    std::vector<gpu::Buffer> buffers;
+    for (uint32_t i = 0; i < 5000; ++i) {
+        const uint64_t bytes = 16 + random_word(i) % 40000;
+        buffers.emplace_back(*own, "image", bytes, i % 2 ? gpu::Texel::rgba8 : gpu::Texel::none);
+    }
+    // Their ends, where a neighbour would be.
+    const auto last = [](const gpu::Buffer& buffer) { return buffer.bytes() - 16; };
+    for (uint32_t i = 0; i < buffers.size(); ++i)
+        buffers[i].upload(std::span<const uint32_t>(contents(i)), last(buffers[i]));
+    const gpu::MemoryUse full = own->memory_use();
+    printf("    %u blocks, %.1f MiB for %.1f MiB\n", full.blocks, double(full.held) / double(kMiB),
+           double(full.used) / double(kMiB));
+    EXPECT_LT(full.allocated - before.allocated, 100u);
+    EXPECT_LT(double(full.held), 1.08 * double(full.used) + double(kMiB));
+    uint64_t bytes = before.used;
+    for (const gpu::Buffer& buffer : buffers) bytes += buffer.bytes();
+    EXPECT_EQ(own->allocated_bytes(), full.used);
+    EXPECT_NEAR(double(full.used), double(bytes), 0.01 * double(bytes));
+    for (uint32_t i = 0; i < buffers.size(); ++i)
+        ASSERT_EQ(buffers[i].download<uint32_t>(4, last(buffers[i])), contents(i)) << i;
+
+    // What one frees, the next takes: no block is new.
+    for (uint32_t i = 0; i < buffers.size(); i += 2) buffers[i] = {};
+    for (uint32_t i = 0; i < buffers.size(); i += 2) buffers[i] = gpu::Buffer(*own, "image", 16);
+    EXPECT_EQ(own->memory_use().allocated, full.allocated);
+    for (uint32_t i = 1; i < buffers.size(); i += 2)
+        ASSERT_EQ(buffers[i].download<uint32_t>(4, last(buffers[i])), contents(i)) << i;
+    buffers.clear();
+    const gpu::MemoryUse after = own->memory_use();
+    EXPECT_EQ(after.used, before.used);
+    EXPECT_EQ(after.held, before.held);
+    EXPECT_EQ(after.blocks, before.blocks);
+    EXPECT_EQ(after.peak, full.used);
+}
+
+TEST(DeviceMemory, ALargeBufferTakesAndFreesItsOwnBytes) {
+    const auto own = open_test_device(true);
+    const gpu::Buffer little(*own, "little", 100);
+    const gpu::MemoryUse before = own->memory_use();
+    {
+        gpu::Buffer large(*own, "large", 5 * kMiB);
+        const gpu::MemoryUse held = own->memory_use();
+        EXPECT_EQ(held.blocks, before.blocks + 1);
+        EXPECT_LT(held.held - before.held, 5 * kMiB + 4096);
+        const gpu::Buffer moved = std::move(large);
+        EXPECT_FALSE(large.mapped());
+        EXPECT_EQ(own->memory_use().used, held.used);
+    }
+    EXPECT_EQ(own->memory_use().held, before.held);
+}
+
+/// Counts of kernels: the host reads them at the end of a submission, whatever it can map.
+TEST(ReadBack, GivesTheValueOfTheLastSubmission) {
+    for (const auto most : {gpu::HostAccess::none, gpu::HostAccess::write, gpu::HostAccess::read_write}) {
+        const auto own = open_test_device(true);
+        own->limit_host_access(most);
+        const gpu::ReadBack<uint32_t> value(*own, "value");
+        gpu::Executor executor(*own);
+        for (const uint32_t expected : {7u, 0u, 9u}) {
+            gpu::Recording recording(own->limits());
+            value.clear(recording);
+            if (expected) recording.fill(value.buffer(), expected, 0, 4);
+            value.record(recording);
+            executor.run(recording);
+            EXPECT_EQ(value.read(), expected);
+        }
+    }
+}
+
+}  // namespace
+}  // namespace ewa::test
