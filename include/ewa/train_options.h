@@ -33,6 +33,8 @@ struct TrainOptions {
     bool random_background = false;  // a new background colour each step
     /// Device memory for decoded training images, in bytes. Images beyond it are read again for each step.
     uint64_t image_cache_bytes = uint64_t(4) << 30;
+    /// Bits of each of Adam's two moments, 16 or 32. With 16 a splat needs a third less memory.
+    int moment_bits = 16;
     RenderOptions render{};  // background and kernel of training and evaluation
 
     // Learning rates of 3DGS (arguments/__init__.py). Those of the means are per unit of scene extent.

@@ -19,11 +19,13 @@ namespace ewa {
 /// The options with concrete values for Strategy::automatic and kAutomaticShDegree.
 TrainOptions resolve(TrainOptions options, const Dataset& dataset);
 
-/// An upper estimate of the device memory of a training, in bytes.
+/// An estimate of the device memory of a training at its peak, in bytes. For the splats that it names it is within
+/// 10 % on usual captures (docs/performance.md).
 struct MemoryEstimate {
-    uint32_t splats = 0;  // the number of splats that it is for
-    uint64_t model = 0;   // parameters, moments, statistics; twice if the strategy writes new generations
-    uint64_t frame = 0;   // images, sort buffers, gradient slots, for the (splat, tile) pairs of most scenes
+    uint32_t splats =
+        0;  // at the end; with adc the most there can be, since their number depends on the images
+    uint64_t model = 0;   // parameters, moments, statistics
+    uint64_t frame = 0;   // images, sort buffers, gradient slots; or what a refinement needs beside the model
     uint64_t images = 0;  // cached training images
     uint64_t total() const { return model + frame + images; }
 };
@@ -56,7 +58,7 @@ struct TrainerArray {
 struct TrainerState {
     StepReport report;
     int sh_degree = 0;  // of the stored coefficients
-    /// params, moments1, moments2 and what the strategy gathers, in the device's layout
+    /// params, moments1, with 32 bits a moment also moments2, and what the strategy gathers, in the device's layout
     /// (shaders/shared/layouts.h).
     std::vector<TrainerArray> arrays;
 };
@@ -67,9 +69,9 @@ struct TrainerState {
 class Trainer {
   public:
     /// train_frames: indices into dataset.frames. start: the first splats, at most options.max_splats.
-    /// Throws InputError (no frame, no or too many splats, an image that cannot be read), RunError (memory).
+    /// Pass an rvalue to spare a copy of them. Throws InputError (no frame, no or too many splats, an image that cannot be read), RunError (memory).
     Trainer(std::shared_ptr<gpu::Device> device, const Dataset& dataset, const std::vector<int>& train_frames,
-            const Gaussians& start, const TrainOptions& options);
+            Gaussians start, const TrainOptions& options);
     ~Trainer();
 
     /// Does one optimisation step, and changes the number of splats if the schedule says so. Throws InputError

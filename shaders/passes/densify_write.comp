@@ -1,8 +1,8 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Writes the next generation of splats into new buffers.
-// One invocation owns old splat i. It reads its parameters, moments and statistics, and the prefix sums of the outputs.
-// It writes what the splat becomes, side by side in the old order.
+// Writes one array of the next generation of splats into a new buffer. SPEC_MODE: WRITE_*.
+// One invocation owns old splat i. It reads its parameters, one of its moments and its statistics, and the prefix sums of
+// the outputs. It writes the parameters or the moments of what the splat becomes, side by side in the old order.
 // A kept splat and a clone's original keep their moments; new splats start with zero moments. Children of a split are
 // drawn from the parent's Gaussian and are SPLIT_SCALE times smaller. With revised opacity, two children in one place
 // are together as opaque as the parent: 1 - (1 - o)^(1/2) (Rota Bulo et al. 2024, eq. 9).
@@ -15,15 +15,13 @@
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3; // stored
+layout(constant_id = SPEC_MODE) const uint MODE = 0;
 TEXELS(0, params);
-TEXELS(1, moments1);
-TEXELS(2, moments2);
-layout(set = 0, binding = 3, scalar) readonly buffer Statistics { vec2 statistics[]; };
-layout(set = 0, binding = 4, scalar) readonly buffer Prefix { uint prefix[]; };
-layout(set = 0, binding = 5, scalar) readonly buffer Totals { uint totals[]; };
-layout(set = 0, binding = 6, scalar) writeonly buffer ParamsOut { vec4 params_out[]; };
-layout(set = 0, binding = 7, scalar) writeonly buffer Moments1Out { vec4 moments1_out[]; };
-layout(set = 0, binding = 8, scalar) writeonly buffer Moments2Out { vec4 moments2_out[]; };
+WORD_TEXELS(1, moments);
+layout(set = 0, binding = 2, scalar) readonly buffer Statistics { vec2 statistics[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer Prefix { uint prefix[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer Totals { uint totals[]; };
+layout(set = 0, binding = 5, scalar) writeonly buffer Out { uvec4 array_out[]; };
 layout(push_constant, scalar) uniform Push { DensifyPush push; };
 
 const uint PLANES = (PARAM_SH + 3 * (SH_DEGREE + 1) * (SH_DEGREE + 1) + 3) / 4;
@@ -51,18 +49,17 @@ void main() {
             if (push.revised_opacity != 0u) logit = halved_logit(logit);
         }
         [[unroll]] for (uint plane = 0; plane < PLANES; ++plane) {
-            const int from = int(param_texel(PLANES, plane, i));
-            vec4 value = fetch(params, from);
-            if (plane == 0u) value = vec4(mean, logit);
-            if (plane == 2u) value.xyz = log_scale;
-            const vec4 m1 = keeps_moments ? fetch(moments1, from) : vec4(0.0);
-            const vec4 m2 = keeps_moments ? fetch(moments2, from) : vec4(0.0);
-            if (written) {
-                const uint at = param_texel(PLANES, plane, to);
-                params_out[at] = value;
-                moments1_out[at] = m1;
-                moments2_out[at] = m2;
+            const uint from = param_texel(PLANES, plane, i);
+            uvec4 words = uvec4(0u);
+            if (MODE == WRITE_PARAMS) {
+                vec4 value = fetch(params, from);
+                if (plane == 0u) value = vec4(mean, logit);
+                if (plane == 2u) value.xyz = log_scale;
+                words = floatBitsToUint(value);
+            } else if (keeps_moments) {
+                words = fetch(moments, from);
             }
+            if (written) array_out[param_texel(PLANES, plane, to)] = words;
         }
     }
 }

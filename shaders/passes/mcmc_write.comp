@@ -1,8 +1,8 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Writes the next generation of splats into new buffers.
-// One invocation owns new splat j. It reads the parameters and moments of splat j or of its source, and writes
-// splat j. A dead splat, and one beyond the old number, becomes a copy of its source. A source and its copies share
+// Writes one array of the next generation of splats into a new buffer. SPEC_MODE: WRITE_*.
+// One invocation owns new splat j. It reads the parameters and one of the moments of splat j or of its source, and writes
+// the parameters or the moments of splat j. A dead splat, and one beyond the old number, becomes a copy of its source. A source and its copies share
 // what the source was (lib/mcmc.glsl) and start with zero moments. With a spread, each is placed by a normal draw
 // of the source's Gaussian.
 #extension GL_GOOGLE_include_directive : require
@@ -14,17 +14,15 @@
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3; // stored
+layout(constant_id = SPEC_MODE) const uint MODE = 0;
 TEXELS(0, params);
-TEXELS(1, moments1);
-TEXELS(2, moments2);
-layout(set = 0, binding = 3, scalar) readonly buffer Dead { uint dead[]; };
-layout(set = 0, binding = 4, scalar) readonly buffer Prefix { uint prefix[]; }; // of dead
-layout(set = 0, binding = 5, scalar) readonly buffer Totals { uint totals[]; };
-layout(set = 0, binding = 6, scalar) readonly buffer Sources { uint sources[]; };
-layout(set = 0, binding = 7, scalar) readonly buffer Hits { uint hits[]; };
-layout(set = 0, binding = 8, scalar) writeonly buffer ParamsOut { vec4 params_out[]; };
-layout(set = 0, binding = 9, scalar) writeonly buffer Moments1Out { vec4 moments1_out[]; };
-layout(set = 0, binding = 10, scalar) writeonly buffer Moments2Out { vec4 moments2_out[]; };
+WORD_TEXELS(1, moments);
+layout(set = 0, binding = 2, scalar) readonly buffer Dead { uint dead[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer Prefix { uint prefix[]; }; // of dead
+layout(set = 0, binding = 4, scalar) readonly buffer Totals { uint totals[]; };
+layout(set = 0, binding = 5, scalar) readonly buffer Sources { uint sources[]; };
+layout(set = 0, binding = 6, scalar) readonly buffer Hits { uint hits[]; };
+layout(set = 0, binding = 7, scalar) writeonly buffer Out { uvec4 array_out[]; };
 layout(push_constant, scalar) uniform Push { McmcPush push; };
 
 const uint PLANES = (PARAM_SH + 3 * (SH_DEGREE + 1) * (SH_DEGREE + 1) + 3) / 4;
@@ -48,13 +46,16 @@ void main() {
         offset = push.spread * (rotation * (scale * normal));
     }
     [[unroll]] for (uint plane = 0; plane < PLANES; ++plane) {
-        const int from = int(param_texel(PLANES, plane, source));
-        const uint to = param_texel(PLANES, plane, j);
-        vec4 value = fetch(params, from);
-        if (plane == 0u && copies > 0u) value = vec4(value.xyz + offset, log(opacity / (1.0 - opacity)));
-        if (plane == 2u && copies > 0u) value.xyz += log(part.y);
-        params_out[to] = value;
-        moments1_out[to] = copies > 0u ? vec4(0.0) : fetch(moments1, from);
-        moments2_out[to] = copies > 0u ? vec4(0.0) : fetch(moments2, from);
+        const uint from = param_texel(PLANES, plane, source);
+        uvec4 words = uvec4(0u);
+        if (MODE == WRITE_PARAMS) {
+            vec4 value = fetch(params, from);
+            if (plane == 0u && copies > 0u) value = vec4(value.xyz + offset, log(opacity / (1.0 - opacity)));
+            if (plane == 2u && copies > 0u) value.xyz += log(part.y);
+            words = floatBitsToUint(value);
+        } else if (copies == 0u) {
+            words = fetch(moments, from);
+        }
+        array_out[param_texel(PLANES, plane, j)] = words;
     }
 }

@@ -1,15 +1,16 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
 // Lowers every opacity to at most a given one and zeroes its moments (3DGS, section 5.2).
-// One invocation owns splat i. It updates the opacity in the parameters and in both moments.
+// One invocation owns splat i. It updates the opacity in the parameters and in both moments. A zero word is a zero moment
+// in every format.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/params.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(set = 0, binding = 0, scalar) buffer Params { vec4 params[]; };
-layout(set = 0, binding = 1, scalar) writeonly buffer Moments1 { vec4 moments1[]; };
-layout(set = 0, binding = 2, scalar) writeonly buffer Moments2 { vec4 moments2[]; };
+layout(set = 0, binding = 1, scalar) writeonly buffer Moments1 { uvec4 moments1[]; };
+layout(set = 0, binding = 2, scalar) writeonly buffer Moments2 { uvec4 moments2[]; };
 layout(push_constant, scalar) uniform Push { ResetPush push; };
 
 void main() {
@@ -17,6 +18,6 @@ void main() {
     if (i >= push.splats) return;
     const uint at = param_texel(push.planes, PARAM_OPACITY / 4u, i);
     params[at][PARAM_OPACITY % 4u] = min(params[at][PARAM_OPACITY % 4u], push.logit);
-    moments1[at][PARAM_OPACITY % 4u] = 0.0;
-    moments2[at][PARAM_OPACITY % 4u] = 0.0;
+    moments1[at][PARAM_OPACITY % 4u] = 0u;
+    moments2[at][PARAM_OPACITY % 4u] = 0u;
 }

@@ -6,6 +6,7 @@
 // A splat that is not visible has gradient zero, and its moments still move it. A step that is too long for its splat
 // is shortened and counted. An update that is not finite is dropped and counted. A frame whose instances did not fit
 // changes nothing: the host repeats it. SPEC_MODE: UPDATE_* bits.
+// A gradient without a step, and moments in float32, are stored by their bits.
 #extension GL_GOOGLE_include_directive : require
 #define BINDING_CAMERA 1
 #include "lib/prelude.glsl"
@@ -13,25 +14,27 @@
 #include "lib/projection.glsl"
 #include "lib/footprint_gradient.glsl"
 #include "lib/step_limits.glsl"
+#include "lib/moments.glsl"
 #include "lib/sh.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3;
 layout(constant_id = SPEC_MODE) const uint MODE = 0;
 const bool GRADIENT_ONLY = (MODE & UPDATE_GRADIENT_ONLY) != 0u, STATISTICS = (MODE & UPDATE_STATISTICS) != 0u,
-           REGULARISED = (MODE & UPDATE_REGULARISED) != 0u, ABSOLUTE = (MODE & UPDATE_ABSOLUTE) != 0u;
+           REGULARISED = (MODE & UPDATE_REGULARISED) != 0u, ABSOLUTE = (MODE & UPDATE_ABSOLUTE) != 0u,
+           PACKED_MOMENTS = (MODE & UPDATE_PACKED_MOMENTS) != 0u;
 
 TEXELS(0, params);
 TEXELS(2, records);
 TEXELS(3, slots);
-TEXELS(4, moments1);
-TEXELS(5, moments2);
+WORD_TEXELS(4, moments1);
+WORD_TEXELS(5, moments2);
 layout(set = 0, binding = 6, scalar) readonly buffer TileCounts { uint tile_counts[]; };
 layout(set = 0, binding = 7, scalar) readonly buffer FirstInstances { uint first_instances[]; };
 layout(set = 0, binding = 8, scalar) buffer CountsBlock { Counts counts; };
 layout(set = 0, binding = 9, scalar) writeonly buffer ParamsOut { vec4 params_out[]; };
-layout(set = 0, binding = 10, scalar) writeonly buffer Moments1Out { vec4 moments1_out[]; };
-layout(set = 0, binding = 11, scalar) writeonly buffer Moments2Out { vec4 moments2_out[]; };
+layout(set = 0, binding = 10, scalar) writeonly buffer Moments1Out { uvec4 moments1_out[]; };
+layout(set = 0, binding = 11, scalar) writeonly buffer Moments2Out { uvec4 moments2_out[]; };
 layout(set = 0, binding = 12, scalar) buffer Statistics { vec2 statistics[]; };
 layout(set = 0, binding = 13, scalar) readonly buffer SortedIndices { uint sorted_indices[]; };
 layout(push_constant, scalar) uniform Push { UpdatePush push; };
@@ -67,21 +70,29 @@ void move(uint plane, uint i, vec4 value, vec4 raw_gradient, vec4 rate, float de
     if (GRADIENT_ONLY) {
         // Infinities become the largest float32. NaN becomes zero and is counted.
         const bvec4 number = equal(raw_gradient, raw_gradient);
-        moments1_out[at] = mix(vec4(0.0), clamp(raw_gradient, -3.402823466e38, 3.402823466e38), number);
+        moments1_out[at] =
+            floatBitsToUint(mix(vec4(0.0), clamp(raw_gradient, -3.402823466e38, 3.402823466e38), number));
         if (!all(number)) atomicAdd(counts.dropped_updates, 1u);
         return;
     }
     const vec4 largest = vec4(GRADIENT_MAX);
     const vec4 gradient = mix(raw_gradient, clamp(raw_gradient, -largest, largest), greaterThan(abs(raw_gradient), largest));
-    const vec4 m = mix(gradient, fetch(moments1, at), float(ADAM_BETA1));
-    const vec4 v = mix(gradient * gradient, fetch(moments2, at), float(ADAM_BETA2));
+    const uvec4 words = fetch(moments1, at);
+    const vec4 old_m = PACKED_MOMENTS ? first_moment(words) : uintBitsToFloat(words);
+    const vec4 old_v = PACKED_MOMENTS ? second_moment(words) : uintBitsToFloat(fetch(moments2, at));
+    const vec4 m = mix(gradient, old_m, float(ADAM_BETA1));
+    const vec4 v = mix(gradient * gradient, old_v, float(ADAM_BETA2));
     vec4 moved = value - rate * (m * push.bias1) / (sqrt(v * push.bias2) + float(ADAM_EPSILON));
     const bool limited = limit_step(plane, value, depth, moved);
     if (is_finite(moved) && is_finite(m) && is_finite(v)) {
         if (limited) atomicAdd(counts.limited_steps, 1u);
         params_out[at] = moved;
-        moments1_out[at] = m;
-        moments2_out[at] = v;
+        if (PACKED_MOMENTS) {
+            moments1_out[at] = pack_moments(m, v, moment_random(i, plane, push.step, push.seed));
+        } else {
+            moments1_out[at] = floatBitsToUint(m);
+            moments2_out[at] = floatBitsToUint(v);
+        }
     } else if (is_finite(value)) {
         atomicAdd(counts.dropped_updates, 1u);
     }

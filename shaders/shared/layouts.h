@@ -23,7 +23,8 @@ EWA_UINT(SPEC_COLOR_FLOATS, 10u);  // a buffer of colours holds 0: 4 bytes a col
 // ---- A splat's parameters ----
 // Flat float f is component f % 4 of texel plane f / 4. Splats are stored in blocks of PARAM_BLOCK. Within a
 // block, plane follows plane: a cache line holds one plane of a block, and a block is contiguous (see
-// lib/params.glsl). Adam's two moments and gradients have the same layout.
+// lib/params.glsl). Gradients and Adam's moments have the same layout, in words: both moments of a value in one word
+// (lib/moments.glsl), or a float32 in each of two buffers.
 EWA_UINT(PARAM_BLOCK, 8u);
 EWA_UINT(PARAM_MEAN, 0u);        // 3 floats, world units
 EWA_UINT(PARAM_OPACITY, 3u);     // logit
@@ -91,6 +92,10 @@ EWA_UINT(UPDATE_STATISTICS, 2u);
 EWA_UINT(UPDATE_REGULARISED, 4u);
 // The norm is that of the pixels' absolute gradients (Ye et al. 2024, AbsGS, eq. 7), which do not cancel.
 EWA_UINT(UPDATE_ABSOLUTE, 8u);
+EWA_UINT(UPDATE_PACKED_MOMENTS, 16u);  // moments1 holds both moments in 16 bits each
+// densify_write.comp, mcmc_write.comp: the array of the next generation that is written
+EWA_UINT(WRITE_PARAMS, 0u);
+EWA_UINT(WRITE_MOMENTS, 1u);  // one of the two in float32, or both in one
 
 // ---- SPEC_BROADCAST ----
 EWA_UINT(BROADCAST_SHUFFLES, 0u);  // one splat a lane, in registers
@@ -249,6 +254,9 @@ struct UpdatePush {
     float half_size[2];  // W / 2, H / 2: px to normalised device coordinates
     // With UPDATE_REGULARISED: d(loss)/d(opacity) and d(loss)/d(scale along one axis) of every splat.
     float opacity_weight, scale_weight;
+    // With UPDATE_PACKED_MOMENTS: of the rounding.
+    uint seed[2];
+    uint step;
 };
 
 struct DensifyPush {

@@ -18,7 +18,7 @@ using namespace pipeline;
 
 FrameRun::FrameRun(std::shared_ptr<gpu::Device> device, const BenchScene& scene, bool train,
                    const std::optional<RenderOptions>& options,
-                   const std::optional<passes::KernelConfig>& config)
+                   const std::optional<passes::KernelConfig>& config, int moment_bits)
     : device_(std::move(device)),
       cache_(*device_, config.value_or(passes::config_for(device_->limits()))),
       executor_(*device_),
@@ -26,8 +26,9 @@ FrameRun::FrameRun(std::shared_ptr<gpu::Device> device, const BenchScene& scene,
       plan_(plan_for({.purpose = train ? Purpose::training : Purpose::picture,
                       .scene_degree = scene.gaussians.sh_degree,
                       .present_degree = sh_degree_present(scene.gaussians),
-                      .render = options_})),
-      model_(upload_model(*device_, scene.gaussians, train ? 2 : 0, false)),
+                      .render = options_,
+                      .packed_moments = moment_bits == 16})),
+      model_(upload_model(*device_, scene.gaussians, plan_.moment_buffers(), false)),
       camera_(scene.camera),
       train_(train) {
     camera_buffer_ = upload_camera(*device_, camera_, cache_.config(), model_.origin);
@@ -50,8 +51,15 @@ void FrameRun::run() {
                                  .width = inputs_.camera.width,
                                  .height = inputs_.camera.height,
                                  .instances = frame_.instance_capacity,
-                                 .gradients = train_},
+                                 .gradients = train_,
+                                 .overlaid = train_},
                                 [&](gpu::Recording& recording) { record(recording); });
+}
+
+void FrameRun::run_forward() {
+    gpu::Recording recording(device_->limits());
+    sorted_ = record_forward(recording, cache_, plan_, model_, frame_, inputs_);
+    executor_.run(recording);
 }
 
 gpu::Recording FrameRun::only(const gpu::Command& command) const {
@@ -139,7 +147,8 @@ struct Lists {
     uint32_t scan_block = 1, tiles = 0, instances = 0;
 };
 
-Lists download(const FrameRun& run) {
+Lists download(FrameRun& run) {
+    run.run_forward();
     const FrameBuffers& frame = run.frame();
     const Sizes& sizes = frame.sizes;
     const size_t n = run.model().splats;
@@ -151,7 +160,7 @@ Lists download(const FrameRun& run) {
     lists.prefix = frame.prefix.download<uint32_t>(n);
     lists.totals = frame.scan_totals.download<uint32_t>(size_t(sizes.scan_blocks) + 1);
     lists.instances = run.counts().instances;
-    lists.keys = frame.instance_keys[sizes.tile_sort.passes & 1].download<uint32_t>(lists.instances);
+    lists.keys = frame.instance_keys[1].download<uint32_t>(lists.instances);
     if (run.plan().gradients) lists.indices = run.sorted().indices->download<uint32_t>(lists.instances);
     lists.splats = run.sorted_splats();
     lists.tile_starts = run.tile_starts();
@@ -255,7 +264,7 @@ constexpr double kGradientBound = 1e-3;  // |actual - expected| / |expected|
 constexpr double kAdamBound = 1e-3;      // in learning rates
 
 /// Wrong entries in depth order, scan, instances, tile order and tile starts; errors of the records.
-std::vector<Check> check_lists(const FrameRun& run, const BenchScene& scene) {
+std::vector<Check> check_lists(FrameRun& run, const BenchScene& scene) {
     const Lists lists = download(run);
     std::vector<Check> checks = check_project(lists, run, scene);
     checks.push_back(check_depth_order(lists));
@@ -306,7 +315,7 @@ std::vector<Check> check_gradient(const std::shared_ptr<gpu::Device>& device, co
 /// One Adam step from zero moments against the CPU reference, with the gradient that the moments hold.
 std::vector<Check> check_update(const std::shared_ptr<gpu::Device>& device, const BenchScene& scene) {
     // The first step has rate zero: it changes only the moments, which then hold the second step's gradient.
-    FrameRun run(device, scene, true);
+    FrameRun run(device, scene, true, {}, {}, 32);
     const Gaussians m = download_model(run.model(), run.model().moments1);
     const Gaussians v = download_model(run.model(), run.model().moments2);
     constexpr float kRate = 0.01f;
@@ -333,7 +342,7 @@ std::vector<Check> check_update(const std::shared_ptr<gpu::Device>& device, cons
 
 }  // namespace
 
-void check_frame(CaseResult& result, const std::shared_ptr<gpu::Device>& device, const FrameRun& run,
+void check_frame(CaseResult& result, const std::shared_ptr<gpu::Device>& device, FrameRun& run,
                  const BenchScene& scene) {
     const Case& one = result.one;
     const auto add = [&](const std::vector<Check>& checks) {

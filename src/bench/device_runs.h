@@ -23,12 +23,15 @@ class FrameRun {
   public:
     /// Uploads the scene and runs once, which sizes the instance buffers and compiles the kernels. Default
     /// options: a black background and the SH degree of the scene. Default config: that of the device.
+    /// moment_bits: as in TrainOptions.
     FrameRun(std::shared_ptr<gpu::Device> device, const BenchScene& scene, bool train,
              const std::optional<RenderOptions>& options = {},
-             const std::optional<passes::KernelConfig>& config = {});
+             const std::optional<passes::KernelConfig>& config = {}, int moment_bits = 16);
 
     /// Records, submits and waits for one more run.
     void run();
+    /// The forward part of a run alone: later passes reuse the memory of sort buffers.
+    void run_forward();
     /// The same work with one submission per command, each through each(name, submit).
     void run_apart(const std::function<void(const std::string&, const std::function<void()>&)>& each);
     /// Runs only the backward projection and Adam, on the gradient slots of the last run.
@@ -96,7 +99,7 @@ class SortRun {
 
 /// Adds checks of the last run to result.checks. The CPU reference blends pixel by pixel in float64. It
 /// checks image, gradient and update of small cases only; result.note names what was skipped.
-void check_frame(CaseResult& result, const std::shared_ptr<gpu::Device>& device, const FrameRun& run,
+void check_frame(CaseResult& result, const std::shared_ptr<gpu::Device>& device, FrameRun& run,
                  const BenchScene& scene);
 
 /// visit(name, member of a, of b) for each of the five arrays of parameters.

@@ -3,6 +3,7 @@
 
 #include <cassert>
 #include <cstring>
+#include <stdexcept>
 #include <utility>
 
 #include "ewa/error.h"
@@ -10,11 +11,15 @@
 namespace ewa::gpu {
 namespace {
 
-/// Not for Texel::none.
+/// Not for Texel::none and Texel::any.
 vk::Format format_of(Texel texel) {
     return texel == Texel::rgba32f    ? vk::Format::eR32G32B32A32Sfloat
            : texel == Texel::rgba32ui ? vk::Format::eR32G32B32A32Uint
                                       : vk::Format::eR8G8B8A8Unorm;
+}
+
+uint64_t whole_texels(uint64_t bytes) {
+    return (std::max<uint64_t>(bytes, 1) + 15) / 16 * 16;
 }
 
 uint64_t texel_bytes(Texel texel) {
@@ -26,39 +31,59 @@ uint64_t texel_bytes(Texel texel) {
 Buffer::Buffer(Device& device, std::string name, uint64_t bytes, Texel texel, bool uniform, bool host_visible)
     : device_(&device),
       name_(std::move(name)),
-      bytes_((std::max<uint64_t>(bytes, 1) + 15) / 16 * 16),
+      bytes_(whole_texels(bytes)),
       texel_(texel),
       uniform_(uniform) {
-    const bool fetched = texel != Texel::none && device.limits().texel_buffers;
-    if (fetched && bytes_ / texel_bytes(texel) > device.limits().max_texels)
+    create([&] {
+        const auto requirements = device.handle().getBufferMemoryRequirements(*buffer_);
+        memory_ = std::make_shared<Memory>(device.allocate(requirements, host_visible));
+    });
+}
+
+Buffer::Buffer(const Buffer& memory, uint64_t offset, std::string name, uint64_t bytes, Texel texel)
+    : device_(memory.device_),
+      name_(std::move(name)),
+      bytes_(whole_texels(bytes)),
+      texel_(texel),
+      memory_offset_(offset) {
+    if (memory.texel_ != Texel::any || offset % kPlacement != 0 || offset + bytes_ > memory.bytes_)
+        throw std::logic_error("buffer " + name_ + " in memory that is not for it");
+    create([&] { memory_ = memory.memory_; });
+}
+
+/// find_memory: sets memory_ when there is a buffer that tells what it needs.
+template <class FindMemory>
+void Buffer::create(FindMemory find_memory) {
+    const Limits& limits = device_->limits();
+    const bool bound = texel_ != Texel::any;
+    const bool fetched = texel_ != Texel::none && limits.texel_buffers;
+    if (bound && fetched && bytes_ / texel_bytes(texel_) > limits.max_texels)
         throw RunError(
             "buffer " + name_ + " needs " + std::to_string(bytes_ >> 20) +
             " MiB, more than this device can fetch texels from; fewer splats or a smaller image need less");
     // Software drivers report 128 MiB here, but bind buffers of any size.
-    if (!device.limits().cpu && bytes_ > device.limits().max_storage_range)
+    if (bound && !limits.cpu && bytes_ > limits.max_storage_range)
         throw RunError("buffer " + name_ + " needs " + std::to_string(bytes_ >> 20) +
                        " MiB, and this device binds at most " +
-                       std::to_string(device.limits().max_storage_range >> 20) +
+                       std::to_string(limits.max_storage_range >> 20) +
                        " MiB at once; fewer splats or a smaller image need less");
     using Usage = vk::BufferUsageFlagBits;
-    vk::BufferCreateInfo create;
-    create.setSize(bytes_).setUsage(Usage::eStorageBuffer | Usage::eTransferSrc | Usage::eTransferDst);
-    if (fetched) create.usage |= Usage::eUniformTexelBuffer;
-    if (uniform) create.usage |= Usage::eUniformBuffer;
+    vk::BufferCreateInfo info;
+    info.setSize(bytes_).setUsage(Usage::eStorageBuffer | Usage::eTransferSrc | Usage::eTransferDst);
+    if (fetched) info.usage |= Usage::eUniformTexelBuffer;
+    if (uniform_) info.usage |= Usage::eUniformBuffer;
     try {
-        buffer_ = device.handle().createBufferUnique(create);
-        const auto requirements = device.handle().getBufferMemoryRequirements(*buffer_);
-        memory_ = device.allocate(requirements, host_visible);
-        device.handle().bindBufferMemory(*buffer_, memory_.handle(), memory_.offset());
-        if (fetched) {
-            vk::BufferViewCreateInfo view;
-            view.setBuffer(*buffer_).setFormat(format_of(texel)).setRange(bytes_);
-            view_ = device.handle().createBufferViewUnique(view);
-        }
+        buffer_ = device_->handle().createBufferUnique(info);
+        find_memory();
+        device_->handle().bindBufferMemory(*buffer_, memory_->handle(), memory_->offset() + memory_offset_);
+        if (!fetched || !bound) return;
+        vk::BufferViewCreateInfo view;
+        view.setBuffer(*buffer_).setFormat(format_of(texel_)).setRange(bytes_);
+        view_ = device_->handle().createBufferViewUnique(view);
     } catch (const vk::OutOfDeviceMemoryError&) {
-        throw device.out_of_memory(bytes_);
+        throw device_->out_of_memory(bytes_);
     } catch (const vk::OutOfHostMemoryError&) {
-        throw device.out_of_memory(bytes_);
+        throw device_->out_of_memory(bytes_);
     } catch (const vk::SystemError& error) {
         throw RunError("buffer " + name_ + " of " + std::to_string(bytes_ >> 20) + " MiB: " + error.what());
     }
@@ -74,7 +99,18 @@ Buffer& Buffer::operator=(Buffer&& other) noexcept {
     view_ = std::move(other.view_);
     buffer_ = std::move(other.buffer_);
     memory_ = std::move(other.memory_);
+    memory_offset_ = other.memory_offset_;
     return *this;
+}
+
+bool Buffer::lies_at(const Buffer& memory, uint64_t offset, uint64_t bytes) const {
+    return memory_ && memory_ == memory.memory_ && memory_offset_ == offset && bytes_ == whole_texels(bytes);
+}
+
+bool Buffer::overlaps(const Buffer& other) const {
+    if (this == &other) return true;
+    return memory_ && memory_ == other.memory_ && memory_offset_ < other.memory_offset_ + other.bytes_ &&
+           other.memory_offset_ < memory_offset_ + bytes_;
 }
 
 void Buffer::upload(std::span<const std::byte> data, uint64_t offset) {
@@ -89,7 +125,7 @@ void Buffer::upload(std::span<const std::byte> data, uint64_t offset) {
 void Buffer::download(std::span<std::byte> data, uint64_t offset) const {
     assert(offset + data.size() <= bytes_);
     if (data.empty()) return;
-    if (memory_.access() == HostAccess::read_write)
+    if (memory_->access() == HostAccess::read_write)
         std::memcpy(data.data(), mapped() + offset, data.size());
     else
         copy_through_staging({}, data, offset);

@@ -3,6 +3,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <utility>
@@ -12,8 +13,9 @@
 
 namespace ewa::gpu {
 
-/// The format of the texels that shaders fetch. none: the buffer is not for fetches.
-enum class Texel { none, rgba32f, rgba32ui, rgba8 };
+/// The format of the texels that shaders fetch. none: the buffer is not for fetches. any: only for memory that
+/// buffers of every format share.
+enum class Texel { none, rgba32f, rgba32ui, rgba8, any };
 
 class Buffer {
   public:
@@ -23,6 +25,10 @@ class Buffer {
     /// written. Throws RunError if memory runs out, or if one binding cannot address that many bytes.
     Buffer(Device& device, std::string name, uint64_t bytes, Texel texel = Texel::none, bool uniform = false,
            bool host_visible = false);
+    /// A buffer in the memory of another, which is of Texel::any, from byte `offset` on, a multiple of kPlacement.
+    /// The memory stays as long as a buffer in it.
+    Buffer(const Buffer& memory, uint64_t offset, std::string name, uint64_t bytes, Texel texel);
+    static constexpr uint64_t kPlacement = 4096;  // bytes
     Buffer(Buffer&& other) noexcept { *this = std::move(other); }
     Buffer& operator=(Buffer&& other) noexcept;
 
@@ -33,9 +39,15 @@ class Buffer {
     vk::Buffer handle() const { return *buffer_; }
     vk::BufferView view() const { return *view_; }
     explicit operator bool() const { return bool(buffer_); }
+    /// Whether the buffer was made of this memory, from byte `offset` on, for that many bytes.
+    bool lies_at(const Buffer& memory, uint64_t offset, uint64_t bytes) const;
+    /// Whether a byte of the two is the same memory.
+    bool overlaps(const Buffer& other) const;
 
     /// The host's address of the memory. Null if the host cannot map it.
-    std::byte* mapped() const { return memory_.mapped(); }
+    std::byte* mapped() const {
+        return memory_ && memory_->mapped() ? memory_->mapped() + memory_offset_ : nullptr;
+    }
     /// Blocking copies. They use a staging buffer if the host cannot map the memory. The device must be idle.
     void upload(std::span<const std::byte> data, uint64_t offset = 0);
     void download(std::span<std::byte> data, uint64_t offset = 0) const;
@@ -52,6 +64,8 @@ class Buffer {
     }
 
   private:
+    template <class FindMemory>
+    void create(FindMemory find_memory);
     void copy_through_staging(std::span<const std::byte> source, std::span<std::byte> target,
                               uint64_t offset) const;
 
@@ -60,7 +74,8 @@ class Buffer {
     uint64_t bytes_ = 0;
     Texel texel_ = Texel::none;
     bool uniform_ = false;
-    Memory memory_;
+    std::shared_ptr<Memory> memory_;
+    uint64_t memory_offset_ = 0;
     vk::UniqueBuffer buffer_;
     vk::UniqueBufferView view_;
 };

@@ -81,21 +81,18 @@ void Recording::copy(const Buffer& source, uint64_t source_offset, const Buffer&
 }
 
 void Recording::append(Command command) {
-    const auto state_of = [&](const Buffer* buffer) {
-        return std::find_if(states_.begin(), states_.end(),
-                            [&](const State& s) { return s.buffer == buffer; });
-    };
-    // A command needs a barrier if, since the last one, a buffer that it reads was written, or a buffer that
-    // it writes was read or written.
+    // A command needs a barrier if, since the last one, memory that it reads was written, or memory that it
+    // writes was read or written. Buffers may share memory.
     command.barrier_before = false;
-    for (const Use& use : command.uses) {
-        const auto state = state_of(use.part.buffer);
-        if (state == states_.end()) continue;
-        if (state->written || (state->read && has(use.access, Access::write))) command.barrier_before = true;
-    }
+    for (const Use& use : command.uses)
+        for (const State& state : states_) {
+            if (!state.written && !has(use.access, Access::write)) continue;
+            if (state.buffer->overlaps(*use.part.buffer)) command.barrier_before = true;
+        }
     if (command.barrier_before) states_.clear();
     for (const Use& use : command.uses) {
-        auto state = state_of(use.part.buffer);
+        auto state = std::find_if(states_.begin(), states_.end(),
+                                  [&](const State& s) { return s.buffer == use.part.buffer; });
         if (state == states_.end()) state = states_.insert(states_.end(), {use.part.buffer, false, false});
         state->read = state->read || has(use.access, Access::read);
         state->written = state->written || has(use.access, Access::write);

@@ -18,7 +18,7 @@ static_assert(sizeof(BlendPush) == 48 && offsetof(BlendPush, capacity) == 44);
 static_assert(sizeof(UnpackPush) == 28 && sizeof(LossPush) == 24 && sizeof(ReducePush) == 16);
 static_assert(sizeof(ImageLayout) == 16 && sizeof(PackPush) == 4 && sizeof(ExposurePush) == 20 &&
               sizeof(ExposureUpdatePush) == 28);
-static_assert(sizeof(UpdatePush) == 60 && sizeof(DensifyPush) == 48 && sizeof(ResetPush) == 12);
+static_assert(sizeof(UpdatePush) == 72 && sizeof(DensifyPush) == 48 && sizeof(ResetPush) == 12);
 static_assert(sizeof(McmcPush) == 56 && sizeof(PerturbPush) == 32);
 static_assert(sizeof(TraceView) == 4 * (9 + 3 + 2 + 2 + 2 + 9 + 1) && sizeof(TraceCounts) == 8 &&
               sizeof(TracePush) == 24);

@@ -213,12 +213,12 @@ struct DensifyDecide {
     gpu::BufferPart params, statistics, outputs;
 };
 
-/// Writes the next generation of splats. Variant: SPEC_SH_DEGREE (stored).
+/// Writes one array of the next generation of splats. moments: the old array to write with WRITE_MOMENTS.
+/// Variant: SPEC_SH_DEGREE (stored), SPEC_MODE (WRITE_*).
 struct DensifyWrite {
     static constexpr char shader[] = "densify_write";
     using Work = PerElement<&shared::DensifyPush::splats>;
-    gpu::BufferPart params, moments1, moments2, statistics, prefix, totals, params_out, moments1_out,
-        moments2_out;
+    gpu::BufferPart params, moments, statistics, prefix, totals, array_out;
 };
 
 /// Lowers every opacity to at most a given one and zeroes its moments.
@@ -242,12 +242,12 @@ struct McmcDraw {
     gpu::BufferPart prefix, totals, sources, hits;
 };
 
-/// Writes the next generation of splats. prefix, totals: of dead. Variant: SPEC_SH_DEGREE (stored).
+/// Writes one array of the next generation of splats. moments: the old array to write with WRITE_MOMENTS.
+/// prefix, totals: of dead. Variant: SPEC_SH_DEGREE (stored), SPEC_MODE (WRITE_*).
 struct McmcWrite {
     static constexpr char shader[] = "mcmc_write";
     using Work = PerElement<&shared::McmcPush::new_splats>;
-    gpu::BufferPart params, moments1, moments2, dead, prefix, totals, sources, hits, params_out, moments1_out,
-        moments2_out;
+    gpu::BufferPart params, moments, dead, prefix, totals, sources, hits, array_out;
 };
 
 /// Adds noise to the means.

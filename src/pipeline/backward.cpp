@@ -71,6 +71,7 @@ uint32_t update_mode(const Plan& plan) {
     if (plan.statistics) mode |= shared::UPDATE_STATISTICS;
     if (plan.regularised) mode |= shared::UPDATE_REGULARISED;
     if (plan.absolute) mode |= shared::UPDATE_ABSOLUTE;
+    if (plan.packed_moments) mode |= shared::UPDATE_PACKED_MOMENTS;
     return mode;
 }
 
@@ -89,7 +90,9 @@ shared::UpdatePush update_push(const Model& model, const FrameBuffers& frame, co
             .bias2 = bias2,
             .half_size = {0.5f * float(frame.sizes.width), 0.5f * float(frame.sizes.height)},
             .opacity_weight = rates.opacity_weight,
-            .scale_weight = rates.scale_weight};
+            .scale_weight = rates.scale_weight,
+            .seed = {uint32_t(rates.seed), uint32_t(rates.seed >> 32)},
+            .step = rates.step};
 }
 
 }  // namespace
@@ -172,9 +175,9 @@ void record_backward(gpu::Recording& recording, passes::PassCache& cache, const 
                  .slots = frame.slots},
                 blend_push(cache.config(), frame, inputs.background));
 
-    // A gradient alone has no second moments or statistics. It does not use those bindings, but
-    // they need a buffer.
-    const gpu::Buffer& moments2 = plan.adam ? model.moments2 : model.moments1;
+    // Packed moments and a gradient alone have no buffer of second moments, and a gradient no statistics. The kernel
+    // does not use those bindings, but they need a buffer.
+    const gpu::Buffer& moments2 = model.second_moments();
     const gpu::Buffer& statistics = plan.statistics ? model.statistics : frame.partials;
     const CameraUse& camera = inputs.camera;
     cache

@@ -70,8 +70,8 @@ void record_instances(gpu::Recording& recording, passes::PassCache& cache, const
                  .prefix = frame.prefix,
                  .totals = frame.scan_totals,
                  .counts = frame.counts,
-                 .keys = frame.instance_keys[0],
-                 .splats = frame.instance_splats[0],
+                 .keys = frame.instance_keys[frame.tile_sort_start()],
+                 .splats = frame.instance_splats[frame.tile_sort_start()],
                  .first_instances = frame.first_instances},
                 {.splats = model.splats,
                  .capacity = frame.instance_capacity,
@@ -81,30 +81,29 @@ void record_instances(gpu::Recording& recording, passes::PassCache& cache, const
                  .tiles = {s.tiles_x, s.tiles_y}});
 }
 
-/// Index of the buffers with the result.
-uint32_t record_tile_order(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
-                           const FrameBuffers& frame) {
+/// The result is in the second buffers.
+void record_tile_order(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
+                       const FrameBuffers& frame) {
     // With gradients a splat must find its instances again: their slots are in sorted order.
-    const auto indices = [&](int i) { return plan.gradients ? &frame.sorted_indices[i] : nullptr; };
-    const uint32_t result = record_sort(recording, cache,
-                                        {.keys = {&frame.instance_keys[0], &frame.instance_keys[1]},
-                                         .values = {&frame.instance_splats[0], &frame.instance_splats[1]},
-                                         .indices = {indices(0), indices(1)},
-                                         .own_indices = false,
-                                         .counters = frame.counters,
-                                         .counter_prefix = frame.counter_prefix,
-                                         .digit_totals = frame.digit_totals,
-                                         .counts = frame.counts},
-                                        {.cut = frame.sizes.tile_sort,
-                                         .items = 0,
-                                         .capacity = frame.instance_capacity,
-                                         .keep_keys = true,
-                                         .name = "tile order"});
+    const auto indices = [&](uint32_t i) { return plan.gradients ? &frame.sorted_indices[i] : nullptr; };
+    const uint32_t a = frame.tile_sort_start(), b = 1 - a;
+    record_sort(recording, cache,
+                {.keys = {&frame.instance_keys[a], &frame.instance_keys[b]},
+                 .values = {&frame.instance_splats[a], &frame.instance_splats[b]},
+                 .indices = {indices(a), indices(b)},
+                 .own_indices = false,
+                 .counters = frame.counters,
+                 .counter_prefix = frame.counter_prefix,
+                 .digit_totals = frame.digit_totals,
+                 .counts = frame.counts},
+                {.cut = frame.sizes.tile_sort,
+                 .items = 0,
+                 .capacity = frame.instance_capacity,
+                 .keep_keys = true,
+                 .name = "tile order"});
     cache.get<passes::TileStarts>().record(
-        recording,
-        {.keys = frame.instance_keys[result], .counts = frame.counts, .tile_starts = frame.tile_starts},
+        recording, {.keys = frame.instance_keys[1], .counts = frame.counts, .tile_starts = frame.tile_starts},
         {.tiles = frame.sizes.tiles, .capacity = frame.instance_capacity});
-    return result;
 }
 
 }  // namespace
@@ -127,16 +126,16 @@ Sorted record_forward(gpu::Recording& recording, passes::PassCache& cache, const
     record_project(recording, cache, plan, model, frame, inputs);
     const gpu::Buffer& order = record_depth_order(recording, cache, model, frame);
     record_instances(recording, cache, plan, model, frame, order);
-    const uint32_t sorted = record_tile_order(recording, cache, plan, frame);
+    record_tile_order(recording, cache, plan, frame);
     cache.get<passes::Blend>({{shared::SPEC_MODE, kBlendModes[size_t(plan.drawing)]}})
         .record(recording,
                 {.records = frame.records,
-                 .splats = frame.instance_splats[sorted],
+                 .splats = frame.instance_splats[1],
                  .tile_starts = frame.tile_starts,
                  .planes = frame.planes},
                 blend_push(cache.config(), frame, inputs.background));
-    return {.splats = &frame.instance_splats[sorted],
-            .indices = plan.gradients ? &frame.sorted_indices[sorted] : nullptr};
+    return {.splats = &frame.instance_splats[1],
+            .indices = plan.gradients ? &frame.sorted_indices[1] : nullptr};
 }
 
 }  // namespace ewa::pipeline

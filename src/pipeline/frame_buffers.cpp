@@ -36,47 +36,84 @@ void check_image(const passes::KernelConfig& config, const FrameRequest& request
                          " tiles that can be drawn; --downscale makes it smaller");
 }
 
-/// Buffers of the same size.
+constexpr uint64_t kAlone = ~uint64_t(0);
+
 struct Allocation {
-    std::span<gpu::Buffer> buffers;
+    gpu::Buffer* buffer;
     const char* name;
     uint64_t bytes;
     Texel texel = Texel::none;
+    uint64_t place = kAlone;  // bytes from the beginning of the overlay
 };
 
-/// All buffers of a frame but the counts. Those that a frame without gradients does not use have no bytes.
+uint64_t placed(uint64_t bytes) {
+    return (bytes + gpu::Buffer::kPlacement - 1) / gpu::Buffer::kPlacement * gpu::Buffer::kPlacement;
+}
+
+/// The buffers that may share memory. A frame needs those of one group at a time.
+std::vector<Allocation> overlaid(FrameBuffers& f, const Sizes& s) {
+    const Texel floats = Texel::rgba32f, words = Texel::rgba32ui;
+    const uint64_t splats = placed(s.splat_words), instances = placed(s.instance_words);
+    const uint64_t indices = s.slots > 0 ? s.instance_words : 0;
+    return {// The depth sort, which ends in order[0].
+            {&f.depth_keys[0], "depth keys", s.splat_words, words, 0},
+            {&f.depth_keys[1], "depth keys", s.splat_words, words, splats},
+            {&f.order[1], "order", s.splat_words, words, 2 * splats},
+            // The tile sort, which ends in instance_splats[1] and sorted_indices[1].
+            {&f.instance_keys[0], "instance keys", s.instance_words, words, 0},
+            {&f.instance_keys[1], "instance keys", s.instance_words, words, instances},
+            {&f.instance_splats[0], "instance splats", s.instance_words, words, 2 * instances},
+            {&f.sorted_indices[0], "sorted indices", indices, words, 3 * instances},
+            // The loss. It is done with the moments when it blurs their derivatives.
+            {&f.moments, "moments", s.moments, floats, 0},
+            {&f.derivatives, "derivatives", s.derivatives, floats, placed(s.moments)},
+            {&f.blurred, "blurred", s.derivatives, floats, 0},
+            // The gradient of blending.
+            {&f.slots, "slots", s.slots, floats, 0}};
+}
+
+/// Bytes of the memory that overlaid buffers share.
+uint64_t overlay_bytes(const Sizes& s) {
+    FrameBuffers none;
+    uint64_t most = 0;
+    for (const Allocation& each : overlaid(none, s)) most = std::max(most, each.place + placed(each.bytes));
+    return most;
+}
+
+/// All buffers of a frame but the counts and those in the overlay. Those that a frame without gradients does not use
+/// have no bytes.
 std::vector<Allocation> allocations(FrameBuffers& f, const Sizes& s) {
-    const auto one = [](gpu::Buffer& buffer) { return std::span(&buffer, 1); };
     const bool gradients = s.slots > 0;
     const Texel floats = Texel::rgba32f, words = Texel::rgba32ui;
-    return {
-        {one(f.records), "records", s.records, floats},
-        {f.depth_keys, "depth keys", s.splat_words, words},
-        {f.order, "order", s.splat_words, words},
-        {one(f.tile_counts), "tile counts", s.splat_words},
-        {one(f.prefix), "prefix", s.splat_words},
-        {one(f.scan_totals), "scan totals", s.scan_totals},
-        {one(f.counters), "counters", s.counters},
-        {one(f.counter_prefix), "counter prefix", s.counters},
-        {one(f.digit_totals), "digit totals", s.digit_totals},
-        {f.instance_keys, "instance keys", s.instance_words, words},
-        {f.instance_splats, "instance splats", s.instance_words, words},
-        {one(f.tile_starts), "tile starts", s.tile_starts},
+    std::vector<Allocation> all{
+        {&f.overlay, "overlay", s.overlay, Texel::any},
+        {&f.records, "records", s.records, floats},
+        {&f.order[0], "order", s.splat_words, words},
+        {&f.tile_counts, "tile counts", s.splat_words},
+        {&f.prefix, "prefix", s.splat_words},
+        {&f.scan_totals, "scan totals", s.scan_totals},
+        {&f.counters, "counters", s.counters},
+        {&f.counter_prefix, "counter prefix", s.counters},
+        {&f.digit_totals, "digit totals", s.digit_totals},
+        {&f.instance_splats[1], "instance splats", s.instance_words, words},
+        {&f.sorted_indices[1], "sorted indices", gradients ? s.instance_words : 0, words},
+        {&f.tile_starts, "tile starts", s.tile_starts},
         // Without gradients no pass reads where a splat's instances begin, but the binding needs a buffer.
-        {one(f.first_instances), "first instances", gradients ? s.splat_words : 16},
-        {one(f.planes), "planes", s.planes, floats},
-        {one(f.target), "target", s.target, floats},
-        {one(f.exposed), "exposed", s.exposed, floats},
-        {one(f.masked), "masked", s.masked, floats},
-        {one(f.moments), "moments", s.moments, floats},
-        {one(f.derivatives), "derivatives", s.derivatives, floats},
-        {one(f.blurred), "blurred", s.derivatives, floats},
-        {one(f.image_gradient), "image gradient", s.image_gradient, floats},
-        {one(f.partials), "partials", s.partial_sums},
-        {one(f.exposure_sums), "exposure sums", s.exposure_sums},
-        {one(f.reduced), "reduced", s.reduced},
-        {f.sorted_indices, "sorted indices", gradients ? s.instance_words : 0, words},
-        {one(f.slots), "slots", s.slots, floats}};
+        {&f.first_instances, "first instances", gradients ? s.splat_words : 16},
+        {&f.planes, "planes", s.planes, floats},
+        {&f.target, "target", s.target, floats},
+        {&f.exposed, "exposed", s.exposed, floats},
+        {&f.masked, "masked", s.masked, floats},
+        {&f.image_gradient, "image gradient", s.image_gradient, floats},
+        {&f.partials, "partials", s.partial_sums},
+        {&f.exposure_sums, "exposure sums", s.exposure_sums},
+        {&f.reduced, "reduced", s.reduced}};
+    if (s.overlay == 0)
+        for (Allocation& each : overlaid(f, s)) {
+            each.place = kAlone;
+            all.push_back(each);
+        }
+    return all;
 }
 
 }  // namespace
@@ -138,6 +175,7 @@ Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request)
         s.partial_sums = uint64_t(s.partials) * word;
         s.reduced = uint64_t(s.reduce_blocks) * word;
         s.slots = std::max<uint64_t>(request.instances, 1) * shared::SLOT_FLOATS * word;
+        if (request.overlaid) s.overlay = overlay_bytes(s);
     }
     return s;
 }
@@ -145,7 +183,7 @@ Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request)
 uint64_t Sizes::total() const {
     FrameBuffers none;
     uint64_t sum = 0;
-    for (const Allocation& each : allocations(none, *this)) sum += each.buffers.size() * each.bytes;
+    for (const Allocation& each : allocations(none, *this)) sum += each.bytes;
     return sum;
 }
 
@@ -161,12 +199,16 @@ void FrameBuffers::reserve(gpu::Device& device, const passes::KernelConfig& conf
                                       Texel::none, false, true);
     }
 
-    for (const Allocation& each : allocations(*this, sizes))
-        for (gpu::Buffer& buffer : each.buffers) {
-            if (each.bytes == 0 || (buffer && buffer.bytes() >= each.bytes)) continue;
-            buffer = gpu::Buffer();  // free the old one first: its contents are not needed
-            buffer = gpu::Buffer(device, each.name, each.bytes, each.texel);
-        }
+    for (const Allocation& each : allocations(*this, sizes)) {
+        if (each.bytes == 0 || each.buffer->bytes() >= each.bytes) continue;
+        if (each.buffer == &overlay) free_overlaid();
+        *each.buffer = gpu::Buffer();  // free the old one first: its contents are not needed
+        *each.buffer = gpu::Buffer(device, each.name, each.bytes, each.texel);
+    }
+    if (sizes.overlay > 0)
+        for (const Allocation& each : overlaid(*this, sizes))
+            if (!each.buffer->lies_at(overlay, each.place, each.bytes))
+                *each.buffer = gpu::Buffer(overlay, each.place, each.name, each.bytes, each.texel);
     // The loss reads the columns between an image's width and its stride as black. No pass writes them.
     if (old.plane_floats != sizes.plane_floats || old.stride != sizes.stride ||
         old.image_planes != sizes.image_planes) {
@@ -175,6 +217,17 @@ void FrameBuffers::reserve(gpu::Device& device, const passes::KernelConfig& conf
         if (exposed) zero(exposed);
         if (masked) zero(masked);
     }
+}
+
+void FrameBuffers::free_overlaid() {
+    for (const Allocation& each : overlaid(*this, sizes)) *each.buffer = gpu::Buffer();
+    overlay = gpu::Buffer();
+}
+
+void FrameBuffers::free_instances() {
+    free_overlaid();
+    instance_splats[1] = gpu::Buffer();
+    sorted_indices[1] = gpu::Buffer();
 }
 
 void FrameBuffers::record_counts(gpu::Recording& recording, uint32_t slot) const {
@@ -190,7 +243,7 @@ shared::Counts FrameBuffers::read_counts(uint32_t slot) const {
 }
 
 uint32_t first_capacity(size_t splats) {
-    return uint32_t(std::min<size_t>(std::max<size_t>(8 * splats, 4096), 1u << 24));
+    return uint32_t(std::min<size_t>(std::max<size_t>(2 * splats, 4096), 1u << 24));
 }
 
 uint32_t grown_capacity(uint32_t needed) {
@@ -198,7 +251,7 @@ uint32_t grown_capacity(uint32_t needed) {
     if (needed > kMost)
         throw RunError(
             "more than 3.7 billion (splat, tile) pairs in one picture; --downscale makes them fewer");
-    return uint32_t(std::min<uint64_t>(uint64_t(needed) + needed / 4, kMost));
+    return uint32_t(std::min<uint64_t>(uint64_t(needed) + needed / 8, kMost));
 }
 
 }  // namespace ewa::pipeline

@@ -17,6 +17,8 @@ struct FrameRequest {
     bool fifth_plane = false;  // of the image: depth or count
     bool masks = false;        // with gradients: some pixels count less
     bool exposure = false;     // with gradients: a training image's exposure is applied before the loss
+    // With gradients: buffers that are not needed at the same time share memory. The same for all requests of a frame.
+    bool overlaid = false;
 };
 
 /// How a radix sort is divided.
@@ -43,6 +45,7 @@ struct Sizes {
     uint64_t instance_words = 0, tile_starts = 0, planes = 0, target = 0;
     uint64_t masked = 0, exposed = 0, moments = 0, derivatives = 0, image_gradient = 0, partial_sums = 0,
              exposure_sums = 0, reduced = 0, slots = 0;
+    uint64_t overlay = 0;  // of the memory that overlaid buffers share
 
     uint64_t total() const;  // of all buffers of a frame with this request
 
@@ -65,18 +68,30 @@ struct FrameBuffers {
     gpu::Buffer instance_keys[2], instance_splats[2], sorted_indices[2], tile_starts;
     gpu::Buffer planes, target, exposed, masked, moments, derivatives, blurred, image_gradient, partials,
         exposure_sums, reduced, slots;
+    // With FrameRequest::overlaid. The buffers in it hold, one after another, the pairs of the depth sort, those of the
+    // tile sort, the planes of the loss, and the gradient slots.
+    gpu::Buffer overlay;
 
     /// Allocates what a request needs. Buffers that are large enough stay. Image planes are zeroed if their
     /// layout changes. Throws what sizes_for and Buffer throw.
     void reserve(gpu::Device& device, const passes::KernelConfig& config, const FrameRequest& request);
+    /// Frees all buffers whose size depends on the number of instances, and those that share their memory, until the
+    /// next reserve.
+    void free_instances();
 
+    /// Which of the two buffers of keys, splats and indices the tile sort begins with. It ends with the second: the
+    /// first is free then, and may be overlaid.
+    uint32_t tile_sort_start() const { return sizes.tile_sort.passes % 2 == 0 ? 1 : 0; }
+
+    /// Frees the memory of overlaid buffers and these buffers, or the same buffers that lie alone.
+    void free_overlaid();
     /// The last command of a frame: lets the host read the counts. slot: which of the frames in flight it is.
     void record_counts(gpu::Recording& recording, uint32_t slot = 0) const;
     /// The counts of the last submission with record_counts for this slot, which must be done.
     shared::Counts read_counts(uint32_t slot = 0) const;
 };
 
-/// Capacity for (splat, tile) instances of a first try: most scenes have a few tiles a splat.
+/// Capacity for (splat, tile) instances of a first try. The first frame tells how many there are.
 uint32_t first_capacity(size_t splats);
 
 /// The next capacity if a frame needs `needed`. Throws RunError beyond what an image can have.

@@ -3,6 +3,7 @@
 // step changes nothing else.
 #pragma once
 #include <cstdint>
+#include <functional>
 
 #include "ewa/gaussians.h"
 #include "gpu/buffer.h"
@@ -35,18 +36,27 @@ struct Model {
     glm::dvec3 origin{0.0};  // of the means, see Gaussians; camera positions are relative to it too
     uint32_t planes() const { return parameter_planes(sh_degree); }
     gpu::Buffer params;
-    gpu::Buffer moments1, moments2;  // both in training; moments1 for a gradient
-    gpu::Buffer statistics;          // vec2 a splat, if a strategy reads it
+    // Words with the layout of params. Training in float32: one moment in each. Training in 16 bits: both moments in
+    // moments1. A gradient: moments1, as float32.
+    gpu::Buffer moments1, moments2;
+    /// For a binding that needs a buffer: the second moments, or where both moments are.
+    const gpu::Buffer& second_moments() const { return moments2 ? moments2 : moments1; }
+    gpu::Buffer statistics;  // vec2 a splat, if a strategy reads it
 };
 
 /// A parameter-sized buffer. Its contents are undefined, except behind the last splat: the rest of that block
 /// is zero, so that a checkpoint of the same splats has the same bytes.
-gpu::Buffer parameter_buffer(gpu::Device& device, const char* name, uint32_t capacity, int sh_degree);
+gpu::Buffer parameter_buffer(gpu::Device& device, const char* name, gpu::Texel texel, uint32_t capacity,
+                             int sh_degree);
 
-/// Buffers for `splats` splats of the same degree with both moments, undefined; no statistics.
-Model next_generation(gpu::Device& device, const Model& model, uint32_t splats);
+/// Replaces the arrays of a model by those of a generation of `splats` splats, one after another: moments1, moments2
+/// if there are any, then params. write(target, source, is_moments): fills `target` from the model's arrays; `source`
+/// is the array that target replaces. The device must be done when it returns. The statistics stay.
+void replace_generation(
+    gpu::Device& device, Model& model, uint32_t splats,
+    const std::function<void(const gpu::Buffer& target, const gpu::Buffer& source, bool is_moments)>& write);
 
-/// moments: 0 none, 1 the first (a gradient), 2 both. They and the statistics are zeroed.
+/// moments: how many buffers of them, 0 to 2. They and the statistics are zeroed.
 Model upload_model(gpu::Device& device, const Gaussians& gaussians, int moments, bool statistics);
 
 /// Reads `values`, a buffer with the layout of the parameters, back into a scene. After a gradient frame

@@ -28,6 +28,7 @@ Plan plan_for(const PlanRequest& request) {
     plan.exposure = request.exposure;
     if (request.purpose == Purpose::training) {
         plan.adam = true;
+        plan.packed_moments = request.packed_moments;
         plan.statistics = request.statistics;
         plan.absolute = request.statistics && request.absolute_gradients;
         plan.regularised = request.regularised;
@@ -46,7 +47,9 @@ std::vector<PlanLine> describe(const Plan& plan, int scene_degree, uint64_t spla
              parameter_bytes(count, scene_degree) - parameters});
     if (!plan.gradients)
         lines.push_back({"loss, backward passes and gradient slots", "a picture needs no gradient", 0});
-    if (!plan.adam) lines.push_back({"Adam's moments", "nothing is optimised", 2 * parameters});
+    if (!plan.adam) lines.push_back({"Adam's moments", "nothing is optimised", parameters});
+    if (plan.packed_moments)
+        lines.push_back({"half of the bits of Adam's moments", "16 bits are enough (--moments)", parameters});
     if (!plan.statistics) lines.push_back({"densification statistics", "no strategy reads them", 8 * splats});
     if (!plan.absolute && plan.statistics)
         lines.push_back({"sums of absolute gradients", "not asked for (--absgrad)", 0});

@@ -35,6 +35,7 @@ struct PlanRequest {
     // Of a training.
     bool statistics = false;          // the strategy reads densification statistics
     bool absolute_gradients = false;  // of the statistics: absolute gradients of the pixels
+    bool packed_moments = false;      // Adam's moments in 16 bits each
     bool regularised = false;         // opacity and scale regularisers in the loss
 };
 
@@ -43,16 +44,19 @@ struct Plan {
     Footprint kernel = Footprint::peak;
     Drawing drawing = Drawing::color;
     bool debug = false;
-    float log_scale_shift = 0;  // with debug: added to every log scale
-    bool gradients = false;     // loss, backward passes and their buffers
-    bool adam = false;          // both moments
-    bool statistics = false;    // densification statistics
-    bool absolute = false;      // of absolute gradients
-    bool regularised = false;   // opacity and scale regularisers in the loss
+    float log_scale_shift = 0;    // with debug: added to every log scale
+    bool gradients = false;       // loss, backward passes and their buffers
+    bool adam = false;            // both moments
+    bool packed_moments = false;  // in 16 bits each
+    bool statistics = false;      // densification statistics
+    bool absolute = false;        // of absolute gradients
+    bool regularised = false;     // opacity and scale regularisers in the loss
     bool masks = false;
     bool exposure = false;
 
     bool operator==(const Plan&) const = default;
+    /// Buffers of moments, which have the size of the parameters. A gradient takes the place of one.
+    int moment_buffers() const { return adam && !packed_moments ? 2 : gradients ? 1 : 0; }
     /// Whether the image has a fifth plane: depth or count.
     bool fifth_plane() const { return drawing == Drawing::depth || drawing == Drawing::count; }
     /// The SH degree that a frame evaluates.

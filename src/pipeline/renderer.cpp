@@ -15,9 +15,8 @@ namespace {
 
 using namespace pipeline;
 
-/// The scene without coefficients above a degree.
+/// The scene without coefficients above a degree, which is lower than its own.
 Gaussians with_degree(const Gaussians& gaussians, int degree) {
-    if (degree >= gaussians.sh_degree) return gaussians;
     Gaussians result = gaussians;
     result.sh_degree = degree;
     result.resize(gaussians.size());
@@ -74,7 +73,8 @@ struct Renderer::State {
     }
     void upload(const Gaussians& gaussians) {
         const int degree = plan_for(request).stored_degree;
-        model = upload_model(*device, with_degree(gaussians, degree), 0, false);
+        model = degree < gaussians.sh_degree ? upload_model(*device, with_degree(gaussians, degree), 0, false)
+                                             : upload_model(*device, gaussians, 0, false);
     }
 
     Plan plan_of(const DrawOptions& options) const;
@@ -199,7 +199,7 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
                                 .scene_degree = gaussians.sh_degree,
                                 .render = options,
                                 .masks = alpha_is_weight && target.channels == 4});
-    const Model model = upload_model(*device, gaussians, 1, false);
+    const Model model = upload_model(*device, gaussians, plan.moment_buffers(), false);
     const gpu::Buffer block = upload_camera(*device, camera, cache.config(), model.origin);
     const gpu::Buffer photo = upload_photo(*device, target);
     const FrameInputs inputs = inputs_of(block, camera, options);
@@ -208,7 +208,8 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
                             .height = inputs.camera.height,
                             .instances = first_capacity(model.splats),
                             .gradients = true,
-                            .masks = plan.masks};
+                            .masks = plan.masks,
+                            .overlaid = true};
     FrameBuffers frame;
     const shared::Counts counts =
         run_until_it_fits(cache, executor, frame, size, [&](gpu::Recording& recording) {

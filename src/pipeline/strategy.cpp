@@ -56,11 +56,18 @@ float fitting_threshold(const DensifyRules& rules, const std::function<uint32_t(
 struct Scanned {
     gpu::Buffer values, prefix, totals;
 
+    Scanned() = default;
     Scanned(gpu::Device& device, const char* name, const Model& model, const FrameBuffers& frame)
         : values(device, name, 4ull * model.splats),
           prefix(device, name, 4ull * model.splats),
           totals(device, name, frame.sizes.scan_totals) {}
 };
+
+/// Of a kernel that writes an array of the next generation.
+passes::Constants write_variant(const Model& model, bool is_moments) {
+    return {{shared::SPEC_SH_DEGREE, uint32_t(model.sh_degree)},
+            {shared::SPEC_MODE, is_moments ? shared::WRITE_MOMENTS : shared::WRITE_PARAMS}};
+}
 
 uint32_t grown(uint32_t splats, const McmcRules& rules) {
     const double target = std::floor(rules.growth * splats);
@@ -91,31 +98,31 @@ Refinement densify(passes::PassCache& cache, gpu::Executor& executor, Model& mod
     const Refinement result{model.splats, after, 0};
     if (after == 0) return {model.splats, model.splats, 0};
 
-    Model next = next_generation(device, model, after);
-    gpu::Recording recording(device.limits());
-    cache.get<passes::DensifyWrite>({{shared::SPEC_SH_DEGREE, uint32_t(model.sh_degree)}})
-        .record(recording,
-                {.params = model.params,
-                 .moments1 = model.moments1,
-                 .moments2 = model.moments2,
-                 .statistics = model.statistics,
-                 .prefix = frame.prefix,
-                 .totals = frame.scan_totals,
-                 .params_out = next.params,
-                 .moments1_out = next.moments1,
-                 .moments2_out = next.moments2},
-                densify_push(model, frame, rules, threshold, after));
-    executor.run(recording);
-    next.statistics = gpu::Buffer(device, "statistics", uint64_t(after) * 8);
-    zero(next.statistics);
-    model = std::move(next);
+    const shared::DensifyPush push = densify_push(model, frame, rules, threshold, after);
+    replace_generation(device, model, after,
+                       [&](const gpu::Buffer& target, const gpu::Buffer& source, bool is_moments) {
+                           gpu::Recording recording(device.limits());
+                           cache.get<passes::DensifyWrite>(write_variant(model, is_moments))
+                               .record(recording,
+                                       {.params = model.params,
+                                        .moments = is_moments ? source : model.moments1,
+                                        .statistics = model.statistics,
+                                        .prefix = frame.prefix,
+                                        .totals = frame.scan_totals,
+                                        .array_out = target},
+                                       push);
+                           executor.run(recording);
+                       });
+    model.statistics = gpu::Buffer();  // free the old ones first
+    model.statistics = gpu::Buffer(device, "statistics", uint64_t(after) * 8);
+    zero(model.statistics);
     return result;
 }
 
 void record_reset_opacity(gpu::Recording& recording, passes::PassCache& cache, const Model& model,
                           float logit) {
     cache.get<passes::ResetOpacity>().record(
-        recording, {.params = model.params, .moments1 = model.moments1, .moments2 = model.moments2},
+        recording, {.params = model.params, .moments1 = model.moments1, .moments2 = model.second_moments()},
         {.splats = model.splats, .planes = model.planes(), .logit = logit});
 }
 
@@ -158,29 +165,30 @@ Refinement refine_mcmc(passes::PassCache& cache, gpu::Executor& executor, Model&
     if (push.draws == 0 || push.total == 0) return {model.splats, model.splats, 0};
 
     gpu::Buffer sources(device, "sources", 4ull * push.draws), hits(device, "hits", 4ull * model.splats);
-    Model next = next_generation(device, model, push.new_splats);
     gpu::Recording recording(device.limits());
     recording.fill(hits, 0, 0, 4ull * model.splats);
     cache.get<passes::McmcDraw>().record(
         recording, {.prefix = weights.prefix, .totals = weights.totals, .sources = sources, .hits = hits},
         push);
-    cache.get<passes::McmcWrite>({{shared::SPEC_SH_DEGREE, uint32_t(model.sh_degree)}})
-        .record(recording,
-                {.params = model.params,
-                 .moments1 = model.moments1,
-                 .moments2 = model.moments2,
-                 .dead = dead.values,
-                 .prefix = dead.prefix,
-                 .totals = dead.totals,
-                 .sources = sources,
-                 .hits = hits,
-                 .params_out = next.params,
-                 .moments1_out = next.moments1,
-                 .moments2_out = next.moments2},
-                push);
     executor.run(recording);
+    weights = {};  // its memory is used again
     const Refinement result{model.splats, push.new_splats, push.dead};
-    model = std::move(next);
+    replace_generation(device, model, push.new_splats,
+                       [&](const gpu::Buffer& target, const gpu::Buffer& source, bool is_moments) {
+                           gpu::Recording write(device.limits());
+                           cache.get<passes::McmcWrite>(write_variant(model, is_moments))
+                               .record(write,
+                                       {.params = model.params,
+                                        .moments = is_moments ? source : model.moments1,
+                                        .dead = dead.values,
+                                        .prefix = dead.prefix,
+                                        .totals = dead.totals,
+                                        .sources = sources,
+                                        .hits = hits,
+                                        .array_out = target},
+                                       push);
+                           executor.run(write);
+                       });
     return result;
 }
 

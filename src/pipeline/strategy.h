@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Strategies that change the number of splats, on the device. Each replaces the model's buffers by those of
-// the next generation. frame: provides sizes, counts and scratch buffers.
+// Strategies that change the number of splats, on the device. Each replaces the model's arrays by those of the next
+// generation, one after another: at most one array is there twice. frame: provides sizes, counts and scratch buffers of
+// a value a splat.
 #pragma once
 #include <cstdint>
 

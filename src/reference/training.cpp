@@ -38,6 +38,46 @@ uint64_t adam_step(std::span<double> values, std::span<const double> gradient, A
 
 namespace {
 
+/// value / 2^exponent in units of 2^-digits, rounded up where the rest and random, both below 1, reach 1 together.
+int64_t rounded_at_random(double value, int exponent, int digits, double random) {
+    const double units = std::ldexp(value, digits - exponent), whole = std::floor(units);
+    return int64_t(whole) + (units - whole + random >= 1);
+}
+
+constexpr int kFirstDigits = 7, kRootDigits = 9;
+constexpr int kLeastFirst = -126, kLeastRoot = -63;  // exponents of 2
+
+}  // namespace
+
+uint32_t packed_moments(double first, double second, uint32_t random) {
+    const double size = std::abs(first), root = double(std::sqrt(float(second)));
+    // Below the least normal number, bfloat16 has steps of one size.
+    const int exponent = size > 0 ? std::max(std::ilogb(size), kLeastFirst) : kLeastFirst;
+    int64_t high = rounded_at_random(size, exponent, kFirstDigits, (random & 0xffffu) / 65536.0);
+    high += int64_t(exponent - kLeastFirst) << kFirstDigits;
+    if (std::signbit(first)) high |= 0x8000;
+    int64_t low = 0;
+    if (root >= std::ldexp(1.0, kLeastRoot)) {
+        const int scale = std::ilogb(root);
+        low = rounded_at_random(root, scale, kRootDigits, (random >> 18) / 16384.0);
+        low += (int64_t(scale - kLeastRoot) << kRootDigits) - (int64_t(1) << kRootDigits);
+    }
+    return uint32_t(high << 16 | low);
+}
+
+AdamMoments unpacked_moments(uint32_t word) {
+    const uint32_t high = word >> 16 & 0x7fffu, low = word & 0xffffu;
+    const int exponent = int(high >> kFirstDigits);
+    const double digits = double(high & 127u) / 128;
+    const double first =
+        exponent == 0 ? std::ldexp(digits, kLeastFirst) : std::ldexp(1 + digits, exponent - 1 + kLeastFirst);
+    const double root =
+        low == 0 ? 0 : std::ldexp(1 + double(low & 511u) / 512, int(low >> kRootDigits) + kLeastRoot);
+    return {word >> 31 ? -first : first, root * root};
+}
+
+namespace {
+
 glm::dmat3 rotation_of(const Splat& splat) {
     const double norm = robust_norm(splat.quaternion);
     std::array<double, 4> unit{};

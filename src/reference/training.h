@@ -26,6 +26,15 @@ struct AdamState {
 uint64_t adam_step(std::span<double> values, std::span<const double> gradient, AdamState& state, double rate,
                    int step);
 
+// Both moments in a word, 16 bits each (docs/numerics.md, "Moments in 16 bits").
+
+struct AdamMoments {
+    double first = 0, second = 0;
+};
+/// first, and second >= 0: float32 values. random: its low 16 bits round the first moment, its high 14 bits the second.
+uint32_t packed_moments(double first, double second, uint32_t random);
+AdamMoments unpacked_moments(uint32_t word);
+
 // ADC (Kerbl et al. 2023, section 5.2, and its published code, scene/gaussian_model.py:
 // add_densification_stats, densify_and_clone, densify_and_split, densify_and_prune, reset_opacity):
 // - A splat grows if the mean over views of |dL/d(mean in device coordinates)| reaches the threshold.

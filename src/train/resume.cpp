@@ -108,8 +108,10 @@ void check_resumable(const std::filesystem::path& path, const std::string& store
         throw InputError(path.string() + ": is of another dataset, or its images or cameras have changed" +
                          way_out);
     for (const auto& [name, value] : now["options"].items()) {
-        const Json other = then["options"].value(name, Json());
-        if (normalised(run_option(name), other) != value)
+        const RunOption& option = run_option(name);
+        Json other = then["options"].value(name, Json());
+        if (other.is_null() && !option.before.empty()) other = normalised(option, option.before);
+        if (normalised(option, other) != value)
             throw InputError(path.string() + ": was written with --" + name + " " +
                              other.dump().substr(0, kLongestValue) + ", not " + value.dump() + way_out);
     }

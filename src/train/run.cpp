@@ -9,6 +9,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <utility>
 
 #include "core/folders.h"
 #include "ewa/error.h"
@@ -52,10 +53,11 @@ std::vector<T> spread_out(const std::vector<T>& values, size_t count) {
 struct Stopped {};
 
 /// What training a scene without view-dependent colour skips, besides what its plan says.
-PlanLine skipped_sh_degrees(uint32_t splats) {
+PlanLine skipped_sh_degrees(uint32_t splats, int moment_bits) {
     // Parameters and both of Adam's moments.
     const uint64_t bytes =
-        3 * (pipeline::parameter_bytes(splats, kMaxShDegree) - pipeline::parameter_bytes(splats, 0));
+        (1 + 2 * uint64_t(moment_bits) / 32) *
+        (pipeline::parameter_bytes(splats, kMaxShDegree) - pipeline::parameter_bytes(splats, 0));
     return {fmt::format("SH degrees 1 to {}", kMaxShDegree),
             "the dataset says that no colour depends on the view", bytes};
 }
@@ -63,7 +65,8 @@ PlanLine skipped_sh_degrees(uint32_t splats) {
 /// What the trainer skips, and what the choice of the SH degree saved before.
 std::vector<PlanLine> plan_of(const Trainer& trainer, const train::RunInput& input) {
     std::vector<PlanLine> plan = trainer.plan();
-    if (input.without_view_dependence()) plan.push_back(skipped_sh_degrees(uint32_t(input.start.size())));
+    if (input.without_view_dependence())
+        plan.push_back(skipped_sh_degrees(trainer.splats(), input.options.train.moment_bits));
     return plan;
 }
 
@@ -93,10 +96,10 @@ class Run {
     void stop_if_asked() const;
     template <class Work>
     bool done_unless_stopped(Work&& work) const;
-    void evaluate_result(const Trainer& trainer, const Gaussians& gaussians);
+    void evaluate_result(const Gaussians& gaussians, const std::vector<Exposure>& exposures);
     void render_result(const Gaussians& gaussians);
-    void finish(const Trainer& trainer);
-    void fill_summary(const Trainer& trainer);
+    void finish(std::unique_ptr<Trainer> trainer);
+    void fill_summary();
 
     RunObserver& observer_;
     Clock::time_point begin_;
@@ -252,10 +255,10 @@ bool Run::done_unless_stopped(Work&& work) const {
     }
 }
 
-void Run::evaluate_result(const Trainer& trainer, const Gaussians& gaussians) {
+void Run::evaluate_result(const Gaussians& gaussians, const std::vector<Exposure>& exposures) {
     observer_.on_note("evaluating");
-    const auto evaluated = [&](const std::vector<int>& frames, const std::vector<Exposure>& exposures) {
-        return evaluate(device_, gaussians, input_.dataset, frames, options().train.render, exposures,
+    const auto evaluated = [&](const std::vector<int>& frames, const std::vector<Exposure>& of_frames) {
+        return evaluate(device_, gaussians, input_.dataset, frames, options().train.render, of_frames,
                         [this] { stop_if_asked(); });
     };
     if (!input_.split.test.empty()) {
@@ -264,7 +267,7 @@ void Run::evaluate_result(const Trainer& trainer, const Gaussians& gaussians) {
         report_.summary.test_ssim = last_evaluation_->ssim;
     }
     report_.summary.train_psnr = evaluated(spread_out(input_.split.train, kTrainViewsEvaluated),
-                                           spread_out(trainer.exposures(), kTrainViewsEvaluated))
+                                           spread_out(exposures, kTrainViewsEvaluated))
                                      .psnr;
 }
 
@@ -301,13 +304,11 @@ void Run::render_result(const Gaussians& gaussians) {
         options().report_section({device_, gaussians, all[size_t(frames.front())].camera, render});
 }
 
-void Run::fill_summary(const Trainer& trainer) {
-    for (const PassTime& time : trainer.pass_times())
-        report_.pass_times.push_back({time.pass, time.milliseconds});
+void Run::fill_summary() {
     report::Summary& summary = report_.summary;
     summary.steps = last_.step;
     summary.seconds = last_.seconds;
-    summary.splats = trainer.splats();
+    summary.splats = last_.splats;
     summary.skipped_nonfinite = last_.skipped_nonfinite;
     summary.dropped_updates = last_.dropped_updates;
     summary.limited_steps = last_.limited_steps;
@@ -316,20 +317,23 @@ void Run::fill_summary(const Trainer& trainer) {
     summary.wall_seconds = wall_seconds();
 }
 
-void Run::finish(const Trainer& trainer) {
-    const Gaussians gaussians = trainer.gaussians();
+void Run::finish(std::unique_ptr<Trainer> trainer) {
+    const Gaussians gaussians = trainer->gaussians();
+    const std::vector<Exposure> exposures = trainer->exposures();
     save_splats(gaussians);
-    if (options().train.exposure)
-        folder_.save_exposures(input_.dataset, input_.split.train, trainer.exposures());
-    save_checkpoint(trainer);  // from here on, a kill costs no training
+    if (options().train.exposure) folder_.save_exposures(input_.dataset, input_.split.train, exposures);
+    save_checkpoint(*trainer);  // from here on, a kill costs no training
+    for (const PassTime& time : trainer->pass_times())
+        report_.pass_times.push_back({time.pass, time.milliseconds});
+    trainer.reset();  // the evaluation takes its memory
     observer_.on_saved(last_);
 
-    const bool evaluated = done_unless_stopped([&] { evaluate_result(trainer, gaussians); });
+    const bool evaluated = done_unless_stopped([&] { evaluate_result(gaussians, exposures); });
     if (last_.step > 0) log(last_evaluation_);
     observer_.on_evaluated(last_, gaussians);
     report_.held_out = !input_.split.test.empty();
     report_.summary.interrupted = !evaluated || !done_unless_stopped([&] { render_result(gaussians); });
-    fill_summary(trainer);
+    fill_summary();
     folder_.save_report(report_);
 }
 
@@ -337,9 +341,10 @@ RunResult Run::run() {
     read_checkpoint();
     open_folder();
     start();
-    Trainer trainer(device_, input_.dataset, input_.split.train, input_.start, options().train);
+    auto owned = std::make_unique<Trainer>(device_, input_.dataset, input_.split.train,
+                                           std::exchange(input_.start, {}), options().train);
+    Trainer& trainer = *owned;
     report_.plan = plan_of(trainer, input_);
-    input_.start = {};
     observer_.on_plan(report_.plan);
     if (trainer.images_on_disk() > 0)
         observer_.on_note(
@@ -350,7 +355,7 @@ RunResult Run::run() {
     log_file_.emplace(folder_.metrics(), report_.metrics);
     observer_.on_begin(folder_.path(), report_.metrics);
     train(trainer);
-    finish(trainer);
+    finish(std::move(owned));
     return {report_.summary, folder_.path(), first_render_};
 }
 

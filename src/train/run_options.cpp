@@ -128,6 +128,22 @@ RunOption sh_degree_option() {
     return option;
 }
 
+RunOption moments_option() {
+    const Member<int> member = [](RunOptions& o) -> int& { return o.train.moment_bits; };
+    RunOption option =
+        member_option("moments", "BITS",
+                      "Bits of each of Adam's moments, 16 or 32. With 32 a splat takes up to half as "
+                      "much memory again",
+                      kDecides, member, [](const std::string& text) {
+                          const int bits = parse_within(text, 16, 32);
+                          if (bits != 16 && bits != 32)
+                              throw InputError("'" + text + "' is neither 16 nor 32");
+                          return bits;
+                      });
+    option.before = "32";
+    return option;
+}
+
 RunOption image_cache_option() {
     const Member<uint64_t> member = [](RunOptions& o) -> uint64_t& { return o.train.image_cache_bytes; };
     RunOption option = member_option(
@@ -202,6 +218,7 @@ std::vector<RunOption> make_table() {
         number<uint64_t>(
             "seed", "S", "The same seed on the same device gives the same bytes", kDecides,
             [](RunOptions& o) -> uint64_t& { return o.train.seed; }, uint64_t(0), UINT64_MAX),
+        moments_option(),
         image_cache_option(),
         background_option(),
         choice<Footprint>(

@@ -24,6 +24,8 @@ struct RunOption {
     /// From the text on the command line. Throws InputError, which does not name the option.
     std::function<void(RunOptions&, const std::string&)> set = {};
     bool& (*flag)(RunOptions&) = nullptr;  // the member of a flag
+    /// The value of runs from before the option existed, as on the command line. Empty: it has always existed.
+    std::string before = {};
 };
 
 /// In the order of config.json.

@@ -29,6 +29,7 @@ pipeline::PlanRequest plan_request(const Gaussians& start, const TrainOptions& o
             .exposure = options.exposure,
             .statistics = options.strategy == Strategy::adc,
             .absolute_gradients = options.absolute_gradients,
+            .packed_moments = options.moment_bits == 16,
             .regularised = options.strategy == Strategy::mcmc};
 }
 

@@ -99,17 +99,17 @@ struct Trainer::State {
     std::deque<std::vector<PassTime>> timings;
 
     State(std::shared_ptr<gpu::Device> d, const Dataset& dataset, const std::vector<int>& frames,
-          const Gaussians& start, const Gaussians& ready, const TrainOptions& o)
+          const Gaussians& ready, double length, const TrainOptions& o)
         : device(std::move(d)),
           options(o),
           schedule(train::schedule_for(o)),
-          extent(extent_for(dataset, frames, start)),
+          extent(length),
           cache(*device),
           executor(*device, cache.config().frames_in_flight),
           images(*device, cache.config(), dataset, frames, train::cache_share(o, 0), ready.origin),
-          plan(plan_for(train::plan_request(start, o, images.any_masked()))),
-          model(upload_model(*device, ready, 2, plan.statistics)),
-          instance_capacity(first_capacity(start.size())) {
+          plan(plan_for(train::plan_request(ready, o, images.any_masked()))),
+          model(upload_model(*device, ready, plan.moment_buffers(), plan.statistics)),
+          instance_capacity(first_capacity(ready.size())) {
         for (int halvings = 1; halvings <= o.halvings; ++halvings)
             smaller.emplace_back(*device, cache.config(), dataset, frames, train::cache_share(o, halvings),
                                  model.origin, 1 << halvings);
@@ -126,6 +126,7 @@ struct Trainer::State {
         r.sh0 = float(options.sh0_rate);
         r.sh_rest = float(schedule.sh_rest_rate);
         r.step = uint32_t(step);
+        r.seed = options.seed;
         if (plan.regularised) {
             r.opacity_weight = float(options.opacity_weight / model.splats);
             r.scale_weight = float(options.scale_weight / (3.0 * model.splats * extent));
@@ -158,7 +159,8 @@ struct Trainer::State {
                 .instances = instance_capacity,
                 .gradients = true,
                 .masks = plan.masks,
-                .exposure = plan.exposure};
+                .exposure = plan.exposure,
+                .overlaid = true};
     }
 
     void record_step(gpu::Recording& recording, int step, size_t index, const train::ImageCache::Photo& photo,
@@ -247,6 +249,7 @@ struct Trainer::State {
     void follow_up(int step) {
         if (options.strategy == Strategy::adc) control_density(step);
         if (options.strategy != Strategy::mcmc || !schedule.relocates(step)) return;
+        frame.free_instances();  // the second copy of an array takes its place
         refine_mcmc(cache, executor, model, frame,
                     {.dead_opacity = options.dead_opacity,
                      .growth = schedule.growth,
@@ -268,6 +271,7 @@ struct Trainer::State {
             rules.seed = options.seed;
             rules.step = uint32_t(step);
             rules.max_splats = options.max_splats;
+            frame.free_instances();  // the second copy of an array takes its place
             densify(cache, executor, model, frame, rules);
         }
         if (schedule.resets_opacity(step)) {
@@ -279,12 +283,13 @@ struct Trainer::State {
 };
 
 Trainer::Trainer(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
-                 const std::vector<int>& train_frames, const Gaussians& start, const TrainOptions& options) {
+                 const std::vector<int>& train_frames, Gaussians start, const TrainOptions& options) {
     if (train_frames.empty())
         throw InputError("there is no training image; a larger --test-every leaves more of them");
     train::check_start(start.size(), options);
-    state_ = std::make_unique<State>(std::move(device), dataset, train_frames, start, prepared(start),
-                                     resolve(options, dataset));
+    const double extent = extent_for(dataset, train_frames, start);
+    state_ = std::make_unique<State>(std::move(device), dataset, train_frames, prepared(std::move(start)),
+                                     extent, resolve(options, dataset));
 }
 Trainer::~Trainer() = default;
 
@@ -313,8 +318,9 @@ struct NamedBuffer {
 std::vector<NamedBuffer> buffers_of(const Plan& plan, Model& model, Exposures& exposures, uint32_t splats) {
     const uint64_t bytes = parameter_bytes(splats, model.sh_degree);
     std::vector<NamedBuffer> buffers{{"params", &model.params, bytes, gpu::Texel::rgba32f},
-                                     {"moments1", &model.moments1, bytes, gpu::Texel::rgba32f},
-                                     {"moments2", &model.moments2, bytes, gpu::Texel::rgba32f}};
+                                     {"moments1", &model.moments1, bytes, gpu::Texel::rgba32ui}};
+    if (plan.moment_buffers() > 1)
+        buffers.push_back({"moments2", &model.moments2, bytes, gpu::Texel::rgba32ui});
     if (plan.statistics)
         buffers.push_back({"statistics", &model.statistics, 8ull * splats, gpu::Texel::none});
     if (plan.exposure)
@@ -353,7 +359,8 @@ void Trainer::restore(const TrainerState& state) {
     if (origin != s.model.origin)
         throw InputError("the state does not fit this training: its means are relative to another origin");
     if (state.arrays.size() != buffers.size() + moved)
-        throw InputError("the state does not fit this training: it is of another strategy");
+        throw InputError(
+            "the state does not fit this training: it is of another strategy or has moments of other bits");
     for (size_t i = 0; i < buffers.size(); ++i)
         if (state.arrays[i].name != buffers[i].name || state.arrays[i].bytes.size() != buffers[i].bytes)
             throw InputError("the state does not fit this training: it lacks " +
@@ -409,43 +416,6 @@ std::vector<PassTime> Trainer::pass_times() const {
         time.milliseconds = *middle;
     }
     return result;
-}
-
-MemoryEstimate estimate_memory(const gpu::Device& device, const Dataset& dataset,
-                               const std::vector<int>& train_frames, const Gaussians& start,
-                               const TrainOptions& given) {
-    const TrainOptions options = resolve(given, dataset);
-    MemoryEstimate estimate;
-    const bool grows = options.strategy != Strategy::none;
-    estimate.splats = grows ? std::max(options.max_splats, uint32_t(start.size())) : uint32_t(start.size());
-    const Plan plan = plan_for(train::plan_request(start, options, false));
-    const uint64_t statistics = plan.statistics ? 8ull * estimate.splats : 0;
-    const uint64_t generation = 3 * parameter_bytes(estimate.splats, start.sh_degree) + statistics;
-    estimate.model = grows ? 2 * generation : generation;
-
-    std::vector<uint64_t> cached_at(size_t(options.halvings) + 1);
-    const passes::KernelConfig config = passes::config_for(device.limits());
-    for (const int index : train_frames) {
-        const Frame& frame = dataset.frames[size_t(index)];
-        const auto width = uint32_t(frame.camera.width), height = uint32_t(frame.camera.height);
-        const auto pairs = std::max(first_capacity(estimate.splats),
-                                    uint32_t(std::min<uint64_t>(8ull * estimate.splats, 0xe0000000u)));
-        const FrameRequest request{.splats = estimate.splats,
-                                   .width = width,
-                                   .height = height,
-                                   .instances = pairs,
-                                   .gradients = true,
-                                   .masks = frame.masks == MaskUse::ignore,
-                                   .exposure = plan.exposure};
-        estimate.frame = std::max(estimate.frame, sizes_for(config, request).total());
-        const uint64_t photo = photo_bytes(int(width), int(height), frame.eight_bit);
-        for (int h = 0; h <= options.halvings; ++h) {
-            uint64_t& cached = cached_at[size_t(h)];
-            if (cached + (photo >> 2 * h) <= train::cache_share(options, h)) cached += photo >> 2 * h;
-        }
-    }
-    for (const uint64_t cached : cached_at) estimate.images += cached;
-    return estimate;
 }
 
 std::vector<PlanLine> plan_lines(const Gaussians& start, const TrainOptions& options, bool masks) {

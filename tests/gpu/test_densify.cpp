@@ -191,23 +191,82 @@ TEST(DensifyEdges, WritesNothingPastItsCapacity) {
                                    0};
     };
     const uint64_t bytes = pipeline::parameter_bytes(capacity, 1);
-    Guarded params("params", bytes), moments1("moments1", bytes), moments2("moments2", bytes);
+    Guarded params("params", bytes), moments("moments", bytes);
     r.run([&](gpu::Recording& recording) {
         r.cache.get<passes::DensifyDecide>().record(
             recording, {start.model.params, start.model.statistics, frame.tile_counts}, push(0));
         pipeline::record_scan(recording, r.cache,
                               {frame.tile_counts, nullptr, frame.prefix, frame.scan_totals, frame.counts},
                               {500, frame.sizes.scan_block, shared::TOTAL_SCAN, "offsets"});
-        r.cache.get<passes::DensifyWrite>({{shared::SPEC_SH_DEGREE, 1}})
-            .record(recording,
-                    {start.model.params, start.model.moments1, start.model.moments2, start.model.statistics,
-                     frame.prefix, frame.scan_totals, params, moments1, moments2},
-                    push(capacity));
+        for (const auto& [mode, out] :
+             {std::pair(shared::WRITE_PARAMS, &params), std::pair(shared::WRITE_MOMENTS, &moments)})
+            r.cache.get<passes::DensifyWrite>({{shared::SPEC_SH_DEGREE, 1}, {shared::SPEC_MODE, mode}})
+                .record(recording,
+                        {start.model.params, start.model.moments1, start.model.statistics, frame.prefix,
+                         frame.scan_totals, *out},
+                        push(capacity));
     });
     EXPECT_GT(frame.read_counts().scan_total, capacity);
-    expect_intact({&params, &moments1, &moments2});
+    expect_intact({&params, &moments});
     EXPECT_TRUE(guarded.intact());
-    for (const uint32_t word : params.read<uint32_t>()) EXPECT_NE(word, kPoison);  // and all of it is filled
+    for (const Guarded* out : {&params, &moments})  // and all of it is filled
+        for (const uint32_t word : out->read<uint32_t>()) EXPECT_NE(word, kPoison);
+}
+
+/// Words of two moments each go with what is kept, bit by bit, even where they are NaN as a float.
+TEST(DensifyEdges, PackedMomentsGoAlong) {
+    Start start(2150, 700, 1);
+    start.model.moments2 = gpu::Buffer();
+    Random random(2151);
+    std::vector<uint32_t> words(start.moments1.size());
+    for (uint32_t& word : words) word = uint32_t(random.bits());
+    start.model.moments1.upload(std::span<const uint32_t>(words));
+    const DensifyRules rules = rules_for(1u << 20);
+    const Expected expected = expected_of(start, rules);
+    ASSERT_EQ(run_densify(start.model, rules).after, expected.source.size());
+    EXPECT_FALSE(start.model.moments2);
+    const uint32_t planes = start.model.planes(), n = start.model.splats;
+    const auto after = start.model.moments1.download<uint32_t>(pipeline::parameter_bytes(n, 1) / 4);
+    for (uint32_t f = 0; f < 4 * planes; ++f)
+        for (uint32_t i = 0; i < n; ++i)
+            ASSERT_EQ(
+                after[pipeline::parameter_index(planes, f, i)],
+                expected.fresh[i] ? 0 : words[pipeline::parameter_index(planes, f, expected.source[i])]);
+}
+
+/// At most one array is there twice, and the instances' buffers are not needed.
+TEST(DensifyEdges, WritesOneArrayAfterAnother) {
+    const auto own = open_device({});
+    Start start(2160, 20000, 3);
+    std::fill(start.gaussians.opacity_logits.begin(), start.gaussians.opacity_logits.end(), 1.0f);
+    std::fill(start.statistics.begin(), start.statistics.end(), 1.0f);  // all grow
+    pipeline::Model model = pipeline::upload_model(*own, start.gaussians, 1, true);
+    model.statistics.upload(std::span<const float>(start.statistics));
+    passes::PassCache cache(*own);
+    gpu::Executor executor(*own);
+    pipeline::FrameBuffers frame;
+    pipeline::FrameRequest request{
+        .splats = 20000, .width = 64, .height = 48, .instances = 100000, .gradients = true, .overlaid = true};
+    frame.reserve(*own, cache.config(), request);
+    const uint64_t instances =
+        frame.overlay.bytes() + frame.instance_splats[1].bytes() + frame.sorted_indices[1].bytes();
+    const uint64_t before = own->allocated_bytes();
+    frame.free_instances();
+    EXPECT_LE(own->allocated_bytes(), before - instances);
+    const uint64_t rest = own->allocated_bytes(), peak = own->peak_bytes();
+    DensifyRules rules = rules_for(1u << 20);
+    rules.prune_scale = 0;
+    const auto result = densify(cache, executor, model, frame, rules);
+    ASSERT_EQ(result.after, 40000u);
+    const uint64_t array = pipeline::parameter_bytes(result.after, 3),
+                   old = pipeline::parameter_bytes(20000, 3);
+    const uint64_t expected = std::max(peak, rest + 2 * array - old);  // the second array beside its old one
+    EXPECT_GE(own->peak_bytes(), expected);
+    EXPECT_LE(own->peak_bytes(), expected + 65536);
+    request.splats = result.after;
+    frame.reserve(*own, cache.config(), request);
+    EXPECT_TRUE(frame.slots && frame.sorted_indices[0] && frame.sorted_indices[1] &&
+                frame.instance_splats[1]);
 }
 
 TEST(DensifyEdges, TheCapIsReachedAndNotPassed) {
@@ -280,8 +339,8 @@ TEST(ResetOpacity, LowersWhatIsHigherAndForgetsItsMoments) {
     Start start(2500, 129, 1);
     Rig& r = rig();
     Guarded params("params", start.model.params.download<float>(start.moments1.size()), gpu::Texel::rgba32f),
-        moments1("moments1", start.moments1, gpu::Texel::rgba32f),
-        moments2("moments2", start.moments2, gpu::Texel::rgba32f);
+        moments1("moments1", start.moments1, gpu::Texel::rgba32ui),
+        moments2("moments2", start.moments2, gpu::Texel::rgba32ui);
     const auto before = params.read<float>();
     const float logit = float(std::log(0.01 / 0.99));
     r.run([&](gpu::Recording& recording) {
@@ -314,8 +373,8 @@ TEST(ResetOpacity, ReachesEverySplatOverSeveralRowsOfWorkgroups) {
     passes::PassCache cache(*device(), narrow);
     Start start(2501, splats, 0);
     Guarded params("params", start.model.params.download<float>(start.moments1.size()), gpu::Texel::rgba32f),
-        moments1("moments1", start.moments1, gpu::Texel::rgba32f),
-        moments2("moments2", start.moments2, gpu::Texel::rgba32f);
+        moments1("moments1", start.moments1, gpu::Texel::rgba32ui),
+        moments2("moments2", start.moments2, gpu::Texel::rgba32ui);
     r.run([&](gpu::Recording& recording) {
         cache.get<passes::ResetOpacity>().record(recording, {params, moments1, moments2},
                                                  {splats, start.model.planes(), -20.0f});

@@ -126,6 +126,21 @@ TEST(DrawOptions, AreThoseOfARendererMadeForThem) {
               Renderer(device(), second.gaussians, {}).render(scene.camera).color.pixels);
 }
 
+/// Buffers that share memory change no result, with one pass of the tile sort and with two.
+TEST(Frame, OverlaidBuffersChangeNothing) {
+    for (const int width : {61, 200}) {
+        const Scene scene = random_scene(80, 600, SplatKind::mixed, width, 120, 1);
+        const Image target = random_target(9, width, 120);
+        const LossGradient shared =
+            loss_gradient(device(), scene.gaussians, scene.camera, target, scene.options);
+        const Result apart = run_frame(scene, 60000, true);
+        EXPECT_EQ(shared.gradient.means, apart.gradient.means);
+        EXPECT_EQ(shared.gradient.sh, apart.gradient.sh);
+        EXPECT_EQ(shared.gradient.quaternions, apart.gradient.quaternions);
+        EXPECT_EQ(shared.l1, double(apart.counts.l1));
+    }
+}
+
 void expect_finite(const Gaussians& g) {
     for (const auto* values : {&g.means, &g.quaternions, &g.log_scales, &g.opacity_logits, &g.sh})
         for (const float value : *values) ASSERT_TRUE(std::isfinite(value));

@@ -166,6 +166,32 @@ TEST(RelocationEdges, BothMomentsOfASourceStartAnew) {
     EXPECT_LE(anew, 12u);
 }
 
+/// With both moments in one word, a source's word is zero, and an untouched splat keeps its own.
+TEST(RelocationEdges, PackedMomentsOfASourceStartAnew) {
+    Gaussians g = random_scene(44, 40, SplatKind::ordinary, 33, 21).gaussians;
+    for (size_t i = 0; i < 40; ++i) g.opacity_logits[i] = i < 6 ? -9.0f : 1.0f;
+    pipeline::Model model = pipeline::upload_model(*device(), g, 1, false);
+    constexpr uint32_t kWord = 0xffc12345u;  // a NaN as a float
+    model.moments1.upload(
+        std::span<const uint32_t>(std::vector<uint32_t>(model.moments1.bytes() / 4, kWord)));
+    pipeline::McmcRules rules;
+    rules.max_splats = 40;
+    rules.seed = 9;
+    rules.step = 3;
+    Rig& r = rig();
+    GuardedFrame guarded(r.config(), {model.splats, 16, 16, 1, true, false});
+    ASSERT_EQ(refine_mcmc(r.cache, r.executor, model, guarded.frame, rules).relocated, 6u);
+    const auto words = model.moments1.download<uint32_t>(model.moments1.bytes() / 4);
+    size_t anew = 0;
+    for (uint32_t i = 0; i < 40; ++i) {
+        const uint32_t word = words[pipeline::parameter_index(model.planes(), shared::PARAM_OPACITY, i)];
+        anew += word == 0;
+        EXPECT_TRUE(word == 0 || word == kWord);
+    }
+    EXPECT_GE(anew, 7u);
+    EXPECT_LE(anew, 12u);
+}
+
 /// A move that leaves float32 is not made, and a frame that just fitted is not repeated.
 TEST(Noise, StaysFiniteAndMovesWhatJustFitted) {
     Gaussians g = random_scene(45, 2, SplatKind::ordinary, 33, 21).gaussians;

@@ -103,6 +103,29 @@ TEST_F(Barriers, WriteAfterWrite) {
     EXPECT_TRUE(barrier_before_last(recording));
 }
 
+/// Buffers in the memory of another one: what counts is whether bytes are the same.
+TEST_F(Barriers, OfBuffersThatShareMemory) {
+    const gpu::Buffer memory(*device(), "memory", 4 * gpu::Buffer::kPlacement, gpu::Texel::any);
+    const auto in_memory = [&](uint64_t place, uint64_t bytes) {
+        return gpu::Buffer(memory, place * gpu::Buffer::kPlacement, "part", bytes, gpu::Texel::none);
+    };
+    const gpu::Buffer first = in_memory(0, 2 * gpu::Buffer::kPlacement), second = in_memory(1, 1024),
+                      third = in_memory(2, 1024);
+    EXPECT_TRUE(first.overlaps(second) && second.overlaps(first));
+    EXPECT_FALSE(first.overlaps(third) || third.overlaps(first) || second.overlaps(third) ||
+                 first.overlaps(a));
+    copy_like(recording, a, b, first);
+    copy_like(recording, a, b, third);
+    EXPECT_FALSE(barrier_before_last(recording));
+    copy_like(recording, second, b, c);  // read after a write of the same bytes
+    EXPECT_TRUE(barrier_before_last(recording));
+    copy_like(recording, d, e, first);  // write after a read
+    EXPECT_TRUE(barrier_before_last(recording));
+    EXPECT_THROW(in_memory(3, 2 * gpu::Buffer::kPlacement), std::logic_error);
+    EXPECT_THROW(gpu::Buffer(memory, 16, "part", 16, gpu::Texel::none), std::logic_error);
+    EXPECT_THROW(gpu::Buffer(a, 0, "part", 16, gpu::Texel::none), std::logic_error);
+}
+
 TEST_F(Barriers, IndependentCommandsAndCommonInputsNeedNone) {
     copy_like(recording, a, b, c);
     copy_like(recording, a, b, d);
@@ -366,7 +389,7 @@ std::optional<std::string> unordered_pair(const std::vector<Command>& commands) 
             if (commands[earlier + 1].barrier_before) break;
             for (const Touch& x : all[earlier])
                 for (const Touch& y : all[later])
-                    if (x.buffer == y.buffer && (x.write || y.write))
+                    if (x.buffer->overlaps(*y.buffer) && (x.write || y.write))
                         return commands[earlier].name + " and " + commands[later].name + " share " +
                                x.buffer->name();
         }
@@ -400,7 +423,8 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
                    .gradients = true,
                    .fifth_plane = true,
                    .masks = true,
-                   .exposure = true});
+                   .exposure = true,
+                   .overlaid = true});
     const pipeline::FrameInputs inputs{.camera = {&camera, 0, 61, 47}};
     std::vector<std::vector<Command>> out;
 

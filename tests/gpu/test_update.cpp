@@ -7,6 +7,7 @@
 #include <limits>
 #include <set>
 
+#include "core/random.h"
 #include "gpu/guarded.h"
 #include "gpu/reference_inputs.h"
 #include "passes/passes.h"
@@ -17,7 +18,7 @@
 namespace ewa::test {
 namespace {
 
-constexpr uint32_t kGradient = 1, kStatistics = 2, kRegularised = 4, kAbsolute = 8;
+constexpr uint32_t kGradient = 1, kStatistics = 2, kRegularised = 4, kAbsolute = 8, kPacked = 16;
 
 /// A scene's way back up to the instances by the CPU reference, in the device's buffers.
 struct Slots {
@@ -112,7 +113,9 @@ shared::UpdatePush push_for(const Scene& scene, uint32_t step) {
             float(1 / (1 - std::pow(shared::ADAM_BETA2, step))),
             {0.5f * float(scene.camera.width), 0.5f * float(scene.camera.height)},
             0,
-            0};
+            0,
+            {0x12345678u, 0x9abcdef0u},
+            step};
 }
 
 /// A model whose moment buffers are guarded.
@@ -121,8 +124,8 @@ struct GuardedModel {
     Guarded moments1, moments2;
     explicit GuardedModel(const Gaussians& g)
         : model(pipeline::upload_model(*device(), g, 0, false)),
-          moments1("moments1", zeros(g), gpu::Texel::rgba32f),
-          moments2("moments2", zeros(g), gpu::Texel::rgba32f) {}
+          moments1("moments1", zeros(g), gpu::Texel::rgba32ui),
+          moments2("moments2", zeros(g), gpu::Texel::rgba32ui) {}
     static std::vector<float> zeros(const Gaussians& g) {
         return std::vector<float>(pipeline::parameter_bytes(uint32_t(g.size()), g.sh_degree) / 4);
     }
@@ -365,6 +368,108 @@ TEST(UpdateEdges, NothingMovesWhereTheInstancesDidNotFit) {
     bench.counts = Guarded("counts", std::vector<shared::Counts>{needed});
     bench.run(scene, model.model, model.moments1, model.moments2, kStatistics, push);
     EXPECT_NE(model.read(model.model.params).means, scene.gaussians.means);
+}
+
+/// The words that a step from zero moments packs, by the CPU reference.
+std::vector<uint32_t> packed_words(const GuardedModel& exact, const shared::UpdatePush& push) {
+    const auto m = exact.moments1.read<float>(), v = exact.moments2.read<float>();
+    std::vector<uint32_t> words(m.size());
+    for (uint32_t i = 0; i < push.splats; ++i)
+        for (uint32_t plane = 0; plane < push.planes; ++plane) {
+            const auto random =
+                core::pcg4d({i, push.step, push.seed[0], push.seed[1] ^ (shared::MOMENT_STREAM + plane)});
+            for (uint32_t c = 0; c < 4; ++c) {
+                const size_t at = pipeline::parameter_index(push.planes, 4 * plane + c, i);
+                words[at] = reference::packed_moments(m[at], v[at], random[c]);
+            }
+        }
+    return words;
+}
+
+/// Moments in 16 bits: the first step moves the parameters as with float32, and rounds the same moments.
+TEST(PackedUpdate, RoundsTheMomentsAsTheReferenceDoes) {
+    for (const int degree : {0, 3}) {
+        const Scene scene = random_scene(1910 + uint64_t(degree), 200, SplatKind::mixed, 61, 47, degree);
+        const Slots slots(scene);
+        const auto push = push_for(scene, 7);
+        GuardedModel exact(scene.gaussians), packed(scene.gaussians);
+        Bench bench(slots);
+        bench.run(scene, exact.model, exact.moments1, exact.moments2, 0, push);
+        bench.run(scene, packed.model, packed.moments1, packed.moments2, kPacked, push);
+        expect_intact({&packed.moments1, &packed.moments2});
+        for (const uint32_t word : packed.moments2.read<uint32_t>()) ASSERT_EQ(word, 0u);
+        const Gaussians a = exact.read(exact.model.params), b = packed.read(packed.model.params);
+        EXPECT_EQ(a.means, b.means);
+        EXPECT_EQ(a.sh, b.sh);
+        const auto words = packed.moments1.read<uint32_t>(), expected = packed_words(exact, push);
+        size_t other = 0, set = 0;
+        for (size_t f = 0; f < words.size(); ++f) {
+            ASSERT_EQ(words[f] >> 16, expected[f] >> 16) << f;
+            // A device's square root may be off by some units of float32.
+            ASSERT_LE(std::abs(int(words[f] & 0xffffu) - int(expected[f] & 0xffffu)), 1) << f;
+            other += words[f] != expected[f];
+            set += words[f] != 0;
+        }
+        EXPECT_LE(other, words.size() / 200);
+        EXPECT_GT(set, words.size() / 4);
+    }
+}
+
+/// Over many steps with one gradient, packed moments follow those in float32, with no bias.
+TEST(PackedUpdate, FollowsTheFloatMomentsOverManySteps) {
+    const Scene scene = random_scene(1912, 150, SplatKind::ordinary, 61, 47);
+    const Slots slots(scene);
+    GuardedModel exact(scene.gaussians), packed(scene.gaussians);
+    Bench bench(slots);
+    for (uint32_t step = 1; step <= 40; ++step) {
+        auto push = push_for(scene, step);
+        for (float* rate : {&push.mean_rate, &push.opacity_rate, &push.quaternion_rate, &push.scale_rate,
+                            &push.sh0_rate, &push.sh_rest_rate})
+            *rate = 0;  // the gradient stays as it is
+        bench.run(scene, exact.model, exact.moments1, exact.moments2, 0, push);
+        bench.run(scene, packed.model, packed.moments1, packed.moments2, kPacked, push);
+    }
+    const auto m = exact.moments1.read<float>(), v = exact.moments2.read<float>();
+    const auto words = packed.moments1.read<uint32_t>();
+    double first = 0, root = 0, first_squares = 0, root_squares = 0;
+    size_t count = 0;
+    for (size_t f = 0; f < words.size(); ++f) {
+        if (v[f] < 1e-34f) continue;  // no gradient, or one whose root is rounded to zero
+        const reference::AdamMoments back = reference::unpacked_moments(words[f]);
+        const double a = back.first / double(m[f]) - 1, b = std::sqrt(back.second / double(v[f])) - 1;
+        first += a;
+        root += b;
+        first_squares += a * a;
+        root_squares += b * b;
+        ++count;
+    }
+    ASSERT_GT(count, 500u);
+    const double n = double(count);
+    printf("    first moment: mean error %.1e, rms %.1e; root of the second: %.1e, %.1e\n", first / n,
+           std::sqrt(first_squares / n), root / n, std::sqrt(root_squares / n));
+    // Steps of 2^-7 and 2^-9; each step adds an error of up to half of them, and forgets 0.1 or 0.001 of the old ones.
+    EXPECT_LT(std::sqrt(first_squares / n), std::ldexp(1.5, -7));
+    EXPECT_LT(std::sqrt(root_squares / n), std::ldexp(4.0, -9));
+    EXPECT_LT(std::abs(first), 5 * std::sqrt(first_squares));
+    EXPECT_LT(std::abs(root), 5 * std::sqrt(root_squares));
+}
+
+TEST(PackedUpdate, RoundsOtherwiseInAnotherStepAndSeedAndTheSameAgain) {
+    const Scene scene = random_scene(1913, 60, SplatKind::ordinary, 61, 47);
+    const Slots slots(scene);
+    const auto words = [&](const shared::UpdatePush& push) {
+        GuardedModel model(scene.gaussians);
+        Bench bench(slots);
+        bench.run(scene, model.model, model.moments1, model.moments2, kPacked, push);
+        return model.moments1.read<uint32_t>();
+    };
+    const auto push = push_for(scene, 3);
+    auto step = push, low = push, high = push;
+    ++step.step;
+    ++low.seed[0];
+    ++high.seed[1];
+    EXPECT_EQ(words(push), words(push));
+    for (const auto& other : {step, low, high}) EXPECT_NE(words(push), words(other));
 }
 
 /// A lower degree evaluated than stored: the coefficients above stay as they are.

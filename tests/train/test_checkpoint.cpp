@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
+
 #include "ewa/error.h"
 #include "gpu/test_device.h"
 #include "train/resume.h"
@@ -102,12 +104,13 @@ TEST(Fingerprint, TellsDatasetsApart) {
     EXPECT_NE(own, train::dataset_fingerprint(dataset, split()));
 }
 
-class RestoredTrainer : public testing::TestWithParam<Strategy> {};
+class RestoredTrainer : public testing::TestWithParam<std::tuple<Strategy, int>> {};
 
 TEST_P(RestoredTrainer, GoesOnAsIfNothingHadHappened) {
     TrainOptions options;
     options.steps = 230;
-    options.strategy = GetParam();
+    options.strategy = std::get<0>(GetParam());
+    options.moment_bits = std::get<1>(GetParam());
     options.refine_stop = 30000;
     options.grow_gradient = 1e-5;
     options.max_splats = 300;
@@ -126,7 +129,7 @@ TEST_P(RestoredTrainer, GoesOnAsIfNothingHadHappened) {
         if (step == 60 || step == 150 || step == 173) states.push_back(whole.state());
     }
     const Gaussians expected = whole.gaussians();
-    EXPECT_EQ(GetParam() == Strategy::none, expected.size() == start.size());
+    EXPECT_EQ(options.strategy == Strategy::none, expected.size() == start.size());
     for (const TrainerState& state : states) {
         Trainer later(device(), small_capture().dataset, frames, start, options);
         later.step();  // restoring replaces whatever was there
@@ -142,7 +145,34 @@ TEST_P(RestoredTrainer, GoesOnAsIfNothingHadHappened) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Strategies, RestoredTrainer,
-                         testing::Values(Strategy::none, Strategy::adc, Strategy::mcmc));
+                         testing::Combine(testing::Values(Strategy::none, Strategy::adc, Strategy::mcmc),
+                                          testing::Values(16, 32)));
+
+/// A checkpoint from before there was --moments has 32 bits.
+TEST(CheckpointSettings, WithoutMomentsHave32Bits) {
+    RunOptions options;
+    auto stored = train::checkpoint_settings(options, "x");
+    EXPECT_EQ(stored["options"]["moments"], 16);
+    stored["options"].erase("moments");
+    expect_error<InputError>(
+        [&] { train::check_resumable("c", stored.dump(), train::checkpoint_settings(options, "x")); },
+        {"--moments 32", "16"});
+    options.train.moment_bits = 32;
+    EXPECT_NO_THROW(train::check_resumable("c", stored.dump(), train::checkpoint_settings(options, "x")));
+}
+
+TEST(TrainerRestore, RefusesMomentsOfOtherBits) {
+    TrainOptions options;
+    options.steps = 10;
+    options.strategy = Strategy::none;
+    const Gaussians start = shaken_start(small_capture(), 0.05, 1, 1);
+    Trainer packed(device(), small_capture().dataset, split().train, start, options);
+    options.moment_bits = 32;
+    Trainer exact(device(), small_capture().dataset, split().train, start, options);
+    EXPECT_EQ(packed.state().arrays.size() + 1, exact.state().arrays.size());
+    expect_error<InputError>([&] { exact.restore(packed.state()); }, {"bits"});
+    expect_error<InputError>([&] { packed.restore(exact.state()); }, {"bits"});
+}
 
 TEST(TrainerRestore, RefusesAnotherTrainersState) {
     TrainOptions options;

@@ -197,6 +197,7 @@ TEST(RunOptions, TableReadsWhatItWrites) {
                                                    {"masks", "cut"},
                                                    {"test-every", "5"},
                                                    {"seed", "18446744073709551615"},
+                                                   {"moments", "32"},
                                                    {"image-cache", "9"},
                                                    {"background", "0.25,1,0"},
                                                    {"kernel", "ewa"},
@@ -225,6 +226,7 @@ TEST(RunOptions, TableReadsWhatItWrites) {
     const Json config = train::to_config(all);
     for (const auto& [name, text] : other)
         EXPECT_EQ(train::value_text(train::run_option(name), all), text) << name;
+    EXPECT_EQ(all.train.moment_bits, 32);
     EXPECT_EQ(all.train.image_cache_bytes, uint64_t(9) << 20);
     EXPECT_EQ(all.train.render.kernel, Footprint::unit_mass);
     EXPECT_EQ(config.begin().key(), "dataset");
@@ -248,6 +250,9 @@ TEST(RunOptions, TableRefusesWhatIsOutOfRange) {
                                                          {"kernel", "box"},
                                                          {"downscale", "1025"},
                                                          {"background", ""},
+                                                         {"moments", "8"},
+                                                         {"moments", "24"},
+                                                         {"moments", "33"},
                                                          {"image-cache", "x"}};
     for (const auto& [name, text] : wrong) {
         RunOptions options;

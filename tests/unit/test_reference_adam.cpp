@@ -37,6 +37,59 @@ TEST(ReferenceAdam, FirstStepIsTheRateWhateverTheGradient) {
     EXPECT_EQ(values[2], 1);
 }
 
+/// Float32 numbers over the whole range of moments.
+std::vector<float> spread_values() {
+    test::Random random(6);
+    std::vector<float> values;
+    for (int i = 0; i < 4000; ++i)
+        values.push_back(float(std::ldexp(random.uniform(1, 2), int(random.integer(-120, 119)))));
+    return values;
+}
+
+TEST(PackedMoments, AreWithinTheFormatsBounds) {
+    test::Random random(7);
+    for (const float value : spread_values()) {
+        const double sign = random.bits() % 2 ? -1 : 1;
+        const AdamMoments back = unpacked_moments(packed_moments(sign * value, value, uint32_t(random.bits())));
+        EXPECT_LT(std::abs(back.first - sign * value), std::ldexp(value, -7)) << value;
+        const double root = std::sqrt(double(value));
+        EXPECT_LE(std::abs(std::sqrt(back.second) - root), std::ldexp(root, -9) * (1 + 1e-6)) << value;
+    }
+}
+
+TEST(PackedMoments, KeepWhatTheyCanHoldExactly) {
+    for (const uint32_t random : {0u, 0x5a5a5a5au, ~0u}) {
+        EXPECT_EQ(packed_moments(0, 0, random), 0u);
+        for (const double value : {1.0, -1.5, 127.0 / 128, -std::ldexp(3, 50), std::ldexp(1, -126)}) {
+            const AdamMoments back = unpacked_moments(packed_moments(value, value * value, random));
+            EXPECT_EQ(back.first, value);
+            if (std::abs(value) > 1e-18) {
+                EXPECT_EQ(back.second, value * value);
+            }
+        }
+        // A root below 2^-63 is none.
+        EXPECT_EQ(unpacked_moments(packed_moments(0, std::ldexp(0.99, -126), random)).second, 0);
+    }
+    EXPECT_EQ(unpacked_moments(0).first, 0);
+    EXPECT_EQ(unpacked_moments(0).second, 0);
+}
+
+/// The mean over all random bits is the value: rounding pulls a moment nowhere.
+TEST(PackedMoments, AreExactOnAverage) {
+    for (const double value : {1.0 + 1.0 / 300, 1.9999, 0.7712345, 3e-12}) {
+        double first = 0, root = 0;
+        constexpr uint32_t kTries = 1u << 14;
+        for (uint32_t i = 0; i < kTries; ++i) {
+            const AdamMoments back = unpacked_moments(packed_moments(
+                double(float(-value)), double(float(value)) * value, i << 18 | (i << 2 & 0xffffu)));
+            first += back.first / kTries;
+            root += std::sqrt(back.second) / kTries;
+        }
+        EXPECT_NEAR(first, -value, value * 2e-6);
+        EXPECT_NEAR(root, value, value * 1e-6);
+    }
+}
+
 TEST(ReferenceAdam, NotFiniteIsDroppedAndCounted) {
     std::vector<double> values = {1, 2, 3, 4};
     AdamState state(4);
