@@ -89,6 +89,6 @@ void main() {
     if (DEBUG) {
         // One atomic a subgroup. All lanes take part in the sum, with or without a splat.
         const uint sum = subgroup_inclusive_sum(visible ? 1u : 0u);
-        if (gl_SubgroupInvocationID == SUBGROUP - 1u && sum > 0u) atomicAdd(counts.visible, sum);
+        if (LANE == SUBGROUP - 1u && sum > 0u) atomicAdd(counts.visible, sum);
     }
 }
