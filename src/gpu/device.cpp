@@ -146,6 +146,7 @@ void Device::create_device(bool own_queue) {
             .get<vk::PhysicalDeviceFloatControlsProperties>());
 
     limits_.cpu = properties.deviceType == vk::PhysicalDeviceType::eCpu;
+    limits_.exact_floats = !limits_.cpu;
     limits_.max_groups = *std::min_element(properties.limits.maxComputeWorkGroupCount.begin(),
                                            properties.limits.maxComputeWorkGroupCount.end());
     limits_.max_invocations = std::min(properties.limits.maxComputeWorkGroupInvocations,

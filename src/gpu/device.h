@@ -23,6 +23,7 @@ struct Limits {
     uint32_t max_groups = 65535;       // workgroups of a dispatch, in each dimension
     uint64_t max_storage_range = 0;    // bytes of a storage binding
     uint64_t max_texels = 0;           // elements of a texel buffer view
+    bool exact_floats = false;         // shaders ask for exact infinities, NaN and denormals where they can
     bool texel_buffers = true;         // buffers with a texel format are fetched by views; else from storage
     uint64_t uniform_alignment = 256;  // bytes
     uint32_t max_invocations = 128;    // of a workgroup along x
@@ -54,8 +55,8 @@ class Device {
     PipelineStore& pipelines() { return *pipelines_; }
 
     /// What pipelines ask of 32-bit floats: what there is. A CPU device is asked for nothing: lavapipe keeps NaN
-    /// anyway, and gives other bytes when asked.
-    FloatModes float_modes() const { return limits_.cpu ? FloatModes{} : float_modes_; }
+    /// anyway, and computes other bytes when asked.
+    FloatModes float_modes() const { return limits_.exact_floats ? float_modes_ : FloatModes{}; }
 
     /// Throws out_of_memory if the driver has no memory left.
     Memory allocate(const vk::MemoryRequirements& requirements, bool host_visible);

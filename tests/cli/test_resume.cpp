@@ -166,8 +166,8 @@ TEST_F(ResumeEdges, NamesACheckpointThatIsWholeButWrong) {
         EXPECT_NE(outcome.err.find(path), std::string::npos) << outcome.err;
         EXPECT_LT(outcome.err.size(), 1000u);
     };
-    refused(with_section(good, "moments2", "momentsX"),
-            path + ": the state does not fit this training: it lacks moments2");
+    refused(with_section(good, "moments1", "momentsX"),
+            path + ": the state does not fit this training: it lacks moments1");
     refused(with_section(good, "metrics", "metrics", "xxx"), path + ": line 1 of the metrics");
 
     const auto settings = [&](const std::string& text) {

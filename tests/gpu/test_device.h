@@ -21,6 +21,7 @@ inline SharedDevice* const unchecked_device_of_all = SharedDevice::add();
 inline void pretend_gpu(gpu::Device& device) {
     gpu::Limits limits = device.limits();
     limits.cpu = limits.texel_buffers = false;
+    limits.exact_floats = true;
     limits.max_storage_range = ~0u;
     if (const char* lanes = std::getenv("EWA_TEST_LANES")) {
         limits.subgroup_size = uint32_t(std::atoi(lanes));

@@ -101,7 +101,8 @@ TEST(DeviceMemory, ThousandsOfBuffersShareAFewBlocks) {
     EXPECT_EQ(after.used, before.used);
     EXPECT_EQ(after.held, before.held);
     EXPECT_EQ(after.blocks, before.blocks);
-    EXPECT_EQ(after.peak, full.used);
+    EXPECT_GE(after.peak, full.used);  // staging copies are small
+    EXPECT_LT(after.peak, full.used + kMiB);
 }
 
 TEST(DeviceMemory, ALargeBufferTakesAndFreesItsOwnBytes) {
