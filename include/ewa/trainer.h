@@ -19,11 +19,9 @@ namespace ewa {
 /// The options with concrete values for Strategy::automatic and kAutomaticShDegree.
 TrainOptions resolve(TrainOptions options, const Dataset& dataset);
 
-/// An estimate of the device memory of a training at its peak, in bytes. For the splats that it names it is within
-/// 10 % on usual captures (docs/performance.md).
+/// An estimate of the device memory of a training at its peak, in bytes. docs/performance.md compares it with runs.
 struct MemoryEstimate {
-    uint32_t splats =
-        0;  // at the end; with adc the most there can be, since their number depends on the images
+    uint32_t splats = 0;  // at the end; with adc at most, since their number depends on the images
     uint64_t model = 0;   // parameters, moments, statistics
     uint64_t frame = 0;   // images, sort buffers, gradient slots; or what a refinement needs beside the model
     uint64_t images = 0;  // cached training images
