@@ -48,10 +48,11 @@ TEST(FloatModesOf, AskForWhatTheDeviceHasAlone) {
 TEST(FloatModesOf, AreAskedOfGpusAlone) {
     const auto own = open_test_device(false);
     gpu::Limits limits = own->limits();
-    limits.cpu = true;
+    EXPECT_EQ(limits.exact_floats, !limits.cpu);
+    limits.exact_floats = false;
     own->pretend(limits);
     EXPECT_EQ(own->float_modes(), gpu::FloatModes{});
-    limits.cpu = false;
+    limits.exact_floats = true;
     own->pretend(limits);
     const auto there =
         own->physical()
