@@ -135,7 +135,8 @@ std::vector<std::string> lacks_of(const OptionalParts& parts) {
     if (!parts.timestamps) lacks.emplace_back("timestamps (no times of single passes)");
     if (!parts.own_queue && !parts.cpu)
         lacks.emplace_back("a queue for compute alone (training and the desktop wait for each other)");
-    if (!parts.cached_memory) lacks.emplace_back("memory that the host caches (reading results back is slow)");
+    if (!parts.cached_memory)
+        lacks.emplace_back("memory that the host caches (reading results back is slow)");
     return lacks;
 }
 

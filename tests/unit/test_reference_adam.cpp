@@ -50,7 +50,8 @@ TEST(PackedMoments, AreWithinTheFormatsBounds) {
     test::Random random(7);
     for (const float value : spread_values()) {
         const double sign = random.bits() % 2 ? -1 : 1;
-        const AdamMoments back = unpacked_moments(packed_moments(sign * value, value, uint32_t(random.bits())));
+        const AdamMoments back =
+            unpacked_moments(packed_moments(sign * value, value, uint32_t(random.bits())));
         EXPECT_LT(std::abs(back.first - sign * value), std::ldexp(value, -7)) << value;
         const double root = std::sqrt(double(value));
         EXPECT_LE(std::abs(std::sqrt(back.second) - root), std::ldexp(root, -9) * (1 + 1e-6)) << value;
