@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // One subgroup owns one tile. Lane l has column l % TILE_WIDTH and PIXELS pixels of it, ROW_STEP rows apart.
 // A batch is SUBGROUP splats of the tile's list. Each lane loads one; SPEC_BROADCAST says how all lanes come to read it.
-// A batch is evaluated in blocks of BLOCK splats. A block is unrolled; unrolling more would outgrow instruction caches.
+// A batch is evaluated in blocks of BLOCK splats. A block is unrolled. On a GPU, unrolling all blocks would outgrow the
+// instruction cache. On a CPU, shuffles are fast only with constant lanes.
 // Needs subgroup.glsl. The including pass declares `push` (BlendPush), records, splats and tile_starts before this file.
 #ifndef EWA_LIB_TILE
 #define EWA_LIB_TILE
@@ -33,8 +34,10 @@ struct Loaded {
 // not the other, so what decides that is precise there. CPU drivers contract neither.
 #ifdef EWA_TEXEL_BUFFERS
 #define EXACT
+#define UNROLL_BLOCKS [[unroll]]
 #else
 #define EXACT precise
+#define UNROLL_BLOCKS
 #endif
 
 // A splat as one lane evaluates it: u and v at the lane's first pixel, and their steps from pixel to pixel.

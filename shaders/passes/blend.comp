@@ -48,7 +48,7 @@ void main() {
     const uint end = tile_starts[tile + 1u];
     for (uint k = tile_starts[tile]; k < end; k += SUBGROUP) {
         const Loaded batch = load_batch(k, end);
-        for (uint first = 0; first < SUBGROUP; first += BLOCK) {
+        UNROLL_BLOCKS for (uint first = 0; first < SUBGROUP; first += BLOCK) {
             [[unroll]] for (uint j = 0; j < BLOCK; ++j) {
                 const LaneSplat s = lane_splat(batch, first + j, pixel);
                 if (MODE == BLEND_ELLIPSOIDS) {

@@ -88,7 +88,7 @@ void main() {
     for (; k < end; k += SUBGROUP) {
         const Loaded batch = load_batch(k, end);
         float slot[12] = none;
-        for (uint first = 0; first < SUBGROUP; first += BLOCK) {
+        UNROLL_BLOCKS for (uint first = 0; first < SUBGROUP; first += BLOCK) {
             float sums[11][8];
             [[unroll]] for (uint j = 0; j < BLOCK; ++j) {
                 const LaneSplat s = lane_splat(batch, first + j, pixel);
