@@ -28,8 +28,8 @@ struct KernelConfig {
     uint32_t max_groups = 65535;               // workgroups along one dimension
     uint32_t loop_limit = 65535;               // iterations of a loop in one invocation
     uint32_t broadcast = shared::BROADCAST_SHUFFLES;  // of blending: SPEC_BROADCAST
-    uint32_t frames_in_flight = 1;  // training steps that the host may be ahead of the device, plus one
-    bool texel_buffers = true;      // read-only buffers are texel buffers, or storage buffers
+    uint32_t frames_in_flight = 1;                    // training steps that are submitted and not finished
+    bool texel_buffers = true;  // read-only buffers are texel buffers, or storage buffers
     float cut_off =
         float(shared::ALPHA_MIN);  // smaller contributions are skipped; other values compare speed
 };

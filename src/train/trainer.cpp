@@ -151,7 +151,7 @@ struct Trainer::State {
         return halvings == 0 ? images : smaller.back();
     }
 
-    /// The inputs of a step, which are pure functions of its number, and the recording of its commands.
+    /// What a step needs of the frame's buffers.
     FrameRequest request_of(const CameraUse& camera) const {
         return {.splats = model.splats,
                 .width = camera.width,
@@ -163,6 +163,7 @@ struct Trainer::State {
                 .overlaid = true};
     }
 
+    /// All that changes from step to step is a pure function of the step's number: a step can be repeated.
     void record_step(gpu::Recording& recording, int step, size_t index, const train::ImageCache::Photo& photo,
                      const CameraUse& camera) {
         const ExposureUse exposure{&exposures, uint32_t(index), float(schedule.exposure_rate(step)),
