@@ -74,6 +74,7 @@ class Trainer {
 
     /// Does one optimisation step, and changes the number of splats if the schedule says so. Throws InputError
     /// before the step if its image cannot be read, RunError if memory runs out (with the size needed).
+    /// After a RunError the trainer is of no more use.
     StepReport step();
 
     /// The state after the last step. A trainer of the same dataset, frames, options and device that restores

@@ -199,6 +199,8 @@ struct Trainer::State {
         frame.record_counts(recording, slot_of(step));
         executor.submit(recording, is_timed(step));
         in_flight.push_back(step);
+        // An image from disk may be gone when its step has to be repeated: no other step follows before it is done.
+        if (!seen.cached(index)) finish_all();
     }
 
     /// Where steps overlap, the queries between the commands would cost time.
