@@ -37,7 +37,7 @@ struct Loaded {
 #define UNROLL_BLOCKS [[unroll]]
 #else
 #define EXACT precise
-#define UNROLL_BLOCKS
+#define UNROLL_BLOCKS [[dont_unroll]]
 #endif
 
 // A splat as one lane evaluates it: u and v at the lane's first pixel, and their steps from pixel to pixel.

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <memory>
 #include <set>
 #include <string>
 #include <string_view>
@@ -73,11 +74,13 @@ void compile_splatting(Compiler& compiler) {
     using namespace shared;
     compiler.compile<passes::Project>(
         {{SPEC_SH_DEGREE, kDegrees}, {SPEC_KERNEL, kFootprints}, {SPEC_MODE, {0, PROJECT_DEBUG}}});
-    compiler.compile<passes::Update>({{SPEC_SH_DEGREE, kDegrees},
-                                      {SPEC_KERNEL, kFootprints},
-                                      {SPEC_MODE,
-                                       {0, UPDATE_GRADIENT_ONLY, UPDATE_STATISTICS, UPDATE_REGULARISED,
-                                        UPDATE_STATISTICS | UPDATE_ABSOLUTE}}});
+    const uint32_t packed = UPDATE_PACKED_MOMENTS;
+    compiler.compile<passes::Update>(
+        {{SPEC_SH_DEGREE, kDegrees},
+         {SPEC_KERNEL, kFootprints},
+         {SPEC_MODE,
+          {UPDATE_GRADIENT_ONLY, 0, UPDATE_STATISTICS, packed, packed | UPDATE_STATISTICS,
+           packed | UPDATE_REGULARISED, packed | UPDATE_STATISTICS | UPDATE_ABSOLUTE}}});
     compiler.compile<passes::ScanBlocks>({{SPEC_MODE, {0, SCAN_GATHERED}}});
     compiler.compile<passes::ScanTotals>();
     const Values scatter_modes = {0,
@@ -113,11 +116,13 @@ void compile_training(Compiler& compiler) {
     compiler.compile<passes::ExposeBackward>();
     compiler.compile<passes::ExposureUpdate>();
     compiler.compile<passes::DensifyDecide>();
-    compiler.compile<passes::DensifyWrite>({{SPEC_SH_DEGREE, kDegrees}});
+    compiler.compile<passes::DensifyWrite>(
+        {{SPEC_SH_DEGREE, kDegrees}, {SPEC_MODE, {WRITE_PARAMS, WRITE_MOMENTS}}});
     compiler.compile<passes::ResetOpacity>();
     compiler.compile<passes::McmcWeigh>();
     compiler.compile<passes::McmcDraw>();
-    compiler.compile<passes::McmcWrite>({{SPEC_SH_DEGREE, kDegrees}});
+    compiler.compile<passes::McmcWrite>(
+        {{SPEC_SH_DEGREE, kDegrees}, {SPEC_MODE, {WRITE_PARAMS, WRITE_MOMENTS}}});
     compiler.compile<passes::Perturb>();
 }
 
@@ -132,19 +137,22 @@ void compile_path_tracer(Compiler& compiler) {
 }  // namespace
 
 int main(int argc, char** argv) {
+    std::shared_ptr<gpu::Device> device;
+    int status = 1;
     try {
-        const auto device = open_device({.selector = argc > 1 ? argv[1] : ""});
+        device = open_device({.selector = argc > 1 ? argv[1] : ""});
         std::fprintf(stderr, "device %s, %u lanes\n", device->info().name.c_str(),
                      device->info().subgroup_size);
         Compiler compiler(*device);
         compile_splatting(compiler);
         compile_training(compiler);
         compile_path_tracer(compiler);
-        if (!compiler.complete()) return 1;
-        std::fprintf(stderr, "compiled\n");
-        std::_Exit(0);  // RADV's null device crashes when it is closed
+        if (compiler.complete()) {
+            std::fprintf(stderr, "compiled\n");
+            status = 0;
+        }
     } catch (const std::exception& error) {
         std::fprintf(stderr, "compile_kernels: %s\n", error.what());
-        return 1;
     }
+    std::_Exit(status);  // RADV's null device crashes when it is closed
 }
