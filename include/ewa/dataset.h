@@ -70,6 +70,7 @@ struct PointCloud {
 
 struct Dataset {
     std::filesystem::path root;
+    std::vector<std::filesystem::path> files;  // of cameras and points; the frames name images and masks
     std::vector<Frame> frames;        // sorted by name
     PointCloud points;                // may be empty
     int missing_images = 0;           // entries whose image file does not exist

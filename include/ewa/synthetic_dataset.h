@@ -25,6 +25,7 @@ struct SyntheticOptions {
     /// Stops: a factor of 2^exposure between radiance and the image, where 1 is white. Empty: 95 of 100
     /// surface pixels stay below 0.8, in tenths of a stop.
     std::optional<double> exposure;
+    bool force = false;  // replaces the views of another scene or of other options in the folder
 };
 
 struct SyntheticDataset {
@@ -48,12 +49,12 @@ bool is_mesh_scene(const std::filesystem::path& path);
 ///   visible.
 /// - depth/*.exr: camera z in world units, 0 for the sky.
 /// - points.ply: initial points.
-/// - photographs.json identifies scene and options. A matching folder is continued, another one is rendered
-///   again.
+/// - photographs.json identifies scene and options. A matching folder is continued. Views of another scene or of
+///   other options are replaced with SyntheticOptions::force, else refused.
 /// - transforms.json: the cameras, written last.
 ///
 /// progress(done, views) is called before the first view and after each; false ends the run. Throws InputError
-/// for an unreadable scene, options out of range, or a folder with another kind of dataset. Throws RunError
+/// for an unreadable scene, options out of range, or a folder with another dataset. Throws RunError
 /// (disk, device).
 SyntheticDataset render_dataset(const std::shared_ptr<gpu::Device>& device,
                                 const std::filesystem::path& scene, const std::filesystem::path& folder,

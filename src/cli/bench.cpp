@@ -84,10 +84,8 @@ fs::path training_svg(const BenchArguments& arguments) {
 void check_files(const BenchArguments& arguments) {
     const fs::path beside = training_svg(arguments);
     const fs::path& json = arguments.options.json;
-    keep_apart({{"--svg", arguments.svg}, {"--svg's diagram of training", beside}, {"--json", json}},
-               {{"--splats", arguments.splats}});
-    check_writable(json, Folder::made);
-    for (const fs::path& file : {arguments.svg, beside}) check_writable(file, Folder::there);
+    check_outputs({{"--svg", arguments.svg}, {"--svg's diagram of training", beside}, {"--json", json}},
+                  {{"--splats", arguments.splats}});
 }
 
 }  // namespace
@@ -161,6 +159,7 @@ int run_accuracy(const BenchArguments& arguments) {
         write_json(arguments.options.json, {{"rendering", report::work_precision_json(rendering)},
                                             {"training", report::work_precision_json(training)}});
     if (!arguments.svg.empty()) {
+        make_folder(arguments.svg.parent_path());
         core::write_text_file(arguments.svg, report::work_precision_svg(rendering));
         if (const fs::path beside = training_svg(arguments); !beside.empty())
             core::write_text_file(beside, report::work_precision_svg(training));

@@ -17,6 +17,7 @@
 #include "ewa/error.h"
 #include "ewa/image.h"
 #include "report/pictures.h"
+#include "scene/dataset_files.h"
 
 namespace ewa::cli {
 namespace {
@@ -129,7 +130,7 @@ fs::path heat_map_file(const ImagePair& pair, const CompareArguments& arguments)
 }
 
 /// Throws if an output is also an input, or cannot be written.
-void check_outputs(const CompareArguments& arguments, const Sides& sides, const ImagePairs& pairs) {
+void check_files(const CompareArguments& arguments, const Sides& sides, const ImagePairs& pairs) {
     const CompareInputs& inputs = arguments.inputs;
     std::vector<NamedFile> written = {{"--json", arguments.json}};
     std::vector<NamedFile> read = {{"A", inputs.a}, {"B", inputs.b}, {"--cameras", inputs.cameras}};
@@ -138,14 +139,9 @@ void check_outputs(const CompareArguments& arguments, const Sides& sides, const 
         if (!sides.a->is_scene) read.push_back({"an image of A", sides.a->place(pair.a)});
         if (!sides.b->is_scene) read.push_back({"an image of B", sides.b->place(pair.b)});
     }
-    for (const Frame& frame : sides.cameras.frames) {
-        read.push_back({"an image of --cameras", frame.image_path});
-        read.push_back({"a mask of --cameras", frame.mask_path});
-    }
-    for (const char* name : {"transforms.json", "transforms_train.json", "transforms_test.json"})
-        if (!inputs.cameras.empty()) read.push_back({"a file of --cameras", inputs.cameras / name});
-    keep_apart(written, read);
-    for (const NamedFile& file : written) check_writable(file.path, Folder::made);
+    const std::vector<NamedFile> dataset = scene::files_of(sides.cameras, "--cameras");
+    read.insert(read.end(), dataset.begin(), dataset.end());
+    check_outputs(written, read);
 }
 
 Compared compare(const ImagePair& pair, const Sides& sides, const CompareArguments& arguments) {
@@ -182,7 +178,7 @@ void print(const CompareTotals& totals, size_t pictures) {
 int run(const CompareArguments& arguments) {
     const Sides sides = open_sides(arguments.inputs);
     const ImagePairs pairs = pair_images(*sides.a, *sides.b);
-    check_outputs(arguments, sides, pairs);
+    check_files(arguments, sides, pairs);
     std::vector<Compared> all;
     for (const ImagePair& pair : pairs.pairs) {
         all.push_back(compare(pair, sides, arguments));

@@ -33,7 +33,7 @@ struct ConvertArguments {
     Edits edits;
     int spz_version = 3;
     fs::path json;
-    bool check = false, quiet = false;
+    bool check = false, allow_empty = false, quiet = false;
 };
 
 struct Work {
@@ -98,18 +98,28 @@ fs::path values_path(const ConvertArguments& arguments) {
     return format_of_name(out) == SplatFormat::gltf ? io::gltf_values_path(out) : fs::path();
 }
 
-/// Throws if an output would overwrite another file of this command, or cannot be written.
-void check_outputs(const ConvertArguments& arguments) {
+/// Throws if an output is another file of this command, or cannot be written.
+void check_files(const ConvertArguments& arguments) {
     const fs::path& out = arguments.files.back();
     const fs::path values = values_path(arguments);
-    std::vector<NamedFile> others = {{"OUT", out}};
-    for (size_t i = 0; i + 1 < arguments.files.size(); ++i)
-        others.push_back({"an input", arguments.files[i]});
-    keep_apart({{"the .bin of OUT", values}, {"--json", arguments.json}}, others);
-    check_writable(out, Folder::there);
+    std::vector<NamedFile> inputs;
+    for (size_t i = 0; i + 1 < arguments.files.size(); ++i) {
+        const fs::path& input = arguments.files[i];
+        inputs.push_back({"an input", input});
+        if (core::lower(input.extension().string()) == ".gltf")
+            inputs.push_back({"the .bin of an input", io::gltf_values_path(input)});
+    }
+    check_outputs({{"OUT", out}, {"the .bin of OUT", values}, {"--json", arguments.json}}, inputs);
     if (!values.empty()) io::check_gltf_values(out);
-    check_writable(values, Folder::there);
-    check_writable(arguments.json, Folder::made);
+}
+
+/// Throws unless splats are left to write, or --allow-empty is given. read: the number of splats in the inputs.
+void check_not_empty(const ConvertArguments& arguments, size_t read, size_t left) {
+    if (left > 0 || arguments.allow_empty) return;
+    const std::string why = read == 0 ? "the inputs have no splats"
+                                      : fmt::format("none of the {} splats is left after the edits", read);
+    throw InputError(arguments.files.back().string() + ": not written: " + why +
+                     "; --allow-empty writes a file without splats");
 }
 
 Json output_json(const ConvertArguments& arguments, const Gaussians& gaussians) {
@@ -132,11 +142,14 @@ int run(const ConvertArguments& arguments) {
     edits.transform = parse_transform(arguments.transform);
     edits.crop = parse_crop(arguments.crop);
     edits.morton = arguments.sort == "morton";
-    check_outputs(arguments);
+    check_files(arguments);
     Work work = read_all(arguments);
+    const size_t read = work.gaussians.size();
     if (auto remark = apply_edits(work.gaussians, edits, format)) work.lost.push_back(std::move(*remark));
 
     const size_t count = work.gaussians.size();
+    check_not_empty(arguments, read, count);
+    make_folder(out.parent_path());
     constexpr size_t kShowFrom = 500'000;
     Progress progress("written", static_cast<int>(std::min<size_t>(count, 1u << 30)), "splats",
                       arguments.quiet || count < kShowFrom);
@@ -201,6 +214,7 @@ Action add_convert(CLI::App& app) {
         ->check(CLI::IsMember({3, 4}))
         ->type_name("3|4")
         ->capture_default_str();
+    app.add_flag("--allow-empty", arguments->allow_empty, "Write the output even if no splat is left");
     app.add_flag("--check", arguments->check,
                  "Read the output back and print its error against the scene in memory");
     app.add_option("--json", arguments->json,

@@ -86,6 +86,7 @@ Action add_dataset(CLI::App& app) {
         ->check(accepted_by(train::run_option("seed")))
         ->type_name("S")
         ->capture_default_str();
+    app.add_flag("--force", options.force, "Replace DIR's views of another scene or of other options");
     add_device_options(app, arguments->device);
     add_quiet_option(app, arguments->quiet);
     return [arguments] { return run(*arguments); };

@@ -12,6 +12,7 @@
 #include "core/text.h"
 #include "ewa/evaluation.h"
 #include "ewa/splat_files.h"
+#include "scene/dataset_files.h"
 
 namespace ewa::cli {
 namespace {
@@ -35,10 +36,11 @@ report::Json to_json(const Evaluation& evaluation) {
 
 int run(const EvalArguments& arguments) {
     const RenderOptions options = arguments.views.draw.options();
-    keep_apart({{"--json", arguments.json}}, {{"SPLATS", arguments.views.splats}});
-    check_writable(arguments.json, Folder::made);
+    const std::vector<NamedFile> written{{"--json", arguments.json}};
+    check_outputs(written, {{"SPLATS", arguments.views.splats}, {"DATASET", arguments.views.dataset}});
     const Gaussians gaussians = load_splats(arguments.views.splats);
     const auto [dataset, frames, folder] = load_views(arguments.views, arguments.split, arguments.test_every);
+    check_outputs(written, scene::files_of(dataset, "DATASET"));
 
     const Evaluation evaluation =
         evaluate(open_device(arguments.views.device), gaussians, dataset, frames, options);

@@ -13,6 +13,7 @@
 #include "ewa/error.h"
 #include "ewa/renderer.h"
 #include "ewa/splat_files.h"
+#include "scene/dataset_files.h"
 
 namespace ewa::cli {
 namespace {
@@ -31,12 +32,11 @@ int run(const GradArguments& arguments) {
     if (arguments.output.extension() != ".ply")
         throw InputError("the gradient is written as a PLY: -o " + arguments.output.string() +
                          " does not end in .ply");
-    keep_apart({{"--output", arguments.output}, {"--json", arguments.json}},
-               {{"SPLATS", arguments.views.splats}});
-    check_writable(arguments.output, Folder::made);
-    check_writable(arguments.json, Folder::made);
+    const std::vector<NamedFile> written{{"--output", arguments.output}, {"--json", arguments.json}};
+    check_outputs(written, {{"SPLATS", arguments.views.splats}, {"DATASET", arguments.views.dataset}});
     const Gaussians gaussians = load_splats(arguments.views.splats);
     const auto [dataset, frames, folder] = load_views(arguments.views, std::to_string(arguments.frame), 0);
+    check_outputs(written, scene::files_of(dataset, "DATASET"));
     const int index = frames.front();
     const Frame& frame = dataset.frames[size_t(index)];
     make_folder(arguments.output.parent_path());

@@ -2,35 +2,19 @@
 // What a command writes: files that the user asked for, JSON, and the progress of long work.
 #pragma once
 #include <chrono>
-#include <filesystem>
 #include <string>
-#include <vector>
 
 #include "core/folders.h"
 #include "core/json.h"
+#include "core/outputs.h"
 #include "report/summary.h"
 
 namespace ewa::cli {
 
+using core::check_outputs;
 using core::make_folder;
+using core::NamedFile;
 using core::write_json;
-
-/// Whether a missing folder of an output file is created.
-enum class Folder { there, made };
-
-/// Throws RunError if the file could not be written, before long work instead of after it. Changes nothing. An
-/// empty path names no file.
-void check_writable(const std::filesystem::path& file, Folder folder);
-
-/// A file with the argument or option that names it.
-struct NamedFile {
-    std::string name;
-    std::filesystem::path path;  // empty: none
-};
-
-/// Throws InputError if one of `written` is the same file as another of them or as one of the others, however the
-/// paths are spelled.
-void keep_apart(const std::vector<NamedFile>& written, const std::vector<NamedFile>& others);
 
 /// Prints the value with indentation. Bytes that are not UTF-8 become U+FFFD: text from a file may hold some.
 void print_json(const report::Json& json);

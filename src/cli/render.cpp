@@ -14,6 +14,7 @@
 #include "ewa/renderer.h"
 #include "ewa/splat_files.h"
 #include "report/pictures.h"
+#include "scene/dataset_files.h"
 
 namespace ewa::cli {
 namespace {
@@ -54,6 +55,13 @@ int run(const RenderArguments& arguments) {
     const Dataset dataset = load_cameras_as_trained(arguments.cameras, arguments.downscale);
     const std::vector<int> frames = select_frames(dataset, arguments.frames, arguments.test_every);
     const std::vector<fs::path> names = report::picture_names(dataset.frames);
+    const auto file_of = [&](int frame) {
+        return arguments.output / (names[size_t(frame)].string() + "." + arguments.format);
+    };
+    std::vector<NamedFile> written, read = scene::files_of(dataset, "--cameras");
+    for (const int frame : frames) written.push_back({"the render", file_of(frame)});
+    read.insert(read.end(), {{"SPLATS", arguments.splats}, {"--cameras", arguments.cameras}});
+    check_outputs(written, read);
     make_folder(arguments.output);
 
     Renderer renderer(open_device(arguments.device), gaussians, options);
@@ -67,7 +75,7 @@ int run(const RenderArguments& arguments) {
         skipped = std::max(skipped, renderer.skipped_nonfinite());
 
         std::string remark;
-        const fs::path file = arguments.output / (names[frames[i]].string() + "." + arguments.format);
+        const fs::path file = file_of(frames[i]);
         make_folder(file.parent_path());
         save_image(file, chosen_image(std::move(rendering), arguments, remark));
         if (!remark.empty()) progress.note(file.string() + ": " + remark);

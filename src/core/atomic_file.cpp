@@ -2,6 +2,7 @@
 #include "core/atomic_file.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -75,6 +76,7 @@ AtomicFile::AtomicFile(const std::filesystem::path& path, Readers readers) : tar
                            readers == Readers::owner ? 0600 : 0666);
     } while (descriptor_ < 0 && errno == EEXIST);
     if (descriptor_ < 0) fail("cannot be written");
+    flock(descriptor_, LOCK_EX | LOCK_NB);  // for remove_abandoned_files(); a file system may have no locks
     listed_ = list_unfinished(temporary_);
     // A file system without permissions is no error.
     if (exists && fchmod(descriptor_, existing.st_mode & 07777) != 0) errno = 0;
@@ -118,6 +120,19 @@ void write_text_file(const std::filesystem::path& path, std::string_view text, A
     file.commit();
 }
 
+namespace {
+
+/// Whether nobody holds the lock of AtomicFile. A process of another container has a number that says nothing here.
+bool is_unlocked(const std::filesystem::path& file) {
+    const int descriptor = open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    if (descriptor < 0) return true;
+    const bool unlocked = flock(descriptor, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK;
+    close(descriptor);
+    return unlocked;
+}
+
+}  // namespace
+
 void remove_abandoned_files(const std::filesystem::path& folder) {
     std::error_code error;
     for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
@@ -127,7 +142,8 @@ void remove_abandoned_files(const std::filesystem::path& folder) {
         if (std::sscanf(name.c_str(), ".ewa-%9d-%9u.tmp%n", &process, &number, &used) != 2 ||
             size_t(used) != name.size() || process <= 0)
             continue;
-        if (kill(process, 0) != 0 && errno == ESRCH) unlink(entry.path().c_str());
+        if (kill(process, 0) != 0 && errno == ESRCH && is_unlocked(entry.path()))
+            unlink(entry.path().c_str());
     }
 }
 

@@ -45,7 +45,7 @@ void write_text_file(const std::filesystem::path& path, std::string_view text,
 void remove_unfinished_files() noexcept;
 
 /// Removes the temporary files that killed processes left in a folder. Their names have AtomicFile's form and
-/// the number of a process that no longer exists. Failures are ignored.
+/// the number of a process that no longer exists, and no process has them locked. Failures are ignored.
 void remove_abandoned_files(const std::filesystem::path& folder);
 
 }  // namespace ewa::core

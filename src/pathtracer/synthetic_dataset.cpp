@@ -12,6 +12,7 @@
 #include "core/folders.h"
 #include "core/hash.h"
 #include "core/json.h"
+#include "core/outputs.h"
 #include "core/random.h"
 #include "core/text.h"
 #include "ewa/error.h"
@@ -71,7 +72,8 @@ std::string stem(size_t view, size_t views) {
 
 struct RenderJob {
     SyntheticOptions options;
-    std::string name;  // of the scene's file
+    fs::path path;  // of the scene's file
+    std::string name;
     scene::MeshScene scene;
     pathtracer::PackedScene packed;
     std::vector<Camera> cameras;
@@ -120,6 +122,7 @@ std::string RenderJob::fingerprint() const {
 RenderJob read_render_job(const fs::path& path, const SyntheticOptions& options) {
     check(options);
     RenderJob job{.options = options,
+                  .path = path,
                   .name = path.filename().string(),
                   .scene = io::read_gltf_mesh(path),
                   .packed = {},
@@ -200,8 +203,32 @@ class Run {
         }
     }
 
-    /// Continues an earlier run if its record matches, else removes its files.
+    void check_outputs() const {
+        std::vector<core::NamedFile> written;
+        for (const char* name : {kRecord, "transforms.json", "points.ply"})
+            written.push_back({"the dataset's", folder_ / name});
+        for (size_t i = 0; i < cameras_.size(); ++i)
+            for (const fs::path& name : {fs::path(job_.image_name(i)), fs::path(job_.depth_name(i))})
+                written.push_back({"the view", folder_ / name});
+        core::check_outputs(written, {{"SCENE", job_.path}});
+    }
+
+    /// Throws InputError if the folder has views, which are of another scene or other options.
+    void refuse_to_replace() const {
+        size_t views = 0;
+        std::error_code absent;
+        for (const fs::directory_entry& entry : fs::directory_iterator(folder_ / "images", absent))
+            views += entry.path().filename().string().rfind("view_", 0) == 0;
+        if (views == 0) return;
+        throw InputError(
+            core::one_line(folder_.string()) + ": holds " + std::to_string(views) +
+            (views == 1 ? " view" : " views") +
+            " of another scene or other options; --force replaces them, -o DIR takes another folder");
+    }
+
+    /// Continues an earlier run if its record matches. Else removes its files, if options.force allows that.
     void prepare_folder() {
+        check_outputs();
         core::make_folder(folder_);
         const auto earlier = read_record(folder_);
         for (const char* name : {kRecord, "transforms.json", "points.ply", "images", "depth", "sparse"})
@@ -209,18 +236,15 @@ class Run {
                 throw InputError(
                     core::one_line(folder_.string() + ": holds \"" + name +
                                    "\" that ewa did not render from a mesh scene; name another folder"));
-        core::remove_abandoned_files(folder_);
         const bool same =
             earlier && earlier->exposure && earlier->fingerprint == record_["fingerprint"].get<std::string>();
+        if (!same && earlier && !options_.force) refuse_to_replace();
         if (!same) remove_views();
         result_.exposure = same ? *earlier->exposure : options_.exposure ? *options_.exposure : measured();
         record_["exposure"] = result_.exposure;
         // Written before the folders, which without it would count as another program's.
         core::write_text_file(folder_ / kRecord, record_.dump(1) + "\n");
-        for (const char* name : {"images", "depth"}) {
-            core::make_folder(folder_ / name);
-            core::remove_abandoned_files(folder_ / name);
-        }
+        for (const char* name : {"images", "depth"}) core::make_folder(folder_ / name);
     }
 
     /// Measures the exposure in a few small images.

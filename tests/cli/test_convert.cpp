@@ -123,10 +123,10 @@ TEST(Convert, WrongUse) {
     expect_failure(run_ewa({"convert", folder / "none.ply", folder / "o.ply"}), 2, "none.ply");
     // Before the inputs are read.
     expect_failure(run_ewa({"convert", folder / "none.ply", folder / "o.ply", "--crop", "1,2"}), 2, "--crop");
-    expect_failure(run_ewa({"convert", folder / "none.ply", folder / "none/o.ply"}), 1, "none/o.ply");
+    expect_failure(run_ewa({"convert", folder / "none.ply", folder / "s.ply/o.ply"}), 1, "s.ply");
     expect_failure(
         run_ewa({"convert", folder / "none.ply", folder / "o.ply", "--json", folder / "s.ply/o.json"}), 1,
-        "s.ply/o.json");
+        "s.ply");
     refuse({"--transform", "spin=1"}, "spin=1");
     refuse({"--transform", "turn=0,0,0,90"}, "turn=0,0,0,90");
     refuse({"--transform", "1,2,3"}, "1,2,3");
@@ -173,9 +173,43 @@ TEST(Convert, NoFileTakesAnothersPlace) {
     fs::copy_file(folder / "s.ply", folder / "o.bin");
     expect_failure(run_ewa({"convert", folder / "o.bin", folder / "o.gltf"}), 2, "o.bin");
     EXPECT_EQ(read_file(folder / "o.bin"), good);
-    // In place is no accident.
-    expect_success(run_ewa({"convert", folder / "s.ply", folder / "s.ply", "--max-sh", "0"}));
-    EXPECT_EQ(ewa::load_splats(folder / "s.ply").sh_degree, 0);
+    // An output that is an input, by any name.
+    fs::create_symlink(folder / "s.ply", folder / "soft.ply");
+    fs::create_hard_link(folder / "s.ply", folder / "hard.ply");
+    fs::create_directory_symlink(folder / ".", folder / "around");
+    for (const char* out : {"s.ply", "soft.ply", "hard.ply", "around/s.ply", "none/../s.ply"})
+        expect_failure(run_ewa({"convert", folder / "s.ply", folder / out, "--max-sh", "0"}), 2,
+                       "is the same file as an input; it would be overwritten; name another file");
+    expect_failure(run_ewa({"convert", folder / "hard.ply", folder / "s.ply", folder / "soft.ply"}), 2,
+                   "an input");
+    EXPECT_EQ(read_file(folder / "s.ply"), good);
+    EXPECT_TRUE(fs::is_symlink(folder / "soft.ply"));
+    expect_success(run_ewa({"convert", folder / "s.ply", folder / "s.ply", folder / "twice.ply"}));
+}
+
+TEST(Convert, KeepsTheBinOfAGltfThatItReads) {
+    const Folder folder;
+    make_splats(folder / "s.ply");
+    expect_success(run_ewa({"convert", folder / "s.ply", folder / "g.gltf"}));
+    const std::string good = read_file(folder / "g.bin");
+    expect_failure(run_ewa({"convert", folder / "g.gltf", folder / "o.ply", "--json", folder / "g.bin"}), 2,
+                   "the .bin of an input");
+    EXPECT_EQ(read_file(folder / "g.bin"), good);
+}
+
+TEST(Convert, RefusesAnEmptyResult) {
+    const Folder folder;
+    make_splats(folder / "s.ply");
+    write_file(folder / "o.ply", "old");
+    const Names convert{"convert", folder / "s.ply", folder / "o.ply", "--crop", "90,90,90,91,91,91"};
+    expect_failure(run_ewa(convert), 2, "none of the 50 splats is left after the edits; --allow-empty");
+    EXPECT_EQ(read_file(folder / "o.ply"), "old");
+    Names allowed = convert;
+    allowed.push_back("--allow-empty");
+    expect_success(run_ewa(allowed));
+    EXPECT_EQ(ewa::load_splats(folder / "o.ply").size(), 0u);
+    expect_failure(run_ewa({"convert", folder / "o.ply", folder / "p.ply"}), 2, "the inputs have no splats");
+    EXPECT_FALSE(fs::exists(folder / "p.ply"));
 }
 
 TEST(Convert, NamesTheBinOfAGltfAndLeavesOthersAlone) {

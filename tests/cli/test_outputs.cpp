@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the commands write, and what happens where they cannot.
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <csignal>
 
 #include "cli/expect.h"
 #include "cli/faulty.h"
@@ -217,7 +222,7 @@ TEST(Outputs, PlacesThatCannotBeWritten) {
     expect_failure(run_ewa({"eval", none, data, "--json", folder / "file/e.json"}), 1, "file");
     expect_failure(run_ewa({"grad", none, data, "--frame", "0", "-o", folder / "file/g.ply"}), 1, "file");
     expect_failure(run_ewa({"bench", "--accuracy", none, "--json", folder / "file/a/b.json"}), 1, "file/a");
-    expect_failure(run_ewa({"bench", "--accuracy", none, "--svg", folder / "none/b.svg"}), 1, "none/b.svg");
+    expect_failure(run_ewa({"bench", "--accuracy", none, "--svg", folder / "file/b.svg"}), 1, "file");
     fs::create_directory(folder / "b_training.svg");
     expect_failure(run_ewa({"bench", "--accuracy", none, "--svg", folder / "b.svg"}), 1, "b_training.svg");
     expect_failure(run_ewa({"bench", "--accuracy", none, "--json", folder / "new/b.json"}), 2, none);
@@ -241,6 +246,119 @@ TEST(Outputs, NoFileTakesAnothersPlace) {
                    "is the same file as --svg");
     EXPECT_EQ(read_file(splats), good);
     EXPECT_FALSE(fs::exists(out));
+}
+
+/// No command writes over a file of a dataset that it reads.
+TEST(Outputs, DatasetsStayWhole) {
+    const Folder folder;
+    make_dataset(folder / "data");
+    make_splats(folder / "s.ply");
+    const std::string splats = folder / "s.ply", data = folder / "data";
+    const auto whole = [&] {
+        std::string all;
+        for (const std::string& file : files_below(data)) all += file + "\n" + read_file(data + "/" + file);
+        return all;
+    };
+    const std::string before = whole();
+    const auto refused = [&](const Names& arguments, const std::string& text) {
+        expect_failure(run_ewa(arguments), 2, text);
+        EXPECT_EQ(whole(), before);
+    };
+    refused({"render", splats, "--cameras", data, "-o", data + "/images"}, "an image of --cameras");
+    fs::create_directory_symlink(data + "/images", folder / "link");
+    refused({"render", splats, "--cameras", data, "-o", folder / "link"}, "an image of --cameras");
+    refused({"eval", splats, data, "--json", data + "/transforms.json"}, "a file of DATASET");
+    refused({"eval", splats, data + "/transforms.json", "--json", data + "/transforms.json"}, "DATASET");
+    refused({"eval", splats, data, "--json", data + "/images/1.png"}, "an image of DATASET");
+    fs::create_hard_link(data + "/images/1.png", folder / "hard.ply");
+    refused({"grad", splats, data, "--frame", "0", "-o", folder / "hard.ply"}, "an image of DATASET");
+    refused({"compare", splats, splats, "--cameras", data, "--heat-map", data + "/images"},
+            "an image of --cameras");
+
+    // Held-out images in test/, where a run in the dataset's folder puts its renders.
+    make_dataset(folder / "blender", {"test/0.png", "test/1.png", "test/2.png"});
+    fs::rename(folder / "blender/images/test", folder / "blender/test");
+    auto json = read_json(folder / "blender/transforms.json");
+    for (auto& frame : json["frames"])
+        frame["file_path"] = frame["file_path"].get<std::string>().substr(std::string("images/").size());
+    write_file(folder / "blender/transforms.json", json.dump());
+    const std::string image = read_file(folder / "blender/test/0.png");
+    expect_failure(
+        run_ewa({"train", folder / "blender", "-o", folder / "blender", "--init", splats, "--steps", "1"}), 2,
+        "an image of DATASET");
+    EXPECT_EQ(read_file(folder / "blender/test/0.png"), image);
+    fs::create_directory(folder / "o");
+    fs::rename(splats, folder / "o/splats.ply");
+    expect_failure(run_ewa({"train", data, "-o", folder / "o", "--init", folder / "o/splats.ply", "--steps",
+                            "1", "--force"}),
+                   2, "is the same file as --init");
+}
+
+TEST(Outputs, MissingFoldersAreMade) {
+    const Folder folder;
+    make_dataset(folder / "data");
+    make_splats(folder / "s.ply");
+    const std::string splats = folder / "s.ply", data = folder / "data";
+    expect_success(run_ewa({"convert", splats, folder / "a/b/c.gltf", "--json", folder / "a/j/c.json"}));
+    expect_success(run_ewa({"grad", splats, data, "--frame", "0", "-o", folder / "g/h/g.ply"}));
+    expect_success(run_ewa({"eval", splats, data, "--json", folder / "e/f/e.json"}));
+    expect_success(run_ewa({"render", splats, "--cameras", data, "-o", folder / "r/s", "--quiet"}));
+    expect_success(run_ewa(
+        {"compare", data + "/images/0.png", data + "/images/0.png", "--heat-map", folder / "m/n/m.png"}));
+    expect_success(
+        run_ewa({"train", data, "--init", splats, "-o", folder / "t/u", "--steps", "1", "--quiet"}));
+    for (const char* file : {"a/b/c.gltf", "a/b/c.bin", "a/j/c.json", "g/h/g.ply", "e/f/e.json", "r/s/0.png",
+                             "m/n/m.png", "t/u/splats.ply"})
+        EXPECT_TRUE(fs::exists(folder / file)) << file;
+}
+
+/// The number of a process that has ended.
+int ended_process() {
+    const pid_t child = fork();
+    if (child == 0) _exit(0);
+    waitpid(child, nullptr, 0);
+    return child;
+}
+
+TEST(Outputs, WhatAKilledCommandLeftIsCleared) {
+    const Folder folder;
+    make_dataset(folder / "data");
+    make_splats(folder / "s.ply");
+    const std::string splats = folder / "s.ply", data = folder / "data";
+    fs::create_directory(folder / "k");
+    const Outcome killed =
+        run_ewa({"convert", splats, folder / "k/o.ply"}, with_fault("EWA_FAULT_KILL", "2"));
+    ASSERT_EQ(killed.status, 128 + SIGKILL);
+    EXPECT_EQ(files_below(folder / "k").size(), 1u);
+    expect_success(run_ewa({"convert", splats, folder / "k/o.ply"}));
+    EXPECT_EQ(files_below(folder / "k"), Names{"o.ply"});
+
+    const std::string name = "/.ewa-" + std::to_string(ended_process()) + "-";
+    const auto clears = [&](const std::string& where, const Names& arguments) {
+        SCOPED_TRACE(arguments[0]);
+        fs::create_directories(folder / where);
+        write_file((folder / where) + name + "0.tmp", "half");
+        write_file((folder / where) + name + "1.tmp.txt", "not ours");
+        const std::string locked = (folder / where) + name + "2.tmp",
+                          running = (folder / where) + "/.ewa-" + std::to_string(getpid()) + "-0.tmp";
+        write_file(locked, "of a process in another container");
+        write_file(running, "of a process that runs");
+        const int descriptor = open(locked.c_str(), O_RDONLY | O_CLOEXEC);
+        ASSERT_EQ(flock(descriptor, LOCK_EX), 0);
+        expect_success(run_ewa(arguments));
+        close(descriptor);
+        EXPECT_FALSE(fs::exists((folder / where) + name + "0.tmp"));
+        for (const std::string& file : {(folder / where) + name + "1.tmp.txt", locked, running})
+            EXPECT_TRUE(fs::exists(file)) << file;
+    };
+    clears("c", {"convert", splats, folder / "c/o.ply"});
+    clears("g", {"grad", splats, data, "--frame", "0", "-o", folder / "g/g.ply"});
+    clears("e", {"eval", splats, data, "--json", folder / "e/e.json"});
+    clears("r", {"render", splats, "--cameras", data, "-o", folder / "r", "--quiet"});
+    clears("m",
+           {"compare", data + "/images/0.png", data + "/images/0.png", "--heat-map", folder / "m/m.png"});
+    clears("t", {"train", data, "--init", splats, "-o", folder / "t", "--steps", "1", "--quiet"});
+    clears("u/test", {"train", data, "--init", splats, "-o", folder / "u", "--steps", "1", "--quiet"});
 }
 
 TEST(Outputs, StandardOutputThatIsFull) {

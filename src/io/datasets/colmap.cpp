@@ -349,7 +349,11 @@ ImageRecords read_colmap(const std::filesystem::path& model, const std::filesyst
                                                        builder);
     (binary ? read_binary_images : read_text_images)(model / (binary ? "images.bin" : "images.txt"), builder);
     if (std::filesystem::exists(points)) (binary ? read_binary_points : read_text_points)(points, builder);
-    return builder.take();
+    ImageRecords records = builder.take();
+    const std::string extension = binary ? ".bin" : ".txt";
+    for (const char* file : {"cameras", "images", "points3D"})
+        records.files.push_back(model / (file + extension));
+    return records;
 }
 
 }  // namespace ewa::io

@@ -175,6 +175,7 @@ fs::path images_folder(const fs::path& root, const fs::path& model) {
 
 void append(io::ImageRecords& all, io::ImageRecords more) {
     std::move(more.images.begin(), more.images.end(), std::back_inserter(all.images));
+    all.files.insert(all.files.end(), more.files.begin(), more.files.end());
     if (all.points.positions.empty()) all.points = std::move(more.points);
     if (all.dropped.count == 0) all.dropped.first = std::move(more.dropped.first);
     all.dropped.count += more.dropped.count;
@@ -232,6 +233,7 @@ Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& op
     if (model.images.empty()) throw InputError(name + ": the dataset has no images");
     Dataset dataset;
     dataset.root = is_folder(path) ? path : path.parent_path();
+    dataset.files = std::move(model.files);
     dataset.points = std::move(model.points);
     dataset.color_depends_on_view = model.color_depends_on_view;
     dataset.dropped_points = model.dropped.count;

@@ -253,6 +253,7 @@ ImageRecords read_transforms(const std::filesystem::path& path, int split, bool 
     ImageRecords result;
     const std::filesystem::path folder = path.parent_path();
     result.folder = folder / "images";
+    result.files = {path};
     for (size_t i = 0; i < frames->size(); ++i) {
         const Entry entry(name + ": frame " + std::to_string(i), top, (*frames)[i]);
         if (!(*frames)[i].is_object()) entry.fail("is not a JSON object");
@@ -272,6 +273,7 @@ ImageRecords read_transforms(const std::filesystem::path& path, int split, bool 
     }
     const json empty = json::object();
     const auto points_name = named_file(Entry(name, top, empty), "ply_file_path", folder);
+    if (!points_name.empty()) result.files.push_back(folder / points_name);
     if (with_points && !points_name.empty()) {
         PlyPoints points = read_points_ply(folder / points_name);
         result.points = std::move(points.points);
