@@ -32,10 +32,12 @@ struct RunOptions {
     std::string init = "sfm";  // first splats: "sfm" (the dataset's points), "random", or a splat file
     int downscale = 1;         // divides the images' width and height
     MaskUse masks = MaskUse::automatic;
-    int test_every = 8;   // every K-th image in name order is held out; 0: none
-    int eval_every = 0;   // evaluates the held-out views every N steps; 0: only at the end
-    int save_every = 0;   // saves splats and checkpoint every N steps; 0: the checkpoint every 30 s or more
+    int test_every = 8;  // every K-th image in name order is held out; 0: none
+    int eval_every = 0;  // evaluates the held-out views every N steps; 0: only at the end
+    int save_every = 0;  // saves splats and checkpoint every N steps; 0: the checkpoint every 30 s or more
+    // A folder with the result or the checkpoint of a run is refused, unless one of these is set.
     bool resume = false;  // continues from the folder's checkpoint, if there is one
+    bool force = false;   // replaces the run in the folder
     DeviceOptions device;
     std::string command;        // how the run was started, for the report; may be empty
     double seconds_before = 0;  // wall time spent before the run, counted in Summary::wall_seconds
@@ -112,8 +114,10 @@ struct RunResult {
 ///
 /// One run at a time may use a folder. Each file but metrics.jsonl is replaced as a whole.
 /// If an image vanishes during training, the checkpoint is saved before the error is thrown.
-/// Throws InputError (options, dataset, start splats, a checkpoint of other options), RunError (device, memory,
-/// disk, a folder that another run uses).
+/// With RunOptions::resume the options must be those of the checkpoint, but `steps` may differ: the rest of the run then
+/// has the schedule of the new number. Strategy::automatic keeps the checkpoint's strategy.
+/// Throws InputError (options, dataset, start splats, a checkpoint of other options or of a later step, a folder with
+/// an earlier run, an output that is an input), RunError (device, memory, disk, a folder that another run uses).
 RunResult run_training(const RunOptions& options, RunObserver& observer);
 RunResult run_training(const RunOptions& options);
 

@@ -56,7 +56,9 @@ struct TrainOptions {
     int sh_degree_every = 1000;      // the SH degree rises by one this often
     int halvings = 0;                // the images' sides are halved this often at the start
     int resolution_every = 3000;     // one halving is undone this often
-    double grow_gradient = 2e-4;     // mean norm of dL/d(mean in normalised device coordinates)
+    /// Of a run that continues one of another number of steps: the SH degree and resolution that it reached stay.
+    int least_sh_degree = 0, most_halvings = 64;
+    double grow_gradient = 2e-4;  // mean norm of dL/d(mean in normalised device coordinates)
     /// Uses the sum of the pixels' absolute gradients, which do not cancel (AbsGS), and their own threshold.
     bool absolute_gradients = false;
     double grow_gradient_absolute = 8e-4;  // gsplat's

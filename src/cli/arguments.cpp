@@ -47,7 +47,7 @@ void print_notes(const SyntheticDataset& made, const fs::path& folder) {
     if (made.dropped_samples > 0)
         fmt::print("{} paths were not finite and count as black\n", made.dropped_samples);
     if (made.interrupted)
-        fmt::print("interrupted; the same command continues\n");
+        fmt::print("interrupted; to continue, repeat the command\n");
     else
         fmt::print("{} views are in {}{}, exposure {:+.1f} stops; {}\n", made.views,
                    core::one_line(folder.string()),

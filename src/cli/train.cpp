@@ -14,6 +14,7 @@
 #include "ewa/error.h"
 #include "ewa/run.h"
 #include "report/chart.h"
+#include "train/earlier_run.h"
 
 namespace ewa::cli {
 namespace {
@@ -61,10 +62,13 @@ void render_scene(TrainArguments& arguments) {
     run.scene = run.dataset;
     run.output = output_folder(run);
     run.dataset = run.output / "dataset";
+    train::check_free(run.output, run);
     // Another training may be reading the images that are there.
     std::unique_ptr<core::FolderLock> lock;
     if (fs::is_directory(run.output)) lock = std::make_unique<core::FolderLock>(run.output);
-    render_with_progress(run.device, run.scene, run.dataset, {}, arguments.output.quiet);
+    SyntheticOptions synthetic;
+    synthetic.force = run.force;
+    render_with_progress(run.device, run.scene, run.dataset, synthetic, arguments.output.quiet);
     if (interrupted()) throw Interrupted();
 }
 
@@ -84,6 +88,7 @@ int run(CLI::App& app, TrainArguments& arguments) {
     render_scene(arguments);
     if (arguments.accuracy) options.report_section = accuracy_section;
     options.seconds_before = std::chrono::duration<double>(Clock::now() - begin).count();
+    arguments.output.force = options.force;
     TrainObserver observer(arguments.output, options.train.steps);
     const RunResult result = run_training(options, observer);
     observer.print(result);
@@ -109,7 +114,13 @@ Action add_train(CLI::App& app, const std::string& command_line) {
            "connect, unless an address stands before the port. Pausing and saving need the token in "
            "DIR/live.json")
         ->type_name("[ADDRESS:]PORT");
-    app.add_flag("--resume", options.resume, "Continue from DIR's checkpoint.ewa, or start if there is none");
+    CLI::Option* resume = app.add_flag(
+        "--resume", options.resume,
+        "Continue from DIR's checkpoint.ewa, or start if there is none. More --steps than before "
+        "train the run further");
+    app.add_flag("--force", options.force,
+                 "Replace the run in DIR. Without --resume or --force it is refused")
+        ->excludes(resume);
     app.add_option("--config", arguments->config,
                    "JSON with the names of these options, such as a run's config.json. The command line has "
                    "precedence")

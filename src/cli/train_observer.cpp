@@ -173,6 +173,9 @@ void TrainObserver::print(const RunResult& result) {
     on_note("splats:  " + (result.folder / "splats.ply").string());
     on_note("report:  " + (result.folder / "report.html").string());
     if (!result.first_render.empty()) on_note("render:  " + result.first_render.string());
+    if (s.interrupted)
+        on_note(std::string("to continue, repeat the command with --resume") +
+                (output_.force ? " in place of --force" : ""));
 }
 
 }  // namespace ewa::cli

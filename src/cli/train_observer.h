@@ -15,7 +15,8 @@ namespace ewa::cli {
 
 struct TrainOutput {
     bool quiet = false, verbose = false;
-    std::string serve;  // [ADDRESS:]PORT; empty: no server
+    bool force = false;  // the run replaces an earlier one
+    std::string serve;   // [ADDRESS:]PORT; empty: no server
 };
 
 class TrainObserver : public RunObserver {

@@ -63,6 +63,14 @@ int steps_of(const fs::path& folder) {
     }
 }
 
+/// A run that continues a finished one leaves that one's summary until it ends itself.
+bool is_done(const fs::path& folder) {
+    std::error_code absent, none;
+    const auto summary = fs::last_write_time(folder / "summary.json", absent);
+    const auto config = fs::last_write_time(folder / "config.json", none);
+    return !absent && (none || summary >= config);
+}
+
 }  // namespace
 
 /// cpp-httplib's client on a Wire. By itself it reads a status line of any length, and crashes on a long one.
@@ -332,9 +340,7 @@ void Watcher::read_metrics() {
         update.status.splats = last.splats;
         update.status.loss = last.loss;
         update.status.seconds = last.seconds;
-        std::error_code absent;
-        update.status.state =
-            fs::exists(what_.folder / "summary.json", absent) ? State::done : State::running;
+        update.status.state = is_done(what_.folder) ? State::done : State::running;
         update.status.commands = false;
         update.status.metrics = std::move(lines);
     });

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "core/atomic_file.h"
 #include "core/json.h"
 #include "ewa/error.h"
 
@@ -106,9 +107,10 @@ std::string metrics_text(const std::vector<MetricsLine>& lines) {
 }
 
 MetricsLog::MetricsLog(const std::filesystem::path& path, const std::vector<MetricsLine>& earlier)
-    : path_(path), file_(path, std::ios::trunc) {
+    : path_(path) {
+    core::write_text_file(path, metrics_text(earlier));
+    file_.open(path, std::ios::app);
     if (!file_) throw RunError("cannot create " + path_.string() + ": " + std::strerror(errno));
-    for (const MetricsLine& line : earlier) append(line);
 }
 
 void MetricsLog::append(const MetricsLine& line) {

@@ -67,9 +67,7 @@ TrainerArray read_section(core::FileReader& file) {
         at += piece;
     }
     if (checksum_of(header, section.bytes) != header.checksum)
-        file.fail(
-            "a section does not have its checksum: the checkpoint is damaged; without --resume the "
-            "training starts anew");
+        file.fail("a section does not have its checksum: the checkpoint is damaged; --force starts anew");
     return section;
 }
 
@@ -102,8 +100,10 @@ void write_checkpoint(const std::filesystem::path& path, const Checkpoint& check
     file.commit();
 }
 
-Checkpoint read_checkpoint(const std::filesystem::path& path) {
-    core::FileReader file(path);
+namespace {
+
+/// Reads the header and the fixed sections. arrays: their number.
+Checkpoint read_head(core::FileReader& file, uint32_t& arrays) {
     if (file.remaining() < kMagic.size() ||
         std::memcmp(file.take(kMagic.size(), "the header"), kMagic.data(), kMagic.size()) != 0)
         file.fail("not a checkpoint of ewa");
@@ -115,6 +115,7 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
     if (sections < std::size(kFixed) || sections > kMaxSections)
         file.fail("a checkpoint of " + std::to_string(sections) + " sections");
 
+    arrays = sections - uint32_t(std::size(kFixed));
     std::array<TrainerArray, std::size(kFixed)> fixed;
     for (size_t i = 0; i < fixed.size(); ++i) {
         fixed[i] = read_section(file);
@@ -131,7 +132,22 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
     state.sh_degree = int(block.sh_degree);
     state.report = {int(block.step),       block.seconds,           block.loss,         block.splats,
                     block.dropped_updates, block.skipped_nonfinite, block.limited_steps};
-    for (uint32_t i = uint32_t(fixed.size()); i < sections; ++i) state.arrays.push_back(read_section(file));
+    return checkpoint;
+}
+
+}  // namespace
+
+Checkpoint read_checkpoint_head(const std::filesystem::path& path) {
+    core::FileReader file(path);
+    uint32_t arrays = 0;
+    return read_head(file, arrays);
+}
+
+Checkpoint read_checkpoint(const std::filesystem::path& path) {
+    core::FileReader file(path);
+    uint32_t arrays = 0;
+    Checkpoint checkpoint = read_head(file, arrays);
+    for (uint32_t i = 0; i < arrays; ++i) checkpoint.state.arrays.push_back(read_section(file));
     if (file.remaining() > 0) file.fail("there are bytes behind the last section");
     return checkpoint;
 }

@@ -33,4 +33,7 @@ void write_checkpoint(const std::filesystem::path& path, const Checkpoint& check
 /// Throws InputError, with the byte, if the file is cut short, damaged, of another version or no checkpoint.
 Checkpoint read_checkpoint(const std::filesystem::path& path);
 
+/// The same without the arrays of the state, which are not read. A file cut short in them is no error.
+Checkpoint read_checkpoint_head(const std::filesystem::path& path);
+
 }  // namespace ewa::train

@@ -10,6 +10,7 @@
 #include "core/json.h"
 #include "ewa/error.h"
 #include "train/run_options.h"
+#include "train/schedule.h"
 
 namespace ewa::train {
 namespace {
@@ -19,20 +20,27 @@ using Json = nlohmann::ordered_json;
 
 // Of an option's value in an error. The checkpoint may come from a stranger.
 constexpr size_t kLongestValue = 200;
+constexpr const char* kWaysOut = "; --force starts anew, -o DIR takes another folder";
 constexpr double kLeastPause = 30;      // seconds
 constexpr double kPausePerSaving = 50;  // times the duration of a save
 
 Json parse_settings(const std::filesystem::path& path, const std::string& stored) {
-    const std::string way_out = "; without --resume the training starts anew";
     Json json;
     try {
         json = core::parse_json<Json>(stored, path.string() + ": its settings");
     } catch (const InputError& error) {
-        throw InputError(error.what() + way_out);
+        throw InputError(std::string(error.what()) + kWaysOut);
     }
     if (!json.is_object() || !json.contains("options") || !json["options"].is_object())
-        throw InputError(path.string() + ": its settings cannot be read" + way_out);
+        throw InputError(path.string() + ": its settings cannot be read" + kWaysOut);
     return json;
+}
+
+/// A value of "reached", which only a run continued with another number of steps has. Wrong values count as absent.
+int reached(const Json& settings, const char* name, int absent, int most) {
+    const Json all = settings.value("reached", Json::object());
+    const Json value = all.is_object() ? all.value(name, Json()) : Json();
+    return value.is_number_unsigned() && value.get<uint64_t>() <= uint64_t(most) ? value.get<int>() : absent;
 }
 
 /// The value as to_config writes it: "1.0,1,1" and "1,1,1" are the same background.
@@ -94,26 +102,65 @@ std::string dataset_fingerprint(const Dataset& dataset, const Split& split) {
     return text;
 }
 
+int continue_from(const std::filesystem::path& path, const Checkpoint& earlier, Strategy asked,
+                  RunOptions& options) {
+    const Json then = parse_settings(path, earlier.settings);
+    RunOptions before = options;
+    const auto take = [&](const char* name, RunOptions& into) {
+        const Json value = then["options"].value(name, Json());
+        if (value.is_null()) return;
+        try {
+            run_option(name).set(into, value.is_string() ? value.get<std::string>() : value.dump());
+        } catch (const InputError& error) {
+            throw InputError(path.string() + ": its settings have --" + name + " " +
+                             value.dump().substr(0, kLongestValue) + ", which is no value of it" + kWaysOut);
+        }
+    };
+    take("steps", before);
+    if (asked == Strategy::automatic) take("strategy", options);
+    const int step = earlier.state.report.step;
+    if (options.train.steps < step)
+        throw InputError(path.string() + ": is at step " + std::to_string(step) +
+                         ", after the last of --steps " + std::to_string(options.train.steps) +
+                         "; give a larger --steps" + kWaysOut);
+    options.train.least_sh_degree = reached(then, "sh_degree", 0, kMaxShDegree);
+    options.train.most_halvings =
+        reached(then, "halvings", TrainOptions().most_halvings, TrainOptions().most_halvings);
+    if (before.train.steps == options.train.steps || step == 0) return before.train.steps;
+    before.train.least_sh_degree = options.train.least_sh_degree;
+    before.train.most_halvings = options.train.most_halvings;
+    const Schedule schedule = schedule_for(before.train);
+    options.train.least_sh_degree = schedule.degree(step);
+    options.train.most_halvings = schedule.halvings_at(step);
+    return before.train.steps;
+}
+
 Json checkpoint_settings(const RunOptions& options, const std::string& fingerprint) {
     Json decisive;
     for (const RunOption& option : run_options())
         if (option.decides_result) decisive[option.name] = option.get(options);
-    return {{"version", EWA_VERSION}, {"dataset", fingerprint}, {"options", decisive}};
+    Json settings{{"version", EWA_VERSION}, {"dataset", fingerprint}, {"options", decisive}};
+    const TrainOptions none;
+    if (options.train.least_sh_degree != none.least_sh_degree ||
+        options.train.most_halvings != none.most_halvings)
+        settings["reached"] = {{"sh_degree", options.train.least_sh_degree},
+                               {"halvings", options.train.most_halvings}};
+    return settings;
 }
 
 void check_resumable(const std::filesystem::path& path, const std::string& stored, const Json& now) {
     const Json then = parse_settings(path, stored);
-    const std::string way_out = "; without --resume the training starts anew, -o takes another folder";
     if (then.value("dataset", Json()) != now["dataset"])
         throw InputError(path.string() + ": is of another dataset, or its images or cameras have changed" +
-                         way_out);
+                         kWaysOut);
     for (const auto& [name, value] : now["options"].items()) {
+        if (name == "steps") continue;
         const RunOption& option = run_option(name);
         Json other = then["options"].value(name, Json());
         if (other.is_null() && !option.before.empty()) other = normalised(option, option.before);
         if (normalised(option, other) != value)
             throw InputError(path.string() + ": was written with --" + name + " " +
-                             other.dump().substr(0, kLongestValue) + ", not " + value.dump() + way_out);
+                             other.dump().substr(0, kLongestValue) + ", not " + value.dump() + kWaysOut);
     }
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "ewa/run.h"
+#include "train/checkpoint.h"
 
 namespace ewa::train {
 
@@ -18,8 +19,15 @@ std::string dataset_fingerprint(const Dataset& dataset, const Split& split);
 /// The run adds the device.
 nlohmann::ordered_json checkpoint_settings(const RunOptions& options, const std::string& fingerprint);
 
-/// Throws InputError that names the first difference if a run with the settings `now` would end with another
-/// result. stored: the settings of the checkpoint at `path`.
+/// Lets a run continue from the checkpoint at `path`. Strategy::automatic becomes the checkpoint's strategy. If the
+/// checkpoint's run has another number of steps, the options keep what it has reached (TrainOptions::least_sh_degree,
+/// most_halvings). Returns that run's number of steps. Throws InputError if the checkpoint lies behind the last step.
+/// asked: the strategy before resolve().
+int continue_from(const std::filesystem::path& path, const Checkpoint& earlier, Strategy asked,
+                  RunOptions& options);
+
+/// Throws InputError that names the first difference, except in the number of steps, if a run with the settings `now`
+/// would continue differently. stored: the settings of the checkpoint at `path`.
 void check_resumable(const std::filesystem::path& path, const std::string& stored,
                      const nlohmann::ordered_json& now);
 

@@ -12,11 +12,14 @@
 #include <utility>
 
 #include "core/folders.h"
+#include "core/outputs.h"
 #include "ewa/error.h"
 #include "ewa/renderer.h"
 #include "pipeline/model.h"
 #include "report/pictures.h"
+#include "scene/dataset_files.h"
 #include "train/checkpoint.h"
+#include "train/earlier_run.h"
 #include "train/resume.h"
 #include "train/run_files.h"
 #include "train/run_input.h"
@@ -70,13 +73,46 @@ std::vector<PlanLine> plan_of(const Trainer& trainer, const train::RunInput& inp
     return plan;
 }
 
+/// The views that the report shows.
+std::vector<int> report_frames(const Split& split) {
+    return spread_out(split.test.empty() ? split.train : split.test, kReportImages);
+}
+
+/// The file of a view's render, for each frame.
+std::vector<std::filesystem::path> render_files(const train::RunInput& input) {
+    std::vector<std::filesystem::path> files;
+    for (const std::filesystem::path& name : report::picture_names(input.dataset.frames))
+        files.push_back(input.options.output / (input.split.test.empty() ? "train" : "test") /
+                        (name.string() + ".png"));
+    return files;
+}
+
+/// The run's folder, after a check that no file in it is an input. --config may be the config.json that the run
+/// writes, since that has the same options.
+const std::filesystem::path& checked_folder(const train::RunInput& input) {
+    const std::filesystem::path& folder = input.options.output;
+    std::vector<core::NamedFile> written, read = scene::files_of(input.dataset, "DATASET");
+    for (const char* name : {"config.json", "metrics.jsonl", "checkpoint.ewa", "splats.ply", "summary.json",
+                             "report.html", "exposures.json"})
+        written.push_back({"the run's file", folder / name});
+    const auto renders = render_files(input);
+    for (const int index : report_frames(input.split))
+        written.push_back({"the run's render", renders[size_t(index)]});
+    if (input.options.init != "sfm" && input.options.init != "random")
+        read.push_back({"--init", input.options.init});
+    read.push_back({"DATASET", input.options.scene});
+    core::check_outputs(written, read);
+    return folder;
+}
+
 class Run {
   public:
     Run(const RunOptions& options, RunObserver& observer)
         : observer_(observer),
           begin_(Clock::now()),
+          asked_strategy_(options.train.strategy),
           input_(train::load_run(options)),
-          folder_(input_.options.output),
+          folder_(checked_folder(input_)),
           pace_(options.save_every) {}
 
     RunResult run();
@@ -85,8 +121,9 @@ class Run {
     const RunOptions& options() const { return input_.options; }
     double wall_seconds() const { return earlier_wall_ + options().seconds_before + seconds_since(begin_); }
     void read_checkpoint();
-    void open_folder();
+    void begin_files();
     void start();
+    void list_settings();
     void restore(Trainer& trainer);
     void save_splats(const Gaussians& gaussians) const;
     void save_checkpoint(const Trainer& trainer);
@@ -104,11 +141,14 @@ class Run {
     RunObserver& observer_;
     Clock::time_point begin_;
     double earlier_wall_ = 0;  // of the run that this one continues
+    Strategy asked_strategy_;
     train::RunInput input_;
     train::RunFolder folder_;
     train::SavePace pace_;
     Json settings_;  // of the checkpoint
     std::optional<train::Checkpoint> earlier_;
+    bool continues_ = false;  // from a checkpoint
+    int earlier_steps_ = 0;   // that the checkpoint's run was asked for
     std::shared_ptr<gpu::Device> device_;
     std::optional<report::MetricsLog> log_file_;
     StepReport last_;
@@ -118,16 +158,25 @@ class Run {
 };
 
 void Run::read_checkpoint() {
+    train::check_free(folder_.path(), options());  // again, now that no other run writes here
+    continues_ = options().resume && std::filesystem::exists(folder_.checkpoint());
+    if (continues_) {
+        earlier_ = train::read_checkpoint(folder_.checkpoint());
+        earlier_steps_ =
+            train::continue_from(folder_.checkpoint(), *earlier_, asked_strategy_, input_.options);
+    }
     settings_ =
         train::checkpoint_settings(options(), train::dataset_fingerprint(input_.dataset, input_.split));
-    if (!options().resume || !std::filesystem::exists(folder_.checkpoint())) return;
-    earlier_ = train::read_checkpoint(folder_.checkpoint());
-    train::check_resumable(folder_.checkpoint(), earlier_->settings, settings_);
+    if (continues_) train::check_resumable(folder_.checkpoint(), earlier_->settings, settings_);
 }
 
-/// Writes config.json, which tells before the training whether the folder takes files.
-void Run::open_folder() {
-    folder_.begin(train::to_config(options()));
+/// Called as late as possible, since it ends an earlier run that is replaced.
+void Run::begin_files() {
+    folder_.begin(train::to_config(options()), continues_);
+    log_file_.emplace(folder_.metrics(), report_.metrics);
+}
+
+void Run::list_settings() {
     for (const train::RunOption& option : train::run_options())
         report_.settings.emplace_back(option.name, train::value_text(option, options()));
 }
@@ -172,12 +221,19 @@ void Run::restore(Trainer& trainer) {
         trainer.restore(earlier_->state);
         report_.metrics = report::parse_metrics(earlier_->metrics);
     } catch (const InputError& error) {
-        throw InputError(folder_.checkpoint().string() + ": " + error.what() +
-                         "; without --resume the training starts anew");
+        throw InputError(folder_.checkpoint().string() + ": " + error.what() + "; --force starts anew");
     }
     earlier_wall_ = earlier_->wall_seconds;
     last_ = earlier_->state.report;
-    observer_.on_note(fmt::format("resumed after step {} of {}", last_.step, options().train.steps));
+    const int steps = options().train.steps;
+    // The checkpoint of a finished run lacks the line of its last evaluation.
+    if (steps > earlier_steps_ && last_.step == earlier_steps_)
+        if (const auto line = folder_.logged(last_.step))
+            if (report_.metrics.empty() || report_.metrics.back().step < line->step)
+                report_.metrics.push_back(*line);
+    observer_.on_note(fmt::format(
+        "resumed after step {} of {}{}", last_.step, steps,
+        steps == earlier_steps_ ? "" : fmt::format(", before which the run had --steps {}", earlier_steps_)));
     earlier_.reset();
 }
 
@@ -275,13 +331,8 @@ void Run::evaluate_result(const Gaussians& gaussians, const std::vector<Exposure
 void Run::render_result(const Gaussians& gaussians) {
     const std::vector<Frame>& all = input_.dataset.frames;
     const RenderOptions& render = options().train.render;
-    const auto names = report::picture_names(all);
-    const auto file_of = [&](int index) {
-        return folder_.path() / (report_.held_out ? "test" : "train") /
-               (names[size_t(index)].string() + ".png");
-    };
-    const std::vector<int> frames =
-        spread_out(report_.held_out ? input_.split.test : input_.split.train, kReportImages);
+    const auto files = render_files(input_);
+    const std::vector<int> frames = report_frames(input_.split);
     Renderer renderer(device_, gaussians, render);
     std::vector<report::ReportPicture> images;
     for (const int index : frames) {
@@ -291,13 +342,13 @@ void Run::render_result(const Gaussians& gaussians) {
         Image rendering = renderer.render(frame.camera).color;
         const double db = psnr(rendering, target, weights);
         if (std::isnan(db)) continue;  // no pixel counts
-        core::make_folder(file_of(index).parent_path());
-        save_image(file_of(index), rendering);
+        core::make_folder(files[size_t(index)].parent_path());
+        save_image(files[size_t(index)], rendering);
         const double similarity = ssim(rendering, target, weights);
         images.push_back({frame.name, std::move(target), std::move(rendering), db, similarity});
     }
     report_.pictures = std::move(images);
-    first_render_ = file_of(frames.front());
+    first_render_ = files[size_t(frames.front())];
     if (!options().report_section) return;
     stop_if_asked();
     report_.section =
@@ -339,7 +390,7 @@ void Run::finish(std::unique_ptr<Trainer> trainer) {
 
 RunResult Run::run() {
     read_checkpoint();
-    open_folder();
+    list_settings();
     start();
     auto owned = std::make_unique<Trainer>(device_, input_.dataset, input_.split.train,
                                            std::exchange(input_.start, {}), options().train);
@@ -352,7 +403,7 @@ RunResult Run::run() {
                         trainer.images_on_disk(), options().train.image_cache_bytes >> 20));
     last_.splats = trainer.splats();
     restore(trainer);
-    log_file_.emplace(folder_.metrics(), report_.metrics);
+    begin_files();
     observer_.on_begin(folder_.path(), report_.metrics);
     train(trainer);
     finish(std::move(owned));
@@ -363,6 +414,7 @@ RunResult Run::run() {
 
 RunResult run_training(const RunOptions& options, RunObserver& observer) {
     check_options(options);
+    train::check_free(output_folder(options), options);  // before the dataset is loaded
     return Run(options, observer).run();
 }
 

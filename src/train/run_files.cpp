@@ -5,12 +5,15 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "core/atomic_file.h"
 #include "core/folders.h"
 #include "core/json.h"
+#include "ewa/error.h"
 #include "ewa/splat_files.h"
+#include "report/summary.h"
 
 namespace ewa::train {
 namespace fs = std::filesystem;
@@ -24,15 +27,26 @@ const fs::path& made(const fs::path& folder) {
 
 }  // namespace
 
-RunFolder::RunFolder(const fs::path& path) : path_(path), lock_(made(path)) {
-    core::remove_abandoned_files(path_);
+RunFolder::RunFolder(const fs::path& path) : path_(path), lock_(made(path)) {}
+
+void RunFolder::begin(const nlohmann::ordered_json& config, bool continues) const {
+    core::write_json(path_ / "config.json", config);
+    if (continues) return;
+    std::error_code absent;
+    for (const char* result : {"checkpoint.ewa", "summary.json", "report.html", "exposures.json"})
+        fs::remove(path_ / result, absent);
 }
 
-void RunFolder::begin(const nlohmann::ordered_json& config) const {
-    core::write_json(path_ / "config.json", config);
-    std::error_code absent;
-    for (const char* result : {"summary.json", "report.html", "exposures.json"})
-        fs::remove(path_ / result, absent);
+std::optional<MetricsLine> RunFolder::logged(int step) const {
+    std::ifstream file(metrics());
+    std::optional<MetricsLine> found;
+    for (std::string text; std::getline(file, text);) try {
+            for (const MetricsLine& line : report::parse_metrics(text))
+                if (line.step == step) found = line;
+        } catch (const InputError&) {
+            continue;  // the last line of a killed run may be cut short
+        }
+    return found;
 }
 
 void RunFolder::save_splats(const Gaussians& gaussians, int step, const RenderOptions& render) const {

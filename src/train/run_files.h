@@ -3,6 +3,7 @@
 #pragma once
 #include <filesystem>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,8 +16,7 @@ namespace ewa::train {
 /// A run's folder. No other process can train in it while this lives.
 class RunFolder {
   public:
-    /// Creates the folder and removes what killed processes left half written. Throws RunError if it cannot be
-    /// created or another process uses it.
+    /// Creates the folder. Throws RunError if it cannot be created or another process uses it.
     explicit RunFolder(const std::filesystem::path& path);
 
     const std::filesystem::path& path() const { return path_; }
@@ -24,9 +24,11 @@ class RunFolder {
     std::filesystem::path metrics() const { return path_ / "metrics.jsonl"; }
 
     // All of these throw RunError.
-    /// Writes config.json. Removes the results of an earlier run: they must not stay beside this run's metrics
-    /// if it fails.
-    void begin(const nlohmann::ordered_json& config) const;
+    /// Writes config.json. If the run does not continue an earlier one, removes that run's checkpoint and results,
+    /// but splats.ply: they must not stay beside this run's metrics if it fails.
+    void begin(const nlohmann::ordered_json& config, bool continues) const;
+    /// The last line of metrics.jsonl for this step, if there is one.
+    std::optional<MetricsLine> logged(int step) const;
     void save_splats(const Gaussians& gaussians, int step, const RenderOptions& render) const;
     /// exposures: one for each of the training frames.
     void save_exposures(const Dataset& dataset, const std::vector<int>& frames,

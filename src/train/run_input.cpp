@@ -198,6 +198,7 @@ fs::path output_folder(const RunOptions& options) {
 }
 
 void check_options(const RunOptions& options) {
+    if (options.resume && options.force) throw InputError("--resume and --force exclude each other");
     const TrainOptions& train = options.train;
     if (train.strategy != Strategy::adc && train.strategy != Strategy::automatic &&
         (train.absolute_gradients || train.revised_opacity))

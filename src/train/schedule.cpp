@@ -50,11 +50,11 @@ bool Schedule::was_reset(int step) const {
 }
 
 int Schedule::degree(int step) const {
-    return std::min(sh_degree, (step - 1) / sh_degree_every);
+    return std::min(sh_degree, std::max(least_degree, (step - 1) / sh_degree_every));
 }
 
 int Schedule::halvings_at(int step) const {
-    return std::max(0, halvings - (step - 1) / resolution_every);
+    return std::clamp(halvings - (step - 1) / resolution_every, 0, most_halvings);
 }
 
 double Schedule::mean_rate(int step, double extent) const {
@@ -93,6 +93,8 @@ Schedule schedule_for(const TrainOptions& options) {
     s.sh_degree_every = scaled(options.sh_degree_every, std::min(options.sh_degree_every, kLeastShEvery));
     s.sh_degree = options.sh_degree;
     s.halvings = options.halvings;
+    s.least_degree = options.least_sh_degree;
+    s.most_halvings = options.most_halvings;
     s.resolution_every = scaled(options.resolution_every, 1);
     const double gain = options.strategy == Strategy::mcmc ? 1 : share + (1 - share) * options.short_run_gain;
     s.means_rate = gain * options.means_rate;

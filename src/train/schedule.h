@@ -29,6 +29,7 @@ struct Schedule {
     int sh_degree_every = 0;
     int sh_degree = 0;  // the highest
     int halvings = 0, resolution_every = 0;
+    int least_degree = 0, most_halvings = 64;     // what the run has reached before
     double means_rate = 0, means_rate_final = 0;  // per unit of scene extent
     double sh_rest_rate = 0;                      // of SH above degree 0
     double exposures_rate = 0, exposures_rate_final = 0;

@@ -11,6 +11,7 @@
 
 #include "core/text.h"
 #include "ewa/error.h"
+#include "train/earlier_run.h"
 #include "viewer/app.h"
 
 namespace {
@@ -91,6 +92,14 @@ OpenedScene open_what(const Arguments& arguments, Startup& startup) {
         if (!scene.dataset || !scene.run.empty())
             throw InputError("--train needs a dataset, and " + arguments.path.string() + " is not one");
         scene.remark.clear();
+        RunOptions run;
+        const auto asked = [&](const char* option) {
+            return std::find(arguments.train_options.begin(), arguments.train_options.end(), option) !=
+                   arguments.train_options.end();
+        };
+        run.resume = asked("--resume");
+        run.force = asked("--force");
+        train::check_free(output_of(arguments), run);  // before the window opens
         const auto now = std::filesystem::file_time_type::clock::now();
         startup.watch = live::WhatToWatch{output_of(arguments), {}, {}, now, now};
     } else if (!scene.run.empty() && arguments.picture.empty() && arguments.film.empty()) {

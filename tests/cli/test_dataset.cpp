@@ -68,6 +68,11 @@ TEST(Dataset, GoesOnWhereItWasEnded) {
     // Another scene in the same folder: nothing of the first stays.
     auto other = small("plaster.gltf", folder / "d");
     other[5] = "3";
+    expect_failure(run_ewa(other), 2,
+                   "holds 4 views of another scene or other options; --force replaces them");
+    EXPECT_TRUE(read_file(folder / "d/images/view_002.png") == picture);
+    EXPECT_TRUE(read_file(folder / "d/transforms.json") == transforms);
+    other.push_back("--force");
     EXPECT_EQ(run_ewa(other).status, 0);
     EXPECT_EQ(ewa::load_dataset(folder / "d", {}).frames.size(), 3u);
     EXPECT_FALSE(fs::exists(folder / "d/images/view_003.png"));
@@ -86,7 +91,9 @@ TEST(Dataset, OtherPeoplesFoldersAndWrongUseAreRefused) {
     EXPECT_EQ(read_file(folder / "list/images/mine.txt"), "mine");
     ASSERT_EQ(run_ewa(small("plaster.gltf", folder / "ours")).status, 0);
     write_file(folder / "ours/images/mine.txt", "mine");
-    ASSERT_EQ(run_ewa(small("railing.gltf", folder / "ours")).status, 0);
+    auto railing = small("railing.gltf", folder / "ours");
+    railing.push_back("--force");
+    ASSERT_EQ(run_ewa(railing).status, 0);
     EXPECT_EQ(read_file(folder / "ours/images/mine.txt"), "mine");
     auto wrong = small("plaster.gltf", folder / "d");
     wrong[7] = "24by16";
@@ -155,6 +162,11 @@ TEST(Dataset, TrainRendersAMeshSceneFirst) {
         run_ewa({"train", folder / "leaf.gltf", "-o", folder / "out", "--steps", "2", "--resume"});
     EXPECT_EQ(again.status, 0) << again.err;
     EXPECT_NE(again.out.find("8 existed already"), std::string::npos) << again.out;
+    // Neither the run nor its dataset gives way to another scene.
+    const std::string views = read_file(folder / "out/dataset/photographs.json");
+    expect_failure(run_ewa({"train", kScenes + "plaster.gltf", "-o", folder / "out", "--steps", "2"}), 2,
+                   "holds a finished run of 2 steps");
+    EXPECT_EQ(read_file(folder / "out/dataset/photographs.json"), views);
     expect_failure(run_ewa({"train", folder / "none.glb", "-o", folder / "out3"}), 2, "none.glb");
     EXPECT_FALSE(fs::exists(folder / "out3"));
 }

@@ -38,6 +38,12 @@ class ResumeEdges : public testing::Test {
             steps.push_back(nlohmann::json::parse(line)["step"].get<int>());
         return steps;
     }
+    std::string metrics_line(const std::string& out, int step) {
+        std::istringstream metrics(read_file(folder / (out + "/metrics.jsonl")));
+        for (std::string line; std::getline(metrics, line);)
+            if (nlohmann::json::parse(line)["step"] == step) return line;
+        return {};
+    }
     Folder folder;
 };
 
@@ -90,6 +96,47 @@ TEST_F(ResumeEdges, AfterCtrlCGoesOn) {
     EXPECT_EQ(logged_steps("o"), logged_steps("whole"));
 }
 
+/// A run of 30 steps that goes on to 90 is the same however often it is ended on the way.
+TEST_P(Resume, WithMoreStepsEndsWithTheSameBytes) {
+    const Names common{"--strategy", GetParam(),     "--seed", "5", "--resolution-schedule",
+                       "1",          "--save-every", "7"};
+    const auto to = [&](const std::string& out, const char* steps, const Circumstances& circumstances = {}) {
+        Names options = common;
+        options.insert(options.end(), {"--steps", steps, "--resume"});
+        return train(out, options, circumstances);
+    };
+    for (const char* out : {"once", "often"}) expect_success(to(out, "30"));
+    const std::string first = read_file(folder / "once/splats.ply"), last_line = metrics_line("once", 30);
+    EXPECT_NE(last_line.find("test_psnr"), std::string::npos);
+    // Until the longer run has something to show, the shorter one's result stays whole.
+    ASSERT_EQ(to("once", "90", with_fault("EWA_FAULT_KILL", "12")).status, 128 + SIGKILL);
+    EXPECT_EQ(read_file(folder / "once/splats.ply"), first);
+    EXPECT_EQ(read_json(folder / "once/summary.json")["steps"], 30);
+    EXPECT_TRUE(fs::exists(folder / "once/report.html"));
+    expect_success(to("once", "90"));
+    EXPECT_EQ(read_json(folder / "once/summary.json")["steps"], 90);
+    EXPECT_EQ(read_json(folder / "once/config.json")["steps"], 90);
+    EXPECT_EQ(metrics_line("once", 30), last_line) << "the first run's evaluation is still in the curve";
+
+    for (const char* moment : {"5", "25", "60"})
+        EXPECT_EQ(to("often", "90", with_fault("EWA_FAULT_KILL", moment)).status, 128 + SIGKILL);
+    ASSERT_EQ(to("often", "90", held_at(20, folder / "held", SIGINT)).status, 130);
+    expect_success(to("often", "90"));
+    EXPECT_EQ(read_file(folder / "often/splats.ply"), read_file(folder / "once/splats.ply"));
+    EXPECT_EQ(logged_steps("often"), logged_steps("once"));
+    expect_failure(to("often", "89"), 2, "after the last of --steps 89");
+}
+
+/// `auto` would choose mcmc for so many steps, but nobody asked for another strategy.
+TEST_F(ResumeEdges, AutoKeepsTheStrategyOfTheCheckpoint) {
+    expect_success(train("o", {"--steps", "4"}));
+    ASSERT_EQ(read_json(folder / "o/config.json")["strategy"], "adc");
+    ASSERT_EQ(train("o", {"--steps", "6000", "--resume"}, held_at(20, folder / "held", SIGINT)).status, 130);
+    EXPECT_EQ(read_json(folder / "o/config.json")["strategy"], "adc");
+    EXPECT_GT(read_json(folder / "o/summary.json")["steps"], 4);
+    expect_failure(train("o", {"--steps", "6000", "--strategy", "mcmc", "--resume"}), 2, "--strategy");
+}
+
 TEST_F(ResumeEdges, StartsWhereThereIsNoCheckpoint) {
     expect_success(train("o", {"--steps", "3", "--resume"}));
     EXPECT_EQ(read_json(folder / "o/summary.json")["steps"], 3);
@@ -109,7 +156,8 @@ TEST_F(ResumeEdges, RefusesWhatWouldEndDifferently) {
         EXPECT_EQ(read_file(folder / "o/metrics.jsonl"), log);
         EXPECT_EQ(read_file(folder / "o/summary.json"), summary);
     };
-    expect_failure(train("o", {"--steps", "7", "--seed", "1", "--resume"}), 2, "--steps 6, not 7");
+    expect_failure(train("o", {"--steps", "5", "--seed", "1", "--resume"}), 2,
+                   "is at step 6, after the last of --steps 5");
     expect_failure(train("o", {"--steps", "6", "--seed", "2", "--resume"}), 2, "--seed 1, not 2");
     refused({"--antialias"}, "--kernel");
     refused({"--background", "1,1,1"}, "--background");
@@ -180,7 +228,11 @@ TEST_F(ResumeEdges, NamesACheckpointThatIsWholeButWrong) {
     refused(settings(""), "not valid JSON");
     const std::string dataset = nlohmann::json::parse(good.substr(48, good.find("metrics") - 48))["dataset"];
     const nlohmann::json longer{{"dataset", dataset}, {"options", {{"steps", std::string(100000, 'x')}}}};
-    refused(settings(longer.dump()), "was written with --");
+    refused(settings(longer.dump()), "its settings have --steps");
+    auto stranger = nlohmann::json::parse(good.substr(48, good.find("metrics") - 48));
+    stranger["reached"] = {{"sh_degree", 1e9}, {"halvings", -1}};
+    write_file(path, settings(stranger.dump()));
+    expect_success(train("o", options));
 
     write_file(path, with_section(good, "settings", "settings"));
     expect_success(train("o", options));

@@ -125,6 +125,7 @@ TEST_F(Train, InterruptKeepsWhatIsThere) {
         const Outcome outcome = train(out, {"--steps", "100000000", "--strategy", "none"}, interrupt);
         EXPECT_EQ(outcome.status, 130) << outcome.err;
         EXPECT_EQ(outcome.err, "");
+        EXPECT_TRUE(outcome.out.ends_with("to continue, repeat the command with --resume\n")) << outcome.out;
         const auto summary = read_json(folder / (out + "/summary.json"));
         EXPECT_EQ(summary["interrupted"], true);
         EXPECT_GE(summary["steps"].get<int>(), 1);
@@ -132,11 +133,76 @@ TEST_F(Train, InterruptKeepsWhatIsThere) {
     }
 }
 
+TEST_F(Train, RefusesTheFolderOfAnotherRun) {
+    expect_success(train("o", {"--steps", "4", "--quiet"}));
+    const auto files = [&](const std::string& out) {
+        std::string all;
+        for (const std::string& file : files_below(folder / out))
+            all += file + "\n" + read_file((folder / out) + "/" + file);
+        return all;
+    };
+    const std::string ways = "--force replaces it, -o DIR takes another folder";
+    const auto refused = [&](const std::string& out, const Names& more, const std::string& text) {
+        const std::string before = files(out);
+        const Outcome outcome = train(out, more);
+        expect_failure(outcome, 2, text);
+        EXPECT_NE(outcome.err.find(ways), std::string::npos) << outcome.err;
+        EXPECT_TRUE(files(out) == before);
+    };
+    const double psnr = read_json(folder / "o/summary.json")["test_psnr"];
+    char finished[64];
+    std::snprintf(finished, sizeof(finished), "holds a finished run of 4 steps (%.2f dB); --resume with more",
+                  psnr);
+    refused("o", {"--steps", "3"}, finished);
+    refused("o", {"--steps", "4"}, finished);
+    refused("o", {"--steps", "900"}, finished);
+    expect_failure(train("o", {"--force", "--resume"}), 2, "--force");
+    expect_failure(train("o", {"--steps", "3", "--resume"}), 2, "is at step 4, after the last of --steps 3");
+
+    // A run that was interrupted is not lost by a second call either.
+    ASSERT_EQ(
+        train("i", {"--steps", "60", "--strategy", "none", "--quiet"}, held_at(20, folder / "held", SIGINT))
+            .status,
+        130);
+    const int done = read_json(folder / "i/summary.json")["steps"];
+    const std::string unfinished =
+        "holds an unfinished run, at step " + std::to_string(done) + " of 60; --resume continues";
+    refused("i", {"--steps", "60", "--strategy", "none"}, unfinished);
+    refused("i", {"--steps", "900"}, unfinished);
+
+    // Splats alone, of whatever origin, are no less a result.
+    fs::create_directory(folder / "s");
+    fs::copy_file(folder / "s.ply", folder / "s/splats.ply");
+    refused("s", {"--steps", "3"}, "holds splats.ply without the checkpoint.ewa");
+    refused("s", {"--steps", "3", "--resume"}, "holds splats.ply without the checkpoint.ewa");
+    fs::remove(folder / "o/checkpoint.ewa");
+    refused("o", {"--steps", "9", "--resume"}, "holds a run of 4 steps without the checkpoint.ewa");
+    write_file(folder / "o/checkpoint.ewa", "ply");
+    refused("o", {"--steps", "9"}, "holds a checkpoint.ewa that cannot be read");
+
+    expect_success(train("o", {"--steps", "3", "--quiet", "--force"}));
+    EXPECT_EQ(read_json(folder / "o/summary.json")["steps"], 3);
+    expect_success(train("other", {"--steps", "3", "--quiet"}));
+    EXPECT_EQ(read_file(folder / "o/splats.ply"), read_file(folder / "other/splats.ply"));
+}
+
+/// A mistake in the new run, found before its first step, costs nothing of the earlier run.
+TEST_F(Train, ForceKeepsTheEarlierRunUntilTheNewOneBegins) {
+    expect_success(train("o", {"--steps", "2", "--quiet"}));
+    const Names before = files_below(folder / "o");
+    expect_failure(train("o", {"--steps", "2", "--force"}, with_fault("EWA_FAULT_ALLOCATIONS", "1")), 1,
+                   "memory");
+    EXPECT_EQ(files_below(folder / "o"), before);
+    expect_failure(train("o", {"--steps", "2", "--force", "--max-splats", "9"}), 2, "--max-splats");
+    EXPECT_EQ(files_below(folder / "o"), before);
+    EXPECT_EQ(read_json(folder / "o/config.json")["max-splats"], 1000000);
+}
+
 TEST_F(Train, FullDiskKeepsTheEarlierSplats) {
     expect_success(train("o", {"--steps", "1", "--quiet"}));
     const std::string before = read_file(folder / "o/splats.ply");
     const Circumstances full = with_fault("EWA_FAULT_BYTES", "4096");
-    expect_failure(train("o", {"--steps", "2", "--quiet"}, full), 1, "splats.ply");
+    expect_failure(train("o", {"--steps", "2", "--quiet", "--force"}, full), 1, "splats.ply");
     EXPECT_EQ(read_file(folder / "o/splats.ply"), before);
     EXPECT_FALSE(fs::exists(folder / "o/summary.json"));
 }

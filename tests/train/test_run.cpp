@@ -143,6 +143,19 @@ TEST(Run, StoppedAndResumedEndsWithTheSameBytes) {
     expect_error<InputError>([&] { run_training(options); }, {"--seed 3, not 4"});
 }
 
+TEST(Run, IsNotReplacedUnlessAskedTo) {
+    TempFolder folder;
+    RunOptions options = small_run(folder / "o");
+    run_training(options);
+    const std::string splats = file_bytes(folder / "o/splats.ply");
+    options.train.seed = 4;
+    expect_error<InputError>([&] { run_training(options); }, {"holds a finished run of 40 steps", "--force"});
+    EXPECT_EQ(file_bytes(folder / "o/splats.ply"), splats);
+    options.force = true;
+    run_training(options);
+    EXPECT_NE(file_bytes(folder / "o/splats.ply"), splats);
+}
+
 TEST(Run, RefusesOptionsThatExcludeEachOther) {
     TempFolder folder;
     RunOptions options = small_run(folder / "o");
@@ -151,6 +164,8 @@ TEST(Run, RefusesOptionsThatExcludeEachOther) {
     options.train.strategy = Strategy::automatic;
     EXPECT_NO_THROW(check_options(options));
     EXPECT_EQ(resolve(options.train, {}).strategy, Strategy::adc);
+    options.resume = options.force = true;
+    expect_error<InputError>([&] { run_training(options); }, {"--resume", "--force"});
     EXPECT_FALSE(fs::exists(folder / "o"));
 }
 

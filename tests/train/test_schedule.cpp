@@ -142,6 +142,25 @@ TEST(Schedule, TheResolutionDoublesEachTenthOfTheRun) {
     EXPECT_EQ(schedule_for(options).halvings_at(3), 0);
 }
 
+/// A run of 1000 steps that goes on to 30000: neither its SH degree nor its resolution falls back.
+TEST(Schedule, WhatAContinuedRunHasReachedStays) {
+    TrainOptions options;
+    options.halvings = 2;
+    const Schedule plain = schedule_for(options);
+    EXPECT_EQ(plain.degree(1001), 1);
+    EXPECT_EQ(plain.halvings_at(1001), 2);
+    options.least_sh_degree = 2;
+    options.most_halvings = 1;
+    const Schedule s = schedule_for(options);
+    EXPECT_EQ(s.degree(1001), 2);
+    EXPECT_EQ(s.degree(3001), 3);
+    EXPECT_EQ(s.halvings_at(1001), 1);
+    EXPECT_EQ(s.halvings_at(6001), 0);
+    EXPECT_EQ(s.mean_rate(1001, 1), plain.mean_rate(1001, 1));
+    options.sh_degree = 1;
+    EXPECT_EQ(schedule_for(options).degree(1001), 1);
+}
+
 TEST(Schedule, TheRateOfTheMeansDecaysExponentially) {
     TrainOptions options;
     options.steps = 1000;

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whether a new run may write into a folder that an earlier run has used.
+#pragma once
+#include <filesystem>
+
+#include "ewa/run.h"
+
+namespace ewa::train {
+
+/// Throws InputError if the folder has the result or the checkpoint of a run which the new one would replace. The
+/// message says which run that is, and the ways out. A folder that does not exist is free.
+/// With options.resume, only a result without a checkpoint is refused. The splats of a run that was killed before its
+/// first checkpoint count as free. With options.force, nothing is refused.
+void check_free(const std::filesystem::path& folder, const RunOptions& options);
+
+}  // namespace ewa::train
