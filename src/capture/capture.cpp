@@ -55,12 +55,6 @@ fs::path folder_of_photos(const fs::path& folder) {
     return is_folder(folder / "images") ? folder / "images" : folder;
 }
 
-bool has_photos(const fs::path& folder) {
-    if (!image::images_below(folder).empty()) return true;
-    return std::any_of(fs::directory_iterator(folder), {},
-                       [](const auto& entry) { return is_heic(entry.path()); });
-}
-
 const char* name_of(Matching matching) {
     return matching == Matching::sequence    ? "sequence"
            : matching == Matching::unordered ? "unordered"
@@ -147,20 +141,20 @@ Capture make(const fs::path& input, const fs::path& folder, const CaptureOptions
 }  // namespace
 
 std::vector<fs::path> capture::photos_in(const fs::path& folder) {
-    std::vector<fs::path> photos;
-    for (const fs::path& name : image::images_below(folder)) {
-        const std::string_view format = image::format_name(folder / name);
-        if (format == "jpeg" || format == "png" || format == "tiff" || format == "bmp")
-            photos.push_back(name);
-    }
-    const auto heic = std::count_if(fs::directory_iterator(folder), {},
-                                    [](const auto& entry) { return is_heic(entry.path()); });
     const std::string name = core::one_line(folder.string());
+    const std::vector<fs::path> files = image::images_below(folder);
+    const auto heic = std::count_if(files.begin(), files.end(), is_heic);
     if (heic > 0)
         throw InputError(
             name + ": " + std::to_string(heic) +
             " photos are HEIC, which COLMAP cannot read; convert them, for example with "
             "heif-convert IMG.HEIC IMG.jpg (Debian: libheif-examples), and remove the originals");
+    std::vector<fs::path> photos;
+    for (const fs::path& file : files) {
+        const std::string_view format = image::format_name(folder / file);
+        if (format == "jpeg" || format == "png" || format == "tiff" || format == "bmp")
+            photos.push_back(file);
+    }
     if (photos.size() < kLeastPhotos)
         throw InputError(
             name + " has " + std::to_string(photos.size()) +
@@ -170,7 +164,7 @@ std::vector<fs::path> capture::photos_in(const fs::path& folder) {
 
 bool is_capture(const fs::path& path) {
     if (is_video(path)) return true;
-    return is_folder(path) && !has_cameras(path) && has_photos(folder_of_photos(path));
+    return is_folder(path) && !has_cameras(path) && !image::images_below(folder_of_photos(path)).empty();
 }
 
 Capture make_dataset(const fs::path& input, const fs::path& folder, const CaptureOptions& options,

@@ -223,7 +223,7 @@ std::vector<std::string> place_photos(const Photos& photos, const fs::path& work
                          " photos: too few of their details match; " + kOverlap + " (" + colmap.log_name() +
                          ")");
     std::vector<std::string> remarks;
-    if (models.size() > 1)
+    if (models.size() > 1 && models.front().images < photos.names.size())
         remarks.push_back("the photos fall into " + std::to_string(models.size()) + " separate models of " +
                           sizes_text(models) +
                           " photos. The largest is used. Photos between them would join them");
