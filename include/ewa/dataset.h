@@ -71,9 +71,9 @@ struct PointCloud {
 struct Dataset {
     std::filesystem::path root;
     std::vector<std::filesystem::path> files;  // of cameras and points; the frames name images and masks
-    std::vector<Frame> frames;        // sorted by name
-    PointCloud points;                // may be empty
-    int missing_images = 0;           // entries whose image file does not exist
+    std::vector<Frame> frames;                 // sorted by name
+    PointCloud points;                         // may be empty
+    int missing_images = 0;                    // entries whose image file does not exist
     int dropped_points = 0;           // points with a coordinate that is not finite; they are not in `points`
     std::string first_dropped_point;  // position of the first: file and byte, line or vertex
     /// False if the dataset has "view_dependent": false. Then SH degree 0 suffices.

@@ -34,9 +34,9 @@ struct PlyPoints {
 };
 
 struct ImageRecords {
-    std::filesystem::path folder;     // of the images; images_2 and so on beside it hold smaller copies
+    std::filesystem::path folder;  // of the images; images_2 and so on beside it hold smaller copies
     std::vector<std::filesystem::path> files;  // Dataset::files
-    std::vector<ImageRecord> images;  // in the order of the file
+    std::vector<ImageRecord> images;           // in the order of the file
     PointCloud points;
     DroppedPoints dropped;
     bool color_depends_on_view = true;  // Dataset::color_depends_on_view
