@@ -82,6 +82,7 @@ void place_photos(TrainArguments& arguments) {
     run.scene = (fs::absolute(run.dataset).lexically_normal() / "").parent_path();
     run.output = output_folder(run);
     run.dataset = run.output / "dataset";
+    train::check_free(run.output, run);
     place_with_progress(run.scene, run.dataset, {}, arguments.output.quiet);
 }
 
