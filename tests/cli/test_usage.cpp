@@ -137,7 +137,7 @@ TEST(Usage, ConfigNamesItsMistake) {
     const std::string file = folder / "c.json";
     const std::pair<const char*, const char*> cases[] = {{R"({"wings": 2})", "wings"},
                                                          {R"({"steps": 0})", "--steps"},
-                                                         {R"({"steps": "many"})", "--steps"},
+                                                         {R"({"steps": "many"})", "\"steps\" must be a number"},
                                                          {R"({"steps": {}})", "steps"},
                                                          {R"([1])", "object"},
                                                          {R"({"steps": 3)", "byte"},

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "core/terminal.h"
 #include "core/text.h"
 
 #include <gtest/gtest.h>
@@ -38,7 +39,9 @@ TEST(Text, HelpBreaksBetweenWords) {
         for (int i = 1; i < count; ++i) text += " " + twelve;
         return text;
     };
-    using ewa::core::help_text;
+    const auto help_text = [](std::string_view text, size_t column) {
+        return ewa::core::wrapped_help(text, column, 80);
+    };
     EXPECT_EQ(help_text("", 10), "");
     EXPECT_EQ(help_text("a\n\n  b\n", 10), "a\n\n  b\n");
     EXPECT_EQ(help_text(std::string(80, 'x'), 10), std::string(80, 'x') + "\n");
