@@ -79,7 +79,7 @@ std::string usage_error(const CLI::App& app, const CLI::App& command, const CLI:
     const std::vector<std::string> commands = command_names(app);
     if (&app == &command && argc > 1 && argv[1][0] != '-')
         return std::string("unknown command '") + argv[1] + "'" + core::did_you_mean(argv[1], commands);
-    if (options || error.get_name() == "ExtrasError")
+    if (options || dynamic_cast<const CLI::ExtrasError*>(&error))
         return core::unexpected_arguments(argc, argv, unknown, option_names(command));
     if (&app == &command && error.get_name() == "RequiredError") {
         std::string all;

@@ -70,7 +70,8 @@ class Builder : public nlohmann::json_sax<Json> {
         if (error.id == kNumberOverflow) return "the number " + shown + " is too large";
         if (std::string_view(error.what()).find("ill-formed UTF-8") != std::string_view::npos)
             return "a text that is not UTF-8";
-        if (token.empty()) return "the text ends too early";
+        if (std::string_view(error.what()).find("unexpected end of input") != std::string_view::npos)
+            return "the text ends too early";
         return "unexpected '" + shown + "'";
     }
 

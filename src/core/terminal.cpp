@@ -32,6 +32,7 @@ std::string wrapped_help(std::string_view text, size_t column, size_t width) {
         const size_t end = std::min(text.find('\n'), text.size());
         std::string line(text.substr(0, end));
         text.remove_prefix(std::min(end + 1, text.size()));
+        if (line.empty() && result.ends_with("\n\n")) continue;
         for (size_t comma = line.find(",--"); line.starts_with("  -") && comma < column;
              comma = line.find(",--", comma + 1)) {
             // The blank takes the place of one of those before the description.

@@ -185,7 +185,7 @@ std::optional<std::array<float, 3>> parse_colour(std::string_view text) {
 std::string not_a_colour(std::string_view text) {
     std::vector<std::string> names;
     for (const NamedColour& colour : kColours) names.emplace_back(colour.name);
-    return "'" + std::string(text) +
+    return std::string("'").append(text) +
            "' is not a colour: r,g,b with each in 0..1 such as 1,1,1, a name such as white, or #rrggbb" +
            did_you_mean(text, names);
 }

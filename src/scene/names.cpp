@@ -19,13 +19,14 @@ int checked_index(const Dataset& dataset, int index) {
                      core::counted(dataset.frames.size(), "frame") + ", numbered from 0 in name order");
 }
 
-/// The index of the frame of this name, or -1. Of names without extension only if one frame has it.
+/// The index of the frame of this name, or -1. Without its folder or its extension, only one frame may have it.
 int index_of_name(const Dataset& dataset, const std::string& name) {
     int found = -1, count = 0;
     for (int i = 0; i < std::ssize(dataset.frames); ++i) {
-        const std::string& own = dataset.frames[size_t(i)].name;
+        const fs::path own = dataset.frames[size_t(i)].name;
         if (own == name) return i;
-        if (fs::path(own).replace_extension().string() != name) continue;
+        const fs::path bare = fs::path(own).replace_extension();
+        if (bare != name && own.filename() != name && bare.filename() != name) continue;
         found = i;
         ++count;
     }
@@ -46,7 +47,10 @@ std::pair<int, int> range_of(const Dataset& dataset, const std::string& item) {
     if (first && last && *last < *first) throw InputError("the frames " + item + " end before they begin");
     if (first && last) return {checked_index(dataset, *first), checked_index(dataset, *last)};
     std::vector<std::string> names;
-    for (const Frame& frame : dataset.frames) names.push_back(frame.name);
+    for (const Frame& frame : dataset.frames) {
+        names.push_back(frame.name);
+        names.push_back(fs::path(frame.name).filename().string());
+    }
     throw InputError("'" + item +
                      "' is not all, train, test, a frame's name, or frame indices such as 0,3 or 5-9" +
                      core::did_you_mean(item, names));

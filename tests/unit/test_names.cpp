@@ -24,21 +24,25 @@ ewa::Dataset of_names(const std::vector<std::string>& names) {
 }
 
 TEST(Names, FramesByIndexRangeAndName) {
-    const ewa::Dataset dataset = of_names({"a.jpg", "a/b.jpg", "b.jpg", "b.png", "c-1.jpg", "1-2", "7.jpg"});
+    const ewa::Dataset dataset =
+        of_names({"a.jpg", "a/d.jpg", "b.jpg", "b.png", "c-1.jpg", "1-2", "7.jpg", "x/d.png"});
     const std::pair<const char*, Indices> good[] = {
-        {"0", {0}},   {"0,3", {0, 3}}, {"3,0,3", {3, 0}}, {"2-4", {2, 3, 4}}, {"1,0-2", {1, 0, 2}},
-        {"6-6", {6}}, {"a.jpg", {0}},  {"a", {0}},        {"a/b", {1}},       {"c-1.jpg,0", {4, 0}},
-        {"1-2", {5}}, {"5", {5}},      {"7.jpg", {6}}};
+        {"0", {0}},           {"0,3", {0, 3}}, {"3,0,3", {3, 0}},   {"2-4", {2, 3, 4}},
+        {"1,0-2", {1, 0, 2}}, {"6-6", {6}},    {"a.jpg", {0}},      {"a", {0}},
+        {"a/d", {1}},         {"d.jpg", {1}},  {"d.png,1", {7, 1}}, {"c-1.jpg,0", {4, 0}},
+        {"1-2", {5}},         {"5", {5}},      {"7.jpg", {6}}};
     for (const auto& [list, frames] : good) EXPECT_EQ(frames_named(dataset, list), frames) << list;
-    const std::pair<const char*, const char*> bad[] = {{"7", "no frame 7: photos has 7 frames"},
-                                                       {"5-7", "no frame 7"},
+    const std::pair<const char*, const char*> bad[] = {{"8", "no frame 8: photos has 8 frames"},
+                                                       {"5-8", "no frame 8"},
                                                        {"-1", "no frame -1"},
                                                        {"4-2", "end before they begin"},
                                                        {"b", "'b' is not"},  // two have that name
+                                                       {"d", "'d' is not"},
                                                        {"0,", "'' is not"},
                                                        {"0-", "'0-' is not"},
                                                        {"2-x", "'2-x' is not"},
-                                                       {"c-2.jpg", "did you mean c-1.jpg?"}};
+                                                       {"c-2.jpg", "did you mean c-1.jpg?"},
+                                                       {"d.pngg", "did you mean d.png?"}};
     for (const auto& [list, mistake] : bad) try {
             frames_named(dataset, list);
             ADD_FAILURE() << list;
