@@ -33,8 +33,8 @@ int index_of_name(const Dataset& dataset, const std::string& name) {
     return count == 1 ? found : -1;
 }
 
-/// The first and the last frame of an item.
-std::pair<int, int> range_of(const Dataset& dataset, const std::string& item) {
+/// The first and the last frame of an item of the list.
+std::pair<int, int> range_of(const Dataset& dataset, const std::string& item, const std::string& list) {
     if (const auto index = core::parse_integer<int>(item)) {
         const int checked = checked_index(dataset, *index);
         return {checked, checked};
@@ -51,7 +51,7 @@ std::pair<int, int> range_of(const Dataset& dataset, const std::string& item) {
         names.push_back(frame.name);
         names.push_back(fs::path(frame.name).filename().string());
     }
-    throw InputError("'" + item +
+    throw InputError("'" + list +
                      "' is not all, train, test, a frame's name, or frame indices such as 0,3 or 5-9" +
                      core::did_you_mean(item, names));
 }
@@ -62,7 +62,7 @@ std::vector<int> frames_named(const Dataset& dataset, const std::string& list) {
     std::vector<int> frames;
     for (size_t begin = 0, end = 0; begin <= list.size(); begin = end + 1) {
         end = std::min(list.find(',', begin), list.size());
-        const auto [first, last] = range_of(dataset, list.substr(begin, end - begin));
+        const auto [first, last] = range_of(dataset, list.substr(begin, end - begin), list);
         for (int index = first; index <= last; ++index)
             if (std::find(frames.begin(), frames.end(), index) == frames.end()) frames.push_back(index);
     }

@@ -38,7 +38,7 @@ TEST(Names, FramesByIndexRangeAndName) {
                                                        {"4-2", "end before they begin"},
                                                        {"b", "'b' is not"},  // two have that name
                                                        {"d", "'d' is not"},
-                                                       {"0,", "'' is not"},
+                                                       {"0,", "'0,' is not"},
                                                        {"0-", "'0-' is not"},
                                                        {"2-x", "'2-x' is not"},
                                                        {"c-2.jpg", "did you mean c-1.jpg?"},
