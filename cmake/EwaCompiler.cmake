@@ -23,6 +23,15 @@ set(ewa_is_cold $<BOOL:$<TARGET_PROPERTY:EWA_COLD>>)
 set(ewa_waits $<BOOL:$<TARGET_PROPERTY:EWA_WAITS>>)
 target_compile_options(ewa_compiler INTERFACE
     $<$<AND:$<CONFIG:Release>,$<OR:${ewa_is_test},${ewa_is_cold}>>:$<IF:${ewa_waits},-O0,-O1>>)
+if(NOT EWA_SANITIZE AND NOT EWA_COVERAGE AND NOT EWA_FUZZ)
+    # Targets with EWA_READS read what strangers sent: there, an overrun that no check found ends the program. The loops that
+    # record and wait for a training step are in other targets. A distribution may define the macro itself.
+    set(ewa_hardened $<AND:$<CONFIG:Release>,$<BOOL:$<TARGET_PROPERTY:EWA_READS>>>)
+    target_compile_options(ewa_compiler INTERFACE
+        "$<${ewa_hardened}:-U_FORTIFY_SOURCE;-D_FORTIFY_SOURCE=2;-fstack-protector-strong>")
+    # Functions of libraries are bound at the start, and their table is read-only from then on.
+    add_link_options($<$<CONFIG:Release>:-Wl,-z,relro,-z,now>)
+endif()
 if(EWA_SANITIZE)
     # The tests too: if a test and a module both have an inline function, the linker takes the test's.
     target_compile_options(ewa_compiler INTERFACE -fsanitize=address,undefined -fno-omit-frame-pointer)

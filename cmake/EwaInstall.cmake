@@ -2,6 +2,11 @@
 # What `cmake --install` puts where, and the package that find_package(ewa) reads.
 include(CMakePackageConfigHelpers)
 
+# Whatever the umask: programs load a module from one of these folders.
+set(CMAKE_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE
+                                                WORLD_READ WORLD_EXECUTE)
+set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS ${CMAKE_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS})
+
 # libewa: the modules below the command line and the viewer, in one shared object. A program that links it needs none of the
 # libraries behind it. ewa's own programs link the modules themselves and run without it.
 set(ewa_library_modules core image scene io capture gpu passes pipeline pathtracer report train)

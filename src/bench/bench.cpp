@@ -12,6 +12,7 @@
 #include "bench/result.h"
 #include "bench/stability/stability.h"
 #include "core/json.h"
+#include "core/typing.h"
 #include "ewa/device.h"
 #include "ewa/error.h"
 
@@ -65,6 +66,11 @@ Result measure_all(const Options& options, const std::vector<std::string>& progr
     return result;
 }
 
+CLI::Validator in_range(int low, int high) {
+    return CLI::Validator([low, high](std::string& text) { return core::settle_number(text, low, high); },
+                          "");
+}
+
 }  // namespace
 
 void add_options(CLI::App& app, Options& options) {
@@ -74,7 +80,7 @@ void add_options(CLI::App& app, Options& options) {
         ->type_name("PATTERN,...");
     app.add_flag("--list", options.list, "List the cases and exit");
     app.add_option("--runs", options.runs, "Runs of each case (0: as many as fit in about a second, 5 to 25)")
-        ->check(CLI::Range(0, 1000).description(""))
+        ->transform(in_range(0, 1000))
         ->type_name("N");
     app.add_option("--device", options.device, "Number of the device, or part of its name (see ewa devices)")
         ->type_name("NAME|N");
@@ -95,7 +101,7 @@ void add_options(CLI::App& app, Options& options) {
         ->type_name("");
     app.add_option("--training-steps", options.training_steps,
                    "With --stability: training steps from each scene; 0: none")
-        ->check(CLI::Range(0, 100000).description(""))
+        ->transform(in_range(0, 100000))
         ->type_name("N");
     app.add_flag("--first-step", options.first_step, "The new process that the case first_step starts")
         ->group("");

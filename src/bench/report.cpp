@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bench/result.h"
+#include "core/typing.h"
 #include "ewa/error.h"
 
 namespace ewa::bench {
@@ -268,7 +269,7 @@ std::string compare_text(const Json& old_results, const Json& new_results) {
                 text += compare_case(*old_case, one);
         return text.empty() ? "no case is in both\n" : text;
     } catch (const Json::exception& error) {
-        throw InputError(std::string("not results of the benchmark: ") + error.what());
+        throw InputError("not results of the benchmark: " + std::string(core::plain_reason(error.what())));
     }
 }
 

@@ -9,26 +9,12 @@
 #include "cli/output.h"
 #include "core/text.h"
 #include "ewa/error.h"
+#include "scene/names.h"
 
 namespace ewa::cli {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::vector<int> listed_frames(const Dataset& dataset, const std::string& list) {
-    std::vector<int> frames;
-    for (size_t begin = 0, end = 0; begin <= list.size(); begin = end + 1) {
-        end = std::min(list.find(',', begin), list.size());
-        const auto index = core::parse_integer<int>(std::string_view(list).substr(begin, end - begin));
-        if (!index) throw InputError("'" + list + "' is not all, train, test or frame indices such as 0,3,7");
-        if (*index < 0 || *index >= std::ssize(dataset.frames))
-            throw InputError(
-                fmt::format("there is no frame {}: {} has {} frames, numbered from 0 in name order", *index,
-                            dataset.root.string(), dataset.frames.size()));
-        if (std::find(frames.begin(), frames.end(), *index) == frames.end()) frames.push_back(*index);
-    }
-    return frames;
-}
 
 /// Whether the path names a glTF file of meshes: by its extension, else by its content.
 bool names_mesh_scene(const fs::path& path) {
@@ -41,7 +27,8 @@ bool names_mesh_scene(const fs::path& path) {
 void print_notes(const SyntheticDataset& made, const fs::path& folder) {
     for (const std::string& remark : made.remarks) fmt::print("note: {}\n", core::one_line(remark));
     if (made.dropped_triangles > 0)
-        fmt::print("{} triangles with a corner that is not finite are skipped\n", made.dropped_triangles);
+        fmt::print("skipped {} with a corner that is not finite\n",
+                   core::counted(uint64_t(made.dropped_triangles), "triangle"));
     if (made.unfinished_rays > 0)
         fmt::print("{} rays exceeded the step limit of the device and see nothing\n", made.unfinished_rays);
     if (made.dropped_samples > 0)
@@ -49,14 +36,21 @@ void print_notes(const SyntheticDataset& made, const fs::path& folder) {
     if (made.interrupted)
         fmt::print("interrupted; to continue, repeat the command\n");
     else
-        fmt::print("{} views are in {}{}, exposure {:+.1f} stops; {}\n", made.views,
-                   core::one_line(folder.string()),
+        fmt::print("{} {} in {}{}, exposure {:+.1f} stops; {}\n", core::counted(uint64_t(made.views), "view"),
+                   core::is_or_are(uint64_t(made.views)), core::one_line(folder.string()),
                    made.kept > 0 ? fmt::format(" ({} existed already)", made.kept) : "", made.exposure,
                    made.color_depends_on_view ? "colours depend on the view"
                                               : "every material is diffuse: SH degree 0 suffices");
 }
 
 }  // namespace
+
+CLI::Validator one_of(const std::vector<std::string>& words) {
+    std::string all;
+    for (const std::string& word : words) all += (all.empty() ? "" : ",") + word;
+    return CLI::Validator([words](std::string& text) { return core::settle_word(text, words); },
+                          "{" + all + "}");
+}
 
 CLI::Validator accepted_by(const train::RunOption& option) {
     return CLI::Validator(
@@ -97,16 +91,17 @@ RenderOptions DrawArguments::options() const {
 }
 
 void add_draw_options(CLI::App& app, DrawArguments& arguments) {
-    app.add_option("--background", arguments.background, "Background colour: r,g,b in 0..1")
+    app.add_option("--background", arguments.background,
+                   "Background colour: r,g,b in 0..1, a name such as white, or #rrggbb")
         ->type_name("COLOUR")
         ->capture_default_str();
     const train::RunOption& kernel = train::run_option("kernel");
     app.add_option("--kernel", arguments.kernel, kernel.help)
-        ->check(CLI::IsMember(kernel.choices))
+        ->transform(one_of(kernel.choices))
         ->capture_default_str();
     app.add_flag("--antialias", arguments.antialias, "The same as --kernel antialias");
     app.add_option("--sh-degree", arguments.sh_degree, "Highest degree of the spherical harmonics")
-        ->check(in_range(0, kMaxShDegree))
+        ->transform(in_range(0, kMaxShDegree))
         ->type_name("0..3")
         ->capture_default_str();
 }
@@ -120,14 +115,14 @@ void add_device_options(CLI::App& app, DeviceOptions& options) {
 
 void add_downscale_option(CLI::App& app, int& downscale) {
     app.add_option("--downscale", downscale, train::run_option("downscale").help)
-        ->check(in_range(1, 1024))
+        ->transform(in_range(1, 1024))
         ->type_name("K")
         ->capture_default_str();
 }
 
 void add_test_every_option(CLI::App& app, int& test_every) {
     app.add_option("--test-every", test_every, train::run_option("test-every").help)
-        ->check(in_range(0, 1000000000))
+        ->transform(in_range(0, 1000000000))
         ->type_name("K")
         ->capture_default_str();
 }
@@ -139,7 +134,7 @@ void add_splats(CLI::App& app, fs::path& splats) {
 }
 
 void add_frames_options(CLI::App& app, std::string& frames, int& test_every) {
-    app.add_option("--frames", frames, "all, train, test, or indices in name order such as 0,3,7")
+    app.add_option("--frames", frames, "all, train, test, names, or indices in name order such as 0,3 or 5-9")
         ->type_name("FRAMES")
         ->capture_default_str();
     add_test_every_option(app, test_every);
@@ -151,7 +146,7 @@ void add_quiet_option(CLI::App& app, bool& quiet) {
 
 std::vector<int> select_frames(const Dataset& dataset, const std::string& which, int test_every) {
     if (dataset.frames.empty()) throw InputError(dataset.root.string() + " has no frames");
-    if (which != "all" && which != "train" && which != "test") return listed_frames(dataset, which);
+    if (which != "all" && which != "train" && which != "test") return scene::frames_named(dataset, which);
 
     const Split split = split_frames(dataset, test_every);
     std::vector<int> frames;
@@ -215,7 +210,7 @@ void add_view_options(CLI::App& app, ViewArguments& arguments) {
                arguments.masks = run.masks;
            },
            masks.help)
-        ->check(CLI::IsMember(masks.choices))
+        ->transform(one_of(masks.choices))
         ->default_str("auto");
     add_device_options(app, arguments.device);
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/folders.h"
+#include "core/typing.h"
 #include "ewa/dataset.h"
 #include "ewa/device.h"
 #include "ewa/render_options.h"
@@ -16,11 +17,16 @@
 
 namespace ewa::cli {
 
-/// Accepts a number from low to high. The help shows the option's type name instead of the range.
+/// For Option::transform: accepts a number from low to high, and counts such as 7k. The help shows the option's
+/// type name instead of the range.
 template <typename T>
 CLI::Validator in_range(T low, T high) {
-    return CLI::Range(low, high).description("");
+    return CLI::Validator([low, high](std::string& text) { return core::settle_number(text, low, high); },
+                          "");
 }
+
+/// For Option::transform: accepts one of the words, in either spelling of colour. The help lists them.
+CLI::Validator one_of(const std::vector<std::string>& words);
 
 /// The option's own check, which names neither the option nor where it was read.
 CLI::Validator accepted_by(const train::RunOption& option);
@@ -35,7 +41,7 @@ struct DrawArguments {
     bool antialias = false;  // the short form of --kernel antialias
     int sh_degree = kMaxShDegree;
 
-    /// Throws InputError if the background is not three numbers in [0, 1].
+    /// Throws InputError if the background is not a colour.
     RenderOptions options() const;
 };
 void add_draw_options(CLI::App& app, DrawArguments& arguments);
@@ -52,8 +58,8 @@ void add_frames_options(CLI::App& app, std::string& frames, int& test_every);
 void add_quiet_option(CLI::App& app, bool& quiet);
 void add_test_every_option(CLI::App& app, int& test_every);
 
-/// The indices of the frames that --frames names: "all", "train", "test", or a list such as "0,3,7" in name
-/// order. Throws InputError, also if there are none.
+/// The indices of the frames that --frames names: "all", "train", "test", or a list that scene::frames_named
+/// reads. Throws InputError, also if there are none.
 std::vector<int> select_frames(const Dataset& dataset, const std::string& which, int test_every);
 
 // A DATASET is what load_dataset reads, or a glTF file of meshes.

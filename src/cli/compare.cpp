@@ -81,7 +81,8 @@ double nearness(const ImageDifference& d) {
     return std::min(d.psnr, -20 * std::log10(d.rms_error));
 }
 
-/// JSON has no number for an infinite PSNR, which equal images have: null.
+/// JSON has no number for an infinite PSNR, which equal images have, nor for NaN: null. "identical" and "nan" tell
+/// which it is.
 Json number(double value) {
     return std::isfinite(value) ? Json(value) : Json();
 }
@@ -96,6 +97,7 @@ Json to_json(const Compared& compared) {
             {"mean_error", number(d.mean_error)},
             {"rms", number(d.rms_error)},
             {"identical", d.max_error == 0},
+            {"nan", std::isnan(d.psnr)},
             {"passed", compared.failed.empty()},
             {"failed", compared.failed}};
 }
@@ -194,8 +196,8 @@ int run(const CompareArguments& arguments) {
         fmt::print("{}  has no image of this name on the other side\n", core::one_line(picture));
     for (const ComparedSide* side : {sides.a.get(), sides.b.get()})
         if (side->skipped_splats > 0)
-            fmt::print("{}: {} splats with a value that is not finite were skipped\n",
-                       core::one_line(side->side), side->skipped_splats);
+            fmt::print("{}: skipped {} with a value that is not finite\n", core::one_line(side->side),
+                       core::counted(side->skipped_splats, "splat"));
     // A missing image is the largest difference of all.
     const bool judged = arguments.threshold || arguments.max_error;
     const bool passed = !judged || (totals.passed && unpaired.empty());
@@ -204,6 +206,8 @@ int run(const CompareArguments& arguments) {
                      {"ssim", number(totals.ssim)},
                      {"max_error", number(totals.max_error)},
                      {"rms", number(totals.rms)},
+                     {"identical", totals.max_error == 0},
+                     {"nan", std::isnan(totals.psnr)},
                      {"worst", to_json(*totals.worst)},
                      {"passed", passed},
                      {"pictures", Json::array()},
@@ -230,12 +234,12 @@ Action add_compare(CLI::App& app) {
     app.add_option("--threshold", arguments->threshold,
                    "Exit with status 1 if the PSNR of an image is lower, over RGB in 0..1 or over all values "
                    "with alpha, or if an image has no partner")
-        ->check(in_range(0.0, 1000.0))
+        ->transform(in_range(0.0, 1000.0))
         ->type_name("PSNR");
     app.add_option(
            "--max-error", arguments->max_error,
            "Exit with status 1 if two values, alpha included, differ by more, or if an image has no partner")
-        ->check(in_range(0.0, 1e9))
+        ->transform(in_range(0.0, 1e9))
         ->type_name("E");
     app.add_option("--json", arguments->json, "Write the results to this file")->type_name("FILE");
     app.add_option(
@@ -243,7 +247,7 @@ Action add_compare(CLI::App& app) {
            "Write the error as an image (.png, .exr); for folders: one image per pair into this folder")
         ->type_name("OUT");
     app.add_option("--heat-scale", arguments->heat_scale, "Error that the heat map shows brightest")
-        ->check(in_range(1e-9, 1e9))
+        ->transform(in_range(1e-9, 1e9))
         ->type_name("E")
         ->capture_default_str();
     CLI::Option* cameras =

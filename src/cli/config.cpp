@@ -2,16 +2,48 @@
 #include "cli/config.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "core/json.h"
 #include "ewa/error.h"
 #include "report/summary.h"
+#include "train/run_options.h"
 
 namespace ewa::cli {
 namespace {
 
 using report::Json;
+
+/// Whether the option's value is a number, as config.json of a run has it.
+bool takes_number(const std::string& name, const Json& value) {
+    const auto& all = train::run_options();
+    const auto option =
+        std::find_if(all.begin(), all.end(), [&](const auto& one) { return one.name == name; });
+    if (option == all.end()) return false;
+    RunOptions options;
+    if (option->get(options).is_number()) return true;
+    try {
+        option->set(options, value.get<std::string>());
+    } catch (const InputError&) {
+        return false;  // the option itself will refuse it
+    }
+    return option->get(options).is_number();
+}
+
+/// Refuses a value of another JSON type than config.json of a run has.
+void check_type(const CLI::Option& option, const Json& value, const std::string& where) {
+    const std::string name = option.get_lnames().empty() ? "dataset" : option.get_lnames().front();
+    const bool flag = option.get_expected_max() == 0;
+    if (flag && !value.is_boolean()) throw InputError(where + " must be true or false, without quotes");
+    if (!flag && value.is_boolean()) throw InputError(where + " takes a value, not true or false");
+    if (value.is_string() && takes_number(name, value))
+        throw InputError(where + " must be a number, without quotes");
+    // A device and a port may be numbers or texts.
+    const bool text = name == "dataset" || name == "init" || name == "output";
+    if (text && !value.is_string()) throw InputError(where + " must be a text in quotes");
+    if (value.is_array() && name != "background") throw InputError(where + " takes one value, not a list");
+}
 
 /// As the value would stand on the command line.
 std::string option_text(const Json& value, const std::string& where) {
@@ -47,7 +79,9 @@ void apply_config(CLI::App& app, const std::filesystem::path& file) {
         const std::string where = file.string() + ": \"" + name + "\"";
         CLI::Option* option = find_option(app, name);
         if (!option) throw InputError(where + " is not an option of ewa " + app.get_name());
-        if (!value.is_null() && !given(app, name)) values.emplace_back(option, option_text(value, where));
+        if (value.is_null() || given(app, name)) continue;
+        values.emplace_back(option, option_text(value, where));
+        check_type(*option, value, where);
     }
     for (const auto& [option, text] : values) {
         option->add_result(text);

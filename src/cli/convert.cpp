@@ -187,14 +187,14 @@ void add_editing_options(CLI::App& app, ConvertArguments& arguments) {
         ->type_name("x,y,z,X,Y,Z");
     app.add_option("--min-opacity", arguments.edits.min_opacity,
                    "Keep only splats with at least this opacity")
-        ->check(in_range(0.0, 1.0))
+        ->transform(in_range(0.0, 1.0))
         ->type_name("0..1");
     app.add_option("--max-sh", arguments.edits.max_sh, "Reduce the spherical harmonics to this degree")
-        ->check(in_range(0, kMaxShDegree))
+        ->transform(in_range(0, kMaxShDegree))
         ->type_name("0..3");
     app.add_option("--sort", arguments.sort,
                    "Order of the splats: morton puts neighbours in space next to each other in the file")
-        ->check(CLI::IsMember({"morton"}))
+        ->transform(one_of({"morton"}))
         ->type_name("ORDER");
 }
 
@@ -211,7 +211,7 @@ Action add_convert(CLI::App& app) {
     add_editing_options(app, *arguments);
     app.add_option("--spz-version", arguments->spz_version,
                    "SPZ version: 3 (every reader supports it) or 4 (newer, smaller files)")
-        ->check(CLI::IsMember({3, 4}))
+        ->transform(one_of({"3", "4"}))
         ->type_name("3|4")
         ->capture_default_str();
     app.add_flag("--allow-empty", arguments->allow_empty, "Write the output even if no splat is left");

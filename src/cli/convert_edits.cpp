@@ -8,7 +8,7 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "core/text.h"
+#include "core/typing.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
 
@@ -144,8 +144,8 @@ std::optional<std::string> apply_edits(Gaussians& gaussians, const Edits& edits,
         const size_t before = gaussians.size();
         keep_if(gaussians, [&](size_t i) { return drawable(gaussians, i); });
         if (gaussians.size() < before)
-            remark = fmt::format("{} splats with a value that is not finite or a zero quaternion are skipped",
-                                 before - gaussians.size());
+            remark = "skipped " + core::counted(before - gaussians.size(), "splat") +
+                     " with a value that is not finite or a zero quaternion";
     }
     if (edits.morton || format == SplatFormat::compressed_ply)
         select_splats(gaussians, morton_order(gaussians));

@@ -65,17 +65,17 @@ Action add_dataset(CLI::App& app) {
     app.add_option("--views", arguments->views,
                    "Number of cameras on a dome over the scene; 0: the cameras of the file "
                    "[those of the file if it has 8 or more, else 48]")
-        ->check(in_range(0, 100000))
+        ->transform(in_range(0, 100000))
         ->type_name("N");
     app.add_option("--size", arguments->size, "Width and height in pixels")
         ->type_name("WxH")
         ->capture_default_str();
     app.add_option("--samples", options.samples, "Paths per pixel")
-        ->check(in_range(1, 65536))
+        ->transform(in_range(1, 65536))
         ->type_name("N")
         ->capture_default_str();
     app.add_option("--points", options.points, "Points on the surfaces, for initial splats; 0: none")
-        ->check(in_range(0, 10000000))
+        ->transform(in_range(0, 10000000))
         ->type_name("N")
         ->capture_default_str();
     app.add_option("--exposure", arguments->exposure, "Exposure in stops, or auto")

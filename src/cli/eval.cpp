@@ -46,9 +46,11 @@ int run(const EvalArguments& arguments) {
         evaluate(open_device(arguments.views.device), gaussians, dataset, frames, options);
     for (const EvalFrame& frame : evaluation.frames)
         fmt::print("{}  PSNR {:.3f} dB  SSIM {:.5f}\n", core::one_line(frame.name), frame.psnr, frame.ssim);
-    if (dataset.missing_images > 0) fmt::print("{} images are missing and skipped\n", dataset.missing_images);
-    fmt::print("mean of {} frames ({})  PSNR {:.3f} dB  SSIM {:.5f}  in {:.2f} s\n", evaluation.frames.size(),
-               arguments.split, evaluation.psnr, evaluation.ssim, evaluation.seconds);
+    if (dataset.missing_images > 0)
+        fmt::print("{} missing and skipped\n", core::counted(uint64_t(dataset.missing_images), "image"));
+    fmt::print("mean of {} ({})  PSNR {:.3f} dB  SSIM {:.5f}  in {:.2f} s\n",
+               core::counted(evaluation.frames.size(), "frame"), arguments.split, evaluation.psnr,
+               evaluation.ssim, evaluation.seconds);
     if (!arguments.json.empty()) write_json(arguments.json, to_json(evaluation));
     return 0;
 }
@@ -59,7 +61,7 @@ Action add_eval(CLI::App& app) {
     const auto arguments = std::make_shared<EvalArguments>();
     add_view_positionals(app, arguments->views);
     app.add_option("--split", arguments->split, "Frames to evaluate: test, train or all")
-        ->check(CLI::IsMember({"test", "train", "all"}))
+        ->transform(one_of({"test", "train", "all"}))
         ->capture_default_str();
     add_test_every_option(app, arguments->test_every);
     app.add_option("--json", arguments->json, "Write the results to this file")->type_name("FILE");

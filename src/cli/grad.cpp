@@ -21,7 +21,7 @@ namespace {
 struct GradArguments {
     ViewArguments views;
     std::filesystem::path output, json;
-    int frame = 0;
+    std::string frame;
 };
 
 int run(const GradArguments& arguments) {
@@ -35,7 +35,8 @@ int run(const GradArguments& arguments) {
     const std::vector<NamedFile> written{{"--output", arguments.output}, {"--json", arguments.json}};
     check_outputs(written, {{"SPLATS", arguments.views.splats}, {"DATASET", arguments.views.dataset}});
     const Gaussians gaussians = load_splats(arguments.views.splats);
-    const auto [dataset, frames, folder] = load_views(arguments.views, std::to_string(arguments.frame), 0);
+    const auto [dataset, frames, folder] = load_views(arguments.views, arguments.frame, 0);
+    if (frames.size() > 1) throw InputError("--frame: '" + arguments.frame + "' is more than one frame");
     check_outputs(written, scene::files_of(dataset, "DATASET"));
     const int index = frames.front();
     const Frame& frame = dataset.frames[size_t(index)];
@@ -55,8 +56,9 @@ int run(const GradArguments& arguments) {
     fmt::print("{}  loss {:.7g}  L1 {:.7g}  SSIM {:.7g}\n", core::one_line(frame.name), result.loss,
                result.l1, result.ssim);
     if (result.skipped_nonfinite > 0)
-        fmt::print("{} splats with a value that is not finite were skipped\n", result.skipped_nonfinite);
-    fmt::print("the gradient of {} splats is in {}\n", result.gradient.size(),
+        fmt::print("skipped {} with a value that is not finite\n",
+                   core::counted(result.skipped_nonfinite, "splat"));
+    fmt::print("the gradient of {} is in {}\n", core::counted(result.gradient.size(), "splat"),
                core::one_line(arguments.output.string()));
     return 0;
 }
@@ -66,10 +68,16 @@ int run(const GradArguments& arguments) {
 Action add_grad(CLI::App& app) {
     const auto arguments = std::make_shared<GradArguments>();
     add_view_positionals(app, arguments->views);
-    app.add_option("--frame", arguments->frame, "Index of the view over all frames, in name order from 0")
+    app.add_option("--frame", arguments->frame,
+                   "The view: its index over all frames, in name order from 0, or its name")
         ->required()
-        ->check(in_range(0, 1000000000))
-        ->type_name("I");
+        ->check(CLI::Validator(
+            [](const std::string& text) {
+                const bool below = core::parse_integer<int>(text).value_or(0) < 0;
+                return below ? "'" + text + "' is no frame: frames are numbered from 0" : std::string();
+            },
+            ""))
+        ->type_name("I|NAME");
     app.add_option("-o,--output", arguments->output,
                    "PLY with the properties of a splat file; each holds the gradient dL/d(stored value)")
         ->required()

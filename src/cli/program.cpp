@@ -7,9 +7,12 @@
 #include <cstring>
 #include <functional>
 #include <new>
+#include <sstream>
 
 #include "cli/command.h"
 #include "cli/interrupt.h"
+#include "cli/usage.h"
+#include "core/terminal.h"
 #include "core/text.h"
 #include "ewa/error.h"
 
@@ -39,15 +42,24 @@ int status_of(const Action& action) {
     }
 }
 
+int fail_to_print(const std::string& who) {
+    return fail(who, std::string("cannot write to standard output: ") + std::strerror(errno), kFailed);
+}
+
+/// --help and --version: what CLI11 prints.
+int print_text(const CLI::App& app, const CLI::ParseError& asked) {
+    std::ostringstream text;
+    app.exit(asked, text, text);
+    return core::print_whole(text.str()) ? kDone : fail_to_print("ewa");
+}
+
 int run(const Command& command) {
     const std::string who = std::string("ewa ") + command.name;
     try {
         remove_temporary_files_on_signals();
         const int status = status_of(command.action);
         // If output is redirected to a full disk, only this flush fails.
-        if (std::fflush(stdout) != 0)
-            return fail(who, std::string("cannot write to standard output: ") + std::strerror(errno),
-                        kFailed);
+        if (std::fflush(stdout) != 0) return fail_to_print(who);
         if (std::ferror(stdout)) return fail(who, "cannot write all of standard output", kFailed);
         return status;
     } catch (const InputError& error) {
@@ -105,19 +117,22 @@ int run_program(int argc, char** argv) {
     for (Command& command : commands) {
         command.app = app.add_subcommand(command.name, command.description);
         command.action = command.add(*command.app);
+        group_by_subject(*command.app);
     }
 
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
-        if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) return app.exit(error);
+        if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) return print_text(app, error);
         std::string who = "ewa";
+        const CLI::App* given = &app;
         for (const Command& command : commands)
-            if (command.app->parsed()) who += std::string(" ") + command.name;
-        std::string what = error.what();
-        // CLI11 asks for a sub-command without naming the unknown one.
-        if (who == "ewa" && argc > 1 && argv[1][0] != '-') what = "unknown command " + shell_quoted(argv[1]);
-        return fail(who, what + " (see " + who + " --help)", kWrongUse);
+            if (command.app->parsed()) {
+                who += std::string(" ") + command.name;
+                given = command.app;
+            }
+        return fail(who, usage_error(app, *given, error, argc, argv) + " (see " + who + " --help)",
+                    kWrongUse);
     }
     for (const Command& command : commands)
         if (command.app->parsed()) return run(command);

@@ -82,8 +82,9 @@ int run(const RenderArguments& arguments) {
         progress.update(static_cast<int>(i) + 1);
     }
     if (skipped > 0)
-        progress.note(fmt::format("{} splats with a value that is not finite were skipped", skipped));
-    progress.note(fmt::format("{} images are in {}", frames.size(), arguments.output.string()));
+        progress.note("skipped " + core::counted(skipped, "splat") + " with a value that is not finite");
+    progress.note(fmt::format("{} {} in {}", core::counted(frames.size(), "image"),
+                              core::is_or_are(frames.size()), arguments.output.string()));
     return 0;
 }
 
@@ -102,11 +103,11 @@ Action add_render(CLI::App& app) {
     add_frames_options(app, arguments->frames, arguments->test_every);
     app.add_option("--format", arguments->format,
                    "File format: png (8 bit, clamped) or exr (float32, not clamped)")
-        ->check(CLI::IsMember({"png", "exr"}))
+        ->transform(one_of({"png", "exr"}))
         ->capture_default_str();
     app.add_option("--mode", arguments->mode,
                    "color, depth (view z; divided by its maximum in a png) or alpha")
-        ->check(CLI::IsMember({"color", "depth", "alpha"}))
+        ->transform(one_of({"color", "depth", "alpha"}))
         ->capture_default_str();
     add_draw_options(app, arguments->draw);
     add_downscale_option(app, arguments->downscale);

@@ -32,7 +32,8 @@ struct TrainArguments {
 
 void add_run_option(CLI::App& app, const train::RunOption& option, RunOptions& options) {
     const bool positional = option.name == "dataset";
-    const std::string name = positional ? "DATASET" : "--" + option.name;
+    std::string name = positional ? "DATASET" : "--" + option.name;
+    if (option.name == "steps") name += ",--iterations,--iters";  // as other trainers call them
     if (option.flag) {
         app.add_flag(name, option.flag(options), option.help);
         return;
@@ -42,7 +43,7 @@ void add_run_option(CLI::App& app, const train::RunOption& option, RunOptions& o
     if (option.choices.empty())
         added->check(accepted_by(option))->type_name(positional ? "" : option.value);
     else
-        added->check(CLI::IsMember(option.choices))->type_name(option.value);
+        added->transform(one_of(option.choices))->type_name(option.value);
     added->default_str(train::value_text(option, options));
 }
 

@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "core/messages.h"
-#include "core/text.h"
+#include "core/typing.h"
 #include "ewa/error.h"
 #include "live/server.h"
 #include "live/watcher.h"
@@ -97,8 +97,9 @@ void TrainObserver::on_note(const std::string& line) {
 }
 
 void TrainObserver::on_start(const RunStart& start) {
-    on_note(fmt::format("{}: {} views to train on, {} held out, {}x{}; {} splats to start from", start.name,
-                        start.train_views, start.test_views, start.width, start.height, start.splats));
+    on_note(fmt::format("{}: {} to train on, {} held out, {}x{}; {} to start from", start.name,
+                        core::counted(start.train_views, "view"), start.test_views, start.width, start.height,
+                        core::counted(start.splats, "splat")));
     for (const std::string& remark : start.remarks) on_note(remark);
     on_note("device: " + start.device.name);
     const MemoryEstimate& memory = start.memory;
@@ -158,18 +159,20 @@ void TrainObserver::on_evaluated(const StepReport& step, const Gaussians& gaussi
 
 void TrainObserver::print(const RunResult& result) {
     const Summary& s = result.summary;
-    on_note(fmt::format("{} {} steps in {} of training ({} in all), {} splats",
-                        s.interrupted ? "interrupted after" : "trained", s.steps,
-                        core::duration_text(s.seconds), core::duration_text(s.wall_seconds), s.splats));
+    on_note(fmt::format("{} {} in {} of training ({} in all), {}",
+                        s.interrupted ? "interrupted after" : "trained",
+                        core::counted(uint64_t(s.steps), "step"), core::duration_text(s.seconds),
+                        core::duration_text(s.wall_seconds), core::counted(s.splats, "splat")));
     if (s.test_psnr) on_note(fmt::format("held-out PSNR {:.2f} dB, SSIM {:.4f}", *s.test_psnr, *s.test_ssim));
     if (s.train_psnr) on_note(fmt::format("training PSNR {:.2f} dB", *s.train_psnr));
     if (s.skipped_nonfinite > 0)
-        on_note(
-            fmt::format("{} splats have a value that is not finite and are skipped", s.skipped_nonfinite));
+        on_note("skipped " + core::counted(s.skipped_nonfinite, "splat") +
+                " with a value that is not finite");
     if (s.dropped_updates > 0)
-        on_note(fmt::format("{} updates were not finite and were dropped", s.dropped_updates));
+        on_note("dropped " + core::counted(s.dropped_updates, "update") + " that were not finite");
     if (s.limited_steps > 0)
-        on_note(fmt::format("{} updates were too long for their splat and were shortened", s.limited_steps));
+        on_note("shortened " + core::counted(s.limited_steps, "update") +
+                " that were too long for their splat");
     on_note("splats:  " + (result.folder / "splats.ply").string());
     on_note("report:  " + (result.folder / "report.html").string());
     if (!result.first_render.empty()) on_note("render:  " + result.first_render.string());

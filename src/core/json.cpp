@@ -16,7 +16,7 @@ namespace ewa::core {
 namespace {
 
 constexpr size_t kMostOrderedKeys = 1024;
-constexpr size_t kLongestReason = 300;  // limits nlohmann's message, which may quote the text at any length
+constexpr size_t kLongestReason = 100;  // limits what is quoted of the text
 
 /// Builds the value from nlohmann's parser events. nlohmann's own callback searches the parent at the end of
 /// every object and list, which takes quadratic time.
@@ -56,12 +56,25 @@ class Builder : public nlohmann::json_sax<Json> {
     bool end_object() override { return close(); }
     bool end_array() override { return close(); }
 
-    bool parse_error(std::size_t byte, const std::string&, const nlohmann::json::exception& error) override {
+    bool parse_error(std::size_t byte, const std::string& token,
+                     const nlohmann::json::exception& error) override {
         throw InputError(name_ + ": byte " + std::to_string(limits_.begin + byte) +
-                         ": not valid JSON: " + one_line(error.what()).substr(0, kLongestReason));
+                         ": not valid JSON: " + reason(token, error));
     }
 
   private:
+    /// In plain words: nlohmann's message names its exception and its parser's states.
+    static std::string reason(const std::string& token, const nlohmann::json::exception& error) {
+        constexpr int kNumberOverflow = 406;
+        const std::string shown = one_line(token).substr(0, kLongestReason);
+        if (error.id == kNumberOverflow) return "the number " + shown + " is too large";
+        if (std::string_view(error.what()).find("ill-formed UTF-8") != std::string_view::npos)
+            return "a text that is not UTF-8";
+        if (std::string_view(error.what()).find("unexpected end of input") != std::string_view::npos)
+            return "the text ends too early";
+        return "unexpected '" + shown + "'";
+    }
+
     /// Whether the current value is skipped or is part of a skipped value.
     bool skipping() const { return skipped_from_ >= 0; }
 

@@ -35,8 +35,8 @@ std::optional<T> parse_integer(std::string_view word) {
     return value;
 }
 
-/// The help text of a command line parser for a terminal of 80 columns. Breaks lines between words, and turns
-/// "-o,--output" into "-o, --output". column: where the descriptions of options begin.
+/// The help text of a command line parser for this terminal: wrapped_help() of core/terminal.h at its width.
+/// column: where the descriptions of options begin.
 std::string help_text(std::string_view text, size_t column);
 
 /// Makes a CLI11 parser and the sub-commands that are added later print their help in this way. A template,

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/json.h"
-#include "core/text.h"
+#include "core/typing.h"
 #include "ewa/error.h"
 
 namespace ewa::live {
@@ -60,7 +60,7 @@ Status decode_status(const std::string& text) {
     } catch (const InputError& error) {
         throw InputError(name + " cannot be read: " + error.what());
     } catch (const Json::exception& error) {
-        throw InputError(name + " cannot be read: " + core::one_line(error.what()));
+        throw InputError(name + " cannot be read: " + core::one_line(core::plain_reason(error.what())));
     }
 }
 

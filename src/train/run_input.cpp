@@ -12,9 +12,12 @@
 #include <numbers>
 
 #include "core/random.h"
+#include "core/typing.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
+#include "scene/names.h"
+#include "train/schedule.h"
 
 namespace ewa::train {
 namespace {
@@ -67,6 +70,43 @@ glm::dvec3 seen_point(const Dataset& dataset, const std::vector<int>& frames, co
     return point_on_a_ray(dataset.frames[size_t(frames[which])].camera, sphere.radius, u);
 }
 
+/// Whether the strategy changes the number of splats at least once.
+bool refines(const TrainOptions& options) {
+    const Schedule schedule = schedule_for(options);
+    return options.strategy == Strategy::mcmc
+               ? schedule.refine_start + schedule.relocate_every < schedule.relocate_stop
+               : schedule.refine_start + schedule.refine_every < schedule.refine_stop;
+}
+
+/// What to tell of a run whose strategy never gets to work.
+std::optional<std::string> too_short_remark(const TrainOptions& options) {
+    if (options.strategy == Strategy::none || refines(options)) return std::nullopt;
+    constexpr int kMostTried = 30000;
+    TrainOptions longer = options;
+    while (longer.steps < kMostTried && !refines(longer)) ++longer.steps;
+    const char* name = options.strategy == Strategy::mcmc ? "mcmc" : "adc";
+    return fmt::format("{} {} too few for {} to add or remove splats; it needs --steps {} or more",
+                       core::counted(uint64_t(options.steps), "step"),
+                       core::is_or_are(uint64_t(options.steps)), name, longer.steps);
+}
+
+/// Throws InputError if --downscale makes a training image too small to learn from.
+void check_downscale(const RunInput& input) {
+    constexpr int kLeastSide = 16;  // px; SSIM's window has 11
+    const int factor = input.options.downscale;
+    if (factor == 1) return;
+    for (const int i : input.split.train) {
+        const Frame& frame = input.dataset.frames[size_t(i)];
+        const int side = std::min(frame.camera.width, frame.camera.height);
+        if (side >= kLeastSide) continue;
+        const int most = std::max(1, std::min(frame.pinhole.width, frame.pinhole.height) / kLeastSide);
+        throw InputError(
+            fmt::format("--downscale {} leaves {}x{} pixels of the image {}; a side needs {} or more, as "
+                        "with --downscale {}",
+                        factor, frame.camera.width, frame.camera.height, frame.name, kLeastSide, most));
+    }
+}
+
 void add_remarks(RunInput& input) {
     const Dataset& dataset = input.dataset;
     if (input.without_view_dependence())
@@ -74,10 +114,14 @@ void add_remarks(RunInput& input) {
     if (input.options.init == "sfm" && dataset.points.positions.empty())
         input.remarks.emplace_back("the dataset has no points: training starts from random splats");
     if (dataset.missing_images > 0)
-        input.remarks.push_back(fmt::format("{} images are missing and are skipped", dataset.missing_images));
+        input.remarks.push_back(fmt::format("{} {} missing and skipped",
+                                            core::counted(uint64_t(dataset.missing_images), "image"),
+                                            core::is_or_are(uint64_t(dataset.missing_images))));
     if (dataset.dropped_points > 0)
-        input.remarks.push_back(fmt::format("{} points have a coordinate that is not finite and are skipped",
-                                            dataset.dropped_points));
+        input.remarks.push_back(fmt::format("{} with a coordinate that is not finite {} skipped",
+                                            core::counted(uint64_t(dataset.dropped_points), "point"),
+                                            core::is_or_are(uint64_t(dataset.dropped_points))));
+    if (const auto remark = too_short_remark(input.options.train)) input.remarks.push_back(*remark);
 }
 
 }  // namespace
@@ -169,6 +213,7 @@ RunInput load_run(const RunOptions& options) {
         throw InputError(fmt::format("{}: of {} images ({} missing) none is left to train on",
                                      options.dataset.string(), input.dataset.frames.size(),
                                      input.dataset.missing_images));
+    check_downscale(input);
     TrainOptions& train = input.options.train;
     train = resolve(train, input.dataset);
     train.render.sh_degree = train.sh_degree;
@@ -185,12 +230,7 @@ namespace fs = std::filesystem;
 
 std::string run_name(const RunOptions& options) {
     if (!options.scene.empty()) return options.scene.stem().string();
-    std::error_code error;
-    fs::path path = fs::weakly_canonical(options.dataset, error);
-    if (error) path = options.dataset;
-    if (path.has_extension() && !fs::is_directory(path, error)) path = path.parent_path();
-    const std::string name = path.filename().string();
-    return name.empty() || name == "." || name == ".." ? "dataset" : name;
+    return scene::dataset_name(options.dataset);
 }
 
 fs::path output_folder(const RunOptions& options) {

@@ -4,12 +4,11 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <charconv>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <utility>
 
-#include "core/text.h"
+#include "core/typing.h"
 #include "ewa/error.h"
 
 namespace ewa::train {
@@ -42,7 +41,7 @@ const T& read(Member<T> member, const RunOptions& options) {
 
 template <class T>
 T parse_within(const std::string& text, T low, T high) {
-    const auto value = core::parse_integer<T>(text);
+    const auto value = core::parse_count<T>(text);
     if (!value || *value < low || *value > high)
         throw InputError(fmt::format("'{}' is not a whole number from {} to {}", text, low, high));
     return *value;
@@ -87,9 +86,10 @@ RunOption choice(const char* name, const char* help, Member<T> member, const Nam
     for (const auto& [known, value] : names) option.choices.emplace_back(known);
     option.get = [=, &names](const RunOptions& options) { return name_among(names, read(member, options)); };
     option.set = [=, &names, choices = option.choices](RunOptions& options, const std::string& text) {
-        const auto found = std::find(choices.begin(), choices.end(), text);
-        if (found == choices.end())
-            throw InputError(fmt::format("'{}' is not one of {}", text, fmt::join(choices, ", ")));
+        std::string word = text;
+        if (const std::string problem = core::settle_word(word, choices); !problem.empty())
+            throw InputError(problem);
+        const auto found = std::find(choices.begin(), choices.end(), word);
         member(options) = names[size_t(found - choices.begin())].second;
     };
     return option;
@@ -156,15 +156,21 @@ RunOption image_cache_option() {
 }
 
 RunOption background_option() {
-    RunOption option{"background", "COLOUR",
-                     "Colour behind the splats: r,g,b in 0..1, or random (a new one each step)", kDecides};
+    RunOption option{
+        "background", "COLOUR",
+        "Colour behind the splats: r,g,b in 0..1, a name such as white, #rrggbb, or random (a new one each "
+        "step)",
+        kDecides};
     option.get = [](const RunOptions& options) {
         const auto& [r, g, b] = options.train.render.background;
         return options.train.random_background ? "random" : fmt::format("{},{},{}", r, g, b);
     };
     option.set = [](RunOptions& options, const std::string& text) {
-        options.train.random_background = text == "random";
-        options.train.render.background = text == "random" ? std::array<float, 3>{} : parse_colour(text);
+        const bool random = text == "random";
+        const auto colour = random ? std::optional(std::array<float, 3>{}) : core::parse_colour(text);
+        if (!colour) throw InputError(core::not_a_colour(text));
+        options.train.random_background = random;
+        options.train.render.background = *colour;
     };
     return option;
 }
@@ -261,20 +267,6 @@ Json to_config(const RunOptions& options) {
     Json json;
     for (const RunOption& option : run_options()) json[option.name] = option.get(options);
     return json;
-}
-
-std::array<float, 3> parse_colour(const std::string& text) {
-    std::array<float, 3> colour{};
-    const char *at = text.data(), *const end = at + text.size();
-    bool good = true;
-    for (size_t c = 0; good && c < 3; ++c) {
-        if (c > 0) good = at != end && *at++ == ',';
-        const auto [next, error] = std::from_chars(at, end, colour[c]);
-        good = good && error == std::errc() && colour[c] >= 0 && colour[c] <= 1;
-        at = next;
-    }
-    if (!good || at != end) throw InputError("'" + text + "' is not r,g,b with each in 0..1, such as 1,1,1");
-    return colour;
 }
 
 std::string name_of(Strategy strategy) {

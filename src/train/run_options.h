@@ -2,7 +2,6 @@
 // The options of a training run under their names: the one table behind the command line, config.json and the
 // settings in a checkpoint.
 #pragma once
-#include <array>
 #include <functional>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
@@ -38,9 +37,6 @@ std::string value_text(const RunOption& option, const RunOptions& options);
 
 /// All options under their names: what config.json holds.
 nlohmann::ordered_json to_config(const RunOptions& options);
-
-/// "r,g,b" with each in [0, 1]. Throws InputError.
-std::array<float, 3> parse_colour(const std::string& text);
 
 /// "none", "adc", "mcmc" or "auto".
 std::string name_of(Strategy strategy);

@@ -3,14 +3,20 @@
 // status.
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
 #include <future>
 #include <map>
 #include <new>
+#include <sstream>
 #include <utility>
+#include <vector>
 
-#include "core/text.h"
+#include "core/terminal.h"
+#include "core/typing.h"
 #include "ewa/error.h"
+#include "scene/names.h"
 #include "train/earlier_run.h"
 #include "viewer/app.h"
 
@@ -24,7 +30,7 @@ constexpr int kLargestSide = 16384;  // px
 
 struct Arguments {
     std::filesystem::path path, cameras, picture, views, film, output;
-    std::string connect, token, size, background;
+    std::string connect, token, size, background, frame;
     bool train = false, antialias = false;
     std::vector<std::string> train_options;
     DeviceOptions device{.selector = {}, .own_queue = false};  // the window shows what this queue renders
@@ -58,23 +64,19 @@ Size parse_size(const std::string& text) {
     return size;
 }
 
-void check_frame(const Startup& startup) {
-    if (startup.frame && !startup.scene.dataset) throw InputError("--frame needs --cameras DATASET");
-    if (!startup.scene.dataset) return;
-    const int count = int(startup.scene.dataset->frames.size());
-    if (startup.frame.value_or(0) < 0 || startup.frame.value_or(0) >= count)
-        throw InputError("there is no frame " + std::to_string(*startup.frame) + ": " +
-                         startup.scene.dataset->root.string() + " has " + std::to_string(count) +
-                         " frames, numbered from 0 in name order");
+/// The index of the frame that --frame names.
+std::optional<int> frame_of(const std::string& frame, const Dataset* dataset) {
+    if (frame.empty()) return std::nullopt;
+    if (!dataset) throw InputError("--frame needs --cameras DATASET");
+    const std::vector<int> frames = scene::frames_named(*dataset, frame);
+    if (frames.size() > 1) throw InputError("--frame: '" + frame + "' is more than one frame");
+    return frames.front();
 }
 
 /// The folder that `ewa train` would choose.
 std::filesystem::path output_of(const Arguments& arguments) {
     if (!arguments.output.empty()) return arguments.output;
-    std::error_code error;
-    std::filesystem::path path = std::filesystem::weakly_canonical(arguments.path, error);
-    if (path.has_extension() && !std::filesystem::is_directory(path, error)) path = path.parent_path();
-    return std::filesystem::path("out") / (path.filename().empty() ? "dataset" : path.filename());
+    return std::filesystem::path("out") / scene::dataset_name(arguments.path);
 }
 
 OpenedScene open_what(const Arguments& arguments, Startup& startup) {
@@ -123,18 +125,45 @@ Startup open(const Arguments& arguments) {
         startup.film = arguments.film;
     }
     startup.scene = open_what(arguments, startup);
-    check_frame(startup);
+    startup.frame = frame_of(arguments.frame, startup.scene.dataset.get());
     startup.settings.cameras = startup.scene.gaussians->size() == 0;
     Look& look = startup.settings.look;
     look.kernel = arguments.antialias ? Footprint::antialias : startup.scene.look.kernel;
     look.background = startup.scene.look.background;
     if (arguments.background.empty()) return startup;
-    const auto background = parse_background(arguments.background);
-    if (!background)
-        throw InputError("--background: '" + arguments.background +
-                         "' is not r,g,b with each in 0..1, such as 1,1,1");
+    const auto background = core::parse_colour(arguments.background);
+    if (!background) throw InputError("--background: " + core::not_a_colour(arguments.background));
     look.background = *background;
     return startup;
+}
+
+/// Accepts one of the names, in either spelling of colour, and gives the parser its value.
+template <class T>
+CLI::Validator one_of(const std::map<std::string, T>& values) {
+    return CLI::Validator(
+        [&values](std::string& text) {
+            std::vector<std::string> names;
+            for (const auto& [name, value] : values) names.push_back(name);
+            std::string problem = core::settle_word(text, names);
+            if (problem.empty()) text = std::to_string(int(values.at(text)));
+            return problem;
+        },
+        "");
+}
+
+std::vector<std::string> option_names(const CLI::App& app) {
+    std::vector<std::string> names;
+    for (const CLI::Option* option : app.get_options())
+        for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    return names;
+}
+
+/// --help and --version: what CLI11 prints.
+int print_text(const CLI::App& app, const CLI::ParseError& asked) {
+    std::ostringstream text;
+    app.exit(asked, text, text);
+    if (core::print_whole(text.str())) return kDone;
+    return fail(std::string("cannot write to standard output: ") + std::strerror(errno), kFailed);
 }
 
 void add_options(CLI::App& app, Arguments& arguments) {
@@ -155,14 +184,16 @@ void add_options(CLI::App& app, Arguments& arguments) {
     option("--token", arguments.token, "TEXT",
            "With --connect: allows pause and save. live.json in the folder of the run holds it");
     option("--cameras", arguments.cameras, "DATASET", "Dataset whose cameras to show and to look through");
-    option("--frame", startup.frame, "I", "Index of the camera to start from, in name order (0)");
+    option("--frame", arguments.frame, "I|NAME",
+           "The camera to start from: its index in name order, or its name (0)");
     option("--mode", startup.settings.look.mode, "MODE",
            "What to show: color, depth, alpha, count (splats per pixel) or ellipsoids")
-        ->transform(CLI::CheckedTransformer(kModes).description(""));
+        ->transform(one_of(kModes));
     option("--compare", startup.settings.comparison, "HOW",
            "Comparison with the image of the camera: none, beside, wipe or difference")
-        ->transform(CLI::CheckedTransformer(kComparisons).description(""));
-    option("--background", arguments.background, "COLOUR", "Background colour: r,g,b in 0..1");
+        ->transform(one_of(kComparisons));
+    option("--background", arguments.background, "COLOUR",
+           "Background colour: r,g,b in 0..1, a name such as white, or #rrggbb");
     app.add_flag("--antialias", arguments.antialias, "Render with the filter of Mip-Splatting");
     option("--size", arguments.size, "WxH",
            "Size of the window in px [the shape of the camera, as large as fits]");
@@ -172,11 +203,24 @@ void add_options(CLI::App& app, Arguments& arguments) {
     option("--film", arguments.film, "DIR",
            "Write a film through the saved views, one PNG per frame, and exit");
     option("--film-seconds", startup.settings.film_seconds, "S", "Duration of the film from view to view (2)")
-        ->check(CLI::Range(0.04f, 3600.0f).description(""));
+        ->transform(
+            CLI::Validator([](std::string& text) { return core::settle_number(text, 0.04f, 3600.0f); }, ""));
     option("--device", arguments.device.selector, "NAME|N",
            "Number of the device that renders, or part of its name (see ewa devices)");
     app.add_flag("--verbose", startup.verbose,
                  "At the end, print the time of the first frame and the frame rate of the moving camera");
+}
+
+/// One heading of the help for each subject.
+void group_options(CLI::App& app) {
+    const std::pair<const char*, std::vector<const char*>> subjects[] = {
+        {"Data", {"--cameras", "--frame", "--views"}},
+        {"Training", {"--train", "--output", "--connect", "--token"}},
+        {"Quality", {"--mode", "--compare", "--background", "--antialias"}},
+        {"Output", {"--size", "--screenshot", "--film", "--film-seconds", "--verbose"}},
+        {"Device", {"--device"}}};
+    for (const auto& [subject, names] : subjects)
+        for (const char* name : names) app.get_option(name)->group(subject);
 }
 
 int run(const Arguments& arguments) {
@@ -219,20 +263,24 @@ int run(const Arguments& arguments) {
 }  // namespace
 
 int main(int argc, char** argv) {
+    core::open_standard_streams();
     CLI::App app{"Shows a 3D Gaussian splat scene in a window. F1 in the window lists the keys."};
     app.name("ewa-view");
     app.set_version_flag("--version", "ewa-view " EWA_VERSION);
     core::use_help_text<CLI::Formatter>(app);
     Arguments arguments;
     add_options(app, arguments);
+    group_options(app);
     app.allow_extras();
     try {
         app.parse(argc, argv);
         arguments.train_options = app.remaining();
         if (!arguments.train && !arguments.train_options.empty())
-            throw CLI::ExtrasError(arguments.train_options);
+            return fail(core::unexpected_arguments(argc, argv, arguments.train_options, option_names(app)) +
+                            " (see ewa-view --help)",
+                        kWrongUse);
     } catch (const CLI::ParseError& error) {
-        if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) return app.exit(error);
+        if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) return print_text(app, error);
         return fail(std::string(error.what()) + " (see ewa-view --help)", kWrongUse);
     }
     return run(arguments);

@@ -6,7 +6,7 @@
 
 #include "core/folders.h"
 #include "core/json.h"
-#include "core/text.h"
+#include "core/typing.h"
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
 #include "ewa/synthetic_dataset.h"
@@ -69,7 +69,7 @@ Look look_of(const nlohmann::json& config) {
     const std::string kernel = text_of(config, "kernel");
     if (kernel == "antialias") look.kernel = Footprint::antialias;
     if (kernel == "ewa") look.kernel = Footprint::unit_mass;
-    look.background = parse_background(text_of(config, "background")).value_or(look.background);
+    look.background = core::parse_colour(text_of(config, "background")).value_or(look.background);
     return look;
 }
 
@@ -144,19 +144,6 @@ void OpenedScene::set_gaussians(std::shared_ptr<const Gaussians> splats) {
     gaussians = std::move(splats);
     sh_degree = sh_degree_present(*gaussians);
     plan = plan_lines(*gaussians, RenderOptions{});
-}
-
-std::optional<std::array<float, 3>> parse_background(const std::string& text) {
-    std::string words = text;
-    std::replace(words.begin(), words.end(), ',', ' ');
-    std::string_view rest = words;
-    std::array<float, 3> color{};
-    for (float& value : color) {
-        const double number = core::parse_number(core::next_word(rest)).value_or(-1);
-        if (!(number >= 0 && number <= 1)) return std::nullopt;
-        value = float(number);
-    }
-    return core::trim(rest).empty() ? std::optional(color) : std::nullopt;
 }
 
 Gaussians splats_of_points(const PointCloud& points) {

@@ -32,9 +32,6 @@ struct OpenedScene {
 /// empty: none. Throws InputError.
 OpenedScene open_scene(const std::filesystem::path& path, const std::filesystem::path& cameras);
 
-/// "r,g,b" with each in 0..1; empty for other text.
-std::optional<std::array<float, 3>> parse_background(const std::string& text);
-
 /// Converts points to small opaque splats.
 Gaussians splats_of_points(const PointCloud& points);
 

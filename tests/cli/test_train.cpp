@@ -113,7 +113,7 @@ TEST_F(Train, MissingImagesAreTold) {
     fs::remove(folder / "data/images/1.png");
     const Outcome outcome = train("o", {"--steps", "2"});
     EXPECT_EQ(outcome.status, 0) << outcome.err;
-    EXPECT_NE(outcome.out.find("1 images are missing"), std::string::npos) << outcome.out;
+    EXPECT_NE(outcome.out.find("1 image is missing"), std::string::npos) << outcome.out;
 }
 
 TEST_F(Train, InterruptKeepsWhatIsThere) {

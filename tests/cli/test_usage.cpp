@@ -135,15 +135,16 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(Usage, ConfigNamesItsMistake) {
     const Folder folder;
     const std::string file = folder / "c.json";
-    const std::pair<const char*, const char*> cases[] = {{R"({"wings": 2})", "wings"},
-                                                         {R"({"steps": 0})", "--steps"},
-                                                         {R"({"steps": "many"})", "--steps"},
-                                                         {R"({"steps": {}})", "steps"},
-                                                         {R"([1])", "object"},
-                                                         {R"({"steps": 3)", "byte"},
-                                                         {R"({"seed": 1e400})", "1e400"},
-                                                         {R"({"config": "c.json"})", "config"},
-                                                         {R"({"strategy": "magic"})", "magic"}};
+    const std::pair<const char*, const char*> cases[] = {
+        {R"({"wings": 2})", "wings"},
+        {R"({"steps": 0})", "--steps"},
+        {R"({"steps": "many"})", "\"steps\" must be a number"},
+        {R"({"steps": {}})", "steps"},
+        {R"([1])", "object"},
+        {R"({"steps": 3)", "byte"},
+        {R"({"seed": 1e400})", "1e400"},
+        {R"({"config": "c.json"})", "config"},
+        {R"({"strategy": "magic"})", "magic"}};
     for (const auto& [text, mistake] : cases) {
         write_file(file, text);
         expect_failure(run_ewa({"train", "/nowhere", "--config", file}), 2, mistake);

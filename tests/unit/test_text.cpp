@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "core/terminal.h"
 #include "core/text.h"
 
 #include <gtest/gtest.h>
@@ -38,9 +39,13 @@ TEST(Text, HelpBreaksBetweenWords) {
         for (int i = 1; i < count; ++i) text += " " + twelve;
         return text;
     };
-    using ewa::core::help_text;
+    const auto help_text = [](std::string_view text, size_t column) {
+        return ewa::core::wrapped_help(text, column, 80);
+    };
     EXPECT_EQ(help_text("", 10), "");
     EXPECT_EQ(help_text("a\n\n  b\n", 10), "a\n\n  b\n");
+    EXPECT_EQ(help_text("a\n\n\n\n  b\n", 10), "a\n\n  b\n") << "one blank line between groups";
+    EXPECT_EQ(help_text("  -a,--bb,--cc   d\n", 20), "  -a, --bb, --cc d\n");
     EXPECT_EQ(help_text(std::string(80, 'x'), 10), std::string(80, 'x') + "\n");
     EXPECT_EQ(help_text(long_word, 10), long_word + "\n") << "a word is never broken";
     EXPECT_EQ(help_text(repeated(7), 10), repeated(6) + "\n" + twelve + "\n");

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
 
 #include "core/folders.h"
 #include "core/sandboxed_path.h"
@@ -163,6 +164,22 @@ Frame make_frame(const io::ImageRecord& image, const ImageFile& file, const Data
     return frame;
 }
 
+/// Throws if a camera has no finite position, or is so far away that its distance is not finite.
+void check_positions(const Dataset& dataset) {
+    glm::dvec3 mean(0.0);
+    for (const Frame& frame : dataset.frames) mean += frame.camera.position() / double(dataset.frames.size());
+    // A single camera far away would move the mean, and so make every other distance infinite.
+    for (const bool from_mean : {false, true})
+        for (const Frame& frame : dataset.frames) {
+            const glm::dvec3 place = frame.camera.position() - (from_mean ? mean : glm::dvec3(0.0));
+            if (!std::isfinite(glm::length(place)))
+                throw InputError(
+                    core::one_line(dataset.root.string() + ": frame \"" + frame.name +
+                                   "\": the position of its camera, or the distance to it, is not "
+                                   "a finite number"));
+        }
+}
+
 /// The images folder that belongs to a COLMAP model.
 fs::path images_folder(const fs::path& root, const fs::path& model) {
     if (model != root) return root / "images";
@@ -250,6 +267,7 @@ Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& op
         dataset.frames.back().mask_path = find_mask(image, model.folder, options.downscale);
     }
     settle_masks(dataset, options.masks);
+    check_positions(dataset);
     if (dataset.frames.empty())
         throw InputError(name + ": none of the " + std::to_string(model.images.size()) +
                          " images exists, the first being " +

@@ -8,6 +8,7 @@
 
 #include "core/atomic_file.h"
 #include "core/json.h"
+#include "core/typing.h"
 #include "ewa/error.h"
 
 namespace ewa::io {
@@ -95,7 +96,7 @@ std::vector<NamedView> read_views(const std::filesystem::path& path) {
         } catch (const InputError& problem) {
             throw InputError(where + problem.what());
         } catch (const Json::exception& problem) {
-            throw InputError(where + problem.what());
+            throw InputError(where + std::string(core::plain_reason(problem.what())));
         }
     }
     return views;

@@ -8,7 +8,7 @@
 #include "core/file_reader.h"
 #include "core/json.h"
 #include "core/sandboxed_path.h"
-#include "core/text.h"
+#include "core/typing.h"
 #include "ewa/error.h"
 
 namespace ewa::io {
@@ -65,6 +65,29 @@ Chunks read_chunks(core::FileReader& reader) {
                         std::to_string(reader.remaining()) + " follow; the file is truncated");
     }
     return chunks;
+}
+
+/// What a file is that is no glTF, by its first bytes.
+std::string foreign_kind(std::string_view head) {
+    constexpr std::pair<std::string_view, const char*> kKinds[] = {
+        {"ply", "it is a PLY"},
+        {"NGSP", "it is a splat file (SPZ)"},
+        {"\x1f\x8b", "it is compressed with gzip, as splat files are (SPZ)"},
+        {"\x89PNG", "it is a PNG image"},
+        {"\xff\xd8", "it is a JPEG image"}};
+    for (const auto& [beginning, kind] : kKinds)
+        if (head.starts_with(beginning)) return kind;
+    return "it begins neither with a brace nor as a .glb does";
+}
+
+/// Throws if the file is not glTF at all: errors of its JSON would mislead.
+void check_kind(const GltfDocument& document, const Chunks& chunks, GltfContent content) {
+    if (chunks.binary) return;
+    if (chunks.json.empty()) document.fail("the file is empty");
+    const size_t first = chunks.json.find_first_not_of(" \t\r\n");
+    if (first != std::string::npos && chunks.json[first] == '{') return;
+    document.fail((content == GltfContent::meshes ? "is not a mesh scene (glTF): " : "is not a glTF: ") +
+                  foreign_kind(chunks.json));
 }
 
 json parse(const std::string& name, const Chunks& chunks, GltfContent content) {
@@ -217,6 +240,7 @@ GltfDocument::GltfDocument(const std::filesystem::path& path, GltfContent conten
         binary_ = chunks.binary;
         bin_begin = chunks.bin_begin;
         bin_size = chunks.bin_size;
+        check_kind(*this, chunks, content);
         top = parse(name_, chunks, content);
     }
     if (!top.is_object()) fail("the JSON is not an object");
@@ -234,7 +258,7 @@ GltfDocument::GltfDocument(const std::filesystem::path& path, GltfContent conten
         loaded =
             loader.LoadASCIIFromString(&model_, &error, &warning, text.data(), unsigned(text.size()), "");
     } catch (const std::exception& exception) {
-        error = exception.what();
+        error = core::plain_reason(exception.what());
     }
     if (!loaded || !error.empty())
         fail("is not a valid glTF: " + error.substr(0, kLongestReason) + missing_property(error));

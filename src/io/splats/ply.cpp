@@ -39,6 +39,12 @@ int degree_of(const PlyTable& table, const PlyElement& vertex) {
                      " properties f_rest_* do not fit any SH degree (0, 9, 24 or 45 are degree 0 to 3)");
 }
 
+bool has_faces(const PlyTable& table) {
+    const auto& all = table.elements();
+    return std::any_of(all.begin(), all.end(),
+                       [](const PlyElement& element) { return element.name == "face" && element.count > 0; });
+}
+
 size_t column(const PlyTable& table, const PlyElement& vertex, const std::string& name) {
     const std::optional<size_t> found = vertex.find(name);
     if (found && !vertex.properties[*found].list_count) return *found;
@@ -47,7 +53,8 @@ size_t column(const PlyTable& table, const PlyElement& vertex, const std::string
     if (name == "scale_2")
         text += "; 2D Gaussian splats are not supported";
     else if (name.starts_with("f_dc_") && !vertex.find("opacity"))
-        text += "; this is a point cloud, not a splat file";
+        text +=
+            std::string("; this is a ") + (has_faces(table) ? "mesh" : "point cloud") + ", not a splat file";
     throw InputError(text);
 }
 

@@ -8,7 +8,7 @@
 #include <cstdio>
 
 #include "core/messages.h"
-#include "core/text.h"
+#include "core/typing.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
 #include "io/splats/formats.h"
@@ -75,8 +75,10 @@ Gaussians drawable_only(const Gaussians& gaussians, std::vector<std::string>& re
     std::vector<uint32_t> kept;
     for (size_t i = 0; i < gaussians.size(); ++i)
         if (drawable(gaussians, i)) kept.push_back(uint32_t(i));
-    remarks.push_back(std::to_string(gaussians.size() - kept.size()) +
-                      " splats have a value that is not finite or a zero quaternion and are skipped");
+    const uint64_t skipped = gaussians.size() - kept.size();
+    remarks.push_back(core::counted(skipped, "splat") + (skipped == 1 ? " has" : " have") +
+                      " a value that is not finite or a zero quaternion and " +
+                      std::string(core::is_or_are(skipped)) + " skipped");
     Gaussians selected = gaussians;
     select_splats(selected, kept);
     return selected;

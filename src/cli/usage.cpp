@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/usage.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <map>
+#include <vector>
+
+#include "core/typing.h"
+
+namespace ewa::cli {
+namespace {
+
+constexpr size_t kFewOptions = 8;  // more are in groups
+
+const std::map<std::string, std::string>& subjects() {
+    static const std::map<std::string, std::string> table = [] {
+        std::map<std::string, std::string> made;
+        const auto add = [&made](const char* subject, std::initializer_list<const char*> names) {
+            for (const char* name : names) made[name] = subject;
+        };
+        add("Data",
+            {"cameras", "frame", "frames", "split", "test-every", "downscale", "masks", "init", "transform",
+             "crop", "min-opacity", "max-sh", "sort", "splats", "cases", "views", "size"});
+        add("Quality", {"steps", "strategy", "max-splats", "sh-degree", "absgrad", "revised-opacity",
+                        "exposure", "resolution-schedule", "seed", "background", "kernel", "antialias",
+                        "samples", "points", "runs", "training-steps"});
+        add("Output", {"output", "format", "mode", "json", "svg", "heat-map", "heat-scale", "eval-every",
+                       "save-every", "serve", "accuracy", "spz-version", "check", "quiet", "verbose",
+                       "results", "compare", "threshold", "max-error"});
+        add("Device", {"device", "moments", "image-cache"});
+        return made;
+    }();
+    return table;
+}
+
+std::vector<std::string> option_names(const CLI::App& command) {
+    std::vector<std::string> names;
+    for (const CLI::Option* option : command.get_options())
+        for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    return names;
+}
+
+std::vector<std::string> command_names(const CLI::App& app) {
+    std::vector<std::string> names;
+    for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
+    return names;
+}
+
+/// CLI11 says "--steps: 1 required N missing".
+std::string missing_value(const std::string& text) {
+    const size_t colon = text.find(": "), required = text.find(" required "), end = text.rfind(" missing");
+    if (colon == std::string::npos || required == std::string::npos || end == std::string::npos ||
+        end < required)
+        return text;
+    constexpr size_t kRequired = 10;
+    return text.substr(0, colon) +
+           " needs a value: " + text.substr(required + kRequired, end - required - kRequired);
+}
+
+}  // namespace
+
+void group_by_subject(CLI::App& command) {
+    const std::vector<CLI::Option*> options = command.get_options();
+    if (options.size() <= kFewOptions) return;
+    for (CLI::Option* option : options) {
+        if (option->get_positional() || option->get_lnames().empty() || option->get_group() != "Options")
+            continue;
+        const auto found = subjects().find(option->get_lnames().front());
+        if (found != subjects().end()) option->group(found->second);
+    }
+}
+
+std::string usage_error(const CLI::App& app, const CLI::App& command, const CLI::Error& error, int argc,
+                        char** argv) {
+    const std::vector<std::string> unknown = app.remaining(true);
+    const bool options = std::any_of(unknown.begin(), unknown.end(),
+                                     [](const std::string& word) { return word.starts_with('-'); });
+    const std::vector<std::string> commands = command_names(app);
+    if (&app == &command && argc > 1 && argv[1][0] != '-')
+        return std::string("unknown command '") + argv[1] + "'" + core::did_you_mean(argv[1], commands);
+    if (options || dynamic_cast<const CLI::ExtrasError*>(&error))
+        return core::unexpected_arguments(argc, argv, unknown, option_names(command));
+    if (&app == &command && error.get_name() == "RequiredError") {
+        std::string all;
+        for (const std::string& name : commands) all += (all.empty() ? "" : ", ") + name;
+        return "a subcommand is required: " + all;
+    }
+    if (error.get_name() == "ArgumentMismatch") return missing_value(error.what());
+    return error.what();
+}
+
+}  // namespace ewa::cli

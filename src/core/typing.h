@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+// What people type: counts such as 7k, colours by name, words out of a set, and suggestions for mistyped words.
+// No function needs a library, so that the parsers of all programs can share them.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include "core/text.h"
+
+namespace ewa::core {
+
+/// The number of letters to insert, delete, replace or swap with their neighbour until one word is the other.
+/// Upper and lower case are the same (ASCII).
+size_t edit_distance(std::string_view a, std::string_view b);
+
+/// The known word that `word` was probably meant to be; empty if none is near. Leading dashes do not count, and
+/// neither does what follows an equals sign.
+std::string closest(std::string_view word, const std::vector<std::string>& known);
+
+/// "; did you mean KNOWN?", or nothing if no known word is near.
+std::string did_you_mean(std::string_view word, const std::vector<std::string>& known);
+
+/// One line on arguments that a program does not know, in the order in which they were typed. argv: the program's
+/// arguments. unknown: some of them. known: the options there are, as "--name". Suggests one for the first
+/// unknown option.
+std::string unexpected_arguments(int argc, const char* const* argv, std::vector<std::string> unknown,
+                                 const std::vector<std::string>& known);
+
+/// The digits of an exact whole number of 0 or more. It may have a decimal fraction, an exponent, or a last letter
+/// k (thousand) or M (million): "1.5k" is 1500. Empty for other text, and for numbers that are not whole.
+std::optional<std::string> whole_digits(std::string_view text);
+
+/// A whole number as whole_digits reads it, or a negative one, if it fits T.
+template <class T>
+std::optional<T> parse_count(std::string_view text) {
+    return parse_integer<T>(whole_digits(text).value_or(std::string(text)));
+}
+
+/// A number as a message shows it: without needless digits.
+std::string shown_number(double number);
+
+/// Empty if the text is a number from low to high, which it then is in plain digits; else what is wrong with it.
+/// Of integers, the number must be whole.
+template <class T>
+std::string settle_number(std::string& text, T low, T high) {
+    if constexpr (std::is_integral_v<T>) {
+        const auto value = parse_count<T>(text);
+        if (value && *value >= low && *value <= high) {
+            text = std::to_string(*value);
+            return {};
+        }
+        return "'" + text + "' is not a whole number from " + std::to_string(low) + " to " +
+               std::to_string(high);
+    } else {
+        const auto value = parse_number(text);
+        if (value && *value >= double(low) && *value <= double(high)) return {};
+        return "'" + text + "' is not a number from " + shown_number(double(low)) + " to " +
+               shown_number(double(high));
+    }
+}
+
+/// Empty if the text is one of the words; else what is wrong with it. "colour" becomes "color" and "grey" becomes
+/// "gray" where the words spell it so, and the reverse.
+std::string settle_word(std::string& text, const std::vector<std::string>& words);
+
+/// sRGB in [0, 1] from "r,g,b" with each in 0..1, "#rgb", "#rrggbb", or the name of a colour of CSS's basic set
+/// (also orange). Commas or blanks stand between numbers. Empty for other text.
+std::optional<std::array<float, 3>> parse_colour(std::string_view text);
+
+/// What a message says of text that parse_colour does not read.
+std::string not_a_colour(std::string_view text);
+
+/// "1 image", "2 images".
+std::string counted(uint64_t count, std::string_view noun);
+/// "is" or "are".
+std::string_view is_or_are(uint64_t count);
+
+/// A library's message without the name of its exception in brackets before it.
+std::string_view plain_reason(std::string_view message);
+
+}  // namespace ewa::core

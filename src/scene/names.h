@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// The names of a dataset and of its frames, as people type them.
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "ewa/dataset.h"
+
+namespace ewa::scene {
+
+/// The indices of a list of frames, in the order of the list and each once. Its items stand between commas: an
+/// index in name order from 0, a range of two indices such as 3-7, or the name of a frame ("0001.jpg"). A name may lack its
+/// folder and its extension if no other frame is meant. A name goes before a range. Throws InputError.
+std::vector<int> frames_named(const Dataset& dataset, const std::string& list);
+
+/// The folder's name that a dataset is known by. For a file, and for a COLMAP model (sparse, or sparse/0): the
+/// folder that it belongs to. "dataset" if there is no name.
+std::string dataset_name(const std::filesystem::path& path);
+
+}  // namespace ewa::scene
