@@ -178,6 +178,9 @@ int render_free_views(RenderArguments arguments) {
 /// Completes the arguments by the run that SPLATS may name, and chooses whose cameras are used.
 int run(CLI::App& app, RenderArguments& arguments) {
     arguments.kernel_given = app.count("--kernel") + app.count("--antialias") > 0;
+    std::string of_frames;  // a given option that only a dataset's views have
+    for (const char* option : {"--frames", "--test-every", "--downscale"})
+        if (app.count(option) > 0) of_frames = option;
     SplatInput input = splat_input(arguments.splats);
     arguments.splats = input.file;
     if (input.run) use_options_of(*input.run, app);
@@ -190,8 +193,7 @@ int run(CLI::App& app, RenderArguments& arguments) {
         arguments.cameras = dataset_of(*input.run);
         return render_dataset_views(arguments);
     }
-    for (const char* option : {"--frames", "--test-every", "--downscale"})
-        if (app.count(option) > 0) throw InputError(std::string(option) + " needs --cameras DATASET");
+    if (!of_frames.empty()) throw InputError(of_frames + " needs --cameras DATASET");
     arguments.run = input.run ? std::move(input.run) : live::run_of_splats(arguments.splats);
     return render_free_views(arguments);
 }

@@ -97,7 +97,7 @@ TEST_F(Runs, InfoConvertGradAndCompareTakeThem) {
     expect_success(run_ewa({"grad", run, "--frame", "1", "-o", folder / "g.ply"}));
     EXPECT_EQ(load_splats(folder / "g.ply").size(), 50u);
 
-    const std::string other = train("other", {"--steps", "4", "--kernel", "antialias"});
+    const std::string other = train("other", {"--seed", "4", "--kernel", "antialias"});
     const Outcome compared = run_ewa({"compare", run, other, "--json", folder / "c.json"});
     expect_success(compared);
     EXPECT_EQ(read_json(folder / "c.json")["pictures"].size(), 5u);
