@@ -8,6 +8,8 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 #include <numbers>
+#include <optional>
+#include <vector>
 
 #include "ewa/trainer.h"
 #include "pipeline/frame_buffers.h"
@@ -24,15 +26,52 @@ namespace {
 using namespace pipeline;
 
 constexpr size_t kSplats = 20000, kViews = 24;  // samples; more change the estimate by less than a percent
-// Splats start transparent. Within a hundred steps their footprints are those of this opacity, or of their own if that
-// is higher (fox_270, fox_540, still_life).
+// Splats from points start transparent. Within a hundred steps their footprints are those of this opacity, or of their
+// own if that is higher (fox_270, fox_540, still_life).
 constexpr double kLeastOpacity = 0.5;
+// Optical depth of the first splats, as the views see them in the mean. From points it is about 1 (fox_270, still_life).
+// Above this bound, as with random splats (15) or trained ones, the image is opaque already: opacities do not rise, and
+// splats that multiply do not cover more.
+constexpr double kOpaque = 4;
 // Fitted to the same trainings. 0.5 would keep the covered area.
 constexpr double kAdcShrink = 0.4, kMcmcShrink = 0.16;
 // The capacity grows to 9/8 of what a frame needs, whenever one needs more than there is.
 constexpr double kCapacity = 17.0 / 16;
 constexpr uint64_t kMostPairs = 0xe0000000u;
 constexpr uint64_t kRefineBytes = 16;  // a splat, of a refinement's own lists
+
+/// A splat as a view sees it.
+struct Footprint2D {
+    double a = 0, b = 0, c = 0;  // covariance, px^2
+    double opacity = 0;
+};
+
+/// Empty if the splat's mean is not in the image.
+std::optional<Footprint2D> project(const Gaussians& g, size_t i, const Camera& camera) {
+    const glm::dvec3 p = camera.rotation * g.world_mean(i) + camera.translation;
+    if (!(p.z > shared::NEAR_PLANE)) return {};
+    const double x = camera.fx * p.x / p.z + camera.cx, y = camera.fy * p.y / p.z + camera.cy;
+    if (!(x >= 0 && x < camera.width && y >= 0 && y < camera.height)) return {};
+    const float* q = &g.quaternions[4 * i];
+    const glm::dmat3 turn = glm::mat3_cast(glm::normalize(glm::dquat(q[0], q[1], q[2], q[3])));
+    Footprint2D f{.a = shared::LOW_PASS, .b = 0, .c = shared::LOW_PASS};
+    for (int axis = 0; axis < 3; ++axis) {
+        const glm::dvec3 v =
+            camera.rotation * turn[axis] * std::exp(double(g.log_scales[3 * i + size_t(axis)]));
+        const double u = camera.fx * (v.x - p.x / p.z * v.z) / p.z,
+                     w = camera.fy * (v.y - p.y / p.z * v.z) / p.z;
+        f.a += u * u;
+        f.b += u * w;
+        f.c += w * w;
+    }
+    f.opacity = 1 / (1 + std::exp(-double(g.opacity_logits[i])));
+    if (!std::isfinite(f.a + f.c) || !std::isfinite(f.opacity)) return {};
+    return f;
+}
+
+double standard_area(const Footprint2D& f) {
+    return std::sqrt(std::max(f.a * f.c - f.b * f.b, 0.0));  // px^2
+}
 
 /// Sums over sampled splats that a view sees.
 struct Footprints {
@@ -41,35 +80,47 @@ struct Footprints {
     double area = 0;   // of the ellipse, tiles
 };
 
-/// Adds the ellipse {alpha >= ALPHA_MIN} of splat i, if its middle is in the image.
-void add_footprint(Footprints& sum, const Gaussians& g, size_t i, const Camera& camera,
+/// Adds the ellipse {alpha >= ALPHA_MIN} of a splat that has at least this opacity.
+void add_footprint(Footprints& sum, const Footprint2D& f, double least_opacity, const Camera& camera,
                    const passes::KernelConfig& config) {
-    const glm::dvec3 p = camera.rotation * g.world_mean(i) + camera.translation;
-    if (!(p.z > shared::NEAR_PLANE)) return;
-    const double x = camera.fx * p.x / p.z + camera.cx, y = camera.fy * p.y / p.z + camera.cy;
-    if (!(x >= 0 && x < camera.width && y >= 0 && y < camera.height)) return;
-    const float* q = &g.quaternions[4 * i];
-    const glm::dmat3 turn = glm::mat3_cast(glm::normalize(glm::dquat(q[0], q[1], q[2], q[3])));
-    double a = shared::LOW_PASS, b = 0, c = shared::LOW_PASS;  // covariance, px^2
-    for (int axis = 0; axis < 3; ++axis) {
-        const glm::dvec3 v =
-            camera.rotation * turn[axis] * std::exp(double(g.log_scales[3 * i + size_t(axis)]));
-        const double u = camera.fx * (v.x - p.x / p.z * v.z) / p.z,
-                     w = camera.fy * (v.y - p.y / p.z * v.z) / p.z;
-        a += u * u;
-        b += u * w;
-        c += w * w;
-    }
-    const double opacity = std::max(1 / (1 + std::exp(-double(g.opacity_logits[i]))), kLeastOpacity);
+    const double opacity = std::max(f.opacity, least_opacity);
     const double reach = 2 * std::log(opacity / shared::ALPHA_MIN);  // squared, in standard deviations
-    if (!(reach > 0 && std::isfinite(a + c))) return;
-    const double width = std::min(2 * std::sqrt(reach * a), double(camera.width)),
-                 height = std::min(2 * std::sqrt(reach * c), double(camera.height));
-    const double area =
-        std::min(std::numbers::pi * reach * std::sqrt(std::max(a * c - b * b, 0.0)), 0.785 * width * height);
+    if (!(reach > 0)) return;
+    const double width = std::min(2 * std::sqrt(reach * f.a), double(camera.width)),
+                 height = std::min(2 * std::sqrt(reach * f.c), double(camera.height));
+    const double area = std::min(std::numbers::pi * reach * standard_area(f), 0.785 * width * height);
     sum.splats += 1;
     sum.sides += width / config.tile_width + height / config.tile_height;
     sum.area += area / (config.tile_width * config.tile_height);
+}
+
+/// A training view, and the sampled splats that it sees.
+struct View {
+    const Camera* camera = nullptr;
+    std::vector<Footprint2D> seen;
+};
+
+std::vector<View> sampled_views(const Gaussians& start, const Dataset& dataset,
+                                const std::vector<int>& frames, size_t stride) {
+    std::vector<View> views(std::min(frames.size(), kViews));
+    for (size_t v = 0; v < views.size(); ++v) {
+        views[v].camera = &dataset.frames[size_t(frames[v * frames.size() / views.size()])].camera;
+        for (size_t i = 0; i < start.size(); i += stride)
+            if (const auto footprint = project(start, i, *views[v].camera))
+                views[v].seen.push_back(*footprint);
+    }
+    return views;
+}
+
+/// Mean over the views and their pixels. The integral of a splat's alpha is opacity times 2 pi times its standard area.
+double optical_depth(const std::vector<View>& views, size_t stride) {
+    double sum = 0;
+    for (const View& view : views) {
+        double alphas = 0;
+        for (const Footprint2D& f : view.seen) alphas += f.opacity * 2 * std::numbers::pi * standard_area(f);
+        sum += alphas * double(stride) / (double(view.camera->width) * view.camera->height);
+    }
+    return sum / double(views.size());
 }
 
 /// (Splat, tile) pairs of the view that has most of them, for `splats` splats that descend from `start`.
@@ -79,18 +130,17 @@ void add_footprint(Footprints& sum, const Gaussians& g, size_t i, const Camera& 
 uint64_t estimated_pairs(const Gaussians& start, const Dataset& dataset, const std::vector<int>& frames,
                          const TrainOptions& options, uint32_t splats, const passes::KernelConfig& config) {
     const size_t stride = start.size() / kSplats + 1;
-    const double shrink = std::pow(double(start.size()) / splats,
-                                   options.strategy == Strategy::mcmc ? kMcmcShrink : kAdcShrink);
+    const std::vector<View> views = sampled_views(start, dataset, frames, stride);
+    const bool opaque = optical_depth(views, stride) > kOpaque;
+    const double growth = opaque ? 1 : double(splats) / double(start.size());
+    const double shrink = std::pow(growth, options.strategy == Strategy::mcmc ? -kMcmcShrink : -kAdcShrink);
     double most = 0;
-    const size_t views = std::min(frames.size(), kViews);
-    for (size_t v = 0; v < views; ++v) {
-        const Camera& camera = dataset.frames[size_t(frames[v * frames.size() / views])].camera;
+    for (const View& view : views) {
         Footprints sum;
-        size_t samples = 0;
-        for (size_t i = 0; i < start.size(); i += stride, ++samples)
-            add_footprint(sum, start, i, camera, config);
+        for (const Footprint2D& f : view.seen)
+            add_footprint(sum, f, opaque ? 0 : kLeastOpacity, *view.camera, config);
         const double pairs = sum.splats + shrink * sum.sides + shrink * shrink * sum.area;
-        most = std::max(most, pairs / double(samples) * splats);
+        most = std::max(most, pairs * double(stride) * growth);
     }
     return uint64_t(most * kCapacity);
 }
