@@ -26,7 +26,7 @@ struct RunScene {
 /// What a run is asked for. `ewa train --help` describes the options of the same names.
 struct RunOptions {
     std::filesystem::path dataset;  // folder or file, as load_dataset takes it
-    std::filesystem::path scene;    // the mesh scene that the dataset was rendered from; empty: none
+    std::filesystem::path scene;    // mesh scene, photos or video that the dataset was made from; empty: none
     std::filesystem::path output;   // the run's folder; empty: see output_folder
     TrainOptions train{.strategy = Strategy::automatic, .sh_degree = kAutomaticShDegree};
     std::string init = "sfm";  // first splats: "sfm" (the dataset's points), "random", or a splat file

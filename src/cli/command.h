@@ -22,6 +22,7 @@ Action add_grad(CLI::App& app);
 Action add_convert(CLI::App& app);
 Action add_info(CLI::App& app);
 Action add_dataset(CLI::App& app);
+Action add_cameras(CLI::App& app);
 Action add_devices(CLI::App& app);
 Action add_bench(CLI::App& app);
 Action add_compare(CLI::App& app);

@@ -6,6 +6,7 @@
 
 #include "cli/arguments.h"
 #include "cli/bench.h"
+#include "cli/cameras.h"
 #include "cli/command.h"
 #include "cli/config.h"
 #include "cli/train_observer.h"
@@ -68,6 +69,18 @@ void render_scene(TrainArguments& arguments) {
     if (interrupted()) throw Interrupted();
 }
 
+/// Makes a dataset of photos without cameras, or of a video, in the run's folder. Throws Interrupted if Ctrl-C ended
+/// that.
+void place_photos(TrainArguments& arguments) {
+    RunOptions& run = arguments.run;
+    if (!is_capture(run.dataset)) return;
+    // The run's name is the last part of the path, which "photos/" and "." do not have.
+    run.scene = (fs::absolute(run.dataset).lexically_normal() / "").parent_path();
+    run.output = output_folder(run);
+    run.dataset = run.output / "dataset";
+    place_with_progress(run.scene, run.dataset, {}, arguments.output.quiet);
+}
+
 std::string accuracy_section(const RunScene& scene) {
     return report::work_precision_html(
         rendering_diagram(scene.device, scene.gaussians, scene.camera, scene.options));
@@ -82,6 +95,7 @@ int run(CLI::App& app, TrainArguments& arguments) {
     kernel = settled_kernel(kernel, arguments.antialias);
     check_options(options);  // before the images of a mesh scene are rendered
     render_scene(arguments);
+    place_photos(arguments);
     if (arguments.accuracy) options.report_section = accuracy_section;
     options.seconds_before = std::chrono::duration<double>(Clock::now() - begin).count();
     TrainObserver observer(arguments.output, options.train.steps);

@@ -24,6 +24,7 @@ const std::map<std::string, Modules> kAllowed = {
     {"src/io/gltf", {"src/scene", "src/image"}},
     {"src/io/splats", {"src/scene", "src/io/gltf", "shaders/shared"}},
     {"src/io/datasets", {"src/scene", "src/image", "src/io/splats"}},
+    {"src/capture", {"src/image", "src/io/datasets"}},
     {"src/gpu", {"src/core"}},
     {"src/passes", {"src/gpu", "shaders/shared"}},
     {"src/pipeline", {"src/passes", "src/scene"}},
@@ -49,7 +50,8 @@ const std::map<std::string, std::string> kOwners = {{"image.h", "src/image"},
                                                     {"trainer.h", "src/train"},
                                                     {"evaluation.h", "src/train"},
                                                     {"run.h", "src/train"},
-                                                    {"synthetic_dataset.h", "src/pathtracer"}};
+                                                    {"synthetic_dataset.h", "src/pathtracer"},
+                                                    {"capture.h", "src/capture"}};
 
 /// Libraries that only some modules may know.
 const std::vector<std::pair<std::string, Modules>> kLibraries = {
@@ -66,7 +68,7 @@ const std::vector<std::pair<std::string, Modules>> kLibraries = {
     {"zstd", {"src/io/splats"}},
     {"zlib", {"src/io/splats", "src/train"}},
     {"nlohmann/",
-     {"src/core", "src/io/splats", "src/io/datasets", "src/io/gltf", "src/pathtracer", "src/train",
+     {"src/core", "src/capture", "src/io/splats", "src/io/datasets", "src/io/gltf", "src/pathtracer", "src/train",
       "src/report", "src/live", "src/bench", "src/cli", "src/viewer"}},
     {"CLI/", {"src/cli", "src/viewer", "src/bench"}}};
 

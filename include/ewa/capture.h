@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Photos without cameras, and videos, become datasets: ffmpeg extracts frames, and COLMAP finds the cameras. Both are
+// run as the programs that they are.
+#pragma once
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace ewa {
+
+/// Which pairs of images COLMAP compares.
+enum class Matching {
+    automatic,  // of a video: sequence. Of photos: unordered up to 200, else sequence
+    sequence,   // each image with those that follow it in the order of names
+    unordered   // all pairs; the time grows with the square of their number
+};
+
+struct CaptureOptions {
+    int frames = 300;  // of a video, about; the sharpest of each of as many equal parts is taken
+    Matching matching = Matching::automatic;
+};
+
+struct CaptureProgress {
+    std::string what;  // a verb, such as "placed"
+    std::string unit;  // its plural, such as "photos"
+    int done = 0, total = 0;
+};
+
+struct Capture {
+    int images = 0;                       // given to COLMAP
+    int placed = 0;                       // that have a camera
+    bool interrupted = false;             // the other members are then not known
+    std::vector<std::string> not_placed;  // names
+    std::vector<std::string> remarks;     // for the user: a line each
+};
+
+/// Whether the path is a video by its extension, or a folder with photos that load_dataset does not read because it has
+/// no cameras.
+bool is_capture(const std::filesystem::path& path);
+
+/// Makes a dataset of a folder of photos (JPEG, PNG, TIFF, BMP; subfolders too) or a video.
+/// - images: the frames of the video, or a link to the photos' folder.
+/// - sparse/0: COLMAP's model, made last. The lens has OpenCV's radial and tangential terms if all images have one size,
+///   else one radial term per image.
+/// - colmap/: what COLMAP needs to go on, and log.txt with what the programs print.
+/// - capture.json: input and options. A folder with the same ones is continued; what is done is kept.
+///
+/// progress is called at least every tenth of a second; false ends the run. Throws InputError: no such input, a folder
+/// of something else, too few photos, HEIC, and what COLMAP cannot place. Throws RunError: ffmpeg or colmap is missing
+/// or fails, disk.
+Capture make_dataset(const std::filesystem::path& input, const std::filesystem::path& folder,
+                     const CaptureOptions& options,
+                     const std::function<bool(const CaptureProgress&)>& progress);
+
+}  // namespace ewa

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// The steps from photos or a video to a dataset. Each writes its result under another name and renames it last, so that
+// an interrupted step is done again and a finished one is kept.
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "ewa/capture.h"
+
+namespace ewa::capture {
+
+using ProgressFunction = std::function<bool(const CaptureProgress&)>;
+
+/// Thrown when the caller's progress function has ended the run.
+struct Stopped {};
+
+/// The variance of a grey image's Laplacian (Pech-Pacheco et al. 2000): larger where the image is sharper. Images of
+/// one size can be compared. 0 for an image of less than 3 x 3 pixels.
+double sharpness(const std::uint8_t* pixels, int width, int height);
+
+/// The index of the sharpest image in each of `parts` parts of equal length, in order; all of them if there are fewer.
+std::vector<int> sharpest(const std::vector<double>& sharpness, int parts);
+
+/// Takes the images out of a stream of binary PGM files that arrives in pieces of any size.
+class PgmStream {
+  public:
+    explicit PgmStream(std::function<void(const std::uint8_t* pixels, int width, int height)> image)
+        : image_(std::move(image)) {}
+    /// Throws RunError where the stream is not PGM of 8 bits with at most 16 million pixels.
+    void add(std::string_view bytes);
+
+  private:
+    bool take_one();
+
+    std::function<void(const std::uint8_t*, int, int)> image_;
+    std::string rest_;
+};
+
+/// Writes the sharpest frames of a video to `images` as JPEG files. Programs write to the log. Throws RunError, Stopped.
+void extract_frames(const std::filesystem::path& video, const std::filesystem::path& images, int frames,
+                    const std::filesystem::path& log, const ProgressFunction& progress);
+
+/// The photos that COLMAP reads, relative to their folder and sorted. Throws InputError if there are fewer than 3, or if
+/// one is HEIC.
+std::vector<std::filesystem::path> photos_in(const std::filesystem::path& folder);
+
+/// What COLMAP has to place.
+struct Photos {
+    std::filesystem::path folder;              // of the images
+    std::vector<std::filesystem::path> names;  // relative to it
+    bool in_sequence = false;                  // neighbours in the order of names show the same things
+};
+
+/// Runs COLMAP in `work` and leaves its largest model in `model` (cameras.bin, images.bin, points3D.bin). Throws
+/// InputError if nothing can be placed, RunError, Stopped. Returns remarks.
+std::vector<std::string> place_photos(const Photos& photos, const std::filesystem::path& work,
+                                      const std::filesystem::path& model, const ProgressFunction& progress);
+
+}  // namespace ewa::capture

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+// ewa cameras: finds the cameras of photos or of a video's frames.
+#include "cli/cameras.h"
+
+#include <spdlog/fmt/fmt.h>
+#include <CLI/CLI.hpp>
+
+#include <map>
+#include <memory>
+
+#include "cli/arguments.h"
+#include "cli/command.h"
+#include "cli/interrupt.h"
+#include "cli/output.h"
+#include "core/text.h"
+
+namespace ewa::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct CamerasArguments {
+    fs::path input, output;
+    CaptureOptions options;
+    bool quiet = false;
+};
+
+/// A progress line for each kind of work.
+class CaptureProgressLine {
+  public:
+    explicit CaptureProgressLine(bool quiet) : quiet_(quiet) {}
+
+    void update(const CaptureProgress& now) {
+        if (now.total < 1) return;
+        if (now.what != what_ || now.unit != unit_ || now.total < done_) {
+            line_.reset();
+            what_ = now.what;
+            unit_ = now.unit;
+            done_ = 0;
+        }
+        // A video may have more frames than its header says.
+        if (!line_ || now.total > total_) line_ = std::make_unique<Progress>(what_, now.total, unit_, quiet_);
+        total_ = now.total;
+        if (now.done > done_) line_->update(now.done);
+        done_ = now.done;
+    }
+
+  private:
+    bool quiet_;
+    std::unique_ptr<Progress> line_;
+    std::string what_, unit_;
+    int done_ = 0, total_ = 0;
+};
+
+int run(const CamerasArguments& arguments) {
+    place_with_progress(arguments.input, arguments.output, arguments.options, arguments.quiet);
+    return 0;
+}
+
+}  // namespace
+
+void place_with_progress(const fs::path& input, const fs::path& folder, const CaptureOptions& options,
+                         bool quiet) {
+    const InterruptWatch watch;
+    auto line = std::make_unique<CaptureProgressLine>(quiet);
+    const Capture capture = make_dataset(input, folder, options, [&](const CaptureProgress& now) {
+        line->update(now);
+        return !interrupted();
+    });
+    line.reset();
+    if (capture.interrupted) throw Interrupted();
+    if (quiet) return;
+    for (const std::string& remark : capture.remarks) std::puts(core::one_line(remark).c_str());
+    std::puts(core::one_line(fmt::format("{}: {} of {} photos have cameras", folder.string(), capture.placed,
+                                         capture.images))
+                  .c_str());
+}
+
+Action add_cameras(CLI::App& app) {
+    const auto arguments = std::make_shared<CamerasArguments>();
+    CaptureOptions& options = arguments->options;
+    app.add_option(
+           "INPUT", arguments->input,
+           "Folder with photos (JPEG, PNG, TIFF or BMP), or a video. COLMAP finds the cameras, ffmpeg "
+           "reads the video; both must be installed")
+        ->required()
+        ->type_name("");
+    app.add_option(
+           "-o,--output", arguments->output,
+           "Folder for the dataset: images/, sparse/0 and colmap/log.txt. An interrupted run continues there")
+        ->required()
+        ->type_name("DIR");
+    app.add_option(
+           "--frames", options.frames,
+           "Number of frames to take from a video, about: the sharpest of each of as many equal parts")
+        ->check(in_range(3, 100000))
+        ->type_name("N")
+        ->capture_default_str();
+    static const std::map<std::string, Matching> kMatchings = {
+        {"auto", Matching::automatic}, {"sequence", Matching::sequence}, {"unordered", Matching::unordered}};
+    app.add_option_function<std::string>(
+           "--matching", [&options](const std::string& name) { options.matching = kMatchings.at(name); },
+           "Which photos to compare. sequence: each with those that follow it in the order of names. "
+           "unordered: all "
+           "with all. auto: sequence for a video and for more than 200 photos")
+        ->check(CLI::IsMember({"auto", "sequence", "unordered"}))
+        ->type_name("ORDER")
+        ->default_str("auto");
+    add_quiet_option(app, arguments->quiet);
+    return [arguments] { return run(*arguments); };
+}
+
+}  // namespace ewa::cli

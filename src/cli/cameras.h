@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+// Datasets from photos and videos, for the commands that take them.
+#pragma once
+#include <filesystem>
+
+#include "ewa/capture.h"
+
+namespace ewa::cli {
+
+/// Makes a dataset of photos or a video, with progress, and prints what was placed. Throws InputError, RunError, and
+/// Interrupted if Ctrl-C ended it.
+void place_with_progress(const std::filesystem::path& input, const std::filesystem::path& folder,
+                         const CaptureOptions& options, bool quiet);
+
+}  // namespace ewa::cli

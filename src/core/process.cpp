@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/process.h"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstdlib>
+#include <cstring>
+
+#include "core/folders.h"
+#include "core/text.h"
+#include "ewa/error.h"
+
+extern char** environ;
+
+namespace ewa::core {
+namespace {
+
+constexpr int kTurn = 100;  // ms
+
+/// A file descriptor.
+class Descriptor {
+  public:
+    explicit Descriptor(int value = -1) : value_(value) {}
+    ~Descriptor() { close(); }
+    Descriptor(const Descriptor&) = delete;
+    int get() const { return value_; }
+    void close() {
+        if (value_ >= 0) ::close(value_);
+        value_ = -1;
+    }
+
+  private:
+    int value_;
+};
+
+std::vector<char*> pointers(std::vector<std::string>& texts) {
+    std::vector<char*> result;
+    for (std::string& text : texts) result.push_back(text.data());
+    result.push_back(nullptr);
+    return result;
+}
+
+/// This process's environment with the program's own values in front: the first of a name counts.
+std::vector<std::string> environment_of(const Program& program) {
+    std::vector<std::string> all = program.environment;
+    for (char** entry = environ; *entry; ++entry) {
+        const std::string_view text = *entry, name = text.substr(0, text.find('=') + 1);
+        bool replaced = false;
+        for (const std::string& own : program.environment) replaced = replaced || own.starts_with(name);
+        if (!replaced) all.emplace_back(text);
+    }
+    return all;
+}
+
+pid_t start(const Program& program, int output, int log) {
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+    posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
+    if (log >= 0) posix_spawn_file_actions_adddup2(&actions, log, STDERR_FILENO);
+    posix_spawnattr_t attributes;
+    posix_spawnattr_init(&attributes);
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+    posix_spawnattr_setpgroup(&attributes, 0);
+    std::vector<std::string> words = program.command, environment = environment_of(program);
+    pid_t child = 0;
+    const int reason = posix_spawnp(&child, words[0].c_str(), &actions, &attributes, pointers(words).data(),
+                                    pointers(environment).data());
+    posix_spawnattr_destroy(&attributes);
+    posix_spawn_file_actions_destroy(&actions);
+    if (reason != 0) throw RunError("cannot start " + one_line(words[0]) + ": " + std::strerror(reason));
+    return child;
+}
+
+void write_all(int descriptor, std::string_view text, const std::filesystem::path& path) {
+    while (!text.empty()) {
+        const ssize_t written = ::write(descriptor, text.data(), text.size());
+        if (written < 0 && errno == EINTR) continue;
+        if (written <= 0)
+            throw RunError(one_line(path.string()) + ": cannot be written: " + std::strerror(errno));
+        text.remove_prefix(size_t(written));
+    }
+}
+
+/// Ends the child when an exception passes.
+class Child {
+  public:
+    explicit Child(pid_t id) : id_(id) {}
+    ~Child() {
+        if (id_ > 0) end();
+    }
+    Child(const Child&) = delete;
+    /// Ends the program and those that it has started.
+    void end() {
+        kill(-id_, SIGTERM);
+        wait();
+    }
+    int wait() {
+        int status = 0;
+        while (waitpid(id_, &status, 0) < 0 && errno == EINTR) {
+        }
+        id_ = 0;
+        return status;
+    }
+
+  private:
+    pid_t id_;
+};
+
+}  // namespace
+
+bool has_program(const std::string& name) {
+    const char* path = std::getenv("PATH");
+    std::string_view rest = path ? path : "";
+    while (!rest.empty()) {
+        const size_t colon = std::min(rest.find(':'), rest.size());
+        const std::filesystem::path file = std::filesystem::path(rest.substr(0, colon)) / name;
+        if (is_file(file) && access(file.c_str(), X_OK) == 0) return true;
+        rest.remove_prefix(std::min(colon + 1, rest.size()));
+    }
+    return false;
+}
+
+Ended run_program(const Program& program, const std::function<bool(std::string_view)>& output) {
+    int ends[2];
+    if (pipe2(ends, O_CLOEXEC) != 0) throw RunError("cannot create a pipe");
+    const Descriptor from(ends[0]);
+    Descriptor to(ends[1]);
+    const Descriptor log(program.log.empty()
+                             ? -1
+                             : open(program.log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666));
+    if (!program.log.empty() && log.get() < 0)
+        throw RunError(one_line(program.log.string()) + ": cannot be written: " + std::strerror(errno));
+    Child child(start(program, to.get(), log.get()));
+    to.close();
+    std::array<char, 65536> piece;
+    for (;;) {
+        pollfd ready{from.get(), POLLIN, 0};
+        const int count = poll(&ready, 1, kTurn);
+        if (count < 0 && errno != EINTR) throw RunError("cannot wait for " + one_line(program.command[0]));
+        std::string_view text;
+        if (count > 0) {
+            const ssize_t n = read(from.get(), piece.data(), piece.size());
+            if (n == 0) break;
+            if (n > 0) text = {piece.data(), size_t(n)};
+        }
+        if (program.output_to_log) write_all(log.get(), text, program.log);
+        if (!output(text)) {
+            child.end();
+            return Ended::stopped;
+        }
+    }
+    return child.wait() == 0 ? Ended::done : Ended::failed;
+}
+
+}  // namespace ewa::core

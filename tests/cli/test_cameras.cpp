@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: Apache-2.0
+// ewa cameras, and ewa train of photos, with programs in the place of COLMAP and ffmpeg. The last test runs the real ones.
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+
+#include "cli/expect.h"
+#include "cli/program.h"
+#include "core/process.h"
+
+namespace {
+
+using namespace ewa::test;
+namespace fs = std::filesystem;
+
+/// A program of the shell in a folder that PATH begins with.
+void make_program(const std::string& path, const std::string& script) {
+    write_file(path, "#!/bin/sh\n" + script);
+    chmod(path.c_str(), 0755);
+}
+
+class Cameras : public testing::Test {
+  protected:
+    /// Photos with their model, as COLMAP's text; colmap writes its binary form.
+    void SetUp() override {
+        make_dataset(folder_ / "source");
+        fs::copy(folder_ / "source/images", folder_ / "photos");
+        fs::create_directories(folder_ / "bin");
+        // The stand-in says what it was called with, prints what COLMAP prints, and its mapper copies models.
+        make_program(folder_ / "bin/colmap", R"sh(
+case "$*" in *--help*) echo "  --SiftExtraction.use_gpu arg (=1)"; exit 0;; esac
+echo "$1" >> "$CALLS"
+previous=
+for word; do
+    if [ "$previous" = --output_path ]; then output=$word; fi
+    previous=$word
+done
+if [ "$FAIL" = "$1" ]; then echo "the reason" >&2; exit 1; fi
+if [ "$HANG" = "$1" ]; then echo begun > "$CALLS.hangs"; sleep 1000; fi
+case $1 in
+feature_extractor) for i in 1 2 3 4; do echo "Processed file [$i/4]"; done;;
+exhaustive_matcher) echo "Matching block [1/1, 1/1] in 0.1s";;
+mapper) cp -r "$MODELS"/. "$output"; echo "Registering image #4 (4)";;
+esac
+)sh");
+    }
+
+    template <class T>
+    static std::string bytes_of(T value) {
+        return {reinterpret_cast<const char*>(&value), sizeof(value)};
+    }
+
+    /// A model of these photos, as COLMAP writes it.
+    void make_model(const std::string& name, const std::vector<std::string>& photos) {
+        const std::string model = folder_ / ("models/" + name);
+        fs::create_directories(model);
+        const ImageDimensions size{};
+        std::string cameras = bytes_of(uint64_t(1)) + bytes_of(uint32_t(1)) + bytes_of(int32_t(1)) +
+                              bytes_of(size.width) + bytes_of(size.height);
+        for (const double value : {40.0, 40.0, 24.0, 16.0}) cameras += bytes_of(value);
+        std::string images = bytes_of(uint64_t(photos.size()));
+        for (size_t i = 0; i < photos.size(); ++i) {
+            images += bytes_of(uint32_t(i + 1));
+            for (const double value : {1.0, 0.0, 0.0, 0.0, 0.1 * double(i), 0.0, 3.0})
+                images += bytes_of(value);
+            images += bytes_of(uint32_t(1)) + photos[i] + '\0' + bytes_of(uint64_t(0));
+        }
+        std::string points = bytes_of(uint64_t(8));
+        for (int i = 0; i < 8; ++i) {
+            points += bytes_of(uint64_t(i + 1));
+            for (const int bit : {1, 2, 4}) points += bytes_of(i & bit ? 0.5 : -0.5);
+            points += std::string(3, '\x80') + bytes_of(0.5) + bytes_of(uint64_t(0));
+        }
+        write_file(model + "/cameras.bin", cameras);
+        write_file(model + "/images.bin", images);
+        write_file(model + "/points3D.bin", points);
+    }
+
+    struct ImageDimensions {
+        uint64_t width = 48, height = 32;
+    };
+
+    Outcome run(const std::vector<std::string>& arguments, Circumstances circumstances = {}) {
+        for (const auto& [name, value] :
+             std::vector<std::pair<std::string, std::string>>{{"PATH", folder_ / "bin" + ":/usr/bin:/bin"},
+                                                              {"CALLS", folder_ / "calls"},
+                                                              {"MODELS", folder_ / "models"}})
+            circumstances.environment.emplace_back(name, value);
+        return run_ewa(arguments, circumstances);
+    }
+
+    Outcome cameras(Circumstances circumstances = {}) {
+        return run({"cameras", folder_ / "photos", "-o", folder_ / "dataset"}, std::move(circumstances));
+    }
+
+    std::string calls() { return fs::exists(folder_ / "calls") ? read_file(folder_ / "calls") : ""; }
+
+    Folder folder_;
+};
+
+TEST_F(Cameras, OfPhotosBecomeADataset) {
+    make_model("0", {"0.png", "1.png", "2.png", "3.png"});
+    const Outcome outcome = cameras();
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_NE(outcome.out.find("4 of 4 photos have cameras"), std::string::npos) << outcome.out;
+    EXPECT_EQ(outcome.out.find("could not be placed"), std::string::npos) << outcome.out;
+    EXPECT_EQ(calls(), "feature_extractor\nexhaustive_matcher\nmapper\n");
+    EXPECT_EQ(run_ewa({"info", folder_ / "dataset"}).status, 0);
+    EXPECT_NE(read_file(folder_ / "dataset/colmap/log.txt").find("Processed file [4/4]"), std::string::npos);
+
+    // A second run has nothing to do.
+    EXPECT_EQ(cameras().status, 0);
+    EXPECT_EQ(calls(), "feature_extractor\nexhaustive_matcher\nmapper\n");
+}
+
+TEST_F(Cameras, OfTheLargestModelAreTaken) {
+    make_model("0", {"2.png"});
+    make_model("1", {"0.png", "1.png", "3.png"});
+    const Outcome outcome = cameras();
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_NE(outcome.out.find("2 separate models of 3 and 1 photos"), std::string::npos) << outcome.out;
+    EXPECT_NE(outcome.out.find("1 of 4 photos could not be placed, and are not used: 2.png"),
+              std::string::npos)
+        << outcome.out;
+}
+
+TEST_F(Cameras, ThatCannotBeFoundAreExplained) {
+    fs::create_directories(folder_ / "models");
+    expect_failure(cameras(), 2, "COLMAP could not place the 4 photos: too few of their details match");
+    expect_failure(cameras({.environment = {{"FAIL", "mapper"}}}), 2, "COLMAP could not place the 4 photos");
+    EXPECT_FALSE(fs::exists(folder_ / "dataset/sparse/0"));
+}
+
+TEST_F(Cameras, AFailureNamesTheLogAndCanBeRepeated) {
+    make_model("0", {"0.png", "1.png", "2.png", "3.png"});
+    expect_failure(
+        cameras({.environment = {{"FAIL", "exhaustive_matcher"}}}), 1,
+        "colmap exhaustive_matcher failed; " + folder_ / "dataset/colmap/log.txt" + " has its reason");
+    EXPECT_NE(read_file(folder_ / "dataset/colmap/log.txt").find("the reason"), std::string::npos);
+    EXPECT_EQ(cameras().status, 0);
+    // What was done is kept.
+    EXPECT_EQ(calls(), "feature_extractor\nexhaustive_matcher\nexhaustive_matcher\nmapper\n");
+}
+
+TEST_F(Cameras, CtrlCEndsColmapToo) {
+    make_model("0", {"0.png", "1.png", "2.png", "3.png"});
+    const Outcome outcome = cameras({.await_file = folder_ / "calls.hangs",
+                                     .signal = SIGINT,
+                                     .environment = {{"HANG", "exhaustive_matcher"}}});
+    EXPECT_EQ(outcome.status, 130) << outcome.err;
+    EXPECT_EQ(cameras().status, 0);
+}
+
+TEST_F(Cameras, AnotherInputNeedsAnotherFolder) {
+    make_model("0", {"0.png", "1.png", "2.png", "3.png"});
+    ASSERT_EQ(cameras().status, 0);
+    fs::copy(folder_ / "photos", folder_ / "others");
+    expect_failure(run({"cameras", folder_ / "others", "-o", folder_ / "dataset"}), 2,
+                   "is the dataset of another input");
+    fs::create_directories(folder_ / "full");
+    write_file(folder_ / "full/notes.txt", "mine");
+    expect_failure(run({"cameras", folder_ / "photos", "-o", folder_ / "full"}), 2, "is not empty");
+    EXPECT_EQ(files_below(folder_ / "full"), std::vector<std::string>{"notes.txt"});
+}
+
+TEST_F(Cameras, WhatIsMissingIsNamed) {
+    fs::remove(folder_ / "bin/colmap");
+    const Circumstances bare{.environment = {{"PATH", folder_ / "bin"}}};
+    expect_failure(run_ewa({"cameras", folder_ / "photos", "-o", folder_ / "dataset"}, bare), 1,
+                   "apt install colmap");
+    write_file(folder_ / "film.mp4", "no film");
+    expect_failure(run_ewa({"cameras", folder_ / "film.mp4", "-o", folder_ / "film"}, bare), 1,
+                   "apt install ffmpeg");
+    expect_failure(run_ewa({"cameras", folder_ / "nowhere", "-o", folder_ / "x"}), 2,
+                   "there is no such file or folder");
+    expect_failure(run_ewa({"cameras", folder_ / "bin", "-o", folder_ / "x"}), 2,
+                   "neither a video nor a folder with photos");
+    EXPECT_FALSE(fs::exists(folder_ / "x"));
+}
+
+/// The stand-in of ffmpeg has 9 frames, of which every third is sharp.
+TEST_F(Cameras, OfAVideoAreThoseOfItsSharpestFrames) {
+    make_program(folder_ / "bin/ffmpeg", R"sh(
+echo "$@" >> "$CALLS.ffmpeg"
+case "$*" in
+*image2pipe*)
+    for i in 0 1 2 3 4 5 6 7 8; do
+        printf 'P5\n4 3\n255\n'
+        if [ $((i % 3)) = 1 ]; then printf 'a\377a\377\377a\377aa\377a\377'; else printf 'aaaabbbbcccc'; fi
+    done;;
+*)
+    for word; do last=$word; done
+    for i in 0 1 2; do cp "$PHOTOS/$i.png" "$(dirname "$last")/frame_0000$((i + 1)).jpg"; done;;
+esac
+)sh");
+    make_model("0", {"frame_00001.jpg", "frame_00002.jpg", "frame_00003.jpg"});
+    write_file(folder_ / "film.mp4", "a film");
+    const Outcome outcome = run({"cameras", folder_ / "film.mp4", "-o", folder_ / "dataset", "--frames", "3"},
+                                {.environment = {{"PHOTOS", folder_ / "photos"}}});
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_NE(outcome.out.find("3 of 3 photos have cameras"), std::string::npos) << outcome.out;
+    EXPECT_NE(read_file(folder_ / "calls.ffmpeg").find("select='eq(n,1)+eq(n,4)+eq(n,7)'"),
+              std::string::npos);
+    EXPECT_EQ(calls(), "feature_extractor\nsequential_matcher\nmapper\n");
+}
+
+TEST_F(Cameras, TrainingPlacesPhotosFirst) {
+    make_model("0", {"0.png", "1.png", "2.png", "3.png"});
+    const std::vector<std::string> train = {"train", folder_ / "photos/", "-o", folder_ / "run", "--steps",
+                                            "3",     "--test-every",      "0",  "--quiet"};
+    const Outcome outcome = run(train);
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_TRUE(fs::exists(folder_ / "run/splats.ply"));
+    EXPECT_TRUE(fs::exists(folder_ / "run/dataset/sparse/0/images.bin"));
+    const auto config = read_json(folder_ / "run/config.json");
+    EXPECT_EQ(fs::path(config.at("dataset").get<std::string>()).filename(), "photos");
+}
+
+/// A film of 20 real photos, where COLMAP, ffmpeg and the photos are on this machine.
+TEST(RealCapture, OfAFilmPlacesItsFrames) {
+    const auto photos = shared_data();
+    if (!photos || !ewa::core::has_program("colmap") || !ewa::core::has_program("ffmpeg"))
+        GTEST_SKIP() << "no COLMAP, no ffmpeg, or no photos";
+    const Folder folder;
+    const std::string film = folder / "film.mp4";
+    const std::string make = "ffmpeg -v error -framerate 10 -pattern_type glob -i '" +
+                             (*photos / "fox_270/images/*.jpg").string() +
+                             "' -frames:v 20 -c:v mpeg4 -q:v 1 " + film;
+    ASSERT_EQ(std::system(make.c_str()), 0);
+    const Outcome outcome = run_ewa({"cameras", film, "-o", folder / "dataset", "--matching", "unordered"});
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    const size_t end = outcome.out.rfind(" of 20 photos have cameras");
+    ASSERT_NE(end, std::string::npos) << outcome.out;
+    EXPECT_GE(std::stoi(outcome.out.substr(outcome.out.rfind(' ', end - 1) + 1)), 15) << outcome.out;
+}
+
+}  // namespace

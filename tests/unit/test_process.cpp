@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/process.h"
+
+#include <chrono>
+#include <csignal>
+
+#include "support/temp_folder.h"
+
+namespace {
+
+using namespace ewa;
+using core::Ended;
+using core::Program;
+
+Program shell(const std::string& script) {
+    return {.command = {"sh", "-c", script}, .environment = {}, .log = {}};
+}
+
+/// A program's end and its standard output.
+std::pair<Ended, std::string> run(const Program& program) {
+    std::string text;
+    const Ended ended = core::run_program(program, [&](std::string_view piece) {
+        text += piece;
+        return true;
+    });
+    return {ended, text};
+}
+
+TEST(Process, OutputAndStatusComeBack) {
+    EXPECT_EQ(run(shell("echo one; echo two")), std::pair(Ended::done, std::string("one\ntwo\n")));
+    EXPECT_EQ(run(shell("echo one; exit 3")), std::pair(Ended::failed, std::string("one\n")));
+    EXPECT_EQ(run(shell("kill -9 $$")).first, Ended::failed);
+    EXPECT_EQ(run(shell("cat; echo end")).second, "end\n");  // standard input is empty
+}
+
+TEST(Process, AMillionBytesArriveInOrder) {
+    const auto [ended, text] = run(shell("i=0; while [ $i -lt 20000 ]; do echo $i; i=$((i+1)); done"));
+    std::string expected;
+    for (int i = 0; i < 20000; ++i) expected.append(std::to_string(i)).append("\n");
+    EXPECT_EQ(text, expected);
+    EXPECT_EQ(ended, Ended::done);
+}
+
+TEST(Process, TheEnvironmentIsThatOfThisProcessWithChanges) {
+    setenv("EWA_TEST_KEPT", "kept", 1);
+    setenv("EWA_TEST_CHANGED", "before", 1);
+    Program program = shell("echo $EWA_TEST_KEPT $EWA_TEST_CHANGED $EWA_TEST_NEW");
+    program.environment = {"EWA_TEST_CHANGED=after", "EWA_TEST_NEW=new"};
+    EXPECT_EQ(run(program).second, "kept after new\n");
+}
+
+TEST(Process, TheLogHasErrorsAndIfAskedForTheOutput) {
+    const test::TempFolder folder;
+    Program program = shell("echo out; echo err >&2");
+    program.log = folder / "log.txt";
+    EXPECT_EQ(run(program).second, "out\n");
+    EXPECT_EQ(test::file_bytes(program.log), "err\n");
+    program.output_to_log = true;
+    EXPECT_EQ(run(program).second, "out\n");
+    const std::string log = test::file_bytes(program.log);
+    EXPECT_EQ(log.find("err\n"), 0u);  // of the first run, which stays
+    EXPECT_NE(log.find("out\n"), std::string::npos);
+}
+
+/// The program and what it has started end, although neither prints anything.
+TEST(Process, StopsWhenAsked) {
+    const test::TempFolder folder;
+    const auto file = folder / "pid";
+    const auto start = std::chrono::steady_clock::now();
+    const Ended ended = core::run_program(shell("sleep 100 & echo $! > " + file.string() + "; wait"),
+                                          [&](std::string_view) { return test::file_bytes(file).empty(); });
+    EXPECT_EQ(ended, Ended::stopped);
+    EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(60));
+    const pid_t child = std::stoi(test::file_bytes(file));
+    for (int i = 0; i < 1000 && kill(child, 0) == 0; ++i) usleep(10000);
+    // Where nobody reaps orphans, the child stays as a zombie.
+    const std::string state = test::file_bytes("/proc/" + std::to_string(child) + "/stat");
+    EXPECT_TRUE(state.empty() || state.find(") Z") != std::string::npos) << state;
+}
+
+TEST(Process, WhatCannotStartIsNamed) {
+    test::expect_error<RunError>(
+        [] { run({.command = {"ewa-no-such-program"}, .environment = {}, .log = {}}); },
+        {"cannot start ewa-no-such-program", "No such file"});
+    test::expect_error<RunError>(
+        [] { run({.command = {"true"}, .environment = {}, .log = "/no/such/folder/log.txt"}); },
+        {"/no/such/folder/log.txt: cannot be written"});
+    EXPECT_TRUE(core::has_program("sh"));
+    EXPECT_FALSE(core::has_program("ewa-no-such-program"));
+}
+
+}  // namespace
