@@ -128,7 +128,8 @@ void add_test_every_option(CLI::App& app, int& test_every) {
 }
 
 void add_splats(CLI::App& app, fs::path& splats) {
-    app.add_option("SPLATS", splats, "Splat file (.ply .compressed.ply .splat .spz .glb .gltf)")
+    app.add_option("SPLATS", splats,
+                   "Splat file (.ply .compressed.ply .splat .spz .glb .gltf), or folder of a training run")
         ->required()
         ->type_name("");
 }
@@ -193,8 +194,9 @@ void add_view_positionals(CLI::App& app, ViewArguments& arguments) {
     app.add_option(
            "DATASET", arguments.dataset,
            "Images with cameras: a COLMAP folder or transforms.json. Or a glTF file of meshes, which is "
-           "rendered as in ewa train")
-        ->required()
+           "rendered as in ewa train. Or the folder of a training run: its dataset [that of the run SPLATS, "
+           "with "
+           "the run's options]")
         ->type_name("");
 }
 

@@ -82,7 +82,7 @@ struct ViewArguments {
     DrawArguments draw;
     DeviceOptions device;
 };
-/// SPLATS and DATASET.
+/// SPLATS and DATASET, which resolve_views of run_inputs.h then completes.
 void add_view_positionals(CLI::App& app, ViewArguments& arguments);
 /// The options of the other members.
 void add_view_options(CLI::App& app, ViewArguments& arguments);

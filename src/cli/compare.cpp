@@ -13,6 +13,7 @@
 #include "cli/command.h"
 #include "cli/compare_inputs.h"
 #include "cli/output.h"
+#include "cli/run_inputs.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/image.h"
@@ -225,10 +226,11 @@ int run(const CompareArguments& arguments) {
 
 Action add_compare(CLI::App& app) {
     const auto arguments = std::make_shared<CompareArguments>();
-    app.add_option("A", arguments->inputs.a, "Image, folder of images, or splat file")
+    app.add_option("A", arguments->inputs.a,
+                   "Image, folder of images, splat file, or folder of a training run")
         ->required()
         ->type_name("");
-    app.add_option("B", arguments->inputs.b, "What A is compared with: image, folder or splat file")
+    app.add_option("B", arguments->inputs.b, "What A is compared with: image, folder, splat file or run")
         ->required()
         ->type_name("");
     app.add_option("--threshold", arguments->threshold,
@@ -255,7 +257,7 @@ Action add_compare(CLI::App& app) {
                "--cameras", arguments->inputs.cameras,
                "Dataset whose cameras render splat files. Each render is compared with that of the other "
                "splat file, or with the image that has the name ewa render would give it, rounded like that "
-               "image")
+               "image [the dataset of a run]")
             ->type_name("DATASET");
     const std::vector<CLI::Option*> before = app.get_options();
     add_frames_options(app, arguments->inputs.frames, arguments->inputs.test_every);
@@ -264,7 +266,12 @@ Action add_compare(CLI::App& app) {
     add_device_options(app, arguments->inputs.device);
     for (CLI::Option* option : app.get_options())
         if (std::find(before.begin(), before.end(), option) == before.end()) option->needs(cameras);
-    return [arguments] { return run(*arguments); };
+    return [&app, arguments] {
+        CompareInputs& inputs = arguments->inputs;
+        if (!inputs.cameras.empty()) inputs.cameras = dataset_input(inputs.cameras);
+        resolve_runs(app, inputs);
+        return run(*arguments);
+    };
 }
 
 }  // namespace ewa::cli

@@ -7,6 +7,7 @@
 #include <map>
 #include <set>
 
+#include "cli/run_inputs.h"
 #include "ewa/error.h"
 #include "ewa/renderer.h"
 #include "ewa/splat_files.h"
@@ -144,6 +145,25 @@ ImagePairs pair_one(const ComparedSide& a, const ComparedSide& b) {
 }
 
 }  // namespace
+
+void resolve_runs(CLI::App& app, CompareInputs& inputs) {
+    std::optional<live::Run> first;
+    for (fs::path* side : {&inputs.a, &inputs.b}) {
+        if (!names_run_with_splats(*side)) continue;
+        const SplatInput input = splat_input(*side);
+        *side = input.file;
+        if (!first) first = input.run;
+        for (const char* option : {"kernel", "background"})
+            if (first->text(option) != input.run->text(option) &&
+                app.get_option("--" + std::string(option))->empty())
+                throw InputError(first->folder.string() + " and " + input.run->folder.string() +
+                                 " were trained with another --" + option +
+                                 "; choose one with --cameras DATASET --" + option);
+    }
+    if (!first) return;
+    if (inputs.cameras.empty()) inputs.cameras = dataset_of(*first);
+    use_options_of(*first, app);
+}
 
 Sides open_sides(const CompareInputs& inputs) {
     Sides sides;

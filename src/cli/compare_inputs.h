@@ -50,6 +50,11 @@ struct Sides {
     RenderOptions options;
 };
 
+/// Replaces folders of training runs by the runs' splats. The first run gives --cameras and the options of
+/// use_options_of, unless they are given. A folder of images stays. Throws InputError, also if two runs differ in
+/// --kernel or --background.
+void resolve_runs(CLI::App& app, CompareInputs& inputs);
+
 /// A path names a splat scene by the first bytes of the file, else by its name. A scene is rendered when an image
 /// is asked for, as `ewa render --format exr` writes it: float32 with alpha, under the same names. Throws
 /// InputError (no such image or folder, a scene without --cameras), RunError if a scene exceeds the device's memory.

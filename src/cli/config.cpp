@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/json.h"
+#include "core/text.h"
 #include "ewa/error.h"
 #include "report/summary.h"
 #include "train/run_options.h"
@@ -86,6 +87,18 @@ void apply_config(CLI::App& app, const std::filesystem::path& file) {
     for (const auto& [option, text] : values) {
         option->add_result(text);
         option->run_callback();
+    }
+}
+
+void apply_config_value(CLI::App& app, const std::string& name, const nlohmann::json& value,
+                        const std::filesystem::path& where) {
+    CLI::Option* option = find_option(app, name);
+    if (!option || given(app, name)) return;
+    try {
+        option->add_result(option_text(value, where.string() + ": \"" + name + "\""));
+        option->run_callback();
+    } catch (const CLI::Error& error) {
+        throw InputError(core::one_line(where.string()) + ": " + error.what());
     }
 }
 

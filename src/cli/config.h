@@ -2,6 +2,8 @@
 // Options from a JSON file, under the names they have on the command line.
 #pragma once
 #include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
 
 namespace CLI {
 class App;
@@ -13,5 +15,10 @@ namespace ewa::cli {
 /// count as one option. Throws InputError for a file that is not a JSON object of known names, and for a value of
 /// another JSON type than a run's config.json has. Throws CLI::Error for a value that its option refuses.
 void apply_config(CLI::App& app, const std::filesystem::path& file);
+
+/// The same for one option, which `app` may lack. where: the file that has the value. Throws InputError for a value
+/// that its option refuses.
+void apply_config_value(CLI::App& app, const std::string& name, const nlohmann::json& value,
+                        const std::filesystem::path& where);
 
 }  // namespace ewa::cli

@@ -12,6 +12,7 @@
 #include "cli/command.h"
 #include "cli/convert_edits.h"
 #include "cli/output.h"
+#include "cli/run_inputs.h"
 #include "cli/splat_statistics.h"
 #include "core/messages.h"
 #include "core/text.h"
@@ -204,7 +205,7 @@ Action add_convert(CLI::App& app) {
     const auto arguments = std::make_shared<ConvertArguments>();
     app.add_option("FILES", arguments->files,
                    "One or more inputs, which are joined, then the output. Formats: .ply .compressed.ply "
-                   ".splat .spz .glb .gltf")
+                   ".splat .spz .glb .gltf. An input may be the folder of a training run")
         ->required()
         ->expected(2, -1)
         ->type_name("IN... OUT");
@@ -221,7 +222,11 @@ Action add_convert(CLI::App& app) {
                    "Write the inputs, the output, remarks and errors of --check to this file")
         ->type_name("FILE");
     add_quiet_option(app, arguments->quiet);
-    return [arguments] { return run(*arguments); };
+    return [arguments] {
+        for (size_t i = 0; i + 1 < arguments->files.size(); ++i)
+            arguments->files[i] = splat_input(arguments->files[i]).file;
+        return run(*arguments);
+    };
 }
 
 }  // namespace ewa::cli

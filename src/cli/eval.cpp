@@ -9,6 +9,7 @@
 #include "cli/arguments.h"
 #include "cli/command.h"
 #include "cli/output.h"
+#include "cli/run_inputs.h"
 #include "core/text.h"
 #include "ewa/evaluation.h"
 #include "ewa/splat_files.h"
@@ -66,7 +67,10 @@ Action add_eval(CLI::App& app) {
     add_test_every_option(app, arguments->test_every);
     app.add_option("--json", arguments->json, "Write the results to this file")->type_name("FILE");
     add_view_options(app, arguments->views);
-    return [arguments] { return run(*arguments); };
+    return [&app, arguments] {
+        resolve_views(app, arguments->views);
+        return run(*arguments);
+    };
 }
 
 }  // namespace ewa::cli

@@ -9,6 +9,7 @@
 #include "cli/arguments.h"
 #include "cli/command.h"
 #include "cli/output.h"
+#include "cli/run_inputs.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/renderer.h"
@@ -85,7 +86,10 @@ Action add_grad(CLI::App& app) {
     app.add_option("--json", arguments->json, "Write loss, l1, ssim, frame (index) and name to this file")
         ->type_name("FILE");
     add_view_options(app, arguments->views);
-    return [arguments] { return run(*arguments); };
+    return [&app, arguments] {
+        resolve_views(app, arguments->views);
+        return run(*arguments);
+    };
 }
 
 }  // namespace ewa::cli

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// ewa info: what a splat file, a dataset or a mesh scene holds.
+// ewa info: what a splat file, a training run, a dataset or a mesh scene holds.
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <numeric>
@@ -13,6 +14,7 @@
 #include "cli/arguments.h"
 #include "cli/command.h"
 #include "cli/output.h"
+#include "cli/run_inputs.h"
 #include "cli/splat_statistics.h"
 #include "core/messages.h"
 #include "core/text.h"
@@ -66,7 +68,42 @@ void print_file(const fs::path& path, const SplatScene& scene) {
         fmt::print("note            {}\n", core::one_line(remark));
 }
 
-void info_splats(const fs::path& path, bool json) {
+/// The members of summary.json; empty if the run has not ended.
+Json summary_of(const live::Run& run) {
+    try {
+        Json summary = core::read_json_file<Json>(run.folder / "summary.json", {.bytes = 1u << 20});
+        if (summary.is_object()) return summary;
+    } catch (const InputError&) {
+        // It is written at the end.
+    }
+    return Json::object();
+}
+
+void add_run(Json& json, const live::Run& run) {
+    json["kind"] = "run";
+    json["run"] = {{"folder", run.folder.string()},
+                   {"dataset", run.named_dataset},
+                   {"dataset_found", !run.dataset.empty()},
+                   {"options", run.config},
+                   {"summary", summary_of(run)}};
+}
+
+void print_run(const live::Run& run) {
+    fmt::print("{}\nkind            training run\n", core::one_line(run.folder.string()));
+    if (!run.named_dataset.empty())
+        fmt::print("dataset         {}{}\n", core::one_line(run.named_dataset),
+                   run.dataset.empty() ? " (not found)" : "");
+    const Json summary = summary_of(run);
+    const auto number = [&](const char* name) {
+        const auto found = summary.find(name);
+        return found != summary.end() && found->is_number() ? found->get<double>() : std::nan("");
+    };
+    if (std::isfinite(number("steps"))) fmt::print("steps           {:.0f}\n", number("steps"));
+    if (std::isfinite(number("test_psnr"))) fmt::print("test PSNR       {:.3f} dB\n", number("test_psnr"));
+}
+
+/// run: the training run that the file is of; null: unknown.
+void info_splats(const fs::path& path, const live::Run* run, bool json) {
     const SplatScene scene = read_splats(path);
     const Gaussians& gaussians = scene.gaussians;
     const SplatStatistics statistics = splat_statistics(gaussians);
@@ -75,24 +112,26 @@ void info_splats(const fs::path& path, bool json) {
     const auto rendering = plan_lines(gaussians, RenderOptions{});
     const auto training = plan_lines(gaussians, options);
     if (json) {
-        const Json out = {{"kind", "splats"},
-                          {"format", name_of(scene.format)},
-                          {"variant", scene.variant},
-                          {"bytes", fs::file_size(path)},
-                          {"antialiased", scene.antialiased},
-                          {"comments", scene.comments},
-                          {"notes", scene.remarks},
-                          {"splats", gaussians.size()},
-                          {"sh_degree", gaussians.sh_degree},
-                          {"file_sh_degree", scene.file_sh_degree},
-                          {"sh_degree_present", sh_degree_present(gaussians)},
-                          {"bounds", {{"min", statistics.low}, {"max", statistics.high}}},
-                          {"opacity", range_json(statistics.opacity)},
-                          {"scale", range_json(statistics.scale)},
-                          {"nonfinite", statistics.nonfinite},
-                          {"plan", {{"rendering", plan_json(rendering)}, {"training", plan_json(training)}}}};
+        Json out = {{"kind", "splats"},
+                    {"format", name_of(scene.format)},
+                    {"variant", scene.variant},
+                    {"bytes", fs::file_size(path)},
+                    {"antialiased", scene.antialiased},
+                    {"comments", scene.comments},
+                    {"notes", scene.remarks},
+                    {"splats", gaussians.size()},
+                    {"sh_degree", gaussians.sh_degree},
+                    {"file_sh_degree", scene.file_sh_degree},
+                    {"sh_degree_present", sh_degree_present(gaussians)},
+                    {"bounds", {{"min", statistics.low}, {"max", statistics.high}}},
+                    {"opacity", range_json(statistics.opacity)},
+                    {"scale", range_json(statistics.scale)},
+                    {"nonfinite", statistics.nonfinite},
+                    {"plan", {{"rendering", plan_json(rendering)}, {"training", plan_json(training)}}}};
+        if (run) add_run(out, *run);
         return print_json(out);
     }
+    if (run) print_run(*run);
     print_file(path, scene);
     fmt::print("splats          {}\n", gaussians.size());
     fmt::print("SH degree       {} stored, {} present\n", gaussians.sh_degree, sh_degree_present(gaussians));
@@ -243,12 +282,14 @@ void info_mesh(const fs::path& path, int test_every, bool json) {
 int run(const fs::path& path, int test_every, bool json) {
     std::error_code error;
     if (!fs::exists(path, error)) throw InputError(path.string() + ": no such file or folder");
-    if (fs::is_directory(path) || path.extension() == ".json")
+    if (const auto run = find_run(path))
+        info_splats(splat_input(path).file, &*run, json);
+    else if (fs::is_directory(path) || path.extension() == ".json")
         info_dataset(path, test_every, json);
     else if (is_mesh_scene(path))
         info_mesh(path, test_every, json);
     else
-        info_splats(path, json);
+        info_splats(path, nullptr, json);
     return 0;
 }
 
@@ -263,8 +304,8 @@ Action add_info(CLI::App& app) {
     const auto arguments = std::make_shared<Arguments>();
     app.add_option(
            "PATH", arguments->path,
-           "Splat file (.ply .compressed.ply .splat .spz .glb .gltf), COLMAP folder, transforms.json, or "
-           "glTF file of meshes")
+           "Splat file (.ply .compressed.ply .splat .spz .glb .gltf), COLMAP folder, transforms.json, "
+           "glTF file of meshes, or folder of a training run")
         ->required();
     add_test_every_option(app, arguments->test_every);
     app.add_flag("--json", arguments->json, "Print JSON");

@@ -1,15 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// ewa render: renders a splat scene through the cameras of a dataset, whose images are not needed.
+// ewa render: renders a splat scene, through the cameras of a dataset, whose images are not needed, or as it is framed
+// by itself.
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
+#include <glm/matrix.hpp>
 #include <memory>
+#include <optional>
 
 #include "cli/arguments.h"
 #include "cli/command.h"
+#include "cli/film.h"
 #include "cli/interrupt.h"
 #include "cli/output.h"
+#include "cli/render_views.h"
+#include "cli/run_inputs.h"
+#include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/renderer.h"
 #include "ewa/splat_files.h"
@@ -25,9 +32,13 @@ struct RenderArguments {
     fs::path splats, cameras, output = "out/render";
     std::string frames = "all", format = "png", mode = "color";
     int test_every = 8, downscale = 1;
+    ViewsArguments views;
     DrawArguments draw;
     DeviceOptions device;
     bool quiet = false;
+    // Of the run that SPLATS names; empty: none.
+    std::optional<live::Run> run;
+    bool kernel_given = false;
 };
 
 /// Divides by the largest value and returns it: the value of white in a PNG.
@@ -49,7 +60,12 @@ Image chosen_image(Rendering&& rendering, const RenderArguments& arguments, std:
     return std::move(rendering.depth);
 }
 
-int run(const RenderArguments& arguments) {
+void note_skipped(Progress& progress, uint32_t skipped) {
+    if (skipped > 0)
+        progress.note(fmt::format("{} splats with a value that is not finite were skipped", skipped));
+}
+
+int render_dataset_views(const RenderArguments& arguments) {
     const RenderOptions options = arguments.draw.options();
     const Gaussians gaussians = load_splats(arguments.splats);
     const Dataset dataset = load_cameras_as_trained(arguments.cameras, arguments.downscale);
@@ -81,11 +97,114 @@ int run(const RenderArguments& arguments) {
         if (!remark.empty()) progress.note(file.string() + ": " + remark);
         progress.update(static_cast<int>(i) + 1);
     }
-    if (skipped > 0)
-        progress.note("skipped " + core::counted(skipped, "splat") + " with a value that is not finite");
+    note_skipped(progress, skipped);
     progress.note(fmt::format("{} {} in {}", core::counted(frames.size(), "image"),
                               core::is_or_are(frames.size()), arguments.output.string()));
     return 0;
+}
+
+/// What the cameras of the run's dataset say about the scene, if they can be read.
+scene::FramingHints hints_of(const RenderArguments& arguments) {
+    if (!arguments.run || arguments.run->dataset.empty()) return {};
+    try {
+        const Dataset dataset = load_cameras_as_trained(arguments.run->dataset, 1);
+        if (dataset.frames.empty()) return {};
+        const glm::dmat3 axes = glm::transpose(dataset.frames[0].camera.rotation);
+        return {.up = scene::mean_up(dataset), .forward = axes[2]};
+    } catch (const InputError&) {
+        return {};  // The scene is framed as one of which nothing is known.
+    }
+}
+
+/// The film of these views. Returns the exit status.
+int write_film(const RenderArguments& arguments, Renderer& renderer, const RenderOptions& options,
+               const std::vector<Camera>& cameras, Progress& progress) {
+    Film film(arguments.output, cameras[0].width, cameras[0].height);
+    for (size_t i = 0; i < cameras.size(); ++i) {
+        if (interrupted()) return kInterruptedStatus;
+        film.add(renderer.render_bytes(cameras[i], {.render = options}));
+        progress.update(int(i) + 1);
+    }
+    film.finish();
+    note_skipped(progress, renderer.skipped_nonfinite());
+    progress.note(fmt::format("{}: {} frames, {:.1f} s", arguments.output.string(), cameras.size(),
+                              double(cameras.size()) / kFilmRate));
+    return 0;
+}
+
+int write_views(const RenderArguments& arguments, Renderer& renderer, const std::vector<Camera>& cameras,
+                bool one_image, Progress& progress) {
+    uint32_t skipped = 0;
+    make_folder(one_image ? arguments.output.parent_path() : arguments.output);
+    for (size_t i = 0; i < cameras.size(); ++i) {
+        if (interrupted()) return kInterruptedStatus;
+        Rendering rendering = renderer.render(cameras[i], arguments.mode == "depth");
+        skipped = std::max(skipped, renderer.skipped_nonfinite());
+        std::string remark;
+        const fs::path file =
+            one_image ? arguments.output : arguments.output / fmt::format("{:05}.{}", i, arguments.format);
+        save_image(file, chosen_image(std::move(rendering), arguments, remark));
+        if (!remark.empty()) progress.note(file.string() + ": " + remark);
+        if (cameras.size() > 1) progress.update(int(i) + 1);
+    }
+    note_skipped(progress, skipped);
+    if (one_image)
+        progress.note(
+            fmt::format("{}: {}x{}", arguments.output.string(), cameras[0].width, cameras[0].height));
+    else
+        progress.note(fmt::format("{} images are in {}", cameras.size(), arguments.output.string()));
+    return 0;
+}
+
+/// Without the cameras of a dataset.
+int render_free_views(RenderArguments arguments) {
+    const ViewsOutput output = views_output(arguments.output);
+    const bool film = output == ViewsOutput::film, one_image = output == ViewsOutput::image;
+    RenderOptions options = arguments.draw.options();
+    check_views(arguments.views);
+    if (film && arguments.mode != "color")
+        throw InputError("a film has --mode color; a folder can have any mode");
+    if (film) find_ffmpeg();
+    if (one_image) arguments.format = core::lower(arguments.output.extension().string()).substr(1);
+    if (output != ViewsOutput::folder) {
+        keep_apart({{"--output", arguments.output}},
+                   {{"SPLATS", arguments.splats}, {"--views", arguments.views.views}});
+        check_writable(arguments.output, Folder::made);
+    }
+    const SplatScene scene = read_splats(arguments.splats);
+    if (scene.antialiased && !arguments.kernel_given) options.kernel = Footprint::antialias;
+    const std::vector<Camera> cameras =
+        views_of(arguments.views, scene.gaussians, hints_of(arguments), output);
+    if (film) make_folder(arguments.output.parent_path());
+
+    Renderer renderer(open_device(arguments.device), scene.gaussians, options);
+    const InterruptWatch watch;
+    Progress progress("rendered", int(cameras.size()), "views", arguments.quiet);
+    if (film) return write_film(arguments, renderer, options, cameras, progress);
+    return write_views(arguments, renderer, cameras, one_image, progress);
+}
+
+/// Completes the arguments by the run that SPLATS may name, and chooses whose cameras are used.
+int run(CLI::App& app, RenderArguments& arguments) {
+    arguments.kernel_given = app.count("--kernel") + app.count("--antialias") > 0;
+    std::string of_frames;  // a given option that only a dataset's views have
+    for (const char* option : {"--frames", "--test-every", "--downscale"})
+        if (app.count(option) > 0) of_frames = option;
+    SplatInput input = splat_input(arguments.splats);
+    arguments.splats = input.file;
+    if (input.run) use_options_of(*input.run, app);
+    if (!arguments.cameras.empty()) {
+        arguments.cameras = dataset_input(arguments.cameras);
+        return render_dataset_views(arguments);
+    }
+    const bool free = any_given(arguments.views) || views_output(arguments.output) != ViewsOutput::folder;
+    if (input.run && !free) {
+        arguments.cameras = dataset_of(*input.run);
+        return render_dataset_views(arguments);
+    }
+    if (!of_frames.empty()) throw InputError(of_frames + " needs --cameras DATASET");
+    arguments.run = input.run ? std::move(input.run) : live::run_of_splats(arguments.splats);
+    return render_free_views(arguments);
 }
 
 }  // namespace
@@ -93,16 +212,22 @@ int run(const RenderArguments& arguments) {
 Action add_render(CLI::App& app) {
     const auto arguments = std::make_shared<RenderArguments>();
     add_splats(app, arguments->splats);
-    app.add_option("--cameras", arguments->cameras, "Dataset whose cameras to render through")
-        ->required()
-        ->type_name("DATASET");
-    app.add_option("-o,--output", arguments->output,
-                   "Folder for the renders, named like the images of the dataset")
-        ->type_name("DIR")
+    CLI::Option* cameras =
+        app.add_option(
+               "--cameras", arguments->cameras,
+               "Dataset whose cameras to render through [that of a run]. Without, the whole scene is shown "
+               "from the front")
+            ->type_name("DATASET");
+    app.add_option(
+           "-o,--output", arguments->output,
+           "Folder for the renders, named like the images of the dataset or by number. Without --cameras "
+           "also one image (.png, .exr), or a film (.mp4, .mov, .mkv, .webm) that the program ffmpeg writes")
+        ->type_name("OUT")
         ->capture_default_str();
+    add_views_options(app, arguments->views, cameras);
     add_frames_options(app, arguments->frames, arguments->test_every);
     app.add_option("--format", arguments->format,
-                   "File format: png (8 bit, clamped) or exr (float32, not clamped)")
+                   "Format in a folder: png (8 bit, clamped) or exr (float32, not clamped)")
         ->transform(one_of({"png", "exr"}))
         ->capture_default_str();
     app.add_option("--mode", arguments->mode,
@@ -113,7 +238,7 @@ Action add_render(CLI::App& app) {
     add_downscale_option(app, arguments->downscale);
     add_device_options(app, arguments->device);
     add_quiet_option(app, arguments->quiet);
-    return [arguments] { return run(*arguments); };
+    return [&app, arguments] { return run(app, *arguments); };
 }
 
 }  // namespace ewa::cli

@@ -14,17 +14,12 @@ namespace {
 
 constexpr double kHintSeconds = 15, kNoteSeconds = 10;
 constexpr double kPollSeconds = 0.05;  // while a better frame, a file or a screenshot is on its way
-constexpr Size kUsualSize{1280, 800};
 
 /// The size of the window if none is asked for: that of the camera, scaled down to fit the desktop and up to
 /// the size that the panel needs. A screenshot keeps the camera's size, which is the size of its file.
 Size window_size(const Startup& startup, const WindowSystem& system) {
     if (startup.size) return *startup.size;
-    Size size = kUsualSize;
-    if (startup.scene.dataset) {
-        const Camera& camera = startup.scene.dataset->frames[size_t(startup.frame.value_or(0))].camera;
-        size = {camera.width, camera.height};
-    }
+    const Size size = camera_size_or_usual(startup);
     if (startup.picture) return size;
     const Size desktop = system.work_area();
     if (desktop.width <= 0 || desktop.height <= 0) return size;
@@ -34,11 +29,6 @@ Size window_size(const Startup& startup, const WindowSystem& system) {
         std::min({grow, double(desktop.width) / size.width, double(desktop.height) / size.height});
     return {std::max(1, int(std::lround(size.width * scale))),
             std::max(1, int(std::lround(size.height * scale)))};
-}
-
-Viewpoint start_view(const OpenedScene& scene, std::optional<int> frame, Size size) {
-    if (scene.dataset) return dataset_view(*scene.gaussians, *scene.dataset, frame.value_or(0));
-    return framing_view(*scene.gaussians, size.width, size.height);
 }
 
 std::chrono::steady_clock::time_point in(double seconds) {
@@ -60,6 +50,17 @@ bool ready(const std::future<Result>& future) {
 }
 
 }  // namespace
+
+Size camera_size_or_usual(const Startup& startup) {
+    if (!startup.scene.dataset) return kUsualSize;
+    const Camera& camera = startup.scene.dataset->frames[size_t(startup.frame.value_or(0))].camera;
+    return {camera.width, camera.height};
+}
+
+Viewpoint start_view(const OpenedScene& scene, std::optional<int> frame, Size size) {
+    if (scene.dataset) return dataset_view(*scene.gaussians, *scene.dataset, frame.value_or(0));
+    return framing_view(*scene.gaussians, size.width, size.height);
+}
 
 std::filesystem::path free_name(const std::string& stem, const std::string& extension) {
     for (int i = 1;; ++i) {

@@ -55,6 +55,12 @@ struct Startup {
     SessionTimes times;
 };
 
+inline constexpr Size kUsualSize{1280, 800};  // of a window
+/// The size of the dataset's camera that the window starts from, or the usual one.
+Size camera_size_or_usual(const Startup& startup);
+/// The first view: of the dataset's camera `frame`, or of the whole scene for an image of this size.
+Viewpoint start_view(const OpenedScene& scene, std::optional<int> frame, Size size);
+
 /// The text over the image.
 struct Message {
     using Clock = std::chrono::steady_clock;

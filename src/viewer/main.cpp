@@ -13,12 +13,14 @@
 #include <utility>
 #include <vector>
 
+#include "core/pixel_size.h"
 #include "core/terminal.h"
 #include "core/typing.h"
 #include "ewa/error.h"
 #include "scene/names.h"
 #include "train/earlier_run.h"
 #include "viewer/app.h"
+#include "viewer/offscreen.h"
 
 namespace {
 
@@ -53,15 +55,11 @@ int fail(const std::string& what, int status) {
 }
 
 Size parse_size(const std::string& text) {
-    const size_t cross = text.find('x');
-    const auto side = [&](size_t from, size_t count) {
-        return core::parse_integer<int>(std::string_view(text).substr(from, count)).value_or(0);
-    };
-    const Size size{side(0, cross), cross == std::string::npos ? 0 : side(cross + 1, std::string::npos)};
-    if (size.width < 1 || size.height < 1 || size.width > kLargestSide || size.height > kLargestSide)
+    const auto size = core::parse_size(text, kLargestSide);
+    if (!size)
         throw InputError("--size: '" + text + "' is not a size such as 1280x720, of at most " +
                          std::to_string(kLargestSide) + " a side");
-    return size;
+    return {size->width, size->height};
 }
 
 /// The index of the frame that --frame names.
@@ -242,7 +240,10 @@ int run(const Arguments& arguments) {
         startup.open_device = [options = arguments.device, first] {
             return *first ? std::exchange(*first, nullptr) : open_device(options);
         };
-        App(startup).run();
+        if ((startup.picture || startup.film) && !has_desktop())
+            write_without_window(startup);
+        else
+            App(startup).run();
         return kDone;
     } catch (const InputError& error) {
         return fail(error.what(), kWrongUse);

@@ -4,21 +4,19 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "core/folders.h"
-#include "core/json.h"
 #include "core/typing.h"
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
 #include "ewa/synthetic_dataset.h"
+#include "live/run_folder.h"
 
 namespace ewa::viewer {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr float kPointOpacity = 3;             // logit
-constexpr float kPointShrink = 1.2f;           // subtracted from the logarithm of a point's size
-constexpr uint64_t kLargestConfig = 1u << 20;  // bytes
+constexpr float kPointOpacity = 3;    // logit
+constexpr float kPointShrink = 1.2f;  // subtracted from the logarithm of a point's size
 
 std::string name_of_path(const fs::path& path) {
     const fs::path clean = path.lexically_normal();
@@ -49,80 +47,62 @@ std::shared_ptr<const Dataset> load_cameras(const fs::path& path, int downscale,
     return std::make_shared<const Dataset>(std::move(dataset));
 }
 
-nlohmann::json read_config(const fs::path& path) {
-    try {
-        const auto json = core::read_json_file<nlohmann::json>(path, {.bytes = kLargestConfig});
-        if (json.is_object()) return json;
-    } catch (const InputError&) {
-        // The run is shown without its settings.
-    }
-    return nlohmann::json::object();
-}
-
-std::string text_of(const nlohmann::json& config, const char* name) {
-    const auto found = config.find(name);
-    return found != config.end() && found->is_string() ? found->get<std::string>() : std::string();
-}
-
-Look look_of(const nlohmann::json& config) {
+Look look_of(const live::Run& run) {
     Look look;
-    const std::string kernel = text_of(config, "kernel");
+    const std::string kernel = run.text("kernel");
     if (kernel == "antialias") look.kernel = Footprint::antialias;
     if (kernel == "ewa") look.kernel = Footprint::unit_mass;
-    look.background = core::parse_colour(text_of(config, "background")).value_or(look.background);
+    look.background = core::parse_colour(run.text("background")).value_or(look.background);
     return look;
 }
 
-/// The dataset that config.json names, relative to the folder where the training was started: the current one
-/// or any folder above the run. Of a mesh scene: the images that the training rendered.
-fs::path dataset_of(const fs::path& run, const nlohmann::json& config) {
-    const fs::path named = text_of(config, "dataset");
-    if (named.empty()) return {};
-    std::error_code error;
-    const std::string extension = core::lower(named.extension().string());
-    const bool mesh = extension == ".gltf" || extension == ".glb";
-    if (mesh && fs::exists(run / "dataset/transforms.json", error)) return run / "dataset";
-    if (fs::exists(named, error)) return named;
-    if (named.is_absolute()) return {};
-    for (fs::path folder = fs::absolute(run, error); folder.has_relative_path();
-         folder = folder.parent_path())
-        if (fs::exists(folder / named, error)) return folder / named;
-    return {};
+int downscale_of(const live::Run& run) {
+    const auto downscale = run.config.find("downscale");
+    const bool given = downscale != run.config.end() && downscale->is_number_integer();
+    return given ? std::clamp(downscale->get<int>(), 1, 1024) : 1;
 }
 
-/// Whether the folder is that of a training run, also of one that has just begun.
-bool is_run(const fs::path& path) {
-    const auto present = [&](const char* name) { return core::is_file(path / name); };
-    return present("config.json") || present("splats.ply") || present("metrics.jsonl");
-}
-
-OpenedScene open_run(const fs::path& run, const fs::path& cameras) {
-    OpenedScene scene;
-    scene.run = run;
-    const nlohmann::json config = read_config(run / "config.json");
-    scene.look = look_of(config);
-    std::error_code error;
-    const bool splats = fs::exists(run / "splats.ply", error);
-    if (splats) {
-        scene.splats_time = fs::last_write_time(run / "splats.ply", error);
-        scene.gaussians = std::make_shared<const Gaussians>(load_splats(run / "splats.ply"));
-    }
-    const fs::path dataset = cameras.empty() ? dataset_of(run, config) : cameras;
-    const auto downscale = config.find("downscale");
-    const int factor = downscale != config.end() && downscale->is_number_integer()
-                           ? std::clamp(downscale->get<int>(), 1, 1024)
-                           : 1;
+/// cameras: the dataset to use instead of the run's; empty: none.
+void add_cameras(OpenedScene& scene, const live::Run& run, const fs::path& cameras, bool points) {
+    const fs::path dataset = cameras.empty() ? run.dataset : cameras;
     try {
         if (!dataset.empty())
-            scene.dataset = load_cameras(dataset, factor, !splats);
+            scene.dataset = load_cameras(dataset, downscale_of(run), points);
         else
             scene.remark = "the dataset of this run was not found; name it with --cameras DATASET";
     } catch (const InputError& problem) {
         if (!cameras.empty()) throw;
         scene.remark = problem.what();
     }
+}
+
+OpenedScene open_run(const live::Run& run, const fs::path& cameras) {
+    OpenedScene scene;
+    scene.run = run.folder;
+    scene.look = look_of(run);
+    const bool splats = !run.splats.empty();
+    if (splats) {
+        std::error_code error;
+        scene.splats_time = fs::last_write_time(run.splats, error);
+        scene.gaussians = std::make_shared<const Gaussians>(load_splats(run.splats));
+    }
+    add_cameras(scene, run, cameras, !splats);
     if (!splats && scene.dataset)
         scene.gaussians = std::make_shared<const Gaussians>(splats_of_points(scene.dataset->points));
+    return scene;
+}
+
+OpenedScene open_splats(const fs::path& path, const fs::path& cameras) {
+    OpenedScene scene;
+    SplatScene splats = read_splats(path);
+    if (splats.antialiased) scene.look.kernel = Footprint::antialias;
+    if (!splats.remarks.empty()) scene.remark = splats.remarks.front();
+    scene.gaussians = std::make_shared<const Gaussians>(std::move(splats.gaussians));
+    if (!cameras.empty()) scene.dataset = load_cameras(cameras, 1, false);
+    if (const auto run = live::run_of_splats(path); run && cameras.empty() && !run->dataset.empty()) {
+        scene.look = look_of(*run);
+        add_cameras(scene, *run, {}, false);
+    }
     return scene;
 }
 
@@ -159,15 +139,12 @@ OpenedScene open_scene(const fs::path& path, const fs::path& cameras) {
     OpenedScene scene;
     if (!fs::exists(path, error)) throw InputError(path.string() + ": no such file or folder");
     if (fs::is_directory(path, error)) {
-        scene = is_run(path) ? open_run(path, cameras) : open_dataset(path);
+        const auto run = live::find_run(path);
+        scene = run ? open_run(*run, cameras) : open_dataset(path);
     } else if (is_dataset_file(path) || is_mesh_scene(path)) {
         scene = open_dataset(path);
     } else {
-        SplatScene splats = read_splats(path);
-        if (splats.antialiased) scene.look.kernel = Footprint::antialias;
-        if (!splats.remarks.empty()) scene.remark = splats.remarks.front();
-        scene.gaussians = std::make_shared<const Gaussians>(std::move(splats.gaussians));
-        if (!cameras.empty()) scene.dataset = load_cameras(cameras, 1, false);
+        scene = open_splats(path, cameras);
     }
     scene.title = name_of_path(path);
     return scene;

@@ -28,8 +28,8 @@ struct OpenedScene {
 };
 
 /// Opens a splat file; a dataset, shown by its points; or the folder of a run (config.json, splats.ply,
-/// metrics.jsonl) with the cameras of its dataset, if that is found. cameras: the dataset to use instead;
-/// empty: none. Throws InputError.
+/// metrics.jsonl). A run, and the splats.ply of a run, come with the cameras of the run's dataset, if that is
+/// found. cameras: the dataset to use instead; empty: none. Throws InputError.
 OpenedScene open_scene(const std::filesystem::path& path, const std::filesystem::path& cameras);
 
 /// Converts points to small opaque splats.

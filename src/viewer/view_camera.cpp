@@ -67,28 +67,7 @@ double middle_depth(const Gaussians& gaussians, const Camera& camera) {
     return depths.size() < 10 ? 0 : scene::quantile(depths, 0.5);
 }
 
-glm::dvec3 mean_up(const Dataset& dataset) {
-    glm::dvec3 sum(0);
-    for (const Frame& frame : dataset.frames) sum -= axis_of(frame.camera, 1);
-    // Cameras with all orientations have no common up.
-    if (!(glm::length(sum) > 0.1 * double(dataset.frames.size()))) return {0, -1, 0};
-    return glm::normalize(sum);
-}
-
 }  // namespace
-
-Camera fitted(const Camera& camera, int width, int height) {
-    if (camera.width == width && camera.height == height) return camera;
-    const double scale = std::min(double(width) / camera.width, double(height) / camera.height);
-    Camera result = camera;
-    result.width = width;
-    result.height = height;
-    result.fx *= scale;
-    result.fy *= scale;
-    result.cx = (camera.cx - camera.width / 2.0) * scale + width / 2.0;
-    result.cy = (camera.cy - camera.height / 2.0) * scale + height / 2.0;
-    return result;
-}
 
 double ViewCamera::distance() const {
     return glm::length(now_.pivot - now_.camera.position());
@@ -176,23 +155,8 @@ SceneBounds scene_bounds(const Gaussians& gaussians) {
 }
 
 Viewpoint framing_view(const Gaussians& gaussians, int width, int height) {
-    const SceneBounds bounds = scene_bounds(gaussians);
-    constexpr double kFieldOfView = 50 * std::numbers::pi / 180;  // of the shorter side
-    Viewpoint view;
-    view.radius = bounds.radius;
-    view.pivot = bounds.center;
-
-    const glm::dvec3 forward = glm::normalize(glm::dvec3(0, 0.25, 1));
-    Camera& camera = view.camera;
-    camera.width = width;
-    camera.height = height;
-    camera.fx = camera.fy = std::min(width, height) / 2.0 / std::tan(kFieldOfView / 2);
-    camera.cx = width / 2.0;
-    camera.cy = height / 2.0;
-    camera.rotation = facing(forward, {1, 0, 0});
-    const glm::dvec3 position = bounds.center - forward * (bounds.radius / std::sin(kFieldOfView / 2));
-    camera.translation = -(camera.rotation * position);
-    return view;
+    const scene::Framing framing = scene::frame_scene(gaussians, width, height);
+    return {framing.camera, framing.target, framing.up, framing.radius};
 }
 
 int nearest_frame(const Dataset& dataset, const Camera& camera, double radius) {
@@ -222,7 +186,7 @@ Viewpoint dataset_view(const Gaussians& gaussians, const Dataset& dataset, int f
     const SceneBounds bounds = scene_bounds(gaussians);
     Viewpoint view;
     view.camera = dataset.frames.at(size_t(frame)).camera;
-    view.up = mean_up(dataset);
+    view.up = scene::mean_up(dataset);
     view.radius = bounds.radius;
     const glm::dvec3 forward = axis_of(view.camera, 2), position = view.camera.position();
     double depth = middle_depth(gaussians, view.camera);

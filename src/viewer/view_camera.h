@@ -7,12 +7,9 @@
 #include "ewa/camera.h"
 #include "ewa/dataset.h"
 #include "ewa/gaussians.h"
+#include "scene/framing.h"
 
 namespace ewa::viewer {
-
-/// The camera for an image of another size. The view of `camera` stays visible and centred; pixels stay
-/// square. The same size returns the same camera, bit for bit.
-Camera fitted(const Camera& camera, int width, int height);
 
 /// A place to look from, and the point to orbit.
 struct Viewpoint {
@@ -47,7 +44,7 @@ class ViewCamera {
     const glm::dvec3& up() const { return now_.up; }
     double radius() const { return start_.radius; }
     double distance() const;
-    Camera camera(int width, int height) const { return fitted(now_.camera, width, height); }
+    Camera camera(int width, int height) const { return scene::fitted(now_.camera, width, height); }
 
   private:
     void turn(double yaw, double pitch, const glm::dvec3& center);
@@ -64,7 +61,7 @@ struct SceneBounds {
 };
 SceneBounds scene_bounds(const Gaussians& gaussians);
 
-/// Shows the whole scene from the front and slightly above, with y down, as in most COLMAP captures.
+/// Shows the whole scene from the front and slightly above, as scene::frame_scene does.
 Viewpoint framing_view(const Gaussians& gaussians, int width, int height);
 
 /// The frame whose camera is closest in position and direction; -1 without frames. A turn of 90 degrees

@@ -30,7 +30,7 @@ WindowSystem::WindowSystem() {
 #endif
     if (!glfwInit())
         throw RunError("no window can be opened: " + glfw_reason() +
-                       "; ewa-view needs a desktop session; ewa render does not");
+                       "; the window needs a desktop session; ewa render and --screenshot need none");
     if (!glfwVulkanSupported()) {
         const std::string reason = glfw_reason();
         glfwTerminate();

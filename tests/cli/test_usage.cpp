@@ -118,7 +118,7 @@ INSTANTIATE_TEST_SUITE_P(
         WrongUse{{"train", "/nowhere", "--background", "1,nan,1"}, "--background"},
         WrongUse{{"train", "/nowhere", "--background", "0,0,2"}, "--background"},
         WrongUse{{"train", "/nowhere", "--quiet", "--verbose"}, "--verbose"},
-        WrongUse{{"train", "/nowhere"}, "/nowhere"}, WrongUse{{"render", "/nowhere.ply"}, "--cameras"},
+        WrongUse{{"train", "/nowhere"}, "/nowhere"}, WrongUse{{"render", "/nowhere.ply"}, "/nowhere.ply"},
         WrongUse{{"render", "/nowhere.ply", "--cameras", "/nowhere"}, "/nowhere.ply"},
         WrongUse{{"render", "/a.ply", "--cameras", "/b", "--background", "random"}, "--background"},
         WrongUse{{"render", "/a.ply", "--cameras", "/b", "--format", "gif"}, "--format"},

@@ -35,6 +35,33 @@ TEST(Opening, ARunOnAMeshSceneHasTheRenderedImages) {
     EXPECT_TRUE(after.dataset->frames[0].image_exists);
 }
 
+TEST(Opening, TheSplatsOfARunHaveItsCameras) {
+    const test::Folder folder;
+    std::filesystem::create_directories(folder / "run");
+    test::make_dataset(folder / "data");
+    test::make_splats(folder / "run/splats.ply");
+    const std::string splats = folder / "run/splats.ply";
+    EXPECT_FALSE(open_scene(splats, {}).dataset);
+    test::write_file(folder / "run/config.json",
+                     R"({"dataset": "data", "downscale": 2, "kernel": "ewa", "background": "1,0,1"})");
+    const OpenedScene scene = open_scene(splats, {});
+    ASSERT_TRUE(scene.dataset);
+    EXPECT_EQ(scene.dataset->frames.size(), 4u);
+    EXPECT_EQ(scene.dataset->frames[0].camera.width, 24);
+    EXPECT_EQ(scene.look.kernel, Footprint::unit_mass);
+    EXPECT_EQ(scene.look.background, (std::array<float, 3>{1, 0, 1}));
+    EXPECT_TRUE(scene.run.empty()) << "a file is not watched";
+    // A dataset that is named has precedence; one that is gone leaves the splats.
+    EXPECT_EQ(open_scene(splats, folder / "data").dataset->frames[0].camera.width, 48);
+    test::write_file(folder / "run/config.json", R"({"dataset": "gone"})");
+    EXPECT_FALSE(open_scene(splats, {}).dataset);
+    EXPECT_EQ(open_scene(splats, {}).gaussians->size(), 50u);
+    // Another name is not the run's.
+    test::write_file(folder / "run/config.json", R"({"dataset": "data"})");
+    std::filesystem::copy_file(splats, folder / "run/mine.ply");
+    EXPECT_FALSE(open_scene(folder / "run/mine.ply", {}).dataset);
+}
+
 TEST(Opening, SettingsThatAreNoneLeaveTheSplats) {
     const test::Folder folder;
     std::filesystem::create_directories(folder / "run");

@@ -173,6 +173,8 @@ TEST(Framing, AFewFarSplatsDoNotCount) {
     for (size_t i = 0; i < 1000; ++i)
         for (size_t k = 0; k < 3; ++k)
             splats.means[3 * i + k] = float(10 + double((7 * i + 13 * i * k) % 101) / 50 - 1);
+    for (float& scale : splats.log_scales) scale = -6;
+    for (size_t i = 0; i < 1000; ++i) splats.quaternions[4 * i] = 1;
     for (size_t i = 0; i < 20; ++i)
         splats.means[3 * i] = i < 10 ? 1e9f : std::numeric_limits<float>::quiet_NaN();
     const SceneBounds bounds = scene_bounds(splats);
@@ -182,9 +184,14 @@ TEST(Framing, AFewFarSplatsDoNotCount) {
 
     const Viewpoint view = framing_view(splats, 640, 480);
     expect_rotation(view.camera.rotation);
-    const glm::dvec2 middle = pixel(view.camera, bounds.center);
+    const glm::dvec2 middle = pixel(view.camera, scene::framed_box(splats).center());
     EXPECT_NEAR(middle.x, 320, 1e-6);
     EXPECT_NEAR(middle.y, 240, 1e-6);
+    EXPECT_NEAR(glm::length(view.pivot - glm::dvec3(10)), 0, 0.3);
+    for (size_t i = 20; i < 1000; ++i) {
+        const glm::dvec2 at = pixel(view.camera, splats.world_mean(i));
+        EXPECT_TRUE(at.x > 0 && at.x < 640 && at.y > 0 && at.y < 480) << i;
+    }
 }
 
 TEST(Framing, NothingAtAllHasAView) {

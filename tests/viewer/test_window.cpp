@@ -3,6 +3,8 @@
 #include <vulkan/vulkan_core.h>
 #include <algorithm>
 
+#include "io/datasets/view_list.h"
+#include "scene/framing.h"
 #include "viewer/window_test.h"
 
 namespace ewa::test {
@@ -152,6 +154,33 @@ TEST(WithoutWindow, NoDisplayIsOneLine) {
     const Folder folder;
     make_splats(folder / "splats.ply");
     expect_failure(run_view({folder / "splats.ply"}), 1, "no window can be opened");
+}
+
+TEST(WithoutWindow, ScreenshotsAndFilmsNeedNoDisplay) {
+    unsetenv("DISPLAY");
+    unsetenv("WAYLAND_DISPLAY");
+    const Folder folder;
+    make_splats(folder / "splats.ply", 400, 2);
+    make_dataset(folder / "views");
+    const std::string splats = folder / "splats.ply", shown = folder / "shown.png";
+    expect_success(run_view({splats, "--cameras", folder / "views", "--frame", "2", "--screenshot", shown}));
+    expect_success(run_ewa({"render", splats, "--cameras", folder / "views", "-o", folder / "r", "--quiet"}));
+    EXPECT_LE(largest_difference(load_image(shown), load_image(folder / "r/2.png")), kRounding);
+    expect_success(run_view({splats, "--size", "64x48", "--mode", "count", "--screenshot", shown}));
+    EXPECT_EQ(load_image(shown).width, 64);
+    const Camera camera = scene::look_at({0, 0, -6}, {0, 0, 0}, {0, -1, 0}, 48, 32);
+    io::write_views(folder / "views.json", {{"1", camera, {}}, {"2", camera, {}}});
+    expect_success(run_view({splats, "--size", "48x32", "--views", folder / "views.json", "--film",
+                             folder / "film", "--film-seconds", "0.1"}));
+    EXPECT_EQ(files_below(folder / "film").size(), 4u);
+    expect_success(run_ewa({"render", splats, "--views", folder / "views.json", "-o", folder / "saved"}));
+    EXPECT_LE(
+        largest_difference(load_image(folder / "film/00003.png"), load_image(folder / "saved/00001.png")),
+        kRounding);
+    expect_failure(
+        run_view({splats, "--cameras", folder / "views", "--compare", "wipe", "--screenshot", shown}), 2,
+        "--compare");
+    expect_failure(run_view({splats, "--screenshot", folder / "nowhere/shown.png"}), 1, "nowhere");
 }
 
 TEST(WithoutWindow, WrongUseIsOneLine) {

@@ -237,7 +237,9 @@ io::ImageRecords read_model(const fs::path& path, const DatasetOptions& options)
         throw InputError(
             name +
             ": not a dataset; expected cameras and images (.bin or .txt) in sparse/0, sparse or the folder "
-            "itself, or transforms.json, transforms_train.json or transforms_test.json");
+            "itself, or transforms.json, transforms_train.json or transforms_test.json; the folder of a "
+            "training "
+            "run has config.json");
     return all;
 }
 

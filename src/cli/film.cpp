@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/film.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <spawn.h>
+#include <spdlog/fmt/fmt.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <string>
+#include <string_view>
+
+#include "core/atomic_file.h"
+#include "core/text.h"
+#include "ewa/error.h"
+
+extern char** environ;
+
+namespace ewa::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The last line that is not empty: ffmpeg's own reason.
+std::string last_line(const fs::path& log) {
+    std::ifstream file(log);
+    std::string last;
+    for (std::string line; std::getline(file, line);)
+        if (!core::trim(line).empty()) last = line;
+    return core::one_line(last);
+}
+
+/// A frame has the colours of a screen, and players expect those of television (BT.709), with every second value
+/// of the two colour differences in each direction.
+constexpr const char* kFilter =
+    "crop=trunc(iw/2)*2:trunc(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv,format=yuv420p";
+
+std::vector<std::string> arguments_of(const fs::path& program, const fs::path& made, int width, int height) {
+    return {program.string(),
+            "-hide_banner",
+            "-loglevel",
+            "error",
+            "-y",
+            "-f",
+            "rawvideo",
+            "-pixel_format",
+            "rgba",
+            "-video_size",
+            fmt::format("{}x{}", width, height),
+            "-framerate",
+            std::to_string(kFilmRate),
+            "-i",
+            "pipe:0",
+            "-an",
+            "-vf",
+            kFilter,
+            "-colorspace",
+            "bt709",
+            "-color_primaries",
+            "bt709",
+            "-color_trc",
+            "bt709",
+            "-color_range",
+            "tv",
+            made.string()};
+}
+
+/// Starts the program in a process group of its own, so that Ctrl-C reaches only ewa, which decides what is kept.
+pid_t start(const std::vector<std::string>& arguments, int input, const fs::path& log) {
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_adddup2(&actions, input, STDIN_FILENO);
+    posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+    posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, log.c_str(), O_WRONLY | O_CREAT, 0600);
+    posix_spawnattr_t attributes;
+    posix_spawnattr_init(&attributes);
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+    std::vector<char*> words;
+    for (const std::string& word : arguments) words.push_back(const_cast<char*>(word.c_str()));
+    words.push_back(nullptr);
+    pid_t process = -1;
+    const int error =
+        posix_spawn(&process, arguments[0].c_str(), &actions, &attributes, words.data(), environ);
+    posix_spawn_file_actions_destroy(&actions);
+    posix_spawnattr_destroy(&attributes);
+    if (error != 0)
+        throw RunError(core::one_line(arguments[0]) + ": cannot be started: " + std::strerror(error));
+    return process;
+}
+
+}  // namespace
+
+bool is_film_name(const fs::path& path) {
+    const std::string extension = core::lower(path.extension().string());
+    return extension == ".mp4" || extension == ".mov" || extension == ".mkv" || extension == ".webm";
+}
+
+fs::path find_ffmpeg() {
+    const char* path = std::getenv("PATH");
+    std::string_view rest = path ? path : "";
+    while (!rest.empty()) {
+        const size_t end = std::min(rest.find(':'), rest.size());
+        const fs::path program = fs::path(rest.substr(0, end)) / "ffmpeg";
+        if (end > 0 && core::is_file(program) && access(program.c_str(), X_OK) == 0) return program;
+        rest.remove_prefix(std::min(end + 1, rest.size()));
+    }
+    throw RunError(
+        "a film needs the program ffmpeg, which is not installed (Debian: apt install ffmpeg); with a folder "
+        "as "
+        "-o, its frames are written as PNG files");
+}
+
+Film::Film(const fs::path& file, int width, int height)
+    : file_(file), folder_("ewa-film-"), made_(folder_.path() / ("film" + file.extension().string())) {
+    if (width < 2 || height < 2) throw InputError("a film needs at least 2x2 pixels");
+    const fs::path program = find_ffmpeg();
+    int ends[2];
+    // A socket, since writing to a pipe whose reader has ended would send a signal.
+    if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
+        throw RunError(std::string("cannot connect to ffmpeg: ") + std::strerror(errno));
+    input_ = ends[0];
+    try {
+        process_ = start(arguments_of(program, made_, width, height), ends[1], folder_.path() / "log");
+    } catch (...) {
+        close(ends[0]);
+        close(ends[1]);
+        throw;
+    }
+    close(ends[1]);
+}
+
+Film::~Film() {
+    if (input_ >= 0) close(input_);
+    if (process_ < 0) return;
+    kill(process_, SIGKILL);
+    wait();
+}
+
+int Film::wait() {
+    int status = 0;
+    while (waitpid(process_, &status, 0) < 0 && errno == EINTR) {
+    }
+    process_ = -1;
+    return status;
+}
+
+void Film::fail(int status) {
+    std::string reason = last_line(folder_.path() / "log");
+    if (reason.empty())
+        reason = WIFSIGNALED(status) ? fmt::format("it ended by signal {}", WTERMSIG(status))
+                                     : fmt::format("exit status {}, no film", WEXITSTATUS(status));
+    throw RunError(core::one_line(file_.string()) + ": ffmpeg failed: " + reason);
+}
+
+int Film::end() {
+    close(input_);
+    input_ = -1;
+    return wait();
+}
+
+void Film::add(const std::vector<uint8_t>& rgba) {
+    for (size_t done = 0; done < rgba.size();) {
+        const ssize_t sent = send(input_, rgba.data() + done, rgba.size() - done, MSG_NOSIGNAL);
+        if (sent < 0 && errno == EINTR) continue;
+        if (sent < 0) fail(end());
+        done += size_t(sent);
+    }
+}
+
+void Film::finish() {
+    const int status = end();
+    std::error_code error;
+    if (status != 0 || fs::file_size(made_, error) == 0 || error) fail(status);
+    std::ifstream made(made_, std::ios::binary);
+    core::AtomicFile kept(file_);
+    std::vector<char> part(1u << 20);
+    while (made.read(part.data(), std::streamsize(part.size())) || made.gcount() > 0)
+        kept.write(part.data(), size_t(made.gcount()));
+    kept.commit();
+}
+
+}  // namespace ewa::cli

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// Writes a film through the program ffmpeg.
+#pragma once
+#include <sys/types.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "core/folders.h"
+
+namespace ewa::cli {
+
+inline constexpr int kFilmRate = 30;  // frames per second
+
+/// Whether the name is that of a film: .mp4, .mov, .mkv or .webm.
+bool is_film_name(const std::filesystem::path& path);
+
+/// The program ffmpeg in $PATH. Throws RunError that says what to install, and that a folder of PNGs needs none.
+std::filesystem::path find_ffmpeg();
+
+/// A film that is being written. ffmpeg runs as a process of its own, without a shell, and gets the frames on its
+/// standard input. It writes into a temporary folder; finish() moves the film to its place. The destructor ends an
+/// unfinished one and leaves nothing.
+class Film {
+  public:
+    /// file: its name decides the format. width, height: of each frame, px. An odd last row or column is cut, since
+    /// films have none. Throws RunError.
+    Film(const std::filesystem::path& file, int width, int height);
+    ~Film();
+    Film(const Film&) = delete;
+    Film& operator=(const Film&) = delete;
+
+    /// rgba: width * height pixels, row by row from the top. Alpha is ignored. Throws RunError with ffmpeg's own
+    /// reason if it has ended.
+    void add(const std::vector<uint8_t>& rgba);
+    /// Throws RunError, also if the disk is full.
+    void finish();
+
+  private:
+    [[noreturn]] void fail(int status);  // wait status of ffmpeg
+    int end();                           // after the last frame; returns the wait status
+    int wait();
+
+    std::filesystem::path file_;
+    core::TemporaryFolder folder_;
+    std::filesystem::path made_;  // in folder_
+    pid_t process_ = -1;
+    int input_ = -1;  // socket
+};
+
+}  // namespace ewa::cli

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/render_views.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+#include "cli/arguments.h"
+#include "cli/film.h"
+#include "core/pixel_size.h"
+#include "core/text.h"
+#include "ewa/error.h"
+#include "io/datasets/view_list.h"
+#include "scene/camera.h"
+
+namespace ewa::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kLargestSide = 16384;  // px
+constexpr core::PixelSize kUsualSize{1280, 720};
+constexpr int kOrbitFrames = 8 * kFilmRate;
+constexpr double kLegSeconds = 2;  // of a film, from one saved view to the next
+constexpr int kMostFrames = 100000;
+
+core::PixelSize size_of(const std::string& text) {
+    const auto size = core::parse_size(text, kLargestSide);
+    if (!size)
+        throw InputError(fmt::format("--size: '{}' is not a size such as 1280x720, of at most {} a side",
+                                     text, kLargestSide));
+    return *size;
+}
+
+/// Eye and target.
+std::array<glm::dvec3, 2> parse_look_at(const std::string& text) {
+    std::vector<std::optional<double>> values;
+    for (size_t begin = 0, end = 0; begin <= text.size(); begin = end + 1) {
+        end = std::min(text.find(',', begin), text.size());
+        values.push_back(core::parse_number(core::trim(std::string_view(text).substr(begin, end - begin))));
+    }
+    const auto number = [](const std::optional<double>& value) { return value && std::isfinite(*value); };
+    if (values.size() != 6 || !std::all_of(values.begin(), values.end(), number))
+        throw InputError(
+            "--look-at: '" + text +
+            "' is not six numbers, the eye and the point that it looks at, such as 0,0,-4,0,0,0");
+    const glm::dvec3 eye(*values[0], *values[1], *values[2]), target(*values[3], *values[4], *values[5]);
+    if (!(glm::length(target - eye) > 0))
+        throw InputError("--look-at: the eye is at the point that it looks at");
+    return {eye, target};
+}
+
+std::optional<glm::dvec3> parse_up(const std::string& text) {
+    if (text.empty()) return std::nullopt;
+    const bool negative = text[0] == '-';
+    const std::string axis = text.substr(negative || text[0] == '+' ? 1 : 0);
+    if (axis != "x" && axis != "y" && axis != "z")
+        throw InputError("--up: '" + text + "' is not an axis: x, y, z, or the opposite such as --up=-y");
+    glm::dvec3 up(0);
+    up[axis[0] - 'x'] = negative ? -1 : 1;
+    return up;
+}
+
+std::vector<Camera> along_views(const std::vector<Camera>& keys, double seconds) {
+    const double frames = double(keys.size() - 1) * kFilmRate * seconds + 1;
+    if (frames > kMostFrames)
+        throw InputError(fmt::format("--film-seconds: a film of more than {} frames", kMostFrames));
+    const int count = std::max(1, int(std::lround(frames)));
+    std::vector<Camera> cameras;
+    for (int i = 0; i < count; ++i)
+        cameras.push_back(
+            along_path(keys, count > 1 ? double(i) * double(keys.size() - 1) / (count - 1) : 0));
+    return cameras;
+}
+
+std::vector<Camera> saved_views(const ViewsArguments& arguments, ViewsOutput output) {
+    std::vector<Camera> cameras;
+    for (const io::NamedView& view : io::read_views(arguments.views)) cameras.push_back(view.camera);
+    if (cameras.empty()) throw InputError(arguments.views.string() + ": has no views");
+    const bool path = output == ViewsOutput::film || arguments.film_seconds > 0;
+    if (!arguments.size.empty() || path) {
+        core::PixelSize size{cameras[0].width, cameras[0].height};
+        if (!arguments.size.empty()) size = size_of(arguments.size);
+        for (Camera& camera : cameras) camera = scene::fitted(camera, size.width, size.height);
+    }
+    if (!path) return cameras;
+    return along_views(cameras, arguments.film_seconds > 0 ? arguments.film_seconds : kLegSeconds);
+}
+
+std::vector<Camera> around(const scene::Framing& framing, int count) {
+    std::vector<Camera> cameras;
+    for (int i = 0; i < count; ++i)
+        cameras.push_back(
+            scene::orbited(framing.camera, framing.target, framing.up, 2 * std::numbers::pi * i / count));
+    return cameras;
+}
+
+}  // namespace
+
+void add_views_options(CLI::App& app, ViewsArguments& arguments, CLI::Option* cameras) {
+    const auto option = [&](const char* name, auto& value, const char* type, const char* help) {
+        return app.add_option(name, value, help)->type_name(type)->excludes(cameras);
+    };
+    option("--size", arguments.size, "WxH",
+           "Size of the renders in px [1280x720, or that of the saved view]");
+    CLI::Option* orbit = option("--orbit", arguments.orbit, "N",
+                                "N views round the scene; a film shows 30 a second [240 for a film]")
+                             ->check(in_range(1, kMostFrames));
+    CLI::Option* eye = option("--look-at", arguments.look_at, "x,y,z,X,Y,Z",
+                              "Look from x,y,z at X,Y,Z (world units). With --orbit: the first view");
+    option(
+        "--up", arguments.up, "AXIS",
+        "Axis that points up: x, y, z, or the opposite such as --up=-y [guessed: -y unless the ground says "
+        "otherwise; a run's cameras]");
+    option(
+        "--views", arguments.views, "FILE",
+        "Saved views, in the format that ewa-view writes. A folder gets one image of each view, a film goes "
+        "from each view to the next")
+        ->excludes(orbit)
+        ->excludes(eye);
+    option("--film-seconds", arguments.film_seconds, "S",
+           "With --views: seconds from view to view [2]. A folder gets the frames of the film")
+        ->check(in_range(0.04, 3600.0))
+        ->needs("--views");
+}
+
+bool any_given(const ViewsArguments& arguments) {
+    return !arguments.size.empty() || !arguments.look_at.empty() || !arguments.up.empty() ||
+           !arguments.views.empty() || arguments.orbit > 0;
+}
+
+ViewsOutput views_output(const fs::path& path) {
+    const std::string extension = core::lower(path.extension().string());
+    if (extension == ".png" || extension == ".exr") return ViewsOutput::image;
+    return is_film_name(path) ? ViewsOutput::film : ViewsOutput::folder;
+}
+
+void check_views(const ViewsArguments& arguments) {
+    if (!arguments.size.empty()) size_of(arguments.size);
+    if (!arguments.look_at.empty()) parse_look_at(arguments.look_at);
+    parse_up(arguments.up);
+}
+
+std::vector<Camera> views_of(const ViewsArguments& arguments, const Gaussians& gaussians,
+                             const scene::FramingHints& hints, ViewsOutput output) {
+    const bool film = output == ViewsOutput::film;
+    std::vector<Camera> cameras;
+    if (!arguments.views.empty()) {
+        cameras = saved_views(arguments, output);
+    } else {
+        const int count = arguments.orbit > 0 ? arguments.orbit : film ? kOrbitFrames : 1;
+        const core::PixelSize size = arguments.size.empty() ? kUsualSize : size_of(arguments.size);
+        scene::FramingHints known = hints;
+        if (const auto up = parse_up(arguments.up)) known.up = up;
+        known.all_round = count > 1;
+        scene::Framing framing;
+        if (arguments.look_at.empty()) {
+            framing = scene::frame_scene(gaussians, size.width, size.height, known);
+        } else {
+            framing.up = known.up ? glm::normalize(*known.up) : scene::guessed_up(gaussians);
+            const auto [eye, target] = parse_look_at(arguments.look_at);
+            framing.target = target;
+            framing.camera = scene::look_at(eye, target, framing.up, size.width, size.height);
+        }
+        cameras = around(framing, count);
+    }
+    if (output == ViewsOutput::image && cameras.size() > 1)
+        throw InputError(
+            fmt::format("--output names one image, and there are {} views; name a folder, or a film such "
+                        "as film.mp4",
+                        cameras.size()));
+    return cameras;
+}
+
+}  // namespace ewa::cli

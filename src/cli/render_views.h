@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// The views of ewa render without a dataset: the scene framed by itself, an orbit, given eyes and saved views.
+#pragma once
+#include <CLI/CLI.hpp>
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "ewa/camera.h"
+#include "ewa/gaussians.h"
+#include "scene/framing.h"
+
+namespace ewa::cli {
+
+struct ViewsArguments {
+    std::string size, look_at, up;
+    std::filesystem::path views;
+    int orbit = 0;            // 0: not given
+    double film_seconds = 0;  // 0: not given
+};
+
+/// --size, --look-at, --up, --orbit, --views and --film-seconds, which exclude `cameras`.
+void add_views_options(CLI::App& app, ViewsArguments& arguments, CLI::Option* cameras);
+
+/// Whether one of these options is given.
+bool any_given(const ViewsArguments& arguments);
+
+/// What the views are written as.
+enum class ViewsOutput { image, folder, film };
+/// By the name: .png and .exr are an image, those of is_film_name a film, others a folder.
+ViewsOutput views_output(const std::filesystem::path& path);
+
+/// Throws InputError for texts that cannot be read, and options that exclude each other. The scene is not needed.
+void check_views(const ViewsArguments& arguments);
+
+/// At least one camera, all of one size for a film. hints: what is known of the scene; --up has precedence. Throws
+/// InputError, also if an image should hold several views.
+std::vector<Camera> views_of(const ViewsArguments& arguments, const Gaussians& gaussians,
+                             const scene::FramingHints& hints, ViewsOutput output);
+
+}  // namespace ewa::cli

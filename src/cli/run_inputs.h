@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// The folder of a training run in the place of a splat file or of a dataset.
+#pragma once
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "cli/arguments.h"
+#include "live/run_folder.h"
+
+namespace ewa::cli {
+
+/// The run whose folder this is. Empty for other paths, and for a folder that is also a dataset.
+std::optional<live::Run> find_run(const std::filesystem::path& path);
+
+/// A path that names splats.
+struct SplatInput {
+    std::filesystem::path file;    // the path itself, or splats.ply of the run's folder
+    std::optional<live::Run> run;  // if the path is a run's folder
+};
+/// Any path but a folder stays as it is: the reader of splats says what is wrong with it. Throws InputError for a
+/// folder that is not a run's, or whose run has no splats yet.
+SplatInput splat_input(const std::filesystem::path& path);
+
+/// Whether the path is the folder of a run that has splats.
+bool names_run_with_splats(const std::filesystem::path& path);
+
+/// The path itself, or the dataset of the run whose folder it is. A folder that holds both is a dataset. Throws
+/// InputError if the run's dataset is not found.
+std::filesystem::path dataset_input(const std::filesystem::path& path);
+
+/// The dataset of a run. Throws InputError that says where it was searched.
+std::filesystem::path dataset_of(const live::Run& run);
+
+/// Gives --kernel, --background, --downscale, --masks and --test-every the run's values, where `app` has the option
+/// and the command line does not. Throws InputError for a value that the option refuses.
+void use_options_of(const live::Run& run, CLI::App& app);
+
+/// Replaces a run's folder among SPLATS and DATASET. Without DATASET, it is that of the run, also of a run that SPLATS
+/// is a file of. The run's options are used as in use_options_of, unless both arguments are files. Throws InputError,
+/// also if nothing names the dataset.
+void resolve_views(CLI::App& app, ViewArguments& arguments);
+
+}  // namespace ewa::cli

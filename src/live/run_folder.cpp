@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "live/run_folder.h"
+
+#include "core/folders.h"
+#include "core/json.h"
+#include "core/text.h"
+#include "ewa/error.h"
+
+namespace ewa::live {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr uint64_t kMostConfigBytes = 1u << 20;  // bytes
+
+nlohmann::json read_config(const fs::path& path) {
+    try {
+        auto json = core::read_json_file<nlohmann::json>(path, {.bytes = kMostConfigBytes});
+        if (json.is_object()) return json;
+    } catch (const InputError&) {
+        // The run is read without its options.
+    }
+    return nlohmann::json::object();
+}
+
+fs::path dataset_of(const fs::path& run, const fs::path& named) {
+    if (named.empty()) return {};
+    std::error_code error;
+    const std::string extension = core::lower(named.extension().string());
+    const bool mesh = extension == ".gltf" || extension == ".glb";
+    if (mesh && fs::exists(run / "dataset/transforms.json", error)) return run / "dataset";
+    if (fs::exists(named, error)) return named;
+    if (named.is_absolute()) return {};
+    for (fs::path folder = fs::absolute(run, error); folder.has_relative_path();
+         folder = folder.parent_path())
+        if (fs::exists(folder / named, error)) return folder / named;
+    return {};
+}
+
+}  // namespace
+
+std::string Run::text(const char* option) const {
+    const auto found = config.find(option);
+    return found != config.end() && found->is_string() ? found->get<std::string>() : std::string();
+}
+
+std::optional<Run> find_run(const fs::path& folder) {
+    const auto present = [&](const char* name) { return core::is_file(folder / name); };
+    if (!present("config.json") && !present("splats.ply") && !present("metrics.jsonl")) return std::nullopt;
+    Run run;
+    run.folder = folder;
+    if (present("splats.ply")) run.splats = folder / "splats.ply";
+    run.config = read_config(folder / "config.json");
+    run.named_dataset = run.text("dataset");
+    run.dataset = dataset_of(folder, run.named_dataset);
+    return run;
+}
+
+std::optional<Run> run_of_splats(const fs::path& splats) {
+    if (splats.filename() != "splats.ply") return std::nullopt;
+    const fs::path folder = splats.parent_path();
+    if (!core::is_file(folder / "config.json")) return std::nullopt;
+    return find_run(folder);
+}
+
+}  // namespace ewa::live

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// The folder of a training run, for those who read it: its splats, its dataset and the options of the run.
+#pragma once
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+namespace ewa::live {
+
+struct Run {
+    std::filesystem::path folder;
+    std::filesystem::path splats;  // folder/splats.ply; empty if there is none yet
+    /// Of the splats: config.json's dataset, or the images that the run rendered of a mesh scene. Empty if it was not
+    /// found; named_dataset then says which.
+    std::filesystem::path dataset;
+    std::string named_dataset;                         // as in config.json; empty: none
+    nlohmann::json config = nlohmann::json::object();  // of the run; empty if it cannot be read
+
+    /// The option's text in config.json; empty if it is not a text.
+    std::string text(const char* option) const;
+};
+
+/// The run whose folder this is, also if it has just begun: with config.json, splats.ply or metrics.jsonl. Empty for
+/// any other path. The dataset is searched relative to the folder where the training was started: the current one, or
+/// any folder above the run.
+std::optional<Run> find_run(const std::filesystem::path& folder);
+
+/// The run that wrote this splat file: it is splats.ply, and config.json is beside it. Empty for any other path.
+std::optional<Run> run_of_splats(const std::filesystem::path& splats);
+
+}  // namespace ewa::live

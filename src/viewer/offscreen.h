@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+// Screenshots and films where no window can be opened.
+#pragma once
+#include "viewer/app.h"
+
+namespace ewa::viewer {
+
+/// Whether the environment names a desktop session: X11 or Wayland.
+bool has_desktop();
+
+/// Writes the screenshot or the film that the command line asks for, as the window would. Throws InputError for
+/// --compare, which the window alone shows, and RunError.
+void write_without_window(const Startup& startup);
+
+}  // namespace ewa::viewer

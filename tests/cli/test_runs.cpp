@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+// The folder of a training run in the place of splats and of a dataset.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "cli/expect.h"
+#include "ewa/image.h"
+#include "ewa/splat_files.h"
+
+namespace {
+
+using namespace ewa;
+using namespace ewa::test;
+namespace fs = std::filesystem;
+using Names = std::vector<std::string>;
+
+class Runs : public testing::Test {
+  protected:
+    void SetUp() override {
+        make_dataset(folder / "data", {"0.png", "1.png", "2.png", "3.png", "4.png"});
+        make_splats(folder / "s.ply");
+    }
+    /// Trains a few steps over white, with options that change every figure.
+    std::string train(const std::string& name, const Names& more = {}) {
+        Names arguments{
+            "train",   folder / "data", "-o", folder / name,  "--init",    folder / "s.ply", "--steps", "3",
+            "--quiet", "--test-every",  "2",  "--background", "0.9,0.8,1", "--downscale",    "2"};
+        if (more.empty()) arguments.insert(arguments.end(), {"--kernel", "antialias"});
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        expect_success(run_ewa(arguments));
+        return folder / name;
+    }
+    Folder folder;
+};
+
+TEST_F(Runs, EvalHasTheFiguresOfTheRun) {
+    const std::string run = train("run");
+    const auto summary = read_json(run + "/summary.json");
+    const auto psnr = [&](const Names& arguments) {
+        Names all{"eval", "--json", folder / "e.json"};
+        all.insert(all.end(), arguments.begin(), arguments.end());
+        expect_success(run_ewa(all));
+        const auto json = read_json(folder / "e.json");
+        EXPECT_EQ(json["frames"].size(), 3u);  // every second of five
+        return json["psnr"].get<double>();
+    };
+    EXPECT_NEAR(psnr({run}), summary["test_psnr"], 1e-6);
+    EXPECT_NEAR(psnr({run, folder / "data"}), summary["test_psnr"], 1e-6);
+    EXPECT_NEAR(psnr({run + "/splats.ply"}), summary["test_psnr"], 1e-6);
+    EXPECT_NEAR(psnr({run, run}), summary["test_psnr"], 1e-6);
+    // The command line has precedence.
+    EXPECT_GT(std::abs(psnr({run, "--background", "0,0,0"}) - summary["test_psnr"].get<double>()), 0.1);
+    EXPECT_GT(std::abs(psnr({run, "--kernel", "peak"}) - summary["test_psnr"].get<double>()), 1e-5);
+    expect_success(run_ewa({"eval", run, "--test-every", "5", "--json", folder / "one.json"}));
+    EXPECT_EQ(read_json(folder / "one.json")["frames"].size(), 1u);
+}
+
+TEST_F(Runs, RenderShowsTheViewsOfTheDataset) {
+    const std::string run = train("run");
+    expect_success(run_ewa({"render", run, "-o", folder / "views"}));
+    EXPECT_EQ(files_below(folder / "views"), (Names{"0.png", "1.png", "2.png", "3.png", "4.png"}));
+    const Names options{"--background", "0.9,0.8,1", "--downscale", "2", "--antialias"};
+    Names plain{"render", run + "/splats.ply", "--cameras", folder / "data", "-o", folder / "plain"};
+    plain.insert(plain.end(), options.begin(), options.end());
+    expect_success(run_ewa(plain));
+    expect_success(run_ewa(
+        {"render", run + "/splats.ply", "--cameras", run, "-o", folder / "run_cameras", "--frames", "test"}));
+    EXPECT_EQ(files_below(folder / "run_cameras").size(), 1u);
+    for (const char* name : {"0.png", "4.png"})
+        EXPECT_EQ(read_file(folder / "views/" + name), read_file(folder / "plain/" + name)) << name;
+
+    // As one image, the scene is framed by itself, with the dataset's up: z in this one.
+    expect_success(run_ewa({"render", run, "-o", folder / "x.png", "--size", "40x30"}));
+    expect_success(run_ewa({"render", run, "-o", folder / "up.png", "--size", "40x30", "--up", "z"}));
+    expect_success(run_ewa({"render", run, "-o", folder / "down.png", "--size", "40x30", "--up=-z"}));
+    EXPECT_GT(compare_images(load_image(folder / "x.png"), load_image(folder / "up.png")).psnr, 40);
+    EXPECT_LT(compare_images(load_image(folder / "x.png"), load_image(folder / "down.png")).psnr, 40);
+}
+
+TEST_F(Runs, InfoConvertGradAndCompareTakeThem) {
+    const std::string run = train("run");
+    const Outcome info = run_ewa({"info", run});
+    expect_success(info);
+    for (const char* text : {"training run", "steps           3", "test PSNR", "splats          50"})
+        EXPECT_NE(info.out.find(text), std::string::npos) << text << " not in " << info.out;
+    const Outcome json = run_ewa({"info", run, "--json"});
+    expect_success(json);
+    const auto parsed = nlohmann::json::parse(json.out);
+    EXPECT_EQ(parsed["kind"], "run");
+    EXPECT_EQ(parsed["splats"], 50);
+    EXPECT_EQ(parsed["run"]["dataset"], folder / "data");
+    EXPECT_EQ(parsed["run"]["summary"]["steps"], 3);
+
+    expect_success(run_ewa({"convert", run, folder / "out.spz", "--quiet"}));
+    EXPECT_EQ(load_splats(folder / "out.spz").size(), 50u);
+    expect_success(run_ewa({"grad", run, "--frame", "1", "-o", folder / "g.ply"}));
+    EXPECT_EQ(load_splats(folder / "g.ply").size(), 50u);
+
+    const std::string other = train("other", {"--seed", "4", "--kernel", "antialias"});
+    const Outcome compared = run_ewa({"compare", run, other, "--json", folder / "c.json"});
+    expect_success(compared);
+    EXPECT_EQ(read_json(folder / "c.json")["pictures"].size(), 5u);
+    const Outcome same = run_ewa({"compare", run, run + "/splats.ply", "--cameras", run, "--max-error", "0"});
+    expect_success(same);
+    expect_failure(run_ewa({"compare", run, train("third", {"--kernel", "peak"})}), 2, "--kernel");
+}
+
+TEST_F(Runs, WhatIsMissingIsNamed) {
+    fs::create_directories(folder / "empty");
+    expect_failure(run_ewa({"render", folder / "empty", "-o", folder / "x.png"}), 2, "splats.ply");
+    expect_failure(run_ewa({"convert", folder / "empty", folder / "x.spz"}), 2, "training run");
+    expect_failure(run_ewa({"eval", folder / "data"}), 2, "a folder without splats");
+    expect_failure(run_ewa({"eval", folder / "s.ply"}), 2, "DATASET is required");
+    expect_failure(run_ewa({"info", folder / "empty"}), 2, "config.json");
+
+    fs::create_directories(folder / "begun");
+    write_file(folder / "begun/config.json", R"({"dataset": "gone"})");
+    expect_failure(run_ewa({"info", folder / "begun"}), 2, "--save-every");
+    expect_failure(run_ewa({"eval", folder / "s.ply", folder / "begun"}), 2,
+                   "the dataset gone was not found");
+    fs::copy_file(folder / "s.ply", folder / "begun/splats.ply");
+    expect_failure(run_ewa({"eval", folder / "begun"}), 2, "each folder above the run");
+    expect_failure(run_ewa({"render", folder / "begun", "-o", folder / "d"}), 2, "the dataset gone");
+    expect_success(run_ewa({"render", folder / "begun", "-o", folder / "x.png", "--size", "20x20"}));
+    // Relative to a folder above the run.
+    fs::create_directories(folder / "gone");
+    make_dataset(folder / "gone");
+    expect_success(run_ewa({"eval", folder / "begun"}));
+    write_file(folder / "begun/config.json", R"({"dataset": "gone", "downscale": "many"})");
+    expect_failure(run_ewa({"eval", folder / "begun"}), 2, "config.json: --downscale");
+    write_file(folder / "begun/config.json", "{}");
+    expect_failure(run_ewa({"eval", folder / "begun"}), 2, "names no dataset");
+}
+
+TEST_F(Runs, AFolderThatIsADatasetTooStaysOne) {
+    write_file(folder / "data/config.json", "{}");
+    const Outcome info = run_ewa({"info", folder / "data"});
+    expect_success(info);
+    EXPECT_NE(info.out.find("frames          5"), std::string::npos) << info.out;
+    expect_success(run_ewa({"eval", folder / "s.ply", folder / "data"}));
+}
+
+}  // namespace

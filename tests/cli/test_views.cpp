@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: Apache-2.0
+// ewa render without a dataset: images, orbits, saved views and films.
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <glm/vec3.hpp>
+
+#include "cli/expect.h"
+#include "ewa/image.h"
+#include "io/datasets/view_list.h"
+#include "scene/framing.h"
+
+namespace {
+
+using namespace ewa;
+using namespace ewa::test;
+using Names = std::vector<std::string>;
+
+class Views : public testing::Test {
+  protected:
+    void SetUp() override { make_splats(splats, 400); }
+    Outcome render(const Names& more, const Circumstances& circumstances = {}) {
+        Names arguments{"render", splats};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return run_ewa(arguments, circumstances);
+    }
+    /// A program of the name ffmpeg that runs this script, and nothing else in $PATH.
+    Circumstances with_ffmpeg(const std::string& script) {
+        std::filesystem::create_directories(folder / "bin");
+        write_file(folder / "bin/ffmpeg", "#!/bin/sh\nPATH=/usr/bin:/bin\n" + script);
+        chmod((folder / "bin/ffmpeg").c_str(), 0755);
+        return {.environment = {{"PATH", folder / "bin"}}};
+    }
+    /// Two cameras of 48 x 32 px in a file of saved views.
+    std::string saved_views() {
+        const Camera a = scene::look_at({0, 0, -6}, {0, 0, 0}, {0, -1, 0}, 48, 32);
+        const Camera b = scene::look_at({6, 0, 0}, {0, 0, 0}, {0, -1, 0}, 48, 32);
+        io::write_views(folder / "views.json", {{"1", a, {}}, {"2", b, {}}});
+        return folder / "views.json";
+    }
+
+    Folder folder;
+    const std::string splats = folder / "s.ply";
+};
+
+bool same_pixels(const std::string& a, const std::string& b) {
+    const Image x = load_image(a), y = load_image(b);
+    return x.width == y.width && x.height == y.height && x.pixels == y.pixels;
+}
+
+bool column_is_dark(const Image& image, int x) {
+    for (int y = 0; y < image.height; ++y)
+        if (*image.at(x, y) > 0.02f) return false;
+    return true;
+}
+
+TEST_F(Views, AFileAloneIsAnImageOfTheWholeScene) {
+    const Outcome outcome = render({"-o", folder / "new/x.png", "--size", "90x60"});
+    expect_success(outcome);
+    EXPECT_NE(outcome.out.find("90x60"), std::string::npos) << outcome.out;
+    const Image image = load_image(folder / "new/x.png");
+    EXPECT_EQ(image.width, 90);
+    EXPECT_EQ(image.height, 60);
+    EXPECT_GT(*std::max_element(image.pixels.begin(), image.pixels.end()), 0.2f);
+    EXPECT_TRUE(column_is_dark(image, 0) && column_is_dark(image, 89)) << "the scene is cut off";
+    EXPECT_FALSE(column_is_dark(image, 45));
+
+    expect_success(render({"-o", folder / "x.exr", "--size", "30x20", "--mode", "depth", "--quiet"}));
+    const Image depth = load_image(folder / "x.exr");
+    EXPECT_GT(*std::max_element(depth.pixels.begin(), depth.pixels.end()), 1.0f) << "view z in world units";
+    expect_success(render({"-o", folder / "usual.png", "--quiet"}));
+    EXPECT_EQ(load_image(folder / "usual.png").width, 1280);
+}
+
+TEST_F(Views, TheMarkOfAntialiasingIsUsed) {
+    expect_success(render({"-o", folder / "peak.png", "--size", "40x40"}));
+    SaveOptions marked{.comments = {"SplatRenderMode: mip"}, .antialiased = true};
+    save_splats(folder / "marked.ply", load_splats(splats), marked);
+    const auto image = [&](const std::string& name, const Names& more) {
+        Names arguments{"render", folder / "marked.ply", "-o", folder / name, "--size", "40x40"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        expect_success(run_ewa(arguments));
+        return folder / name;
+    };
+    const std::string marked_image = image("marked.png", {});
+    EXPECT_TRUE(same_pixels(marked_image, image("antialias.png", {"--antialias"})));
+    EXPECT_FALSE(same_pixels(marked_image, folder / "peak.png"));
+    EXPECT_TRUE(same_pixels(image("given.png", {"--kernel", "peak"}), folder / "peak.png"));
+}
+
+TEST_F(Views, AnOrbitIsAFolder) {
+    expect_success(render({"--orbit", "4", "-o", folder / "round", "--size", "40x30"}));
+    EXPECT_EQ(files_below(folder / "round"), (Names{"00000.png", "00001.png", "00002.png", "00003.png"}));
+    EXPECT_FALSE(same_pixels(folder / "round/00000.png", folder / "round/00002.png"));
+
+    // From the eye that --look-at names. After half a turn it is at the other side.
+    expect_success(
+        render({"--orbit", "2", "-o", folder / "two", "--size", "40x30", "--look-at", "0,0,-5,0,0,0"}));
+    expect_success(render({"-o", folder / "back.png", "--size", "40x30", "--look-at", "0,0,5,0,0,0"}));
+    const ImageDifference difference =
+        compare_images(load_image(folder / "two/00001.png"), load_image(folder / "back.png"));
+    EXPECT_LE(difference.max_error, 1.001 / 255);
+}
+
+TEST_F(Views, LookAtIsTheSameAsASavedView) {
+    const std::string views = saved_views();
+    expect_success(render({"--views", views, "-o", folder / "saved"}));
+    EXPECT_EQ(files_below(folder / "saved"), (Names{"00000.png", "00001.png"}));
+    expect_success(
+        render({"--look-at", "6,0,0,0,0,0", "--up=-y", "--size", "48x32", "-o", folder / "x.png"}));
+    EXPECT_TRUE(same_pixels(folder / "saved/00001.png", folder / "x.png"));
+    expect_success(
+        render({"--look-at", "6,0,0,0,0,0", "--up", "z", "--size", "48x32", "-o", folder / "z.png"}));
+    EXPECT_FALSE(same_pixels(folder / "z.png", folder / "x.png"));
+
+    expect_success(render({"--views", views, "-o", folder / "large", "--size", "96x64", "--quiet"}));
+    EXPECT_EQ(load_image(folder / "large/00000.png").width, 96);
+    // The frames of a film: 3 a tenth of a second, from the first view to the last.
+    expect_success(render({"--views", views, "--film-seconds", "0.1", "-o", folder / "film"}));
+    EXPECT_EQ(files_below(folder / "film").size(), 4u);
+    EXPECT_TRUE(same_pixels(folder / "film/00000.png", folder / "saved/00000.png"));
+    EXPECT_TRUE(same_pixels(folder / "film/00003.png", folder / "saved/00001.png"));
+}
+
+TEST_F(Views, AFilmGoesToFfmpegFrameByFrame) {
+    // Keeps its arguments, and its input as the film, which its last argument names.
+    const Circumstances ffmpeg = with_ffmpeg("printf '%s\\n' \"$@\" > " + (folder / "arguments") +
+                                             "\nfor last; do :; done\ncat > \"$last\"\n");
+    expect_success(
+        render({"--views", saved_views(), "--film-seconds", "0.1", "-o", folder / "a film.mp4"}, ffmpeg));
+    const std::string frames = read_file(folder / "a film.mp4"), words = read_file(folder / "arguments");
+    ASSERT_EQ(frames.size(), size_t(4) * 48 * 32 * 4);
+    EXPECT_NE(words.find("\n48x32\n"), std::string::npos) << words;
+    EXPECT_NE(words.find("\n30\n"), std::string::npos) << words;
+    expect_success(render({"--views", saved_views(), "-o", folder / "saved"}));
+    const Image first = load_image(folder / "saved/00000.png");
+    for (size_t i = 0; i < first.pixels.size(); ++i)
+        ASSERT_NEAR(first.pixels[i], uint8_t(frames[i / 3 * 4 + i % 3]) / 255.0f, 1.001f / 255) << i;
+
+    // Without views a film goes once round the scene.
+    expect_success(render({"--size", "8x6", "-o", folder / "round.webm", "--quiet"}, ffmpeg));
+    EXPECT_EQ(read_file(folder / "round.webm").size(), size_t(240) * 8 * 6 * 4);
+    expect_success(render({"--size", "8x6", "--orbit", "5", "-o", folder / "short.mkv"}, ffmpeg));
+    EXPECT_EQ(read_file(folder / "short.mkv").size(), size_t(5) * 8 * 6 * 4);
+}
+
+TEST_F(Views, AFilmThatFailsIsOneLineAndLeavesNothing) {
+    const Names film{"--orbit", "3", "--size", "300x200", "-o", folder / "film.mp4"};
+    const Circumstances none{.environment = {{"PATH", folder / "nowhere"}}};
+    const Outcome missing = render(film, none);
+    expect_failure(missing, 1, "apt install ffmpeg");
+    EXPECT_NE(missing.err.find("PNG"), std::string::npos) << missing.err;
+
+    // It ends before it has read a frame, and its last line is the reason.
+    expect_failure(render(film, with_ffmpeg("echo noise >&2; echo 'Unknown encoder' >&2; exit 1\n")), 1,
+                   "ffmpeg failed: Unknown encoder");
+    expect_failure(render(film, with_ffmpeg("cat > /dev/null; exit 3\n")), 1, "exit status 3");
+    expect_failure(render(film, with_ffmpeg("cat > /dev/null\n")), 1, "no film");
+    expect_failure(render(film, with_ffmpeg("kill -9 $$\n")), 1, "signal 9");
+    write_file(folder / "film.mp4", "before");
+    expect_failure(render(film, with_ffmpeg("for last; do :; done\necho half > \"$last\"\nexit 1\n")), 1,
+                   "exit status 1");
+    EXPECT_EQ(read_file(folder / "film.mp4"), "before");
+}
+
+TEST_F(Views, FfmpegItselfMakesAFilm) {
+    if (!std::filesystem::exists("/usr/bin/ffmpeg")) GTEST_SKIP() << "ffmpeg is not installed";
+    expect_success(render({"--orbit", "10", "--size", "65x49", "-o", folder / "film.mp4"}));
+    const std::string bytes = read_file(folder / "film.mp4");
+    ASSERT_GT(bytes.size(), 500u);
+    EXPECT_EQ(bytes.substr(4, 4), "ftyp");
+}
+
+TEST_F(Views, WrongUse) {
+    const std::string out = folder / "x.png", views = saved_views();
+    write_file(folder / "none.json", R"({"views": []})");
+    const std::pair<Names, const char*> cases[] = {
+        {{"--size", "90", "-o", out}, "--size"},
+        {{"--size", "0x90", "-o", out}, "--size"},
+        {{"--size", "90x99999", "-o", out}, "--size"},
+        {{"--look-at", "1,2,3", "-o", out}, "six numbers"},
+        {{"--look-at", "1,2,3,4,5,x", "-o", out}, "six numbers"},
+        {{"--look-at", "1,2,3,4,5,6,7", "-o", out}, "six numbers"},
+        {{"--look-at", "1,2,nan,4,5,6", "-o", out}, "six numbers"},
+        {{"--look-at", "1,2,3,1,2,3", "-o", out}, "--look-at"},
+        {{"--up", "w", "-o", out}, "--up"},
+        {{"--orbit", "3", "-o", out}, "name a folder"},
+        {{"--orbit", "0", "-o", folder / "d"}, "--orbit"},
+        {{"--views", views, "-o", out}, "2 views"},
+        {{"--views", views, "--orbit", "3", "-o", folder / "d"}, "--orbit"},
+        {{"--views", folder / "none.json", "-o", folder / "d"}, "no views"},
+        {{"--views", folder / "nowhere.json", "-o", folder / "d"}, "nowhere.json"},
+        {{"--film-seconds", "1", "-o", folder / "d"}, "--views"},
+        {{"--size", "9x9", "--cameras", folder / "d"}, "--cameras"},
+        {{"--frames", "test", "-o", out}, "--frames needs --cameras"},
+        {{"--mode", "depth", "-o", folder / "film.mp4"}, "--mode color"},
+    };
+    for (const auto& [arguments, text] : cases) expect_failure(render(arguments), 2, text);
+    std::filesystem::create_symlink(views, folder / "link.png");
+    expect_failure(render({"--views", views, "-o", folder / "link.png", "--size", "9x9"}), 2, "--views");
+    EXPECT_EQ(files_below(folder / ".").size(), 4u) << "a refused command wrote a file";
+}
+
+}  // namespace
