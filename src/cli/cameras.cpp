@@ -93,7 +93,7 @@ Action add_cameras(CLI::App& app) {
     app.add_option(
            "--frames", options.frames,
            "Number of frames to take from a video, about: the sharpest of each of as many equal parts")
-        ->check(in_range(3, 100000))
+        ->transform(in_range(3, 100000))
         ->type_name("N")
         ->capture_default_str();
     static const std::map<std::string, Matching> kMatchings = {
@@ -103,7 +103,7 @@ Action add_cameras(CLI::App& app) {
            "Which photos to compare. sequence: each with those that follow it in the order of names. "
            "unordered: all "
            "with all. auto: sequence for a video and for more than 200 photos")
-        ->check(CLI::IsMember({"auto", "sequence", "unordered"}))
+        ->transform(one_of({"auto", "sequence", "unordered"}))
         ->type_name("ORDER")
         ->default_str("auto");
     add_quiet_option(app, arguments->quiet);

@@ -103,7 +103,8 @@ int run_program(int argc, char** argv) {
     const auto add_train_here = [&](CLI::App& train) { return add_train(train, command_line(argc, argv)); };
     Command commands[] = {
         {"train", "Trains splats from images with known cameras", add_train_here},
-        {"render", "Renders a splat scene: framed by itself, or through the cameras of a dataset", add_render},
+        {"render", "Renders a splat scene: framed by itself, or through the cameras of a dataset",
+         add_render},
         {"eval", "Measures PSNR and SSIM of a splat scene against images", add_eval},
         {"grad", "Writes the gradient of the training loss for one view", add_grad},
         {"convert", "Converts, joins and edits splat files", add_convert},

@@ -62,7 +62,7 @@ Image chosen_image(Rendering&& rendering, const RenderArguments& arguments, std:
 
 void note_skipped(Progress& progress, uint32_t skipped) {
     if (skipped > 0)
-        progress.note(fmt::format("{} splats with a value that is not finite were skipped", skipped));
+        progress.note("skipped " + core::counted(skipped, "splat") + " with a value that is not finite");
 }
 
 int render_dataset_views(const RenderArguments& arguments) {
@@ -167,9 +167,8 @@ int render_free_views(RenderArguments arguments) {
     if (film) find_ffmpeg();
     if (one_image) arguments.format = core::lower(arguments.output.extension().string()).substr(1);
     if (output != ViewsOutput::folder) {
-        keep_apart({{"--output", arguments.output}},
-                   {{"SPLATS", arguments.splats}, {"--views", arguments.views.views}});
-        check_writable(arguments.output, Folder::made);
+        check_outputs({{"--output", arguments.output}},
+                      {{"SPLATS", arguments.splats}, {"--views", arguments.views.views}});
     }
     const SplatScene scene = read_splats(arguments.splats);
     if (scene.antialiased && !arguments.kernel_given) options.kernel = Footprint::antialias;

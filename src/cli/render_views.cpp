@@ -109,7 +109,7 @@ void add_views_options(CLI::App& app, ViewsArguments& arguments, CLI::Option* ca
            "Size of the renders in px [1280x720, or that of the saved view]");
     CLI::Option* orbit = option("--orbit", arguments.orbit, "N",
                                 "N views round the scene; a film shows 30 a second [240 for a film]")
-                             ->check(in_range(1, kMostFrames));
+                             ->transform(in_range(1, kMostFrames));
     CLI::Option* eye = option("--look-at", arguments.look_at, "x,y,z,X,Y,Z",
                               "Look from x,y,z at X,Y,Z (world units). With --orbit: the first view");
     option(
@@ -124,7 +124,7 @@ void add_views_options(CLI::App& app, ViewsArguments& arguments, CLI::Option* ca
         ->excludes(eye);
     option("--film-seconds", arguments.film_seconds, "S",
            "With --views: seconds from view to view [2]. A folder gets the frames of the film")
-        ->check(in_range(0.04, 3600.0))
+        ->transform(in_range(0.04, 3600.0))
         ->needs("--views");
 }
 

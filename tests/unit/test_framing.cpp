@@ -108,7 +108,8 @@ TEST(FrameScene, AllRoundFitsFromEverySide) {
     std::vector<glm::dvec3> points;  // a long plank away from the camera
     for (int i = 0; i < 2000; ++i)
         points.emplace_back(random.uniform(-0.1, 0.1), random.uniform(-0.1, 0.1), random.uniform(-3, 3));
-    const Framing framing = frame_scene(splats_at(points), 320, 240, {.all_round = true});
+    const Framing framing =
+        frame_scene(splats_at(points), 320, 240, {.up = {}, .forward = {}, .all_round = true});
     for (int side = 0; side < 8; ++side) {
         const Camera camera =
             orbited(framing.camera, framing.target, framing.up, side * std::numbers::pi / 4);
@@ -135,7 +136,7 @@ TEST(FrameScene, HintsChooseTheSide) {
     EXPECT_GT(offset.z, 0);
     EXPECT_EQ(framing.up, glm::dvec3(0, 0, 1));
     // A forward along up is no side.
-    const Framing above = frame_scene(splats, 64, 64, {.forward = glm::dvec3(0, 1, 0)});
+    const Framing above = frame_scene(splats, 64, 64, {.up = {}, .forward = glm::dvec3(0, 1, 0)});
     EXPECT_LT(above.camera.position().z, above.target.z);
 }
 

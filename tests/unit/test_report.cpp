@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include <sys/resource.h>
 #include <cmath>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -75,8 +77,18 @@ TEST(Report, MetricsLogCanBeReadWhileItGrows) {
 }
 
 TEST(Report, MetricsLogSaysWhenTheDiskIsFull) {
-    MetricsLog log("/dev/full");
+    const test::TempFolder folder;
+    MetricsLog log(folder / "metrics.jsonl");
+    log.append({});
+    // A limit on the size of files ends them as a full disk does.
+    rlimit before;
+    getrlimit(RLIMIT_FSIZE, &before);
+    const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit full{4, before.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &full);
     EXPECT_THROW(log.append({}), RunError);
+    setrlimit(RLIMIT_FSIZE, &before);
+    std::signal(SIGXFSZ, handler);
     EXPECT_THROW(MetricsLog("/nowhere/at/all/metrics.jsonl"), RunError);
 }
 
