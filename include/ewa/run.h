@@ -116,8 +116,8 @@ struct RunResult {
 /// If an image vanishes during training, the checkpoint is saved before the error is thrown.
 /// With RunOptions::resume the options must be those of the checkpoint, but `steps` may differ: the rest of the run then
 /// has the schedule of the new number. Strategy::automatic keeps the checkpoint's strategy.
-/// Throws InputError (options, dataset, start splats, a checkpoint of other options or of a later step, a folder with
-/// an earlier run, an output that is an input), RunError (device, memory, disk, a folder that another run uses).
+/// Throws InputError: options, dataset, start splats, a checkpoint of other options or of a later step, a folder with an
+/// earlier run, an output that is an input. Throws RunError: device, memory, disk, a folder that another run uses.
 RunResult run_training(const RunOptions& options, RunObserver& observer);
 RunResult run_training(const RunOptions& options);
 

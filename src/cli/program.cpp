@@ -102,7 +102,7 @@ int run_program(int argc, char** argv) {
     core::use_help_text<CLI::Formatter>(app);
     const auto add_train_here = [&](CLI::App& train) { return add_train(train, command_line(argc, argv)); };
     Command commands[] = {
-        {"train", "Trains splats from images with known cameras", add_train_here},
+        {"train", "Trains splats from images with cameras, photos or a video", add_train_here},
         {"render", "Renders a splat scene: framed by itself, or through the cameras of a dataset",
          add_render},
         {"eval", "Measures PSNR and SSIM of a splat scene against images", add_eval},

@@ -102,8 +102,9 @@ RunOption words(const char* name, const char* value, const char* help, bool deci
 
 RunOption dataset_option() {
     RunOption option{"dataset", "PATH",
-                     "Images with cameras: a COLMAP folder or transforms.json. Or a glTF file with meshes, "
-                     "which is first rendered into DIR/dataset",
+                     "Images with cameras: a COLMAP folder or transforms.json. Or photos or a video, whose "
+                     "cameras are found first, or a glTF file with meshes, which is first rendered: "
+                     "into DIR/dataset",
                      kDoesNotDecide};
     option.get = [](const RunOptions& options) {
         return (options.scene.empty() ? options.dataset : options.scene).string();
