@@ -16,6 +16,7 @@
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
+#include "io/datasets/image_records.h"
 #include "scene/names.h"
 #include "train/schedule.h"
 
@@ -188,6 +189,13 @@ Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, cons
     if (options.init == "random" || (options.init == "sfm" && start.size() == 0)) {
         const uint32_t count = std::min(kRandomSplats, options.train.max_splats);
         start = random_gaussians(dataset, frames, static_cast<int>(count), options.train.seed, degree);
+    } else if (options.init != "sfm" && io::is_point_cloud(options.init)) {
+        const io::PlyPoints cloud = io::read_points_ply(options.init);
+        if (cloud.dropped.count > 0)
+            throw InputError(
+                fmt::format("{}: a coordinate is not finite ({} such points in all); remove them",
+                            cloud.dropped.first, cloud.dropped.count));
+        start = gaussians_from_points(cloud.points, degree);
     } else if (options.init != "sfm") {
         start = load_splats(options.init);
         set_sh_degree(start, degree);

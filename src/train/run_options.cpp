@@ -209,7 +209,7 @@ std::vector<RunOption> make_table() {
             [](RunOptions& o) -> int& { return o.train.halvings; }, 0, 6),
         words("init", "sfm|random|FILE",
               "First splats. sfm: the dataset's points, or random if it has none. random: where the cameras "
-              "look. FILE: a splat file",
+              "look. FILE: a splat file, or a PLY of points",
               kDecides, [](RunOptions& o) -> std::string& { return o.init; }),
         number<int>(
             "downscale", "K", "Divide the images' width and height by this", kDecides,

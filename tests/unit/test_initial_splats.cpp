@@ -146,6 +146,34 @@ TEST(Initialise, ShDegreeIsRaisedAndLowered) {
     EXPECT_EQ(start_of_degree(0).sh, (std::vector<float>{1, 2, 3, 13, 14, 15}));
 }
 
+TEST(Initialise, StartsFromAFileOfPoints) {
+    const TempFolder folder;
+    const std::string header =
+        "ply\nformat ascii 1.0\nelement vertex 2\nproperty double x\nproperty float y\n"
+        "property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n";
+    RunOptions options;
+    options.train.sh_degree = 1;
+    options.init = folder.write("cloud.ply", header + "end_header\n1 2 3 255 0 0\n4 5 6 0 255 0\n").string();
+    const Gaussians start = initial_splats(options, {}, {});
+    EXPECT_EQ(start.means, (std::vector<float>{1, 2, 3, 4, 5, 6}));
+    EXPECT_EQ(start.sh_degree, 1);
+    EXPECT_GT(start.sh[0], start.sh[1]);    // the first point is red
+    EXPECT_LT(start.sh[12], start.sh[13]);  // the second is green
+    options.init = folder.write("nan.ply", header + "end_header\n1 2 3 255 0 0\nnan 5 6 0 255 0\n").string();
+    expect_error<InputError>([&] { initial_splats(options, {}, {}); },
+                             {"nan.ply", "vertex 1", "1 such points"});
+    options.init = folder
+                       .write("mesh.ply", header +
+                                              "element face 1\nproperty list uchar int vertex_indices\n"
+                                              "end_header\n1 2 3 255 0 0\n4 5 6 0 255 0\n2 0 1\n")
+                       .string();
+    expect_error<InputError>([&] { initial_splats(options, {}, {}); }, {"this is a mesh"});
+    options.init = folder.write("cut.ply", "ply\nformat ascii 1.0\nelement vertex 2\n").string();
+    expect_error<InputError>([&] { initial_splats(options, {}, {}); }, {"cut.ply"});
+    options.init = folder.write("other.txt", "no").string();
+    expect_error<InputError>([&] { initial_splats(options, {}, {}); }, {"other.txt"});
+}
+
 TEST(Initialise, StartsFromPointsOrRandomSplats) {
     Dataset dataset = circle({0, 0, 0}, true);
     const auto frames = every_frame(dataset);

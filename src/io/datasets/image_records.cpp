@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/atomic_file.h"
+#include "core/file_reader.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "io/splats/ply_table.h"
@@ -20,6 +21,25 @@ void add_point(PointCloud& points, DroppedPoints& dropped, const glm::dvec3& pos
         }
     points.positions.push_back(position);
     points.colors.push_back(color);
+}
+
+bool is_point_cloud(const std::filesystem::path& path) {
+    {
+        core::FileReader reader(path);
+        constexpr std::string_view kMagic = "ply";
+        if (reader.size() < kMagic.size()) return false;
+        const auto* head = reinterpret_cast<const char*>(reader.take(kMagic.size(), "the header"));
+        if (std::string_view(head, kMagic.size()) != kMagic) return false;
+    }
+    PlyTable table(path);
+    const PlyElement* vertex = nullptr;
+    for (const PlyElement& element : table.elements()) {
+        // Compressed splats have chunks. Faces make a mesh.
+        if (element.name == "chunk" || (element.name == "face" && element.count > 0)) return false;
+        if (element.name == "vertex") vertex = &element;
+    }
+    return vertex && vertex->find_number("x") && vertex->find_number("y") && vertex->find_number("z") &&
+           !vertex->find("opacity") && !vertex->find("f_dc_0");
 }
 
 PlyPoints read_points_ply(const std::filesystem::path& path) {

@@ -51,6 +51,10 @@ void add_point(PointCloud& points, DroppedPoints& dropped, const glm::dvec3& pos
 /// the file and the byte or property.
 PlyPoints read_points_ply(const std::filesystem::path& path);
 
+/// Whether the file is a PLY of points: vertices with x y z, which are not splats, and no faces. Throws InputError
+/// where the file cannot be read, or is a PLY with a damaged header.
+bool is_point_cloud(const std::filesystem::path& path);
+
 /// Writes a binary PLY of x y z (float32) and red green blue (8 bits). Throws RunError.
 void write_points_ply(const std::filesystem::path& path, const PointCloud& points);
 
