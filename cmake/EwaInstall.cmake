@@ -2,7 +2,7 @@
 # What `cmake --install` puts where, and the package that find_package(ewa) reads.
 include(CMakePackageConfigHelpers)
 
-# Whatever the umask: programs load a module from one of these folders.
+# A umask can only take permissions away. Programs load a module from one of these folders.
 set(CMAKE_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE
                                                 WORLD_READ WORLD_EXECUTE)
 set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS ${CMAKE_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS})
