@@ -68,8 +68,8 @@ const std::vector<std::pair<std::string, Modules>> kLibraries = {
     {"zstd", {"src/io/splats"}},
     {"zlib", {"src/io/splats", "src/train"}},
     {"nlohmann/",
-     {"src/core", "src/capture", "src/io/splats", "src/io/datasets", "src/io/gltf", "src/pathtracer", "src/train",
-      "src/report", "src/live", "src/bench", "src/cli", "src/viewer"}},
+     {"src/core", "src/capture", "src/io/splats", "src/io/datasets", "src/io/gltf", "src/pathtracer",
+      "src/train", "src/report", "src/live", "src/bench", "src/cli", "src/viewer"}},
     {"CLI/", {"src/cli", "src/viewer", "src/bench"}}};
 
 Modules reached_from(const std::string& module) {
