@@ -25,7 +25,7 @@ constexpr const char* kOverlap =
 class Colmap {
   public:
     Colmap(const fs::path& work, const ProgressFunction& progress) : work_(work), progress_(progress) {
-        if (!core::has_program("colmap"))
+        if (core::find_program("colmap").empty())
             throw RunError(
                 "photos without cameras need COLMAP, which is not installed (Debian: apt install colmap)");
     }
@@ -175,7 +175,7 @@ std::vector<Model> map(const Colmap& colmap, const Photos& photos, const fs::pat
     const fs::path folder = work / "models";
     fs::remove_all(folder);
     core::make_folder(folder);
-    const bool glomap = core::has_program("glomap");
+    const bool glomap = !core::find_program("glomap").empty();
     std::vector<std::string> words{glomap ? "glomap" : "colmap",
                                    "mapper",
                                    "--database_path",

@@ -35,7 +35,7 @@ void check(core::Ended ended, const fs::path& video, const fs::path& log) {
 
 /// The number of frames that the video's header states; 0 if it states none.
 int stated_frames(const fs::path& video, const fs::path& log) {
-    if (!core::has_program("ffprobe")) return 0;
+    if (core::find_program("ffprobe").empty()) return 0;
     std::string text;
     const core::Program probe{.command = {"ffprobe", "-v", "error", "-select_streams", "v:0", "-show_entries",
                                           "stream=nb_frames", "-of", "csv=p=0", "file:" + video.string()},
@@ -134,7 +134,8 @@ bool PgmStream::take_one() {
 
 void extract_frames(const fs::path& video, const fs::path& images, int frames, const fs::path& log,
                     const ProgressFunction& progress) {
-    if (!core::has_program("ffmpeg")) throw RunError(std::string("a video needs ffmpeg, which ") + kInstall);
+    if (core::find_program("ffmpeg").empty())
+        throw RunError(std::string("a video needs ffmpeg, which ") + kInstall);
     const std::vector<int> chosen = sharpest(measure(video, log, progress), frames);
     if (chosen.empty()) throw InputError(core::one_line(video.string()) + ": the video has no frames");
     std::string filter = "select='";

@@ -66,6 +66,15 @@ CLI::Validator accepted_by(const train::RunOption& option) {
         "");
 }
 
+core::PixelSize size_of(const std::string& text) {
+    constexpr int kLargestSide = 16384;  // px
+    const auto size = core::parse_size(text, kLargestSide);
+    if (!size)
+        throw InputError(fmt::format("--size: '{}' is not a size such as 1280x720, of at most {} a side",
+                                     text, kLargestSide));
+    return *size;
+}
+
 Footprint settled_kernel(Footprint kernel, bool antialias) {
     if (antialias && kernel == Footprint::unit_mass)
         throw InputError("--antialias and --kernel ewa exclude each other");

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/folders.h"
+#include "core/pixel_size.h"
 #include "core/typing.h"
 #include "ewa/dataset.h"
 #include "ewa/device.h"
@@ -30,6 +31,9 @@ CLI::Validator one_of(const std::vector<std::string>& words);
 
 /// The option's own check, which names neither the option nor where it was read.
 CLI::Validator accepted_by(const train::RunOption& option);
+
+/// The size that --size names, such as 1280x720. Throws InputError.
+core::PixelSize size_of(const std::string& text);
 
 /// The kernel, or that of --antialias if it is given. Throws InputError if they exclude each other.
 Footprint settled_kernel(Footprint kernel, bool antialias);

@@ -24,20 +24,11 @@ struct DatasetArguments {
     bool quiet = false;
 };
 
-void parse_size(const std::string& text, SyntheticOptions& options) {
-    const size_t cross = std::min(text.find('x'), text.size());
-    const auto width = core::parse_integer<int>(std::string_view(text).substr(0, cross));
-    const auto height =
-        core::parse_integer<int>(std::string_view(text).substr(std::min(cross + 1, text.size())));
-    options.width = width.value_or(0);
-    options.height = height.value_or(0);
-    if (options.width < 1 || options.height < 1)
-        throw InputError("--size: '" + text + "' is not WxH in pixels, such as 256x256");
-}
-
 int run(const DatasetArguments& arguments) {
     SyntheticOptions options = arguments.options;
-    parse_size(arguments.size, options);
+    const core::PixelSize size = size_of(arguments.size);
+    options.width = size.width;
+    options.height = size.height;
     if (arguments.views >= 0) options.views = arguments.views;
     if (arguments.exposure != "auto") {
         options.exposure = core::parse_number(arguments.exposure);

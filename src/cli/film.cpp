@@ -3,24 +3,20 @@
 
 #include <fcntl.h>
 #include <signal.h>
-#include <spawn.h>
 #include <spdlog/fmt/fmt.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <string>
-#include <string_view>
 
 #include "core/atomic_file.h"
+#include "core/process.h"
 #include "core/text.h"
 #include "ewa/error.h"
-
-extern char** environ;
 
 namespace ewa::cli {
 namespace {
@@ -71,29 +67,6 @@ std::vector<std::string> arguments_of(const fs::path& program, const fs::path& m
             made.string()};
 }
 
-/// Starts the program in a process group of its own, so that Ctrl-C reaches only ewa, which decides what is kept.
-pid_t start(const std::vector<std::string>& arguments, int input, const fs::path& log) {
-    posix_spawn_file_actions_t actions;
-    posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_adddup2(&actions, input, STDIN_FILENO);
-    posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-    posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, log.c_str(), O_WRONLY | O_CREAT, 0600);
-    posix_spawnattr_t attributes;
-    posix_spawnattr_init(&attributes);
-    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
-    std::vector<char*> words;
-    for (const std::string& word : arguments) words.push_back(const_cast<char*>(word.c_str()));
-    words.push_back(nullptr);
-    pid_t process = -1;
-    const int error =
-        posix_spawn(&process, arguments[0].c_str(), &actions, &attributes, words.data(), environ);
-    posix_spawn_file_actions_destroy(&actions);
-    posix_spawnattr_destroy(&attributes);
-    if (error != 0)
-        throw RunError(core::one_line(arguments[0]) + ": cannot be started: " + std::strerror(error));
-    return process;
-}
-
 }  // namespace
 
 bool is_film_name(const fs::path& path) {
@@ -102,18 +75,11 @@ bool is_film_name(const fs::path& path) {
 }
 
 fs::path find_ffmpeg() {
-    const char* path = std::getenv("PATH");
-    std::string_view rest = path ? path : "";
-    while (!rest.empty()) {
-        const size_t end = std::min(rest.find(':'), rest.size());
-        const fs::path program = fs::path(rest.substr(0, end)) / "ffmpeg";
-        if (end > 0 && core::is_file(program) && access(program.c_str(), X_OK) == 0) return program;
-        rest.remove_prefix(std::min(end + 1, rest.size()));
-    }
+    fs::path program = core::find_program("ffmpeg");
+    if (!program.empty()) return program;
     throw RunError(
         "a film needs the program ffmpeg, which is not installed (Debian: apt install ffmpeg); with a folder "
-        "as "
-        "-o, its frames are written as PNG files");
+        "as -o, its frames are written as PNG files");
 }
 
 Film::Film(const fs::path& file, int width, int height)
@@ -125,14 +91,16 @@ Film::Film(const fs::path& file, int width, int height)
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
         throw RunError(std::string("cannot connect to ffmpeg: ") + std::strerror(errno));
     input_ = ends[0];
+    const int log = open((folder_.path() / "log").c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
     try {
-        process_ = start(arguments_of(program, made_, width, height), ends[1], folder_.path() / "log");
+        process_ = core::start_program(arguments_of(program, made_, width, height), {},
+                                       {.input = ends[1], .output = -1, .errors = log});
     } catch (...) {
-        close(ends[0]);
-        close(ends[1]);
+        for (const int descriptor : {ends[0], ends[1], log}) close(descriptor);
         throw;
     }
     close(ends[1]);
+    close(log);
 }
 
 Film::~Film() {

@@ -22,19 +22,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kLargestSide = 16384;  // px
 constexpr core::PixelSize kUsualSize{1280, 720};
 constexpr int kOrbitFrames = 8 * kFilmRate;
 constexpr double kLegSeconds = 2;  // of a film, from one saved view to the next
 constexpr int kMostFrames = 100000;
-
-core::PixelSize size_of(const std::string& text) {
-    const auto size = core::parse_size(text, kLargestSide);
-    if (!size)
-        throw InputError(fmt::format("--size: '{}' is not a size such as 1280x720, of at most {} a side",
-                                     text, kLargestSide));
-    return *size;
-}
 
 /// Eye and target.
 std::array<glm::dvec3, 2> parse_look_at(const std::string& text) {

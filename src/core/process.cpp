@@ -47,36 +47,16 @@ std::vector<char*> pointers(std::vector<std::string>& texts) {
     return result;
 }
 
-/// This process's environment with the program's own values in front: the first of a name counts.
-std::vector<std::string> environment_of(const Program& program) {
-    std::vector<std::string> all = program.environment;
+/// This process's environment with the changes in front: the first of a name counts.
+std::vector<std::string> environment_with(const std::vector<std::string>& changes) {
+    std::vector<std::string> all = changes;
     for (char** entry = environ; *entry; ++entry) {
         const std::string_view text = *entry, name = text.substr(0, text.find('=') + 1);
         bool replaced = false;
-        for (const std::string& own : program.environment) replaced = replaced || own.starts_with(name);
+        for (const std::string& own : changes) replaced = replaced || own.starts_with(name);
         if (!replaced) all.emplace_back(text);
     }
     return all;
-}
-
-pid_t start(const Program& program, int output, int log) {
-    posix_spawn_file_actions_t actions;
-    posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-    posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
-    if (log >= 0) posix_spawn_file_actions_adddup2(&actions, log, STDERR_FILENO);
-    posix_spawnattr_t attributes;
-    posix_spawnattr_init(&attributes);
-    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
-    posix_spawnattr_setpgroup(&attributes, 0);
-    std::vector<std::string> words = program.command, environment = environment_of(program);
-    pid_t child = 0;
-    const int reason = posix_spawnp(&child, words[0].c_str(), &actions, &attributes, pointers(words).data(),
-                                    pointers(environment).data());
-    posix_spawnattr_destroy(&attributes);
-    posix_spawn_file_actions_destroy(&actions);
-    if (reason != 0) throw RunError("cannot start " + one_line(words[0]) + ": " + std::strerror(reason));
-    return child;
 }
 
 void write_all(int descriptor, std::string_view text, const std::filesystem::path& path) {
@@ -116,16 +96,43 @@ class Child {
 
 }  // namespace
 
-bool has_program(const std::string& name) {
+std::filesystem::path find_program(const std::string& name) {
     const char* path = std::getenv("PATH");
     std::string_view rest = path ? path : "";
     while (!rest.empty()) {
         const size_t colon = std::min(rest.find(':'), rest.size());
         const std::filesystem::path file = std::filesystem::path(rest.substr(0, colon)) / name;
-        if (is_file(file) && access(file.c_str(), X_OK) == 0) return true;
+        if (colon > 0 && is_file(file) && access(file.c_str(), X_OK) == 0) return file;
         rest.remove_prefix(std::min(colon + 1, rest.size()));
     }
-    return false;
+    return {};
+}
+
+pid_t start_program(std::vector<std::string> command, const std::vector<std::string>& environment,
+                    const Streams& streams) {
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    const auto give = [&](int descriptor, int place, int mode) {
+        if (descriptor >= 0)
+            posix_spawn_file_actions_adddup2(&actions, descriptor, place);
+        else
+            posix_spawn_file_actions_addopen(&actions, place, "/dev/null", mode, 0);
+    };
+    give(streams.input, STDIN_FILENO, O_RDONLY);
+    give(streams.output, STDOUT_FILENO, O_WRONLY);
+    if (streams.errors >= 0) give(streams.errors, STDERR_FILENO, O_WRONLY);
+    posix_spawnattr_t attributes;
+    posix_spawnattr_init(&attributes);
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+    posix_spawnattr_setpgroup(&attributes, 0);
+    std::vector<std::string> all = environment_with(environment);
+    pid_t child = 0;
+    const int reason = posix_spawnp(&child, command[0].c_str(), &actions, &attributes,
+                                    pointers(command).data(), pointers(all).data());
+    posix_spawnattr_destroy(&attributes);
+    posix_spawn_file_actions_destroy(&actions);
+    if (reason != 0) throw RunError("cannot start " + one_line(command[0]) + ": " + std::strerror(reason));
+    return child;
 }
 
 Ended run_program(const Program& program, const std::function<bool(std::string_view)>& output) {
@@ -138,7 +145,8 @@ Ended run_program(const Program& program, const std::function<bool(std::string_v
                              : open(program.log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666));
     if (!program.log.empty() && log.get() < 0)
         throw RunError(one_line(program.log.string()) + ": cannot be written: " + std::strerror(errno));
-    Child child(start(program, to.get(), log.get()));
+    Child child(start_program(program.command, program.environment,
+                              {.input = -1, .output = to.get(), .errors = log.get()}));
     to.close();
     std::array<char, 65536> piece;
     for (;;) {

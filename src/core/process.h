@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Other programs: looked up in PATH, run without a shell, and ended when the caller wishes.
 #pragma once
+#include <sys/types.h>
+
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -9,8 +11,22 @@
 
 namespace ewa::core {
 
-/// Whether PATH has an executable file of this name.
-bool has_program(const std::string& name);
+/// The executable file of this name in PATH; empty if there is none. Entries of PATH that are empty count for nothing.
+std::filesystem::path find_program(const std::string& name);
+
+/// File descriptors that a program gets.
+struct Streams {
+    int input = -1;   // -1: standard input is empty
+    int output = -1;  // -1: standard output is thrown away
+    int errors = -1;  // -1: standard error is this process's
+};
+
+/// Starts a program in a process group of its own, so Ctrl-C reaches this process alone. The caller waits for it.
+/// command: the name or path of the program, then its arguments.
+/// environment: NAME=value, beside those of this process.
+/// Throws RunError if the program cannot be started.
+pid_t start_program(std::vector<std::string> command, const std::vector<std::string>& environment,
+                    const Streams& streams);
 
 struct Program {
     std::vector<std::string> command;      // the name or path of the program, then its arguments
@@ -24,7 +40,6 @@ enum class Ended { done, failed, stopped };
 /// Runs a program to its end. Its standard input is empty.
 /// - output(text): called with each piece of standard output, as it arrives, and with an empty text at least every
 ///   tenth of a second. False ends the program (SIGTERM), and the result is then `stopped`.
-/// - The program has a process group of its own, so Ctrl-C reaches this process alone.
 /// The result is `failed` where the exit status is not 0. Throws RunError if the program cannot be started, or the
 /// log cannot be written.
 Ended run_program(const Program& program, const std::function<bool(std::string_view text)>& output);

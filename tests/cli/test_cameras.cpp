@@ -222,7 +222,7 @@ TEST_F(Cameras, TrainingPlacesPhotosFirst) {
 /// A film of 20 real photos, where COLMAP, ffmpeg and the photos are on this machine.
 TEST(RealCapture, OfAFilmPlacesItsFrames) {
     const auto photos = shared_data();
-    if (!photos || !ewa::core::has_program("colmap") || !ewa::core::has_program("ffmpeg"))
+    if (!photos || ewa::core::find_program("colmap").empty() || ewa::core::find_program("ffmpeg").empty())
         GTEST_SKIP() << "no COLMAP, no ffmpeg, or no photos";
     const Folder folder;
     const std::string film = folder / "film.mp4";

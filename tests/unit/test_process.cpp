@@ -3,6 +3,9 @@
 
 #include <chrono>
 #include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
 
 #include "support/temp_folder.h"
 
@@ -85,8 +88,24 @@ TEST(Process, WhatCannotStartIsNamed) {
     test::expect_error<RunError>(
         [] { run({.command = {"true"}, .environment = {}, .log = "/no/such/folder/log.txt"}); },
         {"/no/such/folder/log.txt: cannot be written"});
-    EXPECT_TRUE(core::has_program("sh"));
-    EXPECT_FALSE(core::has_program("ewa-no-such-program"));
+}
+
+TEST(Process, ProgramsAreFoundInPath) {
+    const test::TempFolder folder;
+    const std::string before = std::getenv("PATH");
+    setenv("PATH",
+           ("/no/such/folder::" + (folder / "first").string() + ":" + (folder / "second").string()).c_str(),
+           1);
+    for (const char* name : {"first", "second"}) {
+        std::filesystem::create_directory(folder / name);
+        std::ofstream(folder / name / "tool") << "#!/bin/sh\n";
+    }
+    EXPECT_EQ(core::find_program("tool"), "");  // no file of this name is executable
+    std::filesystem::permissions(folder / "second" / "tool", std::filesystem::perms::owner_all);
+    EXPECT_EQ(core::find_program("tool"), folder / "second" / "tool");
+    EXPECT_EQ(core::find_program("no-such-tool"), "");
+    EXPECT_EQ(core::find_program("CMakeLists.txt"), "");
+    setenv("PATH", before.c_str(), 1);
 }
 
 }  // namespace
