@@ -2,6 +2,9 @@
 // The exposure of a training image.
 #pragma once
 #include <array>
+#include <filesystem>
+#include <map>
+#include <string>
 
 #include "ewa/image.h"
 
@@ -15,5 +18,9 @@ inline constexpr Exposure kIdentityExposure{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 /// Applies the exposure to the first three channels, without clamping. Other channels stay. 3 channels or
 /// more.
 Image exposed(Image image, const Exposure& exposure);
+
+/// The exposures of training images under their Frame::name: exposures.json of a run's folder. Throws InputError if the
+/// file cannot be read, or an exposure is not three rows of four finite numbers.
+std::map<std::string, Exposure> load_exposures(const std::filesystem::path& path);
 
 }  // namespace ewa

@@ -29,8 +29,12 @@ struct RunOptions {
     std::filesystem::path scene;    // mesh scene, photos or video that the dataset was made from; empty: none
     std::filesystem::path output;   // the run's folder; empty: see output_folder
     TrainOptions train{.strategy = Strategy::automatic, .sh_degree = kAutomaticShDegree};
-    std::string init = "sfm";  // first splats: "sfm" (the dataset's points), "random", or a splat file
-    int downscale = 1;         // divides the images' width and height
+    std::string init =
+        "sfm";  // first splats: "sfm" (the dataset's points), "random", or a file of splats or points
+    double init_opacity = 0.1;   // of first splats that come from points or at random; above 0, below 1
+    double init_scale = 1;       // factor of their scales, which are the distance to their neighbours
+    std::string frames = "all";  // or a list, as scene::frames_named reads it: other frames are not used
+    int downscale = 1;           // divides the images' width and height
     MaskUse masks = MaskUse::automatic;
     int test_every = 8;  // every K-th image in name order is held out; 0: none
     int eval_every = 0;  // evaluates the held-out views every N steps; 0: only at the end

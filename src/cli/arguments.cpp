@@ -47,9 +47,8 @@ void print_notes(const SyntheticDataset& made, const fs::path& folder) {
 
 CLI::Validator one_of(const std::vector<std::string>& words) {
     std::string all;
-    for (const std::string& word : words) all += (all.empty() ? "" : ",") + word;
-    return CLI::Validator([words](std::string& text) { return core::settle_word(text, words); },
-                          "{" + all + "}");
+    for (const std::string& word : words) all += (all.empty() ? "" : "|") + word;
+    return CLI::Validator([words](std::string& text) { return core::settle_word(text, words); }, all);
 }
 
 CLI::Validator accepted_by(const train::RunOption& option) {
@@ -242,6 +241,14 @@ Views load_views(const ViewArguments& arguments, const std::string& which, int t
     }
     Dataset dataset = load_dataset(folder, {.downscale = arguments.downscale, .masks = arguments.masks});
     std::vector<int> frames = select_frames(dataset, which, test_every);
+    if (arguments.run_frames != "all") {
+        const std::vector<int> used = scene::frames_named(dataset, arguments.run_frames);
+        std::erase_if(frames, [&](int i) { return std::ranges::find(used, i) == used.end(); });
+        if (frames.empty())
+            throw InputError("the run used --frames " + arguments.run_frames +
+                             ", and none of these is in the " + which +
+                             " split; name DATASET for all of its images");
+    }
     return {std::move(dataset), std::move(frames), std::move(rendered)};
 }
 

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include <memory>
+#include <optional>
 
 #include "cli/arguments.h"
 #include "cli/command.h"
@@ -21,7 +22,8 @@ namespace {
 struct EvalArguments {
     ViewArguments views;
     std::filesystem::path json;
-    std::string split = "test";
+    std::string split = "test", exposures = "auto";
+    std::optional<live::Run> run;  // that of SPLATS, if its dataset is used
     int test_every = 8;
 };
 
@@ -42,9 +44,10 @@ int run(const EvalArguments& arguments) {
     const Gaussians gaussians = load_splats(arguments.views.splats);
     const auto [dataset, frames, folder] = load_views(arguments.views, arguments.split, arguments.test_every);
     check_outputs(written, scene::files_of(dataset, "DATASET"));
+    const std::vector<Exposure> exposures = exposures_of(arguments.exposures, arguments.run, dataset, frames);
 
     const Evaluation evaluation =
-        evaluate(open_device(arguments.views.device), gaussians, dataset, frames, options);
+        evaluate(open_device(arguments.views.device), gaussians, dataset, frames, options, exposures);
     for (const EvalFrame& frame : evaluation.frames)
         fmt::print("{}  PSNR {:.3f} dB  SSIM {:.5f}\n", core::one_line(frame.name), frame.psnr, frame.ssim);
     if (dataset.missing_images > 0)
@@ -65,10 +68,11 @@ Action add_eval(CLI::App& app) {
         ->transform(one_of({"test", "train", "all"}))
         ->capture_default_str();
     add_test_every_option(app, arguments->test_every);
+    add_exposures_option(app, arguments->exposures);
     app.add_option("--json", arguments->json, "Write the results to this file")->type_name("FILE");
     add_view_options(app, arguments->views);
     return [&app, arguments] {
-        resolve_views(app, arguments->views);
+        arguments->run = resolve_views(app, arguments->views);
         return run(*arguments);
     };
 }

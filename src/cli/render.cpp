@@ -30,7 +30,7 @@ namespace fs = std::filesystem;
 
 struct RenderArguments {
     fs::path splats, cameras, output = "out/render";
-    std::string frames = "all", format = "png", mode = "color";
+    std::string frames = "all", format = "png", mode = "color", exposures = "auto";
     int test_every = 8, downscale = 1;
     ViewsArguments views;
     DrawArguments draw;
@@ -38,7 +38,7 @@ struct RenderArguments {
     bool quiet = false;
     // Of the run that SPLATS names; empty: none.
     std::optional<live::Run> run;
-    bool kernel_given = false;
+    bool kernel_given = false, cameras_of_run = false;
 };
 
 /// Divides by the largest value and returns it: the value of white in a PNG.
@@ -78,6 +78,8 @@ int render_dataset_views(const RenderArguments& arguments) {
     for (const int frame : frames) written.push_back({"the render", file_of(frame)});
     read.insert(read.end(), {{"SPLATS", arguments.splats}, {"--cameras", arguments.cameras}});
     check_outputs(written, read);
+    const std::vector<Exposure> exposures = exposures_of(
+        arguments.exposures, arguments.cameras_of_run ? arguments.run : std::nullopt, dataset, frames);
     make_folder(arguments.output);
 
     Renderer renderer(open_device(arguments.device), gaussians, options);
@@ -88,6 +90,7 @@ int render_dataset_views(const RenderArguments& arguments) {
         if (interrupted()) return kInterruptedStatus;
         const Frame& frame = dataset.frames[frames[i]];
         Rendering rendering = renderer.render(frame.camera, arguments.mode == "depth");
+        if (!exposures.empty()) rendering.color = exposed(std::move(rendering.color), exposures[i]);
         skipped = std::max(skipped, renderer.skipped_nonfinite());
 
         std::string remark;
@@ -187,7 +190,7 @@ int render_free_views(RenderArguments arguments) {
 int run(CLI::App& app, RenderArguments& arguments) {
     arguments.kernel_given = app.count("--kernel") + app.count("--antialias") > 0;
     std::string of_frames;  // a given option that only a dataset's views have
-    for (const char* option : {"--frames", "--test-every", "--downscale"})
+    for (const char* option : {"--frames", "--test-every", "--downscale", "--exposures"})
         if (app.count(option) > 0) of_frames = option;
     SplatInput input = splat_input(arguments.splats);
     arguments.splats = input.file;
@@ -199,6 +202,8 @@ int run(CLI::App& app, RenderArguments& arguments) {
     const bool free = any_given(arguments.views) || views_output(arguments.output) != ViewsOutput::folder;
     if (input.run && !free) {
         arguments.cameras = dataset_of(*input.run);
+        arguments.run = std::move(input.run);
+        arguments.cameras_of_run = true;
         return render_dataset_views(arguments);
     }
     if (!of_frames.empty()) throw InputError(of_frames + " needs --cameras DATASET");
@@ -235,6 +240,7 @@ Action add_render(CLI::App& app) {
         ->capture_default_str();
     add_draw_options(app, arguments->draw);
     add_downscale_option(app, arguments->downscale);
+    add_exposures_option(app, arguments->exposures);
     add_device_options(app, arguments->device);
     add_quiet_option(app, arguments->quiet);
     return [&app, arguments] { return run(app, *arguments); };

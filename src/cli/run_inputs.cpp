@@ -2,6 +2,7 @@
 #include "cli/run_inputs.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 
 #include "cli/config.h"
 #include "core/folders.h"
@@ -74,9 +75,40 @@ void use_options_of(const live::Run& run, CLI::App& app) {
     }
 }
 
-void resolve_views(CLI::App& app, ViewArguments& arguments) {
+void add_exposures_option(CLI::App& app, std::string& exposures) {
+    app.add_option(
+           "--exposures", exposures,
+           "Exposures of training images, as ewa train --exposure writes them. auto: exposures.json of the "
+           "run SPLATS, if there is one")
+        ->type_name("auto|none|FILE")
+        ->capture_default_str();
+}
+
+std::vector<Exposure> exposures_of(const std::string& which, const std::optional<live::Run>& run,
+                                   const Dataset& dataset, const std::vector<int>& frames) {
+    fs::path file = which;
+    if (which == "auto") {
+        if (!run || !core::is_file(run->folder / "exposures.json")) return {};
+        file = run->folder / "exposures.json";
+    }
+    if (which == "none") return {};
+    const auto known = load_exposures(file);
+    const auto has_exposure = [&](const Frame& frame) { return known.contains(frame.name); };
+    if (std::ranges::none_of(dataset.frames, has_exposure))
+        throw InputError(core::one_line(file.string()) + ": has no exposure of an image of " +
+                         core::one_line(dataset.root.string()) + "; --exposures none uses none");
+    std::vector<Exposure> exposures;
+    for (const int index : frames) {
+        const auto found = known.find(dataset.frames[size_t(index)].name);
+        exposures.push_back(found == known.end() ? kIdentityExposure : found->second);
+    }
+    return exposures;
+}
+
+std::optional<live::Run> resolve_views(CLI::App& app, ViewArguments& arguments) {
     SplatInput input = splat_input(arguments.splats);
     arguments.splats = input.file;
+    const bool own_dataset = arguments.dataset.empty();
     if (!arguments.dataset.empty()) {
         arguments.dataset = dataset_input(arguments.dataset);
     } else {
@@ -86,7 +118,11 @@ void resolve_views(CLI::App& app, ViewArguments& arguments) {
                              " is not of a training run, whose config.json would name it");
         arguments.dataset = dataset_of(*input.run);
     }
-    if (input.run) use_options_of(*input.run, app);
+    if (!input.run) return std::nullopt;
+    use_options_of(*input.run, app);
+    if (!own_dataset) return std::nullopt;
+    if (const std::string frames = input.run->text("frames"); !frames.empty()) arguments.run_frames = frames;
+    return std::move(input.run);
 }
 
 }  // namespace ewa::cli

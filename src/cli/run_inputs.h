@@ -4,8 +4,10 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "cli/arguments.h"
+#include "ewa/exposure.h"
 #include "live/run_folder.h"
 
 namespace ewa::cli {
@@ -36,9 +38,19 @@ std::filesystem::path dataset_of(const live::Run& run);
 /// and the command line does not. Throws InputError for a value that the option refuses.
 void use_options_of(const live::Run& run, CLI::App& app);
 
+/// --exposures of ewa eval and ewa render.
+void add_exposures_option(CLI::App& app, std::string& exposures);
+
+/// The exposure of each of these frames. Frames without one, as those that were held out, get the identity.
+/// which: a file, "none", or "auto": exposures.json beside the splats of a run, if it is there.
+/// run: the run that SPLATS is of; empty: none.
+/// Empty where there are no exposures. Throws InputError, also if the file has none of the dataset's frames.
+std::vector<Exposure> exposures_of(const std::string& which, const std::optional<live::Run>& run,
+                                   const Dataset& dataset, const std::vector<int>& frames);
+
 /// Replaces a run's folder among SPLATS and DATASET. Without DATASET, it is that of the run, also of a run that SPLATS
 /// is a file of. The run's options are used as in use_options_of, unless both arguments are files. Throws InputError,
-/// also if nothing names the dataset.
-void resolve_views(CLI::App& app, ViewArguments& arguments);
+/// also if nothing names the dataset. Returns the run that SPLATS is of, if its dataset is used.
+std::optional<live::Run> resolve_views(CLI::App& app, ViewArguments& arguments);
 
 }  // namespace ewa::cli

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // ewa train: its options, the dataset of a mesh scene, and the run.
 #include <CLI/CLI.hpp>
+#include <array>
 #include <chrono>
 #include <memory>
 
@@ -28,6 +29,7 @@ struct TrainArguments {
     TrainOutput output;
     fs::path config;
     bool antialias = false, accuracy = false;
+    std::string quality;  // empty: not given
 };
 
 void add_run_option(CLI::App& app, const train::RunOption& option, RunOptions& options) {
@@ -53,6 +55,30 @@ void add_run_options(CLI::App& app, TrainArguments& arguments) {
         add_run_option(app, option, arguments.run);
         if (option.name == "kernel")
             app.add_flag("--antialias", arguments.antialias, "The same as --kernel antialias");
+    }
+}
+
+struct Quality {
+    const char* name;
+    int steps;
+    uint32_t max_splats;
+};
+constexpr std::array<Quality, 3> kQualities{
+    {{"low", 2000, 200000}, {"medium", 7000, 500000}, {"high", 30000, 1000000}}};
+
+/// Reads the config, if there is one. Then sets the steps and splats of --quality, unless they are given themselves. A
+/// quality of the command line goes before steps and splats of the config.
+void apply_config_and_quality(CLI::App& app, TrainArguments& arguments) {
+    const auto counts = [&] { return std::array{app.count("--steps"), app.count("--max-splats")}; };
+    const bool on_command_line = !arguments.quality.empty();
+    auto given = counts();
+    if (!arguments.config.empty()) apply_config(app, arguments.config);
+    if (!on_command_line) given = counts();
+    TrainOptions& train = arguments.run.train;
+    for (const Quality& quality : kQualities) {
+        if (quality.name != arguments.quality) continue;
+        if (given[0] == 0) train.steps = quality.steps;
+        if (given[1] == 0) train.max_splats = quality.max_splats;
     }
 }
 
@@ -95,7 +121,7 @@ std::string accuracy_section(const RunScene& scene) {
 int run(CLI::App& app, TrainArguments& arguments) {
     const auto begin = Clock::now();
     RunOptions& options = arguments.run;
-    if (!arguments.config.empty()) apply_config(app, arguments.config);
+    apply_config_and_quality(app, arguments);
     if (options.dataset.empty()) throw InputError("DATASET is required (see ewa train --help)");
     Footprint& kernel = options.train.render.kernel;
     kernel = settled_kernel(kernel, arguments.antialias);
@@ -122,6 +148,11 @@ Action add_train(CLI::App& app, const std::string& command_line) {
                    "checkpoint.ewa [out/<name of the dataset>]")
         ->type_name("DIR");
     add_run_options(app, *arguments);
+    app.add_option(
+           "--quality", arguments->quality,
+           "low: 2000 steps and at most 200000 splats. medium: 7000 and 500000. high: 30000 and 1000000, the "
+           "defaults. --steps and --max-splats go before it")
+        ->transform(one_of({"low", "medium", "high"}));
     app.add_flag("--accuracy", arguments->accuracy,
                  "At the end, measure error against run time for the report, as ewa bench --accuracy does");
     app.add_option(

@@ -20,12 +20,13 @@ const std::map<std::string, std::string>& subjects() {
             for (const char* name : names) made[name] = subject;
         };
         add("Data",
-            {"cameras",   "frame",   "frames",      "split",  "test-every",   "downscale", "masks", "init",
-             "transform", "crop",    "min-opacity", "max-sh", "sort",         "splats",    "cases", "views",
-             "size",      "look-at", "up",          "orbit",  "film-seconds", "matching"});
-        add("Quality", {"steps", "strategy", "max-splats", "sh-degree", "absgrad", "revised-opacity",
-                        "exposure", "resolution-schedule", "seed", "background", "kernel", "antialias",
-                        "samples", "points", "runs", "training-steps"});
+            {"cameras", "frame",     "frames",       "split",      "test-every", "downscale", "masks",
+             "init",    "transform", "init-opacity", "init-scale", "exposures",  "crop",      "min-opacity",
+             "max-sh",  "sort",      "splats",       "cases",      "views",      "size",      "look-at",
+             "up",      "orbit",     "film-seconds", "matching"});
+        add("Quality", {"quality", "steps", "strategy", "max-splats", "sh-degree", "absgrad",
+                        "revised-opacity", "exposure", "resolution-schedule", "seed", "background", "kernel",
+                        "antialias", "samples", "points", "runs", "training-steps"});
         add("Output", {"output",     "format",     "mode",       "json",       "svg",      "heat-map",
                        "heat-scale", "eval-every", "save-every", "serve",      "accuracy", "spz-version",
                        "check",      "quiet",      "verbose",    "results",    "compare",  "threshold",

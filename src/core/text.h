@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 
 namespace ewa::core {
 
@@ -39,13 +40,25 @@ std::optional<T> parse_integer(std::string_view word) {
 /// column: where the descriptions of options begin.
 std::string help_text(std::string_view text, size_t column);
 
-/// Makes a CLI11 parser and the sub-commands that are added later print their help in this way. A template,
-/// so that this module does not need CLI11: Formatter is CLI::Formatter.
+/// Makes a CLI11 parser and the sub-commands that are added later print their help in this way, with defaults in
+/// brackets. A template, so that this module does not need CLI11: Formatter is CLI::Formatter.
 template <class Formatter, class App>
 void use_help_text(App& app) {
     app.formatter_fn([](const App* shown, const std::string& name, auto mode) {
+        using Option = std::remove_pointer_t<typename decltype(shown->get_options({}))::value_type>;
+        struct Plain : Formatter {
+            std::string make_option_opts(const Option* option) const override {
+                std::string text = option->get_type_size() == 0 ? "" : option->get_type_name();
+                // Options of a few words have these in place of a type.
+                if (constexpr std::string_view kText = "TEXT:"; text.starts_with(kText))
+                    text.erase(0, kText.size());
+                if (!text.empty()) text.insert(0, " ");
+                if (!option->get_default_str().empty()) text += " [" + option->get_default_str() + "]";
+                return text;
+            }
+        };
         constexpr size_t kColumn = 30;
-        Formatter formatter;
+        Plain formatter;
         formatter.column_width(kColumn);
         return help_text(formatter.make_help(shown, name, mode), kColumn);
     });

@@ -150,9 +150,6 @@ Json checkpoint_settings(const RunOptions& options, const std::string& fingerpri
 
 void check_resumable(const std::filesystem::path& path, const std::string& stored, const Json& now) {
     const Json then = parse_settings(path, stored);
-    if (then.value("dataset", Json()) != now["dataset"])
-        throw InputError(path.string() + ": is of another dataset, or its images or cameras have changed" +
-                         kWaysOut);
     for (const auto& [name, value] : now["options"].items()) {
         if (name == "steps") continue;
         const RunOption& option = run_option(name);
@@ -162,6 +159,10 @@ void check_resumable(const std::filesystem::path& path, const std::string& store
             throw InputError(path.string() + ": was written with --" + name + " " +
                              other.dump().substr(0, kLongestValue) + ", not " + value.dump() + kWaysOut);
     }
+    // Options such as --downscale change the dataset too, and say more.
+    if (then.value("dataset", Json()) != now["dataset"])
+        throw InputError(path.string() + ": is of another dataset, or its images or cameras have changed" +
+                         kWaysOut);
 }
 
 std::string resume_remark(const std::string& stored, const Json& now) {

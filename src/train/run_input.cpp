@@ -71,6 +71,32 @@ glm::dvec3 seen_point(const Dataset& dataset, const std::vector<int>& frames, co
     return point_on_a_ray(dataset.frames[size_t(frames[which])].camera, sphere.radius, u);
 }
 
+/// Opacity and scale of the first splats as the options ask for. They come from points, with opacity 0.1 and the
+/// distance to their neighbours.
+void adjust_start(const RunOptions& options, Gaussians& start) {
+    const RunOptions usual;
+    if (options.init_opacity != usual.init_opacity) {
+        const double logit = std::log(options.init_opacity / (1 - options.init_opacity));
+        std::fill(start.opacity_logits.begin(), start.opacity_logits.end(), float(logit));
+    }
+    if (options.init_scale != usual.init_scale)
+        for (float& scale : start.log_scales) scale = float(double(scale) + std::log(options.init_scale));
+}
+
+/// The split without frames that --frames does not name. Throws InputError if none is left to train on.
+Split chosen_frames(const Dataset& dataset, Split split, const std::string& list) {
+    if (list == "all") return split;
+    const std::vector<int> chosen = scene::frames_named(dataset, list);
+    for (std::vector<int>* frames : {&split.train, &split.test})
+        std::erase_if(*frames, [&](int i) { return std::ranges::find(chosen, i) == chosen.end(); });
+    if (split.train.empty())
+        throw InputError(
+            fmt::format("--frames {}: all of these {} are held out; name more, or hold fewer out with "
+                        "--test-every",
+                        list, core::counted(chosen.size(), "image")));
+    return split;
+}
+
 /// Whether the strategy changes the number of splats at least once.
 bool refines(const TrainOptions& options) {
     const Schedule schedule = schedule_for(options);
@@ -199,7 +225,14 @@ Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, cons
     } else if (options.init != "sfm") {
         start = load_splats(options.init);
         set_sh_degree(start, degree);
+        const RunOptions usual;
+        if (options.init_opacity != usual.init_opacity || options.init_scale != usual.init_scale)
+            throw InputError("--init-opacity and --init-scale are for first splats without their own; " +
+                             options.init + " is a splat file");
+        check_start(start.size(), options.train);
+        return start;
     }
+    adjust_start(options, start);
     check_start(start.size(), options.train);
     return start;
 }
@@ -221,6 +254,7 @@ RunInput load_run(const RunOptions& options) {
         throw InputError(fmt::format("{}: of {} images ({} missing) none is left to train on",
                                      options.dataset.string(), input.dataset.frames.size(),
                                      input.dataset.missing_images));
+    input.split = chosen_frames(input.dataset, std::move(input.split), options.frames);
     check_downscale(input);
     TrainOptions& train = input.options.train;
     train = resolve(train, input.dataset);

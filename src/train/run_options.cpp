@@ -95,9 +95,29 @@ RunOption choice(const char* name, const char* help, Member<T> member, const Nam
     return option;
 }
 
+RunOption real(const char* name, const char* value, const char* help, Member<double> member, double low,
+               double high) {
+    RunOption option = member_option(name, value, help, kDecides, member, [=](std::string text) {
+        const std::string problem = core::settle_number(text, low, high);
+        if (!problem.empty()) throw InputError(problem);
+        return core::parse_number(text).value();
+    });
+    option.before = option.get(RunOptions()).dump();
+    return option;
+}
+
 RunOption words(const char* name, const char* value, const char* help, bool decides,
                 Member<std::string> member) {
     return member_option(name, value, help, decides, member, [](const std::string& text) { return text; });
+}
+
+RunOption frames_option() {
+    RunOption option = words("frames", "FRAMES",
+                             "Use only these images: names, or indices in name order such as 0,3 or 5-9. The "
+                             "same images are held out as with all",
+                             kDecides, [](RunOptions& o) -> std::string& { return o.frames; });
+    option.before = "all";
+    return option;
 }
 
 RunOption dataset_option() {
@@ -211,6 +231,15 @@ std::vector<RunOption> make_table() {
               "First splats. sfm: the dataset's points, or random if it has none. random: where the cameras "
               "look. FILE: a splat file, or a PLY of points",
               kDecides, [](RunOptions& o) -> std::string& { return o.init; }),
+        real(
+            "init-opacity", "X", "Opacity of the first splats. A splat file has its own",
+            [](RunOptions& o) -> double& { return o.init_opacity; }, 0.001, 0.999),
+        real(
+            "init-scale", "F",
+            "Scale of the first splats: this factor times the distance to their neighbours. A splat file has "
+            "its own",
+            [](RunOptions& o) -> double& { return o.init_scale; }, 0.001, 1000),
+        frames_option(),
         number<int>(
             "downscale", "K", "Divide the images' width and height by this", kDecides,
             [](RunOptions& o) -> int& { return o.downscale; }, 1, 1024),

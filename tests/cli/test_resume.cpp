@@ -162,7 +162,8 @@ TEST_F(ResumeEdges, RefusesWhatWouldEndDifferently) {
     refused({"--antialias"}, "--kernel");
     refused({"--background", "1,1,1"}, "--background");
     refused({"--sh-degree", "1"}, "--sh-degree");
-    refused({"--test-every", "2"}, "another dataset");
+    refused({"--test-every", "2"}, "--test-every 8, not 2");
+    refused({"--frames", "0-1"}, "--frames \"all\", not \"0-1\"");
     expect_success(train("o", {"--steps", "6", "--seed", "1", "--resume", "--eval-every", "2", "--save-every",
                                "3", "--image-cache", "1"}));
 

@@ -56,6 +56,70 @@ TEST_F(Runs, EvalHasTheFiguresOfTheRun) {
     EXPECT_EQ(read_json(folder / "one.json")["frames"].size(), 1u);
 }
 
+TEST_F(Runs, EvalAndRenderUseTheExposures) {
+    const std::string run = train("run", {"--exposure"});
+    const auto train_psnr = [&](const Names& more) {
+        Names all{"eval", run, "--split", "train", "--json", folder / "e.json"};
+        all.insert(all.end(), more.begin(), more.end());
+        expect_success(run_ewa(all));
+        return read_json(folder / "e.json")["psnr"].get<double>();
+    };
+    EXPECT_NEAR(train_psnr({}), read_json(run + "/summary.json")["train_psnr"], 1e-6);
+
+    // An exposure of a training image that turns the picture white, and none of the held-out images.
+    write_file(folder / "white.json", R"({"images/1.png": [[0, 0, 0, 1], [0, 0, 0, 1], [0, 0, 0, 1]]})");
+    EXPECT_GT(
+        std::abs(train_psnr({"--exposures", folder / "white.json"}) - train_psnr({"--exposures", "none"})),
+        0.5);
+    const auto view = [&](const std::string& exposures, const std::string& name) {
+        expect_success(run_ewa({"render", run, "--exposures", exposures, "-o", folder / "views"}));
+        return load_image(folder / "views/" + name);
+    };
+    const Image without = view("none", "0.png");
+    EXPECT_EQ(view(folder / "white.json", "0.png").pixels, without.pixels);
+    for (const float value : view(folder / "white.json", "1.png").pixels) EXPECT_EQ(value, 1);
+    expect_success(run_ewa({"render", run, "-o", folder / "auto"}));
+    expect_success(run_ewa({"render", run, "--exposures", run + "/exposures.json", "-o", folder / "file"}));
+    EXPECT_EQ(read_file(folder / "auto/1.png"), read_file(folder / "file/1.png"));
+}
+
+TEST_F(Runs, WrongExposuresAreNamed) {
+    const std::string run = train("run");
+    const auto fails = [&](const std::string& text, const std::string& reason) {
+        write_file(folder / "x.json", text);
+        expect_failure(run_ewa({"eval", run, "--exposures", folder / "x.json"}), 2, reason);
+    };
+    fails("[]", "not a JSON object of exposures");
+    fails(R"({"images/1.png": [[1, 0, 0, 0], [0, 1, 0, 0]]})", "three rows of four finite numbers");
+    fails(R"({"images/1.png": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1]]})",
+          "three rows of four finite numbers");
+    fails(R"({"images/1.png": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 1e39]]})",
+          "three rows of four finite numbers");
+    fails(R"({"images/1.png": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, "0"]]})",
+          "three rows of four finite numbers");
+    fails(R"({"other.png": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]})", "has no exposure of an image of");
+    expect_failure(run_ewa({"eval", run, "--exposures", folder / "no.json"}), 2, "no.json");
+}
+
+/// A run of some images keeps the same ones held out, and is evaluated on its own.
+TEST_F(Runs, FramesChooseTheImages) {
+    const std::string run = train("run", {"--frames", "0-1,3"});  // 0, 2 and 4 are held out
+    const auto count = [&](const Names& arguments) {
+        Names all{"eval", "--json", folder / "e.json"};
+        all.insert(all.end(), arguments.begin(), arguments.end());
+        expect_success(run_ewa(all));
+        return read_json(folder / "e.json")["frames"].size();
+    };
+    EXPECT_EQ(count({run}), 1u);
+    EXPECT_NEAR(read_json(folder / "e.json")["psnr"], read_json(run + "/summary.json")["test_psnr"], 1e-6);
+    EXPECT_EQ(count({run, "--split", "train"}), 2u);
+    EXPECT_EQ(count({run, folder / "data"}), 3u);
+    Names names{"train", folder / "data", "-o", folder / "none", "--test-every", "2", "--frames", "0,2"};
+    expect_failure(run_ewa(names), 2, "--frames 0,2: all of these 2 images are held out");
+    names.back() = "7";
+    expect_failure(run_ewa(names), 2, "there is no frame 7");
+}
+
 TEST_F(Runs, RenderShowsTheViewsOfTheDataset) {
     const std::string run = train("run");
     expect_success(run_ewa({"render", run, "-o", folder / "views"}));

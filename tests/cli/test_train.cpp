@@ -2,6 +2,7 @@
 // ewa train as a whole, on four small pictures.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <csignal>
 #include <sstream>
 
@@ -93,6 +94,59 @@ TEST_F(Train, ConfigOfARunRepeatsIt) {
     EXPECT_EQ(read_json(folder / "c/config.json")["kernel"], "peak");
     EXPECT_EQ(read_json(folder / "c/config.json")["steps"], 15);
     EXPECT_NE(read_file(folder / "a/splats.ply"), read_file(folder / "c/splats.ply"));
+}
+
+TEST_F(Train, QualityGivesWhatIsNotGiven) {
+    write_file(folder / "c.json", R"({"steps": 5, "max-splats": 700})");
+    write_file(folder / "q.json", R"({"quality": "low", "max-splats": 700})");
+    int number = 0;
+    const auto config = [&](const Names& more) {
+        const std::string out = "o" + std::to_string(++number);
+        Circumstances interrupt;
+        interrupt.signal = SIGINT;
+        interrupt.await_file = folder / (out + "/metrics.jsonl");
+        train(out, more, interrupt);
+        const auto json = read_json(folder / (out + "/config.json"));
+        return std::pair<int, int>(json["steps"], json["max-splats"]);
+    };
+    using Pair = std::pair<int, int>;
+    EXPECT_EQ(config({}), Pair(30000, 1000000));
+    EXPECT_EQ(config({"--quality", "low"}), Pair(2000, 200000));
+    EXPECT_EQ(config({"--quality", "medium"}), Pair(7000, 500000));
+    EXPECT_EQ(config({"--quality", "high"}), Pair(30000, 1000000));
+    EXPECT_EQ(config({"--quality", "low", "--iterations", "6"}), Pair(6, 200000));
+    EXPECT_EQ(config({"--max-splats", "600", "--quality", "low"}), Pair(2000, 600));
+    EXPECT_EQ(config({"--config", folder / "c.json"}), Pair(5, 700));
+    EXPECT_EQ(config({"--quality", "low", "--config", folder / "c.json"}), Pair(2000, 200000));
+    EXPECT_EQ(config({"--quality", "low", "--steps", "8", "--config", folder / "c.json"}), Pair(8, 200000));
+    EXPECT_EQ(config({"--config", folder / "q.json"}), Pair(2000, 700));
+    EXPECT_EQ(config({"--config", folder / "q.json", "--quality", "medium"}), Pair(7000, 500000));
+    expect_failure(train("o", {"--quality", "best"}), 2, "--quality");
+}
+
+TEST_F(Train, FirstSplatsHaveTheOpacityAndScaleAskedFor) {
+    Names arguments{"train",      folder / "data", "--init",  "random", "--max-splats", "100", "--steps", "1",
+                    "--strategy", "none",          "--quiet", "-o"};
+    int number = 0;
+    const auto splats = [&](const Names& more) {
+        Names all = arguments;
+        all.push_back(folder / ("o" + std::to_string(++number)));
+        all.insert(all.end(), more.begin(), more.end());
+        expect_success(run_ewa(all));
+        return ewa::load_splats(all[arguments.size()] + "/splats.ply");
+    };
+    const ewa::Gaussians usual = splats({}),
+                         other = splats({"--init-opacity", "0.5", "--init-scale", "0.25"});
+    for (size_t i = 0; i < usual.size(); ++i) {
+        // One step of Adam moves each by at most its learning rate.
+        EXPECT_NEAR(usual.opacity_logits[i], std::log(0.1 / 0.9), 0.06) << i;
+        EXPECT_NEAR(other.opacity_logits[i], 0, 0.06) << i;
+        EXPECT_NEAR(other.log_scales[3 * i], usual.log_scales[3 * i] + std::log(0.25), 0.03) << i;
+    }
+    expect_failure(train("s", {"--init-opacity", "0.5"}), 2, "s.ply is a splat file");
+    expect_failure(train("s", {"--init-scale", "2"}), 2, "s.ply is a splat file");
+    expect_failure(train("s", {"--init-opacity", "1"}), 2,
+                   "--init-opacity: '1' is not a number from 0.001 to 0.999");
 }
 
 TEST_F(Train, WithoutATestSetItsFiguresAreNull) {
