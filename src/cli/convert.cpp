@@ -93,25 +93,27 @@ Json check(const ConvertArguments& arguments, const Work& work) {
     return json;
 }
 
-/// The .bin that a .gltf output needs beside it; empty for other formats.
+/// The .bin of a .gltf that was written; empty for other formats.
 fs::path values_path(const ConvertArguments& arguments) {
     const fs::path& out = arguments.files.back();
-    return format_of_name(out) == SplatFormat::gltf ? io::gltf_values_path(out) : fs::path();
+    return format_of_name(out) == SplatFormat::gltf ? io::gltf_values(out).at(0) : fs::path();
 }
 
 /// Throws if an output is another file of this command, or cannot be written.
 void check_files(const ConvertArguments& arguments) {
     const fs::path& out = arguments.files.back();
-    const fs::path values = values_path(arguments);
     std::vector<NamedFile> inputs;
     for (size_t i = 0; i + 1 < arguments.files.size(); ++i) {
         const fs::path& input = arguments.files[i];
         inputs.push_back({"an input", input});
         if (core::lower(input.extension().string()) == ".gltf")
-            inputs.push_back({"the .bin of an input", io::gltf_values_path(input)});
+            for (const fs::path& values : io::gltf_values(input))
+                inputs.push_back({"values of an input", values});
     }
-    check_outputs({{"OUT", out}, {"the .bin of OUT", values}, {"--json", arguments.json}}, inputs);
-    if (!values.empty()) io::check_gltf_values(out);
+    check_outputs({{"OUT", out}, {"--json", arguments.json}}, inputs);
+    if (format_of_name(out) != SplatFormat::gltf) return;
+    check_outputs({{"OUT", out}, {"the .bin of OUT", io::new_gltf_values(out)}, {"--json", arguments.json}},
+                  inputs);
 }
 
 /// Throws unless splats are left to write, or --allow-empty is given. read: the number of splats in the inputs.

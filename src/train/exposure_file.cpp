@@ -12,10 +12,14 @@ namespace {
 
 using nlohmann::json;
 
-bool is_list(const json& value, size_t size) { return value.is_array() && value.size() == size; }
+bool is_list(const json& value, size_t size) {
+    return value.is_array() && value.size() == size;
+}
 
 Exposure exposure_of(const json& rows, const std::string& where) {
-    const auto wrong = [&] { return InputError(where + ": an exposure is three rows of four finite numbers"); };
+    const auto wrong = [&] {
+        return InputError(where + ": an exposure is three rows of four finite numbers");
+    };
     if (!is_list(rows, 3)) throw wrong();
     Exposure exposure;
     for (size_t row = 0; row < 3; ++row) {

@@ -193,7 +193,7 @@ TEST(Convert, KeepsTheBinOfAGltfThatItReads) {
     expect_success(run_ewa({"convert", folder / "s.ply", folder / "g.gltf"}));
     const std::string good = read_file(folder / "g.bin");
     expect_failure(run_ewa({"convert", folder / "g.gltf", folder / "o.ply", "--json", folder / "g.bin"}), 2,
-                   "the .bin of an input");
+                   "values of an input");
     EXPECT_EQ(read_file(folder / "g.bin"), good);
 }
 
@@ -225,15 +225,35 @@ TEST(Convert, NamesTheBinOfAGltfAndLeavesOthersAlone) {
     EXPECT_THROW(ewa::save_splats(folder / "g.gltf", ewa::load_splats(folder / "s.ply")), ewa::InputError);
     EXPECT_EQ(read_file(folder / "g.bin"), "somebody's");
     fs::remove(folder / "g.bin");
-    for (int again = 0; again < 2; ++again) {  // its own it replaces
+    const char* turns[] = {"g.bin", "g-2.bin", "g.bin"};  // its own it replaces
+    for (const char* name : turns) {
+        SCOPED_TRACE(name);
         const Outcome outcome = run_ewa(convert);
         expect_success(outcome);
-        const auto bytes = fs::file_size(folder / "g.bin");
+        EXPECT_EQ(files_below(folder / ""), (Names{name, "g.gltf", "g.json", "s.ply"}));
+        const auto bytes = fs::file_size(folder / name);
         EXPECT_EQ(bytes, 50u * (12 + 8 + 16 + 12 + 4 + 4 * 12));
-        EXPECT_NE(outcome.out.find((folder / "g.bin") + ": the values of this glTF, 5 kB"), std::string::npos)
+        EXPECT_NE(outcome.out.find((folder / name) + ": the values of this glTF, 5 kB"), std::string::npos)
             << outcome.out;
         EXPECT_EQ(read_json(folder / "g.json")["output"]["values"]["bytes"], bytes);
     }
+    // A kill may leave the values of an earlier file.
+    write_file(folder / "g-2.bin", "left");
+    expect_success(run_ewa(convert));
+    EXPECT_EQ(files_below(folder / ""), (Names{"g-3.bin", "g.gltf", "g.json", "s.ply"}));
+}
+
+TEST(Convert, ProtectsTheValuesOfAGltfUnderAnyName) {
+    const Folder folder;
+    make_splats(folder / "s.ply");
+    expect_success(run_ewa({"convert", folder / "s.ply", folder / "g.gltf"}));
+    fs::rename(folder / "g.bin", folder / "v.ply");
+    std::string text = read_file(folder / "g.gltf");
+    text.replace(text.find("g.bin"), 5, "v.ply");
+    write_file(folder / "g.gltf", text);
+    const std::string values = read_file(folder / "v.ply");
+    expect_failure(run_ewa({"convert", folder / "g.gltf", folder / "v.ply"}), 2, "values of an input");
+    EXPECT_EQ(read_file(folder / "v.ply"), values);
 }
 
 TEST(Convert, FullDiskLeavesNoHalfFile) {

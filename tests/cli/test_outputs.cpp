@@ -8,6 +8,8 @@
 
 #include <algorithm>
 #include <csignal>
+#include <functional>
+#include <map>
 
 #include "cli/expect.h"
 #include "cli/faulty.h"
@@ -318,6 +320,81 @@ int ended_process() {
     if (child == 0) _exit(0);
     waitpid(child, nullptr, 0);
     return child;
+}
+
+/// Every command that writes is killed at each moment of its writing, with an earlier result in its place. Each file
+/// is then the earlier one or the new one, and what reads them takes them.
+TEST(Outputs, AKillAtAnyMomentLeavesWholeFiles) {
+    const Folder folder;
+    make_dataset(folder / "data");
+    make_splats(folder / "old.ply", 60);
+    make_splats(folder / "new.ply", 50);
+    const std::string data = folder / "data", pictures = data + "/images/";
+    const auto survives = [&](const std::function<Names(const std::string&)>& command, const Names& outputs,
+                              const std::function<void()>& check = {}) {
+        const std::string out = folder / "out";
+        const auto bytes = [&] {
+            std::map<std::string, std::string> all;
+            for (const std::string& name : outputs) all[name] = read_file(folder / name);
+            return all;
+        };
+        fs::remove_all(out);
+        expect_success(run_ewa(command(folder / "new.ply")));
+        const auto later = bytes();
+        fs::remove_all(out);
+        expect_success(run_ewa(command(folder / "old.ply")));
+        SCOPED_TRACE(command("")[0]);
+        int kills = 0;
+        for (int moment = 1; moment < 400; ++moment) {
+            SCOPED_TRACE(moment);
+            const auto earlier = bytes();
+            const Outcome outcome =
+                run_ewa(command(folder / "new.ply"), with_fault("EWA_FAULT_KILL", std::to_string(moment)));
+            for (const auto& [name, now] : bytes())
+                EXPECT_TRUE(now == earlier.at(name) || now == later.at(name)) << name;
+            if (check) check();
+            if (outcome.status == 0) break;
+            ASSERT_EQ(outcome.status, 128 + SIGKILL) << outcome.err;
+            ++kills;
+        }
+        EXPECT_GE(kills, 3);
+        for (const auto& [name, now] : bytes()) EXPECT_TRUE(now == later.at(name)) << name;
+    };
+    const std::string out = folder / "out/";
+    for (const char* name : {"o.ply", "o.spz", "o.glb"})
+        survives(
+            [&](const std::string& splats) {
+                return Names{"convert", splats, out + name};
+            },
+            {std::string("out/") + name});
+    survives(
+        [&](const std::string& splats) {
+            return Names{"convert", splats, out + "o.gltf"};
+        },
+        {},
+        [&] {
+            const size_t splats = ewa::load_splats(out + "o.gltf").size();
+            EXPECT_TRUE(splats == 50 || splats == 60) << splats;
+        });
+    survives(
+        [&](const std::string& splats) {
+            return Names{"grad", splats, data, "--frame", "0", "-o", out + "g.ply", "--json", out + "g.json"};
+        },
+        {"out/g.ply"});
+    survives([&](const std::string& splats) { return Names{"render", splats, "--cameras", data, "-o", out}; },
+             {"out/0.png", "out/3.png"});
+    survives(
+        [&](const std::string& splats) {
+            return Names{"render", splats, "-o", out + "x.exr", "--size", "16x16"};
+        },
+        {"out/x.exr"});
+    survives(
+        [&](const std::string& splats) {
+            const std::string other = splats.ends_with("old.ply") ? "1.png" : "2.png";
+            return Names{"compare",     pictures + "0.png", pictures + other, "--heat-map",
+                         out + "m.png", "--json",           out + "c.json"};
+        },
+        {"out/m.png", "out/c.json"});
 }
 
 TEST(Outputs, WhatAKilledCommandLeftIsCleared) {

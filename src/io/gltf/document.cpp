@@ -362,11 +362,12 @@ GltfDocument::Buffer GltfDocument::open_uri(const std::string& uri, const std::s
     return buffer;
 }
 
-bool GltfDocument::refers_to(const std::filesystem::path& file) const {
-    std::error_code none;
-    return std::any_of(buffers_.begin(), buffers_.end(), [&](const Buffer& buffer) {
-        return !buffer.file.empty() && std::filesystem::equivalent(buffer.file, file, none);
-    });
+std::vector<std::filesystem::path> GltfDocument::external_files() const {
+    std::vector<std::filesystem::path> files;
+    for (const Buffer& buffer : buffers_)
+        if (!buffer.file.empty() && std::find(files.begin(), files.end(), buffer.file) == files.end())
+            files.push_back(buffer.file);
+    return files;
 }
 
 uint64_t GltfDocument::bytes() const {

@@ -32,8 +32,8 @@ class GltfDocument {
     const tinygltf::Model& model() const { return model_; }
     bool binary() const { return binary_; }
     bool animated() const { return animated_; }
-    uint64_t bytes() const;                                   // of the file and of its external buffers
-    bool refers_to(const std::filesystem::path& file) const;  // as one of its buffers
+    uint64_t bytes() const;                                     // of the file and of its external buffers
+    std::vector<std::filesystem::path> external_files() const;  // of its buffers, each once
 
     /// Throws InputError "name: text".
     [[noreturn]] void fail(const std::string& text) const;

@@ -62,16 +62,17 @@ std::vector<std::string> write_spz(const std::filesystem::path& path, const Gaus
 /// the mesh, node or accessor and its property.
 SplatScene read_gltf_splats(const std::filesystem::path& path);
 
-/// The .bin of the same stem that holds a .gltf's values.
-std::filesystem::path gltf_values_path(const std::filesystem::path& gltf);
+/// The files that hold the values of an existing .gltf. Empty if it holds them itself or cannot be read.
+std::vector<std::filesystem::path> gltf_values(const std::filesystem::path& gltf);
 
-/// Throws InputError if that .bin exists but the .gltf does not, or does not refer to it. Then it belongs to
-/// another file.
-void check_gltf_values(const std::filesystem::path& gltf);
+/// The file that write_gltf_splats will write beside a .gltf: STEM.bin. If an earlier .gltf of this name has its values
+/// there, it is STEM-2.bin, so that this .gltf stays whole until it is replaced. Throws InputError if STEM.bin belongs
+/// to another file.
+std::filesystem::path new_gltf_values(const std::filesystem::path& gltf);
 
-/// Writes float32 throughout and sRGB colours. The extension .glb makes one file, any other one a .gltf and
-/// its .bin. Throws InputError for a scene without splats, more than 4 GiB in a .glb, or as check_gltf_values
-/// does.
+/// Writes float32 throughout and sRGB colours. The extension .glb makes one file, any other one a .gltf and the
+/// file of new_gltf_values. The values of an earlier .gltf are removed. Throws InputError for a scene without splats,
+/// more than 4 GiB in a .glb, or as new_gltf_values does.
 std::vector<std::string> write_gltf_splats(const std::filesystem::path& path, const Gaussians& gaussians,
                                            const SaveOptions& options);
 

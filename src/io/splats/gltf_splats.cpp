@@ -380,24 +380,39 @@ void write_binary(const std::filesystem::path& path, const Gaussians& gaussians,
     file.commit();
 }
 
-bool refers_to(const std::filesystem::path& gltf, const std::filesystem::path& values) try {
-    return GltfDocument(gltf).refers_to(values);
-} catch (const InputError&) {
-    return false;
+bool contains(const std::vector<std::filesystem::path>& files, const std::filesystem::path& file) {
+    std::error_code none;
+    return std::any_of(files.begin(), files.end(),
+                       [&](const auto& other) { return std::filesystem::equivalent(other, file, none); });
 }
 
-/// Both files are on disk before either is renamed. The values are renamed first, so a .gltf never lacks
-/// them.
+/// The names that the values of a .gltf may have. Two are enough for one that is replaced. A kill before its old values
+/// are removed needs the third.
+std::array<std::filesystem::path, 3> values_names(const std::filesystem::path& gltf) {
+    const std::filesystem::path stem = std::filesystem::path(gltf).replace_extension();
+    std::array<std::filesystem::path, 3> names{stem, stem, stem};
+    names[0] += ".bin";
+    names[1] += "-2.bin";
+    names[2] += "-3.bin";
+    return names;
+}
+
+/// Both files are on disk before either is renamed. The new values have another name than the old ones. The rename of
+/// the .gltf thus replaces all of it at once.
 void write_pair(const std::filesystem::path& path, const Gaussians& gaussians,
                 const std::vector<Attribute>& attributes, Json root, const SaveOptions& options) {
-    check_gltf_values(path);
-    const std::filesystem::path buffer = gltf_values_path(path);
+    const std::filesystem::path buffer = new_gltf_values(path);
+    const bool replaces = !gltf_values(path).empty();
     root["buffers"][0]["uri"] = percent_encoded(buffer.filename().string());
     core::AtomicFile values(buffer), file(path);
     write_values(values, gaussians, attributes, options);
     file.write(root.dump(1) + "\n");
     values.commit();
     file.commit();
+    if (!replaces) return;
+    std::error_code none;
+    for (const std::filesystem::path& name : values_names(path))
+        if (name != buffer) std::filesystem::remove(name, none);
 }
 
 }  // namespace
@@ -407,17 +422,31 @@ SplatScene read_gltf_splats(const std::filesystem::path& path) {
     return SplatReader(document).read();
 }
 
-std::filesystem::path gltf_values_path(const std::filesystem::path& gltf) {
-    return std::filesystem::path(gltf).replace_extension(".bin");
+std::vector<std::filesystem::path> gltf_values(const std::filesystem::path& gltf) try {
+    if (!core::is_file(gltf)) return {};
+    return GltfDocument(gltf).external_files();
+} catch (const InputError&) {
+    return {};
 }
 
-void check_gltf_values(const std::filesystem::path& gltf) {
-    const std::filesystem::path values = gltf_values_path(gltf);
+std::filesystem::path new_gltf_values(const std::filesystem::path& gltf) {
+    const auto names = values_names(gltf);
     std::error_code none;
-    if (!std::filesystem::exists(values, none) || refers_to(gltf, values)) return;
-    throw InputError(
-        core::one_line(values.string() + ": would be replaced by the values of " + gltf.filename().string() +
-                       ", but belongs to another file; choose another name, or .glb, which is one file"));
+    const auto exists = [&](const std::filesystem::path& name) {
+        return std::filesystem::exists(name, none);
+    };
+    const std::vector<std::filesystem::path> used = gltf_values(gltf);
+    const bool replaces =
+        std::any_of(names.begin(), names.end(), [&](const auto& name) { return contains(used, name); });
+    for (const std::filesystem::path& name : names) {
+        if (!exists(name)) return name;
+        if (!replaces)
+            throw InputError(core::one_line(
+                name.string() + ": would be replaced by the values of " + gltf.filename().string() +
+                ", but belongs to another file; choose another name, or .glb, which is one file"));
+    }
+    // All three exist, and the .gltf uses one of them.
+    return *std::find_if(names.begin(), names.end(), [&](const auto& name) { return !contains(used, name); });
 }
 
 std::vector<std::string> write_gltf_splats(const std::filesystem::path& path, const Gaussians& gaussians,
