@@ -93,7 +93,7 @@ Action add_cameras(CLI::App& app) {
     app.add_option(
            "--frames", options.frames,
            "Number of frames to take from a video, about: the sharpest of each of as many equal parts")
-        ->transform(in_range(3, 100000))
+        ->transform(in_range(kFewestVideoFrames, kMostVideoFrames))
         ->type_name("N")
         ->capture_default_str();
     static const std::map<std::string, Matching> kMatchings = {

@@ -7,6 +7,9 @@
 
 namespace ewa::cli {
 
+// Limits of the number of frames to take from a video.
+inline constexpr int kFewestVideoFrames = 3, kMostVideoFrames = 100000;
+
 /// Makes a dataset of photos or a video, with progress, and prints what was placed. Throws InputError, RunError, and
 /// Interrupted if Ctrl-C ended it.
 void place_with_progress(const std::filesystem::path& input, const std::filesystem::path& folder,

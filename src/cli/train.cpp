@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // ewa train: its options, the dataset of a mesh scene, and the run.
+#include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
 #include <array>
 #include <chrono>
@@ -10,9 +11,11 @@
 #include "cli/cameras.h"
 #include "cli/command.h"
 #include "cli/config.h"
+#include "cli/run_inputs.h"
 #include "cli/train_observer.h"
 #include "core/folders.h"
 #include "core/text.h"
+#include "core/typing.h"
 #include "ewa/error.h"
 #include "ewa/run.h"
 #include "report/chart.h"
@@ -110,7 +113,17 @@ void place_photos(TrainArguments& arguments) {
     run.output = output_folder(run);
     run.dataset = run.output / "dataset";
     train::check_free(run.output, run);
-    place_with_progress(run.scene, run.dataset, {}, arguments.output.quiet);
+    CaptureOptions capture;
+    if (run.frames != "all" && fs::is_regular_file(run.scene)) {
+        const auto count = core::parse_count<int>(run.frames);
+        if (!count || *count < kFewestVideoFrames || *count > kMostVideoFrames)
+            throw InputError(
+                fmt::format("--frames: '{}' is not a number of frames to take from a video, {} to {}",
+                            run.frames, kFewestVideoFrames, kMostVideoFrames));
+        capture.frames = *count;
+        run.frames = "all";
+    }
+    place_with_progress(run.scene, run.dataset, capture, arguments.output.quiet);
 }
 
 std::string accuracy_section(const RunScene& scene) {
@@ -123,6 +136,8 @@ int run(CLI::App& app, TrainArguments& arguments) {
     RunOptions& options = arguments.run;
     apply_config_and_quality(app, arguments);
     if (options.dataset.empty()) throw InputError("DATASET is required (see ewa train --help)");
+    options.dataset = dataset_input(options.dataset);
+    if (fs::is_directory(options.init)) options.init = splat_input(options.init).file.string();
     Footprint& kernel = options.train.render.kernel;
     kernel = settled_kernel(kernel, arguments.antialias);
     check_options(options);  // before the images of a mesh scene are rendered

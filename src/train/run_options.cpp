@@ -112,10 +112,11 @@ RunOption words(const char* name, const char* value, const char* help, bool deci
 }
 
 RunOption frames_option() {
-    RunOption option = words("frames", "FRAMES",
-                             "Use only these images: names, or indices in name order such as 0,3 or 5-9. The "
-                             "same images are held out as with all",
-                             kDecides, [](RunOptions& o) -> std::string& { return o.frames; });
+    RunOption option =
+        words("frames", "FRAMES",
+              "Use only these images: names, or indices in name order such as 0,3 or 5-9. The "
+              "same images are held out as with all. Of a video: the number of frames to take [300]",
+              kDecides, [](RunOptions& o) -> std::string& { return o.frames; });
     option.before = "all";
     return option;
 }
@@ -229,7 +230,7 @@ std::vector<RunOption> make_table() {
             [](RunOptions& o) -> int& { return o.train.halvings; }, 0, 6),
         words("init", "sfm|random|FILE",
               "First splats. sfm: the dataset's points, or random if it has none. random: where the cameras "
-              "look. FILE: a splat file, or a PLY of points",
+              "look. FILE: a splat file, a PLY of points, or the folder of a run",
               kDecides, [](RunOptions& o) -> std::string& { return o.init; }),
         real(
             "init-opacity", "X", "Opacity of the first splats. A splat file has its own",

@@ -205,6 +205,20 @@ esac
     EXPECT_NE(read_file(folder_ / "calls.ffmpeg").find("select='eq(n,1)+eq(n,4)+eq(n,7)'"),
               std::string::npos);
     EXPECT_EQ(calls(), "feature_extractor\nsequential_matcher\nmapper\n");
+
+    // ewa train takes as many frames.
+    fs::remove(folder_ / "calls.ffmpeg");
+    std::vector<std::string> train{"train",  folder_ / "film.mp4", "-o", folder_ / "run", "--steps", "2",
+                                   "--quiet"};
+    const auto train_with = [&](const std::string& frames) {
+        std::vector<std::string> all = train;
+        all.insert(all.end(), {"--frames", frames});
+        return run(all, {.environment = {{"PHOTOS", folder_ / "photos"}}});
+    };
+    expect_failure(train_with("0-2"), 2, "'0-2' is not a number of frames to take from a video, 3 to 100000");
+    expect_success(train_with("3"));
+    EXPECT_NE(read_file(folder_ / "calls.ffmpeg").find("select='eq(n,1)+eq(n,4)+eq(n,7)'"),
+              std::string::npos);
 }
 
 TEST_F(Cameras, TrainingPlacesPhotosFirst) {

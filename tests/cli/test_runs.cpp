@@ -120,6 +120,24 @@ TEST_F(Runs, FramesChooseTheImages) {
     expect_failure(run_ewa(names), 2, "there is no frame 7");
 }
 
+TEST_F(Runs, TrainTakesTheDatasetAndTheSplatsOfARun) {
+    const std::string run = train("run");
+    const Names more{"--steps", "2", "--quiet", "-o"};
+    const auto config = [&](const Names& inputs, const std::string& out) {
+        Names all{"train"};
+        all.insert(all.end(), inputs.begin(), inputs.end());
+        all.insert(all.end(), more.begin(), more.end());
+        all.push_back(out);
+        expect_success(run_ewa(all));
+        return read_json(out + "/config.json");
+    };
+    EXPECT_EQ(config({run}, folder / "a")["dataset"], folder / "data");
+    EXPECT_EQ(config({folder / "data", "--init", run}, folder / "b")["init"], run + "/splats.ply");
+    EXPECT_EQ(load_splats(folder / "b/splats.ply").size(), 50u);
+    expect_failure(run_ewa({"train", folder / "data", "--init", folder / "data", "-o", folder / "c"}), 2,
+                   "a folder without splats");
+}
+
 TEST_F(Runs, RenderShowsTheViewsOfTheDataset) {
     const std::string run = train("run");
     expect_success(run_ewa({"render", run, "-o", folder / "views"}));
