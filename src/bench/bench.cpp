@@ -12,6 +12,7 @@
 #include "bench/result.h"
 #include "bench/stability/stability.h"
 #include "core/json.h"
+#include "core/outputs.h"
 #include "core/typing.h"
 #include "ewa/device.h"
 #include "ewa/error.h"
@@ -109,6 +110,9 @@ void add_options(CLI::App& app, Options& options) {
 
 int run(const Options& options, const std::vector<std::string>& program) {
     if (options.list) return list_cases(options.stability);
+    core::check_outputs(
+        {{"--json", options.json}},
+        {{"--compare", options.compare}, {"--results", options.results}, {"FILE", options.scene}});
     if (options.stability) return run_stability(options);
     if (!options.scene.empty()) throw InputError(options.scene.string() + ": a file needs --stability");
     if (options.first_step) return run_first_step(options.device);

@@ -244,6 +244,9 @@ TEST(Outputs, NoFileTakesAnothersPlace) {
                    "is the same file as --output");
     expect_failure(run_ewa({"bench", "--accuracy", data, "--splats", splats, "--json", splats}), 2,
                    "is the same file as --splats");
+    for (const char* option : {"--compare", "--results"})
+        expect_failure(run_ewa({"bench", option, splats, "--json", splats}), 2, option);
+    expect_failure(run_ewa({"bench", "--stability", splats, "--json", splats}), 2, "the same file as FILE");
     expect_failure(run_ewa({"bench", "--accuracy", data, "--svg", out, "--json", out}), 2,
                    "is the same file as --svg");
     EXPECT_EQ(read_file(splats), good);
