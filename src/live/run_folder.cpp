@@ -13,14 +13,26 @@ namespace fs = std::filesystem;
 
 constexpr uint64_t kMostConfigBytes = 1u << 20;  // bytes
 
-nlohmann::json read_config(const fs::path& path) {
+/// An empty object if the file is not an object of JSON: the run is then read without what it says.
+nlohmann::json read_object(const fs::path& path) {
     try {
         auto json = core::read_json_file<nlohmann::json>(path, {.bytes = kMostConfigBytes});
         if (json.is_object()) return json;
     } catch (const InputError&) {
-        // The run is read without its options.
     }
     return nlohmann::json::object();
+}
+
+/// Whether the run made the dataset in its folder of these photos or this video.
+bool made_of(const fs::path& dataset, const fs::path& named) {
+    const nlohmann::json capture = read_object(dataset / "capture.json");
+    const auto input = capture.find("input");
+    if (input == capture.end() || !input->is_string()) return false;
+    // The folder above may have moved since.
+    const auto last = [](const fs::path& path) {
+        return (path.lexically_normal() / "").parent_path().filename();
+    };
+    return last(input->get<std::string>()) == last(named);
 }
 
 fs::path dataset_of(const fs::path& run, const fs::path& named) {
@@ -29,6 +41,7 @@ fs::path dataset_of(const fs::path& run, const fs::path& named) {
     const std::string extension = core::lower(named.extension().string());
     const bool mesh = extension == ".gltf" || extension == ".glb";
     if (mesh && fs::exists(run / "dataset/transforms.json", error)) return run / "dataset";
+    if (made_of(run / "dataset", named)) return run / "dataset";
     if (fs::exists(named, error)) return named;
     if (named.is_absolute()) return {};
     for (fs::path folder = fs::absolute(run, error); folder.has_relative_path();
@@ -50,7 +63,7 @@ std::optional<Run> find_run(const fs::path& folder) {
     Run run;
     run.folder = folder;
     if (present("splats.ply")) run.splats = folder / "splats.ply";
-    run.config = read_config(folder / "config.json");
+    run.config = read_object(folder / "config.json");
     run.named_dataset = run.text("dataset");
     run.dataset = dataset_of(folder, run.named_dataset);
     return run;

@@ -11,7 +11,7 @@ namespace ewa::live {
 struct Run {
     std::filesystem::path folder;
     std::filesystem::path splats;  // folder/splats.ply; empty if there is none yet
-    /// Of the splats: config.json's dataset, or the images that the run rendered of a mesh scene. Empty if it was not
+    /// Of the splats: config.json's dataset, or the one that the run made of a mesh scene, photos or a video. Empty if it was not
     /// found; named_dataset then says which.
     std::filesystem::path dataset;
     std::string named_dataset;                         // as in config.json; empty: none

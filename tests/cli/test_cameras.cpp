@@ -231,6 +231,12 @@ TEST_F(Cameras, TrainingPlacesPhotosFirst) {
     EXPECT_TRUE(fs::exists(folder_ / "run/dataset/sparse/0/images.bin"));
     const auto config = read_json(folder_ / "run/config.json");
     EXPECT_EQ(fs::path(config.at("dataset").get<std::string>()).filename(), "photos");
+
+    // The run is known by the dataset that it has made.
+    expect_success(run_ewa({"eval", folder_ / "run", "--split", "train", "--json", folder_ / "e.json"}));
+    EXPECT_EQ(read_json(folder_ / "e.json")["frames"].size(), 4u);
+    expect_success(run_ewa({"render", folder_ / "run", "-o", folder_ / "views"}));
+    EXPECT_EQ(files_below(folder_ / "views").size(), 4u);
 }
 
 /// A film of 20 real photos, where COLMAP, ffmpeg and the photos are on this machine.
