@@ -96,7 +96,7 @@ void add_options(CLI::App& app, Options& options) {
         ->type_name("NEW.json");
     app.add_flag("--stability", options.stability,
                  "Compare stiff and extreme scenes with the CPU reference, and train from each; exit with "
-                 "status 1 if a bound is exceeded");
+                 "status 1 if a bound is exceeded. It takes minutes");
     app.add_option("FILE", options.scene,
                    "With --stability: use this splat file instead of the built-in scenes")
         ->type_name("");

@@ -14,6 +14,7 @@
 #include "cli/arguments.h"
 #include "cli/command.h"
 #include "cli/output.h"
+#include "cli/run_inputs.h"
 #include "core/atomic_file.h"
 #include "ewa/error.h"
 #include "ewa/evaluation.h"
@@ -55,16 +56,19 @@ Trained train(const std::shared_ptr<gpu::Device>& device, const Dataset& dataset
     Trainer trainer(device, dataset, split.train, start, options);
     Trained result{{name, true, {}}, {}};
     const int every = std::max(1, steps / kEvaluations);
+    Progress progress("trained with " + name, steps, "steps", false);
     while (trainer.steps_done() < steps) {
         const StepReport report = trainer.step();
+        progress.update(report.step);
         if (report.step % every != 0 && report.step != steps) continue;
         result.gaussians = trainer.gaussians();
         const double psnr = evaluate(device, result.gaussians, dataset, split.test, options.render).psnr;
         result.curve.points.push_back({fmt::format("step {}", report.step), report.seconds, psnr, 0});
     }
     const report::WorkPoint& last = result.curve.points.back();
-    fmt::print("{:<24} {:<14} {:8.2f} s  {:.2f} dB held out, {} splats of SH degree {}\n", "training", name,
-               last.time, last.error, result.gaussians.size(), result.gaussians.sh_degree);
+    progress.note(fmt::format("{:<24} {:<14} {:8.2f} s  {:.2f} dB held out, {} splats of SH degree {}",
+                              "training", name, last.time, last.error, result.gaussians.size(),
+                              result.gaussians.sh_degree));
     return result;
 }
 
@@ -118,13 +122,13 @@ namespace {
 
 /// Error against run time of training and of rendering its result, or of rendering a given scene.
 int run_accuracy(const BenchArguments& arguments) {
-    const fs::path& path = arguments.options.scene;
+    const fs::path path = dataset_input(arguments.options.scene);
     if (path.empty()) throw InputError("--accuracy needs a DATASET: ewa bench --accuracy DATASET");
     if (arguments.splats.empty() && arguments.steps == 0)
         throw InputError("--accuracy: --training-steps 0 leaves no scene to render; name one with --splats");
     check_files(arguments);
     Gaussians given;
-    if (!arguments.splats.empty()) given = load_splats(arguments.splats);
+    if (!arguments.splats.empty()) given = load_splats(splat_input(arguments.splats).file);
     const DeviceOptions device_options{.selector = arguments.options.device};
     const Views views = load_views(
         {.splats = arguments.splats, .dataset = path, .draw = {}, .device = device_options}, "all", 0);
@@ -174,7 +178,7 @@ Action add_bench(CLI::App& app) {
     bench::add_options(app, arguments->options);
     app.add_flag("--accuracy", arguments->accuracy,
                  "Error against run time on the dataset FILE: of rendering, against the integral along each "
-                 "ray, and of training with each strategy for --training-steps (600)");
+                 "ray, and of training with each strategy for --training-steps (600). It takes minutes");
     app.add_option("--splats", arguments->splats,
                    "With --accuracy: render this scene instead of the trained one")
         ->type_name("FILE");

@@ -112,6 +112,9 @@ TEST(BenchProgram, StabilityIsMeasuredAndWritten) {
     const Ended ended =
         run(kProgram + " --stability --cases ordinary,value_nan --training-steps 3 --json " + json);
     ASSERT_EQ(ended.status, 0) << ended.output;
+    EXPECT_NE(ended.output.find("4 scenes. Each is rendered"), std::string::npos) << ended.output;
+    EXPECT_NE(ended.output.find("all 8 results are within their bounds\n"), std::string::npos)
+        << ended.output;
     const nlohmann::json results = read_json(json);
     ASSERT_EQ(results.at("cases").size(), 4u);  // three kernels and the one of NaNs
     for (const auto& one : results.at("cases")) {

@@ -204,10 +204,18 @@ const Comparison& tightest(const StabilityResult& result) {
                              });
 }
 
-std::string stability_header() {
-    return text_of("%-24s %6s %6s %5s | %8s %8s %9s %9s | %-14s %8s %8s %9s\n", "case", "splats", "drawn",
-                   "skip", "picture", "bound", "condition", "plain det", "worst of rest", "error", "bound",
-                   "condition");
+std::string stability_header(size_t cases) {
+    std::string text = text_of(
+        "%zu scenes. Each is rendered and differentiated on the device, and by the float64 reference.\n"
+        "picture, error: the largest differences of the image, and of the values named beside it. bound: "
+        "their limit.\n"
+        "condition: how much an error of the input grows. plain det: the error of the textbook "
+        "determinant.\n\n",
+        cases);
+    text += text_of("%-24s %6s %6s %5s | %8s %8s %9s %9s | %-14s %8s %8s %9s\n", "case", "splats", "drawn",
+                    "skip", "picture", "bound", "condition", "plain det", "worst of rest", "error", "bound",
+                    "condition");
+    return text;
 }
 
 std::string stability_line(const StabilityResult& r) {
@@ -221,18 +229,22 @@ std::string stability_line(const StabilityResult& r) {
         line += text_of("  SKIPPED, the reference %u", r.skipped_by_reference);
     for (const Comparison& c : r.comparisons)
         if (!c.good()) line += "  WRONG " + c.of;
+    if (r.good()) line += "  ok";
     return line + "\n";
 }
 
 std::string stability_training_header() {
-    return text_of("\n%-24s %6s %10s %10s %8s %8s %8s\n", "training from", "steps", "loss", "to", "skipped",
-                   "dropped", "limited");
+    return text_of(
+        "\nskipped: splats with a value that is not finite. dropped, limited: updates left out or "
+        "shortened.\n\n"
+        "%-24s %6s %10s %10s %8s %8s %8s\n",
+        "training from", "steps", "loss", "to", "skipped", "dropped", "limited");
 }
 
 std::string stability_training_line(const StabilityTraining& t) {
     return text_of("%-24s %6d %10.3g %10.3g %8u %8llu %8llu%s\n", t.name.c_str(), t.steps, t.first_loss,
                    t.last_loss, t.skipped, static_cast<unsigned long long>(t.dropped_updates),
-                   static_cast<unsigned long long>(t.limited_steps), t.finite ? "" : "  NOT FINITE");
+                   static_cast<unsigned long long>(t.limited_steps), t.good() ? "  ok" : "  NOT FINITE");
 }
 
 /// Whether all values that were finite still are.
@@ -368,7 +380,7 @@ StabilityTraining train_from(const std::shared_ptr<gpu::Device>& device, const S
 int run_stability(const Options& options) {
     const std::vector<StabilityCase> cases = chosen_cases(options);
     const auto device = open_device({.selector = options.device});
-    print("device: " + device_info(*device).name + "\n" + stability_header());
+    print("device: " + device_info(*device).name + "\n" + stability_header(cases.size()));
     std::vector<StabilityResult> results;
     std::vector<StabilityTraining> trainings;
     for (const StabilityCase& one : cases) {
@@ -384,9 +396,15 @@ int run_stability(const Options& options) {
     if (!options.json.empty())
         core::write_json(options.json,
                          {{"schema", "ewa-stability-1"}, {"cases", results}, {"training", trainings}});
-    const bool good = std::all_of(results.begin(), results.end(), std::mem_fn(&StabilityResult::good)) &&
-                      std::all_of(trainings.begin(), trainings.end(), std::mem_fn(&StabilityTraining::good));
-    return good ? 0 : 1;
+    const auto wrong =
+        std::count_if(results.begin(), results.end(), [](const StabilityResult& r) { return !r.good(); }) +
+        std::count_if(trainings.begin(), trainings.end(),
+                      [](const StabilityTraining& t) { return !t.good(); });
+    print(wrong == 0
+              ? text_of("\nall %zu results are within their bounds\n", results.size() + trainings.size())
+              : text_of("\n%td of %zu results are not within their bounds\n", wrong,
+                        results.size() + trainings.size()));
+    return wrong == 0 ? 0 : 1;
 }
 
 }  // namespace ewa::bench
