@@ -26,11 +26,14 @@ constexpr double kMargin = 1.07;                                 // of the image
 constexpr double kFence = 0.6, kMostFloaters = 0.03;             // of framed_box
 constexpr double kTail = 0.002;                                  // share of splats that the box may cut
 constexpr double kSlab = 0.08, kCovered = 0.5, kClearer = 0.25;  // of guessed_up
-constexpr int kCells = 16;                                       // of a face's grid, along each axis
+constexpr double kBroader = 1.2;  // of towards_broad_side, in standard deviations
+constexpr int kCells = 16;        // of a face's grid, along each axis
 
-/// A splat's mean and its standard deviations along the world's axes.
+/// A splat's mean, its standard deviations along the world's axes, and how much of an image it covers: opacity times the
+/// area of its largest face.
 struct Extent {
     glm::dvec3 mean{0}, deviation{0};
+    double weight = 0;
 };
 
 bool finite(const glm::dvec3& v) {
@@ -43,11 +46,14 @@ Extent extent_of(const Gaussians& gaussians, size_t i) {
         std::sqrt(double(q[0]) * q[0] + double(q[1]) * q[1] + double(q[2]) * q[2] + double(q[3]) * q[3]);
     const glm::dmat3 axes = glm::mat3_cast(glm::dquat(q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm));
     Extent extent{gaussians.world_mean(i), {}};
+    std::array<double, 3> scales{};
     for (int k = 0; k < 3; ++k) {
-        const double scale = std::exp(double(gaussians.log_scales[3 * i + size_t(k)]));
-        extent.deviation += scale * scale * axes[k] * axes[k];
+        scales[size_t(k)] = std::exp(double(gaussians.log_scales[3 * i + size_t(k)]));
+        extent.deviation += scales[size_t(k)] * scales[size_t(k)] * axes[k] * axes[k];
     }
     extent.deviation = glm::sqrt(extent.deviation);
+    std::ranges::sort(scales);
+    extent.weight = scales[1] * scales[2] / (1 + std::exp(-double(gaussians.opacity_logits[i])));
     return extent;
 }
 
@@ -145,6 +151,36 @@ std::optional<glm::dvec3> horizontal(const glm::dvec3& direction, const glm::dve
     return level / length;
 }
 
+/// The horizontal direction in which the scene is thinnest, on the side of `usual`. From there it is seen at its
+/// broadest. It is `usual` itself for a scene that is about as deep as broad.
+glm::dvec3 towards_broad_side(const std::vector<Extent>& extents, const Box& box, const glm::dvec3& up,
+                              const glm::dvec3& usual) {
+    const glm::dvec3 right = glm::cross(usual, up);
+    double sum = 0;
+    glm::dvec2 mean(0), squares(0);
+    double product = 0;
+    for (const Extent& extent : extents) {
+        if (!inside(box, extent.mean) || !std::isfinite(extent.weight)) continue;
+        const glm::dvec3 from_center = extent.mean - box.center();
+        const glm::dvec2 p(glm::dot(from_center, right), glm::dot(from_center, usual));
+        sum += extent.weight;
+        mean += extent.weight * p;
+        squares += extent.weight * p * p;
+        product += extent.weight * p.x * p.y;
+    }
+    if (!(sum > 0)) return usual;
+    mean /= sum;
+    const glm::dvec2 variance = squares / sum - mean * mean;
+    const double covariance = product / sum - mean.x * mean.y;
+    const double middle = (variance.x + variance.y) / 2,
+                 half = std::hypot((variance.x - variance.y) / 2, covariance);
+    if (!(middle + half > kBroader * kBroader * (middle - half))) return usual;
+    const double angle =
+        std::atan2(2 * covariance, variance.x - variance.y) / 2;  // of the broad axis, from `right`
+    const glm::dvec3 thin = usual * std::cos(angle) - right * std::sin(angle);
+    return glm::dot(thin, usual) < 0 ? -thin : thin;
+}
+
 glm::dmat3 facing(const glm::dvec3& forward, const glm::dvec3& up) {
     const glm::dvec3 other = std::abs(forward.z) < 0.9 ? glm::dvec3(0, 0, 1) : glm::dvec3(0, 1, 0);
     const glm::dvec3 level_up = horizontal(up, forward).value_or(*horizontal(other, forward));
@@ -213,8 +249,10 @@ Framing frame_scene(const Gaussians& gaussians, int width, int height, const Fra
     if (radius > 0 && std::isfinite(radius)) framing.radius = radius;
 
     const glm::dvec3 front = usual_forward(framing.up);
-    const glm::dvec3 level = horizontal(hints.forward.value_or(front), framing.up)
-                                 .value_or(horizontal(front, framing.up).value_or(glm::dvec3(1, 0, 0)));
+    const glm::dvec3 usual = horizontal(front, framing.up).value_or(glm::dvec3(1, 0, 0));
+    const std::optional<glm::dvec3> known =
+        hints.forward ? horizontal(*hints.forward, framing.up) : std::nullopt;
+    const glm::dvec3 level = known.value_or(towards_broad_side(extents, box, framing.up, usual));
     const glm::dvec3 forward = glm::normalize(level - kElevation * framing.up);
     constexpr int kDirections = 24;
     Camera& camera = framing.camera;

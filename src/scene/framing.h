@@ -21,7 +21,7 @@ struct Framing {
 /// What is known about a scene besides its splats. Directions are in the world, of any length above zero.
 struct FramingHints {
     std::optional<glm::dvec3> up;       // empty: guessed_up
-    std::optional<glm::dvec3> forward;  // of the view, made horizontal; empty: the front that goes with up
+    std::optional<glm::dvec3> forward;  // of the view, made horizontal; empty: see frame_scene
     bool all_round = false;             // the scene fits from every side, not only from the front
 };
 
@@ -41,7 +41,8 @@ glm::dvec3 guessed_up(const Gaussians& gaussians);
 /// The mean up direction of the cameras; -y if they have all orientations.
 glm::dvec3 mean_up(const Dataset& dataset);
 
-/// Shows the whole framed box from the front and slightly above. The shorter side of the image has a field of view
+/// Shows the whole framed box from the front and slightly above. Without a hint, the front is the broad side of the
+/// scene: a view along the horizontal direction in which it is thinnest. The shorter side of the image has a field of view
 /// of 50 degrees. width, height: px, above zero.
 Framing frame_scene(const Gaussians& gaussians, int width, int height, const FramingHints& hints = {});
 

@@ -10,6 +10,7 @@
 #include <limits>
 #include <numbers>
 
+#include "ewa/splat_edit.h"
 #include "support/random_scene.h"
 
 namespace ewa::scene {
@@ -116,6 +117,41 @@ TEST(FrameScene, AllRoundFitsFromEverySide) {
         for (const glm::dvec3& end : {glm::dvec3(0, 0, 2.9), glm::dvec3(0, 0, -2.9)})
             EXPECT_TRUE(in_image(camera, end)) << side;
     }
+}
+
+/// A board of 2 x 1 x 0.4 units, turned about the vertical, is seen at its broad side, from the usual half of the
+/// directions. A cube is seen from the usual direction.
+TEST(FrameScene, TheBroadSideIsTheFront) {
+    test::Random random(5);
+    std::vector<glm::dvec3> board, cube;
+    for (int i = 0; i < 3000; ++i) {
+        board.emplace_back(random.uniform(-1, 1), random.uniform(-0.5, 0.5), random.uniform(-0.2, 0.2));
+        cube.emplace_back(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1));
+    }
+    for (const double degrees : {0.0, 20.0, 70.0, 85.0, 110.0, 160.0}) {
+        const double angle = degrees * std::numbers::pi / 180;
+        const auto turned = [&](const glm::dvec3& p) {
+            return glm::dvec3(p.x * std::cos(angle) + p.z * std::sin(angle), p.y,
+                              p.z * std::cos(angle) - p.x * std::sin(angle));
+        };
+        std::vector<glm::dvec3> points;
+        for (const glm::dvec3& p : board) points.push_back(turned(p));
+        glm::dvec3 view = frame_scene(splats_at(points), 64, 64).camera.position();
+        EXPECT_LT(view.z, 0) << degrees;
+        view.y = 0;
+        EXPECT_GT(std::abs(glm::dot(glm::normalize(view), turned({0, 0, 1}))), 0.99) << degrees;
+
+        points.clear();
+        for (const glm::dvec3& p : cube) points.push_back(turned(p));
+        EXPECT_NEAR(frame_scene(splats_at(points), 64, 64).camera.rotation[0][2], 0, 1e-9) << degrees;
+    }
+    // Splats that cover little of an image say little.
+    Gaussians splats = splats_at(board);
+    for (int i = 0; i < 300; ++i) {
+        const Gaussians one = splats_at({{0, 0, random.uniform(-3, 3)}}, 0.001);
+        append_splats(splats, one);
+    }
+    EXPECT_NEAR(frame_scene(splats, 64, 64).camera.rotation[0][2], 0, 0.1);
 }
 
 TEST(FrameScene, NothingAtAllHasACamera) {
