@@ -13,8 +13,8 @@ namespace ewa {
 /// The name in messages, e.g. "SPZ".
 std::string_view name_of(SplatFormat format);
 
-/// The format of an extension, in upper or lower case: .ply .compressed.ply .splat .spz .glb .gltf. Throws
-/// InputError for any other.
+/// The format of an extension, in upper or lower case: .ply .compressed.ply .splat .spz .glb .gltf .sog,
+/// or of the name meta.json. Throws InputError for any other.
 SplatFormat format_of_name(const std::filesystem::path& path);
 
 /// The format of a file by its first bytes, or by its extension where these do not tell, as for .splat.
@@ -22,7 +22,7 @@ SplatFormat format_of_name(const std::filesystem::path& path);
 SplatFormat format_of_file(const std::filesystem::path& path);
 
 /// Reads any of the formats. The peak memory is at most twice the larger of the file and the scene. A file is
-/// refused if it claims more than 4 times its size and 40 MiB; for SPZ, which is compressed, 32 times. Values
+/// refused if it claims more than 4 times its size and 40 MiB; for SPZ and SOG, which are compressed, 32 times. Values
 /// may be infinite or NaN if the format can store that. Throws InputError that names the file and the byte or
 /// property.
 SplatScene read_splats(const std::filesystem::path& path);

@@ -10,8 +10,8 @@
 
 namespace ewa {
 
-/// The layouts are in src/io/splats: ply.h, compressed_ply.h, splat.h, spz.h, gltf_splats.h.
-enum class SplatFormat { ply, compressed_ply, splat, spz, glb, gltf };
+/// The sources in src/io/splats describe the layouts. sog is one file, sog_meta a meta.json with images beside it.
+enum class SplatFormat { ply, compressed_ply, splat, spz, glb, gltf, sog, sog_meta };
 
 struct SplatScene {
     Gaussians gaussians;  // in the frame of an INRIA PLY (x right, y down, z forward), whatever the file uses

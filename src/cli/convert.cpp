@@ -93,27 +93,34 @@ Json check(const ConvertArguments& arguments, const Work& work) {
     return json;
 }
 
-/// The .bin of a .gltf that was written; empty for other formats.
-fs::path values_path(const ConvertArguments& arguments) {
-    const fs::path& out = arguments.files.back();
-    return format_of_name(out) == SplatFormat::gltf ? io::gltf_values(out).at(0) : fs::path();
+/// The files that hold the values of an existing .gltf or meta.json; empty for other formats.
+std::vector<fs::path> values_of(const fs::path& path) {
+    const std::string name = core::lower(path.filename().string());
+    if (name.ends_with(".gltf")) return io::gltf_values(path);
+    return name == "meta.json" ? io::sog_images(path) : std::vector<fs::path>();
+}
+
+uint64_t bytes_of(const std::vector<fs::path>& files) {
+    uint64_t sum = 0;
+    for (const fs::path& file : files) sum += fs::file_size(file);
+    return sum;
 }
 
 /// Throws if an output is another file of this command, or cannot be written.
 void check_files(const ConvertArguments& arguments) {
     const fs::path& out = arguments.files.back();
-    std::vector<NamedFile> inputs;
+    std::vector<NamedFile> inputs, outputs = {{"OUT", out}, {"--json", arguments.json}};
     for (size_t i = 0; i + 1 < arguments.files.size(); ++i) {
-        const fs::path& input = arguments.files[i];
-        inputs.push_back({"an input", input});
-        if (core::lower(input.extension().string()) == ".gltf")
-            for (const fs::path& values : io::gltf_values(input))
-                inputs.push_back({"values of an input", values});
+        inputs.push_back({"an input", arguments.files[i]});
+        for (const fs::path& values : values_of(arguments.files[i]))
+            inputs.push_back({"values of an input", values});
     }
-    check_outputs({{"OUT", out}, {"--json", arguments.json}}, inputs);
-    if (format_of_name(out) != SplatFormat::gltf) return;
-    check_outputs({{"OUT", out}, {"the .bin of OUT", io::new_gltf_values(out)}, {"--json", arguments.json}},
-                  inputs);
+    check_outputs(outputs, inputs);
+    const SplatFormat format = format_of_name(out);
+    if (format == SplatFormat::gltf) outputs.push_back({"the .bin of OUT", io::new_gltf_values(out)});
+    if (format == SplatFormat::sog_meta)
+        for (const fs::path& image : io::new_sog_images(out)) outputs.push_back({"an image of OUT", image});
+    if (outputs.size() > 2) check_outputs(outputs, inputs);
 }
 
 /// Throws unless splats are left to write, or --allow-empty is given. read: the number of splats in the inputs.
@@ -127,13 +134,14 @@ void check_not_empty(const ConvertArguments& arguments, size_t read, size_t left
 
 Json output_json(const ConvertArguments& arguments, const Gaussians& gaussians) {
     const fs::path& out = arguments.files.back();
-    const fs::path values = values_path(arguments);
+    const std::vector<fs::path> values = values_of(out);
     Json json = {{"file", out.string()},
                  {"format", name_of(format_of_name(out))},
                  {"splats", gaussians.size()},
                  {"sh_degree", gaussians.sh_degree},
                  {"bytes", fs::file_size(out)}};
-    if (!values.empty()) json["values"] = {{"file", values.string()}, {"bytes", fs::file_size(values)}};
+    if (!values.empty()) json["values"]["bytes"] = bytes_of(values);
+    for (const fs::path& file : values) json["values"]["files"].push_back(file.string());
     return json;
 }
 
@@ -164,9 +172,11 @@ int run(const ConvertArguments& arguments) {
 
     if (!arguments.quiet) {
         fmt::print("{}\n", described(out, format, "", work.gaussians));
-        if (const fs::path values = values_path(arguments); !values.empty())
-            fmt::print("{}: the values of this glTF, {}\n", core::one_line(values.string()),
-                       core::bytes_text(fs::file_size(values)));
+        const std::vector<fs::path> values = values_of(out);
+        if (!values.empty())
+            fmt::print("{}{}: the values of this {}, {}\n", core::one_line(values[0].string()),
+                       values.size() > 1 ? fmt::format(" and {} other images", values.size() - 1) : "",
+                       name_of(format), core::bytes_text(bytes_of(values)));
         for (const std::string& remark : remarks) fmt::print("  {}\n", core::one_line(remark));
     }
     Json json = {
@@ -207,7 +217,7 @@ Action add_convert(CLI::App& app) {
     const auto arguments = std::make_shared<ConvertArguments>();
     app.add_option("FILES", arguments->files,
                    "One or more inputs, which are joined, then the output. Formats: .ply .compressed.ply "
-                   ".splat .spz .glb .gltf. An input may be the folder of a training run")
+                   ".splat .spz .sog meta.json .glb .gltf. An input may be the folder of a training run")
         ->required()
         ->expected(2, -1)
         ->type_name("IN... OUT");

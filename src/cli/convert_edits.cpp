@@ -147,8 +147,10 @@ std::optional<std::string> apply_edits(Gaussians& gaussians, const Edits& edits,
             remark = "skipped " + core::counted(before - gaussians.size(), "splat") +
                      " with a value that is not finite or a zero quaternion";
     }
-    if (edits.morton || format == SplatFormat::compressed_ply)
-        select_splats(gaussians, morton_order(gaussians));
+    // The order in which these formats are written: --check compares splat by splat.
+    const bool ordered = format == SplatFormat::compressed_ply || format == SplatFormat::sog ||
+                         format == SplatFormat::sog_meta;
+    if (edits.morton || ordered) select_splats(gaussians, morton_order(gaussians));
     return remark;
 }
 

@@ -24,6 +24,7 @@
 #include "ewa/synthetic_dataset.h"
 #include "ewa/trainer.h"
 #include "io/gltf/mesh.h"
+#include "io/splats/formats.h"
 #include "report/summary.h"
 
 namespace ewa::cli {
@@ -144,6 +145,11 @@ void info_splats(const fs::path& path, const live::Run* run, bool json) {
                statistics.nonfinite);
     print_plan("rendering", rendering);
     print_plan("training", training);
+}
+
+/// Whether the path names an unpacked SOG: by its name, else by its content.
+bool is_sog(const fs::path& path) {
+    return core::lower(path.filename().string()) == "meta.json" || io::is_sog_meta(path);
 }
 
 const char* dataset_kind(const fs::path& path) {
@@ -284,7 +290,7 @@ int run(const fs::path& path, int test_every, bool json) {
     if (!fs::exists(path, error)) throw InputError(path.string() + ": no such file or folder");
     if (const auto run = find_run(path))
         info_splats(splat_input(path).file, &*run, json);
-    else if (fs::is_directory(path) || path.extension() == ".json")
+    else if (fs::is_directory(path) || (path.extension() == ".json" && !is_sog(path)))
         info_dataset(path, test_every, json);
     else if (is_mesh_scene(path))
         info_mesh(path, test_every, json);
@@ -302,10 +308,10 @@ Action add_info(CLI::App& app) {
         bool json = false;
     };
     const auto arguments = std::make_shared<Arguments>();
-    app.add_option(
-           "PATH", arguments->path,
-           "Splat file (.ply .compressed.ply .splat .spz .glb .gltf), COLMAP folder, transforms.json, "
-           "glTF file of meshes, or folder of a training run")
+    app.add_option("PATH", arguments->path,
+                   "Splat file (.ply .compressed.ply .splat .spz .sog meta.json .glb .gltf), COLMAP folder, "
+                   "transforms.json, "
+                   "glTF file of meshes, or folder of a training run")
         ->required();
     add_test_every_option(app, arguments->test_every);
     app.add_flag("--json", arguments->json, "Print JSON");

@@ -16,7 +16,8 @@ using ewa::Gaussians;
 namespace fs = std::filesystem;
 using Names = std::vector<std::string>;
 
-const Names kFiles = {"a.ply", "a.compressed.ply", "a.splat", "a.spz", "a.glb", "a.gltf"};
+const Names kFiles = {"a.ply", "a.compressed.ply", "a.splat", "a.spz",
+                      "a.glb", "a.gltf",           "a.sog",   "meta.json"};
 
 TEST(Convert, FromEachFormatToEach) {
     const Folder folder;
@@ -24,10 +25,10 @@ TEST(Convert, FromEachFormatToEach) {
     for (const std::string& first : kFiles) {
         expect_success(run_ewa({"convert", folder / "s.ply", folder / first}));
         for (const std::string& second : kFiles) {
-            const Outcome outcome = run_ewa({"convert", folder / first, folder / ("b" + second), "--check"});
+            const Outcome outcome = run_ewa({"convert", folder / first, folder / ("b/" + second), "--check"});
             expect_success(outcome);
             EXPECT_NE(outcome.out.find("position"), std::string::npos) << outcome.out;
-            EXPECT_EQ(ewa::load_splats(folder / ("b" + second)).size(), 300u) << first << " to " << second;
+            EXPECT_EQ(ewa::load_splats(folder / ("b/" + second)).size(), 300u) << first << " to " << second;
         }
     }
 }
@@ -256,12 +257,43 @@ TEST(Convert, ProtectsTheValuesOfAGltfUnderAnyName) {
     EXPECT_EQ(read_file(folder / "v.ply"), values);
 }
 
+TEST(Convert, UnpacksASogAndLeavesOtherImagesAlone) {
+    const Folder folder;
+    make_splats(folder / "s.ply", 50, 1);
+    fs::create_directory(folder / "sog");
+    write_file(folder / "sog/sh0.webp", "somebody's");
+    const Names convert{"convert", folder / "s.ply", folder / "sog/meta.json",
+                        "--check", "--json",         folder / "g.json"};
+    expect_failure(run_ewa(convert), 2, "sh0.webp: would be replaced");
+    EXPECT_EQ(files_below(folder / "sog"), Names{"sh0.webp"});
+    fs::remove(folder / "sog/sh0.webp");
+    for (int again = 0; again < 2; ++again) {  // its own it replaces
+        const Outcome outcome = run_ewa(convert);
+        expect_success(outcome);
+        EXPECT_NE(outcome.out.find("means_l.webp and 6 other images: the values of this SOG"),
+                  std::string::npos)
+            << outcome.out;
+        EXPECT_EQ(files_below(folder / "sog").size(), 8u);
+    }
+    const auto json = read_json(folder / "g.json");
+    EXPECT_EQ(json["output"]["values"]["files"].size(), 7u);
+    // Compared in the order in which it is written.
+    EXPECT_LT(json["check"]["position"]["largest"].get<double>(), 0.001);
+    expect_failure(
+        run_ewa({"convert", folder / "sog/meta.json", folder / "o.ply", "--json", folder / "sog/quats.webp"}),
+        2, "values of an input");
+    fs::rename(folder / "sog/meta.json", folder / "sog/other.json");
+    const Outcome info = run_ewa({"info", folder / "sog/other.json", "--json"});
+    expect_success(info);
+    EXPECT_EQ(nlohmann::json::parse(info.out)["variant"], "version 2, unpacked");
+}
+
 TEST(Convert, FullDiskLeavesNoHalfFile) {
     const Folder folder;
     make_splats(folder / "s.ply", 2000, 3);
     Circumstances full;
     full.file_limit = 2048;
-    for (const char* name : {"o.ply", "o.compressed.ply", "o.splat", "o.spz", "o.glb", "o.gltf"}) {
+    for (const char* name : {"o.ply", "o.compressed.ply", "o.splat", "o.spz", "o.glb", "o.gltf", "o.sog"}) {
         expect_failure(run_ewa({"convert", folder / "s.ply", folder / name}, full), 1, "o.");
         EXPECT_EQ(files_below(folder / "."), Names{"s.ply"}) << name;
     }

@@ -76,4 +76,31 @@ std::filesystem::path new_gltf_values(const std::filesystem::path& gltf);
 std::vector<std::string> write_gltf_splats(const std::filesystem::path& path, const Gaussians& gaussians,
                                            const SaveOptions& options);
 
+/// SOG (PlayCanvas): read_sog reads a zip archive, read_sog_meta a meta.json with its images beside it. Versions
+/// 1 and 2. The names in meta.json must stay in the archive or the folder. Errors name the file and the image
+/// or the property of meta.json.
+SplatScene read_sog(const std::filesystem::path& path);
+SplatScene read_sog_meta(const std::filesystem::path& path);
+
+/// Whether the file is the meta.json of a SOG, whatever its name.
+bool is_sog_meta(const std::filesystem::path& path);
+
+/// Writes version 2 in Morton order: lossless images in an archive of stored entries. The same scene gives the
+/// same bytes with the same libwebp. SH of degree 1 and more become a palette of at most 65,536 rows, see
+/// make_palette. Throws InputError for more splats than a WebP image has pixels.
+std::vector<std::string> write_sog(const std::filesystem::path& path, const Gaussians& gaussians,
+                                   const SaveOptions& options);
+
+/// The same as a meta.json with the images of new_sog_images beside it. The images of an earlier meta.json are
+/// removed. Throws InputError also as new_sog_images does.
+std::vector<std::string> write_sog_meta(const std::filesystem::path& path, const Gaussians& gaussians,
+                                        const SaveOptions& options);
+
+/// The images that an existing meta.json names. Empty if it cannot be read.
+std::vector<std::filesystem::path> sog_images(const std::filesystem::path& meta);
+
+/// The images that write_sog_meta may write, as new_gltf_values: means_l.webp and so on, means_l-2.webp and so on if
+/// the meta.json uses those. Throws InputError if one of them belongs to something else.
+std::vector<std::filesystem::path> new_sog_images(const std::filesystem::path& meta);
+
 }  // namespace ewa::io

@@ -28,6 +28,7 @@
 #include "io/gltf/document.h"
 #include "io/splats/formats.h"
 #include "io/splats/splat_values.h"
+#include "io/splats/value_files.h"
 #include "scene/color.h"
 
 namespace ewa::io {
@@ -380,20 +381,15 @@ void write_binary(const std::filesystem::path& path, const Gaussians& gaussians,
     file.commit();
 }
 
-bool contains(const std::vector<std::filesystem::path>& files, const std::filesystem::path& file) {
-    std::error_code none;
-    return std::any_of(files.begin(), files.end(),
-                       [&](const auto& other) { return std::filesystem::equivalent(other, file, none); });
-}
-
 /// The names that the values of a .gltf may have. Two are enough for one that is replaced. A kill before its old values
 /// are removed needs the third.
-std::array<std::filesystem::path, 3> values_names(const std::filesystem::path& gltf) {
-    const std::filesystem::path stem = std::filesystem::path(gltf).replace_extension();
-    std::array<std::filesystem::path, 3> names{stem, stem, stem};
-    names[0] += ".bin";
-    names[1] += "-2.bin";
-    names[2] += "-3.bin";
+std::vector<Paths> values_names(const std::filesystem::path& gltf) {
+    std::vector<Paths> names;
+    for (const char* end : {".bin", "-2.bin", "-3.bin"}) {
+        std::filesystem::path name = std::filesystem::path(gltf).replace_extension();
+        name += end;
+        names.push_back({name});
+    }
     return names;
 }
 
@@ -409,10 +405,7 @@ void write_pair(const std::filesystem::path& path, const Gaussians& gaussians,
     file.write(root.dump(1) + "\n");
     values.commit();
     file.commit();
-    if (!replaces) return;
-    std::error_code none;
-    for (const std::filesystem::path& name : values_names(path))
-        if (name != buffer) std::filesystem::remove(name, none);
+    if (replaces) remove_other_names(values_names(path), {buffer});
 }
 
 }  // namespace
@@ -430,23 +423,9 @@ std::vector<std::filesystem::path> gltf_values(const std::filesystem::path& gltf
 }
 
 std::filesystem::path new_gltf_values(const std::filesystem::path& gltf) {
-    const auto names = values_names(gltf);
-    std::error_code none;
-    const auto exists = [&](const std::filesystem::path& name) {
-        return std::filesystem::exists(name, none);
-    };
-    const std::vector<std::filesystem::path> used = gltf_values(gltf);
-    const bool replaces =
-        std::any_of(names.begin(), names.end(), [&](const auto& name) { return contains(used, name); });
-    for (const std::filesystem::path& name : names) {
-        if (!exists(name)) return name;
-        if (!replaces)
-            throw InputError(core::one_line(
-                name.string() + ": would be replaced by the values of " + gltf.filename().string() +
-                ", but belongs to another file; choose another name, or .glb, which is one file"));
-    }
-    // All three exist, and the .gltf uses one of them.
-    return *std::find_if(names.begin(), names.end(), [&](const auto& name) { return !contains(used, name); });
+    return free_names(values_names(gltf), gltf_values(gltf),
+                      ": would be replaced by the values of " + gltf.filename().string() +
+                          ", but belongs to another file; choose another name, or .glb, which is one file")[0];
 }
 
 std::vector<std::string> write_gltf_splats(const std::filesystem::path& path, const Gaussians& gaussians,

@@ -26,7 +26,7 @@ struct Kind {
     SplatScene (*read)(const std::filesystem::path&);
     std::vector<std::string> (*write)(const std::filesystem::path&, const Gaussians&, const SaveOptions&);
 };
-/// An extension that is the end of another one comes after it.
+/// An extension that is the end of another one comes after it. One without a dot is a whole name.
 constexpr Kind kKinds[] = {
     {SplatFormat::compressed_ply,
      ".compressed.ply",
@@ -38,7 +38,9 @@ constexpr Kind kKinds[] = {
     {SplatFormat::splat, ".splat", "splat", {}, io::read_splat, io::write_splat},
     {SplatFormat::spz, ".spz", "SPZ", {"NGSP", "\x1f\x8b"}, io::read_spz, io::write_spz},
     {SplatFormat::glb, ".glb", "GLB", {"glTF"}, io::read_gltf_splats, io::write_gltf_splats},
-    {SplatFormat::gltf, ".gltf", "glTF", {"{"}, io::read_gltf_splats, io::write_gltf_splats}};
+    {SplatFormat::gltf, ".gltf", "glTF", {"{"}, io::read_gltf_splats, io::write_gltf_splats},
+    {SplatFormat::sog, ".sog", "SOG", {"PK\x03\x04"}, io::read_sog, io::write_sog},
+    {SplatFormat::sog_meta, "meta.json", "SOG", {}, io::read_sog_meta, io::write_sog_meta}};
 
 const Kind& kind_of(SplatFormat format) {
     return *std::ranges::find(kKinds, format, &Kind::format);
@@ -47,14 +49,15 @@ const Kind& kind_of(SplatFormat format) {
 const Kind* kind_of_name(const std::filesystem::path& path) {
     const std::string name = core::lower(path.filename().string());
     for (const Kind& kind : kKinds)
-        if (name.ends_with(kind.extension)) return &kind;
+        if (kind.extension.starts_with('.') ? name.ends_with(kind.extension) : name == kind.extension)
+            return &kind;
     return nullptr;
 }
 
 [[noreturn]] void refuse(const std::filesystem::path& path) {
     throw InputError(core::one_line(path.string() +
                                     ": not a supported kind of splat file; supported: .ply, .compressed.ply, "
-                                    ".splat, .spz, .glb, .gltf"));
+                                    ".splat, .spz, .sog, meta.json of a SOG, .glb, .gltf"));
 }
 
 /// The kind that the first bytes identify, or null.
@@ -128,7 +131,13 @@ SplatFormat format_of_file(const std::filesystem::path& path) {
     constexpr uint64_t kHeadBytes = 4;
     const size_t size = size_t(std::min(reader.size(), kHeadBytes));
     const std::string head(reinterpret_cast<const char*>(reader.take(size, "the header")), size);
-    if (const Kind* told = kind_of_head(head)) kind = told;
+    // glTF and the meta.json of a SOG are both JSON.
+    const bool sog_meta =
+        head.starts_with('{') && ((kind && kind->format == SplatFormat::sog_meta) || io::is_sog_meta(path));
+    if (sog_meta)
+        kind = &kind_of(SplatFormat::sog_meta);
+    else if (const Kind* told = kind_of_head(head))
+        kind = told;
     if (!kind) refuse(path);
     if (kind->format != SplatFormat::ply) return kind->format;
     return io::is_compressed_ply(io::PlyTable(path)) ? SplatFormat::compressed_ply : SplatFormat::ply;
@@ -162,7 +171,8 @@ std::vector<std::string> save_splats(const std::filesystem::path& path, const Ga
     else
         more = write(path, drawable_only(gaussians, remarks), options);
     remarks.insert(remarks.end(), more.begin(), more.end());
-    if (options.antialiased && !ply && format != SplatFormat::spz)
+    const bool sog = format == SplatFormat::sog || format == SplatFormat::sog_meta;
+    if (options.antialiased && !ply && !sog && format != SplatFormat::spz)
         remarks.push_back("the mark that the scene was trained anti-aliased is dropped");
     if (!options.comments.empty() && !ply && format != SplatFormat::compressed_ply)
         remarks.push_back("comments are dropped");

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/splats/archive.h"
+
+#include <unzip.h>
+#include <zip.h>
+
+#include <algorithm>
+#include <cstring>
+#include <new>
+
+#include "core/file_reader.h"
+#include "core/text.h"
+#include "ewa/error.h"
+
+namespace ewa::io {
+
+/// The archive as minizip sees it: a file in memory.
+struct MemoryFile {
+    std::string bytes;
+    uint64_t at = 0;
+};
+
+namespace {
+
+// minizip is C, so none of these may throw.
+
+MemoryFile& file_of(voidpf opaque) {
+    return *static_cast<MemoryFile*>(opaque);
+}
+
+voidpf open_memory(voidpf opaque, const void*, int) {
+    return opaque;
+}
+uLong read_memory(voidpf opaque, voidpf, void* to, uLong size) {
+    MemoryFile& file = file_of(opaque);
+    const uint64_t left = file.at < file.bytes.size() ? file.bytes.size() - file.at : 0;
+    const uLong n = uLong(std::min<uint64_t>(left, size));
+    if (n > 0) std::memcpy(to, file.bytes.data() + file.at, n);
+    file.at += n;
+    return n;
+}
+uLong write_memory(voidpf opaque, voidpf, const void* from, uLong size) try {
+    MemoryFile& file = file_of(opaque);
+    if (file.bytes.size() < file.at + size) file.bytes.resize(file.at + size);
+    std::memcpy(file.bytes.data() + file.at, from, size);
+    file.at += size;
+    return size;
+} catch (const std::bad_alloc&) {
+    return 0;
+}
+ZPOS64_T tell_memory(voidpf opaque, voidpf) {
+    return file_of(opaque).at;
+}
+long seek_memory(voidpf opaque, voidpf, ZPOS64_T offset, int origin) {
+    MemoryFile& file = file_of(opaque);
+    const uint64_t from = origin == ZLIB_FILEFUNC_SEEK_CUR   ? file.at
+                          : origin == ZLIB_FILEFUNC_SEEK_END ? file.bytes.size()
+                                                             : 0;
+    if (offset > file.bytes.size() || from > file.bytes.size() - offset) return -1;
+    file.at = from + offset;
+    return 0;
+}
+int close_memory(voidpf, voidpf) {
+    return 0;
+}
+int no_error(voidpf, voidpf) {
+    return 0;
+}
+
+zlib_filefunc64_def functions_of(MemoryFile& file) {
+    return {open_memory, read_memory, write_memory, tell_memory, seek_memory, close_memory, no_error, &file};
+}
+
+/// Entries are added in memory, so nothing else can fail.
+void require_added(int result) {
+    if (result != ZIP_OK) throw std::bad_alloc();
+}
+
+constexpr uint16_t kEncrypted = 1;  // a flag
+constexpr uint64_t kSmallEntry = 64 << 10;
+
+}  // namespace
+
+struct ArchiveReader::State {
+    std::string name;
+    MemoryFile file;
+    unzFile zip = nullptr;
+};
+
+ArchiveReader::ArchiveReader(const std::filesystem::path& path) : state_(std::make_unique<State>()) {
+    state_->name = core::one_line(path.string());
+    state_->file.bytes = core::read_text_file(path);
+    zlib_filefunc64_def functions = functions_of(state_->file);
+    state_->zip = unzOpen2_64(state_->name.c_str(), &functions);
+    if (!state_->zip)
+        throw InputError(state_->name + ": not a zip archive, or its directory at byte " +
+                         std::to_string(state_->file.bytes.size()) + " is damaged or cut off");
+}
+
+ArchiveReader::~ArchiveReader() {
+    if (state_->zip) unzClose(state_->zip);
+}
+
+uint64_t ArchiveReader::bytes() const {
+    return state_->file.bytes.size();
+}
+
+std::string ArchiveReader::read(const std::string& entry, uint64_t most) const {
+    const unzFile zip = state_->zip;
+    const std::string where = state_->name + ": \"" + core::one_line(entry) + "\"";
+    constexpr int kSameCase = 1;
+    if (unzLocateFile(zip, entry.c_str(), kSameCase) != UNZ_OK)
+        throw InputError(where + " is not in the archive");
+    unz_file_info64 info{};
+    if (unzGetCurrentFileInfo64(zip, &info, nullptr, 0, nullptr, 0, nullptr, 0) != UNZ_OK)
+        throw InputError(where + ": its entry is damaged");
+    if (info.flag & kEncrypted) throw InputError(where + " is encrypted");
+    if (info.compression_method != 0 && info.compression_method != Z_DEFLATED)
+        throw InputError(where + " is packed with method " + std::to_string(info.compression_method) +
+                         "; stored and deflated entries are supported");
+    const uint64_t size = info.uncompressed_size, packed = std::min<uint64_t>(info.compressed_size, bytes());
+    if (size > most || size > 2 * packed + kSmallEntry)
+        throw InputError(where + " claims to unpack from " + std::to_string(packed) + " to " +
+                         std::to_string(size) + " bytes; it is damaged");
+    std::string content(size_t(size), '\0');
+    const unsigned piece = 1u << 30;  // minizip counts in 32 bits
+    bool whole = unzOpenCurrentFile(zip) == UNZ_OK;
+    for (size_t at = 0; whole && at < content.size();) {
+        const int got =
+            unzReadCurrentFile(zip, &content[at], unsigned(std::min<size_t>(piece, content.size() - at)));
+        whole = got > 0;
+        at += size_t(std::max(got, 0));
+    }
+    // Closing compares the checksum.
+    whole = unzCloseCurrentFile(zip) == UNZ_OK && whole;
+    if (!whole) throw InputError(where + ": its data is damaged or cut off");
+    return content;
+}
+
+struct ArchiveWriter::State {
+    MemoryFile file;
+    zipFile zip = nullptr;
+};
+
+ArchiveWriter::ArchiveWriter() : state_(std::make_unique<State>()) {
+    zlib_filefunc64_def functions = functions_of(state_->file);
+    state_->zip = zipOpen2_64("", APPEND_STATUS_CREATE, nullptr, &functions);
+    if (!state_->zip) throw std::bad_alloc();
+}
+
+ArchiveWriter::~ArchiveWriter() {
+    if (state_->zip) zipClose(state_->zip, nullptr);
+}
+
+void ArchiveWriter::add(const std::string& entry, const std::string& bytes) {
+    constexpr int kStored = 0;
+    zip_fileinfo info{};
+    info.dosDate = 1 << 21 | 1 << 16;  // the first day that the format knows
+    const bool large = bytes.size() > 0xffffffff;
+    require_added(zipOpenNewFileInZip64(state_->zip, entry.c_str(), &info, nullptr, 0, nullptr, 0, nullptr, kStored,
+                                  0, large));
+    constexpr size_t kPiece = size_t(1) << 30;  // minizip counts in 32 bits
+    for (size_t at = 0; at < bytes.size(); at += kPiece)
+        require_added(
+            zipWriteInFileInZip(state_->zip, &bytes[at], unsigned(std::min(kPiece, bytes.size() - at))));
+    require_added(zipCloseFileInZip(state_->zip));
+}
+
+std::string ArchiveWriter::finish() {
+    const zipFile zip = state_->zip;
+    state_->zip = nullptr;
+    require_added(zipClose(zip, nullptr));
+    return std::move(state_->file.bytes);
+}
+
+}  // namespace ewa::io

@@ -1,0 +1,413 @@
+// SPDX-License-Identifier: Apache-2.0
+// Reads SOG, whose layout sog.h describes.
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "core/file_reader.h"
+#include "core/json.h"
+#include "core/sandboxed_path.h"
+#include "core/text.h"
+#include "io/splats/archive.h"
+#include "io/splats/formats.h"
+#include "io/splats/sog.h"
+#include "io/splats/splat_values.h"
+#include "io/splats/webp.h"
+
+namespace ewa::io {
+
+namespace {
+
+using nlohmann::json;
+
+/// Real ones have about 20 kB.
+constexpr core::JsonLimits kMetaLimits = {.bytes = 1 << 20, .objects = 1024, .values = 1 << 16};
+
+/// All names of images in a meta.json.
+std::vector<std::string> image_names_in(const json& meta) {
+    std::vector<std::string> names;
+    for (const json& part : meta)
+        if (part.is_object() && part.contains("files"))
+            for (const json& file : part["files"])
+                if (file.is_string()) names.push_back(file.get<std::string>());
+    return names;
+}
+
+/// The files of a SOG by the names that its meta.json has for them.
+class SogFiles {
+  public:
+    virtual ~SogFiles() = default;
+    virtual std::string read(const std::string& name) = 0;
+    virtual uint64_t bytes(const json& meta) const = 0;  // of all together
+};
+
+class ArchivedFiles final : public SogFiles {
+  public:
+    explicit ArchivedFiles(const std::filesystem::path& path) : archive_(path) {}
+    std::string meta() const { return archive_.read(kSogMeta, kMetaLimits.bytes); }
+    std::string read(const std::string& name) override {
+        return archive_.read(name, 2 * archive_.bytes() + kMetaLimits.bytes);
+    }
+    uint64_t bytes(const json&) const override { return archive_.bytes(); }
+
+  private:
+    ArchiveReader archive_;
+};
+
+class FolderFiles final : public SogFiles {
+  public:
+    explicit FolderFiles(const std::filesystem::path& meta)
+        : meta_(meta), name_(core::one_line(meta.string())) {}
+
+    std::string read(const std::string& name) override { return core::read_text_file(path_of(name)); }
+
+    uint64_t bytes(const json& meta) const override {
+        uint64_t sum = std::filesystem::file_size(meta_);
+        for (const std::string& name : image_names_in(meta)) sum += std::filesystem::file_size(path_of(name));
+        return sum;
+    }
+
+    /// Throws InputError unless the image is in the folder.
+    std::filesystem::path path_of(const std::string& name) const {
+        const auto inside = core::name_inside(name);
+        const std::filesystem::path folder = meta_.parent_path();
+        if (!inside || !core::links_stay_inside(folder, *inside))
+            throw InputError(name_ + ": names the image \"" + core::one_line(name) +
+                             "\", which is not in its folder");
+        return folder / *inside;
+    }
+
+  private:
+    std::filesystem::path meta_;
+    std::string name_;
+};
+
+/// The values of a meta.json, checked.
+class Meta {
+  public:
+    Meta(json values, std::string name) : values_(std::move(values)), name_(std::move(name)) {
+        if (!values_.is_object()) fail("is not a JSON object");
+        const bool versioned = values_.contains("version");
+        version_ = versioned ? integer(values_["version"], "version", 1 << 30) : 1;
+        if (version_ != 1 && version_ != 2)
+            fail("SOG version " + std::to_string(version_) + " in \"version\" is unknown; 1 and 2 are supported");
+        if (version_ == 2) {
+            count_ = integer(at(values_, "count"), "count", kMostSplats);
+        } else {
+            const json& shape = at(at(values_, "means"), "shape");
+            if (!shape.is_array() || shape.empty()) fail("\"shape\" of \"means\" is not a list");
+            count_ = integer(shape[0], "shape", kMostSplats);
+        }
+    }
+
+    [[noreturn]] void fail(const std::string& text) const { throw InputError(name_ + ": " + text); }
+
+    const json& values() const { return values_; }
+    const std::string& name() const { return name_; }
+    uint64_t version() const { return version_; }
+    uint64_t count() const { return count_; }
+    bool antialiased() const {
+        const auto found = values_.find("antialias");
+        return found != values_.end() && found->is_boolean() && found->get<bool>();
+    }
+    bool has_sh() const { return values_.contains("shN") && !values_["shN"].is_null(); }
+
+    const json& part(const char* name) const {
+        const json& found = at(values_, name);
+        if (!found.is_object()) fail("\"" + std::string(name) + "\" is not an object");
+        return found;
+    }
+
+    /// The name of an image of a part.
+    std::string image(const char* part_name, size_t index) const {
+        const json& files = at(part(part_name), "files");
+        if (!files.is_array() || files.size() <= index || !files[index].is_string())
+            fail("\"files\" of \"" + std::string(part_name) + "\" does not name image " +
+                 std::to_string(index));
+        return files[index].get<std::string>();
+    }
+
+    double number(const json& list, size_t index, const std::string& what) const {
+        const json* value = list.is_array() && index < list.size() ? &list[index] : nullptr;
+        if (!value || !value->is_number() || !std::isfinite(value->get<double>()))
+            fail("\"" + what + "\" has no number at position " + std::to_string(index));
+        return value->get<double>();
+    }
+
+    /// mins or maxs of a channel of a part.
+    double bound(const char* part_name, const char* which, size_t channel) const {
+        return number(at(part(part_name), which), channel, std::string(part_name) + "." + which);
+    }
+
+    /// Version 2's table of a part.
+    SogTable codebook(const char* part_name) const {
+        const std::string what = std::string(part_name) + ".codebook";
+        const json& list = at(part(part_name), "codebook");
+        SogTable table;
+        if (!list.is_array() || list.empty() || list.size() > table.size())
+            fail("\"" + what + "\" is not a list of at most 256 numbers");
+        // No splat of a whole file refers to values after the last.
+        for (size_t i = 0; i < table.size(); ++i)
+            table[i] = float(number(list, std::min(i, list.size() - 1), what));
+        return table;
+    }
+
+    /// 256 steps from low to high, as in version 1.
+    static SogTable steps(double low, double high) {
+        SogTable table;
+        for (size_t i = 0; i < table.size(); ++i) table[i] = float(low + (high - low) * (double(i) / 255));
+        return table;
+    }
+
+    uint64_t integer(const json& value, const char* what, uint64_t most) const {
+        if (!value.is_number_unsigned() || value.get<uint64_t>() > most)
+            fail("\"" + std::string(what) + "\" is not a whole number of 0 to " + std::to_string(most));
+        return value.get<uint64_t>();
+    }
+
+    const json& at(const json& object, const char* key) const {
+        const auto found = object.is_object() ? object.find(key) : object.end();
+        if (!object.is_object() || found == object.end())
+            fail("has no \"" + std::string(key) + "\"; it is damaged, or not of a SOG");
+        return *found;
+    }
+
+    static constexpr uint64_t kMostSplats = kMostWebpSide * kMostWebpSide;
+
+  private:
+    json values_;
+    std::string name_;
+    uint64_t version_ = 0, count_ = 0;
+};
+
+class SogReader {
+  public:
+    SogReader(Meta meta, SogFiles& files) : meta_(std::move(meta)), files_(files) {}
+
+    SplatScene read() {
+        scene_.variant = "version " + std::to_string(meta_.version());
+        scene_.antialiased = meta_.antialiased();
+        Image centroids;
+        if (meta_.has_sh()) centroids = palette_image();
+        Gaussians& g = scene_.gaussians;
+        scene_.file_sh_degree = g.sh_degree;
+        // An image of no splats may have no pixels, which WebP lacks.
+        if (meta_.count() == 0) return std::move(scene_);
+        require_memory(meta_.name(), files_.bytes(meta_.values()), meta_.count(), g.sh_degree,
+                       kPackedExpansion);
+        g.resize(size_t(meta_.count()));
+        read_means();
+        read_rotations();
+        read_scales();
+        read_colors();
+        if (g.sh_degree > 0) read_sh(centroids);
+        return std::move(scene_);
+    }
+
+  private:
+    struct Image {
+        std::string bytes, name;  // encoded; for errors
+        WebpHead head;
+    };
+
+    Image open(const char* part, size_t index) {
+        const std::string file = meta_.image(part, index);
+        Image image{files_.read(file), meta_.name() + ": \"" + core::one_line(file) + "\"", {}};
+        image.head = webp_head(image.bytes, image.name);
+        if (!image.head.lossless)
+            scene_.remarks.push_back("the image " + file + " is not lossless, so its values are not exact");
+        return image;
+    }
+
+    static std::string size_text(const WebpHead& head) {
+        return std::to_string(head.width) + "×" + std::to_string(head.height);
+    }
+
+    /// The pixels of an image with one per splat. All such images have one size.
+    std::vector<uint8_t> pixels(const char* part, size_t index) {
+        const Image image = open(part, index);
+        const uint64_t count = meta_.count();
+        if (size_.pixels() == 0) {
+            constexpr uint64_t kSpare = 65536;
+            size_ = image.head;
+            if (size_.pixels() < count || size_.pixels() > 2 * count + kSpare)
+                throw InputError(image.name + " has " + size_text(size_) + " pixels, which does not fit " +
+                                 std::to_string(count) + " splats");
+        } else if (image.head.width != size_.width || image.head.height != size_.height) {
+            throw InputError(image.name + " has " + size_text(image.head) + " pixels; the other images have " +
+                             size_text(size_));
+        }
+        return decode_webp(image.bytes, image.name);
+    }
+
+    /// Opens the palette's image and sets the SH degree by its size.
+    Image palette_image() {
+        Image image = open("shN", 0);
+        int degree = 0;
+        for (int d = 1; d <= kMaxShDegree; ++d)
+            if (image.head.width == kPaletteRow * uint64_t(sh_coefficients(d) - 1)) degree = d;
+        const bool fits = degree > 0 && image.head.height <= kMostPalette / kPaletteRow;
+        if (!fits || (meta_.version() == 2 &&
+                      meta_.integer(meta_.at(meta_.part("shN"), "bands"), "bands", 3) != uint64_t(degree)))
+            throw InputError(image.name + " has " + size_text(image.head) +
+                             " pixels, which does not fit the palette of an SH degree");
+        palette_ = image.head.height * kPaletteRow;
+        if (meta_.version() == 2)
+            palette_ = std::min(palette_,
+                                meta_.integer(meta_.at(meta_.part("shN"), "count"), "count", kMostPalette));
+        scene_.gaussians.sh_degree = degree;
+        return image;
+    }
+
+    void read_means() {
+        Gaussians& g = scene_.gaussians;
+        // The low bytes wait in the means, so that one image is in memory at a time.
+        const auto each = [&](size_t image, const auto& set) {
+            const std::vector<uint8_t> rgba = pixels("means", image);
+            for (size_t i = 0; i < g.size(); ++i)
+                for (size_t k = 0; k < 3; ++k) set(g.means[3 * i + k], rgba[4 * i + k], k);
+        };
+        each(0, [](float& mean, uint8_t low, size_t) { mean = low; });
+        std::array<double, 3> from{}, range{};
+        for (size_t k = 0; k < 3; ++k) {
+            from[k] = meta_.bound("means", "mins", k);
+            range[k] = meta_.bound("means", "maxs", k) - from[k];
+        }
+        each(1, [&](float& mean, uint8_t high, size_t k) {
+            const double v = from[k] + range[k] * ((double(mean) + 256.0 * high) / 65535);
+            mean = float(std::copysign(std::expm1(std::abs(v)), v));
+        });
+    }
+
+    void read_rotations() {
+        const std::vector<uint8_t> rgba = pixels("quats", 0);
+        Gaussians& g = scene_.gaussians;
+        size_t unknown = 0;
+        for (size_t i = 0; i < g.size(); ++i) {
+            float* q = &g.quaternions[4 * i];
+            const uint8_t* pixel = &rgba[4 * i];
+            if (pixel[3] < kFirstRotation) {
+                q[0] = 1;
+                ++unknown;
+                continue;
+            }
+            const auto largest = size_t(pixel[3] - kFirstRotation);
+            double sum = 0;
+            for (size_t k = 0; k < 4; ++k) {
+                if (k == largest) continue;
+                const double c = (*pixel++ / 255.0 - 0.5) * std::numbers::sqrt2;
+                q[k] = float(c);
+                sum += c * c;
+            }
+            q[largest] = float(std::sqrt(std::max(0.0, 1 - sum)));
+        }
+        if (unknown > 0)
+            scene_.remarks.push_back(std::to_string(unknown) +
+                                     " rotations are of an unknown kind and are left out");
+    }
+
+    void read_scales() {
+        std::array<SogTable, 3> tables;
+        for (size_t k = 0; k < 3; ++k)
+            tables[k] = meta_.version() == 2
+                            ? meta_.codebook("scales")
+                            : Meta::steps(meta_.bound("scales", "mins", k), meta_.bound("scales", "maxs", k));
+        const std::vector<uint8_t> rgba = pixels("scales", 0);
+        Gaussians& g = scene_.gaussians;
+        for (size_t i = 0; i < g.size(); ++i)
+            for (size_t k = 0; k < 3; ++k) g.log_scales[3 * i + k] = tables[k][rgba[4 * i + k]];
+    }
+
+    void read_colors() {
+        std::array<SogTable, 4> tables;
+        for (size_t k = 0; k < 4; ++k) {
+            if (meta_.version() == 1)
+                tables[k] = Meta::steps(meta_.bound("sh0", "mins", k), meta_.bound("sh0", "maxs", k));
+            else if (k < 3)
+                tables[k] = meta_.codebook("sh0");
+            else
+                for (uint32_t level = 0; level < 256; ++level)
+                    tables[k][level] = float(logit_of_level(level, 255));
+        }
+        const std::vector<uint8_t> rgba = pixels("sh0", 0);
+        Gaussians& g = scene_.gaussians;
+        for (size_t i = 0; i < g.size(); ++i) {
+            for (size_t k = 0; k < 3; ++k) g.sh[g.sh_stride() * i + k] = tables[k][rgba[4 * i + k]];
+            g.opacity_logits[i] = tables[3][rgba[4 * i + 3]];
+        }
+    }
+
+    SogTable sh_table() const {
+        if (meta_.version() == 2) return meta_.codebook("shN");
+        const auto scalar = [&](const char* which) {
+            return meta_.number(json::array({meta_.at(meta_.part("shN"), which)}), 0,
+                                std::string("shN.") + which);
+        };
+        return Meta::steps(scalar("mins"), scalar("maxs"));
+    }
+
+    void read_sh(const Image& centroids) {
+        const SogTable table = sh_table();
+        const std::vector<uint8_t> palette = decode_webp(centroids.bytes, centroids.name);
+        const std::vector<uint8_t> labels = pixels("shN", 1);
+        Gaussians& g = scene_.gaussians;
+        const size_t coefficients = size_t(sh_coefficients(g.sh_degree)) - 1;
+        for (size_t i = 0; i < g.size(); ++i) {
+            const size_t label = labels[4 * i] + size_t(256) * labels[4 * i + 1];
+            if (label >= palette_)
+                meta_.fail("splat " + std::to_string(i) + " refers to row " + std::to_string(label) +
+                           " of the palette \"shN\", which has " + std::to_string(palette_));
+            const uint8_t* row = &palette[4 * coefficients * label];
+            float* sh = &g.sh[g.sh_stride() * i + 3];
+            for (size_t k = 0; k < coefficients; ++k)
+                for (size_t channel = 0; channel < 3; ++channel)
+                    sh[3 * k + channel] = table[row[4 * k + channel]];
+        }
+    }
+
+    const Meta meta_;
+    SogFiles& files_;
+    SplatScene scene_;
+    WebpHead size_;         // of the images with a pixel per splat
+    uint64_t palette_ = 0;  // its rows
+};
+
+}  // namespace
+
+SplatScene read_sog(const std::filesystem::path& path) {
+    ArchivedFiles files(path);
+    const std::string name = core::one_line(path.string()) + ": \"" + kSogMeta + "\"";
+    SplatScene scene = SogReader(Meta(core::parse_json<json>(files.meta(), name, kMetaLimits), name), files).read();
+    scene.format = SplatFormat::sog;
+    return scene;
+}
+
+SplatScene read_sog_meta(const std::filesystem::path& path) {
+    FolderFiles files(path);
+    const std::string name = core::one_line(path.string());
+    SplatScene scene = SogReader(Meta(core::read_json_file<json>(path, kMetaLimits), name), files).read();
+    scene.format = SplatFormat::sog_meta;
+    scene.variant += ", unpacked";
+    return scene;
+}
+
+bool is_sog_meta(const std::filesystem::path& path) try {
+    if (core::FileReader(path).size() > kMetaLimits.bytes) return false;
+    const json values = core::read_json_file<json>(path, kMetaLimits);
+    return values.is_object() && values.contains("means") && values.contains("quats");
+} catch (const InputError&) {
+    return false;
+}
+
+std::vector<std::filesystem::path> sog_images(const std::filesystem::path& meta) try {
+    std::vector<std::filesystem::path> images;
+    if (!core::is_file(meta)) return images;
+    const FolderFiles folder(meta);
+    const json values = core::read_json_file<json>(meta, kMetaLimits);
+    for (const std::string& name : image_names_in(values)) images.push_back(folder.path_of(name));
+    return images;
+} catch (const InputError&) {
+    return {};
+}
+
+}  // namespace ewa::io
