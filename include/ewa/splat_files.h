@@ -13,9 +13,12 @@ namespace ewa {
 /// The name in messages, e.g. "SPZ".
 std::string_view name_of(SplatFormat format);
 
-/// The format of an extension, in upper or lower case: .ply .compressed.ply .splat .spz .glb .gltf .sog,
-/// or of the name meta.json. Throws InputError for any other.
+/// The format of an extension, in upper or lower case: .ply .compressed.ply .splat .ksplat .spz .glb .gltf
+/// .sog, or of the name meta.json. Throws InputError for any other.
 SplatFormat format_of_name(const std::filesystem::path& path);
+
+/// The same for a file to write. Throws InputError also for .ksplat, which ewa only reads.
+SplatFormat format_to_write(const std::filesystem::path& path);
 
 /// The format of a file by its first bytes, or by its extension where these do not tell, as for .splat.
 /// Throws InputError.

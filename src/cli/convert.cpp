@@ -147,7 +147,7 @@ Json output_json(const ConvertArguments& arguments, const Gaussians& gaussians) 
 
 int run(const ConvertArguments& arguments) {
     const fs::path& out = arguments.files.back();
-    const SplatFormat format = format_of_name(out);
+    const SplatFormat format = format_to_write(out);
     // Report wrong use before the inputs are read: they may be large.
     Edits edits = arguments.edits;
     edits.transform = parse_transform(arguments.transform);
@@ -217,7 +217,8 @@ Action add_convert(CLI::App& app) {
     const auto arguments = std::make_shared<ConvertArguments>();
     app.add_option("FILES", arguments->files,
                    "One or more inputs, which are joined, then the output. Formats: .ply .compressed.ply "
-                   ".splat .spz .sog meta.json .glb .gltf. An input may be the folder of a training run")
+                   ".splat .spz .sog meta.json .glb .gltf, and inputs also .ksplat. An input may be the "
+                   "folder of a training run")
         ->required()
         ->expected(2, -1)
         ->type_name("IN... OUT");

@@ -308,10 +308,11 @@ Action add_info(CLI::App& app) {
         bool json = false;
     };
     const auto arguments = std::make_shared<Arguments>();
-    app.add_option("PATH", arguments->path,
-                   "Splat file (.ply .compressed.ply .splat .spz .sog meta.json .glb .gltf), COLMAP folder, "
-                   "transforms.json, "
-                   "glTF file of meshes, or folder of a training run")
+    app.add_option(
+           "PATH", arguments->path,
+           "Splat file (.ply .compressed.ply .splat .ksplat .spz .sog meta.json .glb .gltf), COLMAP folder, "
+           "transforms.json, "
+           "glTF file of meshes, or folder of a training run")
         ->required();
     add_test_every_option(app, arguments->test_every);
     app.add_flag("--json", arguments->json, "Print JSON");

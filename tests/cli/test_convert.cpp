@@ -123,6 +123,7 @@ TEST(Convert, WrongUse) {
     expect_failure(run_ewa({"convert", folder / "s.ply", folder / "o.obj"}), 2, "supported: .ply");
     expect_failure(run_ewa({"convert", folder / "none.ply", folder / "o.ply"}), 2, "none.ply");
     // Before the inputs are read.
+    expect_failure(run_ewa({"convert", folder / "none.ply", folder / "o.ksplat"}), 2, "does not write it");
     expect_failure(run_ewa({"convert", folder / "none.ply", folder / "o.ply", "--crop", "1,2"}), 2, "--crop");
     expect_failure(run_ewa({"convert", folder / "none.ply", folder / "s.ply/o.ply"}), 1, "s.ply");
     expect_failure(

@@ -68,7 +68,8 @@ std::string zipped(const std::vector<Entry>& entries) {
             packed.resize(stream.total_out);
             deflateEnd(&stream);
         }
-        const auto sum = uint32_t(crc32_z(0, reinterpret_cast<const Bytef*>(e.content.data()), e.content.size()));
+        const auto sum =
+            uint32_t(crc32_z(0, reinterpret_cast<const Bytef*>(e.content.data()), e.content.size()));
         const std::string shared = bytes_of(uint16_t(20)) + bytes_of(e.flags) + bytes_of(e.method) +
                                    bytes_of(uint32_t(0)) + bytes_of(sum + e.sum) +
                                    bytes_of(uint32_t(packed.size())) +
@@ -107,7 +108,10 @@ Files two_splats() {
         {"quats", {{"files", {"quats.webp"}}}},
         {"sh0", {{"codebook", table({0.5, -0.5, 1.25})}, {"files", {"sh0.webp"}}}},
         {"shN",
-         {{"count", 2}, {"bands", 1}, {"codebook", table({0, 0.1, 0.2})}, {"files", {"c.webp", "labels.webp"}}}}};
+         {{"count", 2},
+          {"bands", 1},
+          {"codebook", table({0, 0.1, 0.2})},
+          {"files", {"c.webp", "labels.webp"}}}}};
     std::vector<uint8_t> palette(size_t(4 * 64 * 3), 255);
     for (int k = 0; k < 3; ++k) {
         // Row 0: red 0.1 in each coefficient. Row 1: blue 0.2 in coefficient k = 2.
@@ -145,8 +149,8 @@ void expect_two_splats(const SplatScene& scene) {
     EXPECT_NEAR(g.opacity_logits[0], std::log(0.2 / 0.8), 1e-5);
     EXPECT_GT(g.opacity_logits[1], 6);
     const float red = 0.1f, blue = 0.2f;
-    EXPECT_EQ(g.sh, (std::vector<float>{0.5f, -0.5f, 1.25f, red,   0, 0, red, 0, 0, red, 0, 0,
-                                        1.25f, 1.25f, 1.25f, 0, 0, 0, 0, 0, 0, 0, 0, blue}));
+    EXPECT_EQ(g.sh, (std::vector<float>{0.5f,  -0.5f, 1.25f, red, 0, 0, red, 0, 0, red, 0, 0,
+                                        1.25f, 1.25f, 1.25f, 0,   0, 0, 0,   0, 0, 0,   0, blue}));
 }
 
 TEST(Sog, PixelsAsLaidOut) {
@@ -240,7 +244,8 @@ TEST(Sog, EachValueIsTheNearestThatTheFormatHas) {
             const double low = meta["means"]["mins"][i % 3], high = meta["means"]["maxs"][i % 3];
             const double step = (high - low) / 65535, v = std::abs(double(g.means[i]));
             // A step of the logarithm at the outer end of the half step, and float32's rounding.
-            EXPECT_LE(std::abs(back.means[i] - g.means[i]), (1 + v) * std::expm1(step * 0.5001) + 2e-7 * v) << i;
+            EXPECT_LE(std::abs(back.means[i] - g.means[i]), (1 + v) * std::expm1(step * 0.5001) + 2e-7 * v)
+                << i;
         }
         const auto near = [](const json& codebook, float stored, float value) {
             return std::abs(double(stored) - double(value)) <= distance(codebook, value) + 1e-6;
@@ -287,8 +292,7 @@ TEST(Sog, LargeAndEmptyScenes) {
     // More splats than a palette has rows, in 500 groups of one colour each.
     Gaussians g = test::storable_splats(5, 70000, 1);
     const Gaussians groups = test::storable_splats(6, 500, 1);
-    for (size_t i = 0; i < g.size(); ++i)
-        std::copy_n(&groups.sh[12 * (i % 500) + 3], 9, &g.sh[12 * i + 3]);
+    for (size_t i = 0; i < g.size(); ++i) std::copy_n(&groups.sh[12 * (i % 500) + 3], 9, &g.sh[12 * i + 3]);
     const std::vector<std::string> remarks = save_splats(folder / "a.sog", g, SaveOptions{});
     EXPECT_NE(remarks.back().find("sets of them stand for"), std::string::npos) << remarks.back();
     EXPECT_LE(test::largest_differences(in_order(g), load_splats(folder / "a.sog")).sh, 1.8 / 256);
@@ -325,17 +329,20 @@ TEST(Sog, RefusesWithTheReason) {
     refuse(changed([](json& meta) { meta["sh0"]["codebook"] = json::array(); }), {"\"sh0.codebook\""});
     refuse(changed([](json& meta) { meta["sh0"]["files"] = "a"; }), {"\"files\" of \"sh0\""});
     refuse(changed([](json& meta) { meta["shN"]["bands"] = 2; }), {"c.webp", "192×1"});
-    refuse(changed([](json& meta) { meta["shN"]["count"] = 1; }), {"splat 1", "row 1", "\"shN\", which has 1"});
-    refuse(changed([](json& meta) { meta["sh0"]["files"][0] = "../sh0.webp"; }), {"\"../sh0.webp\" is not in"});
+    refuse(changed([](json& meta) { meta["shN"]["count"] = 1; }),
+           {"splat 1", "row 1", "\"shN\", which has 1"});
+    refuse(changed([](json& meta) { meta["sh0"]["files"][0] = "../sh0.webp"; }),
+           {"\"../sh0.webp\" is not in"});
     refuse(with("sh0.webp", "no image"), {"\"sh0.webp\": not a WebP"});
     refuse(with("sh0.webp", webp(2, 2, std::vector<uint8_t>(16, 255))), {"sh0.webp", "2×2", "4×1"});
     refuse(with("sh0.webp", two_splats()["sh0.webp"].substr(0, 40)), {"sh0.webp", "damaged or truncated"});
-    EXPECT_EQ(read_splats(folder.write("a.sog", zipped(with("sh0.webp", webp(4, 1, std::vector<uint8_t>(16, 255),
-                                                                               false)))))
-                  .remarks.size(),
-              1u);
-    const SplatScene turned = read_splats(folder.write(
-        "a.sog", zipped(with("quats.webp", two_pixels({1, 2, 3, 251}, {128, 128, 128, 255})))));
+    EXPECT_EQ(
+        read_splats(
+            folder.write("a.sog", zipped(with("sh0.webp", webp(4, 1, std::vector<uint8_t>(16, 255), false)))))
+            .remarks.size(),
+        1u);
+    const SplatScene turned = read_splats(
+        folder.write("a.sog", zipped(with("quats.webp", two_pixels({1, 2, 3, 251}, {128, 128, 128, 255})))));
     ASSERT_EQ(turned.remarks.size(), 1u);
     EXPECT_NE(turned.remarks[0].find("1 rotations"), std::string::npos);
     EXPECT_EQ(turned.gaussians.quaternions[0], 1);
@@ -359,7 +366,8 @@ TEST(Sog, RefusesHostileArchives) {
     // Zeros that pack a thousand times.
     refuse({.name = "sh0.webp", .content = image + std::string(100 << 20, '\0'), .method = 8},
            {"\"sh0.webp\" claims to unpack"});
-    refuse({.name = "meta.json", .content = meta + std::string(2 << 20, ' ')}, {"\"meta.json\" claims to unpack"});
+    refuse({.name = "meta.json", .content = meta + std::string(2 << 20, ' ')},
+           {"\"meta.json\" claims to unpack"});
     // An image of a gigabyte in a few hundred bytes.
     refuse({.name = "l.webp", .content = webp(16000, 2000, std::vector<uint8_t>(128000000, 255))},
            {"l.webp", "16000×2000", "2 splats"});
@@ -376,10 +384,12 @@ TEST(Sog, NamesStayInTheFolder) {
         return folder / "in/meta.json";
     };
     const std::filesystem::path outside = folder.write("outside.webp", two_splats()["sh0.webp"]);
-    for (const std::string& name : {std::string("../outside.webp"), outside.string(), std::string(".."), std::string(), std::string("a/../../b")})
+    for (const std::string& name : {std::string("../outside.webp"), outside.string(), std::string(".."),
+                                    std::string(), std::string("a/../../b")})
         expect_error<InputError>([&] { load_splats(unpack(name)); }, {"meta.json", "is not in its folder"});
     std::filesystem::create_symlink(folder / "outside.webp", folder / "in/link.webp");
-    expect_error<InputError>([&] { load_splats(unpack("link.webp")); }, {"\"link.webp\"", "is not in its folder"});
+    expect_error<InputError>([&] { load_splats(unpack("link.webp")); },
+                             {"\"link.webp\"", "is not in its folder"});
     expect_error<InputError>([&] { load_splats(unpack("none.webp")); }, {"none.webp", "cannot be read"});
     EXPECT_EQ(load_splats(unpack("./sh0.webp")).size(), 2u);
 }
@@ -388,7 +398,8 @@ TEST(Sog, LeavesImagesOfOthersAlone) {
     TempFolder folder;
     const Gaussians g = test::storable_splats(1, 40, 0);
     folder.write("quats.webp", "somebody's");
-    expect_error<InputError>([&] { save_splats(folder / "meta.json", g); }, {"quats.webp", "would be replaced"});
+    expect_error<InputError>([&] { save_splats(folder / "meta.json", g); },
+                             {"quats.webp", "would be replaced"});
     folder.write("meta.json", "{}");
     expect_error<InputError>([&] { save_splats(folder / "meta.json", g); }, {"quats.webp"});
     EXPECT_EQ(test::file_bytes(folder / "quats.webp"), "somebody's");
@@ -425,7 +436,8 @@ TEST(Clusters, APaletteIsNear) {
     constexpr size_t kCount = 20000, kStride = 11, kDimensions = 9;
     std::vector<float> values(kCount * kStride);
     for (float& v : values) v = float(random.uniform(-1, 1));
-    for (size_t i = 0; i < kCount; i += 2) std::fill_n(&values[i * kStride], kDimensions, 0.5f);  // half are equal
+    for (size_t i = 0; i < kCount; i += 2)
+        std::fill_n(&values[i * kStride], kDimensions, 0.5f);  // half are equal
     const io::VectorTable table{values.data(), kCount, kStride, kDimensions};
     const io::Palette palette = io::make_palette(table, 1024);
     const size_t rows = palette.rows.size() / kDimensions;

@@ -157,8 +157,8 @@ void ArchiveWriter::add(const std::string& entry, const std::string& bytes) {
     zip_fileinfo info{};
     info.dosDate = 1 << 21 | 1 << 16;  // the first day that the format knows
     const bool large = bytes.size() > 0xffffffff;
-    require_added(zipOpenNewFileInZip64(state_->zip, entry.c_str(), &info, nullptr, 0, nullptr, 0, nullptr, kStored,
-                                  0, large));
+    require_added(zipOpenNewFileInZip64(state_->zip, entry.c_str(), &info, nullptr, 0, nullptr, 0, nullptr,
+                                        kStored, 0, large));
     constexpr size_t kPiece = size_t(1) << 30;  // minizip counts in 32 bits
     for (size_t at = 0; at < bytes.size(); at += kPiece)
         require_added(

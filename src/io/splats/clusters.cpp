@@ -56,8 +56,9 @@ class Cells {
         for (size_t k = 0; k < kCodes; ++k) {
             const double middle = k + 1 < kCodes ? (double(codes[k]) + codes[k + 1]) / 2 : INFINITY;
             const size_t begin = ends[k];
-            const size_t end = size_t(
-                std::upper_bound(values_.begin() + std::ptrdiff_t(begin), values_.end(), middle) - values_.begin());
+            const size_t end =
+                size_t(std::upper_bound(values_.begin() + std::ptrdiff_t(begin), values_.end(), middle) -
+                       values_.begin());
             ends[k + 1] = end;
             if (end == begin) {
                 unused.push_back(k);
@@ -166,10 +167,11 @@ void assign(const VectorTable& vectors, std::span<const uint32_t> members, Clust
     std::vector<float> scores(members.size());
     Centroids(clusters.rows, vectors.dimensions)
         .nearest_to(
-            members.size(), [&](size_t m) { return vectors[members[m]]; }, clusters.labels.data(), scores.data());
+            members.size(), [&](size_t m) { return vectors[members[m]]; }, clusters.labels.data(),
+            scores.data());
     for (size_t m = 0; m < members.size(); ++m)
-        clusters.errors[m] = std::max(
-            0.0, squared_length(vectors[members[m]], vectors.dimensions) + 2 * double(scores[m]));
+        clusters.errors[m] =
+            std::max(0.0, squared_length(vectors[members[m]], vectors.dimensions) + 2 * double(scores[m]));
 }
 
 /// Rows become the means of their members. A row without members becomes one of the worst members.
@@ -187,12 +189,11 @@ void update(const VectorTable& vectors, std::span<const uint32_t> members, Clust
     std::vector<uint32_t> worst(empty > 0 ? members.size() : 0);
     std::iota(worst.begin(), worst.end(), 0u);
     if (empty > 0)
-        std::partial_sort(worst.begin(), worst.begin() + std::ptrdiff_t(empty), worst.end(),
-                          [&](uint32_t a, uint32_t b) {
-                              return clusters.errors[a] != clusters.errors[b]
-                                         ? clusters.errors[a] > clusters.errors[b]
-                                         : a < b;
-                          });
+        std::partial_sort(
+            worst.begin(), worst.begin() + std::ptrdiff_t(empty), worst.end(), [&](uint32_t a, uint32_t b) {
+                return clusters.errors[a] != clusters.errors[b] ? clusters.errors[a] > clusters.errors[b]
+                                                                : a < b;
+            });
     size_t next = 0;
     for (size_t c = 0; c < k; ++c) {
         float* row = &clusters.rows[c * dimensions];
@@ -239,7 +240,8 @@ void on_all_cores(size_t count, const Work& work) {
 }
 
 /// How many rows each group gets: one, and the others by the groups' errors, but no more than it has members.
-std::vector<size_t> shares_of(size_t rows, const std::vector<double>& errors, const std::vector<size_t>& sizes) {
+std::vector<size_t> shares_of(size_t rows, const std::vector<double>& errors,
+                              const std::vector<size_t>& sizes) {
     std::vector<size_t> shares(sizes.size());
     for (size_t g = 0; g < sizes.size(); ++g) shares[g] = std::min<size_t>(1, sizes[g]);
     size_t left = rows - std::accumulate(shares.begin(), shares.end(), size_t(0));

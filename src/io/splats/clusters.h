@@ -24,7 +24,7 @@ struct VectorTable {
 };
 
 struct Palette {
-    std::vector<float> rows;      // one vector after another
+    std::vector<float> rows;       // one vector after another
     std::vector<uint32_t> labels;  // the row of each vector
 };
 

@@ -46,6 +46,10 @@ SplatScene read_splat(const std::filesystem::path& path);
 std::vector<std::string> write_splat(const std::filesystem::path& path, const Gaussians& gaussians,
                                      const SaveOptions& options);
 
+/// The format of GaussianSplats3D (mkkellogg), version 0.1, compression levels 0 to 2. Sections may differ in SH
+/// degree; missing coefficients are 0.
+SplatScene read_ksplat(const std::filesystem::path& path);
+
 /// SPZ (nianticlabs/spz), versions 1 to 4. SH degree 4 is cut to degree 3, and extension records are skipped.
 SplatScene read_spz(const std::filesystem::path& path);
 

@@ -90,7 +90,8 @@ class Meta {
         const bool versioned = values_.contains("version");
         version_ = versioned ? integer(values_["version"], "version", 1 << 30) : 1;
         if (version_ != 1 && version_ != 2)
-            fail("SOG version " + std::to_string(version_) + " in \"version\" is unknown; 1 and 2 are supported");
+            fail("SOG version " + std::to_string(version_) +
+                 " in \"version\" is unknown; 1 and 2 are supported");
         if (version_ == 2) {
             count_ = integer(at(values_, "count"), "count", kMostSplats);
         } else {
@@ -234,8 +235,8 @@ class SogReader {
                 throw InputError(image.name + " has " + size_text(size_) + " pixels, which does not fit " +
                                  std::to_string(count) + " splats");
         } else if (image.head.width != size_.width || image.head.height != size_.height) {
-            throw InputError(image.name + " has " + size_text(image.head) + " pixels; the other images have " +
-                             size_text(size_));
+            throw InputError(image.name + " has " + size_text(image.head) +
+                             " pixels; the other images have " + size_text(size_));
         }
         return decode_webp(image.bytes, image.name);
     }
@@ -377,7 +378,8 @@ class SogReader {
 SplatScene read_sog(const std::filesystem::path& path) {
     ArchivedFiles files(path);
     const std::string name = core::one_line(path.string()) + ": \"" + kSogMeta + "\"";
-    SplatScene scene = SogReader(Meta(core::parse_json<json>(files.meta(), name, kMetaLimits), name), files).read();
+    SplatScene scene =
+        SogReader(Meta(core::parse_json<json>(files.meta(), name, kMetaLimits), name), files).read();
     scene.format = SplatFormat::sog;
     return scene;
 }

@@ -146,13 +146,14 @@ class SogPacker {
 
     void add_sh() {
         const size_t coefficients = size_t(sh_coefficients(g_.sh_degree)) - 1;
-        const Palette palette = make_palette(
-            {g_.sh.data() + 3, g_.size(), g_.sh_stride(), 3 * coefficients}, size_t(kMostPalette));
+        const Palette palette = make_palette({g_.sh.data() + 3, g_.size(), g_.sh_stride(), 3 * coefficients},
+                                             size_t(kMostPalette));
         palette_ = palette.rows.size() / (3 * coefficients);
         meta_["shN"] = {{"count", palette_}, {"bands", g_.sh_degree}};
         const SogTable table = add_codebook("shN", palette.rows);
 
-        const uint64_t width = kPaletteRow * coefficients, height = (palette_ + kPaletteRow - 1) / kPaletteRow;
+        const uint64_t width = kPaletteRow * coefficients,
+                       height = (palette_ + kPaletteRow - 1) / kPaletteRow;
         std::vector<uint8_t> rgba(size_t(4 * width * height), 255);
         for (size_t at = 0; at < palette.rows.size(); ++at)
             rgba[at / 3 * 4 + at % 3] = nearest(table, palette.rows[at]);
@@ -173,10 +174,10 @@ class SogPacker {
 };
 
 std::vector<std::string> remarks_of(const Gaussians& gaussians, uint64_t palette) {
-    std::vector<std::string> remarks = {
-        "the splats are in Morton order",
-        "positions have 16 bits of their logarithm; scales and colours are one of 256 values each, opacities and "
-        "rotations have 8 bits per component"};
+    std::vector<std::string> remarks = {"the splats are in Morton order",
+                                        "positions have 16 bits of their logarithm; scales and colours are "
+                                        "one of 256 values each, opacities and "
+                                        "rotations have 8 bits per component"};
     if (gaussians.sh_degree == 0 || gaussians.size() == 0) return remarks;
     remarks.push_back("SH coefficients of degree 1 and more are one of 256 values each");
     if (palette < gaussians.size())
@@ -200,7 +201,8 @@ std::vector<Paths> image_names(const std::filesystem::path& meta) {
 SogPacker packer_for(const std::filesystem::path& path, const Gaussians& gaussians, const SaveOptions& options) {
     SogPacker packer(gaussians, options);
     if (!packer.fits())
-        throw InputError(path.string() + ": SOG holds about 268 million splats, as many as a WebP image has pixels");
+        throw InputError(path.string() +
+                         ": SOG holds about 268 million splats, as many as a WebP image has pixels");
     return packer;
 }
 

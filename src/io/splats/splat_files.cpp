@@ -24,6 +24,7 @@ struct Kind {
     std::string_view extension, name;
     std::array<std::string_view, 2> beginnings;  // of a file; none where the first bytes do not tell
     SplatScene (*read)(const std::filesystem::path&);
+    /// Null where ewa only reads the format.
     std::vector<std::string> (*write)(const std::filesystem::path&, const Gaussians&, const SaveOptions&);
 };
 /// An extension that is the end of another one comes after it. One without a dot is a whole name.
@@ -40,7 +41,8 @@ constexpr Kind kKinds[] = {
     {SplatFormat::glb, ".glb", "GLB", {"glTF"}, io::read_gltf_splats, io::write_gltf_splats},
     {SplatFormat::gltf, ".gltf", "glTF", {"{"}, io::read_gltf_splats, io::write_gltf_splats},
     {SplatFormat::sog, ".sog", "SOG", {"PK\x03\x04"}, io::read_sog, io::write_sog},
-    {SplatFormat::sog_meta, "meta.json", "SOG", {}, io::read_sog_meta, io::write_sog_meta}};
+    {SplatFormat::sog_meta, "meta.json", "SOG", {}, io::read_sog_meta, io::write_sog_meta},
+    {SplatFormat::ksplat, ".ksplat", "ksplat", {std::string_view("\0\1\0\0", 4)}, io::read_ksplat, nullptr}};
 
 const Kind& kind_of(SplatFormat format) {
     return *std::ranges::find(kKinds, format, &Kind::format);
@@ -57,7 +59,7 @@ const Kind* kind_of_name(const std::filesystem::path& path) {
 [[noreturn]] void refuse(const std::filesystem::path& path) {
     throw InputError(core::one_line(path.string() +
                                     ": not a supported kind of splat file; supported: .ply, .compressed.ply, "
-                                    ".splat, .spz, .sog, meta.json of a SOG, .glb, .gltf"));
+                                    ".splat, .ksplat, .spz, .sog, meta.json of a SOG, .glb, .gltf"));
 }
 
 /// The kind that the first bytes identify, or null.
@@ -121,6 +123,15 @@ SplatFormat format_of_name(const std::filesystem::path& path) {
     return kind->format;
 }
 
+SplatFormat format_to_write(const std::filesystem::path& path) {
+    const SplatFormat format = format_of_name(path);
+    if (!kind_of(format).write)
+        throw InputError(core::one_line(path.string() +
+                                        ": ewa reads this format and does not write it; write .ply, "
+                                        ".spz or .sog instead"));
+    return format;
+}
+
 SplatFormat format_of_file(const std::filesystem::path& path) {
     const Kind* kind = kind_of_name(path);
     std::error_code error;
@@ -155,7 +166,7 @@ Gaussians load_splats(const std::filesystem::path& path) {
 
 std::vector<std::string> save_splats(const std::filesystem::path& path, const Gaussians& gaussians,
                                      const SaveOptions& options) {
-    const SplatFormat format = format_of_name(path);
+    const SplatFormat format = format_to_write(path);
     std::vector<std::string> remarks, more;
     const bool ply = format == SplatFormat::ply;
     if (!ply && gaussians.origin != glm::dvec3(0)) {
