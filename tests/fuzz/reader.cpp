@@ -33,6 +33,30 @@ using namespace ewa;
     return out;
 }
 
+#ifdef EWA_SUM_ARCHIVE
+/// The same for a zip archive's stored entries, as far as its directory leads to them.
+std::string with_entry_checksums(const uint8_t* data, size_t size) {
+    constexpr size_t kLocalHeader = 30, kDirectoryHeader = 46;
+    std::string bytes(reinterpret_cast<const char*>(data), size);
+    const auto word = [&](size_t at, size_t length) {
+        uint32_t value = 0;
+        std::memcpy(&value, &bytes[at], length);
+        return size_t(value);
+    };
+    for (size_t at = bytes.find("PK\1\2"); at != std::string::npos && at + kDirectoryHeader <= size;
+         at = bytes.find("PK\1\2", at + 4)) {
+        const size_t local = word(at + 42, 4), length = word(at + 20, 4);
+        if (word(at + 10, 2) != 0 || local > size || size - local < kLocalHeader) continue;
+        const size_t begin = local + kLocalHeader + word(local + 26, 2) + word(local + 28, 2);
+        if (begin > size || length > size - begin) continue;
+        const auto sum = uint32_t(crc32_z(0, reinterpret_cast<const Bytef*>(&bytes[begin]), length));
+        std::memcpy(&bytes[at + 16], &sum, sizeof(sum));
+        std::memcpy(&bytes[local + 14], &sum, sizeof(sum));
+    }
+    return bytes;
+}
+#endif
+
 #ifdef EWA_SUM_CHECKPOINT
 /// The same for a checkpoint's sections: each with its checksum.
 std::string with_checksums(const uint8_t* data, size_t size) {
@@ -128,6 +152,9 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
 #endif
 #ifdef EWA_SUM_CHECKPOINT
     bytes = with_checksums(data, size);
+#endif
+#ifdef EWA_SUM_ARCHIVE
+    bytes = with_entry_checksums(data, size);
 #endif
     if (!bytes.empty()) {
         data = reinterpret_cast<const uint8_t*>(bytes.data());

@@ -390,7 +390,8 @@ TEST(Sog, NamesStayInTheFolder) {
     std::filesystem::create_symlink(folder / "outside.webp", folder / "in/link.webp");
     expect_error<InputError>([&] { load_splats(unpack("link.webp")); },
                              {"\"link.webp\"", "is not in its folder"});
-    expect_error<InputError>([&] { load_splats(unpack("none.webp")); }, {"none.webp", "cannot be read"});
+    expect_error<InputError>([&] { load_splats(unpack("none.webp")); },
+                             {"meta.json", "\"none.webp\" is missing"});
     EXPECT_EQ(load_splats(unpack("./sh0.webp")).size(), 2u);
 }
 

@@ -250,7 +250,7 @@ std::vector<size_t> shares_of(size_t rows, const std::vector<double>& errors,
     for (int round = 0; round < kRounds && left > 0; ++round) {
         double total = 0;
         for (size_t g = 0; g < sizes.size(); ++g) total += shares[g] < sizes[g] ? errors[g] : 0;
-        if (!(total > 0)) break;
+        if (!(total > 0) || !std::isfinite(total)) break;  // not finite: values beyond 1e19
         const auto budget = double(left);
         for (size_t g = 0; g < sizes.size(); ++g) {
             const size_t more = std::min({size_t(budget * errors[g] / total), sizes[g] - shares[g], left});

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "core/file_reader.h"
+#include "core/folders.h"
 #include "core/json.h"
 #include "core/sandboxed_path.h"
 #include "core/text.h"
@@ -74,6 +75,8 @@ class FolderFiles final : public SogFiles {
         if (!inside || !core::links_stay_inside(folder, *inside))
             throw InputError(name_ + ": names the image \"" + core::one_line(name) +
                              "\", which is not in its folder");
+        if (!core::is_file(folder / *inside))
+            throw InputError(name_ + ": the image \"" + core::one_line(name) + "\" is missing beside it");
         return folder / *inside;
     }
 
