@@ -84,7 +84,7 @@ class Cells {
     std::vector<double> sums_, squares_;  // of all values before each
 };
 
-constexpr size_t kLanes = 8, kMostDimensions = 48;
+constexpr size_t kLanes = 8;
 
 /// Centroids in blocks, so that points are compared with several centroids at once.
 class Centroids {
@@ -326,7 +326,7 @@ uint8_t nearest(const std::array<float, 256>& codebook, float value) {
 }
 
 Palette make_palette(const VectorTable& vectors, size_t most) {
-    assert(most > 0 && vectors.dimensions <= kMostDimensions);
+    assert(most > 0);
     Palette palette;
     palette.labels.resize(vectors.count);
     if (vectors.count <= most) {

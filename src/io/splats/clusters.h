@@ -19,7 +19,7 @@ uint8_t nearest(const std::array<float, 256>& codebook, float value);
 /// VectorTable in memory: vector i is the `dimensions` values from data + i * stride.
 struct VectorTable {
     const float* data = nullptr;
-    size_t count = 0, stride = 0, dimensions = 0;  // at most 48 dimensions
+    size_t count = 0, stride = 0, dimensions = 0;
     const float* operator[](size_t i) const { return data + i * stride; }
 };
 
