@@ -22,6 +22,7 @@
 #include <optional>
 
 #include "core/atomic_file.h"
+#include "core/folders.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
