@@ -40,9 +40,9 @@ listed { sub(/^ +/, ""); command_about[last] = command_about[last] " " $0; next 
     names = 1
     while (part[names] ~ /,$/) names++
     for (i = 1; i <= names; i++) { option[i] = part[i]; sub(/,$/, "", option[i]) }
-    takes_value = count > names && part[names + 1] !~ /^(Excludes|Needs):/
-    values = ""
-    if (match(line, /\{[^}]*\}/)) { values = substr(line, RSTART + 1, RLENGTH - 2); gsub(/,/, " ", values) }
+    takes_value = count > names
+    values = takes_value && part[names + 1] ~ /^[a-z]+(\|[a-z]+)+$/ ? part[names + 1] : ""
+    gsub(/\|/, " ", values)
     next
 }
 names && /^ / { sub(/^ +/, ""); about = about (about == "" ? "" : " ") $0 }
