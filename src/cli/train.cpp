@@ -31,7 +31,7 @@ struct TrainArguments {
     RunOptions run;
     TrainOutput output;
     fs::path config;
-    bool antialias = false, accuracy = false;
+    bool antialias = false, accuracy = false, check_only = false;
     std::string quality;  // empty: not given
 };
 
@@ -141,6 +141,10 @@ int run(CLI::App& app, TrainArguments& arguments) {
     Footprint& kernel = options.train.render.kernel;
     kernel = settled_kernel(kernel, arguments.antialias);
     check_options(options);  // before the images of a mesh scene are rendered
+    if (arguments.check_only) {
+        train::check_free(output_folder(options), options);
+        return 0;
+    }
     render_scene(arguments);
     place_photos(arguments);
     if (arguments.accuracy) options.report_section = accuracy_section;
@@ -188,6 +192,8 @@ Action add_train(CLI::App& app, const std::string& command_line) {
                    "precedence")
         ->type_name("FILE");
     add_device_options(app, options.device);
+    // For ewa-view, which reports wrong options before its window opens.
+    app.add_flag("--check-options", arguments->check_only)->group("");
     const auto quiet = app.add_flag("--quiet", arguments->output.quiet, "Print only errors");
     app.add_flag("--verbose", arguments->output.verbose, "Print the plan: what this scene does not need")
         ->excludes(quiet);

@@ -15,20 +15,25 @@ namespace {
 constexpr double kHintSeconds = 15, kNoteSeconds = 10;
 constexpr double kPollSeconds = 0.05;  // while a better frame, a file or a screenshot is on its way
 
-/// The size of the window if none is asked for: that of the camera, scaled down to fit the desktop and up to
-/// the size that the panel needs. A screenshot keeps the camera's size, which is the size of its file.
-Size window_size(const Startup& startup, const WindowSystem& system) {
+/// The size of the new window. A screenshot keeps the camera's size, which is the size of its file.
+Size initial_size(const Startup& startup, const WindowSystem& system) {
     if (startup.size) return *startup.size;
-    const Size size = camera_size_or_usual(startup);
-    if (startup.picture) return size;
+    const Size picture = camera_size_or_usual(startup);
+    if (startup.picture || startup.film) return picture;
     const Size desktop = system.work_area();
-    if (desktop.width <= 0 || desktop.height <= 0) return size;
-    const double grow = std::max(
-        1.0, std::min(double(kUsualSize.width) / size.width, double(kUsualSize.height) / size.height));
-    const double scale =
-        std::min({grow, double(desktop.width) / size.width, double(desktop.height) / size.height});
-    return {std::max(1, int(std::lround(size.width * scale))),
-            std::max(1, int(std::lround(size.height * scale)))};
+    const double scale = double(system.scale());
+    if (startup.last_size) {
+        const auto side = [&](int last, int most) {
+            const int length = std::max(1, int(std::lround(last * scale)));
+            return most > 0 ? std::min(length, most) : length;
+        };
+        return {side(startup.last_size->width, desktop.width),
+                side(startup.last_size->height, desktop.height)};
+    }
+    const bool beside = startup.settings.comparison == Comparison::beside;
+    const double text = kTextHeight * scale * double(startup.settings.text_scale);
+    return window_size({(beside ? 2 : 1) * picture.width, picture.height}, int(kPanelWidth * text), desktop,
+                       scale);
 }
 
 std::chrono::steady_clock::time_point in(double seconds) {
@@ -45,7 +50,7 @@ std::string reason(const std::exception_ptr& failure) {
 }
 
 template <class Result>
-bool ready(const std::future<Result>& future) {
+bool finished(const std::future<Result>& future) {
     return future.valid() && future.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
 }
 
@@ -59,7 +64,11 @@ Size camera_size_or_usual(const Startup& startup) {
 
 Viewpoint start_view(const OpenedScene& scene, std::optional<int> frame, Size size) {
     if (scene.dataset) return dataset_view(*scene.gaussians, *scene.dataset, frame.value_or(0));
-    return framing_view(*scene.gaussians, size.width, size.height);
+    return framing_view(*scene.gaussians, nullptr, size.width, size.height);
+}
+
+std::string window_title(const OpenedScene& scene) {
+    return scene.title.empty() ? "ewa" : scene.title + " - ewa";
 }
 
 std::filesystem::path free_name(const std::string& stem, const std::string& extension) {
@@ -81,8 +90,7 @@ bool Message::expire(Clock::time_point now) {
 
 App::App(const Startup& startup)
     : startup_(startup),
-      window_(system_, startup.scene.title + " - ewa", window_size(startup, system_), !startup.picture),
-      screen_(std::make_unique<Screen>(system_, window_, startup.device_name)),
+      window_(system_, window_title(startup.scene), initial_size(startup, system_), !startup.picture),
       view_(start_view(startup.scene, startup.frame, startup.size.value_or(kUsualSize))),
       settings_(startup.settings),
       views_(startup.views),
@@ -90,78 +98,32 @@ App::App(const Startup& startup)
       device_name_(startup.device_name),
       capture_(startup.picture.has_value()),
       comparison_([this] { system_.wake(); }),
+      quality_([this] { system_.wake(); }),
       renders_(startup.open_device, [this] { system_.wake(); }),
-      live_(startup.trainer, [this] { system_.wake(); }) {
+      live_([this] { system_.wake(); }) {
+    change_text();
     last_frame_ = Clock::now();
     message_.hint_until = in(kHintSeconds);
+    // A screenshot is framed as `ewa render` does.
+    if (!scripted()) view_.restart(start_view(startup.scene, startup.frame, picture_area().size()));
     adopt(startup.scene, startup.frame);
     settings_.look = startup.settings.look;
     if (startup.film) start_film();
-    if (startup.watch) live_.watch(*startup.watch);
+    if (startup.watch) watch(*startup.watch, startup.trainer);
     times_.window_open = times_.now();
 }
 
-void App::adopt(OpenedScene scene, std::optional<int> frame) {
-    scene_ = std::move(scene);
-    scene_.set_gaussians(scene_.gaussians);
-    renders_.set_scene(scene_.gaussians);
-    settings_.look.kernel = scene_.look.kernel;
-    settings_.look.background = scene_.look.background;
-    settings_.look.sh_degree = scene_.sh_degree;
-    message_.note.clear();
-    if (!scene_.remark.empty()) say(scene_.remark);
-    framed_ = scene_.gaussians->size() > 0;
-    comparison_.forget_scene();
-    leave_camera();
-    start_frame_.reset();
-    if (scene_.dataset) {
-        camera_size_ = camera_size(*scene_.dataset, view_.radius());
-        start_frame_ = at_camera_ = frame.value_or(0);
-    }
-    redraw(kRedraws);
-}
-
-void App::open(const std::filesystem::path& path) {
-    if (opening_.valid()) return say("another file is being opened");
-    say("opening " + path.string());
-    opening_ = std::async(std::launch::async, [this, path] {
-        const Wake wake{system_};
-        return open_scene(path, {});
-    });
-}
-
-void App::take_opened() {
-    if (!ready(opening_)) return;
-    try {
-        OpenedScene scene = opening_.get();
-        view_.restart(start_view(scene, {}, window_.framebuffer()));
-        window_.set_title(scene.title + " - ewa");
-        adopt(std::move(scene), {});
-        live_.stop();
-        if (!scene_.run.empty()) live_.watch({scene_.run, {}, {}, scene_.splats_time});
-    } catch (const std::exception& error) {
-        say(error.what());
-    }
-}
-
-/// New splats of the run replace those that are shown.
-void App::take_live() {
-    if (const auto status = live_.failure(); status && message_.note.empty())
-        say("the training ended with status " + std::to_string(*status) +
-            "; see the terminal for the reason");
-    // A screenshot waits for its full frame, which new splats would start again.
-    if (capture_ && framed_) return;
-    const LiveRun::News news = live_.take();
-    if (news.any) redraw();
-    if (!news.splats) return;
-    const int degree_before = scene_.sh_degree;
-    scene_.set_gaussians(news.splats);
-    renders_.set_scene(news.splats);
-    if (settings_.look.sh_degree == degree_before) settings_.look.sh_degree = scene_.sh_degree;
-    // The first splats tell what to look at, unless the user has moved the camera.
-    if (!framed_ && (!scene_.dataset || at_camera_ == start_frame_))
-        view_.restart(start_view(scene_, start_frame_, window_.framebuffer()));
-    framed_ = true;
+KeptSettings App::kept() const {
+    KeptSettings kept{.window = {},
+                      .mode = settings_.look.mode,
+                      .text_scale = settings_.text_scale,
+                      .gain = settings_.gain,
+                      .film_seconds = settings_.film_seconds};
+    const double scale = double(window_.scale()) / double(window_.density());
+    const Size size = window_.size();
+    if (size.width > 0 && size.height > 0)
+        kept.window = Size{int(std::lround(size.width / scale)), int(std::lround(size.height / scale))};
+    return kept;
 }
 
 void App::run() {
@@ -176,11 +138,12 @@ void App::run() {
             for (const KeyPress& key : keys) handle_key(key);
             move_by_itself(std::min(seconds, 0.1));
             if (const auto dropped = window_.take_dropped(); !dropped.empty()) open(dropped);
+            change_text();
         }
         take_opened();
         take_renders();
         take_comparison();
-        if (ready(saving_)) say(saving_.get());
+        if (finished(saving_)) say(saving_.get());
         take_live();
         if (film_) continue_film();
         if (redraws_ > 0) draw();
@@ -231,13 +194,15 @@ void App::take_renders() {
     }
     for (const auto& file : news.written)
         if (!film_) say("wrote " + std::filesystem::absolute(file).string());
-    if (news.frame) redraw(2);  // a panel that has more to show takes its new size one frame later
+    quality_.take(news.full);
+    if (news.frame) redraw();
 }
 
 void App::take_comparison() {
+    if (at_camera_ && quality_.psnr(*at_camera_) != shown_psnr_) redraw();
     const ImageComparison::News news = comparison_.take();
     if (news == ImageComparison::News::none) return;
-    if (news == ImageComparison::News::comparison) return redraw(2);
+    if (news == ImageComparison::News::comparison) return redraw();
     if (comparison_.image()->failure.empty())
         screen_->presenter.set_picture(Layer::image, comparison_.image()->picture);
     redraw(kRedraws);

@@ -12,11 +12,14 @@
 #include <vector>
 
 #include "io/datasets/view_list.h"
+#include "viewer/kept_settings.h"
 #include "viewer/overlay.h"
+#include "viewer/panel.h"
 #include "viewer/renders.h"
 #include "viewer/screen.h"
 #include "viewer/training.h"
 #include "viewer/view_camera.h"
+#include "viewer/view_quality.h"
 
 namespace ewa::viewer {
 
@@ -42,30 +45,34 @@ struct Film {
 struct Startup {
     OpenedScene scene;
     std::optional<int> frame;                      // of the dataset
-    std::optional<Size> size;                      // of the window
+    std::optional<Size> size;                      // of the window, px
+    std::optional<Size> last_size;                 // of the last session's window, as KeptSettings::window
     std::optional<std::filesystem::path> picture;  // write this screenshot, then exit
     std::optional<std::filesystem::path> film;     // write a film through `views` into this folder, then exit
     std::vector<io::NamedView> views;
     PanelSettings settings;
     OpenDevice open_device;
     std::string device_name;
+    std::string device;                      // the selector of the command line
     std::optional<live::WhatToWatch> watch;  // a training run
     TrainProcess* trainer = nullptr;         // the viewer's own; outlives the App
     bool verbose = false;                    // print times on standard error
     SessionTimes times;
 };
 
-inline constexpr Size kUsualSize{1280, 800};  // of a window
 /// The size of the dataset's camera that the window starts from, or the usual one.
 Size camera_size_or_usual(const Startup& startup);
 /// The first view: of the dataset's camera `frame`, or of the whole scene for an image of this size.
 Viewpoint start_view(const OpenedScene& scene, std::optional<int> frame, Size size);
+
+std::string window_title(const OpenedScene& scene);
 
 /// The text over the image.
 struct Message {
     using Clock = std::chrono::steady_clock;
     std::string note;  // the last one; the panel keeps showing it
     Clock::time_point note_until{}, hint_until{};
+    bool noting(Clock::time_point now) const { return !note.empty() && now < note_until; }
 
     /// Hides what has been shown long enough. Returns whether something changed.
     bool expire(Clock::time_point now);
@@ -78,17 +85,26 @@ class App {
 
     /// Runs until the window is closed or the requested files are written. Throws RunError, InputError.
     void run();
+    /// What the next session should start with.
+    KeptSettings kept() const;
 
   private:
     using Clock = std::chrono::steady_clock;
 
-    // app.cpp: the loop, and what the threads report.
+    // app_open.cpp: scenes that are opened, and training runs.
     void adopt(OpenedScene scene, std::optional<int> frame);
-    void open(const std::filesystem::path& path);
+    void open(const std::vector<std::filesystem::path>& paths);
     void take_opened();
+    void take_live();
+    void train();
+    bool training();  // one that the window has started
+    void watch(const live::WhatToWatch& what, TrainProcess* trainer);
+    std::optional<Headline> headline() const;
+    std::string banner() const;
+
+    // app.cpp: the loop, and what the threads report.
     void take_renders();
     void take_comparison();
-    void take_live();
     std::optional<Camera> requested_camera() const;
     bool scripted() const { return startup_.picture || startup_.film; }
     double patience() const;
@@ -107,6 +123,7 @@ class App {
     void step_camera(int step);
     void leave_camera() { at_camera_.reset(); }
     void reset_view();
+    void show_whole_scene();
     void change_comparison();
     std::vector<io::NamedView>::iterator find_view(size_t number);
     void save_view(size_t number);
@@ -124,6 +141,11 @@ class App {
     void draw_overlays();
     void load_image();
     void choose_picture();
+    void measure_view();
+    void change_text();
+    double text_height() const;  // px of the framebuffer
+    int panel_width() const;     // px of the framebuffer; 0 without the panel
+    Rectangle picture_area() const;
     Comparison comparison() const { return at_camera_ ? settings_.comparison : Comparison::none; }
     bool comparing() const;  // the image of the camera is shown or compared
     std::optional<ComparisonRequest> comparison_wanted() const;
@@ -150,20 +172,24 @@ class App {
 
     std::shared_ptr<const ByteImage> on_screen_;  // the presenter's picture: a render or a difference
     bool difference_on_screen_ = false;
+    std::optional<double> shown_psnr_;  // in the panel, dB
     Clock::time_point last_frame_;
-    int panel_right_ = 0;  // px of the window that the panel covers, from the left
     bool show_panel_ = true, show_help_ = false, dragging_wipe_ = false;
     bool capture_ = false;               // write a screenshot as soon as the full frame is shown
     std::optional<int> pointed_camera_;  // the frame whose camera is under the pointer
     static constexpr int kRedraws = 3;   // frames that ImGui needs to answer input
     int redraws_ = kRedraws;             // frames that are still to draw
     int devices_lost_ = 0;
+    double shown_text_ = 0;     // text_height() of the screen
+    bool live_failed_ = false;  // a training that cannot be reached was reported
     bool done_ = false;
     std::future<OpenedScene> opening_;
     std::future<std::string> saving_;  // a screenshot; the message about it
 
     // Their threads call wake() of the window system. Declared last, so that they end before it does.
+    std::unique_ptr<TrainProcess> trainer_;  // started by the window
     ImageComparison comparison_;
+    ViewQuality quality_;
     Renders renders_;
     LiveRun live_;
 };

@@ -16,7 +16,7 @@ constexpr int kMostDevicesLost = 5;  // a device that is lost more often is brok
 }  // namespace
 
 void App::panel() {
-    const auto compared = comparing() ? comparison_.compared() : nullptr;
+    shown_psnr_ = comparing() ? quality_.psnr(*at_camera_) : std::nullopt;
     const PanelFacts facts{
         .scene = scene_,
         .device = device_name_,
@@ -26,22 +26,24 @@ void App::panel() {
         .drawing = !renders_.settled(),
         .note = message_.note,
         .image_failure = at_camera_ ? comparison_.failure_of(*at_camera_) : std::string(),
-        .psnr = compared ? std::optional(compared->psnr) : std::nullopt,
+        .psnr = shown_psnr_,
         .pictures_a_second = times_.rate(),
         .first_picture = times_.first_frame(),
         .film = film_ ? std::optional(float(film_->next) / float(film_->frames)) : std::nullopt,
         .up = view_.up(),
         .at_camera = at_camera_,
+        .width = float(panel_width()) / std::max(1e-3f, ImGui::GetIO().DisplayFramebufferScale.x),
+        .over_picture = picture_area().x == 0,
     };
-    const PanelActions actions = draw_panel(facts, settings_);
-    panel_right_ = int(actions.right * ImGui::GetIO().DisplayFramebufferScale.x);
-    obey(actions);
+    obey(draw_panel(facts, settings_));
 }
 
 void App::obey(const PanelActions& actions) {
     if (actions.screenshot) capture_ = true;
     if (actions.exr) save_exr();
     if (actions.reset) reset_view();
+    if (actions.whole_scene) show_whole_scene();
+    if (actions.train) train();
     if (actions.frame) go_to_camera(*actions.frame);
     if (actions.command) live_.command(*actions.command);
     if (actions.up) view_.set_up(*actions.up);
@@ -66,7 +68,25 @@ void App::draw_overlays() {
         pointed_camera_ = draw_cameras({*scene_.dataset, seen, places.rendering, camera_size_, at_camera_});
     }
     if (comparing()) draw_comparison(settings_.comparison, places, settings_.wipe);
-    if (Clock::now() < message_.hint_until && !show_help_) draw_hint(scene_.dataset != nullptr);
+    const Rectangle area = picture_area();
+    const std::optional<Headline> words = headline();
+    if (words) draw_headline(*words, area);
+    if (const std::string text = banner(); !text.empty()) draw_banner(text, area);
+    if (!words && Clock::now() < message_.hint_until && !show_help_)
+        draw_hint(scene_.dataset != nullptr, area);
+}
+
+double App::text_height() const {
+    return kTextHeight * double(window_.scale()) * double(settings_.text_scale);
+}
+
+int App::panel_width() const {
+    return show_panel_ && !scripted() ? int(kPanelWidth * text_height()) : 0;
+}
+
+/// The part of the window that the panel leaves to the pictures.
+Rectangle App::picture_area() const {
+    return free_area(window_.framebuffer(), panel_width());
 }
 
 Arrangement App::arrangement() const {
@@ -75,9 +95,20 @@ Arrangement App::arrangement() const {
         const Camera& camera = scene_.dataset->frames[size_t(*at_camera_)].camera;
         image = {camera.width, camera.height};
     }
-    const Size window = window_.framebuffer();
-    return arrange(comparison(), {std::max(1, window.width), std::max(1, window.height)}, image,
-                   panel_right_);
+    return arrange(comparison(), picture_area(), image);
+}
+
+/// Opens the screen, also with another size of the text.
+void App::change_text() {
+    if (screen_ && shown_text_ == text_height()) return;
+    shown_text_ = text_height();
+    screen_.reset();
+    screen_ = std::make_unique<Screen>(system_, window_, device_name_, shown_text_);
+    if (const auto image = comparison_.image(); image && image->failure.empty())
+        screen_->presenter.set_picture(Layer::image, image->picture);
+    on_screen_.reset();
+    choose_picture();
+    redraw(kRedraws);
 }
 
 bool App::comparing() const {
@@ -90,17 +121,24 @@ void App::load_image() {
                      settings_.look.background);
 }
 
+/// The PSNR is of colours, at the size of the image.
+void App::measure_view() {
+    const auto& shown = renders_.shown();
+    if (scripted() || !comparing() || !renders_.settled() || shown->request.look.mode != Mode::color) return;
+    quality_.measure(renders_, *at_camera_, scene_.dataset->frames[size_t(*at_camera_)], settings_.look);
+}
+
 /// The full frame can be compared if it shows colours from the camera of the image.
 std::optional<ComparisonRequest> App::comparison_wanted() const {
     const auto& shown = renders_.shown();
-    if (!comparing() || !renders_.settled() || shown->request.look.mode != Mode::color) return std::nullopt;
+    if (settings_.comparison != Comparison::difference || !comparing() || !renders_.settled() ||
+        shown->request.look.mode != Mode::color)
+        return std::nullopt;
     const Rectangle rendering = arrangement().rendering, image = arrangement().image;
     if (shown->picture.width != rendering.width || shown->picture.height != rendering.height)
         return std::nullopt;
-    const bool difference = settings_.comparison == Comparison::difference;
     return ComparisonRequest{shown, comparison_.image_of(*at_camera_),
-                             fitted(image.size(), {0, 0, rendering.width, rendering.height}),
-                             difference ? settings_.gain : 0};
+                             fitted(image.size(), {0, 0, rendering.width, rendering.height}), settings_.gain};
 }
 
 /// Gives the presenter the render or its difference to the image. The last difference stays until the next is
@@ -111,7 +149,7 @@ void App::choose_picture() {
     const auto wanted = comparison_wanted();
     comparison_.compare(wanted);
     std::shared_ptr<const ByteImage> picture(shown, &shown->picture);
-    if (wanted && wanted->gain > 0) {
+    if (wanted) {
         if (const auto compared = comparison_.compared())
             picture = std::shared_ptr<const ByteImage>(compared, &compared->difference);
         else if (difference_on_screen_)
@@ -129,19 +167,18 @@ void App::draw() {
     const Comparison before = settings_.comparison;
     screen_->gui.begin_frame();
     if (!scripted()) draw_overlays();
-    const int covered = std::exchange(panel_right_, 0);
     if (show_panel_ && !scripted()) panel();
-    if (panel_right_ != covered) redraw();
     if (show_help_) draw_help(show_help_);
-    if (!scripted() && Clock::now() < message_.note_until) draw_note(message_.note);
+    if (!scripted() && message_.noting(Clock::now())) draw_note(message_.note, picture_area());
     handle_mouse();
     ImDrawData* drawn = screen_->gui.end_frame();
     if (settings_.comparison != before) redraw(kRedraws);
     choose_picture();
+    measure_view();
 
     const bool image_ready = comparison() == Comparison::none || comparison_.loaded(*at_camera_);
     const auto& requested = comparison_.requested();
-    const bool difference_ready = !requested || requested->gain == 0 || comparison_.compared();
+    const bool difference_ready = !requested || comparison_.compared();
     const bool capture =
         capture_ && renders_.settled() && image_ready && difference_ready && !film_ && !saving_.valid();
     Image image;
@@ -152,7 +189,7 @@ void App::draw() {
         return;
     }
     times_.count(renders_.shown());
-    if (capture) save(std::move(image));
+    if (capture) save(without_left(image, picture_area().x));
 }
 
 bool App::present(ImDrawData* drawn, Image* capture) {
@@ -178,11 +215,7 @@ bool App::present(ImDrawData* drawn, Image* capture) {
         if (++devices_lost_ > kMostDevicesLost) throw;
     }
     screen_.reset();
-    screen_ = std::make_unique<Screen>(system_, window_, device_name_);
-    if (const auto image = comparison_.image(); image && image->failure.empty())
-        screen_->presenter.set_picture(Layer::image, image->picture);
-    on_screen_.reset();
-    choose_picture();
+    change_text();
     say("the device or surface of the window was lost and has been opened again");
     return false;
 }

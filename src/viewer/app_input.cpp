@@ -58,6 +58,9 @@ void App::handle_key(const KeyPress& press) {
             reset_view();
             settings_.turntable = false;
             return;
+        case GLFW_KEY_F:
+            show_whole_scene();
+            return;
         case GLFW_KEY_MINUS:
         case GLFW_KEY_KP_SUBTRACT:
             scale = std::max(kLeastScale, scale / kScaleStep);
@@ -172,7 +175,7 @@ void App::go_to_camera(int frame) {
 
 void App::go_to_nearest_camera() {
     if (!scene_.dataset) return say("there are no cameras; --cameras DATASET shows a dataset's");
-    const Size size = window_.framebuffer();
+    const Size size = picture_area().size();
     go_to_camera(nearest_frame(*scene_.dataset, view_.camera(size.width, size.height), view_.radius()));
 }
 
@@ -185,6 +188,15 @@ void App::step_camera(int step) {
 void App::reset_view() {
     view_.reset();
     at_camera_ = start_frame_;
+}
+
+void App::show_whole_scene() {
+    const Size size = picture_area().size();
+    Viewpoint place = framing_view(*scene_.gaussians, scene_.dataset.get(), size.width, size.height);
+    view_.stand(place);
+    leave_camera();
+    settings_.turntable = false;
+    redraw();
 }
 
 void App::change_comparison() {
@@ -200,10 +212,9 @@ std::vector<io::NamedView>::iterator App::find_view(size_t number) {
 }
 
 void App::save_view(size_t number) {
-    const Size size = window_.framebuffer();
+    const Size size = picture_area().size();
     const std::string name = std::to_string(number);
-    const io::NamedView view{name, view_.camera(std::max(1, size.width), std::max(1, size.height)),
-                             view_.pivot()};
+    const io::NamedView view{name, view_.camera(size.width, size.height), view_.pivot()};
     if (const auto same = find_view(number); same != views_.end())
         *same = view;
     else
@@ -233,9 +244,8 @@ void App::write_views() {
 }
 
 void App::start_film() {
-    const Size window = window_.framebuffer();
-    Film film(views_, startup_.film.value_or(free_name("ewa-film", "")),
-              {std::max(1, window.width), std::max(1, window.height)}, double(settings_.film_seconds));
+    Film film(views_, startup_.film.value_or(free_name("ewa-film", "")), picture_area().size(),
+              double(settings_.film_seconds));
     try {
         core::make_folder(film.folder);
     } catch (const RunError& error) {

@@ -23,23 +23,6 @@ float bilinear(const ByteImage& picture, double x, double y, size_t c) {
 
 }  // namespace
 
-Rectangle fitted(Size shape, const Rectangle& space) {
-    if (shape.width <= 0 || shape.height <= 0 || shape == space.size()) return space;
-    const double scale = std::min(double(space.width) / shape.width, double(space.height) / shape.height);
-    const int width = std::clamp(int(std::lround(shape.width * scale)), 1, std::max(1, space.width));
-    const int height = std::clamp(int(std::lround(shape.height * scale)), 1, std::max(1, space.height));
-    return {space.x + (space.width - width) / 2, space.y + (space.height - height) / 2, width, height};
-}
-
-Arrangement arrange(Comparison comparison, Size window, Size image, int covered) {
-    const Rectangle whole{0, 0, window.width, window.height};
-    if (comparison != Comparison::beside) return {whole, fitted(image, whole)};
-    const int from = covered <= window.width / 3 ? covered : 0;
-    const int half = std::max(1, (window.width - from) / 2);
-    const Rectangle right{from + half, 0, std::max(1, window.width - from - half), window.height};
-    return {{from, 0, half, window.height}, fitted(image, right)};
-}
-
 ByteImage difference(const ByteImage& rendering, const ByteImage& image, const Rectangle& place) {
     ByteImage result{rendering.width, rendering.height, std::vector<uint8_t>(rendering.rgba.size()), 0};
     const double scale_x = double(image.width) / std::max(1, place.width);
@@ -63,21 +46,6 @@ void amplify(ByteImage& picture, float gain) {
         if (i % 4 != 3) picture.rgba[i] = uint8_t(std::min(float(picture.rgba[i]) * gain, 255.0f) + 0.5f);
 }
 
-double psnr_of_difference(const ByteImage& difference, const Rectangle& place) {
-    double sum = 0;
-    size_t count = 0;
-    for (int y = std::max(0, place.y); y < std::min(difference.height, place.y + place.height); ++y)
-        for (int x = std::max(0, place.x); x < std::min(difference.width, place.x + place.width); ++x)
-            for (size_t c = 0; c < 3; ++c) {
-                const size_t at = 4 * (size_t(y) * size_t(difference.width) + size_t(x)) + c;
-                const double error = double(difference.rgba[at]) / 255;
-                sum += error * error;
-                ++count;
-            }
-    if (count == 0) return std::numeric_limits<double>::quiet_NaN();
-    return 10 * std::log10(double(count) / sum);
-}
-
 CameraImage load_camera_image(const ImageRequest& request) {
     CameraImage loaded{.scene = request.scene, .frame = request.index, .picture = {}, .failure = {}};
     try {
@@ -95,11 +63,7 @@ Compared compare_with_image(const ComparisonRequest& request) {
     Compared compared;
     compared.of = request;
     compared.difference = difference(request.rendering->picture, request.image->picture, request.place);
-    compared.psnr = psnr_of_difference(compared.difference, request.place);
-    if (request.gain > 0)
-        amplify(compared.difference, request.gain);
-    else
-        compared.difference = {};
+    amplify(compared.difference, request.gain);
     return compared;
 }
 

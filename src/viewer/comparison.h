@@ -3,49 +3,24 @@
 // comparing take long and run on threads of their own. Independent of the window.
 #pragma once
 #include <array>
-#include <condition_variable>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
-#include <utility>
 
 #include "ewa/dataset.h"
 #include "viewer/byte_image.h"
+#include "viewer/latest.h"
+#include "viewer/layout.h"
 #include "viewer/render_thread.h"
 
 namespace ewa::viewer {
-
-enum class Comparison { none, beside, wipe, difference };
-
-/// In pixels, from the top left corner.
-struct Rectangle {
-    int x = 0, y = 0, width = 0, height = 0;
-    bool operator==(const Rectangle&) const = default;
-    Size size() const { return {width, height}; }
-};
-
-/// The largest rectangle with the aspect ratio of `shape`, centred in `space`.
-Rectangle fitted(Size shape, const Rectangle& space);
-
-/// Places in the window. Beside: each gets half of the width right of `covered` px, or half of the whole
-/// width if more than a third is covered. Otherwise the render fills the window, and the image the part that
-/// its camera saw.
-struct Arrangement {
-    Rectangle rendering, image;
-};
-Arrangement arrange(Comparison comparison, Size window, Size image, int covered = 0);
 
 /// |rendering - image| per channel, in the size of the render. The image fills `place` (px of the render) and
 /// is sampled bilinearly; outside of it the result is black.
 ByteImage difference(const ByteImage& rendering, const ByteImage& image, const Rectangle& place);
 /// Multiplies every value by `gain`, up to 255.
 void amplify(ByteImage& picture, float gain);
-
-/// PSNR over the pixels of `place`, as psnr() computes it; NaN if the place is empty.
-double psnr_of_difference(const ByteImage& difference, const Rectangle& place);
 
 struct ImageRequest {
     uint64_t scene = 0;  // ImageComparison::scene_
@@ -69,67 +44,16 @@ struct ComparisonRequest {
     std::shared_ptr<const RenderedFrame> rendering;
     std::shared_ptr<const CameraImage> image;
     Rectangle place;  // of the image, px of the render
-    float gain = 0;   // factor of the difference image; 0: no difference image
+    float gain = 1;   // factor of the difference image
     bool operator==(const ComparisonRequest&) const = default;
 };
 
 struct Compared {
     ComparisonRequest of;
-    double psnr = 0;       // over the place, as psnr() computes it
-    ByteImage difference;  // amplified; empty without a gain
+    ByteImage difference;  // amplified
 };
 
 Compared compare_with_image(const ComparisonRequest& request);
-
-/// Work on a thread of its own, of which only the last request matters.
-template <class Request, class Result>
-class Latest {
-  public:
-    /// make runs on the thread and never throws. on_news is called there when result() has changed.
-    Latest(std::function<Result(const Request&)> make, std::function<void()> on_news)
-        : make_(std::move(make)),
-          on_news_(std::move(on_news)),
-          thread_([this](const std::stop_token& stop) { work(stop); }) {}
-
-    /// Replaces a request that is waiting.
-    void ask(Request request) {
-        const std::lock_guard lock(mutex_);
-        waiting_ = std::move(request);
-        wake_.notify_one();
-    }
-    /// The last result, or null.
-    std::shared_ptr<const Result> result() const {
-        const std::lock_guard lock(mutex_);
-        return result_;
-    }
-
-  private:
-    void work(const std::stop_token& stop) {
-        for (;;) {
-            std::optional<Request> request;
-            {
-                std::unique_lock lock(mutex_);
-                wake_.wait(lock, stop, [this] { return waiting_.has_value(); });
-                if (stop.stop_requested()) return;
-                request = std::exchange(waiting_, std::nullopt);
-            }
-            auto made = std::make_shared<const Result>(make_(*request));
-            {
-                const std::lock_guard lock(mutex_);
-                result_ = std::move(made);
-            }
-            on_news_();
-        }
-    }
-
-    std::function<Result(const Request&)> make_;
-    std::function<void()> on_news_;
-    mutable std::mutex mutex_;
-    std::condition_variable_any wake_;
-    std::optional<Request> waiting_;
-    std::shared_ptr<const Result> result_;
-    std::jthread thread_;
-};
 
 /// Loads the image of the camera that the view is at, and compares it with the render, on threads of its own.
 class ImageComparison {

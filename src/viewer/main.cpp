@@ -20,6 +20,7 @@
 #include "scene/names.h"
 #include "train/earlier_run.h"
 #include "viewer/app.h"
+#include "viewer/kept_settings.h"
 #include "viewer/offscreen.h"
 
 namespace {
@@ -85,8 +86,12 @@ OpenedScene open_what(const Arguments& arguments, Startup& startup) {
         scene.title = arguments.connect;
         return scene;
     }
-    if (arguments.path.empty())
-        throw InputError("PATH is required: splats, a dataset, or a run's folder (see ewa-view --help)");
+    if (arguments.path.empty()) {
+        if (arguments.train || !arguments.cameras.empty() || !arguments.picture.empty() ||
+            !arguments.film.empty())
+            throw InputError("PATH is required: splats, a dataset, or a run's folder (see ewa-view --help)");
+        return {};  // files are dropped on the window
+    }
     OpenedScene scene = open_scene(arguments.path, arguments.cameras);
     if (arguments.train) {
         if (!scene.dataset || !scene.run.empty())
@@ -123,6 +128,7 @@ Startup open(const Arguments& arguments) {
         startup.film = arguments.film;
     }
     startup.scene = open_what(arguments, startup);
+    startup.device = arguments.device.selector;
     startup.frame = frame_of(arguments.frame, startup.scene.dataset.get());
     startup.settings.cameras = startup.scene.gaussians->size() == 0;
     Look& look = startup.settings.look;
@@ -149,6 +155,19 @@ CLI::Validator one_of(const std::map<std::string, T>& values) {
         "");
 }
 
+/// What the last session left, where no option says otherwise. Scripts get the same result on every machine.
+void take_settings(const CLI::App& app, Arguments& arguments) {
+    Startup& startup = arguments.startup;
+    startup.settings.train_steps = RunOptions().train.steps;
+    if (!arguments.picture.empty() || !arguments.film.empty()) return;
+    const KeptSettings kept = read_settings(settings_file());
+    startup.last_size = kept.window;
+    startup.settings.text_scale = kept.text_scale;
+    startup.settings.gain = kept.gain;
+    if (app.count("--mode") == 0) startup.settings.look.mode = kept.mode;
+    if (app.count("--film-seconds") == 0) startup.settings.film_seconds = kept.film_seconds;
+}
+
 std::vector<std::string> option_names(const CLI::App& app) {
     std::vector<std::string> names;
     for (const CLI::Option* option : app.get_options())
@@ -170,9 +189,8 @@ void add_options(CLI::App& app, Arguments& arguments) {
         return app.add_option(name, value, help)->type_name(type);
     };
     option("PATH", arguments.path, "",
-           "Splat file (.ply .compressed.ply .splat .ksplat .spz .sog meta.json .glb .gltf), dataset, or "
-           "folder of a "
-           "training run");
+           "Splat file (.ply .compressed.ply .splat .ksplat .spz .sog meta.json .glb .gltf), dataset, or folder of a "
+           "training run. Without it, the window waits for a file to be dropped");
     CLI::Option* train = app.add_flag(
         "--train", arguments.train,
         "Train on the dataset and watch. Other options are passed to ewa train, such as --steps");
@@ -196,7 +214,7 @@ void add_options(CLI::App& app, Arguments& arguments) {
            "Background colour: r,g,b in 0..1, a name such as white, or #rrggbb");
     app.add_flag("--antialias", arguments.antialias, "Render with the filter of Mip-Splatting");
     option("--size", arguments.size, "WxH",
-           "Size of the window in px [the shape of the camera, as large as fits]");
+           "Size of the window in px [that of the last session, or panel and picture as large as fits]");
     option("--screenshot", arguments.picture, "FILE",
            "Write what the window shows, without the panel, as a PNG, and exit");
     option("--views", arguments.views, "FILE", "Saved views, in the format that the window writes");
@@ -223,6 +241,16 @@ void group_options(CLI::App& app) {
         for (const char* name : names) app.get_option(name)->group(subject);
 }
 
+/// Shows the window, and remembers its settings for the next session.
+void show(Startup& startup) {
+    if (startup.picture || startup.film) return App(startup).run();
+    App app(startup);
+    app.run();
+    KeptSettings kept = app.kept();
+    if (startup.size) kept.window = startup.last_size;
+    write_settings(settings_file(), kept);
+}
+
 int run(const Arguments& arguments) {
     try {
         // The device opens while the scene is being read. A lost device is opened again.
@@ -234,6 +262,7 @@ int run(const Arguments& arguments) {
         if (arguments.train) {
             std::vector<std::string> options{arguments.path.string()};
             options.insert(options.end(), arguments.train_options.begin(), arguments.train_options.end());
+            if (!TrainProcess::accepts(options, startup.watch->folder)) return kWrongUse;
             startup.trainer = &trainer.emplace(options, startup.watch->folder);
         }
         const auto first = std::make_shared<std::shared_ptr<gpu::Device>>(opening.get());
@@ -245,7 +274,7 @@ int run(const Arguments& arguments) {
         if ((startup.picture || startup.film) && !has_desktop())
             write_without_window(startup);
         else
-            App(startup).run();
+            show(startup);
         return kDone;
     } catch (const InputError& error) {
         return fail(error.what(), kWrongUse);
@@ -286,5 +315,6 @@ int main(int argc, char** argv) {
         if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) return print_text(app, error);
         return fail(std::string(error.what()) + " (see ewa-view --help)", kWrongUse);
     }
+    take_settings(app, arguments);
     return run(arguments);
 }

@@ -87,8 +87,10 @@ OpenedScene open_run(const live::Run& run, const fs::path& cameras) {
         scene.gaussians = std::make_shared<const Gaussians>(load_splats(run.splats));
     }
     add_cameras(scene, run, cameras, !splats);
-    if (!splats && scene.dataset)
+    if (!splats && scene.dataset) {
         scene.gaussians = std::make_shared<const Gaussians>(splats_of_points(scene.dataset->points));
+        scene.points = true;
+    }
     return scene;
 }
 
@@ -98,6 +100,7 @@ OpenedScene open_splats(const fs::path& path, const fs::path& cameras) {
     if (splats.antialiased) scene.look.kernel = Footprint::antialias;
     if (!splats.remarks.empty()) scene.remark = splats.remarks.front();
     scene.gaussians = std::make_shared<const Gaussians>(std::move(splats.gaussians));
+    if (scene.gaussians->size() == 0) scene.remark = name_of_path(path) + " is empty: it has no splats";
     if (!cameras.empty()) scene.dataset = load_cameras(cameras, 1, false);
     if (const auto run = live::run_of_splats(path); run && cameras.empty() && !run->dataset.empty()) {
         scene.look = look_of(*run);
@@ -110,6 +113,7 @@ OpenedScene open_dataset(const fs::path& path) {
     OpenedScene scene;
     scene.dataset = load_cameras(path, 1, true);
     scene.gaussians = std::make_shared<const Gaussians>(splats_of_points(scene.dataset->points));
+    scene.points = true;
     scene.remark = is_mesh_scene(path)
                        ? "these are the views of a mesh scene; ewa train renders it and trains splats"
                    : scene.gaussians->size() > 0
@@ -147,6 +151,53 @@ OpenedScene open_scene(const fs::path& path, const fs::path& cameras) {
         scene = open_splats(path, cameras);
     }
     scene.title = name_of_path(path);
+    scene.path = path;
+    return scene;
+}
+
+bool is_dataset(const fs::path& path) {
+    std::error_code error;
+    if (fs::is_directory(path, error)) return !live::find_run(path);
+    return fs::exists(path, error) && (is_dataset_file(path) || is_mesh_scene(path));
+}
+
+OpenedScene with_cameras(const OpenedScene& splats, const OpenedScene& cameras) {
+    OpenedScene scene = splats;
+    scene.dataset = cameras.dataset;
+    scene.cameras = cameras.path;
+    scene.remark = "with the cameras of ";
+    scene.remark += cameras.title;
+    return scene;
+}
+
+OpenedScene open_dropped(const std::vector<fs::path>& paths, const OpenedScene& shown) {
+    const auto dataset = std::find_if(paths.begin(), paths.end(), is_dataset);
+    const auto splats = std::find_if_not(paths.begin(), paths.end(), is_dataset);
+    std::vector<fs::path> opened;
+    OpenedScene scene;
+    if (dataset != paths.end() && splats != paths.end()) {
+        scene = with_cameras(open_scene(*splats, {}), open_scene(*dataset, {}));
+        opened = {*splats, *dataset};
+    } else if (dataset != paths.end()) {
+        scene = open_scene(*dataset, {});
+        opened = {*dataset};
+        const bool has_splats = !shown.points && shown.gaussians->size() > 0;
+        if (has_splats && shown.cameras != *dataset) {
+            scene = with_cameras(shown, scene);
+            scene.remark += "; drop it again to open the dataset itself";
+        }
+    } else {
+        scene = open_scene(*splats, {});
+        opened = {*splats};
+        const bool camera_less = !scene.dataset && scene.run.empty();
+        if (camera_less && shown.points && shown.dataset && shown.run.empty() && scene.gaussians->size() > 0)
+            scene = with_cameras(scene, shown);
+    }
+    for (const fs::path& path : paths)
+        if (std::find(opened.begin(), opened.end(), path) == opened.end()) {
+            scene.remark += scene.remark.empty() ? "" : "; ";
+            scene.remark += "one scene is shown at a time: " + name_of_path(path) + " is left out";
+        }
     return scene;
 }
 

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "ewa/dataset.h"
 #include "viewer/render_thread.h"
@@ -12,13 +13,16 @@
 namespace ewa::viewer {
 
 struct OpenedScene {
-    std::string title;
+    std::string title;           // empty: nothing is open
+    std::filesystem::path path;  // as it was named
+    bool points = false;         // the splats are the points of the dataset
     /// Never null; empty if a run has none yet. set_gaussians() also sets the next two.
     std::shared_ptr<const Gaussians> gaussians = std::make_shared<const Gaussians>();
     int sh_degree = 0;                       // the highest that changes the image
     std::vector<PlanLine> plan;              // what rendering skips
     std::shared_ptr<const Dataset> dataset;  // null: no cameras
     std::filesystem::path run;               // folder of the run; empty: no run
+    std::filesystem::path cameras;           // what gave the dataset, if not `path`
     /// Of the run's splats.ply.
     std::filesystem::file_time_type splats_time = std::filesystem::file_time_type::min();
     Look look;           // as the file or the run asks for
@@ -27,10 +31,22 @@ struct OpenedScene {
     void set_gaussians(std::shared_ptr<const Gaussians> splats);
 };
 
+/// Whether open_scene() would open the path as a dataset, and not as splats or a run. False if it does not exist.
+bool is_dataset(const std::filesystem::path& path);
+
 /// Opens a splat file; a dataset, shown by its points; or the folder of a run (config.json, splats.ply,
 /// metrics.jsonl). A run, and the splats.ply of a run, come with the cameras of the run's dataset, if that is
 /// found. cameras: the dataset to use instead; empty: none. Throws InputError.
 OpenedScene open_scene(const std::filesystem::path& path, const std::filesystem::path& cameras);
+
+/// The splats of `splats` with the cameras of `cameras`, and a remark that says so. Both are scenes as opened.
+OpenedScene with_cameras(const OpenedScene& splats, const OpenedScene& cameras);
+
+/// Opens what was dropped on the window, where `shown` is. Throws InputError.
+/// - A dataset gives its cameras to the splats that are shown, unless it has done so before: then it is opened itself.
+/// - A splat file takes the cameras of a dataset that is shown without splats.
+/// - Of several files, splats and a dataset belong together. The remark names those that are left out.
+OpenedScene open_dropped(const std::vector<std::filesystem::path>& paths, const OpenedScene& shown);
 
 /// Converts points to small opaque splats.
 Gaussians splats_of_points(const PointCloud& points);

@@ -1,62 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// What Dear ImGui draws over the image: the panel, the list of keys, cameras, labels, the border of a wipe,
-// and notes. The functions change only their arguments.
+// What Dear ImGui draws over the image: the list of keys, cameras, labels, the border of a wipe, and messages. The
+// functions change only their arguments.
 #pragma once
 #include <optional>
 #include <string>
-#include <vector>
 
-#include "io/datasets/view_list.h"
-#include "live/watcher.h"
-#include "viewer/comparison.h"
-#include "viewer/opening.h"
+#include "ewa/dataset.h"
+#include "viewer/layout.h"
 
 namespace ewa::viewer {
 
-/// What the panel shows.
-struct PanelFacts {
-    const OpenedScene& scene;
-    const std::string& device;
-    const RenderedFrame* picture;  // null: none yet
-    const std::vector<io::NamedView>& views;
-    const live::Update* run;              // null: no training run
-    bool drawing;                         // a better frame follows
-    const std::string& note;              // the last message
-    std::string image_failure;            // why there is no image
-    std::optional<double> psnr;           // of this view against the image
-    double pictures_a_second;             // of the moving camera; else 0
-    std::optional<double> first_picture;  // seconds after the start
-    std::optional<float> film;            // share of the film that is written; empty: no film
-    glm::dvec3 up;
-    std::optional<int> at_camera;  // the camera that the view is at
-};
-
-/// What the panel changes.
-struct PanelSettings {
-    Look look;
-    Comparison comparison = Comparison::none;
-    float wipe = 0.5f;  // share of the width that shows the image
-    float gain = 4;     // factor of the difference image
-    bool cameras = false, turntable = false;
-    float film_seconds = 2;  // from one view to the next
-};
-
-/// What the user asked for in the panel.
-struct PanelActions {
-    bool screenshot = false, exr = false, reset = false, save_view = false, film = false, stop_film = false,
-         write_views = false;
-    std::optional<int> frame;
-    std::optional<size_t> view, forget;
-    std::optional<glm::dvec3> up;
-    std::optional<std::string> command;  // for the training run: pause, resume or save
-    float right = 0;                     // right border of the panel, in ImGui's coordinates
-};
-
-PanelActions draw_panel(const PanelFacts& facts, PanelSettings& settings);
 void draw_help(bool& open);
-
-/// The next of the six axes; the first one if `up` is not an axis.
-glm::dvec3 next_up(const glm::dvec3& up);
 
 struct CamerasShown {
     const Dataset& dataset;
@@ -74,9 +28,18 @@ void draw_comparison(Comparison comparison, const Arrangement& arrangement, floa
 /// Whether the pointer is at the border of the wipe.
 bool over_wipe(const Rectangle& image, float wipe);
 
+// The messages stay inside `area` (px of the window) and wrap.
+
 /// A message, above the hint.
-void draw_note(const std::string& note);
+void draw_note(const std::string& note, const Rectangle& area);
 /// The first keys to know, at the lower border. images: there are images to compare with.
-void draw_hint(bool images);
+void draw_hint(bool images, const Rectangle& area);
+/// What the picture is, at the upper border.
+void draw_banner(const std::string& text, const Rectangle& area);
+/// In the middle: one line in large letters, and an explanation below it.
+struct Headline {
+    std::string text, explanation;
+};
+void draw_headline(const Headline& headline, const Rectangle& area);
 
 }  // namespace ewa::viewer

@@ -67,6 +67,13 @@ uint64_t RenderThread::ask_point(const Camera& camera, const glm::dvec2& pixel) 
     return probes_;
 }
 
+uint64_t RenderThread::ask_full(const Camera& camera, const Look& look) {
+    const std::lock_guard lock(mutex_);
+    full_ = Full{camera, look, ++fulls_};
+    wake_.notify_one();
+    return fulls_;
+}
+
 RenderThread::News RenderThread::take_news() {
     const std::lock_guard lock(mutex_);
     News news = news_;
@@ -84,7 +91,7 @@ void RenderThread::report(const std::function<void(News&)>& change) {
 
 bool RenderThread::next(const std::stop_token& stop, Work& work) {
     std::unique_lock lock(mutex_);
-    wake_.wait(lock, stop, [this] { return probe_ || !waiting_.empty() || next_scene_; });
+    wake_.wait(lock, stop, [this] { return probe_ || full_ || !waiting_.empty() || next_scene_; });
     if (stop.stop_requested()) return false;
     work.scene = std::exchange(next_scene_, nullptr);
     work.scene_number = scene_number_;
@@ -92,6 +99,8 @@ bool RenderThread::next(const std::stop_token& stop, Work& work) {
     if (!waiting_.empty()) {
         work.request = waiting_.front();
         waiting_.erase(waiting_.begin());
+    } else {
+        work.full = std::exchange(full_, std::nullopt);  // what the window shows comes first
     }
     return true;
 }
@@ -123,6 +132,13 @@ void RenderThread::carry_out(const Work& work) {
             news.point = point;
             news.points = work.probe->number;
         });
+    }
+    if (work.full) {
+        const DrawOptions options{options_of(work.full->look), Drawing::color,
+                                  double(work.full->look.splat_scale)};
+        const auto full = std::make_shared<const FullRender>(
+            FullRender{work.full->number, renderer_->render(work.full->camera, options).color});
+        report([&](News& news) { news.full = full; });
     }
     if (!work.request) return;
     const auto finished = draw(*work.request, work.scene_number);

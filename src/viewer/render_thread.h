@@ -43,6 +43,12 @@ struct RenderedFrame {
     uint64_t scene = 0;  // the number that set_scene() returned
 };
 
+/// A render of a camera at its own size, in floating point.
+struct FullRender {
+    uint64_t number = 0;  // that ask_full() returned
+    Image color;
+};
+
 /// Opens the device that renders; called on the thread.
 using OpenDevice = std::function<std::shared_ptr<gpu::Device>()>;
 
@@ -61,12 +67,17 @@ class RenderThread {
     /// last of several waiting requests is answered.
     uint64_t ask_point(const Camera& camera, const glm::dvec2& pixel);
 
+    /// Asks for the colours of a camera at its own size. News::full has them once its number is the returned one. Only
+    /// the last of several waiting requests is answered.
+    uint64_t ask_full(const Camera& camera, const Look& look);
+
     struct News {
         std::shared_ptr<const RenderedFrame> picture;  // the last complete frame, or null
         std::exception_ptr failure;                    // why the last request failed, if it did
         std::optional<std::string> device;             // its name, once it is open
         uint64_t points = 0;                           // number of the last answered ask_point()
         std::optional<glm::dvec3> point;               // world; empty where no splat is half opaque
+        std::shared_ptr<const FullRender> full;        // the last one, or null
         std::vector<std::filesystem::path> written;    // files, since the last take_news()
     };
     News take_news();
@@ -77,10 +88,16 @@ class RenderThread {
         glm::dvec2 pixel{0};
         uint64_t number = 0;
     };
+    struct Full {
+        Camera camera;
+        Look look;
+        uint64_t number = 0;
+    };
     struct Work {
         std::shared_ptr<const Gaussians> scene;  // null: as before
         std::optional<RenderRequest> request;
         std::optional<Probe> probe;
+        std::optional<Full> full;
         uint64_t scene_number = 0;
     };
     void work(const std::stop_token& stop);
@@ -104,8 +121,9 @@ class RenderThread {
     std::condition_variable_any wake_;
     std::vector<RenderRequest> waiting_;  // in order; only the last may have no file
     std::optional<Probe> probe_;
+    std::optional<Full> full_;
     std::shared_ptr<const Gaussians> next_scene_;
-    uint64_t scene_number_ = 0, probes_ = 0;
+    uint64_t scene_number_ = 0, probes_ = 0, fulls_ = 0;
     News news_;
     std::jthread thread_;
 };

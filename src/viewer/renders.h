@@ -86,6 +86,11 @@ class Renders {
     /// Asks for the point under a pixel; News::point has the answer.
     void ask_point(const Camera& camera, const glm::dvec2& pixel);
 
+    /// Asks for the colours of a camera at its own size, as RenderThread::ask_full().
+    uint64_t ask_full(const Camera& camera, const Look& look) { return thread_.ask_full(camera, look); }
+    /// The number of the present scene.
+    uint64_t scene() const { return scene_; }
+
     struct News : RenderThread::News {
         bool frame = false;           // shown() is another one
         bool point_answered = false;  // since the last take()

@@ -8,8 +8,10 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <vector>
 
 #include "ewa/error.h"
+#include "viewer/font.h"
 
 namespace ewa::viewer {
 namespace {
@@ -217,7 +219,28 @@ bool Presenter::draw(Size window, std::span<const Layer> layers, ImDrawData* pan
     return true;
 }
 
-Gui::Gui(const Window& window, const PresentDevice& device, Presenter& presenter) : device_(device) {
+/// The panel's font, and then the one of headlines. Both are rasterised at the size in which the framebuffer shows them.
+void Gui::add_fonts(double text) {
+    // Latin with its extensions, Greek and Cyrillic, and punctuation: file names have them.
+    static const std::array<ImWchar, 5> names{0x20, 0x52f, 0x2010, 0x2027, 0};
+    ImFontAtlas& fonts = *ImGui::GetIO().Fonts;
+    static std::vector<unsigned char> file;  // the atlas reads it until it is built
+    file = read_font(find_font());
+    for (const double size : {text, 2 * text}) {
+        ImFontConfig font;
+        font.SizePixels = float(size);
+        font.FontDataOwnedByAtlas = false;
+        font.OversampleH = font.OversampleV = 1;
+        if (file.empty())
+            fonts.AddFontDefault(&font);
+        else
+            fonts.AddFontFromMemoryTTF(file.data(), int(file.size()), float(size), &font,
+                                       size == text ? names.data() : nullptr);
+    }
+}
+
+Gui::Gui(const Window& window, const PresentDevice& device, Presenter& presenter, double text)
+    : device_(device) {
     const vk::DescriptorPoolSize size(vk::DescriptorType::eCombinedImageSampler, 1);
     vk::DescriptorPoolCreateInfo create;
     create.setMaxSets(1).setPoolSizes(size);
@@ -227,10 +250,10 @@ Gui::Gui(const Window& window, const PresentDevice& device, Presenter& presenter
     ImGui::CreateContext();
     ImGui::GetIO().IniFilename = nullptr;  // write no settings file
     ImGui::StyleColorsDark();
-    ImGui::GetStyle().ScaleAllSizes(window.scale());
-    ImFontConfig font;
-    font.SizePixels = 13.0f * window.scale();
-    ImGui::GetIO().Fonts->AddFontDefault(&font);
+    const float density = window.density();
+    ImGui::GetStyle().ScaleAllSizes(float(text / kTextHeight) / density);
+    ImGui::GetIO().FontGlobalScale = 1 / density;
+    add_fonts(text);
 
     ImGui_ImplGlfw_InitForVulkan(window.handle(), true);
     ImGui_ImplVulkan_InitInfo info{};

@@ -74,22 +74,24 @@ class Presenter {
 /// Dear ImGui on one window.
 class Gui {
   public:
-    /// The window's own callbacks must be set before: those of ImGui call them.
-    Gui(const Window& window, const PresentDevice& device, Presenter& presenter);
+    /// The window's own callbacks must be set before: those of ImGui call them. text: its height, px.
+    Gui(const Window& window, const PresentDevice& device, Presenter& presenter, double text);
     ~Gui();
 
     void begin_frame();
     ImDrawData* end_frame();
 
   private:
+    void add_fonts(double text);
+
     const PresentDevice& device_;
     vk::UniqueDescriptorPool pool_;
 };
 
-/// Created again if its device is lost.
+/// Created again if its device is lost, or the size of the text changes.
 struct Screen {
-    Screen(const WindowSystem& system, Window& window, const std::string& device_name)
-        : device(system, window, device_name), presenter(device), gui(window, device, presenter) {}
+    Screen(const WindowSystem& system, Window& window, const std::string& device_name, double text)
+        : device(system, window, device_name), presenter(device), gui(window, device, presenter, text) {}
     PresentDevice device;
     Presenter presenter;
     Gui gui;

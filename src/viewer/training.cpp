@@ -8,6 +8,7 @@
 
 #include <cstring>
 
+#include "core/process.h"
 #include "ewa/error.h"
 
 extern char** environ;
@@ -15,17 +16,33 @@ extern char** environ;
 namespace ewa::viewer {
 namespace fs = std::filesystem;
 
-TrainProcess::TrainProcess(const std::vector<std::string>& arguments, const fs::path& output) {
+namespace {
+
+std::vector<std::string> command_of(const std::vector<std::string>& arguments, const fs::path& output) {
     std::error_code error;
     const fs::path program = fs::read_symlink("/proc/self/exe", error).parent_path() / "ewa";
     std::vector<std::string> words{program.string(), "train"};
     words.insert(words.end(), arguments.begin(), arguments.end());
     words.insert(words.end(), {"--serve", "0", "-o", output.string()});
+    return words;
+}
+
+}  // namespace
+
+TrainProcess::TrainProcess(const std::vector<std::string>& arguments, const fs::path& output) {
+    std::vector<std::string> words = command_of(arguments, output);
     std::vector<char*> argv;
     for (std::string& word : words) argv.push_back(word.data());
     argv.push_back(nullptr);
-    const int reason = posix_spawn(&child_, program.c_str(), nullptr, nullptr, argv.data(), environ);
-    if (reason != 0) throw RunError("cannot start " + program.string() + ": " + std::strerror(reason));
+    const int reason = posix_spawn(&child_, argv[0], nullptr, nullptr, argv.data(), environ);
+    if (reason != 0) throw RunError("cannot start " + words[0] + ": " + std::strerror(reason));
+}
+
+bool TrainProcess::accepts(const std::vector<std::string>& arguments, const fs::path& output) {
+    core::Program program;
+    program.command = command_of(arguments, output);
+    program.command.push_back("--check-options");
+    return core::run_program(program, [](std::string_view) { return true; }) == core::Ended::done;
 }
 
 TrainProcess::~TrainProcess() {
@@ -42,8 +59,9 @@ std::optional<int> TrainProcess::status() {
     return status_;
 }
 
-void LiveRun::watch(const live::WhatToWatch& what) {
+void LiveRun::watch(const live::WhatToWatch& what, TrainProcess* trainer) {
     watcher_.reset();  // the old watcher stops before the update is replaced
+    trainer_ = trainer;
     update_ = {};
     watcher_ = std::make_unique<live::Watcher>(what, wake_);
 }

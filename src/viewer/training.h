@@ -24,6 +24,9 @@ class TrainProcess {
     TrainProcess(const TrainProcess&) = delete;
     TrainProcess& operator=(const TrainProcess&) = delete;
 
+    /// Whether ewa train takes these options. If not, it has printed the reason. Throws RunError if it cannot be started.
+    static bool accepts(const std::vector<std::string>& arguments, const std::filesystem::path& output);
+
     /// The exit status once it has ended; 128 + the signal if one ended it.
     std::optional<int> status();
 
@@ -35,11 +38,17 @@ class TrainProcess {
 /// The training run that the window watches, if any.
 class LiveRun {
   public:
-    /// trainer: the viewer's own, or null. wake: called on a thread when take() has something new.
-    LiveRun(TrainProcess* trainer, std::function<void()> wake) : trainer_(trainer), wake_(std::move(wake)) {}
+    /// wake: called on a thread when take() has something new.
+    explicit LiveRun(std::function<void()> wake) : wake_(std::move(wake)) {}
 
-    void watch(const live::WhatToWatch& what);
-    void stop() { watcher_.reset(); }
+    /// trainer: that of the run if the viewer started it, or null. It must live until the next call of watch() or stop().
+    void watch(const live::WhatToWatch& what, TrainProcess* trainer);
+    void stop() {
+        watcher_.reset();
+        trainer_ = nullptr;
+    }
+    /// Whether the viewer started the run.
+    bool own() const { return trainer_ != nullptr; }
     /// The status of the run, or null without one.
     const live::Update* update() const { return watcher_ ? &update_ : nullptr; }
     struct News {
@@ -52,7 +61,7 @@ class LiveRun {
     std::optional<int> failure() const;
 
   private:
-    TrainProcess* trainer_;
+    TrainProcess* trainer_ = nullptr;
     std::function<void()> wake_;
     live::Update update_;
     std::unique_ptr<live::Watcher> watcher_;

@@ -154,8 +154,13 @@ SceneBounds scene_bounds(const Gaussians& gaussians) {
     return bounds;
 }
 
-Viewpoint framing_view(const Gaussians& gaussians, int width, int height) {
-    const scene::Framing framing = scene::frame_scene(gaussians, width, height);
+Viewpoint framing_view(const Gaussians& gaussians, const Dataset* dataset, int width, int height) {
+    scene::FramingHints hints;
+    if (dataset && !dataset->frames.empty()) {
+        hints.up = scene::mean_up(*dataset);
+        hints.forward = axis_of(dataset->frames.front().camera, 2);
+    }
+    const scene::Framing framing = scene::frame_scene(gaussians, width, height, hints);
     return {framing.camera, framing.target, framing.up, framing.radius};
 }
 

@@ -61,8 +61,9 @@ struct SceneBounds {
 };
 SceneBounds scene_bounds(const Gaussians& gaussians);
 
-/// Shows the whole scene from the front and slightly above, as scene::frame_scene does.
-Viewpoint framing_view(const Gaussians& gaussians, int width, int height);
+/// Shows the whole scene from the front and slightly above, as `ewa render` does. dataset: tells up and the front; null:
+/// none.
+Viewpoint framing_view(const Gaussians& gaussians, const Dataset* dataset, int width, int height);
 
 /// The frame whose camera is closest in position and direction; -1 without frames. A turn of 90 degrees
 /// counts as much as a distance of `radius` (world units).

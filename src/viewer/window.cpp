@@ -51,6 +51,12 @@ Size WindowSystem::work_area() const {
     return size;
 }
 
+float WindowSystem::scale() const {
+    float x = 1, y = 1;
+    if (GLFWmonitor* monitor = glfwGetPrimaryMonitor()) glfwGetMonitorContentScale(monitor, &x, &y);
+    return std::max(1.0f, std::max(x, y));
+}
+
 std::vector<const char*> WindowSystem::vulkan_extensions() const {
     uint32_t count = 0;
     const char** names = glfwGetRequiredInstanceExtensions(&count);
@@ -63,6 +69,9 @@ void WindowSystem::wake() const {
 
 Window::Window(const WindowSystem&, const std::string& title, Size size, bool resizable) {
     glfwWindowHint(GLFW_CLIENT_API, GLFW_NO_API);
+    // The name by which a desktop finds ewa-view.desktop, and its icon.
+    glfwWindowHintString(GLFW_X11_CLASS_NAME, "ewa-view");
+    glfwWindowHintString(GLFW_X11_INSTANCE_NAME, "ewa-view");
     glfwWindowHint(GLFW_RESIZABLE, resizable ? GLFW_TRUE : GLFW_FALSE);
     window_ = glfwCreateWindow(size.width, size.height, title.c_str(), nullptr, nullptr);
     if (!window_) throw RunError("no window can be opened: " + glfw_reason());
@@ -87,7 +96,7 @@ void Window::watch() {
     });
     glfwSetDropCallback(window_, [](GLFWwindow* window, int count, const char** paths) {
         of(window).stirred_ = true;
-        if (count > 0) of(window).dropped_ = paths[0];
+        of(window).dropped_.assign(paths, paths + count);
     });
     const auto stir = [](GLFWwindow* window, auto...) { of(window).stirred_ = true; };
     glfwSetCursorPosCallback(window_, stir);
@@ -120,6 +129,17 @@ float Window::scale() const {
     float x = 1, y = 1;
     glfwGetWindowContentScale(window_, &x, &y);
     return std::max(1.0f, std::max(x, y));
+}
+
+float Window::density() const {
+    const Size pixels = framebuffer(), units = size();
+    return pixels.width > 0 && units.width > 0 ? float(pixels.width) / float(units.width) : 1.0f;
+}
+
+Size Window::size() const {
+    Size size;
+    glfwGetWindowSize(window_, &size.width, &size.height);
+    return size;
 }
 
 bool Window::closed() const {

@@ -22,8 +22,10 @@ class WindowSystem {
     WindowSystem(const WindowSystem&) = delete;
     WindowSystem& operator=(const WindowSystem&) = delete;
 
-    /// The free size for a window on the main monitor, px; zero if unknown.
+    /// The free size for a window on the main monitor, in the units of window sizes; zero if unknown.
     Size work_area() const;
+    /// Of text on the main monitor: larger than 1 on high-density displays.
+    float scale() const;
     std::vector<const char*> vulkan_extensions() const;
     /// Makes Window::wait() return. Any thread may call it.
     void wake() const;
@@ -52,7 +54,9 @@ class Window {
     GLFWwindow* handle() const { return window_; }
     vk::UniqueSurfaceKHR surface(vk::Instance instance) const;
     Size framebuffer() const;  // px; zero while minimised
-    float scale() const;       // of text, on high-density displays
+    Size size() const;         // in the system's units
+    float scale() const;       // of text in the framebuffer, on high-density displays
+    float density() const;     // px of the framebuffer per unit of the window's size
     bool closed() const;
     void close();
     bool held(int key) const;
@@ -61,8 +65,8 @@ class Window {
     std::vector<KeyPress> wait(double seconds);
     /// Whether the last wait() brought input or a change of the window.
     bool stirred() const { return stirred_; }
-    /// The file that was dropped on the window since the last call; empty: none.
-    std::filesystem::path take_dropped() { return std::exchange(dropped_, {}); }
+    /// The files that were dropped on the window since the last call.
+    std::vector<std::filesystem::path> take_dropped() { return std::exchange(dropped_, {}); }
     void set_title(const std::string& title);
 
   private:
@@ -71,7 +75,7 @@ class Window {
 
     GLFWwindow* window_ = nullptr;
     std::vector<KeyPress> pressed_;
-    std::filesystem::path dropped_;
+    std::vector<std::filesystem::path> dropped_;
     bool stirred_ = false;
 };
 

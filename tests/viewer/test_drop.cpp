@@ -42,7 +42,7 @@ TEST_F(Drop, OpensAFileOfAnyName) {
     expect_silent(session.quit());
 }
 
-TEST_F(Drop, OpensTheFirstOfSeveral) {
+TEST_F(Drop, OpensTheFirstOfSeveralScenes) {
     make_splats(folder_ / "one.ply", 30, 0);
     make_splats(folder_ / "two.ply", 60, 0);
     Session session(shots_, {splats_, "--size", "96x64"});
@@ -53,18 +53,49 @@ TEST_F(Drop, OpensTheFirstOfSeveral) {
     expect_silent(session.quit());
 }
 
+/// The splats that are shown, or dropped with it, are seen through its cameras.
+TEST_F(Drop, ADatasetGivesItsCamerasToSplats) {
+    for (const bool together : {false, true}) {
+        std::filesystem::remove_all(shots_);
+        std::filesystem::create_directories(shots_);
+        std::vector<std::string> arguments{"--size", "48x32"};
+        if (!together) arguments.insert(arguments.begin(), splats_);
+        Session session(shots_, arguments);
+        ASSERT_TRUE(session.found());
+        session.send("key F2");
+        const std::string first = together ? uri_of(splats_) : std::string();
+        ASSERT_TRUE(x_->drop(window(), first + uri_of(cameras_)));
+        const Image expected = rendered("0");
+        Image shown;
+        soon([&] {
+            shown = screenshot(session);
+            return largest_difference(shown, expected) <= kRounding;
+        });
+        EXPECT_LE(largest_difference(shown, expected), kRounding) << together;
+        session.send("key Right");
+        EXPECT_LE(largest_difference(screenshot(session), rendered("1")), kRounding) << together;
+        expect_silent(session.quit());
+    }
+}
+
 TEST_F(Drop, OpensFolders) {
     expect_success(run_ewa({"train", cameras_, "-o", folder_ / "run", "--steps", "3", "--init", splats_,
                             "--background", "0.2,0.4,0.6", "--quiet"}));
-    Session session(shots_, {splats_, "--size", "96x64"});
+    Session session(shots_, {"--size", "96x64"});
     ASSERT_TRUE(session.found());
-    EXPECT_EQ(largest_difference(dropped(session, folder_ / "run", "run"), alone(folder_ / "run")), 0);
+    EXPECT_EQ(range_of(screenshot(session)), 0) << "there is something in the empty window";
     // A dataset of cameras alone shows nothing but them; its keys work.
     const Image cameras = dropped(session, cameras_, "views");
     EXPECT_EQ(largest_difference(cameras, alone(cameras_)), 0);
     session.send("key v key Right");
     EXPECT_GT(range_of(screenshot(session)), 0.3f) << "the image of the dropped dataset";
+    session.send("key v key v key v");
+    EXPECT_EQ(largest_difference(dropped(session, folder_ / "run", "run"), alone(folder_ / "run")), 0);
     EXPECT_EQ(largest_difference(dropped(session, splats_, "splats.ply"), alone(splats_)), 0);
+    // On splats, the dataset only gives its cameras the first time.
+    ASSERT_TRUE(x_->drop(window(), uri_of(cameras_)));
+    screenshot(session);
+    EXPECT_LT(largest_difference(dropped(session, cameras_, "views"), cameras), kRounding);
     expect_silent(session.quit());
 }
 
@@ -75,10 +106,9 @@ TEST_F(Drop, WhatCannotBeReadIsSaid) {
     Session session(shots_, {splats_, "--size", "640x480"});
     ASSERT_TRUE(session.found());
     session.send("key F1 key F1");  // the hint would go by itself
-    const Image picture = screenshot(session);
     for (const bool panel : {true, false}) {
         if (!panel) session.send("key F2");
-        screenshot(session);  // the window says where, and that goes by itself
+        const Image picture = screenshot(session);  // the window says where, and that goes by itself
         const Image saying = x_->pixels_at_rest(window()), quiet = x_->pixels_at_rest(window(), &saying);
         for (const char* name : {"notes.txt", "broken.ply", "absent.ply"}) {
             const Image before = x_->pixels_at_rest(window());

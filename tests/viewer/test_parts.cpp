@@ -182,7 +182,7 @@ TEST(Framing, AFewFarSplatsDoNotCount) {
     EXPECT_GT(bounds.radius, 1);
     EXPECT_LT(bounds.radius, 2);
 
-    const Viewpoint view = framing_view(splats, 640, 480);
+    const Viewpoint view = framing_view(splats, nullptr, 640, 480);
     expect_rotation(view.camera.rotation);
     const glm::dvec2 middle = pixel(view.camera, scene::framed_box(splats).center());
     EXPECT_NEAR(middle.x, 320, 1e-6);
@@ -195,7 +195,7 @@ TEST(Framing, AFewFarSplatsDoNotCount) {
 }
 
 TEST(Framing, NothingAtAllHasAView) {
-    const Viewpoint view = framing_view(Gaussians(), 640, 480);
+    const Viewpoint view = framing_view(Gaussians(), nullptr, 640, 480);
     EXPECT_GT(view.radius, 0);
     expect_rotation(view.camera.rotation);
     EXPECT_TRUE(std::isfinite(view.camera.translation.z));

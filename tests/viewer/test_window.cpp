@@ -188,7 +188,9 @@ TEST(WithoutWindow, WrongUseIsOneLine) {
     make_splats(folder / "splats.ply");
     make_dataset(folder / "views");
     const std::string splats = folder / "splats.ply";
-    expect_failure(run_view({}), 2, "PATH");
+    expect_failure(run_view({"--screenshot", folder / "shown.png"}), 2, "PATH");
+    expect_failure(run_view({"--cameras", folder / "views"}), 2, "PATH");
+    expect_failure(run_view({"--train"}), 2, "PATH");
     expect_failure(run_view({folder / "none.ply"}), 2, "none.ply");
     expect_failure(run_view({folder / "none"}), 2, "no such file or folder");
     expect_failure(run_view({splats, "--size", "640"}), 2, "--size");

@@ -37,10 +37,14 @@ class WindowTest : public testing::Test {
         setenv("DISPLAY", display_.name().c_str(), 1);
         // Its messages come on standard output, which expect_silent() wants empty.
         setenv("VK_INSTANCE_LAYERS", "VK_LAYER_KHRONOS_validation", 1);
+        setenv("XDG_CONFIG_HOME", config_.c_str(), 1);  // the user's settings are not the tests'
         make_splats(splats_, 400, 2);
         make_dataset(cameras_);
     }
-    void TearDown() override { unsetenv("VK_INSTANCE_LAYERS"); }
+    void TearDown() override {
+        unsetenv("VK_INSTANCE_LAYERS");
+        unsetenv("XDG_CONFIG_HOME");
+    }
 
     static void expect_silent(const Outcome& outcome) {
         expect_success(outcome);
@@ -67,7 +71,8 @@ class WindowTest : public testing::Test {
 
     VirtualDisplay display_;
     Folder folder_;
-    const std::string splats_ = folder_ / "splats.ply", cameras_ = folder_ / "views";
+    const std::string splats_ = folder_ / "splats.ply", cameras_ = folder_ / "views",
+                      config_ = folder_ / "config";
 };
 
 }  // namespace ewa::test

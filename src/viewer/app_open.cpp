@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the window shows: scenes that are opened, and training runs.
+#include <cstdio>
+
+#include "core/text.h"
+#include "ewa/error.h"
+#include "scene/names.h"
+#include "train/earlier_run.h"
+#include "viewer/app.h"
+
+namespace ewa::viewer {
+namespace {
+
+/// The folder that `ewa train` takes for the dataset, or the first with a number behind it that no run has used.
+std::filesystem::path free_run_folder(const std::filesystem::path& dataset) {
+    RunOptions run;
+    run.dataset = dataset;
+    const std::filesystem::path usual = output_folder(run);
+    for (int i = 1;; ++i) {
+        std::filesystem::path folder = usual;
+        if (i > 1) folder += "-" + std::to_string(i);
+        std::error_code error;
+        if (!std::filesystem::exists(folder, error)) return folder;
+    }
+}
+
+}  // namespace
+
+void App::adopt(OpenedScene scene, std::optional<int> frame) {
+    scene_ = std::move(scene);
+    scene_.set_gaussians(scene_.gaussians);
+    renders_.set_scene(scene_.gaussians);
+    settings_.look.kernel = scene_.look.kernel;
+    settings_.look.background = scene_.look.background;
+    settings_.look.sh_degree = scene_.sh_degree;
+    message_.note.clear();
+    if (!scene_.remark.empty()) say(scene_.remark);
+    framed_ = scene_.gaussians->size() > 0;
+    comparison_.forget_scene();
+    quality_.forget();
+    leave_camera();
+    start_frame_.reset();
+    if (scene_.dataset) {
+        camera_size_ = camera_size(*scene_.dataset, view_.radius());
+        start_frame_ = at_camera_ = frame.value_or(0);
+    }
+    redraw(kRedraws);
+}
+
+void App::open(const std::vector<std::filesystem::path>& paths) {
+    if (opening_.valid()) return say("another file is being opened");
+    say("opening " + core::one_line(paths.front().string()));
+    opening_ = std::async(std::launch::async, [this, paths, shown = scene_] {
+        const Wake wake{system_};
+        return open_dropped(paths, shown);
+    });
+}
+
+void App::take_opened() {
+    if (!opening_.valid() || opening_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
+    try {
+        OpenedScene scene = opening_.get();
+        const bool same_splats = scene.gaussians == scene_.gaussians;
+        view_.restart(start_view(scene, {}, picture_area().size()));
+        window_.set_title(window_title(scene));
+        adopt(std::move(scene), {});
+        if (same_splats) {
+            settings_.cameras = true;
+            return;
+        }
+        live_.stop();
+        if (!scene_.run.empty()) watch({scene_.run, {}, {}, scene_.splats_time}, nullptr);
+    } catch (const std::exception& error) {
+        say(error.what());
+    }
+}
+
+void App::watch(const live::WhatToWatch& what, TrainProcess* trainer) {
+    live_failed_ = false;
+    live_.watch(what, trainer);
+    redraw();
+}
+
+/// New splats of the run replace those that are shown.
+void App::take_live() {
+    if (const auto status = live_.failure(); status && message_.note.empty())
+        say("the training ended with status " + std::to_string(*status) +
+            "; see the terminal for the reason");
+    // A screenshot waits for its full frame, which new splats would start again.
+    if (capture_ && framed_) return;
+    const LiveRun::News news = live_.take();
+    if (news.any) redraw();
+    const live::Update* run = live_.update();
+    if (run && !run->problem.empty() && run->status.steps == 0 && !live_failed_) {
+        live_failed_ = true;
+        std::fprintf(stderr, "ewa-view: %s\n", core::one_line(run->problem).c_str());
+    }
+    if (!news.splats) return;
+    const int degree_before = scene_.sh_degree;
+    scene_.set_gaussians(news.splats);
+    scene_.points = false;
+    renders_.set_scene(news.splats);
+    if (settings_.look.sh_degree == degree_before) settings_.look.sh_degree = scene_.sh_degree;
+    // The first splats tell what to look at, unless the user has moved the camera.
+    if (!framed_ && (!scene_.dataset || at_camera_ == start_frame_))
+        view_.restart(start_view(scene_, start_frame_, picture_area().size()));
+    framed_ = true;
+}
+
+bool App::training() {
+    return (trainer_ && !trainer_->status()) || (startup_.trainer && !startup_.trainer->status());
+}
+
+/// Starts `ewa train` on the dataset that is shown, in a folder of its own.
+void App::train() {
+    if (training()) return say("a training that this window has started still runs");
+    try {
+        const std::filesystem::path folder = free_run_folder(scene_.path);
+        const auto now = std::filesystem::file_time_type::clock::now();
+        std::vector<std::string> options{scene_.path.string(), "--steps",
+                                         std::to_string(settings_.train_steps), "--quiet"};
+        if (!startup_.device.empty()) options.insert(options.end(), {"--device", startup_.device});
+        live_.stop();
+        trainer_ = std::make_unique<TrainProcess>(options, folder);
+        watch({folder, {}, {}, now, now}, trainer_.get());
+        say("training into " + std::filesystem::absolute(folder).string());
+    } catch (const std::exception& error) {
+        say(error.what());
+    }
+}
+
+/// What the middle of the picture says where there is nothing to see.
+std::optional<Headline> App::headline() const {
+    if (scene_.gaussians->size() > 0) return std::nullopt;
+    if (opening_.valid()) return Headline{"opening ...", ""};
+    if (const live::Update* run = live_.update()) {
+        if (!run->problem.empty())
+            return Headline{run->problem, "The window keeps trying, and shows the training once it answers."};
+        return Headline{"waiting for the first splats", ""};
+    }
+    if (!scene_.title.empty() && !scene_.dataset)
+        return Headline{scene_.title + " has no splats", "Drop another file here."};
+    if (scene_.dataset) return std::nullopt;
+    return Headline{"drop a file here", "splats, a dataset, or the folder of a training run"};
+}
+
+/// What the picture is, if it is no splats.
+std::string App::banner() const {
+    const live::Update* run = live_.update();
+    if (!scene_.points || !run || scene_.gaussians->size() == 0) return "";
+    std::string text = "These are the points of the dataset, not splats: the picture is of step 0.";
+    if (!run->connected && !live_.own())
+        text += " ewa train with --serve or --save-every lets it move.";
+    return text;
+}
+
+}  // namespace ewa::viewer

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "viewer/kept_settings.h"
+
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+#include "core/json.h"
+#include "ewa/error.h"
+
+namespace ewa::viewer {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr uint64_t kMostSettingsBytes = 1u << 16;
+constexpr int kLeastSide = 200, kMostSide = 16384;  // px of a window
+constexpr std::array kModeNames{"color", "depth", "alpha", "count", "ellipsoids"};
+
+/// The number of this name, if it is one in the range.
+template <class T>
+void take(const Json& json, const char* name, T least, T most, T& value) {
+    const auto found = json.find(name);
+    if (found == json.end() || !found->is_number()) return;
+    const double number = found->get<double>();
+    if (number >= double(least) && number <= double(most)) value = T(number);
+}
+
+}  // namespace
+
+fs::path settings_file() {
+    // A relative path in the variable is to be ignored (XDG Base Directory Specification).
+    const auto folder = [](const char* name) {
+        const char* value = std::getenv(name);
+        const fs::path path = value ? value : "";
+        return path.is_absolute() ? path : fs::path();
+    };
+    if (const fs::path config = folder("XDG_CONFIG_HOME"); !config.empty()) return config / "ewa/view.json";
+    const fs::path home = folder("HOME");
+    return home.empty() ? home : home / ".config/ewa/view.json";
+}
+
+KeptSettings read_settings(const fs::path& file) {
+    KeptSettings settings;
+    try {
+        const Json json = core::read_json_file<Json>(file, {.bytes = kMostSettingsBytes});
+        if (!json.is_object()) return settings;
+        Size window;
+        take(json, "window_width", kLeastSide, kMostSide, window.width);
+        take(json, "window_height", kLeastSide, kMostSide, window.height);
+        if (window.width > 0 && window.height > 0) settings.window = window;
+        take(json, "text_scale", kLeastText, kMostText, settings.text_scale);
+        take(json, "gain", 1.0f, 16.0f, settings.gain);
+        take(json, "film_seconds", 0.2f, 10.0f, settings.film_seconds);
+        const Json mode = json.value("mode", Json());
+        for (size_t i = 0; i < kModeNames.size(); ++i)
+            if (mode == kModeNames[i]) settings.mode = Mode(i);
+    } catch (const std::exception&) {
+        return {};
+    }
+    return settings;
+}
+
+void write_settings(const fs::path& file, const KeptSettings& settings) {
+    if (file.empty()) return;
+    Json json{{"mode", kModeNames[size_t(settings.mode)]},
+              {"text_scale", settings.text_scale},
+              {"gain", settings.gain},
+              {"film_seconds", settings.film_seconds}};
+    if (settings.window) {
+        json["window_width"] = settings.window->width;
+        json["window_height"] = settings.window->height;
+    }
+    try {
+        core::write_json(file, json);
+    } catch (const std::exception&) {
+        // The next session starts with the usual settings.
+    }
+}
+
+}  // namespace ewa::viewer

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the window remembers from one session to the next, in a file of the user's.
+#pragma once
+#include <filesystem>
+#include <optional>
+
+#include "viewer/layout.h"
+
+namespace ewa::viewer {
+
+inline constexpr float kLeastText = 0.5f, kMostText = 3;  // times the usual size
+
+struct KeptSettings {
+    std::optional<Size> window;  // logical px: of a screen with a content scale of 1
+    Mode mode = Mode::color;
+    float text_scale = 1;  // times the size that the monitor asks for
+    float gain = 4;        // of the difference image
+    float film_seconds = 2;
+    bool operator==(const KeptSettings&) const = default;
+};
+
+/// $XDG_CONFIG_HOME/ewa/view.json, else ~/.config/ewa/view.json. Empty if the environment names neither.
+std::filesystem::path settings_file();
+
+/// Never throws: an absent or damaged file gives the usual settings, and so does a value out of its range.
+KeptSettings read_settings(const std::filesystem::path& file);
+/// Never throws: a session does not depend on it. Members of the file that this version does not know are lost.
+void write_settings(const std::filesystem::path& file, const KeptSettings& settings);
+
+}  // namespace ewa::viewer

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// Work that takes long, on a thread of its own.
+#pragma once
+#include <condition_variable>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <utility>
+
+namespace ewa::viewer {
+
+/// Work on a thread of its own, of which only the last request matters.
+template <class Request, class Result>
+class Latest {
+  public:
+    /// make runs on the thread and never throws. on_news is called there when result() has changed.
+    Latest(std::function<Result(const Request&)> make, std::function<void()> on_news)
+        : make_(std::move(make)),
+          on_news_(std::move(on_news)),
+          thread_([this](const std::stop_token& stop) { work(stop); }) {}
+
+    /// Replaces a request that is waiting.
+    void ask(Request request) {
+        const std::lock_guard lock(mutex_);
+        waiting_ = std::move(request);
+        wake_.notify_one();
+    }
+    /// The last result, or null.
+    std::shared_ptr<const Result> result() const {
+        const std::lock_guard lock(mutex_);
+        return result_;
+    }
+
+  private:
+    void work(const std::stop_token& stop) {
+        for (;;) {
+            std::optional<Request> request;
+            {
+                std::unique_lock lock(mutex_);
+                wake_.wait(lock, stop, [this] { return waiting_.has_value(); });
+                if (stop.stop_requested()) return;
+                request = std::exchange(waiting_, std::nullopt);
+            }
+            auto made = std::make_shared<const Result>(make_(*request));
+            {
+                const std::lock_guard lock(mutex_);
+                result_ = std::move(made);
+            }
+            on_news_();
+        }
+    }
+
+    std::function<Result(const Request&)> make_;
+    std::function<void()> on_news_;
+    mutable std::mutex mutex_;
+    std::condition_variable_any wake_;
+    std::optional<Request> waiting_;
+    std::shared_ptr<const Result> result_;
+    std::jthread thread_;
+};
+
+}  // namespace ewa::viewer

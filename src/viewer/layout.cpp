@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "viewer/layout.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ewa::viewer {
+namespace {
+
+constexpr Size kLeastWindow{1100, 880};  // where the desktop has room
+constexpr double kShare = 0.92;          // of the desktop: the window's frame takes some
+
+}  // namespace
+
+Rectangle fitted(Size shape, const Rectangle& space) {
+    if (shape.width <= 0 || shape.height <= 0 || shape == space.size()) return space;
+    const double scale = std::min(double(space.width) / shape.width, double(space.height) / shape.height);
+    const int width = std::clamp(int(std::lround(shape.width * scale)), 1, std::max(1, space.width));
+    const int height = std::clamp(int(std::lround(shape.height * scale)), 1, std::max(1, space.height));
+    return {space.x + (space.width - width) / 2, space.y + (space.height - height) / 2, width, height};
+}
+
+Rectangle free_area(Size window, int panel) {
+    const int width = std::max(1, window.width), height = std::max(1, window.height);
+    if (panel <= 0 || panel > width / 2) return {0, 0, width, height};
+    return {panel, 0, width - panel, height};
+}
+
+Arrangement arrange(Comparison comparison, const Rectangle& area, Size image) {
+    if (comparison != Comparison::beside) return {area, fitted(image, area)};
+    const int half_width = std::max(1, area.width / 2), half_height = std::max(1, area.height / 2);
+    const Rectangle left{area.x, area.y, half_width, area.height};
+    const Rectangle right{area.x + half_width, area.y, std::max(1, area.width - half_width), area.height};
+    const Rectangle top{area.x, area.y, area.width, half_height};
+    const Rectangle bottom{area.x, area.y + half_height, area.width, std::max(1, area.height - half_height)};
+    const bool stacked = fitted(image, bottom).width > fitted(image, right).width;
+    return stacked ? Arrangement{top, fitted(image, bottom)} : Arrangement{left, fitted(image, right)};
+}
+
+Size window_size(Size picture, int panel, Size desktop, double scale) {
+    const double most_width = desktop.width > 0 ? kShare * desktop.width : 1e9;
+    const double most_height = desktop.height > 0 ? kShare * desktop.height : 1e9;
+    const double height = std::min(kLeastWindow.height * scale, most_height);
+    const double width = std::clamp(panel + height * picture.width / std::max(1, picture.height),
+                                    kLeastWindow.width * scale, kUsualSize.width * scale + panel);
+    return {std::max(1, int(std::lround(std::min(width, most_width)))),
+            std::max(1, int(std::lround(height)))};
+}
+
+Image without_left(const Image& image, int left) {
+    left = std::clamp(left, 0, image.width - 1);
+    if (left == 0) return image;
+    Image part(image.width - left, image.height, image.channels);
+    for (int y = 0; y < image.height; ++y)
+        std::copy_n(image.at(left, y), size_t(part.width) * size_t(image.channels), part.at(0, y));
+    return part;
+}
+
+}  // namespace ewa::viewer

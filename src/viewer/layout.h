@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where the window shows what: the panel at the left, the pictures beside it. Sizes are in px of the framebuffer,
+// unless stated otherwise. Independent of the window.
+#pragma once
+#include "viewer/byte_image.h"
+
+namespace ewa::viewer {
+
+enum class Comparison { none, beside, wipe, difference };
+
+/// In pixels, from the top left corner.
+struct Rectangle {
+    int x = 0, y = 0, width = 0, height = 0;
+    bool operator==(const Rectangle&) const = default;
+    Size size() const { return {width, height}; }
+};
+
+/// The largest rectangle with the aspect ratio of `shape`, centred in `space`.
+Rectangle fitted(Size shape, const Rectangle& space);
+
+inline constexpr double kTextHeight = 16;   // of the panel's text, at a content scale of 1
+inline constexpr double kPanelWidth = 19;   // in heights of the text
+inline constexpr Size kUsualSize{1280, 800};  // of a picture that no camera sets
+
+/// The part of the window beside the panel. A panel that would take more than half of the width lies over the picture,
+/// and the whole window is free. panel: its width; 0: it is hidden.
+Rectangle free_area(Size window, int panel);
+
+/// Places in the window. Beside: each picture gets half of the area, left and right or one above the other, whichever
+/// shows the image larger. Otherwise the render fills the area, and the image the part that its camera saw.
+struct Arrangement {
+    Rectangle rendering, image;
+};
+Arrangement arrange(Comparison comparison, const Rectangle& area, Size image);
+
+/// The size of a new window with the panel and a picture of this shape beside it: about 1100 px wide and 880 px high
+/// times `scale`, larger for a wide picture, and never larger than most of the desktop. desktop: zero if unknown.
+Size window_size(Size picture, int panel, Size desktop, double scale);
+
+/// The part of an image right of the first `left` columns.
+Image without_left(const Image& image, int left);
+
+}  // namespace ewa::viewer

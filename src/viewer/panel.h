@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// The panel at the left of the window. Each of its rows keeps its place: a row that has nothing to say is empty. The
+// functions change only their arguments.
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "io/datasets/view_list.h"
+#include "live/watcher.h"
+#include "viewer/comparison.h"
+#include "viewer/opening.h"
+
+namespace ewa::viewer {
+
+/// What the panel shows.
+struct PanelFacts {
+    const OpenedScene& scene;
+    const std::string& device;
+    const RenderedFrame* picture;  // null: none yet
+    const std::vector<io::NamedView>& views;
+    const live::Update* run;              // null: no training run
+    bool drawing;                         // a better frame follows
+    const std::string& note;              // the last message
+    std::string image_failure;            // why there is no image
+    std::optional<double> psnr;           // of this view against the image
+    double pictures_a_second;             // of the moving camera; else 0
+    std::optional<double> first_picture;  // seconds after the start
+    std::optional<float> film;            // share of the film that is written; empty: no film
+    glm::dvec3 up;
+    std::optional<int> at_camera;  // the camera that the view is at
+    float width;                   // of the panel, in ImGui's coordinates
+    bool over_picture;             // the panel lies over the picture, which shines through
+};
+
+/// What the panel changes.
+struct PanelSettings {
+    Look look;
+    Comparison comparison = Comparison::none;
+    float wipe = 0.5f;  // share of the width that shows the image
+    float gain = 4;     // factor of the difference image
+    bool cameras = false, turntable = false;
+    float film_seconds = 2;  // from one view to the next
+    float text_scale = 1;    // times the size that the monitor asks for
+    int train_steps = 0;     // of a training that the window starts
+};
+
+/// What the user asked for in the panel.
+struct PanelActions {
+    bool screenshot = false, exr = false, reset = false, whole_scene = false, save_view = false, film = false,
+         stop_film = false, write_views = false, train = false;
+    std::optional<int> frame;
+    std::optional<size_t> view, forget;
+    std::optional<glm::dvec3> up;
+    std::optional<std::string> command;  // for the training run: pause, resume or save
+};
+
+PanelActions draw_panel(const PanelFacts& facts, PanelSettings& settings);
+
+/// The section of a training run, or of a dataset that one can be started on. Part of draw_panel().
+void draw_training(const PanelFacts& facts, PanelSettings& settings, PanelActions& actions);
+
+/// Text that wraps in a fixed number of lines, and scrolls if it has more.
+void draw_text_box(const char* name, const std::string& text, int lines);
+
+/// The next of the six axes; the first one if `up` is not an axis.
+glm::dvec3 next_up(const glm::dvec3& up);
+
+}  // namespace ewa::viewer

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <imgui.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <numeric>
+
+#include "viewer/panel.h"
+
+namespace ewa::viewer {
+namespace {
+
+constexpr size_t kMostPoints = 400;  // of a plotted curve
+constexpr int kMostSteps = 10'000'000;
+
+/// At most kMostPoints values: means over groups of neighbours.
+std::vector<float> curve(const std::vector<float>& values) {
+    if (values.size() <= kMostPoints) return values;
+    std::vector<float> means(kMostPoints);
+    for (size_t i = 0; i < kMostPoints; ++i) {
+        const size_t from = i * values.size() / kMostPoints, to = (i + 1) * values.size() / kMostPoints;
+        means[i] = std::accumulate(values.begin() + std::ptrdiff_t(from), values.begin() + std::ptrdiff_t(to),
+                                   0.0f) /
+                   float(to - from);
+    }
+    return means;
+}
+
+/// The curve, with the name and the last value in it.
+void plot(const char* name, const std::vector<float>& values, const char* format) {
+    std::array<char, 64> text{};
+    if (values.empty())
+        std::snprintf(text.data(), text.size(), "%s: none yet", name);
+    else
+        std::snprintf(text.data(), text.size(), format, double(values.back()));
+    std::vector<float> points = curve(values);
+    if (points.empty()) points.push_back(0);
+    const auto [least, most] = std::minmax_element(points.begin(), points.end());
+    const float margin = std::max(1e-6f, 0.05f * (*most - *least));
+    ImGui::PushID(name);
+    ImGui::PlotLines("", points.data(), int(points.size()), 0, text.data(), *least - margin, *most + margin,
+                     ImVec2(ImGui::GetContentRegionAvail().x, ImGui::GetTextLineHeight() * 3));
+    ImGui::PopID();
+}
+
+void show_progress(const live::Update& run) {
+    const live::Status& status = run.status;
+    std::array<char, 96> text{};
+    if (status.steps == 0) {
+        std::snprintf(text.data(), text.size(), "%s",
+                      run.problem.empty() ? "waiting for the first step ..." : "no training is reached");
+    } else {
+        const char* state = status.state == live::State::paused ? "paused"
+                            : status.state == live::State::done ? "done"
+                                                                : "training";
+        std::snprintf(text.data(), text.size(), "%s: step %d of %d, %.0f s", state, status.step, status.steps,
+                      status.seconds);
+    }
+    ImGui::TextUnformatted(text.data());
+    const float share = status.steps > 0 ? float(status.step) / float(status.steps) : 0;
+    ImGui::ProgressBar(share, ImVec2(ImGui::GetContentRegionAvail().x, 0.4f * ImGui::GetTextLineHeight()), "");
+}
+
+/// Which step the picture is of.
+void show_step(const PanelFacts& facts) {
+    const live::Update& run = *facts.run;
+    if (facts.scene.points)
+        ImGui::TextUnformatted("picture: points, of step 0");
+    else if (run.splats_step >= 0)
+        ImGui::Text("picture: splats of step %d", run.splats_step);
+    else
+        ImGui::TextUnformatted(facts.scene.gaussians->size() > 0 ? "picture: the last saved splats" : "");
+}
+
+void show_curves(const live::Status& status) {
+    std::vector<float> loss, psnr;
+    for (const report::MetricsLine& line : status.metrics) {
+        if (std::isfinite(line.loss)) loss.push_back(float(line.loss));
+        if (line.test_psnr && std::isfinite(*line.test_psnr)) psnr.push_back(float(*line.test_psnr));
+    }
+    plot("loss", loss, "loss %.4f");
+    plot("held-out PSNR", psnr, "held-out PSNR %.2f dB");
+}
+
+std::string remark_of(const PanelFacts& facts) {
+    const live::Update& run = *facts.run;
+    if (!run.problem.empty()) return run.problem;
+    if (run.status.state == live::State::done) return "";
+    if (run.connected) return run.status.commands ? "" : "watching; --token lets you pause and save";
+    if (facts.scene.points)
+        return "No splats are saved yet. ewa train with --serve 0 or --save-every lets the picture move.";
+    return "watching the files of the run; ewa train --serve shows more";
+}
+
+}  // namespace
+
+void draw_text_box(const char* name, const std::string& text, int lines) {
+    ImGui::BeginChild(name, ImVec2(0, float(lines) * ImGui::GetTextLineHeightWithSpacing()));
+    ImGui::PushTextWrapPos(0);
+    ImGui::TextUnformatted(text.c_str());
+    ImGui::PopTextWrapPos();
+    ImGui::EndChild();
+}
+
+void draw_training(const PanelFacts& facts, PanelSettings& settings, PanelActions& actions) {
+    if (!facts.run) {
+        if (ImGui::InputInt("steps", &settings.train_steps, 0))
+            settings.train_steps = std::clamp(settings.train_steps, 1, kMostSteps);
+        actions.train = ImGui::Button("Train splats");
+        return;
+    }
+    const live::Update& run = *facts.run;
+    show_progress(run);
+    show_step(facts);
+    show_curves(run.status);
+    const bool paused = run.status.state == live::State::paused;
+    ImGui::BeginDisabled(run.status.state == live::State::done || !run.connected || !run.status.commands);
+    if (ImGui::Button(paused ? "Resume###pause" : "Pause###pause"))
+        actions.command = paused ? "resume" : "pause";
+    ImGui::SameLine();
+    if (ImGui::Button("Save now")) actions.command = "save";
+    ImGui::EndDisabled();
+    draw_text_box("training remark", remark_of(facts), 2);
+}
+
+}  // namespace ewa::viewer

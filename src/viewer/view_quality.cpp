@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "viewer/view_quality.h"
+
+#include <limits>
+
+#include "ewa/image.h"
+
+namespace ewa::viewer {
+
+Quality quality_of(const QualityRequest& request) {
+    Quality quality{request.rendering->number, std::numeric_limits<double>::quiet_NaN()};
+    try {
+        const auto [photo, weights] = load_training_image(request.frame, request.background);
+        const Image& color = request.rendering->color;
+        if (photo.width == color.width && photo.height == color.height)
+            quality.psnr = psnr(color, photo, weights);
+    } catch (const std::exception&) {
+        // ImageComparison says why there is no image.
+    }
+    return quality;
+}
+
+void ViewQuality::measure(Renders& renders, int index, const Frame& frame, const Look& look) {
+    if (index == index_ && renders.scene() == scene_ && look == look_) return;
+    asked_ = renders.ask_full(frame.camera, look);
+    if (index != index_) first_ = asked_;
+    index_ = index;
+    scene_ = renders.scene();
+    frame_ = frame;
+    look_ = look;
+}
+
+void ViewQuality::take(const std::shared_ptr<const FullRender>& rendering) {
+    if (index_ < 0 || !rendering || rendering->number != asked_ || taken_ == asked_) return;
+    taken_ = asked_;
+    measurements_.ask({rendering, frame_, look_.background});
+}
+
+std::optional<double> ViewQuality::psnr(int index) const {
+    const auto quality = measurements_.result();
+    if (index < 0 || index != index_ || !quality || quality->number < first_) return std::nullopt;
+    return quality->psnr;
+}
+
+}  // namespace ewa::viewer

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// The PSNR of a view against its image, at the image's size: what `ewa eval` says of it.
+#pragma once
+#include <optional>
+
+#include "ewa/dataset.h"
+#include "viewer/latest.h"
+#include "viewer/renders.h"
+
+namespace ewa::viewer {
+
+struct QualityRequest {
+    std::shared_ptr<const FullRender> rendering;  // of the frame's camera
+    Frame frame;
+    std::array<float, 3> background{};
+};
+
+struct Quality {
+    uint64_t number = 0;  // of the render
+    double psnr = 0;      // dB; NaN if no pixel counts, or without an image
+};
+
+/// Never throws: an image that cannot be read has no PSNR.
+Quality quality_of(const QualityRequest& request);
+
+class ViewQuality {
+  public:
+    /// wake: called on a thread when psnr() may have changed.
+    explicit ViewQuality(std::function<void()> wake) : measurements_(quality_of, std::move(wake)) {}
+
+    /// Starts to measure this frame of the dataset, unless that is under way or done.
+    void measure(Renders& renders, int index, const Frame& frame, const Look& look);
+    /// rendering: the last one of the renders, or null.
+    void take(const std::shared_ptr<const FullRender>& rendering);
+    /// Forgets the frame: indices of another dataset mean other images.
+    void forget() { index_ = -1; }
+
+    /// Of this frame, dB. The value of earlier splats stays until that of the present ones is known. Empty: unknown.
+    std::optional<double> psnr(int index) const;
+
+  private:
+    int index_ = -1;
+    uint64_t scene_ = 0;  // number of the splats
+    Frame frame_;
+    Look look_;
+    uint64_t asked_ = 0, taken_ = 0;  // numbers of renders: the last one, and the last one that is measured
+    uint64_t first_ = 0;              // number of the first render of this frame
+    Latest<QualityRequest, Quality> measurements_;
+};
+
+}  // namespace ewa::viewer
