@@ -144,7 +144,9 @@ class App {
     void measure_view();
     void change_text();
     double text_height() const;  // px of the framebuffer
-    int panel_width() const;     // px of the framebuffer; 0 without the panel
+    int panel_width() const;     // px of the framebuffer, also while it is hidden
+    bool panel_fits() const;     // beside the picture
+    bool panel_shown() const { return !scripted() && (panel_fits() ? show_panel_ : show_over_panel_); }
     Rectangle picture_area() const;
     Comparison comparison() const { return at_camera_ ? settings_.comparison : Comparison::none; }
     bool comparing() const;  // the image of the camera is shown or compared
@@ -174,7 +176,9 @@ class App {
     bool difference_on_screen_ = false;
     std::optional<double> shown_psnr_;  // in the panel, dB
     Clock::time_point last_frame_;
-    bool show_panel_ = true, show_help_ = false, dragging_wipe_ = false;
+    bool show_panel_ = true;        // in a window with room for it
+    bool show_over_panel_ = false;  // in a narrow window, where it lies over the picture
+    bool show_help_ = false, dragging_wipe_ = false;
     bool capture_ = false;               // write a screenshot as soon as the full frame is shown
     std::optional<int> pointed_camera_;  // the frame whose camera is under the pointer
     static constexpr int kRedraws = 3;   // frames that ImGui needs to answer input

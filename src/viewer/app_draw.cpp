@@ -33,7 +33,7 @@ void App::panel() {
         .up = view_.up(),
         .at_camera = at_camera_,
         .width = float(panel_width()) / std::max(1e-3f, ImGui::GetIO().DisplayFramebufferScale.x),
-        .over_picture = picture_area().x == 0,
+        .over_picture = !panel_fits(),
     };
     obey(draw_panel(facts, settings_));
 }
@@ -73,7 +73,7 @@ void App::draw_overlays() {
     if (words) draw_headline(*words, area);
     if (const std::string text = banner(); !text.empty()) draw_banner(text, area);
     if (!words && Clock::now() < message_.hint_until && !show_help_)
-        draw_hint(scene_.dataset != nullptr, area);
+        draw_hint(scene_.dataset != nullptr, panel_shown(), area);
 }
 
 double App::text_height() const {
@@ -81,12 +81,16 @@ double App::text_height() const {
 }
 
 int App::panel_width() const {
-    return show_panel_ && !scripted() ? int(kPanelWidth * text_height()) : 0;
+    return int(kPanelWidth * text_height());
+}
+
+bool App::panel_fits() const {
+    return free_area(window_.framebuffer(), panel_width()).x > 0;
 }
 
 /// The part of the window that the panel leaves to the pictures.
 Rectangle App::picture_area() const {
-    return free_area(window_.framebuffer(), panel_width());
+    return free_area(window_.framebuffer(), panel_shown() ? panel_width() : 0);
 }
 
 Arrangement App::arrangement() const {
@@ -167,7 +171,7 @@ void App::draw() {
     const Comparison before = settings_.comparison;
     screen_->gui.begin_frame();
     if (!scripted()) draw_overlays();
-    if (show_panel_ && !scripted()) panel();
+    if (panel_shown()) panel();
     if (show_help_) draw_help(show_help_);
     if (!scripted() && message_.noting(Clock::now())) draw_note(message_.note, picture_area());
     handle_mouse();

@@ -44,7 +44,7 @@ void App::handle_key(const KeyPress& press) {
             message_.hint_until = {};
             return;
         case GLFW_KEY_F2:
-            return toggle(show_panel_);
+            return toggle(panel_fits() ? show_panel_ : show_over_panel_);
         case GLFW_KEY_F12:
             return press.shift ? save_exr() : void(capture_ = true);
         default:

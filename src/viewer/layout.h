@@ -22,8 +22,8 @@ inline constexpr double kTextHeight = 16;   // of the panel's text, at a content
 inline constexpr double kPanelWidth = 19;   // in heights of the text
 inline constexpr Size kUsualSize{1280, 800};  // of a picture that no camera sets
 
-/// The part of the window beside the panel. A panel that would take more than half of the width lies over the picture,
-/// and the whole window is free. panel: its width; 0: it is hidden.
+/// The part of the window beside the panel. A panel that would take more than half of the width is not beside the picture:
+/// the whole window is free. panel: its width; 0: it is hidden.
 Rectangle free_area(Size window, int panel);
 
 /// Places in the window. Beside: each picture gets half of the area, left and right or one above the other, whichever

@@ -127,6 +127,7 @@ void draw_help(bool& open) {
          {"drop a file", "open it; a dataset gives its cameras to splats"}}};
     const ImVec2 size = ImGui::GetIO().DisplaySize;
     ImGui::SetNextWindowPos(ImVec2(size.x / 2, size.y / 2), ImGuiCond_Appearing, ImVec2(0.5f, 0.5f));
+    ImGui::PushStyleVar(ImGuiStyleVar_CellPadding, ImVec2(ImGui::GetTextLineHeight() / 2, 1));
     if (ImGui::Begin("Keys", &open, ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse) &&
         ImGui::BeginTable("keys", 2, ImGuiTableFlags_SizingFixedFit)) {
         for (const auto& row : rows)
@@ -137,6 +138,7 @@ void draw_help(bool& open) {
         ImGui::EndTable();
     }
     ImGui::End();
+    ImGui::PopStyleVar();
 }
 
 std::optional<int> draw_cameras(const CamerasShown& cameras) {
@@ -195,10 +197,11 @@ void draw_note(const std::string& note, const Rectangle& area) {
     draw_message("note", note, area, 1, 7 * ImGui::GetTextLineHeight());
 }
 
-void draw_hint(bool images, const Rectangle& area) {
+void draw_hint(bool images, bool panel, const Rectangle& area) {
     std::vector<std::string> keys{"drag: turn", "right drag: move", "wheel: closer", "double click: look at",
                                   "F: whole scene"};
     keys.insert(keys.end(), {images ? "V: compare with the images" : "W A S D: fly", "F1: all keys"});
+    if (!panel) keys.push_back("F2: panel");
     std::string text;
     for (const std::string& key : keys) {
         if (!text.empty()) text += "    ";

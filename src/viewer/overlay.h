@@ -33,7 +33,7 @@ bool over_wipe(const Rectangle& image, float wipe);
 /// A message, above the hint.
 void draw_note(const std::string& note, const Rectangle& area);
 /// The first keys to know, at the lower border. images: there are images to compare with.
-void draw_hint(bool images, const Rectangle& area);
+void draw_hint(bool images, bool panel, const Rectangle& area);
 /// What the picture is, at the upper border.
 void draw_banner(const std::string& text, const Rectangle& area);
 /// In the middle: one line in large letters, and an explanation below it.

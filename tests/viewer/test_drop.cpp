@@ -35,7 +35,6 @@ TEST_F(Drop, OpensAFileOfAnyName) {
     make_splats(folder_ / name, 30, 0);
     Session session(shots_, {splats_, "--size", "96x64"});
     ASSERT_TRUE(session.found());
-    session.send("key F2");
     const Image before = screenshot(session), after = dropped(session, folder_ / name, name);
     EXPECT_EQ(largest_difference(after, alone(folder_ / name)), 0);
     EXPECT_GT(largest_difference(after, before), 0.1f);
@@ -62,7 +61,6 @@ TEST_F(Drop, ADatasetGivesItsCamerasToSplats) {
         if (!together) arguments.insert(arguments.begin(), splats_);
         Session session(shots_, arguments);
         ASSERT_TRUE(session.found());
-        session.send("key F2");
         const std::string first = together ? uri_of(splats_) : std::string();
         ASSERT_TRUE(x_->drop(window(), first + uri_of(cameras_)));
         const Image expected = rendered("0");

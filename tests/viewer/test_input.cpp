@@ -21,7 +21,6 @@ Image part(const Image& image, int left, int right) {
 TEST_F(Input, KeysChooseModesCamerasAndViews) {
     Session session(shots_, {splats_, "--cameras", cameras_, "--size", "48x32"});
     ASSERT_TRUE(session.found());
-    session.send("key F2");
     const Image first = screenshot(session);
     EXPECT_LE(largest_difference(first, rendered("0")), kRounding);
     session.send("key Right");
@@ -45,7 +44,7 @@ TEST_F(Input, TheDisplayHasWhatRenderWrites) {
     const XClient display(display_.name());
     Session session(shots_, {splats_, "--cameras", cameras_, "--frame", "2", "--size", "48x32"});
     ASSERT_TRUE(session.found());
-    session.send("key F2 key F1 key F1");  // neither panel nor hint
+    session.send("key F1 key F1");  // no hint; the window is too narrow for the panel
     const auto window = display.window_titled("ewa");
     ASSERT_TRUE(window);
     const Image expected = rendered("2");
@@ -77,10 +76,77 @@ TEST_F(Input, ADenseDisplayHasLargerText) {
     EXPECT_NEAR(double(widths[1]) / widths[0], 2, 0.05);
 }
 
+/// Beside the picture where there is room; else over it, and only when it is asked for.
+TEST_F(Input, ThePanelIsBesideThePicture) {
+    Session session(shots_, {splats_, "--cameras", cameras_, "--size", "700x300"});
+    ASSERT_TRUE(session.found());
+    const Image beside = screenshot(session);
+    EXPECT_LT(beside.width, 500);
+    EXPECT_GE(beside.width, 350);
+    session.send("key F2");
+    EXPECT_EQ(screenshot(session).width, 700);
+    session.send("key F2");
+    EXPECT_EQ(largest_difference(screenshot(session), beside), 0);
+    // The camera's view is whole and in the middle of the part beside the panel.
+    session.send("search --name ewa$ windowsize --sync 400 300");
+    const Image narrow = screenshot(session);
+    EXPECT_EQ(narrow.width, 400);
+    const XClient display(display_.name());
+    const auto window = display.window_titled("ewa");
+    ASSERT_TRUE(window);
+    session.send("key F1 key F1");  // no hint
+    soon([&] { return largest_difference(display.pixels(*window), narrow) <= kRounding; });
+    EXPECT_LE(largest_difference(display.pixels(*window), narrow), kRounding) << "something lies over it";
+    session.send("key F2");
+    soon([&] { return largest_difference(display.pixels(*window), narrow) > 0.3f; });
+    EXPECT_GT(largest_difference(display.pixels(*window), narrow), 0.3f) << "no panel";
+    expect_silent(session.quit());
+}
+
+/// What ewa render makes of the splats alone, whatever the cameras are.
+TEST_F(Input, FShowsTheWholeScene) {
+    expect_silent(run_ewa({"render", splats_, "--size", "300x200", "-o", folder_ / "whole.png", "--quiet"}));
+    const Image whole = load_image(folder_ / "whole.png");
+    Session session(shots_, {splats_, "--size", "300x200"});
+    ASSERT_TRUE(session.found());
+    EXPECT_LE(largest_difference(screenshot(session), whole), kRounding) << "the first view";
+    act(session, {"mousemove 150 100", "click 4", "click 4"});
+    EXPECT_GT(largest_difference(screenshot(session), whole), 0.1f);
+    session.send("key f");
+    EXPECT_LE(largest_difference(screenshot(session), whole), kRounding);
+    expect_silent(session.quit());
+}
+
+TEST_F(Input, SettingsComeBack) {
+    {
+        Session session(shots_, {splats_});
+        ASSERT_TRUE(session.found());
+        session.send("search --name ewa$ windowsize --sync 612 345");
+        session.send("key 3");
+        screenshot(session);
+        expect_silent(session.quit());
+    }
+    const auto json = read_json(config_ + "/ewa/view.json");
+    EXPECT_EQ(json["window_width"], 612);
+    EXPECT_EQ(json["mode"], "alpha");
+    Session session(shots_, {splats_});
+    ASSERT_TRUE(session.found());
+    session.send("key F2");
+    session.send("key F12");
+    ASSERT_TRUE(session.awaited(shots_ + "/ewa-view-2.png"));
+    const Image image = load_image(shots_ + "/ewa-view-2.png");
+    EXPECT_EQ(image.width, 612);
+    EXPECT_EQ(image.height, 345);
+    for (size_t i = 0; i < image.pixels.size(); i += 3) ASSERT_EQ(image.pixels[i], image.pixels[i + 1]);
+    expect_silent(session.quit());
+    // A script is not asked how the window looked.
+    expect_silent(run_view({splats_, "--screenshot", folder_ / "shown.png"}));
+    EXPECT_EQ(load_image(folder_ / "shown.png").width, 1280);
+}
+
 TEST_F(Input, TheMouseTurnsMovesAndZooms) {
     Session session(shots_, {splats_, "--cameras", cameras_, "--size", "320x240"});
     ASSERT_TRUE(session.found());
-    session.send("key F2");
     const Image first = screenshot(session);
     Image before = first;
     const std::vector<std::string> actions[] = {
@@ -130,7 +196,7 @@ TEST_F(Input, AFieldOfThePanelTakesDigitsAndLeavesFunctionKeys) {
         screenshot(session);
         return screenshot(session);
     };
-    const Image before = after("key 4");
+    const Image before = after("key F2 key 4");
     after("mousemove 80 135");  // the slider of the splats' scale
     after("keydown ctrl click 1");
     EXPECT_LE(largest_difference(after("keyup ctrl key 1"), before), kRounding) << "1 has chosen a mode";
@@ -144,7 +210,7 @@ TEST_F(Input, AFieldOfThePanelTakesDigitsAndLeavesFunctionKeys) {
 TEST_F(Input, ComparesWithTheImageByKey) {
     Session session(shots_, {splats_, "--cameras", cameras_, "--frame", "1", "--size", "96x32"});
     ASSERT_TRUE(session.found());
-    session.send("key F2 key v");
+    session.send("key v");
     const Image beside = screenshot(session), image = load_image(cameras_ + "/images/1.png");
     for (int x = 0; x < 48; ++x) EXPECT_NEAR(beside.at(48 + x, 16)[1], image.at(x, 16)[1], kRounding);
     // A turn leaves the camera, and with it the image; G comes back.

@@ -26,7 +26,6 @@ TEST_F(Training, OfAnotherProcessIsSeenAsItGoes) {
     ASSERT_TRUE(soon([&] { return std::filesystem::exists(run_ + "/live.json"); }));
     Session session(shots_, {run_, "--size", "96x64"});
     ASSERT_TRUE(session.found());
-    session.send("key F2");
     EXPECT_TRUE(changes(session)) << "the picture stays as it is";
     kill(trainer, SIGINT);
     int status = 0;
