@@ -78,16 +78,6 @@ std::filesystem::path free_name(const std::string& stem, const std::string& exte
     }
 }
 
-bool Message::expire(Clock::time_point now) {
-    bool expired = false;
-    for (Clock::time_point* until : {&hint_until, &note_until}) {
-        if (*until == Clock::time_point{} || now < *until) continue;
-        *until = {};
-        expired = true;
-    }
-    return expired;
-}
-
 App::App(const Startup& startup)
     : startup_(startup),
       window_(system_, window_title(startup.scene), initial_size(startup, system_), !startup.picture),

@@ -13,6 +13,7 @@
 
 #include "io/datasets/view_list.h"
 #include "viewer/kept_settings.h"
+#include "viewer/message.h"
 #include "viewer/overlay.h"
 #include "viewer/panel.h"
 #include "viewer/renders.h"
@@ -66,17 +67,6 @@ Size camera_size_or_usual(const Startup& startup);
 Viewpoint start_view(const OpenedScene& scene, std::optional<int> frame, Size size);
 
 std::string window_title(const OpenedScene& scene);
-
-/// The text over the image.
-struct Message {
-    using Clock = std::chrono::steady_clock;
-    std::string note;  // the last one; the panel keeps showing it
-    Clock::time_point note_until{}, hint_until{};
-    bool noting(Clock::time_point now) const { return !note.empty() && now < note_until; }
-
-    /// Hides what has been shown long enough. Returns whether something changed.
-    bool expire(Clock::time_point now);
-};
 
 class App {
   public:

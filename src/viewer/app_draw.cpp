@@ -72,7 +72,7 @@ void App::draw_overlays() {
     const std::optional<Headline> words = headline();
     if (words) draw_headline(*words, area);
     if (const std::string text = banner(); !text.empty()) draw_banner(text, area);
-    if (!words && Clock::now() < message_.hint_until && !show_help_)
+    if (!words && message_.hinting(Clock::now()) && !show_help_)
         draw_hint(scene_.dataset != nullptr, panel_shown(), area);
 }
 

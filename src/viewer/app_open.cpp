@@ -149,8 +149,7 @@ std::string App::banner() const {
     const live::Update* run = live_.update();
     if (!scene_.points || !run || scene_.gaussians->size() == 0) return "";
     std::string text = "These are the points of the dataset, not splats: the picture is of step 0.";
-    if (!run->connected && !live_.own())
-        text += " ewa train with --serve or --save-every lets it move.";
+    if (!run->connected && !live_.own()) text += " ewa train with --serve or --save-every lets it move.";
     return text;
 }
 

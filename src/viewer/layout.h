@@ -18,8 +18,8 @@ struct Rectangle {
 /// The largest rectangle with the aspect ratio of `shape`, centred in `space`.
 Rectangle fitted(Size shape, const Rectangle& space);
 
-inline constexpr double kTextHeight = 16;   // of the panel's text, at a content scale of 1
-inline constexpr double kPanelWidth = 19;   // in heights of the text
+inline constexpr double kTextHeight = 16;     // of the panel's text, at a content scale of 1
+inline constexpr double kPanelWidth = 19;     // in heights of the text
 inline constexpr Size kUsualSize{1280, 800};  // of a picture that no camera sets
 
 /// The part of the window beside the panel. A panel that would take more than half of the width is not beside the picture:

@@ -96,8 +96,8 @@ std::string comparison_text(const PanelFacts& facts, const PanelSettings& settin
     if (!facts.psnr || std::isnan(*facts.psnr)) return "";
     const Camera& camera = facts.scene.dataset->frames[size_t(*facts.at_camera)].camera;
     std::array<char, 96> text{};
-    std::snprintf(text.data(), text.size(), "PSNR of this view %.2f dB\nat the image's %d x %d px", *facts.psnr,
-                  camera.width, camera.height);
+    std::snprintf(text.data(), text.size(), "PSNR of this view %.2f dB\nat the image's %d x %d px",
+                  *facts.psnr, camera.width, camera.height);
     return text.data();
 }
 
@@ -227,7 +227,8 @@ void draw_footer(const PanelFacts& facts, PanelActions& actions) {
 /// The height of draw_footer().
 float footer_height() {
     return ImGui::GetFrameHeightWithSpacing() +
-           float(kNoteLines + 1) * ImGui::GetTextLineHeightWithSpacing() + 3 * ImGui::GetStyle().ItemSpacing.y;
+           float(kNoteLines + 1) * ImGui::GetTextLineHeightWithSpacing() +
+           3 * ImGui::GetStyle().ItemSpacing.y;
 }
 
 }  // namespace

@@ -60,7 +60,8 @@ void show_progress(const live::Update& run) {
     }
     ImGui::TextUnformatted(text.data());
     const float share = status.steps > 0 ? float(status.step) / float(status.steps) : 0;
-    ImGui::ProgressBar(share, ImVec2(ImGui::GetContentRegionAvail().x, 0.4f * ImGui::GetTextLineHeight()), "");
+    ImGui::ProgressBar(share, ImVec2(ImGui::GetContentRegionAvail().x, 0.4f * ImGui::GetTextLineHeight()),
+                       "");
 }
 
 /// Which step the picture is of.

@@ -10,6 +10,7 @@
 #include "viewer/font.h"
 #include "viewer/kept_settings.h"
 #include "viewer/layout.h"
+#include "viewer/message.h"
 
 namespace ewa::viewer {
 namespace {
@@ -18,7 +19,8 @@ TEST(Layout, ThePictureIsBesideThePanel) {
     EXPECT_EQ(free_area({1100, 800}, 300), (Rectangle{300, 0, 800, 800}));
     EXPECT_EQ(free_area({1100, 800}, 0), (Rectangle{0, 0, 1100, 800}));
     EXPECT_EQ(free_area({600, 800}, 300), (Rectangle{300, 0, 300, 800}));
-    EXPECT_EQ(free_area({599, 800}, 300), (Rectangle{0, 0, 599, 800})) << "too narrow: the panel lies over it";
+    EXPECT_EQ(free_area({599, 800}, 300), (Rectangle{0, 0, 599, 800}))
+        << "too narrow: the panel lies over it";
     EXPECT_EQ(free_area({0, 0}, 300), (Rectangle{0, 0, 1, 1}));
 }
 
@@ -126,6 +128,20 @@ TEST(KeptSettings, AreInTheUsersFolder) {
     EXPECT_EQ(settings_file(), "/home/someone/.config/ewa/view.json");
     const Variable homeless("HOME", "");
     EXPECT_TRUE(settings_file().empty());
+}
+
+TEST(Message, AnEmptyNoteIsNotShown) {
+    const auto now = Message::Clock::now();
+    Message message;
+    message.note = "broken.ply cannot be read";
+    message.note_until = now + std::chrono::seconds(10);
+    EXPECT_TRUE(message.noting(now));
+    EXPECT_FALSE(message.noting(now + std::chrono::seconds(11)));
+    message.note.clear();
+    EXPECT_FALSE(message.noting(now));
+    EXPECT_FALSE(message.expire(now + std::chrono::seconds(9)));
+    EXPECT_TRUE(message.expire(now + std::chrono::seconds(10)));
+    EXPECT_FALSE(message.expire(now + std::chrono::seconds(10)));
 }
 
 TEST(Font, IsAUsualOneOrNone) {

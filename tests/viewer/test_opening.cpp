@@ -62,6 +62,61 @@ TEST(Opening, TheSplatsOfARunHaveItsCameras) {
     EXPECT_FALSE(open_scene(folder / "run/mine.ply", {}).dataset);
 }
 
+TEST(Opening, AnEmptyFileSaysSo) {
+    const test::Folder folder;
+    test::make_splats(folder / "none.ply", 0, 0);
+    const OpenedScene scene = open_scene(folder / "none.ply", {});
+    EXPECT_EQ(scene.gaussians->size(), 0u);
+    EXPECT_EQ(scene.remark, "none.ply is empty: it has no splats");
+}
+
+class Dropping : public testing::Test {
+  protected:
+    void SetUp() override {
+        test::make_splats(splats_);
+        test::make_splats(folder_ / "more.ply", 60, 0);
+        test::make_dataset(dataset_);
+    }
+    const test::Folder folder_;
+    const std::string splats_ = folder_ / "splats.ply", dataset_ = folder_ / "data";
+};
+
+TEST_F(Dropping, ADatasetGivesItsCamerasToSplats) {
+    const OpenedScene splats = open_dropped({splats_}, {});
+    EXPECT_FALSE(splats.dataset);
+    const OpenedScene both = open_dropped({dataset_}, splats);
+    EXPECT_EQ(both.gaussians, splats.gaussians);
+    EXPECT_FALSE(both.points);
+    ASSERT_TRUE(both.dataset);
+    EXPECT_EQ(both.title, "splats.ply");
+    EXPECT_NE(both.remark.find("with the cameras of data; drop it again"), std::string::npos) << both.remark;
+    const OpenedScene alone = open_dropped({dataset_}, both);
+    EXPECT_TRUE(alone.points);
+    EXPECT_EQ(alone.title, "data");
+}
+
+TEST_F(Dropping, SplatsTakeTheCamerasOfADataset) {
+    const OpenedScene dataset = open_dropped({dataset_}, {});
+    const OpenedScene both = open_dropped({splats_}, dataset);
+    EXPECT_EQ(both.dataset, dataset.dataset);
+    EXPECT_EQ(both.gaussians->size(), 50u);
+    EXPECT_EQ(both.remark, "with the cameras of data");
+    EXPECT_FALSE(open_dropped({splats_}, both).dataset) << "the cameras belong to other splats";
+}
+
+TEST_F(Dropping, OfSeveralFilesEachIsSpokenOf) {
+    for (const std::vector<std::filesystem::path>& paths :
+         {std::vector<std::filesystem::path>{splats_, dataset_}, {dataset_, splats_}}) {
+        const OpenedScene both = open_dropped(paths, {});
+        EXPECT_EQ(both.gaussians->size(), 50u);
+        EXPECT_TRUE(both.dataset);
+        EXPECT_EQ(both.remark, "with the cameras of data");
+    }
+    const OpenedScene first = open_dropped({splats_, folder_ / "more.ply"}, {});
+    EXPECT_EQ(first.gaussians->size(), 50u);
+    EXPECT_EQ(first.remark, "one scene is shown at a time: more.ply is left out");
+}
+
 TEST(Opening, SettingsThatAreNoneLeaveTheSplats) {
     const test::Folder folder;
     std::filesystem::create_directories(folder / "run");

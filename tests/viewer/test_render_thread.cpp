@@ -3,11 +3,16 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <cmath>
 
+#include "cli/program.h"
 #include "ewa/error.h"
+#include "ewa/evaluation.h"
+#include "ewa/splat_files.h"
 #include "support/soon.h"
 #include "viewer/opening.h"
 #include "viewer/render_thread.h"
+#include "viewer/view_quality.h"
 
 namespace ewa::viewer {
 namespace {
@@ -79,6 +84,52 @@ TEST(RenderThread, OpensItsDeviceAgainWhereItFails) {
     EXPECT_EQ(opened, 4);
     EXPECT_EQ(thread.take_news().failure, nullptr);
     EXPECT_EQ(thread.take_news().picture->request.serial, 2u);
+}
+
+/// What the panel says of a view is what `ewa eval` says, whatever the window's size is.
+TEST(ViewQuality, IsThatOfTheEvaluation) {
+    const test::Folder folder;
+    test::make_dataset(folder / "data");
+    test::make_splats(folder / "splats.ply", 200, 1);
+    const Dataset dataset = load_dataset(folder / "data", {});
+    const auto splats = std::make_shared<const Gaussians>(load_splats(folder / "splats.ply"));
+    Look look;
+    look.background = {0.2f, 0.4f, 0.6f};
+    Renders renders([] { return open_device({}); }, [] {});
+    ViewQuality quality([] {});
+    const auto measured = [&](int index) {
+        std::optional<double> psnr;
+        soon([&] {
+            quality.measure(renders, index, dataset.frames[size_t(index)], look);
+            quality.take(renders.take().full);
+            return (psnr = quality.psnr(index)).has_value();
+        });
+        return psnr.value_or(0);
+    };
+    const auto expected = [&](const Gaussians& gaussians, int index) {
+        RenderOptions options;
+        options.background = look.background;
+        return evaluate(open_device({}), gaussians, dataset, {index}, options).psnr;
+    };
+    renders.set_scene(splats);
+    EXPECT_NEAR(measured(2), expected(*splats, 2), 1e-3);
+    EXPECT_FALSE(quality.psnr(1)) << "that of another view";
+    EXPECT_NEAR(measured(1), expected(*splats, 1), 1e-3);
+    const double before = measured(1);
+    renders.set_scene(red_splat());
+    quality.measure(renders, 1, dataset.frames[1], look);
+    EXPECT_EQ(quality.psnr(1), before) << "until that of the new splats is known";
+    const double after = expected(*red_splat(), 1);
+    EXPECT_TRUE(soon([&] {
+        quality.take(renders.take().full);
+        return std::abs(quality.psnr(1).value_or(0) - after) < 1e-3;
+    }));
+    quality.forget();
+    EXPECT_FALSE(quality.psnr(1));
+    Frame absent = dataset.frames[0];
+    absent.image_path = folder / "absent.png";
+    const auto nothing = std::make_shared<const FullRender>(FullRender{7, Image(48, 32, 3)});
+    EXPECT_TRUE(std::isnan(quality_of({nothing, absent, {}}).psnr));
 }
 
 }  // namespace

@@ -12,6 +12,16 @@ class Training : public SessionTest {
         const Image first = screenshot(session);
         return soon([&] { return largest_difference(screenshot(session), first) > 0.02f; });
     }
+    static Image rows(const Image& image, int from, int to) {
+        Image part(image.width, to - from, 3);
+        std::copy_n(image.at(0, from), part.pixels.size(), part.pixels.begin());
+        return part;
+    }
+    static Image upper_quarter(const Image& image) { return rows(image, 0, image.height / 4); }
+    /// Where a headline begins.
+    static Image lower_part(const Image& image) {
+        return rows(image, 2 * image.height / 5, image.height * 3 / 5);
+    }
     const std::string run_ = folder_ / "run";
 };
 
@@ -59,6 +69,67 @@ TEST_F(Training, OfItsOwnIsSavedWhenTheWindowIsClosed) {
     EXPECT_EQ(read_json(run_ + "/summary.json")["interrupted"], true);
 }
 
+/// The button stands below the look, at a place that does not change.
+TEST_F(Training, StartsByAButtonInAFolderOfItsOwn) {
+    const std::string earlier = shots_ + "/out/views";
+    std::filesystem::create_directories(earlier);
+    make_splats(earlier + "/splats.ply");
+    const std::string bytes = read_file(earlier + "/splats.ply");
+    Session session(shots_, {cameras_, "--size", "900x800"});
+    ASSERT_TRUE(session.found());
+    session.screenshot();
+    act(session, {"mousemove 50 317", "click 1"});
+    ASSERT_TRUE(session.awaited(earlier + "-2/live.json")) << "no training has started";
+    EXPECT_EQ(read_json(earlier + "-2/config.json")["steps"], 30000);
+    EXPECT_TRUE(changes(session)) << "the picture stays as it is";
+    expect_silent(session.quit());
+    EXPECT_EQ(read_json(earlier + "-2/summary.json")["interrupted"], true);
+    EXPECT_EQ(read_file(earlier + "/splats.ply"), bytes);
+}
+
+/// A run that has saved no splats yet is seen by the points it starts from, and the window says so over the picture.
+TEST_F(Training, PointsAreCalledPoints) {
+    write_file(
+        cameras_ + "/points.ply",
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+        "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n"
+        "0 0 0 255 0 0\n0 0.3 0 0 255 0\n0 0 0.3 0 0 255\n");
+    auto json = read_json(cameras_ + "/transforms.json");
+    json["ply_file_path"] = "points.ply";
+    write_file(cameras_ + "/transforms.json", json.dump());
+    std::filesystem::create_directories(run_);
+    write_file(run_ + "/config.json", "{\"dataset\": \"" + cameras_ + "\", \"steps\": 300}");
+    const XClient display(display_.name());
+    for (const std::string& path : {run_, cameras_}) {
+        Session session(shots_, {path, "--size", "400x300"});  // too narrow for the panel
+        ASSERT_TRUE(session.found());
+        session.send("key F1 key F1");  // no hint
+        const auto window = display.window_titled("ewa");
+        ASSERT_TRUE(window);
+        session.screenshot();
+        const Image upper = upper_quarter(display.pixels_at_rest(*window));
+        const bool said = range_of(upper) > 0.9f;
+        EXPECT_EQ(said, path == run_);
+        expect_silent(session.quit());
+    }
+}
+
+TEST_F(Training, NobodyThereIsSaidOnceAndLarge) {
+    const XClient display(display_.name());
+    Session session(shots_, {"--connect", "127.0.0.1:9", "--size", "500x300"});
+    ASSERT_TRUE(session.found());
+    const auto window = display.window_titled("ewa");
+    ASSERT_TRUE(window);
+    const std::string errors = shots_ + "/err.txt";
+    EXPECT_TRUE(soon([&] { return !read_file(errors).empty(); }));
+    const auto middle = [&] { return range_of(lower_part(display.pixels(*window))); };
+    EXPECT_TRUE(soon([&] { return middle() > 0.9f; })) << "nothing stands in the middle";
+    act(session, {"key 2", "key 1"});  // the window goes on
+    const Outcome outcome = session.quit();
+    EXPECT_EQ(outcome.status, 0);
+    EXPECT_EQ(outcome.err, "ewa-view: cannot reach 127.0.0.1:9: nobody answers there\n");
+}
+
 TEST(WithoutWindow, WrongWaysToATrainingAreOneLine) {
     const Folder folder;
     make_splats(folder / "splats.ply");
@@ -70,6 +141,10 @@ TEST(WithoutWindow, WrongWaysToATrainingAreOneLine) {
     std::filesystem::create_directory(folder / "run");
     make_splats(folder / "run/splats.ply");
     expect_failure(run_view({"--train", folder / "data", "-o", folder / "run"}), 2, "holds splats.ply");
+    // So are options that ewa train does not have.
+    expect_failure(run_view({"--train", folder / "data", "--step", "3"}), 2, "did you mean --steps?");
+    expect_failure(run_view({"--train", folder / "data", "--steps", "none"}), 2, "--steps");
+    expect_failure(run_view({"--train", folder / "data", "--resume", "--force"}), 2, "--force");
 }
 
 }  // namespace

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// The text over the picture that goes by itself.
+#pragma once
+#include <chrono>
+#include <string>
+
+namespace ewa::viewer {
+
+struct Message {
+    using Clock = std::chrono::steady_clock;
+    std::string note;  // the last one; the panel keeps showing it
+    Clock::time_point note_until{}, hint_until{};
+
+    /// Whether the note is over the picture. An empty one never is.
+    bool noting(Clock::time_point now) const { return !note.empty() && now < note_until; }
+    bool hinting(Clock::time_point now) const { return now < hint_until; }
+
+    /// Hides what has been shown long enough. Returns whether something changed.
+    bool expire(Clock::time_point now) {
+        bool expired = false;
+        for (Clock::time_point* until : {&hint_until, &note_until}) {
+            if (*until == Clock::time_point{} || now < *until) continue;
+            *until = {};
+            expired = true;
+        }
+        return expired;
+    }
+};
+
+}  // namespace ewa::viewer
