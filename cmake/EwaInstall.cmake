@@ -77,6 +77,11 @@ foreach(folder bench scenes) # to which README.md points
 endforeach()
 install(FILES shaders/shared/constants.h DESTINATION ${CMAKE_INSTALL_DOCDIR}/shaders/shared)
 
+if(TARGET ewa-view)
+    install(FILES desktop/ewa-view.desktop DESTINATION ${CMAKE_INSTALL_DATADIR}/applications)
+    install(FILES desktop/ewa-view.svg DESTINATION ${CMAKE_INSTALL_DATADIR}/icons/hicolor/scalable/apps)
+endif()
+
 set(ewa_package ${CMAKE_INSTALL_LIBDIR}/cmake/ewa)
 install(EXPORT ewaTargets NAMESPACE ewa:: DESTINATION ${ewa_package})
 file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/ewaConfig.cmake @ONLY CONTENT [[
@@ -102,6 +107,6 @@ set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION graphics)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
-set(CPACK_DEBIAN_PACKAGE_RECOMMENDS mesa-vulkan-drivers)
+set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "mesa-vulkan-drivers, fonts-dejavu-core")
 set(CPACK_DEBIAN_PACKAGE_SUGGESTS "libglm-dev, vulkan-validationlayers")
 include(CPack)

@@ -90,8 +90,7 @@ std::string remark_of(const PanelFacts& facts) {
     if (!run.problem.empty()) return run.problem;
     if (run.status.state == live::State::done) return "";
     if (run.connected) return run.status.commands ? "" : "watching; --token lets you pause and save";
-    if (facts.scene.points)
-        return "No splats are saved yet. ewa train with --serve 0 or --save-every lets the picture move.";
+    if (facts.scene.points) return "no splats are saved yet; --serve or --save-every lets the picture move";
     return "watching the files of the run; ewa train --serve shows more";
 }
 

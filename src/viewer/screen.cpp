@@ -21,6 +21,8 @@ using Layout = vk::ImageLayout;
 using Stage = vk::PipelineStageFlagBits;
 using Usage = vk::ImageUsageFlagBits;
 
+constexpr double kOwnFontShare = 13 / kTextHeight;  // at 13 px, each dot of the bitmap font is a pixel
+
 const vk::ImageSubresourceRange kWhole(vk::ImageAspectFlagBits::eColor, 0, 1, 0, 1);
 const vk::ImageSubresourceLayers kLayer(vk::ImageAspectFlagBits::eColor, 0, 0, 1);
 
@@ -228,7 +230,7 @@ void Gui::add_fonts(double text) {
     file = read_font(find_font());
     for (const double size : {text, 2 * text}) {
         ImFontConfig font;
-        font.SizePixels = float(size);
+        font.SizePixels = float(size * kOwnFontShare);  // of Dear ImGui's own font
         font.FontDataOwnedByAtlas = false;
         font.OversampleH = font.OversampleV = 1;
         if (file.empty())

@@ -3,6 +3,7 @@
 #include <fstream>
 #include <random>
 
+#include "viewer/font.h"
 #include "viewer/session.h"
 
 namespace ewa::test {
@@ -101,6 +102,32 @@ TEST_F(Input, ThePanelIsBesideThePicture) {
     soon([&] { return largest_difference(display.pixels(*window), narrow) > 0.3f; });
     EXPECT_GT(largest_difference(display.pixels(*window), narrow), 0.3f) << "no panel";
     expect_silent(session.quit());
+}
+
+/// Where there is no vector font, Dear ImGui's own takes its place.
+TEST_F(Input, TheTextHasTheSizeOfTheSettings) {
+    std::filesystem::create_directories(config_ + "/ewa");
+    write_file(config_ + "/ewa/view.json", "{\"text_scale\": 1.5}");
+    std::filesystem::create_directories(folder_ / "data");
+    std::filesystem::create_directory_symlink("/usr/share/vulkan", folder_ / "data/vulkan");
+    const XClient display(display_.name());
+    std::vector<Image> panels;
+    for (const std::string& fonts : {std::string("/usr/local/share:/usr/share"), folder_ / "data"}) {
+        Session session(shots_, {splats_, "--size", "1000x500"},
+                        {{"XDG_DATA_DIRS", fonts}, {"XDG_DATA_HOME", folder_ / "none"}});
+        ASSERT_TRUE(session.found());
+        const int panel = 1000 - screenshot(session).width;
+        EXPECT_EQ(panel, int(19 * 16 * 1.5));
+        const auto window = display.window_titled("ewa");
+        ASSERT_TRUE(window);
+        panels.push_back(part(display.pixels_at_rest(*window), 0, panel));
+        EXPECT_GT(range_of(panels.back()), 0.8f) << "no text";
+        std::filesystem::remove_all(shots_);
+        std::filesystem::create_directories(shots_);
+        expect_success(session.quit());
+    }
+    const bool alike = largest_difference(panels[0], panels[1]) < 0.3f;
+    EXPECT_EQ(alike, viewer::find_font().empty()) << "the font";
 }
 
 /// What ewa render makes of the splats alone, whatever the cameras are.
