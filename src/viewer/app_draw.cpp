@@ -129,7 +129,10 @@ void App::load_image() {
 void App::measure_view() {
     const auto& shown = renders_.shown();
     if (scripted() || !comparing() || !renders_.settled() || shown->request.look.mode != Mode::color) return;
-    quality_.measure(renders_, *at_camera_, scene_.dataset->frames[size_t(*at_camera_)], settings_.look);
+    const Frame& frame = scene_.dataset->frames[size_t(*at_camera_)];
+    const auto exposure = scene_.exposures.find(frame.name);
+    quality_.measure(renders_, *at_camera_, frame, settings_.look,
+                     exposure == scene_.exposures.end() ? kIdentityExposure : exposure->second);
 }
 
 /// The full frame can be compared if it shows colours from the camera of the image.

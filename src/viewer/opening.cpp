@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "core/folders.h"
 #include "core/typing.h"
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
@@ -30,15 +31,16 @@ bool is_dataset_file(const fs::path& path) {
 }
 
 /// points: also load the points, which are read only together with the images.
-std::shared_ptr<const Dataset> load_cameras(const fs::path& path, int downscale, bool points) {
+std::shared_ptr<const Dataset> load_cameras(const fs::path& path, DatasetOptions options, bool points) {
     Dataset dataset;
     if (is_mesh_scene(path)) dataset = scene_cameras(path, {});
     try {
-        if (points && dataset.frames.empty()) dataset = load_dataset(path, {.downscale = downscale});
+        if (points && dataset.frames.empty()) dataset = load_dataset(path, options);
     } catch (const InputError&) {
         // An image or the points are invalid: the cameras alone may still load.
     }
-    if (dataset.frames.empty()) dataset = load_dataset(path, {.downscale = downscale, .need_images = false});
+    options.need_images = false;
+    if (dataset.frames.empty()) dataset = load_dataset(path, options);
     // Skip frames without an image, unless all are, as training and `ewa render` do.
     const auto missing = [](const Frame& frame) { return !frame.image_exists; };
     if (!std::all_of(dataset.frames.begin(), dataset.frames.end(), missing))
@@ -56,10 +58,27 @@ Look look_of(const live::Run& run) {
     return look;
 }
 
-int downscale_of(const live::Run& run) {
+/// How the run reads its images.
+DatasetOptions images_of(const live::Run& run) {
+    DatasetOptions options;
     const auto downscale = run.config.find("downscale");
-    const bool given = downscale != run.config.end() && downscale->is_number_integer();
-    return given ? std::clamp(downscale->get<int>(), 1, 1024) : 1;
+    if (downscale != run.config.end() && downscale->is_number_integer())
+        options.downscale = std::clamp(downscale->get<int>(), 1, 1024);
+    const std::string masks = run.text("masks");
+    if (masks == "ignore") options.masks = MaskUse::ignore;
+    if (masks == "cut") options.masks = MaskUse::cut;
+    if (masks == "none") options.masks = MaskUse::none;
+    return options;
+}
+
+std::map<std::string, Exposure> exposures_of(const live::Run& run) {
+    const fs::path file = run.folder / "exposures.json";
+    if (!core::is_file(file)) return {};
+    try {
+        return load_exposures(file);
+    } catch (const InputError&) {
+        return {};  // only the PSNR of training images depends on them
+    }
 }
 
 /// cameras: the dataset to use instead of the run's; empty: none.
@@ -67,9 +86,10 @@ void add_cameras(OpenedScene& scene, const live::Run& run, const fs::path& camer
     const fs::path dataset = cameras.empty() ? run.dataset : cameras;
     try {
         if (!dataset.empty())
-            scene.dataset = load_cameras(dataset, downscale_of(run), points);
+            scene.dataset = load_cameras(dataset, images_of(run), points);
         else
             scene.remark = "the dataset of this run was not found; name it with --cameras DATASET";
+        if (cameras.empty()) scene.exposures = exposures_of(run);
     } catch (const InputError& problem) {
         if (!cameras.empty()) throw;
         scene.remark = problem.what();
@@ -101,7 +121,7 @@ OpenedScene open_splats(const fs::path& path, const fs::path& cameras) {
     if (!splats.remarks.empty()) scene.remark = splats.remarks.front();
     scene.gaussians = std::make_shared<const Gaussians>(std::move(splats.gaussians));
     if (scene.gaussians->size() == 0) scene.remark = name_of_path(path) + " is empty: it has no splats";
-    if (!cameras.empty()) scene.dataset = load_cameras(cameras, 1, false);
+    if (!cameras.empty()) scene.dataset = load_cameras(cameras, {}, false);
     if (const auto run = live::run_of_splats(path); run && cameras.empty() && !run->dataset.empty()) {
         scene.look = look_of(*run);
         add_cameras(scene, *run, {}, false);
@@ -111,7 +131,7 @@ OpenedScene open_splats(const fs::path& path, const fs::path& cameras) {
 
 OpenedScene open_dataset(const fs::path& path) {
     OpenedScene scene;
-    scene.dataset = load_cameras(path, 1, true);
+    scene.dataset = load_cameras(path, {}, true);
     scene.gaussians = std::make_shared<const Gaussians>(splats_of_points(scene.dataset->points));
     scene.points = true;
     scene.remark = is_mesh_scene(path)
@@ -164,6 +184,7 @@ bool is_dataset(const fs::path& path) {
 OpenedScene with_cameras(const OpenedScene& splats, const OpenedScene& cameras) {
     OpenedScene scene = splats;
     scene.dataset = cameras.dataset;
+    scene.exposures.clear();
     scene.cameras = cameras.path;
     scene.remark = "with the cameras of ";
     scene.remark += cameras.title;

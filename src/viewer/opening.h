@@ -2,12 +2,14 @@
 // Opens what the window shows: a splat file, a dataset, or the folder of a training run.
 #pragma once
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "ewa/dataset.h"
+#include "ewa/exposure.h"
 #include "viewer/render_thread.h"
 
 namespace ewa::viewer {
@@ -25,8 +27,9 @@ struct OpenedScene {
     std::filesystem::path cameras;           // what gave the dataset, if not `path`
     /// Of the run's splats.ply.
     std::filesystem::file_time_type splats_time = std::filesystem::file_time_type::min();
-    Look look;           // as the file or the run asks for
-    std::string remark;  // one line: what is missing
+    std::map<std::string, Exposure> exposures;  // of the dataset's frames, by name, as the run learned them
+    Look look;                                  // as the file or the run asks for
+    std::string remark;                         // one line: what is missing
 
     void set_gaussians(std::shared_ptr<const Gaussians> splats);
 };

@@ -11,7 +11,7 @@ Quality quality_of(const QualityRequest& request) {
     Quality quality{request.rendering->number, std::numeric_limits<double>::quiet_NaN()};
     try {
         const auto [photo, weights] = load_training_image(request.frame, request.background);
-        const Image& color = request.rendering->color;
+        const Image color = exposed(request.rendering->color, request.exposure);
         if (photo.width == color.width && photo.height == color.height)
             quality.psnr = psnr(color, photo, weights);
     } catch (const std::exception&) {
@@ -20,7 +20,8 @@ Quality quality_of(const QualityRequest& request) {
     return quality;
 }
 
-void ViewQuality::measure(Renders& renders, int index, const Frame& frame, const Look& look) {
+void ViewQuality::measure(Renders& renders, int index, const Frame& frame, const Look& look,
+                          const Exposure& exposure) {
     if (index == index_ && renders.scene() == scene_ && look == look_) return;
     asked_ = renders.ask_full(frame.camera, look);
     if (index != index_) first_ = asked_;
@@ -28,12 +29,13 @@ void ViewQuality::measure(Renders& renders, int index, const Frame& frame, const
     scene_ = renders.scene();
     frame_ = frame;
     look_ = look;
+    exposure_ = exposure;
 }
 
 void ViewQuality::take(const std::shared_ptr<const FullRender>& rendering) {
     if (index_ < 0 || !rendering || rendering->number != asked_ || taken_ == asked_) return;
     taken_ = asked_;
-    measurements_.ask({rendering, frame_, look_.background});
+    measurements_.ask({rendering, frame_, look_.background, exposure_});
 }
 
 std::optional<double> ViewQuality::psnr(int index) const {

@@ -124,12 +124,23 @@ TEST(ViewQuality, IsThatOfTheEvaluation) {
         quality.take(renders.take().full);
         return std::abs(quality.psnr(1).value_or(0) - after) < 1e-3;
     }));
+    const Exposure bright{1.5f, 0, 0, 0.1f, 0, 1.2f, 0, 0, 0, 0, 1, 0};
+    quality.forget();
+    EXPECT_TRUE(soon([&] {
+        quality.measure(renders, 3, dataset.frames[3], look, bright);
+        quality.take(renders.take().full);
+        return quality.psnr(3).has_value();
+    }));
+    RenderOptions options;
+    options.background = look.background;
+    EXPECT_NEAR(*quality.psnr(3),
+                evaluate(open_device({}), *red_splat(), dataset, {3}, options, {bright}).psnr, 1e-3);
     quality.forget();
     EXPECT_FALSE(quality.psnr(1));
     Frame absent = dataset.frames[0];
     absent.image_path = folder / "absent.png";
     const auto nothing = std::make_shared<const FullRender>(FullRender{7, Image(48, 32, 3)});
-    EXPECT_TRUE(std::isnan(quality_of({nothing, absent, {}}).psnr));
+    EXPECT_TRUE(std::isnan(quality_of({nothing, absent, {}, kIdentityExposure}).psnr));
 }
 
 }  // namespace
