@@ -220,8 +220,8 @@ void draw_footer(const PanelFacts& facts, PanelActions& actions) {
     actions.screenshot = button("PNG", "F12: writes a screenshot");
     ImGui::SameLine();
     actions.exr = button("EXR", "Shift + F12: writes the render in floating point");
-    draw_text_box("note", facts.note, kNoteLines);
     ImGui::TextDisabled("F1: keys   F2: hide this panel");
+    draw_text_box("note", facts.note, kNoteLines);
 }
 
 /// The height of draw_footer().
