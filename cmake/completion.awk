@@ -41,7 +41,7 @@ listed { sub(/^ +/, ""); command_about[last] = command_about[last] " " $0; next 
     while (part[names] ~ /,$/) names++
     for (i = 1; i <= names; i++) { option[i] = part[i]; sub(/,$/, "", option[i]) }
     takes_value = count > names
-    values = takes_value && part[names + 1] ~ /^[a-z]+(\|[a-z]+)+$/ ? part[names + 1] : ""
+    values = takes_value && part[names + 1] ~ /^[a-z0-9-]+(\|[a-z0-9-]+)+$/ ? part[names + 1] : ""
     gsub(/\|/, " ", values)
     next
 }
