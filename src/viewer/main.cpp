@@ -189,7 +189,8 @@ void add_options(CLI::App& app, Arguments& arguments) {
         return app.add_option(name, value, help)->type_name(type);
     };
     option("PATH", arguments.path, "",
-           "Splat file (.ply .compressed.ply .splat .ksplat .spz .sog meta.json .glb .gltf), dataset, or folder of a "
+           "Splat file (.ply .compressed.ply .splat .ksplat .spz .sog meta.json .glb .gltf), dataset, or "
+           "folder of a "
            "training run. Without it, the window waits for a file to be dropped");
     CLI::Option* train = app.add_flag(
         "--train", arguments.train,

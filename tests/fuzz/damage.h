@@ -27,7 +27,8 @@ class Damage {
     }
 
     void change(std::string& bytes, const std::string& other) {
-        const size_t at = below(bytes.size() + 1), length = below(std::min<size_t>(64, bytes.size() - at) + 1);
+        const size_t at = below(bytes.size() + 1),
+                     length = below(std::min<size_t>(64, bytes.size() - at) + 1);
         switch (below(9)) {
             case 0:
                 bytes.resize(at);
@@ -39,7 +40,8 @@ class Damage {
                 if (at < bytes.size()) bytes[at] = char(below(256));
                 return;
             case 3: {
-                constexpr std::array<uint32_t, 6> kWords = {0, 0xffffffff, 0x7fffffff, 0x80000000, 0x10000, 1};
+                constexpr std::array<uint32_t, 6> kWords = {0,          0xffffffff, 0x7fffffff,
+                                                            0x80000000, 0x10000,    1};
                 const uint32_t word = kWords[below(kWords.size())];
                 std::memcpy(&bytes[at], &word, std::min<size_t>(1 + below(4), bytes.size() - at));
                 return;
@@ -64,8 +66,8 @@ class Damage {
     /// The first number in digits from `at`.
     void change_number(std::string& bytes, size_t at) {
         constexpr const char* kDigits = "0123456789.";
-        constexpr std::array<const char*, 8> kNumbers = {"0", "-1", "4294967296", "99999999", "1e999", "nan", "-0.5",
-                                                         "18446744073709551616"};
+        constexpr std::array<const char*, 8> kNumbers = {
+            "0", "-1", "4294967296", "99999999", "1e999", "nan", "-0.5", "18446744073709551616"};
         const size_t begin = bytes.find_first_of(kDigits, at);
         if (begin == std::string::npos) return;
         const size_t end = bytes.find_first_not_of(kDigits, begin);

@@ -424,9 +424,10 @@ std::vector<std::filesystem::path> gltf_values(const std::filesystem::path& gltf
 }
 
 std::filesystem::path new_gltf_values(const std::filesystem::path& gltf) {
-    return free_names(values_names(gltf), gltf_values(gltf),
-                      ": would be replaced by the values of " + gltf.filename().string() +
-                          ", but belongs to another file; choose another name, or .glb, which is one file")[0];
+    return free_names(
+        values_names(gltf), gltf_values(gltf),
+        ": would be replaced by the values of " + gltf.filename().string() +
+            ", but belongs to another file; choose another name, or .glb, which is one file")[0];
 }
 
 std::vector<std::string> write_gltf_splats(const std::filesystem::path& path, const Gaussians& gaussians,

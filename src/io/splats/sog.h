@@ -27,7 +27,15 @@ inline constexpr int kFirstRotation = 252;  // the alpha of a rotation whose lar
 inline constexpr uint64_t kPaletteRow = 64, kMostPalette = 65536;
 inline constexpr const char* kSogMeta = "meta.json";
 /// In the order of kSogImages.
-enum class SogImage { means_low, means_high, scale_codes, rotation_bytes, color_codes, palette_codes, labels };
+enum class SogImage {
+    means_low,
+    means_high,
+    scale_codes,
+    rotation_bytes,
+    color_codes,
+    palette_codes,
+    labels
+};
 inline constexpr std::array<const char*, 7> kSogImages = {
     "means_l.webp", "means_u.webp",       "scales.webp",    "quats.webp",
     "sh0.webp",     "shN_centroids.webp", "shN_labels.webp"};

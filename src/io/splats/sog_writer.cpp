@@ -128,7 +128,8 @@ class SogPacker {
     }
 
     void add_rotations() {
-        add_splats("quats", SogImage::rotation_bytes, [&](size_t i) { return packed_rotation(&g_.quaternions[4 * i]); });
+        add_splats("quats", SogImage::rotation_bytes,
+                   [&](size_t i) { return packed_rotation(&g_.quaternions[4 * i]); });
     }
 
     void add_colors() {
@@ -198,7 +199,8 @@ std::vector<Paths> image_names(const std::filesystem::path& meta) {
     return names;
 }
 
-SogPacker packer_for(const std::filesystem::path& path, const Gaussians& gaussians, const SaveOptions& options) {
+SogPacker packer_for(const std::filesystem::path& path, const Gaussians& gaussians,
+                     const SaveOptions& options) {
     SogPacker packer(gaussians, options);
     if (!packer.fits())
         throw InputError(path.string() +
@@ -213,16 +215,18 @@ std::vector<std::string> write_sog(const std::filesystem::path& path, const Gaus
     SogPacker packer = packer_for(path, gaussians, options);
     core::AtomicFile file(path);
     ArchiveWriter archive;
-    for (const auto& [name, bytes] : packer.pack(Paths(kSogImages.begin(), kSogImages.end()))) archive.add(name, bytes);
+    for (const auto& [name, bytes] : packer.pack(Paths(kSogImages.begin(), kSogImages.end())))
+        archive.add(name, bytes);
     file.write(archive.finish());
     file.commit();
     return remarks_of(gaussians, packer.palette());
 }
 
 std::vector<std::filesystem::path> new_sog_images(const std::filesystem::path& meta) {
-    return free_names(image_names(meta), sog_images(meta),
-                      ": would be replaced, but no meta.json of a SOG beside it names it; choose another folder, or "
-                      ".sog, which is one file");
+    return free_names(
+        image_names(meta), sog_images(meta),
+        ": would be replaced, but no meta.json of a SOG beside it names it; choose another folder, or "
+        ".sog, which is one file");
 }
 
 std::vector<std::string> write_sog_meta(const std::filesystem::path& path, const Gaussians& gaussians,
