@@ -114,7 +114,7 @@ struct RunResult {
 /// - exposures.json, with TrainOptions::exposure: three rows of four numbers for each training image.
 /// - test/*.png: renders of some test views (train/*.png without a test set).
 /// - summary.json: the Summary.
-/// - report.html: all of this in one page.
+/// - report.html: the figures, curves and views in one page. It needs no other file and no network.
 ///
 /// One run at a time may use a folder. Each file but metrics.jsonl is replaced as a whole.
 /// If an image vanishes during training, the checkpoint is saved before the error is thrown.

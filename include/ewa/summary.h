@@ -32,6 +32,7 @@ struct MetricsLine {
     double loss = 0;                       // of this step
     uint32_t splats = 0;
     std::optional<double> test_psnr, test_ssim;  // if the test views were evaluated after this step
+    std::optional<double> train_psnr;            // dB, of this step's training view, as StepReport::psnr
 };
 
 }  // namespace ewa

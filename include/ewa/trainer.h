@@ -44,6 +44,17 @@ struct StepReport {
     uint64_t dropped_updates = 0;    // parameter updates so far that were not finite and were dropped
     uint32_t skipped_nonfinite = 0;  // splats skipped in the last step: a value is not finite
     uint64_t limited_steps = 0;      // updates of a mean, quaternion or scale so far that were shortened
+    /// dB, of the image that `loss` is of. In a masked image, pixels count by the square of their weight. NaN if no
+    /// pixel counts.
+    double psnr = 0;
+};
+
+/// Where the time of the steps since the trainer was made or restored went: means, in ms a step.
+struct StepTimes {
+    int steps = 0;
+    double step = 0;               // wall time in Trainer::step
+    double refinement = 0;         // of it: adding, moving and removing splats
+    std::vector<PassTime> passes;  // on the device, in recording order. On a GPU they are of every 100th step
 };
 
 /// One device buffer of a TrainerState.
@@ -87,10 +98,10 @@ class Trainer {
     Gaussians gaussians() const;
     uint32_t splats() const;
     int steps_done() const;
-    std::vector<Exposure> exposures() const;   // one for each training frame; empty if not learned
-    size_t images_on_disk() const;             // training images that are not cached
-    std::vector<PlanLine> plan() const;        // what the run skips
-    std::vector<PassTime> pass_times() const;  // medians over the last steps, in recording order
+    std::vector<Exposure> exposures() const;  // one for each training frame; empty if not learned
+    size_t images_on_disk() const;            // training images that are not cached
+    std::vector<PlanLine> plan() const;       // what the run skips
+    StepTimes step_times() const;
 
   private:
     struct State;

@@ -3,7 +3,8 @@
 // Gradient of the SSIM window along the rows, and the gradient of the whole loss by the render x:
 // dL/dx = ssim_scale (blur dS/d(mean x) + 2 x blur dS/d(mean x^2) + y blur dS/d(mean x y)) + l1_scale sign(x - y).
 // The first term applies where |x| is within SSIM_LIMIT.
-// One invocation owns LOSS_TEXELS texels of channel workgroup.z; one subgroup owns one partial sum of |x - y|.
+// One invocation owns LOSS_TEXELS texels of channel workgroup.z; one subgroup owns one partial sum of |x - y|
+// and, in a second row, one of (x - y)^2 with both clamped to [0, 1].
 // It reads the blurred derivatives, the render and the target, and writes dL/d(image) and the partial sums.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
@@ -34,7 +35,7 @@ void main() {
         }
         [[unroll]] for (int o = 0; o < int(LOSS_TEXELS); ++o) m[q][o] = blur_row(texels, o);
     }
-    vec4 differences = vec4(0.0);
+    vec4 differences = vec4(0.0), squares = vec4(0.0);
     [[unroll]] for (int o = 0; o < int(LOSS_TEXELS); ++o) {
         const bool there = inside && first + o < int(row_texels);
         const int at = int(channel * plane) + row + first + o;
@@ -45,8 +46,14 @@ void main() {
                                                            clamp(y, -limit, limit) * m[2][o]) +
                                  push.l1_scale * sign(x - y);
         differences += abs(x - y);
+        const vec4 shown = clamp(x, 0.0, 1.0) - clamp(y, 0.0, 1.0);
+        squares += shown * shown;
     }
     const float sum = subgroup_sum(differences.x + differences.y + differences.z + differences.w);
+    const float square_sum = subgroup_sum(squares.x + squares.y + squares.z + squares.w);
     const uint group = (gl_WorkGroupID.z * gl_NumWorkGroups.y + gl_WorkGroupID.y) * gl_NumWorkGroups.x + gl_WorkGroupID.x;
-    if (LANE == 0u) partials[group * (GROUP_SIZE / SUBGROUP) + SUBGROUP_INDEX] = sum;
+    if (LANE != 0u) return;
+    const uint groups = gl_NumWorkGroups.x * gl_NumWorkGroups.y * gl_NumWorkGroups.z, at = group * (GROUP_SIZE / SUBGROUP) + SUBGROUP_INDEX;
+    partials[at] = sum;
+    partials[groups * (GROUP_SIZE / SUBGROUP) + at] = square_sum;
 }

@@ -1,7 +1,7 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Adds floats in a fixed order.
-// One workgroup is one subgroup and owns one block of the source. It writes the sum to sums[block]
+// Adds the floats of each row in a fixed order.
+// One workgroup is one subgroup and owns one block of row workgroup.z. It writes the sum to that block's place in sums
 // or to Counts: REDUCE_TO_*.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
@@ -15,12 +15,16 @@ layout(push_constant, scalar) uniform Push { ReducePush push; };
 
 void main() {
     const uint block = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
-    const uint begin = block * push.block, end = min(begin + push.block, push.items);
+    const uint row = gl_WorkGroupID.z, blocks = (push.items + push.block - 1u) / push.block;
+    if (block >= blocks) return;
+    const uint begin = row * push.items + block * push.block;
+    const uint end = min(begin + push.block, (row + 1u) * push.items);
     float sum = 0.0;
     for (uint e = begin + LANE; e < end; e += SUBGROUP) sum += source[e];
     sum = subgroup_sum(sum) * push.scale;
     if (LANE != 0u) return;
-    if (push.target == REDUCE_TO_SUMS) sums[block] = sum;
-    if (push.target == REDUCE_TO_L1) counts.l1 = sum;
+    if (push.target == REDUCE_TO_SUMS) sums[row * blocks + block] = sum;
+    if (push.target == REDUCE_TO_L1 && row == 0u) counts.l1 = sum;
+    if (push.target == REDUCE_TO_L1 && row == 1u) counts.squared = sum;
     if (push.target == REDUCE_TO_SSIM) counts.ssim = sum;
 }

@@ -109,7 +109,7 @@ EWA_UINT(TOTAL_INSTANCES, 1u);  // Counts.instances
 EWA_UINT(TOTAL_SCAN, 2u);       // Counts.scan_total
 // ReducePush.target
 EWA_UINT(REDUCE_TO_SUMS, 0u);  // sums[block]
-EWA_UINT(REDUCE_TO_L1, 1u);    // Counts.l1
+EWA_UINT(REDUCE_TO_L1, 1u);    // Counts.l1, of a second row Counts.squared
 EWA_UINT(REDUCE_TO_SSIM, 2u);  // Counts.ssim
 
 // ---- Loss: what one invocation owns ----
@@ -156,6 +156,7 @@ struct Counts {
     uint scan_total;         // grand total of a scan with TOTAL_SCAN
     float l1;                // mean |x - y|
     float ssim;              // mean SSIM
+    float squared;           // mean (x - y)^2, both clamped to [0, 1]
     uint limited_steps;      // steps of a mean, quaternion or scale that were shortened
     uint visible;            // splats that reach a tile; counted with PROJECT_DEBUG
     // Not cleared by a frame that may begin before the host has read the counts of the one before. Once a frame
@@ -239,9 +240,10 @@ struct LossPush {
 };
 
 struct ReducePush {
-    uint items;
+    uint items;   // of each row
     uint block;   // items a subgroup adds up
     uint target;  // REDUCE_*
+    uint rows;    // added up separately
     float scale;  // applied to the result
 };
 

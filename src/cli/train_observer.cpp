@@ -4,6 +4,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <chrono>
+#include <cmath>
 #include <thread>
 
 #include "core/messages.h"
@@ -131,8 +132,15 @@ void TrainObserver::on_begin(const std::filesystem::path& folder, const std::vec
 }
 
 void TrainObserver::on_step(const StepReport& step) {
-    if (progress_->due(step.step))
-        progress_->update(step.step, fmt::format("loss {:.4f}, {} splats", step.loss, step.splats));
+    if (std::isfinite(step.psnr)) {
+        psnr_sum_ += step.psnr;
+        ++psnr_steps_;
+    }
+    if (!progress_->due(step.step)) return;
+    const std::string psnr =
+        psnr_steps_ > 0 ? fmt::format(", PSNR {:.1f} dB", psnr_sum_ / psnr_steps_) : std::string();
+    progress_->update(step.step, fmt::format("loss {:.4f}{}, {} splats", step.loss, psnr, step.splats));
+    psnr_sum_ = psnr_steps_ = 0;
 }
 
 void TrainObserver::on_evaluation(int step, const Evaluation& evaluation) {

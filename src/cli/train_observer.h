@@ -47,6 +47,9 @@ class TrainObserver : public RunObserver {
     std::optional<InterruptWatch> watch_;
     std::unique_ptr<Served> served_;  // null without --serve
     std::optional<Progress> progress_;
+    // Training PSNR of the steps since the progress was last shown; steps differ much, since each has another view.
+    double psnr_sum_ = 0;
+    int psnr_steps_ = 0;
 };
 
 }  // namespace ewa::cli

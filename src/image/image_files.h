@@ -24,6 +24,13 @@ Image decode(std::span<const unsigned char> bytes, const std::string& what, int 
 /// The bytes of a PNG of 1 to 4 channels and 8 bits: clamped to [0, 1], rounded, NaN as 0. Throws RunError.
 std::vector<unsigned char> encode_png(const Image& image);
 
+/// The bytes of a JPEG of an RGB image, rounded as encode_png does, with colour at full resolution. quality: 1 to
+/// 100. Throws RunError.
+std::vector<unsigned char> encode_jpeg(const Image& image, int quality);
+
+/// The values as bytes: clamped to [0, 1], rounded, NaN as 0.
+std::vector<uint8_t> eight_bit_values(const Image& image);
+
 /// What the file's first bytes say: png, jpeg, tiff, openexr, webp, bmp, pnm or hdr. Throws InputError for
 /// any other file.
 std::string_view format_name(const std::filesystem::path& path);

@@ -8,9 +8,11 @@
 #include <jerror.h>
 
 #include <csetjmp>
+#include <cstdlib>
 #include <cstring>
 #include <stdexcept>
 
+#include "ewa/error.h"
 #include "image/image_files.h"
 
 namespace ewa::image {
@@ -148,7 +150,70 @@ class JpegReader {
     char message_[JMSG_LENGTH_MAX + 64] = {};
 };
 
+/// Leaves libjpeg's errors by longjmp, as JpegReader does.
+class JpegWriter {
+  public:
+    JpegWriter() {
+        jpeg_.err = jpeg_std_error(&errors_);
+        errors_.error_exit = on_error;
+        jpeg_.client_data = this;
+    }
+    ~JpegWriter() {
+        jpeg_destroy_compress(&jpeg_);
+        std::free(bytes_);
+    }
+    JpegWriter(const JpegWriter&) = delete;
+    JpegWriter& operator=(const JpegWriter&) = delete;
+
+    std::vector<unsigned char> write(const Image& image, std::vector<uint8_t> rgb, int quality) {
+        if (setjmp(jump_)) throw RunError(message_);
+        compress(image.width, image.height, rgb.data(), quality);
+        return {bytes_, bytes_ + size_};
+    }
+
+  private:
+    [[noreturn]] static void on_error(j_common_ptr jpeg) {
+        auto& writer = *static_cast<JpegWriter*>(jpeg->client_data);
+        char text[JMSG_LENGTH_MAX];
+        jpeg->err->format_message(jpeg, text);
+        std::snprintf(writer.message_, sizeof(writer.message_), "cannot be encoded as JPEG: %s", text);
+        std::longjmp(writer.jump_, 1);
+    }
+
+    void compress(int width, int height, uint8_t* rgb, int quality) {
+        jpeg_create_compress(&jpeg_);
+        jpeg_mem_dest(&jpeg_, &bytes_, &size_);
+        jpeg_.image_width = JDIMENSION(width);
+        jpeg_.image_height = JDIMENSION(height);
+        jpeg_.input_components = 3;
+        jpeg_.in_color_space = JCS_RGB;
+        jpeg_set_defaults(&jpeg_);
+        jpeg_set_quality(&jpeg_, quality, TRUE);
+        jpeg_.comp_info[0].h_samp_factor = jpeg_.comp_info[0].v_samp_factor = 1;
+        jpeg_.optimize_coding = TRUE;
+        jpeg_start_compress(&jpeg_, TRUE);
+        while (jpeg_.next_scanline < jpeg_.image_height) {
+            JSAMPROW row = rgb + size_t(jpeg_.next_scanline) * size_t(width) * 3;
+            jpeg_write_scanlines(&jpeg_, &row, 1);
+        }
+        jpeg_finish_compress(&jpeg_);
+    }
+
+    jpeg_compress_struct jpeg_{};
+    jpeg_error_mgr errors_{};
+    std::jmp_buf jump_{};
+    unsigned char* bytes_ = nullptr;
+    unsigned long size_ = 0;
+    char message_[JMSG_LENGTH_MAX + 64] = {};
+};
+
 }  // namespace
+
+std::vector<unsigned char> encode_jpeg(const Image& image, int quality) {
+    if (image.channels != 3)
+        throw RunError("a JPEG has 3 channels here, not " + std::to_string(image.channels));
+    return JpegWriter().write(image, eight_bit_values(image), quality);
+}
 
 StoredImage read_jpeg(std::FILE* file, uint64_t file_bytes, bool pixels) {
     return JpegReader(file).read(file_bytes, pixels);

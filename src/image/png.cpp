@@ -141,14 +141,19 @@ StoredImage read_png(std::FILE* file, uint64_t file_bytes, bool pixels) {
     return image;
 }
 
-std::vector<unsigned char> encode_png(const Image& image) {
-    if (image.channels > 4)
-        throw RunError("a PNG has at most 4 channels, not " + std::to_string(image.channels));
+std::vector<uint8_t> eight_bit_values(const Image& image) {
     std::vector<uint8_t> rounded(image.pixels.size());
     // NaN compares false and becomes 0.
     std::transform(image.pixels.begin(), image.pixels.end(), rounded.begin(), [](float v) {
         return v > 0.0f ? static_cast<uint8_t>(std::lround(std::min(v, 1.0f) * 255.0f)) : uint8_t(0);
     });
+    return rounded;
+}
+
+std::vector<unsigned char> encode_png(const Image& image) {
+    if (image.channels > 4)
+        throw RunError("a PNG has at most 4 channels, not " + std::to_string(image.channels));
+    const std::vector<uint8_t> rounded = eight_bit_values(image);
     constexpr png_uint_32 kFormats[] = {PNG_FORMAT_GRAY, PNG_FORMAT_GA, PNG_FORMAT_RGB, PNG_FORMAT_RGBA};
     png_image png{};
     png.version = PNG_IMAGE_VERSION;

@@ -76,8 +76,8 @@ inline Groups element_groups(const KernelConfig& config, uint64_t items, uint32_
 }
 
 /// One workgroup of a single subgroup for each block of `block` items.
-inline Groups block_groups(const KernelConfig& config, uint64_t items, uint32_t block) {
-    return grid_of(config, (items + block - 1) / block);
+inline Groups block_groups(const KernelConfig& config, uint64_t items, uint32_t block, uint32_t z = 1) {
+    return grid_of(config, (items + block - 1) / block, z);
 }
 
 /// One workgroup a tile. The tile of workgroup (x, y) is x * push.tile_step[0] + y * push.tile_step[1].

@@ -11,11 +11,11 @@ namespace ewa::shared {
 // The scalar block layout packs these structs without padding, and so does C++.
 static_assert(sizeof(CameraBlock) == 4 * (9 + 9 + 3 + 3 + 8 + 4 + 4));
 static_assert(offsetof(CameraBlock, size) == 4 * (9 + 9 + 3 + 3 + 8 + 4));
-static_assert(sizeof(Counts) == 36 && offsetof(Counts, l1) == 16);
+static_assert(sizeof(Counts) == 40 && offsetof(Counts, l1) == 16);
 static_assert(sizeof(ProjectPush) == 12 && sizeof(SortPush) == 16 && sizeof(ScanPush) == 8);
 static_assert(sizeof(ScanTotalsPush) == 12 && sizeof(EmitPush) == 32 && sizeof(TileStartsPush) == 8);
 static_assert(sizeof(BlendPush) == 48 && offsetof(BlendPush, capacity) == 44);
-static_assert(sizeof(UnpackPush) == 28 && sizeof(LossPush) == 24 && sizeof(ReducePush) == 16);
+static_assert(sizeof(UnpackPush) == 28 && sizeof(LossPush) == 24 && sizeof(ReducePush) == 20);
 static_assert(sizeof(ImageLayout) == 16 && sizeof(PackPush) == 4 && sizeof(ExposurePush) == 20 &&
               sizeof(ExposureUpdatePush) == 28);
 static_assert(sizeof(UpdatePush) == 72 && sizeof(DensifyPush) == 48 && sizeof(ResetPush) == 12);

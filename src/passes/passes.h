@@ -165,17 +165,22 @@ struct LossBackwardColumns {
     gpu::BufferPart derivatives, blurred;
 };
 
-/// Gradient of the whole loss by the render, and partial sums of the L1 loss.
+/// Gradient of the whole loss by the render, and partial sums of absolute and of squared
+/// differences.
 struct LossBackwardRows {
     static constexpr char shader[] = "loss_backward_rows";
     using Work = PerElement<loss_row_items, 3>;
     gpu::BufferPart blurred, image, target, image_gradient, partials;
 };
 
-/// Adds floats in a fixed order.
+/// Adds the floats of each row in a fixed order.
 struct Reduce {
     static constexpr char shader[] = "reduce";
-    using Work = PerBlock<shared::ReducePush>;
+    struct Work : OneSubgroup<shared::ReducePush> {
+        static Groups groups(const KernelConfig& config, const Push& push) {
+            return block_groups(config, push.items, push.block, push.rows);
+        }
+    };
     gpu::BufferPart source, sums, counts;
 };
 

@@ -53,16 +53,20 @@ void record_expose_backward(gpu::Recording& recording, passes::PassCache& cache,
                                                 .instance_capacity = frame.instance_capacity});
 }
 
-/// Adds frame.partials, in two steps. target: shared::REDUCE_TO_*.
+/// Adds each row of frame.partials, in two steps. target: shared::REDUCE_TO_*.
 void record_mean(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame,
-                 uint32_t target, float scale) {
+                 uint32_t target, uint32_t rows, float scale) {
     const Sizes& s = frame.sizes;
     const auto reduce = cache.get<passes::Reduce>();
+    reduce.record(recording, {.source = frame.partials, .sums = frame.reduced, .counts = frame.counts},
+                  {.items = s.partials,
+                   .block = s.reduce_block,
+                   .target = shared::REDUCE_TO_SUMS,
+                   .rows = rows,
+                   .scale = 1});
     reduce.record(
-        recording, {.source = frame.partials, .sums = frame.reduced, .counts = frame.counts},
-        {.items = s.partials, .block = s.reduce_block, .target = shared::REDUCE_TO_SUMS, .scale = 1});
-    reduce.record(recording, {.source = frame.reduced, .sums = frame.partials, .counts = frame.counts},
-                  {.items = s.reduce_blocks, .block = s.reduce_blocks, .target = target, .scale = scale});
+        recording, {.source = frame.reduced, .sums = frame.partials, .counts = frame.counts},
+        {.items = s.reduce_blocks, .block = s.reduce_blocks, .target = target, .rows = rows, .scale = scale});
 }
 
 uint32_t update_mode(const Plan& plan) {
@@ -143,7 +147,7 @@ void record_loss(gpu::Recording& recording, passes::PassCache& cache, const Fram
     cache.get<passes::LossRows>().record(
         recording, {.moments = frame.moments, .derivatives = frame.derivatives, .partials = frame.partials},
         push);
-    record_mean(recording, cache, frame, shared::REDUCE_TO_SSIM, float(share));
+    record_mean(recording, cache, frame, shared::REDUCE_TO_SSIM, 1, float(share));
     cache.get<passes::LossBackwardColumns>().record(
         recording, {.derivatives = frame.derivatives, .blurred = frame.blurred}, push);
     cache.get<passes::LossBackwardRows>().record(recording,
@@ -156,7 +160,7 @@ void record_loss(gpu::Recording& recording, passes::PassCache& cache, const Fram
     if (masked)
         cache.get<passes::MaskGradient>(colors).record(
             recording, {.photo = photo, .image_gradient = frame.image_gradient}, layout);
-    record_mean(recording, cache, frame, shared::REDUCE_TO_L1, float(share));
+    record_mean(recording, cache, frame, shared::REDUCE_TO_L1, 2, float(share));
     if (exposure) record_expose_backward(recording, cache, frame, *exposure);
 }
 

@@ -172,8 +172,8 @@ Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request)
         s.moments = uint64_t(s.plane_floats) * 3 * shared::MOMENT_PLANES * word;
         s.derivatives = uint64_t(s.plane_floats) * 3 * shared::DERIVATIVE_PLANES * word;
         s.image_gradient = s.target;
-        s.partial_sums = uint64_t(s.partials) * word;
-        s.reduced = uint64_t(s.reduce_blocks) * word;
+        s.partial_sums = 2 * uint64_t(s.partials) * word;  // of absolute and of squared differences
+        s.reduced = 2 * uint64_t(s.reduce_blocks) * word;
         s.slots = std::max<uint64_t>(request.instances, 1) * shared::SLOT_FLOATS * word;
         if (request.overlaid) s.overlay = overlay_bytes(s);
     }

@@ -107,6 +107,9 @@ Loss image_loss(const Raster& rendered, const Raster& target) {
     for (size_t i = 0; i < rendered.values.size(); ++i) {
         const double difference = rendered.values[i] - target.values[i];
         out.l1 += std::abs(difference) / count;
+        const double shown =
+            std::clamp(rendered.values[i], 0.0, 1.0) - std::clamp(target.values[i], 0.0, 1.0);
+        out.squared += shown * shown / count;
         const double sign = difference > 0 ? 1 : difference < 0 ? -1 : 0;
         out.gradient.values[i] = (1 - SSIM_WEIGHT) * sign / count;
     }

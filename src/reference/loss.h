@@ -22,7 +22,8 @@ namespace ewa::reference {
 
 struct Loss {
     double loss = 0, l1 = 0, ssim = 0;
-    Raster gradient;  // dL/d(rendered), RGB
+    double squared = 0;  // mean (x - y)^2, both clamped to [0, 1]
+    Raster gradient;     // dL/d(rendered), RGB
 };
 
 /// Both RGB of one size.

@@ -86,20 +86,111 @@ std::string chart_grid(const Axes& axes, const Chart& chart) {
     svg += fmt::format("<line class=\"axis\" x1=\"{0}\" x2=\"{1}\" y1=\"{2}\" y2=\"{2}\"/>\n", left, right,
                        bottom);
     return svg + fmt::format("<text class=\"label\" text-anchor=\"middle\" x=\"{}\" y=\"{}\">{}</text>\n",
-                             (left + right) / 2, kChart.height - 6, escape_html(chart.x_label));
+                             (left + right) / 2, kChart.height - 6,
+                             escape_html(chart.x_name + (chart.x_unit.empty() ? "" : ", ") + chart.x_unit));
 }
 
-/// The mean over a centred window of a tenth of the points: losses differ much between views.
+/// The mean over a window of a tenth of the points: losses differ much between views. The window is centred, but at the
+/// end, where curves are flat, it keeps the points before.
 std::vector<ChartPoint> running_mean(const std::vector<ChartPoint>& points) {
     const size_t half = points.size() / 20;
     std::vector<ChartPoint> mean(points);
     for (size_t i = 0; i < points.size(); ++i) {
-        const size_t reach = std::min({half, i, points.size() - 1 - i});
+        const size_t before = std::min(half, i), after = std::min(before, points.size() - 1 - i);
         double sum = 0;
-        for (size_t j = i - reach; j <= i + reach; ++j) sum += points[j].y;
-        mean[i].y = sum / double(2 * reach + 1);
+        for (size_t j = i - before; j <= i + after; ++j) sum += points[j].y;
+        mean[i].y = sum / double(before + after + 1);
     }
     return mean;
+}
+
+// As many values under the pointer as can be told apart.
+constexpr size_t kMostBands = 300;
+
+/// The finite ones.
+std::vector<ChartPoint> finite(std::vector<ChartPoint> points) {
+    std::erase_if(points, [](const ChartPoint& p) { return !std::isfinite(p.x) || !std::isfinite(p.y); });
+    return points;
+}
+
+std::string dots(const Axes& axes, const std::vector<ChartPoint>& points, const char* css) {
+    std::string svg;
+    for (const ChartPoint& p : points)
+        svg += fmt::format("<circle class=\"{}\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3\"/>", css, axes.px(p.x),
+                           axes.py(p.y));
+    return svg;
+}
+
+/// The values at one x.
+struct Band {
+    double x = 0;
+    std::vector<ChartPoint> first, second;  // none or one each
+    double mean = 0;
+};
+
+/// The values of both series by x, evenly thinned out.
+std::vector<Band> bands_of(const Chart& chart, const std::vector<ChartPoint>& mean) {
+    std::vector<Band> bands;
+    for (size_t i = 0; i < chart.points.size(); ++i)
+        bands.push_back({chart.points[i].x, {chart.points[i]}, {}, chart.smooth ? mean[i].y : 0});
+    for (const ChartPoint& p : chart.second) {
+        const auto at = std::lower_bound(bands.begin(), bands.end(), p.x,
+                                         [](const Band& band, double x) { return band.x < x; });
+        if (at != bands.end() && at->x == p.x)
+            at->second = {p};
+        else
+            bands.insert(at, {p.x, {}, {p}, 0});
+    }
+    const size_t every = (bands.size() + kMostBands - 1) / kMostBands;
+    std::vector<Band> some;
+    for (size_t i = 0; i < bands.size(); ++i)
+        if (i % every == 0 || i + 1 == bands.size()) some.push_back(bands[i]);
+    return some;
+}
+
+std::string with_unit(double value, const std::string& unit) {
+    const std::string number =
+        std::abs(value) < 1000 ? fmt::format("{:.4g}", value) : fmt::format("{:.0f}", value);
+    return number + (unit.empty() ? "" : " ") + escape_html(unit);
+}
+
+std::string band_text(const Chart& chart, const Band& band) {
+    std::string text = escape_html(chart.x_name) + " " + with_unit(band.x, chart.x_unit) + ": ";
+    if (!band.first.empty()) {
+        text += with_unit(band.first[0].y, chart.y_unit);
+        if (chart.smooth) text += ", mean " + with_unit(band.mean, "");
+    }
+    if (!band.second.empty())
+        text += band.first.empty() ? "held out " + with_unit(band.second[0].y, chart.y_unit)
+                                   : ", held out " + with_unit(band.second[0].y, "");
+    return text;
+}
+
+/// Invisible columns that show the values at their x: by themselves in a tooltip, with scripts in the readout.
+std::string bands_svg(const Axes& axes, const Chart& chart, const std::vector<Band>& bands) {
+    const double left = kChart.left, right = kChart.width - kChart.right;
+    const double top = kChart.top, bottom = kChart.height - kChart.bottom;
+    std::string svg;
+    for (size_t i = 0; i < bands.size(); ++i) {
+        const double x = axes.px(bands[i].x);
+        const double from = i == 0 ? left : (axes.px(bands[i - 1].x) + x) / 2;
+        const double to = i + 1 == bands.size() ? right : (x + axes.px(bands[i + 1].x)) / 2;
+        svg += fmt::format("<g class=\"band\"><rect x=\"{:.1f}\" y=\"{}\" width=\"{:.1f}\" height=\"{}\"/>",
+                           from, top, std::max(0.1, to - from), bottom - top);
+        svg += fmt::format("<line x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1}\" y2=\"{2}\"/>", x, top, bottom);
+        svg += dots(axes, bands[i].first, "dot") + dots(axes, bands[i].second, "second dot");
+        svg += "<title>" + band_text(chart, bands[i]) + "</title></g>\n";
+    }
+    return svg;
+}
+
+std::string caption(const Chart& chart) {
+    std::string html = "<figcaption>" + escape_html(chart.title);
+    if (!chart.y_unit.empty()) html += " <span>" + escape_html(chart.y_unit) + "</span>";
+    if (!chart.name.empty()) html += "<br><span class=\"key\">" + escape_html(chart.name) + "</span>";
+    if (!chart.second.empty())
+        html += "<br><span class=\"key second\">" + escape_html(chart.second_name) + "</span>";
+    return html + "</figcaption>\n";
 }
 
 // Distinct for readers who cannot tell red from green (Okabe and Ito 2008).
@@ -195,30 +286,35 @@ std::string short_number(double value, int digits) {
     return fmt::format("{:.{}g}{}", value == 0 ? 0.0 : value, digits, kSuffix[thousands]);
 }
 
-std::string chart_svg(const Chart& chart) {
-    std::vector<ChartPoint> points;
-    for (const ChartPoint& p : chart.points)
-        if (std::isfinite(p.x) && std::isfinite(p.y)) points.push_back(p);
-    if (points.size() < 2) return "";
+std::string chart_svg(const Chart& given) {
+    Chart chart = given;
+    chart.points = finite(given.points);
+    chart.second = finite(given.second);
+    std::vector<ChartPoint> all = chart.points;
+    all.insert(all.end(), chart.second.begin(), chart.second.end());
+    if (all.size() < 2) return "";
 
-    const auto [low, high] =
-        std::minmax_element(points.begin(), points.end(), [](auto& a, auto& b) { return a.y < b.y; });
-    const Axes axes{kChart, make_axis(std::min(0.0, points.front().x), points.back().x, false),
+    const auto lower = [](auto& a, auto& b) { return a.y < b.y; };
+    const auto earlier = [](auto& a, auto& b) { return a.x < b.x; };
+    const auto [low, high] = std::minmax_element(all.begin(), all.end(), lower);
+    const auto [first, last] = std::minmax_element(all.begin(), all.end(), earlier);
+    const Axes axes{kChart, make_axis(std::min(0.0, first->x), last->x, false),
                     make_axis(chart.zero_based ? std::min(0.0, low->y) : low->y, high->y, true)};
-    std::string svg = fmt::format(
-        "<figure class=\"chart\"><figcaption>{0}{1}</figcaption>\n"
-        "<svg viewBox=\"0 0 {2} {3}\" role=\"img\" aria-label=\"{0}\">\n",
-        escape_html(chart.title),
-        chart.y_label.empty() ? "" : " <span>" + escape_html(chart.y_label) + "</span>", kChart.width,
-        kChart.height);
+    const std::vector<ChartPoint> mean = running_mean(chart.points);
+    const std::vector<Band> bands = bands_of(chart, mean);
+    std::string svg =
+        "<figure class=\"chart\">" + caption(chart) +
+        fmt::format(
+            "<p class=\"readout\">{}</p>\n<svg viewBox=\"0 0 {} {}\" role=\"img\" "
+            "aria-label=\"{}\">\n",
+            band_text(chart, bands.back()), kChart.width, kChart.height, escape_html(chart.title));
     svg += chart_grid(axes, chart);
-    svg += polyline(axes, points, chart.smooth ? "raw" : "line");
-    if (chart.smooth) svg += polyline(axes, running_mean(points), "line");
-    if (points.size() <= 30 && !chart.smooth)
-        for (const ChartPoint& p : points)
-            svg += fmt::format("<circle class=\"dot\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3\"/>", axes.px(p.x),
-                               axes.py(p.y));
-    return svg + "</svg></figure>\n";
+    svg += polyline(axes, chart.points, chart.smooth ? "raw" : "line");
+    if (chart.smooth) svg += polyline(axes, mean, "line");
+    if (chart.points.size() <= 30 && !chart.smooth) svg += dots(axes, chart.points, "dot");
+    if (chart.second.size() > 1) svg += polyline(axes, chart.second, "second");
+    if (chart.second.size() <= 30) svg += dots(axes, chart.second, "second dot");
+    return svg + bands_svg(axes, chart, bands) + "</svg></figure>\n";
 }
 
 std::string work_precision_svg(const WorkPrecision& diagram) {

@@ -20,13 +20,16 @@ struct ChartPoint {
 };
 
 struct Chart {
-    std::string title, x_label, y_label;
-    std::vector<ChartPoint> points;  // in the order of x; points that are not finite are skipped
-    bool smooth = false;             // draw a running mean, with the points faint behind it
-    bool zero_based = false;         // the y axis starts at 0; the x axis always does
+    std::string title, x_name, x_unit = "", y_unit = "";
+    std::vector<ChartPoint> points = {};  // in the order of x; points that are not finite are skipped
+    bool smooth = false;                  // draw a running mean, with the points faint behind it
+    bool zero_based = false;              // the y axis starts at 0; the x axis always does
+    std::string name = "";                // what the points are
+    std::vector<ChartPoint> second = {};  // another series, as dots; in the order of x
+    std::string second_name = "";
 };
 
-/// A <figure> with one chart; empty if fewer than two points are finite.
+/// A <figure> with one chart that tells the values under the pointer; empty if fewer than two points are finite.
 std::string chart_svg(const Chart& chart);
 
 struct WorkPoint {

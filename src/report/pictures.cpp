@@ -137,10 +137,4 @@ std::string base64(const std::vector<unsigned char>& bytes) {
     return text;
 }
 
-std::string data_uri(const Image& image, int max_width) {
-    const int factor = (image.width + max_width - 1) / max_width;
-    return "data:image/png;base64," +
-           base64(image::encode_png(factor > 1 ? downscale(image, factor) : image));
-}
-
 }  // namespace ewa::report

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// File names of renders, error maps, and data URIs.
+// File names of renders, error maps, and base64.
 #pragma once
 #include <filesystem>
 #include <string>
@@ -25,8 +25,5 @@ Image error_map(const Image& a, const Image& b, double full_scale);
 Image value_error_map(const Image& a, const Image& b, double full_scale);
 
 std::string base64(const std::vector<unsigned char>& bytes);
-
-/// The image as an 8-bit PNG in a data URI, reduced by a whole factor if it is wider than max_width.
-std::string data_uri(const Image& image, int max_width);
 
 }  // namespace ewa::report

@@ -55,6 +55,7 @@ Json to_json(const MetricsLine& line) {
               {"splats", line.splats}};
     if (line.test_psnr) json["test_psnr"] = figure(line.test_psnr);
     if (line.test_ssim) json["test_ssim"] = figure(line.test_ssim);
+    if (line.train_psnr) json["train_psnr"] = figure(line.train_psnr);
     return json;
 }
 
@@ -81,6 +82,7 @@ MetricsLine metrics_line(const Json& json) {
     line.splats = uint32_t(whole_number(json, "splats", UINT32_MAX));
     if (json.contains("test_psnr")) line.test_psnr = number_or_nan(json, "test_psnr");
     if (json.contains("test_ssim")) line.test_ssim = number_or_nan(json, "test_ssim");
+    if (json.contains("train_psnr")) line.train_psnr = number_or_nan(json, "train_psnr");
     return line;
 }
 

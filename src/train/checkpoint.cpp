@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstddef>
 #include <cstring>
 #include <span>
 #include <type_traits>
@@ -27,8 +29,11 @@ struct StateBlock {
     double seconds, wall_seconds, loss;
     uint64_t dropped_updates;
     uint32_t splats, skipped_nonfinite, sh_degree, limited_steps;
+    double psnr;  // absent from the checkpoints of earlier versions
 };
-static_assert(sizeof(StateBlock) == 56 && std::is_trivially_copyable_v<StateBlock>);
+constexpr size_t kEarlierStateBytes = offsetof(StateBlock, psnr);
+static_assert(sizeof(StateBlock) == 64 && kEarlierStateBytes == 56 &&
+              std::is_trivially_copyable_v<StateBlock>);
 
 struct SectionHeader {
     char name[kNameBytes];
@@ -88,7 +93,8 @@ void write_checkpoint(const std::filesystem::path& path, const Checkpoint& check
                            r.splats,
                            r.skipped_nonfinite,
                            uint32_t(state.sh_degree),
-                           uint32_t(std::min<uint64_t>(r.limited_steps, 0xffffffffu))};
+                           uint32_t(std::min<uint64_t>(r.limited_steps, 0xffffffffu)),
+                           r.psnr};
     core::AtomicFile file(path);
     file.write(kMagic);
     const uint32_t counts[] = {kVersion, uint32_t(std::size(kFixed) + state.arrays.size())};
@@ -121,17 +127,19 @@ Checkpoint read_head(core::FileReader& file, uint32_t& arrays) {
         fixed[i] = read_section(file);
         if (fixed[i].name != kFixed[i]) file.fail("no section \"" + std::string(kFixed[i]) + "\" here");
     }
-    StateBlock block;
-    if (fixed[2].bytes.size() != sizeof(block)) file.fail("the section \"state\" is not of its size");
-    std::memcpy(&block, fixed[2].bytes.data(), sizeof(block));
+    StateBlock block{};
+    block.psnr = std::nan("");
+    if (fixed[2].bytes.size() != sizeof(block) && fixed[2].bytes.size() != kEarlierStateBytes)
+        file.fail("the section \"state\" is not of its size");
+    std::memcpy(&block, fixed[2].bytes.data(), fixed[2].bytes.size());
 
     Checkpoint checkpoint{text_of(fixed[0].bytes), text_of(fixed[1].bytes), block.wall_seconds, {}};
     TrainerState& state = checkpoint.state;
     if (block.step < 0 || block.step > INT32_MAX || block.sh_degree > uint32_t(kMaxShDegree))
         file.fail("the section \"state\" has a step or an SH degree out of range");
     state.sh_degree = int(block.sh_degree);
-    state.report = {int(block.step),       block.seconds,           block.loss,         block.splats,
-                    block.dropped_updates, block.skipped_nonfinite, block.limited_steps};
+    state.report = {int(block.step),       block.seconds,           block.loss,          block.splats,
+                    block.dropped_updates, block.skipped_nonfinite, block.limited_steps, block.psnr};
     return checkpoint;
 }
 

@@ -9,7 +9,7 @@
 //   settings  JSON: options and fingerprint of the dataset (train/resume.h)
 //   metrics   the lines of metrics.jsonl so far
 //   state     i64 step; f64 seconds, wall seconds, loss; u64 dropped updates; u32 splats, skipped splats, SH
-//             degree, shortened updates (at most 2^32 - 1)
+//             degree, shortened updates (at most 2^32 - 1); f64 PSNR, which earlier versions do not write
 //
 // The other sections are the arrays of TrainerState under their names, in the device's layout
 // (shaders/shared/layouts.h).

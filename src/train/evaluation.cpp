@@ -1,31 +1,42 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ewa/evaluation.h"
+#include "train/evaluation.h"
 
 #include <chrono>
 #include <cmath>
 
 #include "ewa/error.h"
-#include "ewa/renderer.h"
 
 namespace ewa {
 
-Evaluation evaluate(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians, const Dataset& dataset,
-                    const std::vector<int>& frames, const RenderOptions& options,
-                    const std::vector<Exposure>& exposures, const std::function<void()>& before_frame) {
+namespace train {
+
+RenderedView render_view(Renderer& renderer, const Frame& frame, const RenderOptions& options,
+                         const Exposure* exposure) {
+    auto [photo, weights] = load_training_image(frame, options.background);
+    Image rendering = renderer.render(frame.camera).color;
+    if (exposure) rendering = exposed(std::move(rendering), *exposure);
+    if (photo.width != rendering.width || photo.height != rendering.height)
+        throw InputError("frame " + frame.name + ": the picture's size is not the camera's");
+    return {std::move(photo), std::move(weights), std::move(rendering)};
+}
+
+Evaluation evaluate_views(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians,
+                          const Dataset& dataset, const std::vector<int>& frames,
+                          const RenderOptions& options, const std::vector<Exposure>& exposures,
+                          const std::function<void()>& before_frame,
+                          const std::function<void(size_t, const RenderedView&, const EvalFrame&)>& on_view) {
     const auto start = std::chrono::steady_clock::now();
     Renderer renderer(std::move(device), gaussians, options);
     Evaluation result;
     for (size_t i = 0; i < frames.size(); ++i) {
         if (before_frame) before_frame();
         const Frame& frame = dataset.frames[size_t(frames[i])];
-        const auto [photo, weights] = load_training_image(frame, options.background);
-        Image picture = renderer.render(frame.camera).color;
-        if (!exposures.empty()) picture = exposed(std::move(picture), exposures.at(i));
-        if (photo.width != picture.width || photo.height != picture.height)
-            throw InputError("frame " + frame.name + ": the picture's size is not the camera's");
-        const double db = psnr(picture, photo, weights);
+        const RenderedView view =
+            render_view(renderer, frame, options, exposures.empty() ? nullptr : &exposures.at(i));
+        const double db = psnr(view.rendering, view.photo, view.weights);
         if (std::isnan(db)) continue;  // no pixel counts
-        result.frames.push_back({frame.name, db, ssim(picture, photo, weights)});
+        result.frames.push_back({frame.name, db, ssim(view.rendering, view.photo, view.weights)});
+        if (on_view) on_view(i, view, result.frames.back());
     }
     for (const EvalFrame& frame : result.frames) {
         result.psnr += frame.psnr / double(result.frames.size());
@@ -33,6 +44,15 @@ Evaluation evaluate(std::shared_ptr<gpu::Device> device, const Gaussians& gaussi
     }
     result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     return result;
+}
+
+}  // namespace train
+
+Evaluation evaluate(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians, const Dataset& dataset,
+                    const std::vector<int>& frames, const RenderOptions& options,
+                    const std::vector<Exposure>& exposures, const std::function<void()>& before_frame) {
+    return train::evaluate_views(std::move(device), gaussians, dataset, frames, options, exposures,
+                                 before_frame, {});
 }
 
 }  // namespace ewa

@@ -19,6 +19,13 @@ bool transparent(const Image& image) {
     return found;
 }
 
+/// The mean square of alpha: what a mean over a masked image's squared differences is short of.
+double mean_weight(const Image& image) {
+    double sum = 0;
+    for (size_t i = 3; i < image.pixels.size(); i += 4) sum += double(image.pixels[i]) * image.pixels[i];
+    return sum / (double(image.width) * image.height);
+}
+
 }  // namespace
 
 ImageCache::ImageCache(gpu::Device& device, const passes::KernelConfig& config, const Dataset& dataset,
@@ -54,8 +61,8 @@ ImageCache::ImageCache(gpu::Device& device, const passes::KernelConfig& config, 
 ImageCache::Photo ImageCache::upload(const Frame& frame, const Image& image) const {
     if (image.width != frame.camera.width || image.height != frame.camera.height)
         throw InputError("frame " + frame.name + " changed its size while it was read");
-    return {pipeline::upload_photo(device_, image, frame.eight_bit),
-            frame.masks == MaskUse::ignore && transparent(image)};
+    const bool masked = frame.masks == MaskUse::ignore && transparent(image);
+    return {pipeline::upload_photo(device_, image, frame.eight_bit), masked, masked ? mean_weight(image) : 1};
 }
 
 const ImageCache::Photo& ImageCache::photo(size_t i) {

@@ -31,6 +31,7 @@ class ImageCache {
     struct Photo {
         gpu::Buffer texels;   // empty: on disk
         bool masked = false;  // its alpha weights the pixels, and some weigh less than 1
+        double weight = 1;    // with a mask: mean square of the pixels' weights
     };
     /// Reads image i if it is not cached. The device must be idle. Throws InputError.
     const Photo& photo(size_t i);

@@ -17,9 +17,12 @@
 #include "ewa/renderer.h"
 #include "pipeline/model.h"
 #include "report/pictures.h"
+#include "report/step_time.h"
+#include "report/views.h"
 #include "scene/dataset_files.h"
 #include "train/checkpoint.h"
 #include "train/earlier_run.h"
+#include "train/evaluation.h"
 #include "train/resume.h"
 #include "train/run_files.h"
 #include "train/run_input.h"
@@ -33,7 +36,7 @@ using Json = nlohmann::ordered_json;
 
 // Their mean says enough. All views of a large set would take longer than its training.
 constexpr size_t kTrainViewsEvaluated = 40;
-constexpr size_t kReportImages = 4;
+constexpr size_t kSavedRenders = 4;
 
 double seconds_since(Clock::time_point begin) {
     return std::chrono::duration<double>(Clock::now() - begin).count();
@@ -73,9 +76,9 @@ std::vector<PlanLine> plan_of(const Trainer& trainer, const train::RunInput& inp
     return plan;
 }
 
-/// The views that the report shows.
-std::vector<int> report_frames(const Split& split) {
-    return spread_out(split.test.empty() ? split.train : split.test, kReportImages);
+/// The views whose renders are saved.
+std::vector<int> saved_frames(const Split& split) {
+    return spread_out(split.test.empty() ? split.train : split.test, kSavedRenders);
 }
 
 /// The file of a view's render, for each frame.
@@ -96,13 +99,19 @@ const std::filesystem::path& checked_folder(const train::RunInput& input) {
                              "report.html", "exposures.json"})
         written.push_back({"the run's file", folder / name});
     const auto renders = render_files(input);
-    for (const int index : report_frames(input.split))
+    for (const int index : saved_frames(input.split))
         written.push_back({"the run's render", renders[size_t(index)]});
     if (input.options.init != "sfm" && input.options.init != "random")
         read.push_back({"--init", input.options.init});
     read.push_back({"DATASET", input.options.scene});
     core::check_outputs(written, read);
     return folder;
+}
+
+report::StepTime report_times(const StepTimes& times) {
+    report::StepTime result{times.steps, times.step, times.refinement, {}};
+    for (const PassTime& time : times.passes) result.passes.push_back({time.pass, time.milliseconds});
+    return result;
 }
 
 class Run {
@@ -134,7 +143,9 @@ class Run {
     template <class Work>
     bool done_unless_stopped(Work&& work) const;
     void evaluate_result(const Gaussians& gaussians, const std::vector<Exposure>& exposures);
-    void render_result(const Gaussians& gaussians);
+    void add_view(int index, const train::RenderedView& view, const EvalFrame& figures);
+    void add_full_size(const Gaussians& gaussians, const std::vector<Exposure>& exposures);
+    void add_section(const Gaussians& gaussians);
     void finish(std::unique_ptr<Trainer> trainer);
     void fill_summary();
 
@@ -179,6 +190,8 @@ void Run::begin_files() {
 void Run::list_settings() {
     for (const train::RunOption& option : train::run_options())
         report_.settings.emplace_back(option.name, train::value_text(option, options()));
+    for (auto& [name, value] : report_.settings)
+        if (name == "device" && value.empty()) value = report_.summary.device + " (chosen by ewa)";
 }
 
 /// Opens the device and tells the observer what the run begins with.
@@ -250,7 +263,8 @@ void Run::save_checkpoint(const Trainer& trainer) {
 }
 
 void Run::log(const std::optional<Evaluation>& evaluation) {
-    MetricsLine line{last_.step, last_.seconds, wall_seconds(), last_.loss, last_.splats, {}, {}};
+    MetricsLine line{last_.step, last_.seconds, wall_seconds(), last_.loss, last_.splats, {}, {}, {}};
+    if (last_.step > 0) line.train_psnr = last_.psnr;
     if (evaluation) {
         line.test_psnr = evaluation->psnr;
         line.test_ssim = evaluation->ssim;
@@ -313,46 +327,64 @@ bool Run::done_unless_stopped(Work&& work) const {
 
 void Run::evaluate_result(const Gaussians& gaussians, const std::vector<Exposure>& exposures) {
     observer_.on_note("evaluating");
-    const auto evaluated = [&](const std::vector<int>& frames, const std::vector<Exposure>& of_frames) {
-        return evaluate(device_, gaussians, input_.dataset, frames, options().train.render, of_frames,
-                        [this] { stop_if_asked(); });
+    const bool held_out = !input_.split.test.empty();
+    // The report shows the held-out views, or the training views without a test set.
+    const auto evaluated = [&](const std::vector<int>& frames, const std::vector<Exposure>& of_frames,
+                               bool shown) {
+        return train::evaluate_views(
+            device_, gaussians, input_.dataset, frames, options().train.render, of_frames,
+            [this] { stop_if_asked(); },
+            [&](size_t i, const train::RenderedView& view, const EvalFrame& figures) {
+                if (shown) add_view(frames[i], view, figures);
+            });
     };
-    if (!input_.split.test.empty()) {
-        last_evaluation_ = evaluated(input_.split.test, {});
+    if (held_out) {
+        last_evaluation_ = evaluated(input_.split.test, {}, true);
         report_.summary.test_psnr = last_evaluation_->psnr;
         report_.summary.test_ssim = last_evaluation_->ssim;
     }
     report_.summary.train_psnr = evaluated(spread_out(input_.split.train, kTrainViewsEvaluated),
-                                           spread_out(exposures, kTrainViewsEvaluated))
+                                           spread_out(exposures, kTrainViewsEvaluated), !held_out)
                                      .psnr;
 }
 
-/// Renders a few test views, or training views without a test set. Saves each beside the report, which shows them.
-void Run::render_result(const Gaussians& gaussians) {
-    const std::vector<Frame>& all = input_.dataset.frames;
-    const RenderOptions& render = options().train.render;
-    const auto files = render_files(input_);
-    const std::vector<int> frames = report_frames(input_.split);
-    Renderer renderer(device_, gaussians, render);
-    std::vector<report::ReportPicture> images;
-    for (const int index : frames) {
+/// Adds a view to the report. Saves its render if it is one of those.
+void Run::add_view(int index, const train::RenderedView& view, const EvalFrame& figures) {
+    report_.views.push_back(
+        report::small_view(figures.name, view.photo, view.rendering, figures.psnr, figures.ssim));
+    report_.views.back().frame = index;
+    const std::vector<int> saved = saved_frames(input_.split);
+    if (std::find(saved.begin(), saved.end(), index) == saved.end()) return;
+    const std::filesystem::path file = render_files(input_)[size_t(index)];
+    core::make_folder(file.parent_path());
+    save_image(file, view.rendering);
+    if (first_render_.empty()) first_render_ = file;
+}
+
+/// Gives views of the report their images at full size, as many as the report may hold.
+void Run::add_full_size(const Gaussians& gaussians, const std::vector<Exposure>& exposures) {
+    report::sort_views(report_.views);
+    Renderer renderer(device_, gaussians, options().train.render);
+    size_t bytes = 0;
+    for (const size_t i : report::full_size_order(report_.views.size())) {
+        if (bytes >= report::kFullSizeBytes) break;
         stop_if_asked();
-        const Frame& frame = all[size_t(index)];
-        auto [target, weights] = load_training_image(frame, render.background);
-        Image rendering = renderer.render(frame.camera).color;
-        const double db = psnr(rendering, target, weights);
-        if (std::isnan(db)) continue;  // no pixel counts
-        core::make_folder(files[size_t(index)].parent_path());
-        save_image(files[size_t(index)], rendering);
-        const double similarity = ssim(rendering, target, weights);
-        images.push_back({frame.name, std::move(target), std::move(rendering), db, similarity});
+        report::ReportView& view = report_.views[i];
+        const auto place = std::find(input_.split.train.begin(), input_.split.train.end(), view.frame);
+        const bool exposed = !exposures.empty() && place != input_.split.train.end();
+        const train::RenderedView rendered =
+            train::render_view(renderer, input_.dataset.frames[size_t(view.frame)], options().train.render,
+                               exposed ? &exposures[size_t(place - input_.split.train.begin())] : nullptr);
+        bytes += report::add_full_size(view, rendered.photo, rendered.rendering);
     }
-    report_.pictures = std::move(images);
-    first_render_ = files[size_t(frames.front())];
+}
+
+void Run::add_section(const Gaussians& gaussians) {
     if (!options().report_section) return;
     stop_if_asked();
-    report_.section =
-        options().report_section({device_, gaussians, all[size_t(frames.front())].camera, render});
+    const int first = saved_frames(input_.split).front();
+    report_.section = options().report_section(
+        {device_, gaussians, input_.dataset.frames[size_t(first)].camera, options().train.render});
 }
 
 void Run::fill_summary() {
@@ -374,8 +406,7 @@ void Run::finish(std::unique_ptr<Trainer> trainer) {
     save_splats(gaussians);
     if (options().train.exposure) folder_.save_exposures(input_.dataset, input_.split.train, exposures);
     save_checkpoint(*trainer);  // from here on, a kill costs no training
-    for (const PassTime& time : trainer->pass_times())
-        report_.pass_times.push_back({time.pass, time.milliseconds});
+    report_.times = report_times(trainer->step_times());
     trainer.reset();  // the evaluation takes its memory
     observer_.on_saved(last_);
 
@@ -383,15 +414,20 @@ void Run::finish(std::unique_ptr<Trainer> trainer) {
     if (last_.step > 0) log(last_evaluation_);
     observer_.on_evaluated(last_, gaussians);
     report_.held_out = !input_.split.test.empty();
-    report_.summary.interrupted = !evaluated || !done_unless_stopped([&] { render_result(gaussians); });
+    const auto fill_report = [&] {
+        add_full_size(gaussians, exposures);
+        add_section(gaussians);
+    };
+    if (!evaluated) report_.views.clear();
+    report_.summary.interrupted = !evaluated || !done_unless_stopped(fill_report);
     fill_summary();
     folder_.save_report(report_);
 }
 
 RunResult Run::run() {
     read_checkpoint();
-    list_settings();
     start();
+    list_settings();
     auto owned = std::make_unique<Trainer>(device_, input_.dataset, input_.split.train,
                                            std::exchange(input_.start, {}), options().train);
     Trainer& trainer = *owned;

@@ -9,7 +9,6 @@
 #include <cstring>
 #include <deque>
 #include <glm/geometric.hpp>
-#include <map>
 #include <span>
 #include <utility>
 
@@ -30,9 +29,12 @@ namespace {
 using namespace pipeline;
 using Clock = std::chrono::steady_clock;
 
-constexpr size_t kTimedSteps = 100;     // number of steps for the medians of pass times
 constexpr int kTimedEvery = 100;        // steps, where several are in flight
 constexpr double kResetOpacity = 0.01;  // 3DGS: upper bound of opacities after a reset
+
+double milliseconds(Clock::duration time) {
+    return std::chrono::duration<double, std::milli>(time).count();
+}
 
 double logit(double p) {
     return std::log(p / (1 - p));
@@ -94,9 +96,15 @@ struct Trainer::State {
     std::vector<train::ImageCache> smaller;  // by downsample level, from 1; freed after its last step
     Exposures exposures;
     uint32_t instance_capacity;
-    std::deque<int> in_flight;  // steps that are submitted and not finished
+    /// A step that is submitted and not finished.
+    struct Flight {
+        int step;
+        double weight;  // of its image's pixels
+    };
+    std::deque<Flight> in_flight;
     StepReport report;
-    std::deque<std::vector<PassTime>> timings;
+    StepTimes times;  // sums, over `timed_steps` steps for the passes
+    int timed_steps = 0;
 
     State(std::shared_ptr<gpu::Device> d, const Dataset& dataset, const std::vector<int>& frames,
           const Gaussians& ready, double length, const TrainOptions& o)
@@ -198,7 +206,7 @@ struct Trainer::State {
         record_step(recording, step, index, photo, camera);
         frame.record_counts(recording, slot_of(step));
         executor.submit(recording, is_timed(step));
-        in_flight.push_back(step);
+        in_flight.push_back({step, photo.weight});
         // An image from disk may be gone when its step has to be repeated: no other step follows before it is done.
         if (!seen.cached(index)) finish_all();
     }
@@ -210,27 +218,39 @@ struct Trainer::State {
     /// Waits for the oldest step. If it had too many instances, neither it nor later ones have changed the model: they are
     /// all repeated, one by one, with more capacity.
     void finish_oldest() {
-        const int step = in_flight.front();
+        const auto [step, weight] = in_flight.front();
         executor.wait();
         const shared::Counts counts = frame.read_counts(slot_of(step));
         if (counts.instances > frame.instance_capacity) {
-            const std::deque<int> again = std::exchange(in_flight, {});
+            const std::deque<Flight> again = std::exchange(in_flight, {});
             while (executor.unfinished()) executor.wait();
             instance_capacity = grown_capacity(counts.instances);
-            for (const int repeated : again) {
-                submit(repeated);
+            for (const Flight& repeated : again) {
+                submit(repeated.step);
                 finish_all();
             }
             return;
         }
         in_flight.pop_front();
         report.loss = loss_of(counts);
+        report.psnr = -10 * std::log10(double(counts.squared) / weight);
         report.skipped_nonfinite = counts.skipped_nonfinite;
         report.dropped_updates += counts.dropped_updates;
         report.limited_steps += counts.limited_steps;
         if (!is_timed(step)) return;
-        timings.push_back(executor.timings());
-        if (timings.size() > kTimedSteps) timings.pop_front();
+        add_pass_times();
+    }
+
+    void add_pass_times() {
+        ++timed_steps;
+        for (const PassTime& time : executor.timings()) {
+            const auto same = std::find_if(times.passes.begin(), times.passes.end(),
+                                           [&](const PassTime& sum) { return sum.pass == time.pass; });
+            if (same == times.passes.end())
+                times.passes.push_back(time);
+            else
+                same->milliseconds += time.milliseconds;
+        }
     }
 
     void finish_all() {
@@ -301,10 +321,15 @@ StepReport Trainer::step() {
     const auto start = Clock::now();
     const int step = s.report.step + 1;
     s.optimise(step);
+    const auto optimised = Clock::now();
     s.follow_up(step);
+    const auto end = Clock::now();
     s.report.step = step;
     s.report.splats = s.model.splats;
-    s.report.seconds += std::chrono::duration<double>(Clock::now() - start).count();
+    s.report.seconds += std::chrono::duration<double>(end - start).count();
+    ++s.times.steps;
+    s.times.step += milliseconds(end - start);
+    s.times.refinement += milliseconds(end - optimised);
     return s.report;
 }
 
@@ -403,22 +428,13 @@ std::vector<PlanLine> Trainer::plan() const {
     return describe(state_->plan, state_->model.sh_degree, state_->model.splats);
 }
 
-std::vector<PassTime> Trainer::pass_times() const {
-    std::vector<PassTime> result;
-    std::map<std::string, std::vector<double>> samples;
-    for (const auto& step : state_->timings)
-        for (const PassTime& time : step) {
-            auto& values = samples[time.pass];
-            if (values.empty()) result.push_back({time.pass, 0});
-            values.push_back(time.milliseconds);
-        }
-    for (PassTime& time : result) {
-        auto& values = samples[time.pass];
-        const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-        std::nth_element(values.begin(), middle, values.end());
-        time.milliseconds = *middle;
-    }
-    return result;
+StepTimes Trainer::step_times() const {
+    const State& s = *state_;
+    StepTimes times = s.times;
+    times.step /= std::max(1, times.steps);
+    times.refinement /= std::max(1, times.steps);
+    for (PassTime& time : times.passes) time.milliseconds /= std::max(1, s.timed_steps);
+    return times;
 }
 
 std::vector<PlanLine> plan_lines(const Gaussians& start, const TrainOptions& options, bool masks) {

@@ -83,7 +83,7 @@ TEST_F(PictureModule, IsNotNeededForJpegAndPng) {
     const std::vector<std::string> written = files_below(out);
     for (const char* name : {"report.html", "summary.json", "splats.ply"})
         EXPECT_TRUE(std::ranges::count(written, name)) << name;
-    EXPECT_NE(read_file(out + "/report.html").find("data:image/png;base64,"), std::string::npos);
+    EXPECT_NE(read_file(out + "/report.html").find("data:image/jpeg;base64,"), std::string::npos);
     const std::string splats = out + "/splats.ply";
     for (const std::string& to : {views, copies})
         EXPECT_EQ(run({"render", splats, "--cameras", data, "--downscale", "4", "--frames", "test", "-o", to})

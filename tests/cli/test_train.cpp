@@ -57,11 +57,13 @@ TEST_F(Train, WritesEverythingItPromises) {
         const auto json = nlohmann::json::parse(line);
         EXPECT_TRUE(json["loss"].is_number());
         steps.push_back(json["step"]);
+        EXPECT_TRUE(json["train_psnr"].is_number());
         if (json.contains("test_psnr")) evaluated.push_back(json["step"]);
     }
     EXPECT_EQ(steps.size(), 20u);
     EXPECT_EQ(evaluated, (std::vector<int>{10, 20}));
-    EXPECT_NE(read_file(folder / "o/report.html").find("data:image/png;base64,"), std::string::npos);
+    EXPECT_NE(read_file(folder / "o/report.html").find("data:image/jpeg;base64,"), std::string::npos);
+    EXPECT_NE(outcome.out.find(", PSNR "), std::string::npos) << outcome.out;
 }
 
 TEST_F(Train, QuietIsQuiet) {

@@ -17,7 +17,7 @@
 
 #include "core/atomic_file.h"
 #include "report/chart.h"
-#include "report/html.h"
+#include "report/page.h"
 #include "report/pictures.h"
 
 namespace ewa::test {

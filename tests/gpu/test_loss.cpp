@@ -68,6 +68,7 @@ TEST_P(Loss, ValueAndGradientMatchTheReference) {
     const shared::Counts counts = frame.read_counts();
     // A float32 sum in blocks of subgroups; the terms are of order one.
     EXPECT_NEAR(counts.l1, cpu.l1, 2e-7 + 1e-6 * cpu.l1);
+    EXPECT_NEAR(counts.squared, cpu.squared, 1e-7 + 1e-6 * cpu.squared);
     EXPECT_NEAR(counts.ssim, cpu.ssim, 5e-7);  // each value divides small differences of moments
     EXPECT_NEAR(pipeline::loss_of(counts), cpu.loss, 1e-6);
 
@@ -114,6 +115,7 @@ TEST_P(Loss, OfMaskedPicturesMatchesTheReference) {
     const reference::Loss cpu = reference::image_loss(in.image, photo, weights);
     const shared::Counts counts = frame.read_counts();
     EXPECT_NEAR(counts.l1, cpu.l1, 2e-7 + 1e-6 * cpu.l1);
+    EXPECT_NEAR(counts.squared, cpu.squared, 1e-7 + 1e-6 * cpu.squared);
     EXPECT_NEAR(counts.ssim, cpu.ssim, 5e-7);
     const auto gradient = frame.image_gradient.download<float>(frame.sizes.image_gradient / 4);
     double worst = 0, largest = 0;
@@ -202,6 +204,7 @@ TEST(LossEdges, EqualPicturesHaveNoLossAndNoGradient) {
         record_loss(recording, r.cache, frame, {{nullptr, 0, 40, 30}, {1, 1, 1}}, photo);
     });
     EXPECT_EQ(frame.read_counts().l1, 0);
+    EXPECT_EQ(frame.read_counts().squared, 0);
     EXPECT_NEAR(frame.read_counts().ssim, 1, 1e-6);
     // Against an L1 gradient of 0.8 / 3600 = 2e-4 a pixel.
     for (const float g : frame.image_gradient.download<float>(frame.sizes.image_gradient / 4))
@@ -254,22 +257,24 @@ TEST(Reduce, AddsUpInAFixedOrder) {
     Rig& r = rig();
     for (const uint32_t items : {1u, 7u, 513u, 20000u}) {
         Random random(items);
-        std::vector<float> values(items);
-        double sum = 0;
-        for (float& value : values) sum += value = float(random.uniform(-1, 2));
+        std::vector<float> values(2 * items);  // in two rows
+        double sum[2] = {0, 0};
+        for (size_t i = 0; i < values.size(); ++i) sum[i / items] += values[i] = float(random.uniform(-1, 2));
         const uint32_t block = 512, blocks = (items + block - 1) / block;
-        Guarded source("source", values), sums("sums", blocks * 4), unused("unused", 4),
+        Guarded source("source", values), sums("sums", 2 * blocks * 4), unused("unused", 4),
             counts = zero_counts();
         r.run([&](gpu::Recording& recording) {
             const auto reduce = r.cache.get<passes::Reduce>();
-            reduce.record(recording, {source, sums, counts}, {items, block, shared::REDUCE_TO_SUMS, 1});
-            reduce.record(recording, {sums, unused, counts}, {blocks, blocks, shared::REDUCE_TO_L1, 0.5f});
-            reduce.record(recording, {sums, unused, counts}, {blocks, blocks, shared::REDUCE_TO_SSIM, 2.0f});
+            reduce.record(recording, {source, sums, counts}, {items, block, shared::REDUCE_TO_SUMS, 2, 1});
+            reduce.record(recording, {sums, unused, counts}, {blocks, blocks, shared::REDUCE_TO_L1, 2, 0.5f});
+            reduce.record(recording, {sums, unused, counts},
+                          {blocks, blocks, shared::REDUCE_TO_SSIM, 1, 2.0f});
         });
         expect_intact({&source, &sums, &unused, &counts});
         const auto read = counts.read<shared::Counts>()[0];
-        EXPECT_NEAR(read.l1, 0.5 * sum, 1e-6 * items);
-        EXPECT_NEAR(read.ssim, 2 * sum, 4e-6 * items);
+        EXPECT_NEAR(read.l1, 0.5 * sum[0], 1e-6 * items);
+        EXPECT_NEAR(read.squared, 0.5 * sum[1], 1e-6 * items);
+        EXPECT_NEAR(read.ssim, 2 * sum[0], 4e-6 * items);
         EXPECT_EQ(unused.read<uint32_t>()[0], kPoison);
         EXPECT_EQ(read.instances, 0u);
     }

@@ -6,7 +6,9 @@
 
 #include <jpeglib.h>
 
+#include "ewa/error.h"
 #include "ewa/image.h"
+#include "image/image_files.h"
 #include "support/png_bytes.h"
 #include "support/temp_folder.h"
 
@@ -62,6 +64,21 @@ double worst(const Image& image, const std::function<double(int, int, int)>& exp
             for (int c = 0; c < image.channels; ++c)
                 largest = std::max(largest, std::abs(double(image.at(x, y)[c]) * 255 - expected(x, y, c)));
     return largest;
+}
+
+TEST(Jpeg, WrittenOnesAreReadAgain) {
+    Image picture(kWidth, kHeight, 3);
+    for (int y = 0; y < kHeight; ++y)
+        for (int x = 0; x < kWidth; ++x)
+            for (int c = 0; c < 3; ++c) picture.at(x, y)[c] = float(value_at(x, y, c)) / 255;
+    const auto bytes = image::encode_jpeg(picture, 95);
+    const Image read = image::decode(bytes, "picture", 100);
+    EXPECT_LT(worst(read, value_at), 6);
+    EXPECT_LT(image::encode_jpeg(picture, 50).size(), bytes.size());
+    picture.at(0, 0)[0] = std::nanf("");
+    EXPECT_NO_THROW(image::encode_jpeg(picture, 95));
+    EXPECT_THROW(image::encode_jpeg(Image(4, 4, 1), 95), RunError);
+    EXPECT_THROW(image::encode_jpeg(Image(70000, 1, 3), 95), RunError);
 }
 
 TEST(Jpeg, ColourSpacesBecomeRgb) {

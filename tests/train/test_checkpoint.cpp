@@ -16,7 +16,7 @@ namespace {
 
 train::Checkpoint sample() {
     train::Checkpoint c{R"({"a":1})", "line 1\nline 2\n", 12.5, {}};
-    c.state.report = {41, 7.25, 0.125, 3, (uint64_t(1) << 40), 2};
+    c.state.report = {41, 7.25, 0.125, 3, (uint64_t(1) << 40), 2, 5, 21.5};
     c.state.sh_degree = 2;
     for (const size_t size : {size_t(0), size_t(5), size_t(100)}) {
         TrainerArray& array = c.state.arrays.emplace_back();
@@ -40,6 +40,8 @@ TEST(Checkpoint, ComesBackAsItWasWritten) {
     EXPECT_EQ(read.state.report.splats, 3u);
     EXPECT_EQ(read.state.report.dropped_updates, uint64_t(1) << 40);
     EXPECT_EQ(read.state.report.skipped_nonfinite, 2u);
+    EXPECT_EQ(read.state.report.limited_steps, 5u);
+    EXPECT_EQ(read.state.report.psnr, 21.5);
     EXPECT_EQ(read.state.sh_degree, 2);
     ASSERT_EQ(read.state.arrays.size(), 3u);
     for (size_t i = 0; i < 3; ++i) {

@@ -286,16 +286,31 @@ TEST(Trainer, RunsThePlanThatItTells) {
 TEST(Trainer, TimesEveryPass) {
     Trainer trainer(device(), small_capture().dataset, {0, 1}, shaken_start(small_capture(), 0.05, 1, 0),
                     quick(10));
-    for (int step = 0; step < 3; ++step) trainer.step();
+    StepReport report;
+    for (int step = 0; step < 3; ++step) report = trainer.step();
     double total = 0;
     bool blends = false;
-    for (const PassTime& time : trainer.pass_times()) {
+    const StepTimes times = trainer.step_times();
+    for (const PassTime& time : times.passes) {
         EXPECT_GE(time.milliseconds, 0) << time.pass;
         total += time.milliseconds;
         blends = blends || time.pass == "blend_backward";
     }
     EXPECT_GT(total, 0);
     EXPECT_TRUE(blends);
+    EXPECT_EQ(times.steps, 3);
+    EXPECT_NEAR(times.step, 1000 * report.seconds / 3, 1e-6);
+    EXPECT_LE(times.refinement, times.step);
+}
+
+TEST(Trainer, TellsThePsnrOfEachTrainingImage) {
+    const Spoilt spoilt;
+    const Gaussians start = shaken_start(spoilt.data, 0.05, 1, 0);
+    for (const Dataset* dataset : {&spoilt.masked, &spoilt.unmasked})
+        for (const int frame : {0, 3}) {
+            Trainer trainer(device(), *dataset, {frame}, start, quick(10));
+            EXPECT_NEAR(trainer.step().psnr, evaluate(device(), start, *dataset, {frame}, {}).psnr, 1e-3);
+        }
 }
 
 TEST(Trainer, LearnsNothingFromWhatIsMasked) {

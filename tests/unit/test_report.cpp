@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include <sys/resource.h>
+#include <algorithm>
 #include <cmath>
 #include <csignal>
 #include <filesystem>
@@ -10,6 +11,7 @@
 #include <limits>
 
 #include "ewa/error.h"
+#include "image/image_files.h"
 #include "report/chart.h"
 #include "report/html.h"
 #include "report/pictures.h"
@@ -58,6 +60,10 @@ TEST(Report, MetricsHaveTestFiguresOnlyWhereEvaluated) {
     line.test_ssim = 0.5;
     EXPECT_EQ(to_json(line)["test_psnr"], 20);
     EXPECT_EQ(to_json(line)["test_ssim"], 0.5);
+    EXPECT_FALSE(to_json(line).contains("train_psnr"));
+    line.train_psnr = 25.5;
+    EXPECT_EQ(to_json(line)["train_psnr"], 25.5);
+    EXPECT_EQ(metrics_line(Json::parse(to_json(line).dump())).train_psnr, 25.5);
 }
 
 TEST(Report, MetricsLogCanBeReadWhileItGrows) {
@@ -104,6 +110,13 @@ TEST(Report, ShortNumbers) {
     EXPECT_EQ(short_number(-0.25), "-0.25");
 }
 
+ReportView made_up_view(const std::string& name, double psnr, int side = 16) {
+    const Image picture(side, side, 3);
+    ReportView view = small_view(name, picture, picture, psnr, 0.5);
+    add_full_size(view, picture, picture);
+    return view;
+}
+
 ReportData made_up_data() {
     ReportData data;
     data.title = "<script>alert(1)</script>";
@@ -118,30 +131,163 @@ ReportData made_up_data() {
         line.loss = i == 50 ? std::numeric_limits<double>::quiet_NaN() : 1.0 / i;
         line.splats = 1000 + 10 * i;
         if (i % 10 == 0) line.test_psnr = 20 + i * 0.1;
+        line.train_psnr = 21 + i * 0.1;
         data.metrics.push_back(line);
     }
-    data.pass_times = {{"project", 1.5}, {"blend", 4.5}};
+    data.times = {100, 10, 1, {{"project", 1.5}, {"blend", 4.5}}};
     data.plan = {{"SH buffers", "no view-dependent colour", 45000000}};
     data.remarks = {"3 images are missing and skipped"};
     data.settings = {{"steps", "100"}};
-    ReportPicture picture;
-    picture.name = "a\"b.jpg";
-    picture.original = Image(16, 12, 3);
-    picture.rendering = Image(16, 12, 3);
-    picture.psnr = 23.456;
-    data.pictures.push_back(picture);
+    data.views = {made_up_view("a\"b.jpg", 23.456)};
     return data;
 }
 
 TEST(Report, HtmlHoldsEverythingAndNothingFromOutside) {
     const std::string html = html_report(made_up_data());
     for (const char* part : {"&lt;script&gt;", "ewa train &#39;a &amp; b&#39;", "9.8.7", "llvmpipe &lt;x&gt;",
-                             "a&quot;b.jpg", "23.46 dB", "data:image/png;base64,iVBORw0KGgo", "<svg",
-                             "project", "SH buffers", "no view-dependent colour", "3 images are missing",
-                             "PSNR of held-out views", "prefers-color-scheme: dark"})
+                             "a&quot;b.jpg", "23.46 dB", "data:image/jpeg;base64,/9j/", "<svg", "project",
+                             "SH buffers", "no view-dependent colour", "3 images are missing",
+                             "all held-out views (mean)", "prefers-color-scheme: dark"})
         EXPECT_NE(html.find(part), std::string::npos) << part;
-    for (const char* part : {"<script", "http://", "https://", "url(", "<link", "nan", "@import"})
+    for (const char* part :
+         {"<script>alert", "src=\"http", "http://", "https://", "url(", "<link", "nan", "@import"})
         EXPECT_EQ(html.find(part), std::string::npos) << part;
+}
+
+size_t count_of(const std::string& text, const std::string& part) {
+    size_t count = 0;
+    for (size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++count;
+    return count;
+}
+
+TEST(Report, ViewsAreSortedWorstFirstAndOpenAtFullSize) {
+    std::vector<ReportView> views = {made_up_view("b.jpg", 30), made_up_view("c.jpg", INFINITY),
+                                     made_up_view("a.jpg", 20)};
+    sort_views(views);
+    const std::string html = views_html(views, true);
+    const size_t a = html.find(">a.jpg<"), b = html.find(">b.jpg<"), c = html.find(">c.jpg<");
+    EXPECT_LT(a, b);
+    EXPECT_LT(b, c);
+    EXPECT_LT(c, html.size());
+    EXPECT_NE(html.find("Held-out views"), std::string::npos);
+    EXPECT_NE(html.find("3 views, sorted by PSNR with the worst first"), std::string::npos);
+    for (const char* link : {"href=\"#full-1\"", "id=\"full-1\"", "href=\"#view-1\"", "id=\"view-1\"",
+                             "href=\"#full-3\"", "id=\"full-3\""})
+        EXPECT_NE(html.find(link), std::string::npos) << link;
+    EXPECT_EQ(count_of(html, "type=\"range\""), 3u);
+    EXPECT_EQ(html.find("bounds the size"), std::string::npos);
+    EXPECT_NE(views_html(views, false).find("Training views"), std::string::npos);
+    EXPECT_EQ(views_html({}, true), "");
+}
+
+TEST(Report, ViewsKeepTheFileSmallAndSaySo) {
+    std::vector<ReportView> views(5, made_up_view("v.jpg", 20));
+    const ReportView::Jpeg large(kSmallBytes / 2);
+    views[1].photo.clear();
+    views[3].photo.clear();
+    for (ReportView& view : views) view.small_photo = large;
+    const std::string html = views_html(views, true);
+    EXPECT_NE(
+        html.find("Only 3 of the 5 views open at full size, spread from worst to best. Only the worst 1 "
+                  "have small pictures. This bounds the size of the file."),
+        std::string::npos)
+        << html.substr(0, 400);
+    EXPECT_EQ(count_of(html, "<figure"), 5u);  // every view has its figures
+    EXPECT_EQ(count_of(html, "href=\"#full-2\""), 0u);
+    EXPECT_EQ(count_of(html, "href=\"#full-3\">worse"), 1u);  // from the fifth
+    EXPECT_LT(html.size(), kSmallBytes);
+}
+
+TEST(Report, FullSizeGoesFromTheWorstAndTheBestInwards) {
+    using Order = std::vector<size_t>;
+    EXPECT_EQ(full_size_order(0), Order{});
+    EXPECT_EQ(full_size_order(1), Order{0});
+    EXPECT_EQ(full_size_order(2), (Order{0, 1}));
+    EXPECT_EQ(full_size_order(5), (Order{0, 4, 2, 1, 3}));
+    Order all = full_size_order(100);
+    std::sort(all.begin(), all.end());
+    for (size_t i = 0; i < 100; ++i) ASSERT_EQ(all[i], i);
+}
+
+TEST(Report, FullSizeImagesHaveAllPixelsUpToALimit) {
+    Image photo(30, 20, 3), wide(5000, 1, 3);
+    photo.at(29, 19)[0] = 1;
+    ReportView view = small_view("v", photo, photo, 20, 0.5);
+    const size_t bytes = add_full_size(view, photo, photo);
+    EXPECT_EQ(bytes, view.photo.size() + view.rendering.size());
+    const Image decoded = image::decode(view.photo, "photo", 100);
+    EXPECT_EQ(decoded.width, 30);
+    EXPECT_EQ(decoded.height, 20);
+    EXPECT_GT(decoded.at(29, 19)[0], 0.9f);
+    EXPECT_LT(decoded.at(10, 10)[0], 0.1f);
+    ReportView reduced = small_view("v", wide, wide, 20, 0.5);
+    add_full_size(reduced, wide, wide);
+    EXPECT_EQ(image::decode(reduced.photo, "photo", 5000).width, 2500);
+    EXPECT_LT(image::decode(reduced.small_photo, "photo", 5000).width, 400);
+}
+
+TEST(Report, StagesAddUpToTheStep) {
+    const StepTime time{
+        50,
+        20,
+        2,
+        {{"fill counts", 0.5}, {"project", 1}, {"depth order", 2}, {"tile order", 3}, {"blend", 4}}};
+    std::vector<std::string> names;
+    double sum = 0;
+    for (const StageTime& stage : stages_of(time)) {
+        names.push_back(stage.name);
+        sum += stage.milliseconds;
+        if (stage.name == "sort") {
+            EXPECT_DOUBLE_EQ(stage.milliseconds, 5);
+        }
+        if (stage.name == "host and waiting") {
+            EXPECT_DOUBLE_EQ(stage.milliseconds, 7.5);
+        }
+    }
+    EXPECT_EQ(names, (std::vector<std::string>{"project", "sort", "blend", "other passes", "refinement",
+                                               "host and waiting"}));
+    EXPECT_DOUBLE_EQ(sum, 20);
+    EXPECT_NE(step_time_html(time).find("Means over 50 steps"), std::string::npos);
+}
+
+TEST(Report, StagesOfOverlappingStepsAreScaledToTheStep) {
+    double sum = 0;
+    for (const StageTime& stage : stages_of({50, 20, 0, {{"project", 10}, {"blend", 30}}})) {
+        sum += stage.milliseconds;
+        if (stage.name == "blend") {
+            EXPECT_DOUBLE_EQ(stage.milliseconds, 15);
+        }
+    }
+    EXPECT_DOUBLE_EQ(sum, 20);
+    EXPECT_EQ(step_time_html({}), "");
+}
+
+TEST(Report, ChartsTellTheirValues) {
+    Chart chart{.title = "PSNR", .x_name = "step", .y_unit = "dB", .smooth = true, .second_name = "held out"};
+    for (int i = 0; i < 40; ++i) chart.points.push_back({double(i), i < 39 ? 20.0 : 24.0});
+    chart.second = {{10, 19.5}, {39, 18.25}};
+    const std::string svg = chart_svg(chart);
+    EXPECT_NE(svg.find("<title>step 5: 20 dB, mean 20</title>"), std::string::npos);
+    EXPECT_NE(svg.find("<title>step 10: 20 dB, mean 20, held out 19.5</title>"), std::string::npos);
+    // The mean of the last point is one of the points before it, too.
+    EXPECT_NE(svg.find("class=\"readout\">step 39: 24 dB, mean 21.33, held out 18.25<"), std::string::npos);
+    chart.points.clear();
+    EXPECT_NE(chart_svg(chart).find("<title>step 10: held out 19.5 dB</title>"), std::string::npos);
+}
+
+TEST(Report, LongChartsAreThinnedOut) {
+    Chart chart{.title = "Loss", .x_name = "step"};
+    for (int i = 0; i < 100000; ++i) chart.points.push_back({double(i), 1.0 + i % 7});
+    EXPECT_LE(count_of(chart_svg(chart), "<title>"), 301u);
+}
+
+TEST(Report, PsnrChartNeedsNoEvaluation) {
+    ReportData data = made_up_data();
+    for (MetricsLine& line : data.metrics) line.test_psnr.reset();
+    const std::string html = html_report(data);
+    EXPECT_NE(html.find("training view of the step"), std::string::npos);
+    EXPECT_NE(html.find("<title>step 3: 21.3 dB, mean"), std::string::npos);
+    EXPECT_EQ(html.find("all held-out views (mean)"), std::string::npos);
 }
 
 TEST(Report, HtmlOfARunWithoutAnything) {
@@ -151,7 +297,7 @@ TEST(Report, HtmlOfARunWithoutAnything) {
 }
 
 TEST(Report, ChartNeedsTwoFinitePoints) {
-    Chart chart{"t", "x", "y", {{0, 1}}, false, false};
+    Chart chart{.title = "t", .x_name = "x", .points = {{0, 1}}};
     EXPECT_EQ(chart_svg(chart), "");
     chart.points.push_back({1, std::numeric_limits<double>::infinity()});
     EXPECT_EQ(chart_svg(chart), "");

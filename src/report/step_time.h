@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where the time of a training step goes, in words.
+#pragma once
+#include <string>
+#include <vector>
+
+namespace ewa::report {
+
+struct NamedTime {
+    std::string name;
+    double milliseconds = 0;
+};
+
+/// Means, in ms a step.
+struct StepTime {
+    int steps = 0;                  // that the means are over
+    double step = 0;                // the whole step
+    double refinement = 0;          // of it: adding, moving and removing splats
+    std::vector<NamedTime> passes;  // on the device
+};
+
+struct StageTime {
+    std::string name, what;  // e.g. "blend", and what it does
+    double milliseconds = 0;
+};
+
+/// The stages of a step. They add up to time.step. Passes that were measured to take longer than the step are scaled.
+std::vector<StageTime> stages_of(const StepTime& time);
+
+/// The stages as a table, with the single passes below; empty without a step.
+std::string step_time_html(const StepTime& time);
+
+}  // namespace ewa::report
