@@ -84,6 +84,8 @@ struct DatasetOptions {
     int downscale = 1;  // >= 1
     MaskUse masks = MaskUse::automatic;
     bool need_images = true;  // false: only cameras; frames without a file are kept if the size is known
+    bool need_points =
+        true;  // false: the points of a transforms.json, which are in a file of their own, are not read
 };
 
 /// Loads a dataset. There are three kinds of paths:

@@ -95,7 +95,7 @@ std::string names_text(const std::vector<std::string>& names) {
 }
 
 Capture result_of(const fs::path& folder, const std::vector<fs::path>& names) {
-    const Dataset dataset = load_dataset(folder, {.need_images = false});
+    const Dataset dataset = load_dataset(folder, {.need_images = false, .need_points = false});
     std::set<std::string> placed;
     for (const Frame& frame : dataset.frames) placed.insert(frame.name);
     Capture result;

@@ -170,13 +170,14 @@ std::vector<int> select_frames(const Dataset& dataset, const std::string& which,
     return frames;
 }
 
-Dataset load_cameras_as_trained(const fs::path& path, int downscale) {
+Dataset load_cameras_as_trained(const fs::path& path, int downscale, bool points) {
     if (names_mesh_scene(path)) {
         Dataset dataset = scene_cameras(path, {});
         for (Frame& frame : dataset.frames) frame.camera = ewa::downscale(frame.camera, downscale);
         return dataset;
     }
-    Dataset dataset = load_dataset(path, {.downscale = downscale, .need_images = false});
+    Dataset dataset =
+        load_dataset(path, {.downscale = downscale, .need_images = false, .need_points = points});
     auto missing = [](const Frame& frame) { return !frame.image_exists; };
     const auto count = std::count_if(dataset.frames.begin(), dataset.frames.end(), missing);
     dataset.missing_images = static_cast<int>(count);

@@ -70,8 +70,8 @@ std::vector<int> select_frames(const Dataset& dataset, const std::string& which,
 
 /// The cameras of a dataset, whose images may be missing. If only some are, their frames are skipped as in
 /// training, so that the same frames are held out; Dataset::missing_images counts them. Of a mesh scene: the
-/// views that `ewa train` renders.
-Dataset load_cameras_as_trained(const std::filesystem::path& path, int downscale);
+/// views that `ewa train` renders. points: also reads the points.
+Dataset load_cameras_as_trained(const std::filesystem::path& path, int downscale, bool points = false);
 
 /// Renders a mesh scene into a dataset, with progress, and prints its notes. Throws InputError, RunError, and
 /// Interrupted if Ctrl-C ended it.

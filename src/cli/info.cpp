@@ -33,6 +33,12 @@ namespace {
 namespace fs = std::filesystem;
 using report::Json;
 
+struct InfoArguments {
+    fs::path path;
+    int test_every = 8;
+    bool json = false, verbose = false;
+};
+
 Json range_json(const Spread& spread) {
     return {
         {"min", spread.min}, {"median", spread.median}, {"max", spread.max}, {"histogram", spread.histogram}};
@@ -104,7 +110,7 @@ void print_run(const live::Run& run) {
 }
 
 /// run: the training run that the file is of; null: unknown.
-void info_splats(const fs::path& path, const live::Run* run, bool json) {
+void info_splats(const fs::path& path, const live::Run* run, const InfoArguments& arguments) {
     const SplatScene scene = read_splats(path);
     const Gaussians& gaussians = scene.gaussians;
     const SplatStatistics statistics = splat_statistics(gaussians);
@@ -112,7 +118,7 @@ void info_splats(const fs::path& path, const live::Run* run, bool json) {
     options.strategy = strategy_for(options.steps);
     const auto rendering = plan_lines(gaussians, RenderOptions{});
     const auto training = plan_lines(gaussians, options);
-    if (json) {
+    if (arguments.json) {
         Json out = {{"kind", "splats"},
                     {"format", name_of(scene.format)},
                     {"variant", scene.variant},
@@ -141,8 +147,10 @@ void info_splats(const fs::path& path, const live::Run* run, bool json) {
                statistics.high[2]);
     print_spread("opacity", statistics.opacity);
     print_spread("scale", statistics.scale);
-    fmt::print("undrawable      {} (a value is not finite, or the quaternion is zero)\n",
-               statistics.nonfinite);
+    if (statistics.nonfinite > 0)
+        fmt::print("undrawable      {} (a value is not finite, or the quaternion is zero)\n",
+                   core::counted(statistics.nonfinite, "splat"));
+    if (!arguments.verbose) return;
     print_plan("rendering", rendering);
     print_plan("training", training);
 }
@@ -207,15 +215,16 @@ void print_cameras(const Dataset& dataset) {
     const auto groups = camera_groups(dataset);
     for (size_t i = 0; i < std::min(kShown, groups.size()); ++i) {
         const Camera& c = groups[i].camera;
-        fmt::print("{:<16}{}x{}, fx {:.6g}, fy {:.6g}, cx {:.6g}, cy {:.6g}{} ({} frames)\n",
+        fmt::print("{:<16}{}x{}, fx {:.6g}, fy {:.6g}, cx {:.6g}, cy {:.6g}{} ({})\n",
                    i == 0 ? "cameras" : "", c.width, c.height, c.fx, c.fy, c.cx, c.cy,
-                   groups[i].distorted ? ", undistorted on loading" : "", groups[i].frames);
+                   groups[i].distorted ? ", undistorted on loading" : "",
+                   core::counted(uint64_t(groups[i].frames), "frame"));
     }
     if (groups.size() > kShown) fmt::print("{:<16}and {} more\n", "", groups.size() - kShown);
 }
 
 void info_dataset(const fs::path& path, int test_every, bool json) {
-    const Dataset dataset = load_cameras_as_trained(path, 1);
+    const Dataset dataset = load_cameras_as_trained(path, 1, true);
     const char* kind = dataset_kind(path);
     const Split split = split_frames(dataset, test_every);
     std::vector<int> every(dataset.frames.size());
@@ -229,8 +238,10 @@ void info_dataset(const fs::path& path, int test_every, bool json) {
         fmt::print("images          {} missing; their frames are skipped unless all images are missing\n",
                    dataset.missing_images);
     print_cameras(dataset);
-    fmt::print("points          {} ({} dropped: a coordinate is not finite)\n",
-               dataset.points.positions.size(), dataset.dropped_points);
+    fmt::print("points          {}{}\n", dataset.points.positions.size(),
+               dataset.dropped_points == 0
+                   ? std::string()
+                   : fmt::format(" ({} dropped: a coordinate is not finite)", dataset.dropped_points));
     if (!dataset.color_depends_on_view)
         fmt::print("colour          does not depend on the view: training skips SH degrees 1 to {}\n",
                    kMaxShDegree);
@@ -270,10 +281,13 @@ void info_mesh(const fs::path& path, int test_every, bool json) {
                core::bytes_text(bytes));
     for (const std::string& remark : scene.remarks)
         fmt::print("note            {}\n", core::one_line(remark));
-    fmt::print("triangles       {} ({} more are skipped: a corner is not finite)\n", scene.triangles.size(),
-               scene.dropped_triangles);
-    fmt::print("materials       {}, with {} textures of {} images\n", materials, scene.textures.size(),
-               scene.images.size());
+    fmt::print("triangles       {}{}\n", scene.triangles.size(),
+               scene.dropped_triangles == 0
+                   ? std::string()
+                   : fmt::format(" ({} more {} skipped: a corner is not finite)", scene.dropped_triangles,
+                                 core::is_or_are(scene.dropped_triangles)));
+    fmt::print("materials       {}, with {} of {}\n", materials,
+               core::counted(scene.textures.size(), "texture"), core::counted(scene.images.size(), "image"));
     fmt::print("lights          {}, and the sky\n", scene.lights.size());
     fmt::print("bounds          ({:.6g}, {:.6g}, {:.6g}) .. ({:.6g}, {:.6g}, {:.6g})\n", box.low.x, box.low.y,
                box.low.z, box.high.x, box.high.y, box.high.z);
@@ -285,29 +299,25 @@ void info_mesh(const fs::path& path, int test_every, bool json) {
                                            : "every material is diffuse: training skips SH degrees 1 to 3");
 }
 
-int run(const fs::path& path, int test_every, bool json) {
+int run(const InfoArguments& arguments) {
+    const fs::path& path = arguments.path;
     std::error_code error;
     if (!fs::exists(path, error)) throw InputError(path.string() + ": no such file or folder");
     if (const auto run = find_run(path))
-        info_splats(splat_input(path).file, &*run, json);
+        info_splats(splat_input(path).file, &*run, arguments);
     else if (fs::is_directory(path) || (path.extension() == ".json" && !is_sog(path)))
-        info_dataset(path, test_every, json);
+        info_dataset(path, arguments.test_every, arguments.json);
     else if (is_mesh_scene(path))
-        info_mesh(path, test_every, json);
+        info_mesh(path, arguments.test_every, arguments.json);
     else
-        info_splats(path, nullptr, json);
+        info_splats(path, nullptr, arguments);
     return 0;
 }
 
 }  // namespace
 
 Action add_info(CLI::App& app) {
-    struct Arguments {
-        fs::path path;
-        int test_every = 8;
-        bool json = false;
-    };
-    const auto arguments = std::make_shared<Arguments>();
+    const auto arguments = std::make_shared<InfoArguments>();
     app.add_option(
            "PATH", arguments->path,
            "Splat file (.ply .compressed.ply .splat .ksplat .spz .sog meta.json .glb .gltf), COLMAP folder, "
@@ -316,7 +326,8 @@ Action add_info(CLI::App& app) {
         ->required();
     add_test_every_option(app, arguments->test_every);
     app.add_flag("--json", arguments->json, "Print JSON");
-    return [arguments] { return run(arguments->path, arguments->test_every, arguments->json); };
+    app.add_flag("--verbose", arguments->verbose, "Also print the work that rendering and training skip");
+    return [arguments] { return run(*arguments); };
 }
 
 }  // namespace ewa::cli

@@ -155,7 +155,8 @@ int write_views(const RenderArguments& arguments, Renderer& renderer, const std:
         progress.note(
             fmt::format("{}: {}x{}", arguments.output.string(), cameras[0].width, cameras[0].height));
     else
-        progress.note(fmt::format("{} images are in {}", cameras.size(), arguments.output.string()));
+        progress.note(fmt::format("{} {} in {}", core::counted(cameras.size(), "image"),
+                                  core::is_or_are(cameras.size()), arguments.output.string()));
     return 0;
 }
 

@@ -39,7 +39,7 @@ std::shared_ptr<const Dataset> load_cameras(const fs::path& path, DatasetOptions
     } catch (const InputError&) {
         // An image or the points are invalid: the cameras alone may still load.
     }
-    options.need_images = false;
+    options.need_images = options.need_points = false;
     if (dataset.frames.empty()) dataset = load_dataset(path, options);
     // Skip frames without an image, unless all are, as training and `ewa render` do.
     const auto missing = [](const Frame& frame) { return !frame.image_exists; };

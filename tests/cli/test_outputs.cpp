@@ -138,6 +138,11 @@ TEST(Outputs, Info) {
     const Outcome text = run_ewa({"info", folder / "s.ply"});
     expect_success(text);
     EXPECT_NE(text.out.find("2 stored, 0 present"), std::string::npos) << text.out;
+    EXPECT_EQ(text.out.find("skipped when"), std::string::npos) << text.out;
+    EXPECT_EQ(text.out.find("undrawable"), std::string::npos) << text.out;
+    const Outcome verbose = run_ewa({"info", folder / "s.ply", "--verbose"});
+    EXPECT_EQ(verbose.out.substr(0, text.out.size()), text.out);
+    EXPECT_NE(verbose.out.find("skipped when training"), std::string::npos) << verbose.out;
     const Outcome splats = run_ewa({"info", folder / "s.ply", "--json"});
     expect_success(splats);
     const auto json = nlohmann::json::parse(splats.out);
@@ -167,6 +172,21 @@ TEST(Outputs, Info) {
     EXPECT_EQ(dataset["test"], 2);
     EXPECT_EQ(dataset["cameras"][0]["width"], 48);
     expect_success(run_ewa({"info", folder / "data"}));
+}
+
+TEST(Outputs, InfoCountsThePointsOfATransformsJson) {
+    const Folder folder;
+    write_file(folder / "points.ply",
+               "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
+               "property float z\nend_header\n0 0 1\n0 1 1\n");
+    write_file(folder / "transforms.json",
+               R"({"w": 8, "h": 8, "fl_x": 8, "fl_y": 8, "cx": 4, "cy": 4, "ply_file_path": "points.ply",
+                   "frames": [{"file_path": "0.png",
+                               "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]})");
+    const Outcome info = run_ewa({"info", folder / "."});
+    expect_success(info);
+    EXPECT_NE(info.out.find("points          2\n"), std::string::npos) << info.out;
+    EXPECT_NE(info.out.find("(1 frame)"), std::string::npos) << info.out;
 }
 
 TEST(Outputs, InfoCountsWhatIsNotDrawn) {

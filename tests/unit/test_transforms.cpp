@@ -37,10 +37,10 @@ struct Scene {
     std::filesystem::path write(const char* name = "transforms.json") const {
         return folder.write(name, model.dump());
     }
-    Dataset load(bool need_images = true) const {
+    Dataset load(bool need_files = true) const {
         write();
         DatasetOptions options;
-        options.need_images = need_images;
+        options.need_images = options.need_points = need_files;
         return load_dataset(folder.path(), options);
     }
     void refuse(std::initializer_list<std::string> parts) const {

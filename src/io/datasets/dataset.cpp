@@ -212,7 +212,7 @@ io::ImageRecords read_model(const fs::path& path, const DatasetOptions& options)
             throw InputError(name +
                              ": not a dataset; a dataset is a folder, a transforms.json, or a glTF of meshes "
                              "(.gltf, .glb)");
-        return io::read_transforms(path, split_of(path), options.need_images);
+        return io::read_transforms(path, split_of(path), options.need_points);
     }
     if (!is_folder(path)) throw InputError(name + ": there is no such file or folder");
     if (const std::optional<fs::path> model = io::find_colmap_model(path)) {
@@ -223,14 +223,14 @@ io::ImageRecords read_model(const fs::path& path, const DatasetOptions& options)
         return io::read_colmap(*model, images);
     }
     if (is_file(path / "transforms.json"))
-        return io::read_transforms(path / "transforms.json", 0, options.need_images);
+        return io::read_transforms(path / "transforms.json", 0, options.need_points);
     io::ImageRecords all;
     all.folder = path / "images";
     all.color_depends_on_view = false;  // true as soon as one file does not state the opposite
     bool found = false;
     for (const char* file : {"transforms_train.json", "transforms_test.json"})
         if (is_file(path / file)) {
-            append(all, io::read_transforms(path / file, split_of(file), options.need_images));
+            append(all, io::read_transforms(path / file, split_of(file), options.need_points));
             found = true;
         }
     if (!found)
