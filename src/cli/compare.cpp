@@ -178,6 +178,17 @@ void print(const CompareTotals& totals, size_t pictures) {
             core::one_line(totals.worst->name));
 }
 
+/// One line: a folder of all images is often compared with renders of a few. --json names them all.
+void print_unpaired(const ComparedSide& side, const std::vector<fs::path>& names) {
+    if (names.empty()) return;
+    const std::string first = core::one_line(side.place(names.front()));
+    if (names.size() == 1)
+        fmt::print("{}  has no image of this name on the other side\n", first);
+    else
+        fmt::print("{} images have no image of their name on the other side; the first is {}\n", names.size(),
+                   first);
+}
+
 int run(const CompareArguments& arguments) {
     const Sides sides = open_sides(arguments.inputs);
     const ImagePairs pairs = pair_images(*sides.a, *sides.b);
@@ -193,8 +204,8 @@ int run(const CompareArguments& arguments) {
 
     const CompareTotals totals = totals_of(all);
     print(totals, all.size());
-    for (const std::string& picture : unpaired)
-        fmt::print("{}  has no image of this name on the other side\n", core::one_line(picture));
+    print_unpaired(*sides.a, pairs.only_a);
+    print_unpaired(*sides.b, pairs.only_b);
     for (const ComparedSide* side : {sides.a.get(), sides.b.get()})
         if (side->skipped_splats > 0)
             fmt::print("{}: skipped {} with a value that is not finite\n", core::one_line(side->side),

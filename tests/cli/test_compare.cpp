@@ -251,7 +251,9 @@ TEST_F(CompareScenes, OfSomeFrames) {
     const Outcome outcome = compare(scene_, pictures, {"--cameras", data_, "--threshold", "99"});
     EXPECT_EQ(outcome.status, 1) << "two frames have no picture";
     EXPECT_EQ(read_json(json_)["unpaired"].size(), 2u);
-    EXPECT_NE(outcome.out.find("has no image of this name on the other side"), std::string::npos)
+    EXPECT_NE(
+        outcome.out.find("2 images have no image of their name on the other side; the first is " + scene_),
+        std::string::npos)
         << outcome.out;
     expect_success(compare(scene_, pictures, {"--cameras", data_, "--frames", "1,3", "--threshold", "99"}));
     // Nothing is asked of those that are there besides.
@@ -261,6 +263,11 @@ TEST_F(CompareScenes, OfSomeFrames) {
     EXPECT_TRUE(read_json(json_)["unpaired"].empty());
     save(all + "/stranger.png", plain(0.5f));
     EXPECT_EQ(compare(scene_, all, {"--cameras", data_, "--frames", "1,3", "--threshold", "99"}).status, 1);
+    const Outcome strange =
+        compare(scene_, all, {"--cameras", data_, "--frames", "1,3", "--threshold", "99"});
+    EXPECT_NE(strange.out.find("stranger.png  has no image of this name on the other side"),
+              std::string::npos)
+        << strange.out;
     // One picture goes with one frame, and its map is a picture.
     const std::string one = pictures + "/3.png", map = folder_ / "map.png";
     expect_success(
