@@ -11,6 +11,7 @@
 #include "cli/arguments.h"
 #include "cli/command.h"
 #include "cli/convert_edits.h"
+#include "cli/orbit_check.h"
 #include "cli/output.h"
 #include "cli/run_inputs.h"
 #include "cli/splat_statistics.h"
@@ -28,7 +29,8 @@ namespace fs = std::filesystem;
 using report::Json;
 
 struct ConvertArguments {
-    std::vector<fs::path> files;  // the last is written
+    std::vector<fs::path> files;         // the last is written
+    std::vector<glm::dmat4> placements;  // of the inputs
     std::vector<std::string> transform;
     std::string crop, sort;
     Edits edits;
@@ -58,6 +60,7 @@ Work read_all(const ConvertArguments& arguments) {
     for (size_t i = 0; i + 1 < arguments.files.size(); ++i) {
         const fs::path& path = arguments.files[i];
         SplatScene scene = read_splats(path);
+        place_splats(scene.gaussians, arguments.placements.at(i), path.string());
         if (!arguments.quiet)
             fmt::print("{}\n", described(path, scene.format, scene.variant, scene.gaussians));
         work.inputs.push_back({{"file", path.string()},
@@ -90,6 +93,8 @@ Json check(const ConvertArguments& arguments, const Work& work) {
         if (!arguments.quiet) fmt::print("  {:<18} {:.3g}, {:.3g} {}\n", d.what, d.largest, d.mean, d.unit);
         json[d.what] = {{"largest", d.largest}, {"mean", d.mean}, {"unit", d.unit}};
     }
+    if (!arguments.quiet || !arguments.json.empty())
+        json["renders"] = check_renders(work.gaussians, back, arguments.quiet);
     return json;
 }
 
@@ -187,10 +192,12 @@ int run(const ConvertArguments& arguments) {
 }
 
 void add_editing_options(CLI::App& app, ConvertArguments& arguments) {
-    app.add_option("--transform", arguments.transform,
-                   "move=x,y,z, turn=x,y,z,degrees, scale=s, or a matrix of 12 or 16 numbers, row by row. "
-                   "Repeat the option for several steps, applied in order. Axes are those of a PLY: y down, "
-                   "z forward")
+    app.add_option(
+           "--transform", arguments.transform,
+           "Of the joined scene: move=x,y,z, turn=x,y,z,degrees, scale=s, or a matrix of 12 or 16 numbers, "
+           "row by row. "
+           "Repeat the option for several steps, applied in order. Axes are those of a PLY: y down, "
+           "z forward")
         ->type_name("STEP")
         ->expected(1)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
@@ -218,7 +225,8 @@ Action add_convert(CLI::App& app) {
     app.add_option("FILES", arguments->files,
                    "One or more inputs, which are joined, then the output. Formats: .ply .compressed.ply "
                    ".splat .spz .sog meta.json .glb .gltf, and inputs also .ksplat. An input may be the "
-                   "folder of a training run")
+                   "folder of a training run. IN:STEP, as in b.ply:move=1,0,0, moves one input alone; more "
+                   "steps follow after more colons")
         ->required()
         ->expected(2, -1)
         ->type_name("IN... OUT");
@@ -229,15 +237,19 @@ Action add_convert(CLI::App& app) {
         ->type_name("3|4")
         ->capture_default_str();
     app.add_flag("--allow-empty", arguments->allow_empty, "Write the output even if no splat is left");
-    app.add_flag("--check", arguments->check,
-                 "Read the output back and print its error against the scene in memory");
+    app.add_flag(
+        "--check", arguments->check,
+        "Read the output back and print its error against the scene in memory, also as PSNR of renders");
     app.add_option("--json", arguments->json,
                    "Write the inputs, the output, remarks and errors of --check to this file")
         ->type_name("FILE");
     add_quiet_option(app, arguments->quiet);
     return [arguments] {
-        for (size_t i = 0; i + 1 < arguments->files.size(); ++i)
-            arguments->files[i] = splat_input(arguments->files[i]).file;
+        for (size_t i = 0; i + 1 < arguments->files.size(); ++i) {
+            const PlacedInput input = parse_input(arguments->files[i].string());
+            arguments->files[i] = splat_input(input.file).file;
+            arguments->placements.push_back(input.transform);
+        }
         return run(*arguments);
     };
 }

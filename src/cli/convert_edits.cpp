@@ -7,6 +7,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
+#include <sstream>
 
 #include "core/typing.h"
 #include "ewa/error.h"
@@ -15,9 +16,10 @@
 namespace ewa::cli {
 namespace {
 
-[[noreturn]] void refuse(const std::string& step) {
+/// what: the option or the file that has the step.
+[[noreturn]] void refuse(const std::string& what, const std::string& step) {
     throw InputError(
-        "--transform: '" + step +
+        what + ": '" + step +
         "' is not move=x,y,z, turn=x,y,z,degrees (about that axis), scale=s, or the 12 or 16 numbers of "
         "a matrix, row by row");
 }
@@ -38,9 +40,9 @@ std::vector<double> parse_numbers(const std::string& option, const std::string& 
     }
 }
 
-glm::dmat4 parse_matrix(const std::string& step) {
-    const std::vector<double> numbers = parse_numbers("--transform", step);
-    if (numbers.size() != 12 && numbers.size() != 16) refuse(step);
+glm::dmat4 parse_matrix(const std::string& what, const std::string& step) {
+    const std::vector<double> numbers = parse_numbers(what, step);
+    if (numbers.size() != 12 && numbers.size() != 16) refuse(what, step);
     glm::dmat4 matrix(1.0);
     for (size_t i = 0; i < numbers.size(); ++i) matrix[int(i % 4)][int(i / 4)] = numbers[i];
     return matrix;
@@ -65,16 +67,16 @@ glm::dmat4 turn(const glm::dvec3& axis, double degrees) {
     return matrix;
 }
 
-glm::dmat4 parse_step(const std::string& step) {
+glm::dmat4 parse_step(const std::string& what, const std::string& step) {
     const size_t equals = step.find('=');
-    if (equals == std::string::npos) return parse_matrix(step);
+    if (equals == std::string::npos) return parse_matrix(what, step);
     const std::string name = step.substr(0, equals);
-    const std::vector<double> n = parse_numbers("--transform", step.substr(equals + 1));
+    const std::vector<double> n = parse_numbers(what, step.substr(equals + 1));
     if (name == "move" && n.size() == 3) return glm::translate(glm::dmat4(1.0), glm::dvec3(n[0], n[1], n[2]));
     if (name == "scale" && n.size() == 1) return glm::scale(glm::dmat4(1.0), glm::dvec3(n[0]));
     if (name == "turn" && n.size() == 4 && std::hypot(n[0], n[1], n[2]) > 0)
         return turn({n[0], n[1], n[2]}, n[3]);
-    refuse(step);
+    refuse(what, step);
 }
 
 template <typename Keep>
@@ -91,19 +93,6 @@ size_t drawable_count(const Gaussians& gaussians) {
     return count;
 }
 
-/// Refuses a transform after which fewer splats can be drawn.
-void transform(Gaussians& gaussians, const glm::dmat4& matrix) {
-    if (matrix == glm::dmat4(1.0)) return;
-    const size_t before = drawable_count(gaussians);
-    transform_splats(gaussians, matrix);
-    const size_t after = drawable_count(gaussians);
-    if (after < before)
-        throw InputError(fmt::format(
-            "--transform: {} of {} splats could not be drawn afterwards: a value would exceed the range of "
-            "float32 (3.4e38); use a smaller step, or remove them first with convert --crop",
-            before - after, before));
-}
-
 void crop(Gaussians& gaussians, const std::array<double, 6>& n) {
     keep_if(gaussians, [&](size_t i) {
         bool inside = true;
@@ -117,10 +106,37 @@ void crop(Gaussians& gaussians, const std::array<double, 6>& n) {
 
 }  // namespace
 
-glm::dmat4 parse_transform(const std::vector<std::string>& steps) {
+glm::dmat4 parse_transform(const std::vector<std::string>& steps, const std::string& what) {
     glm::dmat4 matrix(1.0);
-    for (const std::string& step : steps) matrix = parse_step(step) * matrix;
+    for (const std::string& step : steps) matrix = parse_step(what, step) * matrix;
     return matrix;
+}
+
+PlacedInput parse_input(const std::string& text) {
+    std::error_code error;
+    if (std::filesystem::exists(text, error)) return {text};
+    for (size_t colon = text.find(':'); colon != std::string::npos; colon = text.find(':', colon + 1)) {
+        const std::string file = text.substr(0, colon);
+        if (!std::filesystem::exists(file, error)) continue;
+        std::vector<std::string> steps;
+        std::istringstream rest(text.substr(colon + 1));
+        for (std::string step; std::getline(rest, step, ':');) steps.push_back(step);
+        if (steps.empty()) refuse(file, "");
+        return {file, parse_transform(steps, file)};
+    }
+    return {text};
+}
+
+void place_splats(Gaussians& gaussians, const glm::dmat4& matrix, const std::string& what) {
+    if (matrix == glm::dmat4(1.0)) return;
+    const size_t before = drawable_count(gaussians);
+    transform_splats(gaussians, matrix);
+    const size_t after = drawable_count(gaussians);
+    if (after < before)
+        throw InputError(fmt::format(
+            "{}: {} of {} splats could not be drawn afterwards: a value would exceed the range of "
+            "float32 (3.4e38); use a smaller step, or remove them first with convert --crop",
+            what, before - after, before));
 }
 
 std::optional<std::array<double, 6>> parse_crop(const std::string& text) {
@@ -132,7 +148,7 @@ std::optional<std::array<double, 6>> parse_crop(const std::string& text) {
 }
 
 std::optional<std::string> apply_edits(Gaussians& gaussians, const Edits& edits, SplatFormat format) {
-    transform(gaussians, edits.transform);
+    place_splats(gaussians, edits.transform, "--transform");
     if (edits.crop) crop(gaussians, *edits.crop);
     if (edits.min_opacity > 0)
         keep_if(gaussians, [&](size_t i) {

@@ -2,6 +2,7 @@
 // The edits of ewa convert between reading and writing.
 #pragma once
 #include <array>
+#include <filesystem>
 #include <glm/mat4x4.hpp>
 #include <optional>
 #include <string>
@@ -20,8 +21,21 @@ struct Edits {
 };
 
 /// Parses --transform and applies the steps in order: "move=x,y,z", "turn=x,y,z,degrees" about that axis,
-/// "scale=s", or a matrix of 12 or 16 numbers, row by row. Throws InputError that names the step.
-glm::dmat4 parse_transform(const std::vector<std::string>& steps);
+/// "scale=s", or a matrix of 12 or 16 numbers, row by row. Throws InputError that begins with `what` and names the
+/// step.
+glm::dmat4 parse_transform(const std::vector<std::string>& steps, const std::string& what = "--transform");
+
+struct PlacedInput {
+    std::filesystem::path file;
+    glm::dmat4 transform{1.0};
+};
+
+/// Parses an input with its own steps: FILE, FILE:STEP or FILE:STEP:STEP. A path that exists is a file, whatever its
+/// name. Throws InputError for a step that is none.
+PlacedInput parse_input(const std::string& text);
+
+/// Transforms the splats. Throws InputError, which begins with `what`, if fewer of them could be drawn afterwards.
+void place_splats(Gaussians& gaussians, const glm::dmat4& matrix, const std::string& what);
 
 /// Parses --crop. Empty: no box. Throws InputError.
 std::optional<std::array<double, 6>> parse_crop(const std::string& text);

@@ -42,8 +42,7 @@ std::string row(const StageTime& stage, double step, double longest) {
         "<tr><td><b>{}</b> <span class=\"soft\">{}</span></td><td class=\"number\">{:.3f}</td>"
         "<td class=\"number\">{:.1f} %</td><td class=\"bar\"><i style=\"width:{:.1f}%\"></i></td></tr>\n",
         escape_html(stage.name), escape_html(stage.what), stage.milliseconds,
-        step > 0 ? 100 * stage.milliseconds / step : 0,
-        longest > 0 ? 100 * stage.milliseconds / longest : 0);
+        step > 0 ? 100 * stage.milliseconds / step : 0, longest > 0 ? 100 * stage.milliseconds / longest : 0);
 }
 
 std::string single_passes(const std::vector<NamedTime>& passes) {
@@ -94,7 +93,8 @@ std::string step_time_html(const StepTime& time) {
     for (const StageTime& stage : all) html += row(stage, time.step, longest);
     html += fmt::format(
         "<tr><td><b>a step</b></td><td class=\"number\">{:.3f}</td><td></td><td class=\"bar\"></td></tr>\n"
-        "</table>\n<p class=\"soft\">Means over {} steps. Where steps overlap on the device, its passes are timed "
+        "</table>\n<p class=\"soft\">Means over {} steps. Where steps overlap on the device, its passes are "
+        "timed "
         "in every 100th step.</p>\n",
         time.step, time.steps);
     return html + single_passes(time.passes);

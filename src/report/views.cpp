@@ -45,7 +45,8 @@ std::string card(const ReportView& view, size_t number, bool small_pictures) {
     else if (!pictures.empty())
         pictures = "<div>" + pictures + "</div>";
     return fmt::format(
-        "<figure class=\"view\" id=\"view-{}\">{}<figcaption><b>{}</b> <span>{}</span></figcaption></figure>\n",
+        "<figure class=\"view\" id=\"view-{}\">{}<figcaption><b>{}</b> "
+        "<span>{}</span></figcaption></figure>\n",
         number, pictures, escape_html(view.name), figures(view));
 }
 

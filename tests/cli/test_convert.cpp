@@ -2,6 +2,7 @@
 // ewa convert, and what the other commands make of every splat format.
 #include <gtest/gtest.h>
 
+#include <glm/geometric.hpp>
 #include <limits>
 
 #include "cli/expect.h"
@@ -47,6 +48,18 @@ TEST(Convert, SaysWhatIsLostAndMeasuresIt) {
     EXPECT_EQ(json["check"]["position"]["largest"], 0);
     EXPECT_GT(json["check"]["colour"]["largest"].get<double>(), 0);
     EXPECT_LE(json["check"]["colour"]["largest"].get<double>(), 0.5001 / 255);
+    EXPECT_NE(outcome.out.find("renders from 8 sides: PSNR "), std::string::npos) << outcome.out;
+    EXPECT_GT(json["check"]["renders"]["psnr"].get<double>(), 30);
+    EXPECT_LT(json["check"]["renders"]["psnr"].get<double>(), 80);
+    EXPECT_LE(json["check"]["renders"]["worst_psnr"], json["check"]["renders"]["psnr"]);
+    const Outcome equal = run_ewa({"convert", folder / "s.ply", folder / "t.ply", "--check"});
+    EXPECT_NE(equal.out.find("renders from 8 sides are equal"), std::string::npos) << equal.out;
+    Circumstances no_device;
+    no_device.environment = {{"VK_ICD_FILENAMES", folder / "none.json"},
+                             {"VK_DRIVER_FILES", folder / "none.json"}};
+    const Outcome blind = run_ewa({"convert", folder / "s.ply", folder / "u.splat", "--check"}, no_device);
+    expect_success(blind);
+    EXPECT_NE(blind.out.find("no renders to compare: "), std::string::npos) << blind.out;
     EXPECT_FALSE(json["remarks"].empty());
     const Outcome quiet = run_ewa({"convert", folder / "s.ply", folder / "o.splat", "--check", "--quiet"});
     expect_success(quiet);
@@ -139,6 +152,32 @@ TEST(Convert, WrongUse) {
     refuse({"--min-opacity", "2"}, "min-opacity");
     refuse({"--max-sh", "4"}, "max-sh");
     refuse({"--sort", "size"}, "sort");
+}
+
+TEST(Convert, PlacesEachInputByItself) {
+    const Folder folder;
+    make_splats(folder / "a.ply");
+    make_splats(folder / "b:move=9,9,9.ply");  // a path that exists is a path
+    fs::copy_file(folder / "a.ply", folder / "c.ply");
+    expect_success(run_ewa({"convert", folder / "a.ply", folder / "b:move=9,9,9.ply",
+                            folder / "c.ply:scale=2:move=1,0,0", folder / "o.ply"}));
+    const Gaussians a = ewa::load_splats(folder / "a.ply"), out = ewa::load_splats(folder / "o.ply");
+    ASSERT_EQ(out.size(), 3 * a.size());
+    for (size_t i = 0; i < a.size(); ++i) {
+        const glm::dvec3 mean = a.world_mean(i);
+        EXPECT_EQ(out.world_mean(i), mean);
+        EXPECT_EQ(out.world_mean(a.size() + i), mean);
+        const glm::dvec3 placed = 2.0 * mean + glm::dvec3(1, 0, 0);
+        EXPECT_LT(glm::length(out.world_mean(2 * a.size() + i) - placed), 1e-6);
+    }
+    const auto refused = [&](const std::string& input, const std::string& text) {
+        expect_failure(run_ewa({"convert", folder / input, folder / "p.ply"}), 2, text);
+        EXPECT_FALSE(fs::exists(folder / "p.ply"));
+    };
+    refused("a.ply:mov=1,0,0", "a.ply: 'mov=1,0,0' is not move=x,y,z, turn=");
+    refused("a.ply:scale=1e40", "a.ply: 50 of 50 splats could not be drawn afterwards");
+    refused("none.ply:move=1,0,0", "none.ply");
+    expect_failure(run_ewa({"convert", folder / "a.ply:move=1,0,0", folder / "a.ply"}), 2, "an input");
 }
 
 TEST(Convert, RefusesATransformAfterWhichNothingIsDrawn) {
