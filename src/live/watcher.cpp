@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -193,6 +194,24 @@ std::optional<LiveFile> read_live_file(const fs::path& folder) try {
     return LiveFile{uint16_t(port), json["token"].get<std::string>()};
 } catch (const InputError&) {
     return std::nullopt;  // absent, half written, or damaged
+}
+
+std::string find_token(const std::string& given, const fs::path& file) {
+    if (!given.empty()) return given;
+    if (file.empty()) {
+        const char* variable = std::getenv("EWA_TOKEN");
+        return variable ? variable : "";
+    }
+    std::string token(core::trim(start_of(file, kLargestLiveFile)));
+    if (token.starts_with('{')) {
+        const Json json = core::parse_json<Json>(token, file.string());
+        token = json.contains("token") && json["token"].is_string() ? json["token"].get<std::string>() : "";
+    }
+    const auto plain = [](char c) { return c > ' ' && c < 0x7f; };
+    if (token.empty() || !std::all_of(token.begin(), token.end(), plain))
+        throw InputError(core::one_line(file.string()) +
+                         ": holds no token; it is in live.json in the folder of the run");
+    return token;
 }
 
 void write_live_file(const fs::path& folder, const LiveFile& live) {

@@ -62,6 +62,9 @@ struct LiveFile {
 };
 /// Nothing if the folder has none that can be read.
 std::optional<LiveFile> read_live_file(const std::filesystem::path& folder);
+/// The token that was given, else that of the file, which is a live file or the token alone, else that of the variable
+/// EWA_TOKEN. Empty if there is none of these. Throws InputError for a file without a token.
+std::string find_token(const std::string& given, const std::filesystem::path& file);
 /// Throws RunError.
 void write_live_file(const std::filesystem::path& folder, const LiveFile& live);
 

@@ -33,6 +33,7 @@ constexpr int kLargestSide = 16384;  // px
 
 struct Arguments {
     std::filesystem::path path, cameras, picture, views, film, output;
+    std::filesystem::path token_file;
     std::string connect, token, size, background, frame;
     bool train = false, antialias = false;
     std::vector<std::string> train_options;
@@ -80,7 +81,9 @@ std::filesystem::path output_of(const Arguments& arguments) {
 
 OpenedScene open_what(const Arguments& arguments, Startup& startup) {
     if (!arguments.connect.empty()) {
-        startup.watch = live::WhatToWatch{{}, live::parse_address(arguments.connect), arguments.token};
+        startup.watch = live::WhatToWatch{{},
+                                          live::parse_address(arguments.connect),
+                                          live::find_token(arguments.token, arguments.token_file)};
         const std::filesystem::path& what = arguments.path.empty() ? arguments.cameras : arguments.path;
         OpenedScene scene = what.empty() ? OpenedScene() : open_scene(what, {});
         scene.title = arguments.connect;
@@ -200,8 +203,13 @@ void add_options(CLI::App& app, Arguments& arguments) {
         ->needs(train);
     option("--connect", arguments.connect, "HOST:PORT", "Show a training that runs with --serve")
         ->excludes(train);
-    option("--token", arguments.token, "TEXT",
-           "With --connect: allows pause and save. live.json in the folder of the run holds it");
+    option(
+        "--token", arguments.token, "TEXT",
+        "With --connect: allows pause and save. live.json in the folder of the run holds it. Other users see "
+        "it in the list of processes; --token-file and the variable EWA_TOKEN do not show it");
+    option("--token-file", arguments.token_file, "FILE",
+           "With --connect: a file with the token, such as a copy of live.json")
+        ->excludes("--token");
     option("--cameras", arguments.cameras, "DATASET", "Dataset whose cameras to show and to look through");
     option("--frame", arguments.frame, "I|NAME",
            "The camera to start from: its index in name order, or its name (0)");
@@ -234,7 +242,7 @@ void add_options(CLI::App& app, Arguments& arguments) {
 void group_options(CLI::App& app) {
     const std::pair<const char*, std::vector<const char*>> subjects[] = {
         {"Data", {"--cameras", "--frame", "--views"}},
-        {"Training", {"--train", "--output", "--connect", "--token"}},
+        {"Training", {"--train", "--output", "--connect", "--token", "--token-file"}},
         {"Quality", {"--mode", "--compare", "--background", "--antialias"}},
         {"Output", {"--size", "--screenshot", "--film", "--film-seconds", "--verbose"}},
         {"Device", {"--device"}}};

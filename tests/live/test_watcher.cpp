@@ -41,6 +41,23 @@ TEST(LiveFiles, TheTokenIsTheOwnersAlone) {
     }
 }
 
+TEST(LiveFiles, ATokenNeedsNoCommandLine) {
+    const TempFolder folder;
+    EXPECT_EQ(find_token("", {}), "");
+    setenv("EWA_TOKEN", "from the environment", 1);
+    EXPECT_EQ(find_token("", {}), "from the environment");
+    write_live_file(folder.path(), {7001, "abc"});
+    EXPECT_EQ(find_token("", folder.path() / kLiveFile), "abc");
+    EXPECT_EQ(find_token("", folder.write("token", "def\n")), "def");
+    EXPECT_EQ(find_token("given", folder.path() / "none"), "given");
+    unsetenv("EWA_TOKEN");
+    for (const char* text : {"", "{\"port\": 1}", "{", "two words", "\x1b[0m"}) {
+        const auto file = folder.write("wrong", text);
+        EXPECT_THROW(find_token("", file), InputError) << text;
+    }
+    EXPECT_THROW(find_token("", folder.path() / "none"), InputError);
+}
+
 TEST(LiveWatcher, FollowsARunByItsFiles) {
     const TempFolder folder;
     folder.write("config.json", std::string(400000, '['));

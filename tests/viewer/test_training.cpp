@@ -136,6 +136,8 @@ TEST(WithoutWindow, WrongWaysToATrainingAreOneLine) {
     expect_failure(run_view({"--train", folder / "splats.ply"}), 2, "--train needs a dataset");
     expect_failure(run_view({folder / "splats.ply", "--steps", "7"}), 2, "--steps");
     expect_failure(run_view({"--connect", "nowhere"}), 2, "localhost:7000");
+    expect_failure(run_view({"--connect", "localhost:7000", "--token-file", folder / "none"}), 2,
+                   "holds no token");
     // A run that would be replaced is found before the window opens.
     make_dataset(folder / "data");
     std::filesystem::create_directory(folder / "run");
