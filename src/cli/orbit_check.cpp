@@ -56,9 +56,10 @@ report::Json check_renders(const Gaussians& written, const SplatScene& read, boo
         if (!quiet && std::isinf(found.worst))
             fmt::print("  renders from {} sides are equal\n", kSides);
         else if (!quiet)
-            fmt::print("  renders from {} sides: PSNR {:.1f} dB, {:.1f} dB from the worst side; a difference is "
-                       "hard to see over 40 dB\n",
-                       kSides, found.mean, found.worst);
+            fmt::print(
+                "  renders from {} sides: PSNR {:.1f} dB, {:.1f} dB from the worst side; a difference is "
+                "hard to see over 40 dB\n",
+                kSides, found.mean, found.worst);
         return {{"views", kSides}, {"psnr", number(found.mean)}, {"worst_psnr", number(found.worst)}};
     } catch (const RunError& error) {
         if (!quiet) fmt::print("  no renders to compare: {}\n", core::one_line(error.what()));

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "core/system_limits.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "gpu/capabilities.h"
@@ -174,8 +175,9 @@ Memory Device::allocate(const vk::MemoryRequirements& requirements, bool host_vi
 }
 
 RunError Device::out_of_memory(uint64_t bytes) const {
-    return RunError("out of device memory on " + info_.name + ": " + std::to_string(bytes >> 20) +
-                    " MiB are needed beside the " + std::to_string(allocated_bytes() >> 20) +
+    return RunError("out of device memory on " + info_.name + ": " + core::address_limit_text() +
+                    std::to_string(bytes >> 20) + " MiB are needed beside the " +
+                    std::to_string(allocated_bytes() >> 20) +
                     " MiB already allocated; fewer splats, a lower SH degree or --downscale need less");
 }
 
@@ -202,11 +204,12 @@ std::vector<DeviceInfo> list_devices() {
         int index = 0;
         for (const auto& device : instance->enumeratePhysicalDevices())
             infos.push_back(gpu::describe(device, index++));
-        if (infos.empty()) throw RunError("no Vulkan device; " + gpu::what_would_help());
+        if (infos.empty())
+            throw RunError("no Vulkan device; " + core::address_limit_text() + gpu::what_would_help());
         return infos;
     } catch (const vk::SystemError& error) {
         throw RunError("no Vulkan driver works: " + std::string(error.what()) + "; " +
-                       gpu::what_would_help());
+                       core::address_limit_text() + gpu::what_would_help());
     }
 }
 

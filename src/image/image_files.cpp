@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "core/atomic_file.h"
+#include "core/system_limits.h"
 #include "core/text.h"
 #include "ewa/error.h"
 
@@ -38,7 +39,7 @@ auto with_name(const std::string& name, const Read& read) {
     } catch (const std::runtime_error& error) {
         reason = error.what();
     } catch (const std::bad_alloc&) {
-        reason = "it is too large for this machine's memory";
+        reason = core::address_limit_text() + "it is too large for the memory";
     } catch (const std::length_error&) {
         reason = "its header claims more than memory can hold";
     }

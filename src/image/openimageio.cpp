@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <string_view>
 
+#include "core/system_limits.h"
 #include "ewa/error.h"
 #include "image/image_files.h"
 
@@ -50,9 +51,25 @@ fs::path module_file() {
                 " nor in the folders ewa and modules beside " + own.string());
 }
 
+// Some of OpenImageIO's libraries start threads when they are loaded. Where they cannot, the process hangs or
+// ends. With its threads it takes 300 MB of address space on two processors.
+constexpr uint64_t kAddressSpace = 400u << 20;
+constexpr int kThreads = 8;
+
+/// Throws unless the module can be loaded with what the system still gives.
+void check_room() {
+    if (core::has_room(kAddressSpace, kThreads)) return;
+    throw RunError(std::string(kModuleFile) + " needs " + std::to_string(kAddressSpace >> 20) +
+                   " MiB of address space and " + std::to_string(kThreads) +
+                   " threads, more than the system gives; " + core::address_limit_text() +
+                   "a higher limit (ulimit -a) helps, or an image in PNG");
+}
+
 /// Never unloaded: threads and destructors of OpenImageIO's libraries run until the process ends.
 const OpenImageIO& load() {
-    void* library = dlopen(module_file().c_str(), RTLD_NOW | RTLD_LOCAL);
+    const fs::path file = module_file();
+    check_room();
+    void* library = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
     if (!library) cannot_load(dlerror());
     const auto* module = static_cast<const OpenImageIO*>(dlsym(library, kModuleEntry));
     if (!module) cannot_load(std::string("it belongs to another build of ewa: ") + dlerror());

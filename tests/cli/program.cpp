@@ -45,6 +45,10 @@ namespace fs = std::filesystem;
         const rlimit limit{file_limit, file_limit};
         setrlimit(RLIMIT_FSIZE, &limit);
     }
+    if (circumstances.address_limit > 0) {
+        const rlimit limit{circumstances.address_limit, circumstances.address_limit};
+        setrlimit(RLIMIT_AS, &limit);
+    }
     std::vector<char*> argv{const_cast<char*>(program.c_str())};
     for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
     argv.push_back(nullptr);

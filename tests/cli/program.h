@@ -21,6 +21,7 @@ struct Circumstances {
     std::string out_path = {};        // standard output goes here instead of Outcome::out
     std::string err_path = {};        // likewise Outcome::err
     size_t file_limit = 0;            // bytes that no file may exceed, as on a full disk; 0: none
+    size_t address_limit = 0;         // bytes of address space; 0: no limit
     std::string await_file = {};      // as soon as this file has a byte, `signal` is sent
     int signal = 0;                   // 0: none
     int times = 1;                    // that it is sent, each time after the one before has been taken

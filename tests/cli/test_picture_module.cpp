@@ -64,6 +64,28 @@ TEST_F(PictureModule, IsNotTakenFromWhereElseLibrariesAreLookedFor) {
     expect_success(compare(circumstances));
 }
 
+#ifndef __SANITIZE_ADDRESS__  // which takes terabytes of address space
+/// Its libraries would hang, or end the process, where they cannot start their threads.
+TEST_F(PictureModule, IsNotLoadedWithoutRoom) {
+    install_module();
+    for (const size_t megabytes : {200, 300, 400}) {
+        Circumstances circumstances;
+        circumstances.address_limit = megabytes << 20;
+        const Outcome outcome = compare(circumstances);
+        expect_failure(outcome, 1,
+                       "this process may use only " + std::to_string(megabytes) + " MiB of address space");
+        EXPECT_EQ(outcome.err.find("install"), std::string::npos) << outcome.err;
+    }
+}
+
+TEST(AddressSpace, ThatIsShortIsNamedByTheDevice) {
+    Circumstances circumstances;
+    circumstances.address_limit = 100u << 20;
+    const Outcome outcome = run_ewa({"devices"}, circumstances);
+    expect_failure(outcome, 1, "this process may use only 100 MiB of address space (ulimit -v)");
+}
+#endif
+
 TEST_F(PictureModule, IsNamedWhereItIsMissing) {
     const Outcome outcome = compare();
     expect_failure(outcome, 1, folder_ / "a.exr: " + kModule);

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+// Limits that the system sets to this process.
+#pragma once
+#include <cstdint>
+#include <string>
+
+namespace ewa::core {
+
+/// "this process may use only 390 MiB of address space (ulimit -v); ", or empty without such a limit. Where address
+/// space is short, libraries give other reasons for their failure.
+std::string address_limit_text();
+
+/// Whether the process could now map so many bytes, and start so many threads beside that.
+bool has_room(uint64_t bytes, int threads);
+
+}  // namespace ewa::core
