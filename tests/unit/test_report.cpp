@@ -275,6 +275,14 @@ TEST(Report, ChartsTellTheirValues) {
     EXPECT_NE(chart_svg(chart).find("<title>step 10: held out 19.5 dB</title>"), std::string::npos);
 }
 
+TEST(Report, TheMeanOfAStraightLineIsTheLine) {
+    Chart chart{.title = "Loss", .x_name = "step", .smooth = true};
+    for (int i = 0; i < 100; ++i) chart.points.push_back({double(i), double(i)});
+    const std::string svg = chart_svg(chart);
+    for (const char* text : {"step 0: 0, mean 0<", "step 3: 3, mean 3<", "step 50: 50, mean 50<"})
+        EXPECT_NE(svg.find(text), std::string::npos) << text;
+}
+
 TEST(Report, LongChartsAreThinnedOut) {
     Chart chart{.title = "Loss", .x_name = "step"};
     for (int i = 0; i < 100000; ++i) chart.points.push_back({double(i), 1.0 + i % 7});
