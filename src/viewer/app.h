@@ -146,6 +146,7 @@ class App {
     void save_exr();
 
     const Startup& startup_;
+    std::unique_ptr<TrainProcess> trainer_;  // started by the window, which is closed before it ends
     WindowSystem system_;
     Window window_;
     std::unique_ptr<Screen> screen_;
@@ -181,7 +182,6 @@ class App {
     std::future<std::string> saving_;  // a screenshot; the message about it
 
     // Their threads call wake() of the window system. Declared last, so that they end before it does.
-    std::unique_ptr<TrainProcess> trainer_;  // started by the window
     ImageComparison comparison_;
     ViewQuality quality_;
     Renders renders_;

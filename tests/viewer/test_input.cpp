@@ -289,9 +289,9 @@ TEST_F(Input, AThousandRandomEventsAreSilent) {
         return std::to_string(std::uniform_int_distribution<int>(0, n - 1)(random));
     };
     const std::vector<std::string> keys{
-        "w",     "a",     "s",      "d",      "e",       "1",       "2",    "3",     "4",      "5",
-        "r",     "t",     "u",      "c",      "g",       "v",       "Left", "Right", "F1",     "F2",
-        "minus", "equal", "ctrl+1", "ctrl+2", "shift+1", "shift+2", "Tab",  "space", "Return", "Escape"};
+        "w",     "a",      "s",      "d",       "e",       "1",   "2",     "3",      "4",     "5",  "r",
+        "f",     "t",      "u",      "c",       "g",       "v",   "Left",  "Right",  "F1",    "F2", "minus",
+        "equal", "ctrl+1", "ctrl+2", "shift+1", "shift+2", "Tab", "space", "Return", "Escape"};
     std::ofstream script(folder_ / "events");
     for (int i = 0; i < events; ++i) {
         switch (std::uniform_int_distribution<int>(0, 6)(random)) {
