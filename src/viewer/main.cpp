@@ -213,11 +213,11 @@ void add_options(CLI::App& app, Arguments& arguments) {
     option("--cameras", arguments.cameras, "DATASET", "Dataset whose cameras to show and to look through");
     option("--frame", arguments.frame, "I|NAME",
            "The camera to start from: its index in name order, or its name (0)");
-    option("--mode", startup.settings.look.mode, "MODE",
-           "What to show: color, depth, alpha, count (splats per pixel) or ellipsoids")
+    option("--mode", startup.settings.look.mode, "color|depth|alpha|count|ellipsoids",
+           "What to show; count is the splats per pixel")
         ->transform(one_of(kModes));
-    option("--compare", startup.settings.comparison, "HOW",
-           "Comparison with the image of the camera: none, beside, wipe or difference")
+    option("--compare", startup.settings.comparison, "none|beside|wipe|difference",
+           "Comparison with the image of the camera")
         ->transform(one_of(kComparisons));
     option("--background", arguments.background, "COLOUR",
            "Background colour: r,g,b in 0..1, a name such as white, or #rrggbb");
