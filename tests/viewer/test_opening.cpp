@@ -84,7 +84,7 @@ class Dropping : public testing::Test {
         test::make_splats(folder_ / "more.ply", 60, 0);
         test::make_dataset(dataset_);
     }
-    const test::Folder folder_;
+    test::Folder folder_;
     const std::string splats_ = folder_ / "splats.ply", dataset_ = folder_ / "data";
 };
 
