@@ -318,7 +318,7 @@ TEST(Sog, RefusesWithTheReason) {
     refuse({}, {"a.sog", "not"});
     refuse({{"x", "y"}}, {"a.sog: \"meta.json\" is not in the archive"});
     refuse(with("meta.json", "{"), {"a.sog", "byte", "ends too early"});
-    refuse(with("meta.json", "[]"), {"is not a JSON object"});
+    refuse(with("meta.json", "[]"), {"the JSON is not an object"});
     refuse(changed([](json& meta) { meta["version"] = 3; }), {"SOG version 3"});
     refuse(changed([](json& meta) { meta["count"] = -1; }), {"\"count\" is not a whole number"});
     refuse(changed([](json& meta) { meta["count"] = 200000000; }), {"claims 200000000 splats"});

@@ -89,7 +89,7 @@ class FolderFiles final : public SogFiles {
 class Meta {
   public:
     Meta(json values, std::string name) : values_(std::move(values)), name_(std::move(name)) {
-        if (!values_.is_object()) fail("is not a JSON object");
+        if (!values_.is_object()) fail("the JSON is not an object");
         const bool versioned = values_.contains("version");
         version_ = versioned ? integer(values_["version"], "version", 1 << 30) : 1;
         if (version_ != 1 && version_ != 2)
