@@ -77,7 +77,6 @@ void require_added(int result) {
 }
 
 constexpr uint16_t kEncrypted = 1;  // a flag
-constexpr uint64_t kSmallEntry = 64 << 10;
 
 }  // namespace
 
@@ -119,7 +118,7 @@ std::string ArchiveReader::read(const std::string& entry, uint64_t most) const {
         throw InputError(where + " is packed with method " + std::to_string(info.compression_method) +
                          "; stored and deflated entries are supported");
     const uint64_t size = info.uncompressed_size, packed = std::min<uint64_t>(info.compressed_size, bytes());
-    if (size > most || size > 2 * packed + kSmallEntry)
+    if (size > most)
         throw InputError(where + " claims to unpack from " + std::to_string(packed) + " to " +
                          std::to_string(size) + " bytes; it is damaged");
     std::string content(size_t(size), '\0');

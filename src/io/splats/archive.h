@@ -20,9 +20,8 @@ class ArchiveReader {
 
     uint64_t bytes() const;  // of the archive
 
-    /// The content of the entry with this name. Throws InputError without such an entry, if it unpacks to more
-    /// than `most` bytes, or to more than twice its packed bytes and 64 KiB: what a SOG holds is packed
-    /// already.
+    /// The content of the entry with this name. Throws InputError without such an entry, or if it unpacks to more
+    /// than `most` bytes.
     std::string read(const std::string& entry, uint64_t most) const;
 
   private:

@@ -47,6 +47,7 @@ class ArchivedFiles final : public SogFiles {
     explicit ArchivedFiles(const std::filesystem::path& path) : archive_(path) {}
     std::string meta() const { return archive_.read(kSogMeta, kMetaLimits.bytes); }
     std::string read(const std::string& name) override {
+        // WebP is packed already: zip adds little to it.
         return archive_.read(name, 2 * archive_.bytes() + kMetaLimits.bytes);
     }
     uint64_t bytes(const json&) const override { return archive_.bytes(); }
