@@ -11,6 +11,14 @@ namespace ewa::io {
 
 namespace {
 
+/// A word of the file for an error: a damaged one may be as long as the header.
+std::string shown_word(std::string_view word) {
+    constexpr size_t kShown = 60;
+    std::string text = "\"";
+    text += word.substr(0, kShown);
+    return text += '"';
+}
+
 constexpr size_t kMaxHeaderLine = size_t(1) << 16;
 constexpr uint64_t kMaxHeaderBytes = uint64_t(1) << 22;
 constexpr size_t kMaxProperties = 1024;  // per element; each is compared with all before it
@@ -96,7 +104,7 @@ void PlyTable::parse_header() {
         } else if (keyword == "property") {
             parse_property(rest);
         } else if (keyword != "obj_info" && !keyword.empty()) {
-            fail("the header line \"" + line.substr(0, 60) + "\" is unknown in PLY");
+            fail("the header line " + shown_word(line) + " is unknown in PLY");
         }
     }
     fail("the file ends inside the header (there is no \"end_header\")");
@@ -105,7 +113,7 @@ void PlyTable::parse_header() {
 void PlyTable::parse_format(std::string_view rest) {
     const std::string_view format = core::next_word(rest);
     const auto* found = std::ranges::find(kFormats, format);
-    if (found == std::end(kFormats)) fail("the format \"" + std::string(format) + "\" is unknown in PLY");
+    if (found == std::end(kFormats)) fail("the format " + shown_word(format) + " is unknown in PLY");
     format_ = Format(found - kFormats);
 }
 
@@ -119,7 +127,7 @@ void PlyTable::parse_element(std::string_view rest) {
     const std::string_view count = core::next_word(rest);
     const std::optional<uint64_t> parsed = core::parse_integer<uint64_t>(count);
     if (element.name.empty() || !parsed)
-        fail("an element needs a name and a count of 0 or more, not \"" + std::string(count) + "\"");
+        fail("an element needs a name and a count of 0 or more, not " + shown_word(count));
     element.count = *parsed;
     elements_.push_back(std::move(element));
 }
@@ -131,8 +139,7 @@ void PlyTable::parse_property(std::string_view rest) {
         const std::string_view word = core::next_word(rest);
         const auto* found = std::ranges::find_if(
             kTypes, [&](const TypeInfo& type) { return word == type.plain || word == type.sized; });
-        if (found == std::end(kTypes))
-            fail("the property type \"" + std::string(word) + "\" is unknown in PLY");
+        if (found == std::end(kTypes)) fail("the property type " + shown_word(word) + " is unknown in PLY");
         return PlyType(found - kTypes);
     };
     PlyProperty property;
@@ -148,9 +155,9 @@ void PlyTable::parse_property(std::string_view rest) {
     property.name = core::next_word(rest);
     if (property.name.empty()) fail("a property has no name");
     if (element.properties.size() == kMaxProperties)
-        fail("the element \"" + element.name + "\" has more than " + std::to_string(kMaxProperties) +
+        fail("the element " + shown_word(element.name) + " has more than " + std::to_string(kMaxProperties) +
              " properties; the file is damaged");
-    if (element.find(property.name)) fail("the property \"" + property.name + "\" is declared twice");
+    if (element.find(property.name)) fail("the property " + shown_word(property.name) + " is declared twice");
     element.properties.push_back(std::move(property));
 }
 
@@ -220,7 +227,7 @@ void PlyTable::read_row(const PlyElement& element, std::vector<double>& values) 
 uint64_t PlyTable::read_list_count(const PlyProperty& property) {
     const double count = read_value(*property.list_count, property.name);
     if (!(count >= 0) || count > 4294967295.0 || count != std::floor(count))
-        fail("the list \"" + property.name + "\" has an invalid length");
+        fail("the list " + shown_word(property.name) + " has an invalid length");
     return static_cast<uint64_t>(count);
 }
 
