@@ -39,7 +39,7 @@ Exposure exposure_of(const json& rows, const std::string& where) {
 std::map<std::string, Exposure> load_exposures(const std::filesystem::path& path) {
     const auto all = core::read_json_file<json>(path);
     const std::string file = core::one_line(path.string());
-    if (!all.is_object()) throw InputError(file + ": not a JSON object of exposures");
+    if (!all.is_object()) throw InputError(file + ": the JSON is not an object of exposures");
     std::map<std::string, Exposure> exposures;
     for (const auto& [name, rows] : all.items())
         exposures[name] = exposure_of(rows, file + ": \"" + core::one_line(name) + "\"");

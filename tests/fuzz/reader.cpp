@@ -8,6 +8,7 @@
 #include <cctype>
 #include <cmath>
 #include <cstring>
+#include <map>
 #include <string>
 
 #include "ewa/error.h"
@@ -93,6 +94,12 @@ void check_scene(const std::vector<io::NamedView>& views) {
     for (const io::NamedView& view : views)
         EWA_REQUIRE(view.camera.width > 0 && view.camera.height > 0 && view.camera.fx > 0 &&
                     view.camera.fy > 0);
+}
+#elif defined(EWA_READ_EXPOSURES)
+void check_scene(const std::map<std::string, Exposure>& exposures) {
+    const std::string text = std::to_string(exposures.size()) + " exposures";
+    for (const auto& [name, exposure] : exposures)
+        for (const float value : exposure) EWA_REQUIRE(std::isfinite(value));
 }
 #elif defined(EWA_READ_MESH)
 void check_scene(const scene::MeshScene& scene) {
