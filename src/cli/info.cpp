@@ -23,6 +23,7 @@
 #include "ewa/splat_files.h"
 #include "ewa/synthetic_dataset.h"
 #include "ewa/trainer.h"
+#include "io/datasets/image_records.h"
 #include "io/gltf/mesh.h"
 #include "io/splats/formats.h"
 #include "report/summary.h"
@@ -162,7 +163,7 @@ bool is_sog(const fs::path& path) {
 
 const char* dataset_kind(const fs::path& path) {
     if (!fs::is_directory(path)) return "transforms";
-    return fs::exists(path / "sparse") ? "COLMAP" : "transforms";
+    return io::find_colmap_model(path) ? "COLMAP" : "transforms";
 }
 
 /// The frames that share a size and intrinsics.

@@ -127,6 +127,12 @@ bool any_given(const ViewsArguments& arguments) {
 ViewsOutput views_output(const fs::path& path) {
     const std::string extension = core::lower(path.extension().string());
     if (extension == ".png" || extension == ".exr") return ViewsOutput::image;
+    for (const char* other : {".jpg", ".jpeg", ".gif", ".webp", ".bmp", ".tif", ".tiff", ".avi"})
+        if (extension == other)
+            throw InputError(
+                "--output " + core::one_line(path.string()) +
+                ": an image is .png or .exr, a film .mp4, .mov, .mkv or .webm, and a folder has another "
+                "name");
     return is_film_name(path) ? ViewsOutput::film : ViewsOutput::folder;
 }
 

@@ -79,7 +79,7 @@ void add_exposures_option(CLI::App& app, std::string& exposures) {
     app.add_option(
            "--exposures", exposures,
            "Exposures of training images, as ewa train --exposure writes them. auto: exposures.json of the "
-           "run SPLATS, if there is one")
+           "run SPLATS, with its own dataset")
         ->type_name("auto|none|FILE")
         ->capture_default_str();
 }
@@ -94,7 +94,7 @@ std::vector<Exposure> exposures_of(const std::string& which, const std::optional
     if (which == "none") return {};
     const auto known = load_exposures(file);
     const auto has_exposure = [&](const Frame& frame) { return known.contains(frame.name); };
-    if (std::ranges::none_of(dataset.frames, has_exposure))
+    if (which != "auto" && std::ranges::none_of(dataset.frames, has_exposure))
         throw InputError(core::one_line(file.string()) + ": has no exposure of an image of " +
                          core::one_line(dataset.root.string()) + "; --exposures none uses none");
     std::vector<Exposure> exposures;
@@ -120,8 +120,10 @@ std::optional<live::Run> resolve_views(CLI::App& app, ViewArguments& arguments) 
     }
     if (!input.run) return std::nullopt;
     use_options_of(*input.run, app);
-    if (!own_dataset) return std::nullopt;
-    if (const std::string frames = input.run->text("frames"); !frames.empty()) arguments.run_frames = frames;
+    std::error_code none;
+    if (!own_dataset && !fs::equivalent(arguments.dataset, input.run->dataset, none)) return std::nullopt;
+    const std::string frames = input.run->text("frames");
+    if (own_dataset && !frames.empty()) arguments.run_frames = frames;
     return std::move(input.run);
 }
 

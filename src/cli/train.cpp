@@ -18,8 +18,10 @@
 #include "core/typing.h"
 #include "ewa/error.h"
 #include "ewa/run.h"
+#include "live/run_folder.h"
 #include "report/chart.h"
 #include "train/earlier_run.h"
+#include "train/run_options.h"
 
 namespace ewa::cli {
 namespace {
@@ -69,6 +71,15 @@ struct Quality {
 constexpr std::array<Quality, 3> kQualities{
     {{"low", 2000, 200000}, {"medium", 7000, 500000}, {"high", 30000, 1000000}}};
 
+/// A run that is resumed keeps its number of steps.
+void keep_steps(RunOptions& options) {
+    const auto run = live::find_run(output_folder(options));
+    if (!run) return;
+    const auto steps = run->config.find("steps");
+    if (steps != run->config.end() && steps->is_number_unsigned())
+        train::run_option("steps").set(options, steps->dump());
+}
+
 /// Reads the config, if there is one. Then sets the steps and splats of --quality, unless they are given themselves. A
 /// quality of the command line goes before steps and splats of the config.
 void apply_config_and_quality(CLI::App& app, TrainArguments& arguments) {
@@ -83,6 +94,8 @@ void apply_config_and_quality(CLI::App& app, TrainArguments& arguments) {
         if (given[0] == 0) train.steps = quality.steps;
         if (given[1] == 0) train.max_splats = quality.max_splats;
     }
+    if (arguments.run.resume && arguments.quality.empty() && app.count("--steps") == 0)
+        keep_steps(arguments.run);
 }
 
 /// Renders a mesh scene into the run's folder, which becomes the dataset. Throws Interrupted if Ctrl-C ended that.
@@ -180,10 +193,10 @@ Action add_train(CLI::App& app, const std::string& command_line) {
            "connect, unless an address stands before the port. Pausing and saving need the token in "
            "DIR/live.json")
         ->type_name("[ADDRESS:]PORT");
-    CLI::Option* resume = app.add_flag(
-        "--resume", options.resume,
-        "Continue from DIR's checkpoint.ewa, or start if there is none. More --steps than before "
-        "train the run further");
+    CLI::Option* resume = app.add_flag("--resume", options.resume,
+                                       "Continue from DIR's checkpoint.ewa, or start if there is none. The "
+                                       "run keeps its steps; more --steps "
+                                       "than before train it further");
     app.add_flag("--force", options.force,
                  "Replace the run in DIR. Without --resume or --force it is refused")
         ->excludes(resume);

@@ -50,8 +50,12 @@ std::vector<std::string> command_names(const CLI::App& app) {
     return names;
 }
 
-/// CLI11 says "--steps: 1 required N missing".
+/// CLI11 says "--steps: 1 required N missing", and "FILES: At least 2 required but received 1".
 std::string missing_value(const std::string& text) {
+    const std::string few = ": At least ", received = " required but received ";
+    if (const size_t at = text.find(few), given = text.find(received); at < given && given < text.size())
+        return text.substr(0, at) + ": at least " + text.substr(at + few.size(), given - at - few.size()) +
+               " are needed, and there is only " + text.substr(given + received.size());
     const size_t colon = text.find(": "), required = text.find(" required "), end = text.rfind(" missing");
     if (colon == std::string::npos || required == std::string::npos || end == std::string::npos ||
         end < required)

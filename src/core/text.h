@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Text: parsing of words and numbers, safe display of foreign text, and help text.
 #pragma once
+#include <cctype>
 #include <charconv>
 #include <cstdint>
 #include <optional>
@@ -50,8 +51,10 @@ void use_help_text(App& app) {
             std::string make_option_opts(const Option* option) const override {
                 std::string text = option->get_type_size() == 0 ? "" : option->get_type_name();
                 // Options of a few words have these in place of a type.
-                if (constexpr std::string_view kText = "TEXT:"; text.starts_with(kText))
-                    text.erase(0, kText.size());
+                const size_t colon = text.rfind(':');
+                if (colon < text.size() - 1 && !std::isupper(static_cast<unsigned char>(text[colon + 1])))
+                    text.erase(0, colon + 1);
+                if (text == "TEXT" && option->get_positional()) text.clear();
                 if (!text.empty()) text.insert(0, " ");
                 if (!option->get_default_str().empty()) text += " [" + option->get_default_str() + "]";
                 return text;

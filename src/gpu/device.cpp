@@ -208,7 +208,7 @@ std::vector<DeviceInfo> list_devices() {
             throw RunError("no Vulkan device; " + core::address_limit_text() + gpu::what_would_help());
         return infos;
     } catch (const vk::SystemError& error) {
-        throw RunError("no Vulkan driver works: " + std::string(error.what()) + "; " +
+        throw RunError("no Vulkan driver works (" + vk::to_string(vk::Result(error.code().value())) + "); " +
                        core::address_limit_text() + gpu::what_would_help());
     }
 }

@@ -10,6 +10,7 @@
 #include "core/folders.h"
 #include "core/json.h"
 #include "core/text.h"
+#include "core/typing.h"
 #include "ewa/error.h"
 #include "report/summary.h"
 #include "train/checkpoint.h"
@@ -57,8 +58,9 @@ std::string described(const EarlierRun& run) {
     if (run.step < run.steps)
         return fmt::format("holds an unfinished run, at step {} of {}; --resume continues it, {}", run.step,
                            run.steps, kReplace);
-    return fmt::format("holds a finished run of {} steps{}; --resume with more --steps trains it further, {}",
-                       run.step, run.psnr ? fmt::format(" ({:.2f} dB)", *run.psnr) : "", kReplace);
+    return fmt::format("holds a finished run of {}{}; --resume with more --steps trains it further, {}",
+                       core::counted(uint64_t(run.step), "step"),
+                       run.psnr ? fmt::format(" ({:.2f} dB)", *run.psnr) : "", kReplace);
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include <glm/matrix.hpp>
 #include <numbers>
 
+#include "core/folders.h"
 #include "core/random.h"
 #include "core/typing.h"
 #include "ewa/error.h"
@@ -85,15 +86,15 @@ void adjust_start(const RunOptions& options, Gaussians& start) {
 
 /// The split without frames that --frames does not name. Throws InputError if none is left to train on.
 Split chosen_frames(const Dataset& dataset, Split split, const std::string& list) {
-    if (list == "all") return split;
+    if (list == "all" || list == "train") return split;
+    if (list == "test") throw InputError("--frames test: these images are held out; name others");
     const std::vector<int> chosen = scene::frames_named(dataset, list);
     for (std::vector<int>* frames : {&split.train, &split.test})
         std::erase_if(*frames, [&](int i) { return std::ranges::find(chosen, i) == chosen.end(); });
     if (split.train.empty())
         throw InputError(
-            fmt::format("--frames {}: all of these {} are held out; name more, or hold fewer out with "
-                        "--test-every",
-                        list, core::counted(chosen.size(), "image")));
+            fmt::format("--frames {}: {} {} held out; name more, or hold fewer out with --test-every", list,
+                        core::counted(chosen.size(), "image"), core::is_or_are(chosen.size())));
     return split;
 }
 
@@ -140,6 +141,10 @@ void add_remarks(RunInput& input) {
         input.remarks.emplace_back("the dataset says that no colour depends on the view: SH degree 0");
     if (input.options.init == "sfm" && dataset.points.positions.empty())
         input.remarks.emplace_back("the dataset has no points: training starts from random splats");
+    if (const std::filesystem::path dense = dataset.root / "fused.ply";
+        input.options.init == "sfm" && core::is_file(dense) &&
+        std::ranges::find(dataset.files, dense) == dataset.files.end())
+        input.remarks.push_back("a dense cloud is there, too: --init " + dense.string() + " starts from it");
     if (dataset.missing_images > 0)
         input.remarks.push_back(fmt::format("{} {} missing and skipped",
                                             core::counted(uint64_t(dataset.missing_images), "image"),

@@ -76,7 +76,8 @@ void App::take_opened() {
 }
 
 void App::watch(const live::WhatToWatch& what, TrainProcess* trainer) {
-    live_failed_ = false;
+    // A run in a folder may have ended before the window reaches it. Its files then tell how it went.
+    live_failed_ = !what.folder.empty();
     live_.watch(what, trainer);
     redraw();
 }

@@ -133,6 +133,9 @@ TEST_F(ResumeEdges, AutoKeepsTheStrategyOfTheCheckpoint) {
     ASSERT_EQ(read_json(folder / "o/config.json")["strategy"], "adc");
     ASSERT_EQ(train("o", {"--steps", "6000", "--resume"}, held_at(20, folder / "held", SIGINT)).status, 130);
     EXPECT_EQ(read_json(folder / "o/config.json")["strategy"], "adc");
+    // The steps stay, too.
+    ASSERT_EQ(train("o", {"--resume"}, held_at(20, folder / "held", SIGINT)).status, 130);
+    EXPECT_EQ(read_json(folder / "o/config.json")["steps"], 6000);
     EXPECT_GT(read_json(folder / "o/summary.json")["steps"], 4);
     expect_failure(train("o", {"--steps", "6000", "--strategy", "mcmc", "--resume"}), 2, "--strategy");
 }

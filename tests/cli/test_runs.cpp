@@ -65,6 +65,11 @@ TEST_F(Runs, EvalAndRenderUseTheExposures) {
         return read_json(folder / "e.json")["psnr"].get<double>();
     };
     EXPECT_NEAR(train_psnr({}), read_json(run + "/summary.json")["train_psnr"], 1e-6);
+    const double by_name = train_psnr({folder / "data"});
+    EXPECT_NEAR(by_name, train_psnr({}), 1e-6) << "the run's own dataset";
+    fs::copy(folder / "data", folder / "other", fs::copy_options::recursive);
+    EXPECT_NEAR(train_psnr({folder / "other"}), train_psnr({"--exposures", "none"}), 1e-6)
+        << "another dataset";
 
     // An exposure of a training image that turns the picture white, and none of the held-out images.
     write_file(folder / "white.json", R"({"images/1.png": [[0, 0, 0, 1], [0, 0, 0, 1], [0, 0, 0, 1]]})");
@@ -115,7 +120,9 @@ TEST_F(Runs, FramesChooseTheImages) {
     EXPECT_EQ(count({run, "--split", "train"}), 2u);
     EXPECT_EQ(count({run, folder / "data"}), 3u);
     Names names{"train", folder / "data", "-o", folder / "none", "--test-every", "2", "--frames", "0,2"};
-    expect_failure(run_ewa(names), 2, "--frames 0,2: all of these 2 images are held out");
+    expect_failure(run_ewa(names), 2, "--frames 0,2: 2 images are held out; name more");
+    names.back() = "test";
+    expect_failure(run_ewa(names), 2, "--frames test: these images are held out");
     names.back() = "7";
     expect_failure(run_ewa(names), 2, "there is no frame 7");
 }

@@ -56,6 +56,13 @@ bool column_is_dark(const Image& image, int x) {
     return true;
 }
 
+TEST_F(Views, NamesOfOtherImagesAndFilmsAreRefused) {
+    for (const char* name : {"x.jpg", "x.GIF", "x.webp", "x.avi"}) {
+        expect_failure(render({"-o", folder / name}), 2, "an image is .png or .exr, a film .mp4");
+        EXPECT_FALSE(std::filesystem::exists(folder / name));
+    }
+}
+
 TEST_F(Views, AFileAloneIsAnImageOfTheWholeScene) {
     const Outcome outcome = render({"-o", folder / "new/x.png", "--size", "90x60"});
     expect_success(outcome);

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <glm/gtc/quaternion.hpp>
 #include <limits>
 
@@ -131,6 +132,19 @@ TEST(Colmap, ModelMayLieElsewhere) {
     const Dataset dataset = model.load();
     EXPECT_EQ(dataset.frames.size(), 2u);
     EXPECT_TRUE(dataset.points.positions.empty());
+}
+
+TEST(Colmap, ADenseCloudStandsInForMissingPoints) {
+    Model model;
+    io::write_points_ply(model.folder / "fused.ply",
+                         {{{1, 2, 3}, {4, 5, 6}, {7, 8, 9}}, {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}}});
+    expect_the_model(model.load());  // which has points of its own
+    std::filesystem::remove(model.folder / "sparse/0/points3D.bin");
+    const Dataset dataset = model.load();
+    ASSERT_EQ(dataset.points.positions.size(), 3u);
+    EXPECT_EQ(dataset.points.positions[2], glm::dvec3(7, 8, 9));
+    EXPECT_EQ(dataset.points.colors[1], (std::array<uint8_t, 3>{4, 5, 6}));
+    EXPECT_NE(std::ranges::find(dataset.files, model.folder / "fused.ply"), dataset.files.end());
 }
 
 TEST(Colmap, EveryCutIsAnError) {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/file_reader.h"
+#include "core/folders.h"
 #include "core/sandboxed_path.h"
 #include "core/text.h"
 #include "ewa/error.h"
@@ -350,6 +351,14 @@ ImageRecords read_colmap(const std::filesystem::path& model, const std::filesyst
     (binary ? read_binary_images : read_text_images)(model / (binary ? "images.bin" : "images.txt"), builder);
     if (std::filesystem::exists(points)) (binary ? read_binary_points : read_text_points)(points, builder);
     ImageRecords records = builder.take();
+    // The dense cloud of COLMAP's stereo fusion stands in for points that the model lacks.
+    if (const std::filesystem::path dense = images.parent_path() / "fused.ply";
+        records.points.positions.empty() && records.dropped.count == 0 && core::is_file(dense)) {
+        PlyPoints cloud = read_points_ply(dense);
+        records.points = std::move(cloud.points);
+        records.dropped = std::move(cloud.dropped);
+        records.files.push_back(dense);
+    }
     const std::string extension = binary ? ".bin" : ".txt";
     for (const char* file : {"cameras", "images", "points3D"})
         records.files.push_back(model / (file + extension));
