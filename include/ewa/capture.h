@@ -39,16 +39,20 @@ struct Capture {
 /// no cameras.
 bool is_capture(const std::filesystem::path& path);
 
+/// Throws InputError that says what the path is, unless is_capture holds or it has the files of a dataset.
+void check_training_input(const std::filesystem::path& path);
+
 /// Makes a dataset of a folder of photos (JPEG, PNG, TIFF, BMP; subfolders too) or a video.
 /// - images: the frames of the video, or a link to the photos' folder.
 /// - sparse/0: COLMAP's model, made last. The lens has OpenCV's radial and tangential terms if all images have one size,
 ///   else one radial term per image.
 /// - colmap/: what COLMAP needs to go on, and log.txt with what the programs print.
-/// - capture.json: input and options. A folder with the same ones is continued; what is done is kept.
+/// - capture.json: input, options, and what distinguishes the contents of the photos or the video. A folder with the
+///   same ones is continued; what is done is kept.
 ///
 /// progress is called at least every tenth of a second; false ends the run. Throws InputError: no such input, a folder
-/// of something else, too few photos, HEIC, and what COLMAP cannot place. Throws RunError: ffmpeg or colmap is missing
-/// or fails, disk.
+/// of something else, too few photos, HEIC, photos or a video that have changed since, a video that ffmpeg cannot read,
+/// and what COLMAP cannot place. Throws RunError: ffmpeg or colmap is missing or fails, disk.
 Capture make_dataset(const std::filesystem::path& input, const std::filesystem::path& folder,
                      const CaptureOptions& options,
                      const std::function<bool(const CaptureProgress&)>& progress);

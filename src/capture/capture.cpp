@@ -4,15 +4,18 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "capture/steps.h"
 #include "core/folders.h"
+#include "core/hash.h"
 #include "core/json.h"
 #include "core/text.h"
 #include "ewa/dataset.h"
 #include "ewa/error.h"
+#include "ewa/splat_files.h"
 #include "image/image_files.h"
 #include "io/datasets/image_records.h"
 
@@ -61,26 +64,87 @@ const char* name_of(Matching matching) {
                                              : "auto";
 }
 
-Json record_of(const fs::path& input, const CaptureOptions& options, bool video) {
+/// The photos of the input. Those that a training in a folder of the photos has rendered do not count.
+std::vector<fs::path> photos_of(const fs::path& input, const fs::path& folder) {
+    const fs::path photos = folder_of_photos(input);
+    const bool of_run = folder.filename() == "dataset" && is_file(folder.parent_path() / "config.json");
+    const fs::path results = fs::weakly_canonical(fs::absolute(of_run ? folder.parent_path() : folder));
+    const std::string below = results.lexically_relative(fs::canonical(photos)).string() + "/";
+    std::vector<fs::path> names = capture::photos_in(photos);
+    std::erase_if(names, [&](const fs::path& name) { return name.string().starts_with(below); });
+    return names;
+}
+
+/// A line for each file: what distinguishes its content, a space, and its name.
+std::vector<std::string> lines_of(const fs::path& folder, const std::vector<fs::path>& names) {
+    std::vector<std::string> lines;
+    for (const fs::path& name : names) {
+        core::Hash hash;
+        core::add_file(hash, folder / name);
+        lines.push_back(core::digits_of(hash) + " " + name.string());
+    }
+    return lines;
+}
+
+/// files: lines_of the input.
+Json record_of(const fs::path& input, const CaptureOptions& options, bool video,
+               const std::vector<std::string>& files) {
     Json record{{"input", fs::canonical(input).string()}, {"matching", name_of(options.matching)}};
     if (video) record["frames"] = options.frames;
+    record["files"] = files;
     return record;
 }
 
-/// Makes sure that the folder is new, or was begun with the same input and options.
-void claim(const fs::path& folder, const Json& record) {
+/// By name, what distinguishes the contents.
+std::map<std::string, std::string> contents_in(const Json& lines) {
+    std::map<std::string, std::string> contents;
+    for (const Json& value : lines) {
+        const std::string line = value.is_string() ? value.get<std::string>() : "";
+        const size_t space = line.find(' ');
+        if (space != std::string::npos) contents[line.substr(space + 1)] = line.substr(0, space);
+    }
+    return contents;
+}
+
+/// The first file that differs, in words.
+std::string difference(const Json& before, const Json& now) {
+    const auto old = contents_in(before), current = contents_in(now);
+    for (const auto& [name, content] : current) {
+        const auto found = old.find(name);
+        if (found == old.end()) return core::one_line(name) + " is new";
+        if (found->second != content) return core::one_line(name) + " has another content";
+    }
+    for (const auto& [name, content] : old)
+        if (!current.contains(name)) return core::one_line(name) + " is missing";
+    return "their list is damaged";
+}
+
+/// Whether something has been made of the photos or the video.
+bool is_begun(const fs::path& folder, bool video) {
+    return is_folder(folder / "sparse/0") ||
+           (video ? is_folder(folder / "images") : is_file(folder / "colmap/database.db"));
+}
+
+/// Makes sure that the folder is new, or was begun with the same input and options. Older records have no files.
+void check_claim(const fs::path& folder, const Json& record, bool video) {
     const fs::path file = folder / "capture.json";
     const std::string name = core::one_line(folder.string());
-    if (is_file(file)) {
-        if (core::read_json_file<Json>(file) == record) return;
+    if (!is_file(file)) {
+        if (!is_folder(folder) || fs::is_empty(folder)) return;
+        throw InputError(name + " is not empty, and no dataset that ewa has made; choose another folder");
+    }
+    Json before = core::read_json_file<Json>(file), now = record;
+    const Json files = before.is_object() ? before.value("files", Json()) : Json();
+    if (before.is_object()) before.erase("files");
+    now.erase("files");
+    if (before != now)
         throw InputError(name +
                          " is the dataset of another input, or was made with other options; choose another "
                          "folder, or remove it");
-    }
-    if (is_folder(folder) && !fs::is_empty(folder))
-        throw InputError(name + " is not empty, and no dataset that ewa has made; choose another folder");
-    core::make_folder(folder);
-    core::write_json(file, record);
+    if (files.is_null() || files == record["files"] || !is_begun(folder, video)) return;
+    throw InputError(std::string(video ? "the video has" : "the photos have") + " changed since " + name +
+                     " was made of them (" + difference(files, record["files"]) +
+                     "); choose another folder, or remove this one");
 }
 
 std::string names_text(const std::vector<std::string>& names) {
@@ -110,13 +174,26 @@ Capture result_of(const fs::path& folder, const std::vector<fs::path>& names) {
     return result;
 }
 
+void require_programs(const fs::path& folder, bool video) {
+    if (video && !is_folder(folder / "images")) capture::require_ffmpeg();
+    if (!is_folder(folder / "sparse/0")) capture::require_colmap();
+}
+
 Capture make(const fs::path& input, const fs::path& folder, const CaptureOptions& options,
              const capture::ProgressFunction& progress) {
     const bool video = is_video(input);
     const fs::path images = folder / "images", work = folder / "colmap", model = folder / "sparse/0";
-    if (!video) capture::photos_in(folder_of_photos(input));  // its errors come before the folder is made
-    claim(folder, record_of(input, options, video));
+    // All errors of the input come before the folder is made.
+    const std::vector<std::string> files = video
+                                               ? lines_of(input.parent_path(), {input.filename()})
+                                               : lines_of(folder_of_photos(input), photos_of(input, folder));
+    const Json record = record_of(input, options, video, files);
+    check_claim(folder, record, video);
+    require_programs(folder, video);
+    core::make_folder(folder);
     const core::FolderLock lock(folder);
+    if (!is_file(folder / "capture.json") || !is_begun(folder, video))
+        core::write_json(folder / "capture.json", record);
     core::make_folder(work);
     if (!fs::exists(fs::symlink_status(images))) {
         if (video)
@@ -124,7 +201,7 @@ Capture make(const fs::path& input, const fs::path& folder, const CaptureOptions
         else
             fs::create_directory_symlink(fs::canonical(folder_of_photos(input)), images);
     }
-    const std::vector<fs::path> names = capture::photos_in(images);
+    const std::vector<fs::path> names = video ? capture::photos_in(images) : photos_of(input, folder);
     const bool sequence = options.matching == Matching::automatic
                               ? video || int(names.size()) > kMostUnordered
                               : options.matching == Matching::sequence;
@@ -136,6 +213,35 @@ Capture make(const fs::path& input, const fs::path& folder, const CaptureOptions
     Capture result = result_of(folder, names);
     result.remarks.insert(result.remarks.begin(), remarks.begin(), remarks.end());
     return result;
+}
+
+bool is_photo(const fs::path& file) try {
+    return is_heic(file) || !image::format_name(file).empty();
+} catch (const InputError&) {
+    return false;
+}
+
+/// What kind of splat file its name says that it is; empty if none. glTF has meshes, too.
+std::string splat_kind(const fs::path& file) try {
+    const SplatFormat format = format_of_name(file);
+    if (format == SplatFormat::glb || format == SplatFormat::gltf) return {};
+    const char* kind = format == SplatFormat::ply ? "a splat file or a point cloud (" : "a splat file (";
+    return kind + std::string(name_of(format)) + ")";
+} catch (const InputError&) {
+    return {};
+}
+
+/// Throws what the path is instead of an input; `otherwise` if nothing is known.
+[[noreturn]] void refuse(const fs::path& path, const char* otherwise) {
+    const std::string name = core::one_line(path.string());
+    std::error_code ignored;
+    if (!fs::exists(path, ignored)) throw InputError(name + ": there is no such file or folder");
+    if (is_file(path)) {
+        if (is_photo(path)) throw InputError(name + " is a single picture; name the folder of the photos");
+        if (const std::string kind = splat_kind(path); !kind.empty())
+            throw InputError(name + " is " + kind + ", not a folder of photos, a video or a dataset");
+    }
+    throw InputError(name + ": " + otherwise);
 }
 
 }  // namespace
@@ -167,12 +273,22 @@ bool is_capture(const fs::path& path) {
     return is_folder(path) && !has_cameras(path) && !image::images_below(folder_of_photos(path)).empty();
 }
 
+void check_training_input(const fs::path& path) {
+    if (is_capture(path) || (is_folder(path) && has_cameras(path))) return;
+    if (is_file(path) && extension_of(path) == ".json") return;
+    refuse(path,
+           is_folder(path)
+               ? "neither photos, nor a video, nor a dataset; a dataset has cameras and images (.bin or "
+                 ".txt) in sparse/0, sparse or the folder itself, or transforms.json, "
+                 "transforms_train.json or transforms_test.json; the folder of a training run has "
+                 "config.json"
+               : "neither a video nor a dataset; a dataset is a folder, a transforms.json, or a glTF of "
+                 "meshes (.gltf, .glb)");
+}
+
 Capture make_dataset(const fs::path& input, const fs::path& folder, const CaptureOptions& options,
                      const std::function<bool(const CaptureProgress&)>& progress) {
-    if (!is_capture(input))
-        throw InputError(core::one_line(input.string()) + (fs::exists(input)
-                                                               ? ": neither a video nor a folder with photos"
-                                                               : ": there is no such file or folder"));
+    if (!is_capture(input)) refuse(input, "neither a video nor a folder with photos");
     try {
         return make(input, folder, options, progress);
     } catch (const capture::Stopped&) {

@@ -24,11 +24,7 @@ constexpr const char* kOverlap =
 /// COLMAP with its log and the meaning of its lines.
 class Colmap {
   public:
-    Colmap(const fs::path& work, const ProgressFunction& progress) : work_(work), progress_(progress) {
-        if (core::find_program("colmap").empty())
-            throw RunError(
-                "photos without cameras need COLMAP, which is not installed (Debian: apt install colmap)");
-    }
+    Colmap(const fs::path& work, const ProgressFunction& progress) : work_(work), progress_(progress) {}
 
     fs::path log() const { return work_ / "log.txt"; }
     std::string log_name() const { return core::one_line(log().string()); }
@@ -205,6 +201,12 @@ std::string sizes_text(const std::vector<Model>& models) {
 }
 
 }  // namespace
+
+void require_colmap() {
+    if (core::find_program("colmap").empty())
+        throw RunError(
+            "photos without cameras need COLMAP, which is not installed (Debian: apt install colmap)");
+}
 
 std::vector<std::string> place_photos(const Photos& photos, const fs::path& work, const fs::path& model,
                                       const ProgressFunction& progress) {

@@ -40,7 +40,12 @@ class PgmStream {
     std::string rest_;
 };
 
-/// Writes the sharpest frames of a video to `images` as JPEG files. Programs write to the log. Throws RunError, Stopped.
+/// Throws RunError with the package to install if the program is missing.
+void require_ffmpeg();
+void require_colmap();
+
+/// Writes the sharpest frames of a video to `images` as JPEG files. Programs write to the log. Throws
+/// InputError if ffmpeg cannot read the video, RunError, Stopped.
 void extract_frames(const std::filesystem::path& video, const std::filesystem::path& images, int frames,
                     const std::filesystem::path& log, const ProgressFunction& progress);
 

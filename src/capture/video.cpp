@@ -16,7 +16,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kInstall = "is not installed (Debian: apt install ffmpeg)";
 constexpr int kSmallWidth = 480;  // px, of the frames whose sharpness is compared
 constexpr uint64_t kMostPixels = uint64_t(1) << 24;
 
@@ -26,11 +25,13 @@ std::vector<std::string> ffmpeg(const fs::path& video) {
             "-map",   "0:v:0"};
 }
 
-void check(core::Ended ended, const fs::path& video, const fs::path& log) {
+/// Throws Error, with `what`, if ffmpeg has failed.
+template <class Error>
+void check(core::Ended ended, const fs::path& video, const char* what, const fs::path& log) {
     if (ended == core::Ended::stopped) throw Stopped();
     if (ended == core::Ended::failed)
-        throw RunError(core::one_line(video.string()) + ": ffmpeg cannot read the video; " +
-                       core::one_line(log.string()) + " has its reason");
+        throw Error(core::one_line(video.string()) + ": " + what + "; " + core::one_line(log.string()) +
+                    " has its reason");
 }
 
 /// The number of frames that the video's header states; 0 if it states none.
@@ -59,13 +60,14 @@ std::vector<double> measure(const fs::path& video, const fs::path& log, const Pr
     for (const char* word : {"-vf", "scale=480:-2", "-vsync", "0", "-f", "image2pipe", "-c:v", "pgm", "-"})
         command.emplace_back(word);
     static_assert(kSmallWidth == 480);
-    check(core::run_program({.command = std::move(command), .environment = {}, .log = log},
-                            [&](std::string_view piece) {
-                                stream.add(piece);
-                                const int done = int(result.size());
-                                return progress({"looked at", "frames", done, std::max(total, done)});
-                            }),
-          video, log);
+    check<InputError>(
+        core::run_program({.command = std::move(command), .environment = {}, .log = log},
+                          [&](std::string_view piece) {
+                              stream.add(piece);
+                              const int done = int(result.size());
+                              return progress({"looked at", "frames", done, std::max(total, done)});
+                          }),
+        video, "ffmpeg cannot read the video", log);
     return result;
 }
 
@@ -132,10 +134,13 @@ bool PgmStream::take_one() {
     return true;
 }
 
+void require_ffmpeg() {
+    if (core::find_program("ffmpeg").empty())
+        throw RunError("a video needs ffmpeg, which is not installed (Debian: apt install ffmpeg)");
+}
+
 void extract_frames(const fs::path& video, const fs::path& images, int frames, const fs::path& log,
                     const ProgressFunction& progress) {
-    if (core::find_program("ffmpeg").empty())
-        throw RunError(std::string("a video needs ffmpeg, which ") + kInstall);
     const std::vector<int> chosen = sharpest(measure(video, log, progress), frames);
     if (chosen.empty()) throw InputError(core::one_line(video.string()) + ": the video has no frames");
     std::string filter = "select='";
@@ -154,12 +159,13 @@ void extract_frames(const fs::path& video, const fs::path& images, int frames, c
           std::string("2"), (partial / "frame_%05d.jpg").string()})
         command.push_back(word);
     const int total = int(chosen.size());
-    check(core::run_program({.command = std::move(command), .environment = {}, .log = log},
-                            [&](std::string_view) {
-                                const auto files = std::distance(fs::directory_iterator(partial), {});
-                                return progress({"extracted", "frames", std::min(int(files), total), total});
-                            }),
-          video, log);
+    check<RunError>(
+        core::run_program({.command = std::move(command), .environment = {}, .log = log},
+                          [&](std::string_view) {
+                              const auto files = std::distance(fs::directory_iterator(partial), {});
+                              return progress({"extracted", "frames", std::min(int(files), total), total});
+                          }),
+        video, "ffmpeg cannot write the frames", log);
     fs::rename(partial, images);
 }
 

@@ -34,7 +34,7 @@ void print_notes(const SyntheticDataset& made, const fs::path& folder) {
     if (made.dropped_samples > 0)
         fmt::print("{} paths were not finite and count as black\n", made.dropped_samples);
     if (made.interrupted)
-        fmt::print("interrupted; to continue, repeat the command\n");
+        print_how_to_continue();
     else
         fmt::print("{} {} in {}{}, exposure {:+.1f} stops; {}\n", core::counted(uint64_t(made.views), "view"),
                    core::is_or_are(uint64_t(made.views)), core::one_line(folder.string()),

@@ -68,7 +68,10 @@ void place_with_progress(const fs::path& input, const fs::path& folder, const Ca
         return !interrupted();
     });
     line.reset();
-    if (capture.interrupted) throw Interrupted();
+    if (capture.interrupted) {
+        if (!quiet) print_how_to_continue();
+        throw Interrupted();
+    }
     if (quiet) return;
     for (const std::string& remark : capture.remarks) std::puts(core::one_line(remark).c_str());
     std::puts(core::one_line(fmt::format("{}: {} of {} photos have cameras", folder.string(), capture.placed,

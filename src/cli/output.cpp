@@ -27,6 +27,10 @@ void print_json(const report::Json& json) {
     fmt::print("{}\n", json.dump(2, ' ', false, report::Json::error_handler_t::replace));
 }
 
+void print_how_to_continue() {
+    std::puts("interrupted; to continue, repeat the command");
+}
+
 Progress::Progress(std::string what, int total, std::string unit, bool quiet)
     : what_(std::move(what)),
       unit_(std::move(unit)),

@@ -19,6 +19,9 @@ using core::write_json;
 /// Prints the value with indentation. Bytes that are not UTF-8 become U+FFFD: text from a file may hold some.
 void print_json(const report::Json& json);
 
+/// Says how interrupted work goes on.
+void print_how_to_continue();
+
 /// Progress of long work: one line that is redrawn on a terminal, or a line per tenth of the work in a file.
 class Progress {
   public:

@@ -120,6 +120,7 @@ void render_scene(TrainArguments& arguments) {
 /// that.
 void place_photos(TrainArguments& arguments) {
     RunOptions& run = arguments.run;
+    check_training_input(run.dataset);
     if (!is_capture(run.dataset)) return;
     // The run's name is the last part of the path, which "photos/" and "." do not have.
     run.scene = (fs::absolute(run.dataset).lexically_normal() / "").parent_path();

@@ -38,7 +38,7 @@ FolderLock::FolderLock(const std::filesystem::path& folder) {
     if (descriptor_ < 0 || flock(descriptor_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
     close(descriptor_);
     throw RunError(one_line(folder.string()) +
-                   ": another process trains into this folder; wait for it, or give another --output");
+                   ": another process uses this folder; wait for it, or give another --output");
 }
 
 FolderLock::~FolderLock() {

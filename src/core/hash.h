@@ -3,6 +3,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <type_traits>
 
@@ -29,5 +30,11 @@ class Hash {
   private:
     uint64_t value_ = 0xcbf29ce484222325ull;
 };
+
+/// Adds the file's size and its first 64 KiB. Throws InputError.
+void add_file(Hash& hash, const std::filesystem::path& path);
+
+/// The value as 16 hexadecimal digits.
+std::string digits_of(const Hash& hash);
 
 }  // namespace ewa::core

@@ -2,10 +2,8 @@
 #include "train/resume.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "core/file_reader.h"
 #include "core/hash.h"
 #include "core/json.h"
 #include "ewa/error.h"
@@ -70,14 +68,6 @@ void add_distortion(Hash& hash, const Distortion& d) {
         hash.add(k);
 }
 
-/// The size and the first 64 KiB.
-void add_file(Hash& hash, const std::filesystem::path& path) {
-    core::FileReader file(path);
-    hash.add(file.size());
-    const size_t head = size_t(std::min<uint64_t>(file.size(), 1u << 16));
-    hash.add(file.take(head, "the image"), head);
-}
-
 }  // namespace
 
 std::string dataset_fingerprint(const Dataset& dataset, const Split& split) {
@@ -93,13 +83,11 @@ std::string dataset_fingerprint(const Dataset& dataset, const Split& split) {
             hash.add(frame.orientation);
             hash.add(int(frame.masks));
             hash.add(int(frame.mask_path.empty()));
-            if (frame.image_exists) add_file(hash, frame.image_path);
-            if (!frame.mask_path.empty()) add_file(hash, frame.mask_path);
+            if (frame.image_exists) core::add_file(hash, frame.image_path);
+            if (!frame.mask_path.empty()) core::add_file(hash, frame.mask_path);
         }
     }
-    char text[17];
-    std::snprintf(text, sizeof(text), "%016llx", static_cast<unsigned long long>(hash.value()));
-    return text;
+    return core::digits_of(hash);
 }
 
 int continue_from(const std::filesystem::path& path, const Checkpoint& earlier, Strategy asked,

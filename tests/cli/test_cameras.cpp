@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
@@ -29,6 +30,10 @@ class Cameras : public testing::Test {
         make_dataset(folder_ / "source");
         fs::copy(folder_ / "source/images", folder_ / "photos");
         fs::create_directories(folder_ / "bin");
+        SetUpColmap();
+    }
+
+    void SetUpColmap() {
         // The stand-in says what it was called with, prints what COLMAP prints, and its mapper copies models.
         make_program(folder_ / "bin/colmap", R"sh(
 case "$*" in *--help*) echo "  --SiftExtraction.use_gpu arg (=1)"; exit 0;; esac
@@ -41,7 +46,7 @@ done
 if [ "$FAIL" = "$1" ]; then echo "the reason" >&2; exit 1; fi
 if [ "$HANG" = "$1" ]; then echo begun > "$CALLS.hangs"; sleep 1000; fi
 case $1 in
-feature_extractor) for i in 1 2 3 4; do echo "Processed file [$i/4]"; done;;
+feature_extractor) touch "$3"; for i in 1 2 3 4; do echo "Processed file [$i/4]"; done;;
 exhaustive_matcher) echo "Matching block [1/1, 1/1] in 0.1s";;
 mapper) cp -r "$MODELS"/. "$output"; echo "Registering image #4 (4)";;
 esac
@@ -151,6 +156,8 @@ TEST_F(Cameras, CtrlCEndsColmapToo) {
                                      .signal = SIGINT,
                                      .environment = {{"HANG", "exhaustive_matcher"}}});
     EXPECT_EQ(outcome.status, 130) << outcome.err;
+    EXPECT_NE(outcome.out.find("interrupted; to continue, repeat the command"), std::string::npos)
+        << outcome.out;
     EXPECT_EQ(cameras().status, 0);
 }
 
@@ -166,6 +173,71 @@ TEST_F(Cameras, AnotherInputNeedsAnotherFolder) {
     EXPECT_EQ(files_below(folder_ / "full"), std::vector<std::string>{"notes.txt"});
 }
 
+/// A model of photos that were changed afterwards would give cameras to the wrong pictures.
+TEST_F(Cameras, ChangedPhotosNeedAnotherFolder) {
+    make_model("0", {"0.png", "1.png", "2.png", "3.png"});
+    ASSERT_EQ(cameras().status, 0);
+    const std::string changed = "the photos have changed since " + folder_ / "dataset" + " was made of them ";
+    fs::copy(folder_ / "photos/0.png", folder_ / "photos/more.png");
+    expect_failure(cameras(), 2, changed + "(more.png is new); choose another folder, or remove this one");
+    fs::remove(folder_ / "photos/more.png");
+    EXPECT_EQ(cameras().status, 0);
+    fs::rename(folder_ / "photos/0.png", folder_ / "0.png");
+    expect_failure(cameras(), 2, changed + "(0.png is missing)");
+    fs::copy(folder_ / "photos/1.png", folder_ / "photos/0.png");
+    expect_failure(cameras(), 2, changed + "(0.png has another content)");
+
+    // A record from before the contents were recorded.
+    auto record = read_json(folder_ / "dataset/capture.json");
+    EXPECT_EQ(record.erase("files"), 1u);
+    write_file(folder_ / "dataset/capture.json", record.dump());
+    EXPECT_EQ(cameras().status, 0);
+}
+
+TEST_F(Cameras, PhotosMayChangeWhileTheyGiveNothing) {
+    make_model("0", {"0.png", "1.png", "2.png"});
+    make_program(folder_ / "bin/colmap", "exit 1");
+    EXPECT_EQ(cameras().status, 1);
+    fs::remove(folder_ / "photos/3.png");
+    SetUpColmap();
+    EXPECT_EQ(cameras().status, 0);
+    fs::copy(folder_ / "photos/0.png", folder_ / "photos/more.png");
+    expect_failure(cameras(), 2, "(more.png is new)");
+}
+
+TEST_F(Cameras, DamagedVideosAreUnreadableInput) {
+    make_program(folder_ / "bin/ffmpeg", "echo no moov >&2; exit 1");
+    write_file(folder_ / "film.mp4", "no film");
+    const std::string log = folder_ / "dataset/colmap/log.txt";
+    expect_failure(run({"cameras", folder_ / "film.mp4", "-o", folder_ / "dataset"}), 2,
+                   folder_ / "film.mp4: ffmpeg cannot read the video; " + log + " has its reason");
+    EXPECT_NE(read_file(log).find("no moov"), std::string::npos);
+    // Another try with a better film is no other input.
+    write_file(folder_ / "film.mp4", "another film");
+    expect_failure(run({"cameras", folder_ / "film.mp4", "-o", folder_ / "dataset"}), 2,
+                   "ffmpeg cannot read the video");
+}
+
+TEST_F(Cameras, WhatIsNoPhotosIsNamed) {
+    fs::create_directories(folder_ / "empty");
+    write_file(folder_ / "g.spz", "NGSP and so on");
+    write_file(folder_ / "notes", "text");
+    const std::string no_splats = folder_ / "g.spz is a splat file (SPZ), not a folder of photos";
+    const std::string picture = folder_ / "photos/0.png is a single picture; name the folder of the photos";
+    const auto refused = [&](const std::string& command, const std::string& input, const std::string& text) {
+        expect_failure(run({command, folder_ / input, "-o", folder_ / "x"}), 2, text);
+        EXPECT_FALSE(fs::exists(folder_ / "x"));
+    };
+    for (const char* command : {"train", "cameras"}) {
+        refused(command, "g.spz", no_splats);
+        refused(command, "photos/0.png", picture);
+        refused(command, "nowhere", "there is no such file or folder");
+    }
+    refused("train", "empty", "neither photos, nor a video, nor a dataset; a dataset has cameras and images");
+    refused("train", "notes", "neither a video nor a dataset; a dataset is a folder");
+    refused("cameras", "notes", "neither a video nor a folder with photos");
+}
+
 TEST_F(Cameras, WhatIsMissingIsNamed) {
     fs::remove(folder_ / "bin/colmap");
     const Circumstances bare{.environment = {{"PATH", folder_ / "bin"}}};
@@ -174,6 +246,11 @@ TEST_F(Cameras, WhatIsMissingIsNamed) {
     write_file(folder_ / "film.mp4", "no film");
     expect_failure(run_ewa({"cameras", folder_ / "film.mp4", "-o", folder_ / "film"}, bare), 1,
                    "apt install ffmpeg");
+    make_program(folder_ / "bin/ffmpeg", "exit 1");
+    expect_failure(run_ewa({"cameras", folder_ / "film.mp4", "-o", folder_ / "film"}, bare), 1,
+                   "apt install colmap");
+    // Nothing is left of the attempts.
+    for (const char* made : {"dataset", "film"}) EXPECT_FALSE(fs::exists(folder_ / made)) << made;
     expect_failure(run_ewa({"cameras", folder_ / "nowhere", "-o", folder_ / "x"}), 2,
                    "there is no such file or folder");
     expect_failure(run_ewa({"cameras", folder_ / "bin", "-o", folder_ / "x"}), 2,
@@ -237,6 +314,20 @@ TEST_F(Cameras, TrainingPlacesPhotosFirst) {
     EXPECT_EQ(read_json(folder_ / "e.json")["frames"].size(), 4u);
     expect_success(run_ewa({"render", folder_ / "run", "-o", folder_ / "views"}));
     EXPECT_EQ(files_below(folder_ / "views").size(), 4u);
+}
+
+/// The pictures that a training in the folder of the photos leaves are no new photos.
+TEST_F(Cameras, ResultsBesideThePhotosAreNoPhotos) {
+    make_model("0", {"0.png", "1.png", "2.png", "3.png"});
+    const std::vector<std::string> train = {
+        "train", folder_ / "photos", "-o", folder_ / "photos/run", "--steps", "2", "--quiet"};
+    expect_success(run(train));
+    const std::vector<std::string> files = files_below(folder_ / "photos/run");
+    EXPECT_GT(std::ranges::count_if(files, [](const auto& name) { return name.ends_with(".png"); }), 0);
+    std::vector<std::string> again = train;
+    again.emplace_back("--force");
+    expect_success(run(again));
+    EXPECT_EQ(calls(), "feature_extractor\nexhaustive_matcher\nmapper\n");
 }
 
 /// A film of 20 real photos, where COLMAP, ffmpeg and the photos are on this machine.

@@ -199,7 +199,7 @@ TEST_F(Faults, AnImageVanishes) {
 TEST_F(Faults, ASecondTrainerInTheSameFolder) {
     Outcome refused;
     expect_success(train("o", {}, held_at(20, folder / "held", 0, [&] { refused = train("o"); })));
-    expect_failure(refused, 1, "another process");
+    expect_failure(refused, 1, "another process uses this folder");
     expect_success(train("whole"));
     EXPECT_EQ(read_file(folder / "o/splats.ply"), read_file(folder / "whole/splats.ply"));
 }

@@ -15,7 +15,7 @@ TEST(FolderLock, OneAtATime) {
     const test::TempFolder folder, other;
     std::optional<core::FolderLock> first(folder.path());
     expect_error<RunError>([&] { core::FolderLock second(folder.path()); },
-                           {folder.path().string(), "another process"});
+                           {folder.path().string(), "another process uses this folder"});
     const core::FolderLock elsewhere(other.path());
     first.reset();
     const core::FolderLock third(folder.path());
