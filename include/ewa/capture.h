@@ -51,8 +51,8 @@ void check_training_input(const std::filesystem::path& path);
 ///   same ones is continued; what is done is kept.
 ///
 /// progress is called at least every tenth of a second; false ends the run. Throws InputError: no such input, a folder
-/// of something else, too few photos, HEIC, photos or a video that have changed since, a video that ffmpeg cannot read,
-/// and what COLMAP cannot place. Throws RunError: ffmpeg or colmap is missing or fails, disk.
+/// of something else, too few photos, HEIC. Also where photos or a video have changed since, ffmpeg cannot read the
+/// video, or COLMAP cannot place the photos. Throws RunError: ffmpeg or colmap is missing or fails, disk.
 Capture make_dataset(const std::filesystem::path& input, const std::filesystem::path& folder,
                      const CaptureOptions& options,
                      const std::function<bool(const CaptureProgress&)>& progress);
