@@ -88,8 +88,9 @@ fs::path training_svg(const BenchArguments& arguments) {
 void check_files(const BenchArguments& arguments) {
     const fs::path beside = training_svg(arguments);
     const fs::path& json = arguments.options.json;
-    check_outputs({{"--svg", arguments.svg}, {"--svg's diagram of training", beside}, {"--json", json}},
-                  {{"--splats", arguments.splats}});
+    check_command_outputs(
+        {{"--svg", arguments.svg}, {"--svg's diagram of training", beside}, {"--json", json}},
+        {{"--splats", arguments.splats}});
 }
 
 }  // namespace
@@ -189,7 +190,10 @@ Action add_bench(CLI::App& app) {
     arguments->options.read_splats = load_splats;
     const CLI::Option* steps = app.get_option("--training-steps");
     return [arguments, steps] {
-        if (!arguments->accuracy) return bench::run(arguments->options, {"/proc/self/exe", "bench"});
+        if (!arguments->accuracy) {
+            check_command_outputs({{"--json", arguments->options.json}}, {});
+            return bench::run(arguments->options, {"/proc/self/exe", "bench"});
+        }
         if (steps->count() > 0) arguments->steps = arguments->options.training_steps;
         return run_accuracy(*arguments);
     };

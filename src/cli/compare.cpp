@@ -144,7 +144,7 @@ void check_files(const CompareArguments& arguments, const Sides& sides, const Im
     }
     const std::vector<NamedFile> dataset = scene::files_of(sides.cameras, "--cameras");
     read.insert(read.end(), dataset.begin(), dataset.end());
-    check_outputs(written, read);
+    check_command_outputs(written, read);
 }
 
 Compared compare(const ImagePair& pair, const Sides& sides, const CompareArguments& arguments) {

@@ -120,12 +120,12 @@ void check_files(const ConvertArguments& arguments) {
         for (const fs::path& values : values_of(arguments.files[i]))
             inputs.push_back({"values of an input", values});
     }
-    check_outputs(outputs, inputs);
+    check_command_outputs(outputs, inputs);
     const SplatFormat format = format_of_name(out);
     if (format == SplatFormat::gltf) outputs.push_back({"the .bin of OUT", io::new_gltf_values(out)});
     if (format == SplatFormat::sog_meta)
         for (const fs::path& image : io::new_sog_images(out)) outputs.push_back({"an image of OUT", image});
-    if (outputs.size() > 2) check_outputs(outputs, inputs);
+    if (outputs.size() > 2) check_command_outputs(outputs, inputs);
 }
 
 /// Throws unless splats are left to write, or --allow-empty is given. read: the number of splats in the inputs.

@@ -34,11 +34,12 @@ int run(const GradArguments& arguments) {
         throw InputError("the gradient is written as a PLY: -o " + arguments.output.string() +
                          " does not end in .ply");
     const std::vector<NamedFile> written{{"--output", arguments.output}, {"--json", arguments.json}};
-    check_outputs(written, {{"SPLATS", arguments.views.splats}, {"DATASET", arguments.views.dataset}});
+    check_command_outputs(written,
+                          {{"SPLATS", arguments.views.splats}, {"DATASET", arguments.views.dataset}});
     const Gaussians gaussians = load_splats(arguments.views.splats);
     const auto [dataset, frames, folder] = load_views(arguments.views, arguments.frame, 0);
     if (frames.size() > 1) throw InputError("--frame: '" + arguments.frame + "' is more than one frame");
-    check_outputs(written, scene::files_of(dataset, "DATASET"));
+    check_command_outputs(written, scene::files_of(dataset, "DATASET"));
     const int index = frames.front();
     const Frame& frame = dataset.frames[size_t(index)];
     make_folder(arguments.output.parent_path());

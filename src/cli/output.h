@@ -3,6 +3,7 @@
 #pragma once
 #include <chrono>
 #include <string>
+#include <vector>
 
 #include "core/folders.h"
 #include "core/json.h"
@@ -11,10 +12,12 @@
 
 namespace ewa::cli {
 
-using core::check_outputs;
 using core::make_folder;
 using core::NamedFile;
 using core::write_json;
+
+/// core::check_outputs for every command but `ewa train`. It also refuses outputs that are files of a training run.
+void check_command_outputs(const std::vector<NamedFile>& written, std::vector<NamedFile> read);
 
 /// Prints the value with indentation. Bytes that are not UTF-8 become U+FFFD: text from a file may hold some.
 void print_json(const report::Json& json);

@@ -77,7 +77,7 @@ int render_dataset_views(const RenderArguments& arguments) {
     std::vector<NamedFile> written, read = scene::files_of(dataset, "--cameras");
     for (const int frame : frames) written.push_back({"the render", file_of(frame)});
     read.insert(read.end(), {{"SPLATS", arguments.splats}, {"--cameras", arguments.cameras}});
-    check_outputs(written, read);
+    check_command_outputs(written, read);
     const std::vector<Exposure> exposures = exposures_of(
         arguments.exposures, arguments.cameras_of_run ? arguments.run : std::nullopt, dataset, frames);
     make_folder(arguments.output);
@@ -171,8 +171,8 @@ int render_free_views(RenderArguments arguments) {
     if (film) find_ffmpeg();
     if (one_image) arguments.format = core::lower(arguments.output.extension().string()).substr(1);
     if (output != ViewsOutput::folder) {
-        check_outputs({{"--output", arguments.output}},
-                      {{"SPLATS", arguments.splats}, {"--views", arguments.views.views}});
+        check_command_outputs({{"--output", arguments.output}},
+                              {{"SPLATS", arguments.splats}, {"--views", arguments.views.views}});
     }
     const SplatScene scene = read_splats(arguments.splats);
     if (scene.antialiased && !arguments.kernel_given) options.kernel = Footprint::antialias;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "live/run_folder.h"
 
+#include <algorithm>
+
 #include "core/folders.h"
 #include "core/json.h"
 #include "core/text.h"
@@ -50,6 +52,13 @@ fs::path dataset_of(const fs::path& run, const fs::path& named) {
     return {};
 }
 
+/// Programs other than ewa also write a config.json. A run that has begun has metrics.jsonl beside it.
+bool is_run(const fs::path& folder) {
+    const auto present = [&](const char* name) { return core::is_file(folder / name); };
+    return present("config.json") &&
+           (present("metrics.jsonl") || present("splats.ply") || present("checkpoint.ewa"));
+}
+
 }  // namespace
 
 std::string Run::text(const char* option) const {
@@ -74,6 +83,16 @@ std::optional<Run> run_of_splats(const fs::path& splats) {
     const fs::path folder = splats.parent_path();
     if (!core::is_file(folder / "config.json")) return std::nullopt;
     return find_run(folder);
+}
+
+std::optional<fs::path> run_of_file(const fs::path& file) {
+    std::error_code error;
+    for (const fs::path& path : {file, fs::weakly_canonical(file, error)}) {
+        const fs::path folder = path.parent_path();
+        if (std::ranges::find(kRunFiles, path.filename()) != kRunFiles.end() && is_run(folder))
+            return folder.empty() ? "." : folder;
+    }
+    return std::nullopt;
 }
 
 }  // namespace ewa::live

@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // The folder of a training run, for those who read it: its splats, its dataset and the options of the run.
 #pragma once
+#include <array>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
 namespace ewa::live {
+
+/// The files that `ewa train` writes beside its renders.
+inline constexpr std::array kRunFiles{"config.json",  "metrics.jsonl", "checkpoint.ewa", "splats.ply",
+                                      "summary.json", "report.html",   "exposures.json"};
 
 struct Run {
     std::filesystem::path folder;
@@ -28,5 +33,9 @@ std::optional<Run> find_run(const std::filesystem::path& folder);
 
 /// The run that wrote this splat file: it is splats.ply, and config.json is beside it. Empty for any other path.
 std::optional<Run> run_of_splats(const std::filesystem::path& splats);
+
+/// The folder of the run that this path is a file of, also through symbolic links: it has a name of kRunFiles, and a
+/// run's config.json is in its folder. The file itself need not exist. Empty for any other path.
+std::optional<std::filesystem::path> run_of_file(const std::filesystem::path& file);
 
 }  // namespace ewa::live

@@ -222,6 +222,51 @@ TEST_F(Runs, WhatIsMissingIsNamed) {
     expect_failure(run_ewa({"eval", folder / "begun"}), 2, "names no dataset");
 }
 
+/// No command but ewa train writes the files of a run.
+TEST_F(Runs, FilesOfARunStayWhole) {
+    const std::string run = train("run"), other = train("other"), splats = folder / "s.ply";
+    const auto whole = [&] {
+        std::string all;
+        for (const std::string& file : files_below(run)) all += file + "\n" + read_file(run + "/" + file);
+        return all;
+    };
+    const std::string before = whole();
+    const auto refused = [&](const Names& arguments, const std::string& text) {
+        SCOPED_TRACE(arguments[0] + " " + arguments.back());
+        expect_failure(run_ewa(arguments), 2, text);
+        EXPECT_EQ(whole(), before);
+    };
+    const std::string reason = "is a file of the training run in " + run;
+    for (const char* file : {"config.json", "checkpoint.ewa", "summary.json", "metrics.jsonl", "splats.ply",
+                             "report.html", "exposures.json"})
+        refused({"eval", run, "--json", run + "/" + file}, reason);
+    refused({"grad", run, "--frame", "0", "-o", folder / "x.ply", "--json", run + "/summary.json"}, reason);
+    refused({"compare", run, other, "--json", run + "/metrics.jsonl"}, reason);
+    refused({"convert", run, folder / "x.spz", "--json", run + "/config.json"}, reason);
+    refused({"bench", "--cases", "none", "--json", run + "/summary.json"}, reason);
+    // Also where the run is no input.
+    refused({"convert", splats, run + "/splats.ply"}, "; name another file");
+    refused({"eval", splats, folder / "data", "--json", run + "/exposures.json"}, reason);
+    fs::create_symlink(run + "/config.json", folder / "link.json");
+    refused({"eval", run, "--json", folder / "link.json"}, reason);
+    fs::create_hard_link(run + "/config.json", folder / "hard.json");
+    refused({"eval", run + "/splats.ply", "--json", folder / "hard.json"},
+            "is the same file as a file of the run");
+
+    const fs::path here = fs::current_path();
+    fs::current_path(run);
+    refused({"eval", ".", "--json", "config.json"}, "is a file of the training run in .;");
+    fs::current_path(here);
+
+    expect_success(run_ewa({"eval", run, "--json", run + "/eval.json"}));
+    fs::create_directory(folder / "plain");
+    for (int i = 0; i < 2; ++i) {
+        expect_success(run_ewa({"convert", splats, folder / "plain/splats.ply"}));
+        expect_success(run_ewa({"eval", run, "--json", folder / "summary.json"}));
+    }
+    expect_success(run_ewa({"train", "--config", run + "/config.json", "-o", run, "--force", "--quiet"}));
+}
+
 TEST_F(Runs, AFolderThatIsADatasetTooStaysOne) {
     write_file(folder / "data/config.json", "{}");
     const Outcome info = run_ewa({"info", folder / "data"});
