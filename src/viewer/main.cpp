@@ -13,10 +13,14 @@
 #include <utility>
 #include <vector>
 
+#include "core/folders.h"
+#include "core/outputs.h"
 #include "core/pixel_size.h"
 #include "core/terminal.h"
 #include "core/typing.h"
 #include "ewa/error.h"
+#include "live/run_folder.h"
+#include "scene/dataset_files.h"
 #include "scene/names.h"
 #include "train/earlier_run.h"
 #include "viewer/app.h"
@@ -114,6 +118,24 @@ OpenedScene open_what(const Arguments& arguments, Startup& startup) {
         startup.watch = live::WhatToWatch{scene.run, {}, {}, scene.splats_time};
     }
     return scene;
+}
+
+/// Checks the files of a screenshot or a film against the inputs, and creates their folder.
+void prepare_outputs(const Arguments& arguments, const Startup& startup) {
+    std::vector<core::NamedFile> written, read;
+    if (startup.picture) written.push_back({"--screenshot", *startup.picture});
+    if (startup.film) {
+        Film film(startup.views, *startup.film, {}, double(startup.settings.film_seconds));
+        for (; !film.finished(); ++film.next) written.push_back({"--film", film.file()});
+    }
+    if (written.empty()) return;
+    if (startup.scene.dataset) read = scene::files_of(*startup.scene.dataset, "the dataset");
+    read.insert(read.end(),
+                {{"PATH", arguments.path}, {"--cameras", arguments.cameras}, {"--views", arguments.views}});
+    for (const char* name : live::kRunFiles)
+        if (!startup.scene.run.empty()) read.push_back({"a file of the run", startup.scene.run / name});
+    core::check_outputs(written, read);
+    core::make_folder(startup.film ? *startup.film : startup.picture->parent_path());
 }
 
 Startup open(const Arguments& arguments) {
@@ -266,6 +288,7 @@ int run(const Arguments& arguments) {
         auto opening =
             std::async(std::launch::async, [options = arguments.device] { return open_device(options); });
         Startup startup = open(arguments);
+        prepare_outputs(arguments, startup);
         startup.times.scene_read = startup.times.now();
         std::optional<TrainProcess> trainer;
         if (arguments.train) {

@@ -145,7 +145,8 @@ TEST_F(Window, WhatCannotBeMendedIsOneLine) {
 }
 
 TEST_F(Window, APictureThatCannotBeWrittenIsAFailure) {
-    expect_failure(run_view({splats_, "--screenshot", folder_ / "nowhere/shown.png"}), 1, "nowhere");
+    write_file(folder_ / "file", "in the way");
+    expect_failure(run_view({splats_, "--screenshot", folder_ / "file/shown.png"}), 1, "file");
 }
 
 TEST(WithoutWindow, NoDisplayIsOneLine) {
@@ -180,7 +181,43 @@ TEST(WithoutWindow, ScreenshotsAndFilmsNeedNoDisplay) {
     expect_failure(
         run_view({splats, "--cameras", folder / "views", "--compare", "wipe", "--screenshot", shown}), 2,
         "--compare");
-    expect_failure(run_view({splats, "--screenshot", folder / "nowhere/shown.png"}), 1, "nowhere");
+    expect_success(run_view({splats, "--size", "8x8", "--screenshot", folder / "new/folder/shown.png"}));
+    EXPECT_TRUE(std::filesystem::exists(folder / "new/folder/shown.png"));
+    write_file(folder / "file", "in the way");
+    expect_failure(run_view({splats, "--screenshot", folder / "file/shown.png"}), 1, "file");
+}
+
+TEST(WithoutWindow, NoPictureTakesTheNameOfAnInput) {
+    unsetenv("DISPLAY");
+    unsetenv("WAYLAND_DISPLAY");
+    const Folder folder;
+    make_splats(folder / "splats.ply");
+    make_dataset(folder / "views", {"0.png", "1.png", "00002.png"});
+    const Camera camera = scene::look_at({0, 0, -6}, {0, 0, 0}, {0, -1, 0}, 48, 32);
+    io::write_views(folder / "views.json", {{"1", camera, {}}, {"2", camera, {}}});
+    const std::string splats = folder / "splats.ply", data = folder / "views", saved = folder / "views.json",
+                      link = folder / "link.png", hard = folder / "hard.png";
+    std::filesystem::create_symlink(splats, link);
+    std::filesystem::create_hard_link(saved, hard);
+    std::filesystem::copy_file(splats, folder / "same.png");
+    const auto whole = [&] {
+        std::string all;
+        for (const std::string& file : files_below(folder / "")) all += file + read_file(folder / file);
+        return all;
+    };
+    const std::string before = whole();
+    const auto refused = [&](const std::vector<std::string>& arguments, const std::string& text) {
+        expect_failure(run_view(arguments), 2, text);
+        EXPECT_EQ(whole(), before);
+    };
+    refused({splats, "--screenshot", link}, "--screenshot " + link + " is the same file as PATH");
+    refused({splats, "--views", saved, "--screenshot", hard}, "is the same file as --views");
+    refused({folder / "same.png", "--screenshot", folder / "same.png"}, "is the same file as PATH");
+    refused({data, "--screenshot", data + "/images/1.png"}, "is the same file as an image of the dataset");
+    refused({splats, "--cameras", data, "--screenshot", data + "/images/0.png"}, "an image of the dataset");
+    refused(
+        {splats, "--cameras", data, "--views", saved, "--film-seconds", "0.1", "--film", data + "/images"},
+        "00002.png is the same file as an image of the dataset");
 }
 
 TEST(WithoutWindow, WrongUseIsOneLine) {
