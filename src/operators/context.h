@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+// What all operators of a device share, and how arrays of the host reach it.
+#pragma once
+#include <algorithm>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "ewa/error.h"
+#include "ewa/operators.h"
+#include "gpu/executor.h"
+#include "passes/pass.h"
+
+namespace ewa::operators {
+
+/// A buffer that is kept from call to call and grows as needed.
+class Array {
+  public:
+    explicit Array(const char* name, gpu::Texel texel = gpu::Texel::none, bool uniform = false)
+        : name_(name), texel_(texel), uniform_(uniform) {}
+
+    /// Room for `bytes` bytes, whose contents are undefined.
+    const gpu::Buffer& reserve(gpu::Device& device, uint64_t bytes) {
+        if (!buffer_ || buffer_.bytes() < bytes) {
+            buffer_ = gpu::Buffer();
+            buffer_ = gpu::Buffer(device, name_, bytes + bytes / 4, texel_, uniform_);
+        }
+        return buffer_;
+    }
+    template <class T>
+    const gpu::Buffer& upload(gpu::Device& device, std::span<const T> values) {
+        reserve(device, values.size_bytes());
+        buffer_.upload(values);
+        return buffer_;
+    }
+    template <class T>
+    std::vector<T> download(size_t count) const {
+        return buffer_.download<T>(count);
+    }
+    const gpu::Buffer& buffer() const { return buffer_; }
+    gpu::Buffer& buffer() { return buffer_; }
+
+  private:
+    const char* name_;
+    gpu::Texel texel_;
+    bool uniform_;
+    gpu::Buffer buffer_;
+};
+
+/// Buffers of the projection and of spherical harmonics, by use.
+struct ProjectionArrays;
+struct HarmonicsArrays;
+
+struct Context {
+    explicit Context(std::shared_ptr<gpu::Device> device);
+    ~Context();
+
+    std::shared_ptr<gpu::Device> device;
+    passes::PassCache cache;
+    gpu::Executor executor;
+    std::mutex mutex;  // held by each operator while it uses the device or one of the members below
+
+    std::vector<std::unique_ptr<BlendFrame>> free_frames;
+    std::mutex frames_mutex;  // of free_frames
+};
+
+/// Throws InputError unless an array has the size that its shape says. shape: for the text, such as "[N, 3]".
+inline void check_size(const char* argument, size_t size, size_t expected, const char* shape) {
+    if (size != expected)
+        throw InputError(std::string(argument) + " has " + std::to_string(size) + " values; its shape " + shape +
+                         " needs " + std::to_string(expected));
+}
+
+}  // namespace ewa::operators
