@@ -39,19 +39,24 @@ struct ViewArrays {
 };
 
 struct ProjectionOptions {
-    uint32_t width = 0, height = 0;    // px
-    float low_pass = 0.3f;             // added to both diagonal entries of the 2D covariance (px^2)
-    float near = 0.01f, far = 1e10f;   // a splat is visible where near < z < far (world units)
-    float radius_clip = 0;             // a splat with both radii at or below it is not visible (px)
-    bool compensations = false;        // Mip-Splatting's factor of the opacity
+    uint32_t width = 0, height = 0;   // px
+    float low_pass = 0.3f;            // added to both diagonal entries of the 2D covariance (px^2)
+    float near = 0.01f, far = 1e10f;  // a splat is visible where near < z < far (world units)
+    float radius_clip = 0;            // a splat with both radii at or below it is not visible (px)
+    bool compensations = false;       // Mip-Splatting's factor of the opacity
+    // Whiteners in place of conics. They keep their digits where a conic has lost them: a needle 1,000 px long and 1 px
+    // wide has a conic whose determinant is a millionth of its products.
+    bool whiteners = false;
 };
 
 /// C views of N splats. Invisible splats have radii 0, and 0 in all other arrays.
 struct ProjectedSplats {
-    std::vector<int32_t> radii;        // [C, N, 2], px
-    std::vector<float> means2d;        // [C, N, 2], px
-    std::vector<float> depths;         // [C, N], view z
-    std::vector<float> conics;         // [C, N, 3]: xx xy yy of the inverse 2D covariance
+    std::vector<int32_t> radii;  // [C, N, 2], px
+    std::vector<float> means2d;  // [C, N, 2], px
+    std::vector<float> depths;   // [C, N], view z
+    // [C, N, 3], the inverse 2D covariance: conics xx xy yy, or whiteners ux k vy. With d = pixel - mean,
+    // d^T conic d / 2 = u^2 + v^2, u = ux (dx - k dy), v = vy dy.
+    std::vector<float> conics;
     std::vector<float> compensations;  // [C, N]; empty unless asked for
 };
 
@@ -71,8 +76,9 @@ struct SplatGradient {
 
 /// M splats as 2D Gaussians of one image: alpha = min(0.99, opacity exp(-d^T conic d / 2)), d = pixel - mean.
 struct ScreenSplats {
-    std::span<const float> means2d;    // [M, 2], px
-    std::span<const float> conics;     // [M, 3]: xx xy yy of the inverse 2D covariance
+    std::span<const float> means2d;  // [M, 2], px
+    std::span<const float> conics;   // [M, 3]: conics, or whiteners
+    bool whiteners = false;
     std::span<const float> opacities;  // [M]
     std::span<const float> features;   // [M, D]
     uint32_t channels = 3;             // D, at least 1
@@ -81,24 +87,25 @@ struct ScreenSplats {
 
 /// Which splats a pixel draws: all, nearest first, equal depths by index.
 struct DepthOrder {
-    std::span<const float> depths;   // [M]
-    std::span<const int32_t> radii;  // [M, 2]; a splat with a radius of 0 is left out; empty: none is
+    std::span<const float> depths;     // [M]
+    std::span<const int32_t> radii{};  // [M, 2]; a splat with a radius of 0 is left out; empty: none is
 };
 
 /// Which splats a pixel draws: the list of its tile, in the order of the list.
 struct TileLists {
-    uint32_t tile_size = 16;            // px, a multiple of the device's tiles (8 x 8 on most)
-    std::span<const int32_t> offsets;   // [tiles + 1], row by row: where each tile's list begins; the last is the end
-    std::span<const int32_t> splats;    // the lists, one after another
+    uint32_t tile_size = 16;  // px, a multiple of the device's tiles (8 x 8 on most)
+    std::span<const int32_t>
+        offsets;  // [tiles + 1], row by row: where each tile's list begins; the last is the end
+    std::span<const int32_t> splats;  // the lists, one after another
 };
 
 struct BlendOptions {
-    uint32_t width = 0, height = 0;      // px
-    std::span<const float> background;   // [D]; empty: 0
+    uint32_t width = 0, height = 0;       // px
+    std::span<const float> background{};  // [D]; empty: 0
     // A pixel whose tile has 0 here shows the background and has alpha 0. Row by row; empty: all are drawn.
-    std::span<const uint8_t> tile_mask;
-    uint32_t mask_tile_size = 16;        // px
-    bool gradients = true;               // keep what blend_backward needs
+    std::span<const uint8_t> tile_mask{};
+    uint32_t mask_tile_size = 16;  // px
+    bool gradients = true;         // keep what blend_backward needs
 };
 
 /// What blend_backward needs. It holds memory of the device until it is destroyed.
@@ -117,11 +124,14 @@ struct BlendedImage {
     std::vector<float> features;          // [H, W, D]: sum of f alpha T, and T times the background
     std::vector<float> alphas;            // [H, W], 1 - T
     std::shared_ptr<BlendRecord> record;  // null without BlendOptions::gradients
+    // Splats that were left out because a value is not finite or a conic not positive definite. A feature that is not
+    // finite counts as 0, and its splat as skipped.
+    uint32_t skipped_nonfinite = 0;
 };
 
 struct ScreenGradient {
     std::vector<float> means2d;     // [M, 2]
-    std::vector<float> conics;      // [M, 3]
+    std::vector<float> conics;      // [M, 3], by conics or by whiteners
     std::vector<float> opacities;   // [M]
     std::vector<float> features;    // [M, D]
     std::vector<float> background;  // [D]
@@ -140,7 +150,8 @@ class Operators {
     Operators(const Operators&) = delete;
 
     /// The projection of Gaussians by its first-order Taylor expansion (Zwicker et al. 2001, eq. 22 to 31).
-    ProjectedSplats project(const SplatArrays& splats, const ViewArrays& views, const ProjectionOptions& options);
+    ProjectedSplats project(const SplatArrays& splats, const ViewArrays& views,
+                            const ProjectionOptions& options);
     /// radii: those of project for the same arguments.
     SplatGradient project_backward(const SplatArrays& splats, const ViewArrays& views,
                                    const ProjectionOptions& options, std::span<const int32_t> radii,

@@ -13,7 +13,8 @@
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_MODE) const uint MODE = 0;
 const bool ABSOLUTE = (MODE & BLEND_BACKWARD_ABSOLUTE) != 0u;
-const uint SUMS = ABSOLUTE ? 11u : 9u;
+const bool WITH_ALPHA = (MODE & BLEND_BACKWARD_ALPHA) != 0u, WITH_FOURTH = (MODE & BLEND_BACKWARD_FOURTH) != 0u;
+const uint SUMS = WITH_FOURTH ? 12u : ABSOLUTE ? 11u : 9u;
 TEXELS(0, records);
 layout(set = 0, binding = 1, scalar) readonly buffer Splats { uint splats[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer TileStarts { uint tile_starts[]; };
@@ -68,7 +69,7 @@ void main() {
     const uint py = (tile / push.tiles[0]) * TILE_HEIGHT + lane / TILE_WIDTH;
     const vec2 pixel = vec2(px, py) + 0.5;
 
-    float T[PIXELS], rest[PIXELS];
+    float T[PIXELS], rest[PIXELS], fourth[PIXELS];
     vec3 gradient[PIXELS];
     [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
         const uint y = py + p * ROW_STEP;
@@ -81,6 +82,13 @@ void main() {
         rest[p] = dot(gradient[p], vec3(planes[PLANE_R * push.image.plane_floats + at],
                                         planes[PLANE_G * push.image.plane_floats + at],
                                         planes[PLANE_B * push.image.plane_floats + at]));
+        // The light that passes all splats also depends on each of them: it is one more thing behind them.
+        if (WITH_ALPHA)
+            rest[p] += image_gradient[PLANE_T * push.image.plane_floats + at] * planes[PLANE_T * push.image.plane_floats + at];
+        if (WITH_FOURTH) {
+            fourth[p] = image_gradient[PLANE_DEPTH * push.image.plane_floats + at];
+            rest[p] += fourth[p] * planes[PLANE_DEPTH * push.image.plane_floats + at];
+        }
     }
     const float none[12] = float[](0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     const uint end = tile_starts[tile + 1u];
@@ -89,7 +97,7 @@ void main() {
         const Loaded batch = load_batch(k, end);
         float slot[12] = none;
         UNROLL_BLOCKS for (uint first = 0; first < SUBGROUP; first += BLOCK) {
-            float sums[11][8];
+            float sums[12][8];
             [[unroll]] for (uint j = 0; j < BLOCK; ++j) {
                 const LaneSplat s = lane_splat(batch, first + j, pixel);
                 float raw[PIXELS];
@@ -99,11 +107,13 @@ void main() {
                 float s0 = 0.0, s1 = 0.0, s2 = 0.0;
                 vec2 absolute = vec2(0.0);
                 vec3 color_sum = vec3(0.0);
+                float fourth_sum = 0.0;
                 [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
                     const float alpha = alpha_of(raw[p]);
                     bool blended;
                     const float weight = composite(alpha, T[p], blended);
-                    const float own = weight * dot(s.color, gradient[p]);
+                    float own = weight * dot(s.color, gradient[p]);
+                    if (WITH_FOURTH) own += weight * s.z * fourth[p];
                     rest[p] -= own;
                     // dL/d(power) = alpha dL/d(alpha); zero where alpha is clamped.
                     const bool moves = blended && raw[p] <= float(ALPHA_MAX);
@@ -117,6 +127,7 @@ void main() {
                         absolute += abs(g * vec2(u, s.u_step * u + s.v_step * v));
                     }
                     color_sum += weight * gradient[p];
+                    if (WITH_FOURTH) fourth_sum += weight * fourth[p];
                 }
                 const float u = s.u + s.u_step * MIDDLE, v = s.v + s.v_step * MIDDLE;
                 const float us1 = s.u_step * s1, vs1 = s.v_step * s1, us2 = s.u_step * s2;
@@ -131,6 +142,7 @@ void main() {
                 sums[8][j] = color_sum.b;
                 sums[9][j] = absolute.x;
                 sums[10][j] = absolute.y / float(ROW_STEP);
+                sums[11][j] = fourth_sum;
             }
             [[unroll]] for (uint i = 0; i < SUMS; ++i) {
                 const float sum = transposing_sum(sums[i]);

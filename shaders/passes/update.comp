@@ -38,29 +38,10 @@ layout(set = 0, binding = 11, scalar) writeonly buffer Moments2Out { uvec4 momen
 layout(set = 0, binding = 12, scalar) buffer Statistics { vec2 statistics[]; };
 layout(set = 0, binding = 13, scalar) readonly buffer SortedIndices { uint sorted_indices[]; };
 layout(push_constant, scalar) uniform Push { UpdatePush push; };
+#include "lib/slots.glsl"
 
 const uint SH_FLOATS = 3 * (SH_DEGREE + 1) * (SH_DEGREE + 1);
 const uint PLANES = (PARAM_SH + SH_FLOATS + 3) / 4;
-
-// Some drivers stop a loop after 65,535 iterations, so an iteration adds 8 slots.
-Sums sum_slots(uint first, uint count) {
-    vec4 s0 = vec4(0.0), s1 = vec4(0.0);
-    vec3 s2 = vec3(0.0);
-    for (uint j = 0u; j < count; j += 8u) {
-        [[unroll]] for (uint c = 0; c < 8; ++c) {
-            const bool there = j + c < count;
-            const int slot = int(SLOT_TEXELS * sorted_indices[there ? first + j + c : first]);
-            const vec4 t0 = fetch(slots, slot), t1 = fetch(slots, slot + 1), t2 = fetch(slots, slot + 2);
-            if (there) {
-                s0 += t0;
-                s1 += t1;
-                if (ABSOLUTE) s2 += t2.xyz;
-                else s2.x += t2.x;
-            }
-        }
-    }
-    return Sums(s0.x, s0.yz, vec3(s0.w, s1.xy), vec3(s1.zw, s2.x), s2.yz);
-}
 
 uint index_of(uint plane, uint i) { return param_texel(push.planes, plane, i); }
 
@@ -129,7 +110,9 @@ void main() {
     const bool visible = count > 0u;
     const vec4 p0 = fetch(params, index_of(0, i)), p1 = fetch(params, index_of(1, i)),
                p2 = fetch(params, index_of(2, i));
-    const Sums s = sum_slots(visible ? first_instances[i] : 0u, count);
+    vec4 sum[SLOT_TEXELS];
+    sum_slots(visible ? first_instances[i] : 0u, count, ABSOLUTE, sum);
+    const Sums s = Sums(sum[0].x, sum[0].yz, vec3(sum[0].w, sum[1].xy), vec3(sum[1].zw, sum[2].x), sum[2].yz);
     const Projection p = project_splat(SplatShape(p0.xyz, p0.w, p1, p2.xyz));
     // The mean of an invisible splat may be anything. Zero times a direction that is not finite is not zero.
     const vec3 direction = visible ? normalize(p.view.offset) : vec3(0.0);

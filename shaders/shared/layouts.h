@@ -44,6 +44,7 @@ EWA_UINT(RECORD_TEXELS, 3u);
 // With g = dL/d(power) of a pixel and sums over the tile's pixels:
 // 0: sum g; 1 2: sum g u, g v; 3 4 5: sum g u^2, g u v, g v^2; 6 7 8: dL/d(colour);
 // 9 10, with BLEND_BACKWARD_ABSOLUTE: sum |g u|, sum |g (vy v - k ux u)|
+// 11, with BLEND_BACKWARD_FOURTH: dL/d(fourth channel)
 EWA_UINT(SLOT_FLOATS, 12u);
 EWA_UINT(SLOT_TEXELS, 3u);
 
@@ -83,6 +84,17 @@ EWA_UINT(SORT_FIRST, 8u);  // with SORT_TRACKED, first pass: the indices are not
 EWA_UINT(SORT_LAST, 16u);  // with SORT_TRACKED, last pass
 // blend_backward.comp, bits
 EWA_UINT(BLEND_BACKWARD_ABSOLUTE, 1u);  // also sums absolute gradients by the mean
+EWA_UINT(BLEND_BACKWARD_ALPHA, 2u);     // dL/d(image) also has dL/dT, in PLANE_T
+EWA_UINT(BLEND_BACKWARD_FOURTH, 4u);    // a fourth channel, which takes the place of the depth
+// collect_records.comp, bits
+EWA_UINT(COLLECT_FEATURES, 1u);  // writes the features alone, of records that are there
+EWA_UINT(COLLECT_RADII, 2u);     // a splat with a radius of 0 is left out
+EWA_UINT(COLLECT_LISTED, 4u);    // the tiles' lists are given: no depth keys and no tile counts
+EWA_UINT(SHAPE_WHITENERS, 8u);   // shapes are ux, k, vy; else conics. Also of gather_slots.comp
+// gather_slots.comp, bits
+EWA_UINT(GATHER_ADD, 1u);       // adds to the gradients that are there
+EWA_UINT(GATHER_ABSOLUTE, 2u);  // the slots have absolute gradients
+EWA_UINT(GATHER_FOURTH, 4u);    // the slots have a fourth channel
 // update.comp, bits
 EWA_UINT(UPDATE_GRADIENT_ONLY, 1u);  // writes the gradient into moments1 and moves nothing
 // Adds to the densification statistics: norm of dL/d(mean) in normalised device coordinates, number of views
@@ -208,6 +220,19 @@ struct BlendPush {
     uint tiles[2];
     uint tile_step[2];  // tile = workgroup.x * step.x + workgroup.y * step.y
     uint capacity;      // of instances
+};
+
+struct CollectPush {
+    uint splats;
+    uint channels;       // of the features
+    uint first_channel;  // of the record; it holds 4
+    uint size[2];        // px
+};
+
+struct GatherPush {
+    uint splats;
+    uint channels;
+    uint first_channel;
 };
 
 struct UnpackPush {

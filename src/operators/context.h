@@ -69,8 +69,8 @@ struct Context {
 /// Throws InputError unless an array has the size that its shape says. shape: for the text, such as "[N, 3]".
 inline void check_size(const char* argument, size_t size, size_t expected, const char* shape) {
     if (size != expected)
-        throw InputError(std::string(argument) + " has " + std::to_string(size) + " values; its shape " + shape +
-                         " needs " + std::to_string(expected));
+        throw InputError(std::string(argument) + " has " + std::to_string(size) + " values; its shape " +
+                         shape + " needs " + std::to_string(expected));
 }
 
 }  // namespace ewa::operators

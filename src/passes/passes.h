@@ -101,12 +101,30 @@ struct Blend {
     gpu::BufferPart records, splats, tile_starts, planes;
 };
 
-/// Gradient of blending, written to the slot of every (splat, tile) instance. Variant: SPEC_MODE (0 or
-/// BLEND_BACKWARD_ABSOLUTE).
+/// Gradient of blending, written to the slot of every (splat, tile) instance. Variant: SPEC_MODE
+/// (BLEND_BACKWARD_* bits).
 struct BlendBackward {
     static constexpr char shader[] = "blend_backward";
     using Work = PerTile;
     gpu::BufferPart records, splats, tile_starts, planes, image_gradient, slots;
+};
+
+/// Makes records of arrays of 2D Gaussians, 4 channels of their features at a time, with depth keys and tile counts. Adds
+/// to Counts.skipped_nonfinite. Variant: SPEC_MODE (COLLECT_* bits, SHAPE_WHITENERS).
+struct CollectRecords {
+    static constexpr char shader[] = "collect_records";
+    using Work = PerElement<&shared::CollectPush::splats>;
+    gpu::BufferPart means, shapes, opacities, features, depths, radii, records, depth_keys, tile_counts,
+        counts;
+};
+
+/// Adds the slots of each splat, and writes the gradient of the arrays that CollectRecords read. Variant: SPEC_MODE
+/// (GATHER_* bits, SHAPE_WHITENERS).
+struct GatherSlots {
+    static constexpr char shader[] = "gather_slots";
+    using Work = PerElement<&shared::GatherPush::splats>;
+    gpu::BufferPart records, slots, tile_counts, first_instances, sorted_indices, means, shapes, opacities,
+        features, absolute;
 };
 
 /// Packs the colour planes into 8-bit RGBA. packed: plane_floats words.

@@ -29,7 +29,7 @@ void record_project(gpu::Recording& recording, passes::PassCache& cache, const P
 }
 
 /// The buffer of splats in depth order.
-const gpu::Buffer& record_depth_order(gpu::Recording& recording, passes::PassCache& cache, const Model& model,
+const gpu::Buffer& record_depth_order(gpu::Recording& recording, passes::PassCache& cache, uint32_t splats,
                                       const FrameBuffers& frame) {
     const uint32_t result = record_sort(recording, cache,
                                         {.keys = {&frame.depth_keys[0], &frame.depth_keys[1]},
@@ -41,15 +41,15 @@ const gpu::Buffer& record_depth_order(gpu::Recording& recording, passes::PassCac
                                          .digit_totals = frame.digit_totals,
                                          .counts = frame.counts},
                                         {.cut = frame.sizes.depth_sort,
-                                         .items = model.splats,
-                                         .capacity = model.splats,
+                                         .items = splats,
+                                         .capacity = splats,
                                          .keep_keys = false,
                                          .name = "depth order"});
     return frame.order[result];
 }
 
-void record_instances(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
-                      const Model& model, const FrameBuffers& frame, const gpu::Buffer& order) {
+void record_instances(gpu::Recording& recording, passes::PassCache& cache, bool gradients, uint32_t splats,
+                      const FrameBuffers& frame, const gpu::Buffer& order) {
     const Sizes& s = frame.sizes;
     record_scan(recording, cache,
                 {.source = frame.tile_counts,
@@ -57,12 +57,12 @@ void record_instances(gpu::Recording& recording, passes::PassCache& cache, const
                  .prefix = frame.prefix,
                  .totals = frame.scan_totals,
                  .counts = frame.counts},
-                {.items = model.splats,
+                {.items = splats,
                  .block = s.scan_block,
                  .total = shared::TOTAL_INSTANCES,
                  .name = "instance offsets",
                  .capacity = frame.instance_capacity});
-    cache.get<passes::EmitInstances>({{shared::SPEC_MODE, plan.gradients ? shared::EMIT_FIRST_INSTANCES : 0}})
+    cache.get<passes::EmitInstances>({{shared::SPEC_MODE, gradients ? shared::EMIT_FIRST_INSTANCES : 0}})
         .record(recording,
                 {.records = frame.records,
                  .order = order,
@@ -73,7 +73,7 @@ void record_instances(gpu::Recording& recording, passes::PassCache& cache, const
                  .keys = frame.instance_keys[frame.tile_sort_start()],
                  .splats = frame.instance_splats[frame.tile_sort_start()],
                  .first_instances = frame.first_instances},
-                {.splats = model.splats,
+                {.splats = splats,
                  .capacity = frame.instance_capacity,
                  .scan_block = s.scan_block,
                  .strip_rows = s.strip_rows,
@@ -82,10 +82,10 @@ void record_instances(gpu::Recording& recording, passes::PassCache& cache, const
 }
 
 /// The result is in the second buffers.
-void record_tile_order(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
+void record_tile_order(gpu::Recording& recording, passes::PassCache& cache, bool gradients,
                        const FrameBuffers& frame) {
     // With gradients a splat must find its instances again: their slots are in sorted order.
-    const auto indices = [&](uint32_t i) { return plan.gradients ? &frame.sorted_indices[i] : nullptr; };
+    const auto indices = [&](uint32_t i) { return gradients ? &frame.sorted_indices[i] : nullptr; };
     const uint32_t a = frame.tile_sort_start(), b = 1 - a;
     record_sort(recording, cache,
                 {.keys = {&frame.instance_keys[a], &frame.instance_keys[b]},
@@ -119,14 +119,19 @@ shared::BlendPush blend_push(const passes::KernelConfig& config, const FrameBuff
             .capacity = frame.instance_capacity};
 }
 
+void record_tile_lists(gpu::Recording& recording, passes::PassCache& cache, bool gradients, uint32_t splats,
+                       const FrameBuffers& frame) {
+    const gpu::Buffer& order = record_depth_order(recording, cache, splats, frame);
+    record_instances(recording, cache, gradients, splats, frame, order);
+    record_tile_order(recording, cache, gradients, frame);
+}
+
 Sorted record_forward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
                       const Model& model, const FrameBuffers& frame, const FrameInputs& inputs) {
     recording.fill(frame.counts, 0, 0,
                    inputs.keep_overflow ? offsetof(shared::Counts, overflowed) : sizeof(shared::Counts));
     record_project(recording, cache, plan, model, frame, inputs);
-    const gpu::Buffer& order = record_depth_order(recording, cache, model, frame);
-    record_instances(recording, cache, plan, model, frame, order);
-    record_tile_order(recording, cache, plan, frame);
+    record_tile_lists(recording, cache, plan.gradients, model.splats, frame);
     cache.get<passes::Blend>({{shared::SPEC_MODE, kBlendModes[size_t(plan.drawing)]}})
         .record(recording,
                 {.records = frame.records,

@@ -22,6 +22,12 @@ struct Sorted {
 Sorted record_forward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
                       const Model& model, const FrameBuffers& frame, const FrameInputs& inputs);
 
+/// The part between projection and blending: depth order, instances, tile order, tile starts. It reads frame's records,
+/// depth_keys[0] and tile_counts, and leaves each tile's splats in instance_splats[1] and tile_starts; with gradients also
+/// sorted_indices[1] and first_instances.
+void record_tile_lists(gpu::Recording& recording, passes::PassCache& cache, bool gradients, uint32_t splats,
+                       const FrameBuffers& frame);
+
 shared::BlendPush blend_push(const passes::KernelConfig& config, const FrameBuffers& frame,
                              const std::array<float, 3>& background);
 

@@ -159,7 +159,8 @@ Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request)
     s.instance_words = std::max<uint64_t>(request.instances, 1) * word;
     s.tile_starts = (uint64_t(s.tiles) + 2) * word;
     s.planes = uint64_t(s.plane_floats) * s.image_planes * word;
-    if (request.gradients) {
+    if (request.gradients && request.given_gradient) s.image_gradient = uint64_t(s.plane_floats) * 5 * word;
+    if (request.gradients && !request.given_gradient) {
         const auto groups = passes::LossRows::Work::groups(config, {s.image(), 0, 0});
         s.partials = groups[0] * groups[1] * groups[2] * (config.element_group / config.subgroup);
         s.reduce_block = 64 * config.subgroup;
@@ -174,6 +175,8 @@ Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request)
         s.image_gradient = s.target;
         s.partial_sums = 2 * uint64_t(s.partials) * word;  // of absolute and of squared differences
         s.reduced = 2 * uint64_t(s.reduce_blocks) * word;
+    }
+    if (request.gradients) {
         s.slots = std::max<uint64_t>(request.instances, 1) * shared::SLOT_FLOATS * word;
         if (request.overlaid) s.overlay = overlay_bytes(s);
     }

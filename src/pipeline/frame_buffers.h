@@ -17,6 +17,8 @@ struct FrameRequest {
     bool fifth_plane = false;  // of the image: depth or count
     bool masks = false;        // with gradients: some pixels count less
     bool exposure = false;     // with gradients: a training image's exposure is applied before the loss
+    // With gradients: dL/d(image) comes from outside, in 5 planes. There are no buffers for a loss.
+    bool given_gradient = false;
     // With gradients: buffers that are not needed at the same time share memory. The same for all requests of a frame.
     bool overlaid = false;
 };

@@ -1,0 +1,407 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <utility>
+
+#include "operators/blend_frame.h"
+#include "passes/passes.h"
+#include "pipeline/forward.h"
+
+namespace ewa {
+namespace operators {
+namespace {
+
+using pipeline::FrameRequest;
+using pipeline::Sizes;
+
+uint32_t divide_up(uint32_t a, uint32_t b) {
+    return (a + b - 1) / b;
+}
+
+void check_mask(const BlendOptions& options) {
+    if (options.tile_mask.empty()) return;
+    if (options.mask_tile_size == 0) throw InputError("a tile size of 0 px");
+    const size_t tiles = size_t(divide_up(options.width, options.mask_tile_size)) *
+                         divide_up(options.height, options.mask_tile_size);
+    check_size("tile_mask", options.tile_mask.size(), tiles, "[tile rows, tile columns]");
+}
+
+void check_splats(const ScreenSplats& splats, const BlendOptions& options) {
+    if (splats.channels == 0) throw InputError("features of no channels");
+    if (splats.size() > 0x7fffffffu / std::max(splats.channels, 3u))
+        throw InputError(std::to_string(splats.size()) + " splats are more than one image can have");
+    check_size("means2d", splats.means2d.size(), splats.size() * 2, "[M, 2]");
+    check_size("conics", splats.conics.size(), splats.size() * 3, "[M, 3]");
+    check_size("features", splats.features.size(), splats.size() * splats.channels, "[M, D]");
+    if (!options.background.empty())
+        check_size("background", options.background.size(), splats.channels, "[D]");
+    check_mask(options);
+}
+
+std::unique_ptr<BlendFrame> take_frame(const std::shared_ptr<Context>& context, bool gradients) {
+    const std::lock_guard lock(context->frames_mutex);
+    auto& frames = context->free_frames;
+    const auto found = std::ranges::find(frames, gradients, [](const auto& frame) { return frame->gradients; });
+    if (found != frames.end()) {
+        std::unique_ptr<BlendFrame> frame = std::move(*found);
+        frames.erase(found);
+        return frame;
+    }
+    auto frame = std::make_unique<BlendFrame>();
+    frame->context = context;
+    frame->gradients = gradients;
+    return frame;
+}
+
+void describe_image(BlendFrame& f, const ScreenSplats& splats, const BlendOptions& options) {
+    f.splats = uint32_t(splats.size());
+    f.channels = splats.channels;
+    f.width = options.width;
+    f.height = options.height;
+    f.whiteners = splats.whiteners;
+    f.background.assign(options.background.begin(), options.background.end());
+    f.background.resize(f.channels, 0.0f);
+    f.tile_mask.assign(options.tile_mask.begin(), options.tile_mask.end());
+    f.mask_tile_size = options.mask_tile_size;
+}
+
+FrameRequest request_of(const BlendFrame& f, const BlendOptions& options, uint32_t instances) {
+    return {.splats = f.splats,
+            .width = f.width,
+            .height = f.height,
+            .instances = instances,
+            .gradients = options.gradients,
+            .fifth_plane = f.channels > 3,
+            .given_gradient = true,
+            .overlaid = options.gradients};
+}
+
+bool has_fourth(const BlendFrame& f, uint32_t chunk) {
+    return f.channels > kChunk * chunk + 3;
+}
+
+void record_collect(gpu::Recording& recording, Context& context, const BlendFrame& f, uint32_t chunk, uint32_t mode) {
+    if (f.whiteners) mode |= shared::SHAPE_WHITENERS;
+    // A binding that a mode does not use gets the records.
+    const auto or_records = [&](const Array& array) -> const gpu::Buffer& {
+        return array.buffer() ? array.buffer() : f.frame.records;
+    };
+    context.cache.get<passes::CollectRecords>({{shared::SPEC_MODE, mode}})
+        .record(recording,
+                {.means = f.means.buffer(),
+                 .shapes = f.conics.buffer(),
+                 .opacities = f.opacities.buffer(),
+                 .features = f.features.buffer(),
+                 .depths = or_records(f.depths),
+                 .radii = or_records(f.radii),
+                 .records = f.frame.records,
+                 .depth_keys = f.frame.depth_keys[0],
+                 .tile_counts = f.frame.tile_counts,
+                 .counts = f.frame.counts},
+                {.splats = f.splats,
+                 .channels = f.channels,
+                 .first_channel = kChunk * chunk,
+                 .size = {f.width, f.height}});
+}
+
+/// Blends all chunks. mode: of the first chunk's collection.
+void record_blend(gpu::Recording& recording, Context& context, const BlendFrame& f, uint32_t mode) {
+    for (uint32_t chunk = 0; chunk < f.chunks(); ++chunk) {
+        if (chunk > 0) record_collect(recording, context, f, chunk, mode | shared::COLLECT_FEATURES);
+        context.cache
+            .get<passes::Blend>(
+                {{shared::SPEC_MODE, has_fourth(f, chunk) ? shared::BLEND_DEPTH : shared::BLEND_COLOR}})
+            .record(recording,
+                    {.records = f.frame.records,
+                     .splats = f.frame.instance_splats[1],
+                     .tile_starts = f.frame.tile_starts,
+                     .planes = f.planes(chunk)},
+                    pipeline::blend_push(context.cache.config(), f.frame, {0, 0, 0}));
+    }
+}
+
+void reserve_planes(Context& context, BlendFrame& f) {
+    f.more_planes.resize(std::max<size_t>(f.more_planes.size(), f.chunks() - 1));
+    for (uint32_t chunk = 1; chunk < f.chunks(); ++chunk) {
+        gpu::Buffer& planes = f.more_planes[chunk - 1];
+        if (planes && planes.bytes() >= f.frame.sizes.planes) continue;
+        planes = gpu::Buffer();
+        planes = gpu::Buffer(*context.device, "planes", f.frame.sizes.planes, gpu::Texel::rgba32f);
+    }
+}
+
+void upload_splats(Context& context, BlendFrame& f, const ScreenSplats& splats) {
+    gpu::Device& device = *context.device;
+    f.means.upload(device, splats.means2d);
+    f.conics.upload(device, splats.conics);
+    f.opacities.upload(device, splats.opacities);
+    f.features.upload(device, splats.features);
+}
+
+/// Plane of channel c of a chunk: red, green, blue, and depth.
+uint32_t plane_of(uint32_t c) {
+    return c < 3 ? shared::PLANE_R + c : shared::PLANE_DEPTH;
+}
+
+BlendedImage image_of(BlendFrame& f) {
+    const Sizes& s = f.frame.sizes;
+    const size_t pixels = size_t(f.width) * f.height, channels = f.channels;
+    BlendedImage image;
+    image.features.resize(pixels * channels);
+    image.alphas.resize(pixels);
+    f.transmittances.resize(pixels);
+    for (uint32_t chunk = 0; chunk < f.chunks(); ++chunk) {
+        const std::vector<float> planes = f.planes(chunk).download<float>(s.planes / sizeof(float));
+        const uint32_t first = kChunk * chunk, count = std::min(f.channels - first, kChunk);
+        for (uint32_t y = 0; y < f.height; ++y) {
+            const size_t row = size_t(y) * s.stride, at = size_t(y) * f.width;
+            const float* left = &planes[size_t(shared::PLANE_T) * s.plane_floats + row];
+            for (uint32_t c = 0; c < count; ++c) {
+                const float* from = &planes[size_t(plane_of(c)) * s.plane_floats + row];
+                const float background = f.background[first + c];
+                float* to = &image.features[at * channels + first + c];
+                for (uint32_t x = 0; x < f.width; ++x) to[x * channels] = from[x] + left[x] * background;
+            }
+            if (chunk == 0) std::copy_n(left, f.width, &f.transmittances[at]);
+        }
+    }
+    if (!f.tile_mask.empty())
+        for (uint32_t y = 0; y < f.height; ++y)
+            for (uint32_t x = 0; x < f.width; ++x)
+                if (!f.drawn(x, y)) {
+                    const size_t at = size_t(y) * f.width + x;
+                    f.transmittances[at] = 1;
+                    std::copy(f.background.begin(), f.background.end(), &image.features[at * channels]);
+                }
+    for (size_t i = 0; i < pixels; ++i) image.alphas[i] = 1.0f - f.transmittances[i];
+    return image;
+}
+
+/// The lists of the caller's tiles as lists of the device's smaller tiles, and each splat's place in them.
+struct DeviceLists {
+    std::vector<uint32_t> splats, tile_starts, sorted_indices, first_instances, tile_counts;
+};
+
+DeviceLists device_lists(const TileLists& lists, const Sizes& s, const passes::KernelConfig& config,
+                         uint32_t splat_count) {
+    const uint32_t size = lists.tile_size;
+    const uint32_t columns = divide_up(s.width, size), rows = divide_up(s.height, size);
+    check_size("offsets", lists.offsets.size(), size_t(columns) * rows + 1, "[tiles + 1]");
+    for (size_t t = 0; t + 1 < lists.offsets.size(); ++t)
+        if (lists.offsets[t] < 0 || lists.offsets[t] > lists.offsets[t + 1])
+            throw InputError("offsets decrease at tile " + std::to_string(t));
+    if (size_t(lists.offsets.back()) > lists.splats.size())
+        throw InputError("offsets end at " + std::to_string(lists.offsets.back()) + ", and the lists have " +
+                         std::to_string(lists.splats.size()) + " entries");
+    for (const int32_t splat : lists.splats)
+        if (splat < 0 || uint32_t(splat) >= splat_count)
+            throw InputError("a list with splat " + std::to_string(splat) + " of " + std::to_string(splat_count));
+
+    DeviceLists d;
+    d.tile_counts.assign(splat_count, 0);
+    d.first_instances.assign(splat_count, 0);
+    for (uint32_t y = 0; y < s.tiles_y; ++y)
+        for (uint32_t x = 0; x < s.tiles_x; ++x) {
+            d.tile_starts.push_back(uint32_t(d.splats.size()));
+            const size_t tile =
+                size_t(y * config.tile_height / size) * columns + x * config.tile_width / size;
+            for (int32_t e = lists.offsets[tile]; e < lists.offsets[tile + 1]; ++e) {
+                d.splats.push_back(uint32_t(lists.splats[size_t(e)]));
+                ++d.tile_counts[d.splats.back()];
+            }
+        }
+    // One end more: no instance stands behind the last tile.
+    d.tile_starts.insert(d.tile_starts.end(), 2, uint32_t(d.splats.size()));
+    uint32_t sum = 0;
+    for (uint32_t i = 0; i < splat_count; ++i) d.first_instances[i] = std::exchange(sum, sum + d.tile_counts[i]);
+    std::vector<uint32_t> next = d.first_instances;
+    d.sorted_indices.resize(d.splats.size());
+    for (uint32_t k = 0; k < d.splats.size(); ++k) d.sorted_indices[next[d.splats[k]]++] = k;
+    return d;
+}
+
+/// A plane of an image gradient, with zeros where the tile mask has none.
+void fill_gradient(const BlendFrame& f, uint32_t chunk, std::span<const float> features,
+                   std::span<const float> alphas, std::vector<float>& planes) {
+    const Sizes& s = f.frame.sizes;
+    planes.assign(size_t(s.plane_floats) * 5, 0.0f);
+    const uint32_t first = kChunk * chunk, count = std::min(f.channels - first, kChunk);
+    for (uint32_t y = 0; y < f.height; ++y) {
+        const size_t row = size_t(y) * s.stride, at = size_t(y) * f.width;
+        float* left = &planes[size_t(shared::PLANE_T) * s.plane_floats + row];
+        if (chunk == 0 && !alphas.empty())
+            for (uint32_t x = 0; x < f.width; ++x) left[x] = -alphas[at + x];
+        for (uint32_t c = 0; c < count; ++c) {
+            float* to = &planes[size_t(plane_of(c)) * s.plane_floats + row];
+            const float* from = &features[at * f.channels + first + c];
+            const float background = f.background[first + c];
+            for (uint32_t x = 0; x < f.width; ++x) {
+                to[x] = from[size_t(x) * f.channels];
+                left[x] += to[x] * background;
+            }
+        }
+        if (f.tile_mask.empty()) continue;
+        for (uint32_t x = 0; x < f.width; ++x)
+            if (!f.drawn(x, y))
+                for (uint32_t p = 0; p < 5; ++p) planes[size_t(p) * s.plane_floats + row + x] = 0;
+    }
+}
+
+std::vector<float> background_gradient(const BlendFrame& f, std::span<const float> features) {
+    std::vector<double> sums(f.channels, 0.0);
+    for (size_t i = 0; i < f.transmittances.size(); ++i)
+        for (uint32_t c = 0; c < f.channels; ++c)
+            sums[c] += double(f.transmittances[i]) * double(features[i * f.channels + c]);
+    return {sums.begin(), sums.end()};
+}
+
+void record_gradient(gpu::Recording& recording, Context& context, const BlendFrame& f, uint32_t chunk, bool absolute) {
+    const bool fourth = has_fourth(f, chunk);
+    uint32_t blend = shared::BLEND_BACKWARD_ALPHA, gather = 0;
+    if (absolute) {
+        blend |= shared::BLEND_BACKWARD_ABSOLUTE;
+        gather |= shared::GATHER_ABSOLUTE;
+    }
+    if (fourth) {
+        blend |= shared::BLEND_BACKWARD_FOURTH;
+        gather |= shared::GATHER_FOURTH;
+    }
+    if (chunk > 0) gather |= shared::GATHER_ADD;
+    if (f.whiteners) gather |= shared::SHAPE_WHITENERS;
+    if (f.chunks() > 1)
+        record_collect(recording, context, f, chunk, shared::COLLECT_FEATURES);
+    context.cache.get<passes::BlendBackward>({{shared::SPEC_MODE, blend}})
+        .record(recording,
+                {.records = f.frame.records,
+                 .splats = f.frame.instance_splats[1],
+                 .tile_starts = f.frame.tile_starts,
+                 .planes = f.planes(chunk),
+                 .image_gradient = f.frame.image_gradient,
+                 .slots = f.frame.slots},
+                pipeline::blend_push(context.cache.config(), f.frame, {0, 0, 0}));
+    context.cache.get<passes::GatherSlots>({{shared::SPEC_MODE, gather}})
+        .record(recording,
+                {.records = f.frame.records,
+                 .slots = f.frame.slots,
+                 .tile_counts = f.frame.tile_counts,
+                 .first_instances = f.frame.first_instances,
+                 .sorted_indices = f.frame.sorted_indices[1],
+                 .means = f.means_gradient.buffer(),
+                 .shapes = f.conics_gradient.buffer(),
+                 .opacities = f.opacities_gradient.buffer(),
+                 .features = f.features_gradient.buffer(),
+                 .absolute = f.absolute_gradient.buffer()},
+                {.splats = f.splats, .channels = f.channels, .first_channel = kChunk * chunk});
+}
+
+}  // namespace
+}  // namespace operators
+
+using namespace operators;
+
+BlendRecord::BlendRecord(std::unique_ptr<BlendFrame> frame) : frame_(std::move(frame)) {}
+
+BlendRecord::~BlendRecord() {
+    const std::shared_ptr<Context> context = frame_->context.lock();
+    if (!context) return;
+    constexpr size_t kKept = 4;
+    const std::lock_guard lock(context->frames_mutex);
+    if (context->free_frames.size() < kKept) context->free_frames.push_back(std::move(frame_));
+}
+
+BlendedImage Operators::blend(const ScreenSplats& splats, const DepthOrder& order, const BlendOptions& options) {
+    check_splats(splats, options);
+    check_size("depths", order.depths.size(), splats.size(), "[M]");
+    if (!order.radii.empty()) check_size("radii", order.radii.size(), splats.size() * 2, "[M, 2]");
+    Context& context = *context_;
+    const std::lock_guard lock(context.mutex);
+    auto record = std::shared_ptr<BlendRecord>(new BlendRecord(take_frame(context_, options.gradients)));
+    BlendFrame& f = *record->frame_;
+    describe_image(f, splats, options);
+    const uint32_t capacity = std::max(f.frame.instance_capacity, pipeline::first_capacity(splats.size()));
+    const FrameRequest request = request_of(f, options, capacity);
+    upload_splats(context, f, splats);
+    f.depths.upload(*context.device, order.depths);
+    f.radii.upload(*context.device, order.radii);
+    const uint32_t mode = order.radii.empty() ? 0 : shared::COLLECT_RADII;
+    const shared::Counts counts =
+        pipeline::run_until_it_fits(context.cache, context.executor, f.frame, request, [&](gpu::Recording& recording) {
+            reserve_planes(context, f);
+            recording.fill(f.frame.counts, 0, 0, sizeof(shared::Counts));
+            record_collect(recording, context, f, 0, mode);
+            pipeline::record_tile_lists(recording, context.cache, options.gradients, f.splats, f.frame);
+            record_blend(recording, context, f, mode);
+        });
+    BlendedImage image = image_of(f);
+    image.skipped_nonfinite = counts.skipped_nonfinite;
+    if (options.gradients) image.record = std::move(record);
+    return image;
+}
+
+BlendedImage Operators::blend(const ScreenSplats& splats, const TileLists& lists, const BlendOptions& options) {
+    check_splats(splats, options);
+    Context& context = *context_;
+    const passes::KernelConfig& config = context.cache.config();
+    if (lists.tile_size == 0 || lists.tile_size % config.tile_width != 0 || lists.tile_size % config.tile_height != 0)
+        throw InputError("lists of tiles of " + std::to_string(lists.tile_size) + " px; this device draws tiles of " +
+                         std::to_string(config.tile_width) + "x" + std::to_string(config.tile_height));
+    const std::lock_guard lock(context.mutex);
+    auto record = std::shared_ptr<BlendRecord>(new BlendRecord(take_frame(context_, options.gradients)));
+    BlendFrame& f = *record->frame_;
+    describe_image(f, splats, options);
+    const FrameRequest empty = request_of(f, options, 1);
+    const DeviceLists d = device_lists(lists, pipeline::sizes_for(config, empty), config, f.splats);
+    f.frame.reserve(*context.device, config, request_of(f, options, uint32_t(d.splats.size())));
+    upload_splats(context, f, splats);
+    f.frame.instance_splats[1].upload(std::span<const uint32_t>(d.splats));
+    f.frame.tile_starts.upload(std::span<const uint32_t>(d.tile_starts));
+    f.frame.tile_counts.upload(std::span<const uint32_t>(d.tile_counts));
+    if (options.gradients) {
+        f.frame.sorted_indices[1].upload(std::span<const uint32_t>(d.sorted_indices));
+        f.frame.first_instances.upload(std::span<const uint32_t>(d.first_instances));
+    }
+    reserve_planes(context, f);
+    gpu::Recording recording(context.device->limits());
+    recording.fill(f.frame.counts, 0, 0, sizeof(shared::Counts));
+    record_collect(recording, context, f, 0, shared::COLLECT_LISTED);
+    record_blend(recording, context, f, shared::COLLECT_LISTED);
+    f.frame.record_counts(recording);
+    context.executor.run(recording);
+    BlendedImage image = image_of(f);
+    image.skipped_nonfinite = f.frame.read_counts().skipped_nonfinite;
+    if (options.gradients) image.record = std::move(record);
+    return image;
+}
+
+ScreenGradient Operators::blend_backward(const BlendRecord& record, std::span<const float> features_gradient,
+                                         std::span<const float> alphas_gradient, bool absolute) {
+    BlendFrame& f = *record.frame_;
+    const size_t pixels = size_t(f.width) * f.height, n = f.splats;
+    check_size("features_gradient", features_gradient.size(), pixels * f.channels, "[H, W, D]");
+    if (!alphas_gradient.empty()) check_size("alphas_gradient", alphas_gradient.size(), pixels, "[H, W]");
+    Context& context = *context_;
+    const std::lock_guard lock(context.mutex);
+    gpu::Device& device = *context.device;
+    f.means_gradient.reserve(device, n * 8);
+    f.conics_gradient.reserve(device, n * 12);
+    f.opacities_gradient.reserve(device, n * 4);
+    f.features_gradient.reserve(device, n * 4 * f.channels);
+    f.absolute_gradient.reserve(device, absolute ? n * 8 : 16);
+    std::vector<float> planes;
+    for (uint32_t chunk = 0; chunk < f.chunks(); ++chunk) {
+        fill_gradient(f, chunk, features_gradient, alphas_gradient, planes);
+        f.frame.image_gradient.upload(std::span<const float>(planes));
+        gpu::Recording recording(device.limits());
+        record_gradient(recording, context, f, chunk, absolute);
+        context.executor.run(recording);
+    }
+    ScreenGradient gradient;
+    gradient.means2d = f.means_gradient.download<float>(2 * n);
+    gradient.conics = f.conics_gradient.download<float>(3 * n);
+    gradient.opacities = f.opacities_gradient.download<float>(n);
+    gradient.features = f.features_gradient.download<float>(n * f.channels);
+    gradient.background = background_gradient(f, features_gradient);
+    if (absolute) gradient.absolute = f.absolute_gradient.download<float>(2 * n);
+    return gradient;
+}
+
+}  // namespace ewa

@@ -1,0 +1,362 @@
+// SPDX-License-Identifier: Apache-2.0
+// The operators of blending against their reference, on arrays as a caller has them.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <thread>
+
+#include "ewa/error.h"
+#include "ewa/operators.h"
+#include "gpu/test_device.h"
+#include "support/gradient_check.h"
+#include "support/screen_splats.h"
+
+namespace ewa::test {
+namespace {
+
+SharedByTests<std::shared_ptr<Operators>>* const operators_of_all = SharedByTests<std::shared_ptr<Operators>>::add();
+Operators& operators() {
+    return *operators_of_all->get([] { return std::make_shared<Operators>(device()); });
+}
+
+/// A scene's arrays as floats.
+struct Arrays {
+    std::vector<float> means2d, conics, opacities, features, background, depths, features_gradient, alphas_gradient;
+    std::vector<int32_t> radii;
+    const ScreenScene* scene;
+
+    explicit Arrays(const ScreenScene& s)
+        : means2d(floats(s.splats.means2d)),
+          conics(floats(s.splats.conics)),
+          opacities(floats(s.splats.opacities)),
+          features(floats(s.splats.features)),
+          background(floats(s.splats.background)),
+          depths(floats(s.depths)),
+          features_gradient(floats(s.features_gradient)),
+          alphas_gradient(floats(s.alphas_gradient)),
+          radii(s.radii),
+          scene(&s) {}
+
+    ScreenSplats splats() const {
+        return {.means2d = means2d,
+                .conics = conics,
+                .whiteners = scene->splats.whiteners,
+                .opacities = opacities,
+                .features = features,
+                .channels = uint32_t(scene->splats.channels)};
+    }
+    DepthOrder order() const { return {.depths = depths, .radii = radii}; }
+    BlendOptions options() const {
+        return {.width = uint32_t(scene->width), .height = uint32_t(scene->height), .background = background};
+    }
+    BlendedImage blend() const { return operators().blend(splats(), order(), options()); }
+    ScreenGradient backward(const BlendedImage& image, bool absolute) const {
+        return operators().blend_backward(*image.record, features_gradient, alphas_gradient, absolute);
+    }
+};
+
+/// Whether float32 may decide otherwise at a pixel: an alpha near a threshold, or a transmittance near the stop.
+bool is_fragile(const ScreenScene& s, int x, int y) {
+    double left = 1;
+    for (const uint32_t i : s.order) {
+        const double dx = x + 0.5 - s.splats.means2d[2 * i], dy = y + 0.5 - s.splats.means2d[2 * i + 1];
+        const double* shape = &s.splats.conics[3 * i];
+        const double u = shape[0] * (dx - shape[1] * dy), v = shape[2] * dy;
+        const double power = s.splats.whiteners
+                                 ? -(u * u + v * v)
+                                 : -0.5 * (shape[0] * dx * dx + 2 * shape[1] * dx * dy + shape[2] * dy * dy);
+        const double raw = s.splats.opacities[i] * std::exp(power);
+        if (std::abs(raw * 255 - 1) < 2e-3 || std::abs(raw / shared::ALPHA_MAX - 1) < 1e-3) return true;
+        if (raw < shared::ALPHA_MIN) continue;
+        left *= 1 - std::min(shared::ALPHA_MAX, raw);
+        if (std::abs(left / shared::TRANSMITTANCE_STOP - 1) < 1e-2) return true;
+        if (left < shared::TRANSMITTANCE_STOP) return false;
+    }
+    return false;
+}
+
+/// Fragile pixels have no gradient. Returns how many there are.
+size_t quiet_fragile_pixels(ScreenScene& s) {
+    size_t count = 0;
+    const size_t channels = s.splats.channels;
+    for (int y = 0; y < s.height; ++y)
+        for (int x = 0; x < s.width; ++x) {
+            if (!is_fragile(s, x, y)) continue;
+            const size_t at = size_t(y) * size_t(s.width) + size_t(x);
+            std::fill_n(&s.features_gradient[at * channels], channels, 0.0);
+            s.alphas_gradient[at] = 0;
+            ++count;
+        }
+    return count;
+}
+
+void expect_image(const BlendedImage& image, const reference::ScreenImage& expected, const ScreenScene& s) {
+    const size_t channels = s.splats.channels;
+    double worst = 0;
+    for (int y = 0; y < s.height; ++y)
+        for (int x = 0; x < s.width; ++x) {
+            if (is_fragile(s, x, y)) continue;
+            const size_t at = size_t(y) * size_t(s.width) + size_t(x);
+            worst = std::max(worst, std::abs(double(image.alphas[at]) - expected.alphas[at]));
+            for (size_t c = 0; c < channels; ++c) {
+                const double error =
+                    std::abs(double(image.features[at * channels + c]) - expected.features[at * channels + c]);
+                ASSERT_TRUE(std::isfinite(error)) << x << " " << y;
+                worst = std::max(worst, error);
+            }
+        }
+    EXPECT_LT(worst, 2e-5);
+}
+
+void expect_gradient(const ScreenGradient& actual, const reference::ScreenValuesGradient& expected, bool absolute) {
+    const auto wide = [](const std::vector<float>& v) { return std::vector<double>(v.begin(), v.end()); };
+    const GradientTolerance tolerance{1e-7, 3e-4, 5e-3, 1e-4};
+    EXPECT_TRUE(gradients_agree(wide(actual.means2d), expected.values.means2d, tolerance)) << "means";
+    EXPECT_TRUE(gradients_agree(wide(actual.conics), expected.values.conics, tolerance)) << "conics";
+    EXPECT_TRUE(gradients_agree(wide(actual.opacities), expected.values.opacities, tolerance)) << "opacities";
+    EXPECT_TRUE(gradients_agree(wide(actual.features), expected.values.features, tolerance)) << "features";
+    EXPECT_TRUE(gradients_agree(wide(actual.background), expected.values.background, tolerance)) << "background";
+    if (absolute) {
+        EXPECT_TRUE(gradients_agree(wide(actual.absolute), expected.absolute, tolerance)) << "absolute";
+    } else {
+        EXPECT_TRUE(actual.absolute.empty());
+    }
+}
+
+struct OperatorCase {
+    SplatKind kind;
+    size_t splats, channels;
+    bool whiteners;
+};
+
+class OperatorBlend : public testing::TestWithParam<OperatorCase> {};
+
+TEST_P(OperatorBlend, ImageAndGradientMatchTheReference) {
+    const OperatorCase& c = GetParam();
+    ScreenScene s = screen_scene(700 + c.splats, c.splats, c.kind, c.channels, c.whiteners, 61, 47);
+    EXPECT_LT(quiet_fragile_pixels(s), size_t(61 * 47 / 3));
+    const Arrays arrays(s);
+    const BlendedImage image = arrays.blend();
+    expect_image(image, reference::blend(s.splats, s.order, s.width, s.height), s);
+    const auto expected =
+        reference::blend_backward(s.splats, s.order, s.width, s.height, s.features_gradient, s.alphas_gradient);
+    // An absolute gradient is exact for one chunk of channels.
+    const bool absolute = c.channels <= 4;
+    expect_gradient(arrays.backward(image, absolute), expected, absolute);
+    expect_gradient(arrays.backward(image, false), expected, false);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, OperatorBlend,
+    testing::Values(OperatorCase{SplatKind::ordinary, 60, 3, false}, OperatorCase{SplatKind::ordinary, 60, 1, false},
+                    OperatorCase{SplatKind::mixed, 90, 4, false}, OperatorCase{SplatKind::mixed, 90, 9, false},
+                    OperatorCase{SplatKind::mixed, 200, 3, true}, OperatorCase{SplatKind::needles, 60, 4, true},
+                    OperatorCase{SplatKind::opacity_extremes, 120, 2, true}),
+    [](const testing::TestParamInfo<OperatorCase>& each) {
+        const OperatorCase& c = each.param;
+        return std::string(name_of(c.kind)) + "_" + std::to_string(c.splats) + "_" + std::to_string(c.channels) +
+               (c.whiteners ? "_whiteners" : "_conics");
+    });
+
+/// The lists of 16 px tiles that a caller makes: every splat in every tile, front to back.
+struct FullLists {
+    std::vector<int32_t> offsets, splats;
+    explicit FullLists(const ScreenScene& s) {
+        const int tiles = ((s.width + 15) / 16) * ((s.height + 15) / 16);
+        for (int t = 0; t < tiles; ++t) {
+            offsets.push_back(int32_t(splats.size()));
+            splats.insert(splats.end(), s.order.begin(), s.order.end());
+        }
+        offsets.push_back(int32_t(splats.size()));
+    }
+    TileLists lists() const { return {.tile_size = 16, .offsets = offsets, .splats = splats}; }
+};
+
+TEST(OperatorBlendLists, CallersListsGiveTheSameImageAndGradient) {
+    ScreenScene s = screen_scene(41, 50, SplatKind::mixed, 5, false, 61, 47);
+    quiet_fragile_pixels(s);
+    const Arrays arrays(s);
+    const FullLists full(s);
+    const BlendedImage image = operators().blend(arrays.splats(), full.lists(), arrays.options());
+    expect_image(image, reference::blend(s.splats, s.order, s.width, s.height), s);
+    expect_gradient(
+        arrays.backward(image, false),
+        reference::blend_backward(s.splats, s.order, s.width, s.height, s.features_gradient, s.alphas_gradient), false);
+}
+
+TEST(OperatorBlendLists, TheOrderIsThatOfTheLists) {
+    const ScreenScene s = screen_scene(42, 30, SplatKind::ordinary, 3, false, 32, 32);
+    const Arrays arrays(s);
+    ScreenScene backwards = s;
+    std::ranges::reverse(backwards.order);
+    const FullLists full(backwards);
+    const BlendedImage image = operators().blend(arrays.splats(), full.lists(), arrays.options());
+    expect_image(image, reference::blend(s.splats, backwards.order, s.width, s.height), backwards);
+}
+
+TEST(OperatorBlendLists, WrongListsAreRefused) {
+    const ScreenScene s = screen_scene(43, 5, SplatKind::ordinary, 3, false, 32, 16);
+    const Arrays arrays(s);
+    const auto refused = [&](std::vector<int32_t> offsets, std::vector<int32_t> splats, uint32_t tile_size = 16) {
+        try {
+            operators().blend(arrays.splats(), TileLists{tile_size, offsets, splats}, arrays.options());
+        } catch (const InputError& error) {
+            return std::string(error.what());
+        }
+        return std::string();
+    };
+    EXPECT_EQ(refused({0, 1}, {0}), "offsets has 2 values; its shape [tiles + 1] needs 3");
+    EXPECT_EQ(refused({0, 2, 1}, {0, 1}), "offsets decrease at tile 1");
+    EXPECT_EQ(refused({0, 1, 3}, {0, 1}), "offsets end at 3, and the lists have 2 entries");
+    EXPECT_EQ(refused({0, 1, 2}, {0, 5}), "a list with splat 5 of 5");
+    EXPECT_NE(refused({0, 1, 2}, {0, 1}, 5), "");
+}
+
+TEST(OperatorBlendMask, MaskedTilesShowTheBackground) {
+    ScreenScene s = screen_scene(44, 60, SplatKind::ordinary, 4, false, 40, 33);
+    quiet_fragile_pixels(s);
+    const Arrays arrays(s);
+    std::vector<uint8_t> mask(3 * 3, 1);
+    mask[4] = mask[8] = 0;
+    BlendOptions options = arrays.options();
+    options.tile_mask = mask;
+    const BlendedImage image = operators().blend(arrays.splats(), arrays.order(), options);
+    reference::ScreenImage expected = reference::blend(s.splats, s.order, s.width, s.height);
+    std::vector<double> through(4, 0.0);  // of the background's gradient
+    for (int y = 0; y < s.height; ++y)
+        for (int x = 0; x < s.width; ++x) {
+            const size_t at = size_t(y) * 40 + size_t(x);
+            if (mask[size_t(y / 16 * 3 + x / 16)]) continue;
+            expected.alphas[at] = 0;
+            for (size_t c = 0; c < 4; ++c) {
+                expected.features[at * 4 + c] = s.splats.background[c];
+                through[c] += s.features_gradient[at * 4 + c];
+                s.features_gradient[at * 4 + c] = 0;
+            }
+            s.alphas_gradient[at] = 0;
+        }
+    expect_image(image, expected, s);
+    auto gradient =
+        reference::blend_backward(s.splats, s.order, s.width, s.height, s.features_gradient, s.alphas_gradient);
+    for (size_t c = 0; c < 4; ++c) gradient.values.background[c] += through[c];
+    expect_gradient(arrays.backward(image, true), gradient, true);
+}
+
+TEST(OperatorBlend, TwoImagesMayWaitForTheirGradients) {
+    ScreenScene a = screen_scene(45, 40, SplatKind::ordinary, 3, false, 40, 33),
+                b = screen_scene(46, 300, SplatKind::mixed, 5, true, 61, 47);
+    quiet_fragile_pixels(a);
+    quiet_fragile_pixels(b);
+    const Arrays first(a), second(b);
+    const BlendedImage of_first = first.blend(), of_second = second.blend();
+    const ScreenGradient alone = first.backward(of_first, true);
+    second.backward(of_second, false);
+    const ScreenGradient again = first.backward(of_first, true);
+    EXPECT_EQ(alone.means2d, again.means2d);
+    EXPECT_EQ(alone.features, again.features);
+    expect_gradient(
+        again, reference::blend_backward(a.splats, a.order, a.width, a.height, a.features_gradient, a.alphas_gradient),
+        true);
+}
+
+TEST(OperatorBlend, ValuesThatAreNotFiniteAreLeftOutAndCounted) {
+    const ScreenScene s = screen_scene(47, 20, SplatKind::ordinary, 3, false, 40, 33);
+    Arrays arrays(s);
+    const BlendedImage whole = arrays.blend();
+    EXPECT_EQ(whole.skipped_nonfinite, 0u);
+    const uint32_t lost = s.order[0];
+    for (const auto& damage : std::vector<std::function<void(Arrays&)>>{
+             [&](Arrays& d) { d.means2d[2 * lost] = NAN; }, [&](Arrays& d) { d.conics[3 * lost] = -1; },
+             [&](Arrays& d) { d.conics[3 * lost + 1] = 1e9f; }, [&](Arrays& d) { d.opacities[lost] = INFINITY; },
+             [&](Arrays& d) { d.depths[lost] = NAN; }, [&](Arrays& d) { d.features[3 * lost + 2] = NAN; }}) {
+        Arrays damaged(s);
+        damage(damaged);
+        const BlendedImage image = damaged.blend();
+        EXPECT_EQ(image.skipped_nonfinite, 1u);
+        for (const float value : image.features) ASSERT_TRUE(std::isfinite(value));
+        const ScreenGradient gradient = damaged.backward(image, true);
+        for (const auto* values : {&gradient.means2d, &gradient.conics, &gradient.opacities, &gradient.features})
+            for (const float value : *values) ASSERT_TRUE(std::isfinite(value));
+    }
+}
+
+TEST(OperatorBlend, NegativeDepthsAreInOrder) {
+    ScreenScene s = screen_scene(48, 30, SplatKind::ordinary, 3, false, 40, 33);
+    const Arrays plain(s);
+    Arrays shifted(s);
+    // A quarter of the depths stays above zero.
+    std::vector<float> sorted = shifted.depths;
+    std::ranges::sort(sorted);
+    for (float& depth : shifted.depths) depth -= sorted[22];
+    EXPECT_EQ(plain.blend().features, shifted.blend().features);
+}
+
+TEST(OperatorBlend, NothingToDrawIsTheBackground) {
+    for (const size_t count : {size_t(0), size_t(5)}) {
+        ScreenScene s = screen_scene(49, count, SplatKind::ordinary, 3, false, 20, 11);
+        s.radii.assign(s.radii.size(), 0);
+        const Arrays arrays(s);
+        const BlendedImage image = arrays.blend();
+        for (size_t i = 0; i < image.features.size(); ++i) ASSERT_EQ(image.features[i], arrays.background[i % 3]);
+        for (const float alpha : image.alphas) ASSERT_EQ(alpha, 0);
+        const ScreenGradient gradient = arrays.backward(image, true);
+        for (const float value : gradient.means2d) EXPECT_EQ(value, 0);
+        EXPECT_EQ(gradient.features.size(), 3 * count);
+        EXPECT_NE(gradient.background[0], 0);
+    }
+}
+
+TEST(OperatorBlend, WithoutGradientsTheImageIsTheSame) {
+    const ScreenScene s = screen_scene(52, 60, SplatKind::mixed, 3, false, 61, 47);
+    const Arrays arrays(s);
+    BlendOptions options = arrays.options();
+    options.gradients = false;
+    const BlendedImage image = operators().blend(arrays.splats(), arrays.order(), options);
+    EXPECT_EQ(image.record, nullptr);
+    EXPECT_EQ(image.features, arrays.blend().features);
+}
+
+TEST(OperatorBlend, WrongSizesAreRefused) {
+    const ScreenScene s = screen_scene(53, 5, SplatKind::ordinary, 3, false, 32, 16);
+    const auto refused = [&](const std::function<void(Arrays&)>& change) {
+        Arrays arrays(s);
+        change(arrays);
+        try {
+            arrays.blend();
+        } catch (const InputError& error) {
+            return std::string(error.what());
+        }
+        return std::string();
+    };
+    EXPECT_EQ(refused([](Arrays& a) { a.means2d.pop_back(); }), "means2d has 9 values; its shape [M, 2] needs 10");
+    EXPECT_EQ(refused([](Arrays& a) { a.conics.pop_back(); }), "conics has 14 values; its shape [M, 3] needs 15");
+    EXPECT_EQ(refused([](Arrays& a) { a.features.pop_back(); }), "features has 14 values; its shape [M, D] needs 15");
+    EXPECT_EQ(refused([](Arrays& a) { a.depths.pop_back(); }), "depths has 4 values; its shape [M] needs 5");
+    EXPECT_EQ(refused([](Arrays& a) { a.radii.pop_back(); }), "radii has 9 values; its shape [M, 2] needs 10");
+    EXPECT_EQ(refused([](Arrays& a) { a.background.pop_back(); }), "background has 2 values; its shape [D] needs 3");
+    const Arrays arrays(s);
+    const BlendedImage image = arrays.blend();
+    EXPECT_THROW(operators().blend_backward(*image.record, {}, {}, false), InputError);
+}
+
+TEST(OperatorBlend, FourThreadsGetTheBytesOfOne) {
+    const ScreenScene s = screen_scene(54, 200, SplatKind::mixed, 5, false, 61, 47);
+    const Arrays arrays(s);
+    const BlendedImage alone = arrays.blend();
+    const ScreenGradient gradient = arrays.backward(alone, false);
+    std::vector<int> same(4, 0);
+    std::vector<std::thread> threads;
+    for (size_t t = 0; t < 4; ++t)
+        threads.emplace_back([&, t] {
+            for (int round = 0; round < 5; ++round) {
+                const BlendedImage image = arrays.blend();
+                same[t] += image.features == alone.features && arrays.backward(image, false).means2d == gradient.means2d;
+            }
+        });
+    for (std::thread& thread : threads) thread.join();
+    for (const int count : same) EXPECT_EQ(count, 5);
+}
+
+}  // namespace
+}  // namespace ewa::test
