@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cameras.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/matrix.hpp>
+
+namespace ewa::python {
+namespace {
+
+constexpr double kFarFromRotation = 1e-3;  // float32 matrices of a file with few digits are nearer
+
+std::string element(const char* name, size_t index, bool batch) {
+    return batch ? std::string(name) + "[" + std::to_string(index) + "]" : name;
+}
+
+[[noreturn]] void refuse(const std::string& text) {
+    throw nb::value_error(text.c_str());
+}
+
+bool is_rotation(const glm::dmat3& m) {
+    const glm::dmat3 square = glm::transpose(m) * m;
+    for (int c = 0; c < 3; ++c)
+        for (int r = 0; r < 3; ++r)
+            if (!(std::abs(square[c][r] - (c == r)) <= kFarFromRotation)) return false;
+    return glm::determinant(m) > 0;
+}
+
+void set_pose(Camera& camera, const double* m, const std::string& name) {
+    if (!std::all_of(m, m + 16, [](double x) { return std::isfinite(x); })) refuse(name + " is not finite");
+    if (m[12] != 0 || m[13] != 0 || m[14] != 0 || m[15] != 1) refuse(name + ": its last row is not 0 0 0 1");
+    for (int r = 0; r < 3; ++r) {
+        for (int c = 0; c < 3; ++c) camera.rotation[c][r] = m[4 * r + c];
+        camera.translation[r] = m[4 * r + 3];
+    }
+    if (!is_rotation(camera.rotation))
+        refuse(name + ": its first three rows and columns are no rotation; it maps the world to the camera");
+}
+
+void set_intrinsics(Camera& camera, const double* k, const std::string& name) {
+    if (!std::all_of(k, k + 9, [](double x) { return std::isfinite(x); })) refuse(name + " is not finite");
+    if (k[1] != 0 || k[3] != 0 || k[6] != 0 || k[7] != 0 || k[8] != 1)
+        refuse(name + " is not [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]");
+    if (!(k[0] > 0 && k[4] > 0)) refuse(name + ": a focal length is not positive");
+    camera.fx = k[0];
+    camera.cx = k[2];
+    camera.fy = k[4];
+    camera.cy = k[5];
+}
+
+}  // namespace
+
+Cameras cameras_of(nb::handle viewmats, nb::handle intrinsics, int width, int height) {
+    const Array<double> poses(viewmats, "viewmats", {Shape{any('C'), 4, 4}, Shape{4, 4}});
+    Cameras cameras;
+    cameras.batch = poses.dimensions() == 3;
+    const size_t count = cameras.batch ? poses.length(0) : 1;
+    const Array<double> ks(intrinsics, "Ks",
+                           cameras.batch
+                               ? std::initializer_list<Shape>{Shape{ptrdiff_t(count), 3, 3}, Shape{3, 3}}
+                               : std::initializer_list<Shape>{Shape{3, 3}});
+    if (width < 1 || height < 1) refuse("width and height are not positive");
+    const bool each = ks.dimensions() == 3;
+    for (size_t i = 0; i < count; ++i) {
+        Camera camera;
+        camera.width = width;
+        camera.height = height;
+        set_pose(camera, poses.data() + 16 * i, element("viewmats", i, cameras.batch));
+        set_intrinsics(camera, ks.data() + (each ? 9 * i : 0), element("Ks", i, each));
+        cameras.all.push_back(camera);
+    }
+    return cameras;
+}
+
+nb::ndarray<nb::numpy, double> viewmats_of(const std::vector<Camera>& cameras) {
+    std::vector<double> values;
+    for (const Camera& camera : cameras) {
+        for (int r = 0; r < 3; ++r) {
+            for (int c = 0; c < 3; ++c) values.push_back(camera.rotation[c][r]);
+            values.push_back(camera.translation[r]);
+        }
+        values.insert(values.end(), {0, 0, 0, 1});
+    }
+    return to_numpy(std::move(values), {cameras.size(), 4, 4});
+}
+
+nb::ndarray<nb::numpy, double> intrinsics_of(const std::vector<Camera>& cameras) {
+    std::vector<double> values;
+    for (const Camera& camera : cameras)
+        values.insert(values.end(), {camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1});
+    return to_numpy(std::move(values), {cameras.size(), 3, 3});
+}
+
+}  // namespace ewa::python

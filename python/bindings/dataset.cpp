@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dataset.h"
+
+#include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <algorithm>
+#include <optional>
+
+#include "arrays.h"
+#include "bindings.h"
+#include "cameras.h"
+#include "core/typing.h"
+#include "ewa/error.h"
+
+namespace ewa::python {
+namespace {
+
+/// ewa.Images: decodes an image when it is asked for.
+struct Images {
+    SharedDataset dataset;
+
+    const Frame& frame(ptrdiff_t index) const {
+        const auto count = ptrdiff_t(dataset->frames.size());
+        if (index < -count || index >= count)
+            throw nb::index_error(("there are " + std::to_string(count) + " images").c_str());
+        return dataset->frames[size_t(index < 0 ? index + count : index)];
+    }
+};
+
+nb::ndarray<nb::numpy, float> image(const Images& images, ptrdiff_t index) {
+    Image decoded;
+    {
+        const Frame& frame = images.frame(index);
+        const nb::gil_scoped_release released;
+        decoded = load_frame_image(frame);
+    }
+    return to_numpy(std::move(decoded.pixels),
+                    {size_t(decoded.height), size_t(decoded.width), size_t(decoded.channels)});
+}
+
+MaskUse mask_use(std::string word) {
+    const std::vector<std::string> words{"auto", "ignore", "cut", "none"};
+    if (const std::string problem = core::settle_word(word, words); !problem.empty())
+        throw InputError("masks: " + problem);
+    return std::array{MaskUse::automatic, MaskUse::ignore, MaskUse::cut,
+                      MaskUse::none}[size_t(std::find(words.begin(), words.end(), word) - words.begin())];
+}
+
+void open_dataset(LoadedDataset* self, const std::filesystem::path& path, int downscale,
+                  const std::string& masks, bool need_images) {
+    if (downscale < 1) throw InputError("downscale is less than 1");
+    const DatasetOptions options{downscale, mask_use(masks), need_images};
+    const nb::gil_scoped_release released;
+    new (self) LoadedDataset{std::make_shared<Dataset>(load_dataset(path, options))};
+}
+
+std::vector<Camera> cameras(const LoadedDataset& data) {
+    std::vector<Camera> all;
+    for (const Frame& frame : data.dataset->frames) all.push_back(frame.camera);
+    return all;
+}
+
+nb::ndarray<nb::numpy, double> positions(const LoadedDataset& data) {
+    std::vector<double> values;
+    for (const glm::dvec3& p : data.dataset->points.positions) values.insert(values.end(), {p.x, p.y, p.z});
+    return to_numpy(std::move(values), {data.dataset->points.positions.size(), 3});
+}
+
+nb::ndarray<nb::numpy, uint8_t> colors(const LoadedDataset& data) {
+    std::vector<uint8_t> values;
+    for (const auto& c : data.dataset->points.colors) values.insert(values.end(), c.begin(), c.end());
+    return to_numpy(std::move(values), {data.dataset->points.colors.size(), 3});
+}
+
+std::pair<std::vector<int>, std::vector<int>> split(const LoadedDataset& data, int test_every) {
+    if (test_every < 0) throw InputError("test_every is negative");
+    Split parts = split_frames(*data.dataset, test_every);
+    return {std::move(parts.train), std::move(parts.test)};
+}
+
+std::string dataset_text(const LoadedDataset& data) {
+    return "Dataset('" + data.dataset->root.string() + "', " +
+           core::counted(data.dataset->frames.size(), "frame") + ")";
+}
+
+void bind_frame(nb::module_& module) {
+    nb::class_<Frame>(module, "Frame", "An image of a dataset, and its camera without a lens.")
+        .def_ro("name", &Frame::name, "In the dataset, such as \"0001.jpg\".")
+        .def_ro("image_path", &Frame::image_path)
+        .def_ro("image_exists", &Frame::image_exists)
+        .def_prop_ro(
+            "mask_path",
+            [](const Frame& frame) {
+                return frame.mask_path.empty() ? std::nullopt : std::optional(frame.mask_path);
+            },
+            nb::for_getter(nb::sig("def mask_path(self) -> pathlib.Path | None")))
+        .def_prop_ro(
+            "width", [](const Frame& frame) { return frame.camera.width; }, "px")
+        .def_prop_ro(
+            "height", [](const Frame& frame) { return frame.camera.height; }, "px")
+        .def("__repr__", [](const Frame& frame) {
+            return "Frame('" + frame.name + "', " + std::to_string(frame.camera.width) + "x" +
+                   std::to_string(frame.camera.height) + ")";
+        });
+    nb::class_<Images>(module, "Images", "The images of a dataset. Each is decoded when it is asked for.")
+        .def("__len__", [](const Images& images) { return images.dataset->frames.size(); })
+        .def("__getitem__", image, nb::arg("index"),
+             nb::sig("def __getitem__(self, index: int, /) -> numpy.typing.NDArray[numpy.float32]"),
+             "[H, W, 3], or [H, W, 4] with a mask or alpha, from 0 to 1: as the frame's camera sees it.");
+}
+
+}  // namespace
+
+std::vector<int> frames_of(nb::handle value, const Dataset& dataset, const char* name) {
+    const Array<int64_t> array(value, name, {any('m')});
+    const auto count = int64_t(dataset.frames.size());
+    std::vector<int> frames;
+    for (const int64_t index : array.values()) {
+        if (index < 0 || index >= count)
+            throw nb::index_error((std::string(name) + " has the index " + std::to_string(index) +
+                                   "; the dataset has " + core::counted(uint64_t(count), "frame"))
+                                      .c_str());
+        frames.push_back(int(index));
+    }
+    return frames;
+}
+
+void bind_dataset(nb::module_& module) {
+    bind_frame(module);
+    nb::class_<LoadedDataset>(module, "Dataset",
+                              "Images with cameras, and the points that they were reconstructed from.")
+        .def("__init__", open_dataset, nb::arg("path"), nb::kw_only(), nb::arg("downscale") = 1,
+             nb::arg("masks") = "auto", nb::arg("need_images") = true,
+             nb::sig(
+                 "def __init__(self, path: str | os.PathLike[str], *, downscale: int = 1, "
+                 "masks: typing.Literal['auto', 'ignore', 'cut', 'none'] = 'auto', need_images: bool = True) "
+                 "-> None"),
+             "Reads a COLMAP model or transforms.json: a folder, or the file. need_images False reads only "
+             "cameras. Raises "
+             "InputError.")
+        .def_prop_ro("root", [](const LoadedDataset& d) { return d.dataset->root; })
+        .def_prop_ro(
+            "frames", [](const LoadedDataset& d) { return d.dataset->frames; }, "In the order of names.")
+        .def_prop_ro("images", [](const LoadedDataset& d) { return Images{d.dataset}; })
+        .def_prop_ro(
+            "viewmats", [](const LoadedDataset& d) { return viewmats_of(cameras(d)); }, nb::rv_policy::move,
+            nb::for_getter(nb::sig("def viewmats(self) -> numpy.typing.NDArray[numpy.float64]")),
+            "[n, 4, 4], from the world to the camera (x right, y down, z forward).")
+        .def_prop_ro(
+            "Ks", [](const LoadedDataset& d) { return intrinsics_of(cameras(d)); }, nb::rv_policy::move,
+            nb::for_getter(nb::sig("def Ks(self) -> numpy.typing.NDArray[numpy.float64]")),
+            "[n, 3, 3], in pixels of the frame's width and height.")
+        .def_prop_ro("points", positions, nb::rv_policy::move,
+                     nb::for_getter(nb::sig("def points(self) -> numpy.typing.NDArray[numpy.float64]")),
+                     "[m, 3], in world units.")
+        .def_prop_ro("point_colors", colors, nb::rv_policy::move,
+                     nb::for_getter(nb::sig("def point_colors(self) -> numpy.typing.NDArray[numpy.uint8]")),
+                     "[m, 3]")
+        .def_prop_ro("missing_images", [](const LoadedDataset& d) { return d.dataset->missing_images; })
+        .def("split", split, nb::arg("test_every") = 8,
+             "The indices of the training frames and of those held out, as ewa train chooses them.")
+        .def("__len__", [](const LoadedDataset& d) { return d.dataset->frames.size(); })
+        .def("__repr__", dataset_text);
+}
+
+}  // namespace ewa::python

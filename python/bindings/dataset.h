@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// ewa.Dataset, which never changes once it is made.
+#pragma once
+#include <nanobind/nanobind.h>
+
+#include <memory>
+#include <vector>
+
+#include "ewa/dataset.h"
+
+namespace ewa::python {
+
+using SharedDataset = std::shared_ptr<const Dataset>;
+
+struct LoadedDataset {
+    SharedDataset dataset;
+};
+
+/// Indices of frames from Python. Throws IndexError that names the argument.
+std::vector<int> frames_of(nanobind::handle value, const Dataset& dataset, const char* name);
+
+}  // namespace ewa::python

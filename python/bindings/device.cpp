@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "device.h"
+
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/variant.h>
+#include <nanobind/stl/vector.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <string>
+#include <variant>
+
+#include "bindings.h"
+#include "ewa/error.h"
+#include "vulkan_loader.h"
+
+namespace ewa::python {
+namespace {
+
+/// Never destroyed: the driver may be gone before it.
+struct DefaultDevice {
+    std::recursive_mutex mutex;
+    std::string selector;
+    std::shared_ptr<gpu::Device> device;
+    std::atomic<pid_t> opened_by = 0;
+};
+
+DefaultDevice& default_device() {
+    static auto* const one = [] {
+        auto* made = new DefaultDevice;
+        if (const char* named = std::getenv("EWA_DEVICE")) made->selector = named;
+        return made;
+    }();
+    return *one;
+}
+
+void check_loader() {
+    if (has_vulkan_loader()) return;
+    throw RunError(
+        "there is no Vulkan loader (libvulkan.so.1), which rendering and training need; a CPU device comes "
+        "with Mesa "
+        "(Debian: apt install mesa-vulkan-drivers), that of a GPU with its vendor's driver");
+}
+
+std::vector<DeviceInfo> devices() {
+    const DeviceWork work;
+    check_loader();
+    return list_devices();
+}
+
+void set_device(const std::variant<int, std::string>& device) {
+    const std::string selector =
+        device.index() == 0 ? std::to_string(std::get<int>(device)) : std::get<std::string>(device);
+    const DeviceWork work;
+    DefaultDevice& one = default_device();
+    const std::string before = std::exchange(one.selector, selector);
+    const std::shared_ptr<gpu::Device> open = std::exchange(one.device, nullptr);
+    try {
+        // Kernels that are compiled stay with an open device.
+        const auto opened = work.device();
+        if (open && device_info(*open).index == device_info(*opened).index) one.device = open;
+    } catch (...) {
+        one.selector = before;
+        one.device = open;
+        throw;
+    }
+}
+
+DeviceInfo current_device() {
+    const DeviceWork work;
+    return device_info(*work.device());
+}
+
+std::string device_text(const DeviceInfo& info) {
+    return "DeviceInfo(index=" + std::to_string(info.index) + ", name='" + info.name + "', type='" +
+           info.type + "')";
+}
+
+}  // namespace
+
+bool was_forked() {
+    const pid_t opened_by = default_device().opened_by;
+    return opened_by != 0 && opened_by != getpid();
+}
+
+DeviceWork::DeviceWork()
+    : lock_([]() -> std::recursive_mutex& {
+          if (was_forked())
+              throw RunError(
+                  "this process was forked from one that uses a Vulkan device, which a fork cannot share; "
+                  "start "
+                  "processes with multiprocessing.get_context(\"spawn\")");
+          return default_device().mutex;
+      }()) {}
+
+std::shared_ptr<gpu::Device> DeviceWork::device() const {
+    DefaultDevice& one = default_device();
+    if (!one.device) {
+        check_loader();
+        one.device = open_device({.selector = one.selector});
+        one.opened_by = getpid();
+    }
+    return one.device;
+}
+
+void check_signals() {
+    const nb::gil_scoped_acquire interpreter;
+    if (PyErr_CheckSignals() != 0) throw nb::python_error();
+}
+
+void bind_device(nb::module_& module) {
+    nb::class_<DeviceInfo>(module, "DeviceInfo", "A Vulkan device of this machine.")
+        .def_ro("index", &DeviceInfo::index, "The number that set_device takes.")
+        .def_ro("name", &DeviceInfo::name)
+        .def_ro("type", &DeviceInfo::type, "\"cpu\", \"integrated\", \"discrete\", \"virtual\" or \"other\".")
+        .def_ro("driver", &DeviceInfo::driver)
+        .def_ro("api_version", &DeviceInfo::api_version)
+        .def_ro("memory_bytes", &DeviceInfo::memory_bytes)
+        .def_ro("unusable", &DeviceInfo::unusable, "What it lacks; empty if ewa can use it.")
+        .def_ro("lacks", &DeviceInfo::lacks, "What ewa does without on this device.")
+        .def("__repr__", device_text);
+    module.def("devices", devices,
+               "Lists the Vulkan devices of this machine. Raises DeviceError if there is none.");
+    module.def("set_device", set_device, nb::arg("device"),
+               "Opens the device that later calls use: an index, a part of a name, or \"\" for ewa's own "
+               "choice. The "
+               "environment variable EWA_DEVICE names the first one. Renderers and trainers keep theirs.");
+    module.def("current_device", current_device, "The device that calls use. Opens it if none is open.");
+}
+
+}  // namespace ewa::python

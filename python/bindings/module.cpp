@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// The extension module ewa._native, on which the package ewa stands.
+#include <nanobind/nanobind.h>
+
+#include "bindings.h"
+#include "ewa/error.h"
+
+namespace nb = nanobind;
+
+namespace {
+
+/// The classes of ewa/_errors.py. The module lives as long as the process.
+nb::object& error_class(const char* name) {
+    static nb::object* const input = new nb::object(nb::module_::import_("ewa._errors").attr("InputError"));
+    static nb::object* const device = new nb::object(nb::module_::import_("ewa._errors").attr("DeviceError"));
+    return name[0] == 'I' ? *input : *device;
+}
+
+void translate(const std::exception_ptr& thrown, void*) {
+    try {
+        std::rethrow_exception(thrown);
+    } catch (const ewa::InputError& error) {
+        PyErr_SetString(error_class("InputError").ptr(), error.what());
+    } catch (const ewa::RunError& error) {
+        PyErr_SetString(error_class("DeviceError").ptr(), error.what());
+    }
+}
+
+}  // namespace
+
+NB_MODULE(_native, module) {
+    module.doc() = "What the package ewa has from libewa.";
+    module.attr("__version__") = EWA_VERSION;
+    nb::set_leak_warnings(false);  // an exception's traceback may keep objects until the process ends
+    nb::register_exception_translator(translate);
+    ewa::python::bind_device(module);
+    ewa::python::bind_splats(module);
+    ewa::python::bind_render(module);
+    ewa::python::bind_dataset(module);
+    ewa::python::bind_train(module);
+}

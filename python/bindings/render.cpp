@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ewa/renderer.h"
+
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/string.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
+#include "bindings.h"
+#include "cameras.h"
+#include "core/typing.h"
+#include "device.h"
+#include "ewa/error.h"
+#include "options.h"
+
+namespace ewa::python {
+namespace {
+
+/// The renders of one call. Arrays that were not asked for are None.
+struct Renders {
+    nb::object color, alpha, depth, count;
+};
+
+/// The images of one kind, one after the other.
+class Planes {
+  public:
+    Planes(size_t cameras, int width, int height, size_t channels)
+        : shape_{cameras, size_t(height), size_t(width), channels},
+          values_(cameras * size_t(height) * size_t(width) * channels) {}
+    void set(size_t camera, const Image& image) {
+        std::copy(image.pixels.begin(), image.pixels.end(),
+                  values_.begin() + std::ptrdiff_t(camera * image.pixels.size()));
+    }
+    nb::object array(bool batch) {
+        if (!batch) shape_.erase(shape_.begin());
+        return nb::cast(to_numpy(std::move(values_), shape_));
+    }
+
+  private:
+    std::vector<size_t> shape_;
+    std::vector<float> values_;
+};
+
+Drawing drawing_of(std::string mode) {
+    const std::vector<std::string> modes{"color", "depth", "count", "ellipsoids"};
+    if (const std::string problem = core::settle_word(mode, modes); !problem.empty())
+        throw InputError("mode: " + problem);
+    return std::array{
+        Drawing::color, Drawing::depth, Drawing::count,
+        Drawing::ellipsoids}[size_t(std::find(modes.begin(), modes.end(), mode) - modes.begin())];
+}
+
+/// ewa.Renderer: a scene on the device.
+class SceneRenderer {
+  public:
+    SceneRenderer(const Splats& splats, std::optional<bool> antialias, int sh_degree)
+        : options_{.kernel = footprint_of(antialias.value_or(splats.antialiased)), .sh_degree = sh_degree} {
+        if (sh_degree < 0 || sh_degree > kMaxShDegree) throw InputError("sh_degree is not 0, 1, 2 or 3");
+        const DeviceWork work;
+        renderer_ = OnDevice(std::make_unique<Renderer>(work.device(), splats.gaussians, options_));
+    }
+
+    void replace(const Splats& splats) {
+        const DeviceWork work;
+        renderer_->replace(splats.gaussians);
+    }
+
+    Renders render(nb::handle viewmats, nb::handle intrinsics, int width, int height, nb::handle background,
+                   const std::string& mode) {
+        const Cameras cameras = cameras_of(viewmats, intrinsics, width, height);
+        DrawOptions options{.render = options_, .drawing = drawing_of(mode)};
+        options.render.background = background_of(background);
+        const size_t count = cameras.all.size();
+        Planes color(count, width, height, 3), alpha(count, width, height, 1);
+        std::optional<Planes> more;
+        if (options.drawing == Drawing::depth || options.drawing == Drawing::count)
+            more.emplace(count, width, height, 1);
+        draw(cameras.all, options, color, alpha, more ? &*more : nullptr);
+        Renders renders{color.array(cameras.batch), alpha.array(cameras.batch), nb::none(), nb::none()};
+        if (more)
+            (options.drawing == Drawing::depth ? renders.depth : renders.count) = more->array(cameras.batch);
+        return renders;
+    }
+
+  private:
+    void draw(const std::vector<Camera>& cameras, const DrawOptions& options, Planes& color, Planes& alpha,
+              Planes* more) {
+        const DeviceWork work;
+        for (size_t i = 0; i < cameras.size(); ++i) {
+            const Rendering rendering = renderer_->render(cameras[i], options);
+            color.set(i, rendering.color);
+            alpha.set(i, rendering.alpha);
+            if (more) more->set(i, options.drawing == Drawing::depth ? rendering.depth : rendering.count);
+            check_signals();
+        }
+    }
+
+    RenderOptions options_;
+    OnDevice<Renderer> renderer_;
+};
+
+Renders render(const Splats& splats, nb::handle viewmats, nb::handle intrinsics, int width, int height,
+               nb::handle background, const std::string& mode, std::optional<bool> antialias, int sh_degree) {
+    return SceneRenderer(splats, antialias, sh_degree)
+        .render(viewmats, intrinsics, width, height, background, mode);
+}
+
+#define EWA_CAMERA_TYPES                                                                         \
+    "viewmats: numpy.typing.ArrayLike, Ks: numpy.typing.ArrayLike, width: int, height: int, *, " \
+    "background: numpy.typing.ArrayLike | str = (0, 0, 0), "                                     \
+    "mode: typing.Literal['color', 'depth', 'count', 'ellipsoids'] = 'color'"
+#define EWA_SCENE_TYPES "antialias: bool | None = None, sh_degree: int = 3"
+
+constexpr const char* kRenderHelp =
+    "Renders through cameras of the OpenCV convention. viewmats [C, 4, 4] map the world to the camera, Ks "
+    "[C, 3, 3] are in "
+    "pixels, with pixel centres at +0.5. One matrix [4, 4] gives arrays without the first dimension. mode "
+    "\"depth\" and \"count\" "
+    "add these arrays. antialias None is as the splats were trained. Ctrl-C ends it after a camera.";
+
+}  // namespace
+
+void bind_render(nb::module_& module) {
+    using namespace nb::literals;
+    nb::class_<Renders>(module, "Renders", "What render() returns.")
+        .def_ro("color", &Renders::color,
+                nb::for_getter(nb::sig("def color(self) -> numpy.typing.NDArray[numpy.float32]")),
+                "[C, H, W, 3], with the background blended in, not clamped.")
+        .def_ro("alpha", &Renders::alpha,
+                nb::for_getter(nb::sig("def alpha(self) -> numpy.typing.NDArray[numpy.float32]")),
+                "[C, H, W, 1], 0 where no splat is.")
+        .def_ro("depth", &Renders::depth,
+                nb::for_getter(nb::sig("def depth(self) -> numpy.typing.NDArray[numpy.float32] | None")),
+                "[C, H, W, 1], the mean depth along the view's axis in world units, 0 where no splat is. For "
+                "mode \"depth\".")
+        .def_ro("count", &Renders::count,
+                nb::for_getter(nb::sig("def count(self) -> numpy.typing.NDArray[numpy.float32] | None")),
+                "[C, H, W, 1], the number of splats blended. For mode \"count\".");
+    nb::class_<SceneRenderer>(
+        module, "Renderer", "A scene on the device, for more than one call of render(). Threads take turns.")
+        .def(nb::init<const Splats&, std::optional<bool>, int>(), "splats"_a, nb::kw_only(),
+             "antialias"_a = nb::none(), "sh_degree"_a = kMaxShDegree,
+             nb::sig("def __init__(self, splats: Splats, *, " EWA_SCENE_TYPES ") -> None"),
+             "Uploads a copy of the splats.")
+        .def("replace", &SceneRenderer::replace, "splats"_a,
+             "Uploads other splats, with the kernels that there are.")
+        .def("render", &SceneRenderer::render, "viewmats"_a, "Ks"_a, "width"_a, "height"_a, nb::kw_only(),
+             "background"_a = nb::make_tuple(0, 0, 0), "mode"_a = "color",
+             nb::sig("def render(self, " EWA_CAMERA_TYPES ") -> Renders"), kRenderHelp);
+    module.def("render", render, "splats"_a, "viewmats"_a, "Ks"_a, "width"_a, "height"_a, nb::kw_only(),
+               "background"_a = nb::make_tuple(0, 0, 0), "mode"_a = "color", "antialias"_a = nb::none(),
+               "sh_degree"_a = kMaxShDegree,
+               nb::sig("def render(splats: Splats, " EWA_CAMERA_TYPES ", " EWA_SCENE_TYPES ") -> Renders"),
+               kRenderHelp);
+}
+
+}  // namespace ewa::python

@@ -1,0 +1,338 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
+
+#include "arrays.h"
+#include "bindings.h"
+#include "core/json.h"
+#include "core/typing.h"
+#include "dataset.h"
+#include "device.h"
+#include "ewa/error.h"
+#include "ewa/evaluation.h"
+#include "ewa/splat_edit.h"
+#include "ewa/trainer.h"
+#include "options.h"
+#include "train/checkpoint.h"
+#include "train/resume.h"
+#include "train/run_input.h"
+#include "train/run_options.h"
+#include "train_options.h"
+
+namespace ewa::python {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// Every which frame is held out unless frames are given.
+int usual_test_every() {
+    return RunOptions().test_every;
+}
+
+/// What a training begins with.
+struct Plan {
+    SharedDataset dataset;
+    TrainOptions options;  // with a concrete strategy and SH degree
+    std::vector<int> frames;
+    bool own_start = false;  // the first splats are an argument
+
+    void resolve_options() {
+        options = resolve(options, *dataset);
+        options.render.sh_degree = options.sh_degree;
+    }
+    /// The frames that are not trained on count as held out.
+    Split split() const {
+        Split all{frames, {}};
+        for (int i = 0; i < int(dataset->frames.size()); ++i)
+            if (std::find(frames.begin(), frames.end(), i) == frames.end()) all.test.push_back(i);
+        return all;
+    }
+    RunOptions run() const {
+        RunOptions run;
+        run.train = options;
+        return run;
+    }
+};
+
+Gaussians first_splats(const Plan& plan, const Splats* init, const std::string& word) {
+    if (!init) {
+        RunOptions run = plan.run();
+        run.init = word;
+        return train::initial_splats(run, *plan.dataset, plan.frames);
+    }
+    Gaussians start = init->gaussians;
+    set_sh_degree(start, plan.options.sh_degree);
+    return start;
+}
+
+/// ewa.Trainer
+class Training {
+  public:
+    Training(Plan plan, nb::handle init) : plan_(std::move(plan)) {
+        const Splats* given = nb::isinstance<Splats>(init) ? &nb::cast<const Splats&>(init) : nullptr;
+        const std::string word = given ? "" : init.is_none() ? "sfm" : nb::cast<std::string>(init);
+        if (!given && word != "sfm" && word != "random")
+            throw InputError("init is neither splats nor \"sfm\" nor \"random\"");
+        plan_.own_start = given;
+        word_ = word;
+        const DeviceWork work;
+        trainer_ = OnDevice(std::make_unique<Trainer>(work.device(), *plan_.dataset, plan_.frames,
+                                                      first_splats(plan_, given, word), plan_.options));
+    }
+
+    StepReport step() {
+        const DeviceWork work;
+        if (trainer_->steps_done() >= plan_.options.steps)
+            throw InputError("all " + core::counted(uint64_t(plan_.options.steps), "step") + " are done");
+        last_ = trainer_->step();
+        return last_;
+    }
+    StepReport next() {
+        if (last_.step >= plan_.options.steps) throw nb::stop_iteration();
+        return step();
+    }
+
+    Splats splats() const {
+        const DeviceWork work;
+        return {trainer_->gaussians(), plan_.options.render.kernel == Footprint::antialias};
+    }
+    nb::ndarray<nb::numpy, float> exposures() const {
+        std::vector<float> values;
+        size_t count = 0;
+        {
+            const DeviceWork work;
+            for (const Exposure& exposure : trainer_->exposures()) {
+                values.insert(values.end(), exposure.begin(), exposure.end());
+                ++count;
+            }
+        }
+        return to_numpy(std::move(values), {count, 3, 4});
+    }
+
+    void save_checkpoint(const std::filesystem::path& path) const {
+        Json settings = train::checkpoint_settings(plan_.run(),
+                                                   train::dataset_fingerprint(*plan_.dataset, plan_.split()));
+        settings["fields"] = options_json(plan_.options);
+        settings["train_frames"] = plan_.frames;
+        settings["init"] = plan_.own_start ? "splats" : word_;
+        std::optional<TrainerState> state;
+        const DeviceWork work;
+        state = trainer_->state();
+        try {
+            train::write_checkpoint(path, {settings.dump(), "", last_.seconds, std::move(*state)});
+        } catch (const RunError& error) {
+            const nb::gil_scoped_acquire interpreter;
+            PyErr_SetString(PyExc_OSError, error.what());
+            throw nb::python_error();
+        }
+    }
+    void restore(const std::filesystem::path& path, const TrainerState& state) {
+        const DeviceWork work;
+        try {
+            trainer_->restore(state);
+        } catch (const InputError& error) {
+            throw InputError(path.string() + ": " + error.what());
+        }
+        last_ = state.report;
+    }
+
+    const Plan& plan() const { return plan_; }
+    const StepReport& last() const { return last_; }
+
+  private:
+    Plan plan_;
+    std::string word_;
+    OnDevice<Trainer> trainer_;
+    StepReport last_;
+};
+
+void start_training(Training* self, const LoadedDataset& dataset, nb::handle init, nb::handle train_frames,
+                    const nb::kwargs& options) {
+    Plan plan{dataset.dataset, usual_options(), {}};
+    for (const auto& [name, value] : options) set_option(plan.options, nb::cast<std::string>(name), value);
+    plan.frames = train_frames.is_none() ? split_frames(*dataset.dataset, usual_test_every()).train
+                                         : frames_of(train_frames, *dataset.dataset, "train_frames");
+    plan.resolve_options();
+    new (self) Training(std::move(plan), init);
+}
+
+/// The options and the training frames that a checkpoint was written with, of this package or of ewa train.
+void read_settings(const Json& settings, Plan& plan) {
+    if (!settings.is_object()) throw InputError("its settings cannot be read");
+    if (settings.contains("fields")) {
+        read_options(settings["fields"], plan.options);
+        const Json frames = settings.value("train_frames", Json::array());
+        for (const Json& frame : frames)
+            if (frame.is_number_unsigned() && frame.get<uint64_t>() < plan.dataset->frames.size())
+                plan.frames.push_back(frame.get<int>());
+        return;
+    }
+    RunOptions run;
+    const Json stored = settings.value("options", Json::object());
+    for (const train::RunOption& option : train::run_options()) {
+        if (!option.decides_result || !stored.contains(option.name)) continue;
+        const Json& value = stored[option.name];
+        option.set(run, value.is_string() ? value.get<std::string>() : value.dump());
+    }
+    plan.options = run.train;
+    plan.frames = split_frames(*plan.dataset, run.test_every).train;
+}
+
+std::unique_ptr<Training> resume(const std::filesystem::path& path, const LoadedDataset& dataset,
+                                 nb::handle init, std::optional<int> steps) {
+    train::Checkpoint checkpoint;
+    {
+        const nb::gil_scoped_release released;
+        checkpoint = train::read_checkpoint(path);
+    }
+    Plan plan{dataset.dataset, usual_options(), {}};
+    Json settings;
+    try {
+        settings = core::parse_json<Json>(checkpoint.settings, "its settings");
+        read_settings(settings, plan);
+    } catch (const InputError& error) {
+        throw InputError(path.string() + ": " + error.what());
+    }
+    if (settings.value("dataset", Json()) != train::dataset_fingerprint(*dataset.dataset, plan.split()))
+        throw InputError(path.string() + ": is of another dataset, or its images or cameras have changed");
+    const Json begun = settings.value("init", Json("sfm"));
+    if (begun == "splats" && init.is_none())
+        throw InputError(path.string() + ": its training began with splats; pass them again as init");
+    RunOptions run = plan.run();
+    if (steps) run.train.steps = *steps;
+    train::continue_from(path, checkpoint, run.train.strategy, run);
+    plan.options = run.train;
+    plan.resolve_options();
+    const nb::object start =
+        init.is_none() ? nb::cast(begun.is_string() ? begun.get<std::string>() : "sfm") : nb::borrow(init);
+    auto training = std::make_unique<Training>(std::move(plan), start);
+    training->restore(path, checkpoint.state);
+    return training;
+}
+
+Evaluation evaluate_splats(const Splats& splats, const LoadedDataset& dataset, nb::handle frames,
+                           nb::handle background, std::optional<bool> antialias) {
+    std::vector<int> chosen = frames.is_none() ? split_frames(*dataset.dataset, usual_test_every()).test
+                                               : frames_of(frames, *dataset.dataset, "frames");
+    if (chosen.empty()) throw InputError("frames is empty: there is nothing to evaluate");
+    const RenderOptions options{background_of(background),
+                                footprint_of(antialias.value_or(splats.antialiased))};
+    const DeviceWork work;
+    return evaluate(work.device(), splats.gaussians, *dataset.dataset, chosen, options, {}, check_signals);
+}
+
+std::string report_text(const StepReport& report) {
+    return "StepReport(step=" + std::to_string(report.step) + ", loss=" + std::to_string(report.loss) +
+           ", splats=" + std::to_string(report.splats) + ")";
+}
+
+void bind_results(nb::module_& module) {
+    nb::class_<StepReport>(module, "StepReport", "What a step of a training did.")
+        .def_ro("step", &StepReport::step, "Steps done.")
+        .def_ro("seconds", &StepReport::seconds, "In steps so far.")
+        .def_ro("loss", &StepReport::loss,
+                "Of the last step that the device has finished; a GPU may be one behind.")
+        .def_ro("psnr", &StepReport::psnr, "dB, of the image that loss is of.")
+        .def_ro("splats", &StepReport::splats)
+        .def_ro("dropped_updates", &StepReport::dropped_updates, "Updates so far that were not finite.")
+        .def_ro("skipped_nonfinite", &StepReport::skipped_nonfinite,
+                "Splats skipped in the last step: a value is not finite.")
+        .def_ro("limited_steps", &StepReport::limited_steps, "Updates so far that were shortened.")
+        .def("__repr__", report_text);
+    nb::class_<EvalFrame>(module, "EvalFrame", "How close the render of a frame is to its image.")
+        .def_ro("name", &EvalFrame::name)
+        .def_ro("psnr", &EvalFrame::psnr, "dB")
+        .def_ro("ssim", &EvalFrame::ssim)
+        .def("__repr__", [](const EvalFrame& f) {
+            return "EvalFrame('" + f.name + "', psnr=" + std::to_string(f.psnr) +
+                   ", ssim=" + std::to_string(f.ssim) + ")";
+        });
+    nb::class_<Evaluation>(module, "Evaluation", "How close renders are to a dataset's images.")
+        .def_ro("psnr", &Evaluation::psnr, "dB, the mean over the frames.")
+        .def_ro("ssim", &Evaluation::ssim, "The mean over the frames.")
+        .def_ro("frames", &Evaluation::frames)
+        .def_ro("seconds", &Evaluation::seconds)
+        .def("__repr__", [](const Evaluation& e) {
+            return "Evaluation(psnr=" + std::to_string(e.psnr) + ", ssim=" + std::to_string(e.ssim) + ", " +
+                   core::counted(e.frames.size(), "frame") + ")";
+        });
+}
+
+void bind_trainer(nb::module_& module) {
+    using namespace nb::literals;
+    const std::string init =
+        "def __init__(self, dataset: Dataset, *, init: Splats | typing.Literal['sfm', 'random'] | None = "
+        "None, "
+        "train_frames: collections.abc.Sequence[int] | None = None" +
+        option_parameters() + ") -> None";
+    nb::class_<Training>(
+        module, "Trainer",
+        "Trains splats on the images of a dataset. Iterating takes the steps: for report in trainer.")
+        .def("__init__", start_training, "dataset"_a, nb::kw_only(), "init"_a = nb::none(),
+             "train_frames"_a = nb::none(), "options"_a, nb::sig(init.c_str()),
+             "init: the first splats; \"sfm\", the usual, takes the dataset's points, or random ones if "
+             "there are none. "
+             "train_frames: all but every eighth frame unless given. docs/training.md explains the other "
+             "options.")
+        .def(
+            "__iter__", [](nb::handle self) { return nb::borrow(self); },
+            nb::sig("def __iter__(self) -> Trainer"))
+        .def("__next__", &Training::next)
+        .def("step", &Training::step,
+             "Takes one step. Ctrl-C takes effect after it; the trainer can go on or be saved then.")
+        .def("splats", &Training::splats, "The splats after the last step.")
+        .def("exposures", &Training::exposures,
+             nb::sig("def exposures(self) -> numpy.typing.NDArray[numpy.float32]"),
+             "[m, 3, 4], the affine map of colours for each training frame; empty unless exposure=True.")
+        .def("save_checkpoint", &Training::save_checkpoint, "path"_a,
+             "Writes all that later steps depend on. A file is replaced as a whole. Raises OSError.")
+        .def_static(
+            "resume", resume, "path"_a, "dataset"_a, nb::kw_only(), "init"_a = nb::none(),
+            "steps"_a = nb::none(),
+            nb::sig(
+                "def resume(path: str | os.PathLike[str], dataset: Dataset, *, init: Splats | None = None, "
+                "steps: int | None = None) -> Trainer"),
+            "Continues from a checkpoint of this class or of ewa train, with its options. On the same device "
+            "the bytes are "
+            "those of an uninterrupted training. init: the splats that the training began with, if it was "
+            "given some. "
+            "steps: another number of steps. Raises InputError.")
+        .def_prop_ro("steps", [](const Training& t) { return t.plan().options.steps; })
+        .def_prop_ro("steps_done", [](const Training& t) { return t.last().step; })
+        .def_prop_ro("train_frames", [](const Training& t) { return t.plan().frames; })
+        .def_prop_ro(
+            "options", [](const Training& t) { return options_dict(t.plan().options); },
+            nb::for_getter(nb::sig("def options(self) -> dict[str, object]")),
+            "All options, with the strategy and the SH degree that were chosen.")
+        .def("__repr__", [](const Training& t) {
+            return "Trainer(" + std::to_string(t.last().step) + " of " +
+                   core::counted(uint64_t(t.plan().options.steps), "step") + ")";
+        });
+}
+
+}  // namespace
+
+void bind_train(nb::module_& module) {
+    using namespace nb::literals;
+    bind_results(module);
+    bind_trainer(module);
+    module.def(
+        "evaluate", evaluate_splats, "splats"_a, "dataset"_a, "frames"_a = nb::none(), nb::kw_only(),
+        "background"_a = nb::make_tuple(0, 0, 0), "antialias"_a = nb::none(),
+        nb::sig("def evaluate(splats: Splats, dataset: Dataset, frames: collections.abc.Sequence[int] | None "
+                "= None, "
+                "*, background: numpy.typing.ArrayLike | str = (0, 0, 0), antialias: bool | None = None) "
+                "-> Evaluation"),
+        "Renders frames and compares each with its image: every eighth frame unless given, those that "
+        "Trainer leaves "
+        "out. Ctrl-C ends it.");
+}
+
+}  // namespace ewa::python

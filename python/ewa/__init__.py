@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""3D Gaussian splatting on any Vulkan device, a plain CPU included. docs/python.md describes the package."""
+
+from ._errors import DeviceError, InputError
+from ._native import (
+    Dataset,
+    DeviceInfo,
+    EvalFrame,
+    Evaluation,
+    Frame,
+    Images,
+    Renderer,
+    Renders,
+    Splats,
+    StepReport,
+    Trainer,
+    __version__,
+    current_device,
+    devices,
+    evaluate,
+    join,
+    load,
+    render,
+    save,
+    set_device,
+)
+
+__all__ = [
+    "Dataset",
+    "DeviceError",
+    "DeviceInfo",
+    "EvalFrame",
+    "Evaluation",
+    "Frame",
+    "Images",
+    "InputError",
+    "Renderer",
+    "Renders",
+    "Splats",
+    "StepReport",
+    "Trainer",
+    "__version__",
+    "current_device",
+    "devices",
+    "evaluate",
+    "join",
+    "load",
+    "render",
+    "save",
+    "set_device",
+]
