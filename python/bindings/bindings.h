@@ -15,6 +15,7 @@ void bind_splats(nanobind::module_& module);
 void bind_render(nanobind::module_& module);
 void bind_dataset(nanobind::module_& module);
 void bind_train(nanobind::module_& module);
+void bind_operators(nanobind::module_& module);
 
 /// ewa.Splats.
 struct Splats {

@@ -38,4 +38,5 @@ NB_MODULE(_native, module) {
     ewa::python::bind_render(module);
     ewa::python::bind_dataset(module);
     ewa::python::bind_train(module);
+    ewa::python::bind_operators(module);
 }

@@ -62,15 +62,14 @@ void main() {
     // A NaN fails these comparisons.
     const bool finite = is_finite(mean.x) && is_finite(mean.y) && is_finite(shape) && shape.x > 0.0 && shape.z > 0.0 &&
                         is_finite(opacity) && is_finite(depth);
-    const bool drawn = wanted && finite;
-    const vec4 record0 = vec4(mean, 0.0, 0.0), record1 = vec4(shape, drawn ? opacity : 0.0);
+    const vec4 record0 = vec4(mean, 0.0, 0.0), record1 = vec4(shape, opacity);
     records[RECORD_TEXELS * i] = finite ? record0 : vec4(0.0);
     records[RECORD_TEXELS * i + 1] = finite ? record1 : vec4(1.0, 0.0, 1.0, 0.0);
     if (wanted && !(finite && finite_feature)) atomicAdd(counts.skipped_nonfinite, 1u);
     if (LISTED) return;
 
     uint count = 0u;
-    if (drawn) {
+    if (wanted && finite) {
         const uvec2 size = uvec2(push.size[0], push.size[1]);
         const Footprint f = footprint_of(record0, record1, size);
         count = count_tiles(f, f.row_begin, f.row_end, size);

@@ -40,7 +40,8 @@ void check_splats(const ScreenSplats& splats, const BlendOptions& options) {
 std::unique_ptr<BlendFrame> take_frame(const std::shared_ptr<Context>& context, bool gradients) {
     const std::lock_guard lock(context->frames_mutex);
     auto& frames = context->free_frames;
-    const auto found = std::ranges::find(frames, gradients, [](const auto& frame) { return frame->gradients; });
+    const auto found =
+        std::ranges::find(frames, gradients, [](const auto& frame) { return frame->gradients; });
     if (found != frames.end()) {
         std::unique_ptr<BlendFrame> frame = std::move(*found);
         frames.erase(found);
@@ -79,7 +80,8 @@ bool has_fourth(const BlendFrame& f, uint32_t chunk) {
     return f.channels > kChunk * chunk + 3;
 }
 
-void record_collect(gpu::Recording& recording, Context& context, const BlendFrame& f, uint32_t chunk, uint32_t mode) {
+void record_collect(gpu::Recording& recording, Context& context, const BlendFrame& f, uint32_t chunk,
+                    uint32_t mode) {
     if (f.whiteners) mode |= shared::SHAPE_WHITENERS;
     // A binding that a mode does not use gets the records.
     const auto or_records = [&](const Array& array) -> const gpu::Buffer& {
@@ -194,7 +196,8 @@ DeviceLists device_lists(const TileLists& lists, const Sizes& s, const passes::K
                          std::to_string(lists.splats.size()) + " entries");
     for (const int32_t splat : lists.splats)
         if (splat < 0 || uint32_t(splat) >= splat_count)
-            throw InputError("a list with splat " + std::to_string(splat) + " of " + std::to_string(splat_count));
+            throw InputError("a list with splat " + std::to_string(splat) + " of " +
+                             std::to_string(splat_count));
 
     DeviceLists d;
     d.tile_counts.assign(splat_count, 0);
@@ -212,7 +215,8 @@ DeviceLists device_lists(const TileLists& lists, const Sizes& s, const passes::K
     // One end more: no instance stands behind the last tile.
     d.tile_starts.insert(d.tile_starts.end(), 2, uint32_t(d.splats.size()));
     uint32_t sum = 0;
-    for (uint32_t i = 0; i < splat_count; ++i) d.first_instances[i] = std::exchange(sum, sum + d.tile_counts[i]);
+    for (uint32_t i = 0; i < splat_count; ++i)
+        d.first_instances[i] = std::exchange(sum, sum + d.tile_counts[i]);
     std::vector<uint32_t> next = d.first_instances;
     d.sorted_indices.resize(d.splats.size());
     for (uint32_t k = 0; k < d.splats.size(); ++k) d.sorted_indices[next[d.splats[k]]++] = k;
@@ -254,7 +258,8 @@ std::vector<float> background_gradient(const BlendFrame& f, std::span<const floa
     return {sums.begin(), sums.end()};
 }
 
-void record_gradient(gpu::Recording& recording, Context& context, const BlendFrame& f, uint32_t chunk, bool absolute) {
+void record_gradient(gpu::Recording& recording, Context& context, const BlendFrame& f, uint32_t chunk,
+                     bool absolute) {
     const bool fourth = has_fourth(f, chunk);
     uint32_t blend = shared::BLEND_BACKWARD_ALPHA, gather = 0;
     if (absolute) {
@@ -267,8 +272,7 @@ void record_gradient(gpu::Recording& recording, Context& context, const BlendFra
     }
     if (chunk > 0) gather |= shared::GATHER_ADD;
     if (f.whiteners) gather |= shared::SHAPE_WHITENERS;
-    if (f.chunks() > 1)
-        record_collect(recording, context, f, chunk, shared::COLLECT_FEATURES);
+    if (f.chunks() > 1) record_collect(recording, context, f, chunk, shared::COLLECT_FEATURES);
     context.cache.get<passes::BlendBackward>({{shared::SPEC_MODE, blend}})
         .record(recording,
                 {.records = f.frame.records,
@@ -308,7 +312,8 @@ BlendRecord::~BlendRecord() {
     if (context->free_frames.size() < kKept) context->free_frames.push_back(std::move(frame_));
 }
 
-BlendedImage Operators::blend(const ScreenSplats& splats, const DepthOrder& order, const BlendOptions& options) {
+BlendedImage Operators::blend(const ScreenSplats& splats, const DepthOrder& order,
+                              const BlendOptions& options) {
     check_splats(splats, options);
     check_size("depths", order.depths.size(), splats.size(), "[M]");
     if (!order.radii.empty()) check_size("radii", order.radii.size(), splats.size() * 2, "[M, 2]");
@@ -323,8 +328,8 @@ BlendedImage Operators::blend(const ScreenSplats& splats, const DepthOrder& orde
     f.depths.upload(*context.device, order.depths);
     f.radii.upload(*context.device, order.radii);
     const uint32_t mode = order.radii.empty() ? 0 : shared::COLLECT_RADII;
-    const shared::Counts counts =
-        pipeline::run_until_it_fits(context.cache, context.executor, f.frame, request, [&](gpu::Recording& recording) {
+    const shared::Counts counts = pipeline::run_until_it_fits(
+        context.cache, context.executor, f.frame, request, [&](gpu::Recording& recording) {
             reserve_planes(context, f);
             recording.fill(f.frame.counts, 0, 0, sizeof(shared::Counts));
             record_collect(recording, context, f, 0, mode);
@@ -337,13 +342,16 @@ BlendedImage Operators::blend(const ScreenSplats& splats, const DepthOrder& orde
     return image;
 }
 
-BlendedImage Operators::blend(const ScreenSplats& splats, const TileLists& lists, const BlendOptions& options) {
+BlendedImage Operators::blend(const ScreenSplats& splats, const TileLists& lists,
+                              const BlendOptions& options) {
     check_splats(splats, options);
     Context& context = *context_;
     const passes::KernelConfig& config = context.cache.config();
-    if (lists.tile_size == 0 || lists.tile_size % config.tile_width != 0 || lists.tile_size % config.tile_height != 0)
-        throw InputError("lists of tiles of " + std::to_string(lists.tile_size) + " px; this device draws tiles of " +
-                         std::to_string(config.tile_width) + "x" + std::to_string(config.tile_height));
+    if (lists.tile_size == 0 || lists.tile_size % config.tile_width != 0 ||
+        lists.tile_size % config.tile_height != 0)
+        throw InputError("lists of tiles of " + std::to_string(lists.tile_size) +
+                         " px; this device draws tiles of " + std::to_string(config.tile_width) + "x" +
+                         std::to_string(config.tile_height));
     const std::lock_guard lock(context.mutex);
     auto record = std::shared_ptr<BlendRecord>(new BlendRecord(take_frame(context_, options.gradients)));
     BlendFrame& f = *record->frame_;

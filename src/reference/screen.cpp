@@ -86,14 +86,19 @@ ScreenImage blend(const ScreenValues& splats, std::span<const uint32_t> order, i
     return image;
 }
 
-ScreenValuesGradient blend_backward(const ScreenValues& splats, std::span<const uint32_t> order, int width, int height,
-                                    std::span<const double> features_gradient, std::span<const double> alphas_gradient,
-                                    const Smoothing& smoothing) {
+ScreenValuesGradient blend_backward(const ScreenValues& splats, std::span<const uint32_t> order, int width,
+                                    int height, std::span<const double> features_gradient,
+                                    std::span<const double> alphas_gradient, const Smoothing& smoothing) {
     const size_t channels = splats.channels, n = splats.size();
     ScreenValuesGradient gradient;
     ScreenValues& g = gradient.values;
-    g = {std::vector<double>(2 * n), std::vector<double>(3 * n), std::vector<double>(n),
-         std::vector<double>(channels * n), std::vector<double>(channels), channels, splats.whiteners};
+    g = {std::vector<double>(2 * n),
+         std::vector<double>(3 * n),
+         std::vector<double>(n),
+         std::vector<double>(channels * n),
+         std::vector<double>(channels),
+         channels,
+         splats.whiteners};
     gradient.absolute.assign(2 * n, 0.0);
     for (int y = 0; y < height; ++y)
         for (int x = 0; x < width; ++x) {

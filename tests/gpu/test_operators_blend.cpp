@@ -15,14 +15,16 @@
 namespace ewa::test {
 namespace {
 
-SharedByTests<std::shared_ptr<Operators>>* const operators_of_all = SharedByTests<std::shared_ptr<Operators>>::add();
+SharedByTests<std::shared_ptr<Operators>>* const operators_of_all =
+    SharedByTests<std::shared_ptr<Operators>>::add();
 Operators& operators() {
     return *operators_of_all->get([] { return std::make_shared<Operators>(device()); });
 }
 
 /// A scene's arrays as floats.
 struct Arrays {
-    std::vector<float> means2d, conics, opacities, features, background, depths, features_gradient, alphas_gradient;
+    std::vector<float> means2d, conics, opacities, features, background, depths, features_gradient,
+        alphas_gradient;
     std::vector<int32_t> radii;
     const ScreenScene* scene;
 
@@ -100,8 +102,8 @@ void expect_image(const BlendedImage& image, const reference::ScreenImage& expec
             const size_t at = size_t(y) * size_t(s.width) + size_t(x);
             worst = std::max(worst, std::abs(double(image.alphas[at]) - expected.alphas[at]));
             for (size_t c = 0; c < channels; ++c) {
-                const double error =
-                    std::abs(double(image.features[at * channels + c]) - expected.features[at * channels + c]);
+                const double error = std::abs(double(image.features[at * channels + c]) -
+                                              expected.features[at * channels + c]);
                 ASSERT_TRUE(std::isfinite(error)) << x << " " << y;
                 worst = std::max(worst, error);
             }
@@ -109,14 +111,16 @@ void expect_image(const BlendedImage& image, const reference::ScreenImage& expec
     EXPECT_LT(worst, 2e-5);
 }
 
-void expect_gradient(const ScreenGradient& actual, const reference::ScreenValuesGradient& expected, bool absolute) {
+void expect_gradient(const ScreenGradient& actual, const reference::ScreenValuesGradient& expected,
+                     bool absolute) {
     const auto wide = [](const std::vector<float>& v) { return std::vector<double>(v.begin(), v.end()); };
     const GradientTolerance tolerance{1e-7, 3e-4, 5e-3, 1e-4};
     EXPECT_TRUE(gradients_agree(wide(actual.means2d), expected.values.means2d, tolerance)) << "means";
     EXPECT_TRUE(gradients_agree(wide(actual.conics), expected.values.conics, tolerance)) << "conics";
     EXPECT_TRUE(gradients_agree(wide(actual.opacities), expected.values.opacities, tolerance)) << "opacities";
     EXPECT_TRUE(gradients_agree(wide(actual.features), expected.values.features, tolerance)) << "features";
-    EXPECT_TRUE(gradients_agree(wide(actual.background), expected.values.background, tolerance)) << "background";
+    EXPECT_TRUE(gradients_agree(wide(actual.background), expected.values.background, tolerance))
+        << "background";
     if (absolute) {
         EXPECT_TRUE(gradients_agree(wide(actual.absolute), expected.absolute, tolerance)) << "absolute";
     } else {
@@ -139,25 +143,27 @@ TEST_P(OperatorBlend, ImageAndGradientMatchTheReference) {
     const Arrays arrays(s);
     const BlendedImage image = arrays.blend();
     expect_image(image, reference::blend(s.splats, s.order, s.width, s.height), s);
-    const auto expected =
-        reference::blend_backward(s.splats, s.order, s.width, s.height, s.features_gradient, s.alphas_gradient);
+    const auto expected = reference::blend_backward(s.splats, s.order, s.width, s.height, s.features_gradient,
+                                                    s.alphas_gradient);
     // An absolute gradient is exact for one chunk of channels.
     const bool absolute = c.channels <= 4;
     expect_gradient(arrays.backward(image, absolute), expected, absolute);
     expect_gradient(arrays.backward(image, false), expected, false);
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    All, OperatorBlend,
-    testing::Values(OperatorCase{SplatKind::ordinary, 60, 3, false}, OperatorCase{SplatKind::ordinary, 60, 1, false},
-                    OperatorCase{SplatKind::mixed, 90, 4, false}, OperatorCase{SplatKind::mixed, 90, 9, false},
-                    OperatorCase{SplatKind::mixed, 200, 3, true}, OperatorCase{SplatKind::needles, 60, 4, true},
-                    OperatorCase{SplatKind::opacity_extremes, 120, 2, true}),
-    [](const testing::TestParamInfo<OperatorCase>& each) {
-        const OperatorCase& c = each.param;
-        return std::string(name_of(c.kind)) + "_" + std::to_string(c.splats) + "_" + std::to_string(c.channels) +
-               (c.whiteners ? "_whiteners" : "_conics");
-    });
+INSTANTIATE_TEST_SUITE_P(All, OperatorBlend,
+                         testing::Values(OperatorCase{SplatKind::ordinary, 60, 3, false},
+                                         OperatorCase{SplatKind::ordinary, 60, 1, false},
+                                         OperatorCase{SplatKind::mixed, 90, 4, false},
+                                         OperatorCase{SplatKind::mixed, 90, 9, false},
+                                         OperatorCase{SplatKind::mixed, 200, 3, true},
+                                         OperatorCase{SplatKind::needles, 60, 4, true},
+                                         OperatorCase{SplatKind::opacity_extremes, 120, 2, true}),
+                         [](const testing::TestParamInfo<OperatorCase>& each) {
+                             const OperatorCase& c = each.param;
+                             return std::string(name_of(c.kind)) + "_" + std::to_string(c.splats) + "_" +
+                                    std::to_string(c.channels) + (c.whiteners ? "_whiteners" : "_conics");
+                         });
 
 /// The lists of 16 px tiles that a caller makes: every splat in every tile, front to back.
 struct FullLists {
@@ -180,9 +186,10 @@ TEST(OperatorBlendLists, CallersListsGiveTheSameImageAndGradient) {
     const FullLists full(s);
     const BlendedImage image = operators().blend(arrays.splats(), full.lists(), arrays.options());
     expect_image(image, reference::blend(s.splats, s.order, s.width, s.height), s);
-    expect_gradient(
-        arrays.backward(image, false),
-        reference::blend_backward(s.splats, s.order, s.width, s.height, s.features_gradient, s.alphas_gradient), false);
+    expect_gradient(arrays.backward(image, false),
+                    reference::blend_backward(s.splats, s.order, s.width, s.height, s.features_gradient,
+                                              s.alphas_gradient),
+                    false);
 }
 
 TEST(OperatorBlendLists, TheOrderIsThatOfTheLists) {
@@ -198,7 +205,8 @@ TEST(OperatorBlendLists, TheOrderIsThatOfTheLists) {
 TEST(OperatorBlendLists, WrongListsAreRefused) {
     const ScreenScene s = screen_scene(43, 5, SplatKind::ordinary, 3, false, 32, 16);
     const Arrays arrays(s);
-    const auto refused = [&](std::vector<int32_t> offsets, std::vector<int32_t> splats, uint32_t tile_size = 16) {
+    const auto refused = [&](std::vector<int32_t> offsets, std::vector<int32_t> splats,
+                             uint32_t tile_size = 16) {
         try {
             operators().blend(arrays.splats(), TileLists{tile_size, offsets, splats}, arrays.options());
         } catch (const InputError& error) {
@@ -237,8 +245,8 @@ TEST(OperatorBlendMask, MaskedTilesShowTheBackground) {
             s.alphas_gradient[at] = 0;
         }
     expect_image(image, expected, s);
-    auto gradient =
-        reference::blend_backward(s.splats, s.order, s.width, s.height, s.features_gradient, s.alphas_gradient);
+    auto gradient = reference::blend_backward(s.splats, s.order, s.width, s.height, s.features_gradient,
+                                              s.alphas_gradient);
     for (size_t c = 0; c < 4; ++c) gradient.values.background[c] += through[c];
     expect_gradient(arrays.backward(image, true), gradient, true);
 }
@@ -255,9 +263,10 @@ TEST(OperatorBlend, TwoImagesMayWaitForTheirGradients) {
     const ScreenGradient again = first.backward(of_first, true);
     EXPECT_EQ(alone.means2d, again.means2d);
     EXPECT_EQ(alone.features, again.features);
-    expect_gradient(
-        again, reference::blend_backward(a.splats, a.order, a.width, a.height, a.features_gradient, a.alphas_gradient),
-        true);
+    expect_gradient(again,
+                    reference::blend_backward(a.splats, a.order, a.width, a.height, a.features_gradient,
+                                              a.alphas_gradient),
+                    true);
 }
 
 TEST(OperatorBlend, ValuesThatAreNotFiniteAreLeftOutAndCounted) {
@@ -268,17 +277,31 @@ TEST(OperatorBlend, ValuesThatAreNotFiniteAreLeftOutAndCounted) {
     const uint32_t lost = s.order[0];
     for (const auto& damage : std::vector<std::function<void(Arrays&)>>{
              [&](Arrays& d) { d.means2d[2 * lost] = NAN; }, [&](Arrays& d) { d.conics[3 * lost] = -1; },
-             [&](Arrays& d) { d.conics[3 * lost + 1] = 1e9f; }, [&](Arrays& d) { d.opacities[lost] = INFINITY; },
-             [&](Arrays& d) { d.depths[lost] = NAN; }, [&](Arrays& d) { d.features[3 * lost + 2] = NAN; }}) {
+             [&](Arrays& d) { d.conics[3 * lost + 1] = 1e9f; },
+             [&](Arrays& d) { d.opacities[lost] = INFINITY; }, [&](Arrays& d) { d.depths[lost] = NAN; },
+             [&](Arrays& d) { d.features[3 * lost + 2] = NAN; }}) {
         Arrays damaged(s);
         damage(damaged);
         const BlendedImage image = damaged.blend();
         EXPECT_EQ(image.skipped_nonfinite, 1u);
         for (const float value : image.features) ASSERT_TRUE(std::isfinite(value));
         const ScreenGradient gradient = damaged.backward(image, true);
-        for (const auto* values : {&gradient.means2d, &gradient.conics, &gradient.opacities, &gradient.features})
+        for (const auto* values :
+             {&gradient.means2d, &gradient.conics, &gradient.opacities, &gradient.features})
             for (const float value : *values) ASSERT_TRUE(std::isfinite(value));
     }
+}
+
+TEST(OperatorBlend, SplatsThatAreLeftOutMayHoldAnything) {
+    const ScreenScene s = screen_scene(55, 20, SplatKind::ordinary, 3, false, 40, 33);
+    Arrays without(s), damaged(s);
+    const uint32_t lost = s.order[0];
+    without.radii[2 * lost] = damaged.radii[2 * lost + 1] = 0;
+    damaged.means2d[2 * lost] = damaged.conics[3 * lost] = damaged.opacities[lost] =
+        damaged.features[3 * lost] = NAN;
+    const BlendedImage image = damaged.blend();
+    EXPECT_EQ(image.skipped_nonfinite, 0u);
+    EXPECT_EQ(image.features, without.blend().features);
 }
 
 TEST(OperatorBlend, NegativeDepthsAreInOrder) {
@@ -298,7 +321,8 @@ TEST(OperatorBlend, NothingToDrawIsTheBackground) {
         s.radii.assign(s.radii.size(), 0);
         const Arrays arrays(s);
         const BlendedImage image = arrays.blend();
-        for (size_t i = 0; i < image.features.size(); ++i) ASSERT_EQ(image.features[i], arrays.background[i % 3]);
+        for (size_t i = 0; i < image.features.size(); ++i)
+            ASSERT_EQ(image.features[i], arrays.background[i % 3]);
         for (const float alpha : image.alphas) ASSERT_EQ(alpha, 0);
         const ScreenGradient gradient = arrays.backward(image, true);
         for (const float value : gradient.means2d) EXPECT_EQ(value, 0);
@@ -329,12 +353,17 @@ TEST(OperatorBlend, WrongSizesAreRefused) {
         }
         return std::string();
     };
-    EXPECT_EQ(refused([](Arrays& a) { a.means2d.pop_back(); }), "means2d has 9 values; its shape [M, 2] needs 10");
-    EXPECT_EQ(refused([](Arrays& a) { a.conics.pop_back(); }), "conics has 14 values; its shape [M, 3] needs 15");
-    EXPECT_EQ(refused([](Arrays& a) { a.features.pop_back(); }), "features has 14 values; its shape [M, D] needs 15");
+    EXPECT_EQ(refused([](Arrays& a) { a.means2d.pop_back(); }),
+              "means2d has 9 values; its shape [M, 2] needs 10");
+    EXPECT_EQ(refused([](Arrays& a) { a.conics.pop_back(); }),
+              "conics has 14 values; its shape [M, 3] needs 15");
+    EXPECT_EQ(refused([](Arrays& a) { a.features.pop_back(); }),
+              "features has 14 values; its shape [M, D] needs 15");
     EXPECT_EQ(refused([](Arrays& a) { a.depths.pop_back(); }), "depths has 4 values; its shape [M] needs 5");
-    EXPECT_EQ(refused([](Arrays& a) { a.radii.pop_back(); }), "radii has 9 values; its shape [M, 2] needs 10");
-    EXPECT_EQ(refused([](Arrays& a) { a.background.pop_back(); }), "background has 2 values; its shape [D] needs 3");
+    EXPECT_EQ(refused([](Arrays& a) { a.radii.pop_back(); }),
+              "radii has 9 values; its shape [M, 2] needs 10");
+    EXPECT_EQ(refused([](Arrays& a) { a.background.pop_back(); }),
+              "background has 2 values; its shape [D] needs 3");
     const Arrays arrays(s);
     const BlendedImage image = arrays.blend();
     EXPECT_THROW(operators().blend_backward(*image.record, {}, {}, false), InputError);
@@ -351,7 +380,8 @@ TEST(OperatorBlend, FourThreadsGetTheBytesOfOne) {
         threads.emplace_back([&, t] {
             for (int round = 0; round < 5; ++round) {
                 const BlendedImage image = arrays.blend();
-                same[t] += image.features == alone.features && arrays.backward(image, false).means2d == gradient.means2d;
+                same[t] += image.features == alone.features &&
+                           arrays.backward(image, false).means2d == gradient.means2d;
             }
         });
     for (std::thread& thread : threads) thread.join();

@@ -21,16 +21,18 @@ double loss(const test::ScreenScene& s, const Smoothing& smoothing) {
 }
 
 ScreenValuesGradient gradient_of(const test::ScreenScene& s, const Smoothing& smoothing) {
-    return blend_backward(s.splats, s.order, s.width, s.height, s.features_gradient, s.alphas_gradient, smoothing);
+    return blend_backward(s.splats, s.order, s.width, s.height, s.features_gradient, s.alphas_gradient,
+                          smoothing);
 }
 
 void expect_differences(test::ScreenScene s, const Smoothing& smoothing) {
     const ScreenValuesGradient gradient = gradient_of(s, smoothing);
-    const auto check = [&](const char* name, std::vector<double>& values, const std::vector<double>& claimed) {
+    const auto check = [&](const char* name, std::vector<double>& values,
+                           const std::vector<double>& claimed) {
         std::vector<double> expected;
         for (size_t i = 0; i < values.size(); ++i)
-            expected.push_back(
-                test::best_central_difference([&] { return loss(s, smoothing); }, values[i], claimed[i], 1e-4, 1e-6));
+            expected.push_back(test::best_central_difference([&] { return loss(s, smoothing); }, values[i],
+                                                             claimed[i], 1e-4, 1e-6));
         EXPECT_TRUE(test::gradients_agree(claimed, expected, {1e-8, 1e-5, 1e-4, 1e-5})) << name;
     };
     check("means", s.splats.means2d, gradient.values.means2d);
@@ -44,8 +46,10 @@ TEST(ReferenceScreen, GradientsMatchDifferences) {
     for (const bool whiteners : {false, true})
         for (const Smoothing& smoothing : kSmooth) {
             SCOPED_TRACE(whiteners ? "whiteners" : "conics");
-            expect_differences(test::screen_scene(50, 9, test::SplatKind::ordinary, 2, whiteners, 13, 9), smoothing);
-            expect_differences(test::screen_scene(51, 7, test::SplatKind::mixed, 5, whiteners, 11, 7), smoothing);
+            expect_differences(test::screen_scene(50, 9, test::SplatKind::ordinary, 2, whiteners, 13, 9),
+                               smoothing);
+            expect_differences(test::screen_scene(51, 7, test::SplatKind::mixed, 5, whiteners, 11, 7),
+                               smoothing);
         }
 }
 
@@ -53,7 +57,8 @@ TEST(ReferenceScreen, RgbIsThatOfTheTrainersReference) {
     test::ScreenScene s = test::screen_scene(60, 40, test::SplatKind::mixed, 3, true, 33, 21);
     std::vector<Projected> projected(s.splats.size());
     for (size_t i = 0; i < projected.size(); ++i) {
-        const double ux = s.splats.conics[3 * i], k = s.splats.conics[3 * i + 1], vy = s.splats.conics[3 * i + 2];
+        const double ux = s.splats.conics[3 * i], k = s.splats.conics[3 * i + 1],
+                     vy = s.splats.conics[3 * i + 2];
         Projected& p = projected[i];
         p.visible = s.radii[2 * i] > 0;
         p.mean2d = {s.splats.means2d[2 * i], s.splats.means2d[2 * i + 1]};
