@@ -101,34 +101,35 @@ struct BlendArguments {
         nb::object handle = nb::none();
         if (image.record)
             handle = nb::cast(BlendHandle{
-                OnDevice(std::make_unique<BlendHandle::Kept>(BlendHandle::Kept{std::move(image.record)})), size(), d, w,
-                h});
-        return nb::make_tuple(to_numpy(std::move(image.features), {h, w, d}), to_numpy(std::move(image.alphas), {h, w}),
-                              handle);
+                OnDevice(std::make_unique<BlendHandle::Kept>(BlendHandle::Kept{std::move(image.record)})),
+                size(), d, w, h});
+        return nb::make_tuple(to_numpy(std::move(image.features), {h, w, d}),
+                              to_numpy(std::move(image.alphas), {h, w}), handle);
     }
 };
 
-nb::tuple blend(nb::handle means2d, nb::handle conics, nb::handle depths, nb::handle opacities, nb::handle features,
-                nb::handle radii, int width, int height, nb::handle background, nb::handle tile_mask, int tile_size,
-                bool keep, bool whiteners) {
-    const BlendArguments arguments(means2d, conics, opacities, features, width, height, background, tile_mask, tile_size,
-                                   keep, whiteners);
+nb::tuple blend(nb::handle means2d, nb::handle conics, nb::handle depths, nb::handle opacities,
+                nb::handle features, nb::handle radii, int width, int height, nb::handle background,
+                nb::handle tile_mask, int tile_size, bool keep, bool whiteners) {
+    const BlendArguments arguments(means2d, conics, opacities, features, width, height, background, tile_mask,
+                                   tile_size, keep, whiteners);
     const auto m = ptrdiff_t(arguments.size());
     const Array<float> order(depths, "depths", Shape{m});
     const auto sizes = optional_array<int32_t>(radii, "radii", {m, 2});
     BlendedImage image;
     {
         const DeviceWork work;
-        image = operators(work).blend(arguments.splats(), DepthOrder{span_of(order), span_of(sizes)}, arguments.options);
+        image = operators(work).blend(arguments.splats(), DepthOrder{span_of(order), span_of(sizes)},
+                                      arguments.options);
     }
     return arguments.result(std::move(image));
 }
 
-nb::tuple blend_lists(nb::handle means2d, nb::handle conics, nb::handle opacities, nb::handle features, int width,
-                      int height, nb::handle background, nb::handle tile_mask, int tile_size, nb::handle offsets,
-                      nb::handle ids, bool keep, bool whiteners) {
-    const BlendArguments arguments(means2d, conics, opacities, features, width, height, background, tile_mask, tile_size,
-                                   keep, whiteners);
+nb::tuple blend_lists(nb::handle means2d, nb::handle conics, nb::handle opacities, nb::handle features,
+                      int width, int height, nb::handle background, nb::handle tile_mask, int tile_size,
+                      nb::handle offsets, nb::handle ids, bool keep, bool whiteners) {
+    const BlendArguments arguments(means2d, conics, opacities, features, width, height, background, tile_mask,
+                                   tile_size, keep, whiteners);
     const Array<int32_t> begins(offsets, "offsets", Shape{any('T')}), listed(ids, "ids", Shape{any('n')});
     BlendedImage image;
     {
@@ -147,11 +148,13 @@ nb::tuple blend_backward(const BlendHandle& handle, nb::handle features_gradient
     ScreenGradient g;
     {
         const DeviceWork work;
-        g = operators(work).blend_backward(*handle.kept->record, span_of(features), span_of(alphas), absolute);
+        g = operators(work).blend_backward(*handle.kept->record, span_of(features), span_of(alphas),
+                                           absolute);
     }
     const size_t m = handle.splats;
     return nb::make_tuple(to_numpy(std::move(g.means2d), {m, 2}), to_numpy(std::move(g.conics), {m, 3}),
-                          to_numpy(std::move(g.opacities), {m}), to_numpy(std::move(g.features), {m, handle.channels}),
+                          to_numpy(std::move(g.opacities), {m}),
+                          to_numpy(std::move(g.features), {m, handle.channels}),
                           to_numpy(std::move(g.background), {handle.channels}),
                           array_or_none(std::move(g.absolute), {m, 2}, absolute));
 }
@@ -159,20 +162,23 @@ nb::tuple blend_backward(const BlendHandle& handle, nb::handle features_gradient
 }  // namespace
 
 void bind_operators(nb::module_& module) {
-    nb::module_ own = module.def_submodule("operators", "The steps of splatting with gradients, on arrays. "
-                                                        "include/ewa/operators.h has the formulas.");
-    nb::class_<BlendHandle>(own, "BlendHandle", "What blend_backward needs of an image. It holds device memory.");
+    nb::module_ own = module.def_submodule("operators",
+                                           "The steps of splatting with gradients, on arrays. "
+                                           "include/ewa/operators.h has the formulas.");
+    nb::class_<BlendHandle>(own, "BlendHandle",
+                            "What blend_backward needs of an image. It holds device memory.");
     own.def("blend", blend, nb::arg("means2d"), nb::arg("conics"), nb::arg("depths"), nb::arg("opacities"),
             nb::arg("features"), nb::arg("radii").none(), nb::arg("width"), nb::arg("height"),
             nb::arg("background").none(), nb::arg("tile_mask").none(), nb::arg("tile_size"), nb::arg("keep"),
             nb::arg("whiteners") = false,
             "Blends M splats, nearest first: (image [H, W, D], alpha [H, W], handle or None).");
-    own.def("blend_lists", blend_lists, nb::arg("means2d"), nb::arg("conics"), nb::arg("opacities"), nb::arg("features"),
-            nb::arg("width"), nb::arg("height"), nb::arg("background").none(), nb::arg("tile_mask").none(),
-            nb::arg("tile_size"), nb::arg("offsets"), nb::arg("ids"), nb::arg("keep"), nb::arg("whiteners") = false,
+    own.def("blend_lists", blend_lists, nb::arg("means2d"), nb::arg("conics"), nb::arg("opacities"),
+            nb::arg("features"), nb::arg("width"), nb::arg("height"), nb::arg("background").none(),
+            nb::arg("tile_mask").none(), nb::arg("tile_size"), nb::arg("offsets"), nb::arg("ids"),
+            nb::arg("keep"), nb::arg("whiteners") = false,
             "Blends the lists of the caller's tiles, in their order.");
-    own.def("blend_backward", blend_backward, nb::arg("handle"), nb::arg("v_image"), nb::arg("v_alpha").none(),
-            nb::arg("absolute"),
+    own.def("blend_backward", blend_backward, nb::arg("handle"), nb::arg("v_image"),
+            nb::arg("v_alpha").none(), nb::arg("absolute"),
             "Gradients by means2d, conics, opacities, features, background, and absgrad or None.");
 }
 

@@ -94,16 +94,29 @@ void apply_config_and_quality(CLI::App& app, TrainArguments& arguments) {
         if (given[0] == 0) train.steps = quality.steps;
         if (given[1] == 0) train.max_splats = quality.max_splats;
     }
-    if (arguments.run.resume && arguments.quality.empty() && app.count("--steps") == 0)
-        keep_steps(arguments.run);
+}
+
+bool is_mesh_scene(const fs::path& path) {
+    const std::string extension = core::lower(path.extension().string());
+    return extension == ".gltf" || extension == ".glb";
+}
+
+/// Notes what a dataset will be made from: a mesh scene, photos or a video. The run's folder has its name.
+void note_scene(RunOptions& run) {
+    if (is_mesh_scene(run.dataset)) {
+        run.scene = run.dataset;
+        return;
+    }
+    check_training_input(run.dataset);
+    // The run's name is the last part of the path, which "photos/" and "." do not have.
+    if (is_capture(run.dataset))
+        run.scene = (fs::absolute(run.dataset).lexically_normal() / "").parent_path();
 }
 
 /// Renders a mesh scene into the run's folder, which becomes the dataset. Throws Interrupted if Ctrl-C ended that.
 void render_scene(TrainArguments& arguments) {
     RunOptions& run = arguments.run;
-    const std::string extension = core::lower(run.dataset.extension().string());
-    if (extension != ".gltf" && extension != ".glb") return;
-    run.scene = run.dataset;
+    if (!is_mesh_scene(run.scene)) return;
     run.output = output_folder(run);
     run.dataset = run.output / "dataset";
     train::check_free(run.output, run);
@@ -120,10 +133,7 @@ void render_scene(TrainArguments& arguments) {
 /// that.
 void place_photos(TrainArguments& arguments) {
     RunOptions& run = arguments.run;
-    check_training_input(run.dataset);
-    if (!is_capture(run.dataset)) return;
-    // The run's name is the last part of the path, which "photos/" and "." do not have.
-    run.scene = (fs::absolute(run.dataset).lexically_normal() / "").parent_path();
+    if (run.scene.empty() || is_mesh_scene(run.scene)) return;
     run.output = output_folder(run);
     run.dataset = run.output / "dataset";
     train::check_free(run.output, run);
@@ -151,6 +161,8 @@ int run(CLI::App& app, TrainArguments& arguments) {
     apply_config_and_quality(app, arguments);
     if (options.dataset.empty()) throw InputError("DATASET is required (see ewa train --help)");
     options.dataset = dataset_input(options.dataset);
+    note_scene(options);
+    if (options.resume && arguments.quality.empty() && app.count("--steps") == 0) keep_steps(options);
     if (fs::is_directory(options.init)) options.init = splat_input(options.init).file.string();
     Footprint& kernel = options.train.render.kernel;
     kernel = settled_kernel(kernel, arguments.antialias);

@@ -242,4 +242,19 @@ TEST_F(ResumeEdges, NamesACheckpointThatIsWholeButWrong) {
     expect_success(train("o", options));
 }
 
+/// The folder that a run has without -o carries the name of what its dataset is made from.
+TEST(ResumeOfAMeshScene, FindsTheRunsFolder) {
+    const Folder folder;
+    const std::filesystem::path run = folder / "out/plaster";
+    std::filesystem::create_directories(run);
+    write_file(run / "config.json", "{\"steps\": 7}");
+    write_file(run / "metrics.jsonl", "{\"step\": 7}\n");
+    write_file(run / "summary.json", "{\"steps\": 7}");
+    Circumstances in_folder;
+    in_folder.program = "/usr/bin/env";
+    const std::string scene = std::string(EWA_SOURCE_DIR) + "/scenes/plaster.gltf";
+    expect_failure(run_ewa({"-C", folder / "", EWA_PROGRAM, "train", scene, "--check-options"}, in_folder), 2,
+                   "plaster");
+}
+
 }  // namespace

@@ -91,14 +91,7 @@ TEST_F(Training, StartsByAButtonInAFolderOfItsOwn) {
 
 /// A run that has saved no splats yet is seen by the points it starts from, and the window says so over the picture.
 TEST_F(Training, PointsAreCalledPoints) {
-    write_file(
-        cameras_ + "/points.ply",
-        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
-        "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n"
-        "0 0 0 255 0 0\n0 0.3 0 0 255 0\n0 0 0.3 0 0 255\n");
-    auto json = read_json(cameras_ + "/transforms.json");
-    json["ply_file_path"] = "points.ply";
-    write_file(cameras_ + "/transforms.json", json.dump());
+    give_points();
     std::filesystem::create_directories(run_);
     write_file(run_ + "/config.json", "{\"dataset\": \"" + cameras_ + "\", \"steps\": 300}");
     const XClient display(display_.name());

@@ -69,14 +69,7 @@ TEST_F(Window, HasTheSizeAskedForWithoutADataset) {
 }
 
 TEST_F(Window, ADatasetShowsItsPoints) {
-    write_file(
-        cameras_ + "/points.ply",
-        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
-        "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n"
-        "0 0 0 255 0 0\n0 0.3 0 0 255 0\n0 0 0.3 0 0 255\n");
-    auto json = read_json(cameras_ + "/transforms.json");
-    json["ply_file_path"] = "points.ply";
-    write_file(cameras_ + "/transforms.json", json.dump());
+    give_points();
     for (const std::string& path : {cameras_, cameras_ + "/transforms.json"}) {
         expect_silent(run_view({path, "--frame", "3", "--screenshot", folder_ / "shown.png"}));
         EXPECT_GT(range_of(load_image(folder_ / "shown.png")), 0.3f);

@@ -54,6 +54,17 @@ class WindowTest : public testing::Test {
         const auto [darkest, brightest] = std::minmax_element(image.pixels.begin(), image.pixels.end());
         return *brightest - *darkest;
     }
+    /// Three points for the dataset.
+    void give_points() {
+        write_file(
+            cameras_ + "/points.ply",
+            "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+            "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n"
+            "0 0 0 255 0 0\n0 0.3 0 0 255 0\n0 0 0.3 0 0 255\n");
+        auto json = read_json(cameras_ + "/transforms.json");
+        json["ply_file_path"] = "points.ply";
+        write_file(cameras_ + "/transforms.json", json.dump());
+    }
     Image rendered(const std::string& frame, const std::vector<std::string>& more = {}) {
         std::vector<std::string> arguments{"render", splats_, "--cameras",          cameras_, "--frames",
                                            frame,    "-o",    folder_ / "rendered", "--quiet"};
