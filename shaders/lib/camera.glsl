@@ -2,7 +2,7 @@
 // The camera's uniform block, and points in camera coordinates. The including pass defines BINDING_CAMERA.
 #ifndef EWA_LIB_CAMERA
 #define EWA_LIB_CAMERA
-#include "lib/double_float.glsl"
+#include "lib/view.glsl"
 
 layout(set = 0, binding = BINDING_CAMERA, scalar) uniform CameraUniform { CameraBlock camera; };
 
@@ -13,10 +13,10 @@ mat3 camera_rotation() {
                 camera.rotation_hi[8]);
 }
 
-struct View {
-    vec3 offset;     // mean - camera position, world axes
-    vec2 x, y, z;    // camera coordinates as float pairs
-};
+Lens camera_lens() {
+    return Lens(camera_rotation(), vec2(camera.focal_hi[0], camera.focal_hi[1]),
+                vec2(camera.tan_min[0], camera.tan_min[1]), vec2(camera.tan_max[0], camera.tan_max[1]));
+}
 
 // Subtracts the camera's position first, in two floats: a scene far from the origin then loses no precision to float32.
 View view_point(vec3 mean) {
@@ -38,6 +38,6 @@ View view_point(vec3 mean) {
 vec2 pixel_position(vec2 p, vec2 z, int axis) {
     const vec2 focal = vec2(camera.focal_hi[axis], camera.focal_lo[axis]);
     const vec2 center = vec2(camera.center_hi[axis], camera.center_lo[axis]);
-    return df_add(df_mul(df_div(p, z), focal), center);
+    return pixel_of(p, z, focal, center);
 }
 #endif

@@ -8,7 +8,7 @@
 #define BINDING_CAMERA 1
 #include "lib/prelude.glsl"
 #include "lib/params.glsl"
-#include "lib/projection.glsl"
+#include "lib/stored_splat.glsl"
 #include "lib/footprint.glsl"
 #include "lib/sh.glsl"
 #include "lib/subgroup.glsl"
@@ -53,17 +53,18 @@ vec3 sh_color(uint i, vec4 plane2, vec3 direction, out bool finite) {
 bool project(uint i) {
     const vec4 p0 = param(0, i), p1 = param(1, i), p2 = param(2, i);
     const vec3 log_scale = DEBUG ? p2.xyz + push.log_scale_shift : p2.xyz;
-    const Projection p = project_splat(SplatShape(p0.xyz, p0.w, p1, log_scale));
+    const StoredProjection stored = project_splat(StoredSplat(p0.xyz, p0.w, p1, log_scale));
+    const Projection p = stored.footprint;
     const float z = p.view.z.x;
     bool finite_color;
     const vec3 color = sh_color(i, p2, normalize(p.view.offset), finite_color);
 
-    const float opacity = p.peak * p.factor;
+    const float opacity = stored.peak * p.factor;
     const vec2 x = pixel_position(p.view.x, p.view.z, 0), y = pixel_position(p.view.y, p.view.z, 1);
     const vec4 record0 = vec4(x.x, y.x, x.y, y.y), record1 = vec4(p.ux, p.k, p.vy, opacity);
     const uvec2 size = uvec2(camera.size[0], camera.size[1]);
 
-    const bool stored_finite = is_finite(p0) && is_finite(p1) && is_finite(p2.xyz) && p.in_range;
+    const bool stored_finite = is_finite(p0) && is_finite(p1) && is_finite(p2.xyz) && stored.in_range;
     const bool in_front = z > float(NEAR_PLANE);
     const bool projected_finite = p.footprint_in_range && finite_color && is_finite(record0) && is_finite(record1) && p.ux > 0.0 && p.vy > 0.0;
     const bool visible = stored_finite && in_front && projected_finite;

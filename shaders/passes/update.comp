@@ -11,7 +11,7 @@
 #define BINDING_CAMERA 1
 #include "lib/prelude.glsl"
 #include "lib/params.glsl"
-#include "lib/projection.glsl"
+#include "lib/stored_splat.glsl"
 #include "lib/footprint_gradient.glsl"
 #include "lib/step_limits.glsl"
 #include "lib/moments.glsl"
@@ -113,7 +113,8 @@ void main() {
     vec4 sum[SLOT_TEXELS];
     sum_slots(visible ? first_instances[i] : 0u, count, ABSOLUTE, sum);
     const Sums s = Sums(sum[0].x, sum[0].yz, vec3(sum[0].w, sum[1].xy), vec3(sum[1].zw, sum[2].x), sum[2].yz);
-    const Projection p = project_splat(SplatShape(p0.xyz, p0.w, p1, p2.xyz));
+    const StoredProjection stored = project_splat(StoredSplat(p0.xyz, p0.w, p1, p2.xyz));
+    const Projection p = stored.footprint;
     // The mean of an invisible splat may be anything. Zero times a direction that is not finite is not zero.
     const vec3 direction = visible ? normalize(p.view.offset) : vec3(0.0);
     // max(0, .) passes no gradient where the colour is zero.
@@ -122,21 +123,13 @@ void main() {
     vec3 direction_gradient;
     const float red_gradient = move_sh(i, color_gradient, direction, direction_gradient);
 
-    const FootprintGradient f = footprint_gradient(s, p, p2.xyz);
-    // M's rows are focal/z (row x or y of the axes - tangent * row z).
-    const float inverse_z = 1.0 / p.view.z.x;
-    const vec3 row_z = vec3(p.axes[0].z, p.axes[1].z, p.axes[2].z);
-    vec3 view_gradient = vec3(p.focal_over_z * f.mean, 0.0);
-    const vec2 tangent = vec2(p.view.x.x, p.view.y.x) * inverse_z;
-    view_gradient.z = -dot(tangent, view_gradient.xy) -
-                      inverse_z * (f.log_scale.x + f.log_scale.y + f.log_scale.z);
-    const vec2 tangent_gradient =
-        -p.focal_over_z * vec2(p.tangent_clamped.x ? 0.0 : dot(f.dm0, row_z), p.tangent_clamped.y ? 0.0 : dot(f.dm1, row_z));
-    view_gradient += vec3(tangent_gradient, -dot(tangent_gradient, tangent)) * inverse_z;
+    const FootprintGradient f = footprint_gradient(s, p);
+    const vec3 view_gradient = view_point_gradient(f, p);
 
     const mat3 to_world = transpose(camera_rotation());
     const vec3 scale = exp(p2.xyz);
-    const vec4 quaternion_gradient = torque_on_quaternion(p.unit_quaternion, f.torque) / p.quaternion_norm;
+    const vec3 torque = f.beside * scale_ratios(p2.xyz);
+    const vec4 quaternion_gradient = torque_on_quaternion(stored.unit_quaternion, torque) / stored.quaternion_norm;
     const vec3 direction_part =
         (direction_gradient - direction * dot(direction, direction_gradient)) / length(p.view.offset);
     const vec3 mean_gradient = to_world * view_gradient + direction_part;
@@ -147,7 +140,7 @@ void main() {
 
     const vec4 zero = vec4(0.0);
     const vec4 scale_pull = REGULARISED ? vec4(push.scale_weight * scale, 0.0) : zero;
-    const vec4 opacity_pull = REGULARISED ? vec4(vec3(0.0), push.opacity_weight * p.peak * transparency) : zero;
+    const vec4 opacity_pull = REGULARISED ? vec4(vec3(0.0), push.opacity_weight * stored.peak * transparency) : zero;
     move(2, i, p2, (visible ? vec4(f.log_scale, red_gradient) : zero) + scale_pull,
          vec4(vec3(push.scale_rate), push.sh0_rate), depth);
     move(1, i, p1, visible ? quaternion_gradient : zero, vec4(push.quaternion_rate), depth);

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// Projection of a splat as the model stores it: with a logit for the opacity, and logarithms of the scales. The including
+// pass defines BINDING_CAMERA.
+#ifndef EWA_LIB_STORED_SPLAT
+#define EWA_LIB_STORED_SPLAT
+#include "lib/camera.glsl"
+#include "lib/projection.glsl"
+#include "lib/quaternion.glsl"
+
+struct StoredSplat {
+    vec3 mean;
+    float logit;
+    vec4 quaternion;
+    vec3 log_scale;
+};
+
+struct StoredProjection {
+    Projection footprint;
+    vec4 unit_quaternion;
+    float quaternion_norm;
+    bool in_range;          // quaternion and mean are within bounds
+    float peak;             // opacity before the kernel's factor
+};
+
+float sigmoid(float x) { return 1.0 / (1.0 + exp(-x)); }
+
+// A scale below exp(LOG_SCALE_MIN) looks the same as exp(LOG_SCALE_MIN), and ratios of such scales stay finite.
+vec3 computable_log_scale(vec3 log_scale) { return max(log_scale, vec3(float(LOG_SCALE_MIN))); }
+
+// exp(x) - exp(-x), accurate near zero too (a splat that is nearly round).
+vec3 twice_sinh(vec3 x) {
+    const vec3 q = x * x, e = exp(clamp(x, -80.0, 80.0));
+    const vec3 series = 2.0 * x * (1.0 + q / 6.0 * (1.0 + q / 20.0 * (1.0 + q / 42.0)));
+    return mix(e - 1.0 / e, series, lessThan(abs(x), vec3(0.5)));
+}
+
+// s_i / s_j - s_j / s_i of axes yz, zx and xy.
+vec3 scale_ratios(vec3 log_scale) {
+    const vec3 l = computable_log_scale(log_scale);
+    return twice_sinh(l.yzx - l.zxy);
+}
+
+StoredProjection project_splat(StoredSplat splat) {
+    StoredProjection p;
+    const View view = view_point(splat.mean);
+    p.unit_quaternion = normalize_quaternion(splat.quaternion, p.quaternion_norm);
+    const Lens lens = camera_lens();
+    const mat3 directions = lens.rotation * rotation_of(p.unit_quaternion);
+    const vec3 scale = exp(computable_log_scale(splat.log_scale));
+    p.footprint = project_shape(view, lens, directions, directions, scale, float(LOW_PASS));
+    const vec3 far = abs(view.offset);
+    // A NaN fails these comparisons.
+    p.in_range = far.x <= float(VIEW_MAX) && far.y <= float(VIEW_MAX) && far.z <= float(VIEW_MAX) &&
+                 p.quaternion_norm >= float(QUATERNION_MIN);
+    p.peak = sigmoid(splat.logit);
+    return p;
+}
+#endif
