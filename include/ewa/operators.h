@@ -74,6 +74,23 @@ struct SplatGradient {
     std::vector<float> view_matrices;  // [C, 4, 4]; the last row is 0; empty unless asked for
 };
 
+/// Spherical harmonics of N splats, shared by C views: colour = sum over k of coefficient k times Y_k(direction), with neither
+/// an offset nor a clamp. Y_k has INRIA's order and signs (3DGS, utils/sh_utils.py), and to degree 4 gsplat's.
+struct HarmonicsArrays {
+    uint32_t degree = 0;                  // 0 to 4; higher coefficients are not read
+    uint32_t coefficient_count = 1;       // K, at least (degree + 1)^2
+    uint32_t channels = 3;                // D, at least 1
+    std::span<const float> directions;    // [C, N, 3], of any length
+    std::span<const float> coefficients;  // [N, K, D]
+    std::span<const uint8_t> masks;       // [C, N]: 0 makes the colour 0; empty: none is
+};
+
+/// dL/d(input) of spherical harmonics.
+struct HarmonicsGradient {
+    std::vector<float> coefficients;  // [N, K, D], added over the views in their order
+    std::vector<float> directions;    // [C, N, 3]; empty unless asked for
+};
+
 /// M splats as 2D Gaussians of one image: alpha = min(0.99, opacity exp(-d^T conic d / 2)), d = pixel - mean.
 struct ScreenSplats {
     std::span<const float> means2d;  // [M, 2], px
@@ -156,6 +173,13 @@ class Operators {
     SplatGradient project_backward(const SplatArrays& splats, const ViewArrays& views,
                                    const ProjectionOptions& options, std::span<const int32_t> radii,
                                    const ProjectedGradient& gradient, bool view_gradients);
+
+    /// Colours [C, N, D].
+    std::vector<float> spherical_harmonics(const HarmonicsArrays& harmonics);
+    /// colors_gradient: [C, N, D].
+    HarmonicsGradient spherical_harmonics_backward(const HarmonicsArrays& harmonics,
+                                                   std::span<const float> colors_gradient,
+                                                   bool direction_gradients);
 
     /// Blending, front to back: C = sum f alpha T + T background (Kerbl et al. 2023, eq. 3). An alpha below 1/255
     /// is skipped, and a pixel is complete before T would fall to 1e-4.

@@ -43,7 +43,25 @@ EWA_REAL(SH_C3_3, 0.3731763325901154);
 EWA_REAL(SH_C3_4, -0.4570457994644658);
 EWA_REAL(SH_C3_5, 1.445305721320277);
 EWA_REAL(SH_C3_6, -0.5900435899266435);
+// Degree 4, which the operators have and the trainer has not.
+EWA_REAL(SH_C4_0, 2.5033429417967046);
+EWA_REAL(SH_C4_1, -1.7701307697799304);
+EWA_REAL(SH_C4_2, 0.9461746957575601);
+EWA_REAL(SH_C4_3, -0.6690465435572892);
+EWA_REAL(SH_C4_4, 0.10578554691520431);
+EWA_REAL(SH_C4_5, -0.6690465435572892);
+EWA_REAL(SH_C4_6, 0.47308734787878004);
+EWA_REAL(SH_C4_7, -1.7701307697799304);
+EWA_REAL(SH_C4_8, 0.6258357354491761);
 EWA_REAL(COLOR_OFFSET, 0.5);  // colour = max(0, SH sum + COLOR_OFFSET)
+
+// The operators of projection, as gsplat 1.6 has them.
+EWA_REAL(RADIUS_SIGMAS, 3.33);       // a radius is at most this many standard deviations
+EWA_REAL(RADIUS_MAX, 1073741824.0);  // px
+// A smaller compensation has no gradient: ratios of the determinants would leave float32.
+EWA_REAL(COMPENSATION_MIN, 1e-12);
+// A smaller scale counts as this, so that gradients are finite.
+EWA_REAL(SCALE_MIN, 1e-30);
 
 // Loss: (1 - SSIM_WEIGHT) * L1 + SSIM_WEIGHT * (1 - SSIM), mean over pixels and channels, images in [0, 1].
 EWA_REAL(SSIM_WEIGHT, 0.2);

@@ -105,6 +105,13 @@ EWA_UINT(UPDATE_REGULARISED, 4u);
 // The norm is that of the pixels' absolute gradients (Ye et al. 2024, AbsGS, eq. 7), which do not cancel.
 EWA_UINT(UPDATE_ABSOLUTE, 8u);
 EWA_UINT(UPDATE_PACKED_MOMENTS, 16u);  // moments1 holds both moments in 16 bits each
+// project_views.comp, project_views_backward.comp, bits
+EWA_UINT(VIEWS_COVARIANCES, 1u);  // shapes are covariances, not quaternions and scales
+EWA_UINT(VIEWS_OPACITIES, 2u);    // the radii depend on the opacities
+EWA_UINT(VIEWS_GRADIENTS, 4u);    // also the gradient of the view matrices
+// harmonics.comp, harmonics_backward.comp, bits
+EWA_UINT(HARMONICS_MASKED, 1u);      // a (view, splat) pair whose mask is 0 has the colour 0
+EWA_UINT(HARMONICS_DIRECTIONS, 2u);  // also the gradient of the directions
 // densify_write.comp, mcmc_write.comp: the array of the next generation that is written
 EWA_UINT(WRITE_PARAMS, 0u);
 EWA_UINT(WRITE_MOMENTS, 1u);  // one of the two in float32, or both in one
@@ -160,6 +167,19 @@ struct CameraBlock {
     uint tiles[2];
 };
 
+// A view of the operators, whose matrix need not be a rotation. The values are as the caller gave them.
+struct ViewBlock {
+    float rotation[9];  // world to camera, rows
+    float translation[3];
+    float focal[2];    // px
+    float center[2];   // principal point, px
+    float tan_min[2];  // bounds of x/z, y/z in the Jacobian
+    float tan_max[2];
+};
+
+// dL/d(view matrix): rotation, rows; translation
+EWA_UINT(VIEW_GRADIENT_FLOATS, 12u);
+
 // Written by the device, read back by the host after a submission.
 struct Counts {
     uint instances;          // (splat, tile) pairs that the frame needs; may exceed the capacity
@@ -180,6 +200,22 @@ struct ProjectPush {
     uint splats;
     uint planes;            // texel planes a splat
     float log_scale_shift;  // with PROJECT_DEBUG: added to every log scale
+};
+
+struct ViewsPush {
+    uint splats;
+    uint views;
+    float size[2];      // px
+    float near, far;    // visible where near < z < far (world units)
+    float low_pass;     // px^2
+    float radius_clip;  // px
+};
+
+struct HarmonicsPush {
+    uint splats;
+    uint views;
+    uint coefficients;  // stored, of each channel
+    uint channels;
 };
 
 struct SortPush {

@@ -2,12 +2,18 @@
 #include "operators/context.h"
 
 #include "operators/blend_frame.h"
+#include "operators/splat_buffers.h"
 
 namespace ewa {
 
 namespace operators {
 
-Context::Context(std::shared_ptr<gpu::Device> d) : device(std::move(d)), cache(*device), executor(*device) {}
+Context::Context(std::shared_ptr<gpu::Device> d)
+    : device(std::move(d)),
+      cache(*device),
+      executor(*device),
+      projection(std::make_unique<ProjectionBuffers>()),
+      harmonics(std::make_unique<HarmonicsBuffers>()) {}
 Context::~Context() = default;
 
 }  // namespace operators

@@ -50,8 +50,8 @@ class Array {
 };
 
 /// Buffers of the projection and of spherical harmonics, by use.
-struct ProjectionArrays;
-struct HarmonicsArrays;
+struct ProjectionBuffers;
+struct HarmonicsBuffers;
 
 struct Context {
     explicit Context(std::shared_ptr<gpu::Device> device);
@@ -62,6 +62,8 @@ struct Context {
     gpu::Executor executor;
     std::mutex mutex;  // held by each operator while it uses the device or one of the members below
 
+    std::unique_ptr<ProjectionBuffers> projection;
+    std::unique_ptr<HarmonicsBuffers> harmonics;
     std::vector<std::unique_ptr<BlendFrame>> free_frames;
     std::mutex frames_mutex;  // of free_frames
 };

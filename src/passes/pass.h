@@ -48,6 +48,14 @@ struct PerElement : ElementGroup<decltype(push_of(kItems))> {
     }
 };
 
+/// One invocation for each of push.splats, in a layer for each of push.views.
+template <class P>
+struct PerViewElement : ElementGroup<P> {
+    static Groups groups(const KernelConfig& config, const P& push) {
+        return element_groups(config, push.splats, push.views);
+    }
+};
+
 /// One subgroup for each block of push.block items.
 template <class P>
 struct PerBlock : OneSubgroup<P> {

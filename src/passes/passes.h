@@ -24,6 +24,42 @@ struct Update {
         params_out, moments1_out, moments2_out, statistics, sorted_indices;
 };
 
+// The operators of projection and of spherical harmonics. Their arrays are the caller's: include/ewa/operators.h.
+
+/// Projects splats in several views. shapes: quaternions, or covariances with VIEWS_COVARIANCES. Variant: SPEC_KERNEL
+/// (KERNEL_ANTIALIAS writes compensations), SPEC_MODE (VIEWS_COVARIANCES, VIEWS_OPACITIES).
+struct ProjectViews {
+    static constexpr char shader[] = "project_views";
+    using Work = PerViewElement<shared::ViewsPush>;
+    gpu::BufferPart views, means, shapes, scales, opacities, radii, means2d, depths, conics, compensations;
+};
+
+/// Gradient of ProjectViews, added over the views. view_sums: VIEW_GRADIENT_FLOATS rows a view, of one float a subgroup.
+/// Variant: SPEC_KERNEL, SPEC_MODE (VIEWS_COVARIANCES, VIEWS_GRADIENTS).
+struct ProjectViewsBackward {
+    static constexpr char shader[] = "project_views_backward";
+    using Work = PerElement<&shared::ViewsPush::splats>;
+    gpu::BufferPart views, means, shapes, scales, radii, means2d_gradient, depths_gradient, conics_gradient,
+        compensations_gradient, means_gradient, shapes_gradient, scales_gradient, view_sums;
+};
+
+/// Evaluates spherical harmonics. masks: a byte a (view, splat) pair. Variant: SPEC_SH_DEGREE (0 to 4), SPEC_MODE
+/// (0 or HARMONICS_MASKED).
+struct Harmonics {
+    static constexpr char shader[] = "harmonics";
+    using Work = PerViewElement<shared::HarmonicsPush>;
+    gpu::BufferPart directions, coefficients, masks, colors;
+};
+
+/// Gradient of Harmonics, that of the coefficients added over the views. Variant: SPEC_SH_DEGREE (0 to 4), SPEC_MODE
+/// (HARMONICS_* bits).
+struct HarmonicsBackward {
+    static constexpr char shader[] = "harmonics_backward";
+    using Work = PerElement<&shared::HarmonicsPush::splats>;
+    gpu::BufferPart directions, coefficients, masks, colors_gradient, coefficients_gradient,
+        directions_gradient;
+};
+
 // Prefix sums, radix sort, and the lists of (splat, tile) instances built with them.
 
 /// Exclusive prefix sums within blocks. Variant: SPEC_MODE (0 or SCAN_GATHERED).

@@ -55,6 +55,26 @@ glm::dmat3 rotation_matrix(const std::array<double, 4>& q) {
             2 * (x * z + w * y),     2 * (y * z - w * x),     1 - 2 * (x * x + y * y)};
 }
 
+// r[column][row] as glm has it.
+std::array<double, 4> rotation_backward(const std::array<double, 4>& q, const glm::dmat3& r) {
+    const auto [w, x, y, z] = q;
+    return {2 * (x * (r[1][2] - r[2][1]) + y * (r[2][0] - r[0][2]) + z * (r[0][1] - r[1][0])),
+            2 * (y * (r[0][1] + r[1][0]) + z * (r[0][2] + r[2][0]) + w * (r[1][2] - r[2][1]) -
+                 2 * x * (r[1][1] + r[2][2])),
+            2 * (x * (r[0][1] + r[1][0]) + z * (r[1][2] + r[2][1]) + w * (r[2][0] - r[0][2]) -
+                 2 * y * (r[0][0] + r[2][2])),
+            2 * (x * (r[0][2] + r[2][0]) + y * (r[1][2] + r[2][1]) + w * (r[0][1] - r[1][0]) -
+                 2 * z * (r[0][0] + r[1][1]))};
+}
+
+double clamp_slope(double slope, double focal, double principal, int size, bool& free) {
+    const double margin = JACOBIAN_MARGIN * size / (2 * focal);
+    const double low = -(principal / focal + margin);
+    const double high = (size - principal) / focal + margin;
+    free = slope >= low && slope <= high;
+    return std::clamp(slope, low, high);
+}
+
 namespace {
 
 bool stored_values_usable(const Splat& splat) {
@@ -73,16 +93,6 @@ bool within(double most, const glm::dvec3& v) {
 double sum_of_sizes(const Rows& m) {
     const glm::dvec3 sizes = glm::abs(m.x) + glm::abs(m.y);
     return sizes.x + sizes.y + sizes.z;
-}
-
-/// Clamps x/z or y/z to the image with a margin of JACOBIAN_MARGIN half images on each side, relative to the
-/// principal point (gsplat, Utils.cuh, persp_proj).
-double clamp_slope(double slope, double focal, double principal, int size, bool& free) {
-    const double margin = JACOBIAN_MARGIN * size / (2 * focal);
-    const double low = -(principal / focal + margin);
-    const double high = (size - principal) / focal + margin;
-    free = slope >= low && slope <= high;
-    return std::clamp(slope, low, high);
 }
 
 void project_shape(const Splat& splat, const Camera& camera, ProjectionSteps& s) {
@@ -190,18 +200,6 @@ Rows m_gradient(const ProjectionSteps& s, const ScreenGradient& g, const DetGrad
     out.x += 2 * det.det0 * glm::cross(m.y, n) + 2 * det.trace * m.x;
     out.y += 2 * det.det0 * glm::cross(n, m.x) + 2 * det.trace * m.y;
     return out;
-}
-
-/// dL/d(unit quaternion) from dL/dR, the derivative of rotation_matrix(); r[column][row] as glm has it.
-std::array<double, 4> rotation_backward(const std::array<double, 4>& q, const glm::dmat3& r) {
-    const auto [w, x, y, z] = q;
-    return {2 * (x * (r[1][2] - r[2][1]) + y * (r[2][0] - r[0][2]) + z * (r[0][1] - r[1][0])),
-            2 * (y * (r[0][1] + r[1][0]) + z * (r[0][2] + r[2][0]) + w * (r[1][2] - r[2][1]) -
-                 2 * x * (r[1][1] + r[2][2])),
-            2 * (x * (r[0][1] + r[1][0]) + z * (r[1][2] + r[2][1]) + w * (r[2][0] - r[0][2]) -
-                 2 * y * (r[0][0] + r[2][2])),
-            2 * (x * (r[0][2] + r[2][0]) + y * (r[1][2] + r[2][1]) + w * (r[0][1] - r[1][0]) -
-                 2 * z * (r[0][0] + r[1][1]))};
 }
 
 void shape_backward(const ProjectionSteps& s, const Rows& by_m, Splat& out) {

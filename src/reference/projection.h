@@ -82,6 +82,14 @@ Projected project(const Scene& scene, size_t i, const Camera& camera, const Rend
 /// The columns are the rotated axes. The quaternion (w x y z) must have unit norm.
 glm::dmat3 rotation_matrix(const std::array<double, 4>& unit_quaternion);
 
+/// dL/d(unit quaternion) from dL/d(rotation_matrix).
+std::array<double, 4> rotation_backward(const std::array<double, 4>& unit_quaternion,
+                                        const glm::dmat3& gradient);
+
+/// Clamps x/z or y/z to the image with a margin of JACOBIAN_MARGIN half images on each side, relative to the
+/// principal point (gsplat, Utils.cuh, persp_proj). free: whether the clamp did not move it.
+double clamp_slope(double slope, double focal, double principal, int size, bool& free);
+
 /// Euclidean norm without overflow or underflow of the squares.
 double robust_norm(const std::array<double, 4>& quaternion);
 

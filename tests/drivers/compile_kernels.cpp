@@ -126,6 +126,22 @@ void compile_training(Compiler& compiler) {
     compiler.compile<passes::Perturb>();
 }
 
+void compile_operators(Compiler& compiler) {
+    using namespace shared;
+    const Values kernels = {KERNEL_PEAK, KERNEL_ANTIALIAS};
+    compiler.compile<passes::ProjectViews>(
+        {{SPEC_KERNEL, kernels},
+         {SPEC_MODE, {0, VIEWS_COVARIANCES, VIEWS_OPACITIES, VIEWS_COVARIANCES | VIEWS_OPACITIES}}});
+    compiler.compile<passes::ProjectViewsBackward>(
+        {{SPEC_KERNEL, kernels},
+         {SPEC_MODE, {0, VIEWS_COVARIANCES, VIEWS_GRADIENTS, VIEWS_COVARIANCES | VIEWS_GRADIENTS}}});
+    const Values degrees = {0, 1, 2, 3, 4};
+    compiler.compile<passes::Harmonics>({{SPEC_SH_DEGREE, degrees}, {SPEC_MODE, {0, HARMONICS_MASKED}}});
+    compiler.compile<passes::HarmonicsBackward>(
+        {{SPEC_SH_DEGREE, degrees},
+         {SPEC_MODE, {0, HARMONICS_MASKED, HARMONICS_DIRECTIONS, HARMONICS_MASKED | HARMONICS_DIRECTIONS}}});
+}
+
 void compile_path_tracer(Compiler& compiler) {
     using namespace shared;
     const std::vector<std::pair<uint32_t, Values>> choices = {{SPEC_ALPHA_TESTED, {0, 1}},
@@ -146,6 +162,7 @@ int main(int argc, char** argv) {
         Compiler compiler(*device);
         compile_splatting(compiler);
         compile_training(compiler);
+        compile_operators(compiler);
         compile_path_tracer(compiler);
         if (compiler.complete()) {
             std::fprintf(stderr, "compiled\n");
