@@ -159,6 +159,135 @@ nb::tuple blend_backward(const BlendHandle& handle, nb::handle features_gradient
                           array_or_none(std::move(g.absolute), {m, 2}, absolute));
 }
 
+/// The arguments that a projection and its gradient have.
+struct ProjectionArguments {
+    Array<float> means;
+    std::optional<Array<float>> quats, scales, covars, opacities;
+    Array<float> viewmats, intrinsics;
+    ProjectionOptions options;
+
+    ProjectionArguments(nb::handle m, nb::handle q, nb::handle s, nb::handle c, nb::handle o, nb::handle v,
+                        nb::handle k, int width, int height, float eps2d)
+        : means(m, "means", {any('N'), 3}),
+          quats(optional_array<float>(q, "quats", {n(), 4})),
+          scales(optional_array<float>(s, "scales", {n(), 3})),
+          covars(optional_array<float>(c, "covars", {n(), 6})),
+          opacities(optional_array<float>(o, "opacities", Shape{n()})),
+          viewmats(v, "viewmats", {any('C'), 4, 4}),
+          intrinsics(k, "Ks", {ptrdiff_t(viewmats.length(0)), 3, 3}) {
+        if (covars ? quats || scales : !quats || !scales)
+            throw InputError("a splat has quats and scales, or covars; neither more nor less");
+        options.width = pixels(width, "width");
+        options.height = pixels(height, "height");
+        options.low_pass = eps2d;
+    }
+
+    ptrdiff_t n() const { return ptrdiff_t(means.length(0)); }
+    size_t splat_count() const { return means.length(0); }
+    size_t view_count() const { return viewmats.length(0); }
+    SplatArrays splats() const {
+        return {span_of(means), span_of(quats), span_of(scales), span_of(covars), span_of(opacities)};
+    }
+    ViewArrays views() const { return {span_of(viewmats), span_of(intrinsics)}; }
+};
+
+nb::tuple project(nb::handle means, nb::handle quats, nb::handle scales, nb::handle covars,
+                  nb::handle opacities, nb::handle viewmats, nb::handle intrinsics, int width, int height,
+                  float eps2d, float near, float far, float radius_clip, bool compensations) {
+    ProjectionArguments a(means, quats, scales, covars, opacities, viewmats, intrinsics, width, height,
+                          eps2d);
+    a.options.near = near;
+    a.options.far = far;
+    a.options.radius_clip = radius_clip;
+    a.options.compensations = compensations;
+    ProjectedSplats p;
+    {
+        const DeviceWork work;
+        p = operators(work).project(a.splats(), a.views(), a.options);
+    }
+    const size_t c = a.view_count(), n = a.splat_count();
+    return nb::make_tuple(to_numpy(std::move(p.radii), {c, n, 2}), to_numpy(std::move(p.means2d), {c, n, 2}),
+                          to_numpy(std::move(p.depths), {c, n}), to_numpy(std::move(p.conics), {c, n, 3}),
+                          array_or_none(std::move(p.compensations), {c, n}, compensations));
+}
+
+nb::tuple project_backward(nb::handle means, nb::handle quats, nb::handle scales, nb::handle covars,
+                           nb::handle viewmats, nb::handle intrinsics, int width, int height, float eps2d,
+                           nb::handle radii, nb::handle v_means2d, nb::handle v_depths, nb::handle v_conics,
+                           nb::handle v_compensations, bool need_viewmats) {
+    const ProjectionArguments a(means, quats, scales, covars, nb::none(), viewmats, intrinsics, width, height,
+                                eps2d);
+    const auto c = ptrdiff_t(a.view_count()), n = a.n();
+    const Array<int32_t> sizes(radii, "radii", {c, n, 2});
+    const auto by_means = optional_array<float>(v_means2d, "v_means2d", {c, n, 2}),
+               by_depths = optional_array<float>(v_depths, "v_depths", {c, n}),
+               by_conics = optional_array<float>(v_conics, "v_conics", {c, n, 3}),
+               by_compensations = optional_array<float>(v_compensations, "v_compensations", {c, n});
+    SplatGradient g;
+    {
+        const DeviceWork work;
+        g = operators(work).project_backward(
+            a.splats(), a.views(), a.options, span_of(sizes),
+            {span_of(by_means), span_of(by_depths), span_of(by_conics), span_of(by_compensations)},
+            need_viewmats);
+    }
+    const size_t count = a.splat_count();
+    const bool covariances = a.covars.has_value();
+    return nb::make_tuple(to_numpy(std::move(g.means), {count, 3}),
+                          array_or_none(std::move(g.quaternions), {count, 4}, !covariances),
+                          array_or_none(std::move(g.scales), {count, 3}, !covariances),
+                          array_or_none(std::move(g.covariances), {count, 6}, covariances),
+                          array_or_none(std::move(g.view_matrices), {a.view_count(), 4, 4}, need_viewmats));
+}
+
+/// The arguments that spherical harmonics and their gradient have.
+struct HarmonicsArguments {
+    Array<float> dirs, coeffs;
+    std::optional<Array<uint8_t>> masks;
+    int degree;
+
+    HarmonicsArguments(int d, nb::handle directions, nb::handle coefficients, nb::handle mask)
+        : dirs(directions, "dirs", {any('C'), any('N'), 3}),
+          coeffs(coefficients, "coeffs", {ptrdiff_t(dirs.length(1)), any('K'), any('D')}),
+          masks(
+              optional_array<uint8_t>(mask, "masks", {ptrdiff_t(dirs.length(0)), ptrdiff_t(dirs.length(1))})),
+          degree(d) {
+        if (degree < 0) throw InputError("degree is " + std::to_string(degree) + ", below zero");
+    }
+    size_t views() const { return dirs.length(0); }
+    size_t splats() const { return dirs.length(1); }
+    size_t channels() const { return coeffs.length(2); }
+    HarmonicsArrays arrays() const {
+        return {uint32_t(degree),     uint32_t(coeffs.length(1)),
+                uint32_t(channels()), span_of(dirs),
+                span_of(coeffs),      span_of(masks)};
+    }
+};
+
+nb::object spherical_harmonics(int degree, nb::handle dirs, nb::handle coeffs, nb::handle masks) {
+    const HarmonicsArguments a(degree, dirs, coeffs, masks);
+    std::vector<float> colors;
+    {
+        const DeviceWork work;
+        colors = operators(work).spherical_harmonics(a.arrays());
+    }
+    return nb::cast(to_numpy(std::move(colors), {a.views(), a.splats(), a.channels()}));
+}
+
+nb::tuple spherical_harmonics_backward(int degree, nb::handle dirs, nb::handle coeffs, nb::handle masks,
+                                       nb::handle v_colors, bool need_dirs) {
+    const HarmonicsArguments a(degree, dirs, coeffs, masks);
+    const Array<float> incoming(v_colors, "v_colors",
+                                {ptrdiff_t(a.views()), ptrdiff_t(a.splats()), ptrdiff_t(a.channels())});
+    HarmonicsGradient g;
+    {
+        const DeviceWork work;
+        g = operators(work).spherical_harmonics_backward(a.arrays(), span_of(incoming), need_dirs);
+    }
+    return nb::make_tuple(to_numpy(std::move(g.coefficients), {a.splats(), a.coeffs.length(1), a.channels()}),
+                          array_or_none(std::move(g.directions), {a.views(), a.splats(), 3}, need_dirs));
+}
+
 }  // namespace
 
 void bind_operators(nb::module_& module) {
@@ -167,6 +296,23 @@ void bind_operators(nb::module_& module) {
                                            "include/ewa/operators.h has the formulas.");
     nb::class_<BlendHandle>(own, "BlendHandle",
                             "What blend_backward needs of an image. It holds device memory.");
+    own.def("project", project, nb::arg("means"), nb::arg("quats").none(), nb::arg("scales").none(),
+            nb::arg("covars").none(), nb::arg("opacities").none(), nb::arg("viewmats"), nb::arg("Ks"),
+            nb::arg("width"), nb::arg("height"), nb::arg("eps2d"), nb::arg("near"), nb::arg("far"),
+            nb::arg("radius_clip"), nb::arg("compensations"),
+            "Projects N splats into C views: radii [C, N, 2], means2d, depths, conics, and compensations or "
+            "None.");
+    own.def("project_backward", project_backward, nb::arg("means"), nb::arg("quats").none(),
+            nb::arg("scales").none(), nb::arg("covars").none(), nb::arg("viewmats"), nb::arg("Ks"),
+            nb::arg("width"), nb::arg("height"), nb::arg("eps2d"), nb::arg("radii"),
+            nb::arg("v_means2d").none(), nb::arg("v_depths").none(), nb::arg("v_conics").none(),
+            nb::arg("v_compensations").none(), nb::arg("need_viewmats"),
+            "Gradients by means, quats, scales, covars and viewmats; None for what there is not.");
+    own.def("spherical_harmonics", spherical_harmonics, nb::arg("degree"), nb::arg("dirs"), nb::arg("coeffs"),
+            nb::arg("masks").none(), "Colours [C, N, D] of N splats seen along C directions each.");
+    own.def("spherical_harmonics_backward", spherical_harmonics_backward, nb::arg("degree"), nb::arg("dirs"),
+            nb::arg("coeffs"), nb::arg("masks").none(), nb::arg("v_colors"), nb::arg("need_dirs"),
+            "Gradients by coeffs, and by dirs or None.");
     own.def("blend", blend, nb::arg("means2d"), nb::arg("conics"), nb::arg("depths"), nb::arg("opacities"),
             nb::arg("features"), nb::arg("radii").none(), nb::arg("width"), nb::arg("height"),
             nb::arg("background").none(), nb::arg("tile_mask").none(), nb::arg("tile_size"), nb::arg("keep"),

@@ -17,8 +17,9 @@ HarmonicsShape check_harmonics(const HarmonicsArrays& h) {
     if (h.degree > 4)
         throw InputError("spherical harmonics of degree " + std::to_string(h.degree) + "; the highest is 4");
     if (h.coefficient_count < (h.degree + 1) * (h.degree + 1))
-        throw InputError(std::to_string(h.coefficient_count) + " coefficients; degree " + std::to_string(h.degree) +
-                         " needs " + std::to_string((h.degree + 1) * (h.degree + 1)));
+        throw InputError(std::to_string(h.coefficient_count) + " coefficients; degree " +
+                         std::to_string(h.degree) + " needs " +
+                         std::to_string((h.degree + 1) * (h.degree + 1)));
     if (h.channels == 0) throw InputError("spherical harmonics of 0 channels");
     const size_t row = size_t(h.coefficient_count) * h.channels, splats = h.coefficients.size() / row;
     check_size("coefficients", h.coefficients.size(), splats * row, "[N, K, D]");
@@ -61,7 +62,8 @@ std::vector<float> Operators::spherical_harmonics(const HarmonicsArrays& h) {
     b.colors.reserve(device, 4 * count);
     gpu::Recording recording(device.limits());
     context_->cache.get<passes::Harmonics>(variant_of(h, false))
-        .record(recording, {b.directions.buffer(), b.coefficients.buffer(), b.masks.buffer(), b.colors.buffer()},
+        .record(recording,
+                {b.directions.buffer(), b.coefficients.buffer(), b.masks.buffer(), b.colors.buffer()},
                 push_of(h, shape));
     context_->executor.run(recording);
     return b.colors.download<float>(count);

@@ -30,7 +30,8 @@ void check_arguments(const SplatArrays& splats, const ViewArrays& views, const P
     check_size("intrinsics", views.intrinsics.size(), 9 * c, "[C, 3, 3]");
     if (c > kViewsMax)
         throw InputError(std::to_string(c) + " views in one call; the most are " + std::to_string(kViewsMax));
-    if (options.width == 0 || options.height == 0) throw InputError("an image without pixels: width and height are 0");
+    if (options.width == 0 || options.height == 0)
+        throw InputError("an image without pixels: width and height are 0");
     if (!(options.low_pass >= 0)) throw InputError("low_pass must be 0 or more");
     for (size_t v = 0; v < c; ++v)
         for (const size_t entry : {0, 4})
@@ -44,7 +45,8 @@ shared::ViewBlock view_block(const ViewArrays& views, size_t v, const Projection
     const uint32_t size[2] = {options.width, options.height};
     shared::ViewBlock block{};
     for (int row = 0; row < 3; ++row) {
-        for (int column = 0; column < 3; ++column) block.rotation[3 * row + column] = matrix[4 * row + column];
+        for (int column = 0; column < 3; ++column)
+            block.rotation[3 * row + column] = matrix[4 * row + column];
         block.translation[row] = matrix[4 * row + 3];
     }
     for (int k = 0; k < 2; ++k) {
@@ -58,7 +60,8 @@ shared::ViewBlock view_block(const ViewArrays& views, size_t v, const Projection
     return block;
 }
 
-shared::ViewsPush push_of(const SplatArrays& splats, const ViewArrays& views, const ProjectionOptions& options) {
+shared::ViewsPush push_of(const SplatArrays& splats, const ViewArrays& views,
+                          const ProjectionOptions& options) {
     return {.splats = uint32_t(splats.size()),
             .views = uint32_t(views.size()),
             .size = {float(options.width), float(options.height)},
@@ -75,8 +78,8 @@ passes::Constants variant_of(const SplatArrays& splats, bool compensations, uint
             {shared::SPEC_MODE, bits}};
 }
 
-void upload_splats(gpu::Device& device, ProjectionBuffers& b, const SplatArrays& splats, const ViewArrays& views,
-                   const ProjectionOptions& options) {
+void upload_splats(gpu::Device& device, ProjectionBuffers& b, const SplatArrays& splats,
+                   const ViewArrays& views, const ProjectionOptions& options) {
     std::vector<shared::ViewBlock> blocks;
     for (size_t v = 0; v < views.size(); ++v) blocks.push_back(view_block(views, v, options));
     b.views.upload(device, std::span<const shared::ViewBlock>(blocks));
@@ -87,8 +90,8 @@ void upload_splats(gpu::Device& device, ProjectionBuffers& b, const SplatArrays&
 }
 
 /// Uploads `values`, or zeros in place of an empty array.
-void upload_gradient(gpu::Device& device, gpu::Recording& recording, operators::Array& array, const char* name,
-                     std::span<const float> values, size_t count, const char* shape) {
+void upload_gradient(gpu::Device& device, gpu::Recording& recording, operators::Array& array,
+                     const char* name, std::span<const float> values, size_t count, const char* shape) {
     if (values.empty()) {
         recording.fill(array.reserve(device, 4 * count), 0, 0, 4 * count);
     } else {
@@ -98,7 +101,8 @@ void upload_gradient(gpu::Device& device, gpu::Recording& recording, operators::
 }
 
 /// Adds the items of each row, in blocks and then blocks of blocks. Returns the buffer that holds the sums.
-operators::Array& reduce_rows(gpu::Recording& recording, operators::Context& context, uint32_t items, uint32_t rows) {
+operators::Array& reduce_rows(gpu::Recording& recording, operators::Context& context, uint32_t items,
+                              uint32_t rows) {
     ProjectionBuffers& b = *context.projection;
     const auto reduce = context.cache.get<passes::Reduce>();
     operators::Array *from = &b.view_sums, *to = &b.reduced;
@@ -106,7 +110,8 @@ operators::Array& reduce_rows(gpu::Recording& recording, operators::Context& con
     b.reduced.reserve(*context.device, uint64_t(4) * rows * most);
     b.counts.reserve(*context.device, sizeof(shared::Counts));
     for (;;) {
-        reduce.record(recording, {.source = from->buffer(), .sums = to->buffer(), .counts = b.counts.buffer()},
+        reduce.record(recording,
+                      {.source = from->buffer(), .sums = to->buffer(), .counts = b.counts.buffer()},
                       {.items = items,
                        .block = kReduceBlock,
                        .target = shared::REDUCE_TO_SUMS,
@@ -151,9 +156,9 @@ ProjectedSplats Operators::project(const SplatArrays& splats, const ViewArrays& 
     const uint32_t bits = splats.opacities.empty() ? 0 : shared::VIEWS_OPACITIES;
     context_->cache.get<passes::ProjectViews>(variant_of(splats, options.compensations, bits))
         .record(recording,
-                {b.views.buffer(), b.means.buffer(), b.shapes.buffer(), b.scales.buffer(), b.opacities.buffer(),
-                 b.radii.buffer(), b.means2d.buffer(), b.depths.buffer(), b.conics.buffer(),
-                 b.compensations.buffer()},
+                {b.views.buffer(), b.means.buffer(), b.shapes.buffer(), b.scales.buffer(),
+                 b.opacities.buffer(), b.radii.buffer(), b.means2d.buffer(), b.depths.buffer(),
+                 b.conics.buffer(), b.compensations.buffer()},
                 push_of(splats, views, options));
     context_->executor.run(recording);
     ProjectedSplats out;
@@ -186,11 +191,13 @@ SplatGradient Operators::project_backward(const SplatArrays& splats, const ViewA
     gpu::Recording recording(device.limits());
     upload_splats(device, b, splats, views, options);
     b.radii.upload(device, radii);
-    upload_gradient(device, recording, b.means2d, "the gradient of means2d", gradient.means2d, 2 * pairs, "[C, N, 2]");
+    upload_gradient(device, recording, b.means2d, "the gradient of means2d", gradient.means2d, 2 * pairs,
+                    "[C, N, 2]");
     upload_gradient(device, recording, b.depths, "the gradient of depths", gradient.depths, pairs, "[C, N]");
-    upload_gradient(device, recording, b.conics, "the gradient of conics", gradient.conics, 3 * pairs, "[C, N, 3]");
-    upload_gradient(device, recording, b.compensations, "the gradient of compensations", gradient.compensations,
-                    compensations ? pairs : 4, "[C, N]");
+    upload_gradient(device, recording, b.conics, "the gradient of conics", gradient.conics, 3 * pairs,
+                    "[C, N, 3]");
+    upload_gradient(device, recording, b.compensations, "the gradient of compensations",
+                    gradient.compensations, compensations ? pairs : 4, "[C, N]");
     b.means_gradient.reserve(device, 12 * n);
     b.shapes_gradient.reserve(device, n * (covariances ? 24 : 16));
     b.scales_gradient.reserve(device, covariances ? 12 : 12 * n);

@@ -7,8 +7,10 @@ namespace ewa::operators {
 
 struct ProjectionBuffers {
     Array views{"views"}, means{"means"}, shapes{"shapes"}, scales{"scales"}, opacities{"opacities"};
-    Array radii{"radii"}, means2d{"means2d"}, depths{"depths"}, conics{"conics"}, compensations{"compensations"};
-    Array means_gradient{"means gradient"}, shapes_gradient{"shapes gradient"}, scales_gradient{"scales gradient"};
+    Array radii{"radii"}, means2d{"means2d"}, depths{"depths"}, conics{"conics"},
+        compensations{"compensations"};
+    Array means_gradient{"means gradient"}, shapes_gradient{"shapes gradient"},
+        scales_gradient{"scales gradient"};
     Array view_sums{"view sums"}, reduced{"reduced view sums"}, counts{"unused counts"};
 };
 

@@ -57,8 +57,8 @@ std::array<double, 25> harmonics_basis(int degree, const glm::dvec3& d) {
     return out;
 }
 
-std::vector<double> harmonics(int degree, const glm::dvec3& direction, const std::vector<double>& coefficients,
-                              size_t channels) {
+std::vector<double> harmonics(int degree, const glm::dvec3& direction,
+                              const std::vector<double>& coefficients, size_t channels) {
     const auto basis = harmonics_basis(degree, unit_of(direction));
     std::vector<double> colors(channels);
     for (size_t k = 0; k < size_t(degree + 1) * size_t(degree + 1); ++k)
@@ -66,7 +66,8 @@ std::vector<double> harmonics(int degree, const glm::dvec3& direction, const std
     return colors;
 }
 
-HarmonicsGradient harmonics_backward(int degree, const glm::dvec3& direction, const std::vector<double>& coefficients,
+HarmonicsGradient harmonics_backward(int degree, const glm::dvec3& direction,
+                                     const std::vector<double>& coefficients,
                                      const std::vector<double>& by_colors) {
     const size_t channels = by_colors.size();
     const glm::dvec3 unit = unit_of(direction);

@@ -12,14 +12,15 @@ namespace ewa::reference {
 std::array<double, 25> harmonics_basis(int degree, const glm::dvec3& unit);
 
 /// direction: of any length; zero counts as a unit vector that is zero. coefficients: [K, channels].
-std::vector<double> harmonics(int degree, const glm::dvec3& direction, const std::vector<double>& coefficients,
-                              size_t channels);
+std::vector<double> harmonics(int degree, const glm::dvec3& direction,
+                              const std::vector<double>& coefficients, size_t channels);
 
 struct HarmonicsGradient {
     std::vector<double> coefficients;
     glm::dvec3 direction{0};
 };
-HarmonicsGradient harmonics_backward(int degree, const glm::dvec3& direction, const std::vector<double>& coefficients,
+HarmonicsGradient harmonics_backward(int degree, const glm::dvec3& direction,
+                                     const std::vector<double>& coefficients,
                                      const std::vector<double>& by_colors);
 
 }  // namespace ewa::reference

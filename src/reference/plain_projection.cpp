@@ -22,9 +22,9 @@ struct PlainSteps {
     glm::bvec2 slope_free{true};
     std::array<double, 4> unit_quaternion{};
     double norm = 1;
-    glm::dmat3 axes{0};   // Q S
+    glm::dmat3 axes{0};  // Q S
     glm::dmat3 sigma{0};
-    Rows j, t;            // J, T
+    Rows j, t;  // J, T
     double a0 = 0, b = 0, c0 = 0, det0 = 0, det = 0;
 };
 
@@ -38,7 +38,8 @@ PlainSteps plain_steps(const PlainSplat& splat, const PlainView& view, const Pro
     const int size[2] = {int(options.width), int(options.height)};
     for (int k = 0; k < 2; ++k)
         s.slope[k] = clamp_slope(s.p[k] / s.p.z, view.focal[k], view.center[k], size[k], s.slope_free[k]);
-    s.j = {view.focal.x / s.p.z * glm::dvec3(1, 0, -s.slope.x), view.focal.y / s.p.z * glm::dvec3(0, 1, -s.slope.y)};
+    s.j = {view.focal.x / s.p.z * glm::dvec3(1, 0, -s.slope.x),
+           view.focal.y / s.p.z * glm::dvec3(0, 1, -s.slope.y)};
     s.t = {s.j.x * view.rotation, s.j.y * view.rotation};
     const glm::dvec3 n = glm::cross(s.t.x, s.t.y);
     if (splat.has_covariance) {
@@ -76,7 +77,8 @@ glm::dmat2 covariance_gradient(const PlainSteps& s, double low_pass, const Plain
 }
 
 /// dL/dp through mean2d, through the depth and through J.
-glm::dvec3 point_gradient(const PlainSteps& s, const PlainView& view, const PlainScreenGradient& g, const Rows& by_j) {
+glm::dvec3 point_gradient(const PlainSteps& s, const PlainView& view, const PlainScreenGradient& g,
+                          const Rows& by_j) {
     const double z = s.p.z;
     glm::dvec3 out(0, 0, g.depth);
     const glm::dvec3 by[2] = {by_j.x, by_j.y};
@@ -114,8 +116,8 @@ PlainProjected project(const PlainSplat& splat, const PlainView& view, const Pro
     return out;
 }
 
-PlainGradient project_backward(const PlainSplat& splat, const PlainView& view, const ProjectionOptions& options,
-                               const PlainScreenGradient& gradient) {
+PlainGradient project_backward(const PlainSplat& splat, const PlainView& view,
+                               const ProjectionOptions& options, const PlainScreenGradient& gradient) {
     const PlainSteps s = plain_steps(splat, view, options);
     const glm::dmat2 g = covariance_gradient(s, options.low_pass, gradient);
     const Rows gt{g[0][0] * s.t.x + g[1][0] * s.t.y, g[0][1] * s.t.x + g[1][1] * s.t.y};
@@ -130,7 +132,7 @@ PlainGradient project_backward(const PlainSplat& splat, const PlainView& view, c
     out.splat.mean = out.translation * view.rotation;
     if (splat.has_covariance) {
         out.splat.has_covariance = true;
-        out.splat.covariance = {by_sigma[0][0],     2 * by_sigma[0][1], 2 * by_sigma[0][2],
+        out.splat.covariance = {by_sigma[0][0], 2 * by_sigma[0][1], 2 * by_sigma[0][2],
                                 by_sigma[1][1], 2 * by_sigma[1][2], by_sigma[2][2]};
         return out;
     }

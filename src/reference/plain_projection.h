@@ -30,7 +30,7 @@ struct PlainSplat {
 };
 
 struct PlainView {
-    glm::dmat3 rotation{1};     // any matrix
+    glm::dmat3 rotation{1};  // any matrix
     glm::dvec3 translation{0};
     glm::dvec2 focal{1}, center{0};  // px
 };
@@ -63,7 +63,7 @@ struct PlainGradient {
 };
 
 /// Of a splat that is visible.
-PlainGradient project_backward(const PlainSplat& splat, const PlainView& view, const ProjectionOptions& options,
-                               const PlainScreenGradient& gradient);
+PlainGradient project_backward(const PlainSplat& splat, const PlainView& view,
+                               const ProjectionOptions& options, const PlainScreenGradient& gradient);
 
 }  // namespace ewa::reference

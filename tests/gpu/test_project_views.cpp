@@ -46,7 +46,8 @@ class ViewsPass : public testing::TestWithParam<ViewsCase> {
 };
 
 /// Whether rounding may decide about the splat, or about its radii.
-bool fragile(const reference::PlainSplat& splat, const reference::PlainProjected& p, const ProjectionOptions& o) {
+bool fragile(const reference::PlainSplat& splat, const reference::PlainProjected& p,
+             const ProjectionOptions& o) {
     const auto near = [](double a, double b) { return std::abs(a - b) <= 1e-4 * std::max(1.0, std::abs(b)); };
     const double peak = splat.opacity.value_or(1) * (o.compensations && splat.opacity ? p.compensation : 1);
     if (peak < 0.99 * shared::ALPHA_MIN) return false;
@@ -83,25 +84,29 @@ TEST_P(ViewsPass, OutputsMatchTheReference) {
                 EXPECT_EQ(out.means2d[2 * at], 0);
                 EXPECT_EQ(out.depths[at], 0);
                 for (size_t k = 0; k < 3; ++k) EXPECT_EQ(out.conics[3 * at + k], 0);
-                if (c.compensations) { EXPECT_EQ(out.compensations[at], 0); }
+                if (c.compensations) {
+                    EXPECT_EQ(out.compensations[at], 0);
+                }
                 continue;
             }
             ++visible;
             for (size_t k = 0; k < 2; ++k) {
-                EXPECT_NEAR(out.radii[2 * at + k], std::ceil(p.reach[int(k)]), fragile(splat, p, scene.options));
+                EXPECT_NEAR(out.radii[2 * at + k], std::ceil(p.reach[int(k)]),
+                            fragile(splat, p, scene.options));
                 worst_mean = std::max(worst_mean, std::abs(out.means2d[2 * at + k] / p.mean2d[int(k)] - 1));
             }
             EXPECT_NEAR(out.depths[at] / p.depth, 1, 1e-7);
             // An error of xy counts as its share of the root of xx yy.
             const double x = out.conics[3 * at], y = out.conics[3 * at + 2];
-            worst_shape = std::max({worst_shape, std::abs(x / p.conic.x - 1), std::abs(y / p.conic.z - 1),
-                                    std::abs(out.conics[3 * at + 1] - p.conic.y) / std::sqrt(p.conic.x * p.conic.z)});
+            worst_shape =
+                std::max({worst_shape, std::abs(x / p.conic.x - 1), std::abs(y / p.conic.z - 1),
+                          std::abs(out.conics[3 * at + 1] - p.conic.y) / std::sqrt(p.conic.x * p.conic.z)});
             if (c.compensations)
-                worst_compensation =
-                    std::max(worst_compensation, std::abs(out.compensations[at] - p.compensation) / p.compensation);
+                worst_compensation = std::max(
+                    worst_compensation, std::abs(out.compensations[at] - p.compensation) / p.compensation);
         }
-    printf("    %zu visible, %zu doubtful; mean %.1e, shape %.1e, compensation %.1e\n", visible, doubtful, worst_mean,
-           worst_shape, worst_compensation);
+    printf("    %zu visible, %zu doubtful; mean %.1e, shape %.1e, compensation %.1e\n", visible, doubtful,
+           worst_mean, worst_shape, worst_compensation);
     EXPECT_GT(visible, c.splats / 10);
     EXPECT_LT(doubtful, 10 + c.splats * c.views / 10);
     EXPECT_LT(worst_mean, 2e-7);
@@ -133,7 +138,8 @@ struct ExpectedGradient {
     std::vector<double> means, shapes, scales, matrices, matrix_sizes;  // sizes: sums of absolute shares
 };
 
-ExpectedGradient reference_gradient(const PlainScene& scene, const ProjectedSplats& out, const ScreenGradients& g) {
+ExpectedGradient reference_gradient(const PlainScene& scene, const ProjectedSplats& out,
+                                    const ScreenGradients& g) {
     const size_t n = scene.size(), width = scene.covariances.empty() ? 4 : 6;
     ExpectedGradient e;
     e.means.resize(3 * n);
@@ -145,12 +151,12 @@ ExpectedGradient reference_gradient(const PlainScene& scene, const ProjectedSpla
         for (size_t i = 0; i < n; ++i) {
             const size_t at = v * n + i;
             if (out.radii[2 * at] == 0) continue;
-            const reference::PlainGradient by = reference::project_backward(
-                scene.splat(i), scene.view(v), scene.options,
-                {{g.means2d[2 * at], g.means2d[2 * at + 1]},
-                 g.depths[at],
-                 {g.conics[3 * at], g.conics[3 * at + 1], g.conics[3 * at + 2]},
-                 g.compensations.empty() ? 0 : g.compensations[at]});
+            const reference::PlainGradient by =
+                reference::project_backward(scene.splat(i), scene.view(v), scene.options,
+                                            {{g.means2d[2 * at], g.means2d[2 * at + 1]},
+                                             g.depths[at],
+                                             {g.conics[3 * at], g.conics[3 * at + 1], g.conics[3 * at + 2]},
+                                             g.compensations.empty() ? 0 : g.compensations[at]});
             for (size_t k = 0; k < 3; ++k) {
                 e.means[3 * i + k] += by.splat.mean[int(k)];
                 e.scales[3 * i + k] += by.splat.scale[int(k)];
@@ -186,8 +192,8 @@ double worst_of_rows(const std::vector<float>& actual, const std::vector<double>
 TEST_P(ViewsPass, GradientsMatchTheReference) {
     const ProjectedSplats out = operators().project(scene.splats(), scene.view_arrays(), scene.options);
     const ScreenGradients g = random_gradients(scene, out, 7);
-    const SplatGradient actual = operators().project_backward(scene.splats(), scene.view_arrays(), scene.options,
-                                                              out.radii, g.arrays(), true);
+    const SplatGradient actual = operators().project_backward(scene.splats(), scene.view_arrays(),
+                                                              scene.options, out.radii, g.arrays(), true);
     const ExpectedGradient expected = reference_gradient(scene, out, g);
     const double means = worst_of_rows(actual.means, expected.means, 3),
                  shapes = c.covariances ? worst_of_rows(actual.covariances, expected.shapes, 6)
@@ -207,8 +213,8 @@ TEST_P(ViewsPass, GradientsMatchTheReference) {
     EXPECT_LT(shapes, c.gradient);
     EXPECT_LT(scales, c.gradient);
     EXPECT_LT(views, 1e-6);
-    const SplatGradient again = operators().project_backward(scene.splats(), scene.view_arrays(), scene.options,
-                                                             out.radii, g.arrays(), true);
+    const SplatGradient again = operators().project_backward(scene.splats(), scene.view_arrays(),
+                                                             scene.options, out.radii, g.arrays(), true);
     EXPECT_EQ(actual.view_matrices, again.view_matrices);
     EXPECT_EQ(actual.means, again.means);
 }
@@ -219,16 +225,17 @@ std::string views_case_name(const testing::TestParamInfo<ViewsCase>& tested) {
 
 INSTANTIATE_TEST_SUITE_P(
     All, ViewsPass,
-    testing::Values(ViewsCase{"ordinary", SplatKind::ordinary, 1000, 1, false, false, false, 0, 0.3f, 1e-5, 1e-4},
-                    ViewsCase{"several_views", SplatKind::mixed, 257, 3, false, true, true, 0, 0.3f, 1e-5, 1e-4},
-                    ViewsCase{"needles", SplatKind::needles, 500, 2, false, false, true, 0, 0.3f, 3e-5, 5e-4},
-                    ViewsCase{"bent_views", SplatKind::needles, 300, 2, false, false, true, 0.2, 0.3f, 3e-5, 5e-4},
-                    ViewsCase{"close", SplatKind::off_screen_and_close, 500, 1, false, true, false, 0, 0.3f, 1e-5, 1e-4},
-                    ViewsCase{"sub_pixel", SplatKind::sub_pixel, 500, 1, false, false, true, 0, 0.1f, 1e-5, 1e-4},
-                    ViewsCase{"covariances", SplatKind::ordinary, 300, 2, true, true, true, 0, 0.3f, 1e-5, 1e-4},
-                    ViewsCase{"bent_covariances", SplatKind::mixed, 300, 2, true, false, true, 0.2, 0.3f, 1e-5, 1e-4},
-                    ViewsCase{"thin_covariances", SplatKind::needles, 300, 1, true, false, false, 0, 0.3f, 1e-5, 1e-4},
-                    ViewsCase{"one_splat", SplatKind::ordinary, 1, 1, false, false, false, 0, 0.3f, 1e-5, 1e-4}),
+    testing::Values(
+        ViewsCase{"ordinary", SplatKind::ordinary, 1000, 1, false, false, false, 0, 0.3f, 1e-5, 1e-4},
+        ViewsCase{"several_views", SplatKind::mixed, 257, 3, false, true, true, 0, 0.3f, 1e-5, 1e-4},
+        ViewsCase{"needles", SplatKind::needles, 500, 2, false, false, true, 0, 0.3f, 3e-5, 5e-4},
+        ViewsCase{"bent_views", SplatKind::needles, 300, 2, false, false, true, 0.2, 0.3f, 3e-5, 5e-4},
+        ViewsCase{"close", SplatKind::off_screen_and_close, 500, 1, false, true, false, 0, 0.3f, 1e-5, 1e-4},
+        ViewsCase{"sub_pixel", SplatKind::sub_pixel, 500, 1, false, false, true, 0, 0.1f, 1e-5, 1e-4},
+        ViewsCase{"covariances", SplatKind::ordinary, 300, 2, true, true, true, 0, 0.3f, 1e-5, 1e-4},
+        ViewsCase{"bent_covariances", SplatKind::mixed, 300, 2, true, false, true, 0.2, 0.3f, 1e-5, 1e-4},
+        ViewsCase{"thin_covariances", SplatKind::needles, 300, 1, true, false, false, 0, 0.3f, 1e-5, 1e-4},
+        ViewsCase{"one_splat", SplatKind::ordinary, 1, 1, false, false, false, 0, 0.3f, 1e-5, 1e-4}),
     views_case_name);
 
 }  // namespace

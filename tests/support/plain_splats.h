@@ -60,7 +60,8 @@ inline void PlainScene::use_covariances() {
             {s.quaternion[0] / norm, s.quaternion[1] / norm, s.quaternion[2] / norm, s.quaternion[3] / norm});
         for (int k = 0; k < 3; ++k) axes[k] *= s.scale[k];
         const glm::dmat3 sigma = axes * glm::transpose(axes);
-        for (const double value : {sigma[0][0], sigma[0][1], sigma[0][2], sigma[1][1], sigma[1][2], sigma[2][2]})
+        for (const double value :
+             {sigma[0][0], sigma[0][1], sigma[0][2], sigma[1][1], sigma[1][2], sigma[2][2]})
             all.push_back(float(value));
     }
     covariances = all;
@@ -70,8 +71,8 @@ inline void PlainScene::use_covariances() {
 
 /// One view after another of splats of a kind, which are in front of the first view. The matrices are rotations, but for
 /// the rounding to float32 and for `bend`, the size of a random matrix that is added to each.
-inline PlainScene plain_scene(uint64_t seed, size_t splats, SplatKind kind, size_t views, int width, int height,
-                              double bend = 0) {
+inline PlainScene plain_scene(uint64_t seed, size_t splats, SplatKind kind, size_t views, int width,
+                              int height, double bend = 0) {
     PlainScene scene;
     const Camera first = random_camera(seed, width, height);
     const Gaussians g = random_gaussians(seed + 1, splats, kind, first, 0);
@@ -86,7 +87,8 @@ inline PlainScene plain_scene(uint64_t seed, size_t splats, SplatKind kind, size
         Camera camera = first;
         if (v > 0) {  // turned a little, and moved
             const double angle = 0.1 * random.normal();
-            const glm::dmat3 turn(std::cos(angle), std::sin(angle), 0, -std::sin(angle), std::cos(angle), 0, 0, 0, 1);
+            const glm::dmat3 turn(std::cos(angle), std::sin(angle), 0, -std::sin(angle), std::cos(angle), 0,
+                                  0, 0, 1);
             camera.rotation = turn * camera.rotation;
             camera.translation = turn * camera.translation;
             for (int k = 0; k < 3; ++k) camera.translation[k] += 0.2 * random.normal();

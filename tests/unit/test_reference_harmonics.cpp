@@ -50,7 +50,8 @@ TEST(ReferenceHarmonics, GradientMatchesDifferencesForEachDegree) {
         std::vector<double> differences;
         for (int k = 0; k < 3; ++k)
             differences.push_back(test::best_central_difference(value, direction[k], g.direction[k]));
-        EXPECT_TRUE(test::gradients_agree(std::vector{g.direction.x, g.direction.y, g.direction.z}, differences))
+        EXPECT_TRUE(
+            test::gradients_agree(std::vector{g.direction.x, g.direction.y, g.direction.z}, differences))
             << degree;
         differences.clear();
         for (size_t k = 0; k < coefficients.size(); ++k)

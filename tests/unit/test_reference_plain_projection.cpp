@@ -98,7 +98,8 @@ TEST(ReferencePlainProjection, GradientMatchesDifferences) {
                        g.compensation * q.compensation;
             };
             const PlainGradient claimed = project_backward(splat, view, scene.options, g);
-            const auto compare = [&](const char* name, std::vector<double*> variables, std::vector<double> gradient) {
+            const auto compare = [&](const char* name, std::vector<double*> variables,
+                                     std::vector<double> gradient) {
                 std::vector<double> differences;
                 for (size_t k = 0; k < variables.size(); ++k)
                     differences.push_back(test::best_central_difference(
@@ -113,15 +114,18 @@ TEST(ReferencePlainProjection, GradientMatchesDifferences) {
                 compare("covariance", entries, {s.covariance.begin(), s.covariance.end()});
             } else {
                 auto& q = splat.quaternion;
-                compare("quaternion", {&q[0], &q[1], &q[2], &q[3]}, {s.quaternion.begin(), s.quaternion.end()});
-                compare("scale", {&splat.scale.x, &splat.scale.y, &splat.scale.z}, {s.scale.x, s.scale.y, s.scale.z});
+                compare("quaternion", {&q[0], &q[1], &q[2], &q[3]},
+                        {s.quaternion.begin(), s.quaternion.end()});
+                compare("scale", {&splat.scale.x, &splat.scale.y, &splat.scale.z},
+                        {s.scale.x, s.scale.y, s.scale.z});
             }
             std::vector<double*> matrix;
             std::vector<double> by_matrix;
             for (int column = 0; column < 4; ++column)
                 for (int row = 0; row < 3; ++row) {
                     matrix.push_back(column == 3 ? &view.translation[row] : &view.rotation[column][row]);
-                    by_matrix.push_back(column == 3 ? claimed.translation[row] : claimed.rotation[column][row]);
+                    by_matrix.push_back(column == 3 ? claimed.translation[row]
+                                                    : claimed.rotation[column][row]);
                 }
             compare("view matrix", matrix, by_matrix);
             ++checked;
