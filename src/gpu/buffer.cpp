@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gpu/buffer.h"
 
+#include <algorithm>
+#include <bit>
 #include <cassert>
 #include <cstring>
 #include <stdexcept>
@@ -89,6 +91,50 @@ void Buffer::create(FindMemory find_memory) {
     }
 }
 
+std::optional<Buffer> Buffer::in_host_memory(Device& device, std::string name,
+                                             std::span<const std::byte> bytes) {
+    constexpr auto kKind = vk::ExternalMemoryHandleTypeFlagBits::eHostAllocationEXT;
+    const uint64_t page = device.limits().host_page;
+    const auto address = reinterpret_cast<uintptr_t>(bytes.data());
+    // Rounded up to whole texels, the buffer must end in its last page.
+    if (page == 0 || bytes.empty() ||
+        address % std::max<uint64_t>(16, device.limits().storage_alignment) != 0)
+        return std::nullopt;
+    const uintptr_t first = address / page * page, end = (address + bytes.size() + page - 1) / page * page;
+    void* const pages = reinterpret_cast<void*>(first);
+    const auto pointer_properties = reinterpret_cast<PFN_vkGetMemoryHostPointerPropertiesEXT>(
+        device.handle().getProcAddr("vkGetMemoryHostPointerPropertiesEXT"));
+    VkMemoryHostPointerPropertiesEXT properties{VK_STRUCTURE_TYPE_MEMORY_HOST_POINTER_PROPERTIES_EXT, nullptr,
+                                                0};
+    if (!pointer_properties || pointer_properties(device.handle(), VkExternalMemoryHandleTypeFlagBits(kKind),
+                                                  pages, &properties) != VK_SUCCESS)
+        return std::nullopt;
+    Buffer made;
+    made.device_ = &device;
+    made.name_ = std::move(name);
+    made.bytes_ = whole_texels(bytes.size());
+    using Usage = vk::BufferUsageFlagBits;
+    const vk::ExternalMemoryBufferCreateInfo external(kKind);
+    vk::BufferCreateInfo info;
+    info.setSize(end - first).setUsage(Usage::eStorageBuffer | Usage::eTransferSrc | Usage::eTransferDst);
+    info.setPNext(&external);
+    try {
+        // The buffer is all pages: its own bytes may begin where no buffer can be bound.
+        made.buffer_ = device.handle().createBufferUnique(info);
+        made.begin_ = address - first;
+        const auto needs = device.handle().getBufferMemoryRequirements(*made.buffer_);
+        const uint32_t types = needs.memoryTypeBits & properties.memoryTypeBits;
+        if (types == 0 || needs.size > end - first) return std::nullopt;
+        const vk::ImportMemoryHostPointerInfoEXT import(kKind, pages);
+        const vk::MemoryAllocateInfo allocate(end - first, uint32_t(std::countr_zero(types)), &import);
+        made.host_memory_ = device.handle().allocateMemoryUnique(allocate);
+        device.handle().bindBufferMemory(*made.buffer_, *made.host_memory_, 0);
+    } catch (const vk::SystemError&) {
+        return std::nullopt;  // such as pages of a file that may only be read
+    }
+    return made;
+}
+
 Buffer& Buffer::operator=(Buffer&& other) noexcept {
     if (this == &other) return *this;
     device_ = other.device_;
@@ -98,6 +144,8 @@ Buffer& Buffer::operator=(Buffer&& other) noexcept {
     uniform_ = other.uniform_;
     view_ = std::move(other.view_);
     buffer_ = std::move(other.buffer_);
+    host_memory_ = std::move(other.host_memory_);
+    begin_ = std::exchange(other.begin_, 0);
     memory_ = std::move(other.memory_);
     memory_offset_ = other.memory_offset_;
     return *this;

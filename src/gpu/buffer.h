@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -29,6 +30,10 @@ class Buffer {
     /// The memory stays as long as a buffer in it.
     Buffer(const Buffer& memory, uint64_t offset, std::string name, uint64_t bytes, Texel texel);
     static constexpr uint64_t kPlacement = 4096;  // bytes
+    /// A buffer whose bytes are these bytes of the host: nothing is copied. They must stay until the device has done with the
+    /// buffer. Empty if the device cannot do that with them.
+    static std::optional<Buffer> in_host_memory(Device& device, std::string name,
+                                                std::span<const std::byte> bytes);
     Buffer(Buffer&& other) noexcept { *this = std::move(other); }
     Buffer& operator=(Buffer&& other) noexcept;
 
@@ -38,6 +43,8 @@ class Buffer {
     bool uniform() const { return uniform_; }
     vk::Buffer handle() const { return *buffer_; }
     vk::BufferView view() const { return *view_; }
+    /// Bytes of the handle in front of the buffer's own: an address of the host decides where it begins.
+    uint64_t begin() const { return begin_; }
     explicit operator bool() const { return bool(buffer_); }
     /// Whether the buffer was made of this memory, from byte `offset` on, for that many bytes.
     bool lies_at(const Buffer& memory, uint64_t offset, uint64_t bytes) const;
@@ -76,6 +83,8 @@ class Buffer {
     bool uniform_ = false;
     std::shared_ptr<Memory> memory_;
     uint64_t memory_offset_ = 0;
+    vk::UniqueDeviceMemory host_memory_;  // in place of memory_: pages of the host
+    uint64_t begin_ = 0;
     vk::UniqueBuffer buffer_;
     vk::UniqueBufferView view_;
 };

@@ -129,6 +129,11 @@ void Device::create_device(bool own_queue) {
     std::vector<const char*> extensions;
     if (subgroups.controlled && subgroups.extension)
         extensions.push_back(VK_EXT_SUBGROUP_SIZE_CONTROL_EXTENSION_NAME);
+    const bool shares_memory =
+        properties.deviceType == vk::PhysicalDeviceType::eCpu || info_.type == "integrated";
+    const bool imports = shares_memory && has_extension(physical_.enumerateDeviceExtensionProperties(),
+                                                        VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME);
+    if (imports) extensions.push_back(VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME);
     // A driver for a subset of Vulkan wants its users to say that they know.
     if (has_extension(physical_.enumerateDeviceExtensionProperties(), "VK_KHR_portability_subset"))
         extensions.push_back("VK_KHR_portability_subset");
@@ -163,9 +168,16 @@ void Device::create_device(bool own_queue) {
     limits_.max_texels = properties.limits.maxTexelBufferElements;
     limits_.texel_buffers = limits_.cpu && limits_.max_texels >= kManyTexels;
     limits_.uniform_alignment = properties.limits.minUniformBufferOffsetAlignment;
+    limits_.storage_alignment = properties.limits.minStorageBufferOffsetAlignment;
     limits_.timestamps = families[queue_family_].timestampValidBits > 0;
     limits_.timestamp_nanoseconds = properties.limits.timestampPeriod;
-    memory_ = std::make_unique<MemoryPool>(physical_, *device_, limits_.cpu || info_.type == "integrated");
+    if (imports)
+        limits_.host_page = physical_
+                                .getProperties2<vk::PhysicalDeviceProperties2,
+                                                vk::PhysicalDeviceExternalMemoryHostPropertiesEXT>()
+                                .get<vk::PhysicalDeviceExternalMemoryHostPropertiesEXT>()
+                                .minImportedHostPointerAlignment;
+    memory_ = std::make_unique<MemoryPool>(physical_, *device_, shares_memory);
 }
 
 Memory Device::allocate(const vk::MemoryRequirements& requirements, bool host_visible) {

@@ -26,10 +26,13 @@ struct Limits {
     bool exact_floats = false;         // shaders ask for exact infinities, NaN and denormals where they can
     bool texel_buffers = true;         // buffers with a texel format are fetched by views; else from storage
     uint64_t uniform_alignment = 256;  // bytes
+    uint64_t storage_alignment = 256;  // bytes
     uint32_t max_invocations = 128;    // of a workgroup along x
     uint32_t shared_bytes = 16384;     // of a workgroup's shared memory
-    bool ballots = false;              // of subgroups
-    bool scalar_loads = false;         // a load from the same address in all lanes costs next to nothing
+    // Bytes. Buffers can lie in pages of the host, which are this large. 0: they cannot, or it would be slow.
+    uint64_t host_page = 0;
+    bool ballots = false;       // of subgroups
+    bool scalar_loads = false;  // a load from the same address in all lanes costs next to nothing
     bool timestamps = false;
     double timestamp_nanoseconds = 1.0;
 };

@@ -90,7 +90,7 @@ vk::DescriptorSet Executor::bind(const Command& command, vk::DescriptorPool pool
             update.setTexelBufferView(views.emplace_back(part.buffer->view()));
         else
             update.setBufferInfo(
-                infos.emplace_back(part.buffer->handle(), part.offset,
+                infos.emplace_back(part.buffer->handle(), part.buffer->begin() + part.offset,
                                    part.bytes ? part.bytes : part.buffer->bytes() - part.offset));
         updates.push_back(update);
     }
@@ -118,11 +118,14 @@ void Executor::record(const Recording& recording, const Slot& slot, bool timed) 
         if (command.barrier_before)
             commands.pipelineBarrier(work, work, {}, vk::MemoryBarrier(written, used), {}, {});
         if (command.kind == Command::Kind::fill) {
-            commands.fillBuffer(command.uses[0].part.buffer->handle(), command.target_offset, command.bytes,
+            const Buffer& target = *command.uses[0].part.buffer;
+            commands.fillBuffer(target.handle(), target.begin() + command.target_offset, command.bytes,
                                 command.fill_value);
         } else if (command.kind == Command::Kind::copy) {
-            commands.copyBuffer(command.uses[0].part.buffer->handle(), command.uses[1].part.buffer->handle(),
-                                vk::BufferCopy(command.source_offset, command.target_offset, command.bytes));
+            const Buffer &source = *command.uses[0].part.buffer, &target = *command.uses[1].part.buffer;
+            commands.copyBuffer(source.handle(), target.handle(),
+                                vk::BufferCopy(source.begin() + command.source_offset,
+                                               target.begin() + command.target_offset, command.bytes));
         } else {
             const vk::PipelineBindPoint compute = vk::PipelineBindPoint::eCompute;
             commands.bindPipeline(compute, command.pipeline->handle());

@@ -133,10 +133,19 @@ void reserve_planes(Context& context, BlendFrame& f) {
 
 void upload_splats(Context& context, BlendFrame& f, const ScreenSplats& splats) {
     gpu::Device& device = *context.device;
-    f.means.upload(device, splats.means2d);
-    f.conics.upload(device, splats.conics);
-    f.opacities.upload(device, splats.opacities);
-    f.features.upload(device, splats.features);
+    f.means.lend(device, splats.means2d);
+    f.conics.lend(device, splats.conics);
+    f.opacities.lend(device, splats.opacities);
+    // The gradient reads the features of the other chunks again, when the caller's array may be gone.
+    if (f.chunks() > 1)
+        f.features.upload(device, splats.features);
+    else
+        f.features.lend(device, splats.features);
+}
+
+void give_back_splats(BlendFrame& f) {
+    for (Array* array : {&f.means, &f.conics, &f.opacities, &f.features, &f.depths, &f.radii})
+        array->give_back();
 }
 
 /// Plane of channel c of a chunk: red, green, blue, and depth.
@@ -325,8 +334,8 @@ BlendedImage Operators::blend(const ScreenSplats& splats, const DepthOrder& orde
     const uint32_t capacity = std::max(f.frame.instance_capacity, pipeline::first_capacity(splats.size()));
     const FrameRequest request = request_of(f, options, capacity);
     upload_splats(context, f, splats);
-    f.depths.upload(*context.device, order.depths);
-    f.radii.upload(*context.device, order.radii);
+    f.depths.lend(*context.device, order.depths);
+    f.radii.lend(*context.device, order.radii);
     const uint32_t mode = order.radii.empty() ? 0 : shared::COLLECT_RADII;
     const shared::Counts counts = pipeline::run_until_it_fits(
         context.cache, context.executor, f.frame, request, [&](gpu::Recording& recording) {
@@ -336,6 +345,7 @@ BlendedImage Operators::blend(const ScreenSplats& splats, const DepthOrder& orde
             pipeline::record_tile_lists(recording, context.cache, options.gradients, f.splats, f.frame);
             record_blend(recording, context, f, mode);
         });
+    give_back_splats(f);
     BlendedImage image = image_of(f);
     image.skipped_nonfinite = counts.skipped_nonfinite;
     if (options.gradients) image.record = std::move(record);
@@ -374,6 +384,7 @@ BlendedImage Operators::blend(const ScreenSplats& splats, const TileLists& lists
     record_blend(recording, context, f, shared::COLLECT_LISTED);
     f.frame.record_counts(recording);
     context.executor.run(recording);
+    give_back_splats(f);
     BlendedImage image = image_of(f);
     image.skipped_nonfinite = f.frame.read_counts().skipped_nonfinite;
     if (options.gradients) image.record = std::move(record);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -15,7 +16,8 @@
 
 namespace ewa::operators {
 
-/// A buffer that is kept from call to call and grows as needed.
+/// A buffer that is kept from call to call and grows as needed. A large array of the host takes its place for one call where
+/// the device can read it as it is.
 class Array {
   public:
     explicit Array(const char* name, gpu::Texel texel = gpu::Texel::none, bool uniform = false)
@@ -31,22 +33,34 @@ class Array {
     }
     template <class T>
     const gpu::Buffer& upload(gpu::Device& device, std::span<const T> values) {
+        host_.reset();
         reserve(device, values.size_bytes());
         buffer_.upload(values);
         return buffer_;
     }
+    /// upload, for values that stay where they are until the last use of the buffer in this call.
+    template <class T>
+    const gpu::Buffer& lend(gpu::Device& device, std::span<const T> values) {
+        constexpr size_t kWorthIt = size_t(64) << 10;  // bytes; fewer are copied in the time that this takes
+        host_.reset();
+        if (values.size_bytes() >= kWorthIt)
+            host_ = gpu::Buffer::in_host_memory(device, name_, std::as_bytes(values));
+        return host_ ? *host_ : upload(device, values);
+    }
+    /// The end of the call.
+    void give_back() { host_.reset(); }
     template <class T>
     std::vector<T> download(size_t count) const {
         return buffer_.download<T>(count);
     }
-    const gpu::Buffer& buffer() const { return buffer_; }
-    gpu::Buffer& buffer() { return buffer_; }
+    const gpu::Buffer& buffer() const { return host_ ? *host_ : buffer_; }
 
   private:
     const char* name_;
     gpu::Texel texel_;
     bool uniform_;
     gpu::Buffer buffer_;
+    std::optional<gpu::Buffer> host_;
 };
 
 /// Buffers of the projection and of spherical harmonics, by use.

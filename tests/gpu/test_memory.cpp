@@ -139,5 +139,41 @@ TEST(ReadBack, GivesTheValueOfTheLastSubmission) {
     }
 }
 
+/// The device reads and writes an array of the host where it is, and takes no memory of its own.
+TEST(HostMemory, IsReadAndWrittenInPlace) {
+    const auto own = open_test_device(true);
+    if (own->limits().host_page == 0) GTEST_SKIP() << "this device cannot use pages of the host";
+    std::vector<uint32_t> values(100003);
+    std::iota(values.begin(), values.end(), 5u);
+    // Words in front of the array and behind it belong to others.
+    const size_t first = 4 - reinterpret_cast<uintptr_t>(values.data()) / 4 % 4 + 8;
+    const std::span<uint32_t> part(&values[first], 100000 - first);
+    const uint64_t before = own->memory_use().allocated;
+    {
+        const auto lent = gpu::Buffer::in_host_memory(*own, "lent", std::as_bytes(part));
+        ASSERT_TRUE(lent);
+        EXPECT_EQ(own->memory_use().allocated, before);
+        gpu::Buffer copy(*own, "copy", part.size_bytes());
+        gpu::Executor executor(*own);
+        gpu::Recording recording(own->limits());
+        recording.copy(*lent, 0, copy, 0, part.size_bytes());
+        recording.fill(*lent, 77, 0, 16);
+        executor.run(recording);
+        const auto read = copy.download<uint32_t>(part.size());
+        for (size_t i = 0; i < read.size(); ++i) ASSERT_EQ(read[i], uint32_t(first + i + 5)) << i;
+        EXPECT_EQ(part[0], 77u);
+        EXPECT_EQ(part[4], uint32_t(first + 9));
+        EXPECT_EQ(values[first - 1], uint32_t(first + 4));
+    }
+    EXPECT_EQ(values[99999], 100004u);
+}
+
+TEST(HostMemory, OfAnOddAddressIsRefused) {
+    const auto own = open_test_device(true);
+    const std::vector<uint32_t> values(2048);  // its address is a multiple of 16
+    EXPECT_FALSE(gpu::Buffer::in_host_memory(*own, "odd", std::as_bytes(std::span(values)).subspan(4)));
+    EXPECT_FALSE(gpu::Buffer::in_host_memory(*own, "none", {}));
+}
+
 }  // namespace
 }  // namespace ewa::test

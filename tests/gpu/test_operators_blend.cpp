@@ -369,6 +369,34 @@ TEST(OperatorBlend, WrongSizesAreRefused) {
     EXPECT_THROW(operators().blend_backward(*image.record, {}, {}, false), InputError);
 }
 
+/// Large arrays are read where they are. The image is that of a copy, and the gradient does not need them any more.
+TEST(OperatorBlend, LentArraysMayGoAfterTheCall) {
+    for (const size_t channels : {size_t(3), size_t(6)}) {
+        const ScreenScene s = screen_scene(56, 9000, SplatKind::mixed, channels, false, 61, 47);
+        BlendedImage image;
+        {
+            Arrays lent(s);
+            image = lent.blend();
+            for (auto* values : {&lent.means2d, &lent.conics, &lent.features})
+                std::ranges::fill(*values, 1e9f);
+        }
+        Arrays odd(s);  // at addresses that the device cannot use
+        const auto moved = [](std::vector<float>& values, std::vector<float>& kept) {
+            kept.assign(values.size() + 1, 0.0f);
+            std::ranges::copy(values, kept.begin() + 1);
+            return std::span<const float>(kept).subspan(1);
+        };
+        std::vector<float> means, conics, features;
+        ScreenSplats splats = odd.splats();
+        splats.means2d = moved(odd.means2d, means);
+        splats.conics = moved(odd.conics, conics);
+        splats.features = moved(odd.features, features);
+        const BlendedImage copied = operators().blend(splats, odd.order(), odd.options());
+        EXPECT_EQ(image.features, copied.features);
+        EXPECT_EQ(odd.backward(image, false).features, odd.backward(copied, false).features);
+    }
+}
+
 TEST(OperatorBlend, FourThreadsGetTheBytesOfOne) {
     const ScreenScene s = screen_scene(54, 200, SplatKind::mixed, 5, false, 61, 47);
     const Arrays arrays(s);
