@@ -1,13 +1,14 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
 // Projects splats in several views, as gsplat 1.6 does.
-// One invocation owns splat i in view workgroup.z. A splat that is not visible gets zeros. SPEC_MODE: VIEWS_* bits.
+// One invocation owns splat i in view workgroup.z. A splat that is not visible gets zeros. SPEC_MODE: VIEWS_* bits
+// and SHAPE_WHITENERS.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/plain_splat.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
-const bool OPACITIES = (MODE & VIEWS_OPACITIES) != 0u;
+const bool OPACITIES = (MODE & VIEWS_OPACITIES) != 0u, WHITENERS = (MODE & SHAPE_WHITENERS) != 0u;
 
 layout(set = 0, binding = 4, scalar) readonly buffer Opacities { float opacities[]; };
 layout(set = 0, binding = 5, scalar) writeonly buffer Radii { ivec2 radii[]; };
@@ -52,6 +53,7 @@ void main() {
     radii[at] = visible ? ivec2(radius) : ivec2(0);
     means2d[at] = visible ? mean : vec2(0.0);
     depths[at] = visible ? p.view.z.x : 0.0;
-    conics[at] = visible ? vec3(p.c, -p.b, p.a) / p.det * (p.unit * p.unit) : vec3(0.0);
+    const vec3 shape = WHITENERS ? vec3(p.ux, p.k, p.vy) : vec3(p.c, -p.b, p.a) / p.det * (p.unit * p.unit);
+    conics[at] = visible ? shape : vec3(0.0);
     if (COMPENSATIONS) compensations[at] = visible ? p.factor : 0.0;
 }

@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Gradient of project_views.
 // One invocation owns splat i. It adds the gradients of its views in their order. With VIEWS_GRADIENTS each subgroup adds
-// those of the view matrices over its splats, and reduce.comp adds the subgroups. SPEC_MODE: VIEWS_* bits.
+// those of the view matrices over its splats, and reduce.comp adds the subgroups. SPEC_MODE: VIEWS_* bits
+// and SHAPE_WHITENERS.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/plain_splat.glsl"
@@ -10,7 +11,7 @@
 #include "lib/subgroup.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
-const bool VIEW_GRADIENTS = (MODE & VIEWS_GRADIENTS) != 0u;
+const bool VIEW_GRADIENTS = (MODE & VIEWS_GRADIENTS) != 0u, WHITENERS = (MODE & SHAPE_WHITENERS) != 0u;
 
 layout(set = 0, binding = 4, scalar) readonly buffer Radii { ivec2 radii[]; };
 layout(set = 0, binding = 5, scalar) readonly buffer Means2d { vec2 means2d_gradient[]; };
@@ -29,12 +30,17 @@ struct Total {
     float covariance[6];
 };
 
-// With A = 2 ux^2, B = -2 ux^2 k, C = 2 (ux^2 k^2 + vy^2) as the conic: the sums over pixels that have the same gradient by
-// ux, k and vy, which are -2/ux gww.x, 2 ux/vy gww.y and -2/vy gww.z.
-Sums sums_of(vec3 conic_gradient, float compensation_gradient, Projection p) {
-    const float by_a = conic_gradient.x, by_b = conic_gradient.y, by_c = conic_gradient.z;
-    const vec3 gww = vec3(-2.0 * p.ux * p.ux * (by_a - p.k * by_b + p.k * p.k * by_c),
-                          p.ux * p.vy * (2.0 * p.k * by_c - by_b), -2.0 * p.vy * p.vy * by_c);
+// The sums over pixels that have the same gradient by ux, k and vy: it is -2/ux gww.x, 2 ux/vy gww.y and -2/vy gww.z. For a
+// conic A, B, C: A = 2 ux^2, B = -2 ux^2 k, C = 2 (ux^2 k^2 + vy^2).
+Sums sums_of(vec3 shape_gradient, float compensation_gradient, Projection p) {
+    const float by_a = shape_gradient.x, by_b = shape_gradient.y, by_c = shape_gradient.z;
+    vec3 gww;
+    if (WHITENERS) {
+        gww = 0.5 * shape_gradient * vec3(-p.ux, p.vy / p.ux, -p.vy);
+    } else {
+        gww = vec3(-2.0 * p.ux * p.ux * (by_a - p.k * by_b + p.k * p.k * by_c), p.ux * p.vy * (2.0 * p.k * by_c - by_b),
+                   -2.0 * p.vy * p.vy * by_c);
+    }
     const float g = COMPENSATIONS && p.factor > float(COMPENSATION_MIN) ? compensation_gradient * p.factor : 0.0;
     return Sums(g, vec2(0.0), gww, vec3(0.0), vec2(0.0));
 }

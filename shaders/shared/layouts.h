@@ -90,7 +90,8 @@ EWA_UINT(BLEND_BACKWARD_FOURTH, 4u);    // a fourth channel, which takes the pla
 EWA_UINT(COLLECT_FEATURES, 1u);  // writes the features alone, of records that are there
 EWA_UINT(COLLECT_RADII, 2u);     // a splat with a radius of 0 is left out
 EWA_UINT(COLLECT_LISTED, 4u);    // the tiles' lists are given: no depth keys and no tile counts
-EWA_UINT(SHAPE_WHITENERS, 8u);   // shapes are ux, k, vy; else conics. Also of gather_slots.comp
+EWA_UINT(SHAPE_WHITENERS,
+         8u);  // shapes are ux, k, vy; else conics. Also of gather_slots.comp, and of project_views
 // gather_slots.comp, bits
 EWA_UINT(GATHER_ADD, 1u);       // adds to the gradients that are there
 EWA_UINT(GATHER_ABSOLUTE, 2u);  // the slots have absolute gradients
@@ -105,7 +106,7 @@ EWA_UINT(UPDATE_REGULARISED, 4u);
 // The norm is that of the pixels' absolute gradients (Ye et al. 2024, AbsGS, eq. 7), which do not cancel.
 EWA_UINT(UPDATE_ABSOLUTE, 8u);
 EWA_UINT(UPDATE_PACKED_MOMENTS, 16u);  // moments1 holds both moments in 16 bits each
-// project_views.comp, project_views_backward.comp, bits
+// project_views.comp, project_views_backward.comp, bits; SHAPE_WHITENERS too
 EWA_UINT(VIEWS_COVARIANCES, 1u);  // shapes are covariances, not quaternions and scales
 EWA_UINT(VIEWS_OPACITIES, 2u);    // the radii depend on the opacities
 EWA_UINT(VIEWS_GRADIENTS, 4u);    // also the gradient of the view matrices

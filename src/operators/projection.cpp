@@ -72,7 +72,9 @@ shared::ViewsPush push_of(const SplatArrays& splats, const ViewArrays& views,
 }
 
 /// SPEC_KERNEL and SPEC_MODE. bits: VIEWS_* beyond VIEWS_COVARIANCES.
-passes::Constants variant_of(const SplatArrays& splats, bool compensations, uint32_t bits) {
+passes::Constants variant_of(const SplatArrays& splats, const ProjectionOptions& options, bool compensations,
+                             uint32_t bits) {
+    if (options.whiteners) bits |= shared::SHAPE_WHITENERS;
     if (!splats.covariances.empty()) bits |= shared::VIEWS_COVARIANCES;
     return {{shared::SPEC_KERNEL, compensations ? shared::KERNEL_ANTIALIAS : shared::KERNEL_PEAK},
             {shared::SPEC_MODE, bits}};
@@ -154,7 +156,7 @@ ProjectedSplats Operators::project(const SplatArrays& splats, const ViewArrays& 
     b.compensations.reserve(device, options.compensations ? 4 * pairs : 4);
     gpu::Recording recording(device.limits());
     const uint32_t bits = splats.opacities.empty() ? 0 : shared::VIEWS_OPACITIES;
-    context_->cache.get<passes::ProjectViews>(variant_of(splats, options.compensations, bits))
+    context_->cache.get<passes::ProjectViews>(variant_of(splats, options, options.compensations, bits))
         .record(recording,
                 {b.views.buffer(), b.means.buffer(), b.shapes.buffer(), b.scales.buffer(),
                  b.opacities.buffer(), b.radii.buffer(), b.means2d.buffer(), b.depths.buffer(),
@@ -210,7 +212,7 @@ SplatGradient Operators::project_backward(const SplatArrays& splats, const ViewA
     b.view_sums.reserve(device, view_gradients ? uint64_t(4) * rows * subgroups : 4);
     context_->cache
         .get<passes::ProjectViewsBackward>(
-            variant_of(splats, compensations, view_gradients ? shared::VIEWS_GRADIENTS : 0))
+            variant_of(splats, options, compensations, view_gradients ? shared::VIEWS_GRADIENTS : 0))
         .record(recording,
                 {b.views.buffer(), b.means.buffer(), b.shapes.buffer(), b.scales.buffer(), b.radii.buffer(),
                  b.means2d.buffer(), b.depths.buffer(), b.conics.buffer(), b.compensations.buffer(),

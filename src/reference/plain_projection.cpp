@@ -32,7 +32,7 @@ glm::dmat3 cofactors(const glm::dmat3& m) {
     return {glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1])};
 }
 
-PlainSteps plain_steps(const PlainSplat& splat, const PlainView& view, const ProjectionOptions& options) {
+PlainSteps plain_steps(const PlainSplat& splat, const PlainView& view, const PlainOptions& options) {
     PlainSteps s;
     s.p = view.rotation * splat.mean + view.translation;
     const int size[2] = {int(options.width), int(options.height)};
@@ -58,13 +58,25 @@ PlainSteps plain_steps(const PlainSplat& splat, const PlainView& view, const Pro
     s.a0 = glm::dot(s.t.x, s.sigma * s.t.x);
     s.b = glm::dot(s.t.x, s.sigma * s.t.y);
     s.c0 = glm::dot(s.t.y, s.sigma * s.t.y);
-    s.det = s.det0 + options.low_pass * (s.a0 + s.c0) + double(options.low_pass) * options.low_pass;
+    s.det = s.det0 + options.low_pass * (s.a0 + s.c0) + options.low_pass * options.low_pass;
     return s;
 }
 
+glm::dvec3 whitener_of(const PlainSteps& s, double c) {
+    return {std::sqrt(c / (2 * s.det)), s.b / c, std::sqrt(1 / (2 * c))};
+}
+
+/// dL/dconic of dL/dwhitener: ux = sqrt(A / 2), k = -B / A, vy = sqrt((C - B^2 / A) / 2).
+glm::dvec3 conic_gradient(const PlainSteps& s, double c, const glm::dvec3& by_whitener) {
+    const glm::dvec3 w = whitener_of(s, c);
+    const double by_vy = by_whitener.z / (4 * w.z), by_k = by_whitener.y / (2 * w.x * w.x);
+    return {by_whitener.x / (4 * w.x) - by_k * w.y + by_vy * w.y * w.y, -by_k + 2 * by_vy * w.y, by_vy};
+}
+
 /// dL/dSigma2 as a symmetric matrix.
-glm::dmat2 covariance_gradient(const PlainSteps& s, double low_pass, const PlainScreenGradient& g) {
-    const double a = s.a0 + low_pass, c = s.c0 + low_pass;
+glm::dmat2 covariance_gradient(const PlainSteps& s, const PlainOptions& options, PlainScreenGradient g) {
+    const double low_pass = options.low_pass, a = s.a0 + low_pass, c = s.c0 + low_pass;
+    if (options.whiteners) g.conic = conic_gradient(s, c, g.conic);
     const glm::dmat2 conic = glm::dmat2(c, -s.b, -s.b, a) / s.det;
     const glm::dmat2 by_conic(g.conic.x, g.conic.y / 2, g.conic.y / 2, g.conic.z);
     glm::dmat2 out = -(conic * by_conic * conic);
@@ -96,13 +108,13 @@ glm::dvec3 point_gradient(const PlainSteps& s, const PlainView& view, const Plai
 
 }  // namespace
 
-PlainProjected project(const PlainSplat& splat, const PlainView& view, const ProjectionOptions& options) {
+PlainProjected project(const PlainSplat& splat, const PlainView& view, const PlainOptions& options) {
     const PlainSteps s = plain_steps(splat, view, options);
     PlainProjected out;
     out.depth = s.p.z;
     out.mean2d = view.focal * glm::dvec2(s.p) / s.p.z + view.center;
     const double a = s.a0 + options.low_pass, c = s.c0 + options.low_pass;
-    out.conic = glm::dvec3(c, -s.b, a) / s.det;
+    out.conic = options.whiteners ? whitener_of(s, c) : glm::dvec3(c, -s.b, a) / s.det;
     out.compensation = std::sqrt(std::max(0.0, s.det0 / s.det));
     const double factor = options.compensations ? out.compensation : 1;
     const double ratio = splat.opacity ? *splat.opacity * factor / ALPHA_MIN : HUGE_VAL;
@@ -116,10 +128,10 @@ PlainProjected project(const PlainSplat& splat, const PlainView& view, const Pro
     return out;
 }
 
-PlainGradient project_backward(const PlainSplat& splat, const PlainView& view,
-                               const ProjectionOptions& options, const PlainScreenGradient& gradient) {
+PlainGradient project_backward(const PlainSplat& splat, const PlainView& view, const PlainOptions& options,
+                               const PlainScreenGradient& gradient) {
     const PlainSteps s = plain_steps(splat, view, options);
-    const glm::dmat2 g = covariance_gradient(s, options.low_pass, gradient);
+    const glm::dmat2 g = covariance_gradient(s, options, gradient);
     const Rows gt{g[0][0] * s.t.x + g[1][0] * s.t.y, g[0][1] * s.t.x + g[1][1] * s.t.y};
     const Rows by_t{2.0 * (s.sigma * gt.x), 2.0 * (s.sigma * gt.y)};
     const glm::dmat3 by_sigma = glm::outerProduct(s.t.x, gt.x) + glm::outerProduct(s.t.y, gt.y);

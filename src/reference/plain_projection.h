@@ -3,7 +3,8 @@
 //
 // With p = R mean + t, J as in reference/projection.h and T = J R, the 2D covariance is Sigma2 = T Sigma T^T + low_pass I, with
 // Sigma = (Q S)(Q S)^T of quaternion and scales.
-//   conic        = Sigma2^-1
+//   conic        = Sigma2^-1 = [a b; b c]^-1
+//   whitener     = (ux, k, vy) = (sqrt(c / (2 det(Sigma2))), b / c, sqrt(1 / (2 c)))
 //   compensation = sqrt(det(T Sigma T^T) / det(Sigma2))
 //   radius       = ceil(s sqrt(diagonal of Sigma2)), s = min(3.33, sqrt(2 ln(255 opacity)))
 // The gradient, with K the conic and V its gradient as symmetric matrices:
@@ -11,12 +12,11 @@
 //   dL/d(Q S) = 2 dL/dSigma Q S
 #pragma once
 #include <array>
+#include <cstdint>
 #include <glm/mat3x3.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <optional>
-
-#include "ewa/operators.h"
 
 namespace ewa::reference {
 
@@ -35,17 +35,24 @@ struct PlainView {
     glm::dvec2 focal{1}, center{0};  // px
 };
 
+/// As ewa::ProjectionOptions.
+struct PlainOptions {
+    uint32_t width = 0, height = 0;
+    double low_pass = 0.3, near = 0.01, far = 1e10, radius_clip = 0;
+    bool compensations = false, whiteners = false;
+};
+
 struct PlainProjected {
     bool visible = false;
     /// The other members are set in front of the camera too if the splat is not visible.
     glm::dvec2 reach{0};  // px; the radii are their ceilings
     glm::dvec2 mean2d{0};
     double depth = 0;
-    glm::dvec3 conic{0};
+    glm::dvec3 conic{0};  // or whitener
     double compensation = 0;
 };
 
-PlainProjected project(const PlainSplat& splat, const PlainView& view, const ProjectionOptions& options);
+PlainProjected project(const PlainSplat& splat, const PlainView& view, const PlainOptions& options);
 
 /// dL/d(output). The conic's xy counts both of its places.
 struct PlainScreenGradient {
@@ -63,7 +70,7 @@ struct PlainGradient {
 };
 
 /// Of a splat that is visible.
-PlainGradient project_backward(const PlainSplat& splat, const PlainView& view,
-                               const ProjectionOptions& options, const PlainScreenGradient& gradient);
+PlainGradient project_backward(const PlainSplat& splat, const PlainView& view, const PlainOptions& options,
+                               const PlainScreenGradient& gradient);
 
 }  // namespace ewa::reference

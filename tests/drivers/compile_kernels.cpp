@@ -131,10 +131,14 @@ void compile_operators(Compiler& compiler) {
     const Values kernels = {KERNEL_PEAK, KERNEL_ANTIALIAS};
     compiler.compile<passes::ProjectViews>(
         {{SPEC_KERNEL, kernels},
-         {SPEC_MODE, {0, VIEWS_COVARIANCES, VIEWS_OPACITIES, VIEWS_COVARIANCES | VIEWS_OPACITIES}}});
+         {SPEC_MODE,
+          {0, VIEWS_COVARIANCES, VIEWS_OPACITIES, VIEWS_COVARIANCES | VIEWS_OPACITIES, SHAPE_WHITENERS,
+           VIEWS_OPACITIES | SHAPE_WHITENERS}}});
     compiler.compile<passes::ProjectViewsBackward>(
         {{SPEC_KERNEL, kernels},
-         {SPEC_MODE, {0, VIEWS_COVARIANCES, VIEWS_GRADIENTS, VIEWS_COVARIANCES | VIEWS_GRADIENTS}}});
+         {SPEC_MODE,
+          {0, VIEWS_COVARIANCES, VIEWS_GRADIENTS, VIEWS_COVARIANCES | VIEWS_GRADIENTS, SHAPE_WHITENERS,
+           VIEWS_GRADIENTS | SHAPE_WHITENERS}}});
     const Values degrees = {0, 1, 2, 3, 4};
     compiler.compile<passes::Harmonics>({{SPEC_SH_DEGREE, degrees}, {SPEC_MODE, {0, HARMONICS_MASKED}}});
     compiler.compile<passes::HarmonicsBackward>(

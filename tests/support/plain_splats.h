@@ -35,6 +35,10 @@ struct PlainScene {
         if (!opacities.empty()) s.opacity = opacities[i];
         return s;
     }
+    reference::PlainOptions reference_options() const {
+        const ProjectionOptions& o = options;
+        return {o.width, o.height, o.low_pass, o.near, o.far, o.radius_clip, o.compensations, o.whiteners};
+    }
     reference::PlainView view(size_t v) const {
         reference::PlainView out;
         for (int row = 0; row < 3; ++row) {

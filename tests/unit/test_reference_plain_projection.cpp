@@ -26,7 +26,7 @@ TEST(ReferencePlainProjection, AgreesWithTheTrainersProjection) {
         for (size_t i = 0; i < scene.size(); ++i) {
             const Projected expected = project(gaussians, i, camera, options);
             if (!expected.visible) continue;
-            const PlainProjected p = project(scene.splat(i), scene.view(0), scene.options);
+            const PlainProjected p = project(scene.splat(i), scene.view(0), scene.reference_options());
             ++visible;
             EXPECT_LT(glm::length(p.mean2d - expected.mean2d), 1e-3) << i;
             EXPECT_NEAR(p.depth / expected.z, 1, 1e-5) << i;
@@ -48,16 +48,16 @@ TEST(ReferencePlainProjection, WhatIsNotVisible) {
     PlainView view;
     view.focal = {100, 100};
     view.center = {32, 24};
-    ProjectionOptions options;
+    PlainOptions options;
     options.width = 64;
     options.height = 48;
-    const double sigma = std::sqrt(2.5 * 2.5 + 0.3f);
+    const double sigma = std::sqrt(2.5 * 2.5 + 0.3);
     EXPECT_TRUE(project(splat, view, options).visible);
     EXPECT_NEAR(project(splat, view, options).reach.x, 3.33 * sigma, 1e-9);
     const auto shown = [&](auto change) {
         PlainSplat s = splat;
         PlainView v = view;
-        ProjectionOptions o = options;
+        PlainOptions o = options;
         change(s, v, o);
         return project(s, v, o).visible;
     };
@@ -80,24 +80,26 @@ TEST(ReferencePlainProjection, GradientMatchesDifferences) {
         const auto kind = seed % 3 == 0 ? test::SplatKind::off_screen_and_close : test::SplatKind::ordinary;
         test::PlainScene scene = test::plain_scene(seed, 10, kind, 1, 41, 33, seed % 2 ? 0.1 : 0);
         if (seed % 4 >= 2) scene.use_covariances();
+        scene.options.whiteners = seed >= 5;
         test::Random random(seed + 50);
         for (size_t i = 0; i < scene.size(); ++i) {
             SCOPED_TRACE(test::seed_text(seed) + ", splat " + std::to_string(i));
             PlainSplat splat = scene.splat(i);
             PlainView view = scene.view(0);
-            const PlainProjected p = project(splat, view, scene.options);
+            const PlainProjected p = project(splat, view, scene.reference_options());
             if (!p.visible) continue;
             PlainScreenGradient g;
             g.mean2d = {random.normal(), random.normal()};
             g.depth = random.normal();
             g.conic = glm::dvec3(random.normal(), random.normal(), random.normal()) / (p.conic.x + p.conic.z);
+            if (scene.options.whiteners) g.conic.y = random.normal();
             g.compensation = random.normal() / p.compensation;
             const auto value = [&] {
-                const PlainProjected q = project(splat, view, scene.options);
+                const PlainProjected q = project(splat, view, scene.reference_options());
                 return glm::dot(g.mean2d, q.mean2d) + g.depth * q.depth + glm::dot(g.conic, q.conic) +
                        g.compensation * q.compensation;
             };
-            const PlainGradient claimed = project_backward(splat, view, scene.options, g);
+            const PlainGradient claimed = project_backward(splat, view, scene.reference_options(), g);
             const auto compare = [&](const char* name, std::vector<double*> variables,
                                      std::vector<double> gradient) {
                 std::vector<double> differences;
