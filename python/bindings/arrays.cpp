@@ -40,7 +40,7 @@ nb::object numpy_argument(nb::handle value, const std::string& name, const char*
     const bool empty = nb::cast<size_t>(array.attr("size")) == 0;
     if (!empty && std::string("biuf").find(kind) == std::string::npos)
         throw nb::type_error((name + " holds no real numbers: its dtype is " +
-                              nb::cast<std::string>(nb::str(array.attr("dtype"))))
+                              nb::cast<std::string>(array.attr("dtype").attr("__str__")()))
                                  .c_str());
     const auto lengths = nb::cast<std::vector<ptrdiff_t>>(nb::list(array.attr("shape")));
     if (std::none_of(shapes.begin(), shapes.end(),

@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "ewa/image.h"
+
 namespace ewa::python {
 
 namespace nb = nanobind;
@@ -60,6 +62,12 @@ nb::ndarray<nb::numpy, T> to_numpy(std::vector<T>&& values, const std::vector<si
     auto* kept = new std::vector<T>(std::move(values));
     const nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
     return nb::ndarray<nb::numpy, T>(kept->data(), shape.size(), shape.data(), owner);
+}
+
+/// [height, width, channels]
+inline nb::ndarray<nb::numpy, float> to_numpy(Image&& image) {
+    return to_numpy(std::move(image.pixels),
+                    {size_t(image.height), size_t(image.width), size_t(image.channels)});
 }
 
 }  // namespace ewa::python

@@ -12,6 +12,7 @@ namespace ewa::python {
 
 void bind_device(nanobind::module_& module);
 void bind_splats(nanobind::module_& module);
+void bind_images(nanobind::module_& module);
 void bind_render(nanobind::module_& module);
 void bind_dataset(nanobind::module_& module);
 void bind_train(nanobind::module_& module);

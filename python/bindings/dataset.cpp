@@ -14,7 +14,7 @@
 #include "bindings.h"
 #include "cameras.h"
 #include "core/typing.h"
-#include "ewa/error.h"
+#include "errors.h"
 
 namespace ewa::python {
 namespace {
@@ -32,14 +32,8 @@ struct Images {
 };
 
 nb::ndarray<nb::numpy, float> image(const Images& images, ptrdiff_t index) {
-    Image decoded;
-    {
-        const Frame& frame = images.frame(index);
-        const nb::gil_scoped_release released;
-        decoded = load_frame_image(frame);
-    }
-    return to_numpy(std::move(decoded.pixels),
-                    {size_t(decoded.height), size_t(decoded.width), size_t(decoded.channels)});
+    const Frame& frame = images.frame(index);
+    return to_numpy(with_files([&] { return load_frame_image(frame); }));
 }
 
 MaskUse mask_use(std::string word) {
@@ -54,8 +48,8 @@ void open_dataset(LoadedDataset* self, const std::filesystem::path& path, int do
                   const std::string& masks, bool need_images) {
     if (downscale < 1) throw InputError("downscale is less than 1");
     const DatasetOptions options{downscale, mask_use(masks), need_images};
-    const nb::gil_scoped_release released;
-    new (self) LoadedDataset{std::make_shared<Dataset>(load_dataset(path, options))};
+    new (self)
+        LoadedDataset{std::make_shared<Dataset>(with_files([&] { return load_dataset(path, options); }))};
 }
 
 std::vector<Camera> cameras(const LoadedDataset& data) {
@@ -108,6 +102,9 @@ void bind_frame(nb::module_& module) {
         });
     nb::class_<Images>(module, "Images", "The images of a dataset. Each is decoded when it is asked for.")
         .def("__len__", [](const Images& images) { return images.dataset->frames.size(); })
+        .def(
+            "__iter__", [](nb::handle self) { return nb::steal<nb::iterator>(PySeqIter_New(self.ptr())); },
+            nb::sig("def __iter__(self) -> collections.abc.Iterator[numpy.typing.NDArray[numpy.float32]]"))
         .def("__getitem__", image, nb::arg("index"),
              nb::sig("def __getitem__(self, index: int, /) -> numpy.typing.NDArray[numpy.float32]"),
              "[H, W, 3], or [H, W, 4] with a mask or alpha, from 0 to 1: as the frame's camera sees it.");

@@ -35,6 +35,7 @@ NB_MODULE(_native, module) {
     nb::register_exception_translator(translate);
     ewa::python::bind_device(module);
     ewa::python::bind_splats(module);
+    ewa::python::bind_images(module);
     ewa::python::bind_render(module);
     ewa::python::bind_dataset(module);
     ewa::python::bind_train(module);

@@ -28,9 +28,11 @@ struct Renders {
 class Planes {
   public:
     Planes(size_t cameras, int width, int height, size_t channels)
-        : shape_{cameras, size_t(height), size_t(width), channels},
-          values_(cameras * size_t(height) * size_t(width) * channels) {}
+        : shape_{cameras, size_t(height), size_t(width), channels} {}
     void set(size_t camera, const Image& image) {
+        values_.resize(
+            shape_[0] *
+            image.pixels.size());  // only now: a size that is too large is an error of the renderer's
         std::copy(image.pixels.begin(), image.pixels.end(),
                   values_.begin() + std::ptrdiff_t(camera * image.pixels.size()));
     }

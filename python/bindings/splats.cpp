@@ -10,8 +10,8 @@
 
 #include "arrays.h"
 #include "bindings.h"
+#include "errors.h"
 #include "ewa/dataset.h"
-#include "ewa/error.h"
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
 
@@ -129,11 +129,7 @@ void warn(const std::string& text) {
 }
 
 Splats load(const std::filesystem::path& path) {
-    SplatScene scene;
-    {
-        const nb::gil_scoped_release released;
-        scene = read_splats(path);
-    }
+    SplatScene scene = with_files([&] { return read_splats(path); });
     for (const std::string& remark : scene.remarks) warn(path.string() + ": " + remark);
     return {std::move(scene.gaussians), scene.antialiased, std::move(scene.comments)};
 }
@@ -143,13 +139,7 @@ std::vector<std::string> save(const std::filesystem::path& path, const Splats& s
                               int spz_version) {
     if (spz_version != 3 && spz_version != 4) throw nb::value_error("spz_version is neither 3 nor 4");
     const SaveOptions options{comments, antialiased.value_or(splats.antialiased), spz_version};
-    try {
-        const nb::gil_scoped_release released;
-        return save_splats(path, splats.gaussians, options);
-    } catch (const RunError& error) {
-        PyErr_SetString(PyExc_OSError, error.what());
-        throw nb::python_error();
-    }
+    return with_files([&] { return save_splats(path, splats.gaussians, options); });
 }
 
 std::string splats_text(const Splats& splats) {

@@ -15,7 +15,7 @@
 #include "core/typing.h"
 #include "dataset.h"
 #include "device.h"
-#include "ewa/error.h"
+#include "errors.h"
 #include "ewa/evaluation.h"
 #include "ewa/splat_edit.h"
 #include "ewa/trainer.h"
@@ -77,6 +77,8 @@ class Training {
   public:
     Training(Plan plan, nb::handle init) : plan_(std::move(plan)) {
         const Splats* given = nb::isinstance<Splats>(init) ? &nb::cast<const Splats&>(init) : nullptr;
+        if (!given && !init.is_none() && !nb::isinstance<nb::str>(init))
+            throw nb::type_error("init is neither Splats nor text");
         const std::string word = given ? "" : init.is_none() ? "sfm" : nb::cast<std::string>(init);
         if (!given && word != "sfm" && word != "random")
             throw InputError("init is neither splats nor \"sfm\" nor \"random\"");
@@ -117,21 +119,18 @@ class Training {
     }
 
     void save_checkpoint(const std::filesystem::path& path) const {
-        Json settings = train::checkpoint_settings(plan_.run(),
-                                                   train::dataset_fingerprint(*plan_.dataset, plan_.split()));
+        const std::string fingerprint =
+            with_files([&] { return train::dataset_fingerprint(*plan_.dataset, plan_.split()); });
+        Json settings = train::checkpoint_settings(plan_.run(), fingerprint);
         settings["fields"] = options_json(plan_.options);
         settings["train_frames"] = plan_.frames;
         settings["init"] = plan_.own_start ? "splats" : word_;
-        std::optional<TrainerState> state;
-        const DeviceWork work;
-        state = trainer_->state();
-        try {
-            train::write_checkpoint(path, {settings.dump(), "", last_.seconds, std::move(*state)});
-        } catch (const RunError& error) {
-            const nb::gil_scoped_acquire interpreter;
-            PyErr_SetString(PyExc_OSError, error.what());
-            throw nb::python_error();
-        }
+        TrainerState state = [this] {
+            const DeviceWork work;
+            return trainer_->state();
+        }();
+        const train::Checkpoint checkpoint{settings.dump(), "", last_.seconds, std::move(state)};
+        with_files([&] { train::write_checkpoint(path, checkpoint); });
     }
     void restore(const std::filesystem::path& path, const TrainerState& state) {
         const DeviceWork work;
@@ -185,13 +184,9 @@ void read_settings(const Json& settings, Plan& plan) {
     plan.frames = split_frames(*plan.dataset, run.test_every).train;
 }
 
-std::unique_ptr<Training> resume(const std::filesystem::path& path, const LoadedDataset& dataset,
-                                 nb::handle init, std::optional<int> steps) {
-    train::Checkpoint checkpoint;
-    {
-        const nb::gil_scoped_release released;
-        checkpoint = train::read_checkpoint(path);
-    }
+Training resume(const std::filesystem::path& path, const LoadedDataset& dataset, nb::handle init,
+                std::optional<int> steps) {
+    const train::Checkpoint checkpoint = with_files([&] { return train::read_checkpoint(path); });
     Plan plan{dataset.dataset, usual_options(), {}};
     Json settings;
     try {
@@ -212,8 +207,8 @@ std::unique_ptr<Training> resume(const std::filesystem::path& path, const Loaded
     plan.resolve_options();
     const nb::object start =
         init.is_none() ? nb::cast(begun.is_string() ? begun.get<std::string>() : "sfm") : nb::borrow(init);
-    auto training = std::make_unique<Training>(std::move(plan), start);
-    training->restore(path, checkpoint.state);
+    Training training(std::move(plan), start);
+    training.restore(path, checkpoint.state);
     return training;
 }
 

@@ -20,8 +20,10 @@ from ._native import (
     evaluate,
     join,
     load,
+    load_image,
     render,
     save,
+    save_image,
     set_device,
 )
 
@@ -45,7 +47,9 @@ __all__ = [
     "evaluate",
     "join",
     "load",
+    "load_image",
     "render",
     "save",
+    "save_image",
     "set_device",
 ]

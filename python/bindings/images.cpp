@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/string.h>
+
+#include "arrays.h"
+#include "bindings.h"
+#include "errors.h"
+#include "ewa/image.h"
+
+namespace ewa::python {
+namespace {
+
+nb::ndarray<nb::numpy, float> read_image(const std::filesystem::path& path) {
+    return to_numpy(with_files([&] { return load_image(path); }));
+}
+
+void write_image(const std::filesystem::path& path, nb::handle pixels) {
+    const Shape rgb{any('H'), any('W'), 3}, rgba{any('H'), any('W'), 4};
+    const Array<float> array(pixels, "image", {rgb, rgba});
+    Image image(int(array.length(1)), int(array.length(0)), int(array.length(2)));
+    image.pixels = array.values();
+    const auto dtype = nb::module_::import_("numpy").attr("asarray")(pixels).attr("dtype");
+    if (nb::cast<std::string>(dtype.attr("kind")) != "f")
+        for (float& value : image.pixels) value /= 255;
+    with_files([&] { save_image(path, image); });
+}
+
+}  // namespace
+
+void bind_images(nb::module_& module) {
+    module.def("load_image", read_image, nb::arg("path"),
+               nb::sig("def load_image(path: str | os.PathLike[str]) -> numpy.typing.NDArray[numpy.float32]"),
+               "Reads a PNG or JPEG: [H, W, 3] or [H, W, 4], from 0 to 1. Raises InputError.");
+    module.def("save_image", write_image, nb::arg("path"), nb::arg("image"),
+               nb::sig("def save_image(path: str | os.PathLike[str], image: numpy.typing.ArrayLike) -> None"),
+               "Writes a PNG of 8 bits from [H, W, 3] or [H, W, 4], from 0 to 1; integers are from 0 to 255. A file is replaced as a "
+               "whole. Raises InputError, or OSError if the disk refuses.");
+}
+
+}  // namespace ewa::python

@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Renders and devices."""
+
+import re
+
+import numpy as np
+import pytest
+from conftest import STILL_LIFE, camera, make_splats, run_python
+
+import ewa
+
+C0 = 0.28209479177387814
+
+
+def one_splat(opacity=0.7, color=(1.0, 0.5, 0.25), z=0.0, log_scale=-1.0):
+    return ewa.Splats(
+        means=[[0, 0, z]],
+        quats=[[1, 0, 0, 0]],
+        log_scales=np.full((1, 3), log_scale),
+        opacity_logits=[np.log(opacity / (1 - opacity))],
+        sh=(np.array([[color]]) - 0.5) / C0,
+    )
+
+
+def test_one_splat_has_its_closed_form():
+    viewmat, _, width, height = camera()
+    k = np.array([[60, 0, 32.5], [0, 60, 24.5], [0, 0, 1.0]])  # the axis meets the centre of a pixel
+    renders = ewa.render(one_splat(), viewmat, k, width, height, background=(0, 0, 1), mode="depth")
+    assert renders.color.shape == (48, 64, 3) and renders.alpha.shape == renders.depth.shape == (48, 64, 1)
+    assert renders.color.dtype == np.float32 and renders.count is None
+    assert renders.alpha[24, 32, 0] == pytest.approx(0.7, abs=1e-5)
+    assert renders.color[24, 32] == pytest.approx([0.7, 0.35, 0.7 * 0.25 + 0.3], abs=1e-5)
+    assert renders.depth[24, 32, 0] == pytest.approx(4, abs=1e-5)
+    # sigma of the footprint in px: the focal length times exp(-1) / 4, and the low pass of 0.3
+    variance = (60 * np.exp(-1) / 4) ** 2 + 0.3
+    assert renders.alpha[24, 37, 0] == pytest.approx(0.7 * np.exp(-0.5 * 25 / variance), abs=1e-4)
+    assert renders.color[0, 0] == pytest.approx([0, 0, 1]) and renders.alpha[0, 0, 0] == 0 and renders.depth[0, 0, 0] == 0
+
+
+def test_a_batch_holds_the_single_renders():
+    splats = make_splats()
+    viewmats = np.stack([camera(d)[0] for d in (3, 4, 5)]).astype(np.float32)
+    _, k, width, height = camera()
+    renders = ewa.render(splats, viewmats, k, width, height, mode="count")
+    assert renders.color.shape == (3, 48, 64, 3) and renders.count.shape == (3, 48, 64, 1) and renders.depth is None
+    assert renders.count.max() >= 2
+    for i in range(3):
+        one = ewa.render(splats, viewmats[i], k, width, height)
+        assert np.array_equal(renders.color[i], one.color) and np.array_equal(renders.alpha[i], one.alpha)
+    each = ewa.render(splats, viewmats, np.stack([k, k * 1, k]), width, height)
+    assert np.array_equal(renders.color, each.color)
+    assert not np.array_equal(renders.color[0], renders.color[1])
+    none = ewa.render(splats, viewmats[:0], k, width, height)
+    assert none.color.shape == (0, 48, 64, 3)
+
+
+def test_renders_are_those_of_the_command_line(tmp_path, program, still_life):
+    splats = ewa.Splats.from_points(still_life.points, still_life.point_colors, sh_degree=0)
+    ewa.save(tmp_path / "splats.ply", splats)
+    frames = [1, 30]
+    program("render", tmp_path / "splats.ply", "--cameras", STILL_LIFE, "--frames", "1,30", "-o", tmp_path / "views")
+    size = still_life.frames[1].width, still_life.frames[1].height
+    renders = ewa.render(splats, still_life.viewmats[frames], still_life.Ks[frames], *size)
+    files = sorted((tmp_path / "views").glob("*.png"))
+    assert len(files) == 2
+    for file, color in zip(files, renders.color):
+        assert np.abs(ewa.load_image(file)[..., :3] - np.clip(color, 0, 1)).max() <= 0.5001 / 255
+    assert renders.alpha.mean() > 0.05
+
+
+def test_a_renderer_keeps_its_scene_until_it_is_replaced():
+    splats = make_splats()
+    view = camera()
+    renderer = ewa.Renderer(splats)
+    first = renderer.render(*view).color
+    splats.opacity_logits -= 2
+    assert np.array_equal(renderer.render(*view).color, first)
+    renderer.replace(splats)
+    assert renderer.render(*view).color.sum() < first.sum()
+    assert np.array_equal(renderer.render(*view).color, ewa.render(splats, *view).color)
+
+
+def test_antialias_and_degree():
+    splats = make_splats(20)
+    view = camera(30)
+    plain, mip = (ewa.render(splats, *view, antialias=a).alpha for a in (False, True))
+    assert mip.sum() < plain.sum()
+    splats.antialiased = True
+    assert np.array_equal(ewa.render(splats, *view).alpha, mip)
+    flat = make_splats(20)
+    flat.sh[:, 1:] = 0
+    full = make_splats(20)
+    assert np.allclose(ewa.render(full, *camera(), sh_degree=0).color, ewa.render(flat, *camera()).color, atol=1e-6)
+    assert not np.allclose(ewa.render(full, *camera()).color, ewa.render(flat, *camera()).color, atol=1e-3)
+
+
+@pytest.mark.parametrize("background, expected", [("white", [1, 1, 1]), ("#ff0000", [1, 0, 0]), ([0.5, 0, 2], [0.5, 0, 2])])
+def test_backgrounds(background, expected):
+    empty = make_splats(2)[:0]
+    assert np.allclose(ewa.render(empty, *camera(), background=background).color, expected)
+
+
+def test_splats_that_are_not_finite_are_skipped():
+    splats = make_splats(3)
+    splats.means[:] = np.nan
+    assert np.all(ewa.render(splats, *camera()).alpha == 0)
+
+
+@pytest.mark.parametrize(
+    "change, message",
+    [
+        ({"viewmats": np.eye(3)}, "viewmats has the shape (3, 3); expected (C, 4, 4) or (4, 4)"),
+        ({"Ks": np.zeros((2, 3, 3))}, "Ks has the shape (2, 3, 3); expected (3, 3)"),
+        ({"viewmats": np.stack([np.eye(4)] * 3), "Ks": np.zeros((2, 3, 3))}, "Ks has the shape (2, 3, 3); expected (3, 3, 3) or (3, 3)"),
+        ({"viewmats": 2 * np.eye(4)}, "viewmats: its last row is not 0 0 0 1"),
+        ({"viewmats": np.stack([np.eye(4), np.diag([2, 2, 2, 1])])}, "viewmats[1]: its first three rows and columns are no rotation; it maps the world to the camera"),
+        ({"viewmats": np.full((4, 4), np.nan)}, "viewmats is not finite"),
+        ({"Ks": np.eye(3) * 2}, "Ks is not [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]"),
+        ({"Ks": np.diag([-1, 1, 1])}, "Ks: a focal length is not positive"),
+        ({"width": 0}, "width and height are not positive"),
+        ({"background": [0, 0]}, "background has the shape (2,); expected (3,)"),
+        ({"background": "reddish"}, "background: "),
+        ({"mode": "colr"}, "mode: "),
+        ({"sh_degree": 4}, "sh_degree is not 0, 1, 2 or 3"),
+    ],
+)
+def test_wrong_arguments_name_themselves(change, message):
+    viewmat, k, width, height = camera()
+    arguments = {"viewmats": viewmat, "Ks": k, "width": width, "height": height, **change}
+    end = "" if message.endswith(" ") else "$"
+    with pytest.raises(ValueError, match="^" + re.escape(message) + end):
+        ewa.render(make_splats(), **arguments)
+
+
+def test_wrong_types():
+    with pytest.raises(TypeError):
+        ewa.render(make_splats().means, *camera())
+    with pytest.raises(TypeError, match="viewmats holds no real numbers"):
+        ewa.render(make_splats(), "eye", *camera()[1:])
+
+
+def test_pictures_too_large_are_refused():
+    with pytest.raises((ewa.InputError, ewa.DeviceError)):
+        ewa.render(make_splats(), *camera()[:2], 1 << 30, 1)
+
+
+def test_devices():
+    devices = ewa.devices()
+    assert devices and [device.index for device in devices] == list(range(len(devices)))
+    current = ewa.current_device()
+    assert current.name in [device.name for device in devices]
+    ewa.set_device(current.index)
+    ewa.set_device(current.name[:5].upper())
+    with pytest.raises(ewa.InputError, match="no usable Vulkan device matches 'no such device'"):
+        ewa.set_device("no such device")
+    assert ewa.current_device().name == current.name  # the one before stays
+    with pytest.raises(TypeError):
+        ewa.set_device(None)
+    ewa.set_device("")
+
+
+def test_the_environment_names_the_device():
+    code = "import ewa\ntry: ewa.current_device()\nexcept ewa.InputError as e: print(e)"
+    assert "matches 'no such device'" in run_python(code, EWA_DEVICE="no such device")
+
+
+RENDER = """
+import ewa, numpy as np
+splats = ewa.load("tests/fuzz/seeds/read_ply/little.ply")
+ewa.save({path!r}, splats)
+assert len(ewa.load({path!r})) == len(splats)
+for call in (ewa.devices, lambda: ewa.render(splats, np.eye(4), np.eye(3), 8, 8), lambda: ewa.set_device(0)):
+    try: call()
+    except ewa.DeviceError as error: print(error)
+"""
+
+
+def test_without_a_driver_files_work_and_the_error_says_what_to_install(tmp_path):
+    lines = run_python(RENDER.format(path=str(tmp_path / "a.ply")), VK_DRIVER_FILES="/dev/null", VK_ICD_FILENAMES="/dev/null")
+    assert len(lines.splitlines()) == 3 and lines.count("mesa-vulkan-drivers") == 3
+
+
+def test_without_a_loader_files_work_and_the_error_says_what_to_install(tmp_path):
+    (tmp_path / "libvulkan.so.1").write_text("no library")
+    lines = run_python(RENDER.format(path=str(tmp_path / "a.ply")), LD_LIBRARY_PATH=str(tmp_path))
+    assert lines.count("there is no Vulkan loader") == lines.count("apt install mesa-vulkan-drivers") == 3

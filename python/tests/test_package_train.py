@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Datasets, training and evaluation."""
+
+import json
+import re
+import shutil
+
+import numpy as np
+import pytest
+from conftest import STILL_LIFE, make_splats
+
+import ewa
+
+ARRAYS = ["means", "quats", "log_scales", "opacity_logits", "sh"]
+OPTIONS = {"steps": 12, "seed": 3, "max_splats": 3500, "strategy": "mcmc"}
+
+
+def same(a, b):
+    return len(a) == len(b) and all(np.array_equal(getattr(a, name), getattr(b, name)) for name in ARRAYS)
+
+
+def trained(trainer):
+    for _ in trainer:
+        pass
+    return trainer.splats()
+
+
+def test_a_dataset_has_images_cameras_and_points(still_life):
+    count = len(still_life)
+    assert count == len(still_life.frames) == len(still_life.images) == 48
+    assert still_life.viewmats.shape == (48, 4, 4) and still_life.Ks.shape == (48, 3, 3)
+    assert still_life.points.shape == (3000, 3) and still_life.point_colors.dtype == np.uint8
+    frame, image = still_life.frames[0], still_life.images[0]
+    assert image.shape == (frame.height, frame.width, 3) and image.dtype == np.float32
+    assert 0 <= image.min() < 0.3 and 0.7 < image.max() <= 1
+    assert frame.image_exists and frame.image_path.name == frame.name and frame.mask_path is None
+    assert np.array_equal(still_life.images[-1], still_life.images[47])
+    with pytest.raises(IndexError, match="48 images"):
+        still_life.images[48]
+    assert sum(1 for _ in still_life.images) == 48
+    # The points are seen: they are in front of most cameras and project into the image.
+    inside = []
+    for viewmat, k in zip(still_life.viewmats, still_life.Ks):
+        p = still_life.points @ viewmat[:3, :3].T + viewmat[:3, 3]
+        uv = (p @ k.T)[:, :2] / p[:, 2:]
+        inside.append(np.mean((p[:, 2] > 0) & np.all((uv >= 0) & (uv < [frame.width, frame.height]), axis=1)))
+    assert np.mean(inside) > 0.5
+
+
+def test_a_dataset_of_smaller_images_and_cameras_alone(tmp_path):
+    small = ewa.Dataset(STILL_LIFE, downscale=2)
+    assert small.images[0].shape == (96, 128, 3)
+    assert np.allclose(small.Ks[0][:2] * 2, ewa.Dataset(STILL_LIFE).Ks[0][:2])
+    shutil.copy(STILL_LIFE / "transforms.json", tmp_path)
+    with pytest.raises(ewa.InputError):
+        ewa.Dataset(tmp_path)
+    cameras = ewa.Dataset(tmp_path, need_images=False)
+    assert len(cameras) == 48 and not cameras.frames[0].image_exists
+    with pytest.raises(ewa.InputError):
+        cameras.images[0]
+
+
+def test_the_split_is_that_of_the_command_line(still_life):
+    train, test = still_life.split()
+    assert test == list(range(0, 48, 8)) and sorted(train + test) == list(range(48))
+    assert still_life.split(0)[1] == []
+    with pytest.raises(ewa.InputError):
+        still_life.split(-1)
+
+
+def test_datasets_that_cannot_be_read(tmp_path):
+    with pytest.raises(ewa.InputError, match=re.escape(str(tmp_path))):
+        ewa.Dataset(tmp_path)
+    (tmp_path / "transforms.json").write_text('{"frames": [')
+    with pytest.raises(ewa.InputError, match="transforms.json"):
+        ewa.Dataset(tmp_path)
+    with pytest.raises(ewa.InputError, match="downscale"):
+        ewa.Dataset(STILL_LIFE, downscale=0)
+    with pytest.raises(ewa.InputError, match="masks: .*; did you mean cut"):
+        ewa.Dataset(STILL_LIFE, masks="cutt")
+
+
+@pytest.fixture(scope="module")
+def command_line_run(program, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("run")
+    arguments = [f"--{name.replace('_', '-')}={value}" for name, value in OPTIONS.items()]
+    program("train", STILL_LIFE, "-o", folder, "--save-every", 6, *arguments)
+    return folder
+
+
+def test_training_gives_the_bytes_of_the_command_line(still_life, command_line_run):
+    assert same(trained(ewa.Trainer(still_life, **OPTIONS)), ewa.load(command_line_run / "splats.ply"))
+
+
+def test_a_checkpoint_of_the_command_line_continues(still_life, command_line_run, program, tmp_path):
+    again = ewa.Trainer.resume(command_line_run / "checkpoint.ewa", still_life, steps=15)
+    assert (again.steps_done, again.steps, again.options["seed"]) == (12, 15, 3)
+    assert len(trained(again)) > 0 and again.steps_done == 15
+
+
+def test_reports_and_properties(still_life):
+    trainer = ewa.Trainer(still_life, **{**OPTIONS, "steps": 3})
+    assert trainer.train_frames == still_life.split()[0] and trainer.steps == 3 and trainer.steps_done == 0
+    assert trainer.options["strategy"] == "mcmc" and trainer.options["sh_degree"] == 3
+    reports = list(trainer)
+    assert [report.step for report in reports] == [1, 2, 3] == [1, 2, trainer.steps_done]
+    assert all(0 < report.loss < 1 and report.splats == 3000 and report.psnr > 5 for report in reports)
+    assert list(trainer) == []
+    with pytest.raises(ewa.InputError, match="all 3 steps are done"):
+        trainer.step()
+    assert trainer.exposures().shape == (0, 3, 4)
+
+
+def test_a_checkpoint_continues_with_the_bytes_of_an_uninterrupted_training(still_life, tmp_path):
+    options = {**OPTIONS, "growth": 1.1, "background": "white", "means_rate": 2e-4, "train_frames": range(5)}
+    path = tmp_path / "checkpoint.ewa"
+    whole = ewa.Trainer(still_life, **options)
+    for report in whole:
+        if report.step == 7:
+            whole.save_checkpoint(path)
+    again = ewa.Trainer.resume(path, still_life)
+    assert again.steps_done == 7 and again.options == whole.options and again.train_frames == [0, 1, 2, 3, 4]
+    assert same(trained(again), whole.splats())
+
+
+def test_a_checkpoint_of_own_splats_wants_them_again(still_life, tmp_path):
+    start = ewa.Splats.from_points(still_life.points[::3], still_life.point_colors[::3], sh_degree=1)
+    trainer = ewa.Trainer(still_life, init=start, **{**OPTIONS, "sh_degree": 2})
+    assert trainer.splats().sh_degree == 2 and len(trainer.splats()) == 1000
+    trainer.step()
+    trainer.save_checkpoint(tmp_path / "a.ewa")
+    with pytest.raises(ewa.InputError, match="a.ewa: its training began with splats; pass them again as init"):
+        ewa.Trainer.resume(tmp_path / "a.ewa", still_life)
+    again = ewa.Trainer.resume(tmp_path / "a.ewa", still_life, init=start)
+    assert same(trained(again), trained(trainer))
+
+
+def test_checkpoints_that_cannot_be_used(still_life, tmp_path):
+    trainer = ewa.Trainer(still_life, **OPTIONS)
+    trainer.step()
+    path = tmp_path / "a.ewa"
+    trainer.save_checkpoint(path)
+    with pytest.raises(ewa.InputError, match="a.ewa: is of another dataset"):
+        ewa.Trainer.resume(path, ewa.Dataset(STILL_LIFE, downscale=2))
+    with pytest.raises(OSError, match="nowhere"):
+        trainer.save_checkpoint(tmp_path / "nowhere/a.ewa")
+    data = path.read_bytes()
+    path.write_bytes(data[:-9])
+    with pytest.raises(ewa.InputError, match="a.ewa"):
+        ewa.Trainer.resume(path, still_life)
+    path.write_bytes(data.replace(b'"growth":1.05', b'"growth":"x" '))
+    with pytest.raises(ewa.InputError, match="a.ewa"):
+        ewa.Trainer.resume(path, still_life)
+
+
+def test_random_first_splats(still_life):
+    trainer = ewa.Trainer(still_life, init="random", max_splats=500, steps=1, seed=1)
+    assert len(trainer.splats()) == 500
+    with pytest.raises(ewa.InputError, match="init is neither"):
+        ewa.Trainer(still_life, init="rnd")
+
+
+@pytest.mark.parametrize(
+    "options, error, message",
+    [
+        ({"stepz": 3}, TypeError, "Trainer has no option stepz; did you mean steps?"),
+        ({"steps": 0}, ewa.InputError, "steps=0: is not from 1 to "),
+        ({"steps": 1.5}, ewa.InputError, "steps=1.5: is no whole number"),
+        ({"steps": "many"}, TypeError, "steps='many' is of the wrong type"),
+        ({"growth": float("nan")}, ewa.InputError, "growth=nan: is not from 1 to 1000"),
+        ({"strategy": "mcm"}, ewa.InputError, "strategy='mcm': .*; did you mean mcmc"),
+        ({"sh_degree": 4}, ewa.InputError, "sh_degree=4: is not 0, 1, 2, 3"),
+        ({"moment_bits": 8}, ewa.InputError, "moment_bits=8: is neither 16 nor 32"),
+        ({"antialias": "yes"}, TypeError, "antialias='yes' is of the wrong type"),
+        ({"background": [1, 2]}, ValueError, r"background has the shape \(2,\); expected \(3,\)"),
+        ({"train_frames": []}, ewa.InputError, "no training image"),
+        ({"train_frames": [48]}, IndexError, "train_frames has the index 48; the dataset has 48 frames"),
+        ({"max_splats": 10}, ewa.InputError, "3000 splats"),
+        ({"init": make_splats(2).means}, TypeError, ""),
+    ],
+)
+def test_wrong_options(still_life, options, error, message):
+    with pytest.raises(error, match=message):
+        ewa.Trainer(still_life, **options)
+
+
+def test_whole_floats_and_numpy_numbers_are_options(still_life):
+    trainer = ewa.Trainer(still_life, steps=7e3, seed=np.int64(5), growth=1.5, strategy="adc", train_frames=np.arange(3))
+    assert (trainer.options["steps"], trainer.options["seed"], trainer.options["growth"]) == (7000, 5, 1.5)
+
+
+def test_exposures_are_learned(still_life):
+    trainer = ewa.Trainer(still_life, steps=2, exposure=True, train_frames=[0, 1, 2])
+    assert np.array_equal(trainer.exposures(), np.tile(np.eye(3, 4, dtype=np.float32), (3, 1, 1)))
+    trained(trainer)
+    assert not np.array_equal(trainer.exposures(), np.tile(np.eye(3, 4, dtype=np.float32), (3, 1, 1)))
+
+
+def test_evaluation_is_that_of_the_command_line(still_life, command_line_run, program, tmp_path):
+    program("eval", command_line_run / "splats.ply", STILL_LIFE, "--json", tmp_path / "eval.json")
+    expected = json.loads((tmp_path / "eval.json").read_text())
+    splats = ewa.load(command_line_run / "splats.ply")
+    result = ewa.evaluate(splats, still_life)
+    assert result.psnr == pytest.approx(expected["psnr"], abs=1e-6)
+    assert result.ssim == pytest.approx(expected["ssim"], abs=1e-6)
+    assert [frame.name for frame in result.frames] == [still_life.frames[i].name for i in still_life.split()[1]]
+    one = ewa.evaluate(splats, still_life, [8], background="white")
+    assert len(one.frames) == 1 and one.psnr != result.frames[1].psnr
+    with pytest.raises(ewa.InputError, match="frames is empty"):
+        ewa.evaluate(splats, still_life, [])
+    with pytest.raises(IndexError, match="frames has the index -1"):
+        ewa.evaluate(splats, still_life, [-1])
