@@ -75,7 +75,7 @@ def test_wrong_types_are_found(checked):
 
 
 def test_the_stub_names_what_the_module_has():
-    stub = pathlib.Path(ewa._native.__file__).with_name("_native.pyi").read_text()
+    stub = pathlib.Path(ewa._native.__file__).with_name("_native").joinpath("__init__.pyi").read_text()
     for name in ewa.__all__:
         if not name.startswith("_") and not name.endswith("Error"):
             assert f"def {name}(" in stub or f"class {name}:" in stub, name
