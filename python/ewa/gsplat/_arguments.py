@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Checks of arguments: device, type and shape of tensors, and what ewa does not have."""
+
+import warnings
+
+import numpy as np
+import torch
+from torch import Tensor
+
+_warned_of_double = False
+
+
+class ArgumentError(ValueError, AssertionError):
+    """A wrong argument. gsplat asserts the same conditions, so callers may expect either base."""
+
+
+def check(condition, message):
+    if not condition:
+        raise ArgumentError(message)
+
+
+def tensor(name, value):
+    """`value` as a float32 tensor in the memory of the CPU; the gradient flows through the cast."""
+    if not isinstance(value, Tensor):
+        raise TypeError(f"{name} is a {type(value).__name__}; expected a torch.Tensor")
+    if value.device.type != "cpu":
+        raise TypeError(
+            f"{name} is on {value.device}; ewa takes tensors on the CPU: pass {name}.cpu()"
+        )
+    if value.dtype is torch.float32:
+        return value
+    if value.dtype is torch.float64:
+        _warn_of_double(name)
+    return value.float()
+
+
+def _warn_of_double(name):
+    global _warned_of_double
+    if not _warned_of_double:
+        _warned_of_double = True
+        warnings.warn(f"{name} is float64; ewa computes in float32", stacklevel=4)
+
+
+def shape(name, value, expected):
+    if tuple(value.shape) != tuple(expected):
+        raise ArgumentError(f"{name} has shape {tuple(value.shape)}; expected {tuple(expected)}")
+
+
+def array(value):
+    """The numpy view of a tensor; a copy only where its rows are not contiguous in memory."""
+    return np.ascontiguousarray(value.detach().numpy())
+
+
+def bytes_of(mask):
+    """A mask as the uint8 array that the device takes."""
+    view = np.ascontiguousarray(mask.detach().numpy())
+    return view.view(np.uint8) if view.dtype == np.bool_ else (view != 0).view(np.uint8)
+
+
+def unavailable(what):
+    """The error for what gsplat has in CUDA alone."""
+    return NotImplementedError(
+        f"{what} is CUDA-only; ewa renders 3D Gaussians through pinhole, ortho and fisheye cameras"
+    )
+
+
+def refusal(name, what):
+    """A function of gsplat's name that says why it cannot run."""
+
+    def refuse(*args, **kwargs):
+        raise unavailable(f"{name} ({what})")
+
+    refuse.__name__ = refuse.__qualname__ = name
+    refuse.__doc__ = f"Not available: {what} is CUDA-only."
+    return refuse

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""rasterize_to_pixels: the caller's lists of tiles, blended on the device."""
+
+import math
+
+import numpy as np
+
+from ._arguments import ArgumentError, array, check, shape, tensor
+from ._autograd import Blend, ByLists, needs_gradient
+
+
+def rasterize_to_pixels(
+    means2d,
+    conics,
+    colors,
+    opacities,
+    image_width,
+    image_height,
+    tile_size,
+    isect_offsets,
+    flatten_ids,
+    backgrounds=None,
+    masks=None,
+    packed=False,
+    absgrad=False,
+):
+    """Blends footprints to images [..., H, W, D] and alphas [..., H, W, 1].
+
+    Footprints are [..., N, ...], or [nnz, ...] where `packed` is set. `isect_offsets` [..., rows,
+    columns] and `flatten_ids` are from isect_offset_encode and isect_tiles. `masks`, of the shape
+    of `isect_offsets`, are False where a tile shall show the background alone. `absgrad` gives
+    means2d an attribute of that name after the backward pass. `tile_size` is a multiple of 8.
+    """
+    means2d, conics = tensor("means2d", means2d), tensor("conics", conics)
+    colors, opacities = tensor("colors", colors), tensor("opacities", opacities)
+    dims, (rows, columns) = isect_offsets.shape[:-2], isect_offsets.shape[-2:]
+    channels = colors.shape[-1]
+    lead = means2d.shape[:1] if packed else dims + means2d.shape[-2:-1]
+    shape("means2d", means2d, lead + (2,))
+    shape("conics", conics, lead + (3,))
+    shape("colors", colors, lead + (channels,))
+    shape("opacities", opacities, lead)
+    if backgrounds is not None:
+        backgrounds = tensor("backgrounds", backgrounds)
+        shape("backgrounds", backgrounds, dims + (channels,))
+    if masks is not None:
+        shape("masks", masks, isect_offsets.shape)
+    if tile_size % 8:
+        raise ArgumentError(f"tile_size is {tile_size}; the device draws multiples of 8")
+    check(rows * tile_size >= image_height, f"{rows} rows of tiles do not cover {image_height} px")
+    check(columns * tile_size >= image_width, f"{columns} tiles do not cover {image_width} px")
+    ranges, offsets, ids = _lists(isect_offsets, flatten_ids, None if packed else lead[-1])
+    images = ByLists(dims, image_width, image_height, tile_size, ranges, absgrad, masks)
+    keep = needs_gradient(means2d, conics, colors, opacities, backgrounds)
+    images.order(offsets, ids)
+    return Blend.apply(means2d, conics, opacities, colors, backgrounds, images, keep)
+
+
+def _lists(isect_offsets, flatten_ids, count):
+    """For each image: its range of splats, and its lists counted from the start of that range."""
+    images = math.prod(isect_offsets.shape[:-2])
+    starts = array(isect_offsets).astype(np.int32, copy=False).reshape(images, -1)
+    ids = array(flatten_ids).astype(np.int32, copy=False)
+    ends = np.append(starts[1:, 0], len(ids)).astype(np.int32)
+    ranges, offsets, lists = [], [], []
+    for i in range(images):
+        first = starts[i, 0]
+        own = ids[first : ends[i]]
+        if count is not None:
+            low, high = i * count, (i + 1) * count
+        else:
+            low, high = (int(own.min()), int(own.max()) + 1) if len(own) else (0, 0)
+        ranges.append((low, high))
+        offsets.append(np.append(starts[i] - first, len(own)).astype(np.int32))
+        lists.append(np.ascontiguousarray(own - low, np.int32))
+    return ranges, offsets, lists

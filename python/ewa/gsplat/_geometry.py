@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Geometry on the host, in torch, so that autograd differentiates it."""
+
+import math
+
+import torch
+
+from ._arguments import ArgumentError, check, shape, tensor
+
+# A splat is drawn where its alpha reaches this; beyond `reach` deviations no alpha does.
+ALPHA_THRESHOLD = 1.0 / 255.0
+MAX_ALPHA = 0.99
+MIN_TRANSMITTANCE = 1e-4
+REACH = 3.33
+
+_UPPER = ([0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2])
+_FULL = [0, 1, 2, 1, 3, 4, 2, 4, 5]
+
+
+def normalized_quat_to_rotmat(quat):
+    """Unit quaternions [..., 4] (w first) to rotations [..., 3, 3]."""
+    w, x, y, z = quat.unbind(-1)
+    rows = (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    )
+    return torch.stack([torch.stack(row, -1) for row in rows], -2)
+
+
+def upper_triangle(matrices):
+    """Symmetric [..., 3, 3] to [..., 6]: xx xy xz yy yz zz."""
+    return matrices[..., _UPPER[0], _UPPER[1]]
+
+
+def full_matrix(upper):
+    """[..., 6] to symmetric [..., 3, 3]."""
+    return upper[..., _FULL].reshape(upper.shape[:-1] + (3, 3))
+
+
+def _spread(rotations, factors, triu):
+    axes = rotations * factors[..., None, :]
+    matrices = axes @ axes.transpose(-1, -2)
+    return upper_triangle(matrices) if triu else matrices
+
+
+def quat_scale_to_covar_preci(quats, scales, compute_covar=True, compute_preci=True, triu=False):
+    """Covariances and precisions of splats: [..., 3, 3], or [..., 6] where `triu` is set.
+
+    Quaternions [..., 4] need no unit length. A result that is not asked for is None.
+    """
+    quats, scales = tensor("quats", quats), tensor("scales", scales)
+    shape("quats", quats, scales.shape[:-1] + (4,))
+    shape("scales", scales, quats.shape[:-1] + (3,))
+    if not compute_covar and not compute_preci:
+        return None, None
+    rotations = normalized_quat_to_rotmat(torch.nn.functional.normalize(quats, dim=-1))
+    covars = _spread(rotations, scales, triu) if compute_covar else None
+    precis = _spread(rotations, 1.0 / scales, triu) if compute_preci else None
+    return covars, precis
+
+
+def world_to_cam(means, covars, viewmats):
+    """Means [..., N, 3] and covariances [..., N, 3, 3] in each camera's frame: [..., C, N, ...]."""
+    means, covars = tensor("means", means), tensor("covars", covars)
+    viewmats = tensor("viewmats", viewmats)
+    batch, count = means.shape[:-2], means.shape[-2]
+    shape("means", means, batch + (count, 3))
+    shape("covars", covars, batch + (count, 3, 3))
+    shape("viewmats", viewmats, batch + (viewmats.shape[-3], 4, 4))
+    rotations = viewmats[..., None, :3, :3]
+    moved = (rotations @ means[..., None, :, :, None])[..., 0] + viewmats[..., None, :3, 3]
+    turned = rotations @ covars[..., None, :, :, :] @ rotations.transpose(-1, -2)
+    return moved, turned
+
+
+def proj(means, covars, Ks, width, height, camera_model="pinhole"):
+    """Means [..., C, N, 2] and covariances [..., C, N, 2, 2] on the image plane."""
+    means, covars, Ks = tensor("means", means), tensor("covars", covars), tensor("Ks", Ks)
+    lead = means.shape[:-1]
+    check(means.dim() >= 3, f"means has shape {tuple(means.shape)}; expected [..., C, N, 3]")
+    shape("means", means, lead + (3,))
+    shape("covars", covars, lead + (3, 3))
+    shape("Ks", Ks, lead[:-1] + (3, 3))
+    return project_rows(means, covars, Ks[..., None, :, :], width, height, camera_model)
+
+
+def project_rows(means, covars, Ks, width, height, camera_model):
+    """Projects means [..., 3] and covariances in the camera's frame; Ks broadcasts."""
+    fx, fy, cx, cy = Ks[..., 0, 0], Ks[..., 1, 1], Ks[..., 0, 2], Ks[..., 1, 2]
+    if camera_model == "pinhole":
+        center, jacobian = _pinhole(means, fx, fy, cx, cy, width, height)
+    elif camera_model == "ortho":
+        center, jacobian = _ortho(means, fx, fy, cx, cy)
+    elif camera_model == "fisheye":
+        center, jacobian = _fisheye(means, fx, fy, cx, cy)
+    else:
+        raise ArgumentError(f"camera_model {camera_model!r} is none of pinhole, ortho, fisheye")
+    return center, jacobian @ covars @ jacobian.transpose(-1, -2)
+
+
+def _rows(first, second):
+    """A Jacobian [..., 2, 3] from the entries of its rows."""
+    return torch.stack(torch.broadcast_tensors(*first, *second), -1).unflatten(-1, (2, 3))
+
+
+def _pinhole(means, fx, fy, cx, cy, width, height):
+    x, y, z = means.unbind(-1)
+    # The slope is held within 1.3 image sizes, where the linear approximation still holds.
+    margin_x, margin_y = 0.15 * width / fx, 0.15 * height / fy
+    u = _within(x / z, -cx / fx - margin_x, (width - cx) / fx + margin_x)
+    v = _within(y / z, -cy / fy - margin_y, (height - cy) / fy + margin_y)
+    zero = torch.zeros_like(z)
+    center = torch.stack((fx * x / z + cx, fy * y / z + cy), -1)
+    return center, _rows((fx / z, zero, -fx * u / z), (zero, fy / z, -fy * v / z))
+
+
+def _within(value, low, high):
+    return torch.minimum(torch.maximum(value, low), high)
+
+
+def _ortho(means, fx, fy, cx, cy):
+    x, y, z = means.unbind(-1)
+    zero = torch.zeros_like(z)
+    center = torch.stack((fx * x + cx, fy * y + cy), -1)
+    return center, _rows((fx, zero, zero), (zero, fy, zero))
+
+
+def _fisheye(means, fx, fy, cx, cy):
+    """Equidistant: the distance from the principal point is the angle to the axis."""
+    tiny = 1e-7
+    x, y, z = means.unbind(-1)
+    radial = torch.sqrt(x * x + y * y) + tiny
+    angle = torch.atan2(radial, z + tiny)
+    center = torch.stack((fx * x * angle / radial + cx, fy * y * angle / radial + cy), -1)
+    xx, yy, xy = x * x + tiny, y * y, x * y
+    rr = xx + yy
+    inverse = 1.0 / (rr + z * z)
+    along, across = z * inverse / rr, torch.atan2(radial, z) / radial / rr
+    return center, _rows(
+        (fx * (xx * along + yy * across), fx * xy * (along - across), -fx * x * inverse),
+        (fy * xy * (along - across), fy * (yy * along + xx * across), -fy * y * inverse),
+    )
+
+
+def footprint(covars2d, eps2d):
+    """Conics, determinants and compensations of projected covariances, widened by `eps2d`."""
+    a, b, d = covars2d[..., 0, 0], covars2d[..., 0, 1], covars2d[..., 1, 1]
+    sharp = a * d - b * b
+    a, d = a + eps2d, d + eps2d
+    det = a * d - b * b
+    conics = torch.stack((d / det, -b / det, a / det), -1)
+    return conics, det, torch.sqrt(torch.clamp(sharp / det, min=1e-20)), (a, d)
+
+
+@torch.no_grad()
+def radii_of(center, depths, sides, det, opacities, options):
+    """Radii [..., 2] in whole pixels; zero where the splat reaches no pixel of the image."""
+    reach = torch.full_like(depths, REACH)
+    drawn = (det > 0) & (depths > options.near) & (depths < options.far)
+    if opacities is not None:
+        drawn &= opacities >= ALPHA_THRESHOLD
+        ratio = torch.clamp(opacities / ALPHA_THRESHOLD, min=1.0)
+        reach = torch.minimum(reach, torch.sqrt(2.0 * torch.log(ratio)))
+    radii = torch.ceil(reach[..., None] * torch.sqrt(torch.clamp(torch.stack(sides, -1), min=0)))
+    drawn &= (radii > options.radius_clip).any(-1)
+    size = torch.tensor((options.width, options.height), dtype=center.dtype)
+    drawn &= ((center + radii > 0) & (center - radii < size)).all(-1)
+    return (radii * drawn[..., None]).nan_to_num(0, 0, 0).to(torch.int32)
+
+
+def camera_offsets(viewmats):
+    """What turns a mean into its direction from each camera: R^T t, [..., 3]."""
+    return (viewmats[..., :3, :3] * viewmats[..., :3, 3:]).sum(-2)
+
+
+def image_count(dims):
+    return math.prod(dims)
