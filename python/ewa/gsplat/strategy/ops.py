@@ -191,6 +191,7 @@ def sample_add(params, optimizers, state, n, binoms, min_opacity=0.005):
         return _parameter(torch.cat((new, new[chosen])), p)
 
     def longer(v):
+        v[chosen] = 0
         return torch.cat((v, _rows_of_zeros(v, n)))
 
     _update_param_with_optimizer(grown, lambda key, v: longer(v), params, optimizers)

@@ -1,0 +1,302 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Names, errors, dialects and the runner of ewa.gsplat."""
+
+import importlib
+import inspect
+import subprocess
+import sys
+
+import pytest
+
+torch = pytest.importorskip("torch")
+
+from ewa import gsplat as ours
+from gsplat_scenes import HEIGHT, WIDTH, Scene
+
+CUDA_ONLY = [
+    dict(with_ut=True),
+    dict(with_eval3d=True),
+    dict(rays=torch.zeros(1)),
+    dict(radial_coeffs=torch.zeros(1, 6)),
+    dict(tangential_coeffs=torch.zeros(1, 2)),
+    dict(thin_prism_coeffs=torch.zeros(1, 4)),
+    dict(ftheta_coeffs=object()),
+    dict(lidar_coeffs=object()),
+    dict(external_distortion_coeffs=object()),
+    dict(viewmats_rs=torch.zeros(1, 4, 4)),
+    dict(rolling_shutter=ours.RollingShutterType.ROLLING_TOP_TO_BOTTOM),
+    dict(ut_params=object()),
+    dict(distributed=True),
+    dict(camera_model="ftheta"),
+    dict(camera_model="lidar"),
+    dict(return_normals=True),
+    dict(global_z_order=False),
+    dict(render_mode="RGB-d"),
+    dict(render_mode="Ed"),
+]
+
+
+@pytest.mark.parametrize("option", CUDA_ONLY, ids=lambda o: "-".join(map(str, o)))
+def test_what_is_cuda_only_says_so(option):
+    with pytest.raises(NotImplementedError, match="CUDA-only; ewa renders"):
+        ours.rasterization(**Scene().arguments(**option))
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "rasterization_2dgs",
+        "rasterization_inria_wrapper",
+        "fully_fused_projection_2dgs",
+        "fully_fused_projection_with_ut",
+        "rasterize_to_pixels_2dgs",
+        "rasterize_to_pixels_eval3d",
+    ],
+)
+def test_functions_that_are_cuda_only_say_so(name):
+    with pytest.raises(NotImplementedError, match=f"{name}.*CUDA-only"):
+        getattr(ours, name)()
+    with pytest.raises(NotImplementedError, match="CUDA-only"):
+        ours.PngCompression()
+    assert ours.has_3dgs() and not ours.has_2dgs() and not ours.has_3dgut()
+
+
+def test_options_that_change_nothing_are_accepted():
+    s = Scene()
+    plain = ours.rasterization(**s.arguments())[0]
+    image = ours.rasterization(
+        **s.arguments(
+            channel_chunk=8,
+            segmented=True,
+            rolling_shutter=ours.RollingShutterType.GLOBAL,
+            renderer_config=ours.RendererConfig_MixedBatch(),
+        )
+    )[0]
+    assert torch.equal(image, plain)
+    for config, error in (
+        (object(), TypeError),
+        (ours.RendererConfig_ParallelBatch(), ValueError),
+        (type("Other", (ours.RendererConfig,), {})(), NotImplementedError),
+    ):
+        with pytest.raises(error):
+            ours.rasterization(**s.arguments(renderer_config=config))
+    with pytest.raises(TypeError):
+        ours.RendererConfig()
+
+
+@pytest.mark.parametrize(
+    "name,change",
+    [
+        ("means", lambda t: t[:, :2]),
+        ("means", lambda t: t[0]),
+        ("quats", lambda t: t[:, :3]),
+        ("quats", lambda t: t[1:]),
+        ("scales", lambda t: t[:, :2]),
+        ("opacities", lambda t: t[:, None]),
+        ("colors", lambda t: t[1:]),
+        ("viewmats", lambda t: t[0]),
+        ("viewmats", lambda t: t[:, :3]),
+        ("Ks", lambda t: t[:, :2]),
+        ("backgrounds", lambda t: torch.zeros(1, 4)),
+        ("covars", lambda t: torch.zeros(60, 6)),
+    ],
+)
+@pytest.mark.parametrize("error", [ValueError, AssertionError])
+def test_wrong_shapes_name_argument_and_shape(name, change, error):
+    s = Scene()
+    wrong = change(getattr(s, name, None))
+    with pytest.raises(error, match=rf"{name}.*\({', '.join(map(str, wrong.shape))}"):
+        ours.rasterization(**s.arguments(**{name: wrong}))
+
+
+def test_other_wrong_arguments():
+    s = Scene()
+    for options, error, text in (
+        (dict(render_mode="XYZ"), ValueError, "render_mode 'XYZ'"),
+        (dict(rasterize_mode="smooth"), ValueError, "rasterize_mode 'smooth'"),
+        (dict(packed=False, sparse_grad=True), ValueError, "sparse_grad needs packed"),
+        (dict(means=s.means.tolist()), TypeError, "means is a list"),
+        (dict(colors=torch.rand(60, 4, 3), sh_degree=2), ValueError, "colors.*9 bands"),
+        (dict(means=s.means.to("meta")), TypeError, r"means is on meta.*means.cpu\(\)"),
+    ):
+        with pytest.raises(error, match=text):
+            ours.rasterization(**s.arguments(**options))
+    with pytest.raises(ValueError, match="degrees_to_use is 5"):
+        ours.spherical_harmonics(5, torch.rand(4, 3), torch.rand(4, 36, 3))
+    with pytest.raises(ValueError, match="quats and scales"):
+        ours.fully_fused_projection(s.means, None, None, None, s.viewmats, s.Ks, WIDTH, HEIGHT)
+
+
+def test_signature_is_that_of_gsplat():
+    names = list(inspect.signature(ours.rasterization).parameters)
+    start = "means quats scales opacities colors viewmats Ks width height near_plane far_plane"
+    middle = "radius_clip eps2d sh_degree packed tile_size backgrounds render_mode sparse_grad"
+    end = "absgrad rasterize_mode channel_chunk distributed camera_model segmented covars"
+    assert names[:26] == f"{start} {middle} {end}".split()
+    theirs = pytest.importorskip("gsplat.rendering")
+    for name, parameter in inspect.signature(theirs.rasterization).parameters.items():
+        assert name in names, name
+        default = inspect.signature(ours.rasterization).parameters[name].default
+        if name not in ("tile_size", "rolling_shutter"):
+            assert default == parameter.default, name
+    strategy = importlib.import_module("gsplat.strategy")
+    for cls in ("DefaultStrategy", "MCMCStrategy"):
+        own = inspect.signature(getattr(ours, cls)).parameters
+        for name, parameter in inspect.signature(getattr(strategy, cls)).parameters.items():
+            assert own[name].default == parameter.default, (cls, name)
+
+
+def test_mcmc_fields_by_position():
+    strategy = ours.MCMCStrategy(123, 4.5, 6, 7, 8, 9, 0.1, True, 0.2, 30.0)
+    assert (strategy.cap_max, strategy.noise_lr, strategy.refine_start_iter) == (123, 4.5, 6)
+    assert (strategy.refine_stop_iter, strategy.noise_injection_stop_iter) == (7, 8)
+    assert (strategy.refine_every, strategy.min_opacity, strategy.verbose) == (9, 0.1, True)
+    assert (strategy.noise_opacity_t, strategy.noise_opacity_k) == (0.2, 30.0)
+
+
+@pytest.fixture
+def dialect():
+    yield ours.dialect
+    ours.dialect("1.6")
+
+
+def test_dialects(dialect):
+    s = Scene(cameras=2)
+    call = (s.means, None, s.quats, s.scales, s.viewmats, s.Ks, WIDTH, HEIGHT)
+    assert dialect() == "1.6" and ours.__version__ == "1.6.0"
+    new = ours.fully_fused_projection(*call, packed=True)
+    assert len(new) == 9
+    dialect("1.5")
+    middle = ours.fully_fused_projection(*call, packed=True)
+    assert len(middle) == 8 and torch.equal(middle[3], new[4])
+    assert dialect("1.4") == "1.4"
+    old = ours.fully_fused_projection(*call, packed=True)
+    assert len(old) == 7 and torch.equal(old[0], new[1])
+    assert torch.equal(old[2], new[4].amax(-1))
+    for packed in (False, True):
+        image, _, meta = ours.rasterization(**s.arguments(packed=packed))
+        assert meta["radii"].dim() == meta["depths"].dim()
+        strategy = ours.DefaultStrategy()
+        state = strategy.initialize_state()
+        strategy.step_pre_backward(None, None, state, 1, meta)
+        image.sum().backward(retain_graph=True)
+        strategy.step_post_backward({"means": s.means}, {}, state, 1, meta, packed=packed)
+        assert state["count"].sum() == (meta["radii"] > 0).sum()
+        assert len(meta["isect_ids"]) > 0
+    with pytest.raises(ValueError, match="1.3"):
+        dialect("1.3")
+
+
+SCRIPT = """
+import sys
+import gsplat
+from gsplat import rasterization, DefaultStrategy
+from gsplat.cuda._wrapper import fully_fused_projection, isect_tiles
+from gsplat.rendering import rasterization as same
+from gsplat.strategy.ops import duplicate
+from gsplat.relocation import compute_relocation
+from gsplat.optimizers import SelectiveAdam
+from gsplat.exporter import export_splats
+from gsplat.distributed import cli
+import gsplat.utils
+import ewa.gsplat
+
+assert gsplat is ewa.gsplat and same is rasterization and gsplat.__version__ == "1.6.0"
+assert gsplat.strategy.DefaultStrategy is DefaultStrategy
+assert __name__ == "__main__"
+cli(lambda rank, world_rank, size, args: print(rank, size, *args), sys.argv[1:])
+try:
+    import gsplat.nothing
+except ModuleNotFoundError:
+    print("not found")
+"""
+
+
+def run(*arguments, **options):
+    """Runs Python with the modules of this process, and returns the finished process."""
+    return subprocess.run(
+        [sys.executable, *arguments], capture_output=True, text=True, timeout=120, **options
+    )
+
+
+def test_a_script_that_imports_gsplat(tmp_path):
+    script = tmp_path / "train.py"
+    (tmp_path / "beside.py").write_text("")
+    script.write_text("import beside\n" + SCRIPT)
+    done = run("-m", "ewa.gsplat", str(script), "--steps", "7")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "0 1 --steps 7\nnot found\n"
+    done = run("-m", "ewa.gsplat", "-m", "train", "a", cwd=tmp_path)
+    assert done.returncode == 0 and done.stdout.startswith("0 1 a"), done.stderr
+    script.write_text("import sys; sys.exit(5)")
+    assert run("-m", "ewa.gsplat", str(script)).returncode == 5
+
+
+def test_the_runner_says_how_it_is_used(tmp_path):
+    done = run("-m", "ewa.gsplat")
+    assert done.returncode == 2 and done.stderr.startswith("usage:")
+    done = run("-m", "ewa.gsplat", str(tmp_path / "none.py"))
+    assert done.returncode == 2 and "no such file" in done.stderr
+    assert run("-m", "ewa.gsplat", "--help").stdout.startswith("usage:")
+
+
+def test_install_comes_before_gsplat():
+    pytest.importorskip("gsplat")
+    code = "import gsplat, ewa.gsplat; ewa.gsplat.install()"
+    done = run("-c", code)
+    assert done.returncode == 1 and "imported already" in done.stderr
+    twice = "import ewa.gsplat as g; g.install(); g.install(); import gsplat; print(gsplat is g)"
+    assert run("-c", twice).stdout == "True\n"
+
+
+def test_import_is_quick_and_opens_no_device():
+    code = """
+import sys, time
+import torch
+start = time.perf_counter()
+import ewa.gsplat
+print(time.perf_counter() - start)
+print("ewa.gsplat.exporter" in sys.modules)
+"""
+    times = []
+    for _ in range(3):
+        out = run("-c", code).stdout.split()
+        assert out[1] == "False"
+        times.append(float(out[0]))
+    assert min(times) < 0.3
+
+
+def test_export():
+    ewa = pytest.importorskip("ewa")
+    if not hasattr(ewa, "save"):
+        pytest.skip("the package has no files")
+    torch.manual_seed(1)
+    count = 20
+    means = torch.randn(count, 3)
+    means[3, 0] = float("nan")
+    call = (
+        means,
+        torch.randn(count, 3),
+        torch.randn(count, 4),
+        torch.randn(count),
+        torch.randn(count, 1, 3),
+        torch.randn(count, 8, 3),
+    )
+    data = ours.export_splats(*call)
+    assert data.startswith(b"ply") and b"element vertex 19" in data
+    assert len(ours.export_splats(*call, format="splat")) == 19 * 32
+    assert b"element chunk" in ours.export_splats(*call, format="ply_compressed")
+    with pytest.raises(ValueError, match="format"):
+        ours.export_splats(*call, format="obj")
+
+
+def test_export_writes_a_file(tmp_path):
+    ewa = pytest.importorskip("ewa")
+    if not hasattr(ewa, "save"):
+        pytest.skip("the package has no files")
+    path = tmp_path / "splats.ply"
+    call = [torch.randn(4, n) for n in (3, 3, 4)] + [torch.randn(4), torch.randn(4, 3)]
+    data = ours.export_splats(*call, torch.zeros(4, 0, 3), save_to=str(path))
+    assert path.read_bytes() == data
+    found = ewa.load(str(path))
+    torch.testing.assert_close(torch.from_numpy(found.means), call[0])
