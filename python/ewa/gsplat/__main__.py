@@ -10,16 +10,15 @@ from . import install
 _USAGE = "usage: python -m ewa.gsplat (script.py | -m module) [argument...]"
 
 
-def main():
-    arguments = sys.argv[1:]
+def main(arguments):
     if not arguments or arguments[0] in ("-h", "--help"):
         print(_USAGE, file=sys.stdout if arguments else sys.stderr)
         return 0 if arguments else 2
-    install()
+    if arguments == ["-m"]:
+        print(_USAGE, file=sys.stderr)
+        return 2
     if arguments[0] == "-m":
-        if len(arguments) < 2:
-            print(_USAGE, file=sys.stderr)
-            return 2
+        install()
         sys.argv = arguments[1:]
         sys.path.insert(0, os.getcwd())
         runpy.run_module(arguments[1], run_name="__main__", alter_sys=True)
@@ -28,10 +27,12 @@ def main():
     if not os.path.exists(script):
         print(f"{script}: no such file", file=sys.stderr)
         return 2
+    install()
     sys.argv = arguments
     sys.path.insert(0, os.path.dirname(os.path.abspath(script)))
     runpy.run_path(script, run_name="__main__")
     return 0
 
 
-sys.exit(main())
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

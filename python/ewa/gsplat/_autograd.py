@@ -21,10 +21,6 @@ def _tensor_or_none(value):
     return None if value is None else torch.from_numpy(value)
 
 
-def _zeros_for(gradient, like_shape):
-    return np.zeros(like_shape, np.float32) if gradient is None else array(gradient)
-
-
 class ProjectOptions:
     """What a projection takes beside tensors."""
 
@@ -115,16 +111,9 @@ class Project(Function):
     @once_differentiable
     def backward(ctx, _radii, v_means2d, v_depths, v_conics, v_compensations):
         *tensors, radii = ctx.saved_tensors
-        shape = tuple(radii.shape[:-1])
-        gradients = (
-            _zeros_for(v_means2d, shape + (2,)),
-            _zeros_for(v_depths, shape),
-            _zeros_for(v_conics, shape + (3,)),
-            _numpy_or_none(v_compensations),
-        )
-        out = _project_backward(
-            tensors, ctx.options, array(radii), gradients, ctx.needs_input_grad[4]
-        )
+        gradients = [_numpy_or_none(v) for v in (v_means2d, v_depths, v_conics, v_compensations)]
+        need_viewmats = ctx.needs_input_grad[4]
+        out = _project_backward(tensors, ctx.options, array(radii), gradients, need_viewmats)
         return (*out, None, None, None)
 
 
@@ -160,8 +149,6 @@ class ProjectPacked(Function):
         shape = ctx.radii.shape[:-1]
         widths = ((2,), (), (3,), ())
         gradients = [_spread(v, ctx.rows, shape, w) for v, w in zip(packed, widths)]
-        if packed[3] is None:
-            gradients[3] = None
         out = _project_backward(tensors, ctx.options, ctx.radii, gradients, ctx.needs_input_grad[4])
         if ctx.sparse:
             out[:4] = _sparse(out[:4], ctx.rows, shape)
@@ -169,9 +156,11 @@ class ProjectPacked(Function):
 
 
 def _spread(packed, rows, shape, width):
+    """Packed rows in an array of all footprints, zero elsewhere."""
+    if packed is None:
+        return None
     dense = np.zeros((math.prod(shape),) + width, np.float32)
-    if packed is not None:
-        dense[rows] = packed.detach().numpy()
+    dense[rows] = packed.detach().numpy()
     return dense.reshape(shape + width)
 
 
@@ -320,8 +309,11 @@ class Blend(Function):
         ctx.saved_tensors  # torch raises here when the graph is already freed
         images = ctx.images
         size = (len(images.rows), images.height, images.width)
-        v_colors = _zeros_for(v_colors, size + (ctx.channels,)).reshape(size + (-1,))
-        v_alphas = _zeros_for(v_alphas, size).reshape(size)
+        if v_colors is None:
+            v_colors = np.zeros(size + (ctx.channels,), np.float32)
+        else:
+            v_colors = array(v_colors).reshape(size + (ctx.channels,))
+        v_alphas = [None] * size[0] if v_alphas is None else array(v_alphas).reshape(size)
         parts = [
             operators().blend_backward(handle, v_colors[i], v_alphas[i], images.absgrad)
             for i, handle in enumerate(ctx.handles)
