@@ -30,8 +30,9 @@ vec3 direction_gradient(uint i, uint first, vec4 by_color, vec3 direction, float
     vec3 sum = vec3(0.0);
     [[unroll]] for (uint k = 1; k < BASES; ++k) {
         float along = 0.0;
+        // A channel that is not there has a gradient of zero: a condition costs more than its product.
         [[unroll]] for (uint c = 0; c < 4; ++c)
-            if (first + c < push.channels) along += coefficients[coefficient_at(i, k) + first + c] * by_color[c];
+            along += coefficients[coefficient_at(i, k) + min(first + c, push.channels - 1u)] * by_color[c];
         sum += along * slope[k];
     }
     return norm > 0.0 ? (sum - direction * dot(direction, sum)) / norm : vec3(0.0);
