@@ -33,7 +33,8 @@ void bind_images(nb::module_& module) {
                "Reads a PNG or JPEG: [H, W, 3] or [H, W, 4], from 0 to 1. Raises InputError.");
     module.def("save_image", write_image, nb::arg("path"), nb::arg("image"),
                nb::sig("def save_image(path: str | os.PathLike[str], image: numpy.typing.ArrayLike) -> None"),
-               "Writes a PNG of 8 bits from [H, W, 3] or [H, W, 4], from 0 to 1; integers are from 0 to 255. A file is replaced as a "
+               "Writes a PNG of 8 bits from [H, W, 3] or [H, W, 4], from 0 to 1; integers are from 0 to 255. "
+               "A file is replaced as a "
                "whole. Raises InputError, or OSError if the disk refuses.");
 }
 
