@@ -62,7 +62,7 @@ struct ProjectedSplats {
 
 /// dL/d(output) of a projection. An empty array is a gradient of zero.
 struct ProjectedGradient {
-    std::span<const float> means2d, depths, conics, compensations;
+    std::span<const float> means2d{}, depths{}, conics{}, compensations{};
 };
 
 /// dL/d(input) of a projection, added over the views in their order.

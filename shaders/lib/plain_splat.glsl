@@ -25,9 +25,10 @@ struct PlainSplat {
 // The cross products of a matrix's columns: column k + 1 x column k + 2.
 mat3 cofactors_of(mat3 m) { return mat3(cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1])); }
 
+// A NaN stays one.
 vec3 computable_scale(vec3 scale) {
-    const vec3 size = max(abs(scale), vec3(float(SCALE_MIN)));
-    return mix(size, -size, lessThan(scale, vec3(0.0)));
+    const vec3 least = mix(vec3(SCALE_MIN), vec3(-SCALE_MIN), lessThan(scale, vec3(0.0)));
+    return mix(scale, least, lessThan(abs(scale), vec3(SCALE_MIN)));
 }
 
 PlainSplat splat_of_quaternion(vec3 mean, vec4 unit_quaternion, vec3 scale) {

@@ -8,7 +8,8 @@
 
 #include "ewa/error.h"
 #include "ewa/operators.h"
-#include "gpu/test_device.h"
+#include "gpu/guarded.h"
+#include "passes/passes.h"
 #include "reference/harmonics.h"
 #include "support/random_scene.h"
 
@@ -105,6 +106,84 @@ INSTANTIATE_TEST_SUITE_P(
                     HarmonicsCase{2, 16, 3, 129, 3, false}, HarmonicsCase{3, 16, 3, 300, 2, true},
                     HarmonicsCase{4, 25, 7, 200, 1, false}, HarmonicsCase{4, 27, 4, 33, 3, true},
                     HarmonicsCase{3, 16, 5, 1, 1, false}));
+
+TEST(HarmonicsEdges, DirectionsOfAnyLength) {
+    const std::vector<float> coefficients(25, 0.5f);
+    const auto color = [&](float x, float y, float z) {
+        const std::vector<float> direction = {x, y, z};
+        return harmonics_operators().spherical_harmonics({4, 25, 1, direction, coefficients, {}})[0];
+    };
+    const float expected = color(0.6f, -0.3f, 0.5f);
+    EXPECT_NEAR(color(0.6e-25f, -0.3e-25f, 0.5e-25f), expected, 1e-6);
+    EXPECT_NEAR(color(0.6e30f, -0.3e30f, 0.5e30f), expected, 2e-6);
+    EXPECT_FLOAT_EQ(color(0, 0, 0), float(0.5 * shared::SH_C0)) << "no direction: degree 0 alone";
+    const std::vector<float> zero(3), one(1, 1.0f);
+    const HarmonicsGradient by =
+        harmonics_operators().spherical_harmonics_backward({4, 25, 1, zero, coefficients, {}}, one, true);
+    EXPECT_EQ(by.directions, zero);
+}
+
+TEST(HarmonicsEdges, WhatIsMaskedMayBeAnything) {
+    const float nan = std::nanf("");
+    const std::vector<float> directions = {nan, nan, nan, 0, 0, 1},
+                             coefficients = {nan, nan, nan, nan, 1, 2, 3, 4};
+    const std::vector<uint8_t> masks = {0, 1};
+    const HarmonicsArrays arrays = {1, 4, 1, directions, coefficients, masks};
+    const std::vector<float> colors = harmonics_operators().spherical_harmonics(arrays);
+    EXPECT_EQ(colors[0], 0);
+    EXPECT_NEAR(colors[1], shared::SH_C0 + 3 * shared::SH_C1, 1e-5);
+    const std::vector<float> by_colors = {nan, 1};
+    const HarmonicsGradient by = harmonics_operators().spherical_harmonics_backward(arrays, by_colors, true);
+    for (size_t k = 0; k < 4; ++k) EXPECT_EQ(by.coefficients[k], 0) << k;
+    for (size_t k = 0; k < 3; ++k) EXPECT_EQ(by.directions[k], 0) << k;
+}
+
+TEST(HarmonicsEdges, NothingIsWrittenBehindAnArray) {
+    Rig& r = rig();
+    const size_t n = 129, c = 2, count = 17, channels = 5;
+    const Guarded directions("directions", std::vector<float>(3 * n * c, 0.5f)),
+        coefficients("coefficients", std::vector<float>(n * count * channels, 1.0f)), masks("masks", 16);
+    const Guarded colors("colors", 4 * n * c * channels),
+        by_coefficients("by coefficients", 4 * n * count * channels),
+        by_directions("by directions", 12 * n * c);
+    const shared::HarmonicsPush push{uint32_t(n), uint32_t(c), uint32_t(count), uint32_t(channels)};
+    r.run([&](gpu::Recording& recording) {
+        r.cache.get<passes::Harmonics>({{shared::SPEC_SH_DEGREE, 3}, {shared::SPEC_MODE, 0}})
+            .record(recording, {directions, coefficients, masks, colors}, push);
+        r.cache
+            .get<passes::HarmonicsBackward>(
+                {{shared::SPEC_SH_DEGREE, 3}, {shared::SPEC_MODE, shared::HARMONICS_DIRECTIONS}})
+            .record(recording, {directions, coefficients, masks, colors, by_coefficients, by_directions},
+                    push);
+    });
+    expect_intact({&colors, &by_coefficients, &by_directions});
+    for (const float value : by_coefficients.read<float>()) ASSERT_FALSE(std::isnan(value));
+    for (const float value : by_directions.read<float>()) ASSERT_FALSE(std::isnan(value));
+}
+
+TEST(HarmonicsEdges, WrongArgumentsAreNamed) {
+    const std::vector<float> three(3), four(4), eight(8);
+    const std::vector<uint8_t> masks(2);
+    const auto expect = [&](const char* text, const HarmonicsArrays& arrays) {
+        std::string message = "no error";
+        try {
+            harmonics_operators().spherical_harmonics(arrays);
+        } catch (const InputError& error) {
+            message = error.what();
+        }
+        EXPECT_NE(message.find(text), std::string::npos) << message;
+    };
+    expect("degree 5", {5, 36, 1, three, four, {}});
+    expect("needs 4", {1, 3, 1, three, three, {}});
+    expect("0 channels", {0, 1, 0, three, three, {}});
+    expect("coefficients has 3 values", {1, 4, 1, three, three, {}});
+    expect("directions has 4 values", {1, 4, 1, four, four, {}});
+    expect("masks has 2 values", {1, 4, 1, three, four, masks});
+    expect("no error", {1, 4, 2, three, eight, {}});
+    EXPECT_TRUE(harmonics_operators().spherical_harmonics({1, 4, 2, {}, {}, {}}).empty());
+    EXPECT_THROW(harmonics_operators().spherical_harmonics_backward({1, 4, 2, three, eight, {}}, three, true),
+                 InputError);
+}
 
 }  // namespace
 }  // namespace ewa::test

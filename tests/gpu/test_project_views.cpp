@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -31,6 +32,7 @@ struct ViewsCase {
     float low_pass;
     double shape, gradient;  // largest relative errors
     bool whiteners = false;
+    float near = 0.01f, far = 1e10f, radius_clip = 0;
 };
 
 class ViewsPass : public testing::TestWithParam<ViewsCase> {
@@ -40,6 +42,9 @@ class ViewsPass : public testing::TestWithParam<ViewsCase> {
         scene.options.low_pass = c.low_pass;
         scene.options.compensations = c.compensations;
         scene.options.whiteners = c.whiteners;
+        scene.options.near = c.near;
+        scene.options.far = c.far;
+        scene.options.radius_clip = c.radius_clip;
         if (c.covariances) scene.use_covariances();
         if (!c.opacities) scene.opacities.clear();
     }
@@ -240,8 +245,288 @@ INSTANTIATE_TEST_SUITE_P(
         ViewsCase{"bent_covariances", SplatKind::mixed, 300, 2, true, false, true, 0.2, 0.3f, 1e-5, 1e-4},
         ViewsCase{"thin_covariances", SplatKind::needles, 300, 1, true, false, false, 0, 0.3f, 1e-5, 1e-4},
         ViewsCase{"whiteners", SplatKind::mixed, 300, 2, false, true, true, 0, 0.3f, 3e-5, 5e-4, true},
+        ViewsCase{"planes_and_clip", SplatKind::ordinary, 1000, 2, false, false, false, 0, 0.3f, 3e-5, 5e-4,
+                  false, 3, 6, 12},
+        ViewsCase{"two_reductions", SplatKind::ordinary, 40000, 1, false, false, false, 0, 0.3f, 3e-5, 1e-3},
         ViewsCase{"one_splat", SplatKind::ordinary, 1, 1, false, false, false, 0, 0.3f, 1e-5, 1e-4}),
     views_case_name);
+
+/// One view along z, at the origin, and splats that are given one by one.
+PlainScene empty_scene() {
+    PlainScene scene;
+    scene.options.width = 64;
+    scene.options.height = 48;
+    scene.view_matrices = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+    scene.intrinsics = {50, 0, 32, 0, 60, 24, 0, 0, 1};
+    return scene;
+}
+
+void add_splat(PlainScene& scene, std::array<float, 3> mean, std::array<float, 4> quaternion,
+               std::array<float, 3> scale) {
+    scene.means.insert(scene.means.end(), mean.begin(), mean.end());
+    scene.quaternions.insert(scene.quaternions.end(), quaternion.begin(), quaternion.end());
+    scene.scales.insert(scene.scales.end(), scale.begin(), scale.end());
+}
+
+ProjectedSplats project_scene(const PlainScene& scene) {
+    return operators().project(scene.splats(), scene.view_arrays(), scene.options);
+}
+
+/// Compares shapes and gradients of splats that are all visible. shape, gradient: largest relative errors.
+void expect_reference(const PlainScene& scene, double shape, double gradient) {
+    const ProjectedSplats out = project_scene(scene);
+    for (size_t i = 0; i < scene.size(); ++i) {
+        const auto p = reference::project(scene.splat(i), scene.view(0), scene.reference_options());
+        ASSERT_TRUE(p.visible) << i;
+        ASSERT_GT(out.radii[2 * i], 0) << i;
+        EXPECT_NEAR(out.conics[3 * i] / p.conic.x, 1, shape) << i;
+        EXPECT_NEAR(out.conics[3 * i + 2] / p.conic.z, 1, shape) << i;
+        const double skew = scene.options.whiteners ? std::abs(p.conic.y) + p.conic.z / p.conic.x
+                                                    : std::sqrt(p.conic.x * p.conic.z);
+        EXPECT_NEAR((out.conics[3 * i + 1] - p.conic.y) / skew, 0, shape) << i;
+    }
+    const ScreenGradients g = random_gradients(scene, out, 3);
+    const SplatGradient actual = operators().project_backward(scene.splats(), scene.view_arrays(),
+                                                              scene.options, out.radii, g.arrays(), false);
+    const ExpectedGradient expected = reference_gradient(scene, out, g);
+    EXPECT_TRUE(actual.view_matrices.empty());
+    EXPECT_LT(worst_of_rows(actual.means, expected.means, 3), gradient);
+    if (scene.covariances.empty()) {
+        EXPECT_LT(worst_of_rows(actual.quaternions, expected.shapes, 4), gradient);
+        EXPECT_LT(worst_of_rows(actual.scales, expected.scales, 3), gradient);
+    } else {
+        EXPECT_LT(worst_of_rows(actual.covariances, expected.shapes, 6), gradient);
+    }
+}
+
+TEST(ViewsEdges, NoSplatsAndNoViews) {
+    PlainScene scene = empty_scene();
+    EXPECT_TRUE(project_scene(scene).radii.empty());
+    const SplatGradient none =
+        operators().project_backward(scene.splats(), scene.view_arrays(), scene.options, {}, {}, true);
+    EXPECT_TRUE(none.means.empty());
+    EXPECT_EQ(none.view_matrices, std::vector<float>(16));
+    add_splat(scene, {0, 0, 4}, {1, 0, 0, 0}, {1, 1, 1});
+    const ViewArrays no_views;
+    EXPECT_TRUE(operators().project(scene.splats(), no_views, scene.options).radii.empty());
+    const SplatGradient zero =
+        operators().project_backward(scene.splats(), no_views, scene.options, {}, {}, true);
+    EXPECT_EQ(zero.means, std::vector<float>(3));
+    EXPECT_EQ(zero.quaternions, std::vector<float>(4));
+    EXPECT_EQ(zero.scales, std::vector<float>(3));
+}
+
+/// From a point to a million images wide; scales that differ by all that float32 has; quaternions of any norm.
+TEST(ViewsEdges, SplatsOfAllSizes) {
+    PlainScene scene = empty_scene();
+    scene.options.whiteners = scene.options.compensations = true;
+    for (const float size : {1e-3f, 1.0f, 1e6f, 1e10f, 1e14f})
+        for (const float norm : {1e-20f, 1.0f, 1e20f})
+            add_splat(scene, {0.3f, -0.2f, 4}, {0.5f * norm, -0.1f * norm, 0.7f * norm, 0.4f * norm},
+                      {size, 0.3f * size, 0.1f * size});
+    for (const auto& scale : {std::array{1.0f, 1.00001f, 0.99999f}, std::array{1.0f, 1e-6f, 1e-3f},
+                              std::array{1e-8f, 1e4f, 1.0f}, std::array{-0.5f, 0.2f, 0.1f}})
+        add_splat(scene, {0.3f, -0.2f, 4}, {0.5f, -0.1f, 0.7f, 0.4f}, scale);
+    expect_reference(scene, 2e-5, 2e-3);
+}
+
+/// The gradient of a scale of zero is zero, but for the compensation, which float32 cannot tell.
+TEST(ViewsEdges, FlatSplats) {
+    PlainScene scene = empty_scene();
+    add_splat(scene, {0.3f, -0.2f, 4}, {0.5f, -0.1f, 0.7f, 0.4f}, {0.5f, 0, 0.3f});
+    add_splat(scene, {0.3f, -0.2f, 4}, {0.5f, -0.1f, 0.7f, 0.4f}, {0, 0, 0.3f});
+    add_splat(scene, {0.3f, -0.2f, 4}, {0.5f, -0.1f, 0.7f, 0.4f}, {0, 1e-30f, 0});
+    expect_reference(scene, 1e-5, 1e-4);
+}
+
+TEST(ViewsEdges, SingularAndScaledCovariances) {
+    PlainScene scene = empty_scene();
+    const std::array<float, 3> axes[] = {{0.5f, 0.25f, 1}, {0.75f, -0.5f, 0.125f}, {0, 0.5f, -0.25f}};
+    const auto add = [&](float scale, std::initializer_list<int> columns, float z) {
+        std::array<float, 6> sum{};
+        for (const int c : columns) {
+            const auto& a = axes[c];
+            const float products[] = {a[0] * a[0], a[0] * a[1], a[0] * a[2],
+                                      a[1] * a[1], a[1] * a[2], a[2] * a[2]};
+            for (size_t k = 0; k < 6; ++k) sum[k] += scale * products[k];
+        }
+        scene.means.insert(scene.means.end(), {0.1f * z, -0.1f * z, z});
+        scene.covariances.insert(scene.covariances.end(), sum.begin(), sum.end());
+    };
+    for (const float scale : {0x1p-40f, 0x1p-7f, 0x1p-6f, 0x1p1f}) {
+        add(scale, {0, 1, 2}, 4);
+        add(scale, {0, 1}, 4);  // exactly singular
+        add(scale, {0}, 4);
+        add(scale, {2}, 4);  // xx is zero
+        add(scale, {}, 4);
+    }
+    scene.covariances.insert(scene.covariances.end(), {0, 0, 0, 0, 0, 0.25f});
+    scene.means.insert(scene.means.end(), {0.25f, 0.5f, 4});
+    expect_reference(scene, 1e-5, 1e-4);
+    // A scene a million times smaller, seen from as near.
+    PlainScene small = empty_scene();
+    std::swap(scene, small);
+    for (const std::initializer_list<int>& columns : {std::initializer_list<int>{0, 1, 2}, {0, 1}})
+        add(0x1p-42f, columns, 0x1p-19f);
+    scene.options.near = 1e-9f;
+    scene.options.compensations = true;
+    scene.means.resize(3);
+    scene.covariances.resize(6);
+    expect_reference(scene, 1e-5, 1e-4);
+}
+
+/// What float32 keeps of R mean + t, where both are large.
+TEST(ViewsEdges, FarFromTheOrigin) {
+    PlainScene scene = empty_scene();
+    scene.view_matrices = {0.6f, 0, -0.8f, -(1 << 20), 0, 1, 0, 1 << 19, 0.8f, 0, 0.6f, 1 << 18, 0, 0, 0, 1};
+    for (int i = 0; i < 50; ++i)
+        add_splat(scene, {float(419430 + i) + 0.25f, float(-(1 << 19)) + 0.5f, -996149.0f}, {1, 0, 0, 0},
+                  {1, 1, 1});
+    scene.options.near = -1e9f;
+    const ProjectedSplats out = project_scene(scene);
+    int visible = 0;
+    for (size_t i = 0; i < scene.size(); ++i) {
+        const auto p = reference::project(scene.splat(i), scene.view(0), scene.reference_options());
+        if (out.radii[2 * i] == 0 || std::abs(p.depth) < 0.5) continue;
+        ++visible;
+        EXPECT_NEAR(out.depths[i] / p.depth, 1, 1e-6) << i;
+        EXPECT_NEAR(out.means2d[2 * i], p.mean2d.x, 1e-5 * (1 + std::abs(p.mean2d.x))) << i;
+    }
+    EXPECT_GT(visible, 5);
+}
+
+/// Each value in turn not finite: the splat is invisible, and has no gradient. The one after it is as it was.
+TEST(ViewsEdges, PoisonIsInvisible) {
+    PlainScene scene = empty_scene();
+    const float inf = std::numeric_limits<float>::infinity(), nan = std::nanf("");
+    for (int i = 0; i < 34; ++i) add_splat(scene, {0, 0, 4}, {1, 0.1f, 0.2f, 0.3f}, {0.1f, 0.2f, 0.3f});
+    for (size_t v = 0; v < 11; ++v)
+        for (size_t kind = 0; kind < 3; ++kind) {
+            const size_t i = 3 * v + kind;
+            float& value = v < 3    ? scene.means[3 * i + v]
+                           : v < 7  ? scene.quaternions[4 * i + v - 3]
+                           : v < 10 ? scene.scales[3 * i + v - 7]
+                                    : scene.means[3 * i + 2];
+            value = v == 10 ? 1e19f : kind == 0 ? nan : kind == 1 ? inf : -inf;
+        }
+    for (size_t k = 0; k < 4; ++k) scene.quaternions[4 * 32 + k] = 0;
+    scene.means[3 * 32 + 2] = 4;
+    const ProjectedSplats out = project_scene(scene);
+    for (size_t i = 0; i < 33; ++i) EXPECT_EQ(out.radii[2 * i], 0) << i;
+    EXPECT_GT(out.radii[2 * 33], 0);
+    const ScreenGradients g = random_gradients(scene, out, 1);
+    const SplatGradient by = operators().project_backward(scene.splats(), scene.view_arrays(), scene.options,
+                                                          out.radii, g.arrays(), true);
+    for (size_t k = 0; k < 3 * 33; ++k) EXPECT_EQ(by.means[k], 0) << k;
+    for (size_t k = 0; k < 4 * 33; ++k) EXPECT_EQ(by.quaternions[k], 0) << k;
+    for (size_t k = 0; k < 3 * 33; ++k) EXPECT_EQ(by.scales[k], 0) << k;
+    EXPECT_NE(by.scales[3 * 33], 0);
+    for (const float value : by.view_matrices) EXPECT_TRUE(std::isfinite(value));
+}
+
+TEST(ViewsEdges, AMissingGradientIsZero) {
+    PlainScene scene = plain_scene(3, 50, SplatKind::ordinary, 2, 64, 48);
+    const ProjectedSplats out = project_scene(scene);
+    const std::vector<float> two(200), one(100), three(300);
+    ScreenGradients g = random_gradients(scene, out, 2);
+    const auto back = [&](const ProjectedGradient& gradient) {
+        return operators().project_backward(scene.splats(), scene.view_arrays(), scene.options, out.radii,
+                                            gradient, true);
+    };
+    back(g.arrays());  // leaves its gradients in the buffers
+    const SplatGradient missing = back({.means2d = g.means2d}), zero = back({g.means2d, one, three, one});
+    EXPECT_EQ(missing.means, zero.means);
+    EXPECT_EQ(missing.scales, zero.scales);
+    EXPECT_EQ(missing.view_matrices, zero.view_matrices);
+    EXPECT_EQ(back({}).means, std::vector<float>(150));
+}
+
+/// Guards behind each array that the passes write.
+TEST(ViewsEdges, NothingIsWrittenBehindAnArray) {
+    Rig& r = rig();
+    const size_t n = 129, c = 3, pairs = n * c;
+    const PlainScene scene = plain_scene(9, n, SplatKind::ordinary, c, 64, 48);
+    shared::ViewBlock block{};
+    for (int k = 0; k < 9; ++k) block.rotation[k] = k % 4 == 0;
+    block.translation[2] = 4;
+    for (int k = 0; k < 2; ++k) block.focal[k] = block.tan_max[k] = 50, block.tan_min[k] = -50;
+    const Guarded views("views", std::vector(c, block)), means("means", scene.means),
+        quaternions("quaternions", scene.quaternions), scales("scales", scene.scales);
+    const Guarded radii("radii", 8 * pairs), means2d("means2d", 8 * pairs), depths("depths", 4 * pairs),
+        conics("conics", 12 * pairs), compensations("compensations", 4 * pairs);
+    const Guarded by_means("by means", 12 * n), by_quaternions("by quaternions", 16 * n),
+        by_scales("by scales", 12 * n);
+    const shared::ViewsPush push{uint32_t(n), uint32_t(c), {64, 48}, 0.01f, 1e10f, 0.3f, 0};
+    const passes::Groups groups = passes::ProjectViewsBackward::Work::groups(r.config(), push);
+    const size_t subgroups = groups[0] * groups[1] * (r.config().element_group / r.config().subgroup);
+    const Guarded sums("view sums", 4 * shared::VIEW_GRADIENT_FLOATS * c * subgroups);
+    r.run([&](gpu::Recording& recording) {
+        const std::pair kernel(shared::SPEC_KERNEL, shared::KERNEL_ANTIALIAS);
+        r.cache.get<passes::ProjectViews>({{kernel.first, kernel.second}, {shared::SPEC_MODE, 0}})
+            .record(
+                recording,
+                {views, means, quaternions, scales, scales, radii, means2d, depths, conics, compensations},
+                push);
+        r.cache
+            .get<passes::ProjectViewsBackward>(
+                {{kernel.first, kernel.second}, {shared::SPEC_MODE, shared::VIEWS_GRADIENTS}})
+            .record(recording,
+                    {views, means, quaternions, scales, radii, means2d, depths, conics, compensations,
+                     by_means, by_quaternions, by_scales, sums},
+                    push);
+    });
+    expect_intact(
+        {&radii, &means2d, &depths, &conics, &compensations, &by_means, &by_quaternions, &by_scales, &sums});
+    for (const float sum : sums.read<float>()) ASSERT_FALSE(std::isnan(sum));
+    for (const float value : by_means.read<float>()) ASSERT_FALSE(std::isnan(value));
+}
+
+template <class Call>
+std::string message_of(Call call) {
+    try {
+        call();
+    } catch (const InputError& error) {
+        return error.what();
+    }
+    return "no error";
+}
+
+TEST(ViewsEdges, WrongArgumentsAreNamed) {
+    PlainScene scene = empty_scene();
+    add_splat(scene, {0, 0, 4}, {1, 0, 0, 0}, {1, 1, 1});
+    const auto message = [&](auto change) {
+        PlainScene changed = scene;
+        change(changed);
+        return message_of([&] { project_scene(changed); });
+    };
+    const auto expect = [&](const char* text, const std::string& actual) {
+        EXPECT_NE(actual.find(text), std::string::npos) << actual;
+    };
+    expect("means has 4 values; its shape [N, 3]", message([](auto& s) { s.means.push_back(0); }));
+    expect("quaternions has 3 values", message([](auto& s) { s.quaternions.pop_back(); }));
+    expect("scales has 0 values", message([](auto& s) { s.scales.clear(); }));
+    expect("covariances has 5 values", message([](auto& s) { s.covariances.resize(5); }));
+    expect("one of them", message([](auto& s) { s.covariances.resize(6); }));
+    expect("opacities has 2 values", message([](auto& s) { s.opacities.resize(2); }));
+    expect("view_matrices has 17 values", message([](auto& s) { s.view_matrices.push_back(0); }));
+    expect("intrinsics has 8 values", message([](auto& s) { s.intrinsics.pop_back(); }));
+    expect("width and height", message([](auto& s) { s.options.height = 0; }));
+    expect("low_pass", message([](auto& s) { s.options.low_pass = -1; }));
+    expect("focal length of view 0", message([](auto& s) { s.intrinsics[4] = 0; }));
+    expect("focal length of view 0", message([](auto& s) { s.intrinsics[0] = std::nanf(""); }));
+    const std::vector<int32_t> radii = {1, 1};
+    const std::vector<float> wrong(5);
+    const auto back = [&](std::span<const int32_t> given, const ProjectedGradient& g) {
+        return message_of([&] {
+            operators().project_backward(scene.splats(), scene.view_arrays(), scene.options, given, g, false);
+        });
+    };
+    expect("radii has 0 values", back({}, {}));
+    expect("gradient of means2d has 5 values", back(radii, {.means2d = wrong}));
+    expect("gradient of conics has 5 values", back(radii, {.conics = wrong}));
+    expect("gradient of compensations has 5 values", back(radii, {.compensations = wrong}));
+    EXPECT_EQ(back(radii, {}), "no error");
+}
 
 }  // namespace
 }  // namespace ewa::test
