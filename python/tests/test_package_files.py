@@ -151,6 +151,10 @@ def test_ply_holds_every_bit(tmp_path):
     ewa.save(str(tmp_path / "b.ply"), again, antialiased=True)
     assert ewa.load(str(tmp_path / "b.ply")).antialiased
     assert ewa.load(tmp_path / "b.ply")[:3].antialiased
+    ewa.save(tmp_path / "c.ply", ewa.load(tmp_path / "b.ply"))
+    assert ewa.load(tmp_path / "c.ply").antialiased
+    ewa.save(tmp_path / "d.ply", ewa.load(tmp_path / "b.ply"), antialiased=False)
+    assert not ewa.load(tmp_path / "d.ply").antialiased
 
 
 @pytest.mark.parametrize("name", ["a.spz", "a.splat", "a.sog", "a.glb", "a.compressed.ply"])

@@ -189,6 +189,13 @@ def test_whole_floats_and_numpy_numbers_are_options(still_life):
     assert (trainer.options["steps"], trainer.options["seed"], trainer.options["growth"]) == (7000, 5, 1.5)
 
 
+def test_antialiased_training_makes_antialiased_splats(still_life):
+    splats = ewa.Trainer(still_life, steps=1, antialias=True, train_frames=[0]).splats()
+    assert splats.antialiased
+    usual, plain = ewa.evaluate(splats, still_life, [0]), ewa.evaluate(splats, still_life, [0], antialias=False)
+    assert usual.psnr == ewa.evaluate(splats, still_life, [0], antialias=True).psnr != plain.psnr
+
+
 def test_exposures_are_learned(still_life):
     trainer = ewa.Trainer(still_life, steps=2, exposure=True, train_frames=[0, 1, 2])
     assert np.array_equal(trainer.exposures(), np.tile(np.eye(3, 4, dtype=np.float32), (3, 1, 1)))
