@@ -40,7 +40,8 @@ struct Scene {
     Scene() {
         std::mt19937 random(1);
         std::uniform_real_distribution<float> uniform(-0.5f, 0.5f);
-        for (size_t i = 0; i < means.values.size(); ++i) means.values[i] = i % 3 == 2 ? 0.0f : uniform(random);
+        for (size_t i = 0; i < means.values.size(); ++i)
+            means.values[i] = i % 3 == 2 ? 0.0f : uniform(random);
         for (float& value : quaternions.values) value = uniform(random);
         for (float& value : log_scales.values) value = std::log(0.02f);
         for (float& value : colors.values) value = 0.5f + uniform(random);
@@ -48,13 +49,15 @@ struct Scene {
 };
 
 /// One step of gradient descent. Returns the mean squared error, and the image in `shown`.
-double descend(ewa::Operators& operators, Scene& scene, const ewa::Image& target, int number, ewa::Image& shown) {
+double descend(ewa::Operators& operators, Scene& scene, const ewa::Image& target, int number,
+               ewa::Image& shown) {
     const auto width = uint32_t(target.width), height = uint32_t(target.height);
     std::vector<float> scales, opacities;
     for (const float value : scene.log_scales.values) scales.push_back(std::exp(value));
     for (const float value : scene.logits.values) opacities.push_back(1 / (1 + std::exp(-value)));
     const std::array<float, 16> view{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 1, 0, 0, 0, 1};
-    const std::array<float, 9> lens{float(width), 0, 0.5f * float(width), 0, float(height), 0.5f * float(height), 0, 0, 1};
+    const std::array<float, 9> lens{
+        float(width), 0, 0.5f * float(width), 0, float(height), 0.5f * float(height), 0, 0, 1};
 
     const ewa::SplatArrays splats{.means = scene.means.values,
                                   .quaternions = scene.quaternions.values,
