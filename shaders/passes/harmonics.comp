@@ -1,7 +1,8 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
 // Evaluates spherical harmonics of any number of channels: colour = sum over k of coefficient k times Y_k(direction).
-// One invocation owns splat i in view workgroup.z. SPEC_MODE: 0 or HARMONICS_MASKED.
+// One invocation owns splat i. It reads 4 channels of its coefficients at a time, for all views. SPEC_MODE: 0 or
+// HARMONICS_MASKED.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/sh.glsl"
@@ -17,15 +18,25 @@ layout(set = 0, binding = 3, scalar) writeonly buffer Colors { float colors[]; }
 layout(push_constant, scalar) uniform Push { HarmonicsPush push; };
 
 void main() {
-    const uint i = item_index(), at = gl_WorkGroupID.z * push.splats + i;
+    const uint i = item_index();
     if (i >= push.splats) return;
-    const bool shown = MODE != HARMONICS_MASKED || (masks[at / 4u] >> (8u * (at % 4u)) & 255u) != 0u;
-    float norm, basis[25];
-    harmonics_basis(unit_direction(directions[at], norm), basis);
-    for (uint c = 0u; c < push.channels; ++c) {
-        float sum = 0.0;
-        [[unroll]] for (uint k = 0; k < BASES; ++k)
-            sum += basis[k] * coefficients[(i * push.coefficients + k) * push.channels + c];
-        colors[at * push.channels + c] = shown ? sum : 0.0;
+    for (uint first = 0u; first < push.channels; first += 4u) {
+        vec4 chunk[25];
+        [[unroll]] for (uint k = 0; k < BASES; ++k) chunk[k] = vec4(0.0);
+        [[unroll]] for (uint c = 0; c < 4; ++c) {
+            if (first + c < push.channels)
+                [[unroll]] for (uint k = 0; k < BASES; ++k)
+                    chunk[k][c] = coefficients[(i * push.coefficients + k) * push.channels + first + c];
+        }
+        for (uint v = 0u; v < push.views; ++v) {
+            const uint at = v * push.splats + i;
+            const bool shown = MODE != HARMONICS_MASKED || (masks[at / 4u] >> (8u * (at % 4u)) & 255u) != 0u;
+            float norm, basis[25];
+            harmonics_basis(unit_direction(directions[at], norm), basis);
+            vec4 sum = vec4(0.0);
+            [[unroll]] for (uint k = 0; k < BASES; ++k) sum += basis[k] * chunk[k];
+            [[unroll]] for (uint c = 0; c < 4; ++c)
+                if (first + c < push.channels) colors[at * push.channels + first + c] = shown ? sum[c] : 0.0;
+        }
     }
 }

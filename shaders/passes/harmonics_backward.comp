@@ -28,12 +28,10 @@ vec3 direction_gradient(uint i, uint first, vec4 by_color, vec3 direction, float
     vec3 slope[25];
     harmonics_basis_gradient(direction, slope);
     vec3 sum = vec3(0.0);
-    [[unroll]] for (uint k = 1; k < BASES; ++k) {
-        float along = 0.0;
-        // A channel that is not there has a gradient of zero: a condition costs more than its product.
-        [[unroll]] for (uint c = 0; c < 4; ++c)
-            along += coefficients[coefficient_at(i, k) + min(first + c, push.channels - 1u)] * by_color[c];
-        sum += along * slope[k];
+    [[unroll]] for (uint c = 0; c < 4; ++c) {
+        if (first + c < push.channels)
+            [[unroll]] for (uint k = 1; k < BASES; ++k)
+                sum += (coefficients[coefficient_at(i, k) + first + c] * by_color[c]) * slope[k];
     }
     return norm > 0.0 ? (sum - direction * dot(direction, sum)) / norm : vec3(0.0);
 }
@@ -61,13 +59,13 @@ void main() {
                 directions_gradient[at] = earlier + own;
             }
         }
-        for (uint k = 0u; k < push.coefficients; ++k) {
-            if (k >= BASES)
-                [[unroll]] for (uint c = 0; c < 4; ++c)
-                    if (first + c < push.channels) coefficients_gradient[coefficient_at(i, k) + first + c] = 0.0;
+        [[unroll]] for (uint c = 0; c < 4; ++c) {
+            if (first + c < push.channels) {
+                [[unroll]] for (uint k = 0; k < BASES; ++k)
+                    coefficients_gradient[coefficient_at(i, k) + first + c] = sums[k][c];
+                for (uint k = BASES; k < push.coefficients; ++k)
+                    coefficients_gradient[coefficient_at(i, k) + first + c] = 0.0;
+            }
         }
-        [[unroll]] for (uint k = 0; k < BASES; ++k)
-            [[unroll]] for (uint c = 0; c < 4; ++c)
-                if (first + c < push.channels) coefficients_gradient[coefficient_at(i, k) + first + c] = sums[k][c];
     }
 }

@@ -26,7 +26,6 @@ HarmonicsShape check_harmonics(const HarmonicsArrays& h) {
     const size_t views = splats ? h.directions.size() / (3 * splats) : 0;
     check_size("directions", h.directions.size(), 3 * splats * views, "[C, N, 3]");
     if (!h.masks.empty()) check_size("masks", h.masks.size(), splats * views, "[C, N]");
-    if (views > 65535) throw InputError(std::to_string(views) + " views in one call; the most are 65535");
     return {uint32_t(splats), uint32_t(views)};
 }
 

@@ -47,7 +47,7 @@ struct ProjectViewsBackward {
 /// (0 or HARMONICS_MASKED).
 struct Harmonics {
     static constexpr char shader[] = "harmonics";
-    using Work = PerViewElement<shared::HarmonicsPush>;
+    using Work = PerElement<&shared::HarmonicsPush::splats>;
     gpu::BufferPart directions, coefficients, masks, colors;
 };
 
