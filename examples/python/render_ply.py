@@ -5,6 +5,7 @@
 SPLATS is any file that ewa reads. CAMERAS is a transforms.json or a folder with a COLMAP model; its images need not be there.
 OUT is a folder, which gets a PNG for each frame.
 """
+
 import argparse
 import pathlib
 
@@ -12,12 +13,18 @@ import ewa
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("splats", type=pathlib.Path)
     parser.add_argument("cameras", type=pathlib.Path)
     parser.add_argument("out", type=pathlib.Path)
-    parser.add_argument("--frames", type=int, nargs="+", metavar="I", help="indices in the order of names [all]")
-    parser.add_argument("--background", default="black", help='a colour such as "white" or "#8080ff"')
+    parser.add_argument(
+        "--frames", type=int, nargs="+", metavar="I", help="indices in the order of names [all]"
+    )
+    parser.add_argument(
+        "--background", default="black", help='a colour such as "white" or "#8080ff"'
+    )
     options = parser.parse_args()
 
     data = ewa.Dataset(options.cameras, need_images=False)
@@ -25,8 +32,12 @@ def main() -> None:
     options.out.mkdir(parents=True, exist_ok=True)
     for i in options.frames or range(len(data)):
         frame = data.frames[i]
-        renders = renderer.render(data.viewmats[i], data.Ks[i], frame.width, frame.height, background=options.background)
-        ewa.save_image(options.out / pathlib.PurePath(frame.name).with_suffix(".png").name, renders.color)
+        renders = renderer.render(
+            data.viewmats[i], data.Ks[i], frame.width, frame.height, background=options.background
+        )
+        ewa.save_image(
+            options.out / pathlib.PurePath(frame.name).with_suffix(".png").name, renders.color
+        )
 
 
 if __name__ == "__main__":

@@ -51,7 +51,11 @@ def camera(distance=4.0, width=64, height=48):
 def run_python(code, **environment):
     """Runs code in a process of its own and returns its standard output."""
     result = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=120, env={**os.environ, **environment}
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        env={**os.environ, **environment},
     )
     assert result.returncode == 0, result.stderr
     return result.stdout.strip()

@@ -337,9 +337,13 @@ def test_rasterize_to_pixels(channels, packed):
     inputs = splats + [backgrounds]
     for a, e in zip(gradients(actual, inputs), gradients(expected, inputs)):
         assert_close(a, e)
-    assert splats[0].absgrad.shape == splats[0].shape
     if not packed:
         _compare_accumulated(splats, offsets, flatten, actual, backgrounds)
+    assert splats[0].absgrad.shape == splats[0].shape
+    actual[0].sum().backward(retain_graph=True)
+    actual[1].sum().backward()
+    with pytest.raises(RuntimeError, match="second time"):
+        actual[1].sum().backward()
 
 
 def _compare_accumulated(splats, offsets, flatten, actual, backgrounds):

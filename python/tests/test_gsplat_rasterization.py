@@ -2,15 +2,18 @@
 """rasterization against plain torch: gsplat's reference for footprints, every pixel blended."""
 
 import gc
+import os
 import pickle
 import threading
 import warnings
 import weakref
+from pathlib import Path
 
 import pytest
 
 torch = pytest.importorskip("torch")
 
+import ewa
 from ewa import gsplat as ours
 from gsplat_scenes import HEIGHT, WIDTH, Scene, assert_close, blend, gradients
 
@@ -391,12 +394,14 @@ def test_without_gradients_nothing_is_kept():
     assert torch.equal(image, kept)
 
 
-def test_a_dropped_graph_is_freed_at_once():
+@pytest.mark.parametrize("backward", [False, True])
+def test_a_dropped_graph_is_freed_at_once(backward):
     s = Scene()
     gc.disable()  # A reference cycle would keep the device's memory until a collection.
     try:
         image, alpha, meta = ours.rasterization(**s.arguments(absgrad=True))
-        image.sum().backward()
+        if backward:
+            image.sum().backward()
         kept = weakref.ref(meta["means2d"])
         assert kept() is not None
         del image, alpha, meta
@@ -411,3 +416,38 @@ def test_the_tile_size_changes_no_image():
     for image, _, meta in sizes[1:]:
         torch.testing.assert_close(image, sizes[0][0])
     assert [m["isect_offsets"].shape[-2:] for _, _, m in sizes] == [(3, 4), (6, 8), (2, 2)]
+
+
+def resident_bytes():
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="reads Linux's statistics")
+def test_many_calls_need_no_more_memory():
+    s = Scene(splats=100)
+
+    def call():
+        image = ours.rasterization(**s.arguments())[0]
+        torch.autograd.grad(image.sum(), s.tensors())
+
+    for _ in range(50):
+        call()
+    before = resident_bytes()
+    for _ in range(1000):
+        call()
+    assert resident_bytes() - before < 32 << 20
+
+
+def test_a_forked_process_is_told_that_it_cannot_render():
+    s = Scene()
+    ours.rasterization(**s.arguments())
+    child = os.fork()
+    if child == 0:
+        try:
+            ours.rasterization(**s.arguments())
+            os._exit(1)
+        except ewa.DeviceError:
+            os._exit(7)
+        finally:
+            os._exit(2)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7

@@ -21,7 +21,11 @@ def same(a, b):
 def test_arrays_have_shapes_and_values(degree):
     splats = make_splats(7, degree)
     assert len(splats) == 7 and splats.sh_degree == degree
-    assert splats.means.shape == (7, 3) and splats.quats.shape == (7, 4) and splats.log_scales.shape == (7, 3)
+    assert (
+        splats.means.shape == (7, 3)
+        and splats.quats.shape == (7, 4)
+        and splats.log_scales.shape == (7, 3)
+    )
     assert splats.opacity_logits.shape == (7,) and splats.sh.shape == (7, (degree + 1) ** 2, 3)
     assert all(getattr(splats, name).dtype == np.float32 for name in ARRAYS)
     random = np.random.default_rng(0)
@@ -59,7 +63,13 @@ def test_an_assigned_view_of_the_same_splats_is_read_first():
 def test_no_argument_is_copied_where_it_need_not_be():
     # Constructors copy: what the caller does with its array later does not matter.
     means = np.zeros((2, 3), np.float32)
-    splats = ewa.Splats(means=means, quats=np.ones((2, 4)), log_scales=means, opacity_logits=[0, 0], sh=np.zeros((2, 1, 3)))
+    splats = ewa.Splats(
+        means=means,
+        quats=np.ones((2, 4)),
+        log_scales=means,
+        opacity_logits=[0, 0],
+        sh=np.zeros((2, 1, 3)),
+    )
     means[:] = 5
     assert np.all(splats.means == 0)
 
@@ -71,7 +81,10 @@ def test_no_argument_is_copied_where_it_need_not_be():
         ({"quats": np.zeros((4, 4))}, "quats has the shape (4, 4); expected (5, 4)"),
         ({"log_scales": np.zeros(5)}, "log_scales has the shape (5,); expected (5, 3)"),
         ({"opacity_logits": 1.0}, "opacity_logits has the shape (); expected (5,)"),
-        ({"sh": np.zeros((5, 5, 3))}, "sh has the shape (5, 5, 3); expected (5, 1, 3) or (5, 4, 3) or (5, 9, 3) or (5, 16, 3)"),
+        (
+            {"sh": np.zeros((5, 5, 3))},
+            "sh has the shape (5, 5, 3); expected (5, 1, 3) or (5, 4, 3) or (5, 9, 3) or (5, 16, 3)",
+        ),
         ({"origin": [0, 0]}, "origin has the shape (2,); expected (3,)"),
         ({"origin": [0, 0, np.nan]}, "origin is not finite"),
         ({"means": [[1, 2, 3], [4]]}, "means is no array: its parts differ in length"),
@@ -101,7 +114,9 @@ def test_strided_and_other_types_are_converted():
     assert np.array_equal(splats.means, wide[:, ::2])
 
 
-@pytest.mark.parametrize("key", [slice(1, 4), slice(None, None, -2), [3, 0, 3], np.arange(6) % 2 == 0, 2, -1, []])
+@pytest.mark.parametrize(
+    "key", [slice(1, 4), slice(None, None, -2), [3, 0, 3], np.arange(6) % 2 == 0, 2, -1, []]
+)
 def test_indexing_is_numpys_and_copies(key):
     splats = make_splats(6)
     if isinstance(key, list):
@@ -112,7 +127,9 @@ def test_indexing_is_numpys_and_copies(key):
     assert not np.shares_memory(some.means, splats.means)
 
 
-@pytest.mark.parametrize("key", [6, -7, [0, 9], np.ones(5, bool), np.zeros((6, 2), int), "means", 1.5])
+@pytest.mark.parametrize(
+    "key", [6, -7, [0, 9], np.ones(5, bool), np.zeros((6, 2), int), "means", 1.5]
+)
 def test_wrong_keys_are_refused(key):
     with pytest.raises((IndexError, ValueError)):
         make_splats(6)[key]
@@ -230,7 +247,9 @@ def test_skipped_contents_are_warnings(tmp_path):
     ewa.save(path, make_splats(1))
     header, values = path.read_bytes().split(b"end_header\n", 1)
     path.write_bytes(header + b"property float confidence\nend_header\n" + values + b"\0\0\0\0")
-    with pytest.warns(UserWarning, match="more.ply: properties that splats do not have are skipped: confidence"):
+    with pytest.warns(
+        UserWarning, match="more.ply: properties that splats do not have are skipped: confidence"
+    ):
         ewa.load(path)
 
 
@@ -242,7 +261,9 @@ def test_images(tmp_path):
     assert read.dtype == np.float32 and np.array_equal(np.round(read * 255), image)
     ewa.save_image(path, np.dstack([image / 255, np.full((5, 7), 0.5)]))
     assert ewa.load_image(path).shape == (5, 7, 4)
-    with pytest.raises(ValueError, match=r"image has the shape \(5, 7\); expected \(H, W, 3\) or \(H, W, 4\)"):
+    with pytest.raises(
+        ValueError, match=r"image has the shape \(5, 7\); expected \(H, W, 3\) or \(H, W, 4\)"
+    ):
         ewa.save_image(path, image[..., 0])
     with pytest.raises(ewa.InputError):
         ewa.load_image(SEEDS / "read_ply/little.ply")

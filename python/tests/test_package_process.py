@@ -140,7 +140,9 @@ print(trainer.step().step, len(trainer.splats()))
 
 
 def test_ctrl_c_ends_a_training_after_the_step():
-    result = subprocess.run([sys.executable, "-c", INTERRUPTED, STILL_LIFE], capture_output=True, text=True, timeout=120)
+    result = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED, STILL_LIFE], capture_output=True, text=True, timeout=120
+    )
     assert result.stdout.splitlines() == ["interrupted after 5", "6 3000"], result.stderr
 
 
@@ -199,7 +201,12 @@ def test_signals_end_a_long_evaluation(still_life):
 def child(connection):
     splats = make_splats()
     answers = []
-    for call in (ewa.current_device, ewa.devices, lambda: ewa.render(splats, *camera()), lambda: RENDERERS[0].render(*camera())):
+    for call in (
+        ewa.current_device,
+        ewa.devices,
+        lambda: ewa.render(splats, *camera()),
+        lambda: RENDERERS[0].render(*camera()),
+    ):
         try:
             call()
             answers.append("no error")
@@ -246,8 +253,14 @@ def test_the_example_runs(path, tmp_path):
     ewa.save(tmp_path / "a.ply", ewa.Splats.from_points(data.points, data.point_colors))
     for cameras in (STILL_LIFE / "transforms.json", STILL_LIFE):
         out = tmp_path / f"out{cameras.suffix}"
-        subprocess.run([sys.executable, path, tmp_path / "a.ply", cameras, out, "--frames", "3", "0"], check=True, timeout=120)
+        subprocess.run(
+            [sys.executable, path, tmp_path / "a.ply", cameras, out, "--frames", "3", "0"],
+            check=True,
+            timeout=120,
+        )
         assert sorted(file.name for file in out.iterdir()) == ["view_00.png", "view_03.png"]
         view = data.frames[3]
-        expected = ewa.render(ewa.load(tmp_path / "a.ply"), data.viewmats[3], data.Ks[3], view.width, view.height).color
+        expected = ewa.render(
+            ewa.load(tmp_path / "a.ply"), data.viewmats[3], data.Ks[3], view.width, view.height
+        ).color
         assert np.abs(ewa.load_image(out / "view_03.png") - np.clip(expected, 0, 1)).max() < 0.003

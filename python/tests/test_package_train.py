@@ -16,7 +16,9 @@ OPTIONS = {"steps": 12, "seed": 3, "max_splats": 3500, "strategy": "mcmc"}
 
 
 def same(a, b):
-    return len(a) == len(b) and all(np.array_equal(getattr(a, name), getattr(b, name)) for name in ARRAYS)
+    return len(a) == len(b) and all(
+        np.array_equal(getattr(a, name), getattr(b, name)) for name in ARRAYS
+    )
 
 
 def trained(trainer):
@@ -43,7 +45,9 @@ def test_a_dataset_has_images_cameras_and_points(still_life):
     for viewmat, k in zip(still_life.viewmats, still_life.Ks):
         p = still_life.points @ viewmat[:3, :3].T + viewmat[:3, 3]
         uv = (p @ k.T)[:, :2] / p[:, 2:]
-        inside.append(np.mean((p[:, 2] > 0) & np.all((uv >= 0) & (uv < [frame.width, frame.height]), axis=1)))
+        inside.append(
+            np.mean((p[:, 2] > 0) & np.all((uv >= 0) & (uv < [frame.width, frame.height]), axis=1))
+        )
     assert np.mean(inside) > 0.5
 
 
@@ -89,10 +93,14 @@ def command_line_run(program, tmp_path_factory):
 
 
 def test_training_gives_the_bytes_of_the_command_line(still_life, command_line_run):
-    assert same(trained(ewa.Trainer(still_life, **OPTIONS)), ewa.load(command_line_run / "splats.ply"))
+    assert same(
+        trained(ewa.Trainer(still_life, **OPTIONS)), ewa.load(command_line_run / "splats.ply")
+    )
 
 
-def test_a_checkpoint_of_the_command_line_continues(still_life, command_line_run, program, tmp_path):
+def test_a_checkpoint_of_the_command_line_continues(
+    still_life, command_line_run, program, tmp_path
+):
     again = ewa.Trainer.resume(command_line_run / "checkpoint.ewa", still_life, steps=15)
     assert (again.steps_done, again.steps, again.options["seed"]) == (12, 15, 3)
     assert len(trained(again)) > 0 and again.steps_done == 15
@@ -100,11 +108,17 @@ def test_a_checkpoint_of_the_command_line_continues(still_life, command_line_run
 
 def test_reports_and_properties(still_life):
     trainer = ewa.Trainer(still_life, **{**OPTIONS, "steps": 3})
-    assert trainer.train_frames == still_life.split()[0] and trainer.steps == 3 and trainer.steps_done == 0
+    assert (
+        trainer.train_frames == still_life.split()[0]
+        and trainer.steps == 3
+        and trainer.steps_done == 0
+    )
     assert trainer.options["strategy"] == "mcmc" and trainer.options["sh_degree"] == 3
     reports = list(trainer)
     assert [report.step for report in reports] == [1, 2, 3] == [1, 2, trainer.steps_done]
-    assert all(0 < report.loss < 1 and report.splats == 3000 and report.psnr > 5 for report in reports)
+    assert all(
+        0 < report.loss < 1 and report.splats == 3000 and report.psnr > 5 for report in reports
+    )
     assert list(trainer) == []
     with pytest.raises(ewa.InputError, match="all 3 steps are done"):
         trainer.step()
@@ -112,24 +126,38 @@ def test_reports_and_properties(still_life):
 
 
 def test_a_checkpoint_continues_with_the_bytes_of_an_uninterrupted_training(still_life, tmp_path):
-    options = {**OPTIONS, "growth": 1.1, "background": "white", "means_rate": 2e-4, "train_frames": range(5)}
+    options = {
+        **OPTIONS,
+        "growth": 1.1,
+        "background": "white",
+        "means_rate": 2e-4,
+        "train_frames": range(5),
+    }
     path = tmp_path / "checkpoint.ewa"
     whole = ewa.Trainer(still_life, **options)
     for report in whole:
         if report.step == 7:
             whole.save_checkpoint(path)
     again = ewa.Trainer.resume(path, still_life)
-    assert again.steps_done == 7 and again.options == whole.options and again.train_frames == [0, 1, 2, 3, 4]
+    assert (
+        again.steps_done == 7
+        and again.options == whole.options
+        and again.train_frames == [0, 1, 2, 3, 4]
+    )
     assert same(trained(again), whole.splats())
 
 
 def test_a_checkpoint_of_own_splats_wants_them_again(still_life, tmp_path):
-    start = ewa.Splats.from_points(still_life.points[::3], still_life.point_colors[::3], sh_degree=1)
+    start = ewa.Splats.from_points(
+        still_life.points[::3], still_life.point_colors[::3], sh_degree=1
+    )
     trainer = ewa.Trainer(still_life, init=start, **{**OPTIONS, "sh_degree": 2})
     assert trainer.splats().sh_degree == 2 and len(trainer.splats()) == 1000
     trainer.step()
     trainer.save_checkpoint(tmp_path / "a.ewa")
-    with pytest.raises(ewa.InputError, match="a.ewa: its training began with splats; pass them again as init"):
+    with pytest.raises(
+        ewa.InputError, match="a.ewa: its training began with splats; pass them again as init"
+    ):
         ewa.Trainer.resume(tmp_path / "a.ewa", still_life)
     again = ewa.Trainer.resume(tmp_path / "a.ewa", still_life, init=start)
     assert same(trained(again), trained(trainer))
@@ -174,7 +202,11 @@ def test_random_first_splats(still_life):
         ({"antialias": "yes"}, TypeError, "antialias='yes' is of the wrong type"),
         ({"background": [1, 2]}, ValueError, r"background has the shape \(2,\); expected \(3,\)"),
         ({"train_frames": []}, ewa.InputError, "no training image"),
-        ({"train_frames": [48]}, IndexError, "train_frames has the index 48; the dataset has 48 frames"),
+        (
+            {"train_frames": [48]},
+            IndexError,
+            "train_frames has the index 48; the dataset has 48 frames",
+        ),
         ({"max_splats": 10}, ewa.InputError, "3000 splats"),
         ({"init": make_splats(2).means}, TypeError, ""),
     ],
@@ -185,8 +217,19 @@ def test_wrong_options(still_life, options, error, message):
 
 
 def test_whole_floats_and_numpy_numbers_are_options(still_life):
-    trainer = ewa.Trainer(still_life, steps=7e3, seed=np.int64(5), growth=1.5, strategy="adc", train_frames=np.arange(3))
-    assert (trainer.options["steps"], trainer.options["seed"], trainer.options["growth"]) == (7000, 5, 1.5)
+    trainer = ewa.Trainer(
+        still_life,
+        steps=7e3,
+        seed=np.int64(5),
+        growth=1.5,
+        strategy="adc",
+        train_frames=np.arange(3),
+    )
+    assert (trainer.options["steps"], trainer.options["seed"], trainer.options["growth"]) == (
+        7000,
+        5,
+        1.5,
+    )
 
 
 def test_antialiased_training_makes_antialiased_splats(still_life):
@@ -200,7 +243,9 @@ def test_exposures_are_learned(still_life):
     trainer = ewa.Trainer(still_life, steps=2, exposure=True, train_frames=[0, 1, 2])
     assert np.array_equal(trainer.exposures(), np.tile(np.eye(3, 4, dtype=np.float32), (3, 1, 1)))
     trained(trainer)
-    assert not np.array_equal(trainer.exposures(), np.tile(np.eye(3, 4, dtype=np.float32), (3, 1, 1)))
+    assert not np.array_equal(
+        trainer.exposures(), np.tile(np.eye(3, 4, dtype=np.float32), (3, 1, 1))
+    )
 
 
 def test_evaluation_is_that_of_the_command_line(still_life, command_line_run, program, tmp_path):
@@ -210,7 +255,9 @@ def test_evaluation_is_that_of_the_command_line(still_life, command_line_run, pr
     result = ewa.evaluate(splats, still_life)
     assert result.psnr == pytest.approx(expected["psnr"], abs=1e-6)
     assert result.ssim == pytest.approx(expected["ssim"], abs=1e-6)
-    assert [frame.name for frame in result.frames] == [still_life.frames[i].name for i in still_life.split()[1]]
+    assert [frame.name for frame in result.frames] == [
+        still_life.frames[i].name for i in still_life.split()[1]
+    ]
     one = ewa.evaluate(splats, still_life, [8], background="white")
     assert len(one.frames) == 1 and one.psnr != result.frames[1].psnr
     with pytest.raises(ewa.InputError, match="frames is empty"):

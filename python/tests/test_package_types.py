@@ -11,7 +11,7 @@ from conftest import ROOT
 
 import ewa
 
-USER = '''
+USER = """
 import numpy as np
 import numpy.typing as npt
 import ewa
@@ -36,19 +36,27 @@ try:
     ewa.Trainer.resume("a.ewa", data)
 except ewa.InputError as error:
     print(error)
-'''
-WRONG = '''
+"""
+WRONG = """
 import ewa
 
 ewa.load(3)
 ewa.Trainer(ewa.Dataset("photos"), strategy="fast")
 ewa.render(ewa.load("a.ply"), 1, 2, "wide", 3)
 length: str = len(ewa.load("a.ply"))
-'''
+"""
 
 
 def mypy(*arguments):
-    words = [sys.executable, "-m", "mypy", "--strict", "--no-incremental", "--cache-dir=/dev/null", *map(str, arguments)]
+    words = [
+        sys.executable,
+        "-m",
+        "mypy",
+        "--strict",
+        "--no-incremental",
+        "--cache-dir=/dev/null",
+        *map(str, arguments),
+    ]
     result = subprocess.run(words, capture_output=True, text=True, timeout=300)
     return result.stdout
 
@@ -75,7 +83,9 @@ def test_wrong_types_are_found(checked):
 
 
 def test_the_stub_names_what_the_module_has():
-    stub = pathlib.Path(ewa._native.__file__).with_name("_native").joinpath("__init__.pyi").read_text()
+    stub = (
+        pathlib.Path(ewa._native.__file__).with_name("_native").joinpath("__init__.pyi").read_text()
+    )
     for name in ewa.__all__:
         if not name.startswith("_") and not name.endswith("Error"):
             assert f"def {name}(" in stub or f"class {name}:" in stub, name

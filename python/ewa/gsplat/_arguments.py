@@ -47,14 +47,13 @@ def shape(name, value, expected):
 
 
 def array(value):
-    """The numpy view of a tensor; a copy only where its rows are not contiguous in memory."""
-    return np.ascontiguousarray(value.detach().numpy())
+    """The numpy view of a tensor."""
+    return value.detach().numpy()
 
 
 def bytes_of(mask):
     """A mask as the uint8 array that the device takes."""
-    view = np.ascontiguousarray(mask.detach().numpy())
-    return view.view(np.uint8) if view.dtype == np.bool_ else (view != 0).view(np.uint8)
+    return (mask.detach().numpy() != 0).view(np.uint8)
 
 
 def unavailable(what):
