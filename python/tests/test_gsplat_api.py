@@ -266,6 +266,15 @@ print("ewa.gsplat.exporter" in sys.modules, ewa.gsplat._device._operators)
     assert min(times) < 0.5
 
 
+def test_threads_of_torch_wait_without_spinning():
+    def policy(code):
+        code += "; import os; print(os.environ.get('OMP_WAIT_POLICY'))"
+        return run("-c", code).stdout.strip()
+
+    assert policy("import ewa.gsplat") == "PASSIVE"
+    assert policy("import torch; import ewa.gsplat") == "None"
+
+
 def test_export():
     ewa = pytest.importorskip("ewa")
     if not hasattr(ewa, "save"):

@@ -6,7 +6,12 @@ unchanged under `python -m ewa.gsplat script.py`, or after ewa.gsplat.install().
 """
 
 import importlib
+import os
 import sys
+
+if "torch" not in sys.modules:
+    # Otherwise torch's threads spin after each operation, on the cores that a CPU device needs.
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 from ._dialect import dialect
 from .compression import PngCompression
