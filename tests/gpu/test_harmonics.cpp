@@ -125,17 +125,20 @@ TEST(HarmonicsEdges, DirectionsOfAnyLength) {
 
 TEST(HarmonicsEdges, WhatIsMaskedMayBeAnything) {
     const float nan = std::nanf("");
-    const std::vector<float> directions = {nan, nan, nan, 0, 0, 1},
-                             coefficients = {nan, nan, nan, nan, 1, 2, 3, 4};
-    const std::vector<uint8_t> masks = {0, 1};
+    const std::vector<float> directions = {nan, nan, nan, 0, 0, 1, 0, 1, 0},
+                             coefficients = {nan, nan, nan, nan, 1, 2, 3, 4, nan, nan, nan, nan};
+    const std::vector<uint8_t> masks = {0, 1, 0};
     const HarmonicsArrays arrays = {1, 4, 1, directions, coefficients, masks};
     const std::vector<float> colors = harmonics_operators().spherical_harmonics(arrays);
     EXPECT_EQ(colors[0], 0);
     EXPECT_NEAR(colors[1], shared::SH_C0 + 3 * shared::SH_C1, 1e-5);
-    const std::vector<float> by_colors = {nan, 1};
+    EXPECT_EQ(colors[2], 0);
+    const std::vector<float> by_colors = {nan, 1, nan};
     const HarmonicsGradient by = harmonics_operators().spherical_harmonics_backward(arrays, by_colors, true);
-    for (size_t k = 0; k < 4; ++k) EXPECT_EQ(by.coefficients[k], 0) << k;
-    for (size_t k = 0; k < 3; ++k) EXPECT_EQ(by.directions[k], 0) << k;
+    for (const size_t i : {0, 2}) {
+        for (size_t k = 0; k < 4; ++k) EXPECT_EQ(by.coefficients[4 * i + k], 0) << k;
+        for (size_t k = 0; k < 3; ++k) EXPECT_EQ(by.directions[3 * i + k], 0) << k;
+    }
 }
 
 TEST(HarmonicsEdges, NothingIsWrittenBehindAnArray) {

@@ -272,19 +272,24 @@ ProjectedSplats project_scene(const PlainScene& scene) {
     return operators().project(scene.splats(), scene.view_arrays(), scene.options);
 }
 
-/// Compares shapes and gradients of splats that are all visible. shape, gradient: largest relative errors.
+/// Compares shapes and gradients of splats that are all visible. shape, gradient: largest relative errors; a gradient of 0 is
+/// not compared.
 void expect_reference(const PlainScene& scene, double shape, double gradient) {
     const ProjectedSplats out = project_scene(scene);
     for (size_t i = 0; i < scene.size(); ++i) {
         const auto p = reference::project(scene.splat(i), scene.view(0), scene.reference_options());
         ASSERT_TRUE(p.visible) << i;
-        ASSERT_GT(out.radii[2 * i], 0) << i;
+        for (size_t k = 0; k < 2; ++k)
+            EXPECT_NEAR(out.radii[2 * i + k] / std::min(std::ceil(p.reach[int(k)]), shared::RADIUS_MAX), 1,
+                        1e-5)
+                << i;
         EXPECT_NEAR(out.conics[3 * i] / p.conic.x, 1, shape) << i;
         EXPECT_NEAR(out.conics[3 * i + 2] / p.conic.z, 1, shape) << i;
         const double skew = scene.options.whiteners ? std::abs(p.conic.y) + p.conic.z / p.conic.x
                                                     : std::sqrt(p.conic.x * p.conic.z);
         EXPECT_NEAR((out.conics[3 * i + 1] - p.conic.y) / skew, 0, shape) << i;
     }
+    if (gradient == 0) return;
     const ScreenGradients g = random_gradients(scene, out, 3);
     const SplatGradient actual = operators().project_backward(scene.splats(), scene.view_arrays(),
                                                               scene.options, out.radii, g.arrays(), false);
@@ -328,6 +333,8 @@ TEST(ViewsEdges, SplatsOfAllSizes) {
                               std::array{1e-8f, 1e4f, 1.0f}, std::array{-0.5f, 0.2f, 0.1f}})
         add_splat(scene, {0.3f, -0.2f, 4}, {0.5f, -0.1f, 0.7f, 0.4f}, scale);
     expect_reference(scene, 2e-5, 2e-3);
+    scene.options.whiteners = false;
+    expect_reference(scene, 2e-5, 0);
 }
 
 /// The gradient of a scale of zero is zero, but for the compensation, which float32 cannot tell.
@@ -407,10 +414,12 @@ TEST(ViewsEdges, PoisonIsInvisible) {
                            : v < 7  ? scene.quaternions[4 * i + v - 3]
                            : v < 10 ? scene.scales[3 * i + v - 7]
                                     : scene.means[3 * i + 2];
-            value = v == 10 ? 1e19f : kind == 0 ? nan : kind == 1 ? inf : -inf;
+            value = v < 10 ? (kind == 0 ? nan : kind == 1 ? inf : -inf) : 1e19f;
         }
+    scene.options.far = 1e30f;
     for (size_t k = 0; k < 4; ++k) scene.quaternions[4 * 32 + k] = 0;
-    scene.means[3 * 32 + 2] = 4;
+    for (const size_t i : {31, 32}) scene.means[3 * i + 2] = 4;
+    scene.scales[3 * 31] = 1e19f;
     const ProjectedSplats out = project_scene(scene);
     for (size_t i = 0; i < 33; ++i) EXPECT_EQ(out.radii[2 * i], 0) << i;
     EXPECT_GT(out.radii[2 * 33], 0);
