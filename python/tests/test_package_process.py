@@ -225,10 +225,13 @@ def test_a_forked_process_is_told():
     here, there = multiprocessing.Pipe()
     process = multiprocessing.get_context("fork").Process(target=child, args=(there,))
     process.start()
-    assert here.poll(60)
-    *errors, count = here.recv()
-    process.join(60)
-    assert process.exitcode == 0 and count == 3
+    try:
+        assert here.poll(60)
+        *errors, count = here.recv()
+        process.join(60)
+        assert process.exitcode == 0 and count == 3
+    finally:
+        process.kill()
     assert all("forked" in error and "spawn" in error for error in errors), errors
     RENDERERS[0].render(*camera())  # the parent goes on
     RENDERERS.clear()

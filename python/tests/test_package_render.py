@@ -24,15 +24,9 @@ def one_splat(opacity=0.7, color=(1.0, 0.5, 0.25), z=0.0, log_scale=-1.0):
 
 def test_one_splat_has_its_closed_form():
     viewmat, _, width, height = camera()
-    k = np.array(
-        [[60, 0, 32.5], [0, 60, 24.5], [0, 0, 1.0]]
-    )  # the axis meets the centre of a pixel
+    k = np.array([[60, 0, 32.5], [0, 60, 24.5], [0, 0, 1.0]])  # the axis meets the centre of a pixel
     renders = ewa.render(one_splat(), viewmat, k, width, height, background=(0, 0, 1), mode="depth")
-    assert renders.color.shape == (48, 64, 3) and renders.alpha.shape == renders.depth.shape == (
-        48,
-        64,
-        1,
-    )
+    assert renders.color.shape == (48, 64, 3) and renders.alpha.shape == renders.depth.shape == (48, 64, 1)
     assert renders.color.dtype == np.float32 and renders.count is None
     assert renders.alpha[24, 32, 0] == pytest.approx(0.7, abs=1e-5)
     assert renders.color[24, 32] == pytest.approx([0.7, 0.35, 0.7 * 0.25 + 0.3], abs=1e-5)
@@ -40,11 +34,7 @@ def test_one_splat_has_its_closed_form():
     # sigma of the footprint in px: the focal length times exp(-1) / 4, and the low pass of 0.3
     variance = (60 * np.exp(-1) / 4) ** 2 + 0.3
     assert renders.alpha[24, 37, 0] == pytest.approx(0.7 * np.exp(-0.5 * 25 / variance), abs=1e-4)
-    assert (
-        renders.color[0, 0] == pytest.approx([0, 0, 1])
-        and renders.alpha[0, 0, 0] == 0
-        and renders.depth[0, 0, 0] == 0
-    )
+    assert renders.color[0, 0] == pytest.approx([0, 0, 1]) and renders.alpha[0, 0, 0] == 0 and renders.depth[0, 0, 0] == 0
 
 
 def test_a_batch_holds_the_single_renders():
@@ -52,19 +42,15 @@ def test_a_batch_holds_the_single_renders():
     viewmats = np.stack([camera(d)[0] for d in (3, 4, 5)]).astype(np.float32)
     _, k, width, height = camera()
     renders = ewa.render(splats, viewmats, k, width, height, mode="count")
-    assert (
-        renders.color.shape == (3, 48, 64, 3)
-        and renders.count.shape == (3, 48, 64, 1)
-        and renders.depth is None
-    )
+    assert renders.color.shape == (3, 48, 64, 3) and renders.count.shape == (3, 48, 64, 1) and renders.depth is None
     assert renders.count.max() >= 2
     for i in range(3):
         one = ewa.render(splats, viewmats[i], k, width, height)
-        assert np.array_equal(renders.color[i], one.color) and np.array_equal(
-            renders.alpha[i], one.alpha
-        )
-    each = ewa.render(splats, viewmats, np.stack([k, k * 1, k]), width, height)
-    assert np.array_equal(renders.color, each.color)
+        assert np.array_equal(renders.color[i], one.color) and np.array_equal(renders.alpha[i], one.alpha)
+    other = k * [[1.5], [1.5], [1]]
+    each = ewa.render(splats, viewmats, np.stack([k, other, k]), width, height)
+    assert np.array_equal(renders.color[::2], each.color[::2])
+    assert np.array_equal(each.color[1], ewa.render(splats, viewmats[1], other, width, height).color)
     assert not np.array_equal(renders.color[0], renders.color[1])
     none = ewa.render(splats, viewmats[:0], k, width, height)
     assert none.color.shape == (0, 48, 64, 3)
@@ -74,16 +60,7 @@ def test_renders_are_those_of_the_command_line(tmp_path, program, still_life):
     splats = ewa.Splats.from_points(still_life.points, still_life.point_colors, sh_degree=0)
     ewa.save(tmp_path / "splats.ply", splats)
     frames = [1, 30]
-    program(
-        "render",
-        tmp_path / "splats.ply",
-        "--cameras",
-        STILL_LIFE,
-        "--frames",
-        "1,30",
-        "-o",
-        tmp_path / "views",
-    )
+    program("render", tmp_path / "splats.ply", "--cameras", STILL_LIFE, "--frames", "1,30", "-o", tmp_path / "views")
     size = still_life.frames[1].width, still_life.frames[1].height
     renders = ewa.render(splats, still_life.viewmats[frames], still_life.Ks[frames], *size)
     files = sorted((tmp_path / "views").glob("*.png"))
@@ -115,18 +92,11 @@ def test_antialias_and_degree():
     flat = make_splats(20)
     flat.sh[:, 1:] = 0
     full = make_splats(20)
-    assert np.allclose(
-        ewa.render(full, *camera(), sh_degree=0).color, ewa.render(flat, *camera()).color, atol=1e-6
-    )
-    assert not np.allclose(
-        ewa.render(full, *camera()).color, ewa.render(flat, *camera()).color, atol=1e-3
-    )
+    assert np.allclose(ewa.render(full, *camera(), sh_degree=0).color, ewa.render(flat, *camera()).color, atol=1e-6)
+    assert not np.allclose(ewa.render(full, *camera()).color, ewa.render(flat, *camera()).color, atol=1e-3)
 
 
-@pytest.mark.parametrize(
-    "background, expected",
-    [("white", [1, 1, 1]), ("#ff0000", [1, 0, 0]), ([0.5, 0, 2], [0.5, 0, 2])],
-)
+@pytest.mark.parametrize("background, expected", [("white", [1, 1, 1]), ("#ff0000", [1, 0, 0]), ([0.5, 0, 2], [0.5, 0, 2])])
 def test_backgrounds(background, expected):
     empty = make_splats(2)[:0]
     assert np.allclose(ewa.render(empty, *camera(), background=background).color, expected)
@@ -143,15 +113,9 @@ def test_splats_that_are_not_finite_are_skipped():
     [
         ({"viewmats": np.eye(3)}, "viewmats has the shape (3, 3); expected (C, 4, 4) or (4, 4)"),
         ({"Ks": np.zeros((2, 3, 3))}, "Ks has the shape (2, 3, 3); expected (3, 3)"),
-        (
-            {"viewmats": np.stack([np.eye(4)] * 3), "Ks": np.zeros((2, 3, 3))},
-            "Ks has the shape (2, 3, 3); expected (3, 3, 3) or (3, 3)",
-        ),
+        ({"viewmats": np.stack([np.eye(4)] * 3), "Ks": np.zeros((2, 3, 3))}, "Ks has the shape (2, 3, 3); expected (3, 3, 3) or (3, 3)"),
         ({"viewmats": 2 * np.eye(4)}, "viewmats: its last row is not 0 0 0 1"),
-        (
-            {"viewmats": np.stack([np.eye(4), np.diag([2, 2, 2, 1])])},
-            "viewmats[1]: its first three rows and columns are no rotation; it maps the world to the camera",
-        ),
+        ({"viewmats": np.stack([np.eye(4), np.diag([2, 2, 2, 1])])}, "viewmats[1]: its first three rows and columns are no rotation; it maps the world to the camera"),
         ({"viewmats": np.full((4, 4), np.nan)}, "viewmats is not finite"),
         ({"Ks": np.eye(3) * 2}, "Ks is not [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]"),
         ({"Ks": np.diag([-1, 1, 1])}, "Ks: a focal length is not positive"),
@@ -197,6 +161,11 @@ def test_devices():
     ewa.set_device("")
 
 
+def test_a_device_that_cannot_be_had_is_not_kept():
+    code = "import ewa\ntry: ewa.set_device('no such device')\nexcept ewa.InputError: print(ewa.current_device().index >= 0)"
+    assert run_python(code) == "True"
+
+
 def test_the_environment_names_the_device():
     code = "import ewa\ntry: ewa.current_device()\nexcept ewa.InputError as e: print(e)"
     assert "matches 'no such device'" in run_python(code, EWA_DEVICE="no such device")
@@ -214,19 +183,11 @@ for call in (ewa.devices, lambda: ewa.render(splats, np.eye(4), np.eye(3), 8, 8)
 
 
 def test_without_a_driver_files_work_and_the_error_says_what_to_install(tmp_path):
-    lines = run_python(
-        RENDER.format(path=str(tmp_path / "a.ply")),
-        VK_DRIVER_FILES="/dev/null",
-        VK_ICD_FILENAMES="/dev/null",
-    )
+    lines = run_python(RENDER.format(path=str(tmp_path / "a.ply")), VK_DRIVER_FILES="/dev/null", VK_ICD_FILENAMES="/dev/null")
     assert len(lines.splitlines()) == 3 and lines.count("mesa-vulkan-drivers") == 3
 
 
 def test_without_a_loader_files_work_and_the_error_says_what_to_install(tmp_path):
     (tmp_path / "libvulkan.so.1").write_text("no library")
     lines = run_python(RENDER.format(path=str(tmp_path / "a.ply")), LD_LIBRARY_PATH=str(tmp_path))
-    assert (
-        lines.count("there is no Vulkan loader")
-        == lines.count("apt install mesa-vulkan-drivers")
-        == 3
-    )
+    assert lines.count("there is no Vulkan loader") == lines.count("apt install mesa-vulkan-drivers") == 3
