@@ -45,13 +45,14 @@ def main() -> None:
     parser.add_argument("dataset")
     parser.add_argument("--steps", type=int, default=60, help="of each frame")
     parser.add_argument("--frames", type=int, default=4, help="the first frames of the dataset")
+    parser.add_argument("--downscale", type=int, default=1)
     parser.add_argument("--noise", type=float, default=0.02, help="radians and world units")
     parser.add_argument("--rate", type=float, default=3e-3)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
 
     torch.manual_seed(options.seed)
-    data = ewa.Dataset(options.dataset)
+    data = ewa.Dataset(options.dataset, downscale=options.downscale)
     splats = ewa.load(options.splats)
     degree = round(splats.sh.shape[1] ** 0.5) - 1
     shapes = [

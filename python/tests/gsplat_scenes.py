@@ -21,7 +21,7 @@ class Scene:
         self.means = normal(splats, 3) + torch.tensor([0.0, 0.0, 4.0])
         self.quats = normal(splats, 4)
         self.scales = 0.05 + 0.3 * uniform(splats, 3)
-        self.opacities = 0.1 + 0.85 * uniform(splats)
+        self.opacities = 0.1 + 0.9 * uniform(splats)
         self.colors = uniform(splats, channels)
         self.viewmats = cameras_around(cameras).expand(*batch, cameras, 4, 4).clone()
         self.Ks = torch.tensor([[55.0, 0, WIDTH / 2 + 1], [0, 50.0, HEIGHT / 2], [0, 0, 1]])

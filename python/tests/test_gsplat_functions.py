@@ -184,6 +184,10 @@ def test_opacities_tighten_radii_on_the_host(camera_model):
         *_call(s), opacities=torch.full_like(s.opacities, 0.05), **call
     )[0]
     assert (tighter <= radii).all() and (tighter < radii).any()
+    # A compensated splat is fainter still. Here that leaves none.
+    thin = dict(eps2d=1e6, opacities=torch.full_like(s.opacities, 0.005), **call)
+    assert ours.fully_fused_projection(*_call(s), **thin)[0].any()
+    assert not ours.fully_fused_projection(*_call(s), calc_compensations=True, **thin)[0].any()
 
 
 @pytest.mark.parametrize("degree", [0, 1, 2, 3, 4])
@@ -218,16 +222,10 @@ def test_harmonics_of_views(channels):
         expected = reference._spherical_harmonics(3, dirs, wide) * masks[..., None]
         torch.testing.assert_close(actual, expected, rtol=1e-4, atol=1e-4)
     scene, camera, splat = masks.nonzero(as_tuple=True)
-    rows = ours.spherical_harmonics(
-        3,
-        s.means,
-        s.viewmats,
-        coeffs[splat],
-        batch_ids=scene,
-        camera_ids=camera,
-        gaussian_ids=splat,
-    )
-    torch.testing.assert_close(rows, actual[masks])
+    ids = dict(batch_ids=scene, camera_ids=camera, gaussian_ids=splat)
+    for given in (coeffs[splat], coeffs):
+        rows = ours.spherical_harmonics(3, s.means, s.viewmats, given, **ids)
+        torch.testing.assert_close(rows, actual[masks])
     parts = ours.spherical_harmonics_l0(coeffs[:, :1]) + ours.spherical_harmonics_l1_plus(
         3, s.means, s.viewmats, coeffs[:, 1:]
     )
