@@ -101,7 +101,7 @@ std::optional<Buffer> Buffer::in_host_memory(Device& device, std::string name,
         address % std::max<uint64_t>(16, device.limits().storage_alignment) != 0)
         return std::nullopt;
     const uintptr_t first = address / page * page, end = (address + bytes.size() + page - 1) / page * page;
-    void* const pages = reinterpret_cast<void*>(first);
+    auto* const pages = const_cast<std::byte*>(bytes.data()) - (address - first);
     const auto pointer_properties = reinterpret_cast<PFN_vkGetMemoryHostPointerPropertiesEXT>(
         device.handle().getProcAddr("vkGetMemoryHostPointerPropertiesEXT"));
     VkMemoryHostPointerPropertiesEXT properties{VK_STRUCTURE_TYPE_MEMORY_HOST_POINTER_PROPERTIES_EXT, nullptr,
