@@ -43,6 +43,7 @@ from .cuda._wrapper import (
     spherical_harmonics_l1_plus,
     world_to_cam,
 )
+from .exporter import export_splats
 from .optimizers import SelectiveAdam
 from .rendering import (
     RendererConfig,
@@ -55,6 +56,51 @@ from .rendering import (
 )
 from .strategy import DefaultStrategy, MCMCStrategy, Strategy
 from .version import __version__
+
+__all__ = [
+    "DefaultStrategy",
+    "MCMCStrategy",
+    "PngCompression",
+    "RendererConfig",
+    "RendererConfig_MixedBatch",
+    "RendererConfig_ParallelBatch",
+    "RollingShutterType",
+    "SelectiveAdam",
+    "Strategy",
+    "__version__",
+    "accumulate",
+    "accumulate_2dgs",
+    "dialect",
+    "export_splats",
+    "fully_fused_projection",
+    "fully_fused_projection_2dgs",
+    "fully_fused_projection_with_ut",
+    "has_2dgs",
+    "has_3dgs",
+    "has_3dgut",
+    "has_adam",
+    "has_camera_wrappers",
+    "has_losses",
+    "has_reloc",
+    "install",
+    "isect_offset_encode",
+    "isect_tiles",
+    "proj",
+    "quat_scale_to_covar_preci",
+    "rasterization",
+    "rasterization_2dgs",
+    "rasterization_2dgs_inria_wrapper",
+    "rasterization_inria_wrapper",
+    "rasterize_to_indices_in_range",
+    "rasterize_to_indices_in_range_2dgs",
+    "rasterize_to_pixels",
+    "rasterize_to_pixels_2dgs",
+    "rasterize_to_pixels_eval3d",
+    "spherical_harmonics",
+    "spherical_harmonics_l0",
+    "spherical_harmonics_l1_plus",
+    "world_to_cam",
+]
 
 _SUBMODULES = (
     "compression",
@@ -77,14 +123,7 @@ _SUBMODULES = (
 )
 
 
-def export_splats(*args, **kwargs):
-    """As ewa.gsplat.exporter.export_splats, which is loaded when it is first used."""
-    from .exporter import export_splats as export
-
-    return export(*args, **kwargs)
-
-
-def install():
+def install() -> None:
     """Lets `import gsplat`, and its modules, mean this package for the rest of the process."""
     known = sys.modules.get("gsplat")
     if known is not None and known is not sys.modules[__name__]:

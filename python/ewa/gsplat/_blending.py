@@ -4,26 +4,27 @@
 import math
 
 import numpy as np
+from torch import Tensor
 
 from ._arguments import ArgumentError, array, check, shape, tensor
 from ._autograd import Blend, ByLists, needs_gradient
 
 
 def rasterize_to_pixels(
-    means2d,
-    conics,
-    colors,
-    opacities,
-    image_width,
-    image_height,
-    tile_size,
-    isect_offsets,
-    flatten_ids,
-    backgrounds=None,
-    masks=None,
-    packed=False,
-    absgrad=False,
-):
+    means2d: Tensor,
+    conics: Tensor,
+    colors: Tensor,
+    opacities: Tensor,
+    image_width: int,
+    image_height: int,
+    tile_size: int,
+    isect_offsets: Tensor,
+    flatten_ids: Tensor,
+    backgrounds: Tensor | None = None,
+    masks: Tensor | None = None,
+    packed: bool = False,
+    absgrad: bool = False,
+) -> tuple[Tensor, Tensor]:
     """Blends footprints to images [..., H, W, D] and alphas [..., H, W, 1].
 
     Footprints are [..., N, ...], or [nnz, ...] where `packed` is set. `isect_offsets` [..., rows,

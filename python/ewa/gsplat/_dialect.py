@@ -7,7 +7,7 @@ _versions = ("1.4", "1.5", "1.6")
 _current = "1.6"
 
 
-def dialect(version=None):
+def dialect(version: str | None = None) -> str:
     """Chooses the return values of gsplat 1.4, 1.5 or 1.6 (the default) and returns the choice.
 
     1.4: radii are one number a splat, and packed projection returns no batch ids.

@@ -4,6 +4,7 @@
 import math
 
 import torch
+from torch import Tensor
 
 from ._arguments import ArgumentError, check, shape, tensor
 
@@ -17,7 +18,7 @@ _UPPER = ([0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2])
 _FULL = [0, 1, 2, 1, 3, 4, 2, 4, 5]
 
 
-def normalized_quat_to_rotmat(quat):
+def normalized_quat_to_rotmat(quat: Tensor) -> Tensor:
     """Unit quaternions [..., 4] (w first) to rotations [..., 3, 3]."""
     w, x, y, z = quat.unbind(-1)
     rows = (
@@ -44,7 +45,13 @@ def _spread(rotations, factors, triu):
     return upper_triangle(matrices) if triu else matrices
 
 
-def quat_scale_to_covar_preci(quats, scales, compute_covar=True, compute_preci=True, triu=False):
+def quat_scale_to_covar_preci(
+    quats: Tensor,
+    scales: Tensor,
+    compute_covar: bool = True,
+    compute_preci: bool = True,
+    triu: bool = False,
+) -> tuple[Tensor | None, Tensor | None]:
     """Covariances and precisions of splats: [..., 3, 3], or [..., 6] where `triu` is set.
 
     Quaternions [..., 4] need no unit length. A result that is not asked for is None.
@@ -60,7 +67,7 @@ def quat_scale_to_covar_preci(quats, scales, compute_covar=True, compute_preci=T
     return covars, precis
 
 
-def world_to_cam(means, covars, viewmats):
+def world_to_cam(means: Tensor, covars: Tensor, viewmats: Tensor) -> tuple[Tensor, Tensor]:
     """Means [..., N, 3] and covariances [..., N, 3, 3] in each camera's frame: [..., C, N, ...]."""
     means, covars = tensor("means", means), tensor("covars", covars)
     viewmats = tensor("viewmats", viewmats)
@@ -74,7 +81,14 @@ def world_to_cam(means, covars, viewmats):
     return moved, turned
 
 
-def proj(means, covars, Ks, width, height, camera_model="pinhole"):
+def proj(
+    means: Tensor,
+    covars: Tensor,
+    Ks: Tensor,
+    width: int,
+    height: int,
+    camera_model: str = "pinhole",
+) -> tuple[Tensor, Tensor]:
     """Means [..., C, N, 2] and covariances [..., C, N, 2, 2] on the image plane."""
     means, covars, Ks = tensor("means", means), tensor("covars", covars), tensor("Ks", Ks)
     lead = means.shape[:-1]

@@ -2,6 +2,7 @@
 """Spherical harmonics, in the calls of gsplat 1.6 and of 1.5 and older."""
 
 import torch
+from torch import Tensor
 
 from ._arguments import bytes_of, check, shape, tensor, unavailable
 from ._autograd import Harmonics
@@ -23,7 +24,9 @@ _NAMES_OF_VIEWS = (
 _NAMES_OF_DIRS = ("dirs", "coeffs", "masks")
 
 
-def spherical_harmonics(degrees_to_use, *arguments, **named):
+def spherical_harmonics(
+    degrees_to_use: int, *arguments: Tensor | None, **named: Tensor | None
+) -> Tensor:
     """Colours of spherical harmonics, without the 0.5 that renderers add.
 
     gsplat 1.6: (degree, means [..., N, 3], viewmats [..., C, 4, 4], coeffs [N, K, D], masks
@@ -111,12 +114,14 @@ def evaluate(degree, dirs, coeffs, masks):
     return Harmonics.apply(dirs, coeffs, masks, degree).reshape(lead + (channels,))
 
 
-def spherical_harmonics_l0(sh0):
+def spherical_harmonics_l0(sh0: Tensor) -> Tensor:
     """The part of degree 0: sh0 [N, 1, D] gives [N, D]."""
     return tensor("sh0", sh0)[:, 0] * _CONSTANT
 
 
-def spherical_harmonics_l1_plus(degrees_to_use, *arguments, **named):
+def spherical_harmonics_l1_plus(
+    degrees_to_use: int, *arguments: Tensor | None, **named: Tensor | None
+) -> Tensor:
     """The parts of degree 1 and above: as spherical_harmonics, with coefficients [N, K - 1, D]."""
     if "shN" in named:
         named["coeffs"] = named.pop("shN")

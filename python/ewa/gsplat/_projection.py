@@ -4,6 +4,7 @@
 import math
 
 import torch
+from torch import Tensor
 
 from . import _dialect
 from ._arguments import check, shape, tensor, unavailable
@@ -12,24 +13,24 @@ from ._geometry import footprint, full_matrix, project_rows, quat_scale_to_covar
 
 
 def fully_fused_projection(
-    means,
-    covars,
-    quats,
-    scales,
-    viewmats,
-    Ks,
-    width,
-    height,
-    eps2d=0.3,
-    near_plane=0.01,
-    far_plane=1e10,
-    radius_clip=0.0,
-    packed=False,
-    sparse_grad=False,
-    calc_compensations=False,
-    camera_model="pinhole",
-    opacities=None,
-):
+    means: Tensor,
+    covars: Tensor | None,
+    quats: Tensor | None,
+    scales: Tensor | None,
+    viewmats: Tensor,
+    Ks: Tensor,
+    width: int,
+    height: int,
+    eps2d: float = 0.3,
+    near_plane: float = 0.01,
+    far_plane: float = 10000000000.0,
+    radius_clip: float = 0.0,
+    packed: bool = False,
+    sparse_grad: bool = False,
+    calc_compensations: bool = False,
+    camera_model: str = "pinhole",
+    opacities: Tensor | None = None,
+) -> tuple[Tensor, ...]:
     """Projects splats: means [..., N, 3] with covars [..., N, 6] or quats and scales.
 
     Returns radii int32 [..., C, N, 2], means2d, depths, conics and compensations (or None).

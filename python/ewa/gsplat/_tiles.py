@@ -4,6 +4,7 @@
 import math
 
 import torch
+from torch import Tensor
 
 from ._arguments import check, shape
 from ._geometry import ALPHA_THRESHOLD, MAX_ALPHA, MIN_TRANSMITTANCE
@@ -15,21 +16,21 @@ def _tile_bits(tile_width, tile_height):
 
 @torch.no_grad()
 def isect_tiles(
-    means2d,
-    radii,
-    depths,
-    tile_size,
-    tile_width,
-    tile_height,
-    sort=True,
-    segmented=False,
-    packed=False,
-    n_images=None,
-    image_ids=None,
-    gaussian_ids=None,
-    conics=None,
-    opacities=None,
-):
+    means2d: Tensor,
+    radii: Tensor,
+    depths: Tensor,
+    tile_size: int,
+    tile_width: int,
+    tile_height: int,
+    sort: bool = True,
+    segmented: bool = False,
+    packed: bool = False,
+    n_images: int | None = None,
+    image_ids: Tensor | None = None,
+    gaussian_ids: Tensor | None = None,
+    conics: Tensor | None = None,
+    opacities: Tensor | None = None,
+) -> tuple[Tensor, Tensor, Tensor]:
     """The tiles that splats touch.
 
     Returns tiles per splat int32 [..., N] or [nnz], ids int64 [n] and splats int32 [n]. An id is
@@ -95,7 +96,9 @@ def _exponent(a, b, c, x, y):
 
 
 @torch.no_grad()
-def isect_offset_encode(isect_ids, n_images, tile_width, tile_height):
+def isect_offset_encode(
+    isect_ids: Tensor, n_images: int, tile_width: int, tile_height: int
+) -> Tensor:
     """Where the list of each tile starts in the sorted ids: int32 [n_images, rows, columns]."""
     bits = _tile_bits(tile_width, tile_height)
     tiles = torch.arange(tile_width * tile_height)
@@ -106,18 +109,18 @@ def isect_offset_encode(isect_ids, n_images, tile_width, tile_height):
 
 @torch.no_grad()
 def rasterize_to_indices_in_range(
-    range_start,
-    range_end,
-    transmittances,
-    means2d,
-    conics,
-    opacities,
-    image_width,
-    image_height,
-    tile_size,
-    isect_offsets,
-    flatten_ids,
-):
+    range_start: float,
+    range_end: float,
+    transmittances: Tensor,
+    means2d: Tensor,
+    conics: Tensor,
+    opacities: Tensor,
+    image_width: int,
+    image_height: int,
+    tile_size: int,
+    isect_offsets: Tensor,
+    flatten_ids: Tensor,
+) -> tuple[Tensor, Tensor, Tensor]:
     """What each pixel draws of batches [range_start, range_end) of its tile's list.
 
     A batch has tile_size**2 entries. Returns splats, pixels and images, int64 [M], grouped by
@@ -168,16 +171,16 @@ def _drawn(pixels, light, splats, listed, width):
 
 
 def accumulate(
-    means2d,
-    conics,
-    opacities,
-    colors,
-    gaussian_ids,
-    pixel_ids,
-    image_ids,
-    image_width,
-    image_height,
-):
+    means2d: Tensor,
+    conics: Tensor,
+    opacities: Tensor,
+    colors: Tensor,
+    gaussian_ids: Tensor,
+    pixel_ids: Tensor,
+    image_ids: Tensor,
+    image_width: int,
+    image_height: int,
+) -> tuple[Tensor, Tensor]:
     """Blends (splat, pixel, image) triples front to back, differentiably, in torch alone.
 
     Returns images [..., H, W, D] and alphas [..., H, W, 1]. Triples of one pixel must be in the

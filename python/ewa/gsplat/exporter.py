@@ -5,6 +5,7 @@ import os
 import tempfile
 
 import torch
+from torch import Tensor
 
 import ewa
 
@@ -14,7 +15,16 @@ _ENDINGS = {"ply": ".ply", "splat": ".splat", "ply_compressed": ".compressed.ply
 
 
 @torch.no_grad()
-def export_splats(means, scales, quats, opacities, sh0, shN, format="ply", save_to=None):
+def export_splats(
+    means: Tensor,
+    scales: Tensor,
+    quats: Tensor,
+    opacities: Tensor,
+    sh0: Tensor,
+    shN: Tensor,
+    format: str = "ply",
+    save_to: str | os.PathLike[str] | None = None,
+) -> bytes:
     """The bytes of a file: ply, splat or ply_compressed, written to `save_to` as well if given.
 
     Values are as trained: log scales, opacity logits. sh0 [N, 3] or [N, 1, 3], shN [N, K, 3].

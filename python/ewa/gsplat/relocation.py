@@ -2,12 +2,15 @@
 """Relocation of splats after Kheradmand et al., "3D Gaussian Splatting as MCMC", 2024, eq. 9."""
 
 import torch
+from torch import Tensor
 
 from ._arguments import shape
 
 
 @torch.no_grad()
-def compute_relocation(opacities, scales, ratios, binoms, min_opacity=0.0):
+def compute_relocation(
+    opacities: Tensor, scales: Tensor, ratios: Tensor, binoms: Tensor, min_opacity: float = 0.0
+) -> tuple[Tensor, Tensor]:
     """Opacities [N] and scales [N, 3] with which `ratios[i]` splats stand for splat i.
 
     `ratios` [N] are held between 1 and n_max. `binoms` [n_max, n_max] are binomial coefficients:

@@ -3,8 +3,10 @@
 
 import math
 from enum import IntEnum
+from typing import Any
 
 import torch
+from torch import Tensor
 
 from . import _dialect
 from ._arguments import ArgumentError, check, refusal, shape, tensor, unavailable
@@ -20,31 +22,31 @@ _HIT_MODES = {"d", "Ed", "RGB-d", "RGB-Ed"}
 _EXPECTED_MODES = {"ED", "RGB+ED", "Ed", "RGB-Ed"}
 
 
-def render_mode_has_color(mode):
+def render_mode_has_color(mode: str) -> bool:
     return mode in _COLOR_MODES
 
 
-def render_mode_has_depth(mode):
+def render_mode_has_depth(mode: str) -> bool:
     return mode in _DEPTH_MODES
 
 
-def render_mode_has_hit_distance(mode):
+def render_mode_has_hit_distance(mode: str) -> bool:
     return mode in _HIT_MODES
 
 
-def render_mode_has_expected_depth(mode):
+def render_mode_has_expected_depth(mode: str) -> bool:
     return mode in _EXPECTED_MODES
 
 
-def render_mode_has_depth_channel(mode):
+def render_mode_has_depth_channel(mode: str) -> bool:
     return mode in _DEPTH_MODES or mode in _HIT_MODES
 
 
-def render_mode_has_only_depth_channel(mode):
+def render_mode_has_only_depth_channel(mode: str) -> bool:
     return render_mode_has_depth_channel(mode) and not render_mode_has_color(mode)
 
 
-def render_mode_has_only_color(mode):
+def render_mode_has_only_color(mode: str) -> bool:
     return render_mode_has_color(mode) and not render_mode_has_depth_channel(mode)
 
 
@@ -66,50 +68,50 @@ class RendererConfig_ParallelBatch(RendererConfig):
 
 
 def rasterization(
-    means,
-    quats,
-    scales,
-    opacities,
-    colors,
-    viewmats,
-    Ks,
-    width,
-    height,
-    near_plane=0.01,
-    far_plane=1e10,
-    radius_clip=0.0,
-    eps2d=0.3,
-    sh_degree=None,
-    packed=True,
-    tile_size=None,
-    backgrounds=None,
-    render_mode="RGB",
-    sparse_grad=False,
-    absgrad=False,
-    rasterize_mode="classic",
-    channel_chunk=32,
-    distributed=False,
-    camera_model="pinhole",
-    segmented=False,
-    covars=None,
-    with_ut=False,
-    with_eval3d=False,
-    return_normals=False,
-    global_z_order=True,
-    rays=None,
-    radial_coeffs=None,
-    tangential_coeffs=None,
-    thin_prism_coeffs=None,
-    ftheta_coeffs=None,
-    lidar_coeffs=None,
-    external_distortion_coeffs=None,
-    rolling_shutter=None,
-    viewmats_rs=None,
-    ut_params=None,
-    extra_signals=None,
-    extra_signals_sh_degree=None,
-    renderer_config=None,
-):
+    means: Tensor,
+    quats: Tensor | None,
+    scales: Tensor | None,
+    opacities: Tensor,
+    colors: Tensor | None,
+    viewmats: Tensor,
+    Ks: Tensor,
+    width: int,
+    height: int,
+    near_plane: float = 0.01,
+    far_plane: float = 10000000000.0,
+    radius_clip: float = 0.0,
+    eps2d: float = 0.3,
+    sh_degree: int | None = None,
+    packed: bool = True,
+    tile_size: int | None = None,
+    backgrounds: Tensor | None = None,
+    render_mode: str = "RGB",
+    sparse_grad: bool = False,
+    absgrad: bool = False,
+    rasterize_mode: str = "classic",
+    channel_chunk: int = 32,
+    distributed: bool = False,
+    camera_model: str = "pinhole",
+    segmented: bool = False,
+    covars: Tensor | None = None,
+    with_ut: bool = False,
+    with_eval3d: bool = False,
+    return_normals: bool = False,
+    global_z_order: bool = True,
+    rays: object = None,
+    radial_coeffs: object = None,
+    tangential_coeffs: object = None,
+    thin_prism_coeffs: object = None,
+    ftheta_coeffs: object = None,
+    lidar_coeffs: object = None,
+    external_distortion_coeffs: object = None,
+    rolling_shutter: int | None = None,
+    viewmats_rs: Tensor | None = None,
+    ut_params: object = None,
+    extra_signals: Tensor | None = None,
+    extra_signals_sh_degree: int | None = None,
+    renderer_config: object = None,
+) -> tuple[Tensor, Tensor, dict[str, Any]]:
     """Renders splats from cameras.
 
     means [..., N, 3], quats [..., N, 4] (w first, any length), scales [..., N, 3], opacities

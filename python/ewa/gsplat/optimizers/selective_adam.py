@@ -1,13 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
 """Adam over the rows of visible splats."""
 
+from typing import Any
+
 import torch
+from torch import Tensor
 
 from .._arguments import check
 
 
 @torch.no_grad()
-def adam(param, param_grad, exp_avg, exp_avg_sq, valid, lr, b1, b2, eps):
+def adam(
+    param: Tensor,
+    param_grad: Tensor,
+    exp_avg: Tensor,
+    exp_avg_sq: Tensor,
+    valid: Tensor | None,
+    lr: float,
+    b1: float,
+    b2: float,
+    eps: float,
+) -> None:
     """One Adam step, without bias correction, of the rows where `valid` is set (None: all)."""
     rows = slice(None) if valid is None else valid.reshape(-1).nonzero()[:, 0]
     gradient = param_grad[rows]
@@ -20,11 +33,11 @@ def adam(param, param_grad, exp_avg, exp_avg_sq, valid, lr, b1, b2, eps):
 class SelectiveAdam(torch.optim.Adam):
     """Adam whose step takes a mask [N] of visible splats. Each group holds one tensor [N, ...]."""
 
-    def __init__(self, params, eps, betas):
+    def __init__(self, params: Any, eps: float, betas: tuple[float, float]) -> None:
         super().__init__(params=params, eps=eps, betas=betas)
 
     @torch.no_grad()
-    def step(self, visibility):
+    def step(self, visibility: Tensor) -> None:
         for group in self.param_groups:
             check(len(group["params"]) == 1, "a group of SelectiveAdam holds one tensor")
             param = group["params"][0]

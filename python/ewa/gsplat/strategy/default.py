@@ -2,11 +2,12 @@
 """Adaptive density control after Kerbl et al., "3D Gaussian Splatting", 2023, section 5."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import torch
 
 from .._arguments import check
-from .base import Strategy
+from .base import Optimizers, Parameters, Strategy
 from .ops import duplicate, remove, reset_opa, split
 
 
@@ -36,24 +37,39 @@ class DefaultStrategy(Strategy):
     verbose: bool = False
     key_for_gradient: str = "means2d"
 
-    def initialize_state(self, scene_scale=1.0):
+    def initialize_state(self, scene_scale: float = 1.0) -> dict[str, Any]:
         """The running values: sums of pulls, numbers of views, and largest radii where used."""
         state = {"grad2d": None, "count": None, "scene_scale": scene_scale}
         if self.refine_scale2d_stop_iter > 0:
             state["radii"] = None
         return state
 
-    def check_sanity(self, params, optimizers):
+    def check_sanity(self, params: Parameters, optimizers: Optimizers) -> None:
         """Raises an error where parameters or optimizers are not as the strategy needs them."""
         super().check_sanity(params, optimizers)
         self._check_names(params)
 
-    def step_pre_backward(self, params, optimizers, state, step, info):
+    def step_pre_backward(
+        self,
+        params: Parameters,
+        optimizers: Optimizers,
+        state: dict[str, Any],
+        step: int,
+        info: dict[str, Any],
+    ) -> None:
         """Called before loss.backward(): asks for the gradient of the projected means."""
         check(self.key_for_gradient in info, f"info has no {self.key_for_gradient!r}")
         info[self.key_for_gradient].retain_grad()
 
-    def step_post_backward(self, params, optimizers, state, step, info, packed=False):
+    def step_post_backward(
+        self,
+        params: Parameters,
+        optimizers: Optimizers,
+        state: dict[str, Any],
+        step: int,
+        info: dict[str, Any],
+        packed: bool = False,
+    ) -> None:
         """Called after loss.backward(): gathers the pulls and, when it is time, refines."""
         if step >= self.refine_stop_iter:
             return

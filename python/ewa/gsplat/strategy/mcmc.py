@@ -3,10 +3,11 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import torch
 
-from .base import Strategy
+from .base import Optimizers, Parameters, Strategy
 from .ops import inject_noise_to_position, relocate, sample_add
 
 # The most splats that may come to stand on one, with the one itself.
@@ -29,17 +30,25 @@ class MCMCStrategy(Strategy):
     noise_opacity_t: float = 0.005
     noise_opacity_k: float = 100.0
 
-    def initialize_state(self):
+    def initialize_state(self) -> dict[str, Any]:
         """The table of binomial coefficients that relocation needs."""
         rows = [[math.comb(n, k) for k in range(_MOST_COPIES)] for n in range(_MOST_COPIES)]
         return {"binoms": torch.tensor(rows, dtype=torch.float32)}
 
-    def check_sanity(self, params, optimizers):
+    def check_sanity(self, params: Parameters, optimizers: Optimizers) -> None:
         """Raises an error where parameters or optimizers are not as the strategy needs them."""
         super().check_sanity(params, optimizers)
         self._check_names(params)
 
-    def step_post_backward(self, params, optimizers, state, step, info, lr):
+    def step_post_backward(
+        self,
+        params: Parameters,
+        optimizers: Optimizers,
+        state: dict[str, Any],
+        step: int,
+        info: dict[str, Any],
+        lr: float,
+    ) -> None:
         """Called after loss.backward(). `lr` is the learning rate of the means."""
         if self.refine_start_iter < step < self.refine_stop_iter and step % self.refine_every == 0:
             moved = self._relocate_gs(params, optimizers, state["binoms"])

@@ -5,11 +5,15 @@
 which tensors have one row a splat too. Scales are logarithms and opacities logits.
 """
 
+from typing import Any
+
 import torch
 import torch.nn.functional as F
+from torch import Tensor
 
 from .._geometry import normalized_quat_to_rotmat
 from ..relocation import compute_relocation
+from .base import Optimizers, Parameters
 
 # A split splat becomes two whose deviations are smaller by this (Kerbl et al. 2023, section 5.2).
 _SPLIT_FACTOR = 1.6
@@ -61,7 +65,9 @@ def _update_state(state, change):
 
 
 @torch.no_grad()
-def duplicate(params, optimizers, state, mask):
+def duplicate(
+    params: Parameters, optimizers: Optimizers, state: dict[str, Any], mask: Tensor
+) -> None:
     """Appends a copy of the splats of `mask`."""
     chosen = mask.nonzero()[:, 0]
     count = len(chosen)
@@ -75,7 +81,13 @@ def duplicate(params, optimizers, state, mask):
 
 
 @torch.no_grad()
-def split(params, optimizers, state, mask, revised_opacity=False):
+def split(
+    params: Parameters,
+    optimizers: Optimizers,
+    state: dict[str, Any],
+    mask: Tensor,
+    revised_opacity: bool = False,
+) -> None:
     """Replaces each splat of `mask` by two smaller ones, drawn from its distribution.
 
     `revised_opacity` lowers the opacity so that the two together look as the one did.
@@ -110,7 +122,7 @@ def split(params, optimizers, state, mask, revised_opacity=False):
 
 
 @torch.no_grad()
-def remove(params, optimizers, state, mask):
+def remove(params: Parameters, optimizers: Optimizers, state: dict[str, Any], mask: Tensor) -> None:
     """Removes the splats of `mask`."""
     kept = (~mask).nonzero()[:, 0]
     _update_param_with_optimizer(
@@ -120,7 +132,9 @@ def remove(params, optimizers, state, mask):
 
 
 @torch.no_grad()
-def reset_opa(params, optimizers, state, value):
+def reset_opa(
+    params: Parameters, optimizers: Optimizers, state: dict[str, Any], value: float
+) -> None:
     """Lowers opacities to at most `value` and forgets their moments."""
     limit = torch.logit(torch.tensor(value, dtype=torch.float64)).item()
     _update_param_with_optimizer(
@@ -154,7 +168,14 @@ def _set_relocated(name, p, chosen, logits, log_scales):
 
 
 @torch.no_grad()
-def relocate(params, optimizers, state, mask, binoms, min_opacity=0.005):
+def relocate(
+    params: Parameters,
+    optimizers: Optimizers,
+    state: dict[str, Any],
+    mask: Tensor,
+    binoms: Tensor,
+    min_opacity: float = 0.005,
+) -> None:
     """Moves the dead splats of `mask` onto living ones, drawn in proportion to opacity."""
     dead, living = mask.nonzero()[:, 0], (~mask).nonzero()[:, 0]
     if not len(dead) or not len(living):
@@ -180,7 +201,14 @@ def relocate(params, optimizers, state, mask, binoms, min_opacity=0.005):
 
 
 @torch.no_grad()
-def sample_add(params, optimizers, state, n, binoms, min_opacity=0.005):
+def sample_add(
+    params: Parameters,
+    optimizers: Optimizers,
+    state: dict[str, Any],
+    n: int,
+    binoms: Tensor,
+    min_opacity: float = 0.005,
+) -> None:
     """Adds `n` splats onto living ones, drawn in proportion to opacity."""
     chosen = _multinomial_sample(torch.sigmoid(params["opacities"]).flatten(), n)
     logits, log_scales = _relocated(params, chosen, binoms, min_opacity)
@@ -199,7 +227,14 @@ def sample_add(params, optimizers, state, n, binoms, min_opacity=0.005):
 
 
 @torch.no_grad()
-def inject_noise_to_position(params, optimizers, state, scaler, t=0.005, k=100.0):
+def inject_noise_to_position(
+    params: Parameters,
+    optimizers: Optimizers,
+    state: dict[str, Any],
+    scaler: float,
+    t: float = 0.005,
+    k: float = 100.0,
+) -> None:
     """Moves each mean by noise of its own covariance; splats more opaque than `t` barely move."""
     opacities = torch.sigmoid(params["opacities"].flatten())
     rotations = normalized_quat_to_rotmat(F.normalize(params["quats"], dim=-1))
