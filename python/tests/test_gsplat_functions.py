@@ -154,40 +154,37 @@ def _call(s):
     return s.means, None, s.quats, s.scales, s.viewmats, s.Ks, WIDTH, HEIGHT
 
 
-def test_culling_by_planes_radius_and_opacity():
+@pytest.mark.parametrize("camera_model", ["pinhole", "ortho", "fisheye"])
+def test_culling_by_planes_radius_and_opacity(camera_model):
     s = Scene(cameras=1)
-    radii, _, depths, *_ = ours.fully_fused_projection(*_call(s))
+
+    def project(**options):
+        return ours.fully_fused_projection(*_call(s), camera_model=camera_model, **options)
+
+    radii, _, depths, *_ = project()
     seen = (radii > 0).all(-1)
     middle = float(depths[seen].median())
     for plane, kept in (("near_plane", depths > middle), ("far_plane", depths < middle)):
-        clipped = ours.fully_fused_projection(*_call(s), **{plane: middle})[0]
-        assert torch.equal((clipped > 0).all(-1), seen & kept)
-    clipped = ours.fully_fused_projection(*_call(s), radius_clip=12.0)[0]
-    assert torch.equal((clipped > 0).all(-1), seen & (radii > 12).any(-1))
-    faint = torch.full_like(s.opacities, 0.003)
-    assert not ours.fully_fused_projection(*_call(s), opacities=faint)[0].any()
-    half = torch.full_like(s.opacities, 0.05)
-    tighter = ours.fully_fused_projection(*_call(s), opacities=half)[0]
+        assert torch.equal((project(**{plane: middle})[0] > 0).all(-1), seen & kept)
+    largest = int(radii[seen].amax(-1).median())
+    clipped = project(radius_clip=float(largest))[0]
+    assert torch.equal((clipped > 0).all(-1), seen & (radii > largest).any(-1))
+    assert not project(opacities=torch.full_like(s.opacities, 0.003))[0].any()
+    tighter = project(opacities=torch.full_like(s.opacities, 0.05))[0]
     ratio = math.sqrt(2 * math.log(0.05 * 255)) / 3.33
     both = (tighter > 0).all(-1)
     assert (tighter[both] - radii[both] * ratio).abs().max() <= 1
-    # Culled splats have no values and no gradient.
+    # Culled splats have no values.
     assert not depths[~seen].any()
 
 
 @pytest.mark.parametrize("camera_model", ["ortho", "fisheye"])
-def test_opacities_tighten_radii_on_the_host(camera_model):
+def test_compensations_tighten_radii_on_the_host(camera_model):
     s = Scene()
-    call = dict(camera_model=camera_model)
-    radii = ours.fully_fused_projection(*_call(s), **call)[0]
-    tighter = ours.fully_fused_projection(
-        *_call(s), opacities=torch.full_like(s.opacities, 0.05), **call
-    )[0]
-    assert (tighter <= radii).all() and (tighter < radii).any()
-    # A compensated splat is fainter still. Here that leaves none.
-    thin = dict(eps2d=1e6, opacities=torch.full_like(s.opacities, 0.005), **call)
-    assert ours.fully_fused_projection(*_call(s), **thin)[0].any()
-    assert not ours.fully_fused_projection(*_call(s), calc_compensations=True, **thin)[0].any()
+    # Without compensation these are just visible; a compensated splat is fainter.
+    call = dict(eps2d=1e6, opacities=torch.full_like(s.opacities, 0.005), camera_model=camera_model)
+    assert ours.fully_fused_projection(*_call(s), **call)[0].any()
+    assert not ours.fully_fused_projection(*_call(s), calc_compensations=True, **call)[0].any()
 
 
 @pytest.mark.parametrize("degree", [0, 1, 2, 3, 4])
