@@ -7,8 +7,10 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <chrono>
 #include <cstdlib>
 #include <string>
+#include <thread>
 #include <variant>
 
 #include "bindings.h"
@@ -24,6 +26,9 @@ struct DefaultDevice {
     std::string selector;
     std::shared_ptr<gpu::Device> device;
     std::atomic<pid_t> opened_by = 0;
+    std::atomic<int> present = 0;  // DeviceWorks
+    std::atomic<bool> ending = false;
+    std::thread::id ended_by;
 };
 
 DefaultDevice& default_device() {
@@ -33,6 +38,19 @@ DefaultDevice& default_device() {
         return made;
     }();
     return *one;
+}
+
+/// Called before Python ends. A thread that asks for the interpreter after that would be ended in the middle of a C++
+/// function, which ends the process with an abort. So those that use the device finish, and others stay where they are.
+void end_use() {
+    DefaultDevice& one = default_device();
+    {
+        const DeviceWork work;
+        one.ended_by = std::this_thread::get_id();
+        one.ending = true;
+    }
+    const nb::gil_scoped_release released;
+    while (one.present > 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
 }
 
 void check_loader() {
@@ -89,10 +107,26 @@ DeviceWork::DeviceWork()
           if (was_forked())
               throw RunError(
                   "this process was forked from one that uses a Vulkan device, which a fork cannot share; "
-                  "start "
-                  "processes with multiprocessing.get_context(\"spawn\")");
+                  "start processes with multiprocessing.get_context(\"spawn\")");
           return default_device().mutex;
-      }()) {}
+      }()) {
+    stay_while_python_ends();
+}
+
+DeviceWork::Presence::Presence() {
+    ++default_device().present;
+}
+DeviceWork::Presence::~Presence() {
+    --default_device().present;
+}
+
+void DeviceWork::stay_while_python_ends() {
+    DefaultDevice& one = default_device();
+    if (!one.ending || one.ended_by == std::this_thread::get_id()) return;
+    lock_.unlock();
+    --one.present;
+    for (;;) pause();
+}
 
 std::shared_ptr<gpu::Device> DeviceWork::device() const {
     DefaultDevice& one = default_device();
@@ -120,6 +154,9 @@ void bind_device(nb::module_& module) {
         .def_ro("unusable", &DeviceInfo::unusable, "What it lacks; empty if ewa can use it.")
         .def_ro("lacks", &DeviceInfo::lacks, "What ewa does without on this device.")
         .def("__repr__", device_text);
+    nb::module_::import_("atexit").attr("register")(nb::cpp_function([] {
+        if (!was_forked()) end_use();
+    }));
     module.def("devices", devices,
                "Lists the Vulkan devices of this machine. Raises DeviceError if there is none.");
     module.def("set_device", set_device, nb::arg("device"),

@@ -25,8 +25,17 @@ class DeviceWork {
     std::shared_ptr<gpu::Device> device() const;
 
   private:
+    /// Counts, until the thread has the interpreter again.
+    struct Presence {
+        Presence();
+        ~Presence();
+    };
+    /// Never returns in a thread that begins to use the device at the end of the process.
+    void stay_while_python_ends();
+
+    Presence presence_;
     nb::gil_scoped_release released_;
-    std::lock_guard<std::recursive_mutex> lock_;
+    std::unique_lock<std::recursive_mutex> lock_;
 };
 
 /// Whether a device was opened by the process that this one was forked from.

@@ -124,6 +124,25 @@ def test_other_threads_run_meanwhile():
     assert during > 5
 
 
+def test_a_thread_that_still_renders_does_not_disturb_the_end():
+    code = f"""
+import sys, threading
+sys.path.insert(0, {str(ROOT / "python/tests")!r})
+from conftest import camera, ewa, make_splats
+renderer, rendered = ewa.Renderer(make_splats()), threading.Event()
+def render():
+    while True:
+        renderer.render(*camera())
+        rendered.set()
+for _ in range(2):
+    threading.Thread(target=render, daemon=True).start()
+rendered.wait()
+other = ewa.Renderer(make_splats())  # freed at the end
+print("end")
+"""
+    assert [run_python(code) for _ in range(3)] == ["end"] * 3
+
+
 INTERRUPTED = """
 import os, signal, sys
 import numpy as np
