@@ -374,3 +374,22 @@ def test_masked_tiles_show_the_background():
     assert (full[0][hole] - background).abs().max() > 0.1
     with pytest.raises(ValueError, match="multiples of 8"):
         ours.rasterize_to_pixels(*call[:6], 12, *call[7:])
+
+
+def test_alpha_is_at_most_0_99():
+    """Behind an opaque splat, the next one still shows."""
+    means2d = torch.full((1, 2, 2), 4.5)
+    conics = torch.tensor([0.1, 0.0, 0.1]).expand(1, 2, 3)
+    opacities, colors = torch.tensor([[1.0, 0.5]]), torch.tensor([[[1.0, 0.0], [0.0, 1.0]]])
+    offsets, ids = torch.zeros(1, 1, 1, dtype=torch.int32), torch.arange(2, dtype=torch.int32)
+    size = (8, 8, 8, offsets, ids)
+    image, alpha = ours.rasterize_to_pixels(means2d, conics, colors, opacities, *size)
+    torch.testing.assert_close(image[0, 4, 4], torch.tensor([0.99, 0.005]))
+    light = torch.ones(1, 8, 8)
+    splats, pixels, _ = ours.rasterize_to_indices_in_range(
+        0, 9, light, means2d, conics, opacities, *size
+    )
+    assert splats[pixels == 4 * 8 + 4].tolist() == [0, 1]
+    triples = splats, pixels, torch.zeros_like(splats)
+    again = ours.accumulate(means2d, conics, opacities, colors, *triples, 8, 8)
+    torch.testing.assert_close(again, (image, alpha))

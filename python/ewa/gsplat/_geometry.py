@@ -173,7 +173,7 @@ def radii_of(center, depths, sides, det, opacities, options):
     reach = torch.full_like(depths, REACH)
     drawn = (det > 0) & (depths > options.near) & (depths < options.far)
     if opacities is not None:
-        drawn &= opacities >= ALPHA_THRESHOLD
+        # Below the threshold the reach is 0, and so is the radius.
         ratio = torch.clamp(opacities / ALPHA_THRESHOLD, min=1.0)
         reach = torch.minimum(reach, torch.sqrt(2.0 * torch.log(ratio)))
     radii = torch.ceil(reach[..., None] * torch.sqrt(torch.clamp(torch.stack(sides, -1), min=0)))
