@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Geometry on the host, in torch, so that autograd differentiates it."""
 
-import math
-
 import torch
 from torch import Tensor
 
@@ -186,7 +184,3 @@ def radii_of(center, depths, sides, det, opacities, options):
 def camera_offsets(viewmats):
     """What turns a mean into its direction from each camera: R^T t, [..., 3]."""
     return (viewmats[..., :3, :3] * viewmats[..., :3, 3:]).sum(-2)
-
-
-def image_count(dims):
-    return math.prod(dims)

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from . import _dialect
-from ._arguments import ArgumentError, check, refusal, shape, tensor, unavailable
+from ._arguments import check, refusal, shape, tensor, unavailable
 from ._autograd import Blend, ByDepth, ProjectOptions, needs_gradient
 from ._geometry import camera_offsets, upper_triangle
 from ._harmonics import evaluate
