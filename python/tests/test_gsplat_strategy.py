@@ -233,14 +233,14 @@ def test_default_strategy_stops_and_pauses():
     t = Training()
     strategy = ours.DefaultStrategy(
         grow_grad2d=0.0,
-        refine_start_iter=1,
+        refine_start_iter=2,
         refine_every=1,
         refine_stop_iter=9,
         reset_every=6,
         pause_refine_after_reset=2,
     )
     state = strategy.initialize_state()
-    for step, grows in ((1, False), (2, True), (6, False), (7, False), (8, True), (9, False)):
+    for step, grows in ((2, False), (3, True), (6, False), (7, False), (8, True), (9, False)):
         before = len(t.params["means"])
         t.step(strategy, state, step)
         assert (t.check() != before) == grows, step
