@@ -10,7 +10,8 @@
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_MODE) const uint MODE = 0;
-const bool MASKED = (MODE & HARMONICS_MASKED) != 0u, DIRECTIONS = (MODE & HARMONICS_DIRECTIONS) != 0u;
+const bool MASKED = (MODE & HARMONICS_MASKED) != 0u, DIRECTIONS = (MODE & HARMONICS_DIRECTIONS) != 0u,
+           RGB = (MODE & HARMONICS_RGB) != 0u;
 
 layout(set = 0, binding = 0, scalar) readonly buffer Directions { vec3 directions[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Coefficients { float coefficients[]; };
@@ -18,6 +19,7 @@ layout(set = 0, binding = 2, scalar) readonly buffer Masks { uint masks[]; };  /
 layout(set = 0, binding = 3, scalar) readonly buffer ColorsGradient { float colors_gradient[]; };
 layout(set = 0, binding = 4, scalar) writeonly buffer CoefficientsGradient { float coefficients_gradient[]; };
 layout(set = 0, binding = 5, scalar) buffer DirectionsGradient { vec3 directions_gradient[]; };
+layout(set = 0, binding = 6, scalar) readonly buffer RgbCoefficients { vec3 rgb_coefficients[]; };  // the same
 layout(push_constant, scalar) uniform Push { HarmonicsPush push; };
 
 // First of the channels of coefficient k of splat i.
@@ -28,8 +30,11 @@ vec3 direction_gradient(uint i, uint first, vec4 by_color, vec3 direction, float
     vec3 slope[25];
     harmonics_basis_gradient(direction, slope);
     vec3 sum = vec3(0.0);
+    if (RGB)
+        [[unroll]] for (uint k = 1; k < BASES; ++k)
+            sum += dot(rgb_coefficients[i * push.coefficients + k], by_color.rgb) * slope[k];
     [[unroll]] for (uint c = 0; c < 4; ++c) {
-        if (first + c < push.channels)
+        if (!RGB && first + c < push.channels)
             [[unroll]] for (uint k = 1; k < BASES; ++k)
                 sum += (coefficients[coefficient_at(i, k) + first + c] * by_color[c]) * slope[k];
     }

@@ -113,6 +113,7 @@ EWA_UINT(VIEWS_GRADIENTS, 4u);    // also the gradient of the view matrices
 // harmonics.comp, harmonics_backward.comp, bits
 EWA_UINT(HARMONICS_MASKED, 1u);      // a (view, splat) pair whose mask is 0 has the colour 0
 EWA_UINT(HARMONICS_DIRECTIONS, 2u);  // also the gradient of the directions
+EWA_UINT(HARMONICS_RGB, 4u);         // there are 3 channels: loads of a vec3 are faster than of floats
 // densify_write.comp, mcmc_write.comp: the array of the next generation that is written
 EWA_UINT(WRITE_PARAMS, 0u);
 EWA_UINT(WRITE_MOMENTS, 1u);  // one of the two in float32, or both in one

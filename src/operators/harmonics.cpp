@@ -45,7 +45,8 @@ void upload_harmonics(gpu::Device& device, operators::HarmonicsBuffers& b, const
 passes::Constants variant_of(const HarmonicsArrays& h, bool direction_gradients) {
     return {{shared::SPEC_SH_DEGREE, h.degree},
             {shared::SPEC_MODE, (h.masks.empty() ? 0 : shared::HARMONICS_MASKED) |
-                                    (direction_gradients ? shared::HARMONICS_DIRECTIONS : 0)}};
+                                    (direction_gradients ? shared::HARMONICS_DIRECTIONS : 0) |
+                                    (h.channels == 3 ? shared::HARMONICS_RGB : 0)}};
 }
 
 }  // namespace
@@ -62,7 +63,8 @@ std::vector<float> Operators::spherical_harmonics(const HarmonicsArrays& h) {
     gpu::Recording recording(device.limits());
     context_->cache.get<passes::Harmonics>(variant_of(h, false))
         .record(recording,
-                {b.directions.buffer(), b.coefficients.buffer(), b.masks.buffer(), b.colors.buffer()},
+                {b.directions.buffer(), b.coefficients.buffer(), b.masks.buffer(), b.colors.buffer(),
+                 b.coefficients.buffer()},
                 push_of(h, shape));
     context_->executor.run(recording);
     return b.colors.download<float>(count);
@@ -89,7 +91,7 @@ HarmonicsGradient Operators::spherical_harmonics_backward(const HarmonicsArrays&
     context_->cache.get<passes::HarmonicsBackward>(variant_of(h, direction_gradients))
         .record(recording,
                 {b.directions.buffer(), b.coefficients.buffer(), b.masks.buffer(), b.colors.buffer(),
-                 b.coefficients_gradient.buffer(), b.directions_gradient.buffer()},
+                 b.coefficients_gradient.buffer(), b.directions_gradient.buffer(), b.coefficients.buffer()},
                 push_of(h, shape));
     context_->executor.run(recording);
     out.coefficients = b.coefficients_gradient.download<float>(h.coefficients.size());

@@ -43,12 +43,12 @@ struct ProjectViewsBackward {
         compensations_gradient, means_gradient, shapes_gradient, scales_gradient, view_sums;
 };
 
-/// Evaluates spherical harmonics. masks: a byte a (view, splat) pair. Variant: SPEC_SH_DEGREE (0 to 4), SPEC_MODE
-/// (0 or HARMONICS_MASKED).
+/// Evaluates spherical harmonics. masks: a byte a (view, splat) pair. rgb_coefficients: the same as coefficients. Variant:
+/// SPEC_SH_DEGREE (0 to 4), SPEC_MODE (HARMONICS_MASKED, HARMONICS_RGB).
 struct Harmonics {
     static constexpr char shader[] = "harmonics";
     using Work = PerElement<&shared::HarmonicsPush::splats>;
-    gpu::BufferPart directions, coefficients, masks, colors;
+    gpu::BufferPart directions, coefficients, masks, colors, rgb_coefficients;
 };
 
 /// Gradient of Harmonics, that of the coefficients added over the views. Variant: SPEC_SH_DEGREE (0 to 4), SPEC_MODE
@@ -57,7 +57,7 @@ struct HarmonicsBackward {
     static constexpr char shader[] = "harmonics_backward";
     using Work = PerElement<&shared::HarmonicsPush::splats>;
     gpu::BufferPart directions, coefficients, masks, colors_gradient, coefficients_gradient,
-        directions_gradient;
+        directions_gradient, rgb_coefficients;
 };
 
 // Prefix sums, radix sort, and the lists of (splat, tile) instances built with them.

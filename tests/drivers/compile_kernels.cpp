@@ -140,10 +140,13 @@ void compile_operators(Compiler& compiler) {
           {0, VIEWS_COVARIANCES, VIEWS_GRADIENTS, VIEWS_COVARIANCES | VIEWS_GRADIENTS, SHAPE_WHITENERS,
            VIEWS_GRADIENTS | SHAPE_WHITENERS}}});
     const Values degrees = {0, 1, 2, 3, 4};
-    compiler.compile<passes::Harmonics>({{SPEC_SH_DEGREE, degrees}, {SPEC_MODE, {0, HARMONICS_MASKED}}});
+    compiler.compile<passes::Harmonics>(
+        {{SPEC_SH_DEGREE, degrees}, {SPEC_MODE, {0, HARMONICS_MASKED, HARMONICS_RGB}}});
     compiler.compile<passes::HarmonicsBackward>(
         {{SPEC_SH_DEGREE, degrees},
-         {SPEC_MODE, {0, HARMONICS_MASKED, HARMONICS_DIRECTIONS, HARMONICS_MASKED | HARMONICS_DIRECTIONS}}});
+         {SPEC_MODE,
+          {0, HARMONICS_RGB, HARMONICS_DIRECTIONS, HARMONICS_RGB | HARMONICS_DIRECTIONS,
+           HARMONICS_MASKED | HARMONICS_DIRECTIONS}}});
 }
 
 void compile_path_tracer(Compiler& compiler) {

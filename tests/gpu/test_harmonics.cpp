@@ -152,11 +152,12 @@ TEST(HarmonicsEdges, NothingIsWrittenBehindAnArray) {
     const shared::HarmonicsPush push{uint32_t(n), uint32_t(c), uint32_t(count), uint32_t(channels)};
     r.run([&](gpu::Recording& recording) {
         r.cache.get<passes::Harmonics>({{shared::SPEC_SH_DEGREE, 3}, {shared::SPEC_MODE, 0}})
-            .record(recording, {directions, coefficients, masks, colors}, push);
+            .record(recording, {directions, coefficients, masks, colors, coefficients}, push);
         r.cache
             .get<passes::HarmonicsBackward>(
                 {{shared::SPEC_SH_DEGREE, 3}, {shared::SPEC_MODE, shared::HARMONICS_DIRECTIONS}})
-            .record(recording, {directions, coefficients, masks, colors, by_coefficients, by_directions},
+            .record(recording,
+                    {directions, coefficients, masks, colors, by_coefficients, by_directions, coefficients},
                     push);
     });
     expect_intact({&colors, &by_coefficients, &by_directions});
