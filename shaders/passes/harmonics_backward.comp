@@ -55,7 +55,7 @@ void main() {
             harmonics_basis(direction, basis);
             vec4 by_color = vec4(0.0);
             [[unroll]] for (uint c = 0; c < 4; ++c)
-                if (shown && first + c < push.channels) by_color[c] = colors_gradient[at * push.channels + first + c];
+                if (first + c < push.channels) by_color[c] = colors_gradient[at * push.channels + first + c];
             if (shown)
                 [[unroll]] for (uint k = 0; k < BASES; ++k) sums[k] += basis[k] * by_color;
             if (DIRECTIONS) {
