@@ -227,6 +227,16 @@ def test_default_strategy_with_absolute_gradients_and_sizes():
         t.step(strategy, state, step, absgrad=True)
     t.check()
     assert torch.sigmoid(t.params["opacities"]).max() < 0.011  # reset to twice prune_opa
+    # After a reset, splats larger than a tenth of the scene go.
+    strategy.grow_grad2d, state["scene_scale"] = 1e9, 1.0
+    strategy.refine_scale2d_stop_iter = 0
+    with torch.no_grad():
+        t.params["scales"][:] = math.log(0.09)
+        t.params["scales"][7] = math.log(0.2)
+    number = originals(t)[7]
+    copies = (originals(t) == number).sum()
+    t.step(strategy, state, 6, absgrad=True)
+    assert (originals(t) == number).sum() == copies - 1
 
 
 def test_default_strategy_stops_and_pauses():
