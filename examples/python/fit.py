@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Fits splats to the images of a dataset in a plain torch loop: fit.py DATASET [--steps N] [--out FILE]
+"""Fits splats to images in a plain torch loop: fit.py DATASET [--steps N] [--out FILE]
 
-DATASET is a COLMAP model or a transforms.json with points. The last line is the PSNR of the held-out images.
+DATASET is a COLMAP model or a transforms.json with points. The last line is the PSNR of the
+held-out images.
 """
 
 import argparse

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Refines camera poses against splats by the gradient of the view matrices: poses.py SPLATS DATASET
 
-SPLATS is a file that ewa reads, in the frame of the dataset's cameras. --noise first moves each camera
-at random, and the errors before and after show what the refinement restores.
+SPLATS is a file that ewa reads, in the frame of the dataset's cameras. --noise first moves each
+camera at random. The errors before and after show what the refinement restores.
 """
 
 import argparse
@@ -55,13 +55,13 @@ def main() -> None:
     data = ewa.Dataset(options.dataset, downscale=options.downscale)
     splats = ewa.load(options.splats)
     degree = round(splats.sh.shape[1] ** 0.5) - 1
-    shapes = [
+    shapes = (
         to_tensor(splats.means + splats.origin),
         to_tensor(splats.quats),
         to_tensor(splats.log_scales).exp(),
         to_tensor(splats.opacity_logits).sigmoid(),
         to_tensor(splats.sh),
-    ]
+    )
     frames = range(min(options.frames, len(data)))
     photos = [to_tensor(data.images[i])[..., :3] for i in frames]
     truth, Ks = to_tensor(data.viewmats)[: len(frames)], to_tensor(data.Ks)

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """nerfstudio's Splatfacto on ewa, on any device: an example to copy, for nerfstudio 1.1.5.
 
-export NERFSTUDIO_METHOD_CONFIGS="splatfacto-ewa=splatfacto:splatfacto_ewa" PYTHONPATH=examples/python
+export NERFSTUDIO_METHOD_CONFIGS="splatfacto-ewa=splatfacto:splatfacto_ewa"
+export PYTHONPATH=examples/python
 ns-train splatfacto-ewa --data DATA
 """
 
@@ -13,7 +14,7 @@ import torch
 
 import ewa.gsplat
 
-# Before nerfstudio imports gsplat. It is written for gsplat 1.4, whose radii are one number a splat.
+# Before nerfstudio imports gsplat. It is written for gsplat 1.4: radii are one number a splat.
 ewa.gsplat.install()
 ewa.gsplat.dialect("1.4")
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""1 - SSIM (Wang et al. 2004) with its gradient, fast on a CPU: shifted sums blur one axis at a time."""
+"""1 - SSIM (Wang et al. 2004) with its gradient, by shifted sums, which are fast on a CPU."""
 
 import torch
 from torch import Tensor
@@ -13,7 +13,7 @@ WINDOW = (_weights / _weights.sum()).tolist()
 
 
 def blur(image: Tensor) -> Tensor:
-    """A Gaussian of 11x11 pixels over [H, W, channels], with zeros outside. It is its own adjoint."""
+    """A Gaussian of 11x11 pixels over [H, W, channels], zero outside. It is its own adjoint."""
     for axis in (0, 1):
         size = image.shape[axis]
         out = image * WINDOW[RADIUS]
