@@ -57,12 +57,15 @@ def cameras_around(count):
 
 
 def blend(means2d, conics, depths, opacities, features, radii, background=None):
-    """One image [H, W, D] and its alphas [H, W, 1], every pixel against every splat."""
+    """One image [H, W, D] and its alphas [H, W, 1], every pixel against every splat.
+
+    means2d are [M, 2], or [H * W, M, 2] to give each pixel its own.
+    """
     order = torch.argsort(depths.detach(), stable=True)
     order = order[(radii[order] > 0).all(-1)]
     y, x = torch.meshgrid(torch.arange(HEIGHT) + 0.5, torch.arange(WIDTH) + 0.5, indexing="ij")
-    dx = x.reshape(-1, 1) - means2d[order, 0]
-    dy = y.reshape(-1, 1) - means2d[order, 1]
+    dx = x.reshape(-1, 1) - means2d[..., order, 0]
+    dy = y.reshape(-1, 1) - means2d[..., order, 1]
     a, b, c = conics[order].unbind(-1)
     exponent = 0.5 * (a * dx * dx + c * dy * dy) + b * dx * dy
     alpha = (opacities[order] * torch.exp(-exponent)).clamp(max=0.99)

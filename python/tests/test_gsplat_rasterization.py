@@ -151,6 +151,17 @@ def test_the_projected_means_are_between_two_nodes(packed):
     assert not hasattr(again, "absgrad")
 
 
+def test_absolute_gradients_are_sums_over_pixels():
+    s = Scene(splats=12)
+    image, alpha, meta = ours.rasterization(**s.arguments(absgrad=True, packed=False))
+    gradients((image, alpha), s.tensors())
+    values = [meta[k][0].detach() for k in ("conics", "depths", "opacities")]
+    pixels = meta["means2d"][0].detach().expand(HEIGHT * WIDTH, -1, -1).clone().requires_grad_()
+    expected = blend(pixels, *values, s.colors.detach(), meta["radii"][0])
+    expected = gradients([t[None] for t in expected], [pixels])[0].abs().sum(0)
+    assert_close(meta["means2d"].absgrad[0], expected)
+
+
 @pytest.mark.parametrize("packed", [False, True])
 @pytest.mark.parametrize("per_view", [False, True])
 @pytest.mark.parametrize("degree", [None, 2])
