@@ -25,6 +25,7 @@ class Array {
 
     /// Room for `bytes` bytes, whose contents are undefined.
     const gpu::Buffer& reserve(gpu::Device& device, uint64_t bytes) {
+        host_.reset();
         if (!buffer_ || buffer_.bytes() < bytes) {
             buffer_ = gpu::Buffer();
             buffer_ = gpu::Buffer(device, name_, bytes + bytes / 4, texel_, uniform_);
@@ -33,7 +34,6 @@ class Array {
     }
     template <class T>
     const gpu::Buffer& upload(gpu::Device& device, std::span<const T> values) {
-        host_.reset();
         reserve(device, values.size_bytes());
         buffer_.upload(values);
         return buffer_;

@@ -37,9 +37,9 @@ shared::HarmonicsPush push_of(const HarmonicsArrays& h, const HarmonicsShape& sh
 }
 
 void upload_harmonics(gpu::Device& device, operators::HarmonicsBuffers& b, const HarmonicsArrays& h) {
-    b.directions.upload(device, h.directions);
-    b.coefficients.upload(device, h.coefficients);
-    b.masks.upload(device, h.masks);
+    b.directions.lend(device, h.directions);
+    b.coefficients.lend(device, h.coefficients);
+    b.masks.lend(device, h.masks);
 }
 
 passes::Constants variant_of(const HarmonicsArrays& h, bool direction_gradients) {
@@ -67,6 +67,7 @@ std::vector<float> Operators::spherical_harmonics(const HarmonicsArrays& h) {
                  b.coefficients.buffer()},
                 push_of(h, shape));
     context_->executor.run(recording);
+    b.give_back();
     return b.colors.download<float>(count);
 }
 
@@ -84,7 +85,7 @@ HarmonicsGradient Operators::spherical_harmonics_backward(const HarmonicsArrays&
     gpu::Device& device = *context_->device;
     operators::HarmonicsBuffers& b = *context_->harmonics;
     upload_harmonics(device, b, h);
-    b.colors.upload(device, colors_gradient);
+    b.colors.lend(device, colors_gradient);
     b.coefficients_gradient.reserve(device, h.coefficients.size_bytes());
     b.directions_gradient.reserve(device, direction_gradients ? h.directions.size_bytes() : 12);
     gpu::Recording recording(device.limits());
@@ -94,6 +95,7 @@ HarmonicsGradient Operators::spherical_harmonics_backward(const HarmonicsArrays&
                  b.coefficients_gradient.buffer(), b.directions_gradient.buffer(), b.coefficients.buffer()},
                 push_of(h, shape));
     context_->executor.run(recording);
+    b.give_back();
     out.coefficients = b.coefficients_gradient.download<float>(h.coefficients.size());
     if (direction_gradients) out.directions = b.directions_gradient.download<float>(h.directions.size());
     return out;

@@ -85,10 +85,10 @@ void upload_splats(gpu::Device& device, ProjectionBuffers& b, const SplatArrays&
     std::vector<shared::ViewBlock> blocks;
     for (size_t v = 0; v < views.size(); ++v) blocks.push_back(view_block(views, v, options));
     b.views.upload(device, std::span<const shared::ViewBlock>(blocks));
-    b.means.upload(device, splats.means);
-    b.shapes.upload(device, splats.covariances.empty() ? splats.quaternions : splats.covariances);
-    b.scales.upload(device, splats.scales);
-    b.opacities.upload(device, splats.opacities);
+    b.means.lend(device, splats.means);
+    b.shapes.lend(device, splats.covariances.empty() ? splats.quaternions : splats.covariances);
+    b.scales.lend(device, splats.scales);
+    b.opacities.lend(device, splats.opacities);
 }
 
 /// Uploads `values`, or zeros in place of an empty array.
@@ -98,7 +98,7 @@ void upload_gradient(gpu::Device& device, gpu::Recording& recording, operators::
         recording.fill(array.reserve(device, 4 * count), 0, 0, 4 * count);
     } else {
         check_size(name, values.size(), count, shape);
-        array.upload(device, values);
+        array.lend(device, values);
     }
 }
 
@@ -163,6 +163,7 @@ ProjectedSplats Operators::project(const SplatArrays& splats, const ViewArrays& 
                  b.conics.buffer(), b.compensations.buffer()},
                 push_of(splats, views, options));
     context_->executor.run(recording);
+    b.give_back();
     ProjectedSplats out;
     out.radii = b.radii.download<int32_t>(2 * pairs);
     out.means2d = b.means2d.download<float>(2 * pairs);
@@ -192,7 +193,7 @@ SplatGradient Operators::project_backward(const SplatArrays& splats, const ViewA
     ProjectionBuffers& b = *context_->projection;
     gpu::Recording recording(device.limits());
     upload_splats(device, b, splats, views, options);
-    b.radii.upload(device, radii);
+    b.radii.lend(device, radii);
     upload_gradient(device, recording, b.means2d, "the gradient of means2d", gradient.means2d, 2 * pairs,
                     "[C, N, 2]");
     upload_gradient(device, recording, b.depths, "the gradient of depths", gradient.depths, pairs, "[C, N]");
@@ -221,6 +222,7 @@ SplatGradient Operators::project_backward(const SplatArrays& splats, const ViewA
                 push);
     operators::Array* sums = view_gradients ? &reduce_rows(recording, *context_, subgroups, rows) : nullptr;
     context_->executor.run(recording);
+    b.give_back();
     out.means = b.means_gradient.download<float>(3 * n);
     (covariances ? out.covariances : out.quaternions) =
         b.shapes_gradient.download<float>(n * (covariances ? 6 : 4));

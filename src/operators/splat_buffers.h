@@ -12,11 +12,22 @@ struct ProjectionBuffers {
     Array means_gradient{"means gradient"}, shapes_gradient{"shapes gradient"},
         scales_gradient{"scales gradient"};
     Array view_sums{"view sums"}, reduced{"reduced view sums"}, counts{"unused counts"};
+
+    /// The caller's arrays, at the end of a call.
+    void give_back() {
+        for (Array* array :
+             {&means, &shapes, &scales, &opacities, &radii, &means2d, &depths, &conics, &compensations})
+            array->give_back();
+    }
 };
 
 struct HarmonicsBuffers {
     Array directions{"directions"}, coefficients{"coefficients"}, masks{"masks"}, colors{"colors"};
     Array coefficients_gradient{"coefficients gradient"}, directions_gradient{"directions gradient"};
+
+    void give_back() {
+        for (Array* array : {&directions, &coefficients, &masks, &colors}) array->give_back();
+    }
 };
 
 }  // namespace ewa::operators
