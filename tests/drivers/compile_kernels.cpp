@@ -147,6 +147,19 @@ void compile_operators(Compiler& compiler) {
          {SPEC_MODE,
           {0, HARMONICS_RGB, HARMONICS_DIRECTIONS, HARMONICS_RGB | HARMONICS_DIRECTIONS,
            HARMONICS_MASKED | HARMONICS_DIRECTIONS}}});
+    const uint32_t listed = COLLECT_LISTED, whiteners = SHAPE_WHITENERS;
+    compiler.compile<passes::CollectRecords>({{SPEC_MODE,
+                                               {0, COLLECT_FEATURES, COLLECT_RADII, listed, whiteners,
+                                                COLLECT_RADII | whiteners, listed | whiteners}}});
+    compiler.compile<passes::BlendBackward>(
+        {{SPEC_MODE,
+          {BLEND_BACKWARD_ALPHA, BLEND_BACKWARD_ALPHA | BLEND_BACKWARD_ABSOLUTE,
+           BLEND_BACKWARD_ALPHA | BLEND_BACKWARD_FOURTH,
+           BLEND_BACKWARD_ALPHA | BLEND_BACKWARD_FOURTH | BLEND_BACKWARD_ABSOLUTE}}});
+    compiler.compile<passes::GatherSlots>(
+        {{SPEC_MODE,
+          {0, GATHER_ADD, GATHER_ABSOLUTE, GATHER_FOURTH, GATHER_ADD | GATHER_FOURTH,
+           GATHER_ABSOLUTE | GATHER_FOURTH, whiteners, GATHER_ABSOLUTE | whiteners}}});
 }
 
 void compile_path_tracer(Compiler& compiler) {
