@@ -97,6 +97,13 @@ struct BlendArguments {
                 .channels = uint32_t(features.length(1))};
     }
     nb::tuple result(BlendedImage&& image) const {
+        if (image.skipped_nonfinite > 0) {
+            const std::string text = std::to_string(image.skipped_nonfinite) + " of " +
+                                     std::to_string(size()) +
+                                     " splats have a mean, conic, opacity, depth or feature that is not "
+                                     "finite, or a conic that is not positive definite";
+            if (PyErr_WarnEx(PyExc_RuntimeWarning, text.c_str(), 1) != 0) throw nb::python_error();
+        }
         const size_t h = options.height, w = options.width, d = features.length(1);
         nb::object handle = nb::none();
         if (image.record)

@@ -333,6 +333,31 @@ def test_everything_behind_the_camera(packed, camera_model):
     assert not meta["means2d"].grad.any()
 
 
+@pytest.mark.parametrize("packed", [False, True])
+def test_no_cameras(packed):
+    s = Scene(cameras=2)
+    none = {"viewmats": s.viewmats[:0], "Ks": s.Ks[:0]}
+    image, alpha, meta = ours.rasterization(**s.arguments(packed=packed, absgrad=True, **none))
+    assert image.shape[0] == alpha.shape[0] == 0 and image.shape[1:3] == alpha.shape[1:3]
+    (image.sum() + alpha.sum()).backward()
+    assert s.means.grad.shape == s.means.shape and not s.means.grad.any()
+    names = ("means", "quats", "scales", "opacities", "colors", "viewmats", "Ks")
+    batch = {name: getattr(s, name).detach()[None][:0] for name in names}
+    with pytest.raises(ValueError, match="a batch without scenes"):
+        ours.rasterization(**s.arguments(packed=packed, **batch))
+
+
+def test_values_that_are_not_finite_are_skipped_with_a_warning():
+    s = Scene()
+    with torch.no_grad():
+        s.colors[2] = float("nan")
+        s.opacities[3] = float("inf")
+    arguments = s.arguments(opacities=s.opacities.detach())
+    with pytest.warns(RuntimeWarning, match="2 of .* splats have a mean, conic, opacity"):
+        image = ours.rasterization(**arguments)[0]
+    assert torch.isfinite(image).all()
+
+
 def test_strided_and_expanded_tensors():
     s = Scene(cameras=3)
     plain = ours.rasterization(**s.arguments(viewmats=s.viewmats[:1].expand(3, 4, 4)))[0]

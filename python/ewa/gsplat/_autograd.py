@@ -318,13 +318,14 @@ class Blend(Function):
             operators().blend_backward(handle, v_colors[i], v_alphas[i], images.absgrad)
             for i, handle in enumerate(ctx.handles)
         ]
-        v_means2d, v_conics, v_opacities, v_features, v_backgrounds, absolute = zip(*parts)
+        results = zip(*parts) if parts else [()] * 6  # there may be no camera
+        v_means2d, v_conics, v_opacities, v_features, v_backgrounds, absolute = results
         joined = [
-            torch.from_numpy(_gather(v, images.rows, ctx.count)).reshape(s)
+            torch.from_numpy(_gather(v, images.rows, ctx.count)).reshape(s) if v else torch.zeros(s)
             for v, s in zip((v_means2d, v_conics, v_opacities, v_features), ctx.shapes)
         ]
         means2d = ctx.means2d()
-        if images.absgrad and means2d is not None:
+        if images.absgrad and means2d is not None and parts:
             absolute = torch.from_numpy(_gather(absolute, images.rows, ctx.count))
             means2d.absgrad = absolute.reshape(ctx.shapes[0])
         v_background = None
@@ -334,6 +335,8 @@ class Blend(Function):
 
 
 def _stack(arrays, shape):
+    if not arrays:
+        return torch.zeros(shape)
     joined = arrays[0] if len(arrays) == 1 else np.stack(arrays)
     return torch.from_numpy(joined.reshape(shape))
 

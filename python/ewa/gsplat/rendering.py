@@ -282,6 +282,7 @@ class _Scene:
         shape("viewmats", self.viewmats, self.dims + (4, 4))
         shape("Ks", Ks, self.dims + (3, 3))
         self.batches = math.prod(self.batch)
+        check(self.batches > 0, f"means has shape {tuple(means.shape)}: a batch without scenes")
         self.means = means
         known = self.opacities.detach()
         self.tensors = (means, quats, scales, covars, self.viewmats, known, Ks)
