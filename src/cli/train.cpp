@@ -161,12 +161,12 @@ int run(CLI::App& app, TrainArguments& arguments) {
     apply_config_and_quality(app, arguments);
     if (options.dataset.empty()) throw InputError("DATASET is required (see ewa train --help)");
     options.dataset = dataset_input(options.dataset);
-    note_scene(options);
-    if (options.resume && arguments.quality.empty() && app.count("--steps") == 0) keep_steps(options);
     if (fs::is_directory(options.init)) options.init = splat_input(options.init).file.string();
     Footprint& kernel = options.train.render.kernel;
     kernel = settled_kernel(kernel, arguments.antialias);
     check_options(options);  // before the images of a mesh scene are rendered
+    note_scene(options);
+    if (options.resume && arguments.quality.empty() && app.count("--steps") == 0) keep_steps(options);
     if (arguments.check_only) {
         train::check_free(output_folder(options), options);
         return 0;
