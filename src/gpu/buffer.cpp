@@ -173,8 +173,8 @@ void Buffer::upload(std::span<const std::byte> data, uint64_t offset) {
 void Buffer::download(std::span<std::byte> data, uint64_t offset) const {
     assert(offset + data.size() <= bytes_);
     if (data.empty()) return;
-    if (memory_->access() == HostAccess::read_write)
-        std::memcpy(data.data(), mapped() + offset, data.size());
+    if (readable())
+        std::memcpy(data.data(), readable() + offset, data.size());
     else
         copy_through_staging({}, data, offset);
 }
