@@ -18,6 +18,7 @@ EWA_UINT(SPEC_RADIX_BITS, 7u);     // bits a radix pass sorts by, 1..8
 EWA_UINT(SPEC_CUT_OFF, 8u);        // float: contributions below it are skipped; normally ALPHA_MIN
 EWA_UINT(SPEC_ALPHA_TESTED, 9u);   // 1: some mesh material is masked or blended
 EWA_UINT(SPEC_BROADCAST, 11u);     // BROADCAST_*: how the lanes of a tile read a batch of splats
+EWA_UINT(SPEC_SHARP, 12u);         // 1: some footprint is sharper than LOW_PASS leaves any
 EWA_UINT(SPEC_COLOR_FLOATS, 10u);  // a buffer of colours holds 0: 4 bytes a colour; 1: 4 floats
 
 // ---- A splat's parameters ----

@@ -19,6 +19,7 @@ struct BlendFrame {
     // Of the image.
     uint32_t splats = 0, channels = 0, width = 0, height = 0;
     bool whiteners = false;
+    bool sharp = false;  // a footprint is sharper than the low-pass of the projection leaves any
     std::vector<float> background;
     std::vector<uint8_t> tile_mask;
     uint32_t mask_tile_size = 16;

@@ -53,12 +53,33 @@ std::unique_ptr<BlendFrame> take_frame(const std::shared_ptr<Context>& context, 
     return frame;
 }
 
+/// Whether the exponent of a footprint changes faster down a column than the low-pass lets it: yy of the conic is above
+/// 1 / LOW_PASS.
+bool has_sharp(const ScreenSplats& splats) {
+    constexpr float kMost = float(1.01 / shared::LOW_PASS);
+    for (size_t i = 0; i < splats.size(); ++i) {
+        const float* shape = &splats.conics[3 * i];
+        const float skew = shape[0] * shape[1];
+        const float yy = splats.whiteners ? 2 * (shape[2] * shape[2] + skew * skew) : shape[2];
+        if (yy > kMost) return true;
+    }
+    return false;
+}
+
+/// A blending pass's constants: its mode, and whether it computes every pixel's exponential.
+passes::Constants blend_variant(const BlendFrame& f, uint32_t mode) {
+    passes::Constants constants{{shared::SPEC_MODE, mode}};
+    if (f.sharp) constants.push_back({shared::SPEC_SHARP, 1});
+    return constants;
+}
+
 void describe_image(BlendFrame& f, const ScreenSplats& splats, const BlendOptions& options) {
     f.splats = uint32_t(splats.size());
     f.channels = splats.channels;
     f.width = options.width;
     f.height = options.height;
     f.whiteners = splats.whiteners;
+    f.sharp = has_sharp(splats);
     f.background.assign(options.background.begin(), options.background.end());
     f.background.resize(f.channels, 0.0f);
     f.tile_mask.assign(options.tile_mask.begin(), options.tile_mask.end());
@@ -111,7 +132,7 @@ void record_blend(gpu::Recording& recording, Context& context, const BlendFrame&
         if (chunk > 0) record_collect(recording, context, f, chunk, mode | shared::COLLECT_FEATURES);
         context.cache
             .get<passes::Blend>(
-                {{shared::SPEC_MODE, has_fourth(f, chunk) ? shared::BLEND_DEPTH : shared::BLEND_COLOR}})
+                blend_variant(f, has_fourth(f, chunk) ? shared::BLEND_DEPTH : shared::BLEND_COLOR))
             .record(recording,
                     {.records = f.frame.records,
                      .splats = f.frame.instance_splats[1],
@@ -282,7 +303,7 @@ void record_gradient(gpu::Recording& recording, Context& context, const BlendFra
     if (chunk > 0) gather |= shared::GATHER_ADD;
     if (f.whiteners) gather |= shared::SHAPE_WHITENERS;
     if (f.chunks() > 1) record_collect(recording, context, f, chunk, shared::COLLECT_FEATURES);
-    context.cache.get<passes::BlendBackward>({{shared::SPEC_MODE, blend}})
+    context.cache.get<passes::BlendBackward>(blend_variant(f, blend))
         .record(recording,
                 {.records = f.frame.records,
                  .splats = f.frame.instance_splats[1],

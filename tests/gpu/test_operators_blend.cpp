@@ -397,6 +397,33 @@ TEST(OperatorBlend, LentArraysMayGoAfterTheCall) {
     }
 }
 
+/// Footprints that a caller's low-pass, or none, leaves far thinner than a pixel.
+TEST(OperatorBlend, SharpFootprintsMatchTheReference) {
+    for (const bool whiteners : {false, true})
+        for (const double width : {0.05, 0.2, 0.4}) {
+            ScreenScene s = screen_scene(57, 60, SplatKind::ordinary, 4, true, 61, 47);
+            Random random(58);
+            for (size_t i = 0; i < s.splats.size(); ++i) {
+                // A covariance of 8 px by `width` px, turned.
+                const double angle = random.uniform(0, 3), c = std::cos(angle), n = std::sin(angle);
+                const double l = 64, w = width * width, det = l * w;
+                const double xx = c * c * l + n * n * w, xy = c * n * (l - w), yy = n * n * l + c * c * w;
+                const double shape[3] = {whiteners ? std::sqrt(yy / (2 * det)) : yy / det,
+                                         whiteners ? xy / yy : -xy / det,
+                                         whiteners ? std::sqrt(1 / (2 * yy)) : xx / det};
+                for (size_t k = 0; k < 3; ++k) s.splats.conics[3 * i + k] = double(float(shape[k]));
+            }
+            s.splats.whiteners = whiteners;
+            quiet_fragile_pixels(s);
+            const Arrays arrays(s);
+            const BlendedImage image = arrays.blend();
+            expect_image(image, reference::blend(s.splats, s.order, s.width, s.height), s);
+            const auto expected = reference::blend_backward(s.splats, s.order, s.width, s.height,
+                                                            s.features_gradient, s.alphas_gradient);
+            expect_gradient(arrays.backward(image, true), expected, true);
+        }
+}
+
 /// A needle of 400 px by half a pixel: the products of its conic's determinant agree in their first 5 digits.
 TEST(OperatorBlend, WhitenersKeepTheDigitsThatConicsLose) {
     const double angle = 0.7, long_axis = 400 * 400, short_axis = 0.55 * 0.55;
