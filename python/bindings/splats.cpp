@@ -88,6 +88,22 @@ void make_splats(Splats* self, nb::handle means, nb::handle quats, nb::handle lo
     new (self) Splats(std::move(made));
 }
 
+/// For pickle and copy. Views: whoever stores them copies.
+nb::tuple state_of(nb::handle self) {
+    nb::list values;
+    for (const char* name :
+         {"means", "quats", "log_scales", "opacity_logits", "sh", "origin", "antialiased", "comments"})
+        values.append(self.attr(name));
+    return nb::tuple(values);
+}
+
+void restore(Splats* self, const nb::tuple& state) {
+    if (state.size() != 8) throw nb::value_error("the pickled splats are of another version of ewa");
+    make_splats(self, state[0], state[1], state[2], state[3], state[4], state[5]);
+    self->antialiased = nb::cast<bool>(state[6]);
+    self->comments = nb::cast<std::vector<std::string>>(state[7]);
+}
+
 Splats from_points(nb::handle positions, nb::handle colors, int sh_degree) {
     const Array<double> points(positions, "positions", {any('m'), 3});
     const Array<uint8_t> bytes(colors, "colors", {ptrdiff_t(points.length(0)), 3});
@@ -204,6 +220,9 @@ void bind_class(nb::module_& module) {
     splats.def("__getitem__", selected, nb::arg("key"),
                nb::sig("def __getitem__(self, key: object, /) -> Splats"));
     splats.def("__repr__", splats_text);
+    splats.def("__getstate__", state_of, nb::sig("def __getstate__(self) -> tuple[object, ...]"));
+    splats.def("__setstate__", restore,
+               nb::sig("def __setstate__(self, state: tuple[object, ...], /) -> None"));
 }
 
 }  // namespace

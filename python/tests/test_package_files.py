@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Splats in memory and on disk, and images on disk."""
 
+import copy
+import pickle
 import re
 import warnings
 
@@ -267,3 +269,14 @@ def test_images(tmp_path):
         ewa.save_image(path, image[..., 0])
     with pytest.raises(ewa.InputError):
         ewa.load_image(SEEDS / "read_ply/little.ply")
+
+
+def test_splats_are_pickled_and_copied():
+    splats = make_splats(7, 2)
+    splats.antialiased = True
+    splats.origin = (1e6, 2, 3)
+    for other in (pickle.loads(pickle.dumps(splats)), copy.copy(splats), copy.deepcopy(splats)):
+        assert same(other, splats) and other.antialiased and other.comments == splats.comments
+        assert not any(np.shares_memory(getattr(other, n), getattr(splats, n)) for n in ARRAYS)
+    with pytest.raises(ValueError, match="another version"):
+        ewa.Splats.__new__(ewa.Splats).__setstate__((1, 2))
