@@ -132,7 +132,11 @@ std::shared_ptr<gpu::Device> DeviceWork::device() const {
     DefaultDevice& one = default_device();
     if (!one.device) {
         check_loader();
-        one.device = open_device({.selector = one.selector});
+        try {
+            one.device = open_device({.selector = one.selector});
+        } catch (const InputError& error) {
+            throw RunError(error.what());  // a device that is missing is a DeviceError, whoever named it
+        }
         one.opened_by = getpid();
     }
     return one.device;

@@ -153,7 +153,7 @@ def test_devices():
     assert current.name in [device.name for device in devices]
     ewa.set_device(current.index)
     ewa.set_device(current.name[:5].upper())
-    with pytest.raises(ewa.InputError, match="no usable Vulkan device matches 'no such device'"):
+    with pytest.raises(ewa.DeviceError, match="no usable Vulkan device matches 'no such device'"):
         ewa.set_device("no such device")
     assert ewa.current_device().name == current.name  # the one before stays
     with pytest.raises(TypeError):
@@ -162,12 +162,12 @@ def test_devices():
 
 
 def test_a_device_that_cannot_be_had_is_not_kept():
-    code = "import ewa\ntry: ewa.set_device('no such device')\nexcept ewa.InputError: print(ewa.current_device().index >= 0)"
+    code = "import ewa\ntry: ewa.set_device('no such device')\nexcept ewa.DeviceError: print(ewa.current_device().index >= 0)"
     assert run_python(code) == "True"
 
 
 def test_the_environment_names_the_device():
-    code = "import ewa\ntry: ewa.current_device()\nexcept ewa.InputError as e: print(e)"
+    code = "import ewa\ntry: ewa.current_device()\nexcept ewa.DeviceError as e: print(e)"
     assert "matches 'no such device'" in run_python(code, EWA_DEVICE="no such device")
 
 
