@@ -117,12 +117,35 @@ def test_other_wrong_arguments():
         (dict(packed=False, sparse_grad=True), ValueError, "sparse_grad needs packed"),
         (dict(means=s.means.tolist()), TypeError, "means is a list"),
         (dict(colors=torch.rand(60, 4, 3), sh_degree=2), ValueError, "colors.*9 bands"),
+        (dict(colors=torch.rand(60, 0)), ValueError, r"colors .*\(60, 0\).*at least one channel"),
+        (dict(colors=torch.rand(60, 4, 0), sh_degree=1), ValueError, "colors .*one channel"),
+        (dict(sh_degree=3), ValueError, r"colors .*\(60, 3\); expected \[..., N, K, D\]"),
+        (dict(colors=torch.tensor(1.0)), ValueError, r"colors .*\(\); expected \[..., N, D\]"),
+        (dict(viewmats=torch.eye(4)), ValueError, r"viewmats .*\[..., C, 4, 4\]"),
+        (dict(means=torch.zeros(3)), ValueError, r"means .*\[..., N, 3\]"),
+        (dict(eps2d=-0.1), ValueError, "eps2d is -0.1; expected 0 or more"),
+        (dict(width=0), ValueError, "width is 0; expected 1 to 2147483647"),
+        (dict(height=2**31), ValueError, "height is 2147483648; expected"),
+        (dict(width=64.0), TypeError, "width is 64.0; expected an integer"),
+        (dict(height="48"), TypeError, "height is '48'; expected an integer"),
+        (dict(tile_size=2**40), ValueError, "tile_size is 1099511627776"),
+        (dict(tile_size=16.0), TypeError, "tile_size is 16.0"),
+        (dict(colors=torch.rand(60, 36, 3), sh_degree=5), ValueError, "sh_degree is 5; .* 0 to 4"),
+        (dict(colors=torch.rand(60, 4, 3), sh_degree=1.0), TypeError, "sh_degree is 1.0"),
+        (dict(colors=torch.rand(60, 3) + 1j), TypeError, "colors is complex"),
         (dict(means=s.means.to("meta")), TypeError, r"means is on meta.*means.cpu\(\)"),
     ):
         with pytest.raises(error, match=text):
             ours.rasterization(**s.arguments(**options))
     with pytest.raises(ValueError, match="degrees_to_use is 5"):
         ours.spherical_harmonics(5, torch.rand(4, 3), torch.rand(4, 36, 3))
+    with pytest.raises(TypeError, match="degrees_to_use is 1.5"):
+        ours.spherical_harmonics(1.5, torch.rand(4, 3), torch.rand(4, 9, 3))
+    views = (s.means, None, s.quats, s.scales, s.viewmats, s.Ks)
+    with pytest.raises(ValueError, match="height is 2147483648"):
+        ours.fully_fused_projection(*views, WIDTH, 2**31)
+    with pytest.raises(ValueError, match="viewmats .*C, 4, 4"):
+        ours.fully_fused_projection(*views[:4], torch.eye(4), s.Ks, WIDTH, HEIGHT)
     with pytest.raises(ValueError, match="quats and scales"):
         ours.fully_fused_projection(s.means, None, None, None, s.viewmats, s.Ks, WIDTH, HEIGHT)
 
@@ -241,6 +264,30 @@ def test_the_runner_says_how_it_is_used(tmp_path, capsys):
     assert main([str(tmp_path / "none.py")]) == 2
     assert "no such file" in capsys.readouterr().err
     assert main(["--help"]) == 0 and capsys.readouterr().out.startswith("usage:")
+
+
+@pytest.mark.parametrize("module", ["nope", "nope.x", "json", ".x"])
+def test_a_module_that_is_missing_is_one_line(module, tmp_path):
+    done = run("-m", "ewa.gsplat", "-m", module, cwd=tmp_path)
+    assert done.returncode == 1 and len(done.stderr.splitlines()) == 1, done.stderr
+    assert module in done.stderr and not done.stdout
+
+
+def test_errors_inside_a_module_stay_visible(tmp_path):
+    (tmp_path / "pack").mkdir()
+    (tmp_path / "pack/__init__.py").write_text("import nothing_of_the_kind")
+    (tmp_path / "pack/part.py").write_text("")
+    (tmp_path / "plain.py").write_text("import nothing_of_the_kind")
+    for module in ("pack.part", "plain"):
+        done = run("-m", "ewa.gsplat", "-m", module, cwd=tmp_path)
+        assert done.returncode == 1 and "Traceback" in done.stderr
+        assert "No module named 'nothing_of_the_kind'" in done.stderr
+
+
+def test_without_torch_the_import_says_what_is_missing():
+    done = run("-c", "import sys; sys.modules['torch'] = None; import ewa.gsplat")
+    line = "ImportError: ewa.gsplat needs PyTorch: pip install ewa-splatting[torch]"
+    assert done.stderr.splitlines()[-1] == line
 
 
 def test_install_comes_before_gsplat(monkeypatch):

@@ -376,6 +376,44 @@ def test_masked_tiles_show_the_background():
         ours.rasterize_to_pixels(*call[:6], 12, *call[7:])
 
 
+@pytest.mark.parametrize("packed", [False, True])
+def test_lists_with_wrong_ids_are_refused(packed):
+    lead = (3,) if packed else (1, 3)
+    splats = torch.full(lead + (2,), 4.0), torch.tensor([1.0, 0, 1]).expand(lead + (3,))
+    splats += (torch.ones(lead + (3,)), torch.ones(lead))
+    offsets, ids = torch.zeros(1, 1, 1, dtype=torch.int32), torch.arange(3)
+
+    def draw(offsets, ids, size=(8, 8, 8)):
+        return ours.rasterize_to_pixels(*splats, *size, offsets, ids, packed=packed)
+
+    assert draw(offsets, ids)[1].any()
+    for wrong in (ids - 1, ids + 1, ids * 0 - 5, ids + 2**32):
+        with pytest.raises(ValueError, match="flatten_ids holds .* at least 0 and below 3"):
+            draw(offsets, wrong)
+    for wrong in (offsets - 1, offsets + 4):
+        with pytest.raises(ValueError, match="isect_offsets holds .* at least 0 and below 4"):
+            draw(wrong, ids)
+    with pytest.raises(ValueError, match="isect_offsets has shape"):
+        draw(offsets[0, 0], ids)
+    for i, name in enumerate(("image_width", "image_height", "tile_size")):
+        size = [8, 8, 8]
+        size[i] = 2**31
+        with pytest.raises(ValueError, match=f"{name} is 2147483648; expected 1 to 2147483647"):
+            draw(offsets, ids, size)
+    with pytest.raises(ValueError, match="colors has shape .* at least one channel"):
+        ours.rasterize_to_pixels(
+            *splats[:2], splats[2][..., :0], splats[3], 8, 8, 8, offsets, ids, packed=packed
+        )
+
+
+def test_splats_of_another_image_are_refused():
+    splats = torch.full((2, 3, 2), 4.0), torch.tensor([1.0, 0, 1]).expand(2, 3, 3)
+    splats += (torch.ones(2, 3, 3), torch.ones(2, 3))
+    offsets = torch.tensor([0, 3], dtype=torch.int32).reshape(2, 1, 1)
+    with pytest.raises(ValueError, match="flatten_ids holds values from 3 to 5; .* below 3"):
+        ours.rasterize_to_pixels(*splats, 8, 8, 8, offsets, torch.tensor([3, 4, 5, 0, 1, 2]))
+
+
 def test_alpha_is_at_most_0_99():
     """Behind an opaque splat, the next one still shows."""
     means2d = torch.full((1, 2, 2), 4.5)

@@ -137,6 +137,71 @@ def test_meta_travels_as_a_plain_dict():
     assert type(meta.copy()) is dict
 
 
+def test_meta_is_changed_as_a_dict():
+    def make():
+        with torch.no_grad():
+            return ours.rasterization(**Scene().arguments())[2]
+
+    ids = make()["isect_ids"]
+    meta = make()
+    meta["isect_ids"] = 1
+    assert len(meta["flatten_ids"]) == len(ids) and meta["isect_ids"] == 1
+    meta = make()
+    assert torch.equal(meta.pop("isect_ids"), ids)
+    assert "isect_ids" not in meta and set(meta) == META - {"isect_ids"}
+    assert meta.pop("isect_ids", 3) == 3 and meta.get("isect_ids") is None
+    for read in (meta.pop, meta.__getitem__, meta.__delitem__):
+        with pytest.raises(KeyError):
+            read("isect_ids")
+    meta = make()
+    assert torch.equal(meta.setdefault("isect_ids"), ids) and len(meta["flatten_ids"]) == len(ids)
+    assert meta.setdefault("mine", 4) == meta["mine"] == meta.pop("mine") == 4
+    meta = make()
+    del meta["isect_offsets"]
+    assert set(meta) == META - {"isect_offsets"}
+
+
+@pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.parametrize("camera_model", ["pinhole", "ortho", "fisheye"])
+def test_autocast_changes_nothing(camera_model, packed):
+    s = Scene(cameras=2)
+    coeffs = torch.rand(60, 4, 3, requires_grad=True)
+    call = s.arguments(camera_model=camera_model, packed=packed, colors=coeffs, sh_degree=1)
+    inputs = [s.means, s.quats, s.scales, s.opacities, s.viewmats, coeffs]
+    plain = ours.rasterization(**call)[:2]
+    with torch.autocast("cpu", dtype=torch.bfloat16):
+        cast = ours.rasterization(**call)[:2]
+    found = torch.autograd.grad([t.sum() for t in cast], inputs)
+    expected = torch.autograd.grad([t.sum() for t in plain], inputs)
+    for a, e in zip((*cast, *found), (*plain, *expected)):
+        assert a.dtype == torch.float32 and torch.equal(a, e)
+
+
+@pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.parametrize("sparse", [False, True])
+def test_second_derivatives_are_refused(packed, sparse):
+    if sparse and not packed:
+        pytest.skip("sparse gradients are of packed footprints")
+    s = Scene()
+    coeffs = torch.rand(60, 4, 3, requires_grad=True)
+    call = s.arguments(packed=packed, colors=coeffs, sh_degree=1, sparse_grad=sparse)
+    loss = ours.rasterization(**call)[0].sum()  # its gradient is a constant
+    plain = torch.autograd.grad(loss, [s.scales, s.opacities, coeffs], retain_graph=True)
+    for t, expected in zip((s.scales, s.opacities, coeffs), plain):
+        found = torch.autograd.grad(loss, t, create_graph=True)[0]
+        if found.is_sparse:
+            found, expected = found.to_dense(), expected.to_dense()
+        assert torch.equal(found, expected)
+        with pytest.raises(NotImplementedError, match="first derivatives only"):
+            torch.autograd.grad(found.sum(), s.means)
+    with pytest.raises(NotImplementedError, match="first derivatives only"):
+        torch.autograd.functional.jvp(
+            lambda m: ours.rasterization(**s.arguments(means=m, packed=packed))[0],
+            s.means.detach(),
+            torch.ones(60, 3),
+        )
+
+
 @pytest.mark.parametrize("packed", [False, True])
 def test_the_projected_means_are_between_two_nodes(packed):
     s = Scene(cameras=2)

@@ -239,6 +239,17 @@ def test_default_strategy_with_absolute_gradients_and_sizes():
     assert (originals(t) == number).sum() == copies - 1
 
 
+def test_missing_gradients_name_what_gives_them():
+    t = Training()
+    strategy = ours.DefaultStrategy(absgrad=True)
+    with pytest.raises(ValueError, match=r"needs rasterization\(absgrad=True\)"):
+        t.step(strategy, strategy.initialize_state(), 1)
+    strategy = ours.DefaultStrategy()
+    info = {"means2d": torch.zeros(1, 60, 2)}
+    with pytest.raises(ValueError, match="needs step_pre_backward"):
+        strategy.step_post_backward(t.params, t.optimizers, strategy.initialize_state(), 1, info)
+
+
 def test_default_strategy_stops_and_pauses():
     t = Training()
     strategy = ours.DefaultStrategy(

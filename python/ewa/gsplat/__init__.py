@@ -13,6 +13,15 @@ if "torch" not in sys.modules:
     # Otherwise torch's threads spin after each operation, on the cores that a CPU device needs.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
+try:
+    importlib.import_module("torch")
+except ModuleNotFoundError as error:
+    if error.name != "torch":
+        raise
+    raise ImportError(
+        "ewa.gsplat needs PyTorch: pip install ewa-splatting[torch]", name="torch"
+    ) from None
+
 from ._dialect import dialect
 from .compression import PngCompression
 from .cuda._wrapper import (

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Checks of arguments: device, type and shape of tensors, and what ewa does not have."""
 
+import functools
+import operator
 import warnings
 
 import numpy as np
@@ -29,6 +31,8 @@ def tensor(name, value):
         )
     if value.dtype is torch.float32:
         return value
+    if value.dtype.is_complex:
+        raise TypeError(f"{name} is complex; ewa takes real numbers")
     if value.dtype is torch.float64:
         _warn_of_double(name)
     return value.float()
@@ -44,6 +48,35 @@ def _warn_of_double(name):
 def shape(name, value, expected):
     if tuple(value.shape) != tuple(expected):
         raise ArgumentError(f"{name} has shape {tuple(value.shape)}; expected {tuple(expected)}")
+
+
+def mismatch(name, value, expected):
+    """The error for a tensor without the dimensions that `expected` describes."""
+    return ArgumentError(f"{name} has shape {tuple(value.shape)}; expected {expected}")
+
+
+_LARGEST = 2**31 - 1  # what the device counts with
+
+
+def integer(name, value, low=1, high=_LARGEST):
+    """`value` as an int from `low` to `high`."""
+    try:
+        value = operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name} is {value!r}; expected an integer") from None
+    check(low <= value <= high, f"{name} is {value}; expected {low} to {high}")
+    return value
+
+
+def full_precision(function):
+    """The function without autocast: products of half precision place splats some pixels off."""
+
+    @functools.wraps(function)
+    def run(*args, **kwargs):
+        with torch.autocast("cpu", enabled=False):
+            return function(*args, **kwargs)
+
+    return run
 
 
 def array(value):

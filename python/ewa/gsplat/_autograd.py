@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The differentiable operators: numpy views of tensors in, the device's arrays out."""
 
+import functools
 import math
 import weakref
 
 import numpy as np
 import torch
 from torch.autograd import Function
-from torch.autograd.function import once_differentiable
 
-from ._arguments import array, bytes_of
+from ._arguments import array, bytes_of, check
 from ._device import operators
 
 
@@ -21,13 +21,44 @@ def _tensor_or_none(value):
     return None if value is None else torch.from_numpy(value)
 
 
+class _Derivative(Function):
+    """A gradient that depends on tensors in a way that cannot be differentiated."""
+
+    @staticmethod
+    def forward(ctx, value, *_tensors):
+        return value.clone()
+
+    @staticmethod
+    def backward(ctx, _gradient):
+        raise NotImplementedError("ewa.gsplat has first derivatives only")
+
+
+def first_derivatives(backward):
+    """Makes derivatives of gradients an error. torch's once_differentiable lets some be zero."""
+
+    @functools.wraps(backward)
+    def run(ctx, *gradients):
+        with torch.no_grad():
+            out = backward(ctx, *gradients)
+        if not torch.is_grad_enabled():  # create_graph=True enables it
+            return out
+        given = (*ctx.saved_tensors, *gradients)
+        causes = [t for t in given if t is not None and t.requires_grad]
+        if not causes:
+            return out
+        return tuple(None if v is None else _Derivative.apply(v, *causes) for v in out)
+
+    return run
+
+
 class ProjectOptions:
     """What a projection takes beside tensors."""
 
     __slots__ = ("width", "height", "eps2d", "near", "far", "radius_clip", "compensations")
 
     def __init__(self, width, height, eps2d, near, far, radius_clip, compensations):
-        self.width, self.height = int(width), int(height)
+        check(eps2d >= 0, f"eps2d is {eps2d}; expected 0 or more")
+        self.width, self.height = width, height
         self.eps2d, self.near, self.far = float(eps2d), float(near), float(far)
         self.radius_clip, self.compensations = float(radius_clip), bool(compensations)
 
@@ -108,7 +139,7 @@ class Project(Function):
         return tuple(out)
 
     @staticmethod
-    @once_differentiable
+    @first_derivatives
     def backward(ctx, _radii, v_means2d, v_depths, v_conics, v_compensations):
         *tensors, radii = ctx.saved_tensors
         gradients = [_numpy_or_none(v) for v in (v_means2d, v_depths, v_conics, v_compensations)]
@@ -143,7 +174,7 @@ class ProjectPacked(Function):
         return (*ids, *packed)
 
     @staticmethod
-    @once_differentiable
+    @first_derivatives
     def backward(ctx, _batch, _camera, _splat, _indptr, _radii, *packed):
         tensors = ctx.saved_tensors
         shape = ctx.radii.shape[:-1]
@@ -193,7 +224,7 @@ class Harmonics(Function):
         return torch.from_numpy(out)
 
     @staticmethod
-    @once_differentiable
+    @first_derivatives
     def backward(ctx, v_colors):
         dirs, coeffs = ctx.saved_tensors
         v_coeffs, v_dirs = operators().spherical_harmonics_backward(
@@ -214,8 +245,8 @@ class Images:
     """
 
     def __init__(self, dims, width, height, tile_size, rows, absgrad=False, masks=None):
-        self.dims, self.width, self.height = tuple(dims), int(width), int(height)
-        self.tile_size, self.rows, self.absgrad = int(tile_size), rows, absgrad
+        self.dims, self.width, self.height = tuple(dims), width, height
+        self.tile_size, self.rows, self.absgrad = tile_size, rows, absgrad
         self.masks = None
         if masks is not None:
             self.masks = bytes_of(masks).reshape((-1,) + masks.shape[-2:])
@@ -300,11 +331,11 @@ class Blend(Function):
         ctx.shapes = [t.shape for t in (means2d, conics, opacities, features)]
         ctx.means2d = weakref.ref(means2d)
         ctx.set_materialize_grads(False)
-        ctx.save_for_backward(means2d)
+        ctx.save_for_backward(means2d, conics, opacities, features)
         return _stack(colors, size + (channels,)), _stack(alphas, size + (1,))
 
     @staticmethod
-    @once_differentiable
+    @first_derivatives
     def backward(ctx, v_colors, v_alphas):
         ctx.saved_tensors  # torch raises here when the graph is already freed
         images = ctx.images

@@ -6,7 +6,7 @@ import math
 import numpy as np
 from torch import Tensor
 
-from ._arguments import ArgumentError, array, check, shape, tensor
+from ._arguments import ArgumentError, array, check, integer, mismatch, shape, tensor
 from ._autograd import Blend, ByLists, needs_gradient
 
 
@@ -34,6 +34,13 @@ def rasterize_to_pixels(
     """
     means2d, conics = tensor("means2d", means2d), tensor("conics", conics)
     colors, opacities = tensor("colors", colors), tensor("opacities", opacities)
+    image_width = integer("image_width", image_width)
+    image_height = integer("image_height", image_height)
+    tile_size = integer("tile_size", tile_size)
+    if isect_offsets.dim() < 2:
+        raise mismatch("isect_offsets", isect_offsets, "[..., rows, columns]")
+    if not colors.dim() or not colors.shape[-1]:
+        raise mismatch("colors", colors, "[..., D] with at least one channel")
     dims, (rows, columns) = isect_offsets.shape[:-2], isect_offsets.shape[-2:]
     channels = colors.shape[-1]
     lead = means2d.shape[:1] if packed else dims + means2d.shape[-2:-1]
@@ -50,27 +57,40 @@ def rasterize_to_pixels(
         raise ArgumentError(f"tile_size is {tile_size}; the device draws multiples of 8")
     check(rows * tile_size >= image_height, f"{rows} rows of tiles do not cover {image_height} px")
     check(columns * tile_size >= image_width, f"{columns} tiles do not cover {image_width} px")
-    ranges, offsets, ids = _lists(isect_offsets, flatten_ids, None if packed else lead[-1])
+    ranges, offsets, ids = _lists(isect_offsets, flatten_ids, lead[-1], packed)
     images = ByLists(dims, image_width, image_height, tile_size, ranges, absgrad, masks)
     keep = needs_gradient(means2d, conics, colors, opacities, backgrounds)
     images.order(offsets, ids)
     return Blend.apply(means2d, conics, opacities, colors, backgrounds, images, keep)
 
 
-def _lists(isect_offsets, flatten_ids, count):
+def _range(name, values, low, high):
+    """The least of the values and one more than the largest; both are within low and high."""
+    if not values.size:
+        return low, low
+    least, largest = int(values.min()), int(values.max())
+    check(
+        low <= least and largest < high,
+        f"{name} holds values from {least} to {largest}; expected at least {low} and below {high}",
+    )
+    return least, largest + 1
+
+
+def _lists(isect_offsets, flatten_ids, count, packed):
     """For each image: its range of splats, and its lists counted from the start of that range."""
     images = math.prod(isect_offsets.shape[:-2])
+    ids = array(flatten_ids)
+    _range("isect_offsets", array(isect_offsets), 0, len(ids) + 1)
     starts = array(isect_offsets).astype(np.int32, copy=False).reshape(images, -1)
-    ids = array(flatten_ids).astype(np.int32, copy=False)
     ends = np.append(starts[1:, 0], len(ids)).astype(np.int32)
     ranges, offsets, lists = [], [], []
     for i in range(images):
         first = starts[i, 0]
         own = ids[first : ends[i]]
-        if count is not None:
-            low, high = i * count, (i + 1) * count
-        else:
-            low, high = (int(own.min()), int(own.max()) + 1) if len(own) else (0, 0)
+        low, high = (0, count) if packed else (i * count, (i + 1) * count)
+        used = _range("flatten_ids", own, low, high)
+        if packed:
+            low, high = used
         ranges.append((low, high))
         offsets.append(np.append(starts[i] - first, len(own)).astype(np.int32))
         lists.append(np.ascontiguousarray(own - low, np.int32))

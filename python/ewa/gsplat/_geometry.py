@@ -4,7 +4,7 @@
 import torch
 from torch import Tensor
 
-from ._arguments import ArgumentError, check, shape, tensor
+from ._arguments import ArgumentError, check, full_precision, shape, tensor
 
 # A splat is drawn where its alpha reaches this; beyond `reach` deviations no alpha does.
 ALPHA_THRESHOLD = 1.0 / 255.0
@@ -43,6 +43,7 @@ def _spread(rotations, factors, triu):
     return upper_triangle(matrices) if triu else matrices
 
 
+@full_precision
 def quat_scale_to_covar_preci(
     quats: Tensor,
     scales: Tensor,
@@ -65,6 +66,7 @@ def quat_scale_to_covar_preci(
     return covars, precis
 
 
+@full_precision
 def world_to_cam(means: Tensor, covars: Tensor, viewmats: Tensor) -> tuple[Tensor, Tensor]:
     """Means [..., N, 3] and covariances [..., N, 3, 3] in each camera's frame: [..., C, N, ...]."""
     means, covars = tensor("means", means), tensor("covars", covars)
@@ -79,6 +81,7 @@ def world_to_cam(means: Tensor, covars: Tensor, viewmats: Tensor) -> tuple[Tenso
     return moved, turned
 
 
+@full_precision
 def proj(
     means: Tensor,
     covars: Tensor,

@@ -4,7 +4,7 @@
 import torch
 from torch import Tensor
 
-from ._arguments import bytes_of, check, shape, tensor, unavailable
+from ._arguments import bytes_of, check, integer, mismatch, shape, tensor, unavailable
 from ._autograd import Harmonics
 from ._geometry import camera_offsets
 
@@ -94,8 +94,10 @@ def _from_views(
 
 def evaluate(degree, dirs, coeffs, masks):
     """Directions [..., 3] with coefficients [..., K, D], or [N, K, D] for every leading dim."""
+    degree = integer("degrees_to_use", degree, 0, 4)
+    if coeffs.dim() < 2 or not coeffs.shape[-1]:
+        raise mismatch("coeffs", coeffs, "[..., K, D] with at least one channel")
     lead, (bands, channels) = dirs.shape[:-1], coeffs.shape[-2:]
-    check(0 <= degree <= 4, f"degrees_to_use is {degree}; expected 0 to 4")
     check(
         (degree + 1) ** 2 <= bands,
         f"coeffs has {bands} bands; degree {degree} needs {(degree + 1) ** 2}",

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from . import _dialect
-from ._arguments import check, shape, tensor, unavailable
+from ._arguments import check, full_precision, integer, mismatch, shape, tensor, unavailable
 from ._autograd import Project, ProjectOptions, ProjectPacked
 from ._geometry import footprint, full_matrix, project_rows, quat_scale_to_covar_preci, radii_of
 
@@ -39,6 +39,7 @@ def fully_fused_projection(
     """
     tensors = _checked(means, covars, quats, scales, viewmats, Ks, opacities)
     check(packed or not sparse_grad, "sparse_grad needs packed=True")
+    width, height = integer("width", width), integer("height", height)
     options = ProjectOptions(
         width, height, eps2d, near_plane, far_plane, radius_clip, calc_compensations
     )
@@ -54,7 +55,9 @@ def fully_fused_projection(
 def _checked(means, covars, quats, scales, viewmats, Ks, opacities):
     """The tensors in the order of the operators, each with the right shape."""
     means = tensor("means", means)
-    batch, count = means.shape[:-2], means.shape[-2] if means.dim() > 1 else 0
+    if means.dim() < 2:
+        raise mismatch("means", means, "[..., N, 3]")
+    batch, count = means.shape[:-2], means.shape[-2]
     shape("means", means, batch + (count, 3))
     if covars is not None:
         covars, quats, scales = tensor("covars", covars), None, None
@@ -65,13 +68,20 @@ def _checked(means, covars, quats, scales, viewmats, Ks, opacities):
         shape("quats", quats, batch + (count, 4))
         shape("scales", scales, batch + (count, 3))
     viewmats, Ks = tensor("viewmats", viewmats), tensor("Ks", Ks)
-    cameras = viewmats.shape[-3] if viewmats.dim() > 2 else 0
+    cameras = cameras_of(viewmats)
     shape("viewmats", viewmats, batch + (cameras, 4, 4))
     shape("Ks", Ks, batch + (cameras, 3, 3))
     if opacities is not None:
         opacities = tensor("opacities", opacities).detach()
         shape("opacities", opacities, batch + (count,))
     return means, quats, scales, covars, viewmats, opacities, Ks
+
+
+def cameras_of(viewmats):
+    """The number of view matrices [..., C, 4, 4] of a scene."""
+    if viewmats.dim() < 3:
+        raise mismatch("viewmats", viewmats, "[..., C, 4, 4]")
+    return viewmats.shape[-3]
 
 
 def project(tensors, options, packed, sparse_grad, camera_model):
@@ -85,6 +95,7 @@ def project(tensors, options, packed, sparse_grad, camera_model):
     return _project_on_host(tensors, options, packed, camera_model)
 
 
+@full_precision
 def _project_on_host(tensors, options, packed, camera_model):
     means, quats, scales, covars, viewmats, opacities, Ks = tensors
     if covars is None:

@@ -9,11 +9,11 @@ import torch
 from torch import Tensor
 
 from . import _dialect
-from ._arguments import check, refusal, shape, tensor, unavailable
+from ._arguments import check, integer, mismatch, refusal, shape, tensor, unavailable
 from ._autograd import Blend, ByDepth, ProjectOptions, needs_gradient
 from ._geometry import camera_offsets, upper_triangle
 from ._harmonics import evaluate
-from ._projection import project
+from ._projection import cameras_of, project
 from ._tiles import isect_offset_encode, isect_tiles
 
 _COLOR_MODES = {"RGB", "RGB+D", "RGB+ED", "RGB-d", "RGB-Ed"}
@@ -156,7 +156,12 @@ def rasterization(
         f"rasterize_mode {rasterize_mode!r} is neither classic nor antialiased",
     )
     check(packed or not sparse_grad, "sparse_grad needs packed=True")
-    tile_size = 16 if tile_size is None else tile_size
+    width, height = integer("width", width), integer("height", height)
+    tile_size = 16 if tile_size is None else integer("tile_size", tile_size)
+    if sh_degree is not None:
+        sh_degree = integer("sh_degree", sh_degree, 0, 4)
+    if extra_signals_sh_degree is not None:
+        extra_signals_sh_degree = integer("extra_signals_sh_degree", extra_signals_sh_degree, 0, 4)
     scene = _Scene(means, quats, scales, covars, opacities, viewmats, Ks)
     options = ProjectOptions(
         width,
@@ -262,7 +267,8 @@ class _Scene:
 
     def __init__(self, means, quats, scales, covars, opacities, viewmats, Ks):
         means = tensor("means", means)
-        check(means.dim() > 1, f"means has shape {tuple(means.shape)}; expected [..., N, 3]")
+        if means.dim() < 2:
+            raise mismatch("means", means, "[..., N, 3]")
         self.batch, self.splats = means.shape[:-2], means.shape[-2]
         own = self.batch + (self.splats,)
         shape("means", means, own + (3,))
@@ -277,7 +283,7 @@ class _Scene:
         self.opacities = tensor("opacities", opacities)
         shape("opacities", self.opacities, own)
         self.viewmats, Ks = tensor("viewmats", viewmats), tensor("Ks", Ks)
-        self.cameras = self.viewmats.shape[-3] if self.viewmats.dim() > 2 else 0
+        self.cameras = cameras_of(self.viewmats)
         self.dims = self.batch + (self.cameras,)
         shape("viewmats", self.viewmats, self.dims + (4, 4))
         shape("Ks", Ks, self.dims + (3, 3))
@@ -368,6 +374,10 @@ def _channels(scene, ids, radii, name, values, degree):
     values = tensor(name, values)
     batch, splats, cameras = scene.batch, scene.splats, scene.cameras
     own, per_view = batch + (splats,), batch + (cameras, splats)
+    if values.dim() < (len(own) + 1 if degree is None else 3):
+        raise mismatch(name, values, "[..., N, D]" if degree is None else "[..., N, K, D]")
+    if name == "colors" and not values.shape[-1]:
+        raise mismatch(name, values, "at least one channel")
     if degree is None:
         viewed = values.shape[:-1] == per_view
         if not viewed:
@@ -375,7 +385,7 @@ def _channels(scene, ids, radii, name, values, degree):
         return scene.spread(values, ids, viewed)
     bands = values.shape[-2:]
     check(
-        len(bands) == 2 and (degree + 1) ** 2 <= bands[0],
+        (degree + 1) ** 2 <= bands[0],
         f"{name} has shape {tuple(values.shape)}; degree {degree} needs {(degree + 1) ** 2} bands",
     )
     dirs = scene.directions(ids)
@@ -409,15 +419,15 @@ class _Meta(dict):
     """A dict whose entries about tiles are computed when they are first read."""
 
     _LATE = ("tiles_per_gauss", "isect_ids", "flatten_ids", "isect_offsets")
+    _completed = False
 
     def __missing__(self, key):
-        if key not in self._LATE:
+        if key not in self._LATE or self._completed:
             raise KeyError(key)
-        self._complete()
-        return self[key]
+        return dict.__getitem__(self._complete(), key)
 
     def _complete(self):
-        if dict.__contains__(self, "isect_ids"):
+        if self._completed:
             return self
         radii, dims = self.footprints
         images, packed = math.prod(dims), self["gaussian_ids"] is not None
@@ -438,11 +448,22 @@ class _Meta(dict):
             opacities=self["opacities"].detach(),
         )
         offsets = isect_offset_encode(ids, images, columns, rows).reshape(dims + (rows, columns))
-        self.update(zip(self._LATE, (counts, ids, splats, offsets)))
+        self._completed = True
+        for key, value in zip(self._LATE, (counts, ids, splats, offsets)):
+            dict.setdefault(self, key, value)  # a value that the caller has set stays
         return self
 
     def __contains__(self, key):
-        return key in self._LATE or dict.__contains__(self, key)
+        return dict.__contains__(self, key) or (key in self._LATE and not self._completed)
+
+    def setdefault(self, key, default=None):
+        return self[key] if key in self else dict.setdefault(self, key, default)
+
+    def pop(self, key, *default):
+        return dict.pop(self._complete() if key in self._LATE else self, key, *default)
+
+    def __delitem__(self, key):
+        dict.__delitem__(self._complete() if key in self._LATE else self, key)
 
     def get(self, key, default=None):
         return self[key] if key in self else default

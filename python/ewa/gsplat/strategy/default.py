@@ -95,7 +95,13 @@ class DefaultStrategy(Strategy):
     @torch.no_grad()
     def _update_state(self, params, state, info, packed=False):
         means2d = info[self.key_for_gradient]
-        gradient = means2d.absgrad if self.absgrad else means2d.grad
+        gradient = getattr(means2d, "absgrad", None) if self.absgrad else means2d.grad
+        needed = "rasterization(absgrad=True)" if self.absgrad else "step_pre_backward"
+        check(
+            gradient is not None,
+            f"{self.key_for_gradient} has no {'absgrad' if self.absgrad else 'grad'}: "
+            f"DefaultStrategy(absgrad={self.absgrad}) needs {needed} before loss.backward()",
+        )
         width, height, cameras = info["width"], info["height"], info["n_cameras"]
         x, y = gradient.unbind(-1)
         pull = torch.hypot(x * (0.5 * width * cameras), y * (0.5 * height * cameras))
