@@ -331,6 +331,7 @@ class Blend(Function):
         ctx.shapes = [t.shape for t in (means2d, conics, opacities, features)]
         ctx.means2d = weakref.ref(means2d)
         ctx.set_materialize_grads(False)
+        # For first_derivatives alone: the device keeps the values that the backward pass reads.
         ctx.save_for_backward(means2d, conics, opacities, features)
         return _stack(colors, size + (channels,)), _stack(alphas, size + (1,))
 
