@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Makes the records of 2D Gaussians that come as arrays.
 // One invocation owns splat i. It reads its entry of each array, and writes its record, its depth key and the number of
-// tiles that it reaches. A splat that is left out gets count 0 and the last key. SPEC_MODE: COLLECT_* bits and
-// SHAPE_WHITENERS.
+// tiles that it reaches; with COLLECT_LISTED it reads that number. A splat that is left out gets count 0 and the last key.
+// SPEC_MODE: COLLECT_* bits and SHAPE_WHITENERS.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/double_float.glsl"
@@ -22,7 +22,7 @@ layout(set = 0, binding = 4, scalar) readonly buffer Depths { float depths[]; };
 layout(set = 0, binding = 5, scalar) readonly buffer Radii { ivec2 radii[]; };
 layout(set = 0, binding = 6, scalar) writeonly buffer Records { vec4 records[]; };
 layout(set = 0, binding = 7, scalar) writeonly buffer DepthKeys { uint depth_keys[]; };
-layout(set = 0, binding = 8, scalar) writeonly buffer TileCounts { uint tile_counts[]; };
+layout(set = 0, binding = 8, scalar) buffer TileCounts { uint tile_counts[]; };
 layout(set = 0, binding = 9, scalar) buffer CountsBlock { Counts counts; };
 layout(push_constant, scalar) uniform Push { CollectPush push; };
 
@@ -58,7 +58,8 @@ void main() {
     const vec2 mean = means[i];
     const vec3 shape = WHITENERS ? shapes[i] : whitener_of(shapes[i]);
     const float opacity = opacities[i], depth = LISTED ? 0.0 : depths[i];
-    const bool wanted = !WITH_RADII || (radii[i].x > 0 && radii[i].y > 0);
+    // A splat that no tile lists may hold anything.
+    const bool wanted = LISTED ? tile_counts[i] > 0u : !WITH_RADII || (radii[i].x > 0 && radii[i].y > 0);
     // A NaN fails these comparisons.
     const bool finite = is_finite(mean.x) && is_finite(mean.y) && is_finite(shape) && shape.x > 0.0 && shape.z > 0.0 &&
                         is_finite(opacity) && is_finite(depth);

@@ -202,6 +202,18 @@ TEST(OperatorBlendLists, TheOrderIsThatOfTheLists) {
     expect_image(image, reference::blend(s.splats, backwards.order, s.width, s.height), backwards);
 }
 
+TEST(OperatorBlendLists, SplatsOfNoListMayHoldAnything) {
+    ScreenScene s = screen_scene(59, 20, SplatKind::ordinary, 3, false, 32, 32);
+    const uint32_t first = s.order[0], second = s.order[1];
+    s.order.erase(s.order.begin());
+    const FullLists full(s);
+    Arrays damaged(s);
+    damaged.conics[3 * first] = damaged.means2d[2 * first] = NAN;
+    EXPECT_EQ(operators().blend(damaged.splats(), full.lists(), damaged.options()).skipped_nonfinite, 0u);
+    damaged.conics[3 * second] = NAN;
+    EXPECT_EQ(operators().blend(damaged.splats(), full.lists(), damaged.options()).skipped_nonfinite, 1u);
+}
+
 TEST(OperatorBlendLists, WrongListsAreRefused) {
     const ScreenScene s = screen_scene(43, 5, SplatKind::ordinary, 3, false, 32, 16);
     const Arrays arrays(s);
