@@ -125,7 +125,7 @@ struct BlendOptions {
     bool gradients = true;         // keep what blend_backward needs
 };
 
-/// What blend_backward needs. It holds memory of the device until it is destroyed.
+/// What blend_backward of the same operators needs. It holds memory of the device until it is destroyed.
 class BlendRecord {
   public:
     ~BlendRecord();

@@ -13,8 +13,9 @@ namespace ewa::operators {
 inline constexpr uint32_t kChunk = 4;
 
 struct BlendFrame {
-    std::weak_ptr<Context> context;  // takes the frame back
-    bool gradients = false;          // its buffers overlay each other, in all images that it has
+    std::shared_ptr<gpu::Device> device;  // outlives the buffers below, whoever else has gone
+    std::weak_ptr<Context> context;       // takes the frame back
+    bool gradients = false;               // its buffers overlay each other, in all images that it has
 
     // Of the image.
     uint32_t splats = 0, channels = 0, width = 0, height = 0;

@@ -48,6 +48,7 @@ std::unique_ptr<BlendFrame> take_frame(const std::shared_ptr<Context>& context, 
         return frame;
     }
     auto frame = std::make_unique<BlendFrame>();
+    frame->device = context->device;
     frame->context = context;
     frame->gradients = gradients;
     return frame;
@@ -415,6 +416,7 @@ BlendedImage Operators::blend(const ScreenSplats& splats, const TileLists& lists
 ScreenGradient Operators::blend_backward(const BlendRecord& record, std::span<const float> features_gradient,
                                          std::span<const float> alphas_gradient, bool absolute) {
     BlendFrame& f = *record.frame_;
+    if (f.context.lock() != context_) throw InputError("a record of other operators than these");
     const size_t pixels = size_t(f.width) * f.height, n = f.splats;
     check_size("features_gradient", features_gradient.size(), pixels * f.channels, "[H, W, D]");
     if (!alphas_gradient.empty()) check_size("alphas_gradient", alphas_gradient.size(), pixels, "[H, W]");

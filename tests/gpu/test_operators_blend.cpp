@@ -281,6 +281,16 @@ TEST(OperatorBlend, TwoImagesMayWaitForTheirGradients) {
                     true);
 }
 
+/// The record is the last that uses the device.
+TEST(OperatorBlend, ARecordMayOutliveItsOperators) {
+    const ScreenScene s = screen_scene(60, 20, SplatKind::ordinary, 3, false, 40, 33);
+    const Arrays arrays(s);
+    BlendedImage image =
+        Operators(open_test_device(true)).blend(arrays.splats(), arrays.order(), arrays.options());
+    EXPECT_THROW(arrays.backward(image, false), InputError);
+    image.record.reset();
+}
+
 TEST(OperatorBlend, ValuesThatAreNotFiniteAreLeftOutAndCounted) {
     const ScreenScene s = screen_scene(47, 20, SplatKind::ordinary, 3, false, 40, 33);
     Arrays arrays(s);
