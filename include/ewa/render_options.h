@@ -6,12 +6,23 @@
 namespace ewa {
 
 /// How a splat's opacity depends on its footprint. Values are KERNEL_* of shaders/shared/constants.h.
-enum class Footprint { peak = 0, antialias = 1, unit_mass = 2 };
+enum class Footprint { peak = 0, antialias = 1, density = 2 };
+
+/// How the splats along a ray become one colour.
+enum class Integrator {
+    splat,  // footprints on the image, in the order of the splats' centres
+    ray,    // each splat's integral along the ray, in the order of its middle on the ray
+    march   // the volume of all splats, in intervals along the ray
+};
 
 struct RenderOptions {
     std::array<float, 3> background{0, 0, 0};
     Footprint kernel = Footprint::peak;
     int sh_degree = 3;  // degrees above this, or above the scene's, are skipped
+    Integrator integrator = Integrator::splat;
+    int samples = 64;     // of a ray, with Integrator::march
+    bool points = false;  // spheres in place of Gaussians: the nearest ones at a pixel, blended by weight
+    int nearest = 8;      // spheres at a pixel, with `points`
 };
 
 enum class Drawing {

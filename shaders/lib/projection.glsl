@@ -68,7 +68,7 @@ Projection project_shape(View view, Lens lens, mat3 directions, mat3 cofactors, 
 
     p.factor = 1.0;
     if (KERNEL == KERNEL_ANTIALIAS) p.factor = sqrt(max(0.0, p.det0 / p.det));
-    if (KERNEL == KERNEL_UNIT_MASS) p.factor = 0.15915494309189535 * p.unit * p.unit / sqrt(p.det);
+    if (KERNEL == KERNEL_DENSITY) p.factor = 0.15915494309189535 * p.unit * p.unit / sqrt(p.det);
     return p;
 }
 #endif

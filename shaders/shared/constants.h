@@ -105,7 +105,7 @@ EWA_UINT(KERNEL_PEAK, 0u);
 // Mip-Splatting (Yu et al. 2024, eq. 9): times sqrt(det before / det after low-pass).
 EWA_UINT(KERNEL_ANTIALIAS, 1u);
 // EWA (Zwicker et al. 2001): times 1 / (2 pi sqrt(det)) per px^2.
-EWA_UINT(KERNEL_UNIT_MASS, 2u);
+EWA_UINT(KERNEL_DENSITY, 2u);
 
 // The path tracer of mesh scenes (docs/meshes.md describes its model).
 EWA_UINT(TRACE_STACK, 48u);         // greatest depth of the hierarchy: children on the stack of a ray

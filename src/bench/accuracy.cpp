@@ -101,7 +101,7 @@ std::vector<SplattingChoice> splatting_choices(const Gaussians& gaussians, const
         add("splatting, tile", text_of("%ux%u", config.tile_width, height)).tile_height = height;
     add("splatting, kernel", "peak");
     add("splatting, kernel", "antialias").kernel = Footprint::antialias;
-    add("splatting, kernel", "unit mass").kernel = Footprint::unit_mass;
+    add("splatting, kernel", "unit mass").kernel = Footprint::density;
     return choices;
 }
 

@@ -75,7 +75,7 @@ core::PixelSize size_of(const std::string& text) {
 }
 
 Footprint settled_kernel(Footprint kernel, bool antialias) {
-    if (antialias && kernel == Footprint::unit_mass)
+    if (antialias && kernel == Footprint::density)
         throw InputError("--antialias and --kernel ewa exclude each other");
     return antialias ? Footprint::antialias : kernel;
 }

@@ -118,7 +118,7 @@ double kernel_factor(Footprint kernel, double det0, double det) {
             return 1;
         case Footprint::antialias:
             return std::sqrt(std::max(0.0, det0 / det));
-        case Footprint::unit_mass:
+        case Footprint::density:
             return 1 / (2 * std::numbers::pi * std::sqrt(det));
     }
     return 0;

@@ -32,7 +32,7 @@ const Names<MaskUse> kMaskUses = {{"auto", MaskUse::automatic},
                                   {"cut", MaskUse::cut},
                                   {"none", MaskUse::none}};
 const Names<Footprint> kKernels = {
-    {"peak", Footprint::peak}, {"antialias", Footprint::antialias}, {"ewa", Footprint::unit_mass}};
+    {"peak", Footprint::peak}, {"antialias", Footprint::antialias}, {"ewa", Footprint::density}};
 
 template <class T>
 const T& read(Member<T> member, const RunOptions& options) {

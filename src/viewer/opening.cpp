@@ -53,7 +53,7 @@ Look look_of(const live::Run& run) {
     Look look;
     const std::string kernel = run.text("kernel");
     if (kernel == "antialias") look.kernel = Footprint::antialias;
-    if (kernel == "ewa") look.kernel = Footprint::unit_mass;
+    if (kernel == "ewa") look.kernel = Footprint::density;
     look.background = core::parse_colour(run.text("background")).value_or(look.background);
     return look;
 }

@@ -67,7 +67,7 @@ class Compiler {
 };
 
 const Values kDegrees = {0, 1, 2, 3};
-const Values kFootprints = {shared::KERNEL_PEAK, shared::KERNEL_ANTIALIAS, shared::KERNEL_UNIT_MASS};
+const Values kFootprints = {shared::KERNEL_PEAK, shared::KERNEL_ANTIALIAS, shared::KERNEL_DENSITY};
 const Values kBits = {1, 2, 3, 4, 5, 6, 7, 8};
 
 void compile_splatting(Compiler& compiler) {

@@ -252,7 +252,7 @@ std::vector<GoldenScene> golden_scenes() {
         far_from_origin(),
         off_centre(),
         sub_pixel_scene(Footprint::antialias),
-        sub_pixel_scene(Footprint::unit_mass),
+        sub_pixel_scene(Footprint::density),
         mode("mode_color", Shown::color, 0.25),
         mode("mode_depth", Shown::depth, 0.1),
         mode("mode_alpha", Shown::alpha, 1),
@@ -260,7 +260,7 @@ std::vector<GoldenScene> golden_scenes() {
         still_life(),
     };
     for (GoldenScene& scene : scenes)
-        if (scene.options.kernel == Footprint::unit_mass) scene.name = "unit_mass";
+        if (scene.options.kernel == Footprint::density) scene.name = "unit_mass";
     return scenes;
 }
 

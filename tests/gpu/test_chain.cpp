@@ -107,7 +107,7 @@ std::vector<ChainCase> cases() {
           SplatKind::opacity_extremes, SplatKind::mixed})
         for (const size_t splats : {size_t(20), size_t(600)})
             all.push_back({kind, splats, 61, 47, int(seed % 4), Footprint::peak, seed++});
-    for (const Footprint kernel : {Footprint::antialias, Footprint::unit_mass})
+    for (const Footprint kernel : {Footprint::antialias, Footprint::density})
         all.push_back({SplatKind::mixed, 300, 53, 39, 3, kernel, seed++});
     for (const auto& [w, h] : {std::pair{1, 1}, {17, 3}, {3, 17}, {200, 150}, {257, 129}})
         all.push_back({SplatKind::mixed, 400, w, h, 2, Footprint::peak, seed++});

@@ -378,7 +378,7 @@ TEST(FrameEdges, ExtremeValuesMakeNoNaN) {
     for (size_t i = 0; i < g.means.size(); ++i) g.means[i] = often(i % 3 == 2 ? 4 : 0.1f, 12);
     // Squares of colours beyond 1e19 leave float32: the picture holds them, its loss cannot.
     for (const bool gradients : {false, true})
-        for (const Footprint kernel : {Footprint::peak, Footprint::antialias, Footprint::unit_mass}) {
+        for (const Footprint kernel : {Footprint::peak, Footprint::antialias, Footprint::density}) {
             for (float& value : g.sh) value = often(0.3f, gradients ? 9 : 12);
             scene.options.kernel = kernel;
             const Result result = run_frame(scene, 200000, gradients);

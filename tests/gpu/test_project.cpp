@@ -139,7 +139,7 @@ INSTANTIATE_TEST_SUITE_P(
     All, ProjectPass,
     testing::Values(ProjectCase{SplatKind::ordinary, 1000, 160, 120, 0, Footprint::peak},
                     ProjectCase{SplatKind::needles, 1000, 161, 119, 1, Footprint::antialias},
-                    ProjectCase{SplatKind::sub_pixel, 500, 61, 47, 2, Footprint::unit_mass},
+                    ProjectCase{SplatKind::sub_pixel, 500, 61, 47, 2, Footprint::density},
                     ProjectCase{SplatKind::off_screen_and_close, 500, 61, 47, 3, Footprint::peak},
                     ProjectCase{SplatKind::opacity_extremes, 500, 17, 3, 3, Footprint::antialias},
                     ProjectCase{SplatKind::mixed, 257, 1, 1, 2, Footprint::peak},

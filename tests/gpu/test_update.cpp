@@ -166,7 +166,7 @@ TEST_P(UpdatePass, GradientMatchesTheReference) {
 INSTANTIATE_TEST_SUITE_P(All, UpdatePass,
                          testing::Values(UpdateCase{SplatKind::ordinary, 200, 0, Footprint::peak},
                                          UpdateCase{SplatKind::ordinary, 201, 3, Footprint::antialias},
-                                         UpdateCase{SplatKind::ordinary, 202, 2, Footprint::unit_mass},
+                                         UpdateCase{SplatKind::ordinary, 202, 2, Footprint::density},
                                          UpdateCase{SplatKind::mixed, 300, 1, Footprint::peak},
                                          UpdateCase{SplatKind::mixed, 301, 3, Footprint::antialias},
                                          UpdateCase{SplatKind::needles, 150, 2, Footprint::peak},

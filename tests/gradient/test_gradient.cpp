@@ -73,7 +73,7 @@ INSTANTIATE_TEST_SUITE_P(All, Gradient,
                          testing::Values(Case{SplatKind::ordinary, 5, 24, 17, 0, Footprint::peak, 5001},
                                          Case{SplatKind::ordinary, 4, 23, 18, 3, Footprint::peak, 5012},
                                          Case{SplatKind::ordinary, 5, 24, 17, 1, Footprint::antialias, 5023},
-                                         Case{SplatKind::ordinary, 5, 17, 24, 1, Footprint::unit_mass, 5034},
+                                         Case{SplatKind::ordinary, 5, 17, 24, 1, Footprint::density, 5034},
                                          Case{SplatKind::ordinary, 20, 24, 17, 0, Footprint::peak, 5045}),
                          [](const testing::TestParamInfo<Case>& tested) {
                              const Case& c = tested.param;

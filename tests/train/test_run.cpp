@@ -246,7 +246,7 @@ TEST(RunOptions, TableReadsWhatItWrites) {
         EXPECT_EQ(train::value_text(train::run_option(name), all), text) << name;
     EXPECT_EQ(all.train.moment_bits, 32);
     EXPECT_EQ(all.train.image_cache_bytes, uint64_t(9) << 20);
-    EXPECT_EQ(all.train.render.kernel, Footprint::unit_mass);
+    EXPECT_EQ(all.train.render.kernel, Footprint::density);
     EXPECT_EQ(config.begin().key(), "dataset");
 }
 

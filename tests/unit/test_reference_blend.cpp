@@ -68,7 +68,7 @@ TEST(ReferenceBlend, UnitMassKernelKeepsItsMass) {
     scene.log_scales = {-2, -2.5f, -3};
     scene.opacity_logits = {0.4f};
     RenderOptions options;
-    options.kernel = Footprint::unit_mass;
+    options.kernel = Footprint::density;
     ReferenceOptions reference;
     reference.smoothing.cut = AlphaCut::none;
     const Picture picture = render(scene, camera, options, reference);

@@ -55,7 +55,7 @@ TEST(ReferenceProjection, KernelFactors) {
     options.kernel = Footprint::antialias;
     EXPECT_NEAR(project(splat, plain_camera(), options).opacity, 0.7 * std::sqrt(25.0 * 16.0 / (25.3 * 16.3)),
                 1e-12);
-    options.kernel = Footprint::unit_mass;
+    options.kernel = Footprint::density;
     EXPECT_NEAR(project(splat, plain_camera(), options).opacity,
                 0.7 / (2 * std::numbers::pi * std::sqrt(25.3 * 16.3)), 1e-12);
 }

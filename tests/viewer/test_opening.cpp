@@ -48,7 +48,7 @@ TEST(Opening, TheSplatsOfARunHaveItsCameras) {
     ASSERT_TRUE(scene.dataset);
     EXPECT_EQ(scene.dataset->frames.size(), 4u);
     EXPECT_EQ(scene.dataset->frames[0].camera.width, 24);
-    EXPECT_EQ(scene.look.kernel, Footprint::unit_mass);
+    EXPECT_EQ(scene.look.kernel, Footprint::density);
     EXPECT_EQ(scene.look.background, (std::array<float, 3>{1, 0, 1}));
     EXPECT_TRUE(scene.run.empty()) << "a file is not watched";
     EXPECT_TRUE(scene.exposures.empty());

@@ -121,7 +121,7 @@ struct Table {
 };
 
 const std::pair<Footprint, const char*> kKernels[] = {
-    {Footprint::peak, ""}, {Footprint::antialias, "_antialias"}, {Footprint::unit_mass, "_unit_mass"}};
+    {Footprint::peak, ""}, {Footprint::antialias, "_antialias"}, {Footprint::density, "_unit_mass"}};
 
 void add_ordinary(Table& table) {
     for (const auto& [kernel, suffix] : kKernels)
@@ -159,7 +159,7 @@ void add_scales(Table& table) {
             });
             // If none of them is visible, others are, which must not be affected.
             const bool unseen =
-                kernel == Footprint::antialias ? factor < 1 : kernel == Footprint::unit_mass && factor > 1;
+                kernel == Footprint::antialias ? factor < 1 : kernel == Footprint::density && factor > 1;
             if (unseen) builder.add_usual(20);
             table.add(text_of("scale_%.0e%s", factor, suffix), "scales times this", builder.take(),
                       usual_camera(), kernel);
