@@ -23,7 +23,7 @@ struct Gaussians {
     std::vector<float> quaternions;     // 4 n, w x y z, any non-zero norm
     std::vector<float> log_scales;      // 3 n, natural logarithm of the standard deviations in world units
     std::vector<float> opacity_logits;  // n
-    bool density = false;  // opacity_logits are parameters of Footprint::density
+    bool density = false;               // opacity_logits are parameters of Footprint::density
     std::vector<float> sh;              // n * (degree + 1)^2 * 3: coefficient after coefficient, RGB inner
 
     size_t size() const { return opacity_logits.size(); }

@@ -6,8 +6,14 @@
 // |d| = 1, with
 //   a = S^-1 R^T (e - mu),  b = S^-1 R^T d,
 //   rho_i(t) = tau_i N(t; -a.b / b.b, 1 / |b|),   tau_i = tau0_i exp(-|a x b|^2 / (2 b.b))
-// in closed form. k_i depends on the ray's direction, so that the ray through the splat's centre always
-// absorbs the share `opacity`: tau0 = -ln(1 - opacity), as in 3DGS. A ray's colour is
+// in closed form. The kernel says what k_i is:
+// - Footprint::peak: 3DGS's opacity, the same from every side. The ray through the splat's centre always absorbs the
+//   share `opacity`: tau0 = -ln(1 - opacity). So k_i depends on the ray's direction, and there is no density field.
+// - Footprint::density: k_i is fixed, and a longer chord absorbs more: tau0 = softplus(logit) A / (s1 s2 s3 |b|).
+//   s1 s2 s3 |b| is the splat's shadow: the product of the two standard deviations of its projection along d.
+//   A = sqrt((s1^2 s2^2 + s2^2 s3^2 + s3^2 s1^2) / 3) is the shadow's root mean square over all directions. A sphere
+//   looks the same with both kernels.
+// A ray's colour is
 //   C = integral_near^inf sum_i c_i rho_i(t) T(t) dt + T(inf) background,
 //   T(t) = exp(-sum_i tau_i (Phi((t - t_i) / s_i) - Phi((near - t_i) / s_i)))
 // with the colours of splatting (SH towards the mean). Here splats interpenetrate. Splatting flattens them at
@@ -25,6 +31,18 @@
 
 namespace ewa::reference {
 
+/// What splatting does in place of the integral. Each can be switched on and off, so that its error can be told.
+/// Footprint::antialias is no approximation of the integral: its factor is not applied.
+struct Approximations {
+    bool overlap = false;  // each splat absorbs at one place: the one of a smaller distance is all in front
+    bool order = false;    // that place is where the ray reaches the depth of the splat's centre
+    bool formula =
+        false;  // alpha = min(ALPHA_MAX, opacity G), with the optical depth tau0 G: 1 - exp(-tau0 G)
+    bool affine = false;    // G is the 2D Gaussian of the projection's Taylor expansion
+    bool low_pass = false;  // the splat is wider by LOW_PASS px^2 across the ray
+    bool cut_off = false;   // no contribution below ALPHA_MIN, none behind TRANSMITTANCE_STOP
+};
+
 /// A splat on one ray.
 struct RayGaussian {
     double depth = 0;   // optical depth along the whole ray
@@ -36,12 +54,14 @@ struct RayGaussian {
 /// The visible splats of a camera, prepared for its rays. x and y are in px from the top left corner.
 class Volume {
   public:
-    Volume(const Values& values, const Camera& camera, const RenderOptions& options);
+    Volume(const Values& values, const Camera& camera, const RenderOptions& options,
+           const Approximations& approximations = {});
 
     /// The splats with an optical depth above `least` on the ray through (x, y), sorted by their middles.
     std::vector<RayGaussian> along(double x, double y, double least = 1e-7) const;
 
-    /// The ray's colour by Gauss-Legendre quadrature between the splats' borders, relative error below 1e-6.
+    /// The ray's colour by Gauss-Legendre quadrature between the splats' borders, relative error below 1e-6. With the
+    /// approximations, if there are any.
     glm::dvec3 exact(double x, double y) const;
 
     /// The same by ray marching, with `samples` midpoints evenly from the nearest to the farthest splat.
@@ -51,15 +71,24 @@ class Volume {
     static constexpr int kTile = 16;  // px
     struct Member {
         glm::dvec3 mean{0};      // relative to the eye
-        glm::dmat3 whitener{0};  // S^-1 R^T
-        double full_depth = 0;   // tau0
+        glm::dmat3 whitener{0};  // of the rays' Gaussian: S^-1 R^T, or that of the wider splat
+        double full_depth = 0;   // tau0; of a density times |b|
+        double opacity = 0;      // of Approximations::formula
+        double z = 0;            // view depth of the mean
         glm::dvec3 color{0};
+        Projected footprint;  // of Approximations::affine
     };
+    Member member_of(const Splat& splat, const Projected& projected, const ProjectionSteps& steps) const;
     void list(uint32_t member, const Projected& projected, double size);
     double near_along(double x, double y, glm::dvec3& direction) const;
+    /// The optical depth of the whole ray. bb: |b|^2; gaussian: exp(-|a x b|^2 / (2 bb)).
+    double optical_depth(const Member& member, double bb, double gaussian) const;
+    glm::dvec3 composited(const std::vector<RayGaussian>& line) const;
 
     Camera camera_;
     glm::dvec3 background_{0};
+    Footprint kernel_ = Footprint::peak;
+    Approximations approximations_;
     std::vector<Member> members_;
     int columns_ = 0, rows_ = 0;
     std::vector<std::vector<uint32_t>> tiles_;  // the members that rays through the tile can meet

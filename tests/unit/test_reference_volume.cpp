@@ -8,6 +8,8 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "reference/render.h"
+
 namespace ewa::reference {
 namespace {
 
@@ -95,6 +97,84 @@ TEST(Volume, MarchingComesNearerWithMoreSamples) {
         last = error;
     }
     EXPECT_LT(last, kBeyond);
+}
+
+/// A cigar along z, three times as long as wide, seen from a far camera that looks along `forward`.
+double opacity_of_cigar(const glm::dvec3& forward, Footprint kernel) {
+    Values cigar = balls({{0, 0.1, 0.5, {1, 1, 1}}});
+    cigar.log_scales[2] = std::log(0.3);
+    Camera far = camera();
+    const glm::dvec3 right = std::abs(forward.x) > 0.5 ? glm::dvec3(0, 1, 0) : glm::dvec3(1, 0, 0);
+    far.rotation = glm::transpose(glm::dmat3(right, glm::cross(forward, right), forward));
+    far.translation = {0, 0, 100};
+    RenderOptions options;
+    options.kernel = kernel;
+    return Volume(cigar, far, options).exact(16, 16).x;
+}
+
+TEST(Volume, ADensityAbsorbsMoreAlongALongerChord) {
+    const glm::dvec3 x(1, 0, 0), z(0, 0, 1);
+    EXPECT_NEAR(opacity_of_cigar(x, Footprint::peak), 0.5, kQuadrature);
+    EXPECT_NEAR(opacity_of_cigar(z, Footprint::peak), 0.5, kQuadrature);
+    const double along = -std::log1p(-opacity_of_cigar(z, Footprint::density)),
+                 across = -std::log1p(-opacity_of_cigar(x, Footprint::density));
+    EXPECT_NEAR(along / across, 3, 20 * kQuadrature);
+    // Shadows 0.01 along z, 0.03 along x and y: their root mean square is sqrt(19 / 3) of the first.
+    EXPECT_NEAR(along, std::log(2) * std::sqrt(19.0 / 3), 10 * kQuadrature);
+}
+
+TEST(Volume, ASphereIsTheSameWithBothKernels) {
+    RenderOptions density = on_grey();
+    density.kernel = Footprint::density;
+    const Values ball = balls({{3, 0.2, 0.7, {0.9, 0.6, 0.1}}});
+    for (const double x : {16.0, 19.0})
+        expect_color(Volume(ball, camera(), density).exact(x, 15),
+                     Volume(ball, camera(), on_grey()).exact(x, 15), kQuadrature);
+}
+
+/// Turned ellipsoids beside, before and within one another.
+Values crowd() {
+    Values v = balls({{3, 0.2, 0.7, {1, 0, 0}},
+                      {3.2, 0.3, 0.6, {0, 1, 0}},
+                      {3.1, 0.15, 0.97, {1, 1, 0}},
+                      {5, 0.4, 0.8, {0, 0, 1}}});
+    for (size_t i = 0; i < v.size(); ++i) {
+        v.means[3 * i] = 0.2 * double(i) - 0.3;
+        v.means[3 * i + 1] = 0.1 * double(i % 2);
+        v.log_scales[3 * i + i % 3] += 1;
+        for (size_t k = 1; k < 4; ++k) v.quaternions[4 * i + k] = 0.3 * double((i + k) % 3) - 0.2;
+    }
+    return v;
+}
+
+TEST(Volume, WithAllApproximationsItIsSplatting) {
+    const Approximations all{true, true, true, true, true, true};
+    const Volume volume(crowd(), camera(), on_grey(), all);
+    const Picture splatted = render(crowd(), camera(), on_grey());
+    for (int y = 0; y < 32; y += 3)
+        for (int x = 0; x < 32; x += 3) {
+            const double* expected = splatted.blended.color.at(x, y);
+            expect_color(volume.exact(x + 0.5, y + 0.5), {expected[0], expected[1], expected[2]}, 1e-12);
+        }
+}
+
+TEST(Volume, EachApproximationChangesTheImage) {
+    const Volume exact(crowd(), camera(), on_grey());
+    bool Approximations::*const flags[] = {&Approximations::overlap,  &Approximations::order,
+                                           &Approximations::formula,  &Approximations::affine,
+                                           &Approximations::low_pass, &Approximations::cut_off};
+    for (const auto flag : flags) {
+        Approximations one;
+        one.*flag = true;
+        const Volume changed(crowd(), camera(), on_grey(), one);
+        double largest = 0;
+        for (int y = 0; y < 32; y += 3)
+            for (int x = 0; x < 32; x += 3)
+                largest = std::max(
+                    largest, glm::length(changed.exact(x + 0.5, y + 0.5) - exact.exact(x + 0.5, y + 0.5)));
+        EXPECT_GT(largest, 1e-3);
+        EXPECT_LT(largest, 0.5);
+    }
 }
 
 }  // namespace
