@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "core/messages.h"
+#include "core/text.h"
 #include "core/typing.h"
 #include "ewa/error.h"
 #include "live/server.h"

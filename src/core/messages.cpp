@@ -5,8 +5,6 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
-#include <algorithm>
-#include <cmath>
 #include <memory>
 
 #include "core/text.h"
@@ -22,14 +20,6 @@ std::string bytes_text(uint64_t bytes) {
         ++unit;
     }
     return fmt::format("{:.3g} {}", value, kUnits[unit]);
-}
-
-std::string duration_text(double seconds) {
-    if (!(seconds < 3.6e7)) return "very long";
-    const long total = std::lround(std::max(0.0, seconds));
-    if (total < 60) return fmt::format("{} s", total);
-    if (total < 3600) return fmt::format("{} min {:02} s", total / 60, total % 60);
-    return fmt::format("{} h {:02} min", total / 3600, total / 60 % 60);
 }
 
 void warn(const std::string& text) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Text for people: sizes, durations and warnings. Not in text.h, so that ewa-bench needs no spdlog or fmt.
+// Text for people: sizes and warnings. Not in text.h, so that ewa-bench needs no spdlog or fmt.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -8,9 +8,6 @@ namespace ewa::core {
 
 /// Bytes with three digits in powers of 1000, such as "850 B" or "12.3 MB".
 std::string bytes_text(uint64_t bytes);
-
-/// Seconds as "12 s", "3 min 05 s" or "2 h 10 min".
-std::string duration_text(double seconds);
 
 /// Prints a line on standard error through the spdlog logger named "ewa", whose level can silence it.
 /// Standard output is reserved for results.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <limits>
 #include <memory>
 #include <utility>
@@ -81,6 +82,19 @@ std::string lower(std::string_view text) {
     for (char& c : result)
         if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
     return result;
+}
+
+std::string duration_text(double seconds) {
+    if (!(seconds < 3.6e7)) return "very long";
+    const long total = std::lround(std::max(0.0, seconds));
+    char text[32];
+    if (total < 60)
+        std::snprintf(text, sizeof text, "%ld s", total);
+    else if (total < 3600)
+        std::snprintf(text, sizeof text, "%ld min %02ld s", total / 60, total % 60);
+    else
+        std::snprintf(text, sizeof text, "%ld h %02ld min", total / 3600, total / 60 % 60);
+    return text;
 }
 
 std::optional<double> parse_number(std::string_view word) {

@@ -25,6 +25,9 @@ std::string_view trim(std::string_view text);
 /// The text in lower case (ASCII only).
 std::string lower(std::string_view text);
 
+/// Seconds as "12 s", "3 min 05 s" or "2 h 10 min".
+std::string duration_text(double seconds);
+
 /// The whole word as a number, including "nan" and "inf". Independent of the locale.
 std::optional<double> parse_number(std::string_view word);
 
