@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bench/stability/stability.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cfloat>
 #include <cmath>
@@ -9,6 +11,7 @@
 
 #include "bench/device_runs.h"
 #include "core/json.h"
+#include "core/progress.h"
 #include "core/random.h"
 #include "ewa/error.h"
 #include "ewa/renderer.h"
@@ -206,15 +209,18 @@ const Comparison& tightest(const StabilityResult& result) {
 
 std::string stability_header(size_t cases) {
     std::string text = text_of(
-        "%zu scenes. Each is rendered and differentiated on the device, and by the float64 reference.\n"
-        "picture, error: the largest differences of the image, and of the values named beside it. bound: "
-        "their limit.\n"
-        "condition: how much an error of the input grows. plain det: the error of the textbook "
-        "determinant.\n\n",
+        "%zu scenes. Each is rendered and differentiated on the device, and by the float64 reference.\n\n"
+        "splats, drawn, skip  in the scene; in the image; skipped, since a value is not finite\n"
+        "picture, bound       the largest error of the image, relative to its largest value, and the limit\n"
+        "condition            how much an error of the input grows in the image, whatever computes it\n"
+        "plain det            the image's error with the textbook determinant a c - b^2 in float32\n"
+        "worst of rest        of the loss and the gradients, the one nearest to its limit\n"
+        "error ... condition  of that one, relative to its norm\n"
+        "verdict              ok: all is finite and within its limit; or what is not\n\n",
         cases);
-    text += text_of("%-24s %6s %6s %5s | %8s %8s %9s %9s | %-14s %8s %8s %9s\n", "case", "splats", "drawn",
-                    "skip", "picture", "bound", "condition", "plain det", "worst of rest", "error", "bound",
-                    "condition");
+    text += text_of("%-24s %6s %6s %5s | %8s %8s %9s %9s | %-14s %8s %8s %9s | %s\n", "case", "splats",
+                    "drawn", "skip", "picture", "bound", "condition", "plain det", "worst of rest", "error",
+                    "bound", "condition", "verdict");
     return text;
 }
 
@@ -224,27 +230,30 @@ std::string stability_line(const StabilityResult& r) {
         text_of("%-24s %6u %6u %5u | %8.1e %8.1e %9.1e %9.1e | %-14s %8.1e %8.1e %9.1e", r.name.c_str(),
                 r.splats, r.drawn, r.skipped, picture.error, picture.bound, picture.condition,
                 r.plain_determinant, worst.of.c_str(), worst.error, worst.bound, worst.condition);
-    if (!r.finite) line += "  NOT FINITE";
+    line += r.good() ? " | ok" : " |";
+    if (!r.finite) line += " NOT FINITE";
     if (r.skipped != r.skipped_by_reference)
-        line += text_of("  SKIPPED, the reference %u", r.skipped_by_reference);
+        line += text_of(" SKIPPED, the reference %u", r.skipped_by_reference);
     for (const Comparison& c : r.comparisons)
-        if (!c.good()) line += "  WRONG " + c.of;
-    if (r.good()) line += "  ok";
-    return line + "\n";
+        if (!c.good()) line += " WRONG " + c.of;
+    return line;
 }
 
 std::string stability_training_header() {
     return text_of(
-        "\nskipped: splats with a value that is not finite. dropped, limited: updates left out or "
-        "shortened.\n\n"
-        "%-24s %6s %10s %10s %8s %8s %8s\n",
-        "training from", "steps", "loss", "to", "skipped", "dropped", "limited");
+        "\nTraining from each scene with Adam.\n"
+        "loss, to          before the first step and after the last\n"
+        "skipped           splats with a value that is not finite, in the last step\n"
+        "dropped, limited  updates that were not finite, and updates that were shortened\n"
+        "verdict           ok: all that was finite still is\n\n"
+        "%-24s %6s %10s %10s %8s %8s %8s | %s\n",
+        "training from", "steps", "loss", "to", "skipped", "dropped", "limited", "verdict");
 }
 
 std::string stability_training_line(const StabilityTraining& t) {
-    return text_of("%-24s %6d %10.3g %10.3g %8u %8llu %8llu%s\n", t.name.c_str(), t.steps, t.first_loss,
+    return text_of("%-24s %6d %10.3g %10.3g %8u %8llu %8llu | %s", t.name.c_str(), t.steps, t.first_loss,
                    t.last_loss, t.skipped, static_cast<unsigned long long>(t.dropped_updates),
-                   static_cast<unsigned long long>(t.limited_steps), t.good() ? "  ok" : "  NOT FINITE");
+                   static_cast<unsigned long long>(t.limited_steps), t.good() ? "ok" : "NOT FINITE");
 }
 
 /// Whether all values that were finite still are.
@@ -383,15 +392,27 @@ int run_stability(const Options& options) {
     print("device: " + device_info(*device).name + "\n" + stability_header(cases.size()));
     std::vector<StabilityResult> results;
     std::vector<StabilityTraining> trainings;
-    for (const StabilityCase& one : cases) {
-        results.push_back(compare_with_reference(device, one));
-        print(stability_line(results.back()));
+    // In a file, the rows alone tell how far it is.
+    const bool rows_alone = !isatty(STDOUT_FILENO);
+    {
+        core::Progress progress("compared", int(cases.size()), "scenes", rows_alone);
+        for (const StabilityCase& one : cases) {
+            results.push_back(compare_with_reference(device, one));
+            progress.clear();
+            print(stability_line(results.back()) + "\n");
+            progress.update(int(results.size()));
+        }
     }
     if (options.training_steps > 0) print(stability_training_header());
-    for (const StabilityCase& one : cases) {
-        if (options.training_steps == 0) break;
-        trainings.push_back(train_from(device, one, options.training_steps));
-        print(stability_training_line(trainings.back()));
+    {
+        core::Progress progress("trained from", int(cases.size()), "scenes", rows_alone);
+        for (const StabilityCase& one : cases) {
+            if (options.training_steps == 0) break;
+            trainings.push_back(train_from(device, one, options.training_steps));
+            progress.clear();
+            print(stability_training_line(trainings.back()) + "\n");
+            progress.update(int(trainings.size()));
+        }
     }
     if (!options.json.empty())
         core::write_json(options.json,
