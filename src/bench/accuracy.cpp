@@ -7,6 +7,7 @@
 
 #include "bench/ceiling/ceiling.h"
 #include "bench/device_runs.h"
+#include "core/progress.h"
 #include "reference/volume.h"
 #include "shared/constants.h"
 
@@ -14,7 +15,11 @@ namespace ewa::bench {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+using reference::Approximations;
+using reference::Volume;
 constexpr int kPixelsWanted = 3000, kRuns = 7;
+constexpr uint32_t kRaysAtOnce = 64;
+constexpr size_t kCauseStride = 3;  // of the pixels
 
 struct Pixel {
     int x = 0, y = 0;
@@ -28,120 +33,277 @@ std::vector<Pixel> spread_pixels(const Camera& camera) {
     return pixels;
 }
 
-/// Computes all pixels on all host threads. Returns seconds.
-template <class Evaluate>
-double evaluate_pixels(const std::vector<Pixel>& pixels, std::vector<glm::dvec3>& out, Evaluate evaluate) {
-    out.resize(pixels.size());
-    const auto start = Clock::now();
-    for_all(uint32_t(pixels.size()),
-            [&](uint32_t i) { out[i] = evaluate(pixels[i].x + 0.5, pixels[i].y + 0.5); });
-    return std::chrono::duration<double>(Clock::now() - start).count();
-}
+using Colors = std::vector<glm::dvec3>;
 
-void take_error(const std::vector<glm::dvec3>& exact, const std::vector<glm::dvec3>& actual,
-                report::WorkPoint& point) {
+/// Rays of the host, with progress over several passes of all pixels.
+class HostRays {
+  public:
+    HostRays(const std::vector<Pixel>& pixels, const char* what, size_t passes, bool quiet)
+        : pixels_(pixels), progress_(what, int(passes * pixels.size()), "rays", quiet) {}
+
+    /// Computes all pixels on all host threads. Returns seconds. quick: so fast that progress does not count it.
+    template <class Evaluate>
+    double evaluate(Colors& out, Evaluate evaluate, bool quick = false) {
+        out.resize(pixels_.size());
+        const auto start = Clock::now();
+        const auto count = uint32_t(pixels_.size());
+        for (uint32_t first = 0; first < count; first += kRaysAtOnce) {
+            const uint32_t rays = std::min(kRaysAtOnce, count - first);
+            for_all(rays, [&](uint32_t i) {
+                const Pixel& p = pixels_[first + i];
+                out[first + i] = evaluate(p.x + 0.5, p.y + 0.5);
+            });
+            if (!quick) progress_.update(done_ += int(rays));
+        }
+        return std::chrono::duration<double>(Clock::now() - start).count();
+    }
+
+  private:
+    const std::vector<Pixel>& pixels_;
+    core::Progress progress_;
+    int done_ = 0;
+};
+
+struct Error {
+    double rms = 0, worst = 0;
+};
+
+Error error_of(const Colors& exact, const Colors& actual) {
+    Error error;
     double sum = 0;
     for (size_t i = 0; i < exact.size(); ++i)
         for (int c = 0; c < 3; ++c) {
             const double e = std::abs(exact[i][c] - actual[i][c]);
             sum += e * e;
-            point.worst = std::max(point.worst, e);
+            error.worst = std::max(error.worst, e);
         }
-    point.error = std::sqrt(sum / (3.0 * double(exact.size())));
+    error.rms = std::sqrt(sum / (3.0 * double(exact.size())));
+    return error;
 }
 
-struct SplattingChoice {
+/// One meaning of opacity, and its exact image.
+struct Exact {
+    const char* name;
+    Footprint kernel;
+    Colors colors;
+};
+
+struct NamedApproximation {
+    const char* name;
+    bool Approximations::*flag;
+};
+constexpr NamedApproximation kApproximations[] = {
+    {"overlap: splats one behind the other", &Approximations::overlap},
+    {"order: by the depth of centres", &Approximations::order},
+    {"formula: alpha = opacity G", &Approximations::formula},
+    {"affine: Taylor expansion of the projection", &Approximations::affine},
+    {"low-pass: 0.3 px^2", &Approximations::low_pass},
+    {"cut-off: 1/255, and T at 1e-4", &Approximations::cut_off},
+};
+constexpr Approximations kSplatting{true, true, true, true, true, true};
+
+/// A density's alpha is 1 - exp(-tau) in splatting, too.
+bool applies(const NamedApproximation& one, Footprint kernel) {
+    return one.flag != &Approximations::formula || kernel == Footprint::peak;
+}
+
+/// The error of each approximation, at a part of the pixels: that tells their sizes.
+AccuracyReference causes_of(const Exact& exact, const Gaussians& gaussians, const Camera& camera,
+                            const RenderOptions& options, const std::vector<Pixel>& all, bool quiet) {
+    std::vector<Pixel> pixels;
+    Colors right, colors;
+    for (size_t i = 0; i < all.size(); i += kCauseStride) {
+        pixels.push_back(all[i]);
+        right.push_back(exact.colors[i]);
+    }
+    std::vector<NamedApproximation> causes;
+    for (const NamedApproximation& one : kApproximations)
+        if (applies(one, exact.kernel)) causes.push_back(one);
+    // Each is switched on alone. Splatting without one of them is quick, unless splats then overlap.
+    HostRays rays(pixels, "switched approximations on", causes.size(), quiet);
+    const auto error_with = [&](const Approximations& approximations) {
+        const Volume volume(gaussians, camera, options, approximations);
+        rays.evaluate(
+            colors, [&](double x, double y) { return volume.exact(x, y); }, approximations.overlap);
+        return error_of(right, colors).rms;
+    };
+    AccuracyReference result{exact.name, error_with(kSplatting), {}};
+    for (const NamedApproximation& one : causes) {
+        Approximations alone, without = kSplatting;
+        alone.*one.flag = true;
+        without.*one.flag = false;
+        result.causes.push_back({one.name, error_with(alone), error_with(without)});
+    }
+    return result;
+}
+
+/// One way to draw the scene on the device.
+struct Way {
     std::string series, name;
-    Footprint kernel = Footprint::peak;
-    int sh_degree = 3;
-    double alpha_min = shared::ALPHA_MIN;
-    uint32_t tile_height = 0;  // 0: the tile of the device
+    RenderOptions options;
+    double cut_off = shared::ALPHA_MIN;
+    size_t exact = 0;  // index of the exact image
 };
 
 /// Renders the frame several times. Returns its error and the median time.
-report::WorkPoint splat(const std::shared_ptr<gpu::Device>& device, const BenchScene& scene,
-                        RenderOptions options, const SplattingChoice& choice,
-                        const std::vector<Pixel>& pixels, const std::vector<glm::dvec3>& exact) {
-    options.kernel = choice.kernel;
-    options.sh_degree = choice.sh_degree;
+report::WorkPoint draw(const std::shared_ptr<gpu::Device>& device, const BenchScene& scene, const Way& way,
+                       const std::vector<Pixel>& pixels, const Colors& exact) {
     passes::KernelConfig config = passes::config_for(device->limits());
-    config.cut_off = float(choice.alpha_min);
-    if (choice.tile_height > 0) config.tile_height = choice.tile_height;
-    FrameRun run(device, scene, false, options, config);
+    config.cut_off = float(way.cut_off);
+    FrameRun run(device, scene, false, way.options, config);
     report::WorkPoint point;
-    point.name = choice.name;
+    point.name = way.name;
     point.time = time_repeated(kRuns, [&] { run.run(); }).wall.median;
     const pipeline::FrameBuffers& frame = run.frame();
     const auto planes = frame.planes.download<float>(frame.sizes.planes / 4);
-    std::vector<glm::dvec3> actual;
+    Colors actual;
     for (const Pixel& p : pixels) {
         const size_t at = size_t(p.y) * frame.sizes.stride + size_t(p.x), plane = frame.sizes.plane_floats;
         actual.emplace_back(planes[at], planes[plane + at], planes[2 * plane + at]);
     }
-    take_error(exact, actual, point);
+    const Error error = error_of(exact, actual);
+    point.error = error.rms;
+    point.worst = error.worst;
     return point;
 }
 
-std::vector<SplattingChoice> splatting_choices(const Gaussians& gaussians, const gpu::Limits& limits) {
-    SplattingChoice plain;
-    plain.sh_degree = sh_degree_present(gaussians);
-    std::vector<SplattingChoice> choices;
-    const auto add = [&](const char* series, const std::string& name) -> SplattingChoice& {
-        choices.push_back(plain);
-        choices.back().series = series;
-        choices.back().name = name;
-        return choices.back();
-    };
-    for (const int per : {16, 64, 255, 1024, 4096})
-        add("splatting, cut-off", "1/" + std::to_string(per)).alpha_min = 1.0 / per;
-    for (int d = 0; d <= plain.sh_degree; ++d) add("splatting, SH degree", std::to_string(d)).sh_degree = d;
-    const passes::KernelConfig config = passes::config_for(limits);
-    for (const uint32_t height :
-         {config.tile_height / 2, config.tile_height, 2 * config.tile_height, 4 * config.tile_height})
-        add("splatting, tile", text_of("%ux%u", config.tile_width, height)).tile_height = height;
-    add("splatting, kernel", "peak");
-    add("splatting, kernel", "antialias").kernel = Footprint::antialias;
-    add("splatting, kernel", "unit mass").kernel = Footprint::density;
-    return choices;
+std::vector<Way> ways_of(const std::vector<Exact>& exact, const RenderOptions& options, int sh_degree) {
+    std::vector<Way> ways;
+    for (size_t e = 0; e < exact.size(); ++e) {
+        Way plain;
+        plain.options = options;
+        plain.options.kernel = exact[e].kernel;
+        plain.options.integrator = Integrator::splat;
+        plain.options.points = false;
+        plain.options.sh_degree = sh_degree;
+        plain.exact = e;
+        const auto add = [&](const char* series, const std::string& name) -> Way& {
+            ways.push_back(plain);
+            ways.back().series = std::string(series) + ", " + exact[e].name;
+            ways.back().name = name;
+            return ways.back();
+        };
+        if (exact[e].kernel == Footprint::peak) {
+            for (const int nearest : {1, 4, 16}) {
+                Way& way = add("points", std::to_string(nearest) + " nearest");
+                way.options.points = true;
+                way.options.nearest = nearest;
+            }
+            for (int d = 0; d < sh_degree; ++d) add("SH degree", std::to_string(d)).options.sh_degree = d;
+            add("antialias", "1/255").options.kernel = Footprint::antialias;
+        }
+        for (const int per : {16, 64, 255, 1024, 4096})
+            add("splatting", "1/" + std::to_string(per)).cut_off = 1.0 / per;
+        for (const int per : {16, 255, 4096}) {
+            Way& way = add("ray", "1/" + std::to_string(per));
+            way.options.integrator = Integrator::ray;
+            way.cut_off = 1.0 / per;
+        }
+        for (int samples = 1; samples <= 256; samples *= 2) {
+            Way& way = add("march", std::to_string(samples) + (samples == 1 ? " sample" : " samples"));
+            way.options.integrator = Integrator::march;
+            way.options.samples = samples;
+        }
+    }
+    return ways;
+}
+
+/// The host's marcher in float64, with few numbers of samples: it is slow.
+report::WorkSeries march_on_host(const Gaussians& gaussians, const Camera& camera,
+                                 const RenderOptions& options, const std::vector<Pixel>& pixels,
+                                 const Exact& exact, bool quiet) {
+    const Volume volume(gaussians, camera, options);
+    report::WorkSeries marcher{std::string("march on the host, ") + exact.name, true, {}, false, 6};
+    const double share = double(camera.width) * camera.height / double(pixels.size());
+    constexpr int kSamples[] = {16, 64, 256};
+    HostRays rays(pixels, "marched on the host", std::size(kSamples), quiet);
+    Colors actual;
+    for (const int samples : kSamples) {
+        report::WorkPoint point;
+        point.name = std::to_string(samples) + " samples";
+        point.time = 1000 * share *
+                     rays.evaluate(actual, [&](double x, double y) { return volume.marched(x, y, samples); });
+        const Error error = error_of(exact.colors, actual);
+        point.error = error.rms;
+        point.worst = error.worst;
+        marcher.points.push_back(point);
+    }
+    return marcher;
+}
+
+/// Both exact images of one method have one colour.
+report::WorkSeries series_of(const Way& way, const std::vector<Exact>& exact) {
+    const char* const methods[] = {"points", "splatting", "ray", "march", "SH degree", "antialias"};
+    const std::string method = way.series.substr(0, way.series.rfind(", "));
+    const auto found = std::find(std::begin(methods), std::end(methods), method);
+    return {way.series,
+            true,
+            {},
+            exact[way.exact].kernel == Footprint::density,
+            int(found - std::begin(methods))};
+}
+
+/// "ray, density" is measured against the exact image "density".
+std::string exact_of(const report::WorkSeries& series) {
+    return series.name.substr(series.name.rfind(", ") + 2);
 }
 
 }  // namespace
 
+void set_verdicts(std::vector<report::WorkSeries>& all) {
+    for (report::WorkSeries& series : all)
+        for (report::WorkPoint& point : series.points) {
+            point.verdict = "on the front";
+            const report::WorkPoint* best = nullptr;
+            for (const report::WorkSeries& other : all) {
+                if (exact_of(other) != exact_of(series)) continue;
+                for (const report::WorkPoint& rival : other.points) {
+                    if (!(rival.time < point.time && rival.error < point.error)) continue;
+                    if (best && best->error <= rival.error) continue;
+                    best = &rival;
+                    point.verdict = other.name + ": " + rival.name + " is faster and less wrong";
+                }
+            }
+        }
+}
+
 Accuracy measure_accuracy(const std::shared_ptr<gpu::Device>& device, const Gaussians& gaussians,
-                          const Camera& camera, const RenderOptions& options,
-                          const std::function<void(const std::string&)>& say) {
+                          const Camera& camera, const RenderOptions& options, bool quiet) {
     Accuracy result;
     result.threads = host_threads();
     const std::vector<Pixel> pixels = spread_pixels(camera);
     result.pixels = int(pixels.size());
-    say(text_of("integrals along %d rays in float64, %u threads", result.pixels, result.threads));
     RenderOptions whole = options;
     whole.sh_degree = kMaxShDegree;
-    const reference::Volume volume(gaussians, camera, whole);
-    std::vector<glm::dvec3> exact, actual;
-    result.exact_seconds =
-        evaluate_pixels(pixels, exact, [&](double x, double y) { return volume.exact(x, y); });
-
-    say("splatting on the device");
-    const BenchScene scene{gaussians, camera, {}};
-    for (const SplattingChoice& choice : splatting_choices(gaussians, device->limits())) {
-        if (result.series.empty() || result.series.back().name != choice.series)
-            result.series.push_back({choice.series, choice.series == "splatting, cut-off", {}});
-        result.series.back().points.push_back(splat(device, scene, options, choice, pixels, exact));
+    std::vector<Exact> exact{{"opacity", Footprint::peak, {}}, {"density", Footprint::density, {}}};
+    {
+        HostRays rays(pixels, "integrated in float64", exact.size(), quiet);
+        for (Exact& one : exact) {
+            whole.kernel = one.kernel;
+            const Volume volume(gaussians, camera, whole);
+            result.exact_seconds +=
+                rays.evaluate(one.colors, [&](double x, double y) { return volume.exact(x, y); });
+        }
     }
-    say("ray-marching on the host");
-    report::WorkSeries marcher{"ray-marcher (host)", true, {}};
-    const double share = double(camera.width) * camera.height / double(pixels.size());
-    for (int samples = 4; samples <= 1024; samples *= 2) {
-        report::WorkPoint point;
-        point.name = std::to_string(samples) + " samples";
-        point.time = 1000 * share * evaluate_pixels(pixels, actual, [&](double x, double y) {
-                         return volume.marched(x, y, samples);
-                     });
-        take_error(exact, actual, point);
-        marcher.points.push_back(point);
+    for (const Exact& one : exact) {
+        whole.kernel = one.kernel;
+        result.references.push_back(causes_of(one, gaussians, camera, whole, pixels, quiet));
     }
-    result.series.push_back(std::move(marcher));
+    {
+        const BenchScene scene{gaussians, camera, {}};
+        const std::vector<Way> ways = ways_of(exact, options, sh_degree_present(gaussians));
+        core::Progress progress("rendered", int(ways.size()), "ways", quiet);
+        for (size_t i = 0; i < ways.size(); ++i) {
+            const Way& way = ways[i];
+            if (result.series.empty() || result.series.back().name != way.series)
+                result.series.push_back(series_of(way, exact));
+            result.series.back().points.push_back(draw(device, scene, way, pixels, exact[way.exact].colors));
+            progress.update(int(i + 1), way.series + ", " + way.name);
+        }
+    }
+    whole.kernel = exact.front().kernel;
+    result.series.push_back(march_on_host(gaussians, camera, whole, pixels, exact.front(), quiet));
+    set_verdicts(result.series);
     return result;
 }
 

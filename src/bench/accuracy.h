@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Error against run time of splatting and ray-marching. Both approximate the integral in reference/volume.h.
+// Error against run time of every way to draw splats, and the part of the error that each approximation of splatting
+// has. What counts as exact is the integral in reference/volume.h, with either of its two meanings of opacity.
 #pragma once
-#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -14,17 +14,36 @@
 
 namespace ewa::bench {
 
+/// The RMS error that one approximation of splatting makes.
+struct Cause {
+    std::string name;
+    double alone = 0;    // of the exact image with this approximation and no other
+    double without = 0;  // of splatting without this approximation
+};
+
+/// What is measured against one exact image.
+struct AccuracyReference {
+    std::string name;      // the meaning of opacity
+    double splatting = 0;  // RMS error of splatting in float64
+    std::vector<Cause> causes;
+};
+
 struct Accuracy {
-    /// RMS error against ms per frame: the median of the device's whole frame, or of all host threads.
+    /// RMS error against ms per frame: the median of the device's whole frame, or of all host threads. Each series has
+    /// the error against the exact image of its kernel.
     std::vector<report::WorkSeries> series;
+    std::vector<AccuracyReference> references;
     int pixels = 0;            // where the error is measured, evenly spread
     double exact_seconds = 0;  // time of computing their integrals
     unsigned threads = 0;      // of the host
 };
 
-/// say: receives a line for the user before each longer part.
+/// Prints progress, unless it is quiet.
 Accuracy measure_accuracy(const std::shared_ptr<gpu::Device>& device, const Gaussians& gaussians,
-                          const Camera& camera, const RenderOptions& options,
-                          const std::function<void(const std::string&)>& say);
+                          const Camera& camera, const RenderOptions& options, bool quiet);
+
+/// What the points of all series are worth. "on the front": no other point of the same exact image is faster and less
+/// wrong. Otherwise the name of one that is.
+void set_verdicts(std::vector<report::WorkSeries>& series);
 
 }  // namespace ewa::bench

@@ -5,7 +5,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -72,11 +71,41 @@ Trained train(const std::shared_ptr<gpu::Device>& device, const Dataset& dataset
     return result;
 }
 
-void print_table(const report::WorkPrecision& diagram) {
+void print_tables(const report::WorkPrecision& diagram) {
+    fmt::print(
+        "\nTime: the median of a whole frame. RMS error, worst: over pixels and channels, against the exact "
+        "image that "
+        "the method's name ends with.\n"
+        "  opacity: 3DGS's, the same from every side. density: a longer way through a splat absorbs more.\n"
+        "on the front: nothing with the same exact image is faster and less wrong.\n\n"
+        "{:<28} {:<12} {:>10}  {:>9} {:>9}  {}\n",
+        "method", "effort", "ms", "RMS error", "worst", "verdict");
     for (const report::WorkSeries& series : diagram.series)
         for (const report::WorkPoint& p : series.points)
-            fmt::print("{:<24} {:<14} {:10.2f} ms  RMS error {:.2e}, worst {:.2e}\n", series.name, p.name,
-                       p.time, p.error, p.worst);
+            fmt::print("{:<28} {:<12} {:>10.2f}  {:>9.2e} {:>9.2e}  {}\n", series.name, p.name, p.time,
+                       p.error, p.worst, p.verdict);
+    for (const report::WorkTable& table : diagram.tables) {
+        fmt::print("\n{}. {}\n\n{:<44}", table.title, table.note, table.columns.front());
+        for (size_t i = 1; i < table.columns.size(); ++i) fmt::print(" {:>22}", table.columns[i]);
+        fmt::print("\n");
+        for (const auto& [name, values] : table.rows) {
+            fmt::print("{:<44}", name);
+            for (const double value : values) fmt::print(" {:>22.2e}", value);
+            fmt::print("\n");
+        }
+    }
+}
+
+report::WorkTable cause_table(const bench::AccuracyReference& reference) {
+    report::WorkTable table{
+        "Error of splatting by cause, exact image: " + reference.name,
+        {"cause", "alone", "splatting without it"},
+        {},
+        "RMS error in float64. alone: the exact image with this approximation and no other"};
+    for (const bench::Cause& cause : reference.causes)
+        table.rows.emplace_back(cause.name, std::vector<double>{cause.alone, cause.without});
+    table.rows.emplace_back("all: splatting", std::vector<double>{reference.splatting, reference.splatting});
+    return table;
 }
 
 /// The file of the training diagram, beside that of rendering; empty: none.
@@ -97,12 +126,8 @@ void check_files(const BenchArguments& arguments) {
 
 report::WorkPrecision rendering_diagram(const std::shared_ptr<gpu::Device>& device,
                                         const Gaussians& gaussians, const Camera& camera,
-                                        const RenderOptions& options) {
-    const auto say = [](const std::string& line) {
-        fmt::print("{}\n", line);
-        std::fflush(stdout);
-    };
-    const bench::Accuracy accuracy = bench::measure_accuracy(device, gaussians, camera, options, say);
+                                        const RenderOptions& options, bool quiet) {
+    const bench::Accuracy accuracy = bench::measure_accuracy(device, gaussians, camera, options, quiet);
     report::WorkPrecision diagram;
     diagram.title = "Rendering: error against run time";
     diagram.series = accuracy.series;
@@ -112,10 +137,17 @@ report::WorkPrecision rendering_diagram(const std::shared_ptr<gpu::Device>& devi
                     "each ray ({:.1f} s).",
                     gaussians.size(), camera.width, camera.height, device_info(*device).name, accuracy.pixels,
                     accuracy.exact_seconds));
-    diagram.notes.push_back(fmt::format(
-        "The ray-marcher is C++ in float64 on {} host threads; its time at those pixels is scaled to the "
-        "whole image. The time of splatting is the whole frame on the device, with recording and waiting.",
-        accuracy.threads));
+    diagram.notes.push_back(
+        fmt::format("Times are of whole frames on the device, with recording and waiting. The march on the "
+                    "host is C++ in "
+                    "float64 on {} threads; its time at those pixels is scaled to the whole image.",
+                    accuracy.threads));
+    diagram.notes.push_back(
+        "opacity: exact with 3DGS's opacity, the same from every side. density: exact with a density fixed "
+        "per splat, "
+        "so that a longer way through it absorbs more.");
+    for (const bench::AccuracyReference& reference : accuracy.references)
+        diagram.tables.push_back(cause_table(reference));
     return diagram;
 }
 
@@ -158,8 +190,8 @@ int run_accuracy(const BenchArguments& arguments) {
                     arguments.steps, kMaxSplats, device_info(*device).name));
     if (!arguments.splats.empty()) gaussians = std::move(given);
     const report::WorkPrecision rendering =
-        rendering_diagram(device, gaussians, dataset.frames[size_t(split.test.front())].camera, {});
-    print_table(rendering);
+        rendering_diagram(device, gaussians, dataset.frames[size_t(split.test.front())].camera, {}, false);
+    print_tables(rendering);
     if (!arguments.options.json.empty())
         write_json(arguments.options.json, {{"rendering", report::work_precision_json(rendering)},
                                             {"training", report::work_precision_json(training)}});

@@ -11,9 +11,9 @@
 
 namespace ewa::cli {
 
-/// Error against run time of rendering a scene through one camera.
+/// Error against run time of rendering a scene through one camera. Prints progress, unless it is quiet.
 report::WorkPrecision rendering_diagram(const std::shared_ptr<gpu::Device>& device,
                                         const Gaussians& gaussians, const Camera& camera,
-                                        const RenderOptions& options);
+                                        const RenderOptions& options, bool quiet);
 
 }  // namespace ewa::cli

@@ -152,7 +152,7 @@ void place_photos(TrainArguments& arguments) {
 
 std::string accuracy_section(const RunScene& scene) {
     return report::work_precision_html(
-        rendering_diagram(scene.device, scene.gaussians, scene.camera, scene.options));
+        rendering_diagram(scene.device, scene.gaussians, scene.camera, scene.options, false));
 }
 
 int run(CLI::App& app, TrainArguments& arguments) {

@@ -241,25 +241,29 @@ std::string work_grid(const Axes& axes, const WorkPrecision& diagram) {
 }
 
 std::string series_svg(const Axes& axes, const WorkSeries& series, size_t number) {
-    const char* color = kColors[number % std::size(kColors)];
+    const char* color = kColors[(series.hue < 0 ? number : size_t(series.hue)) % std::size(kColors)];
+    const std::string dot = series.dashed
+                                ? fmt::format("fill=\"none\" stroke=\"{}\" stroke-width=\"2\"", color)
+                                : fmt::format("fill=\"{}\"", color);
     std::string path, dots;
     for (const WorkPoint& p : series.points) {
         if (!shown(p)) continue;
         const double x = axes.px(p.time), y = axes.py(p.error);
         path += fmt::format("{:.1f},{:.1f} ", x, y);
         dots += fmt::format(
-            "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"4\" fill=\"{}\"><title>{}: {:.3g}, {:.3g}</title>"
+            "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{}\" {}><title>{}: {:.3g}, {:.3g}</title>"
             "</circle>\n",
-            x, y, color, escape_html(series.name + ", " + p.name), p.time, p.error);
+            x, y, series.dashed ? 3 : 4, dot, escape_html(series.name + ", " + p.name), p.time, p.error);
     }
     std::string svg;
     if (series.line)
-        svg += fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"2\"/>\n", path,
-                           color);
+        svg +=
+            fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{}\"{}/>\n", path,
+                        color, series.dashed ? 1.5 : 2, series.dashed ? " stroke-dasharray=\"5 4\"" : "");
     const double x = kWork.width - kWork.right, y = kWork.top + 14 + 22 * double(number);
     return svg + dots +
-           fmt::format("<circle cx=\"{}\" cy=\"{}\" r=\"4\" fill=\"{}\"/><text x=\"{}\" y=\"{}\">{}</text>\n",
-                       x + 18, y - 4, color, x + 28, y, escape_html(series.name));
+           fmt::format("<circle cx=\"{}\" cy=\"{}\" r=\"{}\" {}/><text x=\"{}\" y=\"{}\">{}</text>\n", x + 18,
+                       y - 4, series.dashed ? 3 : 4, dot, x + 28, y, escape_html(series.name));
 }
 
 }  // namespace
@@ -339,6 +343,33 @@ std::string work_precision_svg(const WorkPrecision& diagram) {
     return svg + "</svg>\n";
 }
 
+namespace {
+
+std::string table_html(const WorkTable& table) {
+    std::string html = "<h3>" + escape_html(table.title) + "</h3>\n<table><tr>";
+    for (size_t i = 0; i < table.columns.size(); ++i)
+        html += (i == 0 ? "<th>" : "<th class=\"number\">") + escape_html(table.columns[i]) + "</th>";
+    html += "</tr>\n";
+    for (const auto& [name, values] : table.rows) {
+        html += "<tr><td>" + escape_html(name) + "</td>";
+        for (const double value : values) html += fmt::format("<td class=\"number\">{:.2e}</td>", value);
+        html += "</tr>\n";
+    }
+    return html + "</table>\n<p class=\"soft\">" + escape_html(table.note) + "</p>\n";
+}
+
+nlohmann::ordered_json table_json(const WorkTable& table) {
+    nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+    for (const auto& [name, values] : table.rows) {
+        nlohmann::ordered_json row{{table.columns.front(), name}};
+        for (size_t i = 0; i < values.size(); ++i) row[table.columns[i + 1]] = values[i];
+        rows.push_back(std::move(row));
+    }
+    return {{"title", table.title}, {"note", table.note}, {"rows", rows}};
+}
+
+}  // namespace
+
 std::string work_precision_html(const WorkPrecision& diagram) {
     const std::string svg = work_precision_svg(diagram);
     if (svg.empty()) return "";
@@ -346,15 +377,18 @@ std::string work_precision_html(const WorkPrecision& diagram) {
     for (const std::string& note : diagram.notes) html += "<p class=\"soft\">" + escape_html(note) + "</p>\n";
     html += fmt::format(
         "<table><tr><th>method</th><th></th><th class=\"number\">{}</th><th class=\"number\">{}</th>"
-        "<th class=\"number\">worst</th></tr>\n",
+        "<th class=\"number\">worst</th><th></th></tr>\n",
         escape_html(diagram.x_label), escape_html(diagram.y_label));
     for (const WorkSeries& series : diagram.series)
         for (const WorkPoint& p : series.points)
             html += fmt::format(
                 "<tr><td>{}</td><td>{}</td><td class=\"number\">{:.3g}</td><td class=\"number\">{:.2e}</td>"
-                "<td class=\"number\">{:.2e}</td></tr>\n",
-                escape_html(series.name), escape_html(p.name), p.time, p.error, p.worst);
-    return html + "</table>\n";
+                "<td class=\"number\">{:.2e}</td><td>{}</td></tr>\n",
+                escape_html(series.name), escape_html(p.name), p.time, p.error, p.worst,
+                escape_html(p.verdict));
+    html += "</table>\n";
+    for (const WorkTable& table : diagram.tables) html += table_html(table);
+    return html;
 }
 
 nlohmann::ordered_json work_precision_json(const WorkPrecision& diagram) {
@@ -365,9 +399,15 @@ nlohmann::ordered_json work_precision_json(const WorkPrecision& diagram) {
     for (const WorkSeries& series : diagram.series) {
         nlohmann::ordered_json points = nlohmann::ordered_json::array();
         for (const WorkPoint& p : series.points)
-            points.push_back({{"name", p.name}, {"time", p.time}, {"error", p.error}, {"worst", p.worst}});
+            points.push_back({{"name", p.name},
+                              {"time", p.time},
+                              {"error", p.error},
+                              {"worst", p.worst},
+                              {"verdict", p.verdict}});
         json["series"].push_back({{"name", series.name}, {"points", points}});
     }
+    json["tables"] = nlohmann::ordered_json::array();
+    for (const WorkTable& table : diagram.tables) json["tables"].push_back(table_json(table));
     return json;
 }
 

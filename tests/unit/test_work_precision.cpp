@@ -42,5 +42,30 @@ TEST(WorkPrecision, JsonHoldsThePoints) {
     EXPECT_EQ(json.at("series")[0].at("points")[1].at("error"), 0.001);
 }
 
+TEST(WorkPrecision, TablesAndVerdictsAreInReportAndJson) {
+    WorkPrecision diagram = two_points();
+    diagram.series[0].points[1].verdict = "on the <front>";
+    diagram.tables.push_back(
+        {"Causes", {"cause", "alone", "without it"}, {{"order & overlap", {0.25, 1e-3}}}, "note"});
+    const std::string html = work_precision_html(diagram);
+    for (const char* text :
+         {"on the &lt;front&gt;", "Causes", "without it", "order &amp; overlap", "2.50e-01", "note"})
+        EXPECT_NE(html.find(text), std::string::npos) << text;
+    const auto json = work_precision_json(diagram);
+    EXPECT_EQ(json.at("series")[0].at("points")[1].at("verdict"), "on the <front>");
+    EXPECT_EQ(json.at("tables")[0].at("rows")[0].at("cause"), "order & overlap");
+    EXPECT_EQ(json.at("tables")[0].at("rows")[0].at("without it"), 1e-3);
+}
+
+TEST(WorkPrecision, SeriesOfOneHueShareItsColour) {
+    WorkPrecision diagram = two_points();
+    diagram.series[0].hue = 2;
+    diagram.series.push_back({"dashed", true, {{"a", 2, 0.3}, {"b", 20, 0.1}}, true, 2});
+    const std::string svg = work_precision_svg(diagram);
+    EXPECT_NE(svg.find("stroke-dasharray"), std::string::npos);
+    EXPECT_NE(svg.find("#009e73"), std::string::npos);
+    EXPECT_EQ(svg.find("#0072b2"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace ewa::report
