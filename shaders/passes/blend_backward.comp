@@ -23,43 +23,10 @@ layout(set = 0, binding = 4, scalar) readonly buffer ImageGradient { float image
 layout(set = 0, binding = 5, scalar) writeonly buffer Slots { vec4 slots[]; };
 layout(push_constant, scalar) uniform Push { BlendPush push; };
 #include "lib/tile.glsl"
-const bool WIDE_STORES = BROADCAST != BROADCAST_SHUFFLES;
+#include "lib/tile_sums.glsl"
 
 // The middle of a lane's pixels, in pixels of its column.
 #define MIDDLE (0.5 * float(PIXELS - 1u))
-
-// Sums BLOCK values over the subgroup at once. At each step a lane keeps half of its values and sends the other half, so
-// that lane l ends with the sum of value l % BLOCK. Then lanes BLOCK apart are added.
-float transposing_sum(float v[8]) {
-    const uint lane = LANE;
-    const bool b0 = (lane & 1u) != 0u, b1 = (lane & 2u) != 0u, b2 = (lane & 4u) != 0u;
-    float four[4], two[2];
-    if (BLOCK == 1u) return v[0];
-    [[unroll]] for (uint i = 0; i < BLOCK / 2u; ++i)
-        four[i] = (b0 ? v[2 * i + 1] : v[2 * i]) + subgroupShuffleXor(b0 ? v[2 * i] : v[2 * i + 1], 1u);
-    if (BLOCK == 2u) return four[0];
-    [[unroll]] for (uint i = 0; i < BLOCK / 4u; ++i)
-        two[i] = (b1 ? four[2 * i + 1] : four[2 * i]) + subgroupShuffleXor(b1 ? four[2 * i] : four[2 * i + 1], 2u);
-    if (BLOCK == 4u) return two[0];
-    float sum = (b2 ? two[1] : two[0]) + subgroupShuffleXor(b2 ? two[0] : two[1], 4u);
-    [[unroll]] for (uint s = 3u; s < DOUBLINGS; ++s) {
-        if ((1u << s) < SUBGROUP) sum += subgroupShuffleXor(sum, 1u << s);
-    }
-    return sum;
-}
-
-// Whole texels take fewer memory transactions; without them the unused floats are not written.
-void write_slot(uint index, float slot[12]) {
-    [[unroll]] for (uint t = 0; t < SLOT_TEXELS; ++t) {
-        if (WIDE_STORES) {
-            slots[SLOT_TEXELS * index + t] = vec4(slot[4 * t], slot[4 * t + 1], slot[4 * t + 2], slot[4 * t + 3]);
-            continue;
-        }
-        [[unroll]] for (uint c = 0; c < 4; ++c) {
-            if (4 * t + c < SUMS) slots[SLOT_TEXELS * index + t][c] = slot[4 * t + c];
-        }
-    }
-}
 
 void main() {
     const uint tile = gl_WorkGroupID.x * push.tile_step[0] + gl_WorkGroupID.y * push.tile_step[1];
@@ -90,12 +57,11 @@ void main() {
             rest[p] += fourth[p] * planes[PLANE_DEPTH * push.image.plane_floats + at];
         }
     }
-    const float none[12] = float[](0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     const uint end = tile_starts[tile + 1u];
     uint k = tile_starts[tile];
     for (; k < end; k += SUBGROUP) {
         const Loaded batch = load_batch(k, end);
-        float slot[12] = none;
+        float slot[12] = NO_GRADIENT;
         UNROLL_BLOCKS for (uint first = 0; first < SUBGROUP; first += BLOCK) {
             float sums[12][8];
             [[unroll]] for (uint j = 0; j < BLOCK; ++j) {
@@ -157,16 +123,5 @@ void main() {
             break;
         }
     }
-    // The last tile also clears the slots of instances with the sentinel tile. Every slot of the list is written, so that
-    // none keeps values of an earlier frame.
-    if (tile + 1u == push.tiles[0] * push.tiles[1]) {
-        const uint all = tile_starts[tile + 2u];
-        for (uint e = end; e < all; e += SUBGROUP) {
-            if (e + lane < all) write_slot(e + lane, none);
-        }
-    }
-    // Instances behind the last open pixel have gradient zero.
-    for (; k < end; k += SUBGROUP) {
-        if (k + lane < end) write_slot(k + lane, none);
-    }
+    write_other_slots(k, end, tile);
 }

@@ -10,7 +10,6 @@
 #include "lib/params.glsl"
 #include "lib/stored_splat.glsl"
 #include "lib/footprint.glsl"
-#include "lib/sh.glsl"
 #include "lib/subgroup.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
@@ -24,30 +23,7 @@ layout(set = 0, binding = 3, scalar) writeonly buffer DepthKeys { uint depth_key
 layout(set = 0, binding = 4, scalar) writeonly buffer TileCounts { uint tile_counts[]; };
 layout(set = 0, binding = 5, scalar) buffer CountsBlock { Counts counts; };
 layout(push_constant, scalar) uniform Push { ProjectPush push; };
-
-vec4 param(uint plane, uint i) { return fetch(params, param_texel(push.planes, plane, i)); }
-
-const uint SH_FLOATS = 3 * (SH_DEGREE + 1) * (SH_DEGREE + 1);
-const uint PLANES = (PARAM_SH + SH_FLOATS + 3) / 4;
-
-// Colour seen along a direction. finite: whether it is within COLOR_MAX.
-vec3 sh_color(uint i, vec4 plane2, vec3 direction, out bool finite) {
-    float basis[16];
-    sh_basis(SH_DEGREE, direction, basis);
-    vec3 sum = vec3(0.0);
-    [[unroll]] for (uint plane = PARAM_SH / 4; plane < PLANES; ++plane) {
-        const vec4 value = plane == 2u ? plane2 : param(plane, i);
-        [[unroll]] for (uint c = 0; c < 4; ++c) {
-            const uint f = 4 * plane + c;
-            if (f >= PARAM_SH && f < PARAM_SH + SH_FLOATS)
-                sum[(f - PARAM_SH) % 3] += basis[(f - PARAM_SH) / 3] * value[c];
-        }
-    }
-    // A NaN fails these comparisons.
-    const vec3 size = abs(sum);
-    finite = size.r <= float(COLOR_MAX) && size.g <= float(COLOR_MAX) && size.b <= float(COLOR_MAX);
-    return max(vec3(0.0), sum + float(COLOR_OFFSET));
-}
+#include "lib/splat_color.glsl"
 
 // Whether splat i reaches a tile.
 bool project(uint i) {

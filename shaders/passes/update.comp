@@ -13,9 +13,6 @@
 #include "lib/params.glsl"
 #include "lib/stored_splat.glsl"
 #include "lib/footprint_gradient.glsl"
-#include "lib/step_limits.glsl"
-#include "lib/moments.glsl"
-#include "lib/sh.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3;
@@ -39,69 +36,7 @@ layout(set = 0, binding = 12, scalar) buffer Statistics { vec2 statistics[]; };
 layout(set = 0, binding = 13, scalar) readonly buffer SortedIndices { uint sorted_indices[]; };
 layout(push_constant, scalar) uniform Push { UpdatePush push; };
 #include "lib/slots.glsl"
-
-const uint SH_FLOATS = 3 * (SH_DEGREE + 1) * (SH_DEGREE + 1);
-const uint PLANES = (PARAM_SH + SH_FLOATS + 3) / 4;
-
-uint index_of(uint plane, uint i) { return param_texel(push.planes, plane, i); }
-
-// Adam's step of one texel of parameters (Kingma and Ba 2015, algorithm 1).
-void move(uint plane, uint i, vec4 value, vec4 raw_gradient, vec4 rate, float depth) {
-    const uint at = index_of(plane, i);
-    if (GRADIENT_ONLY) {
-        // Infinities become the largest float32. NaN becomes zero and is counted.
-        const bvec4 number = equal(raw_gradient, raw_gradient);
-        moments1_out[at] =
-            floatBitsToUint(mix(vec4(0.0), clamp(raw_gradient, -3.402823466e38, 3.402823466e38), number));
-        if (!all(number)) atomicAdd(counts.dropped_updates, 1u);
-        return;
-    }
-    const vec4 largest = vec4(GRADIENT_MAX);
-    const vec4 gradient = mix(raw_gradient, clamp(raw_gradient, -largest, largest), greaterThan(abs(raw_gradient), largest));
-    const uvec4 words = fetch(moments1, at);
-    const vec4 old_m = PACKED_MOMENTS ? first_moment(words) : uintBitsToFloat(words);
-    const vec4 old_v = PACKED_MOMENTS ? second_moment(words) : uintBitsToFloat(fetch(moments2, at));
-    const vec4 m = mix(gradient, old_m, float(ADAM_BETA1));
-    const vec4 v = mix(gradient * gradient, old_v, float(ADAM_BETA2));
-    vec4 moved = value - rate * (m * push.bias1) / (sqrt(v * push.bias2) + float(ADAM_EPSILON));
-    const bool limited = limit_step(plane, value, depth, moved);
-    if (is_finite(moved) && is_finite(m) && is_finite(v)) {
-        if (limited) atomicAdd(counts.limited_steps, 1u);
-        params_out[at] = moved;
-        if (PACKED_MOMENTS) {
-            moments1_out[at] = pack_moments(m, v, moment_random(i, plane, push.step, push.seed));
-        } else {
-            moments1_out[at] = floatBitsToUint(m);
-            moments2_out[at] = floatBitsToUint(v);
-        }
-    } else if (is_finite(value)) {
-        atomicAdd(counts.dropped_updates, 1u);
-    }
-}
-
-// Moves all spherical harmonics except the coefficient in plane 2, which it shares with the scales. Returns that one's
-// gradient. direction_gradient: dL/d(unit direction).
-float move_sh(uint i, vec3 color_gradient, vec3 direction, out vec3 direction_gradient) {
-    float basis[16];
-    vec3 slope[16];
-    sh_basis(SH_DEGREE, direction, basis);
-    sh_basis_gradient(SH_DEGREE, direction, slope);
-    direction_gradient = vec3(0.0);
-    [[unroll]] for (uint plane = PARAM_SH / 4 + 1; plane < PLANES; ++plane) {
-        const vec4 value = fetch(params, index_of(plane, i));
-        vec4 gradient = vec4(0.0), rate = vec4(0.0);
-        [[unroll]] for (uint c = 0; c < 4; ++c) {
-            const uint s = 4 * plane + c - PARAM_SH;
-            if (s < SH_FLOATS) {
-                gradient[c] = basis[s / 3] * color_gradient[s % 3];
-                rate[c] = s < 3 ? push.sh0_rate : push.sh_rest_rate;
-                direction_gradient += (value[c] * color_gradient[s % 3]) * slope[s / 3];
-            }
-        }
-        move(plane, i, value, gradient, rate, 0.0);
-    }
-    return basis[0] * color_gradient.r;
-}
+#include "lib/adam.glsl"
 
 void main() {
     const uint i = item_index();

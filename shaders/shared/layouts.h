@@ -20,6 +20,7 @@ EWA_UINT(SPEC_ALPHA_TESTED, 9u);   // 1: some mesh material is masked or blended
 EWA_UINT(SPEC_BROADCAST, 11u);     // BROADCAST_*: how the lanes of a tile read a batch of splats
 EWA_UINT(SPEC_SHARP, 12u);         // 1: some footprint is sharper than LOW_PASS leaves any
 EWA_UINT(SPEC_COLOR_FLOATS, 10u);  // a buffer of colours holds 0: 4 bytes a colour; 1: 4 floats
+EWA_UINT(SPEC_NEAREST, 13u);       // spheres that a pixel draws, at least 1
 
 // ---- A splat's parameters ----
 // Flat float f is component f % 4 of texel plane f / 4. Splats are stored in blocks of PARAM_BLOCK. Within a

@@ -95,6 +95,9 @@ RenderOptions DrawArguments::options() const {
     RenderOptions render = drawn.train.render;
     render.kernel = settled_kernel(render.kernel, antialias);
     render.sh_degree = sh_degree;
+    render.points = points;
+    render.nearest = nearest;
+    train::check_points(render);
     return render;
 }
 
@@ -108,6 +111,19 @@ void add_draw_options(CLI::App& app, DrawArguments& arguments) {
         ->transform(one_of(kernel.choices))
         ->capture_default_str();
     app.add_flag("--antialias", arguments.antialias, "The same as --kernel antialias");
+    app.add_flag("--points", arguments.points, train::run_option("points").help);
+    const train::RunOption& nearest = train::run_option("nearest");
+    app.add_option_function<std::string>(
+           "--nearest",
+           [&nearest, &arguments](const std::string& text) {
+               RunOptions drawn;
+               nearest.set(drawn, text);
+               arguments.nearest = drawn.train.render.nearest;
+           },
+           nearest.help)
+        ->check(accepted_by(nearest))
+        ->type_name(nearest.value)
+        ->default_str(std::to_string(arguments.nearest));
     app.add_option("--sh-degree", arguments.sh_degree, "Highest degree of the spherical harmonics")
         ->transform(in_range(0, kMaxShDegree))
         ->type_name("0..3")

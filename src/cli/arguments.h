@@ -38,14 +38,16 @@ core::PixelSize size_of(const std::string& text);
 /// The kernel, or that of --antialias if it is given. Throws InputError if they exclude each other.
 Footprint settled_kernel(Footprint kernel, bool antialias);
 
-/// How a scene is rendered: --background, --kernel, --antialias, --sh-degree.
+/// How a scene is rendered: --background, --kernel, --antialias, --sh-degree, --points, --nearest.
 struct DrawArguments {
     std::string background = "0,0,0";
     std::string kernel = "peak";
     bool antialias = false;  // the short form of --kernel antialias
     int sh_degree = kMaxShDegree;
+    bool points = false;
+    int nearest = RenderOptions().nearest;
 
-    /// Throws InputError if the background is not a colour.
+    /// Throws InputError if the background is not a colour, or the options exclude each other.
     RenderOptions options() const;
 };
 void add_draw_options(CLI::App& app, DrawArguments& arguments);

@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <nlohmann/json.hpp>
 
 #include "core/json.h"
@@ -65,8 +66,13 @@ CLI::Option* find_option(CLI::App& app, const std::string& name) {
 }
 
 bool given(CLI::App& app, const std::string& name) {
-    if (name == "kernel" || name == "antialias")
-        return app.get_option("--kernel")->count() > 0 || app.get_option("--antialias")->count() > 0;
+    // Each of these says how a splat is drawn.
+    const std::array ways{"kernel", "antialias", "points"};
+    if (std::ranges::find(ways, name) != ways.end())
+        return std::ranges::any_of(ways, [&](const char* way) {
+            const CLI::Option* option = find_option(app, way);
+            return option && option->count() > 0;
+        });
     return find_option(app, name)->count() > 0;
 }
 

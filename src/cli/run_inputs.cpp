@@ -68,9 +68,11 @@ fs::path dataset_input(const fs::path& path) {
 
 void use_options_of(const live::Run& run, CLI::App& app) {
     const fs::path config = run.folder / "config.json";
-    for (const char* name : {"kernel", "background", "downscale", "masks", "test-every"}) {
+    for (const char* name :
+         {"points", "nearest", "kernel", "background", "downscale", "masks", "test-every"}) {
         const auto value = run.config.find(name);
-        if (value == run.config.end() || *value == "random") continue;  // random: evaluated over black
+        if (value == run.config.end() || *value == false) continue;
+        if (*value == "random") continue;  // evaluated over black
         apply_config_value(app, name, *value, config);
     }
 }

@@ -24,6 +24,23 @@ struct Update {
         params_out, moments1_out, moments2_out, statistics, sorted_indices;
 };
 
+/// Projects every splat as a sphere. Adds to Counts.skipped_nonfinite. Variant: SPEC_SH_DEGREE, SPEC_MODE (0 or
+/// PROJECT_DEBUG).
+struct ProjectPoints {
+    static constexpr char shader[] = "project_points";
+    using Work = PerElement<&shared::ProjectPush::splats>;
+    gpu::BufferPart params, camera, records, depth_keys, tile_counts, counts;
+};
+
+/// Gradient of ProjectPoints, fused with Adam. Variant: SPEC_SH_DEGREE, SPEC_MODE (UPDATE_* bits without
+/// UPDATE_REGULARISED).
+struct UpdatePoints {
+    static constexpr char shader[] = "update_points";
+    using Work = PerElement<&shared::UpdatePush::splats>;
+    gpu::BufferPart params, camera, records, slots, moments1, moments2, tile_counts, first_instances, counts,
+        params_out, moments1_out, moments2_out, statistics, sorted_indices;
+};
+
 // The operators of projection and of spherical harmonics. Their arrays are the caller's: include/ewa/operators.h.
 
 /// Projects splats in several views. shapes: quaternions, or covariances with VIEWS_COVARIANCES. Variant: SPEC_KERNEL
@@ -141,6 +158,21 @@ struct Blend {
 /// (BLEND_BACKWARD_* bits).
 struct BlendBackward {
     static constexpr char shader[] = "blend_backward";
+    using Work = PerTile;
+    gpu::BufferPart records, splats, tile_starts, planes, image_gradient, slots;
+};
+
+/// Blends the nearest spheres of every pixel. Variant: SPEC_NEAREST, SPEC_MODE (BLEND_COLOR, BLEND_DEPTH or BLEND_COUNT).
+struct BlendPoints {
+    static constexpr char shader[] = "blend_points";
+    using Work = PerTile;
+    gpu::BufferPart records, splats, tile_starts, planes;
+};
+
+/// Gradient of BlendPoints, in slots as those of BlendBackward. Variant: SPEC_NEAREST, SPEC_MODE (0 or
+/// BLEND_BACKWARD_ABSOLUTE).
+struct BlendPointsBackward {
+    static constexpr char shader[] = "blend_points_backward";
     using Work = PerTile;
     gpu::BufferPart records, splats, tile_starts, planes, image_gradient, slots;
 };

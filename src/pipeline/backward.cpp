@@ -164,46 +164,70 @@ void record_loss(gpu::Recording& recording, passes::PassCache& cache, const Fram
     if (exposure) record_expose_backward(recording, cache, frame, *exposure);
 }
 
-void record_backward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
-                     const Model& model, const FrameBuffers& frame, const FrameInputs& inputs,
-                     const Sorted& sorted, const Rates& rates) {
-    cache
-        .get<passes::BlendBackward>(
-            {{shared::SPEC_MODE, plan.absolute ? shared::BLEND_BACKWARD_ABSOLUTE : 0}})
-        .record(recording,
-                {.records = frame.records,
-                 .splats = *sorted.splats,
-                 .tile_starts = frame.tile_starts,
-                 .planes = frame.planes,
-                 .image_gradient = frame.image_gradient,
-                 .slots = frame.slots},
-                blend_push(cache.config(), frame, inputs.background));
+namespace {
 
+/// Blending: passes::BlendBackward or BlendPointsBackward.
+template <class Blending>
+void record_blend_backward_as(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame,
+                              const FrameInputs& inputs, const Sorted& sorted,
+                              const passes::Constants& variant) {
+    cache.get<Blending>(variant).record(recording,
+                                        {.records = frame.records,
+                                         .splats = *sorted.splats,
+                                         .tile_starts = frame.tile_starts,
+                                         .planes = frame.planes,
+                                         .image_gradient = frame.image_gradient,
+                                         .slots = frame.slots},
+                                        blend_push(cache.config(), frame, inputs.background));
+}
+
+/// Updating: passes::Update or UpdatePoints.
+template <class Updating>
+void record_update_as(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
+                      const Model& model, const FrameBuffers& frame, const FrameInputs& inputs,
+                      const Sorted& sorted, const Rates& rates, const passes::Constants& variant) {
     // Packed moments and a gradient alone have no buffer of second moments, and a gradient no statistics. The kernel
     // does not use those bindings, but they need a buffer.
     const gpu::Buffer& moments2 = model.second_moments();
     const gpu::Buffer& statistics = plan.statistics ? model.statistics : frame.partials;
     const CameraUse& camera = inputs.camera;
-    cache
-        .get<passes::Update>({{shared::SPEC_SH_DEGREE, plan.evaluated_degree(inputs.sh_degree)},
-                              {shared::SPEC_KERNEL, uint32_t(plan.kernel)},
-                              {shared::SPEC_MODE, update_mode(plan)}})
-        .record(recording,
-                {.params = model.params,
-                 .camera = {*camera.buffer, camera.offset, sizeof(shared::CameraBlock)},
-                 .records = frame.records,
-                 .slots = frame.slots,
-                 .moments1 = model.moments1,
-                 .moments2 = moments2,
-                 .tile_counts = frame.tile_counts,
-                 .first_instances = frame.first_instances,
-                 .counts = frame.counts,
-                 .params_out = model.params,
-                 .moments1_out = model.moments1,
-                 .moments2_out = moments2,
-                 .statistics = statistics,
-                 .sorted_indices = *sorted.indices},
-                update_push(model, frame, rates));
+    cache.get<Updating>(variant).record(
+        recording,
+        {.params = model.params,
+         .camera = {*camera.buffer, camera.offset, sizeof(shared::CameraBlock)},
+         .records = frame.records,
+         .slots = frame.slots,
+         .moments1 = model.moments1,
+         .moments2 = moments2,
+         .tile_counts = frame.tile_counts,
+         .first_instances = frame.first_instances,
+         .counts = frame.counts,
+         .params_out = model.params,
+         .moments1_out = model.moments1,
+         .moments2_out = moments2,
+         .statistics = statistics,
+         .sorted_indices = *sorted.indices},
+        update_push(model, frame, rates));
+}
+
+}  // namespace
+
+void record_backward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
+                     const Model& model, const FrameBuffers& frame, const FrameInputs& inputs,
+                     const Sorted& sorted, const Rates& rates) {
+    passes::Constants blending{{shared::SPEC_MODE, plan.absolute ? shared::BLEND_BACKWARD_ABSOLUTE : 0}};
+    passes::Constants updating{{shared::SPEC_SH_DEGREE, plan.evaluated_degree(inputs.sh_degree)},
+                               {shared::SPEC_MODE, update_mode(plan)}};
+    if (plan.points()) {
+        blending.push_back({shared::SPEC_NEAREST, plan.nearest});
+        record_blend_backward_as<passes::BlendPointsBackward>(recording, cache, frame, inputs, sorted, blending);
+        record_update_as<passes::UpdatePoints>(recording, cache, plan, model, frame, inputs, sorted, rates,
+                                               updating);
+        return;
+    }
+    updating.push_back({shared::SPEC_KERNEL, uint32_t(plan.kernel)});
+    record_blend_backward_as<passes::BlendBackward>(recording, cache, frame, inputs, sorted, blending);
+    record_update_as<passes::Update>(recording, cache, plan, model, frame, inputs, sorted, rates, updating);
 }
 
 }  // namespace ewa::pipeline

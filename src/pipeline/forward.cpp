@@ -11,21 +11,43 @@ namespace {
 constexpr uint32_t kBlendModes[] = {shared::BLEND_COLOR, shared::BLEND_DEPTH, shared::BLEND_COUNT,
                                     shared::BLEND_ELLIPSOIDS};
 
+/// Projection: passes::Project or ProjectPoints.
+template <class Projection>
+void record_project_as(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
+                       const Model& model, const FrameBuffers& frame, const FrameInputs& inputs,
+                       const passes::Constants& variant) {
+    const CameraUse& camera = inputs.camera;
+    cache.get<Projection>(variant).record(
+        recording,
+        {.params = model.params,
+         .camera = {*camera.buffer, camera.offset, sizeof(shared::CameraBlock)},
+         .records = frame.records,
+         .depth_keys = frame.depth_keys[0],
+         .tile_counts = frame.tile_counts,
+         .counts = frame.counts},
+        {.splats = model.splats, .planes = model.planes(), .log_scale_shift = plan.log_scale_shift});
+}
+
 void record_project(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan, const Model& model,
                     const FrameBuffers& frame, const FrameInputs& inputs) {
-    const CameraUse& camera = inputs.camera;
-    cache
-        .get<passes::Project>({{shared::SPEC_SH_DEGREE, plan.evaluated_degree(inputs.sh_degree)},
-                               {shared::SPEC_KERNEL, uint32_t(plan.kernel)},
-                               {shared::SPEC_MODE, plan.debug ? shared::PROJECT_DEBUG : 0}})
-        .record(recording,
-                {.params = model.params,
-                 .camera = {*camera.buffer, camera.offset, sizeof(shared::CameraBlock)},
-                 .records = frame.records,
-                 .depth_keys = frame.depth_keys[0],
-                 .tile_counts = frame.tile_counts,
-                 .counts = frame.counts},
-                {.splats = model.splats, .planes = model.planes(), .log_scale_shift = plan.log_scale_shift});
+    passes::Constants variant{{shared::SPEC_SH_DEGREE, plan.evaluated_degree(inputs.sh_degree)},
+                              {shared::SPEC_MODE, plan.debug ? shared::PROJECT_DEBUG : 0}};
+    if (plan.points())
+        return record_project_as<passes::ProjectPoints>(recording, cache, plan, model, frame, inputs, variant);
+    variant.push_back({shared::SPEC_KERNEL, uint32_t(plan.kernel)});
+    record_project_as<passes::Project>(recording, cache, plan, model, frame, inputs, variant);
+}
+
+/// Blending: passes::Blend or BlendPoints.
+template <class Blending>
+void record_blend_as(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame,
+                     const FrameInputs& inputs, const passes::Constants& variant) {
+    cache.get<Blending>(variant).record(recording,
+                                        {.records = frame.records,
+                                         .splats = frame.instance_splats[1],
+                                         .tile_starts = frame.tile_starts,
+                                         .planes = frame.planes},
+                                        blend_push(cache.config(), frame, inputs.background));
 }
 
 /// The buffer of splats in depth order.
@@ -132,13 +154,13 @@ Sorted record_forward(gpu::Recording& recording, passes::PassCache& cache, const
                    inputs.keep_overflow ? offsetof(shared::Counts, overflowed) : sizeof(shared::Counts));
     record_project(recording, cache, plan, model, frame, inputs);
     record_tile_lists(recording, cache, plan.gradients, model.splats, frame);
-    cache.get<passes::Blend>({{shared::SPEC_MODE, kBlendModes[size_t(plan.drawing)]}})
-        .record(recording,
-                {.records = frame.records,
-                 .splats = frame.instance_splats[1],
-                 .tile_starts = frame.tile_starts,
-                 .planes = frame.planes},
-                blend_push(cache.config(), frame, inputs.background));
+    passes::Constants variant{{shared::SPEC_MODE, kBlendModes[size_t(plan.drawing)]}};
+    if (plan.points()) {
+        variant.push_back({shared::SPEC_NEAREST, plan.nearest});
+        record_blend_as<passes::BlendPoints>(recording, cache, frame, inputs, variant);
+    } else {
+        record_blend_as<passes::Blend>(recording, cache, frame, inputs, variant);
+    }
     return {.splats = &frame.instance_splats[1],
             .indices = plan.gradients ? &frame.sorted_indices[1] : nullptr};
 }

@@ -16,6 +16,9 @@ Plan plan_for(const PlanRequest& request) {
     Plan plan;
     plan.stored_degree = request.scene_degree;
     plan.kernel = request.render.kernel;
+    // An ellipsoid of equal scales is the sphere itself.
+    const bool solid = request.purpose == Purpose::picture && request.drawing == Drawing::ellipsoids;
+    if (request.render.points && !solid) plan.nearest = uint32_t(request.render.nearest);
     if (request.purpose == Purpose::picture) {
         plan.stored_degree = std::clamp(request.render.sh_degree, 0, request.present_degree);
         plan.drawing = request.drawing;
@@ -62,6 +65,10 @@ std::vector<PlanLine> describe(const Plan& plan, int scene_degree, uint64_t spla
             {"mask passes and the masked image", "every pixel of every training image counts", 0});
     if (plan.gradients && !plan.exposure)
         lines.push_back({"exposures, their passes and the exposed image", "not asked for (--exposure)", 0});
+    if (plan.points()) {
+        lines.push_back({"opacities and rotations", "a sphere has none (--points)", 0});
+        return lines;
+    }
     if (plan.kernel == Footprint::peak)
         lines.push_back({"footprint factor of the opacity", "the kernel is normalised to its peak", 0});
     return lines;

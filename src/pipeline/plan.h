@@ -42,6 +42,7 @@ struct PlanRequest {
 struct Plan {
     int stored_degree = 0;  // SH degree in the device's parameters; a frame evaluates at most this
     Footprint kernel = Footprint::peak;
+    uint32_t nearest = 0;  // spheres at a pixel; 0: splats are drawn as footprints
     Drawing drawing = Drawing::color;
     bool debug = false;
     float log_scale_shift = 0;    // with debug: added to every log scale
@@ -55,6 +56,7 @@ struct Plan {
     bool exposure = false;
 
     bool operator==(const Plan&) const = default;
+    bool points() const { return nearest > 0; }
     /// Buffers of moments, which have the size of the parameters. A gradient takes the place of one.
     int moment_buffers() const { return adam && !packed_moments ? 2 : gradients ? 1 : 0; }
     /// Whether the image has a fifth plane: depth or count.

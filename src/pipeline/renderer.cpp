@@ -104,6 +104,8 @@ Plan Renderer::State::plan_of(const DrawOptions& o) const {
         throw InputError("a splat scale of " + std::to_string(o.splat_scale) + ", not above zero");
     PlanRequest drawing = request;
     drawing.render.kernel = o.render.kernel;
+    drawing.render.points = o.render.points;
+    drawing.render.nearest = o.render.nearest;
     drawing.drawing = o.drawing;
     drawing.debug = true;
     drawing.splat_scale = o.splat_scale;

@@ -2,12 +2,14 @@
 #include "reference/render.h"
 
 #include "reference/blend.h"
+#include "reference/points.h"
 #include "reference/projection.h"
 
 namespace ewa::reference {
 
 Picture render(const Values& values, const Camera& camera, const RenderOptions& options,
                const ReferenceOptions& reference) {
+    if (options.points) return render_points(values, camera, options);
     Picture out;
     for (size_t i = 0; i < values.size(); ++i) {
         out.projected.push_back(project(values, i, camera, options));
@@ -22,6 +24,7 @@ Picture render(const Values& values, const Camera& camera, const RenderOptions& 
 
 ReferenceGradient loss_gradient(const Values& values, const Camera& camera, const Image& target,
                                 const RenderOptions& options, const ReferenceOptions& reference) {
+    if (options.points) return points_loss_gradient(values, camera, target, options);
     ReferenceGradient out;
     out.picture = render(values, camera, options, reference);
     const Loss loss = image_loss(out.picture.blended.color, to_double(target));

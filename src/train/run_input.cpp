@@ -19,6 +19,7 @@
 #include "ewa/splat_files.h"
 #include "io/datasets/image_records.h"
 #include "scene/names.h"
+#include "shared/constants.h"
 #include "train/schedule.h"
 
 namespace ewa::train {
@@ -72,10 +73,17 @@ glm::dvec3 seen_point(const Dataset& dataset, const std::vector<int>& frames, co
     return point_on_a_ray(dataset.frames[size_t(frames[which])].camera, sphere.radius, u);
 }
 
+/// Spheres have no opacity. In other drawings they are as opaque as a sphere is in its middle.
+void set_sphere_opacity(Gaussians& splats) {
+    const double logit = std::log(shared::ALPHA_MAX / (1 - shared::ALPHA_MAX));
+    std::fill(splats.opacity_logits.begin(), splats.opacity_logits.end(), float(logit));
+}
+
 /// Opacity and scale of the first splats as the options ask for. They come from points, with opacity 0.1 and the
 /// distance to their neighbours.
 void adjust_start(const RunOptions& options, Gaussians& start) {
     const RunOptions usual;
+    if (options.train.render.points) set_sphere_opacity(start);
     if (options.init_opacity != usual.init_opacity) {
         const double logit = std::log(options.init_opacity / (1 - options.init_opacity));
         std::fill(start.opacity_logits.begin(), start.opacity_logits.end(), float(logit));
@@ -230,6 +238,7 @@ Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, cons
     } else if (options.init != "sfm") {
         start = load_splats(options.init);
         set_sh_degree(start, degree);
+        if (options.train.render.points) set_sphere_opacity(start);
         const RunOptions usual;
         if (options.init_opacity != usual.init_opacity || options.init_scale != usual.init_scale)
             throw InputError("--init-opacity and --init-scale are for first splats without their own; " +
@@ -290,6 +299,9 @@ void check_options(const RunOptions& options) {
     if (train.strategy != Strategy::adc && train.strategy != Strategy::automatic &&
         (train.absolute_gradients || train.revised_opacity))
         throw InputError("--absgrad and --revised-opacity are options of --strategy adc");
+    train::check_training(train);
+    if (train.render.points && options.init_opacity != RunOptions().init_opacity)
+        throw InputError("--init-opacity is for splats with an opacity, not for --points");
 }
 
 }  // namespace ewa

@@ -177,6 +177,24 @@ RunOption image_cache_option() {
     return option;
 }
 
+RunOption points_option() {
+    RunOption option = flag("points",
+                            "Splats are spheres, as PyTorch3D draws points: a pixel blends the nearest ones that "
+                            "cover it. Opacities and rotations are not used",
+                            [](RunOptions& o) -> bool& { return o.train.render.points; });
+    option.before = "false";
+    return option;
+}
+
+RunOption nearest_option() {
+    constexpr int kMostNearest = 1000;
+    RunOption option = number<int>(
+        "nearest", "K", "With --points: spheres that a pixel blends", kDecides,
+        [](RunOptions& o) -> int& { return o.train.render.nearest; }, 1, kMostNearest);
+    option.before = "8";
+    return option;
+}
+
 RunOption background_option() {
     RunOption option{
         "background", "COLOUR",
@@ -261,6 +279,8 @@ std::vector<RunOption> make_table() {
         choice<Footprint>(
             "kernel", "Footprint of a splat: peak (3DGS), antialias (Mip-Splatting) or ewa (unit mass)",
             [](RunOptions& o) -> Footprint& { return o.train.render.kernel; }, kKernels),
+        points_option(),
+        nearest_option(),
         number<int>(
             "eval-every", "N", "Evaluate the held-out views every N steps. 0: only at the end",
             kDoesNotDecide, [](RunOptions& o) -> int& { return o.eval_every; }, 0, kMostSteps),
@@ -302,6 +322,17 @@ Json to_config(const RunOptions& options) {
 
 std::string name_of(Strategy strategy) {
     return name_among(kStrategies, strategy);
+}
+
+void check_points(const RenderOptions& options) {
+    if (!options.points) return;
+    if (options.kernel != Footprint::peak) {
+        std::string problem = "--points and --kernel ";
+        problem += name_among(kKernels, options.kernel);
+        throw InputError(problem + " exclude each other: a sphere has no footprint");
+    }
+    if (options.integrator != Integrator::splat)
+        throw InputError("--points and --integrator exclude each other: spheres are blended on the image");
 }
 
 }  // namespace ewa::train

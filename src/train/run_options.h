@@ -41,4 +41,7 @@ nlohmann::ordered_json to_config(const RunOptions& options);
 /// "none", "adc", "mcmc" or "auto".
 std::string name_of(Strategy strategy);
 
+/// Throws InputError if the options have points, and what spheres cannot have.
+void check_points(const RenderOptions& options);
+
 }  // namespace ewa::train

@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ewa/error.h"
+#include "train/run_options.h"
+
 namespace ewa::train {
 namespace {
 
@@ -31,6 +34,14 @@ pipeline::PlanRequest plan_request(const Gaussians& start, const TrainOptions& o
             .absolute_gradients = options.absolute_gradients,
             .packed_moments = options.moment_bits == 16,
             .regularised = options.strategy == Strategy::mcmc};
+}
+
+void check_training(const TrainOptions& options) {
+    check_points(options.render);
+    if (options.render.points && options.strategy == Strategy::mcmc)
+        throw InputError("--strategy mcmc moves splats of low opacity, and a sphere has none: --points needs adc or none");
+    if (options.render.points && options.revised_opacity)
+        throw InputError("--revised-opacity is for splats with an opacity, not for --points");
 }
 
 bool Schedule::densifies(int step) const {
@@ -87,7 +98,7 @@ Schedule schedule_for(const TrainOptions& options) {
     s.relocate_every = scaled(options.refine_every, std::min(options.refine_every, kLeastRelocateEvery));
     s.growth = std::pow(options.growth, std::max(1.0, s.relocate_every / (share * options.refine_every)));
     s.copy_spread = (1 - share) * options.copy_spread;
-    if (options.opacity_reset_every > 0)
+    if (options.opacity_reset_every > 0 && !options.render.points)
         s.opacity_reset_every =
             scaled(options.opacity_reset_every, std::min(options.opacity_reset_every, kLeastResetEvery));
     s.sh_degree_every = scaled(options.sh_degree_every, std::min(options.sh_degree_every, kLeastShEvery));
@@ -110,7 +121,8 @@ Schedule schedule_for(const TrainOptions& options) {
 namespace ewa {
 
 TrainOptions resolve(TrainOptions options, const Dataset& dataset) {
-    const bool adc_asked_for = options.absolute_gradients || options.revised_opacity;
+    const bool adc_asked_for =
+        options.absolute_gradients || options.revised_opacity || options.render.points;
     if (options.strategy == Strategy::automatic)
         options.strategy = adc_asked_for ? Strategy::adc : strategy_for(options.steps);
     if (options.sh_degree == kAutomaticShDegree)

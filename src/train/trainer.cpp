@@ -9,6 +9,7 @@
 #include <cstring>
 #include <deque>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <span>
 #include <utility>
 
@@ -289,7 +290,8 @@ struct Trainer::State {
                 float(plan.absolute ? options.grow_gradient_absolute : options.grow_gradient);
             rules.revised_opacity = options.revised_opacity;
             rules.split_scale = float(options.split_scale * extent);
-            rules.prune_logit = float(logit(options.prune_opacity));
+            rules.prune_logit = options.render.points ? -std::numeric_limits<float>::infinity()
+                                                      : float(logit(options.prune_opacity));
             rules.prune_scale = schedule.was_reset(step) ? float(options.prune_scale * extent) : 0.0f;
             rules.seed = options.seed;
             rules.step = uint32_t(step);
@@ -310,6 +312,7 @@ Trainer::Trainer(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
     if (train_frames.empty())
         throw InputError("there is no training image; a larger --test-every leaves more of them");
     train::check_start(start.size(), options);
+    train::check_training(options);
     const double extent = extent_for(dataset, train_frames, start);
     state_ = std::make_unique<State>(std::move(device), dataset, train_frames, prepared(std::move(start)),
                                      extent, resolve(options, dataset));

@@ -31,6 +31,8 @@ void App::adopt(OpenedScene scene, std::optional<int> frame) {
     scene_.set_gaussians(scene_.gaussians);
     renders_.set_scene(scene_.gaussians);
     settings_.look.kernel = scene_.look.kernel;
+    settings_.look.points = scene_.look.points;
+    settings_.look.nearest = scene_.look.nearest;
     settings_.look.background = scene_.look.background;
     settings_.look.sh_degree = scene_.sh_degree;
     message_.note.clear();

@@ -158,6 +158,8 @@ Startup open(const Arguments& arguments) {
     startup.settings.cameras = startup.scene.gaussians->size() == 0;
     Look& look = startup.settings.look;
     look.kernel = arguments.antialias ? Footprint::antialias : startup.scene.look.kernel;
+    look.points = startup.scene.look.points && !arguments.antialias;
+    look.nearest = startup.scene.look.nearest;
     look.background = startup.scene.look.background;
     if (arguments.background.empty()) return startup;
     const auto background = core::parse_colour(arguments.background);

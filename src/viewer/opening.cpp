@@ -16,6 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr int kMostNearest = 1000;
 constexpr float kPointOpacity = 3;    // logit
 constexpr float kPointShrink = 1.2f;  // subtracted from the logarithm of a point's size
 
@@ -54,6 +55,10 @@ Look look_of(const live::Run& run) {
     const std::string kernel = run.text("kernel");
     if (kernel == "antialias") look.kernel = Footprint::antialias;
     if (kernel == "ewa") look.kernel = Footprint::density;
+    const auto points = run.config.find("points"), nearest = run.config.find("nearest");
+    look.points = points != run.config.end() && *points == true;
+    if (nearest != run.config.end() && nearest->is_number_integer())
+        look.nearest = std::clamp(nearest->get<int>(), 1, kMostNearest);
     look.background = core::parse_colour(run.text("background")).value_or(look.background);
     return look;
 }

@@ -74,9 +74,12 @@ void edit_look(const PanelFacts& facts, Look& look) {
     ImGui::SliderInt("SH degree", &look.sh_degree, 0, std::max(1, facts.scene.sh_degree), "%d",
                      ImGuiSliderFlags_AlwaysClamp);
     ImGui::EndDisabled();
-    int kernel = int(look.kernel);
-    if (ImGui::Combo("kernel", &kernel, "peak (3DGS)\0antialias\0unit mass (EWA)\0"))
-        look.kernel = Footprint(kernel);
+    constexpr int kPoints = 3;
+    int kernel = look.points ? kPoints : int(look.kernel);
+    if (ImGui::Combo("kernel", &kernel, "peak (3DGS)\0antialias\0unit mass (EWA)\0points (spheres)\0")) {
+        look.points = kernel == kPoints;
+        if (!look.points) look.kernel = Footprint(kernel);
+    }
 }
 
 void choose_up(const PanelFacts& facts, PanelActions& actions) {

@@ -15,7 +15,10 @@ namespace {
 constexpr int kProbeSide = 256;  // px of the depth image that a point is read from
 
 RenderOptions options_of(const Look& look) {
-    return {look.background, look.kernel, look.sh_degree};
+    RenderOptions options{look.background, look.kernel, look.sh_degree};
+    options.points = look.points;
+    options.nearest = look.nearest;
+    return options;
 }
 
 /// The values that the renderer computes for a mode.

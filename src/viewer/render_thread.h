@@ -22,6 +22,8 @@ struct Look {
     Footprint kernel = Footprint::peak;
     int sh_degree = kMaxShDegree;
     float splat_scale = 1;
+    bool points = false;  // in place of the kernel
+    int nearest = RenderOptions().nearest;
     bool operator==(const Look&) const = default;
 };
 

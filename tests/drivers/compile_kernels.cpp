@@ -102,6 +102,22 @@ void compile_splatting(Compiler& compiler) {
     compiler.compile<passes::Pack>();
 }
 
+void compile_points(Compiler& compiler) {
+    using namespace shared;
+    const Values nearest = {1, 8};
+    compiler.compile<passes::ProjectPoints>({{SPEC_SH_DEGREE, kDegrees}, {SPEC_MODE, {0, PROJECT_DEBUG}}});
+    compiler.compile<passes::BlendPoints>(
+        {{SPEC_NEAREST, nearest}, {SPEC_MODE, {BLEND_COLOR, BLEND_DEPTH, BLEND_COUNT}}});
+    compiler.compile<passes::BlendPointsBackward>(
+        {{SPEC_NEAREST, nearest}, {SPEC_MODE, {0, BLEND_BACKWARD_ABSOLUTE}}});
+    const uint32_t packed = UPDATE_PACKED_MOMENTS, statistics = UPDATE_STATISTICS;
+    compiler.compile<passes::UpdatePoints>(
+        {{SPEC_SH_DEGREE, kDegrees},
+         {SPEC_MODE,
+          {UPDATE_GRADIENT_ONLY, 0, statistics, packed, packed | statistics,
+           packed | statistics | UPDATE_ABSOLUTE}}});
+}
+
 void compile_training(Compiler& compiler) {
     using namespace shared;
     compiler.compile<passes::UnpackTarget>({{SPEC_COLOR_FLOATS, {0, 1}}});
@@ -181,6 +197,7 @@ int main(int argc, char** argv) {
                      device->info().subgroup_size);
         Compiler compiler(*device);
         compile_splatting(compiler);
+        compile_points(compiler);
         compile_training(compiler);
         compile_operators(compiler);
         compile_path_tracer(compiler);

@@ -192,6 +192,18 @@ TEST(FrameEdges, NoSplatsOneSplatOddSizes) {
             }
 }
 
+TEST(FrameEdges, PointsStayInTheirBuffers) {
+    for (const bool gradients : {false, true}) {
+        Scene scene = random_scene(3250, 900, SplatKind::mixed, 131, 67, 1);
+        scene.options.points = true;
+        const Result result = run_frame(scene, 60000, gradients);
+        ASSERT_LE(result.counts.instances, 60000u);
+        const auto cpu = reference::render(scene.gaussians, scene.camera, scene.options);
+        EXPECT_LT(worst_color(result, cpu.blended.color), 1e-5);
+        if (gradients) expect_finite(result.gradient);
+    }
+}
+
 TEST(FrameEdges, AllBehindTheCamera) {
     Scene scene = random_scene(3300, 500, SplatKind::ordinary, 61, 47);
     const glm::dmat3 turn(-1, 0, 0, 0, 1, 0, 0, 0, -1);  // half a turn about y

@@ -405,7 +405,7 @@ struct FrameParts {
 };
 SharedByTests<FrameParts>* const frame_parts = SharedByTests<FrameParts>::add();
 
-/// The commands of a step of training, an opacity reset and a picture with depth.
+/// The commands of a step of training, an opacity reset, a picture with depth, and a gradient, also of points.
 std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     Rig& r = rig();
     const Scene scene = random_scene(3000, 50, SplatKind::ordinary, 61, 47, 2);
@@ -454,6 +454,13 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     record_loss(gradient, r.cache, frame, inputs, photo, true);
     record_backward(gradient, r.cache, plan_for(request), model, frame, inputs, again, {});
     out.push_back(gradient.commands());
+
+    request.render.points = true;
+    gpu::Recording points = r.recording();
+    const auto listed = record_forward(points, r.cache, plan_for(request), model, frame, inputs);
+    record_loss(points, r.cache, frame, inputs, photo);
+    record_backward(points, r.cache, plan_for(request), model, frame, inputs, listed, {});
+    out.push_back(points.commands());
     for (const auto& commands : out)
         for (const Command& command : commands)
             if (command.pipeline) pipelines.push_back(command.pipeline->name());

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sums over a tile's pixels, and the gradient slots that they go to. Needs tile.glsl. The including pass declares push,
+// tile_starts, slots, and SUMS: the floats of a slot that it writes.
+#ifndef EWA_LIB_TILE_SUMS
+#define EWA_LIB_TILE_SUMS
+const float NO_GRADIENT[12] = float[](0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+const bool WIDE_STORES = BROADCAST != BROADCAST_SHUFFLES;
+
+// Sums BLOCK values over the subgroup at once. At each step a lane keeps half of its values and sends the other half, so
+// that lane l ends with the sum of value l % BLOCK. Then lanes BLOCK apart are added.
+float transposing_sum(float v[8]) {
+    const uint lane = LANE;
+    const bool b0 = (lane & 1u) != 0u, b1 = (lane & 2u) != 0u, b2 = (lane & 4u) != 0u;
+    float four[4], two[2];
+    if (BLOCK == 1u) return v[0];
+    [[unroll]] for (uint i = 0; i < BLOCK / 2u; ++i)
+        four[i] = (b0 ? v[2 * i + 1] : v[2 * i]) + subgroupShuffleXor(b0 ? v[2 * i] : v[2 * i + 1], 1u);
+    if (BLOCK == 2u) return four[0];
+    [[unroll]] for (uint i = 0; i < BLOCK / 4u; ++i)
+        two[i] = (b1 ? four[2 * i + 1] : four[2 * i]) + subgroupShuffleXor(b1 ? four[2 * i] : four[2 * i + 1], 2u);
+    if (BLOCK == 4u) return two[0];
+    float sum = (b2 ? two[1] : two[0]) + subgroupShuffleXor(b2 ? two[0] : two[1], 4u);
+    [[unroll]] for (uint s = 3u; s < DOUBLINGS; ++s) {
+        if ((1u << s) < SUBGROUP) sum += subgroupShuffleXor(sum, 1u << s);
+    }
+    return sum;
+}
+
+// Whole texels take fewer memory transactions; without them the unused floats are not written.
+void write_slot(uint index, float slot[12]) {
+    [[unroll]] for (uint t = 0; t < SLOT_TEXELS; ++t) {
+        if (WIDE_STORES) {
+            slots[SLOT_TEXELS * index + t] = vec4(slot[4 * t], slot[4 * t + 1], slot[4 * t + 2], slot[4 * t + 3]);
+            continue;
+        }
+        [[unroll]] for (uint c = 0; c < 4; ++c) {
+            if (4 * t + c < SUMS) slots[SLOT_TEXELS * index + t][c] = slot[4 * t + c];
+        }
+    }
+}
+
+// The slots that the tile has not reached, from instance k to the end of its list, have gradient zero: they lie behind the
+// last open pixel.
+void write_other_slots(uint k, uint end, uint tile) {
+    const uint lane = LANE;
+    // The last tile also clears the slots of instances with the sentinel tile. Every slot of the list is written, so that
+    // none keeps values of an earlier frame.
+    if (tile + 1u == push.tiles[0] * push.tiles[1]) {
+        const uint all = tile_starts[tile + 2u];
+        for (uint e = end; e < all; e += SUBGROUP) {
+            if (e + lane < all) write_slot(e + lane, NO_GRADIENT);
+        }
+    }
+    for (; k < end; k += SUBGROUP) {
+        if (k + lane < end) write_slot(k + lane, NO_GRADIENT);
+    }
+}
+#endif

@@ -1,0 +1,69 @@
+#version 460
+// SPDX-License-Identifier: Apache-2.0
+// Projects splats into pixels as spheres.
+// One invocation owns splat i. It reads its parameters and the camera, and writes its record, its depth key and the
+// number of tiles that it reaches. A splat that is not visible gets count 0 and the last key.
+// The record's whitener is the inverse of the radii. Its opacity is the one whose footprint ends where u^2 + v^2 = 1.
+// SPEC_MODE: PROJECT_DEBUG shifts the scales and counts the visible splats.
+#extension GL_GOOGLE_include_directive : require
+#define BINDING_CAMERA 1
+#include "lib/prelude.glsl"
+#include "lib/sphere.glsl"
+#include "lib/footprint.glsl"
+#include "lib/subgroup.glsl"
+
+layout(local_size_x_id = SPEC_GROUP_SIZE) in;
+layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3;
+layout(constant_id = SPEC_MODE) const uint MODE = 0;
+const bool DEBUG = MODE == PROJECT_DEBUG;
+
+TEXELS(0, params);
+layout(set = 0, binding = 2, scalar) writeonly buffer Records { vec4 records[]; };
+layout(set = 0, binding = 3, scalar) writeonly buffer DepthKeys { uint depth_keys[]; };
+layout(set = 0, binding = 4, scalar) writeonly buffer TileCounts { uint tile_counts[]; };
+layout(set = 0, binding = 5, scalar) buffer CountsBlock { Counts counts; };
+layout(push_constant, scalar) uniform Push { ProjectPush push; };
+#include "lib/splat_color.glsl"
+
+// Whether splat i reaches a tile.
+bool project(uint i) {
+    const vec4 p0 = param(0, i), p1 = param(1, i), p2 = param(2, i);
+    const SphereProjection p = project_sphere(p0.xyz, p1, DEBUG ? p2.xyz + push.log_scale_shift : p2.xyz);
+    const float z = p.view.z.x;
+    bool finite_color;
+    const vec3 color = sh_color(i, p2, normalize(p.view.offset), finite_color);
+
+    const vec2 x = pixel_position(p.view.x, p.view.z, 0), y = pixel_position(p.view.y, p.view.z, 1);
+    const float e = 2.718282;  // rounded up
+    const vec4 record0 = vec4(x.x, y.x, x.y, y.y), record1 = vec4(p.inverse_radius.x, 0.0, p.inverse_radius.y, e * CUT_OFF);
+    const uvec2 size = uvec2(camera.size[0], camera.size[1]);
+
+    const bool stored_finite = is_finite(p0) && is_finite(p1) && is_finite(p2.xyz) && p.in_range;
+    const bool in_front = z > float(NEAR_PLANE);
+    const bool projected_finite = p.footprint_in_range && finite_color && is_finite(record0) && is_finite(record1);
+    const bool visible = stored_finite && in_front && projected_finite;
+
+    uint count = 0u;
+    if (visible) {
+        const Footprint f = footprint_of(record0, record1, size);
+        count = count_tiles(f, f.row_begin, f.row_end, size);
+    }
+    records[RECORD_TEXELS * i] = record0;
+    records[RECORD_TEXELS * i + 1] = record1;
+    records[RECORD_TEXELS * i + 2] = vec4(color, z);
+    depth_keys[i] = count > 0u ? floatBitsToUint(z) : 0xffffffffu;
+    tile_counts[i] = count;
+    if (!stored_finite || (in_front && !projected_finite)) atomicAdd(counts.skipped_nonfinite, 1u);
+    return count > 0u;
+}
+
+void main() {
+    const uint i = item_index();
+    bool visible = false;
+    if (i < push.splats) visible = project(i);
+    if (DEBUG) {
+        // One atomic a subgroup. All lanes take part in the sum, with or without a splat.
+        const uint sum = subgroup_inclusive_sum(visible ? 1u : 0u);
+        if (LANE == SUBGROUP - 1u && sum > 0u) atomicAdd(counts.visible, sum);
+    }
+}

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// Splats drawn as spheres (RenderOptions::points), as PyTorch3D draws point clouds (Ravi et al. 2020, PointsRasterizer and
+// AlphaCompositor):
+//   s        = exp(mean of the log scales)                         world units
+//   radius.x = ELLIPSOID_REACH sqrt((fx s / z)^2 + LOW_PASS)       px; likewise y
+//   q        = ((x - mean2d.x) / radius.x)^2 + ((y - mean2d.y) / radius.y)^2
+//   alpha    = min(ALPHA_MAX, 1 - q) where q < 1
+// A pixel blends the nearest spheres that cover it, by the depth of the centre, and no others. The opacity and the rotation
+// are not used. The backward pass has dalpha/dmean2d.x = 2 (x - mean2d.x) / radius.x^2, dalpha/d(ln radius.x) = 2 u^2 with
+// u = (x - mean2d.x) / radius.x, and dln radius.x/dln s = (fx s / z)^2 / ((fx s / z)^2 + LOW_PASS) = -dln radius.x/dln z.
+#pragma once
+#include "reference/render.h"
+
+namespace ewa::reference {
+
+/// The same as render() and loss_gradient(), which call these. Picture::instances is empty, and so is
+/// ReferenceGradient::blend::instances.
+Picture render_points(const Values& values, const Camera& camera, const RenderOptions& options);
+ReferenceGradient points_loss_gradient(const Values& values, const Camera& camera, const Image& target,
+                                       const RenderOptions& options);
+
+}  // namespace ewa::reference
