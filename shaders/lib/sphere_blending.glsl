@@ -12,8 +12,9 @@ struct Meeting {
     float weight;  // alpha * T
 };
 
-// Sphere s at pixel p of the lane's column. left: how many more spheres the pixel takes; it counts down. T: the
-// transmittance in front of the sphere; it becomes that behind it. A record beyond the end of the list has opacity 0.
+// Sphere s at pixel p of the lane's column. left: how many more spheres the pixel takes. It counts down, and is 0 behind the
+// sphere that takes T to TRANSMITTANCE_STOP. T: the transmittance in front of the sphere; it becomes that behind it.
+// A record beyond the end of the list has opacity 0.
 Meeting meet_sphere(LaneSplat s, uint p, inout uint left, inout float T) {
     Meeting m;
     EXACT const float u = s.u + s.u_step * float(p), v = s.v + s.v_step * float(p), q = u * u + v * v;
@@ -24,8 +25,9 @@ Meeting meet_sphere(LaneSplat s, uint p, inout uint left, inout float T) {
     const bool drawn = q < 1.0 && left > 0u && s.opacity > 0.0;
     m.alpha = drawn ? min(float(ALPHA_MAX), m.raw) : 0.0;
     m.weight = m.alpha * T;
-    left -= drawn ? 1u : 0u;
-    T -= m.weight;
+    EXACT const float next = T - T * m.alpha;
+    T = next;
+    left = next > float(TRANSMITTANCE_STOP) ? left - (drawn ? 1u : 0u) : 0u;
     return m;
 }
 #endif

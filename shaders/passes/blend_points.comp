@@ -1,6 +1,7 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Blends the nearest NEAREST spheres of each pixel front to back: C = sum c alpha T + T background, alpha = 1 - q.
+// Blends the nearest NEAREST spheres of each pixel front to back: C = sum c alpha T + T background, alpha = 1 - q. It ends
+// after the sphere that takes T to TRANSMITTANCE_STOP.
 // One workgroup is one subgroup and owns one tile. It reads the tile's range of the sorted splats and their records,
 // and writes the tile's pixels in the image planes. SPEC_MODE: BLEND_COLOR, BLEND_DEPTH or BLEND_COUNT.
 #extension GL_GOOGLE_include_directive : require
@@ -28,7 +29,7 @@ void main() {
     const uint py = (tile / push.tiles[0]) * TILE_HEIGHT + lane / TILE_WIDTH;
     const vec2 pixel = vec2(px, py) + 0.5;
 
-    float T[PIXELS], depth[PIXELS];
+    float T[PIXELS], depth[PIXELS], count[PIXELS];
     uint left[PIXELS];
     vec3 color[PIXELS];
     [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
@@ -36,7 +37,7 @@ void main() {
         left[p] = px < push.image.size[0] && py + p * ROW_STEP < push.image.size[1] ? NEAREST : 0u;
         T[p] = 1.0;
         color[p] = vec3(0.0);
-        depth[p] = 0.0;
+        depth[p] = count[p] = 0.0;
     }
     const uint end = tile_starts[tile + 1u];
     for (uint k = tile_starts[tile]; k < end; k += SUBGROUP) {
@@ -48,6 +49,7 @@ void main() {
                     const Meeting m = meet_sphere(s, p, left[p], T[p]);
                     color[p] += m.weight * s.color;
                     if (WITH_DEPTH) depth[p] += m.weight * s.z;
+                    if (WITH_COUNT) count[p] += m.alpha > 0.0 ? 1.0 : 0.0;
                 }
             }
         }
@@ -65,7 +67,7 @@ void main() {
             planes[PLANE_B * push.image.plane_floats + at] = color[p].b + T[p] * background.b;
             planes[PLANE_T * push.image.plane_floats + at] = T[p];
             if (WITH_DEPTH) planes[PLANE_DEPTH * push.image.plane_floats + at] = depth[p];
-            if (WITH_COUNT) planes[PLANE_COUNT * push.image.plane_floats + at] = float(NEAREST - left[p]);
+            if (WITH_COUNT) planes[PLANE_COUNT * push.image.plane_floats + at] = count[p];
         }
     }
 }

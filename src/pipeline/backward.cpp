@@ -220,7 +220,8 @@ void record_backward(gpu::Recording& recording, passes::PassCache& cache, const 
                                {shared::SPEC_MODE, update_mode(plan)}};
     if (plan.points()) {
         blending.push_back({shared::SPEC_NEAREST, plan.nearest});
-        record_blend_backward_as<passes::BlendPointsBackward>(recording, cache, frame, inputs, sorted, blending);
+        record_blend_backward_as<passes::BlendPointsBackward>(recording, cache, frame, inputs, sorted,
+                                                              blending);
         record_update_as<passes::UpdatePoints>(recording, cache, plan, model, frame, inputs, sorted, rates,
                                                updating);
         return;

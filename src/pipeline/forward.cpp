@@ -33,7 +33,8 @@ void record_project(gpu::Recording& recording, passes::PassCache& cache, const P
     passes::Constants variant{{shared::SPEC_SH_DEGREE, plan.evaluated_degree(inputs.sh_degree)},
                               {shared::SPEC_MODE, plan.debug ? shared::PROJECT_DEBUG : 0}};
     if (plan.points())
-        return record_project_as<passes::ProjectPoints>(recording, cache, plan, model, frame, inputs, variant);
+        return record_project_as<passes::ProjectPoints>(recording, cache, plan, model, frame, inputs,
+                                                        variant);
     variant.push_back({shared::SPEC_KERNEL, uint32_t(plan.kernel)});
     record_project_as<passes::Project>(recording, cache, plan, model, frame, inputs, variant);
 }

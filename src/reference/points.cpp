@@ -6,6 +6,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <limits>
 
 #include "shared/constants.h"
 
@@ -108,6 +109,7 @@ void walk(const std::vector<Sphere>& spheres, const std::vector<uint32_t>& order
                 const SphereHit hit{i, w, std::min(ALPHA_MAX, raw), raw > ALPHA_MAX, transmittance[at]};
                 visit(x, y, hit);
                 transmittance[at] *= 1 - hit.alpha;
+                if (stops(transmittance[at])) left[at] = 0;
             }
     }
 }
@@ -158,8 +160,8 @@ std::vector<SphereGradient> blend_spheres_backward(const std::vector<Sphere>& sp
         g.screen.color += weight * by_pixel;
         if (hit.clamped) return;
         const glm::dvec3 last(rest[0], rest[1], rest[2]);
-        const double by_alpha = glm::dot(
-            by_pixel, hit.transmittance * sphere.projected.color - last / (1 - hit.alpha));
+        const double by_alpha =
+            glm::dot(by_pixel, hit.transmittance * sphere.projected.color - last / (1 - hit.alpha));
         const glm::dvec2 by_mean = 2 * by_alpha * hit.w / sphere.radius;
         g.screen.mean2d += by_mean;
         g.screen.absolute += glm::abs(by_mean);
@@ -218,7 +220,7 @@ ReferenceGradient points_loss_gradient(const Values& values, const Camera& camer
     }
     // A sphere covers at least one pixel centre wherever its own centre is in the image.
     out.in_view.assign(values.size(), 0);
-    walk(spheres, out.picture.order, camera, int(values.size()) + 1,
+    walk(spheres, out.picture.order, camera, std::numeric_limits<int>::max(),
          [&](int, int, const SphereHit& hit) { out.in_view[hit.splat] = 1; });
     return out;
 }

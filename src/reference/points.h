@@ -5,7 +5,8 @@
 //   radius.x = ELLIPSOID_REACH sqrt((fx s / z)^2 + LOW_PASS)       px; likewise y
 //   q        = ((x - mean2d.x) / radius.x)^2 + ((y - mean2d.y) / radius.y)^2
 //   alpha    = min(ALPHA_MAX, 1 - q) where q < 1
-// A pixel blends the nearest spheres that cover it, by the depth of the centre, and no others. The opacity and the rotation
+// A pixel blends the nearest spheres that cover it, by the depth of the centre, and no others. It ends after the sphere that
+// takes T to TRANSMITTANCE_STOP. The opacity and the rotation
 // are not used. The backward pass has dalpha/dmean2d.x = 2 (x - mean2d.x) / radius.x^2, dalpha/d(ln radius.x) = 2 u^2 with
 // u = (x - mean2d.x) / radius.x, and dln radius.x/dln s = (fx s / z)^2 / ((fx s / z)^2 + LOW_PASS) = -dln radius.x/dln z.
 #pragma once

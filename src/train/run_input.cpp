@@ -74,7 +74,7 @@ glm::dvec3 seen_point(const Dataset& dataset, const std::vector<int>& frames, co
 }
 
 /// Spheres have no opacity. In other drawings they are as opaque as a sphere is in its middle.
-void set_sphere_opacity(Gaussians& splats) {
+void make_opaque(Gaussians& splats) {
     const double logit = std::log(shared::ALPHA_MAX / (1 - shared::ALPHA_MAX));
     std::fill(splats.opacity_logits.begin(), splats.opacity_logits.end(), float(logit));
 }
@@ -83,7 +83,11 @@ void set_sphere_opacity(Gaussians& splats) {
 /// distance to their neighbours.
 void adjust_start(const RunOptions& options, Gaussians& start) {
     const RunOptions usual;
-    if (options.train.render.points) set_sphere_opacity(start);
+    if (options.train.render.points) {
+        // The radius is the distance to the neighbours.
+        for (float& scale : start.log_scales) scale -= float(std::log(shared::ELLIPSOID_REACH));
+        make_opaque(start);
+    }
     if (options.init_opacity != usual.init_opacity) {
         const double logit = std::log(options.init_opacity / (1 - options.init_opacity));
         std::fill(start.opacity_logits.begin(), start.opacity_logits.end(), float(logit));
@@ -238,7 +242,7 @@ Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, cons
     } else if (options.init != "sfm") {
         start = load_splats(options.init);
         set_sh_degree(start, degree);
-        if (options.train.render.points) set_sphere_opacity(start);
+        if (options.train.render.points) make_opaque(start);
         const RunOptions usual;
         if (options.init_opacity != usual.init_opacity || options.init_scale != usual.init_scale)
             throw InputError("--init-opacity and --init-scale are for first splats without their own; " +

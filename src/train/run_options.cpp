@@ -178,10 +178,11 @@ RunOption image_cache_option() {
 }
 
 RunOption points_option() {
-    RunOption option = flag("points",
-                            "Splats are spheres, as PyTorch3D draws points: a pixel blends the nearest ones that "
-                            "cover it. Opacities and rotations are not used",
-                            [](RunOptions& o) -> bool& { return o.train.render.points; });
+    RunOption option =
+        flag("points",
+             "Splats are spheres, as PyTorch3D draws points: a pixel blends the nearest ones that "
+             "cover it. Opacities and rotations are not used",
+             [](RunOptions& o) -> bool& { return o.train.render.points; });
     option.before = "false";
     return option;
 }

@@ -39,7 +39,8 @@ pipeline::PlanRequest plan_request(const Gaussians& start, const TrainOptions& o
 void check_training(const TrainOptions& options) {
     check_points(options.render);
     if (options.render.points && options.strategy == Strategy::mcmc)
-        throw InputError("--strategy mcmc moves splats of low opacity, and a sphere has none: --points needs adc or none");
+        throw InputError(
+            "--strategy mcmc moves splats of low opacity, and a sphere has none: --points needs adc or none");
     if (options.render.points && options.revised_opacity)
         throw InputError("--revised-opacity is for splats with an opacity, not for --points");
 }
@@ -121,8 +122,7 @@ Schedule schedule_for(const TrainOptions& options) {
 namespace ewa {
 
 TrainOptions resolve(TrainOptions options, const Dataset& dataset) {
-    const bool adc_asked_for =
-        options.absolute_gradients || options.revised_opacity || options.render.points;
+    const bool adc_asked_for = options.absolute_gradients || options.revised_opacity || options.render.points;
     if (options.strategy == Strategy::automatic)
         options.strategy = adc_asked_for ? Strategy::adc : strategy_for(options.steps);
     if (options.sh_degree == kAutomaticShDegree)

@@ -30,7 +30,9 @@ namespace {
 using namespace pipeline;
 using Clock = std::chrono::steady_clock;
 
-constexpr int kTimedEvery = 100;        // steps, where several are in flight
+constexpr int kTimedEvery = 100;  // steps, where several are in flight
+// Of the threshold that adds splats, with points: edges of opaque spheres have larger gradients than soft footprints.
+constexpr float kPointsThreshold = 8;
 constexpr double kResetOpacity = 0.01;  // 3DGS: upper bound of opacities after a reset
 
 double milliseconds(Clock::duration time) {
@@ -288,6 +290,7 @@ struct Trainer::State {
             DensifyRules rules;
             rules.grow_gradient =
                 float(plan.absolute ? options.grow_gradient_absolute : options.grow_gradient);
+            if (options.render.points) rules.grow_gradient *= kPointsThreshold;
             rules.revised_opacity = options.revised_opacity;
             rules.split_scale = float(options.split_scale * extent);
             rules.prune_logit = options.render.points ? -std::numeric_limits<float>::infinity()

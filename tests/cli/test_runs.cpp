@@ -56,6 +56,58 @@ TEST_F(Runs, EvalHasTheFiguresOfTheRun) {
     EXPECT_EQ(read_json(folder / "one.json")["frames"].size(), 1u);
 }
 
+TEST_F(Runs, OfPointsAreDrawnAsPoints) {
+    const std::string run = train("run", {"--points", "--nearest", "3"});
+    const auto summary = read_json(run + "/summary.json");
+    EXPECT_EQ(read_json(run + "/config.json")["points"], true);
+    EXPECT_EQ(read_json(run + "/config.json")["nearest"], 3);
+    const auto psnr = [&](const Names& arguments) {
+        Names all{"eval", "--json", folder / "e.json"};
+        all.insert(all.end(), arguments.begin(), arguments.end());
+        expect_success(run_ewa(all));
+        return read_json(folder / "e.json")["psnr"].get<double>();
+    };
+    EXPECT_NEAR(psnr({run}), summary["test_psnr"], 1e-6);
+    // The command line has precedence.
+    EXPECT_GT(std::abs(psnr({run, "--kernel", "peak"}) - summary["test_psnr"].get<double>()), 1e-3);
+    EXPECT_GT(std::abs(psnr({run, "--nearest", "1"}) - summary["test_psnr"].get<double>()), 1e-3);
+
+    // A reader of 3DGS sees Gaussians that are as opaque as a sphere is in its middle.
+    for (const float logit : load_splats(run + "/splats.ply").opacity_logits)
+        EXPECT_NEAR(logit, 4.595f, 1e-3);
+    expect_success(run_ewa({"train", folder / "data", "-o", run, "--init", folder / "s.ply", "--steps", "5",
+                            "--quiet", "--test-every", "2", "--background", "0.9,0.8,1", "--downscale", "2",
+                            "--points", "--nearest", "3", "--resume"}));
+    expect_failure(
+        run_ewa({"train", folder / "data", "-o", run, "--init", folder / "s.ply", "--steps", "7", "--quiet",
+                 "--test-every", "2", "--background", "0.9,0.8,1", "--downscale", "2", "--resume"}),
+        2, "was written with --points true");
+}
+
+TEST_F(Runs, PointsExcludeWhatSpheresDoNotHave) {
+    const auto fails = [&](Names arguments, const Names& more, const std::string& reason) {
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        arguments.emplace_back("--points");
+        expect_failure(run_ewa(arguments), 2, reason);
+    };
+    const Names drawing{"render", folder / "s.ply", "--cameras", folder / "data", "-o", folder / "r"};
+    fails(drawing, {"--kernel", "ewa"}, "--points and --kernel ewa exclude each other");
+    fails(drawing, {"--antialias"}, "--points and --kernel antialias exclude each other");
+    fails(drawing, {"--nearest", "0"}, "'0' is not a whole number from 1 to 1000");
+    const Names training{"train", folder / "data", "-o", folder / "t"};
+    fails(training, {"--kernel", "antialias"}, "--points and --kernel antialias exclude each other");
+    fails(training, {"--strategy", "mcmc"}, "--points needs adc or none");
+    fails(training, {"--revised-opacity"}, "--revised-opacity is for splats with an opacity");
+    fails(training, {"--init-opacity", "0.5"}, "--init-opacity is for splats with an opacity");
+    expect_success(run_ewa(
+        {"grad", folder / "s.ply", folder / "data", "--frame", "1", "--points", "-o", folder / "g.ply"}));
+    const Gaussians gradient = load_splats(folder / "g.ply");
+    for (const float by_opacity : gradient.opacity_logits) EXPECT_EQ(by_opacity, 0);
+    for (size_t i = 0; i < gradient.log_scales.size(); ++i)
+        EXPECT_EQ(gradient.log_scales[i], gradient.log_scales[i - i % 3]);
+    EXPECT_TRUE(std::ranges::any_of(gradient.log_scales, [](float g) { return g != 0; }));
+}
+
 TEST_F(Runs, EvalAndRenderUseTheExposures) {
     const std::string run = train("run", {"--exposure"});
     const auto train_psnr = [&](const Names& more) {

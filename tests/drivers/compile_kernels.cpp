@@ -111,11 +111,10 @@ void compile_points(Compiler& compiler) {
     compiler.compile<passes::BlendPointsBackward>(
         {{SPEC_NEAREST, nearest}, {SPEC_MODE, {0, BLEND_BACKWARD_ABSOLUTE}}});
     const uint32_t packed = UPDATE_PACKED_MOMENTS, statistics = UPDATE_STATISTICS;
-    compiler.compile<passes::UpdatePoints>(
-        {{SPEC_SH_DEGREE, kDegrees},
-         {SPEC_MODE,
-          {UPDATE_GRADIENT_ONLY, 0, statistics, packed, packed | statistics,
-           packed | statistics | UPDATE_ABSOLUTE}}});
+    compiler.compile<passes::UpdatePoints>({{SPEC_SH_DEGREE, kDegrees},
+                                            {SPEC_MODE,
+                                             {UPDATE_GRADIENT_ONLY, 0, statistics, packed,
+                                              packed | statistics, packed | statistics | UPDATE_ABSOLUTE}}});
 }
 
 void compile_training(Compiler& compiler) {

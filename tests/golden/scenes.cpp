@@ -149,6 +149,20 @@ GoldenScene faint() {
     return s;
 }
 
+/// Spheres of one size one behind another: a pixel blends the three nearest. Those on the right are smaller than a pixel.
+GoldenScene spheres() {
+    GoldenScene s{"spheres", {}, plain_camera(), {}, Shown::color, 1, kEdges};
+    s.options.points = true;
+    s.options.nearest = 3;
+    s.options.background = {0.1f, 0.2f, 0.3f};
+    for (int i = 7; i >= 0; --i)
+        add(s.gaussians, {-1.4 + 0.22 * i, 0.25 * (i % 3 - 1), 3 + 0.2 * i}, glm::dvec3(0.25), 0.5,
+            {0.9 - 0.1 * i, 0.2 + 0.25 * (i % 3), 0.1 + 0.1 * i});
+    for (int i = 0; i < 6; ++i)
+        add(s.gaussians, {1.2 + 0.07 * (i % 3), 0.4 * (i / 3) - 0.3, 3}, glm::dvec3(1e-3), 0.5, {1, 1, 0.6});
+    return s;
+}
+
 /// Coordinates of a map projection: a million units from the origin, where float32 steps are a sixteenth.
 GoldenScene far_from_origin() {
     GoldenScene s{"far_from_origin", {}, plain_camera(), {}, Shown::color, 1, kEdges};
@@ -258,6 +272,7 @@ std::vector<GoldenScene> golden_scenes() {
         mode("mode_alpha", Shown::alpha, 1),
         poisoned(),
         still_life(),
+        spheres(),
     };
     for (GoldenScene& scene : scenes)
         if (scene.options.kernel == Footprint::density) scene.name = "unit_mass";

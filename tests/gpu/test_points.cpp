@@ -76,29 +76,27 @@ TEST_P(Points, GradientMatchesTheReference) {
     EXPECT_TRUE(splat_gradients_agree(actual.gradient, expected.gradient, tolerance));
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    All, Points,
-    testing::Values(PointsCase{SplatKind::ordinary, 20, 61, 47, 0, 8},
-                    PointsCase{SplatKind::ordinary, 600, 61, 47, 3, 8},
-                    PointsCase{SplatKind::ordinary, 601, 61, 47, 2, 1},
-                    PointsCase{SplatKind::ordinary, 602, 61, 47, 0, 1000},
-                    PointsCase{SplatKind::mixed, 300, 53, 39, 1, 3},
-                    PointsCase{SplatKind::needles, 301, 53, 39, 1, 8},
-                    PointsCase{SplatKind::sub_pixel, 302, 53, 39, 1, 8},
-                    PointsCase{SplatKind::off_screen_and_close, 303, 53, 39, 1, 8},
-                    PointsCase{SplatKind::mixed, 3000, 160, 120, 1, 8},
-                    PointsCase{SplatKind::ordinary, 1, 17, 3, 1, 8}),
-    [](const testing::TestParamInfo<PointsCase>& tested) {
-        const PointsCase& c = tested.param;
-        return std::string(name_of(c.kind)) + "_" + std::to_string(c.splats) + "_" +
-               std::to_string(c.width) + "x" + std::to_string(c.height) + "_nearest" +
-               std::to_string(c.nearest);
-    });
+INSTANTIATE_TEST_SUITE_P(All, Points,
+                         testing::Values(PointsCase{SplatKind::ordinary, 20, 61, 47, 0, 8},
+                                         PointsCase{SplatKind::ordinary, 600, 61, 47, 3, 8},
+                                         PointsCase{SplatKind::ordinary, 601, 61, 47, 2, 1},
+                                         PointsCase{SplatKind::ordinary, 602, 61, 47, 0, 1000},
+                                         PointsCase{SplatKind::mixed, 300, 53, 39, 1, 3},
+                                         PointsCase{SplatKind::needles, 301, 53, 39, 1, 8},
+                                         PointsCase{SplatKind::sub_pixel, 302, 53, 39, 1, 8},
+                                         PointsCase{SplatKind::off_screen_and_close, 303, 53, 39, 1, 8},
+                                         PointsCase{SplatKind::mixed, 3000, 160, 120, 1, 8},
+                                         PointsCase{SplatKind::ordinary, 1, 17, 3, 1, 8}),
+                         [](const testing::TestParamInfo<PointsCase>& tested) {
+                             const PointsCase& c = tested.param;
+                             return std::string(name_of(c.kind)) + "_" + std::to_string(c.splats) + "_" +
+                                    std::to_string(c.width) + "x" + std::to_string(c.height) + "_nearest" +
+                                    std::to_string(c.nearest);
+                         });
 
 /// Stiff scenes: the picture to 1e-5 of white, the gradient to 1e-4 in norm.
 void expect_accurate(const Scene& scene) {
-    const Rendering rendering =
-        Renderer(device(), scene.gaussians, scene.options).render(scene.camera);
+    const Rendering rendering = Renderer(device(), scene.gaussians, scene.options).render(scene.camera);
     const auto cpu = reference::render(scene.gaussians, scene.camera, scene.options);
     EXPECT_LT(worst_difference(rendering.color, cpu.blended.color), 2e-5);
     const Image target = random_target(4300, scene.camera.width, scene.camera.height);
@@ -195,12 +193,14 @@ Stepped take_step(const Scene& scene, const Image& target, const pipeline::PlanR
     Rig& r = rig();
     const pipeline::Plan plan = plan_for(request);
     const uint32_t width = uint32_t(scene.camera.width), height = uint32_t(scene.camera.height);
-    const pipeline::Model model = upload_model(*device(), scene.gaussians, plan.moment_buffers(), true);
+    const pipeline::Model model =
+        pipeline::upload_model(*device(), scene.gaussians, plan.moment_buffers(), true);
     const gpu::Buffer camera = camera_buffer(scene.camera, r.config());
     const gpu::Buffer photo = pipeline::upload_photo(*device(), target);
     pipeline::FrameBuffers frame;
-    frame.reserve(*device(), r.config(),
-                  {.splats = model.splats, .width = width, .height = height, .instances = 60000, .gradients = true});
+    frame.reserve(
+        *device(), r.config(),
+        {.splats = model.splats, .width = width, .height = height, .instances = 60000, .gradients = true});
     const pipeline::FrameInputs inputs{.camera = {&camera, 0, width, height},
                                        .background = scene.options.background};
     for (int step = 0; step < steps; ++step)
@@ -209,8 +209,8 @@ Stepped take_step(const Scene& scene, const Image& target, const pipeline::PlanR
             record_loss(recording, r.cache, frame, inputs, photo);
             record_backward(recording, r.cache, plan, model, frame, inputs, sorted, rates);
         });
-    return {download_model(model, model.params),
-            model.statistics.download<float>(2 * size_t(model.splats)), frame.read_counts()};
+    return {download_model(model, model.params), model.statistics.download<float>(2 * size_t(model.splats)),
+            frame.read_counts()};
 }
 
 pipeline::PlanRequest training_of(const Scene& scene) {
@@ -287,7 +287,9 @@ TEST(PointsUpdate, StatisticsAreTheNormsOfTheReference) {
         EXPECT_GT(largest, 0);
         for (size_t i = 0; i < scene.gaussians.size(); ++i) {
             EXPECT_NEAR(stepped.statistics[2 * i], expected.gradient_sum[i], 1e-4 * largest) << i << absolute;
-            if (expected.views[i]) EXPECT_EQ(stepped.statistics[2 * i + 1], 1) << i;
+            if (expected.views[i] > 0) {
+                EXPECT_EQ(stepped.statistics[2 * i + 1], 1) << i;
+            }
         }
     }
 }

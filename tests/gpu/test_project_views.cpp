@@ -18,9 +18,9 @@
 namespace ewa::test {
 namespace {
 
-inline SharedByTests<Operators>* const operators_of_all = SharedByTests<Operators>::add();
-Operators& operators() {
-    return operators_of_all->get([] { return Operators(device()); });
+inline SharedByTests<Operators>* const view_operators_of_all = SharedByTests<Operators>::add();
+Operators& view_operators() {
+    return view_operators_of_all->get([] { return Operators(device()); });
 }
 
 struct ViewsCase {
@@ -69,7 +69,7 @@ bool fragile(const reference::PlainSplat& splat, const reference::PlainProjected
 }
 
 TEST_P(ViewsPass, OutputsMatchTheReference) {
-    const ProjectedSplats out = operators().project(scene.splats(), scene.view_arrays(), scene.options);
+    const ProjectedSplats out = view_operators().project(scene.splats(), scene.view_arrays(), scene.options);
     ASSERT_EQ(out.radii.size(), 2 * c.splats * c.views);
     ASSERT_EQ(out.compensations.size(), c.compensations ? c.splats * c.views : 0);
     double worst_mean = 0, worst_shape = 0, worst_compensation = 0;
@@ -199,10 +199,10 @@ double worst_of_rows(const std::vector<float>& actual, const std::vector<double>
 }
 
 TEST_P(ViewsPass, GradientsMatchTheReference) {
-    const ProjectedSplats out = operators().project(scene.splats(), scene.view_arrays(), scene.options);
+    const ProjectedSplats out = view_operators().project(scene.splats(), scene.view_arrays(), scene.options);
     const ScreenGradients g = random_gradients(scene, out, 7);
-    const SplatGradient actual = operators().project_backward(scene.splats(), scene.view_arrays(),
-                                                              scene.options, out.radii, g.arrays(), true);
+    const SplatGradient actual = view_operators().project_backward(
+        scene.splats(), scene.view_arrays(), scene.options, out.radii, g.arrays(), true);
     const ExpectedGradient expected = reference_gradient(scene, out, g);
     const double means = worst_of_rows(actual.means, expected.means, 3),
                  shapes = c.covariances ? worst_of_rows(actual.covariances, expected.shapes, 6)
@@ -222,8 +222,8 @@ TEST_P(ViewsPass, GradientsMatchTheReference) {
     EXPECT_LT(shapes, c.gradient);
     EXPECT_LT(scales, c.gradient);
     EXPECT_LT(views, 1e-6);
-    const SplatGradient again = operators().project_backward(scene.splats(), scene.view_arrays(),
-                                                             scene.options, out.radii, g.arrays(), true);
+    const SplatGradient again = view_operators().project_backward(scene.splats(), scene.view_arrays(),
+                                                                  scene.options, out.radii, g.arrays(), true);
     EXPECT_EQ(actual.view_matrices, again.view_matrices);
     EXPECT_EQ(actual.means, again.means);
 }
@@ -269,7 +269,7 @@ void add_splat(PlainScene& scene, std::array<float, 3> mean, std::array<float, 4
 }
 
 ProjectedSplats project_scene(const PlainScene& scene) {
-    return operators().project(scene.splats(), scene.view_arrays(), scene.options);
+    return view_operators().project(scene.splats(), scene.view_arrays(), scene.options);
 }
 
 /// Compares shapes and gradients of splats that are all visible. shape, gradient: largest relative errors; a gradient of 0 is
@@ -291,8 +291,8 @@ void expect_reference(const PlainScene& scene, double shape, double gradient) {
     }
     if (gradient == 0) return;
     const ScreenGradients g = random_gradients(scene, out, 3);
-    const SplatGradient actual = operators().project_backward(scene.splats(), scene.view_arrays(),
-                                                              scene.options, out.radii, g.arrays(), false);
+    const SplatGradient actual = view_operators().project_backward(
+        scene.splats(), scene.view_arrays(), scene.options, out.radii, g.arrays(), false);
     const ExpectedGradient expected = reference_gradient(scene, out, g);
     EXPECT_TRUE(actual.view_matrices.empty());
     EXPECT_LT(worst_of_rows(actual.means, expected.means, 3), gradient);
@@ -308,14 +308,14 @@ TEST(ViewsEdges, NoSplatsAndNoViews) {
     PlainScene scene = empty_scene();
     EXPECT_TRUE(project_scene(scene).radii.empty());
     const SplatGradient none =
-        operators().project_backward(scene.splats(), scene.view_arrays(), scene.options, {}, {}, true);
+        view_operators().project_backward(scene.splats(), scene.view_arrays(), scene.options, {}, {}, true);
     EXPECT_TRUE(none.means.empty());
     EXPECT_EQ(none.view_matrices, std::vector<float>(16));
     add_splat(scene, {0, 0, 4}, {1, 0, 0, 0}, {1, 1, 1});
     const ViewArrays no_views;
-    EXPECT_TRUE(operators().project(scene.splats(), no_views, scene.options).radii.empty());
+    EXPECT_TRUE(view_operators().project(scene.splats(), no_views, scene.options).radii.empty());
     const SplatGradient zero =
-        operators().project_backward(scene.splats(), no_views, scene.options, {}, {}, true);
+        view_operators().project_backward(scene.splats(), no_views, scene.options, {}, {}, true);
     EXPECT_EQ(zero.means, std::vector<float>(3));
     EXPECT_EQ(zero.quaternions, std::vector<float>(4));
     EXPECT_EQ(zero.scales, std::vector<float>(3));
@@ -424,8 +424,8 @@ TEST(ViewsEdges, PoisonIsInvisible) {
     for (size_t i = 0; i < 33; ++i) EXPECT_EQ(out.radii[2 * i], 0) << i;
     EXPECT_GT(out.radii[2 * 33], 0);
     const ScreenGradients g = random_gradients(scene, out, 1);
-    const SplatGradient by = operators().project_backward(scene.splats(), scene.view_arrays(), scene.options,
-                                                          out.radii, g.arrays(), true);
+    const SplatGradient by = view_operators().project_backward(scene.splats(), scene.view_arrays(),
+                                                               scene.options, out.radii, g.arrays(), true);
     for (size_t k = 0; k < 3 * 33; ++k) EXPECT_EQ(by.means[k], 0) << k;
     for (size_t k = 0; k < 4 * 33; ++k) EXPECT_EQ(by.quaternions[k], 0) << k;
     for (size_t k = 0; k < 3 * 33; ++k) EXPECT_EQ(by.scales[k], 0) << k;
@@ -439,8 +439,8 @@ TEST(ViewsEdges, AMissingGradientIsZero) {
     const std::vector<float> two(200), one(100), three(300);
     ScreenGradients g = random_gradients(scene, out, 2);
     const auto back = [&](const ProjectedGradient& gradient) {
-        return operators().project_backward(scene.splats(), scene.view_arrays(), scene.options, out.radii,
-                                            gradient, true);
+        return view_operators().project_backward(scene.splats(), scene.view_arrays(), scene.options,
+                                                 out.radii, gradient, true);
     };
     back(g.arrays());  // leaves its gradients in the buffers
     const SplatGradient missing = back({.means2d = g.means2d}), zero = back({g.means2d, one, three, one});
@@ -527,7 +527,8 @@ TEST(ViewsEdges, WrongArgumentsAreNamed) {
     const std::vector<float> wrong(5);
     const auto back = [&](std::span<const int32_t> given, const ProjectedGradient& g) {
         return message_of([&] {
-            operators().project_backward(scene.splats(), scene.view_arrays(), scene.options, given, g, false);
+            view_operators().project_backward(scene.splats(), scene.view_arrays(), scene.options, given, g,
+                                              false);
         });
     };
     expect("radii has 0 values", back({}, {}));

@@ -55,7 +55,8 @@ TEST(ReferencePoints, ASphereFadesWithTheSquareOfTheDistance) {
     Gaussians g;
     add_sphere(g, 4, 0.3, 0.75);
     const auto picture = reference::render(g, level_camera(), spheres());
-    const double rx = 2 * std::sqrt(std::pow(40 * 0.3 / 4, 2) + 0.3), ry = 2 * std::sqrt(std::pow(30 * 0.3 / 4, 2) + 0.3);
+    const double rx = 2 * std::sqrt(std::pow(40 * 0.3 / 4, 2) + 0.3),
+                 ry = 2 * std::sqrt(std::pow(30 * 0.3 / 4, 2) + 0.3);
     for (const auto& [dx, dy] : {std::pair{0, 0}, {1, 0}, {0, 3}, {-4, 1}, {5, 2}, {7, 0}, {0, 5}}) {
         const double q = std::pow(dx / rx, 2) + std::pow(dy / ry, 2);
         const double alpha = q < 1 ? std::min(kAlphaMax, 1 - q) : 0;
