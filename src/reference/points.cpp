@@ -196,6 +196,8 @@ Picture render_points(const Values& values, const Camera& camera, const RenderOp
         if (sphere.projected.skipped_nonfinite) ++out.skipped_nonfinite;
     }
     out.order = depth_order(out.projected);
+    out.instances.grid = {.image_width = camera.width, .image_height = camera.height};
+    out.instances.first_of_tile.assign(size_t(out.instances.grid.count()) + 1, 0);
     blend_spheres(spheres, camera, options, out);
     return out;
 }

@@ -104,6 +104,47 @@ TEST(Trainer, OverfitsASmallScene) {
     EXPECT_EQ(run.report.skipped_nonfinite, 0u);
 }
 
+/// Spheres of the radius and opacity that a run of points begins with.
+Gaussians sphere_start(double shake, uint64_t seed) {
+    Gaussians start = shaken_start(small_capture(), shake, seed, 0);
+    for (float& scale : start.log_scales) scale -= float(std::log(2));
+    return start;
+}
+
+TEST(Trainer, FitsPoints) {
+    TrainOptions options = quick(200);
+    options.render.points = true;
+    const Gaussians start = sphere_start(0.05, 1);
+    const auto psnr_of = [&](const Gaussians& gaussians) {
+        return evaluate(device(), gaussians, small_capture().dataset, all_frames(small_capture().dataset),
+                        options.render)
+            .psnr;
+    };
+    const TrainedScene run = train(options, start, 200);
+    printf("    psnr %.2f -> %.2f dB\n", psnr_of(start), psnr_of(run.gaussians));
+    EXPECT_GT(psnr_of(run.gaussians), psnr_of(start) + 4);
+    EXPECT_EQ(run.gaussians.quaternions, train(options, start, 1).gaussians.quaternions);
+    EXPECT_EQ(run.report.dropped_updates, 0u);
+    for (size_t i = 0; i < run.gaussians.log_scales.size(); ++i)
+        ASSERT_EQ(run.gaussians.log_scales[i], run.gaussians.log_scales[i - i % 3]);
+    const TrainedScene again = train(options, start, 200);
+    EXPECT_EQ(again.gaussians.means, run.gaussians.means);
+    EXPECT_EQ(again.gaussians.sh, run.gaussians.sh);
+}
+
+/// No sphere is pruned for an opacity that it does not have.
+TEST(Trainer, PointsGrowAndAreNotPruned) {
+    TrainOptions options = quick(300);
+    options.render.points = true;
+    options.strategy = Strategy::adc;
+    options.grow_gradient = 1e-5;
+    Gaussians start = sphere_start(0.05, 1);
+    std::fill(start.opacity_logits.begin(), start.opacity_logits.end(), -20.0f);
+    const TrainedScene run = train(options, start, 160);
+    EXPECT_GT(run.gaussians.size(), start.size());
+    for (const float logit : run.gaussians.opacity_logits) ASSERT_EQ(logit, -20.0f);
+}
+
 TEST(Trainer, TheSameSeedWritesTheSameBytesAndAnotherDoesNot) {
     const Gaussians start = shaken_start(small_capture(), 0.05, 1, 1);
     const auto bytes = [&](uint64_t seed) {
@@ -255,6 +296,9 @@ TEST(Trainer, RefusesWhatItCannotTrain) {
     expect_error<InputError>(make({}, start, 1000), {"no training image"});
     expect_error<InputError>(make({0}, Gaussians{}, 1000), {"no splat"});
     expect_error<InputError>(make({0}, start, 39), {"40", "39"});
+    options.render.points = true;
+    options.strategy = Strategy::mcmc;
+    expect_error<InputError>(make({0}, start, 1000), {"--strategy mcmc", "--points"});
 }
 
 std::vector<std::string> names(const std::vector<PlanLine>& plan) {

@@ -184,6 +184,13 @@ TEST(Initialise, StartsFromPointsOrRandomSplats) {
     dataset.points.positions = {{1, 2, 3}, {4, 5, 6}};
     dataset.points.colors = {{1, 2, 3}, {4, 5, 6}};
     EXPECT_EQ(initial_splats(options, dataset, frames).means, (std::vector<float>{1, 2, 3, 4, 5, 6}));
+    // Spheres are opaque in their middle, and their radius, of two deviations, is the distance to the neighbours.
+    const Gaussians round = initial_splats(options, dataset, frames);
+    options.train.render.points = true;
+    const Gaussians spheres = initial_splats(options, dataset, frames);
+    EXPECT_NEAR(spheres.log_scales[0], round.log_scales[0] - std::log(2), 1e-6);
+    EXPECT_NEAR(spheres.opacity_logits[0], std::log(99), 1e-5);
+    options.train.render.points = false;
     options.init = "random";
     EXPECT_EQ(initial_splats(options, dataset, frames).size(), 70u);
     options.init = "sfm";

@@ -43,12 +43,15 @@ TEST(Opening, TheSplatsOfARunHaveItsCameras) {
     const std::string splats = folder / "run/splats.ply";
     EXPECT_FALSE(open_scene(splats, {}).dataset);
     test::write_file(folder / "run/config.json",
-                     R"({"dataset": "data", "downscale": 2, "kernel": "ewa", "background": "1,0,1"})");
+                     R"({"dataset": "data", "downscale": 2, "kernel": "ewa", "background": "1,0,1",
+                         "points": true, "nearest": 5})");
     const OpenedScene scene = open_scene(splats, {});
     ASSERT_TRUE(scene.dataset);
     EXPECT_EQ(scene.dataset->frames.size(), 4u);
     EXPECT_EQ(scene.dataset->frames[0].camera.width, 24);
     EXPECT_EQ(scene.look.kernel, Footprint::density);
+    EXPECT_TRUE(scene.look.points);
+    EXPECT_EQ(scene.look.nearest, 5);
     EXPECT_EQ(scene.look.background, (std::array<float, 3>{1, 0, 1}));
     EXPECT_TRUE(scene.run.empty()) << "a file is not watched";
     EXPECT_TRUE(scene.exposures.empty());

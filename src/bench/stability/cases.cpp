@@ -318,13 +318,43 @@ void add_replaced(Table& table) {
     }
 }
 
+/// The same splats as spheres.
+void add_points(Table& table) {
+    const auto add = [&](const char* name, const char* what, Gaussians gaussians,
+                         const Camera& camera = usual_camera()) {
+        table.add(std::string("points_") + name, what, std::move(gaussians), camera);
+        table.cases.back().options.points = true;
+    };
+    const auto scaled = [](double factor) {
+        return usual_scene(usual_camera(), 40, 1, [=](Sketch& s, uint32_t) { s.scale *= factor; });
+    };
+    add("ordinary", "spheres, the 8 nearest at a pixel", usual_scene(usual_camera(), 60, 3));
+    add("scale_1e-06", "spheres with scales times this", scaled(1e-6));
+    add("scale_1e+02", "spheres with scales times this", scaled(1e2));
+    add("needles", "spheres of splats that are 1 : 1e4", thin_splats(0.15, 1e4));
+    add("coinciding", "spheres in one place", usual_scene(usual_camera(), 20, 1, [](Sketch& s, uint32_t) {
+            s.view = {0.1, 0.2, 4};
+        }));
+    add("close", "spheres at and just in front of the near plane",
+        usual_scene(usual_camera(), 40, 1, {}, 0.004));
+    Camera far = usual_camera();
+    const glm::dvec3 place(1e7, -8e6, 300);
+    Gaussians held = usual_scene(far, 60, 1);
+    held.origin = place;
+    far.translation = -(far.rotation * (far.position() + place));
+    add("georeferenced_1e7", "spheres 1e7 from the origin", std::move(held), far);
+    Gaussians damaged = usual_scene(usual_camera(), 60, 1);
+    for (size_t i = 0; i < 20; ++i) stored_value(damaged, 2 * i, i) = std::numeric_limits<float>::quiet_NaN();
+    add("value_nan", "spheres, every other one with a value that is not a number", std::move(damaged));
+}
+
 }  // namespace
 
 std::vector<StabilityCase> stability_cases() {
     Table table;
     for (const auto add :
          {add_ordinary, add_axis_ratios, add_scales, add_depths, add_far_from_origin, add_opacities,
-          add_stacks, add_images, add_focal_lengths, add_quaternions, add_colors, add_replaced})
+          add_stacks, add_images, add_focal_lengths, add_quaternions, add_colors, add_replaced, add_points})
         add(table);
     return std::move(table.cases);
 }
