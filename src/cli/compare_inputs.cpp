@@ -159,6 +159,11 @@ void resolve_runs(CLI::App& app, CompareInputs& inputs) {
                 throw InputError(first->folder.string() + " and " + input.run->folder.string() +
                                  " were trained with another --" + option +
                                  "; choose one with --cameras DATASET --" + option);
+        if (first->flag("points") != input.run->flag("points") && app.count("--points") == 0 &&
+            app.count("--kernel") + app.count("--antialias") == 0)
+            throw InputError(first->folder.string() + " and " + input.run->folder.string() +
+                             ": one was trained with --points; choose how both are drawn, with --points or "
+                             "--kernel peak");
     }
     if (!first) return;
     if (inputs.cameras.empty()) inputs.cameras = dataset_of(*first);

@@ -66,6 +66,11 @@ std::string Run::text(const char* option) const {
     return found != config.end() && found->is_string() ? found->get<std::string>() : std::string();
 }
 
+bool Run::flag(const char* option) const {
+    const auto found = config.find(option);
+    return found != config.end() && *found == true;
+}
+
 std::optional<Run> find_run(const fs::path& folder) {
     const auto present = [&](const char* name) { return core::is_file(folder / name); };
     if (!present("config.json") && !present("splats.ply") && !present("metrics.jsonl")) return std::nullopt;

@@ -24,6 +24,8 @@ struct Run {
 
     /// The option's text in config.json; empty if it is not a text.
     std::string text(const char* option) const;
+    /// Whether the option is a flag that is set.
+    bool flag(const char* option) const;
 };
 
 /// The run whose folder this is, also if it has just begun: with config.json, splats.ply or metrics.jsonl. Empty for

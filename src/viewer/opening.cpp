@@ -55,8 +55,8 @@ Look look_of(const live::Run& run) {
     const std::string kernel = run.text("kernel");
     if (kernel == "antialias") look.kernel = Footprint::antialias;
     if (kernel == "ewa") look.kernel = Footprint::density;
-    const auto points = run.config.find("points"), nearest = run.config.find("nearest");
-    look.points = points != run.config.end() && *points == true;
+    look.points = run.flag("points");
+    const auto nearest = run.config.find("nearest");
     if (nearest != run.config.end() && nearest->is_number_integer())
         look.nearest = std::clamp(nearest->get<int>(), 1, kMostNearest);
     look.background = core::parse_colour(run.text("background")).value_or(look.background);

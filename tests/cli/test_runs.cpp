@@ -72,6 +72,9 @@ TEST_F(Runs, OfPointsAreDrawnAsPoints) {
     EXPECT_GT(std::abs(psnr({run, "--kernel", "peak"}) - summary["test_psnr"].get<double>()), 1e-3);
     EXPECT_GT(std::abs(psnr({run, "--nearest", "1"}) - summary["test_psnr"].get<double>()), 1e-3);
 
+    const std::string other = train("other", {"--seed", "2"});
+    expect_failure(run_ewa({"compare", run, other}), 2, "one was trained with --points");
+
     // A reader of 3DGS sees Gaussians that are as opaque as a sphere is in its middle.
     for (const float logit : load_splats(run + "/splats.ply").opacity_logits)
         EXPECT_NEAR(logit, 4.595f, 1e-3);

@@ -134,7 +134,7 @@ TEST(Trainer, FitsPoints) {
 
 /// No sphere is pruned for an opacity that it does not have.
 TEST(Trainer, PointsGrowAndAreNotPruned) {
-    TrainOptions options = quick(300);
+    TrainOptions options = quick(400);
     options.render.points = true;
     options.strategy = Strategy::adc;
     options.grow_gradient = 1e-5;
