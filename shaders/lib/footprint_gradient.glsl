@@ -18,6 +18,7 @@ struct FootprintGradient {
     vec3 dm0, dm1;     // dL/d(rows of M)
     vec3 log_scale;    // dL/d(logarithms of the scales)
     vec3 beside;       // yz, zx and xy of P
+    vec2 tangent;      // dL/d(tangents) with constant M: of KERNEL_DENSITY only
 };
 
 // From the whitened sums to the 2D Gaussian and its M. With power = -(u^2 + v^2) and (u, v) = L d, L = [ux, -k ux; 0, vy]:
@@ -41,7 +42,7 @@ FootprintGradient footprint_gradient(Sums s, Projection p) {
     f.dm1 = 4.0 * (skew * hu + p.vy * hv);
     f.log_scale = 4.0 * (lu * hu + lv * hv);
     f.beside = 4.0 * (lu.yzx * hu.zxy + lv.yzx * hv.zxy);   // P of yz, zx, xy
-    if (KERNEL != KERNEL_PEAK && p.det0 > 0.0) {
+    if (KERNEL == KERNEL_DENSITY || (KERNEL == KERNEL_ANTIALIAS && p.det0 > 0.0)) {
         // ln(factor) = -ln(1 + q) / 2 with q = (det - det0) / det0, or -ln(det) / 2: in either
         // d(ln factor) = -(low_pass d(trace) + share d(det0)) / (2 det), d(det0) = 2 (m1 x n . dm0 + n x m0 . dm1).
         const float share =
@@ -53,6 +54,12 @@ FootprintGradient footprint_gradient(Sums s, Projection p) {
         f.log_scale += scale * (low_pass * (m0 * m0 + m1 * m1) +
                                 share * vec3(squares.y + squares.z, squares.z + squares.x, squares.x + squares.y));
         f.beside += scale * (low_pass * (m0.yzx * m0.zxy + m1.yzx * m1.zxy) - share * n.yzx * n.zxy);
+    }
+    if (KERNEL == KERNEL_DENSITY) {
+        // d(ln(A |J|)): by the scales, and by the tangents of |J|. |J| falls with the square of the depth, as A grows with
+        // the square of the scales: view_point_gradient has that part.
+        f.log_scale += s.g * mean_shadow_slope(p.scale);
+        f.tangent = (s.g / (1.0 + dot(p.tangent, p.tangent))) * p.tangent;
     }
     return f;
 }
@@ -66,8 +73,9 @@ vec3 view_point_gradient(FootprintGradient f, Projection p) {
     const vec2 tangent = vec2(p.view.x.x, p.view.y.x) * inverse_z;
     view_gradient.z = -dot(tangent, view_gradient.xy) -
                       inverse_z * (f.log_scale.x + f.log_scale.y + f.log_scale.z);
-    const vec2 tangent_gradient =
+    vec2 tangent_gradient =
         -p.focal_over_z * vec2(p.tangent_clamped.x ? 0.0 : dot(f.dm0, row_z), p.tangent_clamped.y ? 0.0 : dot(f.dm1, row_z));
+    if (KERNEL == KERNEL_DENSITY) tangent_gradient += mix(f.tangent, vec2(0.0), p.tangent_clamped);
     return view_gradient + vec3(tangent_gradient, -dot(tangent_gradient, tangent)) * inverse_z;
 }
 #endif

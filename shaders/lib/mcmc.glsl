@@ -2,6 +2,7 @@
 // 3DGS as Markov chain Monte Carlo (Kheradmand et al. 2024, "3D Gaussian Splatting as Markov Chain Monte Carlo").
 #ifndef EWA_LIB_MCMC
 #define EWA_LIB_MCMC
+#include "lib/near_zero.glsl"
 
 // relocated: opacity and scale factor of each of `parts` splats that replace one splat of this logit in its place and
 // together look like it (eq. 9). The sum of that equation,
@@ -9,18 +10,7 @@
 // loses all digits of float32 to cancellation for large N. With 1 / sqrt(k) = 2 / sqrt(pi) integral exp(-k t^2) dt it is
 //   2 / sqrt(pi) integral_0^inf 1 - (1 - x exp(-t^2))^N dt,
 // where no term cancels and the trapezoidal rule converges exponentially.
-// With thousands of parts, ln(1 + x) and exp(x) - 1 are needed near zero, where drivers' log and exp have few digits left.
-float log_1p(float x) {   // x > -1
-    const float s = x / (2.0 + x), q = s * s;
-    const float series = 2.0 * s * (1.0 + q * (1.0 / 3.0 + q * (0.2 + q * (1.0 / 7.0 + q * (1.0 / 9.0 + q / 11.0)))));
-    return abs(x) < 0.5 ? series : log(1.0 + x);
-}
-float exp_m1(float x) {   // x <= 0
-    const float series =
-        x * (1.0 + x / 2.0 * (1.0 + x / 3.0 * (1.0 + x / 4.0 * (1.0 + x / 5.0 * (1.0 + x / 6.0 * (1.0 + x / 7.0))))));
-    return x > -0.5 ? series : exp(x) - 1.0;
-}
-
+// With thousands of parts, ln(1 + x) and exp(x) - 1 are needed near zero.
 vec2 relocated(float logit, uint parts) {
     const float step = 0.1;
     const float optical = logit > 20.0 ? logit : log_1p(exp(logit)); // -ln(1 - opacity)

@@ -4,6 +4,7 @@
 // splats, or go back through the projection, share this code.
 #ifndef EWA_LIB_PROJECTION
 #define EWA_LIB_PROJECTION
+#include "lib/density.glsl"
 #include "lib/view.glsl"
 
 layout(constant_id = SPEC_KERNEL) const uint KERNEL = KERNEL_PEAK;
@@ -23,6 +24,7 @@ struct Projection {
     float det0;            // det(M M^T), without the low-pass
     float ux, k, vy;       // as in the record (px)
     float factor;          // the kernel's factor
+    vec3 scale;
 };
 
 // directions: of the splat's axes in camera axes. cofactors: their cross products, direction k of k + 1 and k + 2; those
@@ -31,6 +33,7 @@ Projection project_shape(View view, Lens lens, mat3 directions, mat3 cofactors, 
     Projection p;
     p.view = view;
     p.low_pass = low_pass_px;
+    p.scale = scale;
     const float z = p.view.z.x;
     [[unroll]] for (int k = 0; k < 3; ++k) p.axes[k] = directions[k] * scale[k];
 
@@ -68,7 +71,9 @@ Projection project_shape(View view, Lens lens, mat3 directions, mat3 cofactors, 
 
     p.factor = 1.0;
     if (KERNEL == KERNEL_ANTIALIAS) p.factor = sqrt(max(0.0, p.det0 / p.det));
-    if (KERNEL == KERNEL_DENSITY) p.factor = 0.15915494309189535 * p.unit * p.unit / sqrt(p.det);
+    // A |J| / sqrt(det) with |J| = fx fy sqrt(1 + tx^2 + ty^2) / z^2, the determinant of the ray-space transform.
+    if (KERNEL == KERNEL_DENSITY)
+        p.factor = mean_shadow(scale, p.unit * p.focal_over_z) * sqrt((1.0 + dot(p.tangent, p.tangent)) / p.det);
     return p;
 }
 #endif

@@ -19,7 +19,7 @@ struct StoredProjection {
     vec4 unit_quaternion;
     float quaternion_norm;
     bool in_range;          // quaternion and mean are within bounds
-    float peak;             // opacity before the kernel's factor
+    float peak;             // opacity, or with KERNEL_DENSITY optical depth, before the kernel's factor
 };
 
 float sigmoid(float x) { return 1.0 / (1.0 + exp(-x)); }
@@ -52,7 +52,7 @@ StoredProjection project_splat(StoredSplat splat) {
     // A NaN fails these comparisons.
     p.in_range = far.x <= float(VIEW_MAX) && far.y <= float(VIEW_MAX) && far.z <= float(VIEW_MAX) &&
                  p.quaternion_norm >= float(QUATERNION_MIN);
-    p.peak = sigmoid(splat.logit);
+    p.peak = KERNEL == KERNEL_DENSITY ? softplus(splat.logit) : sigmoid(splat.logit);
     return p;
 }
 #endif

@@ -6,8 +6,11 @@
 // Needs subgroup.glsl. The including pass declares `push` (BlendPush), records, splats and tile_starts before this file.
 #ifndef EWA_LIB_TILE
 #define EWA_LIB_TILE
+#include "lib/density.glsl"
 layout(constant_id = SPEC_TILE_WIDTH) const uint TILE_WIDTH = 8;
 layout(constant_id = SPEC_TILE_HEIGHT) const uint TILE_HEIGHT = 8;
+layout(constant_id = SPEC_KERNEL) const uint KERNEL = KERNEL_PEAK;
+const bool BY_DEPTH = KERNEL == KERNEL_DENSITY;  // a record's opacity is an optical depth
 const uint PIXELS = TILE_WIDTH * TILE_HEIGHT / SUBGROUP;
 const uint ROW_STEP = SUBGROUP / TILE_WIDTH;
 
@@ -122,7 +125,7 @@ LaneSplat lane_splat(Loaded own, uint j, vec2 pixel) {
     return lane_splat_of(record0, record1, record2, BY_RATIO ? ratio_step_of(record1) : 0.0, pixel);
 }
 
-// opacity exp(-(u^2 + v^2)) at each of the lane's pixels.
+// opacity (BY_DEPTH: optical depth) times exp(-(u^2 + v^2)) at each of the lane's pixels.
 void column_alphas(LaneSplat s, out float raw[PIXELS]) {
     float ratio = 0.0;
     [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
@@ -147,8 +150,18 @@ void column_alphas(LaneSplat s, out float raw[PIXELS]) {
     }
 }
 
-// A NaN contributes nothing.
-float alpha_of(float raw) { return raw >= CUT_OFF ? min(float(ALPHA_MAX), raw) : 0.0; }
+// 1 - exp(-depth) for a depth of at least zero, with all digits where it is small.
+float absorbed(float depth) {
+    EXACT const float far = 1.0 - exp(-depth), near = depth * (1.0 - depth / 2.0 * (1.0 - depth / 3.0 * (1.0 - depth / 4.0 *
+                                                     (1.0 - depth / 5.0 * (1.0 - depth / 6.0 * (1.0 - depth / 7.0))))));
+    return depth < 0.35 ? near : far;
+}
+
+// raw: opacity or, BY_DEPTH, optical depth. A NaN contributes nothing.
+float alpha_of(float raw) {
+    if (BY_DEPTH) return raw >= depth_of(CUT_OFF) ? min(float(ALPHA_MAX), absorbed(raw)) : 0.0;
+    return raw >= CUT_OFF ? min(float(ALPHA_MAX), raw) : 0.0;
+}
 
 // T is positive while the pixel is open. It becomes negative at the splat that would have taken it to TRANSMITTANCE_STOP or
 // below: one float is both value and flag.

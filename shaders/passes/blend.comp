@@ -23,7 +23,8 @@ layout(push_constant, scalar) uniform Push { BlendPush push; };
 void meet_ellipsoid(LaneSplat s, uint p, inout float T, inout vec3 color) {
     const float u = s.u + s.u_step * float(p), v = s.v + s.v_step * float(p);
     const float height = 1.0 - (u * u + v * v) * float(2.0 / (ELLIPSOID_REACH * ELLIPSOID_REACH));
-    const bool hit = T > 0.0 && height >= 0.0 && s.opacity >= float(ELLIPSOID_OPACITY);
+    const float least = BY_DEPTH ? depth_of(float(ELLIPSOID_OPACITY)) : float(ELLIPSOID_OPACITY);
+    const bool hit = T > 0.0 && height >= 0.0 && s.opacity >= least;
     const float shade = mix(float(ELLIPSOID_RIM), 1.0, sqrt(max(height, 0.0)));
     color = hit ? shade * s.color : color;
     T = hit ? 0.0 : T;

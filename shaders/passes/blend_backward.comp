@@ -77,13 +77,21 @@ void main() {
                 [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
                     const float alpha = alpha_of(raw[p]);
                     bool blended;
+                    const float before = T[p];
                     const float weight = composite(alpha, T[p], blended);
-                    float own = weight * dot(s.color, gradient[p]);
+                    const float shade = dot(s.color, gradient[p]);
+                    float own = weight * shade;
                     if (WITH_FOURTH) own += weight * s.z * fourth[p];
                     rest[p] -= own;
-                    // dL/d(power) = alpha dL/d(alpha); zero where alpha is clamped.
-                    const bool moves = blended && raw[p] <= float(ALPHA_MAX);
-                    const float g = moves ? own - rest[p] * (alpha / (1.0 - alpha)) : 0.0;
+                    // dL/d(power), which is zero where alpha is clamped: alpha dL/d(alpha), or depth (1 - alpha) dL/d(alpha).
+                    float g = 0.0;
+                    if (BY_DEPTH) {
+                        const bool moves = blended && alpha > 0.0 && raw[p] <= depth_of(float(ALPHA_MAX));
+                        g = moves ? raw[p] * (before * (1.0 - alpha) * shade - rest[p]) : 0.0;
+                    } else {
+                        const bool moves = blended && raw[p] <= float(ALPHA_MAX);
+                        g = moves ? own - rest[p] * (alpha / (1.0 - alpha)) : 0.0;
+                    }
                     const float step = float(p) - MIDDLE;
                     s0 += g;
                     s1 += g * step;

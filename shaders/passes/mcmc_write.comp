@@ -3,17 +3,19 @@
 // Writes one array of the next generation of splats into a new buffer. SPEC_MODE: WRITE_*.
 // One invocation owns new splat j. It reads the parameters and one of the moments of splat j or of its source, and writes
 // the parameters or the moments of splat j. A dead splat, and one beyond the old number, becomes a copy of its source. A source and its copies share
-// what the source was (lib/mcmc.glsl) and start with zero moments. With a spread, each is placed by a normal draw
+// what the source was (lib/mcmc.glsl; optical depths just add up) and start with zero moments. With a spread, each is placed by a normal draw
 // of the source's Gaussian.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/params.glsl"
+#include "lib/density.glsl"
 #include "lib/mcmc.glsl"
 #include "lib/quaternion.glsl"
 #include "lib/random.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3; // stored
+layout(constant_id = SPEC_KERNEL) const uint KERNEL = KERNEL_PEAK;
 layout(constant_id = SPEC_MODE) const uint MODE = 0;
 TEXELS(0, params);
 WORD_TEXELS(1, moments);
@@ -35,8 +37,16 @@ void main() {
     else if (dead[j] != 0u) source = sources[totals[j / push.scan_block] + prefix[j]];
     const uint copies = hits[source];
     const float logit = fetch(params, param_texel(PLANES, 0u, source)).w;
-    const vec2 part = relocated(logit, copies + 1u);
-    const float opacity = clamp(part.x, push.least_opacity, 1.0 - 1e-6);
+    float shared_logit, factor;
+    if (KERNEL == KERNEL_DENSITY) {
+        shared_logit = logit_of_depth(max(softplus(logit) / float(copies + 1u), depth_of(push.least_opacity)));
+        factor = 1.0;
+    } else {
+        const vec2 part = relocated(logit, copies + 1u);
+        const float opacity = clamp(part.x, push.least_opacity, 1.0 - 1e-6);
+        shared_logit = log(opacity / (1.0 - opacity));
+        factor = part.y;
+    }
     vec3 offset = vec3(0.0);
     if (push.spread > 0.0) {
         float norm;
@@ -50,8 +60,8 @@ void main() {
         uvec4 words = uvec4(0u);
         if (MODE == WRITE_PARAMS) {
             vec4 value = fetch(params, from);
-            if (plane == 0u && copies > 0u) value = vec4(value.xyz + offset, log(opacity / (1.0 - opacity)));
-            if (plane == 2u && copies > 0u) value.xyz += log(part.y);
+            if (plane == 0u && copies > 0u) value = vec4(value.xyz + offset, shared_logit);
+            if (plane == 2u && copies > 0u) value.xyz += log(factor);
             words = floatBitsToUint(value);
         } else if (copies == 0u) {
             words = fetch(moments, from);

@@ -43,7 +43,9 @@ bool project(uint i) {
     const bool stored_finite = is_finite(p0) && is_finite(p1) && is_finite(p2.xyz) && stored.in_range;
     const bool in_front = z > float(NEAR_PLANE);
     const bool projected_finite = p.footprint_in_range && finite_color && is_finite(record0) && is_finite(record1) && p.ux > 0.0 && p.vy > 0.0;
-    const bool visible = stored_finite && in_front && projected_finite;
+    bool visible = stored_finite && in_front && projected_finite;
+    // Footprints reach to an optical depth of CUT_OFF: that is a little further than an opacity of CUT_OFF.
+    if (KERNEL == KERNEL_DENSITY) visible = visible && opacity >= depth_of(CUT_OFF);
 
     uint count = 0u;
     if (visible) {

@@ -70,12 +70,13 @@ void main() {
     const vec3 mean_gradient = to_world * view_gradient + direction_part;
     // 1 - opacity has no digits left where the opacity is close to 1.
     const float transparency = sigmoid(-p0.w);
-    const float logit_gradient = s.g * transparency;
+    const float logit_gradient = s.g * (KERNEL == KERNEL_DENSITY ? log_softplus_slope(p0.w) : transparency);
     const float depth = visible ? p.view.z.x : 3.4e38;
 
     const vec4 zero = vec4(0.0);
+    const float opacity = KERNEL == KERNEL_DENSITY ? sigmoid(p0.w) : stored.peak;
     const vec4 scale_pull = REGULARISED ? vec4(push.scale_weight * scale, 0.0) : zero;
-    const vec4 opacity_pull = REGULARISED ? vec4(vec3(0.0), push.opacity_weight * stored.peak * transparency) : zero;
+    const vec4 opacity_pull = REGULARISED ? vec4(vec3(0.0), push.opacity_weight * opacity * transparency) : zero;
     move(2, i, p2, (visible ? vec4(f.log_scale, red_gradient) : zero) + scale_pull,
          vec4(vec3(push.scale_rate), push.sh0_rate), depth);
     move(1, i, p1, visible ? quaternion_gradient : zero, vec4(push.quaternion_rate), depth);

@@ -40,8 +40,9 @@ const gpu::Pipeline& PassCache::pipeline(std::string_view shader, uint32_t group
                            {shared::SPEC_BROADCAST, config_.broadcast},
                            {shared::SPEC_CUT_OFF, std::bit_cast<uint32_t>(config_.cut_off)}};
     constants.insert(constants.end(), variant.begin(), variant.end());
-    if (std::ranges::find(variant, shared::SPEC_SHARP, &gpu::SpecConstant::id) == variant.end())
-        constants.push_back({shared::SPEC_SHARP, 0});
+    for (const uint32_t optional : {shared::SPEC_SHARP, shared::SPEC_KERNEL})
+        if (std::ranges::find(variant, optional, &gpu::SpecConstant::id) == variant.end())
+            constants.push_back({optional, 0});
     const gpu::Pipeline& made = device_.pipelines().get(
         device_, std::string(shader), shader_code(shader, config_.texel_buffers), constants);
     const std::vector<uint32_t>& declared = made.reflection().constants;

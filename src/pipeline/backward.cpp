@@ -227,6 +227,7 @@ void record_backward(gpu::Recording& recording, passes::PassCache& cache, const 
         return;
     }
     updating.push_back({shared::SPEC_KERNEL, uint32_t(plan.kernel)});
+    blending.push_back({shared::SPEC_KERNEL, uint32_t(plan.kernel)});
     record_blend_backward_as<passes::BlendBackward>(recording, cache, frame, inputs, sorted, blending);
     record_update_as<passes::Update>(recording, cache, plan, model, frame, inputs, sorted, rates, updating);
 }

@@ -160,6 +160,7 @@ Sorted record_forward(gpu::Recording& recording, passes::PassCache& cache, const
         variant.push_back({shared::SPEC_NEAREST, plan.nearest});
         record_blend_as<passes::BlendPoints>(recording, cache, frame, inputs, variant);
     } else {
+        variant.push_back({shared::SPEC_KERNEL, uint32_t(plan.kernel)});
         record_blend_as<passes::Blend>(recording, cache, frame, inputs, variant);
     }
     return {.splats = &frame.instance_splats[1],

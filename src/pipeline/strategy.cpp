@@ -176,7 +176,9 @@ Refinement refine_mcmc(passes::PassCache& cache, gpu::Executor& executor, Model&
     replace_generation(device, model, push.new_splats,
                        [&](const gpu::Buffer& target, const gpu::Buffer& source, bool is_moments) {
                            gpu::Recording write(device.limits());
-                           cache.get<passes::McmcWrite>(write_variant(model, is_moments))
+                           passes::Constants variant = write_variant(model, is_moments);
+                           variant.push_back({shared::SPEC_KERNEL, uint32_t(rules.kernel)});
+                           cache.get<passes::McmcWrite>(variant)
                                .record(write,
                                        {.params = model.params,
                                         .moments = is_moments ? source : model.moments1,

@@ -45,13 +45,14 @@ struct McmcRules {
     double growth = 1.05;         // number of splats after a refinement over that before, up to max_splats
     uint32_t max_splats = 0;      // hard cap
     double spread = 0;            // standard deviations of the source by which it and its copies move apart
+    Footprint kernel = Footprint::peak;
     uint64_t seed = 0;
     uint32_t step = 0;
 };
 
 /// Every dead splat and every added splat becomes a copy of a source. Sources are drawn with probability in
 /// proportion to opacity (integer weights in units of 1 / min(65535, 2^32 / splats)). A source and its copies
-/// share its opacity and scales by eq. 9 and start with zero moments. With `spread`, each is placed by a draw
+/// share its opacity and scales by eq. 9, or its optical depth with Footprint::density, and start with zero moments. With `spread`, each is placed by a draw
 /// of the source's Gaussian, `spread` times as wide. No-op if all splats are dead or nothing changes.
 Refinement refine_mcmc(passes::PassCache& cache, gpu::Executor& executor, Model& model,
                        const FrameBuffers& frame, const McmcRules& rules);

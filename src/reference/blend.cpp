@@ -15,19 +15,21 @@ double alpha_floor(const Smoothing& smoothing) {
     return smoothing.cut == AlphaCut::none ? 1e-18 : ALPHA_MIN;
 }
 
-Alpha alpha_of(double raw, const Smoothing& smoothing) {
+Alpha alpha_of(double raw, const Smoothing& smoothing, bool density) {
+    const double opacity = density ? -std::expm1(-raw) : raw;
     Alpha alpha;
-    if (!(raw >= alpha_floor(smoothing))) return alpha;
+    if (!(opacity >= alpha_floor(smoothing))) return alpha;
     alpha.kept = true;
-    alpha.value = std::min(ALPHA_MAX, raw);
-    alpha.slope = raw > ALPHA_MAX ? 0 : 1;
+    alpha.value = std::min(ALPHA_MAX, opacity);
+    alpha.slope = opacity > ALPHA_MAX ? 0 : 1;
     if (smoothing.cut == AlphaCut::ramp) {
-        const double t = std::clamp((raw - ALPHA_MIN) / ALPHA_MIN, 0.0, 1.0);
+        const double t = std::clamp((opacity - ALPHA_MIN) / ALPHA_MIN, 0.0, 1.0);
         const double step = t * t * (3 - 2 * t);
         const double step_slope = 6 * t * (1 - t) / ALPHA_MIN;
         alpha.slope = alpha.slope * step + alpha.value * step_slope;
         alpha.value *= step;
     }
+    if (density) alpha.slope *= std::exp(-raw);
     return alpha;
 }
 
@@ -74,7 +76,7 @@ Span intersection(Span a, int first, int end) {
 std::vector<uint32_t> covered_tiles(const Projected& splat, const TileGrid& grid,
                                     const Smoothing& smoothing) {
     std::vector<uint32_t> tiles;
-    const double floor = alpha_floor(smoothing);
+    const double floor = raw_of(splat, alpha_floor(smoothing));
     if (!splat.visible || !(splat.opacity >= floor)) return tiles;
     const double r = std::sqrt(2 * std::log(splat.opacity / floor));
     const Span xs = pixels_within(splat.mean2d.x, r * std::sqrt(splat.a), grid.image_width);
@@ -234,7 +236,8 @@ Raster ellipsoids(std::span<const Projected> projected, const Instances& instanc
                 const uint32_t splat = instances.sorted[k].splat;
                 const Sample s = sample(projected[splat], whiteners[splat], pixel_centre(x, y));
                 const double height = 1 - (s.u * s.u + s.v * s.v) / (ELLIPSOID_REACH * ELLIPSOID_REACH);
-                if (height < 0 || projected[splat].opacity < ELLIPSOID_OPACITY) continue;
+                if (height < 0 || projected[splat].opacity < raw_of(projected[splat], ELLIPSOID_OPACITY))
+                    continue;
                 const double shade = ELLIPSOID_RIM + (1 - ELLIPSOID_RIM) * std::sqrt(height);
                 for (int c = 0; c < 3; ++c) out.at(x, y)[c] = shade * projected[splat].color[c];
                 break;

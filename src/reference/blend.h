@@ -51,6 +51,7 @@ inline std::vector<uint64_t> exclusive_scan(std::span<const uint32_t> counts) {
 //   d = pixel centre - mean2d
 //   u = (c d.x - b d.y) / sqrt(c det),  v = d.y / sqrt(c),  power = -(u^2 + v^2) / 2
 //   raw alpha = opacity exp(power),  alpha = min(ALPHA_MAX, raw), 0 below ALPHA_MIN
+//   with Footprint::density: raw depth = opacity exp(power), raw alpha = 1 - exp(-raw depth)
 //
 // (u, v) = L d, where L is the Cholesky factor of the inverse covariance L^T L. So the power equals the
 // quadratic form of Kerbl et al. 2023, eq. 4, but as a sum of squares it cannot cancel.
@@ -76,7 +77,8 @@ struct Alpha {
     double value = 0;
     double slope = 0;  // d value / d raw: zero where the clamp to ALPHA_MAX is active
 };
-Alpha alpha_of(double raw, const Smoothing& smoothing);
+/// density: raw is a depth.
+Alpha alpha_of(double raw, const Smoothing& smoothing, bool density = false);
 
 /// L = [ux uy; 0 vy].
 struct Whitener {
@@ -86,7 +88,7 @@ Whitener whitener(const Projected& splat);
 
 struct Sample {
     double u = 0, v = 0;
-    double raw = 0;  // raw alpha
+    double raw = 0;  // raw alpha, or raw depth
 };
 inline glm::dvec2 pixel_centre(int x, int y) {
     return {x + 0.5, y + 0.5};
@@ -175,7 +177,7 @@ uint32_t walk_pixel(std::span<const Projected> projected, std::span<const Whiten
         const uint32_t splat = instances.sorted[k].splat;
         Contribution c{
             k, splat, sample(projected[splat], whiteners[splat], pixel_centre(x, y)), {}, transmittance};
-        c.alpha = alpha_of(c.sample.raw, smoothing);
+        c.alpha = alpha_of(c.sample.raw, smoothing, projected[splat].density);
         if (!c.alpha.kept) continue;
         const double next = transmittance * (1 - c.alpha.value);
         if (smoothing.transmittance_stop && stops(next)) return uint32_t(k + 1 - first);

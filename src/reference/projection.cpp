@@ -75,6 +75,28 @@ double clamp_slope(double slope, double focal, double principal, int size, bool&
     return std::clamp(slope, low, high);
 }
 
+double raw_of(const Projected& splat, double opacity) {
+    return splat.density ? -std::log1p(-opacity) : opacity;
+}
+
+double softplus(double x) {
+    return std::max(x, 0.0) + std::log1p(std::exp(-std::abs(x)));
+}
+
+namespace {
+
+/// Least scale / scale: the products of the other two scales, divided by the largest of these.
+glm::dvec3 pair_ratios(const glm::dvec3& scale) {
+    return std::min({scale.x, scale.y, scale.z}) / scale;
+}
+
+}  // namespace
+
+double mean_shadow(const glm::dvec3& scale) {
+    const double least = std::min({scale.x, scale.y, scale.z});
+    return scale.x * scale.y * scale.z / least * glm::length(pair_ratios(scale)) / std::numbers::sqrt3;
+}
+
 namespace {
 
 bool stored_values_usable(const Splat& splat) {
@@ -112,14 +134,19 @@ void project_shape(const Splat& splat, const Camera& camera, ProjectionSteps& s)
     s.m = {(s.screen.x * s.rotation) * s.scale, (s.screen.y * s.rotation) * s.scale};
 }
 
-double kernel_factor(Footprint kernel, double det0, double det) {
+/// |J| of the ray-space transform.
+double ray_space_factor(const ProjectionSteps& s, const Camera& camera) {
+    return camera.fx / s.view.z * (camera.fy / s.view.z) * std::sqrt(1 + glm::dot(s.slope, s.slope));
+}
+
+double kernel_factor(Footprint kernel, const ProjectionSteps& s, const Camera& camera, double det) {
     switch (kernel) {
         case Footprint::peak:
             return 1;
         case Footprint::antialias:
-            return std::sqrt(std::max(0.0, det0 / det));
+            return std::sqrt(std::max(0.0, s.det0 / det));
         case Footprint::density:
-            return 1 / (2 * std::numbers::pi * std::sqrt(det));
+            return mean_shadow(s.scale) * ray_space_factor(s, camera) / std::sqrt(det);
     }
     return 0;
 }
@@ -167,9 +194,11 @@ Projected project(const Splat& splat, const Camera& camera, const RenderOptions&
     out.det = s.det0 + LOW_PASS * trace + LOW_PASS * LOW_PASS;
 
     s.sigmoid = 1 / (1 + std::exp(-splat.opacity_logit));
-    s.kernel_factor = kernel_factor(options.kernel, s.det0, out.det);
-    out.opacity = s.sigmoid * s.kernel_factor;
-    if (!(out.opacity >= ALPHA_MIN)) return out;
+    s.kernel_factor = kernel_factor(options.kernel, s, camera, out.det);
+    out.density = options.kernel == Footprint::density;
+    s.peak = out.density ? softplus(splat.opacity_logit) : s.sigmoid;
+    out.opacity = s.peak * s.kernel_factor;
+    if (!(out.opacity >= raw_of(out, ALPHA_MIN))) return out;
     out.color = glm::max(s.raw_color, glm::dvec3(0));
     out.visible = true;
     if (steps) *steps = s;
@@ -241,6 +270,17 @@ glm::dvec3 view_backward(const ProjectionSteps& s, const Camera& camera, const S
     return by_view;
 }
 
+/// Adds the gradient through A and |J|, given dL/d ln(optical depth).
+void density_backward(const ProjectionSteps& s, double by_log, glm::dvec3& log_scale, glm::dvec3& by_view) {
+    const glm::dvec3 pairs = pair_ratios(s.scale), squares = pairs * pairs;
+    log_scale += by_log * (1.0 - squares / (squares.x + squares.y + squares.z));
+    glm::dvec2 by_slope = by_log / (1 + glm::dot(s.slope, s.slope)) * s.slope;
+    if (!s.slope_free.x) by_slope.x = 0;
+    if (!s.slope_free.y) by_slope.y = 0;
+    const double z = s.view.z;
+    by_view += glm::dvec3(by_slope, -(by_slope.x * s.view.x + by_slope.y * s.view.y) / z - 2 * by_log) / z;
+}
+
 /// Sets the coefficients' gradient and returns dL/d(mean - camera position) through the direction.
 glm::dvec3 color_backward(const Splat& splat, const ProjectionSteps& s, const glm::dvec3& gradient,
                           Splat& out) {
@@ -267,12 +307,15 @@ Splat project_backward(const Splat& splat, const Camera& camera, const RenderOpt
     if (!projected.visible) return out;
 
     const DetGradient by_det =
-        kernel_backward(options.kernel, s, projected.det, gradient.opacity * s.sigmoid);
+        kernel_backward(options.kernel, s, projected.det, gradient.opacity * s.peak);
     const Rows by_m = m_gradient(s, gradient, by_det);
     shape_backward(s, by_m, out);
-    out.opacity_logit = gradient.opacity * s.kernel_factor * s.sigmoid * (1 - s.sigmoid);
+    const double by_logit = projected.density ? s.sigmoid : s.sigmoid * (1 - s.sigmoid);
+    out.opacity_logit = gradient.opacity * s.kernel_factor * by_logit;
     const glm::dvec3 by_offset = color_backward(splat, s, gradient.color, out);
-    out.mean = glm::transpose(camera.rotation) * view_backward(s, camera, gradient, by_m) + by_offset;
+    glm::dvec3 by_view = view_backward(s, camera, gradient, by_m);
+    if (projected.density) density_backward(s, gradient.opacity * projected.opacity, out.log_scale, by_view);
+    out.mean = glm::transpose(camera.rotation) * by_view + by_offset;
     return out;
 }
 

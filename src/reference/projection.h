@@ -11,7 +11,10 @@
 //   det0       = det(M M^T) = |row0 x row1|^2                 Cauchy-Binet: squared 2 x 2 minors of M
 //   det        = det0 + LOW_PASS * trace(M M^T) + LOW_PASS^2  avoids the cancellation of a c - b^2
 // Opacity is sigmoid(logit) times the kernel's factor (KERNEL_* in shared/constants.h):
-//   peak 1;  antialias sqrt(max(0, det0 / det));  unit mass 1 / (2 pi sqrt(det))
+//   peak 1;  antialias sqrt(max(0, det0 / det))
+// With Footprint::density the splat is a density in space, and the optical depth takes the place of the opacity:
+//   depth = softplus(logit) A |J| / sqrt(det),  A = sqrt(((s1 s2)^2 + (s2 s3)^2 + (s3 s1)^2) / 3)
+//   |J|   = fx fy sqrt(1 + tx^2 + ty^2) / z^2             of the ray-space transform (eq. 26 of that paper)
 // Colour is max(0, COLOR_OFFSET + sum_j sh_j Y_j(direction)), direction = normalise(mean - camera position).
 #pragma once
 #include <array>
@@ -42,8 +45,18 @@ struct Projected {
     double a = 0, b = 0, c = 0;  // covariance with the low-pass, px^2
     double det = 0;              // of that covariance
     double opacity = 0;          // peak of the footprint, before the clamp to ALPHA_MAX
+    bool density = false;        // Footprint::density: `opacity` is the peak of the optical depth
     glm::dvec3 color{0};
 };
+
+/// The value of Projected::opacity's unit that this opacity corresponds to.
+double raw_of(const Projected& splat, double opacity);
+
+/// ln(1 + exp(x)).
+double softplus(double x);
+
+/// The root mean square over all directions of a splat's shadow, the product of its two standard deviations.
+double mean_shadow(const glm::dvec3& scale);
 
 /// A 2 x 3 matrix by rows.
 struct Rows {
@@ -64,6 +77,7 @@ struct ProjectionSteps {
     Rows m;                  // M
     double det0 = 0;
     double sigmoid = 0;  // of the logit
+    double peak = 0;     // that, or with Footprint::density softplus of the logit
     double kernel_factor = 0;
     int sh_degree = 0;  // the lower of the request's and the scene's
     glm::dvec3 direction{0};
@@ -106,6 +120,8 @@ struct ScreenGradient {
 // The backward pass of the projection, with G = dL/dSigma as a symmetric matrix:
 //   dL/dM  = 2 G M, plus the kernel factor's share through det0 and det:
 //            ddet0/drow0 = 2 row1 x n, ddet0/drow1 = 2 n x row0 with n = row0 x row1; dtrace/dM = 2 M
+//   with Footprint::density also d ln A / d log s_k = 1 - (A_k / A)^2 / 3, A_k the product of the other scales,
+//            d ln|J| / dz = -2 / z and d ln|J| / dtx = tx / (1 + tx^2 + ty^2), not through a slope that is clamped
 //   dL/dJ  = dL/dM (W R S)^T;  dL/d(R S) = (J W)^T dL/dM
 //   dL/dlog s_k = s_k sum_i R_ik dL/d(R S)_ik
 //   dL/dq  = (I - q^ q^T) dL/dq^ / |q|, q^ = q / |q|

@@ -281,6 +281,7 @@ struct Trainer::State {
                      .growth = schedule.growth,
                      .max_splats = options.max_splats,
                      .spread = schedule.copy_spread,
+                     .kernel = options.render.kernel,
                      .seed = options.seed,
                      .step = uint32_t(step)});
     }
@@ -418,7 +419,9 @@ std::vector<Exposure> Trainer::exposures() const {
 }
 Gaussians Trainer::gaussians() const {
     state_->finish_all();
-    return download_model(state_->model, state_->model.params);
+    Gaussians gaussians = download_model(state_->model, state_->model.params);
+    gaussians.density = state_->plan.kernel == Footprint::density;
+    return gaussians;
 }
 uint32_t Trainer::splats() const {
     return state_->model.splats;
