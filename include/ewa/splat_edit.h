@@ -23,8 +23,14 @@ void select_splats(Gaussians& gaussians, const std::vector<uint32_t>& indices);
 /// Sets the SH degree (0..3). Higher coefficients are cut, new ones are zero.
 void set_sh_degree(Gaussians& gaussians, int degree);
 
-/// Appends the splats of `more`. The SH degree becomes the larger of both.
+/// Appends the splats of `more`. The SH degree becomes the larger of both. If only one of them has opacities of
+/// Footprint::density, these are fitted to the other kernels.
 void append_splats(Gaussians& gaussians, const Gaussians& more);
+
+/// Converts the opacities to those of Footprint::density, or from them to those of the other kernels, so that pictures
+/// look about the same. Does nothing if Gaussians::density says that they are of that kind. Exact to float32 when it is
+/// undone.
+void fit_opacities(Gaussians& gaussians, bool density);
 
 /// The splat indices in Morton order: along a Z-order curve with 21 bits per axis over the bounds of the
 /// finite means. Ties are in order of the index. Splats without a finite mean come last.

@@ -9,6 +9,7 @@
 #include "cli/output.h"
 #include "core/text.h"
 #include "ewa/error.h"
+#include "ewa/splat_edit.h"
 #include "scene/names.h"
 
 namespace ewa::cli {
@@ -76,7 +77,7 @@ core::PixelSize size_of(const std::string& text) {
 
 Footprint settled_kernel(Footprint kernel, bool antialias) {
     if (antialias && kernel == Footprint::density)
-        throw InputError("--antialias and --kernel ewa exclude each other");
+        throw InputError("--antialias and --kernel density exclude each other");
     return antialias ? Footprint::antialias : kernel;
 }
 
@@ -101,15 +102,20 @@ RenderOptions DrawArguments::options() const {
     return render;
 }
 
+void DrawArguments::match_kernel(Gaussians& gaussians, RenderOptions& options) const {
+    if (gaussians.density && !names_kernel()) options.kernel = Footprint::density;
+    fit_opacities(gaussians, options.kernel == Footprint::density);
+}
+
 void add_draw_options(CLI::App& app, DrawArguments& arguments) {
     app.add_option("--background", arguments.background,
                    "Background colour: r,g,b in 0..1, a name such as white, or #rrggbb")
         ->type_name("COLOUR")
         ->capture_default_str();
     const train::RunOption& kernel = train::run_option("kernel");
-    app.add_option("--kernel", arguments.kernel, kernel.help)
-        ->transform(one_of(kernel.choices))
-        ->capture_default_str();
+    arguments.kernel_option = app.add_option("--kernel", arguments.kernel, kernel.help)
+                                  ->transform(one_of(kernel.choices))
+                                  ->capture_default_str();
     app.add_flag("--antialias", arguments.antialias, "The same as --kernel antialias");
     app.add_flag("--points", arguments.points, train::run_option("points").help);
     const train::RunOption& nearest = train::run_option("nearest");

@@ -12,6 +12,7 @@
 #include "core/typing.h"
 #include "ewa/dataset.h"
 #include "ewa/device.h"
+#include "ewa/gaussians.h"
 #include "ewa/render_options.h"
 #include "ewa/synthetic_dataset.h"
 #include "train/run_options.h"
@@ -46,9 +47,13 @@ struct DrawArguments {
     int sh_degree = kMaxShDegree;
     bool points = false;
     int nearest = RenderOptions().nearest;
+    const CLI::Option* kernel_option = nullptr;
 
     /// Throws InputError if the background is not a colour, or the options exclude each other.
     RenderOptions options() const;
+    bool names_kernel() const { return antialias || (kernel_option && kernel_option->count() > 0); }
+    /// Sets the kernel to that of the splats, or fits their opacities to a kernel that is named.
+    void match_kernel(Gaussians& gaussians, RenderOptions& options) const;
 };
 void add_draw_options(CLI::App& app, DrawArguments& arguments);
 

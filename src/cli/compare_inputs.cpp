@@ -50,8 +50,8 @@ struct ImageSide : ComparedSide {
 struct SceneSide : ComparedSide {
     /// frames: indices of sides.cameras.frames.
     SceneSide(const fs::path& splats, const Sides& sides, const std::vector<int>& frames,
-              const std::shared_ptr<gpu::Device>& device)
-        : renderer_(device, load_splats(splats), sides.options) {
+              const DrawArguments& draw, const std::shared_ptr<gpu::Device>& device)
+        : renderer_(renderer_of(splats, sides.options, draw, device)) {
         side = splats.string();
         is_scene = true;
         const std::vector<fs::path> stems = report::picture_names(sides.cameras.frames);
@@ -72,6 +72,13 @@ struct SceneSide : ComparedSide {
     }
 
   private:
+    static Renderer renderer_of(const fs::path& path, RenderOptions options, const DrawArguments& draw,
+                                const std::shared_ptr<gpu::Device>& device) {
+        Gaussians gaussians = load_splats(path);
+        draw.match_kernel(gaussians, options);
+        return {device, gaussians, options};
+    }
+
     Renderer renderer_;
     std::map<fs::path, Camera> cameras_;
 };
@@ -188,8 +195,8 @@ Sides open_sides(const CompareInputs& inputs) {
     sides.cameras = load_cameras_as_trained(inputs.cameras, inputs.downscale);
     const std::vector<int> frames = select_frames(sides.cameras, inputs.frames, inputs.test_every);
     const auto device = open_device(inputs.device);
-    if (scene_a) sides.a = std::make_unique<SceneSide>(inputs.a, sides, frames, device);
-    if (scene_b) sides.b = std::make_unique<SceneSide>(inputs.b, sides, frames, device);
+    if (scene_a) sides.a = std::make_unique<SceneSide>(inputs.a, sides, frames, inputs.draw, device);
+    if (scene_b) sides.b = std::make_unique<SceneSide>(inputs.b, sides, frames, inputs.draw, device);
     return sides;
 }
 

@@ -56,7 +56,7 @@ std::string described(const fs::path& path, SplatFormat format, const std::strin
 /// Reads the inputs and appends each to the one before.
 Work read_all(const ConvertArguments& arguments) {
     Work work;
-    std::set<bool> marks;
+    std::set<bool> marks, densities;
     for (size_t i = 0; i + 1 < arguments.files.size(); ++i) {
         const fs::path& path = arguments.files[i];
         SplatScene scene = read_splats(path);
@@ -73,6 +73,7 @@ Work read_all(const ConvertArguments& arguments) {
                 work.save.comments.end())
                 work.save.comments.push_back(std::move(comment));
         marks.insert(scene.antialiased);
+        densities.insert(scene.gaussians.density);
         if (i == 0)
             work.gaussians = std::move(scene.gaussians);
         else
@@ -82,12 +83,16 @@ Work read_all(const ConvertArguments& arguments) {
     if (marks.size() > 1)
         work.lost.push_back(
             "some inputs were trained with --antialias and others not; the output is marked as anti-aliased");
+    if (densities.size() > 1)
+        work.lost.push_back(
+            "some inputs have --kernel density and others not; all opacities are fitted to 3DGS's kernel");
     return work;
 }
 
 Json check(const ConvertArguments& arguments, const Work& work) {
     Json json = Json::object();
-    const SplatScene back = read_splats(arguments.files.back());
+    SplatScene back = read_splats(arguments.files.back());
+    fit_opacities(back.gaussians, work.gaussians.density);
     if (!arguments.quiet) fmt::print("read back: largest error, mean error\n");
     for (const Difference& d : differences(work.gaussians, back.gaussians)) {
         if (!arguments.quiet) fmt::print("  {:<18} {:.3g}, {:.3g} {}\n", d.what, d.largest, d.mean, d.unit);

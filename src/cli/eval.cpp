@@ -38,11 +38,12 @@ report::Json to_json(const Evaluation& evaluation) {
 }
 
 int run(const EvalArguments& arguments) {
-    const RenderOptions options = arguments.views.draw.options();
+    RenderOptions options = arguments.views.draw.options();
     const std::vector<NamedFile> written{{"--json", arguments.json}};
     check_command_outputs(written,
                           {{"SPLATS", arguments.views.splats}, {"DATASET", arguments.views.dataset}});
-    const Gaussians gaussians = load_splats(arguments.views.splats);
+    Gaussians gaussians = load_splats(arguments.views.splats);
+    arguments.views.draw.match_kernel(gaussians, options);
     const auto [dataset, frames, folder] = load_views(arguments.views, arguments.split, arguments.test_every);
     check_command_outputs(written, scene::files_of(dataset, "DATASET"));
     const std::vector<Exposure> exposures = exposures_of(arguments.exposures, arguments.run, dataset, frames);

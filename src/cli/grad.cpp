@@ -26,7 +26,7 @@ struct GradArguments {
 };
 
 int run(const GradArguments& arguments) {
-    const RenderOptions options = arguments.views.draw.options();
+    RenderOptions options = arguments.views.draw.options();
     if (format_of_name(arguments.output) != SplatFormat::ply)
         throw InputError("--output " + arguments.output.string() +
                          ": a gradient is written as .ply; the other formats cannot store it");
@@ -36,7 +36,8 @@ int run(const GradArguments& arguments) {
     const std::vector<NamedFile> written{{"--output", arguments.output}, {"--json", arguments.json}};
     check_command_outputs(written,
                           {{"SPLATS", arguments.views.splats}, {"DATASET", arguments.views.dataset}});
-    const Gaussians gaussians = load_splats(arguments.views.splats);
+    Gaussians gaussians = load_splats(arguments.views.splats);
+    arguments.views.draw.match_kernel(gaussians, options);
     const auto [dataset, frames, folder] = load_views(arguments.views, arguments.frame, 0);
     if (frames.size() > 1) throw InputError("--frame: '" + arguments.frame + "' is more than one frame");
     check_command_outputs(written, scene::files_of(dataset, "DATASET"));

@@ -70,6 +70,8 @@ void print_file(const fs::path& path, const SplatScene& scene) {
                scene.variant.empty() ? "" : " (" + scene.variant + ")",
                core::bytes_text(fs::file_size(path)));
     if (scene.antialiased) fmt::print("anti-aliased    yes: render it with --antialias\n");
+    if (scene.gaussians.density)
+        fmt::print("kernel          density; opacities in the file are fitted to 3DGS's kernel\n");
     for (const std::string& comment : scene.comments)
         fmt::print("comment         {}\n", core::one_line(comment));
     for (const std::string& remark : scene.remarks)
@@ -125,6 +127,7 @@ void info_splats(const fs::path& path, const live::Run* run, const InfoArguments
                     {"variant", scene.variant},
                     {"bytes", fs::file_size(path)},
                     {"antialiased", scene.antialiased},
+                    {"density", gaussians.density},
                     {"comments", scene.comments},
                     {"notes", scene.remarks},
                     {"splats", gaussians.size()},

@@ -26,6 +26,7 @@ struct OrbitPsnr {
 OrbitPsnr orbit_psnr(const Gaussians& written, const SplatScene& read) {
     RenderOptions options;
     if (read.antialiased) options.kernel = Footprint::antialias;
+    if (written.density) options.kernel = Footprint::density;
     scene::FramingHints hints;
     hints.all_round = true;
     const scene::Framing framing = scene::frame_scene(written, kSidePixels, kSidePixels, hints);

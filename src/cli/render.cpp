@@ -38,7 +38,7 @@ struct RenderArguments {
     bool quiet = false;
     // Of the run that SPLATS names; empty: none.
     std::optional<live::Run> run;
-    bool kernel_given = false, cameras_of_run = false;
+    bool cameras_of_run = false;
 };
 
 /// Divides by the largest value and returns it: the value of white in a PNG.
@@ -66,8 +66,9 @@ void note_skipped(Progress& progress, uint32_t skipped) {
 }
 
 int render_dataset_views(const RenderArguments& arguments) {
-    const RenderOptions options = arguments.draw.options();
-    const Gaussians gaussians = load_splats(arguments.splats);
+    RenderOptions options = arguments.draw.options();
+    Gaussians gaussians = load_splats(arguments.splats);
+    arguments.draw.match_kernel(gaussians, options);
     const Dataset dataset = load_cameras_as_trained(arguments.cameras, arguments.downscale);
     const std::vector<int> frames = select_frames(dataset, arguments.frames, arguments.test_every);
     const std::vector<fs::path> names = report::picture_names(dataset.frames);
@@ -174,8 +175,9 @@ int render_free_views(RenderArguments arguments) {
         check_command_outputs({{"--output", arguments.output}},
                               {{"SPLATS", arguments.splats}, {"--views", arguments.views.views}});
     }
-    const SplatScene scene = read_splats(arguments.splats);
-    if (scene.antialiased && !arguments.kernel_given) options.kernel = Footprint::antialias;
+    SplatScene scene = read_splats(arguments.splats);
+    if (scene.antialiased && !arguments.draw.names_kernel()) options.kernel = Footprint::antialias;
+    arguments.draw.match_kernel(scene.gaussians, options);
     const std::vector<Camera> cameras =
         views_of(arguments.views, scene.gaussians, hints_of(arguments), output);
     if (film) make_folder(arguments.output.parent_path());
@@ -189,7 +191,6 @@ int render_free_views(RenderArguments arguments) {
 
 /// Completes the arguments by the run that SPLATS may name, and chooses whose cameras are used.
 int run(CLI::App& app, RenderArguments& arguments) {
-    arguments.kernel_given = app.count("--kernel") + app.count("--antialias") > 0;
     std::string of_frames;  // a given option that only a dataset's views have
     for (const char* option : {"--frames", "--test-every", "--downscale", "--exposures"})
         if (app.count(option) > 0) of_frames = option;

@@ -178,17 +178,17 @@ Refinement refine_mcmc(passes::PassCache& cache, gpu::Executor& executor, Model&
                            gpu::Recording write(device.limits());
                            passes::Constants variant = write_variant(model, is_moments);
                            variant.push_back({shared::SPEC_KERNEL, uint32_t(rules.kernel)});
-                           cache.get<passes::McmcWrite>(variant)
-                               .record(write,
-                                       {.params = model.params,
-                                        .moments = is_moments ? source : model.moments1,
-                                        .dead = dead.values,
-                                        .prefix = dead.prefix,
-                                        .totals = dead.totals,
-                                        .sources = sources,
-                                        .hits = hits,
-                                        .array_out = target},
-                                       push);
+                           cache.get<passes::McmcWrite>(variant).record(
+                               write,
+                               {.params = model.params,
+                                .moments = is_moments ? source : model.moments1,
+                                .dead = dead.values,
+                                .prefix = dead.prefix,
+                                .totals = dead.totals,
+                                .sources = sources,
+                                .hits = hits,
+                                .array_out = target},
+                               push);
                            executor.run(write);
                        });
     return result;

@@ -306,8 +306,7 @@ Splat project_backward(const Splat& splat, const Camera& camera, const RenderOpt
     const Projected projected = project(splat, camera, options, &s);
     if (!projected.visible) return out;
 
-    const DetGradient by_det =
-        kernel_backward(options.kernel, s, projected.det, gradient.opacity * s.peak);
+    const DetGradient by_det = kernel_backward(options.kernel, s, projected.det, gradient.opacity * s.peak);
     const Rows by_m = m_gradient(s, gradient, by_det);
     shape_backward(s, by_m, out);
     const double by_logit = projected.density ? s.sigmoid : s.sigmoid * (1 - s.sigmoid);

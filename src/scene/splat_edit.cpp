@@ -249,6 +249,13 @@ void set_sh_degree(Gaussians& gaussians, int degree) {
 }
 
 void append_splats(Gaussians& gaussians, const Gaussians& more) {
+    if (gaussians.size() == 0) gaussians.density = more.density;
+    if (gaussians.density != more.density) {
+        fit_opacities(gaussians, false);
+        Gaussians fitted = more;
+        fit_opacities(fitted, false);
+        return append_splats(gaussians, fitted);
+    }
     const int degree = std::max(gaussians.sh_degree, more.sh_degree);
     set_sh_degree(gaussians, degree);
     const auto append = [](std::vector<float>& to, const std::vector<float>& from) {

@@ -165,6 +165,9 @@ void add_remarks(RunInput& input) {
         input.remarks.push_back(fmt::format("{} with a coordinate that is not finite {} skipped",
                                             core::counted(uint64_t(dataset.dropped_points), "point"),
                                             core::is_or_are(uint64_t(dataset.dropped_points))));
+    if (input.options.train.render.kernel == Footprint::density)
+        input.remarks.emplace_back(
+            "opacities in splats.ply are fitted to 3DGS's kernel, so that other viewers show about the same");
     if (const auto remark = too_short_remark(input.options.train)) input.remarks.push_back(*remark);
 }
 

@@ -31,8 +31,10 @@ const Names<MaskUse> kMaskUses = {{"auto", MaskUse::automatic},
                                   {"ignore", MaskUse::ignore},
                                   {"cut", MaskUse::cut},
                                   {"none", MaskUse::none}};
-const Names<Footprint> kKernels = {
-    {"peak", Footprint::peak}, {"antialias", Footprint::antialias}, {"ewa", Footprint::density}};
+const Names<Footprint> kKernels = {{"peak", Footprint::peak},
+                                   {"antialias", Footprint::antialias},
+                                   {"density", Footprint::density},
+                                   {"ewa", Footprint::density}};
 
 template <class T>
 const T& read(Member<T> member, const RunOptions& options) {
@@ -278,7 +280,9 @@ std::vector<RunOption> make_table() {
         image_cache_option(),
         background_option(),
         choice<Footprint>(
-            "kernel", "Footprint of a splat: peak (3DGS), antialias (Mip-Splatting) or ewa (unit mass)",
+            "kernel",
+            "Footprint of a splat: peak (3DGS), antialias (Mip-Splatting) or density (EWA: a longer way "
+            "through a splat absorbs more)",
             [](RunOptions& o) -> Footprint& { return o.train.render.kernel; }, kKernels),
         points_option(),
         nearest_option(),

@@ -69,7 +69,9 @@ double extent_for(const Dataset& dataset, const std::vector<int>& frames, const 
 /// ADC keeps that order, since children are stored beside their parent; MCMC loses it gradually. Means become
 /// relative to an origin near them. Quaternions far from unit length are normalised: the learning rate
 /// assumes about 1.
-Gaussians prepared(Gaussians start) {
+/// Opacities are fitted to the kernel.
+Gaussians prepared(Gaussians start, Footprint kernel) {
+    fit_opacities(start, kernel == Footprint::density);
     select_splats(start, morton_order(start));
     settle_origin(start);
     for (size_t i = 0; i < start.size(); ++i) {
@@ -318,8 +320,9 @@ Trainer::Trainer(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
     train::check_start(start.size(), options);
     train::check_training(options);
     const double extent = extent_for(dataset, train_frames, start);
-    state_ = std::make_unique<State>(std::move(device), dataset, train_frames, prepared(std::move(start)),
-                                     extent, resolve(options, dataset));
+    state_ = std::make_unique<State>(std::move(device), dataset, train_frames,
+                                     prepared(std::move(start), options.render.kernel), extent,
+                                     resolve(options, dataset));
 }
 Trainer::~Trainer() = default;
 

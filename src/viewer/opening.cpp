@@ -54,7 +54,7 @@ Look look_of(const live::Run& run) {
     Look look;
     const std::string kernel = run.text("kernel");
     if (kernel == "antialias") look.kernel = Footprint::antialias;
-    if (kernel == "ewa") look.kernel = Footprint::density;
+    if (kernel == "density" || kernel == "ewa") look.kernel = Footprint::density;
     look.points = run.flag("points");
     const auto nearest = run.config.find("nearest");
     if (nearest != run.config.end() && nearest->is_number_integer())
@@ -123,6 +123,7 @@ OpenedScene open_splats(const fs::path& path, const fs::path& cameras) {
     OpenedScene scene;
     SplatScene splats = read_splats(path);
     if (splats.antialiased) scene.look.kernel = Footprint::antialias;
+    const bool density = splats.gaussians.density;
     if (!splats.remarks.empty()) scene.remark = splats.remarks.front();
     scene.gaussians = std::make_shared<const Gaussians>(std::move(splats.gaussians));
     if (scene.gaussians->size() == 0) scene.remark = name_of_path(path) + " is empty: it has no splats";
@@ -131,6 +132,7 @@ OpenedScene open_splats(const fs::path& path, const fs::path& cameras) {
         scene.look = look_of(*run);
         add_cameras(scene, *run, {}, false);
     }
+    if (density) scene.look.kernel = Footprint::density;
     return scene;
 }
 

@@ -76,7 +76,7 @@ void edit_look(const PanelFacts& facts, Look& look) {
     ImGui::EndDisabled();
     constexpr int kPoints = 3;
     int kernel = look.points ? kPoints : int(look.kernel);
-    if (ImGui::Combo("kernel", &kernel, "peak (3DGS)\0antialias\0unit mass (EWA)\0points (spheres)\0")) {
+    if (ImGui::Combo("kernel", &kernel, "peak (3DGS)\0antialias\0density (EWA)\0points (spheres)\0")) {
         look.points = kernel == kPoints;
         if (!look.points) look.kernel = Footprint(kernel);
     }

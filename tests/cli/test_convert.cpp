@@ -371,6 +371,42 @@ TEST(Formats, EveryCommandReadsEveryFormat) {
         "g.spz");
 }
 
+TEST(Formats, ADensityKeepsItsKernelAndIsFittedForOthers) {
+    const Folder folder;
+    make_dataset(folder / "data");
+    make_splats(folder / "plain.ply");
+    ewa::Gaussians density = ewa::load_splats(folder / "plain.ply");
+    for (size_t i = 0; i < density.size(); ++i) density.log_scales[3 * i] += 1;
+    ewa::save_splats(folder / "plain.ply", density);
+    density.density = true;
+    ewa::save_splats(folder / "s.ply", density);
+    const Outcome info = run_ewa({"info", folder / "s.ply", "--json"});
+    EXPECT_EQ(nlohmann::json::parse(info.out)["density"], true);
+    const auto psnr = [&](const std::string& file, const std::vector<std::string>& more) {
+        std::vector<std::string> arguments{"eval", folder / file, folder / "data",  "--split",
+                                           "all",  "--json",      folder / "e.json"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        expect_success(run_ewa(arguments));
+        return read_json(folder / "e.json")["psnr"].get<double>();
+    };
+    const double own = psnr("s.ply", {}), fitted = psnr("s.ply", {"--kernel", "peak"});
+    EXPECT_NE(own, fitted);
+    EXPECT_EQ(own, psnr("s.ply", {"--kernel", "ewa"}));
+    // Cut out, it is a density still; in another format it has the opacities that other viewers show.
+    expect_success(run_ewa({"convert", folder / "s.ply", folder / "cut.ply", "--scale", "2"}));
+    const ewa::Gaussians again = ewa::load_splats(folder / "cut.ply");
+    EXPECT_TRUE(again.density);
+    EXPECT_NEAR(again.opacity_logits[7], density.opacity_logits[7], 1e-5);
+    const Outcome packed = run_ewa({"convert", folder / "s.ply", folder / "s.spz"});
+    expect_success(packed);
+    EXPECT_NE(packed.out.find("--kernel density"), std::string::npos) << packed.out;
+    EXPECT_NEAR(psnr("s.spz", {}), fitted, 0.1);
+    const Outcome joined = run_ewa({"convert", folder / "s.ply", folder / "plain.ply", folder / "both.ply"});
+    expect_success(joined);
+    EXPECT_NE(joined.out.find("fitted to 3DGS's kernel"), std::string::npos) << joined.out;
+    EXPECT_FALSE(ewa::load_splats(folder / "both.ply").density);
+}
+
 TEST(Formats, InfoShowsTheMarkAndTheComments) {
     const Folder folder;
     make_splats(folder / "s.ply");

@@ -97,8 +97,10 @@ void compile_splatting(Compiler& compiler) {
     compiler.compile<passes::RadixScatterRanked>({{SPEC_RADIX_BITS, kBits}, {SPEC_MODE, scatter_modes}});
     compiler.compile<passes::EmitInstances>({{SPEC_MODE, {0, EMIT_FIRST_INSTANCES}}});
     compiler.compile<passes::TileStarts>();
-    compiler.compile<passes::Blend>({{SPEC_MODE, {BLEND_COLOR, BLEND_DEPTH, BLEND_COUNT, BLEND_ELLIPSOIDS}}});
-    compiler.compile<passes::BlendBackward>({{SPEC_MODE, {0, BLEND_BACKWARD_ABSOLUTE}}});
+    compiler.compile<passes::Blend>({{SPEC_MODE, {BLEND_COLOR, BLEND_DEPTH, BLEND_COUNT, BLEND_ELLIPSOIDS}},
+                                     {SPEC_KERNEL, {KERNEL_PEAK, KERNEL_DENSITY}}});
+    compiler.compile<passes::BlendBackward>(
+        {{SPEC_MODE, {0, BLEND_BACKWARD_ABSOLUTE}}, {SPEC_KERNEL, {KERNEL_PEAK, KERNEL_DENSITY}}});
     compiler.compile<passes::Pack>();
 }
 
@@ -136,8 +138,9 @@ void compile_training(Compiler& compiler) {
     compiler.compile<passes::ResetOpacity>();
     compiler.compile<passes::McmcWeigh>();
     compiler.compile<passes::McmcDraw>();
-    compiler.compile<passes::McmcWrite>(
-        {{SPEC_SH_DEGREE, kDegrees}, {SPEC_MODE, {WRITE_PARAMS, WRITE_MOMENTS}}});
+    compiler.compile<passes::McmcWrite>({{SPEC_SH_DEGREE, kDegrees},
+                                         {SPEC_KERNEL, {KERNEL_PEAK, KERNEL_DENSITY}},
+                                         {SPEC_MODE, {WRITE_PARAMS, WRITE_MOMENTS}}});
     compiler.compile<passes::Perturb>();
 }
 

@@ -275,7 +275,7 @@ std::vector<GoldenScene> golden_scenes() {
         spheres(),
     };
     for (GoldenScene& scene : scenes)
-        if (scene.options.kernel == Footprint::density) scene.name = "unit_mass";
+        if (scene.options.kernel == Footprint::density) scene.name = "density";
     return scenes;
 }
 

@@ -88,14 +88,16 @@ struct RelocationCase {
     size_t splats;
     int degree;
     double spread = 0;
+    Footprint kernel = Footprint::peak;
 };
 class Relocation : public testing::TestWithParam<RelocationCase> {};
 
 TEST_P(Relocation, WritesTheReferencesNextGeneration) {
-    const auto [splats, degree, spread] = GetParam();
+    const auto [splats, degree, spread, kernel] = GetParam();
     McmcStart start(3000 + splats, splats, degree);
     McmcRules rules = mcmc_rules_for(1u << 20);
     rules.spread = spread;
+    rules.kernel = kernel;
     const auto weights = device_weights(start);
     const uint32_t n = uint32_t(splats), after = uint32_t(std::floor(rules.growth * n));
     std::vector<uint32_t> dead;
@@ -145,7 +147,9 @@ TEST_P(Relocation, WritesTheReferencesNextGeneration) {
             ASSERT_EQ(actual.log_scales[3 * j], old.log_scales[3 * s]);
             continue;
         }
-        const auto share = reference::share_of(sigmoid(old.opacity_logits[s]), int(copies[s]) + 1);
+        auto share = reference::share_of(sigmoid(old.opacity_logits[s]), int(copies[s]) + 1);
+        // Optical depths just add up.
+        if (kernel == Footprint::density) share.scale_factor = 1;
         const double opacity = std::max(share.opacity, 0.005);
         // float32, and a logarithm that is good to 6.6e-7 near 1.
         ASSERT_NEAR(actual.opacity_logits[j], std::log(opacity / (1 - opacity)), 3e-4);
@@ -172,10 +176,33 @@ TEST(RelocationOfMany, ThousandsOfCopiesShareOneSplat) {
                         start.gaussians.log_scales[3 * 17 + k] + std::log(share.scale_factor), 2e-5);
 }
 
+/// Copies of a density together absorb exactly what their source did, also one that absorbs nearly everything.
+TEST(RelocationOfMany, DensitiesShareTheirMass) {
+    for (const float logit : {-3.0f, 0.2f, 12.0f, 40.0f, 3000.0f}) {
+        const size_t splats = 100;
+        McmcStart start(3778, splats, 0);
+        std::fill(start.gaussians.opacity_logits.begin(), start.gaussians.opacity_logits.end(), -9.0f);
+        start.gaussians.opacity_logits[17] = logit;
+        start.model = pipeline::upload_model(*device(), start.gaussians, 2, false);
+        McmcRules rules = mcmc_rules_for(uint32_t(splats));
+        rules.kernel = Footprint::density;
+        rules.dead_opacity = 1e-4;
+        ASSERT_EQ(run_refine(start.model, rules).relocated, splats - 1);
+        const Gaussians actual = download_model(start.model, start.model.params);
+        double sum = 0;
+        for (size_t j = 0; j < splats; ++j) {
+            EXPECT_EQ(actual.log_scales[3 * j], start.gaussians.log_scales[3 * 17]);
+            sum += reference::softplus(actual.opacity_logits[j]);
+        }
+        EXPECT_NEAR(sum, reference::softplus(logit), 2e-5 * sum) << logit;
+    }
+}
+
 INSTANTIATE_TEST_SUITE_P(Sizes, Relocation,
                          testing::Values(RelocationCase{3, 0}, RelocationCase{2000, 0},
                                          RelocationCase{777, 1}, RelocationCase{300, 3},
-                                         RelocationCase{1000, 1, 0.8}));
+                                         RelocationCase{1000, 1, 0.8},
+                                         RelocationCase{500, 1, 0.8, Footprint::density}));
 
 TEST(RelocationEdges, SourcesAreDrawnInProportionToTheirOpacity) {
     McmcStart start(3100, 40, 0, -2);

@@ -74,6 +74,7 @@ INSTANTIATE_TEST_SUITE_P(All, Gradient,
                                          Case{SplatKind::ordinary, 4, 23, 18, 3, Footprint::peak, 5012},
                                          Case{SplatKind::ordinary, 5, 24, 17, 1, Footprint::antialias, 5023},
                                          Case{SplatKind::ordinary, 5, 17, 24, 1, Footprint::density, 5034},
+                                         Case{SplatKind::needles, 5, 24, 17, 0, Footprint::density, 5056},
                                          Case{SplatKind::ordinary, 20, 24, 17, 0, Footprint::peak, 5045}),
                          [](const testing::TestParamInfo<Case>& tested) {
                              const Case& c = tested.param;

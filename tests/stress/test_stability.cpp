@@ -66,7 +66,7 @@ bench::StabilityCase named(const std::string& name) {
 }
 
 TEST(StabilityOrdinary, IsWithinTheTightBounds) {
-    for (const char* name : {"ordinary", "ordinary_antialias", "ordinary_unit_mass"}) {
+    for (const char* name : {"ordinary", "ordinary_antialias", "ordinary_density"}) {
         const bench::StabilityResult result = bench::compare_with_reference(device(), named(name));
         for (const bench::Comparison& c : result.comparisons)
             EXPECT_LE(c.error, c.of == "picture" || c.of == "loss" ? 5e-6 : 1e-4) << name << ' ' << c.of;

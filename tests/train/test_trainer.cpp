@@ -145,6 +145,26 @@ TEST(Trainer, PointsGrowAndAreNotPruned) {
     for (const float logit : run.gaussians.opacity_logits) ASSERT_EQ(logit, -20.0f);
 }
 
+TEST(Trainer, ADensityLearnsAsWellAsAPeak) {
+    const Gaussians start = shaken_start(small_capture(), 0.05, 1, 0);
+    const auto run = [&](Footprint kernel, Strategy strategy) {
+        TrainOptions options = quick(200);
+        options.render.kernel = kernel;
+        options.strategy = strategy;
+        options.max_splats = uint32_t(start.size());
+        const TrainedScene trained = train(options, start, 200);
+        EXPECT_EQ(trained.gaussians.density, kernel == Footprint::density);
+        EXPECT_LT(trained.report.loss, 0.5 * trained.first_loss);
+        EXPECT_EQ(trained.report.dropped_updates, 0u);
+        return trained.report.loss;
+    };
+    for (const Strategy strategy : {Strategy::none, Strategy::mcmc}) {
+        const double peak = run(Footprint::peak, strategy), density = run(Footprint::density, strategy);
+        printf("    loss %.4f, %.4f of a density\n", peak, density);
+        EXPECT_LT(density, 1.3 * peak);
+    }
+}
+
 TEST(Trainer, TheSameSeedWritesTheSameBytesAndAnotherDoesNot) {
     const Gaussians start = shaken_start(small_capture(), 0.05, 1, 1);
     const auto bytes = [&](uint64_t seed) {

@@ -206,6 +206,36 @@ TEST(Ply, CommentsMarksAndExtraProperties) {
     EXPECT_EQ(read_splats(folder / "c.ply").comments, scene.comments);
 }
 
+TEST(Ply, ADensityIsSavedAsOthersShowItAndReadAsItWas) {
+    TempFolder folder;
+    Gaussians density = test::storable_splats(3, 30, 1);
+    density.density = true;
+    save_splats(folder / "a.ply", density, SaveOptions{.comments = {"by hand"}});
+    const SplatScene scene = read_splats(folder / "a.ply");
+    EXPECT_TRUE(scene.gaussians.density);
+    EXPECT_EQ(scene.comments, (std::vector<std::string>{"by hand"}));
+    for (size_t i = 0; i < density.size(); ++i)
+        EXPECT_NEAR(scene.gaussians.opacity_logits[i], density.opacity_logits[i], 1e-5);
+
+    // Without the comment, a reader sees the fitted opacities.
+    std::string bytes = test::file_bytes(folder / "a.ply");
+    const std::string comment = "comment ewa kernel density\n";
+    const size_t at = bytes.find(comment);
+    ASSERT_NE(at, std::string::npos);
+    folder.write("b.ply", bytes.erase(at, comment.size()));
+    const Gaussians shown = load_splats(folder / "b.ply");
+    EXPECT_FALSE(shown.density);
+    Gaussians fitted = density;
+    fit_opacities(fitted, false);
+    EXPECT_EQ(shown.opacity_logits, fitted.opacity_logits);
+
+    // The other formats hold these, too, and say so.
+    const auto remarks = save_splats(folder / "c.spz", density, SaveOptions{});
+    ASSERT_FALSE(remarks.empty());
+    EXPECT_NE(remarks[0].find("--kernel density"), std::string::npos) << remarks[0];
+    EXPECT_FALSE(load_splats(folder / "c.spz").density);
+}
+
 TEST(Ply, EveryCutIsAnError) {
     TempFolder folder;
     save_splats(folder / "a.ply", random_splats(2, 1));

@@ -55,7 +55,7 @@ TEST(ReferenceBlend, OneRoundSplatHasItsPeakRadiusAndTotal) {
                 1e-12);
 }
 
-TEST(ReferenceBlend, UnitMassKernelKeepsItsMass) {
+TEST(ReferenceBlend, ADensityKeepsItsMass) {
     Camera camera;
     camera.width = camera.height = 81;
     camera.fx = camera.fy = 60;
@@ -73,8 +73,13 @@ TEST(ReferenceBlend, UnitMassKernelKeepsItsMass) {
     reference.smoothing.cut = AlphaCut::none;
     const Picture picture = render(scene, camera, options, reference);
     double total = 0;
-    for (double t : picture.blended.transmittance.values) total += 1 - t;
-    EXPECT_NEAR(total, 1 / (1 + std::exp(-0.4)), 1e-6);
+    for (double t : picture.blended.transmittance.values) total -= std::log(t);
+    // 2 pi softplus(logit) A, in the camera's units times |J|.
+    const double shadows = std::exp(-9.0) + std::exp(-11.0) + std::exp(-10.0);
+    const double jacobian = 60 * 60 / 4.0 * std::sqrt(1 + 0.025 * 0.025 + 0.05 * 0.05);
+    EXPECT_NEAR(total,
+                2 * std::numbers::pi * std::log1p(std::exp(double(0.4f))) * std::sqrt(shadows / 3) * jacobian,
+                1e-6);
 }
 
 TEST(ReferenceBlend, TwoOverlapNearestFirst) {
@@ -131,6 +136,16 @@ TEST(ReferenceBlend, RampIsContinuousWithItsSlope) {
             (alpha_of(raw + h, smoothing).value - alpha_of(raw - h, smoothing).value) / (2 * h);
         EXPECT_NEAR(alpha_of(raw, smoothing).slope, slope, 1e-5);
     }
+    for (double raw : {1.3 / 255, 1.999 / 255, 0.4, 4.6}) {
+        const double h = 1e-9;
+        const double slope =
+            (alpha_of(raw + h, smoothing, true).value - alpha_of(raw - h, smoothing, true).value) / (2 * h);
+        EXPECT_NEAR(alpha_of(raw, smoothing, true).slope, slope, 1e-5);
+    }
+    EXPECT_EQ(alpha_of(4.7, {}, true).value, 0.99);
+    EXPECT_EQ(alpha_of(4.7, {}, true).slope, 0);
+    EXPECT_EQ(alpha_of(0.99999 / 255, {}, true).kept, false);
+    EXPECT_NEAR(alpha_of(0.5, {}, true).value, 1 - std::exp(-0.5), 1e-12);
     EXPECT_NEAR(alpha_of(1.0 / 255, smoothing).value, 0, 1e-12);
     EXPECT_EQ(alpha_of(0.999, smoothing).slope, 0);
     EXPECT_EQ(alpha_of(0.999, {}).value, 0.99);

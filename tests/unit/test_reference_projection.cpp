@@ -55,9 +55,26 @@ TEST(ReferenceProjection, KernelFactors) {
     options.kernel = Footprint::antialias;
     EXPECT_NEAR(project(splat, plain_camera(), options).opacity, 0.7 * std::sqrt(25.0 * 16.0 / (25.3 * 16.3)),
                 1e-12);
+    // The optical depth of a sphere is that of its opacity; the low-pass spreads it.
     options.kernel = Footprint::density;
     EXPECT_NEAR(project(splat, plain_camera(), options).opacity,
-                0.7 / (2 * std::numbers::pi * std::sqrt(25.3 * 16.3)), 1e-12);
+                -std::log(0.3) * std::sqrt(25.0 * 16.0 / (25.3 * 16.3)), 1e-12);
+}
+
+TEST(ReferenceProjection, ADensityAbsorbsMoreAlongALongerChord) {
+    Splat splat = round_splat({0, 0, 4}, 0.2, 0.3);
+    splat.log_scale = {std::log(200.0), std::log(200.0), std::log(20.0)};
+    RenderOptions options;
+    options.kernel = Footprint::density;
+    const auto depth = [&] { return project(splat, plain_camera(), options).opacity; };
+    // A disc from its face and from its edge. Between them is A / shadow = sqrt(s1^2 + 2 s3^2) / (sqrt(3) s3).
+    const double face = depth(), tau = -std::log(0.7), bulge = std::sqrt((1 + 0.01 + 0.01) / 3);
+    EXPECT_NEAR(face, tau * bulge, 1e-6);
+    std::swap(splat.log_scale.x, splat.log_scale.z);
+    EXPECT_NEAR(depth(), 10 * face, 1e-5);
+    // Off the axis the chord is longer than the view depth says: |J| has the view position's length.
+    splat = round_splat({0.8, 0, 4}, 200, 0.3);
+    EXPECT_NEAR(depth(), tau, 1e-6);
 }
 
 TEST(ReferenceProjection, CovarianceIsThatOfTheLinearisedPinhole) {

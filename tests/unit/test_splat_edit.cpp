@@ -148,6 +148,65 @@ TEST(Append, TakesTheHigherDegree) {
     }
 }
 
+TEST(Append, FitsADensityToTheOtherKernels) {
+    Gaussians density = storable_splats(3, 2, 1);
+    density.density = true;
+    Gaussians fitted = density;
+    fit_opacities(fitted, false);
+    EXPECT_FALSE(fitted.density);
+    const Gaussians plain = storable_splats(4, 3, 1);
+    Gaussians joined = density;
+    append_splats(joined, plain);
+    EXPECT_FALSE(joined.density);
+    EXPECT_EQ(joined.opacity_logits[1], fitted.opacity_logits[1]);
+    EXPECT_EQ(joined.opacity_logits[2], plain.opacity_logits[0]);
+    joined = plain;
+    append_splats(joined, density);
+    EXPECT_FALSE(joined.density);
+    EXPECT_EQ(joined.opacity_logits[4], fitted.opacity_logits[1]);
+    joined = Gaussians();
+    append_splats(joined, density);
+    append_splats(joined, density);
+    EXPECT_TRUE(joined.density);
+    EXPECT_EQ(joined.opacity_logits[3], density.opacity_logits[1]);
+}
+
+TEST(FitOpacities, IsUndoneAndKeepsWhatIsTransparent) {
+    Gaussians g = storable_splats(3, 400, 0);
+    test::Random random(8);
+    for (size_t i = 0; i < g.size(); ++i) {
+        g.opacity_logits[i] = float(random.uniform(-1, 1) * std::pow(10.0, random.uniform(-3, 6)));
+    }
+    const Gaussians before = g;
+    fit_opacities(g, false);
+    EXPECT_EQ(g.opacity_logits, before.opacity_logits) << "they are of that kind already";
+    g.density = true;
+    fit_opacities(g, false);
+    for (size_t i = 0; i < g.size(); ++i) {
+        const float logit = before.opacity_logits[i];
+        const auto depth = [](double x) { return std::max(x, 0.0) + std::log1p(std::exp(-std::abs(x))); };
+        const double own = depth(logit), shown = depth(g.opacity_logits[i]);
+        if (logit < -20)
+            EXPECT_EQ(g.opacity_logits[i], logit);
+        else
+            EXPECT_NEAR(shown, own + own * own / 4, 1e-6 * shown * (1 + std::abs(double(logit)))) << logit;
+    }
+    fit_opacities(g, true);
+    EXPECT_TRUE(g.density);
+    for (size_t i = 0; i < g.size(); ++i)
+        EXPECT_NEAR(g.opacity_logits[i], before.opacity_logits[i],
+                    1e-6 * (1 + std::abs(before.opacity_logits[i])));
+
+    // What is not finite stays, and does not become finite.
+    g.opacity_logits[0] = NAN;
+    g.opacity_logits[1] = INFINITY;
+    g.opacity_logits[2] = 1e30f;
+    fit_opacities(g, false);
+    EXPECT_TRUE(std::isnan(g.opacity_logits[0]));
+    EXPECT_EQ(g.opacity_logits[1], INFINITY);
+    EXPECT_TRUE(std::isfinite(g.opacity_logits[2]));
+}
+
 TEST(Morton, NeighboursStayNeighbours) {
     Gaussians g = storable_splats(3, 4000, 0);
     g.means[30] = NAN;

@@ -121,7 +121,7 @@ struct Table {
 };
 
 const std::pair<Footprint, const char*> kKernels[] = {
-    {Footprint::peak, ""}, {Footprint::antialias, "_antialias"}, {Footprint::density, "_unit_mass"}};
+    {Footprint::peak, ""}, {Footprint::antialias, "_antialias"}, {Footprint::density, "_density"}};
 
 void add_ordinary(Table& table) {
     for (const auto& [kernel, suffix] : kKernels)
@@ -146,6 +146,8 @@ void add_axis_ratios(Table& table) {
                           usual_camera(), kernel);
     for (const double ratio : {1e4, 1e7})
         table.add(text_of("long_axes_1:%.0e", ratio), "needles and discs of 200 px", thin_splats(3, ratio));
+    table.add("long_axes_1:1e+07_density", "needles and discs of 200 px", thin_splats(3, 1e7), usual_camera(),
+              Footprint::density);
 }
 
 void add_scales(Table& table) {
@@ -158,8 +160,7 @@ void add_scales(Table& table) {
                 if (factor > 1) s.logit = between(uniform(i, 6)[0], -3, -1);  // transparent
             });
             // If none of them is visible, others are, which must not be affected.
-            const bool unseen =
-                kernel == Footprint::antialias ? factor < 1 : kernel == Footprint::density && factor > 1;
+            const bool unseen = kernel != Footprint::peak && factor < 1;
             if (unseen) builder.add_usual(20);
             table.add(text_of("scale_%.0e%s", factor, suffix), "scales times this", builder.take(),
                       usual_camera(), kernel);
@@ -222,8 +223,10 @@ void add_opacities(Table& table) {
         s.logit = logits[i % std::size(logits)];
         s.scale *= 0.5;
     };
-    table.add("opacity_0_and_1", "opacity logits of -1e30 to 1e30",
-              usual_scene(usual_camera(), 60, 1, change));
+    for (const auto& [kernel, suffix] : kKernels)
+        if (kernel != Footprint::antialias)
+            table.add(std::string("opacity_0_and_1") + suffix, "opacity logits of -1e30 to 1e30",
+                      usual_scene(usual_camera(), 60, 1, change), usual_camera(), kernel);
 }
 
 void add_stacks(Table& table) {

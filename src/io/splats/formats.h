@@ -17,7 +17,8 @@ class PlyTable;
 /// INRIA's PLY. Accepts any property order and scalar type, ascii and binary of either byte order. Other
 /// properties and elements are ignored. Values stay as they are, finite or not. Positions in double far from
 /// the world's origin become means relative to an origin of the scene. A comment "SplatRenderMode: mip"
-/// (Brush) or "antialiased 1" (Postshot) sets SplatScene::antialiased.
+/// (Brush) or "antialiased 1" (Postshot) sets SplatScene::antialiased. A comment "ewa kernel density" sets
+/// Gaussians::density; it is not one of SplatScene::comments.
 SplatScene read_ply(const std::filesystem::path& path);
 
 /// Writes binary_little_endian and float32. If the scene has an origin, x y z are world positions in double.

@@ -6,7 +6,7 @@
 //   nx ny nz         written as zero, ignored when read
 //   f_dc_0..2        SH coefficient 0 of R, G, B
 //   f_rest_0..3K-1   SH coefficients 1..K of R, then of G, then of B; K = 0, 3, 8, 15 for degree 0..3
-//   opacity          logit
+//   opacity          logit; of Footprint::density, fitted so that 3DGS's viewers show about the same
 //   scale_0..2       natural logarithm
 //   rot_0..3         w x y z
 // In memory, SH is coefficient after coefficient with RGB inner. So f_rest is transposed here.
@@ -18,9 +18,11 @@
 #include "core/atomic_file.h"
 #include "core/text.h"
 #include "ewa/error.h"
+#include "ewa/splat_edit.h"
 #include "io/splats/formats.h"
 #include "io/splats/ply_table.h"
 #include "io/splats/splat_values.h"
+#include "scene/opacity_fit.h"
 
 namespace ewa::io {
 
@@ -28,6 +30,8 @@ namespace {
 
 constexpr size_t kBeforeSh = 11;  // columns before f_rest: x y z opacity scale_0..2 rot_0..3
 constexpr int kMaxFileDegree = 4;
+// Says that the opacities are fitted to those of Footprint::density.
+constexpr char kDensityComment[] = "ewa kernel density";
 
 /// The SH degree of f_rest_0..3K-1.
 int degree_of(const PlyTable& table, const PlyElement& vertex) {
@@ -120,6 +124,7 @@ std::string ply_header(const Gaussians& gaussians, const SaveOptions& options) {
     std::string text = "ply\nformat binary_little_endian 1.0\n";
     for (const std::string& comment : options.comments) text += "comment " + core::one_line(comment) + "\n";
     if (options.antialiased && !any_antialiased(options.comments)) text += "comment SplatRenderMode: mip\n";
+    if (gaussians.density) text += std::string("comment ") + kDensityComment + "\n";
     text += "element vertex " + std::to_string(gaussians.size()) + "\n";
     const auto property = [&](const std::string& name) { text += "property float " + name + "\n"; };
     for (const char* name : {"x", "y", "z"})
@@ -154,7 +159,8 @@ void append_ply_row(const Gaussians& gaussians, size_t i, std::vector<float>& ro
     append(&gaussians.sh[stride * i], 3);
     for (size_t channel = 0; channel < 3; ++channel)
         for (size_t k = 3; k < stride; k += 3) rows.push_back(gaussians.sh[stride * i + k + channel]);
-    rows.push_back(gaussians.opacity_logits[i]);
+    const float logit = gaussians.opacity_logits[i];
+    rows.push_back(gaussians.density ? scene::shown_logit(logit) : logit);
     append(&gaussians.log_scales[3 * i], 3);
     append(&gaussians.quaternions[4 * i], 4);
 }
@@ -165,6 +171,7 @@ SplatScene read_ply(const std::filesystem::path& path) {
     scene.comments = table.comments();
     scene.variant = table.format_name();
     scene.antialiased = any_antialiased(scene.comments);
+    const bool density = std::erase(scene.comments, kDensityComment) > 0;
     const PlyElement& vertex = table.go_to("vertex");
     scene.file_sh_degree = degree_of(table, vertex);
     Gaussians& gaussians = scene.gaussians;
@@ -191,6 +198,7 @@ SplatScene read_ply(const std::filesystem::path& path) {
         copy(row + kBeforeSh, &gaussians.sh[stride * i], stride);
     });
     if (wide) set_world_means(gaussians, positions);
+    if (density) fit_opacities(gaussians, true);
     return scene;
 }
 

@@ -174,6 +174,14 @@ std::vector<std::string> save_splats(const std::filesystem::path& path, const Ga
         remarks.push_back(rounding_remark(gaussians.origin));
         return remarks;
     }
+    if (!ply && gaussians.density) {
+        Gaussians fitted = gaussians;
+        fit_opacities(fitted, false);
+        remarks = save_splats(path, fitted, options);
+        remarks.push_back(
+            "opacities of --kernel density are fitted to 3DGS's kernel; a .ply keeps the kernel");
+        return remarks;
+    }
     bool whole = true;
     for (size_t i = 0; i < gaussians.size() && whole && !ply; ++i) whole = drawable(gaussians, i);
     const auto write = kind_of(format).write;
