@@ -4,7 +4,10 @@
 #include <nanobind/nanobind.h>
 
 #include <array>
+#include <optional>
 
+#include "bindings.h"
+#include "ewa/error.h"
 #include "ewa/render_options.h"
 
 namespace ewa::python {
@@ -14,6 +17,14 @@ std::array<float, 3> background_of(nanobind::handle value);
 
 inline Footprint footprint_of(bool antialias) {
     return antialias ? Footprint::antialias : Footprint::peak;
+}
+
+/// The kernel of a render or an evaluation. antialias: if given. Throws InputError for antialiased densities.
+inline Footprint footprint_of(std::optional<bool> antialias, const Splats& splats) {
+    if (!splats.gaussians.density) return footprint_of(antialias.value_or(splats.antialiased));
+    if (antialias.value_or(false))
+        throw InputError("antialias: splats of the density kernel have no such renders");
+    return Footprint::density;
 }
 
 }  // namespace ewa::python

@@ -14,6 +14,7 @@
 #include "core/typing.h"
 #include "device.h"
 #include "ewa/error.h"
+#include "ewa/splat_edit.h"
 #include "options.h"
 
 namespace ewa::python {
@@ -59,15 +60,19 @@ Drawing drawing_of(std::string mode) {
 class SceneRenderer {
   public:
     SceneRenderer(const Splats& splats, std::optional<bool> antialias, int sh_degree)
-        : options_{.kernel = footprint_of(antialias.value_or(splats.antialiased)), .sh_degree = sh_degree} {
+        : options_{.kernel = footprint_of(antialias, splats), .sh_degree = sh_degree} {
         if (sh_degree < 0 || sh_degree > kMaxShDegree) throw InputError("sh_degree is not 0, 1, 2 or 3");
         const DeviceWork work;
         renderer_ = OnDevice(std::make_unique<Renderer>(work.device(), splats.gaussians, options_));
     }
 
     void replace(const Splats& splats) {
+        const bool density = options_.kernel == Footprint::density;
         const DeviceWork work;
-        renderer_->replace(splats.gaussians);
+        if (splats.gaussians.density == density) return renderer_->replace(splats.gaussians);
+        Gaussians fitted = splats.gaussians;
+        fit_opacities(fitted, density);
+        renderer_->replace(fitted);
     }
 
     Renders render(nb::handle viewmats, nb::handle intrinsics, int width, int height, nb::handle background,

@@ -91,17 +91,18 @@ void make_splats(Splats* self, nb::handle means, nb::handle quats, nb::handle lo
 /// For pickle and copy. Views: whoever stores them copies.
 nb::tuple state_of(nb::handle self) {
     nb::list values;
-    for (const char* name :
-         {"means", "quats", "log_scales", "opacity_logits", "sh", "origin", "antialiased", "comments"})
+    for (const char* name : {"means", "quats", "log_scales", "opacity_logits", "sh", "origin", "antialiased",
+                             "comments", "density"})
         values.append(self.attr(name));
     return nb::tuple(values);
 }
 
 void restore(Splats* self, const nb::tuple& state) {
-    if (state.size() != 8) throw nb::value_error("the pickled splats are of another version of ewa");
+    if (state.size() != 9) throw nb::value_error("the pickled splats are of another version of ewa");
     make_splats(self, state[0], state[1], state[2], state[3], state[4], state[5]);
     self->antialiased = nb::cast<bool>(state[6]);
     self->comments = nb::cast<std::vector<std::string>>(state[7]);
+    self->gaussians.density = nb::cast<bool>(state[8]);
 }
 
 Splats from_points(nb::handle positions, nb::handle colors, int sh_degree) {
@@ -215,6 +216,10 @@ void bind_class(nb::module_& module) {
         "sh_degree", [](const Splats& s) { return s.gaussians.sh_degree; }, "0 to 3.");
     splats.def_rw("antialiased", &Splats::antialiased,
                   "Whether the splats were trained for antialiased renders (Mip-Splatting).");
+    splats.def_prop_rw(
+        "density", [](const Splats& s) { return s.gaussians.density; },
+        [](Splats& s, bool density) { s.gaussians.density = density; },
+        "Whether opacity_logits are those of the density kernel. Files keep it as .ply alone.");
     splats.def_ro("comments", &Splats::comments, "The comments of the file.");
     splats.def("__len__", [](const Splats& s) { return s.gaussians.size(); });
     splats.def("__getitem__", selected, nb::arg("key"),

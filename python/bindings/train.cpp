@@ -217,8 +217,7 @@ Evaluation evaluate_splats(const Splats& splats, const LoadedDataset& dataset, n
     std::vector<int> chosen = frames.is_none() ? split_frames(*dataset.dataset, usual_test_every()).test
                                                : frames_of(frames, *dataset.dataset, "frames");
     if (chosen.empty()) throw InputError("frames is empty: there is nothing to evaluate");
-    const RenderOptions options{background_of(background),
-                                footprint_of(antialias.value_or(splats.antialiased))};
+    const RenderOptions options{background_of(background), footprint_of(antialias, splats)};
     const DeviceWork work;
     return evaluate(work.device(), splats.gaussians, *dataset.dataset, chosen, options, {}, check_signals);
 }

@@ -136,6 +136,19 @@ void set_background(TrainOptions& options, nb::handle value) {
     options.render.background = options.random_background ? std::array<float, 3>{} : background_of(value);
 }
 
+const std::vector<std::string> kKernelWords{"peak", "antialias", "density"};  // in the order of Footprint
+
+nb::object kernel_word(const TrainOptions& options) {
+    return nb::str(kKernelWords[size_t(options.render.kernel)].c_str());
+}
+
+void set_kernel(TrainOptions& options, nb::handle value) {
+    std::string word = nb::cast<std::string>(value);
+    if (const std::string problem = core::settle_word(word, kKernelWords); !problem.empty())
+        throw InputError(problem);
+    options.render.kernel = Footprint(std::ranges::find(kKernelWords, word) - kKernelWords.begin());
+}
+
 const std::vector<Special>& specials() {
     static const std::vector<Special> all = {
         {"strategy", "typing.Literal['auto', 'adc', 'mcmc', 'none']", strategy_word, set_strategy},
@@ -153,6 +166,7 @@ const std::vector<Special>& specials() {
              return nb::bool_(o.render.kernel == Footprint::antialias);
          },
          [](TrainOptions& o, nb::handle value) { o.render.kernel = footprint_of(nb::cast<bool>(value)); }},
+        {"kernel", "typing.Literal['peak', 'antialias', 'density']", kernel_word, set_kernel},
     };
     return all;
 }

@@ -239,6 +239,24 @@ def test_antialiased_training_makes_antialiased_splats(still_life):
     assert usual.psnr == ewa.evaluate(splats, still_life, [0], antialias=True).psnr != plain.psnr
 
 
+def test_densities_are_trained_and_kept(still_life, tmp_path):
+    trainer = ewa.Trainer(still_life, steps=1, kernel="density", train_frames=[0])
+    assert trainer.options["kernel"] == "density" and not trainer.options["antialias"]
+    splats = trainer.splats()
+    assert splats.density and not splats.antialiased
+    ewa.save(tmp_path / "a.ply", splats)
+    again = ewa.load(tmp_path / "a.ply")
+    assert again.density and np.allclose(again.opacity_logits, splats.opacity_logits, atol=1e-5)
+    usual = ewa.evaluate(splats, still_life, [0])
+    assert abs(usual.psnr - ewa.evaluate(again, still_life, [0]).psnr) < 1e-3
+    with pytest.raises(ewa.InputError, match="density kernel"):
+        ewa.evaluate(splats, still_life, [0], antialias=True)
+    splats.density = False
+    assert ewa.evaluate(splats, still_life, [0]).psnr != usual.psnr
+    with pytest.raises(ewa.InputError, match="kernel"):
+        ewa.Trainer(still_life, steps=1, kernel="box", train_frames=[0])
+
+
 def test_exposures_are_learned(still_life):
     trainer = ewa.Trainer(still_life, steps=2, exposure=True, train_frames=[0, 1, 2])
     assert np.array_equal(trainer.exposures(), np.tile(np.eye(3, 4, dtype=np.float32), (3, 1, 1)))

@@ -35,7 +35,9 @@ bool project(uint i) {
     bool finite_color;
     const vec3 color = sh_color(i, p2, normalize(p.view.offset), finite_color);
 
-    const float opacity = stored.peak * p.factor;
+    float opacity = stored.peak * p.factor;
+    // A NaN stays one.
+    if (KERNEL == KERNEL_DENSITY) opacity = opacity > float(DEPTH_MAX) ? float(DEPTH_MAX) : opacity;
     const vec2 x = pixel_position(p.view.x, p.view.z, 0), y = pixel_position(p.view.y, p.view.z, 1);
     const vec4 record0 = vec4(x.x, y.x, x.y, y.y), record1 = vec4(p.ux, p.k, p.vy, opacity);
     const uvec2 size = uvec2(camera.size[0], camera.size[1]);

@@ -47,9 +47,10 @@ void main() {
                p2 = fetch(params, index_of(2, i));
     vec4 sum[SLOT_TEXELS];
     sum_slots(visible ? first_instances[i] : 0u, count, ABSOLUTE, sum);
-    const Sums s = Sums(sum[0].x, sum[0].yz, vec3(sum[0].w, sum[1].xy), vec3(sum[1].zw, sum[2].x), sum[2].yz);
+    Sums s = Sums(sum[0].x, sum[0].yz, vec3(sum[0].w, sum[1].xy), vec3(sum[1].zw, sum[2].x), sum[2].yz);
     const StoredProjection stored = project_splat(StoredSplat(p0.xyz, p0.w, p1, p2.xyz));
     const Projection p = stored.footprint;
+    if (KERNEL == KERNEL_DENSITY && stored.peak * p.factor > float(DEPTH_MAX)) s.g = 0.0;
     // The mean of an invisible splat may be anything. Zero times a direction that is not finite is not zero.
     const vec3 direction = visible ? normalize(p.view.offset) : vec3(0.0);
     // max(0, .) passes no gradient where the colour is zero.

@@ -104,8 +104,10 @@ EWA_UINT(MOMENT_STREAM, 0x6d6f6d00u);  // plus the plane: rounding of Adam's mom
 EWA_UINT(KERNEL_PEAK, 0u);
 // Mip-Splatting (Yu et al. 2024, eq. 9): times sqrt(det before / det after low-pass).
 EWA_UINT(KERNEL_ANTIALIAS, 1u);
-// EWA (Zwicker et al. 2001): times 1 / (2 pi sqrt(det)) per px^2.
+// EWA (Zwicker et al. 2001): a density in space, which absorbs more along a longer chord.
 EWA_UINT(KERNEL_DENSITY, 2u);
+// A larger optical depth at the middle of a density's footprint counts as this.
+EWA_REAL(DEPTH_MAX, 1e4);
 
 // The path tracer of mesh scenes (docs/meshes.md describes its model).
 EWA_UINT(TRACE_STACK, 48u);         // greatest depth of the hierarchy: children on the stack of a ray

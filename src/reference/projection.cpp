@@ -198,6 +198,7 @@ Projected project(const Splat& splat, const Camera& camera, const RenderOptions&
     out.density = options.kernel == Footprint::density;
     s.peak = out.density ? softplus(splat.opacity_logit) : s.sigmoid;
     out.opacity = s.peak * s.kernel_factor;
+    if (out.density) out.opacity = std::min(out.opacity, DEPTH_MAX);
     if (!(out.opacity >= raw_of(out, ALPHA_MIN))) return out;
     out.color = glm::max(s.raw_color, glm::dvec3(0));
     out.visible = true;
@@ -299,12 +300,14 @@ glm::dvec3 color_backward(const Splat& splat, const ProjectionSteps& s, const gl
 }  // namespace
 
 Splat project_backward(const Splat& splat, const Camera& camera, const RenderOptions& options,
-                       const ScreenGradient& gradient) {
+                       const ScreenGradient& by_screen) {
     Splat out;
     out.sh_degree = splat.sh_degree;
     ProjectionSteps s;
     const Projected projected = project(splat, camera, options, &s);
     if (!projected.visible) return out;
+    ScreenGradient gradient = by_screen;
+    if (projected.density && s.peak * s.kernel_factor > DEPTH_MAX) gradient.opacity = 0;
 
     const DetGradient by_det = kernel_backward(options.kernel, s, projected.det, gradient.opacity * s.peak);
     const Rows by_m = m_gradient(s, gradient, by_det);

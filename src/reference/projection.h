@@ -14,7 +14,7 @@
 //   peak 1;  antialias sqrt(max(0, det0 / det))
 // With Footprint::density the splat is a density in space, and the optical depth takes the place of the opacity:
 //   depth = softplus(logit) A |J| / sqrt(det),  A = sqrt(((s1 s2)^2 + (s2 s3)^2 + (s3 s1)^2) / 3)
-//   |J|   = fx fy sqrt(1 + tx^2 + ty^2) / z^2             of the ray-space transform (eq. 26 of that paper)
+//   |J|   = fx fy sqrt(1 + tx^2 + ty^2) / z^2             of the ray-space transform; depth is at most DEPTH_MAX
 // Colour is max(0, COLOR_OFFSET + sum_j sh_j Y_j(direction)), direction = normalise(mean - camera position).
 #pragma once
 #include <array>

@@ -31,17 +31,6 @@ double density(const RayGaussian& g, double t) {
                : g.depth * std::exp(-0.5 * u * u) / (g.sigma * std::sqrt(2 * std::numbers::pi));
 }
 
-double softplus(double x) {
-    return std::max(x, 0.0) + std::log1p(std::exp(-std::abs(x)));
-}
-
-/// The root mean square of a splat's shadow over all directions: each squared component of a direction is a third on
-/// average.
-double mean_shadow(const glm::dvec3& scale) {
-    const glm::dvec3 faces(scale.y * scale.z, scale.z * scale.x, scale.x * scale.y);
-    return glm::length(faces) / std::sqrt(3.0);
-}
-
 /// The whitener of the covariance plus `variance` in the plane across `direction`: any root of the inverse will do.
 glm::dmat3 widened(const glm::dmat3& rotation, const glm::dvec3& scale, double variance,
                    const glm::dvec3& direction) {

@@ -181,7 +181,7 @@ TEST(RelocationOfMany, DensitiesShareTheirMass) {
     for (const float logit : {-3.0f, 0.2f, 12.0f, 40.0f, 3000.0f}) {
         const size_t splats = 100;
         McmcStart start(3778, splats, 0);
-        std::fill(start.gaussians.opacity_logits.begin(), start.gaussians.opacity_logits.end(), -9.0f);
+        std::fill(start.gaussians.opacity_logits.begin(), start.gaussians.opacity_logits.end(), -20.0f);
         start.gaussians.opacity_logits[17] = logit;
         start.model = pipeline::upload_model(*device(), start.gaussians, 2, false);
         McmcRules rules = mcmc_rules_for(uint32_t(splats));
