@@ -103,7 +103,7 @@ RenderOptions DrawArguments::options() const {
 }
 
 void DrawArguments::match_kernel(Gaussians& gaussians, RenderOptions& options) const {
-    if (gaussians.density && !names_kernel()) options.kernel = Footprint::density;
+    if (gaussians.density && !names_kernel() && !options.points) options.kernel = Footprint::density;
     fit_opacities(gaussians, options.kernel == Footprint::density);
 }
 
