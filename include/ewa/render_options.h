@@ -15,6 +15,8 @@ enum class Integrator {
     march   // the volume of all splats, in intervals along the ray
 };
 
+inline constexpr int kMostSamples = 4096;
+
 struct RenderOptions {
     std::array<float, 3> background{0, 0, 0};
     Footprint kernel = Footprint::peak;

@@ -23,6 +23,12 @@ EWA_REAL(ALPHA_MIN, 1.0 / 255.0);  // a contribution below this is skipped
 // Blending stops before the splat that would take T to this or below.
 EWA_REAL(TRANSMITTANCE_STOP, 1e-4);
 
+// Marching along rays.
+EWA_REAL(MARCH_DEPTH_MIN, 1e-5);  // a smaller optical depth of the whole ray is skipped
+EWA_REAL(MARCH_REACH, 4.5);       // standard deviations along a ray; only 7e-6 of a splat is beyond
+EWA_REAL(MARCH_STOP, 1e-7);       // behind this transmittance, intervals need not be evaluated
+EWA_UINT(MARCH_BINS, 16u);        // of the first look at a ray, by which its intervals are placed
+
 // Splats drawn as solids, for a look at the structure of a scene.
 EWA_REAL(ELLIPSOID_REACH, 2.0);    // radius in standard deviations
 EWA_REAL(ELLIPSOID_OPACITY, 0.1);  // splats of a lower opacity are not drawn

@@ -42,6 +42,17 @@ EWA_UINT(PARAM_SH, 11u);         // 3 (degree + 1)^2 floats: coefficient after c
 // 2: colour r g b, view z
 EWA_UINT(RECORD_TEXELS, 3u);
 
+// ---- A splat as rays meet it: 3 texels at 3 * i. Its record's texels 0 and 1 are an ellipse for the tiles' lists ----
+// 0: mean in px, as in a record
+// 1: ux, k, vy of the footprint without a low-pass, optical depth of the ray through the centre
+// 2: g.x, g.y, rho, least view depth of a point that counts. lib/rays.glsl has the formulas.
+EWA_UINT(RAY_TEXELS, 3u);
+
+// ---- A gradient slot of rays: 16 floats (4 texels) ----
+// W11 W22 W33 W12; W13 W23 V1 V2; V3, dL/d(ln depth), dL/d(colour) r g; b, 0 0 0. lib/rays.glsl defines W and V.
+EWA_UINT(RAY_SLOT_FLOATS, 16u);
+EWA_UINT(RAY_SLOT_TEXELS, 4u);
+
 // ---- A gradient slot: what one tile adds to one splat's gradient, 12 floats (3 texels) ----
 // With g = dL/d(power) of a pixel and sums over the tile's pixels:
 // 0: sum g; 1 2: sum g u, g v; 3 4 5: sum g u^2, g u v, g v^2; 6 7 8: dL/d(colour);
@@ -67,6 +78,8 @@ EWA_UINT(PLANE_COUNT, 4u);  // splats blended; an image has depth or count, not 
 // ---- SPEC_MODE ----
 // project.comp
 EWA_UINT(PROJECT_DEBUG, 1u);  // shifts the scales, and counts the visible splats
+// project_rays.comp
+EWA_UINT(PROJECT_RAYS_DEEP, 1u);  // a splat counts to MARCH_DEPTH_MIN, not to the cut-off
 // emit_instances.comp
 EWA_UINT(EMIT_FIRST_INSTANCES, 1u);  // also writes where each splat's instances begin
 // scan_blocks.comp
@@ -260,6 +273,12 @@ struct BlendPush {
     uint tiles[2];
     uint tile_step[2];  // tile = workgroup.x * step.x + workgroup.y * step.y
     uint capacity;      // of instances
+};
+
+struct RayPush {
+    BlendPush blend;
+    uint samples;  // intervals of a marching ray
+    uint strip;    // of a gradient: the tiles' strips are done one after another
 };
 
 struct CollectPush {

@@ -99,6 +99,14 @@ RenderOptions DrawArguments::options() const {
     render.points = points;
     render.nearest = nearest;
     train::check_points(render);
+    render.integrator = integrator == "ray"     ? Integrator::ray
+                        : integrator == "march" ? Integrator::march
+                                                : Integrator::splat;
+    if (render.integrator != Integrator::splat && render.kernel == Footprint::antialias)
+        throw InputError("--integrator " + integrator + ": there are no footprints to antialias");
+    if (samples && render.integrator != Integrator::march)
+        throw InputError("--samples: only --integrator march takes samples of a ray");
+    render.samples = samples.value_or(render.samples);
     return render;
 }
 
@@ -134,6 +142,15 @@ void add_draw_options(CLI::App& app, DrawArguments& arguments) {
         ->transform(in_range(0, kMaxShDegree))
         ->type_name("0..3")
         ->capture_default_str();
+    app.add_option(
+           "--integrator", arguments.integrator,
+           "How splats become a colour: splat blends footprints, ray orders splats on each ray, march "
+           "integrates the volume")
+        ->transform(one_of({"splat", "ray", "march"}))
+        ->capture_default_str();
+    app.add_option("--samples", arguments.samples, "Intervals of a ray, with --integrator march (64)")
+        ->transform(in_range(1, kMostSamples))
+        ->type_name("N");
 }
 
 void add_device_options(CLI::App& app, DeviceOptions& options) {

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -39,7 +40,7 @@ core::PixelSize size_of(const std::string& text);
 /// The kernel, or that of --antialias if it is given. Throws InputError if they exclude each other.
 Footprint settled_kernel(Footprint kernel, bool antialias);
 
-/// How a scene is rendered: --background, --kernel, --antialias, --sh-degree, --points, --nearest.
+/// How a scene is rendered: --background, --kernel, --antialias, --sh-degree, --points, --nearest, --integrator, --samples.
 struct DrawArguments {
     std::string background = "0,0,0";
     std::string kernel = "peak";
@@ -48,6 +49,8 @@ struct DrawArguments {
     bool points = false;
     int nearest = RenderOptions().nearest;
     const CLI::Option* kernel_option = nullptr;
+    std::string integrator = "splat";
+    std::optional<int> samples;
 
     /// Throws InputError if the background is not a colour, or the options exclude each other.
     RenderOptions options() const;

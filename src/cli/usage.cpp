@@ -26,7 +26,7 @@ const std::map<std::string, std::string>& subjects() {
              "up",      "orbit",     "film-seconds", "matching"});
         add("Quality", {"quality", "steps", "strategy", "max-splats", "sh-degree", "absgrad",
                         "revised-opacity", "exposure", "resolution-schedule", "seed", "background", "kernel",
-                        "antialias", "samples", "points", "nearest", "runs", "training-steps"});
+                        "antialias", "integrator", "samples", "points", "nearest", "runs", "training-steps"});
         add("Output", {"output",     "format",     "mode",       "json",       "svg",      "heat-map",
                        "heat-scale", "eval-every", "save-every", "serve",      "accuracy", "spz-version",
                        "check",      "quiet",      "verbose",    "results",    "compare",  "threshold",

@@ -16,6 +16,7 @@ static_assert(sizeof(ProjectPush) == 12 && sizeof(SortPush) == 16 && sizeof(Scan
 static_assert(sizeof(ViewBlock) == 80 && sizeof(ViewsPush) == 32 && sizeof(HarmonicsPush) == 16);
 static_assert(sizeof(ScanTotalsPush) == 12 && sizeof(EmitPush) == 32 && sizeof(TileStartsPush) == 8);
 static_assert(sizeof(BlendPush) == 48 && offsetof(BlendPush, capacity) == 44);
+static_assert(sizeof(RayPush) == 56);
 static_assert(sizeof(CollectPush) == 20 && sizeof(GatherPush) == 12);
 static_assert(sizeof(UnpackPush) == 28 && sizeof(LossPush) == 24 && sizeof(ReducePush) == 20);
 static_assert(sizeof(ImageLayout) == 16 && sizeof(PackPush) == 4 && sizeof(ExposurePush) == 20 &&

@@ -69,6 +69,34 @@ struct PerTile : OneSubgroup<shared::BlendPush> {
     static Groups groups(const KernelConfig& config, const Push& push) { return tile_groups(config, push); }
 };
 
+inline const shared::BlendPush& blend_of(const shared::BlendPush& push) {
+    return push;
+}
+inline const shared::BlendPush& blend_of(const shared::RayPush& push) {
+    return push.blend;
+}
+
+/// Strips of a tile, in each of which a lane has one pixel.
+inline uint32_t strips_of(const KernelConfig& config) {
+    return config.tile_width * config.tile_height / config.subgroup;
+}
+
+/// One subgroup a tile, for one of its strips.
+struct StripPerTile : OneSubgroup<shared::RayPush> {
+    static Groups groups(const KernelConfig& config, const Push& push) {
+        return tile_groups(config, push.blend);
+    }
+};
+
+/// One subgroup for each strip of a tile.
+template <class P>
+struct PerStrip : OneSubgroup<P> {
+    static Groups groups(const KernelConfig& config, const P& push) {
+        const Groups tiles = tile_groups(config, blend_of(push));
+        return {tiles[0], tiles[1], strips_of(config)};
+    }
+};
+
 /// One invocation a lane of the radix sort.
 struct PerSortLane {
     using Push = shared::SortPush;

@@ -15,6 +15,14 @@ struct Project {
     gpu::BufferPart params, camera, records, depth_keys, tile_counts, counts;
 };
 
+/// Prepares splats for rays. rays: how a ray meets each. Adds to Counts.skipped_nonfinite. Variant: SPEC_SH_DEGREE,
+/// SPEC_KERNEL, SPEC_MODE (0 or PROJECT_RAYS_DEEP).
+struct ProjectRays {
+    static constexpr char shader[] = "project_rays";
+    using Work = PerElement<&shared::ProjectPush::splats>;
+    gpu::BufferPart params, camera, records, depth_keys, tile_counts, counts, rays;
+};
+
 /// Gradient of the projection, fused with Adam. Variant: SPEC_SH_DEGREE, SPEC_KERNEL, SPEC_MODE (UPDATE_*
 /// bits).
 struct Update {
@@ -175,6 +183,42 @@ struct BlendPointsBackward {
     static constexpr char shader[] = "blend_points_backward";
     using Work = PerTile;
     gpu::BufferPart records, splats, tile_starts, planes, image_gradient, slots;
+};
+
+/// Blends the splats of every ray in their order along it. Variant: SPEC_KERNEL, SPEC_MODE (BLEND_COLOR, BLEND_DEPTH).
+struct BlendRays {
+    static constexpr char shader[] = "blend_rays";
+    using Work = PerStrip<shared::BlendPush>;
+    gpu::BufferPart records, splats, tile_starts, planes, rays, camera;
+};
+
+/// Marches along every ray, in intervals. Variant: SPEC_KERNEL, SPEC_MODE (intervals evaluated together).
+struct MarchRays {
+    static constexpr char shader[] = "march_rays";
+    using Work = PerStrip<shared::RayPush>;
+    gpu::BufferPart records, splats, tile_starts, planes, rays, camera;
+};
+
+/// Gradient of BlendRays in a strip of each tile, added to the slot of every (splat, tile) instance. Variant: SPEC_KERNEL.
+struct BlendRaysBackward {
+    static constexpr char shader[] = "blend_rays_backward";
+    using Work = StripPerTile;
+    gpu::BufferPart records, splats, tile_starts, planes, image_gradient, slots, rays, camera;
+};
+
+/// Gradient of MarchRays in a strip of each tile, added to the slot of every (splat, tile) instance. Variant: as of MarchRays.
+struct MarchRaysBackward {
+    static constexpr char shader[] = "march_rays_backward";
+    using Work = StripPerTile;
+    gpu::BufferPart records, splats, tile_starts, planes, image_gradient, slots, rays, camera;
+};
+
+/// Adds the slots of each splat, and writes the gradient of its parameters. Variant: SPEC_SH_DEGREE, SPEC_KERNEL.
+struct GatherRays {
+    static constexpr char shader[] = "gather_rays";
+    using Work = PerElement<&shared::UpdatePush::splats>;
+    gpu::BufferPart params, camera, records, slots, tile_counts, first_instances, counts, sorted_indices,
+        gradients;
 };
 
 /// Makes records of arrays of 2D Gaussians, 4 channels of their features at a time, with depth keys and tile counts. Adds

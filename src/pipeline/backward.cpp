@@ -166,6 +166,53 @@ void record_loss(gpu::Recording& recording, passes::PassCache& cache, const Fram
 
 namespace {
 
+/// A driver may limit the iterations of an invocation: each strip of the tiles has its own dispatch.
+template <class Backward>
+void record_rays_backward(gpu::Recording& recording, const passes::Pass<Backward>& backward,
+                          const FrameBuffers& frame, const FrameInputs& inputs, const Sorted& sorted,
+                          const shared::BlendPush& blend) {
+    recording.fill(frame.slots, 0, 0, frame.sizes.slots);
+    for (uint32_t strip = 0; strip < passes::strips_of(backward.config); ++strip)
+        backward.record(recording,
+                        {.records = frame.records,
+                         .splats = *sorted.splats,
+                         .tile_starts = frame.tile_starts,
+                         .planes = frame.planes,
+                         .image_gradient = frame.image_gradient,
+                         .slots = frame.slots,
+                         .rays = frame.rays,
+                         .camera = camera_part(inputs)},
+                        {.blend = blend, .samples = inputs.samples, .strip = strip});
+}
+
+/// The gradient of integration along rays, to model.moments1.
+void record_backward_of_rays(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
+                             const Model& model, const FrameBuffers& frame, const FrameInputs& inputs,
+                             const Sorted& sorted) {
+    const gpu::SpecConstant kernel{shared::SPEC_KERNEL, uint32_t(plan.kernel)};
+    const shared::BlendPush blend = blend_push(cache.config(), frame, inputs.background);
+    if (plan.integrator == Integrator::ray)
+        record_rays_backward(recording, cache.get<passes::BlendRaysBackward>({kernel}), frame, inputs, sorted,
+                             blend);
+    else
+        record_rays_backward(
+            recording,
+            cache.get<passes::MarchRaysBackward>({kernel, {shared::SPEC_MODE, march_chunk(inputs.samples)}}),
+            frame, inputs, sorted, blend);
+    cache.get<passes::GatherRays>({{shared::SPEC_SH_DEGREE, plan.evaluated_degree(inputs.sh_degree)}, kernel})
+        .record(recording,
+                {.params = model.params,
+                 .camera = camera_part(inputs),
+                 .records = frame.records,
+                 .slots = frame.slots,
+                 .tile_counts = frame.tile_counts,
+                 .first_instances = frame.first_instances,
+                 .counts = frame.counts,
+                 .sorted_indices = *sorted.indices,
+                 .gradients = model.moments1},
+                update_push(model, frame, {}));
+}
+
 /// Blending: passes::BlendBackward or BlendPointsBackward.
 template <class Blending>
 void record_blend_backward_as(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame,
@@ -215,6 +262,7 @@ void record_update_as(gpu::Recording& recording, passes::PassCache& cache, const
 void record_backward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
                      const Model& model, const FrameBuffers& frame, const FrameInputs& inputs,
                      const Sorted& sorted, const Rates& rates) {
+    if (plan.rays()) return record_backward_of_rays(recording, cache, plan, model, frame, inputs, sorted);
     passes::Constants blending{{shared::SPEC_MODE, plan.absolute ? shared::BLEND_BACKWARD_ABSOLUTE : 0}};
     passes::Constants updating{{shared::SPEC_SH_DEGREE, plan.evaluated_degree(inputs.sh_degree)},
                                {shared::SPEC_MODE, update_mode(plan)}};

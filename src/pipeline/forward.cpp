@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pipeline/forward.h"
 
+#include <algorithm>
+#include <bit>
+
 #include "passes/passes.h"
 #include "pipeline/sorting.h"
 
@@ -49,6 +52,54 @@ void record_blend_as(gpu::Recording& recording, passes::PassCache& cache, const 
                                          .tile_starts = frame.tile_starts,
                                          .planes = frame.planes},
                                         blend_push(cache.config(), frame, inputs.background));
+}
+
+void record_project_rays(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
+                         const Model& model, const FrameBuffers& frame, const FrameInputs& inputs) {
+    cache
+        .get<passes::ProjectRays>(
+            {{shared::SPEC_SH_DEGREE, plan.evaluated_degree(inputs.sh_degree)},
+             {shared::SPEC_KERNEL, uint32_t(plan.kernel)},
+             {shared::SPEC_MODE, plan.integrator == Integrator::march ? shared::PROJECT_RAYS_DEEP : 0}})
+        .record(recording,
+                {.params = model.params,
+                 .camera = camera_part(inputs),
+                 .records = frame.records,
+                 .depth_keys = frame.depth_keys[0],
+                 .tile_counts = frame.tile_counts,
+                 .counts = frame.counts,
+                 .rays = frame.rays},
+                {.splats = model.splats, .planes = model.planes(), .log_scale_shift = 0});
+}
+
+void record_integrate(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
+                      const FrameBuffers& frame, const FrameInputs& inputs) {
+    const shared::BlendPush push = blend_push(cache.config(), frame, inputs.background);
+    const gpu::BufferPart camera = camera_part(inputs);
+    if (plan.integrator == Integrator::ray)
+        cache
+            .get<passes::BlendRays>({{shared::SPEC_KERNEL, uint32_t(plan.kernel)},
+                                     {shared::SPEC_MODE, kBlendModes[size_t(plan.drawing)]}})
+            .record(recording,
+                    {.records = frame.records,
+                     .splats = frame.instance_splats[1],
+                     .tile_starts = frame.tile_starts,
+                     .planes = frame.planes,
+                     .rays = frame.rays,
+                     .camera = camera},
+                    push);
+    else
+        cache
+            .get<passes::MarchRays>({{shared::SPEC_KERNEL, uint32_t(plan.kernel)},
+                                     {shared::SPEC_MODE, march_chunk(inputs.samples)}})
+            .record(recording,
+                    {.records = frame.records,
+                     .splats = frame.instance_splats[1],
+                     .tile_starts = frame.tile_starts,
+                     .planes = frame.planes,
+                     .rays = frame.rays,
+                     .camera = camera},
+                    {.blend = push, .samples = inputs.samples, .strip = 0});
 }
 
 /// The buffer of splats in depth order.
@@ -131,6 +182,14 @@ void record_tile_order(gpu::Recording& recording, passes::PassCache& cache, bool
 
 }  // namespace
 
+gpu::BufferPart camera_part(const FrameInputs& inputs) {
+    return {*inputs.camera.buffer, inputs.camera.offset, sizeof(shared::CameraBlock)};
+}
+
+uint32_t march_chunk(uint32_t samples) {
+    return std::min(std::bit_ceil(samples), 8u);
+}
+
 shared::BlendPush blend_push(const passes::KernelConfig& config, const FrameBuffers& frame,
                              const std::array<float, 3>& background) {
     const Sizes& s = frame.sizes;
@@ -153,10 +212,15 @@ Sorted record_forward(gpu::Recording& recording, passes::PassCache& cache, const
                       const Model& model, const FrameBuffers& frame, const FrameInputs& inputs) {
     recording.fill(frame.counts, 0, 0,
                    inputs.keep_overflow ? offsetof(shared::Counts, overflowed) : sizeof(shared::Counts));
-    record_project(recording, cache, plan, model, frame, inputs);
+    if (plan.rays())
+        record_project_rays(recording, cache, plan, model, frame, inputs);
+    else
+        record_project(recording, cache, plan, model, frame, inputs);
     record_tile_lists(recording, cache, plan.gradients, model.splats, frame);
     passes::Constants variant{{shared::SPEC_MODE, kBlendModes[size_t(plan.drawing)]}};
-    if (plan.points()) {
+    if (plan.rays()) {
+        record_integrate(recording, cache, plan, frame, inputs);
+    } else if (plan.points()) {
         variant.push_back({shared::SPEC_NEAREST, plan.nearest});
         record_blend_as<passes::BlendPoints>(recording, cache, frame, inputs, variant);
     } else {

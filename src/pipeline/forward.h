@@ -28,6 +28,12 @@ Sorted record_forward(gpu::Recording& recording, passes::PassCache& cache, const
 void record_tile_lists(gpu::Recording& recording, passes::PassCache& cache, bool gradients, uint32_t splats,
                        const FrameBuffers& frame);
 
+/// The camera's block, as a binding.
+gpu::BufferPart camera_part(const FrameInputs& inputs);
+
+/// Intervals of a ray that a march evaluates together.
+uint32_t march_chunk(uint32_t samples);
+
 shared::BlendPush blend_push(const passes::KernelConfig& config, const FrameBuffers& frame,
                              const std::array<float, 3>& background);
 

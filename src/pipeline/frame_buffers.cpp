@@ -88,6 +88,7 @@ std::vector<Allocation> allocations(FrameBuffers& f, const Sizes& s) {
     std::vector<Allocation> all{
         {&f.overlay, "overlay", s.overlay, Texel::any},
         {&f.records, "records", s.records, floats},
+        {&f.rays, "rays", s.rays, floats},
         {&f.order[0], "order", s.splat_words, words},
         {&f.tile_counts, "tile counts", s.splat_words},
         {&f.prefix, "prefix", s.splat_words},
@@ -152,6 +153,7 @@ Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request)
 
     const uint64_t word = 4, texel = 16;
     s.records = std::max<uint64_t>(request.splats, 1) * shared::RECORD_TEXELS * texel;
+    s.rays = request.rays ? std::max<uint64_t>(request.splats, 1) * shared::RAY_TEXELS * texel : 0;
     s.splat_words = std::max<uint64_t>(request.splats, 1) * word;
     s.scan_totals = (uint64_t(s.scan_blocks) + 1) * word;
     s.counters = std::max(counter_words(s.depth_sort), counter_words(s.tile_sort)) * word;
@@ -177,7 +179,8 @@ Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request)
         s.reduced = 2 * uint64_t(s.reduce_blocks) * word;
     }
     if (request.gradients) {
-        s.slots = std::max<uint64_t>(request.instances, 1) * shared::SLOT_FLOATS * word;
+        const uint32_t slot = request.rays ? shared::RAY_SLOT_FLOATS : shared::SLOT_FLOATS;
+        s.slots = std::max<uint64_t>(request.instances, 1) * slot * word;
         if (request.overlaid) s.overlay = overlay_bytes(s);
     }
     return s;

@@ -15,6 +15,7 @@ struct FrameRequest {
     uint32_t instances = 0;          // capacity for (splat, tile) pairs
     bool gradients = false;
     bool fifth_plane = false;  // of the image: depth or count
+    bool rays = false;         // splats are integrated along rays
     bool masks = false;        // with gradients: some pixels count less
     bool exposure = false;     // with gradients: a training image's exposure is applied before the loss
     // With gradients: dL/d(image) comes from outside, in 5 planes. There are no buffers for a loss.
@@ -46,7 +47,7 @@ struct Sizes {
     uint64_t records = 0, splat_words = 0, scan_totals = 0, counters = 0, digit_totals = 0;
     uint64_t instance_words = 0, tile_starts = 0, planes = 0, target = 0;
     uint64_t masked = 0, exposed = 0, moments = 0, derivatives = 0, image_gradient = 0, partial_sums = 0,
-             exposure_sums = 0, reduced = 0, slots = 0;
+             exposure_sums = 0, reduced = 0, slots = 0, rays = 0;
     uint64_t overlay = 0;  // of the memory that overlaid buffers share
 
     uint64_t total() const;  // of all buffers of a frame with this request
@@ -69,7 +70,7 @@ struct FrameBuffers {
     gpu::Buffer counters, counter_prefix, digit_totals;
     gpu::Buffer instance_keys[2], instance_splats[2], sorted_indices[2], tile_starts;
     gpu::Buffer planes, target, exposed, masked, moments, derivatives, blurred, image_gradient, partials,
-        exposure_sums, reduced, slots;
+        exposure_sums, reduced, slots, rays;
     // With FrameRequest::overlaid. The buffers in it hold, one after another, the pairs of the depth sort, those of the
     // tile sort, the planes of the loss, and the gradient slots.
     gpu::Buffer overlay;

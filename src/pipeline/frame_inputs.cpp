@@ -78,7 +78,8 @@ gpu::Buffer upload_camera(gpu::Device& device, const Camera& camera, const passe
 FrameInputs inputs_of(const gpu::Buffer& block, const Camera& camera, const RenderOptions& options) {
     return {.camera = {.buffer = &block, .width = uint32_t(camera.width), .height = uint32_t(camera.height)},
             .background = options.background,
-            .sh_degree = options.sh_degree};
+            .sh_degree = options.sh_degree,
+            .samples = uint32_t(std::max(options.samples, 1))};
 }
 
 gpu::Buffer upload_photo(gpu::Device& device, const Image& image, bool round_to_8_bit) {

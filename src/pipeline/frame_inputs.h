@@ -24,6 +24,7 @@ struct FrameInputs {
     std::array<float, 3> background{0, 0, 0};
     bool keep_overflow = false;    // the frame before may not be done: if it overflows, this one does nothing
     int sh_degree = kMaxShDegree;  // evaluated: at most this, and at most what the plan stores
+    uint32_t samples = 1;          // of a ray, with Integrator::march
 };
 
 /// A camera as the shaders read it: each float64 value in two floats. origin: of the scene's means, world

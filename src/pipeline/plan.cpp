@@ -4,21 +4,52 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ewa/error.h"
 #include "pipeline/model.h"
+#include "shared/layouts.h"
 
 namespace ewa::pipeline {
+
+namespace {
+
+void check_integrator(const PlanRequest& request) {
+    const Integrator integrator = request.render.integrator;
+    if (integrator == Integrator::splat) return;
+    const std::string name = integrator == Integrator::ray ? "ray" : "march";
+    const auto refuse = [&](const std::string& why) {
+        throw InputError("the integrator " + name + " " + why);
+    };
+    if (request.render.points) refuse("has no points; splat draws them");
+    if (request.purpose == Purpose::training) refuse("cannot train; splat can");
+    if (request.render.kernel == Footprint::antialias)
+        refuse("has no footprints to antialias; the kernels peak and density can be used");
+    if (request.drawing == Drawing::count || request.drawing == Drawing::ellipsoids)
+        refuse("draws neither counts nor ellipsoids; splat does");
+    if (integrator == Integrator::march && request.drawing == Drawing::depth)
+        refuse("draws no depth; splat and ray do");
+    if (request.debug && request.splat_scale != 1)
+        refuse("draws splats at their own scale; splat draws others");
+    if (integrator == Integrator::march &&
+        (request.render.samples < 1 || request.render.samples > kMostSamples))
+        refuse("takes 1 to " + std::to_string(kMostSamples) + " samples, not " +
+               std::to_string(request.render.samples));
+}
+
+}  // namespace
 
 uint32_t Plan::evaluated_degree(int wanted) const {
     return uint32_t(std::clamp(wanted, 0, stored_degree));
 }
 
 Plan plan_for(const PlanRequest& request) {
+    check_integrator(request);
     Plan plan;
     plan.stored_degree = request.scene_degree;
     plan.kernel = request.render.kernel;
     // An ellipsoid of equal scales is the sphere itself.
     const bool solid = request.purpose == Purpose::picture && request.drawing == Drawing::ellipsoids;
     if (request.render.points && !solid) plan.nearest = uint32_t(request.render.nearest);
+    plan.integrator = request.render.integrator;
     if (request.purpose == Purpose::picture) {
         plan.stored_degree = std::clamp(request.render.sh_degree, 0, request.present_degree);
         plan.drawing = request.drawing;
@@ -69,6 +100,9 @@ std::vector<PlanLine> describe(const Plan& plan, int scene_degree, uint64_t spla
         lines.push_back({"opacities and rotations", "a sphere has none (--points)", 0});
         return lines;
     }
+    if (!plan.rays())
+        lines.push_back({"how rays meet splats, and their order along each ray",
+                         "not asked for (--integrator)", shared::RAY_TEXELS * 16 * splats});
     if (plan.kernel == Footprint::peak)
         lines.push_back({"footprint factor of the opacity", "the kernel is normalised to its peak", 0});
     return lines;

@@ -43,6 +43,7 @@ struct Plan {
     int stored_degree = 0;  // SH degree in the device's parameters; a frame evaluates at most this
     Footprint kernel = Footprint::peak;
     uint32_t nearest = 0;  // spheres at a pixel; 0: splats are drawn as footprints
+    Integrator integrator = Integrator::splat;
     Drawing drawing = Drawing::color;
     bool debug = false;
     float log_scale_shift = 0;    // with debug: added to every log scale
@@ -61,6 +62,8 @@ struct Plan {
     int moment_buffers() const { return adam && !packed_moments ? 2 : gradients ? 1 : 0; }
     /// Whether the image has a fifth plane: depth or count.
     bool fifth_plane() const { return drawing == Drawing::depth || drawing == Drawing::count; }
+    /// Whether splats are integrated along rays.
+    bool rays() const { return integrator != Integrator::splat; }
     /// The SH degree that a frame evaluates.
     uint32_t evaluated_degree(int wanted) const;
 };

@@ -92,7 +92,8 @@ void Renderer::State::submit(const Camera& camera, const Plan& plan, const Rende
                             .width = inputs.camera.width,
                             .height = inputs.camera.height,
                             .instances = std::max(frame.instance_capacity, first_capacity(model.splats)),
-                            .fifth_plane = plan.fifth_plane()};
+                            .fifth_plane = plan.fifth_plane(),
+                            .rays = plan.rays()};
     counts = run_until_it_fits(cache, executor, frame, size, [&](gpu::Recording& recording) {
         record_forward(recording, cache, plan, model, frame, inputs);
         then(recording);
@@ -106,6 +107,8 @@ Plan Renderer::State::plan_of(const DrawOptions& o) const {
     drawing.render.kernel = o.render.kernel;
     drawing.render.points = o.render.points;
     drawing.render.nearest = o.render.nearest;
+    drawing.render.integrator = o.render.integrator;
+    drawing.render.samples = o.render.samples;
     drawing.drawing = o.drawing;
     drawing.debug = true;
     drawing.splat_scale = o.splat_scale;
@@ -210,6 +213,7 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
                             .height = inputs.camera.height,
                             .instances = first_capacity(model.splats),
                             .gradients = true,
+                            .rays = plan.rays(),
                             .masks = plan.masks,
                             .overlaid = true};
     FrameBuffers frame;

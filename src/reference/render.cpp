@@ -4,6 +4,7 @@
 #include "reference/blend.h"
 #include "reference/points.h"
 #include "reference/projection.h"
+#include "reference/rays.h"
 
 namespace ewa::reference {
 
@@ -11,6 +12,13 @@ Picture render(const Values& values, const Camera& camera, const RenderOptions& 
                const ReferenceOptions& reference) {
     if (options.points) return render_points(values, camera, options);
     Picture out;
+    if (options.integrator != Integrator::splat) {
+        const Rays rays(values, camera, options, reference.smoothing);
+        out.projected = rays.projected();
+        for (const Projected& each : out.projected) out.skipped_nonfinite += each.skipped_nonfinite;
+        out.blended = rays.picture();
+        return out;
+    }
     for (size_t i = 0; i < values.size(); ++i) {
         out.projected.push_back(project(values, i, camera, options));
         if (out.projected.back().skipped_nonfinite) ++out.skipped_nonfinite;
@@ -32,6 +40,11 @@ ReferenceGradient loss_gradient(const Values& values, const Camera& camera, cons
     out.l1 = loss.l1;
     out.ssim = loss.ssim;
     out.picture_gradient = loss.gradient;
+    if (options.integrator != Integrator::splat) {
+        out.gradient = Rays(values, camera, options, reference.smoothing).gradient(loss.gradient);
+        for (const Projected& each : out.picture.projected) out.in_view.push_back(each.visible);
+        return out;
+    }
     out.blend = blend_backward(out.picture.projected, out.picture.instances, out.picture.blended,
                                loss.gradient, reference.smoothing);
     out.gradient = zeros_like(values);

@@ -27,6 +27,7 @@ struct Picture {
     uint32_t skipped_nonfinite = 0;
 };
 
+/// With an integrator along rays, the picture has no order and no instances.
 Picture render(const Values& values, const Camera& camera, const RenderOptions& options,
                const ReferenceOptions& reference = {});
 

@@ -32,6 +32,24 @@ class Typed : public testing::Test {
     Folder folder;
 };
 
+TEST_F(Typed, IntegratorsTakeWhatTheyCanUse) {
+    const auto render = [&](const std::vector<std::string>& more) {
+        std::vector<std::string> arguments{"render", folder / "s.ply", "--cameras", folder / "data",
+                                           "-o",     folder / "out"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return run_ewa(arguments);
+    };
+    expect_failure(render({"--samples", "8"}), 2,
+                   "--samples: only --integrator march takes samples of a ray");
+    expect_failure(render({"--integrator", "march", "--samples", "5000"}), 2, "--samples");
+    expect_failure(render({"--integrator", "ray", "--antialias"}), 2,
+                   "--integrator ray: there are no footprints to antialias");
+    expect_failure(render({"--integrator", "march", "--mode", "depth"}), 2,
+                   "the integrator march draws no depth; splat and ray do");
+    const Outcome drawn = render({"--integrator", "march", "--samples", "4"});
+    EXPECT_EQ(drawn.status, 0) << drawn.err;
+}
+
 TEST_F(Typed, MistypedWordsAreRecognised) {
     expect_failure(run_ewa({"trian", "photos"}), 2,
                    "unknown command 'trian'; did you mean train? (see ewa --help)");
@@ -47,6 +65,10 @@ TEST_F(Typed, MistypedWordsAreRecognised) {
     expect_failure(run_ewa({"eval", "s.ply", "data", "--masks", "foo"}), 2,
                    "'foo' is not one of auto, ignore, cut, none");
     expect_failure(run_ewa({"train", "photos", "--steps"}), 2, "--steps needs a value: N");
+    expect_failure(run_ewa({"eval", "s.ply", "data", "--integrator", "rya"}), 2,
+                   "--integrator: 'rya' is not one of splat, ray, march; did you mean ray?");
+    expect_failure(run_ewa({"train", "photos", "--integrator", "ray"}), 2,
+                   "unexpected arguments: --integrator ray");
     expect_failure(run_ewa({}), 2, "a subcommand is required: train, render");
 #ifdef EWA_VIEW_PROGRAM
     const Circumstances viewer{.program = EWA_VIEW_PROGRAM};

@@ -119,6 +119,18 @@ void compile_points(Compiler& compiler) {
                                               packed | statistics, packed | statistics | UPDATE_ABSOLUTE}}});
 }
 
+void compile_rays(Compiler& compiler) {
+    using namespace shared;
+    const Values kernels = {KERNEL_PEAK, KERNEL_DENSITY}, chunks = {1, 2, 4, 8};
+    compiler.compile<passes::ProjectRays>(
+        {{SPEC_SH_DEGREE, kDegrees}, {SPEC_KERNEL, kernels}, {SPEC_MODE, {0, PROJECT_RAYS_DEEP}}});
+    compiler.compile<passes::BlendRays>({{SPEC_KERNEL, kernels}, {SPEC_MODE, {BLEND_COLOR, BLEND_DEPTH}}});
+    compiler.compile<passes::MarchRays>({{SPEC_KERNEL, kernels}, {SPEC_MODE, chunks}});
+    compiler.compile<passes::BlendRaysBackward>({{SPEC_KERNEL, kernels}});
+    compiler.compile<passes::MarchRaysBackward>({{SPEC_KERNEL, kernels}, {SPEC_MODE, chunks}});
+    compiler.compile<passes::GatherRays>({{SPEC_SH_DEGREE, kDegrees}, {SPEC_KERNEL, kernels}});
+}
+
 void compile_training(Compiler& compiler) {
     using namespace shared;
     compiler.compile<passes::UnpackTarget>({{SPEC_COLOR_FLOATS, {0, 1}}});
@@ -200,6 +212,7 @@ int main(int argc, char** argv) {
         Compiler compiler(*device);
         compile_splatting(compiler);
         compile_points(compiler);
+        compile_rays(compiler);
         compile_training(compiler);
         compile_operators(compiler);
         compile_path_tracer(compiler);

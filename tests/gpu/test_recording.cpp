@@ -405,7 +405,7 @@ struct FrameParts {
 };
 SharedByTests<FrameParts>* const frame_parts = SharedByTests<FrameParts>::add();
 
-/// The commands of a step of training, an opacity reset, a picture with depth, and a gradient, also of points.
+/// The commands of a step of training, an opacity reset, a picture with depth, and gradients, also of points and along rays.
 std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     Rig& r = rig();
     const Scene scene = random_scene(3000, 50, SplatKind::ordinary, 61, 47, 2);
@@ -422,6 +422,7 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
                    .instances = 4096,
                    .gradients = true,
                    .fifth_plane = true,
+                   .rays = true,
                    .masks = true,
                    .exposure = true,
                    .overlaid = true});
@@ -461,6 +462,17 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     record_loss(points, r.cache, frame, inputs, photo);
     record_backward(points, r.cache, plan_for(request), model, frame, inputs, listed, {});
     out.push_back(points.commands());
+
+    request.render.points = false;
+    request.drawing = Drawing::color;
+    for (const Integrator integrator : {Integrator::ray, Integrator::march}) {
+        request.render.integrator = integrator;
+        gpu::Recording rays = r.recording();
+        const auto met = record_forward(rays, r.cache, plan_for(request), model, frame, inputs);
+        record_loss(rays, r.cache, frame, inputs, photo);
+        record_backward(rays, r.cache, plan_for(request), model, frame, inputs, met, {});
+        out.push_back(rays.commands());
+    }
     for (const auto& commands : out)
         for (const Command& command : commands)
             if (command.pipeline) pipelines.push_back(command.pipeline->name());

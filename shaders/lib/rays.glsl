@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+// Splats as the rays of a tile meet them. One subgroup owns one tile, and walks it in strips of ROW_STEP rows: a lane has one
+// pixel of a strip.
+//
+// With the whitener M = S^-1 R^T, m the mean in camera coordinates, and v the ray's direction with v.z = 1, the ray is
+// a + t b with a = -M m and b = M v; t is the view depth. Rotated so that b at the mean is (0, 0, |b|), and with u, v of the
+// footprint without a low-pass, q = u^2 + v^2, h = 1 + g . (pixel - mean), rho = sqrt(2) / |a| and s = rho^2 q + h^2:
+//   b = |b at the mean| (rho u, rho v, h)         middle, the point of the ray closest to the mean: t = z h / s
+//   x, that point: sqrt(2) / s (h u, h v, -rho q)  power: -x.x / 2 = -q / s
+// In these terms nothing cancels. The affine footprint is the case s = 1.
+//
+// Gradient. With G = dL/d(ln depth), and S1, S2 by the borders of marching (0 without), each splat needs sums over its rays of
+//   W = -G x x^T + S1 (b x^T + x b^T) + (S2 - share G) b b^T,   V = -G x + S1 b,   b of length 1
+// where share is 1 for KERNEL_DENSITY: W = dL/dM M^-1, V = dL/da.
+//
+// Needs tile.glsl. The including pass declares rays before this file.
+#ifndef EWA_LIB_RAYS
+#define EWA_LIB_RAYS
+#include "lib/camera.glsl"
+
+const float NEVER = 3.402823466e38;
+
+struct RaySplat {
+    uint at;             // its instance
+    vec4 mean, shape, bend;
+    vec4 color;          // and z
+};
+
+struct Meeting {
+    float u, v, q, h, s;
+    float root;   // of s
+    float depth;  // optical depth of the whole ray
+    float middle; // view depth
+};
+
+struct Ray {
+    vec2 pixel;    // centre
+    float norm;  // of the direction
+};
+
+Ray ray_through(vec2 pixel) {
+    const vec2 tangent = (pixel - vec2(camera.center_hi[0], camera.center_hi[1])) / vec2(camera.focal_hi[0], camera.focal_hi[1]);
+    return Ray(pixel, sqrt(1.0 + dot(tangent, tangent)));
+}
+
+// The lane's pixel in a strip of the tile, and the strip's first row of pixel centres.
+uvec2 strip_pixel(uint tile, uint strip) {
+    const uint lane = LANE;
+    return uvec2((tile % push.tiles[0]) * TILE_WIDTH + lane % TILE_WIDTH,
+                 (tile / push.tiles[0]) * TILE_HEIGHT + lane / TILE_WIDTH + strip * ROW_STEP);
+}
+float strip_top(uint tile, uint strip) { return float((tile / push.tiles[0]) * TILE_HEIGHT + strip * ROW_STEP) + 0.5; }
+
+RaySplat read_ray_splat(uint at) {
+    const uint splat = splats[at];
+    return RaySplat(at, fetch(rays, RAY_TEXELS * splat), fetch(rays, RAY_TEXELS * splat + 1u),
+                    fetch(rays, RAY_TEXELS * splat + 2u), fetch(records, RECORD_TEXELS * splat + 2u));
+}
+
+// The splat that lane j has.
+RaySplat shared_ray_splat(RaySplat own, uint j) {
+    return RaySplat(subgroupShuffle(own.at, j), shuffled(own.mean, j), shuffled(own.shape, j), shuffled(own.bend, j),
+                    shuffled(own.color, j));
+}
+
+// Splats that are evaluated in one unrolled block. Between blocks the lanes' splats move down by as many lanes: shuffles from
+// a constant lane are fast on a CPU, and what is unrolled stays small.
+const uint RAY_BLOCK = SUBGROUP < 4u ? SUBGROUP : 4u;
+void move_down(inout RaySplat own) { own = shared_ray_splat(own, (LANE + RAY_BLOCK) % SUBGROUP); }
+
+Meeting meet(RaySplat r, Ray ray) {
+    Meeting m;
+    EXACT const float dx = (ray.pixel.x - r.mean.x) - r.mean.z;
+    EXACT const float dy = (ray.pixel.y - r.mean.y) - r.mean.w;
+    EXACT const float u = r.shape.x * (dx - r.shape.y * dy), v = r.shape.z * dy;
+    EXACT const float q = min(u * u + v * v, 1e36);
+    EXACT const float h = clamp(1.0 + (r.bend.x * dx + r.bend.y * dy), -1e18, 1e18);
+    EXACT const float s = r.bend.z * r.bend.z * q + h * h;
+    EXACT const float root = sqrt(s);
+    EXACT const float power = -q / s;
+    EXACT const float depth = (KERNEL == KERNEL_DENSITY ? r.shape.w * ray.norm / root : r.shape.w) * exp(power);
+    EXACT const float middle = r.color.w * (h / s);
+    m.u = u;
+    m.v = v;
+    m.q = q;
+    m.h = h;
+    m.s = s;
+    m.root = root;
+    m.depth = depth;
+    m.middle = middle;
+    return m;
+}
+
+// Instances of the tile that the strip's rays can meet.
+#ifndef CHOSEN_ROOM
+#define CHOSEN_ROOM (CHOSEN_MOST + PEEK * SUBGROUP)
+#endif
+const uint CHOSEN_MOST = 256u;
+const uint PEEK = 4u;  // lanes' worths of instances looked at together: a driver may limit the iterations
+shared uint chosen[CHOSEN_ROOM];
+
+// Appends instances of [k, end) whose ellipse reaches a row of pixels between top and bottom, and whose view depths meet
+// [from, to]. Stops when there are CHOSEN_MOST. Returns their number; k: the first instance that was not looked at.
+uint choose(inout uint k, uint end, float top, float bottom, float from, float to) {
+    subgroupBarrier();  // the last ones have been read
+    uint count = 0u;
+    while (k < end && count < CHOSEN_MOST) {
+        [[unroll]] for (uint b = 0u; b < PEEK; ++b) {
+            const uint at = k + b * SUBGROUP + LANE;
+            const uint splat = splats[min(at, end - 1u)];
+            const vec4 record0 = fetch(records, RECORD_TEXELS * splat), record1 = fetch(records, RECORD_TEXELS * splat + 1u);
+            const float z = fetch(records, RECORD_TEXELS * splat + 2u).w, least = fetch(rays, RAY_TEXELS * splat + 2u).w;
+            const float half_height = 1.002 / record1.z + 1e-3;
+            const bool keep = at < end && top <= record0.y + half_height && bottom >= record0.y - half_height &&
+                              least <= to && 2.0 * z - least >= from;
+            const uint rank = subgroup_inclusive_sum(keep ? 1u : 0u);
+            if (keep) chosen[count + rank - 1u] = at;
+            count += subgroupShuffle(rank, SUBGROUP - 1u);
+        }
+        k += PEEK * SUBGROUP;
+    }
+    subgroupMemoryBarrierShared();
+    subgroupBarrier();
+    return count;
+}
+
+// The splat that this lane reads of those from `first` on. Beyond the last, one whose depth is 0.
+RaySplat read_chosen(uint first, uint count) {
+    RaySplat own = read_ray_splat(chosen[min(first + LANE, count - 1u)]);
+    own.shape.w = first + LANE < count ? own.shape.w : 0.0;
+    return own;
+}
+
+float subgroup_min(float x) {
+    [[unroll]] for (uint s = 0u; s < DOUBLINGS; ++s) {
+        if ((1u << s) < SUBGROUP) x = min(x, subgroupShuffleXor(x, 1u << s));
+    }
+    return x;
+}
+
+uint subgroup_min(uint x) {
+    [[unroll]] for (uint s = 0u; s < DOUBLINGS; ++s) {
+        if ((1u << s) < SUBGROUP) x = min(x, subgroupShuffleXor(x, 1u << s));
+    }
+    return x;
+}
+#endif

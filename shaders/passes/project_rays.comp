@@ -1,0 +1,139 @@
+#version 460
+// SPDX-License-Identifier: Apache-2.0
+// Prepares splats for integration along rays.
+// One invocation owns splat i. It reads its parameters and the camera, and writes how rays meet it, its record, its depth key
+// and the number of tiles that it reaches. The record has an ellipse for the tiles' lists: the outline of the ellipsoid
+// outside of which no ray counts. Under perspective that is exactly an ellipse, unless the ellipsoid reaches the plane of the
+// eye; then all tiles list the splat. The key is the least view depth of the ellipsoid.
+// SPEC_MODE: PROJECT_RAYS_DEEP.
+#extension GL_GOOGLE_include_directive : require
+#define BINDING_CAMERA 1
+#include "lib/prelude.glsl"
+#include "lib/stored_splat.glsl"
+#include "lib/ray_shape.glsl"
+#include "lib/footprint.glsl"
+
+layout(local_size_x_id = SPEC_GROUP_SIZE) in;
+layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3;
+layout(constant_id = SPEC_MODE) const uint MODE = 0;
+
+TEXELS(0, params);
+layout(set = 0, binding = 2, scalar) writeonly buffer Records { vec4 records[]; };
+layout(set = 0, binding = 3, scalar) writeonly buffer DepthKeys { uint depth_keys[]; };
+layout(set = 0, binding = 4, scalar) writeonly buffer TileCounts { uint tile_counts[]; };
+layout(set = 0, binding = 5, scalar) buffer CountsBlock { Counts counts; };
+layout(set = 0, binding = 6, scalar) writeonly buffer Rays { vec4 rays[]; };
+layout(push_constant, scalar) uniform Push { ProjectPush push; };
+#include "lib/splat_color.glsl"
+
+// The least optical depth that counts.
+float depth_min() {
+    return MODE == PROJECT_RAYS_DEEP ? float(MARCH_DEPTH_MIN) : CUT_OFF * (1.0 + CUT_OFF * (0.5 + CUT_OFF / 3.0));
+}
+
+// Longest direction of a ray through the image, with z = 1.
+float longest_direction() {
+    const vec2 focal = vec2(camera.focal_hi[0], camera.focal_hi[1]), center = vec2(camera.center_hi[0], camera.center_hi[1]);
+    const vec2 far = max(abs(center), abs(vec2(camera.size[0], camera.size[1]) - center)) / focal;
+    return sqrt(1.0 + dot(far, far));
+}
+
+// Where the ellipsoid x.x = 2 reach projects to: u^2 + v^2 <= K^2 (1 + g . (u, v))^2.
+struct Outline {
+    bool ellipse;
+    float k2;      // K^2
+    vec2 g;        // by (u, v)
+    float bend2;   // K^2 |g|^2
+};
+
+Outline outline_of(RayShape r, float reach) {
+    Outline o;
+    const float inside = reach * r.rho * r.rho;
+    o.k2 = reach / (1.0 - inside);
+    o.g = vec2(r.bend.x / r.ux, (r.bend.x * r.k + r.bend.y) / r.vy);
+    o.bend2 = o.k2 * dot(o.g, o.g);
+    o.ellipse = inside < 0.999 && o.bend2 < 0.999;
+    return o;
+}
+
+// Half the squared radius of the ellipsoid that holds every ray that counts, in standard deviations; below 0: there is none.
+float reach_of(RayShape r) {
+    if (KERNEL != KERNEL_DENSITY) return log(r.depth / depth_min());
+    // Of all directions, that with the least shadow has the most depth. Inside the ellipsoid that follows from it, |b| has a
+    // better bound, which gives a smaller ellipsoid.
+    const float most = r.depth * longest_direction(), least = min(min(r.sharpness.x, r.sharpness.y), r.sharpness.z);
+    float reach = log(most / depth_min()) + log(robust_length((vec3(r.view.x.x, r.view.y.x, r.view.z.x) / r.view.z.x * r.directions) * r.sharpness) / least);
+    [[unroll]] for (int i = 0; i < 2; ++i) {
+        const Outline o = outline_of(r, reach);
+        if (reach > 0.0 && o.ellipse) reach = min(reach, log(most * (1.0 + sqrt(o.bend2)) / depth_min()));
+    }
+    return reach;
+}
+
+// The ellipse as a footprint that reaches to u^2 + v^2 = 1.
+void outline_record(RayShape r, vec2 mean, float reach, out vec4 record0, out vec4 record1) {
+    const float opacity = 2.718281828 * CUT_OFF;
+    const Outline o = outline_of(r, reach);
+    if (!o.ellipse) {
+        record0 = vec4(0.5 * vec2(camera.size[0], camera.size[1]), 0.0, 0.0);
+        record1 = vec4(1e-9, 0.0, 1e-9, opacity);
+        return;
+    }
+    const float rest = 1.0 - o.bend2;
+    const vec2 middle = o.g * (o.k2 / rest);
+    // E = rest / K^2 (1 - K^2 g g^T) is the ellipse's matrix, e its Cholesky factor.
+    const float e11 = sqrt(rest / o.k2 * (1.0 - o.k2 * o.g.x * o.g.x));
+    const float e12 = -rest * o.g.x * o.g.y / e11, e22 = rest / o.k2 * sqrt(rest) / e11;
+    const float dy = middle.y / r.vy;
+    record0 = vec4(mean + vec2(middle.x / r.ux + r.k * dy, dy), 0.0, 0.0);
+    record1 = vec4(e11 * r.ux, r.k - e12 * r.vy / (e11 * r.ux), e22 * r.vy, opacity);
+}
+
+void project(uint i) {
+    const vec4 p0 = param(0, i), p1 = param(1, i), p2 = param(2, i);
+    const StoredSplat splat = StoredSplat(p0.xyz, p0.w, p1, p2.xyz);
+    const StoredProjection stored = project_splat(splat);
+    const View view = stored.footprint.view;
+    const RayShape r = ray_shape(view, camera_lens(), stored.unit_quaternion, splat.log_scale, splat.logit);
+    const float z = view.z.x;
+    bool finite_color;
+    const vec3 color = sh_color(i, p2, normalize(view.offset), finite_color);
+
+    const vec2 x = pixel_position(view.x, view.z, 0), y = pixel_position(view.y, view.z, 1);
+    const vec4 mean = vec4(x.x, y.x, x.y, y.y), shape = vec4(r.ux, r.k, r.vy, r.depth);
+    const float reach = reach_of(r) * 1.00001 + 1e-5;
+    const mat3 rows = transpose(r.directions);
+    const vec3 scale = r.least_scale / r.sharpness;
+    // Less the rounding of a ray's middle.
+    const float least = z - sqrt(2.0 * max(reach, 0.0)) * robust_length(rows[2] * scale) * 1.00001 - 1e-6 * z;
+    const vec4 bend = vec4(r.bend, r.rho, least);
+
+    const bool stored_finite = is_finite(p0) && is_finite(p1) && is_finite(p2.xyz) && stored.in_range;
+    const bool in_front = z > float(NEAR_PLANE);
+    const bool projected_finite = stored.footprint.footprint_in_range && finite_color && is_finite(mean) && is_finite(shape) &&
+                                  is_finite(bend) && r.ux > 0.0 && r.vy > 0.0;
+    const bool visible = stored_finite && in_front && projected_finite && sigmoid(p0.w) >= float(ALPHA_MIN) && reach > 0.0;
+
+    uint count = 0u;
+    vec4 record0 = vec4(0.0), record1 = vec4(1.0, 0.0, 1.0, 0.0);
+    if (visible) {
+        outline_record(r, mean.xy, reach, record0, record1);
+        const uvec2 size = uvec2(camera.size[0], camera.size[1]);
+        const Footprint f = footprint_of(record0, record1, size);
+        count = count_tiles(f, f.row_begin, f.row_end, size);
+    }
+    rays[RAY_TEXELS * i] = mean;
+    rays[RAY_TEXELS * i + 1] = shape;
+    rays[RAY_TEXELS * i + 2] = bend;
+    records[RECORD_TEXELS * i] = record0;
+    records[RECORD_TEXELS * i + 1] = record1;
+    records[RECORD_TEXELS * i + 2] = vec4(color, z);
+    depth_keys[i] = count > 0u ? floatBitsToUint(max(least, float(NEAR_PLANE))) : 0xffffffffu;
+    tile_counts[i] = count;
+    if (!stored_finite || (in_front && !projected_finite)) atomicAdd(counts.skipped_nonfinite, 1u);
+}
+
+void main() {
+    const uint i = item_index();
+    if (i < push.splats) project(i);
+}
