@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/matrix.hpp>
 #include <limits>
 
 #include "ewa/error.h"
@@ -13,6 +14,7 @@
 #include "passes/passes.h"
 #include "pipeline/backward.h"
 #include "reference/training.h"
+#include "shared/constants.h"
 #include "support/gradient_check.h"
 
 namespace ewa::test {
@@ -86,6 +88,8 @@ INSTANTIATE_TEST_SUITE_P(All, Points,
                                          PointsCase{SplatKind::sub_pixel, 302, 53, 39, 1, 8},
                                          PointsCase{SplatKind::off_screen_and_close, 303, 53, 39, 1, 8},
                                          PointsCase{SplatKind::mixed, 3000, 160, 120, 1, 8},
+                                         // A pixel position has few digits left behind the point.
+                                         PointsCase{SplatKind::sub_pixel, 304, 8192, 4, 0, 8},
                                          PointsCase{SplatKind::ordinary, 1, 17, 3, 1, 8}),
                          [](const testing::TestParamInfo<PointsCase>& tested) {
                              const PointsCase& c = tested.param;
@@ -119,6 +123,23 @@ TEST(PointsStiff, RadiiFromTinyToHuge) {
         scale_by(scene.gaussians, factor);
         expect_accurate(scene);
     }
+}
+
+TEST(PointsStiff, OnBothSidesOfTheNearPlane) {
+    Scene scene = point_scene(4315, 40, SplatKind::ordinary, 53, 39);
+    Gaussians& g = scene.gaussians;
+    const Camera& camera = scene.camera;
+    for (size_t i = 0; i < g.size(); ++i) {
+        const glm::dvec3 view = camera.rotation * g.world_mean(i) + camera.translation;
+        const double share = (i % 2 == 0 ? 0.95 : 1.05) * shared::NEAR_PLANE / view.z;
+        const glm::dvec3 mean = glm::transpose(camera.rotation) * (share * view - camera.translation);
+        for (int k = 0; k < 3; ++k) {
+            g.means[3 * i + size_t(k)] = float(mean[k]);
+            g.log_scales[3 * i + size_t(k)] += float(std::log(share));
+        }
+    }
+    EXPECT_EQ(reference::render(g, camera, scene.options).order.size(), 20u);
+    expect_accurate(scene);
 }
 
 TEST(PointsStiff, FarFromTheOrigin) {
