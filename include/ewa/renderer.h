@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "ewa/camera.h"
+#include "ewa/camera_motion.h"
 #include "ewa/device.h"
 #include "ewa/gaussians.h"
 #include "ewa/image.h"
@@ -59,7 +60,8 @@ class Renderer {
 
 struct LossGradient {
     double loss = 0, l1 = 0, ssim = 0;
-    Gaussians gradient;  // dL/d(stored value) in place of each stored value
+    Gaussians gradient;   // dL/d(stored value) in place of each stored value
+    CameraMotion camera;  // dL/d(each value of the camera's motion), for no motion; zero with `points`
     uint32_t skipped_nonfinite = 0;
 };
 

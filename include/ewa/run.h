@@ -111,6 +111,7 @@ struct RunResult {
 /// - metrics.jsonl: a MetricsLine every 1 % of the steps and at each evaluation.
 /// - checkpoint.ewa: the state to resume from.
 /// - splats.ply: the splats.
+/// - cameras.json and the COLMAP model cameras/sparse/0, with TrainOptions::refine_poses: the refined cameras.
 /// - exposures.json, with TrainOptions::exposure: three rows of four numbers for each training image.
 /// - test/*.png: renders of some test views (train/*.png without a test set).
 /// - summary.json: the Summary.

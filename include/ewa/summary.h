@@ -7,6 +7,15 @@
 
 namespace ewa {
 
+/// How far training moved the cameras of the training images, and of the test images.
+struct CameraMoves {
+    double median_degrees = 0, largest_degrees = 0;  // between rotations
+    double median_share = 0, largest_share = 0;      // of the scene extent, between centres
+    double least_focal = 1, largest_focal = 1;       // factors of the focal lengths
+    bool test_aligned =
+        false;  // test_psnr and test_ssim are of cameras that were aligned to their images first
+};
+
 /// summary.json. A figure that does not exist (no test set, not evaluated) is null there. So is one that is not
 /// finite, such as the PSNR of equal images.
 struct Summary {
@@ -22,7 +31,8 @@ struct Summary {
     uint64_t dropped_updates = 0;
     uint64_t limited_steps = 0;
     std::string version, command, strategy;
-    bool interrupted = false;  // the run was stopped before its end
+    bool interrupted = false;            // the run was stopped before its end
+    std::optional<CameraMoves> cameras;  // with TrainOptions::refine_poses
 };
 
 /// A line of metrics.jsonl.

@@ -49,12 +49,10 @@ struct TrainOptions {
     bool exposure = false;  // learns an exposure for each training image, from the identity
     double exposure_rate = 0.01, exposure_rate_final = 0.001;
 
-    // Cameras. Rotations are in radians, and lengths in units of scene extent.
+    // Cameras.
     bool refine_poses = false;  // learns a rotation and a translation for each training camera, from none
     bool refine_focal = false;  // with refine_poses: also a factor of its focal lengths, from 1
-    double rotation_rate = 1e-3, rotation_rate_final = 1e-5;
-    double translation_rate = 1e-3, translation_rate_final = 1e-5;
-    double focal_rate = 1e-3, focal_rate_final = 1e-5;
+    double pose_rate = 5e-3, pose_rate_final = 5e-5;  // radians by which a step moves the points of the image
 
     // Adaptive density control. Steps are those of a 30,000 step run; a shorter run scales them
     // (src/train/schedule.h).

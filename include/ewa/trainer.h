@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "ewa/camera_motion.h"
 #include "ewa/dataset.h"
 #include "ewa/device.h"
 #include "ewa/exposure.h"
@@ -98,9 +99,11 @@ class Trainer {
     Gaussians gaussians() const;
     uint32_t splats() const;
     int steps_done() const;
-    std::vector<Exposure> exposures() const;  // one for each training frame; empty if not learned
-    size_t images_on_disk() const;            // training images that are not cached
-    std::vector<PlanLine> plan() const;       // what the run skips
+    std::vector<Exposure> exposures() const;           // one for each training frame; empty if not learned
+    std::vector<CameraMotion> camera_motions() const;  // one for each training frame; empty if not learned
+    size_t images_on_disk() const;                     // training images that are not cached
+    double extent() const;                             // the length that rates are relative to, world units
+    std::vector<PlanLine> plan() const;                // what the run skips
     StepTimes step_times() const;
 
   private:

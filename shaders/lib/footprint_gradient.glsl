@@ -78,4 +78,14 @@ vec3 view_point_gradient(FootprintGradient f, Projection p) {
     if (KERNEL == KERNEL_DENSITY) tangent_gradient += mix(f.tangent, vec2(0.0), p.tangent_clamped);
     return view_gradient + vec3(tangent_gradient, -dot(tangent_gradient, tangent)) * inverse_z;
 }
+
+// dL/d(logarithm of both focal lengths). The pixel's distance from the principal point and M are proportional to them, and
+// so are the reciprocals of the tangents' bounds. |J| grows with their product, as A grows with the square of the scales.
+float focal_gradient(FootprintGradient f, Projection p) {
+    const vec3 row_z = vec3(p.axes[0].z, p.axes[1].z, p.axes[2].z);
+    vec2 by_bound = p.focal_over_z * p.tangent * vec2(dot(f.dm0, row_z), dot(f.dm1, row_z));
+    if (KERNEL == KERNEL_DENSITY) by_bound -= p.tangent * f.tangent;
+    return dot(f.mean, p.focal_over_z * vec2(p.view.x.x, p.view.y.x)) + f.log_scale.x + f.log_scale.y + f.log_scale.z +
+           (p.tangent_clamped.x ? by_bound.x : 0.0) + (p.tangent_clamped.y ? by_bound.y : 0.0);
+}
 #endif

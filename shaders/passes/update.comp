@@ -5,7 +5,8 @@
 // adds the slots, carries the sums back through the projection, and writes parameters and moments.
 // A splat that is not visible has gradient zero, and its moments still move it. A step that is too long for its splat
 // is shortened and counted. An update that is not finite is dropped and counted. A frame whose instances did not fit
-// changes nothing: the host repeats it. SPEC_MODE: UPDATE_* bits.
+// changes nothing: the host repeats it. With UPDATE_MOTION each subgroup adds the gradient by the camera's motion over its
+// splats, and reduce.comp adds the subgroups. SPEC_MODE: UPDATE_* bits.
 // A gradient without a step, and moments in float32, are stored by their bits.
 #extension GL_GOOGLE_include_directive : require
 #define BINDING_CAMERA 1
@@ -13,13 +14,14 @@
 #include "lib/params.glsl"
 #include "lib/stored_splat.glsl"
 #include "lib/footprint_gradient.glsl"
+#include "lib/subgroup.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3;
 layout(constant_id = SPEC_MODE) const uint MODE = 0;
 const bool GRADIENT_ONLY = (MODE & UPDATE_GRADIENT_ONLY) != 0u, STATISTICS = (MODE & UPDATE_STATISTICS) != 0u,
            REGULARISED = (MODE & UPDATE_REGULARISED) != 0u, ABSOLUTE = (MODE & UPDATE_ABSOLUTE) != 0u,
-           PACKED_MOMENTS = (MODE & UPDATE_PACKED_MOMENTS) != 0u;
+           PACKED_MOMENTS = (MODE & UPDATE_PACKED_MOMENTS) != 0u, MOTION = (MODE & UPDATE_MOTION) != 0u;
 
 TEXELS(0, params);
 TEXELS(2, records);
@@ -34,13 +36,39 @@ layout(set = 0, binding = 10, scalar) writeonly buffer Moments1Out { uvec4 momen
 layout(set = 0, binding = 11, scalar) writeonly buffer Moments2Out { uvec4 moments2_out[]; };
 layout(set = 0, binding = 12, scalar) buffer Statistics { vec2 statistics[]; };
 layout(set = 0, binding = 13, scalar) readonly buffer SortedIndices { uint sorted_indices[]; };
+layout(set = 0, binding = 14, scalar) writeonly buffer MotionSums { float motion_sums[]; };
 layout(push_constant, scalar) uniform Push { UpdatePush push; };
 #include "lib/slots.glsl"
 #include "lib/adam.glsl"
 
-void main() {
-    const uint i = item_index();
-    if (i >= push.splats || counts.instances > push.instance_capacity) return;
+// A splat's share of the gradient by the camera's motion, in the order of a motion's floats. Rotation and shift are
+// relative to the moved camera.
+struct MotionGradient {
+    vec4 first;
+    vec3 shift;
+};
+
+// The rotation turns the splat's position and axes, as the camera sees them. The shift moves the mean the other way.
+MotionGradient motion_gradient(FootprintGradient f, StoredProjection stored, vec3 view_gradient, vec3 torque, vec3 mean_gradient) {
+    const Projection p = stored.footprint;
+    const vec3 position = vec3(p.view.x.x, p.view.y.x, p.view.z.x);
+    const vec3 axes_torque = camera_rotation() * (rotation_of(stored.unit_quaternion) * torque);
+    return MotionGradient(vec4(cross(position, view_gradient) + axes_torque, focal_gradient(f, p)),
+                          -(camera_rotation() * mean_gradient));
+}
+
+// All lanes take part in the sums, with or without a splat.
+void write_motion_sums(MotionGradient own) {
+    const uint subgroups = gl_NumWorkGroups.x * gl_NumWorkGroups.y * (GROUP_SIZE / SUBGROUP);
+    const uint at = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * (GROUP_SIZE / SUBGROUP) + SUBGROUP_INDEX;
+    [[unroll]] for (uint row = 0; row < MOTION_VALUES; ++row) {
+        const float sum = subgroup_sum(row < 4u ? own.first[row % 4u] : own.shift[(row + 2u) % 3u]);
+        if (LANE == 0u) motion_sums[row * subgroups + at] = sum;
+    }
+}
+
+// Returns the gradient by the camera's motion.
+MotionGradient update_splat(uint i) {
     const uint count = tile_counts[i];
     const bool visible = count > 0u;
     const vec4 p0 = fetch(params, index_of(0, i)), p1 = fetch(params, index_of(1, i)),
@@ -87,4 +115,18 @@ void main() {
         const float norm = length((ABSOLUTE ? f.absolute : f.mean) * vec2(push.half_size[0], push.half_size[1]));
         if (is_finite(norm)) statistics[i] += vec2(norm, 1.0);
     }
+    const MotionGradient none = MotionGradient(vec4(0.0), vec3(0.0));
+    if (!MOTION || !visible) return none;
+    const MotionGradient motion = motion_gradient(f, stored, view_gradient, torque, mean_gradient);
+    // One splat's gradient that is not finite leaves those of the others.
+    if (is_finite(motion.first) && is_finite(motion.shift)) return motion;
+    return none;
+}
+
+void main() {
+    if (counts.instances > push.instance_capacity) return;
+    const uint i = item_index();
+    MotionGradient motion = MotionGradient(vec4(0.0), vec3(0.0));
+    if (i < push.splats) motion = update_splat(i);
+    if (MOTION) write_motion_sums(motion);
 }

@@ -121,6 +121,7 @@ EWA_UINT(UPDATE_REGULARISED, 4u);
 // The norm is that of the pixels' absolute gradients (Ye et al. 2024, AbsGS, eq. 7), which do not cancel.
 EWA_UINT(UPDATE_ABSOLUTE, 8u);
 EWA_UINT(UPDATE_PACKED_MOMENTS, 16u);  // moments1 holds both moments in 16 bits each
+EWA_UINT(UPDATE_MOTION, 32u);          // also writes sums of the gradient by the camera's motion
 // project_views.comp, project_views_backward.comp, bits; SHAPE_WHITENERS too
 EWA_UINT(VIEWS_COVARIANCES, 1u);  // shapes are covariances, not quaternions and scales
 EWA_UINT(VIEWS_OPACITIES, 2u);    // the radii depend on the opacities
@@ -162,6 +163,15 @@ EWA_UINT(DERIVATIVE_PLANES, 3u);  // of 3 c + 0: dS/d(mean x); 1: dS/d(mean x^2)
 EWA_UINT(EXPOSURE_FLOATS, 12u);
 EWA_UINT(EXPOSURE_TEXELS, 3u);
 EWA_UINT(EXPOSURE_BLOCK, 4096u);  // pixels whose gradient one subgroup sums
+
+// ---- A camera's motion: what training learns of a camera ----
+// 2 texels at 2 * image: rotation vector (radians, camera axes), logarithm of the factor of the focal lengths; shift of
+// the centre (world units, along the axes that the camera had at the start), 0. lib/motion.glsl has the formulas.
+EWA_UINT(MOTION_TEXELS, 2u);
+EWA_UINT(MOTION_FLOATS, 8u);
+EWA_UINT(MOTION_VALUES, 7u);  // without the last float
+// A camera's basis: MOTION_VALUES rows of as many floats. The motion changes by the basis times a step of Adam.
+EWA_UINT(MOTION_BASIS_FLOATS, 49u);
 
 EWA_UINT(RADIX_DIGITS_MAX, 256u);
 // A radix sort that ranks in shared memory: a workgroup has RANKED_SUBGROUPS subgroups, and an invocation
@@ -314,6 +324,20 @@ struct ExposureUpdatePush {
     float rate;
     float pull;          // d(loss)/d(value) for a value 1 away from the identity's
     float bias1, bias2;  // 1 / (1 - beta^visit); each training image has its own number of steps
+    uint instance_capacity;
+};
+
+struct MoveCameraPush {
+    uint photo;  // index of the training image
+};
+
+struct MotionUpdatePush {
+    uint photo;
+    uint blocks;  // of partial sums
+    float rate;
+    float pull, shift_pull;  // d(loss)/d(value) for a value of 1
+    float beta1, beta2;      // Adam's
+    float bias1, bias2;      // 1 / (1 - beta^visit); each training image has its own number of steps
     uint instance_capacity;
 };
 

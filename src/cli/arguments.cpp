@@ -10,6 +10,7 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
+#include "io/datasets/refined_cameras.h"
 #include "scene/names.h"
 
 namespace ewa::cli {
@@ -282,6 +283,7 @@ Views load_views(const ViewArguments& arguments, const std::string& which, int t
         }
     }
     Dataset dataset = load_dataset(folder, {.downscale = arguments.downscale, .masks = arguments.masks});
+    if (!arguments.refined_cameras.empty()) io::use_refined_cameras(dataset, arguments.refined_cameras);
     std::vector<int> frames = select_frames(dataset, which, test_every);
     if (arguments.run_frames != "all") {
         const std::vector<int> used = scene::frames_named(dataset, arguments.run_frames);

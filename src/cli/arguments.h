@@ -91,7 +91,8 @@ void render_with_progress(const DeviceOptions& device, const std::filesystem::pa
 /// A splat scene and a dataset whose images it is compared with.
 struct ViewArguments {
     std::filesystem::path splats, dataset;
-    std::string run_frames = "all";  // --frames of the run SPLATS, if the dataset is its own
+    std::filesystem::path refined_cameras = {};  // cameras.json of that run; empty: none
+    std::string run_frames = "all";              // --frames of the run SPLATS, if the dataset is its own
     int downscale = 1;
     MaskUse masks = MaskUse::automatic;
     DrawArguments draw;

@@ -25,6 +25,13 @@ struct GradArguments {
     std::string frame;
 };
 
+/// dL/d(each value of the camera's motion).
+report::Json motion_json(const CameraMotion& m) {
+    return {{"rotation", {m.rotation.x, m.rotation.y, m.rotation.z}},
+            {"shift", {m.shift.x, m.shift.y, m.shift.z}},
+            {"log_focal", m.log_focal}};
+}
+
 int run(const GradArguments& arguments) {
     RenderOptions options = arguments.views.draw.options();
     if (format_of_name(arguments.output) != SplatFormat::ply)
@@ -54,6 +61,7 @@ int run(const GradArguments& arguments) {
         write_json(arguments.json, {{"loss", result.loss},
                                     {"l1", result.l1},
                                     {"ssim", result.ssim},
+                                    {"camera", motion_json(result.camera)},
                                     {"frame", index},
                                     {"name", frame.name}});
     fmt::print("{}  loss {:.7g}  L1 {:.7g}  SSIM {:.7g}\n", core::one_line(frame.name), result.loss,

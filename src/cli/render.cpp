@@ -20,6 +20,7 @@
 #include "ewa/error.h"
 #include "ewa/renderer.h"
 #include "ewa/splat_files.h"
+#include "io/datasets/refined_cameras.h"
 #include "report/pictures.h"
 #include "scene/dataset_files.h"
 
@@ -69,7 +70,9 @@ int render_dataset_views(const RenderArguments& arguments) {
     RenderOptions options = arguments.draw.options();
     Gaussians gaussians = load_splats(arguments.splats);
     arguments.draw.match_kernel(gaussians, options);
-    const Dataset dataset = load_cameras_as_trained(arguments.cameras, arguments.downscale);
+    Dataset dataset = load_cameras_as_trained(arguments.cameras, arguments.downscale);
+    if (arguments.cameras_of_run && !arguments.run->refined_cameras().empty())
+        io::use_refined_cameras(dataset, arguments.run->refined_cameras());
     const std::vector<int> frames = select_frames(dataset, arguments.frames, arguments.test_every);
     const std::vector<fs::path> names = report::picture_names(dataset.frames);
     const auto file_of = [&](int frame) {

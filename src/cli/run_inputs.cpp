@@ -126,6 +126,7 @@ std::optional<live::Run> resolve_views(CLI::App& app, ViewArguments& arguments) 
     if (!own_dataset && !fs::equivalent(arguments.dataset, input.run->dataset, none)) return std::nullopt;
     const std::string frames = input.run->text("frames");
     if (own_dataset && !frames.empty()) arguments.run_frames = frames;
+    arguments.refined_cameras = input.run->refined_cameras();
     return std::move(input.run);
 }
 

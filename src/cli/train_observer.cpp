@@ -13,6 +13,7 @@
 #include "ewa/error.h"
 #include "live/server.h"
 #include "live/watcher.h"
+#include "report/summary.h"
 
 namespace ewa::cli {
 
@@ -172,8 +173,12 @@ void TrainObserver::print(const RunResult& result) {
                         s.interrupted ? "interrupted after" : "trained",
                         core::counted(uint64_t(s.steps), "step"), core::duration_text(s.seconds),
                         core::duration_text(s.wall_seconds), core::counted(s.splats, "splat")));
-    if (s.test_psnr) on_note(fmt::format("held-out PSNR {:.2f} dB, SSIM {:.4f}", *s.test_psnr, *s.test_ssim));
+    if (s.test_psnr)
+        on_note(fmt::format(
+            "held-out PSNR {:.2f} dB, SSIM {:.4f}{}", *s.test_psnr, *s.test_ssim,
+            s.cameras && s.cameras->test_aligned ? ", with cameras aligned to their images" : ""));
     if (s.train_psnr) on_note(fmt::format("training PSNR {:.2f} dB", *s.train_psnr));
+    if (s.cameras) on_note(report::cameras_text(*s.cameras));
     if (s.skipped_nonfinite > 0)
         on_note("skipped " + core::counted(s.skipped_nonfinite, "splat") +
                 " with a value that is not finite");

@@ -24,9 +24,10 @@ const std::map<std::string, std::string>& subjects() {
              "init",    "transform", "init-opacity", "init-scale", "exposures",  "crop",      "min-opacity",
              "max-sh",  "sort",      "splats",       "cases",      "views",      "size",      "look-at",
              "up",      "orbit",     "film-seconds", "matching"});
-        add("Quality", {"quality", "steps", "strategy", "max-splats", "sh-degree", "absgrad",
-                        "revised-opacity", "exposure", "resolution-schedule", "seed", "background", "kernel",
-                        "antialias", "integrator", "samples", "points", "nearest", "runs", "training-steps"});
+        add("Quality",
+            {"quality", "steps", "strategy", "max-splats", "sh-degree", "absgrad", "revised-opacity",
+             "exposure", "refine-poses", "refine-focal", "resolution-schedule", "seed", "background",
+             "kernel", "antialias", "integrator", "samples", "points", "nearest", "runs", "training-steps"});
         add("Output", {"output",     "format",     "mode",       "json",       "svg",      "heat-map",
                        "heat-scale", "eval-every", "save-every", "serve",      "accuracy", "spz-version",
                        "check",      "quiet",      "verbose",    "results",    "compare",  "threshold",

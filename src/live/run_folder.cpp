@@ -71,6 +71,11 @@ bool Run::flag(const char* option) const {
     return found != config.end() && *found == true;
 }
 
+fs::path Run::refined_cameras() const {
+    const fs::path file = folder / "cameras.json";
+    return core::is_file(file) ? file : fs::path();
+}
+
 std::optional<Run> find_run(const fs::path& folder) {
     const auto present = [&](const char* name) { return core::is_file(folder / name); };
     if (!present("config.json") && !present("splats.ply") && !present("metrics.jsonl")) return std::nullopt;

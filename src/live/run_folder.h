@@ -11,7 +11,7 @@ namespace ewa::live {
 
 /// The files that `ewa train` writes beside its renders.
 inline constexpr std::array kRunFiles{"config.json",  "metrics.jsonl", "checkpoint.ewa", "splats.ply",
-                                      "summary.json", "report.html",   "exposures.json"};
+                                      "summary.json", "report.html",   "exposures.json", "cameras.json"};
 
 struct Run {
     std::filesystem::path folder;
@@ -22,6 +22,8 @@ struct Run {
     std::string named_dataset;                         // as in config.json; empty: none
     nlohmann::json config = nlohmann::json::object();  // of the run; empty if it cannot be read
 
+    /// folder/cameras.json, the refined cameras of the dataset; empty if there is none.
+    std::filesystem::path refined_cameras() const;
     /// The option's text in config.json; empty if it is not a text.
     std::string text(const char* option) const;
     /// Whether the option is a flag that is set.

@@ -21,6 +21,7 @@ static_assert(sizeof(CollectPush) == 20 && sizeof(GatherPush) == 12);
 static_assert(sizeof(UnpackPush) == 28 && sizeof(LossPush) == 24 && sizeof(ReducePush) == 20);
 static_assert(sizeof(ImageLayout) == 16 && sizeof(PackPush) == 4 && sizeof(ExposurePush) == 20 &&
               sizeof(ExposureUpdatePush) == 28);
+static_assert(sizeof(MoveCameraPush) == 4 && sizeof(MotionUpdatePush) == 40);
 static_assert(sizeof(UpdatePush) == 72 && sizeof(DensifyPush) == 48 && sizeof(ResetPush) == 12);
 static_assert(sizeof(McmcPush) == 56 && sizeof(PerturbPush) == 32);
 static_assert(sizeof(TraceView) == 4 * (9 + 3 + 2 + 2 + 2 + 9 + 1) && sizeof(TraceCounts) == 8 &&

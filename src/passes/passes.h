@@ -29,7 +29,23 @@ struct Update {
     static constexpr char shader[] = "update";
     using Work = PerElement<&shared::UpdatePush::splats>;
     gpu::BufferPart params, camera, records, slots, moments1, moments2, tile_counts, first_instances, counts,
-        params_out, moments1_out, moments2_out, statistics, sorted_indices;
+        params_out, moments1_out, moments2_out, statistics, sorted_indices, motion_sums;
+};
+
+// A training camera's motion.
+
+/// Writes the camera that a frame uses: the dataset's, moved.
+struct MoveCamera {
+    static constexpr char shader[] = "move_camera";
+    using Work = OneSubgroup<shared::MoveCameraPush>;
+    gpu::BufferPart camera, motions, moved;
+};
+
+/// Adam's step of one training camera's motion.
+struct MotionUpdate {
+    static constexpr char shader[] = "motion_update";
+    using Work = OneSubgroup<shared::MotionUpdatePush>;
+    gpu::BufferPart sums, motions, moments1, moments2, bases, counts;
 };
 
 /// Projects every splat as a sphere. Adds to Counts.skipped_nonfinite. Variant: SPEC_SH_DEGREE, SPEC_MODE (0 or

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pipeline/backward.h"
 
+#include <bit>
 #include <cmath>
 
 #include "passes/passes.h"
@@ -76,6 +77,7 @@ uint32_t update_mode(const Plan& plan) {
     if (plan.regularised) mode |= shared::UPDATE_REGULARISED;
     if (plan.absolute) mode |= shared::UPDATE_ABSOLUTE;
     if (plan.packed_moments) mode |= shared::UPDATE_PACKED_MOMENTS;
+    if (plan.motion) mode |= shared::UPDATE_MOTION;
     return mode;
 }
 
@@ -228,56 +230,60 @@ void record_blend_backward_as(gpu::Recording& recording, passes::PassCache& cach
                                         blend_push(cache.config(), frame, inputs.background));
 }
 
-/// Updating: passes::Update or UpdatePoints.
-template <class Updating>
-void record_update_as(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
-                      const Model& model, const FrameBuffers& frame, const FrameInputs& inputs,
-                      const Sorted& sorted, const Rates& rates, const passes::Constants& variant) {
+passes::UpdatePoints update_buffers(const Plan& plan, const Model& model, const FrameBuffers& frame,
+                                    const CameraUse& camera, const Sorted& sorted) {
     // Packed moments and a gradient alone have no buffer of second moments, and a gradient no statistics. The kernel
     // does not use those bindings, but they need a buffer.
     const gpu::Buffer& moments2 = model.second_moments();
     const gpu::Buffer& statistics = plan.statistics ? model.statistics : frame.partials;
-    const CameraUse& camera = inputs.camera;
-    cache.get<Updating>(variant).record(
-        recording,
-        {.params = model.params,
-         .camera = {*camera.buffer, camera.offset, sizeof(shared::CameraBlock)},
-         .records = frame.records,
-         .slots = frame.slots,
-         .moments1 = model.moments1,
-         .moments2 = moments2,
-         .tile_counts = frame.tile_counts,
-         .first_instances = frame.first_instances,
-         .counts = frame.counts,
-         .params_out = model.params,
-         .moments1_out = model.moments1,
-         .moments2_out = moments2,
-         .statistics = statistics,
-         .sorted_indices = *sorted.indices},
-        update_push(model, frame, rates));
+    return {.params = model.params,
+            .camera = {*camera.buffer, camera.offset, sizeof(shared::CameraBlock)},
+            .records = frame.records,
+            .slots = frame.slots,
+            .moments1 = model.moments1,
+            .moments2 = moments2,
+            .tile_counts = frame.tile_counts,
+            .first_instances = frame.first_instances,
+            .counts = frame.counts,
+            .params_out = model.params,
+            .moments1_out = model.moments1,
+            .moments2_out = moments2,
+            .statistics = statistics,
+            .sorted_indices = *sorted.indices};
 }
+
+/// passes::Update has the buffers of UpdatePoints, and one more.
+struct MoreBuffers {
+    passes::UpdatePoints buffers;
+    gpu::BufferPart motion_sums;
+};
 
 }  // namespace
 
 void record_backward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
                      const Model& model, const FrameBuffers& frame, const FrameInputs& inputs,
-                     const Sorted& sorted, const Rates& rates) {
+                     const Sorted& sorted, const Rates& rates, const MotionUse* motion) {
     if (plan.rays()) return record_backward_of_rays(recording, cache, plan, model, frame, inputs, sorted);
     passes::Constants blending{{shared::SPEC_MODE, plan.absolute ? shared::BLEND_BACKWARD_ABSOLUTE : 0}};
     passes::Constants updating{{shared::SPEC_SH_DEGREE, plan.evaluated_degree(inputs.sh_degree)},
                                {shared::SPEC_MODE, update_mode(plan)}};
+    const passes::UpdatePoints buffers = update_buffers(plan, model, frame, inputs.camera, sorted);
+    const shared::UpdatePush push = update_push(model, frame, rates);
     if (plan.points()) {
         blending.push_back({shared::SPEC_NEAREST, plan.nearest});
         record_blend_backward_as<passes::BlendPointsBackward>(recording, cache, frame, inputs, sorted,
                                                               blending);
-        record_update_as<passes::UpdatePoints>(recording, cache, plan, model, frame, inputs, sorted, rates,
-                                               updating);
+        cache.get<passes::UpdatePoints>(updating).record(recording, buffers, push);
         return;
     }
     updating.push_back({shared::SPEC_KERNEL, uint32_t(plan.kernel)});
     blending.push_back({shared::SPEC_KERNEL, uint32_t(plan.kernel)});
     record_blend_backward_as<passes::BlendBackward>(recording, cache, frame, inputs, sorted, blending);
-    record_update_as<passes::Update>(recording, cache, plan, model, frame, inputs, sorted, rates, updating);
+    const gpu::Buffer& motion_sums = plan.motion ? frame.motion_sums : frame.partials;
+    cache.get<passes::Update>(updating).record(
+        recording, std::bit_cast<passes::Update>(MoreBuffers{buffers, motion_sums}), push);
+    if (plan.motion) record_motion_sums(recording, cache, frame);
+    if (motion) record_motion_update(recording, cache, frame, *motion);
 }
 
 }  // namespace ewa::pipeline

@@ -8,6 +8,7 @@
 
 #include "ewa/exposure.h"
 #include "pipeline/forward.h"
+#include "pipeline/motions.h"
 
 namespace ewa::pipeline {
 
@@ -49,9 +50,11 @@ void record_loss(gpu::Recording& recording, passes::PassCache& cache, const Fram
 
 /// Gradients of blending and projection. With plan.adam it moves the model; without, it writes
 /// the gradient to model.moments1.
+/// With plan.motion, the gradient of the camera's motion is in frame.motion_reduced, which must be reserved for it.
+/// motion: that of the training image's camera, if motions are learned. It takes its own step of Adam.
 void record_backward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
                      const Model& model, const FrameBuffers& frame, const FrameInputs& inputs,
-                     const Sorted& sorted, const Rates& rates);
+                     const Sorted& sorted, const Rates& rates, const MotionUse* motion = nullptr);
 
 /// (1 - SSIM_WEIGHT) l1 + SSIM_WEIGHT (1 - ssim).
 double loss_of(const shared::Counts& counts);

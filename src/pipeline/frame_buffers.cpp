@@ -108,6 +108,8 @@ std::vector<Allocation> allocations(FrameBuffers& f, const Sizes& s) {
         {&f.image_gradient, "image gradient", s.image_gradient, floats},
         {&f.partials, "partials", s.partial_sums},
         {&f.exposure_sums, "exposure sums", s.exposure_sums},
+        {&f.motion_sums, "motion sums", s.motion_sums},
+        {&f.motion_reduced, "motion reduced", s.motion_reduced},
         {&f.reduced, "reduced", s.reduced}};
     if (s.overlay == 0)
         for (Allocation& each : overlaid(f, s)) {
@@ -177,6 +179,16 @@ Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request)
         s.image_gradient = s.target;
         s.partial_sums = 2 * uint64_t(s.partials) * word;  // of absolute and of squared differences
         s.reduced = 2 * uint64_t(s.reduce_blocks) * word;
+    }
+    if (request.gradients && request.motion) {
+        constexpr uint64_t kRows = shared::MOTION_VALUES;
+        shared::UpdatePush push{};
+        push.splats = std::max(request.splats, 1u);
+        const auto groups = passes::Update::Work::groups(config, push);
+        s.motion_items = groups[0] * groups[1] * (config.element_group / config.subgroup);
+        s.motion_blocks = divide_up(s.motion_items, s.reduce_block);
+        s.motion_sums = kRows * s.motion_items * word;
+        s.motion_reduced = kRows * s.motion_blocks * word;
     }
     if (request.gradients) {
         const uint32_t slot = request.rays ? shared::RAY_SLOT_FLOATS : shared::SLOT_FLOATS;

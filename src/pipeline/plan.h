@@ -31,6 +31,7 @@ struct PlanRequest {
     // Of a gradient or a training.
     bool masks = false;     // training images in which some pixels count less
     bool exposure = false;  // each training image's exposure is learned
+    bool motion = false;    // the gradient by the camera's motion; in a training it is learned
 
     // Of a training.
     bool statistics = false;          // the strategy reads densification statistics
@@ -55,6 +56,7 @@ struct Plan {
     bool regularised = false;     // opacity and scale regularisers in the loss
     bool masks = false;
     bool exposure = false;
+    bool motion = false;  // the gradient by the camera's motion
 
     bool operator==(const Plan&) const = default;
     bool points() const { return nearest > 0; }

@@ -203,7 +203,8 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
     const Plan plan = plan_for({.purpose = Purpose::gradient,
                                 .scene_degree = gaussians.sh_degree,
                                 .render = options,
-                                .masks = alpha_is_weight && target.channels == 4});
+                                .masks = alpha_is_weight && target.channels == 4,
+                                .motion = true});
     const Model model = upload_model(*device, gaussians, plan.moment_buffers(), false);
     const gpu::Buffer block = upload_camera(*device, camera, cache.config(), model.origin);
     const gpu::Buffer photo = upload_photo(*device, target);
@@ -215,7 +216,8 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
                             .gradients = true,
                             .rays = plan.rays(),
                             .masks = plan.masks,
-                            .overlaid = true};
+                            .overlaid = true,
+                            .motion = plan.motion};
     FrameBuffers frame;
     const shared::Counts counts =
         run_until_it_fits(cache, executor, frame, size, [&](gpu::Recording& recording) {
@@ -229,6 +231,7 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
     result.loss = loss_of(counts);
     result.gradient = download_model(model, model.moments1);
     result.gradient.origin = glm::dvec3(0);  // a gradient has no origin
+    if (plan.motion) result.camera = download_motion_gradient(frame);
     result.skipped_nonfinite = counts.skipped_nonfinite;
     return result;
 }

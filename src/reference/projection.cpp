@@ -297,10 +297,31 @@ glm::dvec3 color_backward(const Splat& splat, const ProjectionSteps& s, const gl
     return (by_direction - s.direction * glm::dot(s.direction, by_direction)) / glm::length(s.offset);
 }
 
+/// by_log: dL/d ln(optical depth) of a density, whose |J| has both focal lengths; else 0.
+void add_motion_gradient(const ProjectionSteps& s, const Camera& camera, const ScreenGradient& g,
+                         const Rows& by_m, double by_log, const glm::dvec3& by_view,
+                         const glm::dvec3& by_mean, CameraMotion& out) {
+    const double z = s.view.z, fx = camera.fx / z, fy = camera.fy / z;
+    // dL/dJ by rows, and with that dL/dW_j = J^T dL/d(J W)_j.
+    const glm::dmat3 axes =
+        camera.rotation *
+        glm::dmat3(s.rotation[0] * s.scale[0], s.rotation[1] * s.scale[1], s.rotation[2] * s.scale[2]);
+    const glm::dvec3 by_jx = axes * by_m.x, by_jy = axes * by_m.y;
+    const glm::dvec3 jx{fx, 0, -fx * s.slope.x}, jy{0, fy, -fy * s.slope.y};
+    out.rotation += glm::cross(s.view, by_view) + glm::cross(by_jx, jx) + glm::cross(by_jy, jy);
+    out.shift -= camera.rotation * by_mean;
+    out.log_focal +=
+        g.mean2d.x * fx * s.view.x + g.mean2d.y * fy * s.view.y + glm::dot(by_jx, jx) + glm::dot(by_jy, jy);
+    const double by_secant = by_log / (1 + glm::dot(s.slope, s.slope));
+    out.log_focal += 2 * by_log;
+    if (!s.slope_free.x) out.log_focal += fx * s.slope.x * by_jx.z - by_secant * s.slope.x * s.slope.x;
+    if (!s.slope_free.y) out.log_focal += fy * s.slope.y * by_jy.z - by_secant * s.slope.y * s.slope.y;
+}
+
 }  // namespace
 
 Splat project_backward(const Splat& splat, const Camera& camera, const RenderOptions& options,
-                       const ScreenGradient& by_screen) {
+                       const ScreenGradient& by_screen, CameraMotion* by_motion) {
     Splat out;
     out.sh_degree = splat.sh_degree;
     ProjectionSteps s;
@@ -318,6 +339,26 @@ Splat project_backward(const Splat& splat, const Camera& camera, const RenderOpt
     glm::dvec3 by_view = view_backward(s, camera, gradient, by_m);
     if (projected.density) density_backward(s, gradient.opacity * projected.opacity, out.log_scale, by_view);
     out.mean = glm::transpose(camera.rotation) * by_view + by_offset;
+    if (by_motion) {
+        const double by_log = projected.density ? gradient.opacity * projected.opacity : 0;
+        add_motion_gradient(s, camera, gradient, by_m, by_log, by_view, out.mean, *by_motion);
+    }
+    return out;
+}
+
+CameraMotion motion_backward(const CameraMotion& motion, const CameraMotion& gradient) {
+    const glm::dvec3 w = motion.rotation;
+    const double angle = glm::length(w);
+    if (angle == 0) return gradient;
+    const glm::dvec3 axis = w / angle;
+    const double sine = std::sin(angle), cosine = std::cos(angle);
+    // The transposes of exp(w), and of its left Jacobian (Sola et al. 2018, eq. 145), by Rodrigues' formula.
+    const auto transposed = [&](double along, double across, double turned, const glm::dvec3& v) {
+        return across * v + (along - across) * axis * glm::dot(axis, v) - turned * glm::cross(axis, v);
+    };
+    CameraMotion out = gradient;
+    out.rotation = transposed(1, sine / angle, (1 - cosine) / angle, gradient.rotation);
+    out.shift = transposed(1, cosine, sine, gradient.shift);
     return out;
 }
 

@@ -24,6 +24,7 @@
 #include <glm/vec3.hpp>
 
 #include "ewa/camera.h"
+#include "ewa/camera_motion.h"
 #include "ewa/render_options.h"
 #include "reference/values.h"
 #include "scene/color.h"
@@ -129,8 +130,14 @@ struct ScreenGradient {
 // A channel of the colour that max(0, .) clamps to zero has no gradient.
 
 /// dL/d(stored value). Zero for an invisible splat, and for coefficients above the degree in use.
+/// by_motion: adds dL/d(each value of the camera's motion), for no motion.
+//  With the columns W_j of W, dL/dw = p x dL/dp + sum_j W_j x dL/dW_j and dL/ds = -W dL/dmean. Both focal lengths move
+//  mean2d - centre and M in proportion, and a slope that is clamped in inverse proportion.
 Splat project_backward(const Splat& splat, const Camera& camera, const RenderOptions& options,
-                       const ScreenGradient& gradient);
+                       const ScreenGradient& gradient, CameraMotion* by_motion = nullptr);
+
+/// dL/d(each value of a motion) from that of a motion which follows it.
+CameraMotion motion_backward(const CameraMotion& motion, const CameraMotion& gradient);
 
 /// dY_j/d(x, y, z) of the polynomials in scene/color.h, with independent x, y and z. The caller's
 /// normalisation removes the part along the direction.

@@ -49,8 +49,9 @@ ReferenceGradient loss_gradient(const Values& values, const Camera& camera, cons
                                loss.gradient, reference.smoothing);
     out.gradient = zeros_like(values);
     for (size_t i = 0; i < values.size(); ++i)
-        write_splat(out.gradient, i,
-                    project_backward(read_splat(values, i), camera, options, out.blend.splats[i]));
+        write_splat(
+            out.gradient, i,
+            project_backward(read_splat(values, i), camera, options, out.blend.splats[i], &out.camera));
     out.in_view.assign(values.size(), 0);
     for (const Instance& instance : out.picture.instances.sorted) out.in_view[instance.splat] = 1;
     return out;

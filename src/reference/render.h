@@ -34,6 +34,7 @@ Picture render(const Values& values, const Camera& camera, const RenderOptions& 
 struct ReferenceGradient {
     double loss = 0, l1 = 0, ssim = 0;
     Values gradient;               // dL/d(stored value) for each stored value
+    CameraMotion camera;           // dL/d(each value of the camera's motion), for no motion
     std::vector<uint8_t> in_view;  // per splat: it had a tile
     Raster picture_gradient;       // dL/d(colour)
     BlendGradients blend;          // gradients of each splat, and moments of each instance

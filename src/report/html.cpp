@@ -39,6 +39,12 @@ std::string headline(const ReportData& data) {
         {s.dropped_updates, "parameter updates were not finite and were dropped."}};
     for (const auto& [count, what] : warnings)
         if (count > 0) html += fmt::format("<p class=\"warn\">{} {}</p>\n", count, what);
+    if (s.cameras) {
+        html += "<p>Refined poses: " + escape_html(cameras_text(*s.cameras)) + ".";
+        if (s.cameras->test_aligned)
+            html += " The cameras of held-out views were aligned to their images before these were scored.";
+        html += "</p>\n";
+    }
     html += "<div class=\"figures\">";
     html += figure(decibels_or_none(s.test_psnr), "PSNR, held-out views");
     html += figure(s.test_ssim ? fmt::format("{:.4f}", *s.test_ssim) : "–", "SSIM, held-out views");

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "report/summary.h"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <cerrno>
 #include <cmath>
 #include <cstdint>
@@ -25,26 +27,48 @@ Json figure(double value) {
 
 }  // namespace
 
+Json to_json(const CameraMoves& moves) {
+    return {{"median_degrees", moves.median_degrees},
+            {"largest_degrees", moves.largest_degrees},
+            {"median_percent_of_extent", 100 * moves.median_share},
+            {"largest_percent_of_extent", 100 * moves.largest_share},
+            {"least_focal_factor", moves.least_focal},
+            {"largest_focal_factor", moves.largest_focal},
+            {"test_cameras_aligned", moves.test_aligned}};
+}
+
+std::string cameras_text(const CameraMoves& moves) {
+    std::string text = fmt::format(
+        "cameras turned by {:.3g} degrees (median; largest {:.3g}) and moved by {:.3g} % of the extent "
+        "(largest {:.3g})",
+        moves.median_degrees, moves.largest_degrees, 100 * moves.median_share, 100 * moves.largest_share);
+    if (moves.least_focal != 1 || moves.largest_focal != 1)
+        text += fmt::format(", focal lengths times {:.4f} to {:.4f}", moves.least_focal, moves.largest_focal);
+    return text;
+}
+
 Json to_json(const Summary& s) {
-    return {{"steps", s.steps},
-            {"seconds", figure(s.seconds)},
-            {"seconds_per_step", s.steps > 0 ? figure(s.seconds / s.steps) : Json(nullptr)},
-            {"wall_seconds", figure(s.wall_seconds)},
-            {"splats", s.splats},
-            {"test_psnr", figure(s.test_psnr)},
-            {"test_ssim", figure(s.test_ssim)},
-            {"train_psnr", figure(s.train_psnr)},
-            {"device", s.device},
-            {"peak_device_bytes", s.peak_device_bytes},
-            {"peak_host_bytes", s.peak_host_bytes},
-            {"seed", s.seed},
-            {"skipped_nonfinite", s.skipped_nonfinite},
-            {"dropped_updates", s.dropped_updates},
-            {"limited_steps", s.limited_steps},
-            {"strategy", s.strategy},
-            {"interrupted", s.interrupted},
-            {"version", s.version},
-            {"command", s.command}};
+    Json json = {{"steps", s.steps},
+                 {"seconds", figure(s.seconds)},
+                 {"seconds_per_step", s.steps > 0 ? figure(s.seconds / s.steps) : Json(nullptr)},
+                 {"wall_seconds", figure(s.wall_seconds)},
+                 {"splats", s.splats},
+                 {"test_psnr", figure(s.test_psnr)},
+                 {"test_ssim", figure(s.test_ssim)},
+                 {"train_psnr", figure(s.train_psnr)},
+                 {"device", s.device},
+                 {"peak_device_bytes", s.peak_device_bytes},
+                 {"peak_host_bytes", s.peak_host_bytes},
+                 {"seed", s.seed},
+                 {"skipped_nonfinite", s.skipped_nonfinite},
+                 {"dropped_updates", s.dropped_updates},
+                 {"limited_steps", s.limited_steps},
+                 {"strategy", s.strategy},
+                 {"interrupted", s.interrupted},
+                 {"version", s.version},
+                 {"command", s.command}};
+    if (s.cameras) json["cameras"] = to_json(*s.cameras);
+    return json;
 }
 
 Json to_json(const MetricsLine& line) {

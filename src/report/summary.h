@@ -20,6 +20,8 @@ using ewa::MetricsLine;
 using ewa::Summary;
 
 Json to_json(const Summary& summary);
+/// A sentence without a full stop.
+std::string cameras_text(const CameraMoves& moves);
 
 /// The whole number in 0..most that an object has under this name. Throws InputError if it has none.
 uint64_t whole_number(const Json& object, const char* name, uint64_t most);

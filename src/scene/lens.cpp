@@ -235,6 +235,16 @@ bool one_to_one(const Distortion& lens, glm::dvec2 ray) {
     return glm::determinant(jacobian(lens, plane_of_ray(lens, ray))) > 0;
 }
 
+Distortion for_longer_focal(Distortion d, double factor) {
+    if (d.lens != Lens::brown) return d;
+    const double square = factor * factor;
+    for (double* linear : {&d.p1, &d.p2}) *linear *= factor;
+    for (double* second : {&d.k1, &d.k4}) *second *= square;
+    for (double* fourth : {&d.k2, &d.k5}) *fourth *= square * square;
+    for (double* sixth : {&d.k3, &d.k6}) *sixth *= square * square * square;
+    return d;
+}
+
 Camera undistorted_camera(const Camera& source, const Distortion& distortion) {
     if (distortion.none()) return source;
     if (source.width < 2 || source.height < 2)

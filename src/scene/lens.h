@@ -32,6 +32,10 @@ std::optional<glm::dvec2> undistort(const Distortion& lens, glm::dvec2 point);
 /// Whether the model keeps the orientation around that ray. If it does not, it has folded over.
 bool one_to_one(const Distortion& lens, glm::dvec2 ray);
 
+/// The distortion d for focal lengths `factor` times as long, with d(ray) = distortion(factor ray) / factor: every pixel of
+/// the undistorted image keeps its pixel in the file. Only Lens::brown has one; others stay as they are.
+Distortion for_longer_focal(Distortion distortion, double factor);
+
 /// The pinhole camera of the undistorted image, as COLMAP's image_undistorter chooses it (blank_pixels 0;
 /// src/colmap/image/undistortion.cc). Pose and focal lengths are the source's. The size is the largest
 /// without blank pixels, between 0.2 and 2 times the source's. It comes from the undistorted pixel centres of

@@ -202,7 +202,8 @@ MemoryEstimate estimate_memory(const gpu::Device& device, const Dataset& dataset
                                    .gradients = true,
                                    .masks = frame.masks == MaskUse::ignore,
                                    .exposure = plan.exposure,
-                                   .overlaid = true};
+                                   .overlaid = true,
+                                   .motion = plan.motion};
         const Sizes sizes = sizes_for(config, request);
         const uint64_t instances = sizes.overlay + 2 * sizes.instance_words;
         const uint64_t second = grows ? array + kRefineBytes * estimate.splats : 0;

@@ -23,6 +23,7 @@
 #include "train/checkpoint.h"
 #include "train/earlier_run.h"
 #include "train/evaluation.h"
+#include "train/refined_cameras.h"
 #include "train/resume.h"
 #include "train/run_files.h"
 #include "train/run_input.h"
@@ -96,7 +97,8 @@ const std::filesystem::path& checked_folder(const train::RunInput& input) {
     const std::filesystem::path& folder = input.options.output;
     std::vector<core::NamedFile> written, read = scene::files_of(input.dataset, "DATASET");
     for (const char* name : {"config.json", "metrics.jsonl", "checkpoint.ewa", "splats.ply", "summary.json",
-                             "report.html", "exposures.json"})
+                             "report.html", "exposures.json", "cameras.json", "cameras/sparse/0/cameras.bin",
+                             "cameras/sparse/0/images.bin", "cameras/sparse/0/points3D.bin"})
         written.push_back({"the run's file", folder / name});
     const auto renders = render_files(input);
     for (const int index : saved_frames(input.split))
@@ -135,6 +137,12 @@ class Run {
     void list_settings();
     void restore(Trainer& trainer);
     void save_splats(const Gaussians& gaussians) const;
+    void save_result(const Trainer& trainer);
+    bool refines() const { return options().train.refine_poses; }
+    void use_refined_cameras(const Trainer& trainer);
+    void use_given_cameras();
+    void align_test_cameras(const Gaussians& gaussians, const std::function<void()>& before_frame);
+    void save_cameras(bool aligned) const;
     void save_checkpoint(const Trainer& trainer);
     void train(Trainer& trainer);
     void after_step(Trainer& trainer);
@@ -158,8 +166,11 @@ class Run {
     train::SavePace pace_;
     Json settings_;  // of the checkpoint
     std::optional<train::Checkpoint> earlier_;
-    bool continues_ = false;  // from a checkpoint
-    int earlier_steps_ = 0;   // that the checkpoint's run was asked for
+    bool continues_ = false;             // from a checkpoint
+    int earlier_steps_ = 0;              // that the checkpoint's run was asked for
+    std::vector<Camera> given_cameras_;  // of the dataset, while its frames have the refined ones
+    train::Similarity world_;            // of the refined cameras
+    double extent_ = 1;                  // Trainer::extent
     std::shared_ptr<gpu::Device> device_;
     std::optional<report::MetricsLog> log_file_;
     StepReport last_;
@@ -254,6 +265,44 @@ void Run::save_splats(const Gaussians& gaussians) const {
     folder_.save_splats(gaussians, last_.step, options().train.render);
 }
 
+/// The splats, and the cameras that belong to them.
+void Run::save_result(const Trainer& trainer) {
+    save_splats(trainer.gaussians());
+    if (!refines()) return;
+    use_refined_cameras(trainer);
+    save_cameras(false);
+    use_given_cameras();
+}
+
+/// Gives the frames the cameras that belong to the trainer's splats.
+void Run::use_refined_cameras(const Trainer& trainer) {
+    extent_ = trainer.extent();
+    auto [cameras, world] =
+        train::refined_cameras(input_.dataset, input_.split.train, trainer.camera_motions());
+    world_ = world;
+    for (size_t i = 0; i < cameras.size(); ++i) std::swap(input_.dataset.frames[i].camera, cameras[i]);
+    given_cameras_ = std::move(cameras);
+}
+
+void Run::use_given_cameras() {
+    for (size_t i = 0; i < given_cameras_.size(); ++i) input_.dataset.frames[i].camera = given_cameras_[i];
+    given_cameras_.clear();
+}
+
+void Run::align_test_cameras(const Gaussians& gaussians, const std::function<void()>& before_frame) {
+    const std::vector<int>& frames = input_.split.test;
+    const auto motions = train::align_cameras(device_, gaussians, input_.dataset, frames, options().train,
+                                              extent_, before_frame);
+    for (size_t i = 0; i < frames.size(); ++i) {
+        Camera& camera = input_.dataset.frames[size_t(frames[i])].camera;
+        camera = moved(camera, motions[i]);
+    }
+}
+
+void Run::save_cameras(bool aligned) const {
+    folder_.save_cameras(input_.dataset, input_.split, given_cameras_, world_, extent_, aligned);
+}
+
 void Run::save_checkpoint(const Trainer& trainer) {
     const auto start = Clock::now();
     train::write_checkpoint(folder_.checkpoint(),
@@ -280,16 +329,19 @@ void Run::after_step(Trainer& trainer) {
     std::optional<Evaluation> evaluation;
     if (at(step, options().eval_every) && !input_.split.test.empty()) {
         // Cannot be stopped: a run that is resumed would not repeat it.
-        evaluation =
-            evaluate(device_, trainer.gaussians(), input_.dataset, input_.split.test, options().train.render);
+        const Gaussians gaussians = trainer.gaussians();
+        if (refines()) use_refined_cameras(trainer);
+        if (refines()) align_test_cameras(gaussians, {});
+        evaluation = evaluate(device_, gaussians, input_.dataset, input_.split.test, options().train.render);
+        use_given_cameras();
         observer_.on_evaluation(step, *evaluation);
     }
     const int log_every = std::max(1, options().train.steps / 100);
     if (evaluation || step == 1 || at(step, log_every)) log(evaluation);
     if (pace_.due(step)) save_checkpoint(trainer);
-    if (at(step, options().save_every)) save_splats(trainer.gaussians());
+    if (at(step, options().save_every)) save_result(trainer);
     observer_.between_steps(last_, trainer, [&] {
-        save_splats(trainer.gaussians());
+        save_result(trainer);
         save_checkpoint(trainer);
     });
 }
@@ -339,6 +391,11 @@ void Run::evaluate_result(const Gaussians& gaussians, const std::vector<Exposure
             });
     };
     if (held_out) {
+        if (refines()) {
+            align_test_cameras(gaussians, [this] { stop_if_asked(); });
+            report_.summary.cameras->test_aligned = true;
+            save_cameras(true);
+        }
         last_evaluation_ = evaluated(input_.split.test, {}, true);
         report_.summary.test_psnr = last_evaluation_->psnr;
         report_.summary.test_ssim = last_evaluation_->ssim;
@@ -404,6 +461,12 @@ void Run::finish(std::unique_ptr<Trainer> trainer) {
     const Gaussians gaussians = trainer->gaussians();
     const std::vector<Exposure> exposures = trainer->exposures();
     save_splats(gaussians);
+    if (refines()) {
+        use_refined_cameras(*trainer);
+        save_cameras(false);
+        report_.summary.cameras =
+            train::moves_of(input_.dataset, input_.split.train, given_cameras_, extent_);
+    }
     if (options().train.exposure) folder_.save_exposures(input_.dataset, input_.split.train, exposures);
     save_checkpoint(*trainer);  // from here on, a kill costs no training
     report_.times = report_times(trainer->step_times());

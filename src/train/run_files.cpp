@@ -13,7 +13,10 @@
 #include "core/json.h"
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
+#include "io/datasets/image_records.h"
+#include "io/datasets/refined_cameras.h"
 #include "report/summary.h"
+#include "scene/lens.h"
 
 namespace ewa::train {
 namespace fs = std::filesystem;
@@ -33,7 +36,9 @@ void RunFolder::begin(const nlohmann::ordered_json& config, bool continues) cons
     core::write_json(path_ / "config.json", config);
     if (continues) return;
     std::error_code absent;
-    for (const char* result : {"checkpoint.ewa", "summary.json", "report.html", "exposures.json"})
+    for (const char* result :
+         {"checkpoint.ewa", "summary.json", "report.html", "exposures.json", "cameras.json",
+          "cameras/sparse/0/cameras.bin", "cameras/sparse/0/images.bin", "cameras/sparse/0/points3D.bin"})
         fs::remove(path_ / result, absent);
 }
 
@@ -67,6 +72,56 @@ void RunFolder::save_exposures(const Dataset& dataset, const std::vector<int>& f
         }
     }
     core::write_json(path_ / "exposures.json", json);
+}
+
+namespace {
+
+/// The camera of the frame's file, as the frame's pinhole camera was refined.
+io::ImageRecord refined_record(const Frame& frame, const Camera& given) {
+    const double longer = frame.camera.fx / given.fx;
+    io::ImageRecord record;
+    record.name = frame.name;
+    record.camera = frame.source;
+    record.camera.rotation = frame.camera.rotation;
+    record.camera.translation = frame.camera.translation;
+    record.camera.fx *= longer;
+    record.camera.fy *= longer;
+    record.distortion = scene::for_longer_focal(frame.distortion, longer);
+    return record;
+}
+
+/// The folder that an image's name is relative to; empty if its path does not end with its name.
+fs::path folder_of_images(const Frame& frame) {
+    const std::string path = fs::absolute(frame.image_path).string();
+    if (!path.ends_with("/" + frame.name)) return {};
+    return path.substr(0, path.size() - frame.name.size() - 1);
+}
+
+}  // namespace
+
+void RunFolder::save_cameras(const Dataset& dataset, const Split& split, const std::vector<Camera>& given,
+                             const Similarity& world, double extent, bool aligned) const {
+    std::vector<io::RefinedCamera> cameras;
+    std::vector<io::ImageRecord> images;
+    for (size_t i = 0; i < dataset.frames.size(); ++i) {
+        const Frame& frame = dataset.frames[i];
+        const auto in = [&](const std::vector<int>& part) {
+            return std::find(part.begin(), part.end(), int(i)) != part.end();
+        };
+        const char* name = in(split.train) ? "train" : in(split.test) ? "test" : "other";
+        cameras.push_back(
+            {frame.name, name, frame.camera, distance_between(given[i], frame.camera), aligned});
+        images.push_back(refined_record(frame, given[i]));
+    }
+    io::write_refined_cameras(path_ / "cameras.json", cameras, extent);
+    PointCloud points = dataset.points;
+    for (glm::dvec3& point : points.positions) point = world(point);
+    io::write_colmap(path_ / "cameras/sparse/0", images, points);
+    // With a link to the images, the model is a dataset. It is one without images where links are not possible.
+    std::error_code ignored;
+    const fs::path folder = folder_of_images(dataset.frames.front()), link = path_ / "cameras/images";
+    if (fs::is_symlink(link, ignored)) fs::remove(link, ignored);
+    if (!folder.empty()) fs::create_directory_symlink(folder, link, ignored);
 }
 
 void RunFolder::save_report(const report::ReportData& report) const {

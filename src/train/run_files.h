@@ -10,6 +10,7 @@
 #include "core/folders.h"
 #include "ewa/run.h"
 #include "report/html.h"
+#include "train/refined_cameras.h"
 
 namespace ewa::train {
 
@@ -33,6 +34,10 @@ class RunFolder {
     /// exposures: one for each of the training frames.
     void save_exposures(const Dataset& dataset, const std::vector<int>& frames,
                         const std::vector<Exposure>& exposures) const;
+    /// cameras.json, and a COLMAP model of the dataset with these cameras in cameras/, where images is a link. The frames have
+    /// the refined cameras. given: those of the dataset. aligned: the test cameras were aligned to their images.
+    void save_cameras(const Dataset& dataset, const Split& split, const std::vector<Camera>& given,
+                      const Similarity& world, double extent, bool aligned) const;
     /// summary.json and report.html.
     void save_report(const report::ReportData& report) const;
 

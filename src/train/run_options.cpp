@@ -82,6 +82,13 @@ RunOption flag(const char* name, const char* help, Member<bool> member) {
     return option;
 }
 
+/// A flag that runs of earlier versions did not have.
+RunOption later_flag(const char* name, const char* help, Member<bool> member) {
+    RunOption option = flag(name, help, member);
+    option.before = "false";
+    return option;
+}
+
 template <class T>
 RunOption choice(const char* name, const char* help, Member<T> member, const Names<T>& names) {
     RunOption option{name, "TEXT", help, kDecides};
@@ -245,6 +252,13 @@ std::vector<RunOption> make_table() {
             "Learn an exposure (an affine map of colours) for each training image. For captures in which the "
             "exposure varies",
             [](RunOptions& o) -> bool& { return o.train.exposure; }),
+        later_flag(
+            "refine-poses",
+            "Learn a small rotation and translation for each training camera. Test cameras are aligned to "
+            "their images before they are scored",
+            [](RunOptions& o) -> bool& { return o.train.refine_poses; }),
+        later_flag("refine-focal", "With --refine-poses: also learn a factor of each camera's focal lengths",
+                   [](RunOptions& o) -> bool& { return o.train.refine_focal; }),
         number<int>(
             "resolution-schedule", "N",
             "Start with the images' sides halved N times. Each tenth of the run doubles them", kDecides,

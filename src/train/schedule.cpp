@@ -16,6 +16,8 @@ constexpr int kLeastRefineEvery = 50;    // a small capture shows each of its im
 constexpr int kLeastRelocateEvery = 25;  // a relocated splat has time to fade or to stay
 constexpr int kLeastResetEvery = 1000;
 constexpr int kLeastShEvery = 50;
+// Share of the steps in which the rate of the poses rises from 0: the first splats say little of the cameras.
+constexpr double kPoseWarmUp = 0.1;
 
 double decayed(double first, double last, double share) {
     const double t = std::clamp(share, 0.0, 1.0);
@@ -30,6 +32,7 @@ pipeline::PlanRequest plan_request(const Gaussians& start, const TrainOptions& o
             .render = options.render,
             .masks = masks,
             .exposure = options.exposure,
+            .motion = options.refine_poses,
             .statistics = options.strategy == Strategy::adc,
             .absolute_gradients = options.absolute_gradients,
             .packed_moments = options.moment_bits == 16,
@@ -77,6 +80,11 @@ double Schedule::exposure_rate(int step) const {
     return decayed(exposures_rate, exposures_rate_final, double(step) / steps);
 }
 
+double Schedule::pose_rate(int step) const {
+    const double share = double(step) / steps;
+    return decayed(poses_rate, poses_rate_final, share) * std::min(1.0, share / kPoseWarmUp);
+}
+
 uint64_t cache_share(const TrainOptions& options, int halvings) {
     const uint64_t all = options.image_cache_bytes;
     if (halvings > 0) return all >> 2 * halvings;
@@ -114,6 +122,8 @@ Schedule schedule_for(const TrainOptions& options) {
     s.sh_rest_rate = gain * options.sh_rest_rate;
     s.exposures_rate = options.exposure_rate;
     s.exposures_rate_final = options.exposure_rate_final;
+    s.poses_rate = options.pose_rate;
+    s.poses_rate_final = options.pose_rate_final;
     return s;
 }
 

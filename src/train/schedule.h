@@ -33,6 +33,7 @@ struct Schedule {
     double means_rate = 0, means_rate_final = 0;  // per unit of scene extent
     double sh_rest_rate = 0;                      // of SH above degree 0
     double exposures_rate = 0, exposures_rate_final = 0;
+    double poses_rate = 0, poses_rate_final = 0;
 
     /// Densify after this step (steps count from 1)?
     bool densifies(int step) const;
@@ -50,6 +51,8 @@ struct Schedule {
     double mean_rate(int step, double extent) const;
     /// Learning rate of the exposures, with the same decay.
     double exposure_rate(int step) const;
+    /// Learning rate of the cameras' motions, with the same decay after a rise from 0.
+    double pose_rate(int step) const;
 };
 
 /// The part of image_cache_bytes for images whose sides are halved so often. Each level gets a quarter of the

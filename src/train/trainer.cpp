@@ -100,6 +100,7 @@ struct Trainer::State {
     FrameBuffers frame;
     std::vector<train::ImageCache> smaller;  // by downsample level, from 1; freed after its last step
     Exposures exposures;
+    Motions motions;
     uint32_t instance_capacity;
     /// A step that is submitted and not finished.
     struct Flight {
@@ -127,6 +128,13 @@ struct Trainer::State {
             smaller.emplace_back(*device, cache.config(), dataset, frames, train::cache_share(o, halvings),
                                  model.origin, 1 << halvings);
         if (plan.exposure) exposures = Exposures(*device, images.count());
+        if (plan.motion) {
+            std::vector<MotionBasis> bases;
+            for (const int frame_index : frames)
+                bases.push_back(
+                    motion_basis(dataset.frames[size_t(frame_index)].camera, ready, o.refine_focal, extent));
+            motions = Motions(*device, bases);
+        }
         report.splats = model.splats;
     }
 
@@ -173,24 +181,36 @@ struct Trainer::State {
                 .gradients = true,
                 .masks = plan.masks,
                 .exposure = plan.exposure,
-                .overlaid = true};
+                .overlaid = true,
+                .motion = plan.motion};
+    }
+
+    MotionUse motion_of(int step, size_t index, uint32_t visit) const {
+        return {.motions = &motions,
+                .photo = uint32_t(index),
+                .rate = float(schedule.pose_rate(step)),
+                .extent = float(extent),
+                .visit = visit};
     }
 
     /// All that changes from step to step is a pure function of the step's number: a step can be repeated.
     void record_step(gpu::Recording& recording, int step, size_t index, const train::ImageCache::Photo& photo,
                      const CameraUse& camera) {
-        const ExposureUse exposure{&exposures, uint32_t(index), float(schedule.exposure_rate(step)),
-                                   uint32_t(size_t(step - 1) / images.count() + 1)};
-        const FrameInputs inputs{.camera = camera,
-                                 .background = options.random_background
-                                                   ? random_background(step, options.seed)
-                                                   : options.render.background,
-                                 .keep_overflow = !in_flight.empty(),
-                                 .sh_degree = schedule.degree(step)};
+        const uint32_t visit = uint32_t(size_t(step - 1) / images.count() + 1);
+        const ExposureUse exposure{&exposures, uint32_t(index), float(schedule.exposure_rate(step)), visit};
+        const MotionUse motion = motion_of(step, index, visit);
+        const FrameInputs inputs{
+            .camera =
+                plan.motion ? record_move_camera(recording, cache, motions, uint32_t(index), camera) : camera,
+            .background =
+                options.random_background ? random_background(step, options.seed) : options.render.background,
+            .keep_overflow = !in_flight.empty(),
+            .sh_degree = schedule.degree(step)};
         const Sorted sorted = record_forward(recording, cache, plan, model, frame, inputs);
         record_loss(recording, cache, frame, inputs, photo.texels, photo.masked,
                     plan.exposure ? &exposure : nullptr);
-        record_backward(recording, cache, plan, model, frame, inputs, sorted, rates(step));
+        record_backward(recording, cache, plan, model, frame, inputs, sorted, rates(step),
+                        plan.motion ? &motion : nullptr);
         if (options.strategy == Strategy::mcmc) record_noise(recording, cache, model, frame, noise(step));
     }
 
@@ -353,7 +373,8 @@ struct NamedBuffer {
 };
 
 /// The buffers that a run of `splats` splats keeps from step to step.
-std::vector<NamedBuffer> buffers_of(const Plan& plan, Model& model, Exposures& exposures, uint32_t splats) {
+std::vector<NamedBuffer> buffers_of(const Plan& plan, Model& model, Exposures& exposures, Motions& motions,
+                                    uint32_t splats) {
     const uint64_t bytes = parameter_bytes(splats, model.sh_degree);
     std::vector<NamedBuffer> buffers{{"params", &model.params, bytes, gpu::Texel::rgba32f},
                                      {"moments1", &model.moments1, bytes, gpu::Texel::rgba32ui}};
@@ -366,6 +387,13 @@ std::vector<NamedBuffer> buffers_of(const Plan& plan, Model& model, Exposures& e
                                            {"exp_moments1", &exposures.moments1},
                                            {"exp_moments2", &exposures.moments2}})
             buffers.push_back({name, buffer, exposures.bytes(), gpu::Texel::none});
+    if (plan.motion)
+        for (const auto& [name, buffer] : {std::pair{"motions", &motions.values},
+                                           {"motion_moments1", &motions.moments1},
+                                           {"motion_moments2", &motions.moments2}})
+            buffers.push_back({name, buffer, motions.bytes(), gpu::Texel::none});
+    if (plan.motion)
+        buffers.push_back({"motion_bases", &motions.bases, motions.basis_bytes(), gpu::Texel::none});
     return buffers;
 }
 
@@ -375,7 +403,7 @@ TrainerState Trainer::state() const {
     State& s = *state_;
     s.finish_all();
     TrainerState state{s.report, s.model.sh_degree, {}};
-    for (const NamedBuffer& named : buffers_of(s.plan, s.model, s.exposures, s.model.capacity))
+    for (const NamedBuffer& named : buffers_of(s.plan, s.model, s.exposures, s.motions, s.model.capacity))
         state.arrays.push_back({named.name, named.buffer->download<std::byte>(named.bytes)});
     const auto origin = std::as_bytes(std::span(&s.model.origin, 1));
     if (s.model.origin != glm::dvec3(0)) state.arrays.push_back({"origin", {origin.begin(), origin.end()}});
@@ -389,7 +417,7 @@ void Trainer::restore(const TrainerState& state) {
         splats > s.options.max_splats || splats == 0)
         throw InputError(
             "the state does not fit this training: another SH degree, more steps or more splats");
-    const auto buffers = buffers_of(s.plan, s.model, s.exposures, splats);
+    const auto buffers = buffers_of(s.plan, s.model, s.exposures, s.motions, splats);
     const bool moved = !state.arrays.empty() && state.arrays.back().name == "origin";
     glm::dvec3 origin(0);
     if (moved && state.arrays.back().bytes.size() == sizeof(origin))
@@ -420,6 +448,10 @@ std::vector<Exposure> Trainer::exposures() const {
     state_->finish_all();
     return state_->plan.exposure ? state_->exposures.download() : std::vector<Exposure>();
 }
+std::vector<CameraMotion> Trainer::camera_motions() const {
+    state_->finish_all();
+    return state_->plan.motion ? state_->motions.download() : std::vector<CameraMotion>();
+}
 Gaussians Trainer::gaussians() const {
     state_->finish_all();
     Gaussians gaussians = download_model(state_->model, state_->model.params);
@@ -434,6 +466,10 @@ size_t Trainer::images_on_disk() const {
 }
 int Trainer::steps_done() const {
     return state_->report.step;
+}
+
+double Trainer::extent() const {
+    return state_->extent;
 }
 
 std::vector<PlanLine> Trainer::plan() const {

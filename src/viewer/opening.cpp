@@ -9,6 +9,7 @@
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
 #include "ewa/synthetic_dataset.h"
+#include "io/datasets/refined_cameras.h"
 #include "live/run_folder.h"
 
 namespace ewa::viewer {
@@ -32,7 +33,9 @@ bool is_dataset_file(const fs::path& path) {
 }
 
 /// points: also load the points, which are read only together with the images.
-std::shared_ptr<const Dataset> load_cameras(const fs::path& path, DatasetOptions options, bool points) {
+/// refined: cameras.json of the run; empty: none.
+std::shared_ptr<const Dataset> load_cameras(const fs::path& path, DatasetOptions options, bool points,
+                                            const fs::path& refined = {}) {
     Dataset dataset;
     if (is_mesh_scene(path)) dataset = scene_cameras(path, {});
     try {
@@ -47,6 +50,7 @@ std::shared_ptr<const Dataset> load_cameras(const fs::path& path, DatasetOptions
     if (!std::all_of(dataset.frames.begin(), dataset.frames.end(), missing))
         std::erase_if(dataset.frames, missing);
     if (dataset.frames.empty()) throw InputError(path.string() + " has no frames");
+    if (!refined.empty()) io::use_refined_cameras(dataset, refined);
     return std::make_shared<const Dataset>(std::move(dataset));
 }
 
@@ -91,7 +95,8 @@ void add_cameras(OpenedScene& scene, const live::Run& run, const fs::path& camer
     const fs::path dataset = cameras.empty() ? run.dataset : cameras;
     try {
         if (!dataset.empty())
-            scene.dataset = load_cameras(dataset, images_of(run), points);
+            scene.dataset = load_cameras(dataset, images_of(run), points,
+                                         cameras.empty() ? run.refined_cameras() : fs::path());
         else
             scene.remark = "the dataset of this run was not found; name it with --cameras DATASET";
         if (cameras.empty()) scene.exposures = exposures_of(run);

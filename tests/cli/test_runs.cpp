@@ -143,6 +143,59 @@ TEST_F(Runs, EvalAndRenderUseTheExposures) {
     EXPECT_EQ(read_file(folder / "auto/1.png"), read_file(folder / "file/1.png"));
 }
 
+TEST_F(Runs, EvalRenderAndGradUseTheRefinedCameras) {
+    const std::string run = folder / "run";
+    const Outcome trained =
+        run_ewa({"train", folder / "data", "-o", run, "--init", folder / "s.ply", "--steps", "30",
+                 "--test-every", "2", "--refine-poses", "--refine-focal"});
+    expect_success(trained);
+    EXPECT_NE(trained.out.find("with cameras aligned to their images"), std::string::npos) << trained.out;
+    EXPECT_NE(trained.out.find("cameras turned by "), std::string::npos) << trained.out;
+    const auto summary = read_json(run + "/summary.json");
+    EXPECT_GT(summary["cameras"]["largest_degrees"], 0);
+    EXPECT_EQ(summary["cameras"]["test_cameras_aligned"], true);
+    EXPECT_NE(read_file(run + "/report.html").find("were aligned to their images"), std::string::npos);
+
+    const auto psnr = [&](Names arguments) {
+        arguments.insert(arguments.begin(), "eval");
+        arguments.insert(arguments.end(), {"--json", folder / "e.json"});
+        expect_success(run_ewa(arguments));
+        return read_json(folder / "e.json")["psnr"].get<double>();
+    };
+    EXPECT_NEAR(psnr({run}), summary["test_psnr"], 1e-6);
+    EXPECT_NEAR(psnr({run, "--split", "train"}), summary["train_psnr"], 1e-6);
+    const double unrefined = psnr({run + "/splats.ply", folder / "data", "--test-every", "2"});
+    EXPECT_GT(std::abs(unrefined - summary["test_psnr"].get<double>()), 1e-3);
+    const auto loss = [&](const std::string& splats, const Names& more) {
+        Names arguments{"grad", splats, "--frame", "1", "-o", folder / "g.ply", "--json", folder / "g.json"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        expect_success(run_ewa(arguments));
+        EXPECT_NE(read_json(folder / "g.json")["camera"]["rotation"][0], 0);
+        return read_json(folder / "g.json")["loss"].get<double>();
+    };
+    EXPECT_NE(loss(run, {}), loss(run + "/splats.ply", {folder / "data"}));
+    expect_success(run_ewa({"render", run, "-o", folder / "refined"}));
+    expect_success(
+        run_ewa({"render", run + "/splats.ply", "--cameras", folder / "data", "-o", folder / "given"}));
+    EXPECT_NE(read_file(folder / "refined/1.png"), read_file(folder / "given/1.png"));
+
+    // The run goes on to the same bytes, and not with other options.
+    const auto bytes = read_file(run + "/cameras.json");
+    const Outcome other = run_ewa({"train", folder / "data", "-o", run, "--init", folder / "s.ply", "--steps",
+                                   "30", "--test-every", "2", "--resume"});
+    expect_failure(other, 2, "was written with --refine-");
+    expect_success(run_ewa({"train", folder / "data", "-o", run, "--init", folder / "s.ply", "--steps", "30",
+                            "--test-every", "2", "--refine-poses", "--refine-focal", "--resume", "--quiet"}));
+    EXPECT_EQ(read_file(run + "/cameras.json"), bytes);
+    // A run without leaves no cameras of the one before.
+    expect_success(run_ewa({"train", folder / "data", "-o", run, "--init", folder / "s.ply", "--steps", "1",
+                            "--test-every", "2", "--force", "--quiet"}));
+    EXPECT_FALSE(fs::exists(run + "/cameras.json"));
+    EXPECT_FALSE(fs::exists(run + "/cameras/sparse/0/cameras.bin"));
+    expect_failure(run_ewa({"train", folder / "data", "-o", folder / "x", "--refine-focal"}), 2,
+                   "--refine-focal is an option of --refine-poses");
+}
+
 TEST_F(Runs, WrongExposuresAreNamed) {
     const std::string run = train("run");
     const auto fails = [&](const std::string& text, const std::string& reason) {
@@ -293,7 +346,7 @@ TEST_F(Runs, FilesOfARunStayWhole) {
     };
     const std::string reason = "is a file of the training run in " + run;
     for (const char* file : {"config.json", "checkpoint.ewa", "summary.json", "metrics.jsonl", "splats.ply",
-                             "report.html", "exposures.json"})
+                             "report.html", "exposures.json", "cameras.json"})
         refused({"eval", run, "--json", run + "/" + file}, reason);
     refused({"grad", run, "--frame", "0", "-o", folder / "x.ply", "--json", run + "/summary.json"}, reason);
     refused({"compare", run, other, "--json", run + "/metrics.jsonl"}, reason);

@@ -79,8 +79,9 @@ void compile_splatting(Compiler& compiler) {
         {{SPEC_SH_DEGREE, kDegrees},
          {SPEC_KERNEL, kFootprints},
          {SPEC_MODE,
-          {UPDATE_GRADIENT_ONLY, 0, UPDATE_STATISTICS, packed, packed | UPDATE_STATISTICS,
-           packed | UPDATE_REGULARISED, packed | UPDATE_STATISTICS | UPDATE_ABSOLUTE}}});
+          {UPDATE_GRADIENT_ONLY, UPDATE_GRADIENT_ONLY | UPDATE_MOTION, packed | UPDATE_MOTION, 0,
+           UPDATE_STATISTICS, packed, packed | UPDATE_STATISTICS, packed | UPDATE_REGULARISED,
+           packed | UPDATE_STATISTICS | UPDATE_ABSOLUTE}}});
     compiler.compile<passes::ScanBlocks>({{SPEC_MODE, {0, SCAN_GATHERED}}});
     compiler.compile<passes::ScanTotals>();
     const Values scatter_modes = {0,
@@ -144,6 +145,8 @@ void compile_training(Compiler& compiler) {
     compiler.compile<passes::Expose>();
     compiler.compile<passes::ExposeBackward>();
     compiler.compile<passes::ExposureUpdate>();
+    compiler.compile<passes::MoveCamera>();
+    compiler.compile<passes::MotionUpdate>();
     compiler.compile<passes::DensifyDecide>();
     compiler.compile<passes::DensifyWrite>(
         {{SPEC_SH_DEGREE, kDegrees}, {SPEC_MODE, {WRITE_PARAMS, WRITE_MOMENTS}}});

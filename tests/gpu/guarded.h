@@ -99,6 +99,10 @@ class GuardedFrame {
                 make(frame.exposed, "exposed", s.exposed, Texel::rgba32f);
                 make(frame.exposure_sums, "exposure sums", s.exposure_sums);
             }
+            if (request.motion) {
+                make(frame.motion_sums, "motion sums", s.motion_sums);
+                make(frame.motion_reduced, "motion reduced", s.motion_reduced);
+            }
             if (request.masks) make(frame.masked, "masked", s.masked, Texel::rgba32f);
             make(frame.moments, "moments", s.moments, Texel::rgba32f);
             make(frame.derivatives, "derivatives", s.derivatives, Texel::rgba32f);

@@ -402,6 +402,7 @@ struct FrameParts {
     pipeline::FrameBuffers frame;
     gpu::Buffer camera, photo;
     pipeline::Exposures exposures;
+    pipeline::Motions motions;
 };
 SharedByTests<FrameParts>* const frame_parts = SharedByTests<FrameParts>::add();
 
@@ -409,9 +410,11 @@ SharedByTests<FrameParts>* const frame_parts = SharedByTests<FrameParts>::add();
 std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     Rig& r = rig();
     const Scene scene = random_scene(3000, 50, SplatKind::ordinary, 61, 47, 2);
-    auto& [model, frame, camera, photo, exposures] = frame_parts->get([] { return FrameParts(); });
+    auto& [model, frame, camera, photo, exposures, motions] = frame_parts->get([] { return FrameParts(); });
     exposures = pipeline::Exposures(*device(), 3);
     const pipeline::ExposureUse exposure{&exposures, 1, 0.01f, 1};
+    motions = pipeline::Motions(*device(), std::vector<pipeline::MotionBasis>(3));
+    const pipeline::MotionUse motion{.motions = &motions, .photo = 1};
     model = pipeline::upload_model(*device(), scene.gaussians, 2, true);
     camera = camera_buffer(scene.camera, r.config());
     photo = gpu::Buffer(*device(), "photo", 61 * 47 * 16, gpu::Texel::rgba32f);
@@ -425,7 +428,8 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
                    .rays = true,
                    .masks = true,
                    .exposure = true,
-                   .overlaid = true});
+                   .overlaid = true,
+                   .motion = true});
     const pipeline::FrameInputs inputs{.camera = {&camera, 0, 61, 47}};
     std::vector<std::vector<Command>> out;
 
@@ -434,12 +438,15 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
                                   .present_degree = 2,
                                   .render = {},
                                   .drawing = Drawing::depth,
+                                  .motion = true,
                                   .statistics = true};
     gpu::Recording step = r.recording();
     const auto plan = plan_for(request);
-    const auto sorted = record_forward(step, r.cache, plan, model, frame, inputs);
+    const pipeline::FrameInputs moved{
+        .camera = record_move_camera(step, r.cache, motions, motion.photo, inputs.camera)};
+    const auto sorted = record_forward(step, r.cache, plan, model, frame, moved);
     record_loss(step, r.cache, frame, inputs, photo, false, &exposure);
-    record_backward(step, r.cache, plan, model, frame, inputs, sorted, {});
+    record_backward(step, r.cache, plan, model, frame, inputs, sorted, {}, &motion);
     record_reset_opacity(step, r.cache, model, 0);
     record_noise(step, r.cache, model, frame, {.amplitude = 0.1f, .max_length = 1, .seed = 1, .step = 1});
     out.push_back(step.commands());

@@ -18,7 +18,8 @@
 namespace ewa::test {
 namespace {
 
-constexpr uint32_t kGradient = 1, kStatistics = 2, kRegularised = 4, kAbsolute = 8, kPacked = 16;
+constexpr uint32_t kGradient = 1, kStatistics = 2, kRegularised = 4, kAbsolute = 8, kPacked = 16,
+                   kMotion = 32;
 
 /// A scene's way back up to the instances by the CPU reference, in the device's buffers.
 struct Slots {
@@ -55,7 +56,7 @@ struct Slots {
 /// What the pass reads and writes besides the model.
 struct Bench {
     gpu::Buffer camera;
-    Guarded records, slots, tile_counts, first, places, counts, statistics;
+    Guarded records, slots, tile_counts, first, places, counts, statistics, motion_sums;
 
     explicit Bench(const Slots& s)
         : camera(camera_buffer(s.scene.camera, rig().config())),
@@ -65,7 +66,23 @@ struct Bench {
           first("first instances", s.first),
           places("places", s.places),
           counts(zero_counts()),
-          statistics("statistics", std::vector<float>(2 * s.scene.gaussians.size())) {}
+          statistics("statistics", std::vector<float>(2 * s.scene.gaussians.size())),
+          motion_sums("motion sums", std::vector<float>(kMotionRows * subgroups(s.scene.gaussians.size()))) {}
+
+    static constexpr size_t kMotionRows = shared::MOTION_VALUES;
+    static size_t subgroups(size_t splats) {
+        const passes::KernelConfig& config = rig().config();
+        return (splats + config.element_group - 1) / config.element_group *
+               (config.element_group / config.subgroup);
+    }
+    /// dL/d(each value of the camera's motion).
+    std::vector<double> by_motion() const {
+        const std::vector<float> sums = motion_sums.read<float>();
+        std::vector<double> rows(kMotionRows);
+        const size_t count = sums.size() / kMotionRows;
+        for (size_t i = 0; i < kMotionRows * count; ++i) rows[i / count] += sums[i];
+        return rows;
+    }
 
     void run(const Scene& scene, const pipeline::Model& model, const gpu::Buffer& moments1,
              const gpu::Buffer& moments2, uint32_t mode, const shared::UpdatePush& push,
@@ -91,10 +108,11 @@ struct Bench {
                          .moments1_out = moments1,
                          .moments2_out = moments2,
                          .statistics = statistics,
-                         .sorted_indices = places},
+                         .sorted_indices = places,
+                         .motion_sums = motion_sums},
                         push);
         });
-        expect_intact({&records, &slots, &tile_counts, &first, &places, &counts, &statistics});
+        expect_intact({&records, &slots, &tile_counts, &first, &places, &counts, &statistics, &motion_sums});
     }
 };
 
@@ -148,6 +166,7 @@ TEST_P(UpdatePass, GradientMatchesTheReference) {
     Bench bench(slots);
     bench.run(slots.scene, model.model, model.moments1, model.moments2, kGradient, push_for(slots.scene, 1));
     expect_intact({&model.moments1});
+    for (const double sum : bench.by_motion()) EXPECT_EQ(sum, 0);  // not asked for
     const Gaussians actual = model.read(model.moments1);
     // float32 along one chain of products; a needle's axes differ by 1000, and so do the terms that cancel.
     GradientTolerance tolerance;
@@ -176,6 +195,54 @@ INSTANTIATE_TEST_SUITE_P(All, UpdatePass,
                              return std::string(name_of(c.kind)) + "_" + std::to_string(c.splats) + "_sh" +
                                     std::to_string(c.sh_degree) + "_kernel" + std::to_string(int(c.kernel));
                          });
+
+TEST_P(UpdatePass, GradientByTheCamerasMotionMatchesTheReference) {
+    const UpdateCase& c = GetParam();
+    const Slots slots(random_scene(1800 + c.splats, c.splats, c.kind, 61, 47, c.sh_degree, c.kernel));
+    GuardedModel model(slots.scene.gaussians);
+    Bench bench(slots);
+    bench.run(slots.scene, model.model, model.moments1, model.moments2, kGradient | kMotion,
+              push_for(slots.scene, 1));
+    const CameraMotion& cpu = slots.cpu.camera;
+    const std::vector<double> actual = bench.by_motion();
+    GradientTolerance tolerance;
+    tolerance.cosine = 1e-8;
+    tolerance.norm = 1e-4;
+    const std::span<const double> all = actual;
+    EXPECT_TRUE(gradients_agree(all.subspan(0, 3),
+                                std::vector{cpu.rotation.x, cpu.rotation.y, cpu.rotation.z}, tolerance));
+    EXPECT_TRUE(gradients_agree(all.subspan(3, 1), std::vector{cpu.log_focal}, tolerance));
+    EXPECT_TRUE(
+        gradients_agree(all.subspan(4, 3), std::vector{cpu.shift.x, cpu.shift.y, cpu.shift.z}, tolerance));
+}
+
+/// Nothing of a splat whose gradient is not finite reaches the camera, and nothing of a frame whose instances did not fit.
+TEST(UpdateMotion, LeavesOutWhatIsNotFinite) {
+    const Scene scene = random_scene(1906, 40, SplatKind::ordinary, 61, 47, 1);
+    Slots slots(scene);
+    GuardedModel model(scene.gaussians);
+    const auto sums_of = [&](const Slots& s, const shared::UpdatePush& push, uint32_t instances) {
+        Bench bench(s);
+        shared::Counts counts{};
+        counts.instances = instances;
+        bench.counts = Guarded("counts", std::vector{counts});
+        bench.run(scene, model.model, model.moments1, model.moments2, kGradient | kMotion, push);
+        return bench.by_motion();
+    };
+    auto push = push_for(scene, 1);
+    const std::vector<double> all = sums_of(slots, push, 0);
+    size_t spoilt = 0;
+    while (slots.tile_counts[spoilt] == 0) ++spoilt;
+    slots.slots[size_t(slots.places[slots.first[spoilt]]) * shared::SLOT_FLOATS] = std::nanf("");
+    slots.slots[size_t(slots.places[slots.first[spoilt]]) * shared::SLOT_FLOATS + 1] = std::nanf("");
+    const std::vector<double> others = sums_of(slots, push, 0);
+    for (size_t k = 0; k < all.size(); ++k) {
+        EXPECT_TRUE(std::isfinite(others[k]));
+        EXPECT_NE(others[k], all[k]);
+    }
+    push.instance_capacity = 5;
+    for (const double sum : sums_of(slots, push, 6)) EXPECT_EQ(sum, 0);
+}
 
 std::vector<double> wide(const std::vector<float>& values) {
     return {values.begin(), values.end()};

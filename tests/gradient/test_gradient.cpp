@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <tuple>
 
 #include "ewa/renderer.h"
 #include "gpu/test_device.h"
@@ -67,6 +68,42 @@ TEST_P(Gradient, IsTheSlopeOfTheReferencesLoss) {
     check("log scales", values.log_scales, g.log_scales, cpu.gradient.log_scales);
     check("opacities", values.opacity_logits, g.opacity_logits, cpu.gradient.opacity_logits);
     check("sh", values.sh, g.sh, cpu.gradient.sh);
+}
+
+/// The device's and the reference's gradient by the camera's motion, against central differences of the reference's loss.
+TEST_P(Gradient, ByTheCamerasMotionIsTheSlopeOfTheReferencesLoss) {
+    const Case& c = GetParam();
+    SCOPED_TRACE(seed_text(c.seed));
+    const Camera camera = random_camera(c.seed, c.width, c.height);
+    const Gaussians gaussians = random_gaussians(c.seed + 1, c.splats, c.kind, camera, c.sh_degree);
+    const Image target = random_target(c.seed + 2, c.width, c.height);
+    RenderOptions options;
+    options.kernel = c.kernel;
+    const reference::Values values = gaussians;
+    const CameraMotion actual = loss_gradient(device(), gaussians, camera, target, options).camera;
+    const CameraMotion cpu = reference::loss_gradient(values, camera, target, options).camera;
+    CameraMotion motion;
+    const auto loss = [&] {
+        return reference::loss_gradient(values, moved(camera, motion), target, options).loss;
+    };
+    const auto slope = [&](double& value, double claimed) {
+        return best_central_difference(loss, value, claimed, 1e-4, 1e-7);
+    };
+    std::vector<double> rotation, shift;
+    for (int k = 0; k < 3; ++k) {
+        rotation.push_back(slope(motion.rotation[k], cpu.rotation[k]));
+        shift.push_back(slope(motion.shift[k], cpu.shift[k]));
+    }
+    const std::vector<double> focal{slope(motion.log_focal, cpu.log_focal)};
+    const auto list = [](const glm::dvec3& v) { return std::vector<double>{v.x, v.y, v.z}; };
+    for (const auto& [who, by, norm] : {std::tuple{"device", &actual, 1e-4}, {"reference", &cpu, 1e-5}}) {
+        GradientTolerance tolerance;
+        tolerance.cosine = norm * norm;
+        tolerance.norm = norm;
+        EXPECT_TRUE(gradients_agree(list(by->rotation), rotation, tolerance)) << who;
+        EXPECT_TRUE(gradients_agree(list(by->shift), shift, tolerance)) << who;
+        EXPECT_TRUE(gradients_agree(std::vector<double>{by->log_focal}, focal, tolerance)) << who;
+    }
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Gradient,

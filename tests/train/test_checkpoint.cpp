@@ -118,7 +118,7 @@ TEST_P(RestoredTrainer, GoesOnAsIfNothingHadHappened) {
     options.max_splats = 300;
     options.sh_degree = 1;
     options.random_background = true;
-    options.exposure = true;
+    options.exposure = options.refine_poses = options.refine_focal = true;
     options.halvings = 1;
     options.absolute_gradients = options.revised_opacity = true;  // of adc
     options.grow_gradient_absolute = 1e-5;
@@ -142,6 +142,7 @@ TEST_P(RestoredTrainer, GoesOnAsIfNothingHadHappened) {
         EXPECT_EQ(later.gaussians().means, expected.means);
         EXPECT_EQ(later.gaussians().sh, expected.sh);
         EXPECT_EQ(later.gaussians().opacity_logits, expected.opacity_logits);
+        EXPECT_EQ(later.camera_motions(), whole.camera_motions());
         EXPECT_EQ(report.splats, expected.size());
     }
 }

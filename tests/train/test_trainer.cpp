@@ -335,7 +335,7 @@ TEST(Trainer, RunsThePlanThatItTells) {
         for (const bool exposure : {false, true}) {
             TrainOptions options = quick(10);
             options.strategy = strategy;
-            options.exposure = options.absolute_gradients = exposure;
+            options.exposure = options.refine_poses = options.absolute_gradients = exposure;
             const Gaussians start = shaken_start(spoilt.data, 0.05, 1, 0);
             const Trainer masked(device(), spoilt.masked, frames, start, options);
             const Trainer plain(device(), spoilt.unmasked, frames, start, options);
@@ -343,7 +343,7 @@ TEST(Trainer, RunsThePlanThatItTells) {
             EXPECT_EQ(names(plain.plan()), names(plan_lines(start, options, false)));
             EXPECT_EQ(plain.plan().size(), masked.plan().size() + 1);
             // A checkpoint has what the plan keeps from step to step.
-            EXPECT_EQ(plain.state().arrays.size(), 2u + (strategy == Strategy::adc) + (exposure ? 3 : 0));
+            EXPECT_EQ(plain.state().arrays.size(), 2u + (strategy == Strategy::adc) + (exposure ? 6 : 0));
         }
 }
 

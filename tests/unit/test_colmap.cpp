@@ -299,6 +299,49 @@ TEST(Colmap, TextErrorsNameTheLine) {
     refuse(camera_line, "# none\n", "", {"no images"});
 }
 
+/// What is written is read back: every kind of lens, names with spaces, and points.
+TEST(ColmapWriter, WhatIsWrittenIsReadBack) {
+    TempFolder folder;
+    std::vector<io::ImageRecord> images;
+    const auto add = [&](const std::string& name, const Distortion& distortion) {
+        io::ImageRecord& image = images.emplace_back();
+        image.name = name;
+        image.camera = {.width = 640, .height = 480, .fx = 500.1, .fy = 499.9, .cx = 321.5, .cy = 239.25};
+        image.camera.rotation =
+            glm::mat3_cast(glm::normalize(glm::dquat(0.9, 0.1, -0.2, 0.1 * double(images.size()))));
+        image.camera.translation = {1.0 / 3, -2, double(images.size())};
+        image.distortion = distortion;
+    };
+    add("a b.jpg", {});
+    add("c.jpg", {});
+    add("d.jpg", {.k1 = 0.1, .p2 = 0.01});
+    add("e.jpg", {.k1 = 0.1, .k6 = 0.02});
+    add("f.jpg", {.k1 = 0.1, .k4 = 0.01, .lens = Lens::fisheye});
+    add("g.jpg", {.k1 = 0.1, .s1 = 0.01, .lens = Lens::fisheye});
+    add("h.jpg", {.k1 = 0.1, .k6 = 0.01, .s4 = 0.02, .lens = Lens::fisheye624});
+    add("i.jpg", {.k1 = 0.9, .lens = Lens::fov});
+    add("j.jpg", {.k1 = -0.1, .lens = Lens::division});
+    add("k.jpg", {.k1 = 0.5, .k2 = 1.1, .lens = Lens::unified});
+    const PointCloud points{{{1, 2, 3}, {-4.5, 1e-3, 7}}, {{1, 2, 3}, {255, 0, 128}}};
+    io::write_colmap(folder / "sparse/0", images, points);
+    const io::ImageRecords read = io::read_colmap(folder / "sparse/0", folder / "images");
+    ASSERT_EQ(read.images.size(), images.size());
+    for (size_t i = 0; i < images.size(); ++i) {
+        SCOPED_TRACE(images[i].name);
+        const Camera &is = read.images[i].camera, &was = images[i].camera;
+        EXPECT_EQ(read.images[i].name, images[i].name);
+        EXPECT_TRUE(read.images[i].distortion == images[i].distortion);
+        EXPECT_EQ(is.width, was.width);
+        EXPECT_EQ(is.height, was.height);
+        for (const auto value : {&Camera::fx, &Camera::fy, &Camera::cx, &Camera::cy})
+            EXPECT_EQ(is.*value, was.*value);
+        EXPECT_EQ(is.translation, was.translation);
+        for (int k = 0; k < 3; ++k) EXPECT_LT(glm::length(is.rotation[k] - was.rotation[k]), 1e-14);
+    }
+    EXPECT_EQ(read.points.positions, points.positions);
+    EXPECT_EQ(read.points.colors, points.colors);
+}
+
 TEST(Dataset, MissingImages) {
     Model model;
     std::filesystem::remove(model.folder / "images" / "b.png");

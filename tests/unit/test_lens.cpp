@@ -320,4 +320,16 @@ TEST(Lens, ACornerBeyondTheFoldShrinksThePicture) {
         }
 }
 
+TEST(Lens, ALongerFocalLengthKeepsThePixels) {
+    const Distortion d{
+        .k1 = 0.1, .k2 = -0.05, .p1 = 0.01, .p2 = -0.02, .k3 = 0.01, .k4 = 0.03, .k5 = 0.02, .k6 = 0.04};
+    for (const double factor : {0.9, 1.0, 1.2})
+        for (const glm::dvec2& ray : kRays) {
+            const glm::dvec2 is = scene::distort(scene::for_longer_focal(d, factor), ray);
+            const glm::dvec2 want = scene::distort(d, factor * ray) / factor;
+            EXPECT_NEAR(is.x, want.x, 1e-14);
+            EXPECT_NEAR(is.y, want.y, 1e-14);
+        }
+}
+
 }  // namespace

@@ -68,6 +68,11 @@ std::optional<std::filesystem::path> find_colmap_model(const std::filesystem::pa
 /// Throws InputError that names the file and the byte (.bin) or line (.txt).
 ImageRecords read_colmap(const std::filesystem::path& model, const std::filesystem::path& images);
 
+/// Writes a binary model with these images, cameras and points into the folder, which is created. The images' paths, masks
+/// and splits are not used. Throws RunError.
+void write_colmap(const std::filesystem::path& model, const std::vector<ImageRecord>& images,
+                  const PointCloud& points);
+
 /// Reads the file. Cameras get OpenCV's axes; the world frame stays the file's. nerfstudio's
 /// applied_transform is ignored, because it already applies to cameras and points alike. A rotation with a
 /// uniform factor or a little noise becomes orthonormal. `split` becomes each image's. with_points false

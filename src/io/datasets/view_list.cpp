@@ -52,7 +52,7 @@ NamedView parse_view(const Json& object) {
         *value = numbers(object, name, 1)[0];
     if (!(camera.fx > 0) || !(camera.fy > 0)) throw InputError("a focal length is not above zero");
     const auto rotation = numbers(object, "rotation", 9), translation = numbers(object, "translation", 3),
-               pivot = numbers(object, "pivot", 3);
+               pivot = object.contains("pivot") ? numbers(object, "pivot", 3) : std::vector<double>(3);
     for (int row = 0; row < 3; ++row) {
         for (int column = 0; column < 3; ++column)
             camera.rotation[column][row] = rotation[size_t(3 * row + column)];
@@ -63,12 +63,13 @@ NamedView parse_view(const Json& object) {
     return view;
 }
 
-Json to_json(const NamedView& view) {
-    const Camera& c = view.camera;
+}  // namespace
+
+Json camera_json(const std::string& name, const Camera& c) {
     Json rotation = Json::array();
     for (int row = 0; row < 3; ++row)
         for (int column = 0; column < 3; ++column) rotation.push_back(c.rotation[column][row]);
-    return {{"name", view.name},
+    return {{"name", name},
             {"width", c.width},
             {"height", c.height},
             {"fx", c.fx},
@@ -76,11 +77,8 @@ Json to_json(const NamedView& view) {
             {"cx", c.cx},
             {"cy", c.cy},
             {"rotation", rotation},
-            {"translation", {c.translation.x, c.translation.y, c.translation.z}},
-            {"pivot", {view.pivot.x, view.pivot.y, view.pivot.z}}};
+            {"translation", {c.translation.x, c.translation.y, c.translation.z}}};
 }
-
-}  // namespace
 
 std::vector<NamedView> read_views(const std::filesystem::path& path) {
     const Json json = core::read_json_file<Json>(path, {.bytes = kLargestFile});
@@ -104,7 +102,10 @@ std::vector<NamedView> read_views(const std::filesystem::path& path) {
 
 void write_views(const std::filesystem::path& path, const std::vector<NamedView>& views) {
     Json list = Json::array();
-    for (const NamedView& view : views) list.push_back(to_json(view));
+    for (const NamedView& view : views) {
+        list.push_back(camera_json(view.name, view.camera));
+        list.back()["pivot"] = {view.pivot.x, view.pivot.y, view.pivot.z};
+    }
     core::write_text_file(path,
                           Json{{"views", list}}.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
 }

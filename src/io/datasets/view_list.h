@@ -2,9 +2,11 @@
 // Named cameras in a JSON file. Sizes are in px; the rotation is world to camera, row after row:
 //   {"views": [{"name": "...", "width": n, "height": n, "fx": n, "fy": n, "cx": n, "cy": n,
 //               "rotation": [9 numbers], "translation": [3], "pivot": [3]}, ...]}
+// The pivot may be missing, and there may be other keys.
 #pragma once
 #include <filesystem>
 #include <glm/vec3.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -23,6 +25,9 @@ inline constexpr size_t kMostViews = 10000;
 /// Throws InputError that names the file and the view. Causes are more than kMostViews views, a value that is
 /// missing or not finite, a size out of 1..65536, or a rotation that is not orthonormal to 1e-6.
 std::vector<NamedView> read_views(const std::filesystem::path& path);
+
+/// Name and camera as in the file.
+nlohmann::ordered_json camera_json(const std::string& name, const Camera& camera);
 
 /// Writes a temporary file and renames it. Every number survives a round trip unchanged. Throws RunError.
 void write_views(const std::filesystem::path& path, const std::vector<NamedView>& views);

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/datasets/refined_cameras.h"
+
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "core/json.h"
+#include "io/datasets/view_list.h"
+
+namespace ewa::io {
+
+void write_refined_cameras(const std::filesystem::path& path, const std::vector<RefinedCamera>& cameras,
+                           double extent) {
+    nlohmann::ordered_json views = nlohmann::ordered_json::array();
+    for (const RefinedCamera& refined : cameras) {
+        nlohmann::ordered_json& view = views.emplace_back(camera_json(refined.name, refined.camera));
+        view["split"] = refined.split;
+        if (refined.split == "test") view["aligned"] = refined.aligned;
+        view["degrees"] = refined.moved.degrees;
+        view["moved"] = refined.moved.length;
+        view["percent_of_extent"] = 100 * refined.moved.length / extent;
+        view["focal_factor"] = refined.moved.focal;
+    }
+    core::write_json(path, {{"extent", extent}, {"views", views}});
+}
+
+void use_refined_cameras(Dataset& dataset, const std::filesystem::path& path) {
+    std::map<std::string, Camera> cameras;
+    for (const NamedView& view : read_views(path)) cameras[view.name] = view.camera;
+    for (Frame& frame : dataset.frames) {
+        const auto found = cameras.find(frame.name);
+        if (found == cameras.end()) continue;
+        const Camera& refined = found->second;
+        Camera& camera = frame.camera;
+        camera.rotation = refined.rotation;
+        camera.translation = refined.translation;
+        camera.fx = refined.fx * (double(camera.width) / refined.width);
+        camera.fy = refined.fy * (double(camera.height) / refined.height);
+    }
+}
+
+}  // namespace ewa::io

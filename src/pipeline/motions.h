@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// Motions of the training cameras, learned beside the splats by the gradient of the loss.
+//
+// A rotation and a shift that compensate each other hardly change the image, and Adam's step along each value alone would
+// take very long to find how much of which. Each camera therefore has a basis in which every coordinate moves the image as
+// much as any other (CamP, Park et al. 2023). With J the derivative of a point's direction in the image by the motion, and A
+// the mean of J^T J over the points that the camera sees, the basis B has B B^T = A^-1.
+#pragma once
+#include <array>
+#include <vector>
+
+#include "ewa/camera_motion.h"
+#include "ewa/gaussians.h"
+#include "pipeline/frame_buffers.h"
+#include "pipeline/frame_inputs.h"
+
+namespace ewa::pipeline {
+
+using MotionBasis = std::array<float, shared::MOTION_BASIS_FLOATS>;
+
+/// focal: the focal lengths move too. extent: of the scene, world units.
+MotionBasis motion_basis(const Camera& camera, const Gaussians& gaussians, bool focal, double extent);
+
+/// Motions of all training cameras, with Adam's moments.
+struct Motions {
+    uint32_t photos = 0;
+    gpu::Buffer values, moments1, moments2, bases;
+    gpu::Buffer camera;  // the moved camera of the frame
+
+    Motions() = default;
+    /// bases: motion_basis of each photo's camera.
+    Motions(gpu::Device& device, const std::vector<MotionBasis>& bases);
+    uint64_t bytes() const { return 4ull * shared::MOTION_FLOATS * photos; }  // of values and of each moment
+    uint64_t basis_bytes() const { return 4ull * shared::MOTION_BASIS_FLOATS * photos; }
+    std::vector<CameraMotion> download() const;
+};
+
+/// A step of one training camera's motion.
+struct MotionUse {
+    const Motions* motions = nullptr;
+    uint32_t photo = 0;
+    float rate = 0;      // radians by which a step moves the points of the image
+    float extent = 1;    // of the scene, world units
+    uint32_t visit = 1;  // number of this camera's step, from 1
+};
+
+/// Writes the moved camera. base: the camera of the dataset. Returns the camera for the frame.
+CameraUse record_move_camera(gpu::Recording& recording, passes::PassCache& cache, const Motions& motions,
+                             uint32_t photo, const CameraUse& base);
+
+/// Adds the partial sums of the gradient that the update pass has left in frame.motion_sums. Their blocks are in
+/// frame.motion_reduced.
+void record_motion_sums(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame);
+
+/// The motion takes its own step of Adam, after record_motion_sums.
+void record_motion_update(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame,
+                          const MotionUse& use);
+
+/// The gradient of the last frame with record_motion_sums, for no motion.
+CameraMotion download_motion_gradient(const FrameBuffers& frame);
+
+}  // namespace ewa::pipeline
