@@ -76,9 +76,10 @@ std::vector<uint8_t> pixels_at_threshold(const Picture& picture) {
             bool hangs = false;
             for (size_t k = lists.first_of_tile[tile]; k < lists.first_of_tile[tile + 1]; ++k) {
                 const uint32_t splat = lists.sorted[k].splat;
-                const double raw = reference::sample(picture.projected[splat], whiteners[splat],
-                                                     reference::pixel_centre(x, y))
-                                       .raw;
+                const reference::Projected& p = picture.projected[splat];
+                const double sampled =
+                    reference::sample(p, whiteners[splat], reference::pixel_centre(x, y)).raw;
+                const double raw = p.density ? -std::expm1(-sampled) : sampled;
                 const double alpha = raw >= shared::ALPHA_MIN ? std::min(raw, shared::ALPHA_MAX) : 0;
                 const double next = transmittance * (1 - alpha);
                 // At exactly (1 - ALPHA_MAX)^2 both sides decide equally.
