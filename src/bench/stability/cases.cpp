@@ -146,8 +146,6 @@ void add_axis_ratios(Table& table) {
                           usual_camera(), kernel);
     for (const double ratio : {1e4, 1e7})
         table.add(text_of("long_axes_1:%.0e", ratio), "needles and discs of 200 px", thin_splats(3, ratio));
-    table.add("long_axes_1:1e+07_density", "needles and discs of 200 px", thin_splats(3, 1e7), usual_camera(),
-              Footprint::density);
 }
 
 void add_scales(Table& table) {
