@@ -349,13 +349,49 @@ void add_points(Table& table) {
     add("value_nan", "spheres, every other one with a value that is not a number", std::move(damaged));
 }
 
+/// The same splats on rays.
+void add_rays(Table& table) {
+    const auto add = [&](const char* name, const char* what, const Gaussians& gaussians,
+                         const Camera& camera = usual_camera(), Footprint kernel = Footprint::peak) {
+        for (const auto& [integrator, prefix] :
+             {std::pair(Integrator::ray, "ray_"), std::pair(Integrator::march, "march_")}) {
+            table.add(std::string(prefix) + name, what, gaussians, camera, kernel);
+            table.cases.back().options.integrator = integrator;
+            table.cases.back().options.samples = 16;
+        }
+    };
+    const auto scaled = [](double factor) {
+        return usual_scene(usual_camera(), 40, 1, [=](Sketch& s, uint32_t) { s.scale *= factor; });
+    };
+    add("ordinary", "splats along rays", usual_scene(usual_camera(), 60, 3));
+    add("ordinary_density", "densities along rays", usual_scene(usual_camera(), 60, 3), usual_camera(),
+        Footprint::density);
+    add("scale_1e-02", "scales times this", scaled(1e-2));
+    add("scale_1e+02", "scales times this: the camera is inside", scaled(1e2));
+    add("needles", "scales of 1 : 1e4", thin_splats(0.15, 1e4));
+    add("pancakes", "one scale of 1e-4",
+        usual_scene(usual_camera(), 40, 1, [](Sketch& s, uint32_t i) { s.scale[i % 3] *= 1e-4; }));
+    add("coinciding", "splats in one place", usual_scene(usual_camera(), 20, 1, [](Sketch& s, uint32_t) {
+            s.view = {0.1, 0.2, 4};
+        }));
+    Camera far = usual_camera();
+    const glm::dvec3 place(1e7, -8e6, 300);
+    Gaussians held = usual_scene(far, 60, 1);
+    held.origin = place;
+    far.translation = -(far.rotation * (far.position() + place));
+    add("georeferenced_1e7", "splats 1e7 from the origin", held, far);
+    Gaussians damaged = usual_scene(usual_camera(), 60, 1);
+    for (size_t i = 0; i < 20; ++i) stored_value(damaged, 2 * i, i) = std::numeric_limits<float>::quiet_NaN();
+    add("value_nan", "every other splat has a value that is not a number", damaged);
+}
+
 }  // namespace
 
 std::vector<StabilityCase> stability_cases() {
     Table table;
-    for (const auto add :
-         {add_ordinary, add_axis_ratios, add_scales, add_depths, add_far_from_origin, add_opacities,
-          add_stacks, add_images, add_focal_lengths, add_quaternions, add_colors, add_replaced, add_points})
+    for (const auto add : {add_ordinary, add_axis_ratios, add_scales, add_depths, add_far_from_origin,
+                           add_opacities, add_stacks, add_images, add_focal_lengths, add_quaternions,
+                           add_colors, add_replaced, add_points, add_rays})
         add(table);
     return std::move(table.cases);
 }

@@ -15,6 +15,7 @@
 #include "core/random.h"
 #include "ewa/error.h"
 #include "ewa/renderer.h"
+#include "reference/rays.h"
 #include "reference/render.h"
 #include "shared/constants.h"
 
@@ -100,6 +101,7 @@ struct Expected {
     std::vector<uint8_t> excluded;  // pixels_at_threshold
     double scale = 1;               // of the image's errors
     double least_quaternions = 0;   // see least_quaternion_norm
+    bool moves_camera = false;      // there is a gradient by the camera
 };
 
 /// The largest error of a pixel that is not excluded. color: an Image or a Raster.
@@ -117,10 +119,14 @@ double picture_error(const Expected& expected, const Pixels& color) {
     return largest;
 }
 
-/// The errors of image, loss and each group of the gradient, without bounds.
+std::vector<double> numbers_of(const glm::dvec3& v) {
+    return {v.x, v.y, v.z};
+}
+
+/// The errors of image, loss, each group of the gradient and the gradient by the camera, without bounds.
 template <class Pixels, class Gradient>
 std::vector<Comparison> errors_of(const Expected& expected, const Pixels& color, double loss,
-                                  const Gradient& gradient) {
+                                  const Gradient& gradient, const CameraMotion& camera) {
     const double right = expected.reference.loss;
     std::vector<Comparison> errors{{"picture", picture_error(expected, color)},
                                    {"loss", std::abs(loss - right) / std::max(1.0, right)}};
@@ -129,6 +135,14 @@ std::vector<Comparison> errors_of(const Expected& expected, const Pixels& color,
                        const double least = name == "quaternions" ? expected.least_quaternions : 0;
                        errors.push_back({name, relative_distance(a, b, least)});
                    });
+    if (!expected.moves_camera) return errors;
+    const CameraMotion& expected_camera = expected.reference.camera;
+    errors.push_back({"camera rotation",
+                      relative_distance(numbers_of(camera.rotation), numbers_of(expected_camera.rotation))});
+    errors.push_back(
+        {"camera shift", relative_distance(numbers_of(camera.shift), numbers_of(expected_camera.shift))});
+    errors.push_back({"focal length",
+                      relative_distance(std::vector<double>{camera.log_focal}, {expected_camera.log_focal})});
     return errors;
 }
 
@@ -159,7 +173,7 @@ bool all_finite(const std::vector<float>& values) {
 
 /// The error of the reference image if each determinant is a c - b^2 in float32, unlike in the pipeline.
 double plain_determinant_error(const Expected& expected, const RenderOptions& options) {
-    if (options.points) return 0;  // a sphere has no determinant
+    if (options.points || options.integrator != Integrator::splat) return 0;  // no 2D determinant
     const Picture& picture = expected.reference.picture;
     std::vector<reference::Projected> plain = picture.projected;
     for (reference::Projected& p : plain) {
@@ -174,7 +188,11 @@ double plain_determinant_error(const Expected& expected, const RenderOptions& op
 
 Expected expected_of(const StabilityCase& one, const Image& target) {
     Expected expected{reference::loss_gradient(one.gaussians, one.camera, target, one.options), {}};
-    expected.excluded = pixels_at_threshold(expected.reference.picture);
+    const bool on_rays = one.options.integrator != Integrator::splat;
+    expected.excluded =
+        on_rays ? reference::Rays(one.gaussians, one.camera, one.options).at_threshold(kAtThreshold)
+                : pixels_at_threshold(expected.reference.picture);
+    expected.moves_camera = !on_rays && !one.options.points;
     for (const double v : expected.reference.picture.blended.color.values)
         expected.scale = std::max(expected.scale, std::abs(v));
     expected.least_quaternions = least_quaternion_norm(one, expected.reference.gradient);
@@ -188,7 +206,8 @@ std::vector<double> conditions_of(const StabilityCase& one, const Image& target,
     for (uint32_t draw = 0; draw < kPerturbations; ++draw) {
         const ReferenceGradient moved = reference::loss_gradient(
             perturbed(one.gaussians, one.camera.position(), draw), one.camera, target, one.options);
-        const auto errors = errors_of(expected, moved.picture.blended.color, moved.loss, moved.gradient);
+        const auto errors =
+            errors_of(expected, moved.picture.blended.color, moved.loss, moved.gradient, moved.camera);
         largest.resize(errors.size());
         for (size_t i = 0; i < errors.size(); ++i)
             largest[i] = std::max(largest[i], errors[i].error / kPerturbation);
@@ -329,7 +348,9 @@ StabilityResult compare_with_reference(const std::shared_ptr<gpu::Device>& devic
     result.name = one.name;
     result.what = one.what;
     result.splats = uint32_t(one.gaussians.size());
-    result.drawn = uint32_t(expected.reference.picture.order.size());
+    const auto& projected = expected.reference.picture.projected;
+    result.drawn = uint32_t(
+        std::count_if(projected.begin(), projected.end(), [](const auto& each) { return each.visible; }));
     result.skipped_by_reference = expected.reference.picture.skipped_nonfinite;
     result.pixels = excluded.size();
     result.pixels_at_threshold = uint64_t(std::count(excluded.begin(), excluded.end(), 1));
@@ -345,13 +366,17 @@ StabilityResult compare_with_reference(const std::shared_ptr<gpu::Device>& devic
     for_each_group(actual.gradient, actual.gradient, [&](const char*, const auto& group, const auto&) {
         result.finite = result.finite && all_finite(group);
     });
-    result.comparisons = errors_of(expected, color, actual.loss, actual.gradient);
+    result.comparisons = errors_of(expected, color, actual.loss, actual.gradient, actual.camera);
     const std::vector<double> conditions = conditions_of(one, target, expected);
     for (size_t i = 0; i < conditions.size(); ++i) {
         result.comparisons[i].condition = conditions[i];
         result.comparisons[i].bound = bound(i < 2 ? kPictureFloor : kGradientFloor, conditions[i]);
     }
     return result;
+}
+
+bool trains(const StabilityCase& one) {
+    return one.options.integrator == Integrator::splat;
 }
 
 StabilityTraining train_from(const std::shared_ptr<gpu::Device>& device, const StabilityCase& one,
@@ -407,9 +432,11 @@ int run_stability(const Options& options) {
     }
     if (options.training_steps > 0) print(stability_training_header());
     {
-        core::Progress progress("trained from", int(cases.size()), "scenes", rows_alone);
+        core::Progress progress("trained from", int(std::count_if(cases.begin(), cases.end(), trains)),
+                                "scenes", rows_alone);
         for (const StabilityCase& one : cases) {
             if (options.training_steps == 0) break;
+            if (!trains(one)) continue;
             trainings.push_back(train_from(device, one, options.training_steps));
             progress.clear();
             print(stability_training_line(trainings.back()) + "\n");

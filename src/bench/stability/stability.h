@@ -48,7 +48,7 @@ struct StabilityResult {
     uint64_t pixels = 0;
     uint64_t pixels_at_threshold = 0;     // where a contribution is close to a threshold of the model
     bool finite = true;                   // image, loss and gradient
-    std::vector<Comparison> comparisons;  // image, loss, and each group of the gradient
+    std::vector<Comparison> comparisons;  // image, loss, each group of the gradient, the camera's gradient
     double plain_determinant = 0;         // image error of the reference if det = a c - b^2 in float32
     double loss = 0;
     /// Also requires that at most 4 pixels, or one in 200, are excluded for being close to a threshold.
@@ -69,7 +69,10 @@ struct StabilityTraining {
     bool good() const { return finite; }
 };
 
-/// Trains with Adam at the rates of 3DGS, without densification.
+/// Integration along rays has gradients, but no training.
+bool trains(const StabilityCase& one);
+
+/// Trains with Adam at the rates of 3DGS, without densification. The case must train.
 StabilityTraining train_from(const std::shared_ptr<gpu::Device>& device, const StabilityCase& one, int steps);
 
 /// Compares and trains from each case that the options choose. Prints the table and writes the JSON. Returns
