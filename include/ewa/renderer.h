@@ -60,8 +60,9 @@ class Renderer {
 
 struct LossGradient {
     double loss = 0, l1 = 0, ssim = 0;
-    Gaussians gradient;   // dL/d(stored value) in place of each stored value
-    CameraMotion camera;  // dL/d(each value of the camera's motion), for no motion; zero with `points`
+    Gaussians gradient;  // dL/d(stored value) in place of each stored value
+    CameraMotion
+        camera;  // dL/d(each value of the camera's motion), for no motion; zero with `points`, ray and march
     uint32_t skipped_nonfinite = 0;
 };
 

@@ -57,13 +57,14 @@ int run(const GradArguments& arguments) {
                       options, frame.masks == MaskUse::ignore);
     save_splats(arguments.output, result.gradient,
                 {"ewa " EWA_VERSION, fmt::format("gradient of the training loss of frame {}", index)});
-    if (!arguments.json.empty())
-        write_json(arguments.json, {{"loss", result.loss},
-                                    {"l1", result.l1},
-                                    {"ssim", result.ssim},
-                                    {"camera", motion_json(result.camera)},
-                                    {"frame", index},
-                                    {"name", frame.name}});
+    if (!arguments.json.empty()) {
+        report::Json json{{"loss", result.loss}, {"l1", result.l1}, {"ssim", result.ssim}};
+        if (options.integrator == Integrator::splat && !options.points)
+            json["camera"] = motion_json(result.camera);
+        json["frame"] = index;
+        json["name"] = frame.name;
+        write_json(arguments.json, json);
+    }
     fmt::print("{}  loss {:.7g}  L1 {:.7g}  SSIM {:.7g}\n", core::one_line(frame.name), result.loss,
                result.l1, result.ssim);
     if (result.skipped_nonfinite > 0)

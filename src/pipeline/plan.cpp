@@ -60,7 +60,8 @@ Plan plan_for(const PlanRequest& request) {
     plan.gradients = true;
     plan.masks = request.masks;
     plan.exposure = request.exposure;
-    plan.motion = request.motion && !request.render.points;  // spheres have no gradient by the camera
+    // Spheres and integration along rays have no gradient by the camera.
+    plan.motion = request.motion && !request.render.points && !plan.rays();
     if (request.purpose == Purpose::training) {
         plan.adam = true;
         plan.packed_moments = request.packed_moments;
@@ -97,7 +98,7 @@ std::vector<PlanLine> describe(const Plan& plan, int scene_degree, uint64_t spla
             {"mask passes and the masked image", "every pixel of every training image counts", 0});
     if (plan.gradients && !plan.exposure)
         lines.push_back({"exposures, their passes and the exposed image", "not asked for (--exposure)", 0});
-    if (plan.gradients && !plan.motion && !plan.points())
+    if (plan.gradients && !plan.motion && !plan.points() && !plan.rays())
         lines.push_back({"gradient of the camera and its passes", "not asked for (--refine-poses)", 0});
     if (plan.points()) {
         lines.push_back({"opacities and rotations", "a sphere has none (--points)", 0});
