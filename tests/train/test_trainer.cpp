@@ -343,7 +343,7 @@ TEST(Trainer, RunsThePlanThatItTells) {
             EXPECT_EQ(names(plain.plan()), names(plan_lines(start, options, false)));
             EXPECT_EQ(plain.plan().size(), masked.plan().size() + 1);
             // A checkpoint has what the plan keeps from step to step.
-            EXPECT_EQ(plain.state().arrays.size(), 2u + (strategy == Strategy::adc) + (exposure ? 6 : 0));
+            EXPECT_EQ(plain.state().arrays.size(), 2u + (strategy == Strategy::adc) + (exposure ? 7 : 0));
         }
 }
 
