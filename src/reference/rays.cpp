@@ -314,6 +314,8 @@ Values Rays::gradient(const Raster& picture_gradient) const {
 std::vector<uint8_t> Rays::at_threshold(double relative) const {
     std::vector<uint8_t> at(size_t(camera_.width) * size_t(camera_.height));
     if (options_.integrator != Integrator::ray) return at;
+    // A middle is one quotient: float32 is nearer to it than to an alpha.
+    constexpr double kOrderShare = 0.05;
     const auto near = [&](double value, double threshold) {
         return std::abs(value - threshold) <= relative * threshold;
     };
@@ -329,8 +331,8 @@ std::vector<uint8_t> Rays::at_threshold(double relative) const {
                 const double raw = -std::expm1(-m.depth);
                 const double next = transmittance * (1 - std::min(raw, shared::ALPHA_MAX));
                 const bool exact = stops(next) && raw > shared::ALPHA_MAX;
-                hangs = hangs || near(m.middle, middle) || near(raw, shared::ALPHA_MAX) ||
-                        (!exact && near(next, shared::TRANSMITTANCE_STOP));
+                hangs = hangs || std::abs(m.middle - middle) <= kOrderShare * relative * middle ||
+                        near(raw, shared::ALPHA_MAX) || (!exact && near(next, shared::TRANSMITTANCE_STOP));
                 if (stops(next)) break;
                 transmittance = next;
                 middle = m.middle;

@@ -255,6 +255,9 @@ std::string stability_line(const StabilityResult& r) {
     if (!r.finite) line += " NOT FINITE";
     if (r.skipped != r.skipped_by_reference)
         line += text_of(" SKIPPED, the reference %u", r.skipped_by_reference);
+    if (r.too_many_at_threshold())
+        line +=
+            text_of(" %llu PIXELS AT A THRESHOLD", static_cast<unsigned long long>(r.pixels_at_threshold));
     for (const Comparison& c : r.comparisons)
         if (!c.good()) line += " WRONG " + c.of;
     return line;
@@ -332,9 +335,12 @@ void to_json(Json& json, const StabilityTraining& t) {
             {"finite", t.finite}};
 }
 
+bool StabilityResult::too_many_at_threshold() const {
+    return pixels_at_threshold > std::max(kFewPixels, pixels / kPixelsEach);
+}
+
 bool StabilityResult::good() const {
-    return finite && skipped == skipped_by_reference &&
-           pixels_at_threshold <= std::max(kFewPixels, pixels / kPixelsEach) &&
+    return finite && skipped == skipped_by_reference && !too_many_at_threshold() &&
            std::all_of(comparisons.begin(), comparisons.end(), std::mem_fn(&Comparison::good));
 }
 

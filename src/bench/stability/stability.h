@@ -51,7 +51,8 @@ struct StabilityResult {
     std::vector<Comparison> comparisons;  // image, loss, each group of the gradient, the camera's gradient
     double plain_determinant = 0;         // image error of the reference if det = a c - b^2 in float32
     double loss = 0;
-    /// Also requires that at most 4 pixels, or one in 200, are excluded for being close to a threshold.
+    /// More than 4 pixels and than one in 200 are excluded for being close to a threshold.
+    bool too_many_at_threshold() const;
     bool good() const;
 };
 
