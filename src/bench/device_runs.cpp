@@ -52,7 +52,8 @@ void FrameRun::run() {
                                  .height = inputs_.camera.height,
                                  .instances = frame_.instance_capacity,
                                  .gradients = train_,
-                                 .overlaid = train_},
+                                 .overlaid = train_,
+                                 .rays = plan_.rays()},
                                 [&](gpu::Recording& recording) { record(recording); });
 }
 

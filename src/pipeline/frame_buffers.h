@@ -15,7 +15,6 @@ struct FrameRequest {
     uint32_t instances = 0;          // capacity for (splat, tile) pairs
     bool gradients = false;
     bool fifth_plane = false;  // of the image: depth or count
-    bool rays = false;         // splats are integrated along rays
     bool masks = false;        // with gradients: some pixels count less
     bool exposure = false;     // with gradients: a training image's exposure is applied before the loss
     // With gradients: dL/d(image) comes from outside, in 5 planes. There are no buffers for a loss.
@@ -23,6 +22,7 @@ struct FrameRequest {
     // With gradients: buffers that are not needed at the same time share memory. The same for all requests of a frame.
     bool overlaid = false;
     bool motion = false;  // with gradients: that of the camera's motion
+    bool rays = false;    // splats are integrated along rays
 };
 
 /// How a radix sort is divided.

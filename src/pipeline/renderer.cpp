@@ -214,10 +214,10 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
                             .height = inputs.camera.height,
                             .instances = first_capacity(model.splats),
                             .gradients = true,
-                            .rays = plan.rays(),
                             .masks = plan.masks,
                             .overlaid = true,
-                            .motion = plan.motion};
+                            .motion = plan.motion,
+                            .rays = plan.rays()};
     FrameBuffers frame;
     const shared::Counts counts =
         run_until_it_fits(cache, executor, frame, size, [&](gpu::Recording& recording) {

@@ -94,7 +94,7 @@ TEST_F(Runs, PointsExcludeWhatSpheresDoNotHave) {
         expect_failure(run_ewa(arguments), 2, reason);
     };
     const Names drawing{"render", folder / "s.ply", "--cameras", folder / "data", "-o", folder / "r"};
-    fails(drawing, {"--kernel", "ewa"}, "--points and --kernel ewa exclude each other");
+    fails(drawing, {"--kernel", "ewa"}, "--points and --kernel density exclude each other");
     fails(drawing, {"--antialias"}, "--points and --kernel antialias exclude each other");
     fails(drawing, {"--nearest", "0"}, "'0' is not a whole number from 1 to 1000");
     const Names training{"train", folder / "data", "-o", folder / "t"};

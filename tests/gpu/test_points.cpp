@@ -229,6 +229,7 @@ Stepped take_step(const Scene& scene, const Image& target, const pipeline::PlanR
             const auto sorted = record_forward(recording, r.cache, plan, model, frame, inputs);
             record_loss(recording, r.cache, frame, inputs, photo);
             record_backward(recording, r.cache, plan, model, frame, inputs, sorted, rates);
+            frame.record_counts(recording);
         });
     return {download_model(model, model.params), model.statistics.download<float>(2 * size_t(model.splats)),
             frame.read_counts()};

@@ -425,11 +425,11 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
                    .instances = 4096,
                    .gradients = true,
                    .fifth_plane = true,
-                   .rays = true,
                    .masks = true,
                    .exposure = true,
                    .overlaid = true,
-                   .motion = true});
+                   .motion = true,
+                   .rays = true});
     const pipeline::FrameInputs inputs{.camera = {&camera, 0, 61, 47}};
     std::vector<std::vector<Command>> out;
 
