@@ -7,6 +7,7 @@
 #include <cfloat>
 #include <cmath>
 #include <functional>
+#include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
 #include "bench/device_runs.h"
@@ -95,6 +96,11 @@ std::vector<uint8_t> pixels_at_threshold(const Picture& picture) {
     return at;
 }
 
+/// A norm for each part of a gradient by the camera.
+struct CameraTerms {
+    double rotation = 0, shift = 0, focal = 0;
+};
+
 /// What the reference computes of a case, and how errors against it are measured.
 struct Expected {
     ReferenceGradient reference;
@@ -102,6 +108,7 @@ struct Expected {
     double scale = 1;               // of the image's errors
     double least_quaternions = 0;   // see least_quaternion_norm
     bool moves_camera = false;      // there is a gradient by the camera
+    CameraTerms least_camera{};     // of its three parts, see least_camera_terms
 };
 
 /// The largest error of a pixel that is not excluded. color: an Image or a Raster.
@@ -137,12 +144,14 @@ std::vector<Comparison> errors_of(const Expected& expected, const Pixels& color,
                    });
     if (!expected.moves_camera) return errors;
     const CameraMotion& expected_camera = expected.reference.camera;
-    errors.push_back({"camera rotation",
-                      relative_distance(numbers_of(camera.rotation), numbers_of(expected_camera.rotation))});
+    const CameraTerms& least = expected.least_camera;
     errors.push_back(
-        {"camera shift", relative_distance(numbers_of(camera.shift), numbers_of(expected_camera.shift))});
-    errors.push_back({"focal length",
-                      relative_distance(std::vector<double>{camera.log_focal}, {expected_camera.log_focal})});
+        {"camera rotation", relative_distance(numbers_of(camera.rotation),
+                                              numbers_of(expected_camera.rotation), least.rotation)});
+    errors.push_back({"camera shift", relative_distance(numbers_of(camera.shift),
+                                                        numbers_of(expected_camera.shift), least.shift)});
+    errors.push_back({"focal length", relative_distance(std::vector<double>{camera.log_focal},
+                                                        {expected_camera.log_focal}, least.focal)});
     return errors;
 }
 
@@ -165,6 +174,26 @@ double least_quaternion_norm(const StabilityCase& one, const Values& gradient) {
         if (std::isfinite(norm)) largest = std::max(largest, norm);
     }
     return largest > 0 ? kShare * norm_of(gradient.log_scales) / largest : 0;
+}
+
+/// The least norms of the gradient by the camera to measure errors against. It is a sum over all splats, and a splat's share
+/// is a sum of torques. Where these cancel, half of the sum of their norms replaces it: each has its own roundings.
+CameraTerms least_camera_terms(const StabilityCase& one, const ReferenceGradient& gradient) {
+    constexpr double kShare = 0.5;
+    const Values values = one.gaussians;
+    CameraTerms least;
+    for (size_t i = 0; i < values.size(); ++i) {
+        if (!gradient.picture.projected[i].visible) continue;
+        const reference::Splat splat = reference::read_splat(values, i);
+        CameraMotion term;
+        project_backward(splat, one.camera, one.options, gradient.blend.splats[i], &term);
+        const double shift = glm::length(term.shift),
+                     torque = shift * glm::length(splat.mean - one.camera.position());
+        least.rotation += kShare * (glm::length(term.rotation) + torque);
+        least.shift += kShare * shift;
+        least.focal += kShare * (std::abs(term.log_focal) + torque);
+    }
+    return least;
 }
 
 bool all_finite(const std::vector<float>& values) {
@@ -193,6 +222,7 @@ Expected expected_of(const StabilityCase& one, const Image& target) {
         on_rays ? reference::Rays(one.gaussians, one.camera, one.options).at_threshold(kAtThreshold)
                 : pixels_at_threshold(expected.reference.picture);
     expected.moves_camera = !on_rays && !one.options.points;
+    if (expected.moves_camera) expected.least_camera = least_camera_terms(one, expected.reference);
     for (const double v : expected.reference.picture.blended.color.values)
         expected.scale = std::max(expected.scale, std::abs(v));
     expected.least_quaternions = least_quaternion_norm(one, expected.reference.gradient);
