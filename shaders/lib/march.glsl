@@ -68,15 +68,16 @@ uint choose_next(inout uint k, uint end, float top, float bottom, float from, fl
 
 // For each splat r of the strip whose view depths meet [FROM, TO]; END_SPLATS ends the loop's body.
 #define FOR_EACH_SPLAT(FROM, TO)                                                             \
-    for (uint k = LISTED; k == LISTED || k < end;) {                                         \
+    for (uint turn = 0u, k = LISTED; turn < end + 1u; ++turn) {                              \
+        if (k != LISTED && k >= end) break;                                                  \
         const uint count = choose_next(k, end, top, bottom, FROM, TO);                       \
         for (uint first = 0u; first < count; first += SUBGROUP) {                            \
             RaySplat own = read_chosen(first, count);                                        \
             const uint most = min(count - first, SUBGROUP);                                  \
-            [[dont_unroll]] for (uint b = 0; b < most; b += RAY_BLOCK, move_down(own)) {     \
+            [[dont_unroll]] for (uint b = 0; b < most; b += RAY_BLOCK) {                     \
                 [[unroll]] for (uint j = 0; j < RAY_BLOCK; ++j) {                            \
                     const RaySplat r = shared_ray_splat(own, j);
-#define END_SPLATS }}}}
+#define END_SPLATS } move_down(own); }}}
 
 // Lists the splats that the strip's rays meet.
 void list_row(uint tile, uint strip, Ray ray) {
@@ -84,12 +85,13 @@ void list_row(uint tile, uint strip, Ray ray) {
     const uint end = tile_starts[tile + 1u];
     row_count = 0u;
     listed_to = tile_starts[tile];
-    while (listed_to < end && row_count + CHOSEN_MOST + PEEK * SUBGROUP <= ROW_MOST) {
+    for (uint turn = tile_starts[tile]; turn < end; ++turn) {
+        if (listed_to >= end || row_count + CHOSEN_MOST + PEEK * SUBGROUP > ROW_MOST) break;
         const uint count = choose(listed_to, end, top, bottom, float(NEAR_PLANE), NEVER);
         for (uint first = 0u; first < count; first += SUBGROUP) {
             RaySplat own = read_chosen(first, count);
             const uint most = min(count - first, SUBGROUP);
-            [[dont_unroll]] for (uint b = 0; b < most; b += RAY_BLOCK, move_down(own)) {
+            [[dont_unroll]] for (uint b = 0; b < most; b += RAY_BLOCK) {
                 [[unroll]] for (uint j = 0; j < RAY_BLOCK; ++j) {
                     const RaySplat r = shared_ray_splat(own, j);
                     const Passing p = pass_by(r, ray);
@@ -105,6 +107,7 @@ void list_row(uint tile, uint strip, Ray ray) {
                         ++row_count;
                     }
                 }
+                move_down(own);
             }
         }
     }

@@ -33,7 +33,7 @@ void hold(inout RayOrder o, float depth, float alpha, uint at) {
 }
 
 void release(inout RayOrder o, bool first) {
-    [[unroll]] for (uint i = 0u; i + 1u < HELD; ++i) {
+    [[unroll]] for (uint i = 0u; i < HELD - 1u; ++i) {
         o.depths[i] = first ? o.depths[i + 1u] : o.depths[i];
         o.alphas[i] = first ? o.alphas[i + 1u] : o.alphas[i];
         o.instances[i] = first ? o.instances[i + 1u] : o.instances[i];

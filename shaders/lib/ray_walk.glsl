@@ -27,7 +27,8 @@ void walk_rays(uint tile, uint strip, Ray ray) {
     uint begin = tile_starts[tile];
     float start = 0.0;
     uint start_at = 0u;
-    for (;;) {
+    // Each walk closes a pixel, or blends some of its splats for good.
+    for (uint walk = 0u; walk < end; ++walk) {
         RayOrder o;
         [[unroll]] for (uint i = 0u; i < HELD; ++i) {
             o.depths[i] = NEVER;
@@ -38,7 +39,8 @@ void walk_rays(uint tile, uint strip, Ray ray) {
         o.bound_at = o.redo = end;
         uint k = begin;
         bool done = false;
-        while (k < end && !done) {
+        for (uint turn = begin; turn < end; ++turn) {
+            if (k >= end || done) break;
             const uint count = choose(k, end, top, bottom, 0.0, NEVER);
             for (uint first = 0u; first < count && !done; first += SUBGROUP) {
                 const RaySplat own = read_chosen(first, count);

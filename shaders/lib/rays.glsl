@@ -97,6 +97,7 @@ Meeting meet(RaySplat r, Ray ray) {
 #endif
 const uint CHOSEN_MOST = 256u;
 const uint PEEK = 4u;  // lanes' worths of instances looked at together: a driver may limit the iterations
+const uint PEEKED = PEEK * SUBGROUP;
 shared uint chosen[CHOSEN_ROOM];
 
 // Appends instances of [k, end) whose ellipse reaches a row of pixels between top and bottom, and whose view depths meet
@@ -104,7 +105,8 @@ shared uint chosen[CHOSEN_ROOM];
 uint choose(inout uint k, uint end, float top, float bottom, float from, float to) {
     subgroupBarrier();  // the last ones have been read
     uint count = 0u;
-    while (k < end && count < CHOSEN_MOST) {
+    for (; k < end; k += PEEKED) {
+        if (count >= CHOSEN_MOST) break;
         [[unroll]] for (uint b = 0u; b < PEEK; ++b) {
             const uint at = k + b * SUBGROUP + LANE;
             const uint splat = splats[min(at, end - 1u)];
@@ -117,7 +119,6 @@ uint choose(inout uint k, uint end, float top, float bottom, float from, float t
             if (keep) chosen[count + rank - 1u] = at;
             count += subgroupShuffle(rank, SUBGROUP - 1u);
         }
-        k += PEEK * SUBGROUP;
     }
     subgroupMemoryBarrierShared();
     subgroupBarrier();

@@ -32,7 +32,7 @@ Ray own_ray;
 
 // Blends the nearest splats that are held, of lanes where they are nearer than what is still to come.
 void blend_held(inout RayOrder o, float to_come) {
-    for (;;) {
+    for (uint turn = 0u; turn < HELD * SUBGROUP; ++turn) {
         const bool next = T > 0.0 && o.depths[0] < NEVER && o.depths[0] <= to_come;
         if (subgroupAll(!next)) break;
         // The nearest of the lanes' next splats: in the lanes' common order, each is added once.

@@ -112,18 +112,23 @@ TEST(BenchProgram, StabilityIsMeasuredAndWritten) {
     const Ended ended =
         run(kProgram + " --stability --cases ordinary,value_nan --training-steps 3 --json " + json);
     ASSERT_EQ(ended.status, 0) << ended.output;
-    EXPECT_NE(ended.output.find("4 scenes. Each is rendered"), std::string::npos) << ended.output;
-    EXPECT_NE(ended.output.find("all 8 results are within their bounds\n"), std::string::npos)
+    EXPECT_NE(ended.output.find("12 scenes. Each is rendered"), std::string::npos) << ended.output;
+    EXPECT_NE(ended.output.find("all 18 results are within their bounds\n"), std::string::npos)
         << ended.output;
     const nlohmann::json results = read_json(json);
-    ASSERT_EQ(results.at("cases").size(), 4u);  // three kernels and the one of NaNs
+    // Three kernels and the one of NaNs, and the same of points, rays and marches.
+    ASSERT_EQ(results.at("cases").size(), 12u);
     for (const auto& one : results.at("cases")) {
+        const std::string name = one.at("name");
         EXPECT_EQ(one.at("good"), true) << one;
         EXPECT_EQ(one.at("finite"), true);
-        EXPECT_EQ(one.at("comparisons").size(), 7u);
+        const bool moves_camera = name.starts_with("ordinary") || name == "value_nan";
+        EXPECT_EQ(one.at("comparisons").size(), moves_camera ? 10u : 7u) << name;
+        if (name == "value_nan") {
+            EXPECT_EQ(one.at("skipped"), 59);
+        }
     }
-    EXPECT_EQ(results.at("cases")[3].at("skipped"), 59);
-    EXPECT_EQ(results.at("training").size(), 4u);
+    EXPECT_EQ(results.at("training").size(), 6u);  // along rays nothing trains
     EXPECT_EQ(run(kProgram + " --stability /nowhere.ply").status, 2);
 }
 

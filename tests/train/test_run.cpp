@@ -218,7 +218,11 @@ TEST(RunOptions, TableReadsWhatItWrites) {
                                                    {"moments", "32"},
                                                    {"image-cache", "9"},
                                                    {"background", "0.25,1,0"},
-                                                   {"kernel", "ewa"},
+                                                   {"kernel", "density"},
+                                                   {"points", "true"},
+                                                   {"nearest", "3"},
+                                                   {"refine-poses", "true"},
+                                                   {"refine-focal", "true"},
                                                    {"eval-every", "6"},
                                                    {"save-every", "4"},
                                                    {"device", "cpu"}};
