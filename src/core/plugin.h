@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// Libraries of ewa that are loaded when they are needed: each alone links a large library behind it.
+#pragma once
+#include <functional>
+#include <string>
+
+namespace ewa::core {
+
+struct Plugin {
+    const char* file;     // "libewa_mpi.so"
+    const char* entry;    // the name of what it exports
+    const char* purpose;  // for messages: "which lets processes train together"
+    const char* help;     // for messages: what to install
+};
+
+/// Throws RunError: the library cannot be loaded, why, and what would help.
+[[noreturn]] void cannot_load(const Plugin& plugin, const std::string& reason);
+
+/// Loads the library from its folder beside the program or libewa, and returns what it exports. That begins with the
+/// library's version, a const char*, which must be EWA_VERSION. check_room: is called before the library is loaded,
+/// once it is found. The library stays until the process ends. Throws RunError where there is no such library, or it
+/// does not fit.
+const void* load_plugin(const Plugin& plugin, const std::function<void()>& check_room = {});
+
+}  // namespace ewa::core
