@@ -2,7 +2,6 @@
 #include "gpu/device.h"
 
 #include <algorithm>
-#include <array>
 #include <cstdlib>
 #include <filesystem>
 #include <utility>
@@ -11,6 +10,7 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "gpu/capabilities.h"
+#include "gpu/choose.h"
 #include "gpu/pipeline.h"
 
 namespace ewa {
@@ -225,37 +225,10 @@ std::vector<DeviceInfo> list_devices() {
     }
 }
 
-namespace {
-
-bool matches(const DeviceInfo& info, const std::string& selector) {
-    const bool number = selector.find_first_not_of("0123456789") == std::string::npos;
-    return number ? selector == std::to_string(info.index)
-                  : core::lower(info.name).find(core::lower(selector)) != std::string::npos;
-}
-
-}  // namespace
-
 std::shared_ptr<gpu::Device> open_device(const DeviceOptions& options) {
     const auto infos = list_devices();
-    const std::array<std::string, 5> preference{"discrete", "integrated", "virtual", "cpu", "other"};
-    const DeviceInfo* best = nullptr;
-    size_t best_rank = preference.size();
-    std::string present;
-    for (const auto& info : infos) {
-        present += (present.empty() ? "" : "; ") + std::to_string(info.index) + " " + info.name +
-                   (info.unusable.empty() ? "" : " (lacks " + info.unusable + ")");
-        if (!info.unusable.empty() || (!options.selector.empty() && !matches(info, options.selector)))
-            continue;
-        const size_t rank =
-            size_t(std::find(preference.begin(), preference.end(), info.type) - preference.begin());
-        if (!best || rank < best_rank) best = &info, best_rank = rank;
-    }
-    if (!best)
-        throw InputError((options.selector.empty()
-                              ? "no usable Vulkan device"
-                              : "no usable Vulkan device matches '" + options.selector + "'") +
-                         "; present: " + present);
-    return std::make_shared<gpu::Device>(*best, options.validation, options.own_queue);
+    return std::make_shared<gpu::Device>(gpu::choose_device(infos, options.selector), options.validation,
+                                         options.own_queue);
 }
 
 DeviceInfo device_info(const gpu::Device& device) {

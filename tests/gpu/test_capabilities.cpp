@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "gpu/capabilities.h"
+#include "gpu/choose.h"
 #include "gpu/pipeline.h"
 #include "gpu/test_device.h"
 #include "passes/shader_code.h"
@@ -31,6 +32,40 @@ TEST(ComputeFamily, PrefersOneWithoutGraphics) {
     EXPECT_FALSE(family_of({Queue::eGraphics, Queue::eTransfer}, true));
     EXPECT_FALSE(family_of({Queue::eGraphics, Queue::eTransfer}, false));
     EXPECT_FALSE(family_of({}, true));
+}
+
+DeviceInfo device_of(int index, const char* name, const char* type, const char* unusable = "") {
+    DeviceInfo info;
+    info.index = index, info.name = name, info.type = type, info.unusable = unusable;
+    return info;
+}
+
+TEST(ChosenDevice, IsOfTheBestType) {
+    const std::vector<DeviceInfo> infos = {
+        device_of(0, "lavapipe", "cpu"), device_of(1, "Iris", "integrated"),
+        device_of(2, "old", "discrete", "Vulkan 1.2"), device_of(3, "H200", "discrete")};
+    EXPECT_EQ(gpu::choose_device(infos, "").index, 3);
+    EXPECT_EQ(gpu::choose_device(infos, "iris").index, 1);
+    EXPECT_EQ(gpu::choose_device(infos, "0").index, 0);
+    EXPECT_THROW(gpu::choose_device(infos, "old"), InputError);
+    EXPECT_THROW(gpu::choose_device(infos, "4"), InputError);
+    EXPECT_THROW(gpu::choose_device({}, ""), InputError);
+}
+
+/// A GPU of another kind, or with another driver, would compute other bytes.
+TEST(ChosenDevice, IsAnotherOneOfItsKindForEachProcess) {
+    std::vector<DeviceInfo> infos = {device_of(0, "lavapipe", "cpu"), device_of(1, "H200", "discrete"),
+                                     device_of(2, "A2", "discrete"), device_of(3, "H200", "discrete"),
+                                     device_of(4, "H200", "discrete")};
+    infos[4].driver = "another";
+    const int chosen[] = {1, 3, 1, 3};
+    for (int process = 0; process < 4; ++process) {
+        EXPECT_EQ(gpu::choose_device(infos, "", process).index, chosen[process]);
+        EXPECT_EQ(gpu::choose_device(infos, "h200", process).index, chosen[process]);
+        EXPECT_EQ(gpu::choose_device(infos, "a2", process).index, 2);
+        EXPECT_EQ(gpu::choose_device(infos, "4", process).index, 4);
+        EXPECT_EQ(gpu::choose_device(infos, "pipe", process).index, 0);
+    }
 }
 
 TEST(FloatModesOf, AskForWhatTheDeviceHasAlone) {
