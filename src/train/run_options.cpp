@@ -310,6 +310,10 @@ std::vector<RunOption> make_table() {
             kDoesNotDecide, [](RunOptions& o) -> int& { return o.save_every; }, 0, kMostSteps),
         words("device", "NAME|N", "Number of a device, or part of its name (see ewa devices)", kDoesNotDecide,
               [](RunOptions& o) -> std::string& { return o.device.selector; }),
+        number<int>(
+            "rank-timeout", "S",
+            "Under mpirun or srun: end with an error if a process does not answer for so many seconds",
+            kDoesNotDecide, [](RunOptions& o) -> int& { return o.rank_timeout; }, 1, 86400),
     };
 }
 

@@ -225,7 +225,8 @@ TEST(RunOptions, TableReadsWhatItWrites) {
                                                    {"refine-focal", "true"},
                                                    {"eval-every", "6"},
                                                    {"save-every", "4"},
-                                                   {"device", "cpu"}};
+                                                   {"device", "cpu"},
+                                                   {"rank-timeout", "7"}};
     ASSERT_EQ(train::run_options().size(), other.size());
     RunOptions all;
     for (const train::RunOption& option : train::run_options()) {
