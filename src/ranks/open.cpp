@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ranks/open.h"
+
+#include <cstdlib>
+
+#include "core/plugin.h"
+#include "ranks/launcher.h"
+#include "ranks/plugin.h"
+
+namespace ewa {
+namespace ranks {
+
+std::shared_ptr<Ranks> open_mpi(const MpiOptions& options) {
+    constexpr core::Plugin kPlugin{kMpiFile, kMpiEntry, "which lets the processes of a launcher train together",
+                                   "install ewa's module and Open MPI (Debian: openmpi-bin), or start ewa "
+                                   "without mpirun and srun"};
+    return static_cast<const Mpi*>(core::load_plugin(kPlugin))->open(options);
+}
+
+}  // namespace ranks
+
+std::shared_ptr<Ranks> open_ranks(std::chrono::milliseconds timeout) {
+    const auto launcher = ranks::find_launcher([](const char* name) { return std::getenv(name); });
+    if (!launcher.found) return alone();
+    return ranks::open_mpi({.timeout = timeout, .size = launcher.size});
+}
+
+}  // namespace ewa

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ranks/scaling.h"
+
+#include <algorithm>
+
+namespace ewa::ranks {
+namespace {
+
+// Of a visible splat of a view that another rank draws.
+constexpr double kOutBytes = 48 + 8;                    // its record, and what orders it
+constexpr double kBackBytes = 36, kBackAbsolute = 44;   // the sums of its gradients
+constexpr double kGathers = 2;                          // of a step: sizes of the parts, and the state of each rank
+
+/// Between two sizes that were measured, time grows evenly. Beyond the last it grows as before it.
+double transfer_ms(const Network& network, double bytes) {
+    Transfer low{0, network.gather_ms}, high = low;
+    for (const Transfer& next : network.transfers) {
+        low = high, high = next;
+        if (double(next.bytes) >= bytes) break;
+    }
+    if (high.bytes == low.bytes) return high.milliseconds;
+    const double slope = (high.milliseconds - low.milliseconds) / double(high.bytes - low.bytes);
+    return low.milliseconds + std::max(0.0, slope) * (bytes - double(low.bytes));
+}
+
+}  // namespace
+
+StepCost predict_step(const ViewCost& view, const Network& network, int ranks) {
+    StepCost cost{.ranks = ranks};
+    if (ranks > 1) {
+        const double back = view.absolute_gradients ? kBackAbsolute : kBackBytes;
+        // A rank keeps what it needs of its own splats.
+        const double away = view.splats * view.visible * (ranks - 1) / ranks;
+        // Each further rank costs one message more.
+        const double message_ms = network.gather_ms / std::max(1, network.ranks - 1);
+        const double messages_ms = (ranks - network.ranks) * message_ms;
+        const auto exchange_ms = [&](double bytes) {
+            return std::max(message_ms, transfer_ms(network, bytes) + messages_ms);
+        };
+        cost.sent_bytes = away * (kOutBytes + back);
+        cost.exchange_ms = exchange_ms(away * kOutBytes) + exchange_ms(away * back) +
+                           kGathers * (ranks - 1) * message_ms;
+    }
+    cost.step_ms = view.milliseconds + cost.exchange_ms;
+    cost.views_per_second = ranks * 1000 / cost.step_ms;
+    cost.efficiency = view.milliseconds / cost.step_ms;
+    return cost;
+}
+
+}  // namespace ewa::ranks
