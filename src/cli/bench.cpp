@@ -11,6 +11,7 @@
 #include "bench/accuracy.h"
 #include "bench/bench.h"
 #include "cli/arguments.h"
+#include "cli/bench_ranks.h"
 #include "cli/command.h"
 #include "cli/output.h"
 #include "cli/run_inputs.h"
@@ -31,7 +32,8 @@ constexpr int kEvaluations = 6;
 struct BenchArguments {
     bench::Options options;
     bool accuracy = false;
-    // Used only with --accuracy.
+    RankBench ranks;
+    // Used only with --accuracy, and the splats with --ranks.
     fs::path splats, svg;  // splats empty: the result of the training. svg empty: not written
     int steps = 600;       // of each training; 0: no training
 };
@@ -213,15 +215,19 @@ Action add_bench(CLI::App& app) {
                  "Error against run time on the dataset FILE: of rendering, against the integral along each "
                  "ray, and of training with each strategy for --training-steps (600). It takes minutes");
     app.add_option("--splats", arguments->splats,
-                   "With --accuracy: render this scene instead of the trained one")
+                   "With --accuracy: render this scene instead of the trained one. With --ranks: measure it")
         ->type_name("FILE");
     app.add_option("--svg", arguments->svg,
                    "With --accuracy: write the diagram of rendering to FILE, and that of training to "
                    "NAME_training.svg beside it")
         ->type_name("FILE");
+    add_rank_options(app, arguments->ranks);
     arguments->options.read_splats = load_splats;
     const CLI::Option* steps = app.get_option("--training-steps");
     return [arguments, steps] {
+        if (arguments->ranks.asked)
+            return run_rank_bench(arguments->ranks, arguments->options.scene, arguments->splats,
+                                  arguments->options.device, arguments->options.json);
         if (!arguments->accuracy) {
             check_command_outputs({{"--json", arguments->options.json}}, {});
             return bench::run(arguments->options, {"/proc/self/exe", "bench"});

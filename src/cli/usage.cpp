@@ -23,7 +23,7 @@ const std::map<std::string, std::string>& subjects() {
             {"cameras", "frame",     "frames",       "split",      "test-every", "downscale", "masks",
              "init",    "transform", "init-opacity", "init-scale", "exposures",  "crop",      "min-opacity",
              "max-sh",  "sort",      "splats",       "cases",      "views",      "size",      "look-at",
-             "up",      "orbit",     "film-seconds", "matching"});
+             "up",      "orbit",     "film-seconds", "matching",   "scene-splats", "visible", "view-time"});
         add("Quality", {"quality",
                         "steps",
                         "strategy",
@@ -47,7 +47,7 @@ const std::map<std::string, std::string>& subjects() {
                         "training-steps"});
         add("Output", {"output",     "format",     "mode",       "json",       "svg",      "heat-map",
                        "heat-scale", "eval-every", "save-every", "serve",      "accuracy", "spz-version",
-                       "check",      "quiet",      "verbose",    "results",    "compare",  "threshold",
+                       "check",      "ranks",      "quiet",      "verbose",    "results",    "compare",  "threshold",
                        "max-error",  "resume",     "force",      "allow-empty"});
         add("Device", {"device", "moments", "image-cache", "rank-timeout"});
         return made;
