@@ -121,9 +121,10 @@ report::Json json_of(const Network& network, const ViewCost& view, const std::ve
 }  // namespace
 
 void add_rank_options(CLI::App& app, RankBench& bench) {
-    app.add_flag("--ranks", bench.asked,
-                 "Under mpirun or srun: measure the network between the processes, and predict how a training "
-                 "scales. With FILE and --splats the time of a view is measured, else these options state it");
+    app.add_flag(
+        "--ranks", bench.asked,
+        "Under mpirun or srun: measure the network between the processes, and predict how a training "
+        "scales. With FILE and --splats the time of a view is measured, else these options state it");
     app.add_option("--scene-splats", bench.splats, "With --ranks: splats of the scene")
         ->transform(in_range(1.0, 1e12))
         ->type_name("N")

@@ -20,10 +20,10 @@ const std::map<std::string, std::string>& subjects() {
             for (const char* name : names) made[name] = subject;
         };
         add("Data",
-            {"cameras", "frame",     "frames",       "split",      "test-every", "downscale", "masks",
-             "init",    "transform", "init-opacity", "init-scale", "exposures",  "crop",      "min-opacity",
-             "max-sh",  "sort",      "splats",       "cases",      "views",      "size",      "look-at",
-             "up",      "orbit",     "film-seconds", "matching",   "scene-splats", "visible", "view-time"});
+            {"cameras", "frame",     "frames",       "split",      "test-every",   "downscale", "masks",
+             "init",    "transform", "init-opacity", "init-scale", "exposures",    "crop",      "min-opacity",
+             "max-sh",  "sort",      "splats",       "cases",      "views",        "size",      "look-at",
+             "up",      "orbit",     "film-seconds", "matching",   "scene-splats", "visible",   "view-time"});
         add("Quality", {"quality",
                         "steps",
                         "strategy",
@@ -45,10 +45,10 @@ const std::map<std::string, std::string>& subjects() {
                         "nearest",
                         "runs",
                         "training-steps"});
-        add("Output", {"output",     "format",     "mode",       "json",       "svg",      "heat-map",
-                       "heat-scale", "eval-every", "save-every", "serve",      "accuracy", "spz-version",
-                       "check",      "ranks",      "quiet",      "verbose",    "results",    "compare",  "threshold",
-                       "max-error",  "resume",     "force",      "allow-empty"});
+        add("Output", {"output",     "format",     "mode",       "json",    "svg",        "heat-map",
+                       "heat-scale", "eval-every", "save-every", "serve",   "accuracy",   "spz-version",
+                       "check",      "ranks",      "quiet",      "verbose", "results",    "compare",
+                       "threshold",  "max-error",  "resume",     "force",   "allow-empty"});
         add("Device", {"device", "moments", "image-cache", "rank-timeout"});
         return made;
     }();

@@ -38,9 +38,9 @@ fs::path file_of(const Plugin& plugin) {
         std::error_code absent;
         if (fs::exists(file, absent)) return file;
     }
-    cannot_load(plugin,
-                "it is neither in " + (folder / EWA_MODULES_FROM_PROGRAMS).lexically_normal().string() +
-                    " nor in the folders ewa and modules beside " + own.string());
+    cannot_load(plugin, "it is neither in " +
+                            (folder / EWA_MODULES_FROM_PROGRAMS).lexically_normal().string() +
+                            " nor in the folders ewa and modules beside " + own.string());
 }
 
 }  // namespace

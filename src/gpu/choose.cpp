@@ -18,7 +18,8 @@ bool matches(const DeviceInfo& info, const std::string& selector) {
 
 }  // namespace
 
-const DeviceInfo& choose_device(const std::vector<DeviceInfo>& infos, const std::string& selector, int number) {
+const DeviceInfo& choose_device(const std::vector<DeviceInfo>& infos, const std::string& selector,
+                                int number) {
     const std::array<std::string, 5> preference{"discrete", "integrated", "virtual", "cpu", "other"};
     std::vector<const DeviceInfo*> chosen;  // of one name and driver
     size_t best_rank = preference.size();

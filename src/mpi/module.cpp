@@ -36,12 +36,18 @@ struct Card {
     char version[32] = "";
 };
 
+struct Message {
+    int peer;
+    size_t bytes;
+    bool incoming;
+    bool first = false;  // the first one from a rank: it has come to this gather or exchange
+};
+
 /// The messages of one gather or exchange. Bytes must stay where they are until all have arrived.
 struct Messages {
     std::vector<MPI_Request> requests = {};
-    std::vector<int> peers = {};      // of each request
-    std::vector<size_t> bytes = {};   // of each request
-    std::vector<bool> incoming = {};  // for each request
+    std::vector<Message> each = {};  // of the requests
+    size_t awaited = 0;              // ranks whose first message has not arrived
 };
 
 class MpiRanks final : public ewa::Ranks {
@@ -65,8 +71,8 @@ class MpiRanks final : public ewa::Ranks {
     void enter(const MpiOptions& options);
     void introduce();
     void gather_bytes(std::span<const std::byte> own, std::span<std::byte> all);
-    void receive(int peer, std::span<std::byte> part, Messages& messages) const;
-    void send(int peer, std::span<const std::byte> part, Messages& messages) const;
+    void receive(int peer, std::span<std::byte> piece, Messages& messages, bool first) const;
+    void send(int peer, std::span<const std::byte> piece, Messages& messages) const;
     void wait(Messages& messages);
     size_t take_arrived(Messages& messages);
     [[noreturn]] void tell_missing(const Messages& messages) const;
@@ -96,6 +102,8 @@ void MpiRanks::enter(const MpiOptions& options) {
     check(MPI_Finalized(&has_ended), "start");
     if (has_ended) throw RunError("this process has left MPI; it cannot train with other processes again");
     if (!has_begun) {
+        // Open MPI's other way of sending over TCP uses one direction of the network at a time. The user's choice goes before.
+        setenv("OMPI_MCA_btl_tcp_flags", "1", 0);
         check(MPI_Init_thread(nullptr, nullptr, MPI_THREAD_SERIALIZED, &level), "start");
         entered_ = true;
     }
@@ -110,8 +118,8 @@ void MpiRanks::enter(const MpiOptions& options) {
         std::string known = library;
         known.resize(std::min(known.size(), known.find(',')));
         throw RunError("the launcher started " + std::to_string(options.size) + " processes, and MPI knows " +
-                       std::to_string(size_) + " of them: ewa's module is built with " +
-                       known + "; start ewa by its mpirun, or by srun --mpi=pmix");
+                       std::to_string(size_) + " of them: ewa's module is built with " + known +
+                       "; start ewa by its mpirun, or by srun --mpi=pmix");
     }
 }
 
@@ -128,40 +136,29 @@ void MpiRanks::introduce() {
     crowded_ = std::ranges::count(nodes_, nodes_[size_t(rank_)]) > sysconf(_SC_NPROCESSORS_ONLN);
     for (size_t i = 0; i < all.size(); ++i)
         if (std::strcmp(all[i].version, EWA_VERSION) != 0)
-            throw RunError(name(int(i)) + " runs ewa " + all[i].version + ", and " +
-                           name(rank_) + " ewa " EWA_VERSION);
+            throw RunError(name(int(i)) + " runs ewa " + all[i].version + ", and " + name(rank_) +
+                           " ewa " EWA_VERSION);
 }
 
 MpiRanks::~MpiRanks() {
     if (entered_ && !failed_ && std::uncaught_exceptions() == 0) MPI_Finalize();
 }
 
-void MpiRanks::receive(int peer, std::span<std::byte> part, Messages& messages) const {
-    while (!part.empty()) {
-        const auto piece = part.first(std::min(part.size(), message_bytes_));
-        MPI_Request request = MPI_REQUEST_NULL;
-        check(MPI_Irecv(piece.data(), int(piece.size()), MPI_BYTE, peer, kTag, world_, &request),
-              "receive from " + name(peer));
-        messages.requests.push_back(request);
-        messages.peers.push_back(peer);
-        messages.bytes.push_back(piece.size());
-        messages.incoming.push_back(true);
-        part = part.subspan(piece.size());
-    }
+void MpiRanks::receive(int peer, std::span<std::byte> piece, Messages& messages, bool first) const {
+    MPI_Request request = MPI_REQUEST_NULL;
+    check(MPI_Irecv(piece.data(), int(piece.size()), MPI_BYTE, peer, kTag, world_, &request),
+          "receive from " + name(peer));
+    messages.requests.push_back(request);
+    messages.each.push_back({peer, piece.size(), true, first});
+    messages.awaited += first;
 }
 
-void MpiRanks::send(int peer, std::span<const std::byte> part, Messages& messages) const {
-    while (!part.empty()) {
-        const auto piece = part.first(std::min(part.size(), message_bytes_));
-        MPI_Request request = MPI_REQUEST_NULL;
-        check(MPI_Isend(piece.data(), int(piece.size()), MPI_BYTE, peer, kTag, world_, &request),
-              "send to " + name(peer));
-        messages.requests.push_back(request);
-        messages.peers.push_back(peer);
-        messages.bytes.push_back(piece.size());
-        messages.incoming.push_back(false);
-        part = part.subspan(piece.size());
-    }
+void MpiRanks::send(int peer, std::span<const std::byte> piece, Messages& messages) const {
+    MPI_Request request = MPI_REQUEST_NULL;
+    check(MPI_Isend(piece.data(), int(piece.size()), MPI_BYTE, peer, kTag, world_, &request),
+          "send to " + name(peer));
+    messages.requests.push_back(request);
+    messages.each.push_back({peer, piece.size(), false});
 }
 
 /// The number of messages that have come or gone since the last call. SIZE_MAX: none was left.
@@ -170,21 +167,20 @@ size_t MpiRanks::take_arrived(Messages& messages) {
     arrived_.resize(size_t(count));
     statuses_.resize(size_t(count));
     int done = 0;
-    const int code =
-        MPI_Testsome(count, messages.requests.data(), &done, arrived_.data(), statuses_.data());
+    const int code = MPI_Testsome(count, messages.requests.data(), &done, arrived_.data(), statuses_.data());
     if (code != MPI_SUCCESS && code != MPI_ERR_IN_STATUS) check(code, "exchange data");
     if (done == MPI_UNDEFINED) return SIZE_MAX;
     for (size_t i = 0; i < size_t(done); ++i) {
-        const size_t one = size_t(arrived_[i]);
-        const int peer = messages.peers[one];
-        const std::string action = messages.incoming[one] ? "receive from " : "send to ";
-        if (code == MPI_ERR_IN_STATUS) check(statuses_[i].MPI_ERROR, action + name(peer));
-        if (!messages.incoming[one]) continue;
+        const Message& one = messages.each[size_t(arrived_[i])];
+        if (code == MPI_ERR_IN_STATUS)
+            check(statuses_[i].MPI_ERROR, (one.incoming ? "receive from " : "send to ") + name(one.peer));
+        if (!one.incoming) continue;
         int bytes = 0;
         MPI_Get_count(&statuses_[i], MPI_BYTE, &bytes);
-        if (size_t(bytes) != messages.bytes[one])
-            throw RunError(name(peer) + " sent " + std::to_string(bytes) + " bytes in place of " +
-                           std::to_string(messages.bytes[one]));
+        if (size_t(bytes) != one.bytes)
+            throw RunError(name(one.peer) + " sent " + std::to_string(bytes) + " bytes in place of " +
+                           std::to_string(one.bytes));
+        messages.awaited -= one.first;
     }
     return size_t(done);
 }
@@ -200,14 +196,14 @@ void MpiRanks::wait(Messages& messages) {
         else if (pause.waited() > patience)
             tell_missing(messages);
         else
-            pause.wait();
+            pause.wait(messages.awaited == 0);
     }
 }
 
 void MpiRanks::tell_missing(const Messages& messages) const {
     std::vector<int> missing;
     for (size_t i = 0; i < messages.requests.size(); ++i)
-        if (messages.requests[i] != MPI_REQUEST_NULL) missing.push_back(messages.peers[i]);
+        if (messages.requests[i] != MPI_REQUEST_NULL) missing.push_back(messages.each[i].peer);
     std::ranges::sort(missing);
     missing.erase(std::unique(missing.begin(), missing.end()), missing.end());
     constexpr size_t kNamed = 4;
@@ -224,7 +220,7 @@ void MpiRanks::gather_bytes(std::span<const std::byte> own, std::span<std::byte>
     failed_ = true;  // until it has succeeded
     Messages messages;
     for (int peer = 0; peer < size_; ++peer)
-        if (peer != rank_) receive(peer, all.subspan(size_t(peer) * own.size(), own.size()), messages);
+        if (peer != rank_) receive(peer, all.subspan(size_t(peer) * own.size(), own.size()), messages, true);
     std::ranges::copy(own, all.subspan(size_t(rank_) * own.size()).begin());
     // Each begins with its neighbour: not all ranks send to the same one at once.
     for (int step = 1; step < size_; ++step) send((rank_ + step) % size_, own, messages);
@@ -242,13 +238,21 @@ void MpiRanks::exchange(std::span<const std::span<const std::byte>> out,
                         std::span<const std::span<std::byte>> in) {
     failed_ = true;  // until it has succeeded
     Messages messages;
+    // Ranks that have something for each other greet each other first, by an empty message.
     for (int step = 1; step < size_; ++step) {
-        const int peer = (rank_ + size_ - step) % size_;
-        receive(peer, in[size_t(peer)], messages);
+        const size_t peer = size_t((rank_ + size_ - step) % size_);
+        if (in[peer].empty() && out[peer].empty()) continue;
+        receive(int(peer), {}, messages, true);
+        for (size_t at = 0; at < in[peer].size(); at += message_bytes_)
+            receive(int(peer), in[peer].subspan(at, std::min(message_bytes_, in[peer].size() - at)), messages,
+                    false);
     }
     for (int step = 1; step < size_; ++step) {
-        const int peer = (rank_ + step) % size_;
-        send(peer, out[size_t(peer)], messages);
+        const size_t peer = size_t((rank_ + step) % size_);
+        if (in[peer].empty() && out[peer].empty()) continue;
+        send(int(peer), {}, messages);
+        for (size_t at = 0; at < out[peer].size(); at += message_bytes_)
+            send(int(peer), out[peer].subspan(at, std::min(message_bytes_, out[peer].size() - at)), messages);
     }
     const auto own = out[size_t(rank_)];
     if (!own.empty()) std::memmove(in[size_t(rank_)].data(), own.data(), own.size());

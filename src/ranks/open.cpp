@@ -11,7 +11,8 @@ namespace ewa {
 namespace ranks {
 
 std::shared_ptr<Ranks> open_mpi(const MpiOptions& options) {
-    constexpr core::Plugin kPlugin{kMpiFile, kMpiEntry, "which lets the processes of a launcher train together",
+    constexpr core::Plugin kPlugin{kMpiFile, kMpiEntry,
+                                   "which lets the processes of a launcher train together",
                                    "install ewa's module and Open MPI (Debian: openmpi-bin), or start ewa "
                                    "without mpirun and srun"};
     return static_cast<const Mpi*>(core::load_plugin(kPlugin))->open(options);

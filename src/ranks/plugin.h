@@ -10,8 +10,8 @@
 namespace ewa::ranks {
 
 struct MpiOptions {
-    std::chrono::milliseconds timeout;    // of gather and exchange
-    int size = 0;                         // the processes that the launcher started; 0: it does not say
+    std::chrono::milliseconds timeout;  // of gather and exchange
+    int size = 0;                       // the processes that the launcher started; 0: it does not say
     // Longer parts travel in several messages: MPI counts bytes with an int, and each one that arrives shows that data
     // still flow.
     size_t message_bytes = size_t(4) << 20;

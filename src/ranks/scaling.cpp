@@ -7,9 +7,9 @@ namespace ewa::ranks {
 namespace {
 
 // Of a visible splat of a view that another rank draws.
-constexpr double kOutBytes = 48 + 8;                    // its record, and what orders it
-constexpr double kBackBytes = 36, kBackAbsolute = 44;   // the sums of its gradients
-constexpr double kGathers = 2;                          // of a step: sizes of the parts, and the state of each rank
+constexpr double kOutBytes = 48 + 8;                   // its record, and what orders it
+constexpr double kBackBytes = 36, kBackAbsolute = 44;  // the sums of its gradients
+constexpr double kGathers = 2;  // of a step: sizes of the parts, and the state of each rank
 
 /// Between two sizes that were measured, time grows evenly. Beyond the last it grows as before it.
 double transfer_ms(const Network& network, double bytes) {
@@ -38,8 +38,8 @@ StepCost predict_step(const ViewCost& view, const Network& network, int ranks) {
             return std::max(message_ms, transfer_ms(network, bytes) + messages_ms);
         };
         cost.sent_bytes = away * (kOutBytes + back);
-        cost.exchange_ms = exchange_ms(away * kOutBytes) + exchange_ms(away * back) +
-                           kGathers * (ranks - 1) * message_ms;
+        cost.exchange_ms =
+            exchange_ms(away * kOutBytes) + exchange_ms(away * back) + kGathers * (ranks - 1) * message_ms;
     }
     cost.step_ms = view.milliseconds + cost.exchange_ms;
     cost.views_per_second = ranks * 1000 / cost.step_ms;

@@ -23,7 +23,8 @@ Outcome run(const std::string& command) {
     std::string line = command;
     line.append(" > ").append(out).append(" 2> ").append(err).append(" < /dev/null");
     const int ended = std::system(line.c_str());
-    return {WIFEXITED(ended) ? WEXITSTATUS(ended) : -1, ewa::test::file_bytes(out), ewa::test::file_bytes(err)};
+    return {WIFEXITED(ended) ? WEXITSTATUS(ended) : -1, ewa::test::file_bytes(out),
+            ewa::test::file_bytes(err)};
 }
 
 /// Ranks on this machine, which may have more of them than cores.
@@ -83,7 +84,8 @@ TEST(Mpi, NamesARankThatFallsSilent) {
         expect_end(outcome, 1, "RunError: rank 1 (");
         expect_end(outcome, 1, ") has not answered for 1 s\n");
         // The other ranks wait for it as well, and leave it to the first of them to say so.
-        EXPECT_EQ(outcome.err.find("RunError", outcome.err.find("RunError") + 1), std::string::npos) << outcome.err;
+        EXPECT_EQ(outcome.err.find("RunError", outcome.err.find("RunError") + 1), std::string::npos)
+            << outcome.err;
     }
 }
 
@@ -109,9 +111,12 @@ TEST_F(MpiModule, IsNotNeededWithoutALauncher) {
 
 TEST_F(MpiModule, IsNamedWhereItIsMissing) {
     const Outcome outcome = start("OMPI_COMM_WORLD_SIZE=2");
-    expect_end(outcome, 1, "RunError: libewa_mpi.so, which lets the processes of a launcher train together, cannot be loaded: it is ");
+    expect_end(outcome, 1,
+               "RunError: libewa_mpi.so, which lets the processes of a launcher train together, cannot be "
+               "loaded: it is ");
     expect_end(outcome, 1, "neither in ");
-    expect_end(outcome, 1, "; install ewa's module and Open MPI (Debian: openmpi-bin), or start ewa without mpirun");
+    expect_end(outcome, 1,
+               "; install ewa's module and Open MPI (Debian: openmpi-bin), or start ewa without mpirun");
     EXPECT_EQ(outcome.err.find('\n'), outcome.err.size() - 1) << outcome.err;
 }
 

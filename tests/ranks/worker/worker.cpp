@@ -101,7 +101,8 @@ void measure(Ranks& ranks) {
     if (ranks.rank() > 0) return;
     std::printf("gather %.4f ms\n", network.gather_ms);
     for (const auto& t : network.transfers)
-        std::printf("%10lu bytes %9.4f ms %8.1f MB/s\n", t.bytes, t.milliseconds, double(t.bytes) / t.milliseconds / 1e3);
+        std::printf("%10lu bytes %9.4f ms %8.1f MB/s\n", t.bytes, t.milliseconds,
+                    double(t.bytes) / t.milliseconds / 1e3);
 }
 
 void run(const std::string& what, Ranks& ranks) {
@@ -121,8 +122,7 @@ void run(const std::string& what, Ranks& ranks) {
         }
         meet(ranks);
     }
-    if (what == "name")
-        std::printf("%s of %d\n", ranks.name(ranks.rank()).c_str(), ranks.size());
+    if (what == "name") std::printf("%s of %d\n", ranks.name(ranks.rank()).c_str(), ranks.size());
 }
 
 }  // namespace
@@ -130,7 +130,8 @@ void run(const std::string& what, Ranks& ranks) {
 int main(int argc, char** argv) {
     const std::string what = argc > 1 ? argv[1] : "";
     try {
-        ranks::MpiOptions options{.timeout = std::chrono::milliseconds(argc > 3 ? std::atoi(argv[3]) : 60000)};
+        ranks::MpiOptions options{.timeout =
+                                      std::chrono::milliseconds(argc > 3 ? std::atoi(argv[3]) : 60000)};
         if (argc > 2) options.message_bytes = size_t(std::atol(argv[2]));
         const auto ranks = argc > 2 ? ranks::open_mpi(options) : open_ranks(options.timeout);
         run(what, *ranks);
