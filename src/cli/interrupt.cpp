@@ -12,7 +12,8 @@
 namespace ewa::cli {
 namespace {
 
-constexpr std::array kSignals{SIGINT, SIGTERM, SIGHUP};
+// SIGUSR1 is what mpirun passes on without ending the job, and what batch systems send before a time limit.
+constexpr std::array kSignals{SIGINT, SIGTERM, SIGHUP, SIGUSR1};
 constexpr std::string_view kNote = "\nsaving, then ending; Ctrl-\\ ends at once without saving\n";
 
 // Two threads can handle two signals at the same time.

@@ -7,7 +7,7 @@
 
 namespace ewa::cli {
 
-/// While a watch exists, SIGINT, SIGTERM and SIGHUP (unless nohup ignores it) only set a flag, however often
+/// While a watch exists, SIGINT, SIGTERM, SIGUSR1 and SIGHUP (unless nohup ignores it) only set a flag, however often
 /// they arrive. timeout(1) signals the program and then its group, and a second Ctrl-C must not prevent what
 /// the first one saves. SIGQUIT (Ctrl-\, as a terminal is told) and SIGKILL still end the program at once.
 /// The destructor restores the handlers. At most one watch exists at a time.
@@ -19,7 +19,7 @@ class InterruptWatch {
     InterruptWatch& operator=(const InterruptWatch&) = delete;
 
   private:
-    std::array<struct sigaction, 3> before_;
+    std::array<struct sigaction, 4> before_;
 };
 
 /// Whether a signal has arrived during a watch.

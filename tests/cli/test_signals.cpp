@@ -29,7 +29,7 @@ Circumstances storm(int first, int signal) {
 }
 
 TEST_F(Signals, AskATrainingToEnd) {
-    for (const int signal : {SIGTERM, SIGHUP, SIGINT})
+    for (const int signal : {SIGTERM, SIGHUP, SIGINT, SIGUSR1})
         for (const int submission : signal == SIGTERM ? std::vector{1, 2, 20, 55} : std::vector{20}) {
             std::string out = std::to_string(signal);
             out.append("_").append(std::to_string(submission));
