@@ -126,9 +126,9 @@ void add_rank_options(CLI::App& app, RankBench& bench) {
         "Under mpirun or srun: measure the network between the processes, and predict how a training "
         "scales. With FILE and --splats the time of a view is measured, else these options state it");
     app.add_option("--scene-splats", bench.splats, "With --ranks: splats of the scene")
-        ->transform(in_range(1.0, 1e12))
+        ->transform(in_range(uint64_t(1), uint64_t(1000000000000)))
         ->type_name("N")
-        ->default_str("1000000");
+        ->capture_default_str();
     app.add_option("--visible", bench.visible_percent, "With --ranks: how many of them a view sees")
         ->transform(in_range(0.0, 100.0))
         ->type_name("PERCENT")
@@ -151,7 +151,7 @@ int run_rank_bench(const RankBench& bench, const fs::path& dataset, const fs::pa
         throw InputError(
             "--ranks measures the network between several processes; start them together: mpirun -n 2 ewa "
             "bench --ranks");
-    ViewCost view{bench.splats, bench.visible_percent / 100, bench.view_ms, false};
+    ViewCost view{double(bench.splats), bench.visible_percent / 100, bench.view_ms, false};
     if (!dataset.empty()) view = measure_view(*group, dataset, splats, device);
     view.absolute_gradients = bench.absolute_gradients;
     const Network network = ranks::measure_network(*group, kTransferBytes);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // ewa bench --ranks: the network between the processes of mpirun or srun, and what a scene's training costs with it.
 #pragma once
+#include <cstdint>
 #include <filesystem>
 #include <string>
 
@@ -13,7 +14,8 @@ namespace ewa::cli {
 struct RankBench {
     bool asked = false;
     // The scene, where none is measured.
-    double splats = 1e6, visible_percent = 30, view_ms = 100;
+    uint64_t splats = 1000000;
+    double visible_percent = 30, view_ms = 100;
     bool absolute_gradients = false;
 };
 

@@ -28,10 +28,14 @@ Outcome run(const std::string& command) {
 }
 
 /// Ranks on this machine, which may have more of them than cores.
-Outcome mpirun(int ranks, const std::string& what, const std::string& options = "") {
+Outcome start(int ranks, const std::string& command, const std::string& options = "") {
     return run("OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 " EWA_MPIRUN
                " --oversubscribe --bind-to none " +
-               options + " -n " + std::to_string(ranks) + " " EWA_RANKS_WORKER " " + what);
+               options + " -n " + std::to_string(ranks) + " " + command);
+}
+
+Outcome mpirun(int ranks, const std::string& what, const std::string& options = "") {
+    return start(ranks, EWA_RANKS_WORKER " " + what, options);
 }
 
 void expect_success(const Outcome& outcome) {
@@ -89,6 +93,36 @@ TEST(Mpi, NamesARankThatFallsSilent) {
     }
 }
 
+TEST(RankBench, PredictsTheStepsOfAStatedScene) {
+    const Outcome outcome =
+        start(2, EWA_PROGRAM " bench --ranks --scene-splats 1M --visible 50 --view-time 80");
+    expect_success(outcome);
+    for (const char* text :
+         {"2 ranks: rank 0 (", "\n      67108864 ",
+          "1000000 splats, of which a view sees 50 %; 80.0 ms a view",
+          "\n     1         0.00         0.00       80.0      12.50       100 %\n     2        23.00 "})
+        EXPECT_NE(outcome.out.find(text), std::string::npos) << text << " not in:\n" << outcome.out;
+    EXPECT_EQ(outcome.out.find(" ranks: ", outcome.out.find(" ranks: ") + 1), std::string::npos)
+        << outcome.out;
+}
+
+TEST(RankBench, MeasuresAView) {
+    const ewa::test::TempFolder folder;
+    const std::string json = folder / "figures.json", tree = EWA_SOURCE_DIR;
+    const Outcome outcome = start(2, EWA_PROGRAM " bench --ranks " + tree + "/scenes/still_life --splats " +
+                                         tree + "/tests/fuzz/seeds/read_ply/little.ply --json " + json);
+    expect_success(outcome);
+    EXPECT_NE(outcome.out.find(" splats, of which a view sees "), std::string::npos) << outcome.out;
+    EXPECT_EQ(outcome.out.find("1000000 splats"), std::string::npos) << outcome.out;
+    for (const char* text : {"\"gather_ms\"", "\"transfers\"", "\"predicted\""})
+        EXPECT_NE(ewa::test::file_bytes(json).find(text), std::string::npos) << text;
+}
+
+TEST(RankBench, SaysHowToStartIt) {
+    expect_end(run(EWA_PROGRAM " bench --ranks"), 2, "mpirun -n 2 ewa bench --ranks\n");
+    expect_end(run(EWA_PROGRAM " bench --ranks --splats a.ply"), 2, "with both a DATASET and --splats FILE");
+}
+
 /// The worker in a folder of its own, where it looks for its module.
 class MpiModule : public testing::Test {
   protected:
@@ -96,7 +130,7 @@ class MpiModule : public testing::Test {
         fs::create_directories(folder_ / "bin/modules");
         fs::copy_file(EWA_RANKS_WORKER, program_);
     }
-    Outcome start(const std::string& environment) const {
+    Outcome run_with(const std::string& environment) const {
         return run(environment + " " + program_.string() + " name");
     }
 
@@ -105,12 +139,12 @@ class MpiModule : public testing::Test {
 };
 
 TEST_F(MpiModule, IsNotNeededWithoutALauncher) {
-    EXPECT_EQ(start("").out, "rank 0 of 1\n");
-    EXPECT_EQ(start("OMPI_COMM_WORLD_SIZE=1").out, "rank 0 of 1\n");
+    EXPECT_EQ(run_with("").out, "rank 0 of 1\n");
+    EXPECT_EQ(run_with("OMPI_COMM_WORLD_SIZE=1").out, "rank 0 of 1\n");
 }
 
 TEST_F(MpiModule, IsNamedWhereItIsMissing) {
-    const Outcome outcome = start("OMPI_COMM_WORLD_SIZE=2");
+    const Outcome outcome = run_with("OMPI_COMM_WORLD_SIZE=2");
     expect_end(outcome, 1,
                "RunError: libewa_mpi.so, which lets the processes of a launcher train together, cannot be "
                "loaded: it is ");
@@ -126,13 +160,13 @@ TEST_F(MpiModule, OfAnotherLayoutIsRefused) {
     for (size_t at = bytes.find(entry); at != std::string::npos; at = bytes.find(entry, at + 1))
         bytes[at + entry.size()] = '0';
     folder_.write("bin/modules/libewa_mpi.so", bytes);
-    expect_end(start("PMI_SIZE=2"), 1, "it belongs to another build of ewa");
+    expect_end(run_with("PMI_SIZE=2"), 1, "it belongs to another build of ewa");
 }
 
 /// As under the mpirun of another MPI: each process would train alone, into the same folder.
 TEST_F(MpiModule, ThatDoesNotSeeTheOtherProcessesIsRefused) {
     fs::copy_file(EWA_MPI_MODULE, module_);
-    const Outcome outcome = start("OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 PMI_SIZE=4");
+    const Outcome outcome = run_with("OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 PMI_SIZE=4");
     expect_end(outcome, 1, "the launcher started 4 processes, and MPI knows 1 of them");
 }
 #endif
