@@ -25,7 +25,10 @@ inline constexpr int kAutomaticShDegree = -1;
 /// Options of a Trainer. Learning rates are those of Adam. Lengths are in world units. "Scene extent" is
 /// scene_extent() of ewa/dataset.h, or the median distance of the start's splats if all cameras coincide.
 struct TrainOptions {
-    int steps = 30000;  // optimisation steps, of one view each
+    int steps = 30000;  // views: an optimisation step takes `batch` of them
+    /// Views a step, at least 1. Their gradients are averaged. Rates and Adam's decays follow the square root rule of
+    /// Grendel (Zhao et al. 2024, section 3.3): rates times sqrt(batch), decays to the power of batch.
+    int batch = 1;
     Strategy strategy = Strategy::mcmc;
     uint32_t max_splats = 1000000;   // hard limit
     int sh_degree = 3;               // 0 to 3, or kAutomaticShDegree

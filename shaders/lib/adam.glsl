@@ -1,12 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 // Adam's step of a splat's parameters, or their gradient alone. The including pass declares the buffers of update.comp, push
-// (UpdatePush), SH_DEGREE, GRADIENT_ONLY and PACKED_MOMENTS.
+// (UpdatePush, or UpdateViewsPush with ADAM_OF_PUSH defined), SH_DEGREE, GRADIENT_ONLY and PACKED_MOMENTS.
 #ifndef EWA_LIB_ADAM
 #define EWA_LIB_ADAM
 #include "lib/params.glsl"
 #include "lib/step_limits.glsl"
 #include "lib/moments.glsl"
 #include "lib/sh.glsl"
+
+#ifdef ADAM_OF_PUSH
+#define BETA1 push.beta1
+#define BETA2 push.beta2
+#define EPSILON push.epsilon
+#define FIRST_SPLAT push.first
+#else
+#define BETA1 float(ADAM_BETA1)
+#define BETA2 float(ADAM_BETA2)
+#define EPSILON float(ADAM_EPSILON)
+#define FIRST_SPLAT 0u
+#endif
 
 const uint SH_FLOATS = 3 * (SH_DEGREE + 1) * (SH_DEGREE + 1);
 const uint PLANES = (PARAM_SH + SH_FLOATS + 3) / 4;
@@ -30,9 +42,9 @@ void move_rounded(uint plane, uint i, vec4 value, vec4 raw_gradient, vec4 rate, 
     const uvec4 words = fetch(moments1, at);
     const vec4 old_m = PACKED_MOMENTS ? first_moment(words) : uintBitsToFloat(words);
     const vec4 old_v = PACKED_MOMENTS ? second_moment(words) : uintBitsToFloat(fetch(moments2, at));
-    const vec4 m = mix(gradient, old_m, float(ADAM_BETA1));
-    const vec4 v = mix(gradient * gradient, old_v, float(ADAM_BETA2));
-    vec4 moved = value - rate * (m * push.bias1) / (sqrt(v * push.bias2) + float(ADAM_EPSILON));
+    const vec4 m = mix(gradient, old_m, BETA1);
+    const vec4 v = mix(gradient * gradient, old_v, BETA2);
+    vec4 moved = value - rate * (m * push.bias1) / (sqrt(v * push.bias2) + EPSILON);
     const bool limited = limit_step(plane, value, depth, moved);
     if (is_finite(moved) && is_finite(m) && is_finite(v)) {
         if (limited) atomicAdd(counts.limited_steps, 1u);
@@ -49,30 +61,55 @@ void move_rounded(uint plane, uint i, vec4 value, vec4 raw_gradient, vec4 rate, 
 }
 
 void move(uint plane, uint i, vec4 value, vec4 raw_gradient, vec4 rate, float depth) {
-    move_rounded(plane, i, value, raw_gradient, rate, depth, moment_random(i, plane, push.step, push.seed));
+    move_rounded(plane, i, value, raw_gradient, rate, depth, moment_random(FIRST_SPLAT + i, plane, push.step, push.seed));
+}
+
+const uint FIRST_SH_PLANE = PARAM_SH / 4 + 1;   // of those that hold nothing else
+
+struct ShBasis {
+    float value[16];
+    vec3 slope[16];
+};
+
+ShBasis sh_basis_of(vec3 direction) {
+    ShBasis basis;
+    sh_basis(SH_DEGREE, direction, basis.value);
+    sh_basis_gradient(SH_DEGREE, direction, basis.slope);
+    return basis;
+}
+
+// Gradient by the spherical harmonics of a plane. Adds that by the unit direction.
+vec4 sh_gradient(uint plane, vec4 value, vec3 color_gradient, ShBasis basis, inout vec3 direction_gradient) {
+    vec4 gradient = vec4(0.0);
+    [[unroll]] for (uint c = 0; c < 4; ++c) {
+        const uint s = 4 * plane + c - PARAM_SH;
+        if (s < SH_FLOATS) {
+            gradient[c] = basis.value[s / 3] * color_gradient[s % 3];
+            direction_gradient += (value[c] * color_gradient[s % 3]) * basis.slope[s / 3];
+        }
+    }
+    return gradient;
+}
+
+vec4 sh_rates(uint plane) {
+    vec4 rate = vec4(0.0);
+    [[unroll]] for (uint c = 0; c < 4; ++c) {
+        const uint s = 4 * plane + c - PARAM_SH;
+        if (s < SH_FLOATS) rate[c] = s < 3 ? push.sh0_rate : push.sh_rest_rate;
+    }
+    return rate;
 }
 
 // Moves all spherical harmonics except the coefficient in plane 2, which it shares with the scales. Returns that one's
 // gradient. direction_gradient: dL/d(unit direction).
 float move_sh(uint i, vec3 color_gradient, vec3 direction, out vec3 direction_gradient) {
-    float basis[16];
-    vec3 slope[16];
-    sh_basis(SH_DEGREE, direction, basis);
-    sh_basis_gradient(SH_DEGREE, direction, slope);
+    const ShBasis basis = sh_basis_of(direction);
     direction_gradient = vec3(0.0);
-    [[unroll]] for (uint plane = PARAM_SH / 4 + 1; plane < PLANES; ++plane) {
+    [[unroll]] for (uint plane = FIRST_SH_PLANE; plane < PLANES; ++plane) {
         const vec4 value = fetch(params, index_of(plane, i));
-        vec4 gradient = vec4(0.0), rate = vec4(0.0);
-        [[unroll]] for (uint c = 0; c < 4; ++c) {
-            const uint s = 4 * plane + c - PARAM_SH;
-            if (s < SH_FLOATS) {
-                gradient[c] = basis[s / 3] * color_gradient[s % 3];
-                rate[c] = s < 3 ? push.sh0_rate : push.sh_rest_rate;
-                direction_gradient += (value[c] * color_gradient[s % 3]) * slope[s / 3];
-            }
-        }
-        move(plane, i, value, gradient, rate, 0.0);
+        const vec4 gradient = sh_gradient(plane, value, color_gradient, basis, direction_gradient);
+        move(plane, i, value, gradient, sh_rates(plane), 0.0);
     }
-    return basis[0] * color_gradient.r;
+    return basis.value[0] * color_gradient.r;
 }
 #endif

@@ -1,10 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// The camera's uniform block, and points in camera coordinates. The including pass defines BINDING_CAMERA.
+// The camera's uniform block, and points in camera coordinates. The including pass defines BINDING_CAMERA, or
+// BINDING_CAMERAS: then camera_index says which camera of a buffer the functions use.
 #ifndef EWA_LIB_CAMERA
 #define EWA_LIB_CAMERA
 #include "lib/view.glsl"
 
+#ifdef BINDING_CAMERAS
+layout(set = 0, binding = BINDING_CAMERAS, scalar) readonly buffer Cameras { CameraBlock cameras[]; };
+uint camera_index = 0u;
+#define camera cameras[camera_index]
+#else
 layout(set = 0, binding = BINDING_CAMERA, scalar) uniform CameraUniform { CameraBlock camera; };
+#endif
 
 // The world-to-camera rotation as a matrix that multiplies column vectors.
 mat3 camera_rotation() {

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Exclusive prefix sums within blocks.
 // One workgroup is one subgroup and owns one block of `block` entries. It reads them, and writes for each entry
-// the sum of the entries before it in the block, and the block's total. SPEC_MODE: SCAN_GATHERED takes
-// source[order[e]] as entry e.
+// the sum of the entries before it in the block, and the block's total. SPEC_MODE: SCAN_GATHERED or
+// SCAN_FLAGS, which say what an entry is.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"
@@ -26,6 +26,7 @@ void main() {
         const uint e = base + LANE;
         uint value = 0u;
         if (e < end) value = source[MODE == SCAN_GATHERED ? order[e] : e];
+        if (MODE == SCAN_FLAGS) value = min(value, 1u);
         const uint sum = subgroup_inclusive_sum(value);
         if (e < end) prefix[e] = carry + sum - value;
         carry += subgroupShuffle(sum, SUBGROUP - 1u);

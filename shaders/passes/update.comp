@@ -14,6 +14,7 @@
 #include "lib/params.glsl"
 #include "lib/stored_splat.glsl"
 #include "lib/footprint_gradient.glsl"
+#include "lib/splat_gradient.glsl"
 #include "lib/subgroup.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
@@ -76,9 +77,10 @@ MotionGradient update_splat(uint i) {
     vec4 sum[SLOT_TEXELS];
     sum_slots(visible ? first_instances[i] : 0u, count, ABSOLUTE, sum);
     Sums s = Sums(sum[0].x, sum[0].yz, vec3(sum[0].w, sum[1].xy), vec3(sum[1].zw, sum[2].x), sum[2].yz);
-    const StoredProjection stored = project_splat(StoredSplat(p0.xyz, p0.w, p1, p2.xyz));
+    const StoredSplat splat = StoredSplat(p0.xyz, p0.w, p1, p2.xyz);
+    const StoredProjection stored = project_splat(splat);
     const Projection p = stored.footprint;
-    if (KERNEL == KERNEL_DENSITY && stored.peak * p.factor > float(DEPTH_MAX)) s.g = 0.0;
+    cut_off_gradient(stored, s);
     // The mean of an invisible splat may be anything. Zero times a direction that is not finite is not zero.
     const vec3 direction = visible ? normalize(p.view.offset) : vec3(0.0);
     // max(0, .) passes no gradient where the colour is zero.
@@ -88,28 +90,17 @@ MotionGradient update_splat(uint i) {
     const float red_gradient = move_sh(i, color_gradient, direction, direction_gradient);
 
     const FootprintGradient f = footprint_gradient(s, p);
-    const vec3 view_gradient = view_point_gradient(f, p);
-
-    const mat3 to_world = transpose(camera_rotation());
-    const vec3 scale = exp(p2.xyz);
-    const vec3 torque = f.beside * scale_ratios(p2.xyz);
-    const vec4 quaternion_gradient = torque_on_quaternion(stored.unit_quaternion, torque) / stored.quaternion_norm;
-    const vec3 direction_part =
-        (direction_gradient - direction * dot(direction, direction_gradient)) / length(p.view.offset);
-    const vec3 mean_gradient = to_world * view_gradient + direction_part;
-    // 1 - opacity has no digits left where the opacity is close to 1.
-    const float transparency = sigmoid(-p0.w);
-    const float logit_gradient = s.g * (KERNEL == KERNEL_DENSITY ? log_softplus_slope(p0.w) : transparency);
+    const SplatGradient g = splat_gradient(f, stored, splat, s.g, direction, direction_gradient);
     const float depth = visible ? p.view.z.x : 3.4e38;
 
     const vec4 zero = vec4(0.0);
     const float opacity = KERNEL == KERNEL_DENSITY ? sigmoid(p0.w) : stored.peak;
-    const vec4 scale_pull = REGULARISED ? vec4(push.scale_weight * scale, 0.0) : zero;
-    const vec4 opacity_pull = REGULARISED ? vec4(vec3(0.0), push.opacity_weight * opacity * transparency) : zero;
-    move(2, i, p2, (visible ? vec4(f.log_scale, red_gradient) : zero) + scale_pull,
+    const vec4 scale_pull = REGULARISED ? vec4(push.scale_weight * exp(p2.xyz), 0.0) : zero;
+    const vec4 opacity_pull = REGULARISED ? vec4(vec3(0.0), push.opacity_weight * opacity * transparency_of(p0.w)) : zero;
+    move(2, i, p2, (visible ? vec4(g.log_scale, red_gradient) : zero) + scale_pull,
          vec4(vec3(push.scale_rate), push.sh0_rate), depth);
-    move(1, i, p1, visible ? quaternion_gradient : zero, vec4(push.quaternion_rate), depth);
-    move(0, i, p0, (visible ? vec4(mean_gradient, logit_gradient) : zero) + opacity_pull,
+    move(1, i, p1, visible ? g.quaternion : zero, vec4(push.quaternion_rate), depth);
+    move(0, i, p0, (visible ? vec4(g.mean, g.logit) : zero) + opacity_pull,
          vec4(vec3(push.mean_rate), push.opacity_rate), depth);
     if (STATISTICS && visible) {
         const float norm = length((ABSOLUTE ? f.absolute : f.mean) * vec2(push.half_size[0], push.half_size[1]));
@@ -117,7 +108,7 @@ MotionGradient update_splat(uint i) {
     }
     const MotionGradient none = MotionGradient(vec4(0.0), vec3(0.0));
     if (!MOTION || !visible) return none;
-    const MotionGradient motion = motion_gradient(f, stored, view_gradient, torque, mean_gradient);
+    const MotionGradient motion = motion_gradient(f, stored, g.view, g.torque, g.mean);
     // One splat's gradient that is not finite leaves those of the others.
     if (is_finite(motion.first) && is_finite(motion.shift)) return motion;
     return none;

@@ -61,6 +61,13 @@ EWA_UINT(RAY_SLOT_TEXELS, 4u);
 EWA_UINT(SLOT_FLOATS, 12u);
 EWA_UINT(SLOT_TEXELS, 3u);
 
+// ---- A batch of views: each view has a list of the splats that reach a tile of it, in the order of the splats ----
+EWA_UINT(NOT_LISTED, 0xffffffffu);  // place of a splat that is not in a view's list
+// Sums over the slots of a listed splat: the first 9 floats of a slot, with UPDATE_ABSOLUTE 11. The gradient of a colour
+// that is cut off at 0 is 0.
+EWA_UINT(SUM_FLOATS, 9u);
+EWA_UINT(SUM_FLOATS_ABSOLUTE, 11u);
+
 // ---- Image planes ----
 // Plane p of pixel (x, y) is float p * plane_floats + y * stride + x.
 struct ImageLayout {
@@ -84,6 +91,7 @@ EWA_UINT(PROJECT_RAYS_DEEP, 1u);  // a splat counts to MARCH_DEPTH_MIN, not to t
 EWA_UINT(EMIT_FIRST_INSTANCES, 1u);  // also writes where each splat's instances begin
 // scan_blocks.comp
 EWA_UINT(SCAN_GATHERED, 1u);  // entry e is source[order[e]]
+EWA_UINT(SCAN_FLAGS, 2u);     // entry e is 1 where source[e] is not 0
 // blend.comp
 EWA_UINT(BLEND_COLOR, 0u);
 EWA_UINT(BLEND_DEPTH, 1u);       // also writes PLANE_DEPTH
@@ -111,7 +119,8 @@ EWA_UINT(SHAPE_WHITENERS,
 EWA_UINT(GATHER_ADD, 1u);       // adds to the gradients that are there
 EWA_UINT(GATHER_ABSOLUTE, 2u);  // the slots have absolute gradients
 EWA_UINT(GATHER_FOURTH, 4u);    // the slots have a fourth channel
-// update.comp, bits
+// sum_slots.comp: 0 or UPDATE_ABSOLUTE
+// update.comp, and update_views.comp without UPDATE_GRADIENT_ONLY and UPDATE_MOTION: bits
 EWA_UINT(UPDATE_GRADIENT_ONLY, 1u);  // writes the gradient into moments1 and moves nothing
 // Adds to the densification statistics: norm of dL/d(mean) in normalised device coordinates, number of views
 // that the splat is visible in.
@@ -362,6 +371,41 @@ struct UpdatePush {
     float mean_rate, opacity_rate, quaternion_rate, scale_rate, sh0_rate, sh_rest_rate;
     float bias1, bias2;  // 1 / (1 - beta^step)
     float half_size[2];  // W / 2, H / 2: px to normalised device coordinates
+    // With UPDATE_REGULARISED: d(loss)/d(opacity) and d(loss)/d(scale along one axis) of every splat.
+    float opacity_weight, scale_weight;
+    // With UPDATE_PACKED_MOMENTS: of the rounding.
+    uint seed[2];
+    uint step;
+};
+
+struct CollectVisiblePush {
+    uint splats;
+    uint scan_block;
+    uint view;
+    uint first_place;   // of the view's list, among the lists of all views
+    uint first_record;  // where the view's records begin
+};
+
+struct ReceivePush {
+    uint splats;
+    uint size[2];  // px
+};
+
+struct SumSlotsPush {
+    uint splats;
+    uint first_place;  // of the view's list, among the lists of all views
+};
+
+// Has the members of UpdatePush that lib/adam.glsl uses.
+struct UpdateViewsPush {
+    uint splats;
+    uint first;   // number of the first splat, among those of all ranks
+    uint planes;  // texel planes a splat
+    uint views;
+    float share;  // of a view in the gradient: 1 / views
+    float mean_rate, opacity_rate, quaternion_rate, scale_rate, sh0_rate, sh_rest_rate;
+    float beta1, beta2, epsilon;  // Adam's
+    float bias1, bias2;           // 1 / (1 - beta^step)
     // With UPDATE_REGULARISED: d(loss)/d(opacity) and d(loss)/d(scale along one axis) of every splat.
     float opacity_weight, scale_weight;
     // With UPDATE_PACKED_MOMENTS: of the rounding.

@@ -32,6 +32,38 @@ struct Update {
         params_out, moments1_out, moments2_out, statistics, sorted_indices, motion_sums;
 };
 
+// A batch of views. Each view has a list of the splats that reach a tile of it.
+
+/// Lists a view's visible splats: writes each splat's place and copies the listed records.
+struct CollectVisible {
+    static constexpr char shader[] = "collect_visible";
+    using Work = PerElement<&shared::CollectVisiblePush::splats>;
+    gpu::BufferPart records, tile_counts, prefix, totals, places, visible;
+};
+
+/// Depth keys and tile counts of a list of records.
+struct ReceiveRecords {
+    static constexpr char shader[] = "receive_records";
+    using Work = PerElement<&shared::ReceivePush::splats>;
+    gpu::BufferPart records, depth_keys, tile_counts;
+};
+
+/// Adds the gradient slots of each listed splat. Variant: SPEC_MODE (0 or UPDATE_ABSOLUTE).
+struct SumSlots {
+    static constexpr char shader[] = "sum_slots";
+    using Work = PerElement<&shared::SumSlotsPush::splats>;
+    gpu::BufferPart records, slots, tile_counts, first_instances, sorted_indices, sums;
+};
+
+/// Gradient of the projection in all views, fused with Adam. Variant: SPEC_SH_DEGREE, SPEC_KERNEL, SPEC_MODE (UPDATE_*
+/// bits without UPDATE_GRADIENT_ONLY and UPDATE_MOTION).
+struct UpdateViews {
+    static constexpr char shader[] = "update_views";
+    using Work = PerElement<&shared::UpdateViewsPush::splats>;
+    gpu::BufferPart params, cameras, places, sums, moments1, moments2, counts, params_out, moments1_out,
+        moments2_out, statistics;
+};
+
 // A training camera's motion.
 
 /// Writes the camera that a frame uses: the dataset's, moved.
@@ -103,7 +135,7 @@ struct HarmonicsBackward {
 
 // Prefix sums, radix sort, and the lists of (splat, tile) instances built with them.
 
-/// Exclusive prefix sums within blocks. Variant: SPEC_MODE (0 or SCAN_GATHERED).
+/// Exclusive prefix sums within blocks. Variant: SPEC_MODE (0, SCAN_GATHERED or SCAN_FLAGS).
 struct ScanBlocks {
     static constexpr char shader[] = "scan_blocks";
     using Work = PerBlock<shared::ScanPush>;

@@ -14,12 +14,6 @@ namespace {
 // matter, except where the loss is flat: all exposures change one way, and the splats the other way.
 constexpr float kPull = 1e-3f;
 
-/// Factors that correct the bias of Adam's two moments at a step.
-std::array<float, 2> adam_biases(double step) {
-    return {float(1 / (1 - std::pow(shared::ADAM_BETA1, step))),
-            float(1 / (1 - std::pow(shared::ADAM_BETA2, step)))};
-}
-
 /// Writes frame.planes with the exposure applied to frame.exposed.
 void record_expose(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame,
                    const ExposureUse& use) {
@@ -70,17 +64,6 @@ void record_mean(gpu::Recording& recording, passes::PassCache& cache, const Fram
         {.items = s.reduce_blocks, .block = s.reduce_blocks, .target = target, .rows = rows, .scale = scale});
 }
 
-uint32_t update_mode(const Plan& plan) {
-    uint32_t mode = 0;
-    if (!plan.adam) mode |= shared::UPDATE_GRADIENT_ONLY;
-    if (plan.statistics) mode |= shared::UPDATE_STATISTICS;
-    if (plan.regularised) mode |= shared::UPDATE_REGULARISED;
-    if (plan.absolute) mode |= shared::UPDATE_ABSOLUTE;
-    if (plan.packed_moments) mode |= shared::UPDATE_PACKED_MOMENTS;
-    if (plan.motion) mode |= shared::UPDATE_MOTION;
-    return mode;
-}
-
 shared::UpdatePush update_push(const Model& model, const FrameBuffers& frame, const Rates& rates) {
     const auto [bias1, bias2] = adam_biases(rates.step);
     return {.splats = model.splats,
@@ -102,6 +85,22 @@ shared::UpdatePush update_push(const Model& model, const FrameBuffers& frame, co
 }
 
 }  // namespace
+
+std::array<float, 2> adam_biases(double visits) {
+    return {float(1 / (1 - std::pow(shared::ADAM_BETA1, visits))),
+            float(1 / (1 - std::pow(shared::ADAM_BETA2, visits)))};
+}
+
+uint32_t update_mode(const Plan& plan) {
+    uint32_t mode = 0;
+    if (!plan.adam) mode |= shared::UPDATE_GRADIENT_ONLY;
+    if (plan.statistics) mode |= shared::UPDATE_STATISTICS;
+    if (plan.regularised) mode |= shared::UPDATE_REGULARISED;
+    if (plan.absolute) mode |= shared::UPDATE_ABSOLUTE;
+    if (plan.packed_moments) mode |= shared::UPDATE_PACKED_MOMENTS;
+    if (plan.motion) mode |= shared::UPDATE_MOTION;
+    return mode;
+}
 
 Exposures::Exposures(gpu::Device& device, size_t count)
     : photos(uint32_t(count)),
@@ -260,25 +259,32 @@ struct MoreBuffers {
 
 }  // namespace
 
+void record_blend_backward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
+                           const FrameBuffers& frame, const FrameInputs& inputs, const Sorted& sorted) {
+    record_blend_backward_as<passes::BlendBackward>(
+        recording, cache, frame, inputs, sorted,
+        {{shared::SPEC_MODE, plan.absolute ? shared::BLEND_BACKWARD_ABSOLUTE : 0},
+         {shared::SPEC_KERNEL, uint32_t(plan.kernel)}});
+}
+
 void record_backward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
                      const Model& model, const FrameBuffers& frame, const FrameInputs& inputs,
                      const Sorted& sorted, const Rates& rates, const MotionUse* motion) {
     if (plan.rays()) return record_backward_of_rays(recording, cache, plan, model, frame, inputs, sorted);
-    passes::Constants blending{{shared::SPEC_MODE, plan.absolute ? shared::BLEND_BACKWARD_ABSOLUTE : 0}};
     passes::Constants updating{{shared::SPEC_SH_DEGREE, plan.evaluated_degree(inputs.sh_degree)},
                                {shared::SPEC_MODE, update_mode(plan)}};
     const passes::UpdatePoints buffers = update_buffers(plan, model, frame, inputs.camera, sorted);
     const shared::UpdatePush push = update_push(model, frame, rates);
     if (plan.points()) {
-        blending.push_back({shared::SPEC_NEAREST, plan.nearest});
-        record_blend_backward_as<passes::BlendPointsBackward>(recording, cache, frame, inputs, sorted,
-                                                              blending);
+        record_blend_backward_as<passes::BlendPointsBackward>(
+            recording, cache, frame, inputs, sorted,
+            {{shared::SPEC_MODE, plan.absolute ? shared::BLEND_BACKWARD_ABSOLUTE : 0},
+             {shared::SPEC_NEAREST, plan.nearest}});
         cache.get<passes::UpdatePoints>(updating).record(recording, buffers, push);
         return;
     }
+    record_blend_backward(recording, cache, plan, frame, inputs, sorted);
     updating.push_back({shared::SPEC_KERNEL, uint32_t(plan.kernel)});
-    blending.push_back({shared::SPEC_KERNEL, uint32_t(plan.kernel)});
-    record_blend_backward_as<passes::BlendBackward>(recording, cache, frame, inputs, sorted, blending);
     const gpu::Buffer& motion_sums = plan.motion ? frame.motion_sums : frame.partials;
     cache.get<passes::Update>(updating).record(
         recording, std::bit_cast<passes::Update>(MoreBuffers{buffers, motion_sums}), push);

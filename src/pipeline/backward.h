@@ -4,6 +4,7 @@
 // Each training image may have an exposure: an affine map of colours, learned beside the splats. The
 // published code of 3DGS does the same for captures with automatic exposure; see include/ewa/exposure.h.
 #pragma once
+#include <array>
 #include <vector>
 
 #include "ewa/exposure.h"
@@ -34,10 +35,14 @@ struct ExposureUse {
 struct Rates {
     float mean = 0, opacity = 0, quaternion = 0, scale = 0, sh0 = 0, sh_rest = 0;
     uint32_t step = 1;  // Adam's, from 1
+    uint32_t views = 1;  // of a step: see batch_rates
     uint64_t seed = 0;  // of the rounding of packed moments
     // With plan.regularised: d(loss)/d(opacity) and d(loss)/d(scale along one axis) of every splat.
     float opacity_weight = 0, scale_weight = 0;
 };
+
+/// Factors that correct the bias of Adam's two moments after `visits` steps of one view each.
+std::array<float, 2> adam_biases(double visits);
 
 /// Leaves the parts of the loss in Counts and dL/d(image) in frame.image_gradient.
 /// photo: width * height texels, RGBA. Its alpha composites it over the background or, if `masked`, is the
@@ -55,6 +60,13 @@ void record_loss(gpu::Recording& recording, passes::PassCache& cache, const Fram
 void record_backward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
                      const Model& model, const FrameBuffers& frame, const FrameInputs& inputs,
                      const Sorted& sorted, const Rates& rates, const MotionUse* motion = nullptr);
+
+/// Gradients of blending, which are left in frame.slots. Not for points and rays.
+void record_blend_backward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
+                           const FrameBuffers& frame, const FrameInputs& inputs, const Sorted& sorted);
+
+/// SPEC_MODE of the update: UPDATE_* bits.
+uint32_t update_mode(const Plan& plan);
 
 /// (1 - SSIM_WEIGHT) l1 + SSIM_WEIGHT (1 - ssim).
 double loss_of(const shared::Counts& counts);

@@ -208,15 +208,19 @@ void record_tile_lists(gpu::Recording& recording, passes::PassCache& cache, bool
     record_tile_order(recording, cache, gradients, frame);
 }
 
-Sorted record_forward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
-                      const Model& model, const FrameBuffers& frame, const FrameInputs& inputs) {
+void record_projection(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
+                       const Model& model, const FrameBuffers& frame, const FrameInputs& inputs) {
     recording.fill(frame.counts, 0, 0,
                    inputs.keep_overflow ? offsetof(shared::Counts, overflowed) : sizeof(shared::Counts));
     if (plan.rays())
         record_project_rays(recording, cache, plan, model, frame, inputs);
     else
         record_project(recording, cache, plan, model, frame, inputs);
-    record_tile_lists(recording, cache, plan.gradients, model.splats, frame);
+}
+
+Sorted record_picture(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan, uint32_t splats,
+                      const FrameBuffers& frame, const FrameInputs& inputs) {
+    record_tile_lists(recording, cache, plan.gradients, splats, frame);
     passes::Constants variant{{shared::SPEC_MODE, kBlendModes[size_t(plan.drawing)]}};
     if (plan.rays()) {
         record_integrate(recording, cache, plan, frame, inputs);
@@ -229,6 +233,12 @@ Sorted record_forward(gpu::Recording& recording, passes::PassCache& cache, const
     }
     return {.splats = &frame.instance_splats[1],
             .indices = plan.gradients ? &frame.sorted_indices[1] : nullptr};
+}
+
+Sorted record_forward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
+                      const Model& model, const FrameBuffers& frame, const FrameInputs& inputs) {
+    record_projection(recording, cache, plan, model, frame, inputs);
+    return record_picture(recording, cache, plan, model.splats, frame, inputs);
 }
 
 }  // namespace ewa::pipeline

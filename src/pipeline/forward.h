@@ -22,6 +22,14 @@ struct Sorted {
 Sorted record_forward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
                       const Model& model, const FrameBuffers& frame, const FrameInputs& inputs);
 
+/// The first part of a forward frame: clears the counts and projects the model's splats.
+void record_projection(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
+                       const Model& model, const FrameBuffers& frame, const FrameInputs& inputs);
+
+/// The rest of a forward frame: from frame's records, depth_keys[0] and tile_counts of `splats` splats to the image planes.
+Sorted record_picture(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan, uint32_t splats,
+                      const FrameBuffers& frame, const FrameInputs& inputs);
+
 /// The part between projection and blending: depth order, instances, tile order, tile starts. It reads frame's records,
 /// depth_keys[0] and tile_counts, and leaves each tile's splats in instance_splats[1] and tile_starts; with gradients also
 /// sorted_indices[1] and first_instances.

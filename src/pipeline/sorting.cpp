@@ -7,7 +7,8 @@ namespace ewa::pipeline {
 
 void record_scan(gpu::Recording& recording, passes::PassCache& cache, const ScanBuffers& buffers,
                  const ScanWork& work) {
-    cache.get<passes::ScanBlocks>({{shared::SPEC_MODE, buffers.order ? shared::SCAN_GATHERED : 0}})
+    const uint32_t mode = buffers.order ? shared::SCAN_GATHERED : work.flags ? shared::SCAN_FLAGS : 0;
+    cache.get<passes::ScanBlocks>({{shared::SPEC_MODE, mode}})
         .record(recording,
                 {.source = buffers.source,
                  .order = buffers.order ? *buffers.order : buffers.source,

@@ -18,6 +18,7 @@ struct ScanWork {
     uint32_t total;           // shared::TOTAL_*: which of Counts receives the grand total
     const char* name;         // of the timing
     uint32_t capacity = ~0u;  // of instances, with TOTAL_INSTANCES
+    bool flags = false;       // counts the entries that are not 0
 };
 
 /// Exclusive prefix sum; that of entry e is totals[e / block] + prefix[e].

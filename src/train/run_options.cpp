@@ -21,6 +21,7 @@ template <class T>
 using Names = std::vector<std::pair<const char*, T>>;
 
 constexpr int kMostSteps = 1000000000;
+constexpr int kMostBatch = 256;
 constexpr bool kDecides = true, kDoesNotDecide = false;
 
 const Names<Strategy> kStrategies = {{"auto", Strategy::automatic},
@@ -205,6 +206,16 @@ RunOption nearest_option() {
     return option;
 }
 
+RunOption batch_option() {
+    RunOption option = number<int>(
+        "batch", "B",
+        "Views of an optimisation step. Learning rates grow with its square root. --steps and all other counts of steps "
+        "go on counting views",
+        kDecides, [](RunOptions& o) -> int& { return o.train.batch; }, 1, kMostBatch);
+    option.before = "1";
+    return option;
+}
+
 RunOption background_option() {
     RunOption option{
         "background", "COLOUR",
@@ -229,8 +240,9 @@ std::vector<RunOption> make_table() {
     return {
         dataset_option(),
         number<int>(
-            "steps", "N", "Optimisation steps, one view each", kDecides,
+            "steps", "N", "Training views: an optimisation step takes one of them, or --batch", kDecides,
             [](RunOptions& o) -> int& { return o.train.steps; }, 1, kMostSteps),
+        batch_option(),
         choice<Strategy>(
             "strategy",
             "adc adds and removes splats (3DGS). mcmc relocates dead splats and grows to --max-splats "

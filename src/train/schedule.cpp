@@ -40,6 +40,11 @@ pipeline::PlanRequest plan_request(const Gaussians& start, const TrainOptions& o
 }
 
 void check_training(const TrainOptions& options) {
+    if (options.batch < 1) throw InputError("--batch: a step has at least one view");
+    if (options.batch > 1 && options.refine_poses)
+        throw InputError("--batch and --refine-poses exclude each other: a camera learns from its own step");
+    if (options.batch > 1 && options.render.points)
+        throw InputError("--batch and --points exclude each other");
     check_points(options.render);
     if (options.render.points && options.strategy == Strategy::mcmc)
         throw InputError(

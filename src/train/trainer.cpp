@@ -20,6 +20,7 @@
 #include "pipeline/backward.h"
 #include "pipeline/frame_buffers.h"
 #include "pipeline/strategy.h"
+#include "train/batch.h"
 #include "train/image_cache.h"
 #include "train/run_input.h"
 #include "train/schedule.h"
@@ -111,6 +112,7 @@ struct Trainer::State {
     StepReport report;
     StepTimes times;  // sums, over `timed_steps` steps for the passes
     int timed_steps = 0;
+    std::optional<train::Batch> batch;  // empty: a step has one view
 
     State(std::shared_ptr<gpu::Device> d, const Dataset& dataset, const std::vector<int>& frames,
           const Gaussians& ready, double length, const TrainOptions& o)
@@ -136,6 +138,7 @@ struct Trainer::State {
             motions = Motions(*device, bases);
         }
         report.splats = model.splats;
+        if (o.batch > 1) batch.emplace(alone());
     }
 
     Rates rates(int step) const {
@@ -263,11 +266,11 @@ struct Trainer::State {
         report.dropped_updates += counts.dropped_updates;
         report.limited_steps += counts.limited_steps;
         if (!is_timed(step)) return;
+        ++timed_steps;
         add_pass_times();
     }
 
     void add_pass_times() {
-        ++timed_steps;
         for (const PassTime& time : executor.timings()) {
             const auto same = std::find_if(times.passes.begin(), times.passes.end(),
                                            [&](const PassTime& sum) { return sum.pass == time.pass; });
@@ -292,6 +295,57 @@ struct Trainer::State {
     void optimise(int step) {
         submit(step);
         if (must_finish(step) || cache.config().frames_in_flight == 1) finish_all();
+    }
+
+    train::BatchView view_of(int step, train::ImageCache& seen, int sh_degree) {
+        const size_t index = train::frame_of_step(step, images.count(), options.seed);
+        const CameraUse camera = seen.camera(index);
+        const FrameInputs inputs{
+            .camera = camera,
+            .background =
+                options.random_background ? random_background(step, options.seed) : options.render.background,
+            .sh_degree = sh_degree};
+        const ExposureUse exposure{&exposures, uint32_t(index), float(schedule.exposure_rate(step)),
+                                   uint32_t(size_t(step - 1) / images.count() + 1)};
+        const auto weight = std::make_shared<double>(1);
+        return {.inputs = inputs,
+                .request = request_of(camera),
+                .record_loss =
+                    [this, inputs, exposure, weight, index, &seen](gpu::Recording& recording) {
+                        const auto& photo = seen.photo(index);
+                        *weight = photo.weight;
+                        record_loss(recording, cache, frame, inputs, photo.texels, photo.masked,
+                                    plan.exposure ? &exposure : nullptr);
+                    },
+                .psnr =
+                    [weight](const shared::Counts& counts) {
+                        return -10 * std::log10(double(counts.squared) / *weight);
+                    }};
+    }
+
+    /// A step of several views, of which `last` is the last.
+    void optimise_batch(int first, int last) {
+        train::ImageCache& seen = images_at(first);
+        const int sh_degree = schedule.degree(first);
+        std::vector<train::BatchView> views;
+        for (int step = first; step <= last; ++step) views.push_back(view_of(step, seen, sh_degree));
+        const train::BatchParts parts{cache, executor,          plan, model,
+                                      frame, instance_capacity, [this] { add_pass_times(); }};
+        train::BatchReport drawn = batch->draw(parts, views);
+        Rates of_step = rates(last);
+        of_step.views = uint32_t(views.size());
+        Noise of_noise = noise(last);
+        of_noise.amplitude *= float(std::sqrt(double(views.size())));
+        const auto more = [&](gpu::Recording& recording) {
+            if (options.strategy == Strategy::mcmc) record_noise(recording, cache, model, frame, of_noise);
+        };
+        batch->update(parts, batch_rates(of_step), 0, sh_degree, more, drawn);
+        timed_steps += int(views.size());
+        report.loss = drawn.loss;
+        report.psnr = drawn.psnr;
+        report.skipped_nonfinite = uint32_t(drawn.skipped_nonfinite);
+        report.dropped_updates += drawn.dropped_updates;
+        report.limited_steps += drawn.limited_steps;
     }
 
     void follow_up(int step) {
@@ -349,15 +403,18 @@ Trainer::~Trainer() = default;
 StepReport Trainer::step() {
     State& s = *state_;
     const auto start = Clock::now();
-    const int step = s.report.step + 1;
-    s.optimise(step);
+    const int first = s.report.step + 1, last = std::min(s.report.step + s.options.batch, s.options.steps);
+    if (s.batch)
+        s.optimise_batch(first, last);
+    else
+        s.optimise(first);
     const auto optimised = Clock::now();
-    s.follow_up(step);
+    for (int step = first; step <= last; ++step) s.follow_up(step);
     const auto end = Clock::now();
-    s.report.step = step;
+    s.report.step = last;
     s.report.splats = s.model.splats;
     s.report.seconds += std::chrono::duration<double>(end - start).count();
-    ++s.times.steps;
+    s.times.steps += last - first + 1;
     s.times.step += milliseconds(end - start);
     s.times.refinement += milliseconds(end - optimised);
     return s.report;

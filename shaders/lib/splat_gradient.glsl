@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// One view's gradient by a splat's mean, logit, quaternion and scales. Needs stored_splat.glsl and footprint_gradient.glsl.
+#ifndef EWA_LIB_SPLAT_GRADIENT
+#define EWA_LIB_SPLAT_GRADIENT
+
+struct SplatGradient {
+    vec3 mean;
+    float logit;
+    vec4 quaternion;
+    vec3 log_scale;
+    vec3 view;     // dL/d(mean in camera coordinates), without the part that passes through the colour
+    vec3 torque;   // dL/d(rotation about the splat's own axes, radians)
+};
+
+// 1 - opacity has no digits left where the opacity is close to 1.
+float transparency_of(float logit) { return sigmoid(-logit); }
+
+// With KERNEL_DENSITY an optical depth above DEPTH_MAX is cut off, and has no gradient.
+void cut_off_gradient(StoredProjection stored, inout Sums s) {
+    if (KERNEL == KERNEL_DENSITY && stored.peak * stored.footprint.factor > float(DEPTH_MAX)) s.g = 0.0;
+}
+
+// g: Sums.g. direction: of the splat from the camera, of unit length. direction_gradient: the colour's, by the direction.
+SplatGradient splat_gradient(FootprintGradient f, StoredProjection stored, StoredSplat splat, float g, vec3 direction,
+                             vec3 direction_gradient) {
+    const Projection p = stored.footprint;
+    SplatGradient result;
+    result.view = view_point_gradient(f, p);
+    const mat3 to_world = transpose(camera_rotation());
+    result.torque = f.beside * scale_ratios(splat.log_scale);
+    result.quaternion = torque_on_quaternion(stored.unit_quaternion, result.torque) / stored.quaternion_norm;
+    const vec3 direction_part =
+        (direction_gradient - direction * dot(direction, direction_gradient)) / length(p.view.offset);
+    result.mean = to_world * result.view + direction_part;
+    result.logit = g * (KERNEL == KERNEL_DENSITY ? log_softplus_slope(splat.logit) : transparency_of(splat.logit));
+    result.log_scale = f.log_scale;
+    return result;
+}
+#endif

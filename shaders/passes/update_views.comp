@@ -1,0 +1,95 @@
+#version 460
+// SPDX-License-Identifier: Apache-2.0
+// Gradient of the projection in several views, fused with Adam.
+// One invocation owns splat i. It carries the sums of each view that lists the splat back through the projection, adds the
+// gradients in the order of the views, and writes parameters and moments. The gradient is the mean over all views. As in
+// update.comp, a splat that no view lists has gradient zero, a step that is too long is shortened and counted, and an update
+// that is not finite is dropped and counted. SPEC_MODE: UPDATE_* bits.
+#extension GL_GOOGLE_include_directive : require
+#define BINDING_CAMERAS 1
+#define ADAM_OF_PUSH
+#include "lib/prelude.glsl"
+#include "lib/params.glsl"
+#include "lib/stored_splat.glsl"
+#include "lib/footprint_gradient.glsl"
+#include "lib/splat_gradient.glsl"
+
+layout(local_size_x_id = SPEC_GROUP_SIZE) in;
+layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3;
+layout(constant_id = SPEC_MODE) const uint MODE = 0;
+const bool GRADIENT_ONLY = false, STATISTICS = (MODE & UPDATE_STATISTICS) != 0u,
+           REGULARISED = (MODE & UPDATE_REGULARISED) != 0u, ABSOLUTE = (MODE & UPDATE_ABSOLUTE) != 0u,
+           PACKED_MOMENTS = (MODE & UPDATE_PACKED_MOMENTS) != 0u;
+const uint FLOATS = ABSOLUTE ? SUM_FLOATS_ABSOLUTE : SUM_FLOATS;
+
+TEXELS(0, params);
+layout(set = 0, binding = 2, scalar) readonly buffer Places { uint places[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer SumsIn { float sums[]; };
+WORD_TEXELS(4, moments1);
+WORD_TEXELS(5, moments2);
+layout(set = 0, binding = 6, scalar) buffer CountsBlock { Counts counts; };
+layout(set = 0, binding = 7, scalar) writeonly buffer ParamsOut { vec4 params_out[]; };
+layout(set = 0, binding = 8, scalar) writeonly buffer Moments1Out { uvec4 moments1_out[]; };
+layout(set = 0, binding = 9, scalar) writeonly buffer Moments2Out { uvec4 moments2_out[]; };
+layout(set = 0, binding = 10, scalar) buffer Statistics { vec2 statistics[]; };
+layout(push_constant, scalar) uniform Push { UpdateViewsPush push; };
+#include "lib/adam.glsl"
+
+Sums sums_at(uint place) {
+    float s[SUM_FLOATS_ABSOLUTE];
+    s[9] = s[10] = 0.0;
+    [[unroll]] for (uint f = 0; f < FLOATS; ++f) s[f] = sums[FLOATS * place + f];
+    return Sums(s[0], vec2(s[1], s[2]), vec3(s[3], s[4], s[5]), vec3(s[6], s[7], s[8]), vec2(s[9], s[10]));
+}
+
+// Zero plus a value is not that value if it is -0: the first view's gradient is not added.
+vec4 added(bool first, vec4 sum, vec4 value) { return first ? push.share * value : sum + push.share * value; }
+
+void main() {
+    const uint i = item_index();
+    if (i >= push.splats) return;
+    const vec4 p0 = fetch(params, index_of(0, i)), p1 = fetch(params, index_of(1, i)), p2 = fetch(params, index_of(2, i));
+    const StoredSplat splat = StoredSplat(p0.xyz, p0.w, p1, p2.xyz);
+    vec4 by_mean = vec4(0.0), by_quaternion = vec4(0.0), by_scale = vec4(0.0), by_sh[16];
+    [[unroll]] for (uint plane = FIRST_SH_PLANE; plane < PLANES; ++plane) by_sh[plane] = vec4(0.0);
+    float depth = 3.4e38;
+    vec2 seen = vec2(0.0);
+    for (uint view = 0u; view < push.views; ++view) {
+        const uint place = places[view * push.splats + i];
+        if (place == NOT_LISTED) continue;
+        const bool first = depth == 3.4e38;
+        camera_index = view;
+        Sums s = sums_at(place);
+        const StoredProjection stored = project_splat(splat);
+        const Projection p = stored.footprint;
+        cut_off_gradient(stored, s);
+        const vec3 direction = normalize(p.view.offset);
+        const ShBasis basis = sh_basis_of(direction);
+        vec3 direction_gradient = vec3(0.0);
+        [[unroll]] for (uint plane = FIRST_SH_PLANE; plane < PLANES; ++plane) {
+            const vec4 value = fetch(params, index_of(plane, i));
+            by_sh[plane] = added(first, by_sh[plane], sh_gradient(plane, value, s.color, basis, direction_gradient));
+        }
+        const FootprintGradient f = footprint_gradient(s, p);
+        const SplatGradient g = splat_gradient(f, stored, splat, s.g, direction, direction_gradient);
+        by_mean = added(first, by_mean, vec4(g.mean, g.logit));
+        by_quaternion = added(first, by_quaternion, g.quaternion);
+        by_scale = added(first, by_scale, vec4(g.log_scale, basis.value[0] * s.color.r));
+        depth = min(depth, p.view.z.x);
+        const float norm =
+            length((ABSOLUTE ? f.absolute : f.mean) * (0.5 * vec2(camera.size[0], camera.size[1])));
+        if (is_finite(norm)) seen += vec2(norm, 1.0);
+    }
+
+    const float opacity = sigmoid(p0.w);
+    const vec4 scale_pull = REGULARISED ? vec4(push.scale_weight * exp(p2.xyz), 0.0) : vec4(0.0);
+    const vec4 opacity_pull =
+        REGULARISED ? vec4(vec3(0.0), push.opacity_weight * opacity * transparency_of(p0.w)) : vec4(0.0);
+    [[unroll]] for (uint plane = FIRST_SH_PLANE; plane < PLANES; ++plane) {
+        move(plane, i, fetch(params, index_of(plane, i)), by_sh[plane], sh_rates(plane), 0.0);
+    }
+    move(2, i, p2, by_scale + scale_pull, vec4(vec3(push.scale_rate), push.sh0_rate), depth);
+    move(1, i, p1, by_quaternion, vec4(push.quaternion_rate), depth);
+    move(0, i, p0, by_mean + opacity_pull, vec4(vec3(push.mean_rate), push.opacity_rate), depth);
+    if (STATISTICS && seen.y > 0.0) statistics[i] += seen;
+}

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pipeline/views.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "passes/passes.h"
+#include "pipeline/sorting.h"
+#include "shared/constants.h"
+
+namespace ewa::pipeline {
+namespace {
+
+void make_room(gpu::Device& device, gpu::Buffer& buffer, const char* name, uint64_t bytes,
+               gpu::Texel texel = gpu::Texel::none) {
+    if (buffer && buffer.bytes() >= bytes) return;
+    buffer = gpu::Buffer();  // free the old one first: its contents are not needed
+    buffer = gpu::Buffer(device, name, bytes, texel);
+}
+
+/// Adam's decay over several views.
+float decay(double beta, uint32_t views) {
+    return float(std::pow(beta, views));
+}
+
+shared::UpdateViewsPush update_views_push(const Model& model, const Rates& rates, uint32_t first) {
+    const auto [bias1, bias2] = adam_biases(rates.step);
+    return {.splats = model.splats,
+            .first = first,
+            .planes = model.planes(),
+            .views = rates.views,
+            .share = 1.0f / float(rates.views),
+            .mean_rate = rates.mean,
+            .opacity_rate = rates.opacity,
+            .quaternion_rate = rates.quaternion,
+            .scale_rate = rates.scale,
+            .sh0_rate = rates.sh0,
+            .sh_rest_rate = rates.sh_rest,
+            .beta1 = decay(shared::ADAM_BETA1, rates.views),
+            .beta2 = decay(shared::ADAM_BETA2, rates.views),
+            .epsilon = float(shared::ADAM_EPSILON / std::sqrt(rates.views)),
+            .bias1 = bias1,
+            .bias2 = bias2,
+            .opacity_weight = rates.opacity_weight,
+            .scale_weight = rates.scale_weight,
+            .seed = {uint32_t(rates.seed), uint32_t(rates.seed >> 32)},
+            .step = rates.step};
+}
+
+}  // namespace
+
+uint64_t ViewBuffers::sum_bytes(const Plan& plan, uint64_t splats) {
+    return 4 * splats * (plan.absolute ? shared::SUM_FLOATS_ABSOLUTE : shared::SUM_FLOATS);
+}
+
+void ViewBuffers::reserve(gpu::Device& device, uint32_t splats, uint32_t views, uint32_t records) {
+    make_room(device, cameras, "cameras of a batch", sizeof(shared::CameraBlock) * uint64_t(views));
+    make_room(device, places, "places", 4 * uint64_t(views) * splats);
+    make_room(device, visible, "visible records", 16ull * shared::RECORD_TEXELS * records,
+              gpu::Texel::rgba32f);
+}
+
+void ViewBuffers::reserve_sums(gpu::Device& device, gpu::Executor& executor, const Plan& plan,
+                               uint64_t splats) {
+    const uint64_t bytes = sum_bytes(plan, splats);
+    if (sums && sums.bytes() >= bytes) return;
+    // A quarter more: the next views are of about this size.
+    gpu::Buffer larger(device, "sums of a batch", bytes + bytes / 4);
+    if (sums) {
+        gpu::Recording recording(device.limits());
+        recording.copy(sums, 0, larger, 0, sums.bytes());
+        executor.run(recording);
+    }
+    sums = std::move(larger);
+}
+
+void record_list(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan, const Model& model,
+                 const FrameBuffers& frame, const FrameInputs& inputs, const ViewBuffers& buffers,
+                 uint32_t view, uint32_t first_place, uint32_t first_record) {
+    constexpr uint64_t kBlock = sizeof(shared::CameraBlock);
+    recording.copy(*inputs.camera.buffer, inputs.camera.offset, buffers.cameras, view * kBlock, kBlock);
+    record_projection(recording, cache, plan, model, frame, inputs);
+    record_scan(recording, cache,
+                {.source = frame.tile_counts,
+                 .order = nullptr,
+                 .prefix = frame.prefix,
+                 .totals = frame.scan_totals,
+                 .counts = frame.counts},
+                {.items = model.splats,
+                 .block = frame.sizes.scan_block,
+                 .total = shared::TOTAL_SCAN,
+                 .name = "visible splats",
+                 .flags = true});
+    cache.get<passes::CollectVisible>().record(recording,
+                                               {.records = frame.records,
+                                                .tile_counts = frame.tile_counts,
+                                                .prefix = frame.prefix,
+                                                .totals = frame.scan_totals,
+                                                .places = buffers.places,
+                                                .visible = buffers.visible},
+                                               {.splats = model.splats,
+                                                .scan_block = frame.sizes.scan_block,
+                                                .view = view,
+                                                .first_place = first_place,
+                                                .first_record = first_record});
+}
+
+Sorted record_list_forward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
+                           uint32_t splats, const FrameBuffers& frame, const FrameInputs& inputs) {
+    recording.fill(frame.counts, 0, 0, sizeof(shared::Counts));
+    cache.get<passes::ReceiveRecords>().record(recording,
+                                               {.records = frame.records,
+                                                .depth_keys = frame.depth_keys[0],
+                                                .tile_counts = frame.tile_counts},
+                                               {.splats = splats, .size = {frame.sizes.width, frame.sizes.height}});
+    return record_picture(recording, cache, plan, splats, frame, inputs);
+}
+
+void record_list_backward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
+                          uint32_t splats, const FrameBuffers& frame, const FrameInputs& inputs,
+                          const Sorted& sorted, const gpu::Buffer& sums, uint32_t first_place) {
+    record_blend_backward(recording, cache, plan, frame, inputs, sorted);
+    cache.get<passes::SumSlots>({{shared::SPEC_MODE, plan.absolute ? shared::UPDATE_ABSOLUTE : 0}})
+        .record(recording,
+                {.records = frame.records,
+                 .slots = frame.slots,
+                 .tile_counts = frame.tile_counts,
+                 .first_instances = frame.first_instances,
+                 .sorted_indices = *sorted.indices,
+                 .sums = sums},
+                {.splats = splats, .first_place = first_place});
+}
+
+void record_update_views(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
+                         const Model& model, const FrameBuffers& frame, const ViewBuffers& buffers,
+                         const Rates& rates, uint32_t first, int sh_degree) {
+    const gpu::Buffer& moments2 = model.second_moments();
+    cache
+        .get<passes::UpdateViews>({{shared::SPEC_SH_DEGREE, plan.evaluated_degree(sh_degree)},
+                                   {shared::SPEC_MODE, update_mode(plan)},
+                                   {shared::SPEC_KERNEL, uint32_t(plan.kernel)}})
+        .record(recording,
+                {.params = model.params,
+                 .cameras = buffers.cameras,
+                 .places = buffers.places,
+                 .sums = buffers.sums,
+                 .moments1 = model.moments1,
+                 .moments2 = moments2,
+                 .counts = frame.counts,
+                 .params_out = model.params,
+                 .moments1_out = model.moments1,
+                 .moments2_out = moments2,
+                 // A binding that a mode does not use needs a buffer.
+                 .statistics = plan.statistics ? model.statistics : frame.partials},
+                update_views_push(model, rates, first));
+}
+
+Rates batch_rates(const Rates& rates) {
+    Rates r = rates;
+    const float factor = float(std::sqrt(double(rates.views)));
+    for (float* rate : {&r.mean, &r.opacity, &r.quaternion, &r.scale, &r.sh0, &r.sh_rest}) *rate *= factor;
+    return r;
+}
+
+}  // namespace ewa::pipeline

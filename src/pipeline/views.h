@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// A step of several views. Each view draws a list of the splats that it sees. Then one update adds the gradients of all
+// views to each splat, in the order of the views. The list of a view and its sums are all that passes between the model and
+// the picture, so another process may draw the view.
+#pragma once
+#include <cstdint>
+#include <span>
+
+#include "gpu/executor.h"
+#include "pipeline/backward.h"
+#include "pipeline/forward.h"
+
+namespace ewa::pipeline {
+
+struct ViewBuffers {
+    gpu::Buffer cameras;  // CameraBlocks, one view after another
+    gpu::Buffer places;   // a word a splat of each view: its place among the lists of all views, or NOT_LISTED
+    gpu::Buffer visible;  // records of a view's list, or of the lists of several views
+    gpu::Buffer sums;     // by place: see SUM_FLOATS
+
+    /// Bytes of `splats` listed splats in sums.
+    static uint64_t sum_bytes(const Plan& plan, uint64_t splats);
+
+    /// Makes room for the places of `splats` splats in `views` views, and for `records` records.
+    void reserve(gpu::Device& device, uint32_t splats, uint32_t views, uint32_t records);
+    /// Makes room for the sums of `splats` listed splats. Keeps those that are there. The device must be idle.
+    void reserve_sums(gpu::Device& device, gpu::Executor& executor, const Plan& plan, uint64_t splats);
+};
+
+/// Projects the model's splats for a view and lists those that reach a tile. After the submission Counts.scan_total is their
+/// number. `frame` must be reserved for the model's splats.
+/// first_place: number of splats in the lists of the views before. first_record: where the records go in buffers.visible.
+void record_list(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan, const Model& model,
+                 const FrameBuffers& frame, const FrameInputs& inputs, const ViewBuffers& buffers,
+                 uint32_t view, uint32_t first_place, uint32_t first_record);
+
+/// A forward frame of a list of `splats` splats, whose records are in frame.records. As with record_forward,
+/// Counts.instances tells whether it has to be repeated.
+Sorted record_list_forward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
+                           uint32_t splats, const FrameBuffers& frame, const FrameInputs& inputs);
+
+/// Gradients of blending a list, after record_loss: their sums go to `sums` from first_place on.
+void record_list_backward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
+                          uint32_t splats, const FrameBuffers& frame, const FrameInputs& inputs,
+                          const Sorted& sorted, const gpu::Buffer& sums, uint32_t first_place);
+
+/// Moves the model by the mean gradient of the views. rates: of one view; batch_rates turns them into those of the step.
+/// first: number of the model's first splat, among those of all ranks. sh_degree: evaluated in this step.
+void record_update_views(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
+                         const Model& model, const FrameBuffers& frame, const ViewBuffers& buffers,
+                         const Rates& rates, uint32_t first, int sh_degree);
+
+/// The rates of a step of rates.views views, from those of a step of one view (Zhao et al. 2024, Grendel, section 3.3):
+/// times the square root of their number.
+Rates batch_rates(const Rates& rates);
+
+}  // namespace ewa::pipeline
