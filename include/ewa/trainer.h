@@ -12,6 +12,7 @@
 #include "ewa/device.h"
 #include "ewa/exposure.h"
 #include "ewa/gaussians.h"
+#include "ewa/ranks.h"
 #include "ewa/renderer.h"
 #include "ewa/train_options.h"
 
@@ -80,9 +81,19 @@ class Trainer {
   public:
     /// train_frames: indices into dataset.frames. start: the first splats, at most options.max_splats.
     /// Pass an rvalue to spare a copy of them. Throws InputError (no frame, no or too many splats, an image that cannot be read), RunError (memory).
+    /// ranks: the processes that train together. Each makes a trainer of the same arguments, and holds a share of the
+    /// splats. Rank 0 calls the functions below; all others call follow() alone. The results do not depend on the number
+    /// of ranks.
     Trainer(std::shared_ptr<gpu::Device> device, const Dataset& dataset, const std::vector<int>& train_frames,
-            Gaussians start, const TrainOptions& options);
+            Gaussians start, const TrainOptions& options, std::shared_ptr<Ranks> ranks = alone());
     ~Trainer();
+
+    /// Of a rank other than 0: does its part of what rank 0 calls, until that one's trainer ends. Throws what those
+    /// functions throw.
+    void follow();
+    /// Tells ranks that wait for the next call that this one is at work. Call it at least once in the time that the ranks
+    /// were opened with.
+    void keep_waiting() const;
 
     /// Does one optimisation step, and changes the number of splats if the schedule says so. Throws InputError
     /// before the step if its image cannot be read, RunError if memory runs out (with the size needed).
@@ -108,6 +119,12 @@ class Trainer {
 
   private:
     struct State;
+
+    StepReport take_step();
+    TrainerState join_state() const;
+    void share_state(const TrainerState& state);
+    Gaussians join_gaussians() const;
+
     std::unique_ptr<State> state_;
 };
 

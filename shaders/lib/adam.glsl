@@ -12,11 +12,13 @@
 #define BETA1 push.beta1
 #define BETA2 push.beta2
 #define EPSILON push.epsilon
+#define DECAYED(NEW, OLD, BETA) ((NEW) * (1.0 - (BETA)) + (OLD) * (BETA))
 #define FIRST_SPLAT push.first
 #else
 #define BETA1 float(ADAM_BETA1)
 #define BETA2 float(ADAM_BETA2)
 #define EPSILON float(ADAM_EPSILON)
+#define DECAYED(NEW, OLD, BETA) mix(NEW, OLD, BETA)
 #define FIRST_SPLAT 0u
 #endif
 
@@ -41,9 +43,15 @@ void move_rounded(uint plane, uint i, vec4 value, vec4 raw_gradient, vec4 rate, 
     const vec4 gradient = mix(raw_gradient, clamp(raw_gradient, -largest, largest), greaterThan(abs(raw_gradient), largest));
     const uvec4 words = fetch(moments1, at);
     const vec4 old_m = PACKED_MOMENTS ? first_moment(words) : uintBitsToFloat(words);
+    const vec4 m = DECAYED(gradient, old_m, BETA1);
+#ifdef ADAM_OF_PUSH
+    const vec4 root = second_root(words);
+    const vec4 kept_v = PACKED_MOMENTS ? root * (root * BETA2) : uintBitsToFloat(fetch(moments2, at)) * BETA2;
+    const vec4 v = gradient * (gradient * (1.0 - BETA2)) + kept_v;
+#else
     const vec4 old_v = PACKED_MOMENTS ? second_moment(words) : uintBitsToFloat(fetch(moments2, at));
-    const vec4 m = mix(gradient, old_m, BETA1);
-    const vec4 v = mix(gradient * gradient, old_v, BETA2);
+    const vec4 v = DECAYED(gradient * gradient, old_v, BETA2);
+#endif
     vec4 moved = value - rate * (m * push.bias1) / (sqrt(v * push.bias2) + EPSILON);
     const bool limited = limit_step(plane, value, depth, moved);
     if (is_finite(moved) && is_finite(m) && is_finite(v)) {

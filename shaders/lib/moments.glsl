@@ -19,6 +19,13 @@ vec4 second_moment(uvec4 words) {
     return mix(root * root, vec4(0.0), equal(kept, uvec4(0u)));
 }
 
+// Its square root.
+vec4 second_root(uvec4 words) {
+    const uvec4 kept = words & ~MOMENT_HIGH_HALF;
+    const vec4 root = uintBitsToFloat((kept << MOMENT_ROOT_CUT) + MOMENT_LEAST_ROOT);
+    return mix(root, vec4(0.0), equal(kept, uvec4(0u)));
+}
+
 // Rounds at random, up with the probability of the part that is cut off, so that the mean is exact.
 // random: 16 bits for the first moment, 14 others for the second.
 uvec4 pack_moments(vec4 first, vec4 second, uvec4 random) {

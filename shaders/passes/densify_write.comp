@@ -43,7 +43,7 @@ void main() {
         float logit = p0.w;
         if (action == ACTION_SPLIT) {
             float norm;
-            const vec3 normal = normal3(uvec4(i, 2u * push.step + child, push.seed[0], push.seed[1]));
+            const vec3 normal = normal3(uvec4(push.first + i, 2u * push.step + child, push.seed[0], push.seed[1]));
             mean += rotation_of(normalize_quaternion(p1, norm)) * (exp(p2.xyz) * normal);
             log_scale -= log(float(SPLIT_SCALE));
             if (push.revised_opacity != 0u) logit = halved_logit(logit);

@@ -50,7 +50,7 @@ void main() {
     vec3 offset = vec3(0.0);
     if (push.spread > 0.0) {
         float norm;
-        const vec3 normal = normal3(uvec4(j, push.step, push.seed[0], push.seed[1] ^ MCMC_SPREAD_STREAM));
+        const vec3 normal = normal3(uvec4(push.first + j, push.step, push.seed[0], push.seed[1] ^ MCMC_SPREAD_STREAM));
         const vec3 scale = exp(fetch(params, param_texel(PLANES, 2u, source)).xyz);
         const mat3 rotation = rotation_of(normalize_quaternion(fetch(params, param_texel(PLANES, 1u, source)), norm));
         offset = push.spread * (rotation * (scale * normal));

@@ -24,7 +24,7 @@ void main() {
     const vec3 scale = exp(params[param_texel(push.planes, 2u, i)].xyz);
     const float opacity = 1.0 / (1.0 + exp(-p0.w));
     const float gate = 1.0 / (1.0 + exp(float(MCMC_GATE_SLOPE) * (opacity - float(MCMC_GATE_OPACITY))));
-    const vec3 normal = normal3(uvec4(i, push.step, push.seed[0], push.seed[1] ^ MCMC_NOISE_STREAM));
+    const vec3 normal = normal3(uvec4(push.first + i, push.step, push.seed[0], push.seed[1] ^ MCMC_NOISE_STREAM));
     float norm;
     const mat3 rotation = rotation_of(normalize_quaternion(params[param_texel(push.planes, 1u, i)], norm));
     // Noise of a splat larger than the scene is shortened to the scene's size.

@@ -424,6 +424,7 @@ struct DensifyPush {
     float prune_scale;    // world units; a larger splat is pruned; 0: none is
     uint seed[2];
     uint step;
+    uint first;            // number of the first splat, among those of all ranks
     uint revised_opacity;  // 1: a split's two children in one place are together as opaque as their parent
 };
 
@@ -439,14 +440,17 @@ struct McmcPush {
     uint new_splats;  // of the new buffers
     uint scan_block;
     uint dead;            // splats to relocate
-    uint draws;           // sources to draw
-    uint total;           // sum of the weights
+    uint draws;           // sources to draw, for all ranks
+    uint total;           // sum of the weights of all ranks
+    uint total_before;    // of the ranks before this one
+    uint own_total;       // of this rank
     float weight_scale;   // weight of an opacity of 1
     float dead_logit;     // a splat at or below it is dead
     float least_opacity;  // lower bound of the opacity that a source and its copies share
     float spread;         // standard deviations of the source by which it and its copies move apart
     uint seed[2];
     uint step;
+    uint first;  // number of the first splat, among those of all ranks
 };
 
 struct PerturbPush {
@@ -457,6 +461,7 @@ struct PerturbPush {
     float max_length;  // of the noise along an axis of the splat (world units)
     uint seed[2];
     uint step;
+    uint first;  // number of the first splat, among those of all ranks
 };
 
 // ---- A mesh scene for ray tracing: buffers of rgba32ui texels that hold floats by their bits ----

@@ -22,10 +22,10 @@ static_assert(sizeof(UnpackPush) == 28 && sizeof(LossPush) == 24 && sizeof(Reduc
 static_assert(sizeof(ImageLayout) == 16 && sizeof(PackPush) == 4 && sizeof(ExposurePush) == 20 &&
               sizeof(ExposureUpdatePush) == 28);
 static_assert(sizeof(MoveCameraPush) == 4 && sizeof(MotionUpdatePush) == 40);
-static_assert(sizeof(UpdatePush) == 72 && sizeof(DensifyPush) == 48 && sizeof(ResetPush) == 12);
+static_assert(sizeof(UpdatePush) == 72 && sizeof(DensifyPush) == 52 && sizeof(ResetPush) == 12);
 static_assert(sizeof(CollectVisiblePush) == 20 && sizeof(ReceivePush) == 12 && sizeof(SumSlotsPush) == 8 &&
               sizeof(UpdateViewsPush) == 84);
-static_assert(sizeof(McmcPush) == 56 && sizeof(PerturbPush) == 32);
+static_assert(sizeof(McmcPush) == 68 && sizeof(PerturbPush) == 36);
 static_assert(sizeof(TraceView) == 4 * (9 + 3 + 2 + 2 + 2 + 9 + 1) && sizeof(TraceCounts) == 8 &&
               sizeof(TracePush) == 24);
 

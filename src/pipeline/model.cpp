@@ -77,7 +77,7 @@ void replace_generation(
 
 Model upload_model(gpu::Device& device, const Gaussians& gaussians, int moments, bool statistics) {
     Model model;
-    model.splats = model.capacity = uint32_t(gaussians.size());
+    model.splats = model.capacity = model.share.all = uint32_t(gaussians.size());
     model.sh_degree = gaussians.sh_degree;
     model.origin = gaussians.origin;
     const uint64_t bytes = parameter_bytes(model.capacity, model.sh_degree);
@@ -107,6 +107,15 @@ Gaussians download_model(const Model& model, const gpu::Buffer& buffer) {
             const auto values = buffer.download<float>(floats, offset);
             for_each_value(gaussians, from, to, [&](size_t at, float& value) { value = values[at]; });
         });
+    return gaussians;
+}
+
+Gaussians gaussians_of(const Model& model, std::span<const float> values, uint32_t splats) {
+    Gaussians gaussians;
+    gaussians.sh_degree = model.sh_degree;
+    gaussians.origin = model.origin;
+    gaussians.resize(splats);
+    for_each_value(gaussians, 0, splats, [&](size_t at, float& value) { value = values[at]; });
     return gaussians;
 }
 

@@ -4,8 +4,11 @@
 #pragma once
 #include <cstdint>
 #include <functional>
+#include <memory>
+#include <span>
 
 #include "ewa/gaussians.h"
+#include "ewa/ranks.h"
 #include "gpu/buffer.h"
 #include "shared/layouts.h"
 
@@ -30,8 +33,16 @@ constexpr size_t parameter_index(uint32_t planes, uint32_t f, size_t i) {
     return ((block * planes + f / 4) * shared::PARAM_BLOCK + within) * 4 + f % 4;
 }
 
+/// Which splats of a run a model has: a range of the one order that all ranks agree on.
+struct Share {
+    std::shared_ptr<Ranks> ranks = alone();
+    uint32_t first = 0;  // number of the model's first splat
+    uint32_t all = 0;    // splats of all ranks
+};
+
 struct Model {
     uint32_t splats = 0, capacity = 0;
+    Share share;
     int sh_degree = 0;       // stored
     glm::dvec3 origin{0.0};  // of the means, see Gaussians; camera positions are relative to it too
     uint32_t planes() const { return parameter_planes(sh_degree); }
@@ -62,6 +73,9 @@ Model upload_model(gpu::Device& device, const Gaussians& gaussians, int moments,
 /// Reads `values`, a buffer with the layout of the parameters, back into a scene. After a gradient frame
 /// moments1 holds the gradient.
 Gaussians download_model(const Model& model, const gpu::Buffer& values);
+
+/// The same for values on the host, of `splats` splats.
+Gaussians gaussians_of(const Model& model, std::span<const float> values, uint32_t splats);
 
 /// Sets a buffer to zero bytes from the host; the device must be idle.
 void zero(gpu::Buffer& buffer);

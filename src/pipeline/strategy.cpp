@@ -2,17 +2,19 @@
 #include "pipeline/strategy.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
 
 #include "passes/passes.h"
+#include "pipeline/share.h"
 #include "pipeline/sorting.h"
 
 namespace ewa::pipeline {
 namespace {
 
-/// Records the prefix sums of a value a splat, runs the recording, and returns the sum of all values.
+/// Records the prefix sums of a value a splat, runs the recording, and returns the sum of this rank's values.
 uint32_t run_scan(gpu::Recording& recording, passes::PassCache& cache, gpu::Executor& executor,
                   const FrameBuffers& frame, const ScanBuffers& buffers, uint32_t splats, const char* name) {
     record_scan(
@@ -35,6 +37,7 @@ shared::DensifyPush densify_push(const Model& model, const FrameBuffers& frame, 
             .prune_scale = rules.prune_scale,
             .seed = {uint32_t(rules.seed), uint32_t(rules.seed >> 32)},
             .step = rules.step,
+            .first = model.share.first,
             .revised_opacity = rules.revised_opacity ? 1u : 0u};
 }
 
@@ -93,10 +96,11 @@ Refinement densify(passes::PassCache& cache, gpu::Executor& executor, Model& mod
                          .counts = frame.counts},
                         model.splats, "densify offsets");
     };
-    const float threshold = fitting_threshold(rules, count);
-    const uint32_t after = count(threshold);
-    const Refinement result{model.splats, after, 0};
-    if (after == 0) return {model.splats, model.splats, 0};
+    Ranks& ranks = *model.share.ranks;
+    const float threshold =
+        fitting_threshold(rules, [&](float t) { return uint32_t(sum_over(ranks, count(t))); });
+    const uint32_t after = count(threshold), before = model.share.all;
+    if (sum_over(ranks, after) == 0) return {before, before, 0};
 
     const shared::DensifyPush push = densify_push(model, frame, rules, threshold, after);
     replace_generation(device, model, after,
@@ -114,9 +118,10 @@ Refinement densify(passes::PassCache& cache, gpu::Executor& executor, Model& mod
                            executor.run(recording);
                        });
     model.statistics = gpu::Buffer();  // free the old ones first
-    model.statistics = gpu::Buffer(device, "statistics", uint64_t(after) * 8);
+    level(device, model);
+    model.statistics = gpu::Buffer(device, "statistics", uint64_t(model.splats) * 8);
     zero(model.statistics);
-    return result;
+    return {before, model.share.all, 0};
 }
 
 void record_reset_opacity(gpu::Recording& recording, passes::PassCache& cache, const Model& model,
@@ -136,12 +141,17 @@ Refinement refine_mcmc(passes::PassCache& cache, gpu::Executor& executor, Model&
                           .dead = 0,
                           .draws = 0,
                           .total = 0,
-                          .weight_scale = float(std::min(65535u, 0xffffffffu / std::max(model.splats, 1u))),
+                          .total_before = 0,
+                          .own_total = 0,
+                          .weight_scale = float(std::min(65535u, 0xffffffffu / std::max(model.share.all, 1u))),
                           .dead_logit = float(std::log(rules.dead_opacity / (1 - rules.dead_opacity))),
                           .least_opacity = float(rules.dead_opacity),
                           .spread = float(rules.spread),
                           .seed = {uint32_t(rules.seed), uint32_t(rules.seed >> 32)},
-                          .step = rules.step};
+                          .step = rules.step,
+                          .first = model.share.first};
+    Ranks& ranks = *model.share.ranks;
+    const size_t own = size_t(ranks.rank());
 
     Scanned weights(device, "weights", model, frame), dead(device, "dead", model, frame);
     gpu::Recording weigh(device.limits());
@@ -158,11 +168,18 @@ Refinement refine_mcmc(passes::PassCache& cache, gpu::Executor& executor, Model&
                          .counts = frame.counts},
                         model.splats, "relocation offsets");
     };
-    push.total = sum(weights);
+    push.own_total = sum(weights);
     push.dead = sum(dead);
-    push.new_splats = grown(model.splats, rules);
-    push.draws = push.dead + (push.new_splats - model.splats);
-    if (push.draws == 0 || push.total == 0) return {model.splats, model.splats, 0};
+    const std::vector<uint64_t> sums = ranks.gather(std::array<uint64_t, 2>{push.own_total, push.dead});
+    uint32_t all_dead = 0;
+    for (size_t rank = 0; 2 * rank < sums.size(); ++rank) {
+        if (rank == own) push.total_before = push.total;
+        push.total += uint32_t(sums[2 * rank]);
+        all_dead += uint32_t(sums[2 * rank + 1]);
+    }
+    const uint32_t before = model.share.all, after = grown(before, rules), added = after - before;
+    push.draws = all_dead + added;
+    if (push.draws == 0 || push.total == 0) return {before, before, 0};
 
     gpu::Buffer sources(device, "sources", 4ull * push.draws), hits(device, "hits", 4ull * model.splats);
     gpu::Recording recording(device.limits());
@@ -172,7 +189,13 @@ Refinement refine_mcmc(passes::PassCache& cache, gpu::Executor& executor, Model&
         push);
     executor.run(recording);
     weights = {};  // its memory is used again
-    const Refinement result{model.splats, push.new_splats, push.dead};
+    push.new_splats = model.splats;
+    if (own + 1 == size_t(ranks.size())) push.new_splats += added;
+    if (ranks.size() > 1) {
+        ForeignSources fetched = fetch_sources(device, model, sources, hits, push.dead, added);
+        sources = std::move(fetched.sources);
+        hits = std::move(fetched.hits);
+    }
     replace_generation(device, model, push.new_splats,
                        [&](const gpu::Buffer& target, const gpu::Buffer& source, bool is_moments) {
                            gpu::Recording write(device.limits());
@@ -191,7 +214,8 @@ Refinement refine_mcmc(passes::PassCache& cache, gpu::Executor& executor, Model&
                                push);
                            executor.run(write);
                        });
-    return result;
+    level(device, model);
+    return {before, after, all_dead};
 }
 
 void record_noise(gpu::Recording& recording, passes::PassCache& cache, const Model& model,
@@ -203,7 +227,8 @@ void record_noise(gpu::Recording& recording, passes::PassCache& cache, const Mod
                                          .amplitude = noise.amplitude,
                                          .max_length = noise.max_length,
                                          .seed = {uint32_t(noise.seed), uint32_t(noise.seed >> 32)},
-                                         .step = noise.step});
+                                         .step = noise.step,
+                                         .first = model.share.first});
 }
 
 }  // namespace ewa::pipeline

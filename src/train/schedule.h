@@ -61,8 +61,8 @@ uint64_t cache_share(const TrainOptions& options, int halvings);
 
 Schedule schedule_for(const TrainOptions& options);
 
-/// Throws InputError if a run of points asks for what spheres do not have.
-void check_training(const TrainOptions& options);
+/// Throws InputError if options exclude each other, or exclude several ranks.
+void check_training(const TrainOptions& options, int ranks = 1);
 
 /// The plan that a run asks for. masks: some training images have pixels that do not count.
 pipeline::PlanRequest plan_request(const Gaussians& start, const TrainOptions& options, bool masks);

@@ -8,8 +8,10 @@
 #include <cmath>
 #include <cstring>
 #include <deque>
+#include <exception>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <numeric>
 #include <span>
 #include <utility>
 
@@ -19,6 +21,7 @@
 #include "gpu/executor.h"
 #include "pipeline/backward.h"
 #include "pipeline/frame_buffers.h"
+#include "pipeline/share.h"
 #include "pipeline/strategy.h"
 #include "train/batch.h"
 #include "train/image_cache.h"
@@ -86,10 +89,25 @@ Gaussians prepared(Gaussians start, Footprint kernel) {
     return start;
 }
 
+/// A rank's part of the first splats.
+Gaussians share_of(Gaussians start, const Ranks& ranks) {
+    if (ranks.size() == 1) return start;
+    check_share(uint32_t(start.size()), ranks.size());
+    const Range range = range_of(uint32_t(start.size()), ranks.rank(), ranks.size());
+    std::vector<uint32_t> indices(range.splats);
+    std::iota(indices.begin(), indices.end(), range.first);
+    select_splats(start, indices);
+    return start;
+}
+
+/// What rank 0 asks the others to take part in.
+enum class Call : uint64_t { end, wait, step, state, restore, gaussians };
+
 }  // namespace
 
 struct Trainer::State {
     std::shared_ptr<gpu::Device> device;
+    std::shared_ptr<Ranks> ranks;
     TrainOptions options;
     train::Schedule schedule;
     double extent;
@@ -115,8 +133,9 @@ struct Trainer::State {
     std::optional<train::Batch> batch;  // empty: a step has one view
 
     State(std::shared_ptr<gpu::Device> d, const Dataset& dataset, const std::vector<int>& frames,
-          const Gaussians& ready, double length, const TrainOptions& o)
+          const Gaussians& ready, double length, const TrainOptions& o, std::shared_ptr<Ranks> r)
         : device(std::move(d)),
+          ranks(std::move(r)),
           options(o),
           schedule(train::schedule_for(o)),
           extent(length),
@@ -124,7 +143,7 @@ struct Trainer::State {
           executor(*device, cache.config().frames_in_flight),
           images(*device, cache.config(), dataset, frames, train::cache_share(o, 0), ready.origin),
           plan(plan_for(train::plan_request(ready, o, images.any_masked()))),
-          model(upload_model(*device, ready, plan.moment_buffers(), plan.statistics)),
+          model(upload_model(*device, share_of(ready, *ranks), plan.moment_buffers(), plan.statistics)),
           instance_capacity(first_capacity(ready.size())) {
         for (int halvings = 1; halvings <= o.halvings; ++halvings)
             smaller.emplace_back(*device, cache.config(), dataset, frames, train::cache_share(o, halvings),
@@ -137,8 +156,54 @@ struct Trainer::State {
                     motion_basis(dataset.frames[size_t(frame_index)].camera, ready, o.refine_focal, extent));
             motions = Motions(*device, bases);
         }
-        report.splats = model.splats;
-        if (o.batch > 1) batch.emplace(alone());
+        take_share(uint32_t(ready.size()));
+        report.splats = model.share.all;
+        if (o.batch > 1 || ranks->size() > 1) batch.emplace(ranks);
+    }
+
+    /// Notes which splats of `all` the model has.
+    void take_share(uint32_t all) {
+        model.share = {ranks, range_of(all, ranks->rank(), ranks->size()).first, all};
+    }
+
+    /// Of rank 0: begins what all ranks do together.
+    void call(Call what) const {
+        const auto word = uint64_t(what);
+        if (ranks->size() > 1) ranks->gather(std::span(&word, 1));
+    }
+    /// Of the other ranks: what rank 0 begins.
+    Call next_call() const {
+        const uint64_t none = 0;
+        return Call(ranks->gather(std::span(&none, 1)).front());
+    }
+
+    /// The bytes of all ranks one after another, on rank 0.
+    std::vector<std::byte> joined(const std::vector<std::byte>& own) const {
+        if (ranks->size() == 1) return own;
+        const uint64_t size = own.size();
+        const std::vector<uint64_t> sizes = ranks->gather(std::span(&size, 1));
+        std::vector<std::byte> all(
+            ranks->rank() == 0 ? std::accumulate(sizes.begin(), sizes.end(), uint64_t(0)) : 0);
+        std::vector<std::span<const std::byte>> out(sizes.size());
+        std::vector<std::span<std::byte>> in(sizes.size());
+        out[0] = own;
+        uint64_t at = 0;
+        for (size_t rank = 0; rank < sizes.size() && !all.empty(); at += sizes[rank++])
+            in[rank] = std::span(all).subspan(at, sizes[rank]);
+        ranks->exchange(out, in);
+        return all;
+    }
+    /// This rank's part of bytes that rank 0 has. sizes: of the part of each rank.
+    std::vector<std::byte> part_of(std::span<const std::byte> all, const std::vector<uint64_t>& sizes) const {
+        std::vector<std::byte> own(sizes[size_t(ranks->rank())]);
+        std::vector<std::span<const std::byte>> out(sizes.size());
+        std::vector<std::span<std::byte>> in(sizes.size());
+        uint64_t at = 0;
+        for (size_t rank = 0; rank < sizes.size() && ranks->rank() == 0; at += sizes[rank++])
+            out[rank] = all.subspan(at, sizes[rank]);
+        in[0] = own;
+        ranks->exchange(out, in);
+        return own;
     }
 
     Rates rates(int step) const {
@@ -152,8 +217,8 @@ struct Trainer::State {
         r.step = uint32_t(step);
         r.seed = options.seed;
         if (plan.regularised) {
-            r.opacity_weight = float(options.opacity_weight / model.splats);
-            r.scale_weight = float(options.scale_weight / (3.0 * model.splats * extent));
+            r.opacity_weight = float(options.opacity_weight / model.share.all);
+            r.scale_weight = float(options.scale_weight / (3.0 * model.share.all * extent));
         }
         return r;
     }
@@ -339,7 +404,7 @@ struct Trainer::State {
         const auto more = [&](gpu::Recording& recording) {
             if (options.strategy == Strategy::mcmc) record_noise(recording, cache, model, frame, of_noise);
         };
-        batch->update(parts, batch_rates(of_step), 0, sh_degree, more, drawn);
+        batch->update(parts, batch_rates(of_step), model.share.first, sh_degree, more, drawn);
         timed_steps += int(views.size());
         report.loss = drawn.loss;
         report.psnr = drawn.psnr;
@@ -388,19 +453,59 @@ struct Trainer::State {
 };
 
 Trainer::Trainer(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
-                 const std::vector<int>& train_frames, Gaussians start, const TrainOptions& options) {
+                 const std::vector<int>& train_frames, Gaussians start, const TrainOptions& options,
+                 std::shared_ptr<Ranks> ranks) {
     if (train_frames.empty())
         throw InputError("there is no training image; a larger --test-every leaves more of them");
     train::check_start(start.size(), options);
-    train::check_training(options);
+    train::check_training(options, ranks->size());
     const double extent = extent_for(dataset, train_frames, start);
     state_ = std::make_unique<State>(std::move(device), dataset, train_frames,
                                      prepared(std::move(start), options.render.kernel), extent,
-                                     resolve(options, dataset));
+                                     resolve(options, dataset), std::move(ranks));
 }
-Trainer::~Trainer() = default;
+
+Trainer::~Trainer() {
+    // After an exception the other ranks may be in the middle of something else.
+    if (!state_ || state_->ranks->rank() != 0 || std::uncaught_exceptions() > 0) return;
+    try {
+        state_->call(Call::end);
+    } catch (const std::exception&) {
+        // A rank that does not answer has ended.
+    }
+}
+
+void Trainer::follow() {
+    for (;;) switch (state_->next_call()) {
+            case Call::end:
+                return;
+            case Call::wait:
+                break;
+            case Call::step:
+                take_step();
+                break;
+            case Call::state:
+                join_state();
+                break;
+            case Call::restore:
+                share_state({});
+                break;
+            case Call::gaussians:
+                join_gaussians();
+                break;
+        }
+}
+
+void Trainer::keep_waiting() const {
+    state_->call(Call::wait);
+}
 
 StepReport Trainer::step() {
+    state_->call(Call::step);
+    return take_step();
+}
+
+StepReport Trainer::take_step() {
     State& s = *state_;
     const auto start = Clock::now();
     const int first = s.report.step + 1, last = std::min(s.report.step + s.options.batch, s.options.steps);
@@ -412,7 +517,7 @@ StepReport Trainer::step() {
     for (int step = first; step <= last; ++step) s.follow_up(step);
     const auto end = Clock::now();
     s.report.step = last;
-    s.report.splats = s.model.splats;
+    s.report.splats = s.model.share.all;
     s.report.seconds += std::chrono::duration<double>(end - start).count();
     s.times.steps += last - first + 1;
     s.times.step += milliseconds(end - start);
@@ -457,11 +562,16 @@ std::vector<NamedBuffer> buffers_of(const Plan& plan, Model& model, Exposures& e
 }  // namespace
 
 TrainerState Trainer::state() const {
+    state_->call(Call::state);
+    return join_state();
+}
+
+TrainerState Trainer::join_state() const {
     State& s = *state_;
     s.finish_all();
     TrainerState state{s.report, s.model.sh_degree, {}};
     for (const NamedBuffer& named : buffers_of(s.plan, s.model, s.exposures, s.motions, s.model.capacity))
-        state.arrays.push_back({named.name, named.buffer->download<std::byte>(named.bytes)});
+        state.arrays.push_back({named.name, s.joined(named.buffer->download<std::byte>(named.bytes))});
     const auto origin = std::as_bytes(std::span(&s.model.origin, 1));
     if (s.model.origin != glm::dvec3(0)) state.arrays.push_back({"origin", {origin.begin(), origin.end()}});
     return state;
@@ -488,17 +598,47 @@ void Trainer::restore(const TrainerState& state) {
         if (state.arrays[i].name != buffers[i].name || state.arrays[i].bytes.size() != buffers[i].bytes)
             throw InputError("the state does not fit this training: it lacks " +
                              std::string(buffers[i].name) + " of " + std::to_string(splats) + " splats");
+    s.call(Call::restore);
+    share_state(state);
+}
+
+void Trainer::share_state(const TrainerState& state) {
+    State& s = *state_;
+    const int rank = s.ranks->rank(), ranks = s.ranks->size();
     s.finish_all();
+    StepReport report = state.report;
+    if (ranks > 1) {
+        const auto own = s.part_of(std::as_bytes(std::span(&state.report, 1)),
+                                   std::vector<uint64_t>(size_t(ranks), sizeof(report)));
+        std::memcpy(&report, own.data(), sizeof(report));
+    }
+    check_share(report.splats, ranks);
+    const int sh_degree = s.model.sh_degree;
+    const glm::dvec3 origin = s.model.origin;
     s.model = {};  // free its memory first
-    s.model.splats = s.model.capacity = splats;
-    s.model.sh_degree = state.sh_degree;
+    s.model.splats = s.model.capacity = range_of(report.splats, rank, ranks).splats;
+    s.model.sh_degree = sh_degree;
     s.model.origin = origin;
+    s.take_share(report.splats);
+    const auto bytes_of = [&](int of, size_t array) {
+        const uint32_t splats = range_of(report.splats, of, ranks).splats;
+        return buffers_of(s.plan, s.model, s.exposures, s.motions, splats)[array].bytes;
+    };
+    const auto buffers = buffers_of(s.plan, s.model, s.exposures, s.motions, s.model.splats);
     for (size_t i = 0; i < buffers.size(); ++i) {
         *buffers[i].buffer = gpu::Buffer(*s.device, buffers[i].name, buffers[i].bytes, buffers[i].texel);
-        buffers[i].buffer->upload(std::span<const std::byte>(state.arrays[i].bytes));
+        if (ranks == 1) {
+            buffers[i].buffer->upload(std::span<const std::byte>(state.arrays[i].bytes));
+            continue;
+        }
+        std::vector<uint64_t> sizes;
+        for (int of = 0; of < ranks; ++of) sizes.push_back(bytes_of(of, i));
+        const std::span<const std::byte> all =
+            rank == 0 ? std::span<const std::byte>(state.arrays[i].bytes) : std::span<const std::byte>();
+        buffers[i].buffer->upload(std::span<const std::byte>(s.part_of(all, sizes)));
     }
-    s.report = state.report;
-    s.instance_capacity = std::max(s.instance_capacity, first_capacity(splats));
+    s.report = report;
+    s.instance_capacity = std::max(s.instance_capacity, first_capacity(report.splats));
 }
 
 std::vector<Exposure> Trainer::exposures() const {
@@ -510,13 +650,28 @@ std::vector<CameraMotion> Trainer::camera_motions() const {
     return state_->plan.motion ? state_->motions.download() : std::vector<CameraMotion>();
 }
 Gaussians Trainer::gaussians() const {
-    state_->finish_all();
-    Gaussians gaussians = download_model(state_->model, state_->model.params);
+    state_->call(Call::gaussians);
+    return join_gaussians();
+}
+Gaussians Trainer::join_gaussians() const {
+    State& s = *state_;
+    s.finish_all();
+    Gaussians gaussians;
+    if (s.ranks->size() == 1) {
+        gaussians = download_model(s.model, s.model.params);
+    } else {
+        const auto bytes = s.joined(
+            s.model.params.download<std::byte>(parameter_bytes(s.model.splats, s.model.sh_degree)));
+        if (s.ranks->rank() != 0) return gaussians;
+        gaussians = gaussians_of(
+            s.model, {reinterpret_cast<const float*>(bytes.data()), bytes.size() / sizeof(float)},
+            s.model.share.all);
+    }
     gaussians.density = state_->plan.kernel == Footprint::density;
     return gaussians;
 }
 uint32_t Trainer::splats() const {
-    return state_->model.splats;
+    return state_->model.share.all;
 }
 size_t Trainer::images_on_disk() const {
     return state_->images.on_disk();
@@ -530,7 +685,7 @@ double Trainer::extent() const {
 }
 
 std::vector<PlanLine> Trainer::plan() const {
-    return describe(state_->plan, state_->model.sh_degree, state_->model.splats);
+    return describe(state_->plan, state_->model.sh_degree, state_->model.share.all);
 }
 
 StepTimes Trainer::step_times() const {

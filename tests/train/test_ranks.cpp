@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+// Training by several ranks: the bytes of one that trains alone, and no more memory than a share.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "ewa/error.h"
+#include "ewa/trainer.h"
+#include "gpu/test_device.h"
+#include "pipeline/share.h"
+#include "support/thread_ranks.h"
+#include "train/synthetic.h"
+
+namespace ewa::test {
+namespace {
+
+/// Densifies, resets and relocates within some tens of steps.
+TrainOptions busy(Strategy strategy, int batch) {
+    TrainOptions options;
+    options.steps = 60;
+    options.batch = batch;
+    options.strategy = strategy;
+    options.seed = 3;
+    options.sh_degree = 1;
+    options.max_splats = 900;
+    options.grow_gradient = 1e-5;
+    options.refine_start = 10;
+    options.refine_every = 20;
+    options.refine_stop = 30000;
+    options.relocate_stop = 30000;
+    options.dead_opacity = 0.09;
+    options.growth = 1.2;
+    options.opacity_reset_every = 50;
+    options.means_rate = 3e-3;
+    options.opacity_rate = 0.3;
+    return options;
+}
+
+const Synthetic& capture() {
+    static const Synthetic* const made = [] {
+        auto* data = new Synthetic;
+        make_synthetic(*data, 300, 7, 64, 48, 11);
+        return data;
+    }();
+    return *made;
+}
+
+Gaussians start() {
+    Gaussians splats = capture().truth;
+    for (size_t i = 0; i < splats.size(); ++i) {
+        splats.means[3 * i] += 0.05f;
+        splats.opacity_logits[i] = i % 5 == 0 ? -3.0f : -1.0f;
+    }
+    return splats;
+}
+
+/// The state after training by so many ranks. resume: where it begins.
+TrainerState trained(const TrainOptions& options, int ranks, int until,
+                     const TrainerState* resume = nullptr) {
+    TrainerState result;
+    run_ranks(ranks, [&](std::shared_ptr<Ranks> group) {
+        const auto own = open_test_device(false);
+        Trainer trainer(own, capture().dataset, all_frames(capture().dataset), start(), options, group);
+        if (group->rank() != 0) return trainer.follow();
+        if (resume) trainer.restore(*resume);
+        while (trainer.steps_done() < until) trainer.step();
+        trainer.keep_waiting();
+        result = trainer.state();
+        const Gaussians splats = trainer.gaussians();
+        EXPECT_EQ(splats.size(), trainer.splats());
+        const auto& params = result.arrays.front().bytes;
+        float first;
+        std::memcpy(&first, params.data(), sizeof(first));
+        EXPECT_EQ(splats.means.front(), first);
+    });
+    return result;
+}
+
+void expect_same(const TrainerState& a, const TrainerState& b) {
+    EXPECT_EQ(a.report.step, b.report.step);
+    EXPECT_EQ(a.report.splats, b.report.splats);
+    EXPECT_EQ(a.report.loss, b.report.loss);
+    EXPECT_EQ(a.report.psnr, b.report.psnr);
+    EXPECT_EQ(a.report.limited_steps, b.report.limited_steps);
+    EXPECT_EQ(a.report.dropped_updates, b.report.dropped_updates);
+    EXPECT_EQ(a.report.skipped_nonfinite, b.report.skipped_nonfinite);
+    ASSERT_EQ(a.arrays.size(), b.arrays.size());
+    for (size_t i = 0; i < a.arrays.size(); ++i) {
+        EXPECT_EQ(a.arrays[i].name, b.arrays[i].name);
+        EXPECT_TRUE(a.arrays[i].bytes == b.arrays[i].bytes) << a.arrays[i].name;
+    }
+}
+
+struct RanksCase {
+    Strategy strategy;
+    int batch, ranks;
+    void (*change)(TrainOptions&) = nullptr;
+    const char* name = "";
+};
+void wide_moments(TrainOptions& options) {
+    options.moment_bits = 32;
+}
+void absolute_density(TrainOptions& options) {
+    options.absolute_gradients = true;
+    options.render.kernel = Footprint::density;
+    options.grow_gradient_absolute = 1e-5;
+}
+void antialiased(TrainOptions& options) {
+    options.render.kernel = Footprint::antialias;
+    options.random_background = true;
+}
+
+std::string name_of_case(const testing::TestParamInfo<RanksCase>& tested) {
+    const char* names[] = {"none", "adc", "mcmc"};
+    std::string name = names[int(tested.param.strategy)];
+    return name + tested.param.name + "_batch" + std::to_string(tested.param.batch) + "_ranks" +
+           std::to_string(tested.param.ranks);
+}
+
+class RanksTrain : public testing::TestWithParam<RanksCase> {};
+
+TEST_P(RanksTrain, TheBytesOfOneRank) {
+    const auto& [strategy, batch, ranks, change, name] = GetParam();
+    TrainOptions options = busy(strategy, batch);
+    if (change) change(options);
+    const TrainerState alone = trained(options, 1, options.steps);
+    EXPECT_EQ(alone.report.splats == start().size(), strategy == Strategy::none) << "the number of splats should change";
+    expect_same(trained(options, ranks, options.steps), alone);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Ranks, RanksTrain,
+    testing::Values(RanksCase{Strategy::adc, 4, 2}, RanksCase{Strategy::adc, 4, 3},
+                    RanksCase{Strategy::adc, 3, 5}, RanksCase{Strategy::adc, 1, 2},
+                    RanksCase{Strategy::adc, 2, 2, wide_moments, "_wide"},
+                    RanksCase{Strategy::adc, 1, 2, absolute_density, "_absolute_density"},
+                    RanksCase{Strategy::adc, 2, 3, antialiased, "_antialiased"},
+                    RanksCase{Strategy::mcmc, 4, 2}, RanksCase{Strategy::mcmc, 3, 4},
+                    RanksCase{Strategy::mcmc, 1, 3}, RanksCase{Strategy::mcmc, 2, 2, wide_moments, "_wide"},
+                    RanksCase{Strategy::mcmc, 2, 3, absolute_density, "_absolute_density"},
+                    RanksCase{Strategy::none, 2, 2}, RanksCase{Strategy::none, 1, 4, wide_moments, "_wide"}),
+    name_of_case);
+
+TEST(Ranks, ARunMayContinueWithAnotherNumberOfThem) {
+    for (const Strategy strategy : {Strategy::adc, Strategy::mcmc}) {
+        const TrainOptions options = busy(strategy, 4);
+        const TrainerState whole = trained(options, 1, options.steps);
+        const TrainerState half = trained(options, 3, 28);
+        expect_same(trained(options, 2, options.steps, &half), whole);
+        expect_same(trained(options, 1, options.steps, &half), whole);
+    }
+}
+
+TEST(Ranks, ABatchThatDoesNotDivideTheStepsEndsWithASmallerOne) {
+    TrainOptions options = busy(Strategy::none, 7);
+    options.steps = 17;
+    const TrainerState state = trained(options, 1, 17);
+    EXPECT_EQ(state.report.step, 17);
+    expect_same(trained(options, 2, 17), state);
+}
+
+TEST(Ranks, EachHoldsItsRange) {
+    for (const uint32_t all : {8u, 9u, 64u, 100u, 1000003u})
+        for (const int ranks : {1, 2, 3, 7, 64}) {
+            uint32_t next = 0;
+            for (int rank = 0; rank < ranks; ++rank) {
+                const pipeline::Range range = pipeline::range_of(all, rank, ranks);
+                EXPECT_EQ(range.first, next);
+                EXPECT_EQ(range.first % shared::PARAM_BLOCK == 0 || range.splats == 0, true);
+                EXPECT_LE(range.splats, all / uint32_t(ranks) + 2 * shared::PARAM_BLOCK);
+                next += range.splats;
+            }
+            EXPECT_EQ(next, all);
+        }
+}
+
+TEST(Ranks, AreRefusedWhatTheyCannotDo) {
+    const auto message = [&](void (*change)(TrainOptions&)) {
+        TrainOptions options = busy(Strategy::none, 1);
+        change(options);
+        try {
+            trained(options, 2, 1);
+        } catch (const std::exception& error) {
+            return std::string(error.what());
+        }
+        return std::string();
+    };
+    EXPECT_EQ(message([](TrainOptions& o) { o.exposure = true; }), "several ranks and --exposure exclude each other");
+    EXPECT_EQ(message([](TrainOptions& o) { o.render.points = true; }),
+              "several ranks and --points exclude each other");
+    EXPECT_NE(message([](TrainOptions& o) { o.refine_poses = true; }).find("--refine-poses"), std::string::npos);
+    TrainOptions options = busy(Strategy::none, 2);
+    options.refine_poses = true;
+    EXPECT_THROW(trained(options, 1, 1), InputError);
+    // 300 splats are 38 blocks.
+    EXPECT_THROW(pipeline::check_share(300, 39), RunError);
+    EXPECT_NO_THROW(pipeline::check_share(300, 38));
+}
+
+}  // namespace
+}  // namespace ewa::test
