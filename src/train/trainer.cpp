@@ -608,7 +608,8 @@ void Trainer::share_state(const TrainerState& state) {
     s.finish_all();
     StepReport report = state.report;
     if (ranks > 1) {
-        const auto own = s.part_of(std::as_bytes(std::span(&state.report, 1)),
+        const std::vector<StepReport> for_each(size_t(ranks), state.report);
+        const auto own = s.part_of(std::as_bytes(std::span(for_each)),
                                    std::vector<uint64_t>(size_t(ranks), sizeof(report)));
         std::memcpy(&report, own.data(), sizeof(report));
     }
