@@ -43,6 +43,9 @@ struct RunOptions {
     bool resume = false;  // continues from the folder's checkpoint, if there is one
     bool force = false;   // replaces the run in the folder
     DeviceOptions device;
+    /// The processes that train together. Rank 0 writes the run's files and calls the observer. The others return an empty
+    /// result when it ends.
+    std::shared_ptr<Ranks> ranks = alone();
     int rank_timeout = 300;     // s; of several ranks, one that does not answer for so long ends the run
     std::string command;        // how the run was started, for the report; may be empty
     double seconds_before = 0;  // wall time spent before the run, counted in Summary::wall_seconds

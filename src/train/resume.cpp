@@ -161,8 +161,7 @@ std::string resume_remark(const std::string& stored, const Json& now) {
     return {};
 }
 
-bool SavePace::due(int step) const {
-    if (every_ > 0) return step % every_ == 0;
+bool SavePace::due() const {
     return std::chrono::duration<double>(Clock::now() - last_).count() >= pause_;
 }
 

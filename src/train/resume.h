@@ -34,17 +34,15 @@ void check_resumable(const std::filesystem::path& path, const std::string& store
 /// A remark if version or device differ, since the result's bytes may then differ. Else an empty text.
 std::string resume_remark(const std::string& stored, const nlohmann::ordered_json& now);
 
-/// Says when to save a checkpoint: every so many steps. With 0, by the clock: every 30 seconds, or less often so
-/// that saving takes less than 2 percent of the time.
+/// Says when to save a checkpoint by the clock: every 30 seconds, or less often so that saving takes less than 2 percent of
+/// the time.
 class SavePace {
   public:
-    explicit SavePace(int every) : every_(every) {}
-    bool due(int step) const;
+    bool due() const;
     void saved(double seconds_taken);
 
   private:
     using Clock = std::chrono::steady_clock;
-    int every_;
     Clock::time_point last_ = Clock::now();
     double pause_ = 30;  // seconds
 };

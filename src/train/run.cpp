@@ -20,6 +20,7 @@
 #include "report/step_time.h"
 #include "report/views.h"
 #include "scene/dataset_files.h"
+#include "train/agreement.h"
 #include "train/checkpoint.h"
 #include "train/earlier_run.h"
 #include "train/evaluation.h"
@@ -43,8 +44,9 @@ double seconds_since(Clock::time_point begin) {
     return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
-bool at(int step, int every) {
-    return every > 0 && step % every == 0;
+/// Whether the steps after `before`, up to `step`, have a multiple of `every` among them.
+bool passes_multiple(int before, int step, int every) {
+    return every > 0 && step / every > before / every;
 }
 
 /// `count` of the values, evenly spread, with the first among them. All of them if there are fewer.
@@ -123,8 +125,7 @@ class Run {
           begin_(Clock::now()),
           asked_strategy_(options.train.strategy),
           input_(train::load_run(options)),
-          folder_(checked_folder(input_)),
-          pace_(options.save_every) {}
+          folder_(checked_folder(input_)) {}
 
     RunResult run();
 
@@ -145,7 +146,7 @@ class Run {
     void save_cameras(bool aligned) const;
     void save_checkpoint(const Trainer& trainer);
     void train(Trainer& trainer);
-    void after_step(Trainer& trainer);
+    void after_step(Trainer& trainer, int before);
     void log(const std::optional<Evaluation>& evaluation);
     void stop_if_asked() const;
     template <class Work>
@@ -323,23 +324,27 @@ void Run::log(const std::optional<Evaluation>& evaluation) {
     observer_.on_metrics(line);
 }
 
-/// Evaluates, logs and saves as far as this step is due for it.
-void Run::after_step(Trainer& trainer) {
+/// Evaluates, logs and saves as far as this step is due for it. before: steps done before it.
+void Run::after_step(Trainer& trainer, int before) {
     const int step = last_.step;
+    const auto at = [&](int every) { return passes_multiple(before, step, every); };
     std::optional<Evaluation> evaluation;
-    if (at(step, options().eval_every) && !input_.split.test.empty()) {
+    if (at(options().eval_every) && !input_.split.test.empty()) {
         // Cannot be stopped: a run that is resumed would not repeat it.
         const Gaussians gaussians = trainer.gaussians();
         if (refines()) use_refined_cameras(trainer);
         if (refines()) align_test_cameras(gaussians, {});
-        evaluation = evaluate(device_, gaussians, input_.dataset, input_.split.test, options().train.render);
+        evaluation = train::evaluate_views(
+            device_, gaussians, input_.dataset, input_.split.test, options().train.render, {},
+            [&] { trainer.keep_waiting(); },
+            [](size_t, const train::RenderedView&, const EvalFrame&) {});
         use_given_cameras();
         observer_.on_evaluation(step, *evaluation);
     }
     const int log_every = std::max(1, options().train.steps / 100);
-    if (evaluation || step == 1 || at(step, log_every)) log(evaluation);
-    if (pace_.due(step)) save_checkpoint(trainer);
-    if (at(step, options().save_every)) save_result(trainer);
+    if (evaluation || before == 0 || at(log_every)) log(evaluation);
+    if (options().save_every > 0 ? at(options().save_every) : pace_.due()) save_checkpoint(trainer);
+    if (at(options().save_every)) save_result(trainer);
     observer_.between_steps(last_, trainer, [&] {
         save_result(trainer);
         save_checkpoint(trainer);
@@ -350,9 +355,10 @@ void Run::train(Trainer& trainer) {
     const int steps = options().train.steps;
     try {
         while (trainer.steps_done() < steps && !observer_.should_stop()) {
+            const int before = trainer.steps_done();
             last_ = trainer.step();
             observer_.on_step(last_);
-            if (last_.step < steps) after_step(trainer);  // finish() does so after the last step
+            if (last_.step < steps) after_step(trainer, before);  // finish() does so after the last step
         }
     } catch (const InputError&) {
         // An image that vanished is found before its step begins, so the state is consistent.
@@ -491,8 +497,10 @@ RunResult Run::run() {
     read_checkpoint();
     start();
     list_settings();
-    auto owned = std::make_unique<Trainer>(device_, input_.dataset, input_.split.train,
-                                           std::exchange(input_.start, {}), options().train);
+    train::agree(input_.options, settings_, settings_.at("dataset").get<std::string>(), *device_);
+    auto owned =
+        std::make_unique<Trainer>(device_, input_.dataset, input_.split.train,
+                                  std::exchange(input_.start, {}), options().train, options().ranks);
     Trainer& trainer = *owned;
     report_.plan = plan_of(trainer, input_);
     observer_.on_plan(report_.plan);
@@ -509,10 +517,22 @@ RunResult Run::run() {
     return {report_.summary, folder_.path(), first_render_};
 }
 
+/// The part of a rank other than 0: it reads the dataset, and writes nothing.
+RunResult follow_training(const RunOptions& asked) {
+    train::RunInput input = train::load_run(asked);
+    const std::shared_ptr<gpu::Device> device = open_device(asked.device);
+    train::agree(input.options, {}, train::dataset_fingerprint(input.dataset, input.split), *device);
+    Trainer trainer(device, input.dataset, input.split.train, std::exchange(input.start, {}),
+                    input.options.train, asked.ranks);
+    trainer.follow();
+    return {};
+}
+
 }  // namespace
 
 RunResult run_training(const RunOptions& options, RunObserver& observer) {
     check_options(options);
+    if (options.ranks->rank() != 0) return follow_training(options);
     train::check_free(output_folder(options), options);  // before the dataset is loaded
     return Run(options, observer).run();
 }

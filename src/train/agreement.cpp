@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/agreement.h"
+
+#include <algorithm>
+#include <array>
+
+#include "core/hash.h"
+#include "ewa/error.h"
+#include "gpu/device.h"
+#include "passes/kernel_config.h"
+#include "train/resume.h"
+#include "train/run_options.h"
+
+namespace ewa::train {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// A text of rank 0, on every rank.
+std::string told(Ranks& ranks, const std::string& text) {
+    const uint64_t own = text.size();
+    const uint64_t size = ranks.gather(std::span(&own, 1)).front();
+    std::string heard(size, ' ');
+    std::vector<std::span<const std::byte>> out(size_t(ranks.size()));
+    std::vector<std::span<std::byte>> in(size_t(ranks.size()));
+    if (ranks.rank() == 0) std::fill(out.begin(), out.end(), std::as_bytes(std::span(text)));
+    in[0] = std::as_writable_bytes(std::span(heard));
+    ranks.exchange(out, in);
+    return heard;
+}
+
+void take_options(const Json& settings, RunOptions& options) {
+    for (const auto& [name, value] : settings.at("options").items())
+        run_option(name).set(options, value.is_string() ? value.get<std::string>() : value.dump());
+    const Json reached = settings.value("reached", Json::object());
+    options.train.least_sh_degree = reached.value("sh_degree", TrainOptions().least_sh_degree);
+    options.train.most_halvings = reached.value("halvings", TrainOptions().most_halvings);
+}
+
+uint64_t hash_of(const std::string& text) {
+    core::Hash hash;
+    hash.add(text);
+    return hash.value();
+}
+
+/// What of the device decides the bytes: which kernels it gets.
+uint64_t kernels_of(const gpu::Device& device) {
+    const passes::KernelConfig config = passes::config_for(device.limits());
+    core::Hash hash;
+    for (const uint32_t value : {config.subgroup, config.tile_width, config.tile_height, config.broadcast,
+                                 uint32_t(config.ranked_sort), uint32_t(config.texel_buffers)})
+        hash.add(value);
+    return hash.value();
+}
+
+}  // namespace
+
+void agree(RunOptions& options, const Json& settings, const std::string& fingerprint,
+           const gpu::Device& device) {
+    Ranks& ranks = *options.ranks;
+    if (ranks.size() == 1) return;
+    constexpr std::array kParts{"another version of ewa", "another dataset, or other images or cameras in it",
+                                "a device that runs other kernels"};
+    const std::array<uint64_t, kParts.size()> own{hash_of(EWA_VERSION), hash_of(fingerprint),
+                                                  kernels_of(device)};
+    const std::vector<uint64_t> all = ranks.gather(own);
+    for (size_t i = 0; i < all.size(); ++i)
+        if (all[i] != all[i % kParts.size()])
+            throw InputError(ranks.name(int(i / kParts.size())) + " has " + kParts[i % kParts.size()] +
+                             " than " + ranks.name(0));
+    const std::string text = told(ranks, ranks.rank() == 0 ? settings.dump() : std::string());
+    if (ranks.rank() != 0) take_options(Json::parse(text), options);
+}
+
+}  // namespace ewa::train
