@@ -2,24 +2,17 @@
 #include "cli/program.h"
 
 #include <CLI/CLI.hpp>
-#include <cerrno>
-#include <cstdio>
-#include <cstring>
 #include <functional>
-#include <new>
 #include <sstream>
 
 #include "cli/command.h"
 #include "cli/interrupt.h"
+#include "cli/status.h"
 #include "cli/usage.h"
 #include "core/terminal.h"
-#include "core/text.h"
-#include "ewa/error.h"
 
 namespace ewa::cli {
 namespace {
-
-enum ExitStatus { kDone = 0, kFailed = 1, kWrongUse = 2 };
 
 struct Command {
     const char *name, *description;
@@ -27,24 +20,6 @@ struct Command {
     CLI::App* app = nullptr;
     Action action = {};
 };
-
-int fail(const std::string& who, const std::string& what, int status) {
-    std::fflush(stdout);
-    std::fprintf(stderr, "%s: %s\n", who.c_str(), core::one_line(what).c_str());
-    return status;
-}
-
-int status_of(const Action& action) {
-    try {
-        return action();
-    } catch (const Interrupted&) {
-        return kInterruptedStatus;
-    }
-}
-
-int fail_to_print(const std::string& who) {
-    return fail(who, std::string("cannot write to standard output: ") + std::strerror(errno), kFailed);
-}
 
 /// --help and --version: what CLI11 prints.
 int print_text(const CLI::App& app, const CLI::ParseError& asked) {
@@ -54,25 +29,10 @@ int print_text(const CLI::App& app, const CLI::ParseError& asked) {
 }
 
 int run(const Command& command) {
-    const std::string who = std::string("ewa ") + command.name;
-    try {
+    return status_of(std::string("ewa ") + command.name, [&] {
         remove_temporary_files_on_signals();
-        const int status = status_of(command.action);
-        // If output is redirected to a full disk, only this flush fails.
-        if (std::fflush(stdout) != 0) return fail_to_print(who);
-        if (std::ferror(stdout)) return fail(who, "cannot write all of standard output", kFailed);
-        return status;
-    } catch (const InputError& error) {
-        return fail(who, error.what(), kWrongUse);
-    } catch (const CLI::Error& error) {  // an invalid value in --config
-        return fail(who, error.what(), kWrongUse);
-    } catch (const RunError& error) {
-        return fail(who, error.what(), kFailed);
-    } catch (const std::bad_alloc&) {
-        return fail(who, "out of host memory; try --downscale or a smaller scene", kFailed);
-    } catch (const std::exception& error) {
-        return fail(who, std::string("unexpected failure: ") + error.what(), kFailed);
-    }
+        return command.action();
+    });
 }
 
 /// The word as a POSIX shell reads it back.

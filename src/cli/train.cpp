@@ -11,7 +11,9 @@
 #include "cli/cameras.h"
 #include "cli/command.h"
 #include "cli/config.h"
+#include "cli/interrupt.h"
 #include "cli/run_inputs.h"
+#include "cli/status.h"
 #include "cli/train_observer.h"
 #include "core/folders.h"
 #include "core/text.h"
@@ -20,8 +22,10 @@
 #include "ewa/run.h"
 #include "live/run_folder.h"
 #include "report/chart.h"
+#include "ranks/open.h"
 #include "train/earlier_run.h"
 #include "train/run_options.h"
+#include "train/share_machine.h"
 
 namespace ewa::cli {
 namespace {
@@ -155,10 +159,16 @@ std::string accuracy_section(const RunScene& scene) {
         rendering_diagram(scene.device, scene.gaussians, scene.camera, scene.options, false));
 }
 
+/// What the process of another rank than 0 does: it trains and says nothing.
+int run_follower(const RunOptions& options) {
+    const InterruptWatch watch;  // rank 0 ends all
+    run_training(options);
+    return 0;
+}
+
 int run(CLI::App& app, TrainArguments& arguments) {
     const auto begin = Clock::now();
     RunOptions& options = arguments.run;
-    apply_config_and_quality(app, arguments);
     if (options.dataset.empty()) throw InputError("DATASET is required (see ewa train --help)");
     options.dataset = dataset_input(options.dataset);
     if (fs::is_directory(options.init)) options.init = splat_input(options.init).file.string();
@@ -166,11 +176,16 @@ int run(CLI::App& app, TrainArguments& arguments) {
     kernel = settled_kernel(kernel, arguments.antialias);
     check_options(options);  // before the images of a mesh scene are rendered
     note_scene(options);
+    if (options.ranks->size() > 1 && !options.scene.empty())
+        throw InputError(options.scene.string() +
+                         ": several ranks train on a dataset; make it first, with ewa dataset or ewa cameras");
     if (options.resume && arguments.quality.empty() && app.count("--steps") == 0) keep_steps(options);
     if (arguments.check_only) {
         train::check_free(output_folder(options), options);
         return 0;
     }
+    train::share_machine(*options.ranks, options.device);
+    if (options.ranks->rank() != 0) return run_follower(options);
     render_scene(arguments);
     place_photos(arguments);
     if (arguments.accuracy) options.report_section = accuracy_section;
@@ -180,6 +195,19 @@ int run(CLI::App& app, TrainArguments& arguments) {
     const RunResult result = run_training(options, observer);
     observer.print(result);
     return result.summary.interrupted ? kInterruptedStatus : 0;
+}
+
+
+/// Under mpirun or srun this is one of several processes. If it fails, it ends all.
+int run_rank(CLI::App& app, TrainArguments& arguments) {
+    apply_config_and_quality(app, arguments);
+    RunOptions& options = arguments.run;
+    options.ranks = open_ranks(std::chrono::seconds(options.rank_timeout));
+    if (options.ranks->size() == 1) return run(app, arguments);
+    const std::string who = "ewa train: " + options.ranks->name(options.ranks->rank());
+    const int status = status_of(who, [&] { return run(app, arguments); });
+    if (status != kDone && status != kInterruptedStatus) options.ranks->end_all(status);
+    return status;
 }
 
 }  // namespace
@@ -223,7 +251,7 @@ Action add_train(CLI::App& app, const std::string& command_line) {
     const auto quiet = app.add_flag("--quiet", arguments->output.quiet, "Print only errors");
     app.add_flag("--verbose", arguments->output.verbose, "Print the plan: what this scene does not need")
         ->excludes(quiet);
-    return [&app, arguments] { return run(app, *arguments); };
+    return [&app, arguments] { return run_rank(app, *arguments); };
 }
 
 }  // namespace ewa::cli
