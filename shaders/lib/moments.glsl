@@ -23,7 +23,7 @@ vec4 second_moment(uvec4 words) {
 vec4 second_root(uvec4 words) {
     const uvec4 kept = words & ~MOMENT_HIGH_HALF;
     const vec4 root = uintBitsToFloat((kept << MOMENT_ROOT_CUT) + MOMENT_LEAST_ROOT);
-    return mix(root, vec4(0.0), equal(kept, uvec4(0u)));
+    return mix(vec4(0.0), root, notEqual(kept, uvec4(0u)));
 }
 
 // Rounds at random, up with the probability of the part that is cut off, so that the mean is exact.

@@ -82,7 +82,16 @@ void compile_splatting(Compiler& compiler) {
           {UPDATE_GRADIENT_ONLY, UPDATE_GRADIENT_ONLY | UPDATE_MOTION, packed | UPDATE_MOTION, 0,
            UPDATE_STATISTICS, packed, packed | UPDATE_STATISTICS, packed | UPDATE_REGULARISED,
            packed | UPDATE_STATISTICS | UPDATE_ABSOLUTE}}});
-    compiler.compile<passes::ScanBlocks>({{SPEC_MODE, {0, SCAN_GATHERED}}});
+    compiler.compile<passes::CollectVisible>();
+    compiler.compile<passes::ReceiveRecords>();
+    compiler.compile<passes::SumSlots>({{SPEC_MODE, {0, UPDATE_ABSOLUTE}}});
+    compiler.compile<passes::UpdateViews>({{SPEC_SH_DEGREE, kDegrees},
+                                           {SPEC_KERNEL, kFootprints},
+                                           {SPEC_MODE,
+                                            {0, UPDATE_STATISTICS, packed, packed | UPDATE_STATISTICS,
+                                             packed | UPDATE_REGULARISED,
+                                             packed | UPDATE_STATISTICS | UPDATE_ABSOLUTE}}});
+    compiler.compile<passes::ScanBlocks>({{SPEC_MODE, {0, SCAN_GATHERED, SCAN_FLAGS}}});
     compiler.compile<passes::ScanTotals>();
     const Values scatter_modes = {0,
                                   SORT_OWN_INDICES,

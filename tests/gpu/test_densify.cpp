@@ -188,6 +188,7 @@ TEST(DensifyEdges, WritesNothingPastItsCapacity) {
                                    rules.prune_scale,
                                    {1, 2},
                                    3,
+                                   0,
                                    0};
     };
     const uint64_t bytes = pipeline::parameter_bytes(capacity, 1);

@@ -15,6 +15,7 @@
 #include "passes/shader_code.h"
 #include "pipeline/backward.h"
 #include "pipeline/strategy.h"
+#include "pipeline/views.h"
 
 namespace ewa::test {
 namespace {
@@ -403,6 +404,7 @@ struct FrameParts {
     gpu::Buffer camera, photo;
     pipeline::Exposures exposures;
     pipeline::Motions motions;
+    pipeline::ViewBuffers views;
 };
 SharedByTests<FrameParts>* const frame_parts = SharedByTests<FrameParts>::add();
 
@@ -410,7 +412,7 @@ SharedByTests<FrameParts>* const frame_parts = SharedByTests<FrameParts>::add();
 std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     Rig& r = rig();
     const Scene scene = random_scene(3000, 50, SplatKind::ordinary, 61, 47, 2);
-    auto& [model, frame, camera, photo, exposures, motions] = frame_parts->get([] { return FrameParts(); });
+    auto& [model, frame, camera, photo, exposures, motions, views] = frame_parts->get([] { return FrameParts(); });
     exposures = pipeline::Exposures(*device(), 3);
     const pipeline::ExposureUse exposure{&exposures, 1, 0.01f, 1};
     motions = pipeline::Motions(*device(), std::vector<pipeline::MotionBasis>(3));
@@ -450,6 +452,24 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     record_reset_opacity(step, r.cache, model, 0);
     record_noise(step, r.cache, model, frame, {.amplitude = 0.1f, .max_length = 1, .seed = 1, .step = 1});
     out.push_back(step.commands());
+
+    // A step of two views. The sums have room for both.
+    request.motion = false;
+    const auto plan_of_views = plan_for(request);
+    views.reserve(*device(), 50, 2, 50);
+    views.reserve_sums(*device(), r.executor, plan_of_views, 100);
+    gpu::Recording batch = r.recording();
+    for (uint32_t view = 0; view < 2; ++view) {
+        record_list(batch, r.cache, plan_of_views, model, frame, inputs, views, view, 50 * view, 0);
+        batch.copy(views.visible, 0, frame.records, 0, 48 * 50);
+        const auto drawn = record_list_forward(batch, r.cache, plan_of_views, 50, frame, inputs);
+        record_loss(batch, r.cache, frame, inputs, photo);
+        record_list_backward(batch, r.cache, plan_of_views, 50, frame, inputs, drawn, views.sums, 50 * view);
+    }
+    pipeline::Rates rates;
+    rates.views = 2;
+    record_update_views(batch, r.cache, plan_of_views, model, frame, views, rates, 0, 2);
+    out.push_back(batch.commands());
 
     request.purpose = pipeline::Purpose::picture;
     gpu::Recording picture = r.recording();

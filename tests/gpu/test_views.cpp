@@ -1,0 +1,328 @@
+// SPDX-License-Identifier: Apache-2.0
+// A step of several views: their lists, their gradients and Adam's step, against the CPU reference and against the passes of
+// a step of one view.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "gpu/guarded.h"
+#include "gpu/reference_inputs.h"
+#include "pipeline/views.h"
+#include "reference/training.h"
+#include "support/gradient_check.h"
+
+namespace ewa::test {
+namespace {
+
+using namespace pipeline;
+
+constexpr int kWidth = 61, kHeight = 47;
+
+/// A scene seen by several cameras, each with its target.
+struct SeenScene {
+    Scene scene;
+    std::vector<Camera> cameras;
+    std::vector<Image> targets;
+
+    SeenScene(uint64_t seed, size_t splats, size_t views, SplatKind kind = SplatKind::mixed,
+              Footprint kernel = Footprint::peak, int sh_degree = 2)
+        : scene(random_scene(seed, splats, kind, kWidth, kHeight, sh_degree, kernel)) {
+        for (size_t v = 0; v < views; ++v) {
+            Camera camera = scene.camera;
+            // A step to the side, so that some splats leave the picture.
+            camera.translation.x += 0.3 * double(v);
+            camera.fx *= 1 + 0.1 * double(v);
+            cameras.push_back(camera);
+            targets.push_back(random_target(seed + 7 + v, kWidth, kHeight));
+        }
+    }
+    /// The mean of the views' gradients, in float64.
+    reference::Values mean_gradient() const {
+        std::vector<reference::ReferenceGradient> all;
+        for (size_t v = 0; v < cameras.size(); ++v)
+            all.push_back(
+                reference::loss_gradient(scene.gaussians, cameras[v], targets[v], scene.options));
+        reference::Values sum = all[0].gradient;
+        const auto add = [&](auto member) {
+            for (size_t v = 1; v < all.size(); ++v)
+                for (size_t i = 0; i < (sum.*member).size(); ++i)
+                    (sum.*member)[i] += (all[v].gradient.*member)[i];
+            for (double& x : sum.*member) x /= double(all.size());
+        };
+        add(&reference::Values::means);
+        add(&reference::Values::quaternions);
+        add(&reference::Values::log_scales);
+        add(&reference::Values::opacity_logits);
+        add(&reference::Values::sh);
+        return sum;
+    }
+};
+
+/// The device's step of a scene's views.
+struct Step {
+    Plan plan;
+    Model model;
+    FrameBuffers frame;
+    ViewBuffers buffers;
+    std::vector<gpu::Buffer> cameras, photos;
+    std::vector<uint32_t> first_places{0};
+    std::vector<std::vector<float>> pictures;
+
+    Step(const SeenScene& seen, PlanRequest request) {
+        request.purpose = Purpose::training;
+        request.scene_degree = request.present_degree = seen.scene.gaussians.sh_degree;
+        request.render = seen.scene.options;
+        plan = plan_for(request);
+        model = upload_model(*device(), seen.scene.gaussians, plan.moment_buffers(), plan.statistics);
+        for (size_t v = 0; v < seen.cameras.size(); ++v) {
+            cameras.push_back(camera_buffer(seen.cameras[v], rig().config()));
+            photos.push_back(upload_photo(*device(), seen.targets[v]));
+        }
+        frame.reserve(*device(), rig().config(),
+                      {.splats = model.splats,
+                       .width = kWidth,
+                       .height = kHeight,
+                       .instances = 1 << 16,
+                       .gradients = true,
+                       .overlaid = true});
+        buffers.reserve(*device(), model.splats, uint32_t(cameras.size()), model.splats);
+    }
+    FrameInputs inputs(const SeenScene& seen, size_t view) const {
+        return {.camera = {&cameras[view], 0, uint32_t(kWidth), uint32_t(kHeight)},
+                .background = seen.scene.options.background};
+    }
+    void list(const SeenScene& seen, size_t view) {
+        Rig& r = rig();
+        gpu::Recording recording = r.recording();
+        record_list(recording, r.cache, plan, model, frame, inputs(seen, view), buffers, uint32_t(view),
+                    first_places[view], 0);
+        frame.record_counts(recording);
+        r.executor.run(recording);
+        first_places.push_back(first_places[view] + frame.read_counts().scan_total);
+    }
+    uint32_t listed(size_t view) const { return first_places[view + 1] - first_places[view]; }
+    void draw(const SeenScene& seen, size_t view) {
+        Rig& r = rig();
+        buffers.reserve_sums(*device(), r.executor, plan, first_places.back());
+        gpu::Recording recording = r.recording();
+        recording.copy(buffers.visible, 0, frame.records, 0, 48ull * listed(view));
+        const Sorted sorted =
+            record_list_forward(recording, r.cache, plan, listed(view), frame, inputs(seen, view));
+        record_loss(recording, r.cache, frame, inputs(seen, view), photos[view]);
+        record_list_backward(recording, r.cache, plan, listed(view), frame, inputs(seen, view), sorted,
+                             buffers.sums, first_places[view]);
+        r.executor.run(recording);
+        pictures.push_back(frame.planes.download<float>(frame.sizes.planes / 4));
+    }
+    void update(const SeenScene& seen, Rates rates) {
+        Rig& r = rig();
+        first_places = {0};
+        for (size_t v = 0; v < cameras.size(); ++v) {
+            list(seen, v);
+            draw(seen, v);
+        }
+        rates.views = uint32_t(cameras.size());
+        gpu::Recording recording = r.recording();
+        recording.fill(frame.counts, 0, 0, sizeof(shared::Counts));
+        record_update_views(recording, r.cache, plan, model, frame, buffers, batch_rates(rates), 0,
+                            kMaxShDegree);
+        r.executor.run(recording);
+    }
+};
+
+Rates some_rates(uint32_t step) {
+    return {.mean = 1e-3f,
+            .opacity = 2e-3f,
+            .quaternion = 3e-3f,
+            .scale = 4e-3f,
+            .sh0 = 5e-3f,
+            .sh_rest = 6e-4f,
+            .step = step};
+}
+
+TEST(ViewBatch, AListHasTheSplatsThatReachATileInTheirOrder) {
+    const SeenScene seen(70, 700, 2, SplatKind::off_screen_and_close);
+    Step step(seen, {});
+    for (size_t v = 0; v < 2; ++v) {
+        step.list(seen, v);
+        const auto counts = step.frame.tile_counts.download<uint32_t>(700);
+        const auto records = step.frame.records.download<std::array<float, 12>>(700);
+        const auto visible = step.buffers.visible.download<std::array<float, 12>>(step.listed(v));
+        const auto places = step.buffers.places.download<uint32_t>(1400);
+        uint32_t next = step.first_places[v];
+        for (uint32_t i = 0; i < 700; ++i) {
+            if (counts[i] == 0) {
+                EXPECT_EQ(places[700 * v + i], shared::NOT_LISTED);
+                continue;
+            }
+            ASSERT_EQ(places[700 * v + i], next);
+            EXPECT_EQ(visible[next - step.first_places[v]], records[i]);
+            ++next;
+        }
+        EXPECT_EQ(next, step.first_places[v + 1]);
+        EXPECT_GT(step.listed(v), 20u);
+        EXPECT_LT(step.listed(v), 680u);
+    }
+}
+
+TEST(ViewBatch, AListDrawsThePictureOfItsView) {
+    const SeenScene seen(71, 900, 2);
+    Step step(seen, {});
+    for (size_t v = 0; v < 2; ++v) {
+        step.list(seen, v);
+        step.draw(seen, v);
+        gpu::Recording whole = rig().recording();
+        record_forward(whole, rig().cache, step.plan, step.model, step.frame, step.inputs(seen, v));
+        rig().executor.run(whole);
+        EXPECT_EQ(step.frame.planes.download<float>(step.frame.sizes.planes / 4), step.pictures[v]);
+    }
+}
+
+struct ViewsCase {
+    Footprint kernel;
+    SplatKind kind;
+    size_t views;
+};
+class ViewBatchGradient : public testing::TestWithParam<ViewsCase> {};
+
+TEST_P(ViewBatchGradient, IsTheMeanOfTheViews) {
+    const auto& [kernel, kind, views] = GetParam();
+    const SeenScene seen(80 + uint64_t(kernel), 300, views, kind, kernel);
+    Step step(seen, {});
+    step.update(seen, some_rates(uint32_t(views)));
+    // The first moment of the first step is (1 - beta^views) times the gradient.
+    Gaussians moments = download_model(step.model, step.model.moments1);
+    const double share = 1 - std::pow(shared::ADAM_BETA1, double(views));
+    for (auto* values : {&moments.means, &moments.quaternions, &moments.log_scales, &moments.opacity_logits,
+                         &moments.sh})
+        for (float& x : *values) x = float(x / share);
+    EXPECT_TRUE(splat_gradients_agree(
+        moments, seen.mean_gradient(),
+        {.cosine = 1e-6, .norm = 2e-4, .element_relative = 1e-2, .element_absolute = 1e-4}));
+}
+
+INSTANTIATE_TEST_SUITE_P(ViewBatch, ViewBatchGradient,
+                         testing::Values(ViewsCase{Footprint::peak, SplatKind::ordinary, 1},
+                                         ViewsCase{Footprint::peak, SplatKind::mixed, 3},
+                                         ViewsCase{Footprint::antialias, SplatKind::mixed, 2},
+                                         ViewsCase{Footprint::density, SplatKind::ordinary, 2},
+                                         ViewsCase{Footprint::peak, SplatKind::needles, 2}));
+
+TEST(ViewBatch, AStepFollowsAdamWithTheRulesOfABatch) {
+    constexpr double kViews = 3;
+    const SeenScene seen(90, 60, size_t(kViews), SplatKind::ordinary);
+    Step step(seen, {});
+    std::vector<double> m, v;
+    for (uint32_t t = 1; t <= 2; ++t) {
+        const auto before = step.model.params.download<float>(parameter_bytes(60, 2) / 4);
+        const auto old_m = step.model.moments1.download<float>(before.size());
+        const auto old_v = step.model.moments2.download<float>(before.size());
+        step.update(seen, some_rates(uint32_t(kViews) * t));
+        const auto after = step.model.params.download<float>(before.size());
+        const auto new_m = step.model.moments1.download<float>(before.size());
+        const auto new_v = step.model.moments2.download<float>(before.size());
+        const double beta1 = std::pow(0.9, kViews), beta2 = std::pow(0.999, kViews);
+        const double bias1 = 1 - std::pow(beta1, t), bias2 = 1 - std::pow(beta2, t);
+        size_t moved = 0;
+        for (uint32_t f : {0u, 3u, 5u, 9u, 11u, 12u, 30u})
+            for (size_t i = 0; i < 60; ++i) {
+                const size_t at = parameter_index(step.model.planes(), f, i);
+                const double g = (new_m[at] - beta1 * old_m[at]) / (1 - beta1);
+                const double expected_v = beta2 * old_v[at] + (1 - beta2) * g * g;
+                EXPECT_NEAR(new_v[at], expected_v, 1e-3 * expected_v + 1e-16);
+                const double rates[] = {1e-3, 2e-3, 3e-3, 4e-3, 5e-3, 5e-3, 6e-4};
+                const size_t which = f == 0   ? 0
+                                     : f == 3 ? 1
+                                     : f == 5 ? 2
+                                     : f == 9 ? 3
+                                     : f < 14 ? 4
+                                              : 6;
+                const double to = rates[which] * std::sqrt(kViews) * (new_m[at] / bias1) /
+                                  (std::sqrt(new_v[at] / bias2) + 1e-15 / std::sqrt(kViews));
+                EXPECT_NEAR(before[at] - after[at], to, 2e-6 + 1e-4 * std::abs(to)) << f << " of splat " << i;
+                moved += std::abs(to) > 1e-4;
+            }
+        EXPECT_GT(moved, 100u);
+    }
+}
+
+TEST(ViewBatch, StatisticsAddTheNormsOfTheViewsThatSeeASplat) {
+    const SeenScene seen(95, 200, 2, SplatKind::off_screen_and_close);
+    for (const bool absolute : {false, true}) {
+        Step both(seen, {.render = {}, .statistics = true, .absolute_gradients = absolute});
+        both.update(seen, some_rates(1));
+        std::vector<float> sums(400);
+        for (size_t v = 0; v < 2; ++v) {
+            SeenScene one = seen;
+            one.cameras = {seen.cameras[v]};
+            one.targets = {seen.targets[v]};
+            Step alone(one, {.render = {}, .statistics = true, .absolute_gradients = absolute});
+            alone.update(one, some_rates(1));
+            const auto own = alone.model.statistics.download<float>(400);
+            for (size_t i = 0; i < 400; ++i) sums[i] += own[i];
+        }
+        EXPECT_EQ(both.model.statistics.download<float>(400), sums);
+        EXPECT_GT(*std::max_element(sums.begin(), sums.end()), 1.5f);
+    }
+}
+
+/// Against the kernel of a step of one view, whose bytes runs of one rank have.
+TEST(ViewBatch, AStepOfOneViewHasTheBytesOfTheFusedKernel) {
+    for (const bool packed : {false, true})
+        for (const Footprint kernel : {Footprint::peak, Footprint::antialias, Footprint::density}) {
+            const SeenScene seen(100, 400, 1, SplatKind::mixed, kernel);
+            const PlanRequest request{.render = {}, .statistics = true,
+                                      .absolute_gradients = packed,
+                                      .packed_moments = packed,
+                                      .regularised = true};
+            Rates rates = some_rates(1);
+            rates.opacity_weight = 1e-5f;
+            rates.scale_weight = 2e-5f;
+            Step split(seen, request), fused(seen, request);
+            for (uint32_t t = 1; t <= 3; ++t) {
+                rates.step = t;
+                split.update(seen, rates);
+                gpu::Recording recording = rig().recording();
+                const FrameInputs inputs = fused.inputs(seen, 0);
+                const Sorted sorted =
+                    record_forward(recording, rig().cache, fused.plan, fused.model, fused.frame, inputs);
+                record_loss(recording, rig().cache, fused.frame, inputs, fused.photos[0]);
+                record_backward(recording, rig().cache, fused.plan, fused.model, fused.frame, inputs, sorted,
+                                rates);
+                rig().executor.run(recording);
+            }
+            const auto bytes = [&](const gpu::Buffer& buffer) {
+                return buffer.download<uint32_t>(parameter_bytes(400, 2) / 4);
+            };
+            EXPECT_EQ(bytes(split.model.params), bytes(fused.model.params)) << int(kernel) << packed;
+            EXPECT_EQ(bytes(split.model.moments1), bytes(fused.model.moments1)) << int(kernel) << packed;
+            EXPECT_EQ(split.model.statistics.download<uint32_t>(800),
+                      fused.model.statistics.download<uint32_t>(800));
+        }
+}
+
+TEST(ViewBatch, WhatNoViewSeesMovesByItsMomentsAlone) {
+    SeenScene seen(110, 50, 2, SplatKind::ordinary);
+    Step step(seen, {});
+    step.update(seen, some_rates(2));
+    // Behind both cameras now.
+    for (Camera& camera : seen.cameras) camera.translation.z -= 1000;
+    step.cameras.clear();
+    for (const Camera& camera : seen.cameras) step.cameras.push_back(camera_buffer(camera, rig().config()));
+    const auto m = step.model.moments1.download<float>(parameter_bytes(50, 2) / 4);
+    step.first_places = {0};
+    for (size_t v = 0; v < 2; ++v) step.list(seen, v);
+    EXPECT_EQ(step.first_places.back(), 0u);
+    Rates rates = some_rates(4);
+    rates.views = 2;
+    gpu::Recording recording = rig().recording();
+    record_update_views(recording, rig().cache, step.plan, step.model, step.frame, step.buffers,
+                        batch_rates(rates), 0, kMaxShDegree);
+    rig().executor.run(recording);
+    const auto after = step.model.moments1.download<float>(m.size());
+    for (size_t i = 0; i < m.size(); ++i) ASSERT_NEAR(after[i], 0.81f * m[i], 1e-6f * std::abs(m[i]) + 1e-38f);
+}
+
+}  // namespace
+}  // namespace ewa::test
