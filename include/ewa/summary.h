@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace ewa {
 
@@ -14,6 +15,16 @@ struct CameraMoves {
     double least_focal = 1, largest_focal = 1;       // factors of the focal lengths
     bool test_aligned =
         false;  // test_psnr and test_ssim are of cameras that were aligned to their images first
+};
+
+/// What a rank of several has exchanged, and what it held. Means a training view.
+struct RankFigures {
+    std::string name;            // e.g. "rank 1 (node7)"
+    double sent_bytes = 0;       // to other ranks
+    double exchange = 0;         // ms, in which data moved
+    double waiting = 0;          // ms, until the other ranks had come as far
+    double own_bytes = 0;        // largest state so far: parameters, moments and statistics of its splats
+    double peak_device_bytes = 0;
 };
 
 /// summary.json. A figure that does not exist (no test set, not evaluated) is null there. So is one that is not
@@ -33,6 +44,7 @@ struct Summary {
     std::string version, command, strategy;
     bool interrupted = false;            // the run was stopped before its end
     std::optional<CameraMoves> cameras;  // with TrainOptions::refine_poses
+    std::vector<RankFigures> ranks;      // of several ranks
 };
 
 /// A line of metrics.jsonl.

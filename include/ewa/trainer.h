@@ -14,6 +14,7 @@
 #include "ewa/gaussians.h"
 #include "ewa/ranks.h"
 #include "ewa/renderer.h"
+#include "ewa/summary.h"
 #include "ewa/train_options.h"
 
 namespace ewa {
@@ -116,6 +117,7 @@ class Trainer {
     double extent() const;                             // the length that rates are relative to, world units
     std::vector<PlanLine> plan() const;                // what the run skips
     StepTimes step_times() const;
+    std::vector<RankFigures> rank_figures() const;     // of every rank; empty for one that is alone
 
   private:
     struct State;
@@ -124,6 +126,7 @@ class Trainer {
     TrainerState join_state() const;
     void share_state(const TrainerState& state);
     Gaussians join_gaussians() const;
+    std::vector<RankFigures> join_figures() const;
 
     std::unique_ptr<State> state_;
 };

@@ -82,6 +82,24 @@ std::vector<StageTime> stages_of(const StepTime& time) {
     return result;
 }
 
+std::string ranks_html(const std::vector<RankFigures>& ranks) {
+    if (ranks.empty()) return "";
+    std::string html =
+        "<h2>What the ranks exchanged</h2>\n<table class=\"times\"><tr><th>rank</th>"
+        "<th class=\"number\">sent, KiB a view</th><th class=\"number\">moving data, ms a view</th>"
+        "<th class=\"number\">waiting, ms a view</th><th class=\"number\">state of its splats, MiB</th>"
+        "<th class=\"number\">peak device memory, MiB</th></tr>\n";
+    for (const RankFigures& rank : ranks)
+        html += fmt::format(
+            "<tr><td>{}</td><td class=\"number\">{:.1f}</td><td class=\"number\">{:.3f}</td>"
+            "<td class=\"number\">{:.3f}</td><td class=\"number\">{:.1f}</td><td class=\"number\">{:.1f}</td>"
+            "</tr>\n",
+            escape_html(rank.name), rank.sent_bytes / 1024, rank.exchange, rank.waiting,
+            rank.own_bytes / (1 << 20), rank.peak_device_bytes / (1 << 20));
+    return html +
+           "</table>\n<p class=\"soft\">A rank waits until the others have come as far as it has.</p>\n";
+}
+
 std::string step_time_html(const StepTime& time) {
     if (time.steps == 0 || !(time.step > 0)) return "";
     const std::vector<StageTime> all = stages_of(time);

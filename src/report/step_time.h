@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "ewa/summary.h"
+
 namespace ewa::report {
 
 struct NamedTime {
@@ -29,5 +31,8 @@ std::vector<StageTime> stages_of(const StepTime& time);
 
 /// The stages as a table, with the single passes below; empty without a step.
 std::string step_time_html(const StepTime& time);
+
+/// What the ranks of a run exchanged, as a table; empty without ranks.
+std::string ranks_html(const std::vector<RankFigures>& ranks);
 
 }  // namespace ewa::report

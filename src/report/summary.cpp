@@ -68,6 +68,13 @@ Json to_json(const Summary& s) {
                  {"version", s.version},
                  {"command", s.command}};
     if (s.cameras) json["cameras"] = to_json(*s.cameras);
+    for (const RankFigures& rank : s.ranks)
+        json["ranks"].push_back({{"name", rank.name},
+                                 {"sent_bytes_per_view", figure(rank.sent_bytes)},
+                                 {"exchange_ms_per_view", figure(rank.exchange)},
+                                 {"waiting_ms_per_view", figure(rank.waiting)},
+                                 {"state_bytes", figure(rank.own_bytes)},
+                                 {"peak_device_bytes", figure(rank.peak_device_bytes)}});
     return json;
 }
 

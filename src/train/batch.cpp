@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <chrono>
 #include <numeric>
 
 namespace ewa::train {
@@ -60,6 +61,12 @@ class Received {
     std::span<std::byte> bytes_;
 };
 
+using Clock = std::chrono::steady_clock;
+
+double milliseconds_since(Clock::time_point begin) {
+    return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
+}
+
 shared::Counts run(const BatchParts& parts, gpu::Recording& recording) {
     parts.frame.record_counts(recording);
     parts.executor.run(recording, true);
@@ -68,6 +75,22 @@ shared::Counts run(const BatchParts& parts, gpu::Recording& recording) {
 }
 
 }  // namespace
+
+std::vector<uint64_t> Batch::gather(std::span<const uint64_t> own) {
+    const auto begin = Clock::now();
+    std::vector<uint64_t> all = ranks_->gather(own);
+    traffic_.waiting += milliseconds_since(begin);
+    return all;
+}
+
+void Batch::exchange(std::span<const std::span<const std::byte>> out,
+                     std::span<const std::span<std::byte>> in) {
+    const auto begin = Clock::now();
+    ranks_->exchange(out, in);
+    traffic_.exchange += milliseconds_since(begin);
+    for (size_t rank = 0; rank < out.size(); ++rank)
+        if (rank != size_t(ranks_->rank())) traffic_.sent_bytes += out[rank].size();
+}
 
 /// Views that are drawn at one time: at most one by each rank. View `first` + k is drawn by rank k.
 struct Batch::Round {
@@ -112,7 +135,7 @@ void Batch::tell_counts(Round& round, BatchReport& report) {
     const size_t ranks = size_t(ranks_->size()), own = size_t(ranks_->rank());
     std::vector<uint64_t> told = round.listed;
     told.push_back(round.skipped);
-    const std::vector<uint64_t> all = ranks_->gather(told);
+    const std::vector<uint64_t> all = gather(told);
     report.skipped_nonfinite = 0;
     for (size_t rank = 0; rank < ranks; ++rank) {
         round.of_own.push_back(round.draws(int(own)) ? all[rank * told.size() + own] : 0);
@@ -134,7 +157,7 @@ void Batch::send_records(const BatchParts& parts, const Round& round) {
         from += out[rank].size();
         to += in[rank].size();
     }
-    ranks_->exchange(out, in);
+    exchange(out, in);
     list.finish();
 }
 
@@ -153,7 +176,7 @@ void Batch::return_sums(const BatchParts& parts, const Round& round) {
         from += out[rank].size();
         to += in[rank].size();
     }
-    ranks_->exchange(out, in);
+    exchange(out, in);
     sums.finish();
 }
 
@@ -203,9 +226,10 @@ BatchReport Batch::draw(const BatchParts& parts, std::span<const BatchView> view
             const shared::Counts counts = draw_own(parts, view, round);
             losses = {loss_of(counts), view.psnr(counts)};
         }
-        if (ranks > 1) return_sums(parts, round);
+        // Waits for the slowest of them.
         const auto words = std::bit_cast<std::array<uint64_t, 2>>(losses);
-        const std::vector<uint64_t> all = ranks_->gather(words);
+        const std::vector<uint64_t> all = gather(words);
+        if (ranks > 1) return_sums(parts, round);
         for (size_t k = 0; k < round.views; ++k) {
             report.loss += std::bit_cast<double>(all[2 * k]) / double(views.size());
             report.psnr += std::bit_cast<double>(all[2 * k + 1]) / double(views.size());
@@ -230,7 +254,7 @@ void Batch::update(const BatchParts& parts, const Rates& rates, uint32_t first, 
     if (more) more(recording);
     const shared::Counts counts = run(parts, recording);
     const std::vector<uint64_t> all =
-        ranks_->gather(std::array<uint64_t, 2>{counts.dropped_updates, counts.limited_steps});
+        gather(std::array<uint64_t, 2>{counts.dropped_updates, counts.limited_steps});
     for (size_t i = 0; i < all.size(); i += 2) {
         report.dropped_updates += all[i];
         report.limited_steps += all[i + 1];

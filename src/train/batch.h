@@ -37,6 +37,12 @@ struct BatchParts {
     std::function<void()> submitted;  // called after each submission
 };
 
+/// What this rank has exchanged with others so far.
+struct Traffic {
+    uint64_t sent_bytes = 0;
+    double exchange = 0, waiting = 0;  // ms
+};
+
 class Batch {
   public:
     explicit Batch(std::shared_ptr<Ranks> ranks) : ranks_(std::move(ranks)) {}
@@ -48,8 +54,12 @@ class Batch {
     void update(const BatchParts& parts, const pipeline::Rates& rates, uint32_t first, int sh_degree,
                 const std::function<void(gpu::Recording&)>& more, BatchReport& report);
 
+    const Traffic& traffic() const { return traffic_; }
+
   private:
     struct Round;
+    std::vector<uint64_t> gather(std::span<const uint64_t> own);
+    void exchange(std::span<const std::span<const std::byte>> out, std::span<const std::span<std::byte>> in);
     void reserve(const BatchParts& parts, pipeline::FrameRequest request, uint64_t listed);
     void make_room_for_own(const BatchParts& parts, uint64_t listed);
     void list(const BatchParts& parts, std::span<const BatchView> views, Round& round);
@@ -62,6 +72,7 @@ class Batch {
     pipeline::ViewBuffers buffers_;
     gpu::Buffer own_sums_;  // of the view that this rank draws, with several ranks
     uint32_t places_ = 0;  // in the lists of the step's views
+    Traffic traffic_;
 };
 
 }  // namespace ewa::train

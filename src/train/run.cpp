@@ -476,6 +476,7 @@ void Run::finish(std::unique_ptr<Trainer> trainer) {
     if (options().train.exposure) folder_.save_exposures(input_.dataset, input_.split.train, exposures);
     save_checkpoint(*trainer);  // from here on, a kill costs no training
     report_.times = report_times(trainer->step_times());
+    report_.summary.ranks = trainer->rank_figures();
     trainer.reset();  // the evaluation takes its memory
     observer_.on_saved(last_);
 

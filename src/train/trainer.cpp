@@ -4,6 +4,7 @@
 #include "ewa/trainer.h"
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <cmath>
 #include <cstring>
@@ -101,7 +102,7 @@ Gaussians share_of(Gaussians start, const Ranks& ranks) {
 }
 
 /// What rank 0 asks the others to take part in.
-enum class Call : uint64_t { end, wait, step, state, restore, gaussians };
+enum class Call : uint64_t { end, wait, step, state, restore, gaussians, figures };
 
 }  // namespace
 
@@ -131,6 +132,7 @@ struct Trainer::State {
     StepTimes times;  // sums, over `timed_steps` steps for the passes
     int timed_steps = 0;
     std::optional<train::Batch> batch;  // empty: a step has one view
+    uint64_t most_own_bytes = 0;        // of the state that this rank has held after a step
 
     State(std::shared_ptr<gpu::Device> d, const Dataset& dataset, const std::vector<int>& frames,
           const Gaussians& ready, double length, const TrainOptions& o, std::shared_ptr<Ranks> r)
@@ -493,6 +495,9 @@ void Trainer::follow() {
             case Call::gaussians:
                 join_gaussians();
                 break;
+            case Call::figures:
+                join_figures();
+                break;
         }
 }
 
@@ -518,6 +523,11 @@ StepReport Trainer::take_step() {
     const auto end = Clock::now();
     s.report.step = last;
     s.report.splats = s.model.share.all;
+    uint64_t bytes = 0;
+    for (const gpu::Buffer* buffer :
+         {&s.model.params, &s.model.moments1, &s.model.moments2, &s.model.statistics})
+        bytes += buffer->bytes();
+    s.most_own_bytes = std::max(s.most_own_bytes, bytes);
     s.report.seconds += std::chrono::duration<double>(end - start).count();
     s.times.steps += last - first + 1;
     s.times.step += milliseconds(end - start);
@@ -696,6 +706,28 @@ StepTimes Trainer::step_times() const {
     times.refinement /= std::max(1, times.steps);
     for (PassTime& time : times.passes) time.milliseconds /= std::max(1, s.timed_steps);
     return times;
+}
+
+std::vector<RankFigures> Trainer::rank_figures() const {
+    if (state_->ranks->size() == 1) return {};
+    state_->call(Call::figures);
+    return join_figures();
+}
+
+std::vector<RankFigures> Trainer::join_figures() const {
+    const State& s = *state_;
+    const train::Traffic& traffic = s.batch->traffic();
+    const double views = std::max(1, s.times.steps);
+    const std::array<double, 5> own{double(traffic.sent_bytes) / views, traffic.exchange / views,
+                                    traffic.waiting / views, double(s.most_own_bytes),
+                                    double(peak_device_bytes(*s.device))};
+    const std::vector<uint64_t> all = s.ranks->gather(std::bit_cast<std::array<uint64_t, 5>>(own));
+    std::vector<RankFigures> figures;
+    for (size_t i = 0; i < all.size(); i += own.size()) {
+        const auto value = [&](size_t k) { return std::bit_cast<double>(all[i + k]); };
+        figures.push_back({s.ranks->name(int(i / own.size())), value(0), value(1), value(2), value(3), value(4)});
+    }
+    return figures;
 }
 
 std::vector<PlanLine> plan_lines(const Gaussians& start, const TrainOptions& options, bool masks) {

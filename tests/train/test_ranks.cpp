@@ -152,6 +152,33 @@ TEST(Ranks, ARunMayContinueWithAnotherNumberOfThem) {
     }
 }
 
+TEST(Ranks, EachHoldsItsShareOfTheState) {
+    const TrainOptions options = busy(Strategy::adc, 3);
+    for (const int ranks : {1, 3}) {
+        std::vector<RankFigures> figures;
+        uint64_t state = 0;
+        run_ranks(ranks, [&](std::shared_ptr<Ranks> group) {
+            const auto own = open_test_device(false);
+            Trainer trainer(own, capture().dataset, all_frames(capture().dataset), start(), options, group);
+            if (group->rank() != 0) return trainer.follow();
+            while (trainer.steps_done() < 30) trainer.step();
+            figures = trainer.rank_figures();
+            for (const TrainerArray& array : trainer.state().arrays)
+                if (array.name != "origin") state += array.bytes.size();
+        });
+        ASSERT_EQ(figures.size(), ranks == 1 ? 0u : 3u);
+        for (const RankFigures& figure : figures) {
+            EXPECT_LT(figure.own_bytes, 0.4 * double(state));
+            EXPECT_GT(figure.own_bytes, 0.1 * double(state));
+            // A visible splat is 48 bytes one way and 36 back. Two thirds of them go to other ranks.
+            EXPECT_GT(figure.sent_bytes, 84 * 20.0);
+            EXPECT_LT(figure.sent_bytes, 84 * 900.0);
+            EXPECT_GT(figure.exchange, 0);
+            EXPECT_GT(figure.peak_device_bytes, figure.own_bytes);
+        }
+    }
+}
+
 TEST(Ranks, ABatchThatDoesNotDivideTheStepsEndsWithASmallerOne) {
     TrainOptions options = busy(Strategy::none, 7);
     options.steps = 17;
