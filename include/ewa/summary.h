@@ -19,11 +19,11 @@ struct CameraMoves {
 
 /// What a rank of several has exchanged, and what it held. Means a training view.
 struct RankFigures {
-    std::string name;            // e.g. "rank 1 (node7)"
-    double sent_bytes = 0;       // to other ranks
-    double exchange = 0;         // ms, in which data moved
-    double waiting = 0;          // ms, until the other ranks had come as far
-    double own_bytes = 0;        // largest state so far: parameters, moments and statistics of its splats
+    std::string name;       // e.g. "rank 1 (node7)"
+    double sent_bytes = 0;  // to other ranks
+    double exchange = 0;    // ms, in which data moved
+    double waiting = 0;     // ms, until the other ranks had come as far
+    double own_bytes = 0;   // largest state so far: parameters, moments and statistics of its splats
     double peak_device_bytes = 0;
 };
 

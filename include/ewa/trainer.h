@@ -117,7 +117,7 @@ class Trainer {
     double extent() const;                             // the length that rates are relative to, world units
     std::vector<PlanLine> plan() const;                // what the run skips
     StepTimes step_times() const;
-    std::vector<RankFigures> rank_figures() const;     // of every rank; empty for one that is alone
+    std::vector<RankFigures> rank_figures() const;  // of every rank; empty for one that is alone
 
   private:
     struct State;

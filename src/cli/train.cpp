@@ -21,8 +21,8 @@
 #include "ewa/error.h"
 #include "ewa/run.h"
 #include "live/run_folder.h"
-#include "report/chart.h"
 #include "ranks/open.h"
+#include "report/chart.h"
 #include "train/earlier_run.h"
 #include "train/run_options.h"
 #include "train/share_machine.h"
@@ -177,8 +177,9 @@ int run(CLI::App& app, TrainArguments& arguments) {
     check_options(options);  // before the images of a mesh scene are rendered
     note_scene(options);
     if (options.ranks->size() > 1 && !options.scene.empty())
-        throw InputError(options.scene.string() +
-                         ": several ranks train on a dataset; make it first, with ewa dataset or ewa cameras");
+        throw InputError(
+            options.scene.string() +
+            ": several ranks train on a dataset; make it first, with ewa dataset or ewa cameras");
     if (options.resume && arguments.quality.empty() && app.count("--steps") == 0) keep_steps(options);
     if (arguments.check_only) {
         train::check_free(output_folder(options), options);
@@ -196,7 +197,6 @@ int run(CLI::App& app, TrainArguments& arguments) {
     observer.print(result);
     return result.summary.interrupted ? kInterruptedStatus : 0;
 }
-
 
 /// Under mpirun or srun this is one of several processes. If it fails, it ends all.
 int run_rank(CLI::App& app, TrainArguments& arguments) {

@@ -76,7 +76,8 @@ gpu::Buffer levelled(gpu::Device& device, const Model& model, const gpu::Buffer&
     std::vector<std::byte> next(parameter_bytes(has.splats, model.sh_degree));
     size_t i = 0;
     for (const auto& part : parcels.in)
-        for (size_t at = 0; at < part.size(); at += splat, ++i) unpack_splat(&part[at], planes, i, next.data());
+        for (size_t at = 0; at < part.size(); at += splat, ++i)
+            unpack_splat(&part[at], planes, i, next.data());
     gpu::Buffer result =
         parameter_buffer(device, array.name().c_str(), array.texel(), has.splats, model.sh_degree);
     result.upload(std::span<const std::byte>(next));
@@ -88,7 +89,8 @@ gpu::Buffer levelled(gpu::Device& device, const Model& model, const gpu::Buffer&
 Range range_of(uint32_t all, int rank, int ranks) {
     const uint64_t blocks = (uint64_t(all) + shared::PARAM_BLOCK - 1) / shared::PARAM_BLOCK;
     const auto begin = [&](int q) {
-        return uint32_t(std::min<uint64_t>(all, blocks * uint64_t(q) / uint64_t(ranks) * shared::PARAM_BLOCK));
+        return uint32_t(
+            std::min<uint64_t>(all, blocks * uint64_t(q) / uint64_t(ranks) * shared::PARAM_BLOCK));
     };
     return {begin(rank), begin(rank + 1) - begin(rank)};
 }

@@ -134,22 +134,23 @@ void record_reset_opacity(gpu::Recording& recording, passes::PassCache& cache, c
 Refinement refine_mcmc(passes::PassCache& cache, gpu::Executor& executor, Model& model,
                        const FrameBuffers& frame, const McmcRules& rules) {
     gpu::Device& device = cache.device();
-    shared::McmcPush push{.splats = model.splats,
-                          .planes = model.planes(),
-                          .new_splats = 0,
-                          .scan_block = frame.sizes.scan_block,
-                          .dead = 0,
-                          .draws = 0,
-                          .total = 0,
-                          .total_before = 0,
-                          .own_total = 0,
-                          .weight_scale = float(std::min(65535u, 0xffffffffu / std::max(model.share.all, 1u))),
-                          .dead_logit = float(std::log(rules.dead_opacity / (1 - rules.dead_opacity))),
-                          .least_opacity = float(rules.dead_opacity),
-                          .spread = float(rules.spread),
-                          .seed = {uint32_t(rules.seed), uint32_t(rules.seed >> 32)},
-                          .step = rules.step,
-                          .first = model.share.first};
+    shared::McmcPush push{
+        .splats = model.splats,
+        .planes = model.planes(),
+        .new_splats = 0,
+        .scan_block = frame.sizes.scan_block,
+        .dead = 0,
+        .draws = 0,
+        .total = 0,
+        .total_before = 0,
+        .own_total = 0,
+        .weight_scale = float(std::min(65535u, 0xffffffffu / std::max(model.share.all, 1u))),
+        .dead_logit = float(std::log(rules.dead_opacity / (1 - rules.dead_opacity))),
+        .least_opacity = float(rules.dead_opacity),
+        .spread = float(rules.spread),
+        .seed = {uint32_t(rules.seed), uint32_t(rules.seed >> 32)},
+        .step = rules.step,
+        .first = model.share.first};
     Ranks& ranks = *model.share.ranks;
     const size_t own = size_t(ranks.rank());
 

@@ -109,11 +109,10 @@ void record_list(gpu::Recording& recording, passes::PassCache& cache, const Plan
 Sorted record_list_forward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
                            uint32_t splats, const FrameBuffers& frame, const FrameInputs& inputs) {
     recording.fill(frame.counts, 0, 0, sizeof(shared::Counts));
-    cache.get<passes::ReceiveRecords>().record(recording,
-                                               {.records = frame.records,
-                                                .depth_keys = frame.depth_keys[0],
-                                                .tile_counts = frame.tile_counts},
-                                               {.splats = splats, .size = {frame.sizes.width, frame.sizes.height}});
+    cache.get<passes::ReceiveRecords>().record(
+        recording,
+        {.records = frame.records, .depth_keys = frame.depth_keys[0], .tile_counts = frame.tile_counts},
+        {.splats = splats, .size = {frame.sizes.width, frame.sizes.height}});
     return record_picture(recording, cache, plan, splats, frame, inputs);
 }
 

@@ -14,7 +14,7 @@ namespace ewa::pipeline {
 
 struct ViewBuffers {
     gpu::Buffer cameras;  // CameraBlocks, one view after another
-    gpu::Buffer places;   // a word a splat of each view: its place among the lists of all views, or NOT_LISTED
+    gpu::Buffer places;  // a word a splat of each view: its place among the lists of all views, or NOT_LISTED
     gpu::Buffer visible;  // records of a view's list, or of the lists of several views
     gpu::Buffer sums;     // by place: see SUM_FLOATS
 

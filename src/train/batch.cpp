@@ -95,10 +95,10 @@ void Batch::exchange(std::span<const std::span<const std::byte>> out,
 /// Views that are drawn at one time: at most one by each rank. View `first` + k is drawn by rank k.
 struct Batch::Round {
     size_t first = 0, views = 0;
-    std::vector<uint64_t> listed;      // by this rank, of each view
-    std::vector<uint32_t> places;      // of the first of them
-    std::vector<uint64_t> of_own;      // listed by each rank, of the view that this rank draws
-    uint64_t skipped = 0;              // of the last view
+    std::vector<uint64_t> listed;  // by this rank, of each view
+    std::vector<uint32_t> places;  // of the first of them
+    std::vector<uint64_t> of_own;  // listed by each rank, of the view that this rank draws
+    uint64_t skipped = 0;          // of the last view
     bool draws(int rank) const { return size_t(rank) < views; }
     uint64_t own() const { return std::accumulate(of_own.begin(), of_own.end(), uint64_t(0)); }
 };
@@ -118,8 +118,8 @@ void Batch::list(const BatchParts& parts, std::span<const BatchView> views, Roun
         const size_t view = round.first + k;
         reserve(parts, views[view].request, 0);
         gpu::Recording recording(device.limits());
-        record_list(recording, parts.cache, parts.plan, parts.model, parts.frame, views[view].inputs, buffers_,
-                    uint32_t(view), places_, uint32_t(records));
+        record_list(recording, parts.cache, parts.plan, parts.model, parts.frame, views[view].inputs,
+                    buffers_, uint32_t(view), places_, uint32_t(records));
         const shared::Counts counts = run(parts, recording);
         round.places.push_back(places_);
         round.listed.push_back(counts.scan_total);
@@ -196,8 +196,8 @@ shared::Counts Batch::draw_own(const BatchParts& parts, const BatchView& view, c
         const Sorted sorted =
             record_list_forward(recording, parts.cache, parts.plan, splats, parts.frame, view.inputs);
         view.record_loss(recording);
-        record_list_backward(recording, parts.cache, parts.plan, splats, parts.frame, view.inputs, sorted, sums,
-                             alone ? round.places.front() : 0);
+        record_list_backward(recording, parts.cache, parts.plan, splats, parts.frame, view.inputs, sorted,
+                             sums, alone ? round.places.front() : 0);
         const shared::Counts counts = run(parts, recording);
         if (counts.instances <= parts.frame.instance_capacity) return counts;
         parts.instance_capacity = grown_capacity(counts.instances);

@@ -71,7 +71,7 @@ class Batch {
     std::shared_ptr<Ranks> ranks_;
     pipeline::ViewBuffers buffers_;
     gpu::Buffer own_sums_;  // of the view that this rank draws, with several ranks
-    uint32_t places_ = 0;  // in the lists of the step's views
+    uint32_t places_ = 0;   // in the lists of the step's views
     Traffic traffic_;
 };
 

@@ -336,8 +336,7 @@ void Run::after_step(Trainer& trainer, int before) {
         if (refines()) align_test_cameras(gaussians, {});
         evaluation = train::evaluate_views(
             device_, gaussians, input_.dataset, input_.split.test, options().train.render, {},
-            [&] { trainer.keep_waiting(); },
-            [](size_t, const train::RenderedView&, const EvalFrame&) {});
+            [&] { trainer.keep_waiting(); }, [](size_t, const train::RenderedView&, const EvalFrame&) {});
         use_given_cameras();
         observer_.on_evaluation(step, *evaluation);
     }
@@ -499,9 +498,8 @@ RunResult Run::run() {
     start();
     list_settings();
     train::agree(input_.options, settings_, settings_.at("dataset").get<std::string>(), *device_);
-    auto owned =
-        std::make_unique<Trainer>(device_, input_.dataset, input_.split.train,
-                                  std::exchange(input_.start, {}), options().train, options().ranks);
+    auto owned = std::make_unique<Trainer>(device_, input_.dataset, input_.split.train,
+                                           std::exchange(input_.start, {}), options().train, options().ranks);
     Trainer& trainer = *owned;
     report_.plan = plan_of(trainer, input_);
     observer_.on_plan(report_.plan);

@@ -306,7 +306,7 @@ void check_options(const RunOptions& options) {
     if (train.strategy != Strategy::adc && train.strategy != Strategy::automatic &&
         (train.absolute_gradients || train.revised_opacity))
         throw InputError("--absgrad and --revised-opacity are options of --strategy adc");
-    train::check_training(train);
+    train::check_training(train, options.ranks->size());
     if (train.render.points && options.init_opacity != RunOptions().init_opacity)
         throw InputError("--init-opacity is for splats with an opacity, not for --points");
     if (train.refine_focal && !train.refine_poses)

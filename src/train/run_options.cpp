@@ -209,7 +209,8 @@ RunOption nearest_option() {
 RunOption batch_option() {
     RunOption option = number<int>(
         "batch", "B",
-        "Views of an optimisation step. Learning rates grow with its square root. --steps and all other counts of steps "
+        "Views of an optimisation step. Learning rates grow with its square root. --steps and all other "
+        "counts of steps "
         "go on counting views",
         kDecides, [](RunOptions& o) -> int& { return o.train.batch; }, 1, kMostBatch);
     option.before = "1";

@@ -44,7 +44,8 @@ void check_training(const TrainOptions& options, int ranks) {
     if (options.batch > 1 || ranks > 1) {
         const std::string several = ranks > 1 ? "several ranks" : "--batch";
         if (options.refine_poses)
-            throw InputError(several + " and --refine-poses exclude each other: a camera learns from its own step");
+            throw InputError(several +
+                             " and --refine-poses exclude each other: a camera learns from its own step");
         if (options.render.points) throw InputError(several + " and --points exclude each other");
     }
     if (options.exposure && ranks > 1) throw InputError("several ranks and --exposure exclude each other");

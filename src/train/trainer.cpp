@@ -367,11 +367,11 @@ struct Trainer::State {
     train::BatchView view_of(int step, train::ImageCache& seen, int sh_degree) {
         const size_t index = train::frame_of_step(step, images.count(), options.seed);
         const CameraUse camera = seen.camera(index);
-        const FrameInputs inputs{
-            .camera = camera,
-            .background =
-                options.random_background ? random_background(step, options.seed) : options.render.background,
-            .sh_degree = sh_degree};
+        const FrameInputs inputs{.camera = camera,
+                                 .background = options.random_background
+                                                   ? random_background(step, options.seed)
+                                                   : options.render.background,
+                                 .sh_degree = sh_degree};
         const ExposureUse exposure{&exposures, uint32_t(index), float(schedule.exposure_rate(step)),
                                    uint32_t(size_t(step - 1) / images.count() + 1)};
         const auto weight = std::make_shared<double>(1);
@@ -396,8 +396,8 @@ struct Trainer::State {
         const int sh_degree = schedule.degree(first);
         std::vector<train::BatchView> views;
         for (int step = first; step <= last; ++step) views.push_back(view_of(step, seen, sh_degree));
-        const train::BatchParts parts{cache, executor,          plan, model,
-                                      frame, instance_capacity, [this] { add_pass_times(); }};
+        const train::BatchParts parts{
+            cache, executor, plan, model, frame, instance_capacity, [this] { add_pass_times(); }};
         train::BatchReport drawn = batch->draw(parts, views);
         Rates of_step = rates(last);
         of_step.views = uint32_t(views.size());
@@ -671,12 +671,12 @@ Gaussians Trainer::join_gaussians() const {
     if (s.ranks->size() == 1) {
         gaussians = download_model(s.model, s.model.params);
     } else {
-        const auto bytes = s.joined(
-            s.model.params.download<std::byte>(parameter_bytes(s.model.splats, s.model.sh_degree)));
+        const auto bytes =
+            s.joined(s.model.params.download<std::byte>(parameter_bytes(s.model.splats, s.model.sh_degree)));
         if (s.ranks->rank() != 0) return gaussians;
-        gaussians = gaussians_of(
-            s.model, {reinterpret_cast<const float*>(bytes.data()), bytes.size() / sizeof(float)},
-            s.model.share.all);
+        gaussians = gaussians_of(s.model,
+                                 {reinterpret_cast<const float*>(bytes.data()), bytes.size() / sizeof(float)},
+                                 s.model.share.all);
     }
     gaussians.density = state_->plan.kernel == Footprint::density;
     return gaussians;
@@ -725,7 +725,8 @@ std::vector<RankFigures> Trainer::join_figures() const {
     std::vector<RankFigures> figures;
     for (size_t i = 0; i < all.size(); i += own.size()) {
         const auto value = [&](size_t k) { return std::bit_cast<double>(all[i + k]); };
-        figures.push_back({s.ranks->name(int(i / own.size())), value(0), value(1), value(2), value(3), value(4)});
+        figures.push_back(
+            {s.ranks->name(int(i / own.size())), value(0), value(1), value(2), value(3), value(4)});
     }
     return figures;
 }

@@ -85,12 +85,12 @@ void compile_splatting(Compiler& compiler) {
     compiler.compile<passes::CollectVisible>();
     compiler.compile<passes::ReceiveRecords>();
     compiler.compile<passes::SumSlots>({{SPEC_MODE, {0, UPDATE_ABSOLUTE}}});
-    compiler.compile<passes::UpdateViews>({{SPEC_SH_DEGREE, kDegrees},
-                                           {SPEC_KERNEL, kFootprints},
-                                           {SPEC_MODE,
-                                            {0, UPDATE_STATISTICS, packed, packed | UPDATE_STATISTICS,
-                                             packed | UPDATE_REGULARISED,
-                                             packed | UPDATE_STATISTICS | UPDATE_ABSOLUTE}}});
+    compiler.compile<passes::UpdateViews>(
+        {{SPEC_SH_DEGREE, kDegrees},
+         {SPEC_KERNEL, kFootprints},
+         {SPEC_MODE,
+          {0, UPDATE_STATISTICS, packed, packed | UPDATE_STATISTICS, packed | UPDATE_REGULARISED,
+           packed | UPDATE_STATISTICS | UPDATE_ABSOLUTE}}});
     compiler.compile<passes::ScanBlocks>({{SPEC_MODE, {0, SCAN_GATHERED, SCAN_FLAGS}}});
     compiler.compile<passes::ScanTotals>();
     const Values scatter_modes = {0,

@@ -412,7 +412,8 @@ SharedByTests<FrameParts>* const frame_parts = SharedByTests<FrameParts>::add();
 std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     Rig& r = rig();
     const Scene scene = random_scene(3000, 50, SplatKind::ordinary, 61, 47, 2);
-    auto& [model, frame, camera, photo, exposures, motions, views] = frame_parts->get([] { return FrameParts(); });
+    auto& [model, frame, camera, photo, exposures, motions, views] =
+        frame_parts->get([] { return FrameParts(); });
     exposures = pipeline::Exposures(*device(), 3);
     const pipeline::ExposureUse exposure{&exposures, 1, 0.01f, 1};
     motions = pipeline::Motions(*device(), std::vector<pipeline::MotionBasis>(3));

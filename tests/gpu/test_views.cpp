@@ -41,8 +41,7 @@ struct SeenScene {
     reference::Values mean_gradient() const {
         std::vector<reference::ReferenceGradient> all;
         for (size_t v = 0; v < cameras.size(); ++v)
-            all.push_back(
-                reference::loss_gradient(scene.gaussians, cameras[v], targets[v], scene.options));
+            all.push_back(reference::loss_gradient(scene.gaussians, cameras[v], targets[v], scene.options));
         reference::Values sum = all[0].gradient;
         const auto add = [&](auto member) {
             for (size_t v = 1; v < all.size(); ++v)
@@ -194,8 +193,8 @@ TEST_P(ViewBatchGradient, IsTheMeanOfTheViews) {
     // The first moment of the first step is (1 - beta^views) times the gradient.
     Gaussians moments = download_model(step.model, step.model.moments1);
     const double share = 1 - std::pow(shared::ADAM_BETA1, double(views));
-    for (auto* values : {&moments.means, &moments.quaternions, &moments.log_scales, &moments.opacity_logits,
-                         &moments.sh})
+    for (auto* values :
+         {&moments.means, &moments.quaternions, &moments.log_scales, &moments.opacity_logits, &moments.sh})
         for (float& x : *values) x = float(x / share);
     EXPECT_TRUE(splat_gradients_agree(
         moments, seen.mean_gradient(),
@@ -232,12 +231,7 @@ TEST(ViewBatch, AStepFollowsAdamWithTheRulesOfABatch) {
                 const double expected_v = beta2 * old_v[at] + (1 - beta2) * g * g;
                 EXPECT_NEAR(new_v[at], expected_v, 1e-3 * expected_v + 1e-16);
                 const double rates[] = {1e-3, 2e-3, 3e-3, 4e-3, 5e-3, 5e-3, 6e-4};
-                const size_t which = f == 0   ? 0
-                                     : f == 3 ? 1
-                                     : f == 5 ? 2
-                                     : f == 9 ? 3
-                                     : f < 14 ? 4
-                                              : 6;
+                const size_t which = f == 0 ? 0 : f == 3 ? 1 : f == 5 ? 2 : f == 9 ? 3 : f < 14 ? 4 : 6;
                 const double to = rates[which] * std::sqrt(kViews) * (new_m[at] / bias1) /
                                   (std::sqrt(new_v[at] / bias2) + 1e-15 / std::sqrt(kViews));
                 EXPECT_NEAR(before[at] - after[at], to, 2e-6 + 1e-4 * std::abs(to)) << f << " of splat " << i;
@@ -272,7 +266,8 @@ TEST(ViewBatch, AStepOfOneViewHasTheBytesOfTheFusedKernel) {
     for (const bool packed : {false, true})
         for (const Footprint kernel : {Footprint::peak, Footprint::antialias, Footprint::density}) {
             const SeenScene seen(100, 400, 1, SplatKind::mixed, kernel);
-            const PlanRequest request{.render = {}, .statistics = true,
+            const PlanRequest request{.render = {},
+                                      .statistics = true,
                                       .absolute_gradients = packed,
                                       .packed_moments = packed,
                                       .regularised = true};
@@ -321,7 +316,8 @@ TEST(ViewBatch, WhatNoViewSeesMovesByItsMomentsAlone) {
                         batch_rates(rates), 0, kMaxShDegree);
     rig().executor.run(recording);
     const auto after = step.model.moments1.download<float>(m.size());
-    for (size_t i = 0; i < m.size(); ++i) ASSERT_NEAR(after[i], 0.81f * m[i], 1e-6f * std::abs(m[i]) + 1e-38f);
+    for (size_t i = 0; i < m.size(); ++i)
+        ASSERT_NEAR(after[i], 0.81f * m[i], 1e-6f * std::abs(m[i]) + 1e-38f);
 }
 
 }  // namespace

@@ -60,7 +60,8 @@ class ThreadRank : public Ranks {
         meeting_.wait();
         std::vector<uint64_t> all;
         for (const auto& words : meeting_.words) {
-            if (words.size() != own.size()) throw std::logic_error("ranks gather different numbers of values");
+            if (words.size() != own.size())
+                throw std::logic_error("ranks gather different numbers of values");
             all.insert(all.end(), words.begin(), words.end());
         }
         meeting_.wait();

@@ -125,7 +125,8 @@ TEST_P(RanksTrain, TheBytesOfOneRank) {
     TrainOptions options = busy(strategy, batch);
     if (change) change(options);
     const TrainerState alone = trained(options, 1, options.steps);
-    EXPECT_EQ(alone.report.splats == start().size(), strategy == Strategy::none) << "the number of splats should change";
+    EXPECT_EQ(alone.report.splats == start().size(), strategy == Strategy::none)
+        << "the number of splats should change";
     expect_same(trained(options, ranks, options.steps), alone);
 }
 
@@ -213,10 +214,12 @@ TEST(Ranks, AreRefusedWhatTheyCannotDo) {
         }
         return std::string();
     };
-    EXPECT_EQ(message([](TrainOptions& o) { o.exposure = true; }), "several ranks and --exposure exclude each other");
+    EXPECT_EQ(message([](TrainOptions& o) { o.exposure = true; }),
+              "several ranks and --exposure exclude each other");
     EXPECT_EQ(message([](TrainOptions& o) { o.render.points = true; }),
               "several ranks and --points exclude each other");
-    EXPECT_NE(message([](TrainOptions& o) { o.refine_poses = true; }).find("--refine-poses"), std::string::npos);
+    EXPECT_NE(message([](TrainOptions& o) { o.refine_poses = true; }).find("--refine-poses"),
+              std::string::npos);
     TrainOptions options = busy(Strategy::none, 2);
     options.refine_poses = true;
     EXPECT_THROW(trained(options, 1, 1), InputError);

@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+// ewa train on several ranks under mpirun, on four small pictures. Skipped where there is no MPI.
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+
+#include "cli/expect.h"
+#include "ewa/splat_files.h"
+
+namespace {
+
+using namespace ewa::test;
+namespace fs = std::filesystem;
+using Names = std::vector<std::string>;
+
+#ifdef EWA_MPIRUN
+
+/// The processes whose arguments contain this text, except mpirun.
+std::vector<pid_t> processes_with(const std::string& text) {
+    std::vector<pid_t> found;
+    for (const auto& entry : fs::directory_iterator("/proc")) {
+        const std::string name = entry.path().filename();
+        if (name.find_first_not_of("0123456789") != std::string::npos) continue;
+        std::ifstream file(entry.path() / "cmdline");
+        const std::string line((std::istreambuf_iterator<char>(file)), {});
+        if (line.starts_with(EWA_PROGRAM) && line.find(text) != std::string::npos)
+            found.push_back(std::stoi(name));
+    }
+    std::sort(found.begin(), found.end());
+    return found;
+}
+
+class TrainRanks : public testing::Test {
+  protected:
+    void SetUp() override {
+        make_dataset(folder / "data");
+        make_splats(folder / "s.ply", 120);
+    }
+    Names arguments_of(const std::string& data, const std::string& out, const Names& more) {
+        Names arguments{"train",          data,       "-o",     folder / out, "--init", folder / "s.ply",
+                        "--max-splats",   "400",      "--seed", "5",          "--quiet", "--strategy",
+                        "mcmc",           "--batch",  "2",      "--steps",    steps};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return arguments;
+    }
+    Outcome alone(const std::string& out, const Names& more = {}) {
+        return run_ewa(arguments_of(folder / "data", out, more));
+    }
+    /// programs: the arguments of each rank's ewa.
+    Outcome mpirun(const std::vector<Names>& programs, const Names& options = {},
+                   Circumstances circumstances = {}) {
+        Names arguments{"-q", "--oversubscribe", "--bind-to", "none"};
+        arguments.insert(arguments.end(), options.begin(), options.end());
+        for (const Names& program : programs) {
+            if (&program != &programs.front()) arguments.push_back(":");
+            for (const char* word : {"-n", "1", EWA_PROGRAM}) arguments.push_back(word);
+            arguments.insert(arguments.end(), program.begin(), program.end());
+        }
+        circumstances.program = EWA_MPIRUN;
+        circumstances.environment = {{"OMPI_ALLOW_RUN_AS_ROOT", "1"},
+                                     {"OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1"}};
+        return run_ewa(arguments, circumstances);
+    }
+    Outcome ranks(size_t count, const std::string& out, const Names& more = {}, const Names& options = {},
+                  Circumstances circumstances = {}) {
+        const Names program = arguments_of(folder / "data", out, more);
+        return mpirun(std::vector<Names>(count, program), options, std::move(circumstances));
+    }
+    std::string splats(const std::string& out) { return read_file(folder / (out + "/splats.ply")); }
+
+    Folder folder;
+    std::string steps = "120";
+};
+
+TEST_F(TrainRanks, EndWithTheBytesOfOneProcess) {
+    expect_success(alone("one"));
+    expect_success(ranks(2, "two"));
+    EXPECT_EQ(splats("two"), splats("one"));
+    expect_success(ranks(3, "three", {}, {"--mca", "btl", "self,tcp"}));
+    EXPECT_EQ(splats("three"), splats("one"));
+
+    const auto figures = read_json(folder / "three/summary.json")["ranks"];
+    ASSERT_EQ(figures.size(), 3u);
+    for (size_t rank = 0; rank < 3; ++rank) {
+        EXPECT_EQ(figures[rank]["name"].get<std::string>().find("rank " + std::to_string(rank) + " ("), 0u);
+        EXPECT_GT(figures[rank]["sent_bytes_per_view"].get<double>(), 0);
+    }
+    EXPECT_NE(read_file(folder / "three/report.html").find("What the ranks exchanged"), std::string::npos);
+    EXPECT_FALSE(read_json(folder / "one/summary.json").contains("ranks"));
+}
+
+TEST_F(TrainRanks, ContinueWithAnotherNumberAfterAKill) {
+    expect_success(alone("one"));
+    const Names saving{"--save-every", "10"};
+    Circumstances killing;
+    killing.await_file = folder / "o/checkpoint.ewa";
+    killing.then = [&] {
+        const auto found = processes_with(folder / "o");
+        ASSERT_EQ(found.size(), 3u);
+        kill(found.back(), SIGKILL);
+    };
+    EXPECT_NE(ranks(3, "o", saving, {}, killing).status, 0);
+    ASSERT_FALSE(fs::exists(folder / "o/splats.ply") && splats("o") == splats("one"));
+    expect_success(ranks(2, "o", {"--resume"}));
+    EXPECT_EQ(splats("o"), splats("one"));
+}
+
+TEST_F(TrainRanks, SaveOnASignalToTheLauncher) {
+    steps = "4000";
+    Circumstances asking;
+    asking.await_file = folder / "o/checkpoint.ewa";
+    asking.signal = SIGUSR1;
+    const Outcome outcome = ranks(2, "o", {"--save-every", "10"}, {}, asking);
+    EXPECT_EQ(outcome.status, 130) << outcome.err;
+    EXPECT_TRUE(read_json(folder / "o/summary.json")["interrupted"].get<bool>());
+    EXPECT_TRUE(processes_with(folder / "o").empty());
+}
+
+TEST_F(TrainRanks, NameTheOneThatFallsSilent) {
+    steps = "100000";
+    Circumstances stopping;
+    stopping.await_file = folder / "o/checkpoint.ewa";
+    stopping.then = [&] {
+        const auto found = processes_with(folder / "o");
+        ASSERT_EQ(found.size(), 3u);
+        kill(found.back(), SIGSTOP);
+    };
+    const Outcome outcome = ranks(3, "o", {"--save-every", "10", "--rank-timeout", "2"}, {}, stopping);
+    EXPECT_EQ(outcome.status, 1) << outcome.err;
+    EXPECT_NE(outcome.err.find("has not answered for 2 s"), std::string::npos) << outcome.err;
+    for (const pid_t left : processes_with(folder / "o")) kill(left, SIGKILL);
+}
+
+TEST_F(TrainRanks, AreRefusedWithDifferentInputs) {
+    make_dataset(folder / "other", {"0.png", "1.png", "2.png", "9.png"});
+    const Names here = arguments_of(folder / "data", "o", {}), there = arguments_of(folder / "other", "o", {});
+    const Outcome outcome = mpirun({here, there});
+    EXPECT_EQ(outcome.status, 2) << outcome.err;
+    EXPECT_NE(outcome.err.find("has another dataset, or other images or cameras in it than rank 0"),
+              std::string::npos)
+        << outcome.err;
+    EXPECT_FALSE(fs::exists(folder / "o/splats.ply"));
+}
+
+TEST_F(TrainRanks, SayWhichOneFailed) {
+    Names missing = arguments_of(folder / "data", "o", {});
+    missing[1] = folder / "nowhere";
+    const Outcome outcome = mpirun({arguments_of(folder / "data", "o", {}), missing});
+    EXPECT_EQ(outcome.status, 2) << outcome.err;
+    EXPECT_NE(outcome.err.find("ewa train: rank 1 ("), std::string::npos) << outcome.err;
+    EXPECT_NE(outcome.err.find("nowhere"), std::string::npos) << outcome.err;
+
+    const Outcome refused = ranks(2, "o", {"--refine-poses"});
+    EXPECT_EQ(refused.status, 2) << refused.err;
+    EXPECT_NE(refused.err.find("and --refine-poses exclude each other"), std::string::npos)
+        << refused.err;
+}
+
+#endif
+
+}  // namespace
