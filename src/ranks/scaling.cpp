@@ -7,7 +7,7 @@ namespace ewa::ranks {
 namespace {
 
 // Of a visible splat of a view that another rank draws.
-constexpr double kOutBytes = 48 + 8;                   // its record, and what orders it
+constexpr double kOutBytes = 48;                       // its record
 constexpr double kBackBytes = 36, kBackAbsolute = 44;  // the sums of its gradients
 constexpr double kGathers = 2;  // of a step: sizes of the parts, and the state of each rank
 

@@ -211,7 +211,7 @@ RunOption batch_option() {
         "batch", "B",
         "Views of an optimisation step. Learning rates grow with its square root. --steps and all other "
         "counts of steps "
-        "go on counting views",
+        "still count views",
         kDecides, [](RunOptions& o) -> int& { return o.train.batch; }, 1, kMostBatch);
     option.before = "1";
     return option;

@@ -39,9 +39,9 @@ class TrainRanks : public testing::Test {
         make_splats(folder / "s.ply", 120);
     }
     Names arguments_of(const std::string& data, const std::string& out, const Names& more) {
-        Names arguments{"train",          data,       "-o",     folder / out, "--init", folder / "s.ply",
-                        "--max-splats",   "400",      "--seed", "5",          "--quiet", "--strategy",
-                        "mcmc",           "--batch",  "2",      "--steps",    steps};
+        Names arguments{"train",        data,      "-o",     folder / out, "--init",  folder / "s.ply",
+                        "--max-splats", "400",     "--seed", "5",          "--quiet", "--strategy",
+                        "mcmc",         "--batch", "2",      "--steps",    steps};
         arguments.insert(arguments.end(), more.begin(), more.end());
         return arguments;
     }
@@ -135,7 +135,8 @@ TEST_F(TrainRanks, NameTheOneThatFallsSilent) {
 
 TEST_F(TrainRanks, AreRefusedWithDifferentInputs) {
     make_dataset(folder / "other", {"0.png", "1.png", "2.png", "9.png"});
-    const Names here = arguments_of(folder / "data", "o", {}), there = arguments_of(folder / "other", "o", {});
+    const Names here = arguments_of(folder / "data", "o", {}),
+                there = arguments_of(folder / "other", "o", {});
     const Outcome outcome = mpirun({here, there});
     EXPECT_EQ(outcome.status, 2) << outcome.err;
     EXPECT_NE(outcome.err.find("has another dataset, or other images or cameras in it than rank 0"),
@@ -154,8 +155,7 @@ TEST_F(TrainRanks, SayWhichOneFailed) {
 
     const Outcome refused = ranks(2, "o", {"--refine-poses"});
     EXPECT_EQ(refused.status, 2) << refused.err;
-    EXPECT_NE(refused.err.find("and --refine-poses exclude each other"), std::string::npos)
-        << refused.err;
+    EXPECT_NE(refused.err.find("and --refine-poses exclude each other"), std::string::npos) << refused.err;
 }
 
 #endif

@@ -125,7 +125,7 @@ TEST(Scaling, FollowsFromBytesAndMessages) {
     // A quarter of a million visible splats, two thirds of them for other ranks.
     const ViewCost view{.splats = 1e6, .visible = 0.375, .milliseconds = 50};
     const StepCost cost = predict_step(view, kNetwork, 3);
-    EXPECT_DOUBLE_EQ(cost.sent_bytes, 250000 * (56 + 36));
+    EXPECT_DOUBLE_EQ(cost.sent_bytes, 250000 * (48 + 36));
     // Out 14 MB and back 9 MB at 1 MB a ms after the first 3, and two gathers.
     EXPECT_NEAR(cost.exchange_ms, (6 + 11) + (6 + 6) + 2 * 2, 1e-9);
     EXPECT_NEAR(cost.step_ms, 83, 1e-9);
@@ -144,7 +144,7 @@ TEST(Scaling, CountsAMessageForEachFurtherRank) {
     const double away = 1e4 * 3 / 4;
     const auto measured = [](double bytes) { return 3 + (bytes - 1000) / 999000; };
     EXPECT_NEAR(predict_step(view, kNetwork, 4).exchange_ms,
-                measured(away * 56) + 1 + measured(away * 36) + 1 + 2 * 3, 1e-9);
+                measured(away * 48) + 1 + measured(away * 36) + 1 + 2 * 3, 1e-9);
 }
 
 }  // namespace
