@@ -7,6 +7,8 @@
 #include "arrays.h"
 #include "core/typing.h"
 #include "ewa/error.h"
+#include "ewa/splat_edit.h"
+#include "train/run_options.h"
 
 namespace ewa::python {
 
@@ -21,6 +23,68 @@ std::array<float, 3> background_of(nb::handle value) {
     if (!std::all_of(array.data(), array.data() + 3, [](float x) { return std::isfinite(x); }))
         throw InputError("background is not finite");
     return {array.data()[0], array.data()[1], array.data()[2]};
+}
+
+namespace {
+
+/// Throws InputError that suggests a word.
+size_t position_of(const char* name, std::string word, const std::vector<std::string>& words) {
+    if (const std::string problem = core::settle_word(word, words); !problem.empty())
+        throw InputError(std::string(name) + ": " + problem);
+    return size_t(std::ranges::find(words, word) - words.begin());
+}
+
+int whole_number(const char* name, int value, int most) {
+    if (value < 1 || value > most)
+        throw InputError(std::string(name) + " is not from 1 to " + std::to_string(most));
+    return value;
+}
+
+Footprint kernel_of(const LookArguments& arguments, const Splats& splats) {
+    if (arguments.kernel && arguments.antialias) throw InputError("antialias and kernel exclude each other");
+    if (arguments.kernel) return Footprint(position_of("kernel", *arguments.kernel, kernel_words()));
+    if (arguments.points) return footprint_of(arguments.antialias.value_or(false));
+    if (!splats.gaussians.density) return footprint_of(arguments.antialias.value_or(splats.antialiased));
+    if (arguments.antialias.value_or(false))
+        throw InputError("antialias: splats of the density kernel have no such renders");
+    return Footprint::density;
+}
+
+}  // namespace
+
+const std::vector<std::string>& kernel_words() {
+    static const std::vector<std::string> words{"peak", "antialias", "density"};
+    return words;
+}
+
+RenderOptions look_of(const LookArguments& arguments, const Splats& splats) {
+    RenderOptions look;
+    look.kernel = kernel_of(arguments, splats);
+    if (arguments.sh_degree < 0 || arguments.sh_degree > kMaxShDegree)
+        throw InputError("sh_degree is not 0, 1, 2 or 3");
+    look.sh_degree = arguments.sh_degree;
+    look.integrator = Integrator(position_of("integrator", arguments.integrator, {"splat", "ray", "march"}));
+    look.points = arguments.points;
+    if (look.points && look.kernel != Footprint::peak)
+        throw InputError("points and a kernel exclude each other: a sphere has no footprint");
+    if (look.points && look.integrator != Integrator::splat)
+        throw InputError("points and integrator exclude each other: spheres are blended on the image");
+    if (look.integrator != Integrator::splat && look.kernel == Footprint::antialias)
+        throw InputError("integrator: there are no footprints to antialias; kernel=\"peak\" has none");
+    if (arguments.samples && look.integrator != Integrator::march)
+        throw InputError("samples: only integrator=\"march\" takes samples of a ray");
+    if (arguments.nearest && !look.points) throw InputError("nearest is an argument of points=True");
+    if (arguments.samples) look.samples = whole_number("samples", *arguments.samples, kMostSamples);
+    if (arguments.nearest) look.nearest = whole_number("nearest", *arguments.nearest, train::kMostNearest);
+    return look;
+}
+
+const Gaussians& fitted_to(Footprint kernel, const Splats& splats, Gaussians& fitted) {
+    const bool density = kernel == Footprint::density;
+    if (splats.gaussians.density == density) return splats.gaussians;
+    fitted = splats.gaussians;
+    fit_opacities(fitted, density);
+    return fitted;
 }
 
 }  // namespace ewa::python

@@ -5,6 +5,8 @@
 
 #include <array>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "bindings.h"
 #include "ewa/error.h"
@@ -15,16 +17,33 @@ namespace ewa::python {
 /// Three numbers, or a colour as core::parse_colour reads it. Throws InputError.
 std::array<float, 3> background_of(nanobind::handle value);
 
+/// In the order of Footprint.
+const std::vector<std::string>& kernel_words();
+
 inline Footprint footprint_of(bool antialias) {
     return antialias ? Footprint::antialias : Footprint::peak;
 }
 
-/// The kernel of a render or an evaluation. antialias: if given. Throws InputError for antialiased densities.
-inline Footprint footprint_of(std::optional<bool> antialias, const Splats& splats) {
-    if (!splats.gaussians.density) return footprint_of(antialias.value_or(splats.antialiased));
-    if (antialias.value_or(false))
-        throw InputError("antialias: splats of the density kernel have no such renders");
-    return Footprint::density;
-}
+/// How splats are rendered or evaluated, besides the background. Empty values are not given.
+struct LookArguments {
+    std::optional<bool> antialias;
+    std::optional<std::string> kernel;
+    std::string integrator = "splat";
+    std::optional<int> samples;
+    bool points = false;
+    std::optional<int> nearest;
+    int sh_degree = kMaxShDegree;
+};
+
+/// Throws InputError if a value is wrong, or values exclude each other.
+RenderOptions look_of(const LookArguments& arguments, const Splats& splats);
+
+/// The splats with opacities of the kernel. `fitted` holds them if they are not these already.
+const Gaussians& fitted_to(Footprint kernel, const Splats& splats, Gaussians& fitted);
+
+#define EWA_LOOK_TYPES                                                                                      \
+    "antialias: bool | None = None, kernel: typing.Literal['peak', 'antialias', 'density'] | None = None, " \
+    "integrator: typing.Literal['splat', 'ray', 'march'] = 'splat', samples: int | None = None, "           \
+    "points: bool = False, nearest: int | None = None"
 
 }  // namespace ewa::python

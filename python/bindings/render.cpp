@@ -2,6 +2,7 @@
 #include "ewa/renderer.h"
 
 #include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 
 #include <algorithm>
@@ -14,7 +15,6 @@
 #include "core/typing.h"
 #include "device.h"
 #include "ewa/error.h"
-#include "ewa/splat_edit.h"
 #include "options.h"
 
 namespace ewa::python {
@@ -59,20 +59,17 @@ Drawing drawing_of(std::string mode) {
 /// ewa.Renderer: a scene on the device.
 class SceneRenderer {
   public:
-    SceneRenderer(const Splats& splats, std::optional<bool> antialias, int sh_degree)
-        : options_{.kernel = footprint_of(antialias, splats), .sh_degree = sh_degree} {
-        if (sh_degree < 0 || sh_degree > kMaxShDegree) throw InputError("sh_degree is not 0, 1, 2 or 3");
+    SceneRenderer(const Splats& splats, const LookArguments& look) : options_(look_of(look, splats)) {
         const DeviceWork work;
-        renderer_ = OnDevice(std::make_unique<Renderer>(work.device(), splats.gaussians, options_));
+        Gaussians fitted;
+        renderer_ = OnDevice(
+            std::make_unique<Renderer>(work.device(), fitted_to(options_.kernel, splats, fitted), options_));
     }
 
     void replace(const Splats& splats) {
-        const bool density = options_.kernel == Footprint::density;
         const DeviceWork work;
-        if (splats.gaussians.density == density) return renderer_->replace(splats.gaussians);
-        Gaussians fitted = splats.gaussians;
-        fit_opacities(fitted, density);
-        renderer_->replace(fitted);
+        Gaussians fitted;
+        renderer_->replace(fitted_to(options_.kernel, splats, fitted));
     }
 
     Renders render(nb::handle viewmats, nb::handle intrinsics, int width, int height, nb::handle background,
@@ -110,8 +107,11 @@ class SceneRenderer {
 };
 
 Renders render(const Splats& splats, nb::handle viewmats, nb::handle intrinsics, int width, int height,
-               nb::handle background, const std::string& mode, std::optional<bool> antialias, int sh_degree) {
-    return SceneRenderer(splats, antialias, sh_degree)
+               nb::handle background, const std::string& mode, std::optional<bool> antialias,
+               std::optional<std::string> kernel, const std::string& integrator, std::optional<int> samples,
+               bool points, std::optional<int> nearest, int sh_degree) {
+    return SceneRenderer(splats,
+                         {antialias, std::move(kernel), integrator, samples, points, nearest, sh_degree})
         .render(viewmats, intrinsics, width, height, background, mode);
 }
 
@@ -119,14 +119,16 @@ Renders render(const Splats& splats, nb::handle viewmats, nb::handle intrinsics,
     "viewmats: numpy.typing.ArrayLike, Ks: numpy.typing.ArrayLike, width: int, height: int, *, " \
     "background: numpy.typing.ArrayLike | str = (0, 0, 0), "                                     \
     "mode: typing.Literal['color', 'depth', 'count', 'ellipsoids'] = 'color'"
-#define EWA_SCENE_TYPES "antialias: bool | None = None, sh_degree: int = 3"
+#define EWA_SCENE_TYPES EWA_LOOK_TYPES ", sh_degree: int = 3"
 
 constexpr const char* kRenderHelp =
     "Renders through cameras of the OpenCV convention. viewmats [C, 4, 4] map the world to the camera, Ks "
     "[C, 3, 3] are in "
     "pixels, with pixel centres at +0.5. One matrix [4, 4] gives arrays without the first dimension. mode "
     "\"depth\" and \"count\" "
-    "add these arrays. antialias None is as the splats were trained. Ctrl-C ends it after a camera.";
+    "add these arrays. Without antialias and kernel, the kernel is that of the splats. Ctrl-C ends it after "
+    "a "
+    "camera.";
 
 }  // namespace
 
@@ -148,10 +150,19 @@ void bind_render(nb::module_& module) {
                 "[C, H, W, 1], the number of splats blended. For mode \"count\".");
     nb::class_<SceneRenderer>(
         module, "Renderer", "A scene on the device, for more than one call of render(). Threads take turns.")
-        .def(nb::init<const Splats&, std::optional<bool>, int>(), "splats"_a, nb::kw_only(),
-             "antialias"_a = nb::none(), "sh_degree"_a = kMaxShDegree,
-             nb::sig("def __init__(self, splats: Splats, *, " EWA_SCENE_TYPES ") -> None"),
-             "Uploads a copy of the splats.")
+        .def(
+            "__init__",
+            [](SceneRenderer* self, const Splats& splats, std::optional<bool> antialias,
+               std::optional<std::string> kernel, const std::string& integrator, std::optional<int> samples,
+               bool points, std::optional<int> nearest, int sh_degree) {
+                new (self) SceneRenderer(
+                    splats, {antialias, std::move(kernel), integrator, samples, points, nearest, sh_degree});
+            },
+            "splats"_a, nb::kw_only(), "antialias"_a = nb::none(), "kernel"_a = nb::none(),
+            "integrator"_a = "splat", "samples"_a = nb::none(), "points"_a = false, "nearest"_a = nb::none(),
+            "sh_degree"_a = kMaxShDegree,
+            nb::sig("def __init__(self, splats: Splats, *, " EWA_SCENE_TYPES ") -> None"),
+            "Uploads a copy of the splats.")
         .def("replace", &SceneRenderer::replace, "splats"_a,
              "Uploads other splats, with the kernels that there are.")
         .def("render", &SceneRenderer::render, "viewmats"_a, "Ks"_a, "width"_a, "height"_a, nb::kw_only(),
@@ -159,7 +170,8 @@ void bind_render(nb::module_& module) {
              nb::sig("def render(self, " EWA_CAMERA_TYPES ") -> Renders"), kRenderHelp);
     module.def("render", render, "splats"_a, "viewmats"_a, "Ks"_a, "width"_a, "height"_a, nb::kw_only(),
                "background"_a = nb::make_tuple(0, 0, 0), "mode"_a = "color", "antialias"_a = nb::none(),
-               "sh_degree"_a = kMaxShDegree,
+               "kernel"_a = nb::none(), "integrator"_a = "splat", "samples"_a = nb::none(),
+               "points"_a = false, "nearest"_a = nb::none(), "sh_degree"_a = kMaxShDegree,
                nb::sig("def render(splats: Splats, " EWA_CAMERA_TYPES ", " EWA_SCENE_TYPES ") -> Renders"),
                kRenderHelp);
 }

@@ -213,13 +213,19 @@ Training resume(const std::filesystem::path& path, const LoadedDataset& dataset,
 }
 
 Evaluation evaluate_splats(const Splats& splats, const LoadedDataset& dataset, nb::handle frames,
-                           nb::handle background, std::optional<bool> antialias) {
+                           nb::handle background, std::optional<bool> antialias,
+                           std::optional<std::string> kernel, const std::string& integrator,
+                           std::optional<int> samples, bool points, std::optional<int> nearest) {
     std::vector<int> chosen = frames.is_none() ? split_frames(*dataset.dataset, usual_test_every()).test
                                                : frames_of(frames, *dataset.dataset, "frames");
     if (chosen.empty()) throw InputError("frames is empty: there is nothing to evaluate");
-    const RenderOptions options{background_of(background), footprint_of(antialias, splats)};
+    RenderOptions options =
+        look_of({antialias, std::move(kernel), integrator, samples, points, nearest}, splats);
+    options.background = background_of(background);
+    Gaussians fitted;
+    const Gaussians& gaussians = fitted_to(options.kernel, splats, fitted);
     const DeviceWork work;
-    return evaluate(work.device(), splats.gaussians, *dataset.dataset, chosen, options, {}, check_signals);
+    return evaluate(work.device(), gaussians, *dataset.dataset, chosen, options, {}, check_signals);
 }
 
 std::string report_text(const StepReport& report) {
@@ -319,10 +325,11 @@ void bind_train(nb::module_& module) {
     bind_trainer(module);
     module.def(
         "evaluate", evaluate_splats, "splats"_a, "dataset"_a, "frames"_a = nb::none(), nb::kw_only(),
-        "background"_a = nb::make_tuple(0, 0, 0), "antialias"_a = nb::none(),
+        "background"_a = nb::make_tuple(0, 0, 0), "antialias"_a = nb::none(), "kernel"_a = nb::none(),
+        "integrator"_a = "splat", "samples"_a = nb::none(), "points"_a = false, "nearest"_a = nb::none(),
         nb::sig("def evaluate(splats: Splats, dataset: Dataset, frames: collections.abc.Sequence[int] | None "
                 "= None, "
-                "*, background: numpy.typing.ArrayLike | str = (0, 0, 0), antialias: bool | None = None) "
+                "*, background: numpy.typing.ArrayLike | str = (0, 0, 0), " EWA_LOOK_TYPES ") "
                 "-> Evaluation"),
         "Renders frames and compares each with its image: every eighth frame unless given, those that "
         "Trainer leaves "

@@ -140,17 +140,15 @@ void set_background(TrainOptions& options, nb::handle value) {
     options.render.background = options.random_background ? std::array<float, 3>{} : background_of(value);
 }
 
-const std::vector<std::string> kKernelWords{"peak", "antialias", "density"};  // in the order of Footprint
-
 nb::object kernel_word(const TrainOptions& options) {
-    return nb::str(kKernelWords[size_t(options.render.kernel)].c_str());
+    return nb::str(kernel_words()[size_t(options.render.kernel)].c_str());
 }
 
 void set_kernel(TrainOptions& options, nb::handle value) {
     std::string word = nb::cast<std::string>(value);
-    if (const std::string problem = core::settle_word(word, kKernelWords); !problem.empty())
+    if (const std::string problem = core::settle_word(word, kernel_words()); !problem.empty())
         throw InputError(problem);
-    options.render.kernel = Footprint(std::ranges::find(kKernelWords, word) - kKernelWords.begin());
+    options.render.kernel = Footprint(std::ranges::find(kernel_words(), word) - kernel_words().begin());
 }
 
 const std::vector<Special>& specials() {

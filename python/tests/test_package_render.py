@@ -96,6 +96,83 @@ def test_antialias_and_degree():
     assert not np.allclose(ewa.render(full, *camera()).color, ewa.render(flat, *camera()).color, atol=1e-3)
 
 
+def test_kernels_points_and_integrators_are_those_of_the_command_line(tmp_path, program):
+    scene = ewa.Splats.from_points([[0, 0, 0], [0.1, 0, 0.3], [0.4, 0.2, -0.2]], [[1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    ewa.save(tmp_path / "s.ply", scene)
+    data = ewa.Dataset(STILL_LIFE, need_images=False)
+    view = data.viewmats[1], data.Ks[1], data.frames[1].width, data.frames[1].height
+    pictures = []
+    for look in (
+        {},
+        {"kernel": "antialias"},
+        {"kernel": "density"},
+        {"points": True, "nearest": 1},
+        {"points": True},
+        {"integrator": "ray"},
+        {"integrator": "march", "samples": 2},
+        {"integrator": "march", "kernel": "density"},
+    ):
+        words = [word for name, value in look.items() for word in ([f"--{name}"] if value is True else [f"--{name}", value])]
+        program("render", tmp_path / "s.ply", "--cameras", STILL_LIFE, "--frames", "1", "-o", tmp_path, *words)
+        file = ewa.load_image(next(tmp_path.glob("*.png")))
+        color = ewa.render(scene, *view, **look).color
+        assert np.abs(file[..., :3] - np.clip(color, 0, 1)).max() <= 0.5001 / 255, look
+        assert np.array_equal(ewa.Renderer(scene, **look).render(*view).color, color)
+        assert not any(np.array_equal(color, other) for other in pictures), look
+        pictures.append(color)
+
+
+def test_densities_can_be_rendered_as_opacities():
+    opacities = make_splats()
+    densities = make_splats()
+    densities.density = True
+    view = camera()
+    as_densities = ewa.render(opacities, *view, kernel="density").color
+    assert not np.array_equal(as_densities, ewa.render(densities, *view).color)  # their logits are fitted
+    assert np.abs(as_densities - ewa.render(opacities, *view).color).mean() < 0.02
+    assert np.abs(ewa.render(densities, *view, kernel="peak").color - ewa.render(densities, *view).color).mean() < 0.02
+    spheres = ewa.render(densities, *view, points=True).color
+    assert np.array_equal(spheres, ewa.render(opacities, *view, points=True).color)
+
+
+@pytest.mark.parametrize(
+    "look, message",
+    [
+        ({"kernel": "box"}, "kernel: 'box' is not one of peak, antialias, density"),
+        ({"kernel": "peak", "antialias": True}, "antialias and kernel exclude each other"),
+        ({"integrator": "marsh"}, "integrator: 'marsh' is not one of splat, ray, march; did you mean march?"),
+        ({"samples": 4}, 'samples: only integrator="march" takes samples of a ray'),
+        ({"integrator": "march", "samples": 0}, "samples is not from 1 to 4096"),
+        ({"integrator": "march", "samples": 5000}, "samples is not from 1 to 4096"),
+        ({"integrator": "ray", "antialias": True}, "integrator: there are no footprints to antialias"),
+        ({"nearest": 3}, "nearest is an argument of points=True"),
+        ({"points": True, "nearest": 0}, "nearest is not from 1 to 1000"),
+        ({"points": True, "kernel": "density"}, "points and a kernel exclude each other"),
+        ({"points": True, "antialias": True}, "points and a kernel exclude each other"),
+        ({"points": True, "integrator": "ray"}, "points and integrator exclude each other"),
+    ],
+)
+def test_looks_that_exclude_each_other(look, message, still_life):
+    for call in (
+        lambda: ewa.render(make_splats(1), *camera(), **look),
+        lambda: ewa.Renderer(make_splats(1), **look),
+        lambda: ewa.evaluate(make_splats(1), still_life, [0], **look),
+    ):
+        with pytest.raises(ewa.InputError, match=re.escape(message)):
+            call()
+
+
+def test_evaluations_have_the_looks_of_renders(still_life):
+    splats = ewa.Splats.from_points(still_life.points, still_life.point_colors, sh_degree=0)
+    frame = still_life.frames[0]
+    view = still_life.viewmats[0], still_life.Ks[0], frame.width, frame.height
+    image = still_life.images[0][..., :3]
+    for look in ({"points": True}, {"integrator": "march", "samples": 3}, {"kernel": "density"}):
+        color = np.clip(ewa.render(splats, *view, **look).color, 0, 1)
+        psnr = -10 * np.log10(np.mean((color - image) ** 2))
+        assert ewa.evaluate(splats, still_life, [0], **look).psnr == pytest.approx(psnr, abs=1e-3)
+
+
 @pytest.mark.parametrize("background, expected", [("white", [1, 1, 1]), ("#ff0000", [1, 0, 0]), ([0.5, 0, 2], [0.5, 0, 2])])
 def test_backgrounds(background, expected):
     empty = make_splats(2)[:0]

@@ -198,7 +198,6 @@ RunOption points_option() {
 }
 
 RunOption nearest_option() {
-    constexpr int kMostNearest = 1000;
     RunOption option = number<int>(
         "nearest", "K", "With --points: spheres that a pixel blends", kDecides,
         [](RunOptions& o) -> int& { return o.train.render.nearest; }, 1, kMostNearest);

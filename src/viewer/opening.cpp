@@ -11,13 +11,13 @@
 #include "ewa/synthetic_dataset.h"
 #include "io/datasets/refined_cameras.h"
 #include "live/run_folder.h"
+#include "train/run_options.h"
 
 namespace ewa::viewer {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMostNearest = 1000;
 constexpr float kPointOpacity = 3;    // logit
 constexpr float kPointShrink = 1.2f;  // subtracted from the logarithm of a point's size
 
@@ -62,7 +62,7 @@ Look look_of(const live::Run& run) {
     look.points = run.flag("points");
     const auto nearest = run.config.find("nearest");
     if (nearest != run.config.end() && nearest->is_number_integer())
-        look.nearest = std::clamp(nearest->get<int>(), 1, kMostNearest);
+        look.nearest = std::clamp(nearest->get<int>(), 1, train::kMostNearest);
     look.background = core::parse_colour(run.text("background")).value_or(look.background);
     return look;
 }
