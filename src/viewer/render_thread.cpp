@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "ewa/error.h"
+#include "ewa/splat_edit.h"
 #include "scene/camera.h"
 
 namespace ewa::viewer {
@@ -118,12 +119,26 @@ void RenderThread::prepare(const Work& work) {
         device_ = open_();
         report([&](News& news) { news.device = device_info(*device_).name; });
     }
-    if (!scene_ || scene_is_up_) return;
+    if (scene_ && !scene_is_up_) upload(scene_->density);
+}
+
+void RenderThread::upload(bool densities) {
+    std::optional<Gaussians> fitted;
+    if (scene_->density != densities) fit_opacities(fitted.emplace(*scene_), densities);
+    const Gaussians& splats = fitted ? *fitted : *scene_;
+    scene_is_up_ = false;
     if (renderer_)
-        renderer_->replace(*scene_);
+        renderer_->replace(splats);
     else
-        renderer_.emplace(device_, *scene_, RenderOptions{});
+        renderer_.emplace(device_, splats, RenderOptions{});
     scene_is_up_ = true;
+    densities_are_up_ = densities;
+}
+
+/// Opacities are those of the kernel, so that a scene looks about the same with all kernels.
+void RenderThread::fit_to(const Look& look) {
+    const bool densities = look.kernel == Footprint::density;
+    if (!look.points && densities != densities_are_up_) upload(densities);
 }
 
 void RenderThread::carry_out(const Work& work) {
@@ -137,6 +152,7 @@ void RenderThread::carry_out(const Work& work) {
         });
     }
     if (work.full) {
+        fit_to(work.full->look);
         const DrawOptions options{options_of(work.full->look), Drawing::color,
                                   double(work.full->look.splat_scale)};
         const auto full = std::make_shared<const FullRender>(
@@ -156,6 +172,7 @@ std::shared_ptr<const RenderedFrame> RenderThread::draw(const RenderRequest& req
     const auto start = std::chrono::steady_clock::now();
     const Look& look = request.look;
     const Camera camera = downscale(request.camera, request.divisor);
+    fit_to(look);
     const DrawOptions options{options_of(look), drawing_for(look.mode), double(look.splat_scale)};
     auto finished = std::make_shared<RenderedFrame>();
     finished->request = request;
@@ -181,7 +198,9 @@ std::optional<glm::dvec3> RenderThread::point_at(const Probe& probe) {
     const Camera& full = probe.camera;
     const int divisor = std::max(1, std::min(full.width, full.height) / kProbeSide);
     const Camera camera = downscale(full, divisor);
-    const Rendering rendering = renderer_->render(camera, DrawOptions{{}, Drawing::depth, 1});
+    DrawOptions options{{}, Drawing::depth, 1};
+    if (densities_are_up_) options.render.kernel = Footprint::density;
+    const Rendering rendering = renderer_->render(camera, options);
     const int x = std::clamp(int(probe.pixel.x * camera.width / full.width), 0, camera.width - 1);
     const int y = std::clamp(int(probe.pixel.y * camera.height / full.height), 0, camera.height - 1);
     if (!(*rendering.alpha.at(x, y) >= 0.5f)) return std::nullopt;

@@ -107,6 +107,8 @@ class RenderThread {
     void carry_out(const Work& work);
     void fail(const Work& work);
     void prepare(const Work& work);
+    void upload(bool densities);
+    void fit_to(const Look& look);
     std::shared_ptr<const RenderedFrame> draw(const RenderRequest& request, uint64_t scene);
     std::optional<glm::dvec3> point_at(const Probe& probe);
     void report(const std::function<void(News&)>& change);
@@ -118,6 +120,7 @@ class RenderThread {
     std::optional<Renderer> renderer_;
     std::shared_ptr<const Gaussians> scene_;
     bool scene_is_up_ = false;
+    bool densities_are_up_ = false;  // the scene has opacities of Footprint::density
 
     mutable std::mutex mutex_;
     std::condition_variable_any wake_;

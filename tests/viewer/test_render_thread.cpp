@@ -8,6 +8,7 @@
 #include "cli/program.h"
 #include "ewa/error.h"
 #include "ewa/evaluation.h"
+#include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
 #include "support/soon.h"
 #include "viewer/opening.h"
@@ -64,6 +65,31 @@ TEST(RenderThread, DrawsTheSceneItWasGivenLast) {
     EXPECT_EQ(thread.ask_point(request(0).camera, {1, 1}), 2u);
     ASSERT_TRUE(soon([&] { return thread.take_news().points == 2; }));
     EXPECT_FALSE(thread.take_news().point) << "there is nothing in the corner";
+}
+
+TEST(RenderThread, FitsOpacitiesToTheKernel) {
+    RenderThread thread([] { return open_device({}); }, [] {});
+    Gaussians dense = *red_splat();
+    dense.opacity_logits = {2};
+    fit_opacities(dense, true);
+    thread.set_scene(std::make_shared<const Gaussians>(dense));
+    uint64_t serial = 0;
+    const auto red = [&](Footprint kernel) {
+        RenderRequest asked = request(++serial);
+        asked.look.kernel = kernel;
+        thread.ask(asked);
+        EXPECT_TRUE(soon([&] {
+            const auto picture = thread.take_news().picture;
+            return picture && picture->request.serial == serial;
+        }));
+        return int(thread.take_news().picture->picture.rgba[4 * (15 * 40 + 20)]);
+    };
+    // The sigmoid of 2 is 0.88. The density's own logit is another one.
+    const int density = red(Footprint::density), peak = red(Footprint::peak);
+    EXPECT_NEAR(peak, 0.88 * 255, 8);
+    EXPECT_GT(std::abs(density - peak), 2) << "the fit is of the whole footprint, not of its middle";
+    EXPECT_EQ(red(Footprint::density), density) << "the fit is undone";
+    EXPECT_EQ(red(Footprint::peak), peak);
 }
 
 TEST(RenderThread, OpensItsDeviceAgainWhereItFails) {
