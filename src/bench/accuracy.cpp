@@ -8,6 +8,7 @@
 #include "bench/ceiling/ceiling.h"
 #include "bench/device_runs.h"
 #include "core/progress.h"
+#include "ewa/splat_edit.h"
 #include "reference/volume.h"
 #include "shared/constants.h"
 
@@ -85,8 +86,17 @@ Error error_of(const Colors& exact, const Colors& actual) {
 struct Exact {
     const char* name;
     Footprint kernel;
+    Gaussians gaussians;  // with opacities of this meaning
     Colors colors;
 };
+
+/// Both meanings, without their images.
+std::vector<Exact> meanings_of(const Gaussians& gaussians) {
+    std::vector<Exact> all{{"opacity", Footprint::peak, gaussians, {}},
+                           {"density", Footprint::density, gaussians, {}}};
+    for (Exact& one : all) fit_opacities(one.gaussians, one.kernel == Footprint::density);
+    return all;
+}
 
 struct NamedApproximation {
     const char* name;
@@ -108,8 +118,8 @@ bool applies(const NamedApproximation& one, Footprint kernel) {
 }
 
 /// The error of each approximation, at a part of the pixels: that tells their sizes.
-AccuracyReference causes_of(const Exact& exact, const Gaussians& gaussians, const Camera& camera,
-                            const RenderOptions& options, const std::vector<Pixel>& all, bool quiet) {
+AccuracyReference causes_of(const Exact& exact, const Camera& camera, const RenderOptions& options,
+                            const std::vector<Pixel>& all, bool quiet) {
     std::vector<Pixel> pixels;
     Colors right, colors;
     for (size_t i = 0; i < all.size(); i += kCauseStride) {
@@ -122,7 +132,7 @@ AccuracyReference causes_of(const Exact& exact, const Gaussians& gaussians, cons
     // Each is switched on alone. Splatting without one of them is quick, unless splats then overlap.
     HostRays rays(pixels, "switched approximations on", causes.size(), quiet);
     const auto error_with = [&](const Approximations& approximations) {
-        const Volume volume(gaussians, camera, options, approximations);
+        const Volume volume(exact.gaussians, camera, options, approximations);
         rays.evaluate(
             colors, [&](double x, double y) { return volume.exact(x, y); }, approximations.overlap);
         return error_of(right, colors).rms;
@@ -209,10 +219,9 @@ std::vector<Way> ways_of(const std::vector<Exact>& exact, const RenderOptions& o
 }
 
 /// The host's marcher in float64, with few numbers of samples: it is slow.
-report::WorkSeries march_on_host(const Gaussians& gaussians, const Camera& camera,
-                                 const RenderOptions& options, const std::vector<Pixel>& pixels,
-                                 const Exact& exact, bool quiet) {
-    const Volume volume(gaussians, camera, options);
+report::WorkSeries march_on_host(const Camera& camera, const RenderOptions& options,
+                                 const std::vector<Pixel>& pixels, const Exact& exact, bool quiet) {
+    const Volume volume(exact.gaussians, camera, options);
     report::WorkSeries marcher{std::string("march on the host, ") + exact.name, true, {}, false, 6};
     const double share = double(camera.width) * camera.height / double(pixels.size());
     constexpr int kSamples[] = {16, 64, 256};
@@ -275,34 +284,35 @@ Accuracy measure_accuracy(const std::shared_ptr<gpu::Device>& device, const Gaus
     result.pixels = int(pixels.size());
     RenderOptions whole = options;
     whole.sh_degree = kMaxShDegree;
-    std::vector<Exact> exact{{"opacity", Footprint::peak, {}}, {"density", Footprint::density, {}}};
+    std::vector<Exact> exact = meanings_of(gaussians);
     {
         HostRays rays(pixels, "integrated in float64", exact.size(), quiet);
         for (Exact& one : exact) {
             whole.kernel = one.kernel;
-            const Volume volume(gaussians, camera, whole);
+            const Volume volume(one.gaussians, camera, whole);
             result.exact_seconds +=
                 rays.evaluate(one.colors, [&](double x, double y) { return volume.exact(x, y); });
         }
     }
     for (const Exact& one : exact) {
         whole.kernel = one.kernel;
-        result.references.push_back(causes_of(one, gaussians, camera, whole, pixels, quiet));
+        result.references.push_back(causes_of(one, camera, whole, pixels, quiet));
     }
     {
-        const BenchScene scene{gaussians, camera, {}};
         const std::vector<Way> ways = ways_of(exact, options, sh_degree_present(gaussians));
         core::Progress progress("rendered", int(ways.size()), "ways", quiet);
         for (size_t i = 0; i < ways.size(); ++i) {
             const Way& way = ways[i];
             if (result.series.empty() || result.series.back().name != way.series)
                 result.series.push_back(series_of(way, exact));
-            result.series.back().points.push_back(draw(device, scene, way, pixels, exact[way.exact].colors));
+            const Exact& right = exact[way.exact];
+            const BenchScene scene{right.gaussians, camera, {}};
+            result.series.back().points.push_back(draw(device, scene, way, pixels, right.colors));
             progress.update(int(i + 1), way.series + ", " + way.name);
         }
     }
     whole.kernel = exact.front().kernel;
-    result.series.push_back(march_on_host(gaussians, camera, whole, pixels, exact.front(), quiet));
+    result.series.push_back(march_on_host(camera, whole, pixels, exact.front(), quiet));
     set_verdicts(result.series);
     return result;
 }

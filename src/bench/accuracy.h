@@ -38,7 +38,7 @@ struct Accuracy {
     unsigned threads = 0;      // of the host
 };
 
-/// Prints progress, unless it is quiet.
+/// Opacities are fitted to each exact image, as --kernel of ewa render does. Prints progress, unless it is quiet.
 Accuracy measure_accuracy(const std::shared_ptr<gpu::Device>& device, const Gaussians& gaussians,
                           const Camera& camera, const RenderOptions& options, bool quiet);
 

@@ -4,6 +4,12 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <map>
+
+#include "bench/stability/stability.h"
+#include "ewa/splat_edit.h"
+
 namespace ewa::bench {
 namespace {
 
@@ -22,6 +28,70 @@ TEST(Accuracy, APointIsOnTheFrontIfNothingIsFasterAndLessWrong) {
     EXPECT_EQ(series[1].points[2].verdict, "march, opacity: many is faster and less wrong");
     // Points of another exact image are no rivals.
     EXPECT_EQ(series[2].points[0].verdict, "on the front");
+}
+
+TEST(Accuracy, OpacitiesAreFittedToEachExactImage) {
+    // A large splat in front of the camera, whose density has another logit than its opacity.
+    Gaussians densities;
+    densities.resize(1);
+    densities.means = {0, 0, 3};
+    densities.quaternions = {1, 0, 0, 0};
+    densities.log_scales = {-0.5f, -0.5f, -0.5f};
+    densities.opacity_logits = {3};
+    densities.sh = {1, 1, 1};
+    densities.density = true;
+    Gaussians opacities = densities;
+    fit_opacities(opacities, false);
+    ASSERT_NE(opacities.opacity_logits, densities.opacity_logits);
+    const Camera camera{16, 16, 16, 16, 8, 8, glm::dmat3(1), glm::dvec3(0)};
+    const auto device = open_device({});
+    const Accuracy of_densities = measure_accuracy(device, densities, camera, {}, true),
+                   of_opacities = measure_accuracy(device, opacities, camera, {}, true);
+    ASSERT_EQ(of_densities.references.size(), 2u);
+    for (size_t i = 0; i < 2; ++i) {
+        const AccuracyReference &a = of_densities.references[i], &b = of_opacities.references[i];
+        EXPECT_NEAR(a.splatting, b.splatting, 1e-6) << a.name;
+        EXPECT_GT(a.splatting, 1e-4) << a.name;
+    }
+    // One splat has no order. It has a formula only where alpha is not that of a density.
+    for (const AccuracyReference& one : of_opacities.references) {
+        std::map<std::string, const Cause*> causes;
+        for (const Cause& cause : one.causes) causes[cause.name.substr(0, cause.name.find(':'))] = &cause;
+        EXPECT_EQ(causes.contains("formula"), one.name == "opacity");
+        ASSERT_TRUE(causes.contains("order") && causes.contains("low-pass"));
+        EXPECT_LT(causes["order"]->alone, 1e-6) << one.name;
+        EXPECT_NEAR(causes["order"]->without, one.splatting, 1e-9) << one.name;
+        EXPECT_GT(causes["low-pass"]->alone, 1e-4) << one.name;
+        EXPECT_NE(causes["low-pass"]->without, one.splatting) << one.name;
+    }
+    for (const report::WorkSeries& series : of_densities.series) {
+        if (!series.name.starts_with("march, ")) continue;
+        EXPECT_LT(series.points.back().error, 1e-4) << series.name;
+    }
+}
+
+TEST(StabilityVerdict, NamesAllThatIsWrong) {
+    StabilityResult result;
+    result.pixels = 100;
+    result.comparisons = {{"picture", 1e-7, 5e-6, 1}, {"means", 1e-4, 1e-4, 1}};
+    EXPECT_EQ(result.verdict(), "ok");
+    result.pixels_at_threshold = 5;
+    result.comparisons[1].error = std::nan("");
+    EXPECT_EQ(result.verdict(), "5 PIXELS AT A THRESHOLD, WRONG means");
+    result.pixels = 1000;
+    result.finite = false;
+    result.skipped = 3;
+    result.skipped_by_reference = 2;
+    result.comparisons[0].error = 6e-6;
+    EXPECT_EQ(result.verdict(), "NOT FINITE, SKIPPED, the reference 2, WRONG picture, WRONG means");
+}
+
+TEST(Accuracy, AFileOfDensitiesIsJudgedWithItsKernel) {
+    Gaussians gaussians;
+    gaussians.resize(1);
+    EXPECT_EQ(stability_case_of("a", gaussians).options.kernel, Footprint::peak);
+    gaussians.density = true;
+    EXPECT_EQ(stability_case_of("a", gaussians).options.kernel, Footprint::density);
 }
 
 }  // namespace

@@ -417,7 +417,9 @@ StabilityCase stability_case_of(const std::string& name, const Gaussians& gaussi
     const glm::dmat3 rotation = turned(0.3, 0.5);
     const glm::dvec3 eye = 0.5 * (low + high) - glm::transpose(rotation) * glm::dvec3(0, 0, 3 * radius);
     const Camera camera{320, 240, 300, 300, 160, 120, rotation, -(rotation * eye)};
-    return {name, "the scene of this file", gaussians, camera, {}};
+    RenderOptions options;
+    options.kernel = gaussians.density ? Footprint::density : Footprint::peak;
+    return {name, "the scene of this file", gaussians, camera, options};
 }
 
 Image stability_target(int width, int height) {

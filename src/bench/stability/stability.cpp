@@ -281,15 +281,8 @@ std::string stability_line(const StabilityResult& r) {
         text_of("%-24s %6u %6u %5u | %8.1e %8.1e %9.1e %9.1e | %-14s %8.1e %8.1e %9.1e", r.name.c_str(),
                 r.splats, r.drawn, r.skipped, picture.error, picture.bound, picture.condition,
                 r.plain_determinant, worst.of.c_str(), worst.error, worst.bound, worst.condition);
-    line += r.good() ? " | ok" : " |";
-    if (!r.finite) line += " NOT FINITE";
-    if (r.skipped != r.skipped_by_reference)
-        line += text_of(" SKIPPED, the reference %u", r.skipped_by_reference);
-    if (r.too_many_at_threshold())
-        line +=
-            text_of(" %llu PIXELS AT A THRESHOLD", static_cast<unsigned long long>(r.pixels_at_threshold));
-    for (const Comparison& c : r.comparisons)
-        if (!c.good()) line += " WRONG " + c.of;
+    line += " | ";
+    line += r.verdict();
     return line;
 }
 
@@ -367,6 +360,22 @@ void to_json(Json& json, const StabilityTraining& t) {
 
 bool StabilityResult::too_many_at_threshold() const {
     return pixels_at_threshold > std::max(kFewPixels, pixels / kPixelsEach);
+}
+
+std::string StabilityResult::verdict() const {
+    if (good()) return "ok";
+    std::vector<std::string> faults;
+    if (!finite) faults.emplace_back("NOT FINITE");
+    if (skipped != skipped_by_reference)
+        faults.push_back(text_of("SKIPPED, the reference %u", skipped_by_reference));
+    if (too_many_at_threshold())
+        faults.push_back(
+            text_of("%llu PIXELS AT A THRESHOLD", static_cast<unsigned long long>(pixels_at_threshold)));
+    for (const Comparison& c : comparisons)
+        if (!c.good()) faults.push_back("WRONG " + c.of);
+    std::string text;
+    for (const std::string& fault : faults) text += (text.empty() ? "" : ", ") + fault;
+    return text;
 }
 
 bool StabilityResult::good() const {

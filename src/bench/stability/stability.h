@@ -25,7 +25,7 @@ struct StabilityCase {
 /// All cases in the order of their families. Equal on all machines up to the last bits of exp and log.
 std::vector<StabilityCase> stability_cases();
 
-/// A user's scene, seen from a distance at which it fills the image.
+/// A user's scene, seen from a distance at which it fills the image, with the kernel of its opacities.
 StabilityCase stability_case_of(const std::string& name, const Gaussians& gaussians);
 
 /// The target image of the loss, RGB in [0, 1]: smooth waves and noise.
@@ -54,6 +54,7 @@ struct StabilityResult {
     /// More than 4 pixels and than one in 200 are excluded for being close to a threshold.
     bool too_many_at_threshold() const;
     bool good() const;
+    std::string verdict() const;  // "ok", or all that is not
 };
 
 /// The device renders `drawn`, by default the splats of the case. With others, a test sees the bounds fail.
