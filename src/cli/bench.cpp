@@ -206,6 +206,18 @@ int run_accuracy(const BenchArguments& arguments) {
     return 0;
 }
 
+/// Refuses options that the chosen mode would not use.
+void check_modes(const CLI::App& app) {
+    const bool accuracy = app.count("--accuracy") > 0;
+    if (!accuracy && app.count("--svg") > 0) throw InputError("--svg is an option of --accuracy");
+    if (!accuracy && app.count("--splats") > 0)
+        throw InputError("--splats is an option of --accuracy and of --ranks");
+    for (const char* name :
+         {"--stability", "--list", "--large", "--cases", "--check", "--compare", "--results", "--runs"})
+        if (accuracy && app.count(name) > 0)
+            throw InputError(std::string(name) + " and --accuracy exclude each other");
+}
+
 }  // namespace
 
 Action add_bench(CLI::App& app) {
@@ -222,12 +234,13 @@ Action add_bench(CLI::App& app) {
                    "NAME_training.svg beside it")
         ->type_name("FILE");
     add_rank_options(app, arguments->ranks);
-    arguments->options.read_splats = load_splats;
+    arguments->options.read_splats = [](const fs::path& path) { return load_splats(splat_input(path).file); };
     const CLI::Option* steps = app.get_option("--training-steps");
-    return [arguments, steps] {
+    return [&app, arguments, steps] {
         if (arguments->ranks.asked)
             return run_rank_bench(arguments->ranks, arguments->options.scene, arguments->splats,
                                   arguments->options.device, arguments->options.json);
+        check_modes(app);
         if (!arguments->accuracy) {
             check_command_outputs({{"--json", arguments->options.json}}, {});
             return bench::run(arguments->options, {"/proc/self/exe", "bench"});
