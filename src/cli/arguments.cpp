@@ -98,10 +98,11 @@ RenderOptions DrawArguments::options() const {
     render.kernel = settled_kernel(render.kernel, antialias);
     render.sh_degree = sh_degree;
     render.points = points;
-    render.nearest = nearest;
-    train::check_points(render);
+    if (nearest && !points) throw InputError("--nearest is an option of --points");
+    render.nearest = nearest.value_or(render.nearest);
     render.integrator = integrator == "ray"     ? Integrator::ray
                         : integrator == "march" ? Integrator::march
+    train::check_points(render);
                                                 : Integrator::splat;
     if (render.integrator != Integrator::splat && render.kernel == Footprint::antialias)
         throw InputError("--integrator " + integrator + ": there are no footprints to antialias");
@@ -138,7 +139,7 @@ void add_draw_options(CLI::App& app, DrawArguments& arguments) {
            nearest.help)
         ->check(accepted_by(nearest))
         ->type_name(nearest.value)
-        ->default_str(std::to_string(arguments.nearest));
+        ->default_str(std::to_string(RenderOptions().nearest));
     app.add_option("--sh-degree", arguments.sh_degree, "Highest degree of the spherical harmonics")
         ->transform(in_range(0, kMaxShDegree))
         ->type_name("0..3")

@@ -47,7 +47,7 @@ struct DrawArguments {
     bool antialias = false;  // the short form of --kernel antialias
     int sh_degree = kMaxShDegree;
     bool points = false;
-    int nearest = RenderOptions().nearest;
+    std::optional<int> nearest;
     const CLI::Option* kernel_option = nullptr;
     std::string integrator = "splat";
     std::optional<int> samples;

@@ -197,6 +197,8 @@ int run(CLI::App& app, RenderArguments& arguments) {
     std::string of_frames;  // a given option that only a dataset's views have
     for (const char* option : {"--frames", "--test-every", "--downscale", "--exposures"})
         if (app.count(option) > 0) of_frames = option;
+    if (arguments.mode == "depth" && arguments.draw.integrator == "march")
+        throw InputError("--mode depth: the integrator march draws no depth; splat and ray do");
     SplatInput input = splat_input(arguments.splats);
     arguments.splats = input.file;
     if (input.run) use_options_of(*input.run, app);

@@ -74,6 +74,7 @@ void use_options_of(const live::Run& run, CLI::App& app) {
         if (value == run.config.end() || *value == false) continue;
         if (*value == "random") continue;  // evaluated over black
         apply_config_value(app, name, *value, config);
+        if (name == std::string_view("nearest") && app.count("--points") == 0) continue;
     }
 }
 

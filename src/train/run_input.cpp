@@ -309,6 +309,8 @@ void check_options(const RunOptions& options) {
     train::check_training(train, options.ranks->size());
     if (train.render.points && options.init_opacity != RunOptions().init_opacity)
         throw InputError("--init-opacity is for splats with an opacity, not for --points");
+    if (!train.render.points && train.render.nearest != RenderOptions().nearest)
+        throw InputError("--nearest is an option of --points");
     if (train.refine_focal && !train.refine_poses)
         throw InputError("--refine-focal is an option of --refine-poses");
     if (train.refine_poses && train.render.points)

@@ -96,12 +96,17 @@ TEST_F(Runs, PointsExcludeWhatSpheresDoNotHave) {
     const Names drawing{"render", folder / "s.ply", "--cameras", folder / "data", "-o", folder / "r"};
     fails(drawing, {"--kernel", "ewa"}, "--points and --kernel density exclude each other");
     fails(drawing, {"--antialias"}, "--points and --kernel antialias exclude each other");
+    fails(drawing, {"--integrator", "ray"}, "--points and --integrator exclude each other");
     fails(drawing, {"--nearest", "0"}, "'0' is not a whole number from 1 to 1000");
     const Names training{"train", folder / "data", "-o", folder / "t"};
     fails(training, {"--kernel", "antialias"}, "--points and --kernel antialias exclude each other");
     fails(training, {"--strategy", "mcmc"}, "--points needs adc or none");
     fails(training, {"--revised-opacity"}, "--revised-opacity is for splats with an opacity");
     fails(training, {"--init-opacity", "0.5"}, "--init-opacity is for splats with an opacity");
+    fails(training, {"--refine-poses"}, "--refine-poses does not work with --points");
+    expect_failure(run_ewa({"train", folder / "data", "-o", folder / "t", "--nearest", "3"}), 2,
+                   "--nearest is an option of --points");
+    EXPECT_FALSE(fs::exists(folder / "t"));
     expect_success(run_ewa(
         {"grad", folder / "s.ply", folder / "data", "--frame", "1", "--points", "-o", folder / "g.ply"}));
     const Gaussians gradient = load_splats(folder / "g.ply");

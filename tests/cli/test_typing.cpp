@@ -46,6 +46,10 @@ TEST_F(Typed, IntegratorsTakeWhatTheyCanUse) {
                    "--integrator ray: there are no footprints to antialias");
     expect_failure(render({"--integrator", "march", "--mode", "depth"}), 2,
                    "the integrator march draws no depth; splat and ray do");
+    expect_failure(render({"--integrator", "march", "--points"}), 2,
+                   "--points and --integrator exclude each other");
+    expect_failure(render({"--nearest", "8"}), 2, "--nearest is an option of --points");
+    EXPECT_FALSE(std::filesystem::exists(folder / "out"));
     const Outcome drawn = render({"--integrator", "march", "--samples", "4"});
     EXPECT_EQ(drawn.status, 0) << drawn.err;
 }
