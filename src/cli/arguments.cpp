@@ -10,7 +10,6 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
-#include "io/datasets/refined_cameras.h"
 #include "scene/names.h"
 
 namespace ewa::cli {
@@ -102,8 +101,8 @@ RenderOptions DrawArguments::options() const {
     render.nearest = nearest.value_or(render.nearest);
     render.integrator = integrator == "ray"     ? Integrator::ray
                         : integrator == "march" ? Integrator::march
-    train::check_points(render);
                                                 : Integrator::splat;
+    train::check_points(render);
     if (render.integrator != Integrator::splat && render.kernel == Footprint::antialias)
         throw InputError("--integrator " + integrator + ": there are no footprints to antialias");
     if (samples && render.integrator != Integrator::march)
@@ -284,7 +283,9 @@ Views load_views(const ViewArguments& arguments, const std::string& which, int t
         }
     }
     Dataset dataset = load_dataset(folder, {.downscale = arguments.downscale, .masks = arguments.masks});
-    if (!arguments.refined_cameras.empty()) io::use_refined_cameras(dataset, arguments.refined_cameras);
+    io::RefinedUse refined;
+    if (!arguments.refined_cameras.empty())
+        refined = io::use_refined_cameras(dataset, arguments.refined_cameras);
     std::vector<int> frames = select_frames(dataset, which, test_every);
     if (arguments.run_frames != "all") {
         const std::vector<int> used = scene::frames_named(dataset, arguments.run_frames);
@@ -294,7 +295,7 @@ Views load_views(const ViewArguments& arguments, const std::string& which, int t
                              ", and none of these is in the " + which +
                              " split; name DATASET for all of its images");
     }
-    return {std::move(dataset), std::move(frames), std::move(rendered)};
+    return {std::move(dataset), refined, std::move(frames), std::move(rendered)};
 }
 
 }  // namespace ewa::cli

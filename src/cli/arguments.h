@@ -16,6 +16,7 @@
 #include "ewa/gaussians.h"
 #include "ewa/render_options.h"
 #include "ewa/synthetic_dataset.h"
+#include "io/datasets/refined_cameras.h"
 #include "train/run_options.h"
 
 namespace ewa::cli {
@@ -105,6 +106,7 @@ void add_view_options(CLI::App& app, ViewArguments& arguments);
 
 struct Views {
     Dataset dataset;
+    io::RefinedUse refined;                         // of the cameras of a run
     std::vector<int> frames;                        // those that were asked for
     std::unique_ptr<core::TemporaryFolder> folder;  // of the images, or null
 };

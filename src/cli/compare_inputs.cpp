@@ -2,6 +2,7 @@
 #include "cli/compare_inputs.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <map>
@@ -12,6 +13,7 @@
 #include "ewa/renderer.h"
 #include "ewa/splat_files.h"
 #include "image/image_files.h"
+#include "io/datasets/refined_cameras.h"
 #include "report/pictures.h"
 
 namespace ewa::cli {
@@ -49,17 +51,21 @@ struct ImageSide : ComparedSide {
 
 struct SceneSide : ComparedSide {
     /// frames: indices of sides.cameras.frames.
-    SceneSide(const fs::path& splats, const Sides& sides, const std::vector<int>& frames,
-              const DrawArguments& draw, const std::shared_ptr<gpu::Device>& device)
+    /// refined: a cameras.json to draw through; empty: through the dataset's cameras.
+    SceneSide(const fs::path& splats, const fs::path& refined, const Sides& sides,
+              const std::vector<int>& frames, const DrawArguments& draw,
+              const std::shared_ptr<gpu::Device>& device)
         : renderer_(renderer_of(splats, sides.options, draw, device)) {
         side = splats.string();
         is_scene = true;
-        const std::vector<fs::path> stems = report::picture_names(sides.cameras.frames);
+        Dataset cameras = sides.cameras;
+        if (!refined.empty()) io::use_refined_cameras(cameras, refined);
+        const std::vector<fs::path> stems = report::picture_names(cameras.frames);
         const std::set<int> wanted(frames.begin(), frames.end());
         for (int frame = 0; frame < int(stems.size()); ++frame) {
             const fs::path name = stems[size_t(frame)].string() + ".exr";
             (wanted.contains(frame) ? asked : other).push_back(name);
-            cameras_[name] = sides.cameras.frames[size_t(frame)].camera;
+            cameras_[name] = cameras.frames[size_t(frame)].camera;
         }
     }
     std::string place(const fs::path& name) const override {
@@ -155,11 +161,14 @@ ImagePairs pair_one(const ComparedSide& a, const ComparedSide& b) {
 
 void resolve_runs(CLI::App& app, CompareInputs& inputs) {
     std::optional<live::Run> first;
-    for (fs::path* side : {&inputs.a, &inputs.b}) {
-        if (!names_run_with_splats(*side)) continue;
-        const SplatInput input = splat_input(*side);
-        *side = input.file;
+    std::array<std::optional<fs::path>, 2> refined;
+    for (const size_t i : {size_t(0), size_t(1)}) {
+        fs::path& side = i == 0 ? inputs.a : inputs.b;
+        if (!names_run_with_splats(side)) continue;
+        const SplatInput input = splat_input(side);
+        side = input.file;
         if (!first) first = input.run;
+        if (inputs.cameras.empty()) refined[i] = refined_cameras_of(*input.run);
         for (const char* option : {"kernel", "background"})
             if (first->text(option) != input.run->text(option) &&
                 app.get_option("--" + std::string(option))->empty())
@@ -173,6 +182,9 @@ void resolve_runs(CLI::App& app, CompareInputs& inputs) {
                              "--kernel peak");
     }
     if (!first) return;
+    const fs::path of_first = refined[0] ? *refined[0] : refined[1].value_or(fs::path());
+    inputs.refined_a = refined[0].value_or(of_first);
+    inputs.refined_b = refined[1].value_or(of_first);
     if (inputs.cameras.empty()) inputs.cameras = dataset_of(*first);
     use_options_of(*first, app);
 }
@@ -195,8 +207,10 @@ Sides open_sides(const CompareInputs& inputs) {
     sides.cameras = load_cameras_as_trained(inputs.cameras, inputs.downscale);
     const std::vector<int> frames = select_frames(sides.cameras, inputs.frames, inputs.test_every);
     const auto device = open_device(inputs.device);
-    if (scene_a) sides.a = std::make_unique<SceneSide>(inputs.a, sides, frames, inputs.draw, device);
-    if (scene_b) sides.b = std::make_unique<SceneSide>(inputs.b, sides, frames, inputs.draw, device);
+    if (scene_a)
+        sides.a = std::make_unique<SceneSide>(inputs.a, inputs.refined_a, sides, frames, inputs.draw, device);
+    if (scene_b)
+        sides.b = std::make_unique<SceneSide>(inputs.b, inputs.refined_b, sides, frames, inputs.draw, device);
     return sides;
 }
 

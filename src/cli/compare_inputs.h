@@ -38,6 +38,7 @@ struct CompareInputs {
     std::filesystem::path a, b;
     // How splat scenes are rendered.
     std::filesystem::path cameras;
+    std::filesystem::path refined_a, refined_b;  // cameras.json of the run of each side; empty: none
     std::string frames = "all";
     int test_every = 8, downscale = 1;
     DrawArguments draw;
@@ -51,7 +52,8 @@ struct Sides {
 };
 
 /// Replaces folders of training runs by the runs' splats. The first run gives --cameras and the options of
-/// use_options_of, unless they are given. A folder of images stays. Throws InputError, also if two runs differ in
+/// use_options_of, unless they are given. Without --cameras, each run is drawn through its own refined cameras, and
+/// other splats through those of the first run. A folder of images stays. Throws InputError, also if two runs differ in
 /// --kernel or --background.
 void resolve_runs(CLI::App& app, CompareInputs& inputs);
 

@@ -27,14 +27,16 @@ struct EvalArguments {
     int test_every = 8;
 };
 
-report::Json to_json(const Evaluation& evaluation) {
+report::Json to_json(const Evaluation& evaluation, const io::RefinedUse& refined) {
     report::Json frames = report::Json::array();
     for (const EvalFrame& frame : evaluation.frames)
         frames.push_back({{"name", frame.name}, {"psnr", frame.psnr}, {"ssim", frame.ssim}});
-    return {{"psnr", evaluation.psnr},
-            {"ssim", evaluation.ssim},
-            {"frames", frames},
-            {"seconds", evaluation.seconds}};
+    report::Json json{{"psnr", evaluation.psnr},
+                      {"ssim", evaluation.ssim},
+                      {"frames", frames},
+                      {"seconds", evaluation.seconds}};
+    if (refined.used) json["test_cameras_aligned"] = refined.aligned;
+    return json;
 }
 
 int run(const EvalArguments& arguments) {
@@ -44,7 +46,8 @@ int run(const EvalArguments& arguments) {
                           {{"SPLATS", arguments.views.splats}, {"DATASET", arguments.views.dataset}});
     Gaussians gaussians = load_splats(arguments.views.splats);
     arguments.views.draw.match_kernel(gaussians, options);
-    const auto [dataset, frames, folder] = load_views(arguments.views, arguments.split, arguments.test_every);
+    const auto [dataset, refined, frames, folder] =
+        load_views(arguments.views, arguments.split, arguments.test_every);
     check_command_outputs(written, scene::files_of(dataset, "DATASET"));
     const std::vector<Exposure> exposures = exposures_of(arguments.exposures, arguments.run, dataset, frames);
 
@@ -54,10 +57,13 @@ int run(const EvalArguments& arguments) {
         fmt::print("{}  PSNR {:.3f} dB  SSIM {:.5f}\n", core::one_line(frame.name), frame.psnr, frame.ssim);
     if (dataset.missing_images > 0)
         fmt::print("{} missing and skipped\n", core::counted(uint64_t(dataset.missing_images), "image"));
+    if (refined.used)
+        fmt::print("cameras as the run refined them, those of test images {}aligned to these\n",
+                   refined.aligned ? "" : "not ");
     fmt::print("mean of {} ({})  PSNR {:.3f} dB  SSIM {:.5f}  in {:.2f} s\n",
                core::counted(evaluation.frames.size(), "frame"), arguments.split, evaluation.psnr,
                evaluation.ssim, evaluation.seconds);
-    if (!arguments.json.empty()) write_json(arguments.json, to_json(evaluation));
+    if (!arguments.json.empty()) write_json(arguments.json, to_json(evaluation, refined));
     return 0;
 }
 

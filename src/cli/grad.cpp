@@ -45,7 +45,7 @@ int run(const GradArguments& arguments) {
                           {{"SPLATS", arguments.views.splats}, {"DATASET", arguments.views.dataset}});
     Gaussians gaussians = load_splats(arguments.views.splats);
     arguments.views.draw.match_kernel(gaussians, options);
-    const auto [dataset, frames, folder] = load_views(arguments.views, arguments.frame, 0);
+    const auto [dataset, refined, frames, folder] = load_views(arguments.views, arguments.frame, 0);
     if (frames.size() > 1) throw InputError("--frame: '" + arguments.frame + "' is more than one frame");
     check_command_outputs(written, scene::files_of(dataset, "DATASET"));
     const int index = frames.front();

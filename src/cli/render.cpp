@@ -71,8 +71,8 @@ int render_dataset_views(const RenderArguments& arguments) {
     Gaussians gaussians = load_splats(arguments.splats);
     arguments.draw.match_kernel(gaussians, options);
     Dataset dataset = load_cameras_as_trained(arguments.cameras, arguments.downscale);
-    if (arguments.cameras_of_run && !arguments.run->refined_cameras().empty())
-        io::use_refined_cameras(dataset, arguments.run->refined_cameras());
+    const fs::path refined = arguments.cameras_of_run ? refined_cameras_of(*arguments.run) : fs::path();
+    if (!refined.empty()) io::use_refined_cameras(dataset, refined);
     const std::vector<int> frames = select_frames(dataset, arguments.frames, arguments.test_every);
     const std::vector<fs::path> names = report::picture_names(dataset.frames);
     const auto file_of = [&](int frame) {

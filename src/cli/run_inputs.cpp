@@ -6,6 +6,7 @@
 
 #include "cli/config.h"
 #include "core/folders.h"
+#include "core/messages.h"
 #include "core/text.h"
 #include "ewa/error.h"
 #include "io/datasets/image_records.h"
@@ -73,9 +74,17 @@ void use_options_of(const live::Run& run, CLI::App& app) {
         const auto value = run.config.find(name);
         if (value == run.config.end() || *value == false) continue;
         if (*value == "random") continue;  // evaluated over black
-        apply_config_value(app, name, *value, config);
         if (name == std::string_view("nearest") && app.count("--points") == 0) continue;
+        apply_config_value(app, name, *value, config);
     }
+}
+
+fs::path refined_cameras_of(const live::Run& run) {
+    fs::path file = run.refined_cameras();
+    if (file.empty() && run.flag("refine-poses"))
+        core::warn(core::one_line(run.folder.string()) +
+                   ": cameras.json is missing; the dataset's cameras are used, which --refine-poses moved");
+    return file;
 }
 
 void add_exposures_option(CLI::App& app, std::string& exposures) {
@@ -127,7 +136,7 @@ std::optional<live::Run> resolve_views(CLI::App& app, ViewArguments& arguments) 
     if (!own_dataset && !fs::equivalent(arguments.dataset, input.run->dataset, none)) return std::nullopt;
     const std::string frames = input.run->text("frames");
     if (own_dataset && !frames.empty()) arguments.run_frames = frames;
-    arguments.refined_cameras = input.run->refined_cameras();
+    arguments.refined_cameras = refined_cameras_of(*input.run);
     return std::move(input.run);
 }
 

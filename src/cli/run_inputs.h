@@ -38,6 +38,10 @@ std::filesystem::path dataset_of(const live::Run& run);
 /// and the command line does not. Throws InputError for a value that the option refuses.
 void use_options_of(const live::Run& run, CLI::App& app);
 
+/// cameras.json of the run. Empty if its cameras are those of the dataset. Warns if they should be refined, and the file
+/// is missing.
+std::filesystem::path refined_cameras_of(const live::Run& run);
+
 /// --exposures of ewa eval and ewa render.
 void add_exposures_option(CLI::App& app, std::string& exposures);
 

@@ -168,6 +168,8 @@ TEST_F(Runs, EvalRenderAndGradUseTheRefinedCameras) {
         return read_json(folder / "e.json")["psnr"].get<double>();
     };
     EXPECT_NEAR(psnr({run}), summary["test_psnr"], 1e-6);
+    EXPECT_EQ(read_json(folder / "e.json")["test_cameras_aligned"], true);
+    EXPECT_NE(run_ewa({"eval", run}).out.find("those of test images aligned to these"), std::string::npos);
     EXPECT_NEAR(psnr({run, "--split", "train"}), summary["train_psnr"], 1e-6);
     const double unrefined = psnr({run + "/splats.ply", folder / "data", "--test-every", "2"});
     EXPECT_GT(std::abs(unrefined - summary["test_psnr"].get<double>()), 1e-3);
@@ -184,6 +186,18 @@ TEST_F(Runs, EvalRenderAndGradUseTheRefinedCameras) {
         run_ewa({"render", run + "/splats.ply", "--cameras", folder / "data", "-o", folder / "given"}));
     EXPECT_NE(read_file(folder / "refined/1.png"), read_file(folder / "given/1.png"));
 
+    // Its renders are those that compare makes. Other splats are drawn through the same cameras.
+    const auto same = [&](const Names& sides) {
+        Names arguments{"compare", "--json", folder / "c.json"};
+        arguments.insert(arguments.end(), sides.begin(), sides.end());
+        expect_success(run_ewa(arguments));
+        return read_json(folder / "c.json")["identical"].get<bool>();
+    };
+    EXPECT_TRUE(same({run, folder / "refined"}));
+    EXPECT_TRUE(same({folder / "refined", run}));
+    EXPECT_TRUE(same({run, run + "/splats.ply"}));
+    EXPECT_FALSE(same({run, folder / "refined", "--cameras", folder / "data"}));
+
     // The run goes on to the same bytes, and not with other options.
     const auto bytes = read_file(run + "/cameras.json");
     const Outcome other = run_ewa({"train", folder / "data", "-o", run, "--init", folder / "s.ply", "--steps",
@@ -199,6 +213,36 @@ TEST_F(Runs, EvalRenderAndGradUseTheRefinedCameras) {
     EXPECT_FALSE(fs::exists(run + "/cameras/sparse/0/cameras.bin"));
     expect_failure(run_ewa({"train", folder / "data", "-o", folder / "x", "--refine-focal"}), 2,
                    "--refine-focal is an option of --refine-poses");
+}
+
+TEST_F(Runs, RefinedCamerasThatAreWrongAreNamed) {
+    const std::string run = train("run", {"--refine-poses"});
+    const auto cameras = read_json(run + "/cameras.json");
+    const auto with_views = [&](const nlohmann::json& views) {
+        write_file(run + "/cameras.json", nlohmann::json{{"views", views}}.dump());
+        return run_ewa({"eval", run});
+    };
+    // A dataset may have more images than a list of saved views.
+    nlohmann::json many = cameras["views"];
+    for (int i = 0; i < 10001; ++i) many.push_back(many[0]), many.back()["name"] = std::to_string(i);
+    const Outcome eval = with_views(many);
+    expect_success(eval);
+    EXPECT_NE(eval.out.find("those of test images aligned"), std::string::npos);
+    for (auto& view : many) view["aligned"] = false;
+    EXPECT_NE(with_views(many).out.find("those of test images not aligned"), std::string::npos);
+    // Those of another dataset, or of none.
+    for (auto& view : many) view["name"] = "x" + view["name"].get<std::string>();
+    expect_failure(with_views(many), 2, "cameras.json: has no camera of an image of " + (folder / "data"));
+    expect_failure(with_views(nlohmann::json::array()), 2, "cameras.json: has no camera of an image of ");
+    many = cameras["views"];
+    many[1]["fx"] = 0;
+    expect_failure(with_views(many), 2, "cameras.json: view 1: a focal length is not above zero");
+    // Whoever removes the file gets the cameras of the dataset, and is told so.
+    fs::remove(run + "/cameras.json");
+    const Outcome without = run_ewa({"eval", run});
+    EXPECT_EQ(without.status, 0);
+    EXPECT_NE(without.err.find("cameras.json is missing"), std::string::npos) << without.err;
+    EXPECT_EQ(without.out.find("as the run refined them"), std::string::npos);
 }
 
 TEST_F(Runs, WrongExposuresAreNamed) {

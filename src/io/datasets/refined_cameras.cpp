@@ -5,6 +5,8 @@
 #include <nlohmann/json.hpp>
 
 #include "core/json.h"
+#include "core/text.h"
+#include "ewa/error.h"
 #include "io/datasets/view_list.h"
 
 namespace ewa::io {
@@ -24,19 +26,26 @@ void write_refined_cameras(const std::filesystem::path& path, const std::vector<
     core::write_json(path, {{"extent", extent}, {"views", views}});
 }
 
-void use_refined_cameras(Dataset& dataset, const std::filesystem::path& path) {
-    std::map<std::string, Camera> cameras;
-    for (const NamedView& view : read_views(path)) cameras[view.name] = view.camera;
+RefinedUse use_refined_cameras(Dataset& dataset, const std::filesystem::path& path) {
+    std::map<std::string, NamedView> cameras;
+    for (const NamedView& view : read_views(path, kMostCameras)) cameras[view.name] = view;
+    RefinedUse use;
     for (Frame& frame : dataset.frames) {
         const auto found = cameras.find(frame.name);
         if (found == cameras.end()) continue;
-        const Camera& refined = found->second;
+        use.used = true;
+        use.aligned = use.aligned || found->second.aligned;
+        const Camera& refined = found->second.camera;
         Camera& camera = frame.camera;
         camera.rotation = refined.rotation;
         camera.translation = refined.translation;
         camera.fx = refined.fx * (double(camera.width) / refined.width);
         camera.fy = refined.fy * (double(camera.height) / refined.height);
     }
+    if (!use.used && !dataset.frames.empty())
+        throw InputError(core::one_line(path.string()) + ": has no camera of an image of " +
+                         core::one_line(dataset.root.string()));
+    return use;
 }
 
 }  // namespace ewa::io

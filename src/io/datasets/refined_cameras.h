@@ -24,8 +24,13 @@ struct RefinedCamera {
 void write_refined_cameras(const std::filesystem::path& path, const std::vector<RefinedCamera>& cameras,
                            double extent);
 
+struct RefinedUse {
+    bool used = false;
+    bool aligned = false;  // those of test images to their images
+};
+
 /// Gives frames the cameras that the file has under their names, at the frames' own resolution. Other frames keep theirs.
-/// Throws InputError.
-void use_refined_cameras(Dataset& dataset, const std::filesystem::path& path);
+/// Throws InputError, also if the file names none of the frames.
+RefinedUse use_refined_cameras(Dataset& dataset, const std::filesystem::path& path);
 
 }  // namespace ewa::io

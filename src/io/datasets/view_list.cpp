@@ -16,7 +16,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr uint64_t kLargestFile = 16u << 20;  // bytes
+constexpr uint64_t kLargestView = 2048;  // bytes of the file
 constexpr double kRotationTolerance = 1e-6;
 
 std::vector<double> numbers(const Json& object, const char* name, size_t count) {
@@ -59,6 +59,7 @@ NamedView parse_view(const Json& object) {
         camera.translation[row] = translation[size_t(row)];
         view.pivot[row] = pivot[size_t(row)];
     }
+    view.aligned = object.value("aligned", false);
     if (!is_rotation(camera.rotation)) throw InputError("rotation is not orthonormal");
     return view;
 }
@@ -80,12 +81,12 @@ Json camera_json(const std::string& name, const Camera& c) {
             {"translation", {c.translation.x, c.translation.y, c.translation.z}}};
 }
 
-std::vector<NamedView> read_views(const std::filesystem::path& path) {
-    const Json json = core::read_json_file<Json>(path, {.bytes = kLargestFile});
+std::vector<NamedView> read_views(const std::filesystem::path& path, size_t most) {
+    const Json json = core::read_json_file<Json>(path, {.bytes = most * kLargestView});
     if (!json.is_object() || !json.contains("views") || !json["views"].is_array())
         throw InputError(path.string() + ": is not a list of views: expected an object with \"views\"");
-    if (json["views"].size() > kMostViews)
-        throw InputError(path.string() + ": more than " + std::to_string(kMostViews) + " views");
+    if (json["views"].size() > most)
+        throw InputError(path.string() + ": more than " + std::to_string(most) + " views");
     std::vector<NamedView> views;
     for (const Json& entry : json["views"]) {
         const std::string where = path.string() + ": view " + std::to_string(views.size()) + ": ";

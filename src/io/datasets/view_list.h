@@ -17,14 +17,16 @@ namespace ewa::io {
 struct NamedView {
     std::string name;
     Camera camera;
-    glm::dvec3 pivot{0};  // world; the point that the viewer orbits
+    glm::dvec3 pivot{0};   // world; the point that the viewer orbits
+    bool aligned = false;  // see refined_cameras.h
 };
 
 inline constexpr size_t kMostViews = 10000;
+inline constexpr size_t kMostCameras = 100000;  // of a dataset
 
-/// Throws InputError that names the file and the view. Causes are more than kMostViews views, a value that is
+/// Throws InputError that names the file and the view. Causes are more than `most` views, a value that is
 /// missing or not finite, a size out of 1..65536, or a rotation that is not orthonormal to 1e-6.
-std::vector<NamedView> read_views(const std::filesystem::path& path);
+std::vector<NamedView> read_views(const std::filesystem::path& path, size_t most = kMostViews);
 
 /// Name and camera as in the file.
 nlohmann::ordered_json camera_json(const std::string& name, const Camera& camera);
