@@ -90,8 +90,10 @@ Action add_grad(CLI::App& app) {
             },
             ""))
         ->type_name("I|NAME");
-    app.add_option("-o,--output", arguments->output,
-                   "PLY with the properties of a splat file; each holds the gradient dL/d(stored value)")
+    app.add_option(
+           "-o,--output", arguments->output,
+           "PLY with the properties of a splat file; each holds the gradient dL/d(stored value). That of a "
+           "density is by its own logit, not by the opacity that is stored for other programs")
         ->required()
         ->type_name("OUT.ply");
     app.add_option("--json", arguments->json, "Write loss, l1, ssim, frame (index) and name to this file")
