@@ -79,6 +79,9 @@ TEST(Accuracy, OpacitiesAreFittedToEachExactImage) {
         EXPECT_NE(causes["low-pass"]->without, one.splatting) << one.name;
     }
     for (const report::WorkSeries& series : accuracy.series) {
+        if (series.name.starts_with("splatting, ")) {
+            EXPECT_GT(series.points.front().error, series.points.back().error) << "by the cut-off";
+        }
         if (!series.name.starts_with("march, ")) continue;
         EXPECT_LT(series.points.back().error, 1e-4) << series.name;
     }
@@ -89,6 +92,9 @@ TEST(StabilityVerdict, NamesAllThatIsWrong) {
     result.pixels = 100;
     result.comparisons = {{"picture", 1e-7, 5e-6, 1}, {"means", 1e-4, 1e-4, 1}};
     EXPECT_EQ(result.verdict(), "ok");
+    result.skipped = 1;
+    EXPECT_EQ(result.verdict(), "SKIPPED, the reference 0");
+    result.skipped = 0;
     result.pixels_at_threshold = 5;
     result.comparisons[1].error = std::nan("");
     EXPECT_EQ(result.verdict(), "5 PIXELS AT A THRESHOLD, WRONG means");

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "io/datasets/refined_cameras.h"
 #include "io/datasets/view_list.h"
 #include "support/temp_folder.h"
 
@@ -77,6 +78,30 @@ TEST(ViewList, DamageIsRefusedWithItsPlace) {
     refused(with("\"pivot\": [", "\"pivot\": [1,"), "pivot needs 3");
     refused(with("\"rotation\": [", "\"rotation\": [0,0,0, 0,0,0, 0,0,0], \"other\": ["),
             "rotation is not orthonormal");
+    refused(with("\"rotation\": [", "\"rotation\": [1,0,0, 0,1,0, 0,0,-1], \"other\": ["),
+            "rotation is not orthonormal");
+    refused(with("\"name\"", "\"aligned\": 3, \"name\""), "view 1: ");
+}
+
+TEST(RefinedCamerasFile, GivesFramesTheirCamerasAtTheirOwnSize) {
+    const TempFolder folder;
+    RefinedCamera refined{"b.png", "test", some_view().camera, {}, true};
+    write_refined_cameras(folder / "cameras.json", {refined}, 2);
+    Dataset dataset;
+    dataset.frames.resize(2);
+    dataset.frames[0].name = "a.png";
+    dataset.frames[1].name = "b.png";
+    for (Frame& frame : dataset.frames) frame.camera = Camera{64, 12, 1, 2, 3, 4, glm::dmat3(1), {}};
+    EXPECT_TRUE(use_refined_cameras(dataset, folder / "cameras.json").aligned);
+    EXPECT_EQ(dataset.frames[0].camera.fx, 1) << "a frame without a refined camera keeps its own";
+    const Camera& camera = dataset.frames[1].camera;
+    EXPECT_DOUBLE_EQ(camera.fx, 50.01);
+    EXPECT_DOUBLE_EQ(camera.fy, 1.0 / 120);
+    EXPECT_EQ(camera.cx, 3);
+    EXPECT_EQ(camera.translation, refined.camera.translation);
+    EXPECT_EQ(camera.rotation, refined.camera.rotation);
+    dataset.frames.pop_back();
+    EXPECT_THROW(use_refined_cameras(dataset, folder / "cameras.json"), InputError);
 }
 
 }  // namespace
