@@ -3,10 +3,11 @@
 // optical depth in an interval is a difference of its normal distribution, so that none is lost however few intervals there
 // are. Within an interval all splats are mixed.
 //
-// Intervals are dense where light is absorbed. First MARCH_BINS bins are laid over three standard deviations of the ray's
-// optical depth on either side of its mean. With the depth F up to each border of a bin, the intervals then have equal shares
-// of 1 - exp(-F / 2), interpolated within a bin. This is the optimum if an interval's error is proportional to the square of
-// its optical depth and to the light that reaches it.
+// Intervals are dense where light is absorbed. First MARCH_BINS bins are laid over the splats that the ray meets, equal in the
+// logarithm of the view depth: a far splat does not widen the bins of near ones much. For this look a splat is spread evenly, which
+// is quick. With the depth F up to each border of a bin, the intervals then have equal shares of 1 - exp(-F / 2), interpolated
+// within a bin. This is the optimum if an interval's error is proportional to the square of its optical depth and to the light
+// that reaches it.
 // Needs rays.glsl and normal.glsl.
 #ifndef EWA_LIB_MARCH
 #define EWA_LIB_MARCH
@@ -15,7 +16,8 @@ const float FAR = 1e30;  // the last border
 
 // The borders of a ray's intervals.
 struct Placing {
-    float first, step;                 // of the bins
+    float first, last;                 // of the bins; 0 if the ray meets nothing
+    float step;                        // log2 of the ratio of their borders
     float reached[MARCH_BINS + 1u];    // 1 - exp(-F / 2) at their borders
     float slopes[MARCH_BINS];          // bins by that
 };
@@ -69,47 +71,55 @@ uint choose_next(inout uint k, uint end, float top, float bottom, float from, fl
 // For each splat r of the strip whose view depths meet [FROM, TO]; END_SPLATS ends the loop's body.
 #define FOR_EACH_SPLAT(FROM, TO)                                                             \
     for (uint turn = 0u, k = LISTED; turn < end + 1u; ++turn) {                              \
-        if (k != LISTED && k >= end) break;                                                  \
+        if ((k != LISTED && k >= end) || !in_time()) break;                                  \
         const uint count = choose_next(k, end, top, bottom, FROM, TO);                       \
-        for (uint first = 0u; first < count; first += SUBGROUP) {                            \
-            RaySplat own = read_chosen(first, count);                                        \
-            const uint most = min(count - first, SUBGROUP);                                  \
-            [[dont_unroll]] for (uint b = 0; b < most; b += RAY_BLOCK) {                     \
-                [[unroll]] for (uint j = 0; j < RAY_BLOCK; ++j) {                            \
-                    const RaySplat r = shared_ray_splat(own, j);
-#define END_SPLATS } move_down(own); }}}
+        RaySplat own;                                                                        \
+        [[dont_unroll]] for (uint i = 0u; i < count; i += RAY_BLOCK) {                       \
+            if (!in_time()) break;                                                           \
+            next_block(own, i, count);                                                       \
+            [[unroll]] for (uint j = 0; j < RAY_BLOCK; ++j) {                                \
+                const RaySplat r = shared_ray_splat(own, j);
+#define END_SPLATS }}}
 
-// Lists the splats that the strip's rays meet.
-void list_row(uint tile, uint strip, Ray ray) {
-    const float top = strip_top(tile, strip), bottom = top + float(ROW_STEP - 1u);
+// Lists the splats that the strip's rays meet. first, last: the view depths that this lane's ray meets any at, to MARCH_BIN_REACH;
+// NEVER and 0 if it meets none.
+void list_row(uint tile, uint strip, Ray ray, out float first, out float last) {
+    const float top = strip_top(tile, strip), bottom = top + float(ROW_STEP - 1u), near = float(NEAR_PLANE);
     const uint end = tile_starts[tile + 1u];
+    first = NEVER;
+    last = 0.0;
     row_count = 0u;
     listed_to = tile_starts[tile];
+    bool room = true;
+    uint k = listed_to;
     for (uint turn = tile_starts[tile]; turn < end; ++turn) {
-        if (listed_to >= end || row_count + CHOSEN_MOST + PEEK * SUBGROUP > ROW_MOST) break;
-        const uint count = choose(listed_to, end, top, bottom, float(NEAR_PLANE), NEVER);
-        for (uint first = 0u; first < count; first += SUBGROUP) {
-            RaySplat own = read_chosen(first, count);
-            const uint most = min(count - first, SUBGROUP);
-            [[dont_unroll]] for (uint b = 0; b < most; b += RAY_BLOCK) {
-                [[unroll]] for (uint j = 0; j < RAY_BLOCK; ++j) {
-                    const RaySplat r = shared_ray_splat(own, j);
-                    const Passing p = pass_by(r, ray);
-                    const float reach = p.depth > 0.0 ? float(MARCH_REACH) / p.sharpness : 0.0;
-                    const float from = subgroup_min(p.depth > 0.0 ? p.m.middle - reach : NEVER);
-                    const float to = subgroup_max(p.depth > 0.0 ? p.m.middle + reach : -NEVER);
-                    if (from <= to && to > float(NEAR_PLANE)) {
-                        if (LANE == 0u) {
-                            row[row_count] = r.at;
-                            row_from[row_count] = from;
-                            row_to[row_count] = to;
-                        }
-                        ++row_count;
+        if (k >= end || !in_time()) break;
+        const uint count = choose(k, end, top, bottom, near, NEVER);
+        RaySplat own;
+        [[dont_unroll]] for (uint i = 0u; i < count; i += RAY_BLOCK) {
+            if (!in_time()) break;
+            next_block(own, i, count);
+            [[unroll]] for (uint j = 0; j < RAY_BLOCK; ++j) {
+                const RaySplat r = shared_ray_splat(own, j);
+                const Passing p = pass_by(r, ray);
+                const float sigma = p.depth > 0.0 ? 1.0 / p.sharpness : 0.0;
+                const float from = subgroup_min(p.depth > 0.0 ? p.m.middle - float(MARCH_REACH) * sigma : NEVER);
+                const float to = subgroup_max(p.depth > 0.0 ? p.m.middle + float(MARCH_REACH) * sigma : -NEVER);
+                const bool met = p.depth > 0.0 && p.m.middle + float(MARCH_BIN_REACH) * sigma > near;
+                first = met ? min(first, max(p.m.middle - float(MARCH_BIN_REACH) * sigma, near)) : first;
+                last = met ? max(last, p.m.middle + float(MARCH_BIN_REACH) * sigma) : last;
+                if (room && from <= to && to > near) {
+                    if (LANE == 0u) {
+                        row[row_count] = r.at;
+                        row_from[row_count] = from;
+                        row_to[row_count] = to;
                     }
+                    ++row_count;
                 }
-                move_down(own);
             }
         }
+        listed_to = room ? k : listed_to;
+        room = room && row_count + CHOSEN_MOST + PEEKED <= ROW_MOST;
     }
     subgroupMemoryBarrierShared();
     subgroupBarrier();
@@ -117,38 +127,25 @@ void list_row(uint tile, uint strip, Ray ray) {
 
 Placing place_intervals(uint tile, uint strip, Ray ray, uint samples) {
     Placing placing;
-    placing.first = float(NEAR_PLANE);
     placing.step = 0.0;
-    [[unroll]] for (uint b = 0u; b <= MARCH_BINS; ++b) placing.reached[b] = 1.0;
-    list_row(tile, strip, ray);
-    if (samples == 1u) return placing;
-    const float top = strip_top(tile, strip), bottom = top + float(ROW_STEP - 1u);
-    const uint end = tile_starts[tile + 1u];
-    const float near = float(NEAR_PLANE);
-    // Sums relative to a splat of the ray: the deviation may be far smaller than the depth.
-    float origin = -1.0, sum = 1e-30, sum1 = 0.0, sum2 = 0.0;
-    FOR_EACH_SPLAT(near, NEVER)
-        const Passing p = pass_by(r, ray);
-        const float weight = p.depth * (1.0 - share_before(p, near));
-        const float at = max(p.m.middle, near);
-        origin = origin < 0.0 && weight > 0.0 ? at : origin;
-        const float by = at - origin, sigma = weight > 0.0 ? 1.0 / p.sharpness : 0.0;
-        sum += weight;
-        sum1 += weight > 0.0 ? weight * by : 0.0;
-        sum2 += weight > 0.0 ? weight * (by * by + sigma * sigma) : 0.0;
-    END_SPLATS
-    const float mean = sum1 / sum, deviation = sqrt(max(0.0, sum2 / sum - mean * mean));
-    placing.first = max(near, origin + mean - 3.0 * deviation);
-    placing.step = max(origin + mean + 3.0 * deviation - placing.first, 0.0) / float(MARCH_BINS);
     [[unroll]] for (uint b = 0u; b <= MARCH_BINS; ++b) placing.reached[b] = 0.0;
+    list_row(tile, strip, ray, placing.first, placing.last);
+    if (samples == 1u || subgroupAll(placing.last == 0.0)) return placing;
+    const float top = strip_top(tile, strip), bottom = top + float(ROW_STEP - 1u), near = float(NEAR_PLANE);
+    const uint end = tile_starts[tile + 1u];
+    placing.first = placing.last > 0.0 ? placing.first : 1.0;
+    placing.step = placing.last > 0.0 ? log2(placing.last / placing.first) / float(MARCH_BINS) : 0.0;
+    float at[MARCH_BINS + 1u];
+    [[unroll]] for (uint b = 0u; b <= MARCH_BINS; ++b) at[b] = placing.first * exp2(placing.step * float(b));
+    float before = 0.0;  // the eye
     FOR_EACH_SPLAT(near, NEVER)
+        // A splat's depth is spread evenly over as long a way as has the same standard deviation.
         const Passing p = pass_by(r, ray);
-        const float before = share_before(p, near);
-        [[unroll]] for (uint b = 1u; b < MARCH_BINS; ++b)
-            placing.reached[b] += p.depth * (share_before(p, placing.first + placing.step * float(b)) - before);
-        placing.reached[MARCH_BINS] += p.depth * (1.0 - before);
+        const float slope = p.depth * p.sharpness * 0.28867513, none = 0.5 * p.depth - slope * p.m.middle;
+        before += clamp(slope * near + none, 0.0, p.depth);
+        [[unroll]] for (uint b = 1u; b <= MARCH_BINS; ++b) placing.reached[b] += clamp(slope * at[b] + none, 0.0, p.depth);
     END_SPLATS
-    [[unroll]] for (uint b = 1u; b <= MARCH_BINS; ++b) placing.reached[b] = 1.0 - exp(-0.5 * placing.reached[b]);
+    [[unroll]] for (uint b = 1u; b <= MARCH_BINS; ++b) placing.reached[b] = 1.0 - exp(-0.5 * max(placing.reached[b] - before, 0.0));
     [[unroll]] for (uint b = 0u; b < MARCH_BINS; ++b)
         placing.slopes[b] = 1.0 / max(placing.reached[b + 1u] - placing.reached[b], 1e-12);
     return placing;
@@ -163,7 +160,7 @@ float border_of(Placing placing, uint j, uint samples) {
     [[unroll]] for (uint b = 0u; b < MARCH_BINS; ++b) {
         bins += clamp((wanted - placing.reached[b]) * placing.slopes[b], 0.0, 1.0);
     }
-    return placing.first + placing.step * bins;
+    return placing.first * exp2(placing.step * bins);
 }
 
 // Intervals that are evaluated together, in registers.

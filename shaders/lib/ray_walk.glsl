@@ -4,20 +4,17 @@
 #ifndef EWA_LIB_RAY_WALK
 #define EWA_LIB_RAY_WALK
 
-// Holds the `count` splats of the lanes that count on this lane's ray and are from `start` on.
-void hold_batch(inout RayOrder o, RaySplat own, uint count, Ray ray, float start, uint start_at) {
-    [[dont_unroll]] for (uint first = 0; first < min(count, SUBGROUP); first += RAY_BLOCK) {
-        [[unroll]] for (uint j = 0; j < RAY_BLOCK; ++j) {
-            const RaySplat r = shared_ray_splat(own, j);
-            const Meeting m = meet(r, ray);
-            const float alpha = alpha_of_depth(m.depth);
-            const bool counts = T > 0.0 && alpha > 0.0 && m.middle > float(NEAR_PLANE) &&
-                                (m.middle > start || (m.middle == start && r.at >= start_at));
-            const bool late = counts && m.middle >= o.bound;
-            o.redo = late ? min(o.redo, r.at) : o.redo;
-            hold(o, counts && !late ? m.middle : NEVER, alpha, r.at);
-        }
-        move_down(own);
+// Holds the splats of the block that count on this lane's ray and are from `start` on.
+void hold_block(inout RayOrder o, RaySplat own, Ray ray, float start, uint start_at) {
+    [[unroll]] for (uint j = 0; j < RAY_BLOCK; ++j) {
+        const RaySplat r = shared_ray_splat(own, j);
+        const Meeting m = meet(r, ray);
+        const float alpha = alpha_of_depth(m.depth);
+        const bool counts = T > 0.0 && alpha > 0.0 && m.middle > float(NEAR_PLANE) &&
+                            (m.middle > start || (m.middle == start && r.at >= start_at));
+        const bool late = counts && m.middle >= o.bound;
+        o.redo = late ? min(o.redo, r.at) : o.redo;
+        hold(o, counts && !late ? m.middle : NEVER, alpha, r.at);
     }
 }
 
@@ -40,23 +37,23 @@ void walk_rays(uint tile, uint strip, Ray ray) {
         uint k = begin;
         bool done = false;
         for (uint turn = begin; turn < end; ++turn) {
-            if (k >= end || done) break;
+            if (k >= end || done || !in_time()) break;
             const uint count = choose(k, end, top, bottom, 0.0, NEVER);
-            for (uint first = 0u; first < count && !done; first += SUBGROUP) {
-                const RaySplat own = read_chosen(first, count);
+            RaySplat own;
+            [[dont_unroll]] for (uint i = 0u; i < count; i += RAY_BLOCK) {
+                if (done || !in_time()) break;
+                next_block(own, i, count);
                 const float to_come = subgroupShuffle(own.bend.w, 0u);
                 // The splats are held as long as there is room: lanes then blend more of them at a time.
-                if (subgroupAll(o.depths[HELD / 2u] == NEVER)) {
-                } else {
-                    blend_held(o, to_come);
-                }
-                hold_batch(o, own, count - first, ray, start, start_at);
+                const bool room = subgroupAll(o.depths[HELD / 2u] == NEVER);
+                if (!room) blend_held(o, to_come);
+                hold_block(o, own, ray, start, start_at);
                 done = subgroupAll(T <= 0.0 || o.bound <= to_come);
             }
         }
         blend_held(o, NEVER);
         const bool more = T > 0.0 && o.bound < NEVER;
-        if (subgroupAll(!more)) break;
+        if (subgroupAll(!more) || !in_time()) break;
         start = more ? o.bound : NEVER;
         start_at = o.bound_at;
         begin = subgroup_min(more ? o.redo : end);

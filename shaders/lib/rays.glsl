@@ -65,8 +65,20 @@ RaySplat shared_ray_splat(RaySplat own, uint j) {
 
 // Splats that are evaluated in one unrolled block. Between blocks the lanes' splats move down by as many lanes: shuffles from
 // a constant lane are fast on a CPU, and what is unrolled stays small.
+#ifdef EWA_TEXEL_BUFFERS
+const uint RAY_BLOCK = SUBGROUP < 8u ? SUBGROUP : 8u;
+#else
 const uint RAY_BLOCK = SUBGROUP < 4u ? SUBGROUP : 4u;
-void move_down(inout RaySplat own) { own = shared_ray_splat(own, (LANE + RAY_BLOCK) % SUBGROUP); }
+#endif
+
+// Turns of all loops over splats. A driver may end an invocation's loops, silently: lavapipe does after 65,535 turns. So they
+// end a little earlier, and the host hears of it.
+const uint TURNS_MOST = 60000u;
+uint turns = 0u;
+bool in_time() { return ++turns <= TURNS_MOST; }
+void report_turns() {
+    if (turns > TURNS_MOST && LANE == 0u) atomicAdd(counts.unfinished, 1u);
+}
 
 Meeting meet(RaySplat r, Ray ray) {
     Meeting m;
@@ -106,7 +118,7 @@ uint choose(inout uint k, uint end, float top, float bottom, float from, float t
     subgroupBarrier();  // the last ones have been read
     uint count = 0u;
     for (; k < end; k += PEEKED) {
-        if (count >= CHOSEN_MOST) break;
+        if (count >= CHOSEN_MOST || !in_time()) break;
         [[unroll]] for (uint b = 0u; b < PEEK; ++b) {
             const uint at = k + b * SUBGROUP + LANE;
             const uint splat = splats[min(at, end - 1u)];
@@ -125,11 +137,14 @@ uint choose(inout uint k, uint end, float top, float bottom, float from, float t
     return count;
 }
 
-// The splat that this lane reads of those from `first` on. Beyond the last, one whose depth is 0.
-RaySplat read_chosen(uint first, uint count) {
-    RaySplat own = read_ray_splat(chosen[min(first + LANE, count - 1u)]);
-    own.shape.w = first + LANE < count ? own.shape.w : 0.0;
-    return own;
+// Before the block of chosen splats that begins at i: lane j of the block has splat i + j. Beyond the last, one whose depth is 0.
+void next_block(inout RaySplat own, uint i, uint count) {
+    if (i % SUBGROUP == 0u) {
+        own = read_ray_splat(chosen[min(i + LANE, count - 1u)]);
+        own.shape.w = i + LANE < count ? own.shape.w : 0.0;
+    } else {
+        own = shared_ray_splat(own, (LANE + RAY_BLOCK) % SUBGROUP);
+    }
 }
 
 float subgroup_min(float x) {

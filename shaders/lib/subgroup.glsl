@@ -18,11 +18,14 @@ uint met(uint x, uint lane) {
     return meeting[SUBGROUP_INDEX * SUBGROUP + lane];
 }
 float met(float x, uint lane) { return uintBitsToFloat(met(floatBitsToUint(x), lane)); }
+// Without a loop over the lanes: lavapipe ends an invocation's loops after 65,535 iterations of all together.
 bool all_met(bool x) {
-    bool all = true;
-    met(uint(x), 0u);
-    for (uint lane = 0u; lane < SUBGROUP; ++lane) all = all && meeting[SUBGROUP_INDEX * SUBGROUP + lane] != 0u;
-    return all;
+    barrier();
+    meeting[gl_LocalInvocationID.x] = 1u;
+    barrier();
+    if (!x) meeting[SUBGROUP_INDEX * SUBGROUP] = 0u;
+    barrier();
+    return meeting[SUBGROUP_INDEX * SUBGROUP] != 0u;
 }
 #define subgroupShuffle(X, OTHER) met(X, OTHER)
 #define subgroupShuffleXor(X, MASK) met(X, LANE ^ (MASK))

@@ -16,7 +16,9 @@ layout(set = 0, binding = 1, scalar) readonly buffer Splats { uint splats[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer TileStarts { uint tile_starts[]; };
 layout(set = 0, binding = 3, scalar) writeonly buffer Planes { float planes[]; };
 TEXELS(4, rays);
-layout(push_constant, scalar) uniform Push { BlendPush push; };
+layout(set = 0, binding = 6, scalar) buffer CountsBlock { Counts counts; };
+layout(push_constant, scalar) uniform Push { RayPush ray_push; };
+#define push ray_push.blend
 #include "lib/tile.glsl"
 #include "lib/rays.glsl"
 const uint HELD = 16u;  // splats that a lane holds
@@ -29,7 +31,7 @@ vec3 color = vec3(0.0);
 void blend_held(inout RayOrder o, float to_come) {
     for (uint turn = 0u; turn < HELD; ++turn) {
         const bool next = T > 0.0 && o.depths[0] < NEVER && o.depths[0] <= to_come;
-        if (subgroupAll(!next)) break;
+        if (subgroupAll(!next) || !in_time()) break;
         const vec4 shown = fetch(records, RECORD_TEXELS * splats[next ? o.instances[0] : 0u] + 2u);
         if (next) {
             bool blended;
@@ -50,6 +52,7 @@ void main() {
     const bool inside = p.x < push.image.size[0] && p.y < push.image.size[1];
     T = inside ? 1.0 : -1.0;
     walk_rays(tile, gl_WorkGroupID.z, ray_through(vec2(p) + 0.5));
+    report_turns();
     if (inside) {
         const uint at = p.y * push.image.stride + p.x;
         const float left = abs(T);

@@ -18,6 +18,7 @@ layout(set = 0, binding = 3, scalar) readonly buffer Planes { float planes[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer ImageGradient { float image_gradient[]; };
 layout(set = 0, binding = 5, scalar) buffer Slots { vec4 slots[]; };
 TEXELS(6, rays);
+layout(set = 0, binding = 8, scalar) buffer CountsBlock { Counts counts; };
 layout(push_constant, scalar) uniform Push { RayPush ray_push; };
 #define push ray_push.blend
 #include "lib/tile.glsl"
@@ -34,7 +35,7 @@ Ray own_ray;
 void blend_held(inout RayOrder o, float to_come) {
     for (uint turn = 0u; turn < HELD * SUBGROUP; ++turn) {
         const bool next = T > 0.0 && o.depths[0] < NEVER && o.depths[0] <= to_come;
-        if (subgroupAll(!next)) break;
+        if (subgroupAll(!next) || !in_time()) break;
         // The nearest of the lanes' next splats: in the lanes' common order, each is added once.
         const float nearest = subgroup_min(next ? o.depths[0] : NEVER);
         const uint at = subgroup_min(next && o.depths[0] == nearest ? o.instances[0] : 0xffffffffu);
@@ -70,4 +71,5 @@ void main() {
     rest = dot(gradient, color_of(at));
     own_ray = ray_through(vec2(p) + 0.5);
     walk_rays(tile, strip, own_ray);
+    report_turns();
 }

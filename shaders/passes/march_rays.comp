@@ -15,6 +15,7 @@ layout(set = 0, binding = 1, scalar) readonly buffer Splats { uint splats[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer TileStarts { uint tile_starts[]; };
 layout(set = 0, binding = 3, scalar) writeonly buffer Planes { float planes[]; };
 TEXELS(4, rays);
+layout(set = 0, binding = 6, scalar) buffer CountsBlock { Counts counts; };
 layout(push_constant, scalar) uniform Push { RayPush ray_push; };
 #define push ray_push.blend
 #include "lib/tile.glsl"
@@ -36,7 +37,7 @@ void main() {
     float T = 1.0;
     vec3 color = vec3(0.0);
     for (uint begin = 0u; begin < ray_push.samples; begin += CHUNK) {
-        const bool open = inside && T > float(MARCH_STOP) && placing.reached[MARCH_BINS] > 0.0;
+        const bool open = inside && T > float(MARCH_STOP) && placing.last > 0.0;
         if (subgroupAll(!open)) break;
         float from, to;
         march_chunk(tile, strip, ray, placing, begin, ray_push.samples, open, from, to);
@@ -45,6 +46,7 @@ void main() {
             T *= exp(-depths[i]);
         }
     }
+    report_turns();
     if (inside) {
         const uint at = p.y * push.image.stride + p.x;
         planes[PLANE_R * push.image.plane_floats + at] = color.r + T * push.background[0];

@@ -19,6 +19,7 @@ layout(set = 0, binding = 3, scalar) readonly buffer Planes { float planes[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer ImageGradient { float image_gradient[]; };
 layout(set = 0, binding = 5, scalar) buffer Slots { vec4 slots[]; };
 TEXELS(6, rays);
+layout(set = 0, binding = 8, scalar) buffer CountsBlock { Counts counts; };
 layout(push_constant, scalar) uniform Push { RayPush ray_push; };
 #define push ray_push.blend
 #include "lib/tile.glsl"
@@ -73,7 +74,7 @@ void main() {
     const vec3 gradient = gradient_of(at);
     float T = 1.0, rest = dot(gradient, color_of(at));
     for (uint begin = 0u; begin < ray_push.samples; begin += CHUNK) {
-        const bool open = inside && T > float(MARCH_STOP) && placing.reached[MARCH_BINS] > 0.0;
+        const bool open = inside && T > float(MARCH_STOP) && placing.last > 0.0;
         if (subgroupAll(!open)) break;
         float from, to;
         march_chunk(tile, strip, ray, placing, begin, ray_push.samples, open, from, to);
@@ -86,4 +87,5 @@ void main() {
         }
         add_chunk(tile, strip, ray, open, from, to);
     }
+    report_turns();
 }

@@ -27,7 +27,8 @@ EWA_REAL(TRANSMITTANCE_STOP, 1e-4);
 EWA_REAL(MARCH_DEPTH_MIN, 1e-5);  // a smaller optical depth of the whole ray is skipped
 EWA_REAL(MARCH_REACH, 4.5);       // standard deviations along a ray; only 7e-6 of a splat is beyond
 EWA_REAL(MARCH_STOP, 1e-7);       // behind this transmittance, intervals need not be evaluated
-EWA_UINT(MARCH_BINS, 16u);        // of the first look at a ray, by which its intervals are placed
+EWA_REAL(MARCH_BIN_REACH, 3.0);   // the same, of the first look at a ray
+EWA_UINT(MARCH_BINS, 32u);        // of the first look at a ray, by which its intervals are placed
 
 // Splats drawn as solids, for a look at the structure of a scene.
 EWA_REAL(ELLIPSOID_REACH, 2.0);    // radius in standard deviations

@@ -227,6 +227,7 @@ struct Counts {
     float squared;           // mean (x - y)^2, both clamped to [0, 1]
     uint limited_steps;      // steps of a mean, quaternion or scale that were shortened
     uint visible;            // splats that reach a tile; counted with PROJECT_DEBUG
+    uint unfinished;         // strips of tiles with more splats than rays can walk
     // Not cleared by a frame that may begin before the host has read the counts of the one before. Once a frame
     // has too many instances, this is 1, later frames report 2^32 - 1 instances, and no pass changes the model.
     uint overflowed;

@@ -11,7 +11,7 @@ namespace ewa::shared {
 // The scalar block layout packs these structs without padding, and so does C++.
 static_assert(sizeof(CameraBlock) == 4 * (9 + 9 + 3 + 3 + 8 + 4 + 4));
 static_assert(offsetof(CameraBlock, size) == 4 * (9 + 9 + 3 + 3 + 8 + 4));
-static_assert(sizeof(Counts) == 40 && offsetof(Counts, l1) == 16);
+static_assert(sizeof(Counts) == 44 && offsetof(Counts, l1) == 16);
 static_assert(sizeof(ProjectPush) == 12 && sizeof(SortPush) == 16 && sizeof(ScanPush) == 8);
 static_assert(sizeof(ViewBlock) == 80 && sizeof(ViewsPush) == 32 && sizeof(HarmonicsPush) == 16);
 static_assert(sizeof(ScanTotalsPush) == 12 && sizeof(EmitPush) == 32 && sizeof(TileStartsPush) == 8);

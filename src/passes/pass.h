@@ -69,13 +69,6 @@ struct PerTile : OneSubgroup<shared::BlendPush> {
     static Groups groups(const KernelConfig& config, const Push& push) { return tile_groups(config, push); }
 };
 
-inline const shared::BlendPush& blend_of(const shared::BlendPush& push) {
-    return push;
-}
-inline const shared::BlendPush& blend_of(const shared::RayPush& push) {
-    return push.blend;
-}
-
 /// Strips of a tile, in each of which a lane has one pixel.
 inline uint32_t strips_of(const KernelConfig& config) {
     return config.tile_width * config.tile_height / config.subgroup;
@@ -89,10 +82,9 @@ struct StripPerTile : OneSubgroup<shared::RayPush> {
 };
 
 /// One subgroup for each strip of a tile.
-template <class P>
-struct PerStrip : OneSubgroup<P> {
-    static Groups groups(const KernelConfig& config, const P& push) {
-        const Groups tiles = tile_groups(config, blend_of(push));
+struct PerStrip : OneSubgroup<shared::RayPush> {
+    static Groups groups(const KernelConfig& config, const Push& push) {
+        const Groups tiles = tile_groups(config, push.blend);
         return {tiles[0], tiles[1], strips_of(config)};
     }
 };

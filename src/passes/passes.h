@@ -233,32 +233,37 @@ struct BlendPointsBackward {
     gpu::BufferPart records, splats, tile_starts, planes, image_gradient, slots;
 };
 
+/// What the passes along rays read and write. They add to Counts.unfinished.
+struct AlongRays {
+    using Work = PerStrip;
+    gpu::BufferPart records, splats, tile_starts, planes, rays, camera, counts;
+};
+
 /// Blends the splats of every ray in their order along it. Variant: SPEC_KERNEL, SPEC_MODE (BLEND_COLOR, BLEND_DEPTH).
-struct BlendRays {
+struct BlendRays : AlongRays {
     static constexpr char shader[] = "blend_rays";
-    using Work = PerStrip<shared::BlendPush>;
-    gpu::BufferPart records, splats, tile_starts, planes, rays, camera;
 };
 
 /// Marches along every ray, in intervals. Variant: SPEC_KERNEL, SPEC_MODE (intervals evaluated together).
-struct MarchRays {
+struct MarchRays : AlongRays {
     static constexpr char shader[] = "march_rays";
-    using Work = PerStrip<shared::RayPush>;
-    gpu::BufferPart records, splats, tile_starts, planes, rays, camera;
 };
 
-/// Gradient of BlendRays in a strip of each tile, added to the slot of every (splat, tile) instance. Variant: SPEC_KERNEL.
-struct BlendRaysBackward {
+/// What the gradients of passes along rays read and write, in a strip of each tile. They add to the slot of every
+/// (splat, tile) instance, and to Counts.unfinished.
+struct AlongRaysBackward {
+    using Work = StripPerTile;
+    gpu::BufferPart records, splats, tile_starts, planes, image_gradient, slots, rays, camera, counts;
+};
+
+/// Gradient of BlendRays. Variant: SPEC_KERNEL.
+struct BlendRaysBackward : AlongRaysBackward {
     static constexpr char shader[] = "blend_rays_backward";
-    using Work = StripPerTile;
-    gpu::BufferPart records, splats, tile_starts, planes, image_gradient, slots, rays, camera;
 };
 
-/// Gradient of MarchRays in a strip of each tile, added to the slot of every (splat, tile) instance. Variant: as of MarchRays.
-struct MarchRaysBackward {
+/// Gradient of MarchRays. Variant: as of MarchRays.
+struct MarchRaysBackward : AlongRaysBackward {
     static constexpr char shader[] = "march_rays_backward";
-    using Work = StripPerTile;
-    gpu::BufferPart records, splats, tile_starts, planes, image_gradient, slots, rays, camera;
 };
 
 /// Adds the slots of each splat, and writes the gradient of its parameters. Variant: SPEC_SH_DEGREE, SPEC_KERNEL.

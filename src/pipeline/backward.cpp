@@ -175,14 +175,15 @@ void record_rays_backward(gpu::Recording& recording, const passes::Pass<Backward
     recording.fill(frame.slots, 0, 0, frame.sizes.slots);
     for (uint32_t strip = 0; strip < passes::strips_of(backward.config); ++strip)
         backward.record(recording,
-                        {.records = frame.records,
-                         .splats = *sorted.splats,
-                         .tile_starts = frame.tile_starts,
-                         .planes = frame.planes,
-                         .image_gradient = frame.image_gradient,
-                         .slots = frame.slots,
-                         .rays = frame.rays,
-                         .camera = camera_part(inputs)},
+                        {{.records = frame.records,
+                          .splats = *sorted.splats,
+                          .tile_starts = frame.tile_starts,
+                          .planes = frame.planes,
+                          .image_gradient = frame.image_gradient,
+                          .slots = frame.slots,
+                          .rays = frame.rays,
+                          .camera = camera_part(inputs),
+                          .counts = frame.counts}},
                         {.blend = blend, .samples = inputs.samples, .strip = strip});
 }
 

@@ -72,34 +72,23 @@ void record_project_rays(gpu::Recording& recording, passes::PassCache& cache, co
                 {.splats = model.splats, .planes = model.planes(), .log_scale_shift = 0});
 }
 
-void record_integrate(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
-                      const FrameBuffers& frame, const FrameInputs& inputs) {
-    const shared::BlendPush push = blend_push(cache.config(), frame, inputs.background);
-    const gpu::BufferPart camera = camera_part(inputs);
-    if (plan.integrator == Integrator::ray)
-        cache
-            .get<passes::BlendRays>({{shared::SPEC_KERNEL, uint32_t(plan.kernel)},
-                                     {shared::SPEC_MODE, kBlendModes[size_t(plan.drawing)]}})
-            .record(recording,
-                    {.records = frame.records,
-                     .splats = frame.instance_splats[1],
-                     .tile_starts = frame.tile_starts,
-                     .planes = frame.planes,
-                     .rays = frame.rays,
-                     .camera = camera},
-                    push);
-    else
-        cache
-            .get<passes::MarchRays>({{shared::SPEC_KERNEL, uint32_t(plan.kernel)},
-                                     {shared::SPEC_MODE, march_chunk(inputs.samples)}})
-            .record(recording,
-                    {.records = frame.records,
-                     .splats = frame.instance_splats[1],
-                     .tile_starts = frame.tile_starts,
-                     .planes = frame.planes,
-                     .rays = frame.rays,
-                     .camera = camera},
-                    {.blend = push, .samples = inputs.samples, .strip = 0});
+/// Integration along rays: passes::BlendRays or MarchRays.
+template <class Integration>
+void record_integrate_as(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
+                         const FrameBuffers& frame, const FrameInputs& inputs, uint32_t mode) {
+    cache
+        .get<Integration>({{shared::SPEC_KERNEL, uint32_t(plan.kernel)}, {shared::SPEC_MODE, mode}})
+        .record(recording,
+                {{.records = frame.records,
+                  .splats = frame.instance_splats[1],
+                  .tile_starts = frame.tile_starts,
+                  .planes = frame.planes,
+                  .rays = frame.rays,
+                  .camera = camera_part(inputs),
+                  .counts = frame.counts}},
+                {.blend = blend_push(cache.config(), frame, inputs.background),
+                 .samples = inputs.samples,
+                 .strip = 0});
 }
 
 /// The buffer of splats in depth order.
@@ -223,7 +212,12 @@ Sorted record_picture(gpu::Recording& recording, passes::PassCache& cache, const
     record_tile_lists(recording, cache, plan.gradients, splats, frame);
     passes::Constants variant{{shared::SPEC_MODE, kBlendModes[size_t(plan.drawing)]}};
     if (plan.rays()) {
-        record_integrate(recording, cache, plan, frame, inputs);
+        if (plan.integrator == Integrator::ray)
+            record_integrate_as<passes::BlendRays>(recording, cache, plan, frame, inputs,
+                                                   kBlendModes[size_t(plan.drawing)]);
+        else
+            record_integrate_as<passes::MarchRays>(recording, cache, plan, frame, inputs,
+                                                   march_chunk(inputs.samples));
     } else if (plan.points()) {
         variant.push_back({shared::SPEC_NEAREST, plan.nearest});
         record_blend_as<passes::BlendPoints>(recording, cache, frame, inputs, variant);

@@ -264,6 +264,13 @@ uint32_t first_capacity(size_t splats) {
     return uint32_t(std::min<size_t>(std::max<size_t>(2 * splats, 4096), 1u << 24));
 }
 
+void check_rays_finished(const shared::Counts& counts) {
+    if (counts.unfinished > 0)
+        throw RunError(
+            "too many splats on one ray to integrate along it: take --integrator splat, fewer --samples, or fewer "
+            "splats");
+}
+
 uint32_t grown_capacity(uint32_t needed) {
     constexpr uint32_t kMost = 0xe0000000u;
     if (needed > kMost)

@@ -103,6 +103,9 @@ uint32_t first_capacity(size_t splats);
 /// The next capacity if a frame needs `needed`. Throws RunError beyond what an image can have.
 uint32_t grown_capacity(uint32_t needed);
 
+/// Throws RunError if the rays of a tile met more splats than one invocation may loop over.
+void check_rays_finished(const shared::Counts& counts);
+
 /// Runs a frame, with more capacity each time, until its instances fit. record: fills a recording.
 template <class Record>
 shared::Counts run_until_it_fits(passes::PassCache& cache, gpu::Executor& executor, FrameBuffers& frame,
@@ -114,7 +117,10 @@ shared::Counts run_until_it_fits(passes::PassCache& cache, gpu::Executor& execut
         frame.record_counts(recording);
         executor.run(recording, true);
         const shared::Counts counts = frame.read_counts();
-        if (counts.instances <= frame.instance_capacity) return counts;
+        if (counts.instances <= frame.instance_capacity) {
+            check_rays_finished(counts);
+            return counts;
+        }
         request.instances = grown_capacity(counts.instances);
     }
 }

@@ -17,6 +17,11 @@ double share_below(double y) {
     return 0.5 * std::erfc(-y * std::numbers::sqrt2 / 2);
 }
 
+/// The same of an even distribution with the same standard deviation.
+double spread_below(double y) {
+    return std::clamp(0.5 + y / std::sqrt(12), 0.0, 1.0);
+}
+
 double normal_density(double y) {
     return std::exp(-0.5 * y * y) / std::sqrt(2 * std::numbers::pi);
 }
@@ -112,23 +117,21 @@ std::vector<double> Rays::borders(int x, int y) const {
     constexpr uint32_t kBins = shared::MARCH_BINS;
     const double near = shared::NEAR_PLANE;
     const std::vector<Met> line = met(x, y, shared::MARCH_DEPTH_MIN);
-    double sum = 0, sum1 = 0, sum2 = 0;
+    double first = INFINITY, last = 0;
     for (const Met& m : line) {
-        const double weight = m.depth * share_below((m.middle - near) * m.sharpness);
-        const double at = std::max(m.middle, near);
-        sum += weight;
-        sum1 += weight * at;
-        sum2 += weight * (at * at + 1 / (m.sharpness * m.sharpness));
+        const double reach = shared::MARCH_BIN_REACH / m.sharpness;
+        if (!(m.middle + reach > near)) continue;
+        first = std::min(first, std::max(m.middle - reach, near));
+        last = std::max(last, m.middle + reach);
     }
-    if (!(sum > 0)) return {};
-    const double mean = sum1 / sum, deviation = std::sqrt(std::max(0.0, sum2 / sum - mean * mean));
-    const double first = std::max(near, mean - 3 * deviation), step = (mean + 3 * deviation - first) / kBins;
+    if (!(last > 0)) return {};
+    const double step = std::log(last / first) / kBins;
     double reached[kBins + 1] = {};
     for (uint32_t b = 1; b <= kBins; ++b) {
-        for (const Met& m : line) {
-            const double below = b == kBins ? 1 : share_below((first + step * b - m.middle) * m.sharpness);
-            reached[b] += m.depth * (below - share_below((near - m.middle) * m.sharpness));
-        }
+        const double at = first * std::exp(step * b);
+        for (const Met& m : line)
+            reached[b] += m.depth * (spread_below((at - m.middle) * m.sharpness) -
+                                     spread_below((near - m.middle) * m.sharpness));
         reached[b] = -std::expm1(-0.5 * reached[b]);
     }
     std::vector<double> borders{near};
@@ -138,7 +141,7 @@ std::vector<double> Rays::borders(int x, int y) const {
         for (uint32_t b = 0; b < kBins; ++b)
             bins +=
                 std::clamp((wanted - reached[b]) / std::max(reached[b + 1] - reached[b], 1e-12), 0.0, 1.0);
-        borders.push_back(first + step * bins);
+        borders.push_back(first * std::exp(step * bins));
     }
     borders.push_back(INFINITY);
     return borders;
