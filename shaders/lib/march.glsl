@@ -33,8 +33,7 @@ Passing pass_by(RaySplat r, Ray ray) {
     Passing p;
     p.m = meet(r, ray);
     p.depth = p.m.depth >= float(MARCH_DEPTH_MIN) ? p.m.depth : 0.0;
-    // |b| at the mean: sqrt(2) / (rho z).
-    p.sharpness = p.depth > 0.0 ? 1.4142135623730951 * p.m.root / (r.bend.z * r.color.w) : 0.0;
+    p.sharpness = p.depth > 0.0 ? r.along * p.m.root : 0.0;
     p.m.middle = p.depth > 0.0 ? p.m.middle : 0.0;
     return p;
 }
@@ -56,6 +55,7 @@ uint choose_next(inout uint k, uint end, float top, float bottom, float from, fl
     subgroupBarrier();  // the last ones have been read
     uint count = 0u;
     for (uint i = 0u; i < row_count; i += SUBGROUP) {
+        if (!in_time()) break;
         const uint at = min(i + LANE, ROW_MOST - 1u);
         const bool keep = i + LANE < row_count && row_from[at] <= to && row_to[at] >= from;
         const uint rank = subgroup_inclusive_sum(keep ? 1u : 0u);
@@ -71,7 +71,7 @@ uint choose_next(inout uint k, uint end, float top, float bottom, float from, fl
 // For each splat r of the strip whose view depths meet [FROM, TO]; END_SPLATS ends the loop's body.
 #define FOR_EACH_SPLAT(FROM, TO)                                                             \
     for (uint turn = 0u, k = LISTED; turn < end + 1u; ++turn) {                              \
-        if ((k != LISTED && k >= end) || !in_time()) break;                                  \
+        if (!in_time() || (k != LISTED && k >= end)) break;                                  \
         const uint count = choose_next(k, end, top, bottom, FROM, TO);                       \
         RaySplat own;                                                                        \
         [[dont_unroll]] for (uint i = 0u; i < count; i += RAY_BLOCK) {                       \
@@ -80,6 +80,10 @@ uint choose_next(inout uint k, uint end, float top, float bottom, float from, fl
             [[unroll]] for (uint j = 0; j < RAY_BLOCK; ++j) {                                \
                 const RaySplat r = shared_ray_splat(own, j);
 #define END_SPLATS }}}
+
+// How far a splat of this optical depth reaches along a ray, in standard deviations: to the ellipsoid outside of which no ray
+// counts. What is beyond has 2e-6 of optical depth at most.
+float reach_along(float depth) { return sqrt(2.0 * log(max(depth / float(MARCH_DEPTH_MIN), 1.0))); }
 
 // Lists the splats that the strip's rays meet. first, last: the view depths that this lane's ray meets any at, to MARCH_BIN_REACH;
 // NEVER and 0 if it meets none.
@@ -93,7 +97,7 @@ void list_row(uint tile, uint strip, Ray ray, out float first, out float last) {
     bool room = true;
     uint k = listed_to;
     for (uint turn = tile_starts[tile]; turn < end; ++turn) {
-        if (k >= end || !in_time()) break;
+        if (!in_time() || k >= end) break;
         const uint count = choose(k, end, top, bottom, near, NEVER);
         RaySplat own;
         [[dont_unroll]] for (uint i = 0u; i < count; i += RAY_BLOCK) {
@@ -103,8 +107,9 @@ void list_row(uint tile, uint strip, Ray ray, out float first, out float last) {
                 const RaySplat r = shared_ray_splat(own, j);
                 const Passing p = pass_by(r, ray);
                 const float sigma = p.depth > 0.0 ? 1.0 / p.sharpness : 0.0;
-                const float from = subgroup_min(p.depth > 0.0 ? p.m.middle - float(MARCH_REACH) * sigma : NEVER);
-                const float to = subgroup_max(p.depth > 0.0 ? p.m.middle + float(MARCH_REACH) * sigma : -NEVER);
+                const float reach = reach_along(p.depth) * sigma;
+                const float from = subgroup_min(p.depth > 0.0 ? p.m.middle - reach : NEVER);
+                const float to = subgroup_max(p.depth > 0.0 ? p.m.middle + reach : -NEVER);
                 const bool met = p.depth > 0.0 && p.m.middle + float(MARCH_BIN_REACH) * sigma > near;
                 first = met ? min(first, max(p.m.middle - float(MARCH_BIN_REACH) * sigma, near)) : first;
                 last = met ? max(last, p.m.middle + float(MARCH_BIN_REACH) * sigma) : last;

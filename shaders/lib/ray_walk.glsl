@@ -37,23 +37,23 @@ void walk_rays(uint tile, uint strip, Ray ray) {
         uint k = begin;
         bool done = false;
         for (uint turn = begin; turn < end; ++turn) {
-            if (k >= end || done || !in_time()) break;
+            if (!in_time() || k >= end || done) break;
             const uint count = choose(k, end, top, bottom, 0.0, NEVER);
             RaySplat own;
             [[dont_unroll]] for (uint i = 0u; i < count; i += RAY_BLOCK) {
-                if (done || !in_time()) break;
+                if (!in_time() || done) break;
                 next_block(own, i, count);
                 const float to_come = subgroupShuffle(own.bend.w, 0u);
                 // The splats are held as long as there is room: lanes then blend more of them at a time.
                 const bool room = subgroupAll(o.depths[HELD / 2u] == NEVER);
-                if (!room) blend_held(o, to_come);
+                blend_held(o, room ? 0.0 : to_come);
                 hold_block(o, own, ray, start, start_at);
                 done = subgroupAll(T <= 0.0 || o.bound <= to_come);
             }
         }
         blend_held(o, NEVER);
         const bool more = T > 0.0 && o.bound < NEVER;
-        if (subgroupAll(!more) || !in_time()) break;
+        if (!in_time() || subgroupAll(!more)) break;
         start = more ? o.bound : NEVER;
         start_at = o.bound_at;
         begin = subgroup_min(more ? o.redo : end);

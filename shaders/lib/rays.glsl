@@ -24,6 +24,7 @@ struct RaySplat {
     uint at;             // its instance
     vec4 mean, shape, bend;
     vec4 color;          // and z
+    float along;         // |b| at the mean: sqrt(2) / (rho z)
 };
 
 struct Meeting {
@@ -53,14 +54,15 @@ float strip_top(uint tile, uint strip) { return float((tile / push.tiles[0]) * T
 
 RaySplat read_ray_splat(uint at) {
     const uint splat = splats[at];
-    return RaySplat(at, fetch(rays, RAY_TEXELS * splat), fetch(rays, RAY_TEXELS * splat + 1u),
-                    fetch(rays, RAY_TEXELS * splat + 2u), fetch(records, RECORD_TEXELS * splat + 2u));
+    const vec4 bend = fetch(rays, RAY_TEXELS * splat + 2u), color = fetch(records, RECORD_TEXELS * splat + 2u);
+    return RaySplat(at, fetch(rays, RAY_TEXELS * splat), fetch(rays, RAY_TEXELS * splat + 1u), bend, color,
+                    1.4142135623730951 / (bend.z * color.w));
 }
 
 // The splat that lane j has.
 RaySplat shared_ray_splat(RaySplat own, uint j) {
     return RaySplat(subgroupShuffle(own.at, j), shuffled(own.mean, j), shuffled(own.shape, j), shuffled(own.bend, j),
-                    shuffled(own.color, j));
+                    shuffled(own.color, j), subgroupShuffle(own.along, j));
 }
 
 // Splats that are evaluated in one unrolled block. Between blocks the lanes' splats move down by as many lanes: shuffles from
@@ -71,9 +73,9 @@ const uint RAY_BLOCK = SUBGROUP < 8u ? SUBGROUP : 8u;
 const uint RAY_BLOCK = SUBGROUP < 4u ? SUBGROUP : 4u;
 #endif
 
-// Turns of all loops over splats. A driver may end an invocation's loops, silently: lavapipe does after 65,535 turns. So they
-// end a little earlier, and the host hears of it.
-const uint TURNS_MOST = 60000u;
+// Turns of all loops over splats. A driver may end an invocation's loops, silently: lavapipe does after 65,535 turns, in which it
+// counts one more for each loop that ends. So they end earlier, and the host hears of it.
+const uint TURNS_MOST = 50000u;
 uint turns = 0u;
 bool in_time() { return ++turns <= TURNS_MOST; }
 void report_turns() {
@@ -89,9 +91,9 @@ Meeting meet(RaySplat r, Ray ray) {
     EXACT const float h = clamp(1.0 + (r.bend.x * dx + r.bend.y * dy), -1e18, 1e18);
     EXACT const float s = r.bend.z * r.bend.z * q + h * h;
     EXACT const float root = sqrt(s);
-    EXACT const float power = -q / s;
-    EXACT const float depth = (KERNEL == KERNEL_DENSITY ? r.shape.w * ray.norm / root : r.shape.w) * exp(power);
-    EXACT const float middle = r.color.w * (h / s);
+    EXACT const float inverse = 1.0 / s, power = -(q * inverse);
+    EXACT const float depth = (KERNEL == KERNEL_DENSITY ? r.shape.w * ray.norm * (root * inverse) : r.shape.w) * exp(power);
+    EXACT const float middle = r.color.w * (h * inverse);
     m.u = u;
     m.v = v;
     m.q = q;
@@ -118,7 +120,7 @@ uint choose(inout uint k, uint end, float top, float bottom, float from, float t
     subgroupBarrier();  // the last ones have been read
     uint count = 0u;
     for (; k < end; k += PEEKED) {
-        if (count >= CHOSEN_MOST || !in_time()) break;
+        if (!in_time() || count >= CHOSEN_MOST) break;
         [[unroll]] for (uint b = 0u; b < PEEK; ++b) {
             const uint at = k + b * SUBGROUP + LANE;
             const uint splat = splats[min(at, end - 1u)];

@@ -31,7 +31,7 @@ vec3 color = vec3(0.0);
 void blend_held(inout RayOrder o, float to_come) {
     for (uint turn = 0u; turn < HELD; ++turn) {
         const bool next = T > 0.0 && o.depths[0] < NEVER && o.depths[0] <= to_come;
-        if (subgroupAll(!next) || !in_time()) break;
+        if (!in_time() || subgroupAll(!next)) break;
         const vec4 shown = fetch(records, RECORD_TEXELS * splats[next ? o.instances[0] : 0u] + 2u);
         if (next) {
             bool blended;

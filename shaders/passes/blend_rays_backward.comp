@@ -35,7 +35,7 @@ Ray own_ray;
 void blend_held(inout RayOrder o, float to_come) {
     for (uint turn = 0u; turn < HELD * SUBGROUP; ++turn) {
         const bool next = T > 0.0 && o.depths[0] < NEVER && o.depths[0] <= to_come;
-        if (subgroupAll(!next) || !in_time()) break;
+        if (!in_time() || subgroupAll(!next)) break;
         // The nearest of the lanes' next splats: in the lanes' common order, each is added once.
         const float nearest = subgroup_min(next ? o.depths[0] : NEVER);
         const uint at = subgroup_min(next && o.depths[0] == nearest ? o.instances[0] : 0xffffffffu);

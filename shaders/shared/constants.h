@@ -25,9 +25,8 @@ EWA_REAL(TRANSMITTANCE_STOP, 1e-4);
 
 // Marching along rays.
 EWA_REAL(MARCH_DEPTH_MIN, 1e-5);  // a smaller optical depth of the whole ray is skipped
-EWA_REAL(MARCH_REACH, 4.5);       // standard deviations along a ray; only 7e-6 of a splat is beyond
 EWA_REAL(MARCH_STOP, 1e-7);       // behind this transmittance, intervals need not be evaluated
-EWA_REAL(MARCH_BIN_REACH, 3.0);   // the same, of the first look at a ray
+EWA_REAL(MARCH_BIN_REACH, 3.0);   // standard deviations along a ray, of the first look at it
 EWA_UINT(MARCH_BINS, 32u);        // of the first look at a ray, by which its intervals are placed
 
 // Splats drawn as solids, for a look at the structure of a scene.

@@ -197,10 +197,10 @@ void record_backward_of_rays(gpu::Recording& recording, passes::PassCache& cache
         record_rays_backward(recording, cache.get<passes::BlendRaysBackward>({kernel}), frame, inputs, sorted,
                              blend);
     else
-        record_rays_backward(
-            recording,
-            cache.get<passes::MarchRaysBackward>({kernel, {shared::SPEC_MODE, march_chunk(inputs.samples)}}),
-            frame, inputs, sorted, blend);
+        record_rays_backward(recording,
+                             cache.get<passes::MarchRaysBackward>(
+                                 {kernel, {shared::SPEC_MODE, march_chunk(inputs.samples, 8)}}),
+                             frame, inputs, sorted, blend);
     cache.get<passes::GatherRays>({{shared::SPEC_SH_DEGREE, plan.evaluated_degree(inputs.sh_degree)}, kernel})
         .record(recording,
                 {.params = model.params,

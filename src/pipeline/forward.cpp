@@ -76,8 +76,7 @@ void record_project_rays(gpu::Recording& recording, passes::PassCache& cache, co
 template <class Integration>
 void record_integrate_as(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
                          const FrameBuffers& frame, const FrameInputs& inputs, uint32_t mode) {
-    cache
-        .get<Integration>({{shared::SPEC_KERNEL, uint32_t(plan.kernel)}, {shared::SPEC_MODE, mode}})
+    cache.get<Integration>({{shared::SPEC_KERNEL, uint32_t(plan.kernel)}, {shared::SPEC_MODE, mode}})
         .record(recording,
                 {{.records = frame.records,
                   .splats = frame.instance_splats[1],
@@ -175,8 +174,8 @@ gpu::BufferPart camera_part(const FrameInputs& inputs) {
     return {*inputs.camera.buffer, inputs.camera.offset, sizeof(shared::CameraBlock)};
 }
 
-uint32_t march_chunk(uint32_t samples) {
-    return std::min(std::bit_ceil(samples), 8u);
+uint32_t march_chunk(uint32_t samples, uint32_t most) {
+    return std::min(std::bit_ceil(samples), most);
 }
 
 shared::BlendPush blend_push(const passes::KernelConfig& config, const FrameBuffers& frame,
@@ -216,8 +215,9 @@ Sorted record_picture(gpu::Recording& recording, passes::PassCache& cache, const
             record_integrate_as<passes::BlendRays>(recording, cache, plan, frame, inputs,
                                                    kBlendModes[size_t(plan.drawing)]);
         else
-            record_integrate_as<passes::MarchRays>(recording, cache, plan, frame, inputs,
-                                                   march_chunk(inputs.samples));
+            record_integrate_as<passes::MarchRays>(
+                recording, cache, plan, frame, inputs,
+                march_chunk(inputs.samples, cache.config().texel_buffers ? 16 : 8));
     } else if (plan.points()) {
         variant.push_back({shared::SPEC_NEAREST, plan.nearest});
         record_blend_as<passes::BlendPoints>(recording, cache, frame, inputs, variant);

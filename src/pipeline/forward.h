@@ -39,8 +39,8 @@ void record_tile_lists(gpu::Recording& recording, passes::PassCache& cache, bool
 /// The camera's block, as a binding.
 gpu::BufferPart camera_part(const FrameInputs& inputs);
 
-/// Intervals of a ray that a march evaluates together.
-uint32_t march_chunk(uint32_t samples);
+/// Intervals of a ray that a march evaluates together; most: a power of two.
+uint32_t march_chunk(uint32_t samples, uint32_t most);
 
 shared::BlendPush blend_push(const passes::KernelConfig& config, const FrameBuffers& frame,
                              const std::array<float, 3>& background);

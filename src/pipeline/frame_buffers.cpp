@@ -267,7 +267,8 @@ uint32_t first_capacity(size_t splats) {
 void check_rays_finished(const shared::Counts& counts) {
     if (counts.unfinished > 0)
         throw RunError(
-            "too many splats on one ray to integrate along it: take --integrator splat, fewer --samples, or fewer "
+            "too many splats on one ray to integrate along it: take --integrator splat, fewer --samples, or "
+            "fewer "
             "splats");
 }
 

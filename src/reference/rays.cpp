@@ -34,6 +34,11 @@ double mean_transmittance_slope(double x) {
     return std::abs(x) < 1e-4 ? -0.5 + x / 3 - x * x / 8 : (std::exp(-x) - mean_transmittance(x)) / x;
 }
 
+/// The smallest optical depth of a ray that a march counts.
+double march_floor(const Smoothing& smoothing) {
+    return smoothing.cut == AlphaCut::none ? 1e-18 : shared::MARCH_DEPTH_MIN;
+}
+
 RenderOptions with_peak(RenderOptions options) {
     options.kernel = Footprint::peak;
     return options;
@@ -116,7 +121,7 @@ std::vector<double> Rays::borders(int x, int y) const {
     if (fixed_) return fixed_->borders(x, y);
     constexpr uint32_t kBins = shared::MARCH_BINS;
     const double near = shared::NEAR_PLANE;
-    const std::vector<Met> line = met(x, y, shared::MARCH_DEPTH_MIN);
+    const std::vector<Met> line = met(x, y, march_floor(smoothing_));
     double first = INFINITY, last = 0;
     for (const Met& m : line) {
         const double reach = shared::MARCH_BIN_REACH / m.sharpness;
@@ -184,7 +189,7 @@ Blended Rays::picture() const {
                     ++out.blended[size_t(y) * size_t(camera_.width) + size_t(x)];
                 });
             else
-                left = march(met(x, y, shared::MARCH_DEPTH_MIN), borders(x, y),
+                left = march(met(x, y, march_floor(smoothing_)), borders(x, y),
                              [&](size_t, double d, const glm::dvec3& emitted, double transmittance) {
                                  color += transmittance * mean_transmittance(d) * emitted;
                              });
@@ -225,7 +230,7 @@ void Rays::ray_gradient(int x, int y, const glm::dvec3& up, std::vector<Sums>& s
 
 void Rays::march_gradient(int x, int y, const glm::dvec3& up, std::vector<Sums>& sums) const {
     const glm::dvec3 background(options_.background[0], options_.background[1], options_.background[2]);
-    const std::vector<Met> line = met(x, y, shared::MARCH_DEPTH_MIN);
+    const std::vector<Met> line = met(x, y, march_floor(smoothing_));
     const std::vector<double> borders = this->borders(x, y);
     glm::dvec3 behind(0);
     const double left =

@@ -3,14 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "ewa/error.h"
 #include "ewa/renderer.h"
+#include "gpu/chain.h"
 #include "gpu/test_device.h"
-#include "reference/render.h"
 #include "support/gradient_check.h"
-#include "support/random_scene.h"
 
 namespace ewa::test {
 namespace {
@@ -34,50 +32,21 @@ std::string chain_case_name(const testing::TestParamInfo<ChainCase>& info) {
            std::to_string(int(c.kernel)) + "_seed" + std::to_string(c.seed);
 }
 
-class Chain : public testing::TestWithParam<ChainCase> {
+class Chain : public testing::TestWithParam<ChainCase>, protected ChainScene {
   protected:
     void SetUp() override {
         const ChainCase& c = GetParam();
-        camera = random_camera(c.seed, c.width, c.height);
-        gaussians = random_gaussians(c.seed + 1, c.splats, c.kind, camera, c.sh_degree);
-        target = random_target(c.seed + 2, c.width, c.height);
-        options.kernel = c.kernel;
-        options.background = {0.2f, 0.5f, 0.8f};
+        ChainScene::operator=(
+            chain_scene(c.seed, c.kind, c.splats, c.width, c.height, c.sh_degree, c.kernel));
     }
-    Camera camera;
-    Gaussians gaussians;
-    Image target;
-    RenderOptions options;
 };
-
-/// Share of pixels whose error exceeds the bound: a contribution on the 1/255 threshold may go either way in
-/// float32.
-struct Errors {
-    double worst = 0, median = 0;
-    size_t over = 0, pixels = 0;
-};
-
-Errors compare(const Image& actual, const reference::Raster& expected, double bound) {
-    Errors errors;
-    errors.pixels = size_t(actual.width) * size_t(actual.height);
-    for (int y = 0; y < actual.height; ++y)
-        for (int x = 0; x < actual.width; ++x) {
-            double error = 0;
-            for (int c = 0; c < actual.channels; ++c) {
-                const double e = std::abs(double(actual.at(x, y)[c]) - expected.at(x, y)[c]);
-                error = std::isfinite(e) ? std::max(error, e) : INFINITY;
-            }
-            errors.worst = std::max(errors.worst, error);
-            if (!(error <= bound)) ++errors.over;
-        }
-    return errors;
-}
 
 TEST_P(Chain, PictureMatchesTheReference) {
     Renderer renderer(device(), gaussians, options);
     const Rendering rendering = renderer.render(camera, true);
     const reference::Picture cpu = reference::render(gaussians, camera, options);
-    const Errors color = compare(rendering.color, cpu.blended.color, 1e-5);
+    // A contribution on the 1/255 threshold may go either way in float32.
+    const PictureErrors color = picture_errors(rendering.color, cpu.blended.color, 1e-5);
     RecordProperty("worst", std::to_string(color.worst));
     printf("    worst %.2e, over 1e-5: %zu of %zu\n", color.worst, color.over, color.pixels);
     EXPECT_LE(color.over, color.pixels / 1000);
