@@ -5,6 +5,8 @@
 #ifndef EWA_LIB_RAY_GRADIENT
 #define EWA_LIB_RAY_GRADIENT
 
+vec4 subgroup_sum(vec4 v) { return vec4(subgroup_sum(v.x), subgroup_sum(v.y), subgroup_sum(v.z), subgroup_sum(v.w)); }
+
 // g, s1, s2: G, S1 and S2 of this lane's ray. counts: whether it has any.
 void add_to_slot(RaySplat r, Meeting m, bool counts, float g, float s1, float s2, vec3 color) {
     const vec3 x = counts ? (1.4142135623730951 / m.s) * vec3(m.h * m.u, m.h * m.v, -r.bend.z * m.q) : vec3(0.0);
@@ -16,13 +18,16 @@ void add_to_slot(RaySplat r, Meeting m, bool counts, float g, float s1, float s2
     const vec3 diagonal = -g * x * x + 2.0 * s1 * b * x + along * b * b;
     const vec3 beside = -g * x.yxx * x.zzy + s1 * (b.yxx * x.zzy + x.yxx * b.zzy) + along * b.yxx * b.zzy;  // 23, 13, 12
     const vec3 v = -g * x + s1 * b;
-    vec4 own[RAY_SLOT_TEXELS] = vec4[](vec4(diagonal, beside.z), vec4(beside.y, beside.x, v.xy), vec4(v.z, g, color.rg),
-                                       vec4(color.b, 0.0, 0.0, 0.0));
-    [[unroll]] for (uint t = 0u; t < RAY_SLOT_TEXELS; ++t) {
-        [[unroll]] for (uint c = 0u; c < (t == 3u ? 1u : 4u); ++c) own[t][c] = subgroup_sum(own[t][c]);
-    }
+    const vec4 own0 = subgroup_sum(vec4(diagonal, beside.z)), own1 = subgroup_sum(vec4(beside.y, beside.x, v.xy));
+    const vec4 own2 = subgroup_sum(vec4(v.z, g, color.rg));
+    const float own3 = subgroup_sum(color.b);
+    // Without loops: their turns would count (rays.glsl).
     if (LANE == r.at % SUBGROUP) {
-        [[unroll]] for (uint t = 0u; t < RAY_SLOT_TEXELS; ++t) slots[RAY_SLOT_TEXELS * r.at + t] += own[t];
+        const uint at = RAY_SLOT_TEXELS * r.at;
+        slots[at] += own0;
+        slots[at + 1u] += own1;
+        slots[at + 2u] += own2;
+        slots[at + 3u].x += own3;
     }
 }
 
