@@ -2,9 +2,9 @@
 #include "pipeline/backward.h"
 
 #include <bit>
-#include <cmath>
 
 #include "passes/passes.h"
+#include "pipeline/adam.h"
 #include "shared/constants.h"
 
 namespace ewa::pipeline {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "passes/passes.h"
+#include "pipeline/adam.h"
 #include "pipeline/model.h"
 
 namespace ewa::pipeline {
@@ -151,6 +152,7 @@ void record_motion_sums(gpu::Recording& recording, passes::PassCache& cache, con
 void record_motion_update(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame,
                           const MotionUse& use) {
     const Motions& m = *use.motions;
+    const auto [bias1, bias2] = adam_biases(use.visit, kBeta1, kBeta2);
     cache.get<passes::MotionUpdate>().record(recording,
                                              {.sums = frame.motion_reduced,
                                               .motions = m.values,
@@ -165,8 +167,8 @@ void record_motion_update(gpu::Recording& recording, passes::PassCache& cache, c
                                               .shift_pull = kMotionPull / (use.extent * use.extent),
                                               .beta1 = float(kBeta1),
                                               .beta2 = float(kBeta2),
-                                              .bias1 = float(1 / (1 - std::pow(kBeta1, use.visit))),
-                                              .bias2 = float(1 / (1 - std::pow(kBeta2, use.visit))),
+                                              .bias1 = bias1,
+                                              .bias2 = bias2,
                                               .instance_capacity = frame.instance_capacity});
 }
 
