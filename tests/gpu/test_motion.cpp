@@ -179,7 +179,8 @@ TEST(MotionUpdate, FollowsTheReferencesAdam) {
         GuardedFrame guarded(rig().config(), request_for(splats));
         pipeline::FrameBuffers& frame = guarded.frame;
         pipeline::Motions motions(*device(), bases());
-        CameraMotion motion = rounded({{0.03, -0.02, 0.04}, 0.01, {0.2, -0.1, 0.3}});
+        // The factor of the focal length is so large that its pull exceeds the tolerance.
+        CameraMotion motion = rounded({{0.03, -0.02, 0.04}, 1.5, {0.2, -0.1, 0.3}});
         set_motion(motions, motion);
         Random random(84);
         std::array<double, kMotionFloats> first{}, second{};

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "ewa/dataset.h"
+#include "ewa/train_options.h"
 #include "reference/render.h"
 #include "support/random_scene.h"
 #include "support/temp_folder.h"
@@ -104,6 +105,23 @@ inline Gaussians shaken_start(const Synthetic& data, double shake, uint64_t seed
     for (glm::dvec3& p : points.positions)
         for (int k = 0; k < 3; ++k) p[k] += shake * random.normal();
     return gaussians_from_points(points, sh_degree);
+}
+
+/// Options of a run that ends after a few hundred steps.
+inline TrainOptions quick(int steps) {
+    TrainOptions options;
+    options.steps = steps;
+    options.sh_degree = 0;
+    options.strategy = Strategy::none;
+    options.seed = 3;
+    // Such a run has to take longer steps than a run of 30,000.
+    options.means_rate = 3e-3;
+    options.means_rate_final = 2e-4;
+    options.sh0_rate = 0.05;
+    options.opacity_rate = 0.05;
+    options.scale_rate = 0.03;
+    options.quaternion_rate = 0.03;
+    return options;
 }
 
 }  // namespace ewa::test

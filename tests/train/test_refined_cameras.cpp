@@ -58,18 +58,9 @@ Errors errors_of(const std::vector<Camera>& cameras, const std::vector<Camera>& 
 }
 
 TrainOptions refining(int steps) {
-    TrainOptions options;
-    options.steps = steps;
-    options.sh_degree = 0;
-    options.strategy = Strategy::none;
-    options.seed = 3;
-    // A run of a few hundred steps has to take longer ones than a run of 30,000.
+    TrainOptions options = quick(steps);
     options.means_rate = 1e-3;
     options.means_rate_final = 1e-4;
-    options.sh0_rate = 0.05;
-    options.opacity_rate = 0.05;
-    options.scale_rate = 0.03;
-    options.quaternion_rate = 0.03;
     options.refine_poses = true;
     return options;
 }
@@ -95,8 +86,8 @@ TEST(RefinedCameras, ComeNearerToTheTrueOnes) {
     const Errors after = errors_of(refined.cameras, cameras_of(truth));
     printf("    %.3f degrees and %.4f units before, %.3f degrees and %.4f units after\n", before.degrees,
            before.length, after.degrees, after.length);
-    EXPECT_LT(after.degrees, before.degrees / 2);
-    EXPECT_LT(after.length, before.length / 2);
+    EXPECT_LT(after.degrees, before.degrees / 2.2);
+    EXPECT_LT(after.length, before.length / 2.7);
     for (size_t i = 0; i < refined.cameras.size(); ++i)
         EXPECT_EQ(refined.cameras[i].fx, truth.frames[i].camera.fx);  // not asked for
 
@@ -115,7 +106,7 @@ TEST(RefinedCameras, LearnFocalLengthsToo) {
     const Errors before = errors_of(cameras_of(wrong), cameras_of(truth));
     const Errors after = errors_of(refine(wrong, options).cameras, cameras_of(truth));
     printf("    focal lengths wrong by %.4f before, %.4f after\n", before.focal, after.focal);
-    EXPECT_LT(after.focal, before.focal / 1.5);
+    EXPECT_LT(after.focal, before.focal / 1.6);
 }
 
 /// A step with more instances than fit is repeated: it moves a camera once.
@@ -180,6 +171,26 @@ TEST(RefinedCameras, ASimilarityIsFound) {
     }
 }
 
+/// Training cameras that all moved as one carry the others along.
+TEST(RefinedCameras, HeldOutCamerasFollowTheTrainingCameras) {
+    const Dataset& dataset = small_capture().dataset;
+    const train::Similarity similarity{1.3, glm::dmat3(1.0), {3, -2, 5}};
+    const std::vector<int> train{0, 2, 3, 5};
+    std::vector<CameraMotion> motions;
+    for (const int i : train) {
+        const Camera& camera = dataset.frames[size_t(i)].camera;
+        const glm::dvec3 center = camera.position();
+        motions.push_back({glm::dvec3(0), 0, camera.rotation * (similarity(center) - center)});
+    }
+    const train::RefinedCameras refined = train::refined_cameras(dataset, train, motions);
+    ASSERT_EQ(refined.cameras.size(), dataset.frames.size());
+    for (size_t i = 0; i < dataset.frames.size(); ++i) {
+        const Camera want = transformed(dataset.frames[i].camera, similarity);
+        EXPECT_NEAR(distance_between(refined.cameras[i], want).length, 0, 1e-9) << i;
+        EXPECT_NEAR(distance_between(refined.cameras[i], want).degrees, 0, 1e-6) << i;
+    }
+}
+
 /// A dataset on disk with disturbed cameras: the run's files, its figures, and the model that is read back.
 TEST(RefinedCameras, ARunWritesThemAndAlignsWhatItHeldOut) {
     const Dataset wrong = disturbed(small_capture().dataset);
@@ -224,6 +235,13 @@ TEST(RefinedCameras, ARunWritesThemAndAlignsWhatItHeldOut) {
         EXPECT_NEAR(view["moved"], d.length, 1e-9);
         EXPECT_NEAR(view["percent_of_extent"].get<double>(), 100 * d.length / json["extent"].get<double>(),
                     1e-9);
+    }
+    Dataset halved = load_dataset(folder / "data", {.downscale = 2});
+    io::use_refined_cameras(halved, folder / "run/cameras.json");
+    for (size_t i = 0; i < halved.frames.size(); ++i) {
+        EXPECT_EQ(halved.frames[i].camera.rotation, refined.frames[i].camera.rotation);
+        EXPECT_NEAR(halved.frames[i].camera.fx, refined.frames[i].camera.fx / 2, 1e-9);
+        EXPECT_NEAR(halved.frames[i].camera.fy, refined.frames[i].camera.fy / 2, 1e-9);
     }
     const Evaluation again =
         evaluate(device(), run.summary.splats ? load_splats(folder / "run/splats.ply") : Gaussians(), refined,

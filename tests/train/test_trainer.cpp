@@ -17,22 +17,6 @@
 namespace ewa::test {
 namespace {
 
-TrainOptions quick(int steps) {
-    TrainOptions options;
-    options.steps = steps;
-    options.sh_degree = 0;
-    options.strategy = Strategy::none;
-    options.seed = 3;
-    // A run of a few hundred steps has to take longer ones than a run of 30,000.
-    options.means_rate = 3e-3;
-    options.means_rate_final = 2e-4;
-    options.sh0_rate = 0.05;
-    options.opacity_rate = 0.05;
-    options.scale_rate = 0.03;
-    options.quaternion_rate = 0.03;
-    return options;
-}
-
 /// The same capture with a stripe of garbage across every training image, which masks exclude.
 struct Spoilt {
     Synthetic data;
