@@ -86,11 +86,6 @@ shared::UpdatePush update_push(const Model& model, const FrameBuffers& frame, co
 
 }  // namespace
 
-std::array<float, 2> adam_biases(double visits) {
-    return {float(1 / (1 - std::pow(shared::ADAM_BETA1, visits))),
-            float(1 / (1 - std::pow(shared::ADAM_BETA2, visits)))};
-}
-
 uint32_t update_mode(const Plan& plan) {
     uint32_t mode = 0;
     if (!plan.adam) mode |= shared::UPDATE_GRADIENT_ONLY;

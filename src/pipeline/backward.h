@@ -4,7 +4,6 @@
 // Each training image may have an exposure: an affine map of colours, learned beside the splats. The
 // published code of 3DGS does the same for captures with automatic exposure; see include/ewa/exposure.h.
 #pragma once
-#include <array>
 #include <vector>
 
 #include "ewa/exposure.h"
@@ -40,9 +39,6 @@ struct Rates {
     // With plan.regularised: d(loss)/d(opacity) and d(loss)/d(scale along one axis) of every splat.
     float opacity_weight = 0, scale_weight = 0;
 };
-
-/// Factors that correct the bias of Adam's two moments after `visits` steps of one view each.
-std::array<float, 2> adam_biases(double visits);
 
 /// Leaves the parts of the loss in Counts and dL/d(image) in frame.image_gradient.
 /// photo: width * height texels, RGBA. Its alpha composites it over the background or, if `masked`, is the

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "passes/passes.h"
+#include "pipeline/adam.h"
 #include "pipeline/sorting.h"
 #include "shared/constants.h"
 
