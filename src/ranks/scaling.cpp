@@ -9,7 +9,8 @@ namespace {
 // Of a visible splat of a view that another rank draws.
 constexpr double kOutBytes = 48;                       // its record
 constexpr double kBackBytes = 36, kBackAbsolute = 44;  // the sums of its gradients
-constexpr double kGathers = 2;  // of a step: sizes of the parts, and the state of each rank
+// Of a step: its begin, the sizes of the lists, the losses, and the counts of the update.
+constexpr double kGathers = 4;
 
 /// Between two sizes that were measured, time grows evenly. Beyond the last it grows as before it.
 double transfer_ms(const Network& network, double bytes) {

@@ -130,17 +130,31 @@ TEST(RelocationEdges, ADrawOnABorderIsTheLaterSplats) {
     push.splats = kSplats;
     push.scan_block = kBlock;
     push.draws = kDraws;
-    push.total = sum;
+    push.total = push.own_total = sum;
     push.seed[0] = 77;
     push.step = 5;
-    r.run([&](gpu::Recording& recording) {
-        r.cache.get<passes::McmcDraw>().record(recording, {prefixes, bases, sources, hits}, push);
-    });
+    const auto draw = [&] {
+        r.run([&](gpu::Recording& recording) {
+            r.cache.get<passes::McmcDraw>().record(recording, {prefixes, bases, sources, hits}, push);
+        });
+    };
+    draw();
     expect_intact({&prefixes, &bases, &sources, &hits});
     std::vector<uint32_t> random;
     for (uint32_t d = 0; d < kDraws; ++d)
         random.push_back(core::pcg4d({d, 5, 77, shared::MCMC_DRAW_STREAM})[0]);
     EXPECT_EQ(sources.read<uint32_t>(), reference::draw_sources(weights, random));
+
+    // Ranks before and after this one have splats too.
+    push.total_before = 90;
+    push.total = 90 + sum + 40;
+    draw();
+    weights.insert(weights.begin(), 90, 1);
+    weights.insert(weights.end(), 40, 1);
+    std::vector<uint32_t> expected = reference::draw_sources(weights, random);
+    for (uint32_t& source : expected)
+        source = source >= 90 && source < 90 + kSplats ? source - 90 : shared::NOT_LISTED;
+    EXPECT_EQ(sources.read<uint32_t>(), expected);
 }
 
 /// Both moments of a source that was copied once start anew; an untouched splat keeps both.

@@ -219,6 +219,7 @@ TEST(RunOptions, TableReadsWhatItWrites) {
                                                    {"image-cache", "9"},
                                                    {"background", "0.25,1,0"},
                                                    {"kernel", "density"},
+                                                   {"batch", "4"},
                                                    {"points", "true"},
                                                    {"nearest", "3"},
                                                    {"refine-poses", "true"},
