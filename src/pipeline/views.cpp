@@ -13,6 +13,8 @@
 namespace ewa::pipeline {
 namespace {
 
+constexpr uint64_t kRecordBytes = 16 * shared::RECORD_TEXELS;
+
 void make_room(gpu::Device& device, gpu::Buffer& buffer, const char* name, uint64_t bytes,
                gpu::Texel texel = gpu::Texel::none) {
     if (buffer && buffer.bytes() >= bytes) return;
@@ -55,11 +57,15 @@ uint64_t ViewBuffers::sum_bytes(const Plan& plan, uint64_t splats) {
     return 4 * splats * (plan.absolute ? shared::SUM_FLOATS_ABSOLUTE : shared::SUM_FLOATS);
 }
 
+uint64_t ViewBuffers::most_bytes(const Plan& plan, uint64_t splats, uint64_t views) {
+    return kRecordBytes * splats +
+           views * (sizeof(shared::CameraBlock) + 4 * splats + sum_bytes(plan, splats));
+}
+
 void ViewBuffers::reserve(gpu::Device& device, uint32_t splats, uint32_t views, uint32_t records) {
     make_room(device, cameras, "cameras of a batch", sizeof(shared::CameraBlock) * uint64_t(views));
     make_room(device, places, "places", 4 * uint64_t(views) * splats);
-    make_room(device, visible, "visible records", 16ull * shared::RECORD_TEXELS * records,
-              gpu::Texel::rgba32f);
+    make_room(device, visible, "visible records", kRecordBytes * records, gpu::Texel::rgba32f);
 }
 
 void ViewBuffers::reserve_sums(gpu::Device& device, gpu::Executor& executor, const Plan& plan,

@@ -20,6 +20,8 @@ struct ViewBuffers {
 
     /// Bytes of `splats` listed splats in sums.
     static uint64_t sum_bytes(const Plan& plan, uint64_t splats);
+    /// Bytes of all buffers for a step of `views` views that all see `splats` splats.
+    static uint64_t most_bytes(const Plan& plan, uint64_t splats, uint64_t views);
 
     /// Makes room for the places of `splats` splats in `views` views, and for `records` records.
     void reserve(gpu::Device& device, uint32_t splats, uint32_t views, uint32_t records);

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/agreement.h"
 
-#include <algorithm>
 #include <array>
 
 #include "core/hash.h"
 #include "ewa/error.h"
 #include "gpu/device.h"
 #include "passes/kernel_config.h"
+#include "train/collect.h"
 #include "train/resume.h"
 #include "train/run_options.h"
 
@@ -15,19 +15,6 @@ namespace ewa::train {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-/// A text of rank 0, on every rank.
-std::string told(Ranks& ranks, const std::string& text) {
-    const uint64_t own = text.size();
-    const uint64_t size = ranks.gather(std::span(&own, 1)).front();
-    std::string heard(size, ' ');
-    std::vector<std::span<const std::byte>> out(size_t(ranks.size()));
-    std::vector<std::span<std::byte>> in(size_t(ranks.size()));
-    if (ranks.rank() == 0) std::fill(out.begin(), out.end(), std::as_bytes(std::span(text)));
-    in[0] = std::as_writable_bytes(std::span(heard));
-    ranks.exchange(out, in);
-    return heard;
-}
 
 void take_options(const Json& settings, RunOptions& options) {
     for (const auto& [name, value] : settings.at("options").items())
@@ -68,8 +55,12 @@ void agree(RunOptions& options, const Json& settings, const std::string& fingerp
         if (all[i] != all[i % kParts.size()])
             throw InputError(ranks.name(int(i / kParts.size())) + " has " + kParts[i % kParts.size()] +
                              " than " + ranks.name(0));
-    const std::string text = told(ranks, ranks.rank() == 0 ? settings.dump() : std::string());
-    if (ranks.rank() != 0) take_options(Json::parse(text), options);
+    const std::string text = settings.dump();
+    const std::vector<std::byte> heard = told(ranks, std::as_bytes(std::span(text)));
+    if (ranks.rank() != 0)
+        take_options(Json::parse(reinterpret_cast<const char*>(heard.data()),
+                                 reinterpret_cast<const char*>(heard.data()) + heard.size()),
+                     options);
 }
 
 }  // namespace ewa::train

@@ -15,6 +15,7 @@
 #include "pipeline/frame_buffers.h"
 #include "pipeline/model.h"
 #include "pipeline/plan.h"
+#include "pipeline/views.h"
 #include "shared/constants.h"
 #include "train/image_cache.h"
 #include "train/run_input.h"
@@ -209,6 +210,8 @@ MemoryEstimate estimate_memory(const gpu::Device& device, const Dataset& dataset
         const uint64_t second = grows ? array + kRefineBytes * estimate.splats : 0;
         estimate.frame = std::max(estimate.frame, sizes.total() - instances + std::max(instances, second));
     }
+    if (options.batch > 1)
+        estimate.frame += ViewBuffers::most_bytes(plan, estimate.splats, uint64_t(options.batch));
     estimate.images = image_bytes(dataset, train_frames, options);
     return estimate;
 }

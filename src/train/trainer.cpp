@@ -25,6 +25,7 @@
 #include "pipeline/share.h"
 #include "pipeline/strategy.h"
 #include "train/batch.h"
+#include "train/collect.h"
 #include "train/image_cache.h"
 #include "train/run_input.h"
 #include "train/schedule.h"
@@ -177,35 +178,6 @@ struct Trainer::State {
     Call next_call() const {
         const uint64_t none = 0;
         return Call(ranks->gather(std::span(&none, 1)).front());
-    }
-
-    /// The bytes of all ranks one after another, on rank 0.
-    std::vector<std::byte> joined(const std::vector<std::byte>& own) const {
-        if (ranks->size() == 1) return own;
-        const uint64_t size = own.size();
-        const std::vector<uint64_t> sizes = ranks->gather(std::span(&size, 1));
-        std::vector<std::byte> all(
-            ranks->rank() == 0 ? std::accumulate(sizes.begin(), sizes.end(), uint64_t(0)) : 0);
-        std::vector<std::span<const std::byte>> out(sizes.size());
-        std::vector<std::span<std::byte>> in(sizes.size());
-        out[0] = own;
-        uint64_t at = 0;
-        for (size_t rank = 0; rank < sizes.size() && !all.empty(); at += sizes[rank++])
-            in[rank] = std::span(all).subspan(at, sizes[rank]);
-        ranks->exchange(out, in);
-        return all;
-    }
-    /// This rank's part of bytes that rank 0 has. sizes: of the part of each rank.
-    std::vector<std::byte> part_of(std::span<const std::byte> all, const std::vector<uint64_t>& sizes) const {
-        std::vector<std::byte> own(sizes[size_t(ranks->rank())]);
-        std::vector<std::span<const std::byte>> out(sizes.size());
-        std::vector<std::span<std::byte>> in(sizes.size());
-        uint64_t at = 0;
-        for (size_t rank = 0; rank < sizes.size() && ranks->rank() == 0; at += sizes[rank++])
-            out[rank] = all.subspan(at, sizes[rank]);
-        in[0] = own;
-        ranks->exchange(out, in);
-        return own;
     }
 
     Rates rates(int step) const {
@@ -581,7 +553,8 @@ TrainerState Trainer::join_state() const {
     s.finish_all();
     TrainerState state{s.report, s.model.sh_degree, {}};
     for (const NamedBuffer& named : buffers_of(s.plan, s.model, s.exposures, s.motions, s.model.capacity))
-        state.arrays.push_back({named.name, s.joined(named.buffer->download<std::byte>(named.bytes))});
+        state.arrays.push_back(
+            {named.name, train::joined(*s.ranks, named.buffer->download<std::byte>(named.bytes))});
     const auto origin = std::as_bytes(std::span(&s.model.origin, 1));
     if (s.model.origin != glm::dvec3(0)) state.arrays.push_back({"origin", {origin.begin(), origin.end()}});
     return state;
@@ -618,9 +591,7 @@ void Trainer::share_state(const TrainerState& state) {
     s.finish_all();
     StepReport report = state.report;
     if (ranks > 1) {
-        const std::vector<StepReport> for_each(size_t(ranks), state.report);
-        const auto own = s.part_of(std::as_bytes(std::span(for_each)),
-                                   std::vector<uint64_t>(size_t(ranks), sizeof(report)));
+        const auto own = train::told(*s.ranks, std::as_bytes(std::span(&state.report, 1)));
         std::memcpy(&report, own.data(), sizeof(report));
     }
     check_share(report.splats, ranks);
@@ -646,7 +617,7 @@ void Trainer::share_state(const TrainerState& state) {
         for (int of = 0; of < ranks; ++of) sizes.push_back(bytes_of(of, i));
         const std::span<const std::byte> all =
             rank == 0 ? std::span<const std::byte>(state.arrays[i].bytes) : std::span<const std::byte>();
-        buffers[i].buffer->upload(std::span<const std::byte>(s.part_of(all, sizes)));
+        buffers[i].buffer->upload(std::span<const std::byte>(train::part_of(*s.ranks, all, sizes)));
     }
     s.report = report;
     s.instance_capacity = std::max(s.instance_capacity, first_capacity(report.splats));
@@ -671,8 +642,8 @@ Gaussians Trainer::join_gaussians() const {
     if (s.ranks->size() == 1) {
         gaussians = download_model(s.model, s.model.params);
     } else {
-        const auto bytes =
-            s.joined(s.model.params.download<std::byte>(parameter_bytes(s.model.splats, s.model.sh_degree)));
+        const auto bytes = train::joined(
+            *s.ranks, s.model.params.download<std::byte>(parameter_bytes(s.model.splats, s.model.sh_degree)));
         if (s.ranks->rank() != 0) return gaussians;
         gaussians = gaussians_of(s.model,
                                  {reinterpret_cast<const float*>(bytes.data()), bytes.size() / sizeof(float)},
