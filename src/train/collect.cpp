@@ -39,7 +39,8 @@ std::vector<std::byte> part_of(Ranks& ranks, std::span<const std::byte> all,
     InParts in(sizes.size());
     uint64_t at = 0;
     if (ranks.rank() == 0)
-        for (size_t rank = 0; rank < sizes.size(); at += sizes[rank++]) out[rank] = all.subspan(at, sizes[rank]);
+        for (size_t rank = 0; rank < sizes.size(); at += sizes[rank++])
+            out[rank] = all.subspan(at, sizes[rank]);
     in[0] = own;
     ranks.exchange(out, in);
     return own;
