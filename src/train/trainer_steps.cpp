@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "core/random.h"
+#include "train/trainer_state.h"
+
+namespace ewa {
+
+using namespace pipeline;
+
+namespace {
+
+constexpr int kTimedEvery = 100;  // steps, where several are in flight
+// Of the threshold that adds splats, with points: edges of opaque spheres have larger gradients than soft footprints.
+constexpr float kPointsThreshold = 8;
+constexpr double kResetOpacity = 0.01;  // 3DGS: upper bound of opacities after a reset
+double logit(double p) {
+    return std::log(p / (1 - p));
+}
+
+std::array<float, 3> random_background(int step, uint64_t seed) {
+    const auto u = core::uniform4({uint32_t(step), 0x62636b67u, uint32_t(seed), uint32_t(seed >> 32)});
+    return {float(u[0]), float(u[1]), float(u[2])};
+}
+
+}  // namespace
+
+Rates Trainer::State::rates(int step) const {
+    Rates r;
+    r.mean = float(schedule.mean_rate(step, extent));
+    r.opacity = float(options.opacity_rate);
+    r.quaternion = float(options.quaternion_rate);
+    r.scale = float(options.scale_rate);
+    r.sh0 = float(options.sh0_rate);
+    r.sh_rest = float(schedule.sh_rest_rate);
+    r.step = uint32_t(step);
+    r.seed = options.seed;
+    if (plan.regularised) {
+        r.opacity_weight = float(options.opacity_weight / model.share.all);
+        r.scale_weight = float(options.scale_weight / (3.0 * model.share.all * extent));
+    }
+    return r;
+}
+
+Noise Trainer::State::noise(int step) const {
+    // Sigma is a square of lengths. Divided by the extent it is a length again, as in a scene of unit extent.
+    const double amplitude = options.noise_rate * schedule.mean_rate(step, 1) / extent;
+    return {.amplitude = float(amplitude),
+            .max_length = float(extent),
+            .seed = options.seed,
+            .step = uint32_t(step)};
+}
+
+train::ImageCache& Trainer::State::images_at(int step) {
+    const size_t halvings = size_t(schedule.halvings_at(step));
+    if (smaller.size() > halvings) finish_all();
+    while (smaller.size() > halvings) smaller.pop_back();
+    return halvings == 0 ? images : smaller.back();
+}
+
+FrameRequest Trainer::State::request_of(const CameraUse& camera) const {
+    return {.splats = model.splats,
+            .width = camera.width,
+            .height = camera.height,
+            .instances = instance_capacity,
+            .gradients = true,
+            .masks = plan.masks,
+            .exposure = plan.exposure,
+            .overlaid = true,
+            .motion = plan.motion};
+}
+
+MotionUse Trainer::State::motion_of(int step, size_t index, uint32_t visit) const {
+    return {.motions = &motions,
+            .photo = uint32_t(index),
+            .rate = float(schedule.pose_rate(step)),
+            .extent = float(extent),
+            .visit = visit};
+}
+
+void Trainer::State::record_step(gpu::Recording& recording, int step, size_t index,
+                                 const train::ImageCache::Photo& photo, const CameraUse& camera) {
+    const uint32_t visit = uint32_t(size_t(step - 1) / images.count() + 1);
+    const ExposureUse exposure{&exposures, uint32_t(index), float(schedule.exposure_rate(step)), visit};
+    const MotionUse motion = motion_of(step, index, visit);
+    const FrameInputs inputs{
+        .camera =
+            plan.motion ? record_move_camera(recording, cache, motions, uint32_t(index), camera) : camera,
+        .background =
+            options.random_background ? random_background(step, options.seed) : options.render.background,
+        .keep_overflow = !in_flight.empty(),
+        .sh_degree = schedule.degree(step)};
+    const Sorted sorted = record_forward(recording, cache, plan, model, frame, inputs);
+    record_loss(recording, cache, frame, inputs, photo.texels, photo.masked,
+                plan.exposure ? &exposure : nullptr);
+    record_backward(recording, cache, plan, model, frame, inputs, sorted, rates(step),
+                    plan.motion ? &motion : nullptr);
+    if (options.strategy == Strategy::mcmc) record_noise(recording, cache, model, frame, noise(step));
+}
+
+void Trainer::State::submit(int step) {
+    train::ImageCache& seen = images_at(step);
+    const size_t index = train::frame_of_step(step, images.count(), options.seed);
+    const CameraUse camera = seen.camera(index);
+    // Buffers of another size, and an image from disk, take the place of what a step in flight reads.
+    if (!seen.cached(index) || camera.width != frame.sizes.width || camera.height != frame.sizes.height)
+        finish_all();
+    while (in_flight.size() >= cache.config().frames_in_flight) finish_oldest();
+    const auto& photo = seen.photo(index);
+    if (schedule.halvings_at(step + 1) == schedule.halvings_at(step))
+        seen.prepare(train::frame_of_step(step + 1, images.count(), options.seed));
+    if (in_flight.empty()) frame.reserve(cache.device(), cache.config(), request_of(camera));
+    gpu::Recording recording(device->limits());
+    record_step(recording, step, index, photo, camera);
+    frame.record_counts(recording, slot_of(step));
+    executor.submit(recording, is_timed(step));
+    in_flight.push_back({step, photo.weight});
+    // An image from disk may be gone when its step has to be repeated: no other step follows before it is done.
+    if (!seen.cached(index)) finish_all();
+}
+
+void Trainer::State::finish_oldest() {
+    const auto [step, weight] = in_flight.front();
+    executor.wait();
+    const shared::Counts counts = frame.read_counts(slot_of(step));
+    if (counts.instances > frame.instance_capacity) {
+        const std::deque<Flight> again = std::exchange(in_flight, {});
+        while (executor.unfinished()) executor.wait();
+        instance_capacity = grown_capacity(counts.instances);
+        for (const Flight& repeated : again) {
+            submit(repeated.step);
+            finish_all();
+        }
+        return;
+    }
+    in_flight.pop_front();
+    report.loss = loss_of(counts);
+    report.psnr = -10 * std::log10(double(counts.squared) / weight);
+    report.skipped_nonfinite = counts.skipped_nonfinite;
+    report.dropped_updates += counts.dropped_updates;
+    report.limited_steps += counts.limited_steps;
+    if (!is_timed(step)) return;
+    ++timed_steps;
+    add_pass_times();
+}
+
+void Trainer::State::add_pass_times() {
+    for (const PassTime& time : executor.timings()) {
+        const auto same = std::find_if(times.passes.begin(), times.passes.end(),
+                                       [&](const PassTime& sum) { return sum.pass == time.pass; });
+        if (same == times.passes.end())
+            times.passes.push_back(time);
+        else
+            same->milliseconds += time.milliseconds;
+    }
+}
+
+void Trainer::State::finish_all() {
+    while (!in_flight.empty()) finish_oldest();
+}
+
+bool Trainer::State::must_finish(int step) const {
+    return step == options.steps || (options.strategy == Strategy::mcmc && schedule.relocates(step)) ||
+           (options.strategy == Strategy::adc && (schedule.densifies(step) || schedule.resets_opacity(step)));
+}
+
+void Trainer::State::optimise(int step) {
+    submit(step);
+    if (must_finish(step) || cache.config().frames_in_flight == 1) finish_all();
+}
+
+train::BatchView Trainer::State::view_of(int step, train::ImageCache& seen, int sh_degree) {
+    const size_t index = train::frame_of_step(step, images.count(), options.seed);
+    const CameraUse camera = seen.camera(index);
+    const FrameInputs inputs{.camera = camera,
+                             .background = options.random_background ? random_background(step, options.seed)
+                                                                     : options.render.background,
+                             .sh_degree = sh_degree};
+    const ExposureUse exposure{&exposures, uint32_t(index), float(schedule.exposure_rate(step)),
+                               uint32_t(size_t(step - 1) / images.count() + 1)};
+    const auto weight = std::make_shared<double>(1);
+    return {.inputs = inputs,
+            .request = request_of(camera),
+            .record_loss =
+                [this, inputs, exposure, weight, index, &seen](gpu::Recording& recording) {
+                    const auto& photo = seen.photo(index);
+                    *weight = photo.weight;
+                    record_loss(recording, cache, frame, inputs, photo.texels, photo.masked,
+                                plan.exposure ? &exposure : nullptr);
+                },
+            .psnr =
+                [weight](const shared::Counts& counts) {
+                    return -10 * std::log10(double(counts.squared) / *weight);
+                }};
+}
+
+void Trainer::State::optimise_batch(int first, int last) {
+    train::ImageCache& seen = images_at(first);
+    const int sh_degree = schedule.degree(first);
+    std::vector<train::BatchView> views;
+    for (int step = first; step <= last; ++step) views.push_back(view_of(step, seen, sh_degree));
+    const train::BatchParts parts{
+        cache, executor, plan, model, frame, instance_capacity, [this] { add_pass_times(); }};
+    train::BatchReport drawn = batch->draw(parts, views);
+    Rates of_step = rates(last);
+    of_step.views = uint32_t(views.size());
+    Noise of_noise = noise(last);
+    of_noise.amplitude *= float(std::sqrt(double(views.size())));
+    const auto more = [&](gpu::Recording& recording) {
+        if (options.strategy == Strategy::mcmc) record_noise(recording, cache, model, frame, of_noise);
+    };
+    batch->update(parts, batch_rates(of_step), model.share.first, sh_degree, more, drawn);
+    timed_steps += int(views.size());
+    report.loss = drawn.loss;
+    report.psnr = drawn.psnr;
+    report.skipped_nonfinite = uint32_t(drawn.skipped_nonfinite);
+    report.dropped_updates += drawn.dropped_updates;
+    report.limited_steps += drawn.limited_steps;
+}
+
+void Trainer::State::follow_up(int step) {
+    if (options.strategy == Strategy::adc) control_density(step);
+    if (options.strategy != Strategy::mcmc || !schedule.relocates(step)) return;
+    frame.free_instances();  // the second copy of an array takes its place
+    refine_mcmc(cache, executor, model, frame,
+                {.dead_opacity = options.dead_opacity,
+                 .growth = schedule.growth,
+                 .max_splats = options.max_splats,
+                 .spread = schedule.copy_spread,
+                 .kernel = options.render.kernel,
+                 .seed = options.seed,
+                 .step = uint32_t(step)});
+}
+
+void Trainer::State::control_density(int step) {
+    if (schedule.densifies(step)) {
+        DensifyRules rules;
+        rules.grow_gradient = float(plan.absolute ? options.grow_gradient_absolute : options.grow_gradient);
+        if (options.render.points) rules.grow_gradient *= kPointsThreshold;
+        rules.revised_opacity = options.revised_opacity;
+        rules.split_scale = float(options.split_scale * extent);
+        rules.prune_logit = options.render.points ? -std::numeric_limits<float>::infinity()
+                                                  : float(logit(options.prune_opacity));
+        rules.prune_scale = schedule.was_reset(step) ? float(options.prune_scale * extent) : 0.0f;
+        rules.seed = options.seed;
+        rules.step = uint32_t(step);
+        rules.max_splats = options.max_splats;
+        frame.free_instances();  // the second copy of an array takes its place
+        densify(cache, executor, model, frame, rules);
+    }
+    if (schedule.resets_opacity(step)) {
+        gpu::Recording recording(device->limits());
+        record_reset_opacity(recording, cache, model, float(logit(kResetOpacity)));
+        executor.run(recording);
+    }
+}
+
+bool Trainer::State::is_timed(int step) const {
+    return cache.config().frames_in_flight == 1 || step % kTimedEvery == 1;
+}
+
+}  // namespace ewa
