@@ -30,7 +30,7 @@ struct Axis {
 struct Drawing {
     double width, height, left, right, top, bottom;
 };
-constexpr Drawing kChart{400, 240, 48, 16, 12, 44}, kWork{720, 420, 64, 190, 36, 52};
+constexpr Drawing kChart{400, 240, 48, 16, 12, 44}, kWork{740, 420, 64, 210, 36, 52};
 
 /// The axes of a diagram.
 struct Axes {
