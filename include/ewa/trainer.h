@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -109,6 +110,9 @@ class Trainer {
 
     /// The splats, read back from the device. Their order is the trainer's own.
     Gaussians gaussians() const;
+    /// Pictures of the splats as they are, without exposures: those that a Renderer of gaussians() draws. Every rank draws
+    /// some of them. Only for a trainer of several views a step or several ranks.
+    std::vector<Image> render(std::span<const Camera> cameras) const;
     uint32_t splats() const;
     int steps_done() const;
     std::vector<Exposure> exposures() const;           // one for each training frame; empty if not learned
@@ -126,6 +130,7 @@ class Trainer {
     TrainerState join_state() const;
     void share_state(const TrainerState& state);
     Gaussians join_gaussians() const;
+    std::vector<Image> join_renders(std::span<const Camera> cameras) const;
     std::vector<RankFigures> join_figures() const;
 
     std::unique_ptr<State> state_;

@@ -9,6 +9,7 @@
 #include "ewa/error.h"
 #include "passes/passes.h"
 #include "pipeline/backward.h"
+#include "pipeline/picture.h"
 
 namespace ewa {
 namespace {
@@ -24,17 +25,6 @@ Gaussians with_degree(const Gaussians& gaussians, int degree) {
     for (size_t i = 0; i < gaussians.size(); ++i)
         std::copy_n(&gaussians.sh[i * from], to, &result.sh[i * to]);
     return result;
-}
-
-/// Copies one plane into one channel of an image.
-void copy_plane(const std::vector<float>& planes, const Sizes& sizes, uint32_t plane, Image& image,
-                int channel) {
-    const size_t step = size_t(image.channels);
-    for (int y = 0; y < image.height; ++y) {
-        const float* from = &planes[size_t(plane) * sizes.plane_floats + size_t(y) * sizes.stride];
-        float* to = image.at(0, y) + channel;
-        for (size_t x = 0; x < size_t(image.width); ++x) to[x * step] = from[x];
-    }
 }
 
 PlanRequest picture_request(const Gaussians& gaussians, const RenderOptions& options) {
@@ -117,18 +107,12 @@ Plan Renderer::State::plan_of(const DrawOptions& o) const {
 
 Rendering Renderer::State::draw(const Camera& camera, const Plan& plan, const RenderOptions& look) {
     submit(camera, plan, look, [](gpu::Recording&) {});
-    const Sizes& sizes = frame.sizes;
-    const auto planes = frame.planes.download<float>(sizes.planes / 4);
-    const auto image_of = [&](uint32_t first, int count) {
-        Image image(camera.width, camera.height, count);
-        for (int c = 0; c < count; ++c) copy_plane(planes, sizes, first + uint32_t(c), image, c);
-        return image;
-    };
-    Rendering result{image_of(shared::PLANE_R, 3), image_of(shared::PLANE_T, 1), {}, {}};
+    const Picture picture(frame);
+    Rendering result{picture.image(shared::PLANE_R, 3), picture.image(shared::PLANE_T, 1), {}, {}};
     for (float& value : result.alpha.pixels) value = 1.0f - value;
-    if (plan.drawing == Drawing::count) result.count = image_of(shared::PLANE_COUNT, 1);
+    if (plan.drawing == Drawing::count) result.count = picture.image(shared::PLANE_COUNT, 1);
     if (plan.drawing == Drawing::depth) {
-        result.depth = image_of(shared::PLANE_DEPTH, 1);
+        result.depth = picture.image(shared::PLANE_DEPTH, 1);
         for (size_t i = 0; i < result.depth.pixels.size(); ++i)
             if (result.alpha.pixels[i] > 0) result.depth.pixels[i] /= result.alpha.pixels[i];
     }

@@ -195,13 +195,39 @@ shared::Counts Batch::draw_own(const BatchParts& parts, const BatchView& view, c
             recording.copy(buffers_.visible, 0, parts.frame.records, 0, listed * kRecordBytes);
         const Sorted sorted =
             record_list_forward(recording, parts.cache, parts.plan, splats, parts.frame, view.inputs);
-        view.record_loss(recording);
-        record_list_backward(recording, parts.cache, parts.plan, splats, parts.frame, view.inputs, sorted,
-                             sums, alone ? round.places.front() : 0);
+        if (view.record_loss) {
+            view.record_loss(recording);
+            record_list_backward(recording, parts.cache, parts.plan, splats, parts.frame, view.inputs, sorted,
+                                 sums, alone ? round.places.front() : 0);
+        }
         const shared::Counts counts = run(parts, recording);
         if (counts.instances <= parts.frame.instance_capacity) return counts;
         parts.instance_capacity = grown_capacity(counts.instances);
     }
+}
+
+/// Afterwards each rank has the list of the view that it draws.
+void Batch::exchange_lists(const BatchParts& parts, std::span<const BatchView> views, Round& round,
+                           BatchReport& report) {
+    list(parts, views, round);
+    tell_counts(round, report);
+    if (ranks_->size() == 1) return;
+    const int own = ranks_->rank();
+    if (round.draws(own)) {
+        reserve(parts, views[round.first + size_t(own)].request, round.own());
+        make_room_for_own(parts, round.own());
+    }
+    send_records(parts, round);
+}
+
+bool Batch::draw_pictures(const BatchParts& parts, std::span<const BatchView> views) {
+    BatchReport report;
+    places_ = 0;
+    Round round{0, views.size(), {}, {}, {}};
+    exchange_lists(parts, views, round, report);
+    const bool draws = round.draws(ranks_->rank());
+    if (draws) draw_own(parts, views[size_t(ranks_->rank())], round);
+    return draws;
 }
 
 BatchReport Batch::draw(const BatchParts& parts, std::span<const BatchView> views) {
@@ -210,16 +236,7 @@ BatchReport Batch::draw(const BatchParts& parts, std::span<const BatchView> view
     places_ = 0;
     for (size_t first = 0; first < views.size(); first += size_t(ranks)) {
         Round round{first, std::min(size_t(ranks), views.size() - first), {}, {}, {}};
-        list(parts, views, round);
-        tell_counts(round, report);
-        if (ranks > 1) {
-            if (round.draws(own)) {
-                const BatchView& view = views[first + size_t(own)];
-                reserve(parts, view.request, round.own());
-                make_room_for_own(parts, round.own());
-            }
-            send_records(parts, round);
-        }
+        exchange_lists(parts, views, round, report);
         std::array<double, 2> losses{};
         if (round.draws(own)) {
             const BatchView& view = views[first + size_t(own)];

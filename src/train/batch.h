@@ -15,7 +15,7 @@ namespace ewa::train {
 struct BatchView {
     pipeline::FrameInputs inputs;
     pipeline::FrameRequest request;  // of its picture, without splats and instances
-    /// Records the loss after the picture. Called once for every attempt to draw.
+    /// Records the loss after the picture. Called once for every attempt to draw. Empty: the view is only a picture.
     std::function<void(gpu::Recording&)> record_loss;
     /// dB, from the counts of the picture.
     std::function<double(const shared::Counts&)> psnr;
@@ -54,6 +54,10 @@ class Batch {
     void update(const BatchParts& parts, const pipeline::Rates& rates, uint32_t first, int sh_degree,
                 const std::function<void(gpu::Recording&)>& more, BatchReport& report);
 
+    /// Draws pictures: view k by rank k. There are at most as many views as ranks. Returns whether this rank has drawn one,
+    /// which the frame then holds.
+    bool draw_pictures(const BatchParts& parts, std::span<const BatchView> views);
+
     const Traffic& traffic() const { return traffic_; }
 
   private:
@@ -66,6 +70,8 @@ class Batch {
     void tell_counts(Round& round, BatchReport& report);
     void send_records(const BatchParts& parts, const Round& round);
     void return_sums(const BatchParts& parts, const Round& round);
+    void exchange_lists(const BatchParts& parts, std::span<const BatchView> views, Round& round,
+                        BatchReport& report);
     shared::Counts draw_own(const BatchParts& parts, const BatchView& view, const Round& round);
 
     std::shared_ptr<Ranks> ranks_;

@@ -3,6 +3,7 @@
 #pragma once
 #include <functional>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "ewa/evaluation.h"
@@ -10,19 +11,29 @@
 
 namespace ewa::train {
 
+/// How a scene is drawn.
+struct Drawing {
+    size_t at_once = 1;  // cameras of a call that draws fastest
+    /// The images through the cameras, in their order.
+    std::function<std::vector<Image>(std::span<const Camera>)> images;
+};
+
+/// By a renderer of these splats.
+Drawing drawing_of(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians,
+                   const RenderOptions& options);
+
 /// A training or held-out image and its render, of one size.
 struct RenderedView {
     Image photo, weights, rendering;  // weights: see psnr
 };
 
-/// exposure: applied to the render; null: none. Throws InputError (an image that cannot be read or changed its
-/// size), RunError (device).
-RenderedView render_view(Renderer& renderer, const Frame& frame, const RenderOptions& options,
-                         const Exposure* exposure);
+/// rendering: through the frame's camera. exposure: applied to it; null: none. Throws InputError (an image that cannot be
+/// read or changed its size).
+RenderedView with_photo(Image rendering, const Frame& frame, const RenderOptions& options,
+                        const Exposure* exposure);
 
 /// As ewa::evaluate. on_view: called after each view that counts, with its place in `frames`.
-Evaluation evaluate_views(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians,
-                          const Dataset& dataset, const std::vector<int>& frames,
+Evaluation evaluate_views(const Drawing& drawing, const Dataset& dataset, const std::vector<int>& frames,
                           const RenderOptions& options, const std::vector<Exposure>& exposures,
                           const std::function<void()>& before_frame,
                           const std::function<void(size_t, const RenderedView&, const EvalFrame&)>& on_view);

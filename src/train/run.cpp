@@ -151,9 +151,12 @@ class Run {
     void stop_if_asked() const;
     template <class Work>
     bool done_unless_stopped(Work&& work) const;
-    void evaluate_result(const Gaussians& gaussians, const std::vector<Exposure>& exposures);
+    bool draws_with_ranks() const { return options().ranks->size() > 1; }
+    train::Drawing drawing(const Gaussians& gaussians, const Trainer* trainer) const;
+    void evaluate_result(const train::Drawing& drawing, const Gaussians& gaussians,
+                         const std::vector<Exposure>& exposures);
     void add_view(int index, const train::RenderedView& view, const EvalFrame& figures);
-    void add_full_size(const Gaussians& gaussians, const std::vector<Exposure>& exposures);
+    void add_full_size(const train::Drawing& drawing, const std::vector<Exposure>& exposures);
     void add_section(const Gaussians& gaussians);
     void finish(std::unique_ptr<Trainer> trainer);
     void fill_summary();
@@ -331,11 +334,11 @@ void Run::after_step(Trainer& trainer, int before) {
     std::optional<Evaluation> evaluation;
     if (at(options().eval_every) && !input_.split.test.empty()) {
         // Cannot be stopped: a run that is resumed would not repeat it.
-        const Gaussians gaussians = trainer.gaussians();
+        const Gaussians gaussians = draws_with_ranks() ? Gaussians() : trainer.gaussians();
         if (refines()) use_refined_cameras(trainer);
         if (refines()) align_test_cameras(gaussians, {});
         evaluation = train::evaluate_views(
-            device_, gaussians, input_.dataset, input_.split.test, options().train.render, {},
+            drawing(gaussians, &trainer), input_.dataset, input_.split.test, options().train.render, {},
             [&] { trainer.keep_waiting(); }, [](size_t, const train::RenderedView&, const EvalFrame&) {});
         use_given_cameras();
         observer_.on_evaluation(step, *evaluation);
@@ -382,15 +385,22 @@ bool Run::done_unless_stopped(Work&& work) const {
     }
 }
 
-void Run::evaluate_result(const Gaussians& gaussians, const std::vector<Exposure>& exposures) {
+/// By all ranks from their shares; or by a renderer, without the trainer.
+train::Drawing Run::drawing(const Gaussians& gaussians, const Trainer* trainer) const {
+    if (!draws_with_ranks()) return train::drawing_of(device_, gaussians, options().train.render);
+    return {size_t(options().ranks->size()),
+            [trainer](std::span<const Camera> cameras) { return trainer->render(cameras); }};
+}
+
+void Run::evaluate_result(const train::Drawing& drawing, const Gaussians& gaussians,
+                          const std::vector<Exposure>& exposures) {
     observer_.on_note("evaluating");
     const bool held_out = !input_.split.test.empty();
     // The report shows the held-out views, or the training views without a test set.
     const auto evaluated = [&](const std::vector<int>& frames, const std::vector<Exposure>& of_frames,
                                bool shown) {
         return train::evaluate_views(
-            device_, gaussians, input_.dataset, frames, options().train.render, of_frames,
-            [this] { stop_if_asked(); },
+            drawing, input_.dataset, frames, options().train.render, of_frames, [this] { stop_if_asked(); },
             [&](size_t i, const train::RenderedView& view, const EvalFrame& figures) {
                 if (shown) add_view(frames[i], view, figures);
             });
@@ -424,9 +434,8 @@ void Run::add_view(int index, const train::RenderedView& view, const EvalFrame& 
 }
 
 /// Gives views of the report their images at full size, as many as the report may hold.
-void Run::add_full_size(const Gaussians& gaussians, const std::vector<Exposure>& exposures) {
+void Run::add_full_size(const train::Drawing& drawing, const std::vector<Exposure>& exposures) {
     report::sort_views(report_.views);
-    Renderer renderer(device_, gaussians, options().train.render);
     size_t bytes = 0;
     for (const size_t i : report::full_size_order(report_.views.size())) {
         if (bytes >= report::kFullSizeBytes) break;
@@ -434,9 +443,10 @@ void Run::add_full_size(const Gaussians& gaussians, const std::vector<Exposure>&
         report::ReportView& view = report_.views[i];
         const auto place = std::find(input_.split.train.begin(), input_.split.train.end(), view.frame);
         const bool exposed = !exposures.empty() && place != input_.split.train.end();
-        const train::RenderedView rendered =
-            train::render_view(renderer, input_.dataset.frames[size_t(view.frame)], options().train.render,
-                               exposed ? &exposures[size_t(place - input_.split.train.begin())] : nullptr);
+        const Frame& frame = input_.dataset.frames[size_t(view.frame)];
+        const train::RenderedView rendered = train::with_photo(
+            std::move(drawing.images(std::span(&frame.camera, 1)).front()), frame, options().train.render,
+            exposed ? &exposures[size_t(place - input_.split.train.begin())] : nullptr);
         bytes += report::add_full_size(view, rendered.photo, rendered.rendering);
     }
 }
@@ -476,19 +486,21 @@ void Run::finish(std::unique_ptr<Trainer> trainer) {
     save_checkpoint(*trainer);  // from here on, a kill costs no training
     report_.times = report_times(trainer->step_times());
     report_.summary.ranks = trainer->rank_figures();
-    trainer.reset();  // the evaluation takes its memory
+    if (!draws_with_ranks()) trainer.reset();  // the renderer takes its memory
     observer_.on_saved(last_);
 
-    const bool evaluated = done_unless_stopped([&] { evaluate_result(gaussians, exposures); });
+    const train::Drawing draw = drawing(gaussians, trainer.get());
+    const bool evaluated = done_unless_stopped([&] { evaluate_result(draw, gaussians, exposures); });
     if (last_.step > 0) log(last_evaluation_);
     observer_.on_evaluated(last_, gaussians);
     report_.held_out = !input_.split.test.empty();
     const auto fill_report = [&] {
-        add_full_size(gaussians, exposures);
+        add_full_size(draw, exposures);
         add_section(gaussians);
     };
     if (!evaluated) report_.views.clear();
     report_.summary.interrupted = !evaluated || !done_unless_stopped(fill_report);
+    trainer.reset();  // ends the other ranks
     fill_summary();
     folder_.save_report(report_);
 }

@@ -163,6 +163,9 @@ void Trainer::follow() {
             case Call::gaussians:
                 join_gaussians();
                 break;
+            case Call::render:
+                join_renders({});
+                break;
             case Call::figures:
                 join_figures();
                 break;

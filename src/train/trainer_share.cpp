@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // What all ranks of a training join on rank 0, and what rank 0 divides among them.
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstring>
 #include <span>
+#include <type_traits>
 #include <utility>
 
 #include "ewa/error.h"
@@ -151,6 +153,48 @@ Gaussians Trainer::join_gaussians() const {
     }
     gaussians.density = state_->plan.kernel == Footprint::density;
     return gaussians;
+}
+
+std::vector<Image> Trainer::render(std::span<const Camera> cameras) const {
+    state_->call(Call::render);
+    return join_renders(cameras);
+}
+
+namespace {
+
+/// The images of all ranks on rank 0, the one of view k from rank k. own: empty pixels of a rank that has none.
+std::vector<Image> joined_images(Ranks& ranks, const Image& own, std::span<const Camera> cameras) {
+    const auto bytes = std::as_bytes(std::span(own.pixels));
+    const auto all = train::joined(ranks, {bytes.begin(), bytes.end()});
+    std::vector<Image> images;
+    if (ranks.rank() != 0) return images;
+    size_t at = 0;
+    for (const Camera& camera : cameras) {
+        Image image(camera.width, camera.height, 3);
+        const size_t size = image.pixels.size() * sizeof(float);
+        std::memcpy(image.pixels.data(), &all.at(at), size);
+        at += size;
+        images.push_back(std::move(image));
+    }
+    return images;
+}
+
+}  // namespace
+
+std::vector<Image> Trainer::join_renders(std::span<const Camera> asked) const {
+    State& s = *state_;
+    static_assert(std::is_trivially_copyable_v<Camera>);
+    const auto told = train::told(*s.ranks, std::as_bytes(asked));
+    std::vector<Camera> cameras(told.size() / sizeof(Camera));
+    std::memcpy(cameras.data(), told.data(), told.size());
+    const size_t ranks = size_t(s.ranks->size());
+    std::vector<Image> images;
+    for (size_t first = 0; first < cameras.size(); first += ranks) {
+        const auto some = std::span(cameras).subspan(first, std::min(ranks, cameras.size() - first));
+        for (Image& image : joined_images(*s.ranks, s.render_own(some), some))
+            images.push_back(std::move(image));
+    }
+    return images;
 }
 
 std::vector<RankFigures> Trainer::rank_figures() const {

@@ -4,6 +4,7 @@
 #include <deque>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "ewa/trainer.h"
@@ -19,7 +20,7 @@ namespace ewa {
 namespace train {
 
 /// What rank 0 asks the others to take part in.
-enum class Call : uint64_t { end, wait, step, state, restore, gaussians, figures };
+enum class Call : uint64_t { end, wait, step, state, restore, gaussians, render, figures };
 
 }  // namespace train
 
@@ -95,6 +96,10 @@ struct Trainer::State {
 
     /// A step of several views, of which `last` is the last.
     void optimise_batch(int first, int last);
+    train::BatchParts batch_parts();
+
+    /// The picture through the camera of this rank's number; without pixels if there is none. Collective.
+    Image render_own(std::span<const Camera> cameras);
     void follow_up(int step);
     void control_density(int step);
 };

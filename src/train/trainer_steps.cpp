@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/random.h"
+#include "pipeline/picture.h"
 #include "train/trainer_state.h"
 
 namespace ewa {
@@ -202,8 +203,7 @@ void Trainer::State::optimise_batch(int first, int last) {
     const int sh_degree = schedule.degree(first);
     std::vector<train::BatchView> views;
     for (int step = first; step <= last; ++step) views.push_back(view_of(step, seen, sh_degree));
-    const train::BatchParts parts{
-        cache, executor, plan, model, frame, instance_capacity, [this] { add_pass_times(); }};
+    const train::BatchParts parts = batch_parts();
     train::BatchReport drawn = batch->draw(parts, views);
     Rates of_step = rates(last);
     of_step.views = uint32_t(views.size());
@@ -219,6 +219,26 @@ void Trainer::State::optimise_batch(int first, int last) {
     report.skipped_nonfinite = uint32_t(drawn.skipped_nonfinite);
     report.dropped_updates += drawn.dropped_updates;
     report.limited_steps += drawn.limited_steps;
+}
+
+train::BatchParts Trainer::State::batch_parts() {
+    return {cache, executor, plan, model, frame, instance_capacity, [this] { add_pass_times(); }};
+}
+
+Image Trainer::State::render_own(std::span<const Camera> cameras) {
+    std::vector<gpu::Buffer> blocks;
+    for (const Camera& camera : cameras)
+        blocks.push_back(upload_camera(*device, camera, cache.config(), model.origin));
+    std::vector<train::BatchView> views;
+    for (size_t i = 0; i < cameras.size(); ++i) {
+        const FrameInputs inputs = inputs_of(blocks[i], cameras[i], options.render);
+        views.push_back(
+            {.inputs = inputs, .request = request_of(inputs.camera), .record_loss = {}, .psnr = {}});
+    }
+    train::BatchParts parts = batch_parts();
+    parts.submitted = [] {};
+    if (!batch->draw_pictures(parts, views)) return {};
+    return Picture(frame).image(shared::PLANE_R, 3);
 }
 
 void Trainer::State::follow_up(int step) {

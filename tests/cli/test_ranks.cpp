@@ -87,6 +87,10 @@ TEST_F(TrainRanks, EndWithTheBytesOfOneProcess) {
         EXPECT_EQ(figures[rank]["name"].get<std::string>().find("rank " + std::to_string(rank) + " ("), 0u);
         EXPECT_GT(figures[rank]["sent_bytes_per_view"].get<double>(), 0);
     }
+    for (const char* figure : {"test_psnr", "test_ssim", "train_psnr"})
+        EXPECT_EQ(read_json(folder / "three/summary.json")[figure],
+                  read_json(folder / "one/summary.json")[figure])
+            << figure;
     EXPECT_NE(read_file(folder / "three/report.html").find("What the ranks exchanged"), std::string::npos);
     EXPECT_FALSE(read_json(folder / "one/summary.json").contains("ranks"));
 }

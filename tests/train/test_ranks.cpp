@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "ewa/error.h"
+#include "ewa/renderer.h"
 #include "ewa/trainer.h"
 #include "gpu/test_device.h"
 #include "pipeline/share.h"
@@ -177,6 +178,31 @@ TEST(Ranks, EachHoldsItsShareOfTheState) {
             EXPECT_GT(figure.exchange, 0);
             EXPECT_GT(figure.peak_device_bytes, figure.own_bytes);
         }
+    }
+}
+
+TEST(Ranks, DrawThePicturesOfARenderer) {
+    for (const int ranks : {1, 3}) {
+        std::vector<Image> drawn, expected;
+        const TrainOptions options = busy(Strategy::adc, 2);
+        run_ranks(ranks, [&](std::shared_ptr<Ranks> group) {
+            const auto own = open_test_device(false);
+            Trainer trainer(own, capture().dataset, all_frames(capture().dataset), start(), options, group);
+            if (group->rank() != 0) return trainer.follow();
+            while (trainer.steps_done() < 30) trainer.step();
+            std::vector<Camera> cameras;
+            for (const Frame& frame : capture().dataset.frames) cameras.push_back(frame.camera);
+            // One that sees nothing, between others.
+            cameras[4].rotation = glm::dmat3(-1, 0, 0, 0, 1, 0, 0, 0, -1) * cameras[4].rotation;
+            cameras[4].translation = glm::dvec3(0, 0, -1e4);
+            drawn = trainer.render(cameras);
+            EXPECT_TRUE(trainer.render({}).empty());
+            Renderer renderer(own, trainer.gaussians(), options.render);
+            for (const Camera& camera : cameras) expected.push_back(renderer.render(camera).color);
+            trainer.step();  // the training continues
+        });
+        ASSERT_EQ(drawn.size(), expected.size());
+        for (size_t i = 0; i < drawn.size(); ++i) EXPECT_TRUE(drawn[i].pixels == expected[i].pixels) << i;
     }
 }
 
