@@ -204,6 +204,23 @@ TEST(RayChainScenes, AMarchMeetsTheIntegralFarInFrontOfAWall) {
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(image.at(4, 4)[c], exact[c], 1e-3);
 }
 
+TEST(RayChainScenes, WhatARayMeetsInFrontOfTheNearPlaneIsNotDrawn) {
+    ChainScene disc{camera_ahead(16), {}, random_target(63, 16, 16), {.integrator = Integrator::ray}};
+    add_splat(disc.gaussians, {{0, 0, 0.02}, 0.05, 1, {0.9f, 0.5f, 0.2f}});
+    // A disc whose plane z = 0.02 + 5 x comes before the near plane at the left of the image.
+    const double half = 0.5 * std::atan(5.0);
+    for (int k = 0; k < 4; ++k) disc.gaussians.quaternions[size_t(k)] = 0;
+    disc.gaussians.quaternions[0] = float(std::cos(half));
+    disc.gaussians.quaternions[2] = float(-std::sin(half));
+    disc.gaussians.log_scales[2] = float(std::log(1e-3));
+    const Image image = Renderer(device(), disc.gaussians, disc.options).render(disc.camera).color;
+    const auto expected = reference::render(disc.gaussians, disc.camera, disc.options);
+    const auto excluded = reference::Rays(disc.gaussians, disc.camera, disc.options).at_threshold(2e-4);
+    EXPECT_LT(picture_errors(image, expected.blended.color, 1e-5, excluded).worst, 1e-5);
+    EXPECT_EQ(image.at(0, 8)[0], 0.0f);
+    EXPECT_GT(image.at(7, 8)[0], 0.1f);
+}
+
 /// Splats that reach the plane of the eye far from the image, so that every tile lists them and no ray meets them, and some others.
 ChainScene with_unmet_splats(size_t count, Integrator integrator) {
     ChainScene scene{camera_ahead(8), {}, random_target(61, 8, 8), {.integrator = integrator, .samples = 8}};
