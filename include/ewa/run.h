@@ -113,7 +113,7 @@ struct RunResult {
 /// Trains, evaluates, and writes into the run's folder:
 /// - config.json: the options, as `ewa train --config` takes them.
 /// - metrics.jsonl: a MetricsLine every 1 % of the steps and at each evaluation.
-/// - checkpoint.ewa: the state to resume from.
+/// - checkpoint.ewa, times.json: the state to resume from, and the times up to it.
 /// - splats.ply: the splats.
 /// - cameras.json and the COLMAP model cameras/sparse/0, with TrainOptions::refine_poses: the refined cameras.
 /// - exposures.json, with TrainOptions::exposure: three rows of four numbers for each training image.

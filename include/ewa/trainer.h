@@ -20,6 +20,11 @@
 
 namespace ewa {
 
+namespace train {
+class StateWriter;
+class StateReader;
+}  // namespace train
+
 /// The options with concrete values for Strategy::automatic and kAutomaticShDegree.
 TrainOptions resolve(TrainOptions options, const Dataset& dataset);
 
@@ -107,6 +112,9 @@ class Trainer {
     TrainerState state() const;
     /// Throws InputError if the state does not fit this trainer; the trainer then stays as it was.
     void restore(const TrainerState& state);
+    /// The same for checkpoints, in pieces (train/state_stream.h). If reading fails, the trainer is of no more use.
+    void save(train::StateWriter& to) const;
+    void restore(train::StateReader& from);
 
     /// The splats, read back from the device. Their order is the trainer's own.
     Gaussians gaussians() const;
@@ -115,6 +123,7 @@ class Trainer {
     std::vector<Image> render(std::span<const Camera> cameras) const;
     uint32_t splats() const;
     int steps_done() const;
+    StepReport report() const;                         // of the last step, once the device has finished it
     std::vector<Exposure> exposures() const;           // one for each training frame; empty if not learned
     std::vector<CameraMotion> camera_motions() const;  // one for each training frame; empty if not learned
     size_t images_on_disk() const;                     // training images that are not cached
@@ -127,8 +136,8 @@ class Trainer {
     struct State;
 
     StepReport take_step();
-    TrainerState join_state() const;
-    void share_state(const TrainerState& state);
+    void join_state(train::StateWriter* to) const;
+    void share_state(train::StateReader* from);
     Gaussians join_gaussians() const;
     std::vector<Image> join_renders(std::span<const Camera> cameras) const;
     std::vector<RankFigures> join_figures() const;

@@ -10,8 +10,9 @@
 namespace ewa::live {
 
 /// The files that `ewa train` writes beside its renders.
-inline constexpr std::array kRunFiles{"config.json",  "metrics.jsonl", "checkpoint.ewa", "splats.ply",
-                                      "summary.json", "report.html",   "exposures.json", "cameras.json"};
+inline constexpr std::array kRunFiles{"config.json", "metrics.jsonl",  "checkpoint.ewa",
+                                      "times.json",  "splats.ply",     "summary.json",
+                                      "report.html", "exposures.json", "cameras.json"};
 
 struct Run {
     std::filesystem::path folder;

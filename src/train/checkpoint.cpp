@@ -10,9 +10,8 @@
 #include <cstring>
 #include <span>
 #include <type_traits>
+#include <utility>
 
-#include "core/atomic_file.h"
-#include "core/file_reader.h"
 #include "ewa/error.h"
 
 namespace ewa::train {
@@ -42,37 +41,59 @@ struct SectionHeader {
 };
 static_assert(sizeof(SectionHeader) == 32);
 
-uint32_t checksum_of(const SectionHeader& header, std::span<const std::byte> data) {
-    const auto* head = reinterpret_cast<const Bytef*>(&header);
-    const uLong sum = crc32_z(0, head, offsetof(SectionHeader, checksum));
-    if (data.empty()) return uint32_t(sum);  // zlib restarts the sum for a null pointer
-    return uint32_t(crc32_z(sum, reinterpret_cast<const Bytef*>(data.data()), data.size()));
+/// zlib restarts the sum for a null pointer.
+uint32_t added(uint32_t checksum, std::span<const std::byte> data) {
+    if (data.empty()) return checksum;
+    return uint32_t(crc32_z(checksum, reinterpret_cast<const Bytef*>(data.data()), data.size()));
+}
+
+/// Of the name and the size.
+uint32_t checksum_of(const SectionHeader& header) {
+    return added(0, std::as_bytes(std::span(&header, 1)).first(offsetof(SectionHeader, checksum)));
+}
+
+void write_header(core::AtomicFile& file, std::string_view name, uint64_t bytes, uint32_t checksum) {
+    SectionHeader header{};
+    std::memcpy(header.name, name.data(), std::min(name.size(), kNameBytes - 1));
+    header.bytes = bytes;
+    header.checksum = uint32_t(crc32_combine(checksum_of(header), checksum, z_off_t(bytes)));
+    file.write(&header, sizeof(header));
 }
 
 void write_section(core::AtomicFile& file, std::string_view name, std::span<const std::byte> data) {
-    SectionHeader header{};
-    std::memcpy(header.name, name.data(), std::min(name.size(), kNameBytes - 1));
-    header.bytes = data.size();
-    header.checksum = checksum_of(header, data);
-    file.write(&header, sizeof(header));
+    write_header(file, name, data.size(), added(0, data));
     file.write(data.data(), data.size());
 }
 
-TrainerArray read_section(core::FileReader& file) {
+/// Reads a section, piece by piece. take: gets its header first, with an empty piece.
+template <class Take>
+void read_section(core::FileReader& file, Take&& take) {
     SectionHeader header;
     std::memcpy(&header, file.take(sizeof(header), "a section's header"), sizeof(header));
-    TrainerArray section;
-    section.name.assign(std::begin(header.name),
-                        std::find(std::begin(header.name), std::end(header.name), char(0)));
     file.require_room(header.bytes, 1, "a section");
-    section.bytes.resize(header.bytes);
+    StateReader::Array section{
+        {std::begin(header.name), std::find(std::begin(header.name), std::end(header.name), char(0))},
+        header.bytes};
+    take(section, {});
+    uint32_t checksum = checksum_of(header);
     for (uint64_t at = 0; at < header.bytes;) {
-        const size_t piece = size_t(std::min<uint64_t>(kPiece, header.bytes - at));
-        std::memcpy(&section.bytes[at], file.take(piece, "a section"), piece);
-        at += piece;
+        const size_t size = size_t(std::min<uint64_t>(kPiece, header.bytes - at));
+        const std::span<const std::byte> piece(file.take(size, "a section"), size);
+        checksum = added(checksum, piece);
+        take(section, piece);
+        at += size;
     }
-    if (checksum_of(header, section.bytes) != header.checksum)
+    if (checksum != header.checksum)
         file.fail("a section does not have its checksum: the checkpoint is damaged; --force starts anew");
+}
+
+TrainerArray read_section(core::FileReader& file) {
+    TrainerArray section;
+    read_section(file, [&](const StateReader::Array& array, std::span<const std::byte> piece) {
+        section.name = array.name;
+        section.bytes.reserve(array.bytes);
+        section.bytes.insert(section.bytes.end(), piece.begin(), piece.end());
+    });
     return section;
 }
 
@@ -82,28 +103,50 @@ std::string text_of(const std::vector<std::byte>& bytes) {
 
 }  // namespace
 
-void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint) {
-    const TrainerState& state = checkpoint.state;
-    const StepReport& r = state.report;
+CheckpointWriter::CheckpointWriter(const std::filesystem::path& path, std::string settings,
+                                   std::string metrics, std::optional<double> wall_seconds)
+    : file_(path),
+      settings_(std::move(settings)),
+      metrics_(std::move(metrics)),
+      wall_seconds_(wall_seconds) {}
+
+void CheckpointWriter::begin(const StateHead& head, size_t arrays) {
+    const StepReport& r = head.report;
     const StateBlock block{r.step,
-                           r.seconds,
-                           checkpoint.wall_seconds,
+                           wall_seconds_ ? r.seconds : 0,
+                           wall_seconds_.value_or(0),
                            r.loss,
                            r.dropped_updates,
                            r.splats,
                            r.skipped_nonfinite,
-                           uint32_t(state.sh_degree),
+                           uint32_t(head.sh_degree),
                            uint32_t(std::min<uint64_t>(r.limited_steps, 0xffffffffu)),
                            r.psnr};
-    core::AtomicFile file(path);
-    file.write(kMagic);
-    const uint32_t counts[] = {kVersion, uint32_t(std::size(kFixed) + state.arrays.size())};
-    file.write(counts, sizeof(counts));
-    write_section(file, kFixed[0], std::as_bytes(std::span(checkpoint.settings)));
-    write_section(file, kFixed[1], std::as_bytes(std::span(checkpoint.metrics)));
-    write_section(file, kFixed[2], std::as_bytes(std::span(&block, 1)));
-    for (const TrainerArray& array : state.arrays) write_section(file, array.name, array.bytes);
-    file.commit();
+    file_.write(kMagic);
+    const uint32_t counts[] = {kVersion, uint32_t(std::size(kFixed) + arrays)};
+    file_.write(counts, sizeof(counts));
+    write_section(file_, kFixed[0], std::as_bytes(std::span(settings_)));
+    write_section(file_, kFixed[1], std::as_bytes(std::span(metrics_)));
+    write_section(file_, kFixed[2], std::as_bytes(std::span(&block, 1)));
+}
+
+void CheckpointWriter::begin_array(const std::string& name, uint64_t bytes, uint32_t checksum) {
+    write_header(file_, name, bytes, checksum);
+}
+
+void CheckpointWriter::write(std::span<const std::byte> piece) {
+    file_.write(piece.data(), piece.size());
+}
+
+void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint) {
+    const TrainerState& state = checkpoint.state;
+    CheckpointWriter writer(path, checkpoint.settings, checkpoint.metrics, checkpoint.wall_seconds);
+    writer.begin({state.report, state.sh_degree}, state.arrays.size());
+    for (const TrainerArray& array : state.arrays) {
+        writer.begin_array(array.name, array.bytes.size(), added(0, array.bytes));
+        writer.write(array.bytes);
+    }
+    writer.commit();
 }
 
 namespace {
@@ -151,12 +194,38 @@ Checkpoint read_checkpoint_head(const std::filesystem::path& path) {
     return read_head(file, arrays);
 }
 
-Checkpoint read_checkpoint(const std::filesystem::path& path) {
-    core::FileReader file(path);
+CheckpointReader::CheckpointReader(const std::filesystem::path& path) : file_(path) {
     uint32_t arrays = 0;
-    Checkpoint checkpoint = read_head(file, arrays);
-    for (uint32_t i = 0; i < arrays; ++i) checkpoint.state.arrays.push_back(read_section(file));
-    if (file.remaining() > 0) file.fail("there are bytes behind the last section");
+    checkpoint_ = read_head(file_, arrays);
+    head_ = {checkpoint_.state.report, checkpoint_.state.sh_degree};
+    for (uint32_t i = 0; i < arrays; ++i)
+        read_section(file_, [&](const Array& array, std::span<const std::byte> piece) {
+            if (!piece.empty()) return;
+            arrays_.push_back(array);
+            begins_.push_back(file_.offset());
+        });
+    if (file_.remaining() > 0) file_.fail("there are bytes behind the last section");
+}
+
+void CheckpointReader::read(size_t array, uint64_t offset, std::span<std::byte> into) {
+    file_.go_to(begins_[array] + offset, "a section");
+    for (size_t at = 0; at < into.size();) {
+        const size_t piece = std::min(kPiece, into.size() - at);
+        std::memcpy(&into[at], file_.take(piece, "a section"), piece);
+        at += piece;
+    }
+}
+
+Checkpoint read_checkpoint(const std::filesystem::path& path) {
+    CheckpointReader reader(path);
+    Checkpoint checkpoint = reader.checkpoint();
+    for (size_t i = 0; i < reader.arrays().size(); ++i) {
+        const StateReader::Array& array = reader.arrays()[i];
+        TrainerArray& read = checkpoint.state.arrays.emplace_back();
+        read.name = array.name;
+        read.bytes.resize(array.bytes);
+        reader.read(i, 0, read.bytes);
+    }
     return checkpoint;
 }
 

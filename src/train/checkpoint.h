@@ -13,11 +13,22 @@
 //
 // The other sections are the arrays of TrainerState under their names, in the device's layout
 // (shaders/shared/layouts.h).
+//
+// A run leaves all times in it zero, so that equal runs have equal files. They are in times.json (train/run_times.h).
+// Earlier versions wrote them here.
 #pragma once
+#include <cstddef>
+#include <cstdint>
 #include <filesystem>
+#include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
+#include "core/atomic_file.h"
+#include "core/file_reader.h"
 #include "ewa/trainer.h"
+#include "train/state_stream.h"
 
 namespace ewa::train {
 
@@ -27,10 +38,50 @@ struct Checkpoint {
     TrainerState state;
 };
 
-/// Replaces the file as a whole: after a kill the path holds this checkpoint or the previous one. Throws RunError.
-void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint);
+/// Writes a checkpoint array by array. The file is replaced as a whole by commit(): after a kill the path holds this
+/// checkpoint or the previous one. All functions throw RunError.
+class CheckpointWriter : public StateWriter {
+  public:
+    /// Without wall_seconds, the file gets no times at all.
+    CheckpointWriter(const std::filesystem::path& path, std::string settings, std::string metrics,
+                     std::optional<double> wall_seconds = {});
+    void begin(const StateHead& head, size_t arrays) override;
+    void begin_array(const std::string& name, uint64_t bytes, uint32_t checksum) override;
+    void write(std::span<const std::byte> piece) override;
+    void commit() { file_.commit(); }  // call once, last
 
-/// Throws InputError, with the byte, if the file is cut short, damaged, of another version or no checkpoint.
+  private:
+    core::AtomicFile file_;
+    std::string settings_, metrics_;
+    std::optional<double> wall_seconds_;
+};
+
+/// A checkpoint whose arrays stay in the file until they are asked for.
+class CheckpointReader : public StateReader {
+  public:
+    /// Reads the whole file once. Throws InputError, with the byte, if it is cut short, damaged, of another version or no
+    /// checkpoint.
+    explicit CheckpointReader(const std::filesystem::path& path);
+
+    /// Its settings, metrics and times, without the arrays.
+    const Checkpoint& checkpoint() const { return checkpoint_; }
+    /// Replaces the training time of the state.
+    void set_seconds(double seconds) { head_.report.seconds = seconds; }
+
+    const StateHead& head() const override { return head_; }
+    const std::vector<Array>& arrays() const override { return arrays_; }
+    void read(size_t array, uint64_t offset, std::span<std::byte> into) override;
+
+  private:
+    core::FileReader file_;
+    Checkpoint checkpoint_;
+    StateHead head_;
+    std::vector<Array> arrays_;
+    std::vector<uint64_t> begins_;  // of each array's bytes in the file
+};
+
+/// Both throw what the classes throw.
+void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint);
 Checkpoint read_checkpoint(const std::filesystem::path& path);
 
 /// The same without the arrays of the state, which are not read. A file cut short in them is no error.

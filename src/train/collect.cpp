@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/collect.h"
 
+#include <zlib.h>
+
 #include <algorithm>
+#include <array>
 #include <numeric>
 #include <utility>
 
@@ -11,6 +14,13 @@ namespace {
 /// A part for each rank.
 using OutParts = std::vector<std::span<const std::byte>>;
 using InParts = std::vector<std::span<std::byte>>;
+
+constexpr size_t kPiece = size_t(4) << 20;  // bytes
+
+uint32_t checksum_of(std::span<const std::byte> bytes) {
+    if (bytes.empty()) return 0;  // zlib restarts the sum for a null pointer
+    return uint32_t(crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+}
 
 }  // namespace
 
@@ -32,17 +42,50 @@ std::vector<std::byte> joined(Ranks& ranks, std::vector<std::byte> own) {
     return all;
 }
 
-std::vector<std::byte> part_of(Ranks& ranks, std::span<const std::byte> all,
-                               const std::vector<uint64_t>& sizes) {
-    std::vector<std::byte> own(sizes[size_t(ranks.rank())]);
-    OutParts out(sizes.size());
-    InParts in(sizes.size());
-    uint64_t at = 0;
-    if (ranks.rank() == 0)
-        for (size_t rank = 0; rank < sizes.size(); at += sizes[rank++])
-            out[rank] = all.subspan(at, sizes[rank]);
-    in[0] = own;
-    ranks.exchange(out, in);
+void pass_on(Ranks& ranks, std::span<const std::byte> own,
+             const std::function<void(uint64_t, uint32_t)>& begin,
+             const std::function<void(std::span<const std::byte>)>& take) {
+    const std::array<uint64_t, 2> card{own.size(), checksum_of(own)};
+    const std::vector<uint64_t> cards = ranks.gather(card);
+    uint64_t bytes = cards[0], checksum = cards[1];
+    for (size_t i = 2; i < cards.size(); i += 2) {
+        bytes += cards[i];
+        checksum = crc32_combine(uLong(checksum), uLong(cards[i + 1]), z_off_t(cards[i]));
+    }
+    const bool first = ranks.rank() == 0;
+    if (first) begin(bytes, uint32_t(checksum));
+    if (first) take(own);
+    std::vector<std::byte> buffer;
+    for (size_t rank = 1; rank < size_t(ranks.size()); ++rank)
+        for (uint64_t at = 0, size = cards[2 * rank]; at < size; at += kPiece) {
+            const size_t piece = std::min(kPiece, size_t(size - at));
+            OutParts out(size_t(ranks.size()));
+            InParts in(size_t(ranks.size()));
+            if (size_t(ranks.rank()) == rank) out[0] = own.subspan(at, piece);
+            if (first) buffer.resize(piece);
+            if (first) in[rank] = buffer;
+            ranks.exchange(out, in);
+            if (first) take(buffer);
+        }
+}
+
+std::vector<std::byte> part_of(Ranks& ranks, const std::vector<uint64_t>& sizes,
+                               const std::function<void(uint64_t, std::span<std::byte>)>& read) {
+    std::vector<std::byte> own(sizes[size_t(ranks.rank())]), buffer;
+    const bool first = ranks.rank() == 0;
+    if (first) read(0, own);
+    uint64_t offset = sizes[0];
+    for (size_t rank = 1; rank < sizes.size(); offset += sizes[rank++])
+        for (uint64_t at = 0; at < sizes[rank]; at += kPiece) {
+            const size_t piece = std::min(kPiece, size_t(sizes[rank] - at));
+            OutParts out(sizes.size());
+            InParts in(sizes.size());
+            if (first) buffer.resize(piece);
+            if (first) read(offset + at, buffer);
+            if (first) out[rank] = buffer;
+            if (size_t(ranks.rank()) == rank) in[0] = std::span(own).subspan(at, piece);
+            ranks.exchange(out, in);
+        }
     return own;
 }
 

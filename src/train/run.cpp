@@ -29,6 +29,7 @@
 #include "train/run_files.h"
 #include "train/run_input.h"
 #include "train/run_options.h"
+#include "train/run_times.h"
 
 namespace ewa {
 namespace {
@@ -98,9 +99,10 @@ std::vector<std::filesystem::path> render_files(const train::RunInput& input) {
 const std::filesystem::path& checked_folder(const train::RunInput& input) {
     const std::filesystem::path& folder = input.options.output;
     std::vector<core::NamedFile> written, read = scene::files_of(input.dataset, "DATASET");
-    for (const char* name : {"config.json", "metrics.jsonl", "checkpoint.ewa", "splats.ply", "summary.json",
-                             "report.html", "exposures.json", "cameras.json", "cameras/sparse/0/cameras.bin",
-                             "cameras/sparse/0/images.bin", "cameras/sparse/0/points3D.bin"})
+    for (const char* name :
+         {"config.json", "metrics.jsonl", "checkpoint.ewa", "times.json", "splats.ply", "summary.json",
+          "report.html", "exposures.json", "cameras.json", "cameras/sparse/0/cameras.bin",
+          "cameras/sparse/0/images.bin", "cameras/sparse/0/points3D.bin"})
         written.push_back({"the run's file", folder / name});
     const auto renders = render_files(input);
     for (const int index : saved_frames(input.split))
@@ -137,6 +139,7 @@ class Run {
     void start();
     void list_settings();
     void restore(Trainer& trainer);
+    void restore_times();
     void save_splats(const Gaussians& gaussians) const;
     void save_result(const Trainer& trainer);
     bool refines() const { return options().train.refine_poses; }
@@ -169,7 +172,8 @@ class Run {
     train::RunFolder folder_;
     train::SavePace pace_;
     Json settings_;  // of the checkpoint
-    std::optional<train::Checkpoint> earlier_;
+    std::unique_ptr<train::CheckpointReader> earlier_;
+    train::RunTimes times_;              // of the checkpoints
     bool continues_ = false;             // from a checkpoint
     int earlier_steps_ = 0;              // that the checkpoint's run was asked for
     std::vector<Camera> given_cameras_;  // of the dataset, while its frames have the refined ones
@@ -187,13 +191,13 @@ void Run::read_checkpoint() {
     train::check_free(folder_.path(), options());  // again, now that no other run writes here
     continues_ = options().resume && std::filesystem::exists(folder_.checkpoint());
     if (continues_) {
-        earlier_ = train::read_checkpoint(folder_.checkpoint());
-        earlier_steps_ =
-            train::continue_from(folder_.checkpoint(), *earlier_, asked_strategy_, input_.options);
+        earlier_ = std::make_unique<train::CheckpointReader>(folder_.checkpoint());
+        earlier_steps_ = train::continue_from(folder_.checkpoint(), earlier_->checkpoint(), asked_strategy_,
+                                              input_.options);
     }
     settings_ =
         train::checkpoint_settings(options(), train::dataset_fingerprint(input_.dataset, input_.split));
-    if (continues_) train::check_resumable(folder_.checkpoint(), earlier_->settings, settings_);
+    if (continues_) train::check_resumable(folder_.checkpoint(), earlier_->checkpoint().settings, settings_);
 }
 
 /// Called as late as possible, since it ends an earlier run that is replaced.
@@ -240,19 +244,19 @@ void Run::start() {
 /// Continues from the checkpoint, if there is one.
 void Run::restore(Trainer& trainer) {
     if (!earlier_) return;
-    const std::string remark = train::resume_remark(earlier_->settings, settings_);
+    const std::string remark = train::resume_remark(earlier_->checkpoint().settings, settings_);
     if (!remark.empty()) {
         report_.remarks.push_back(remark);
         observer_.on_note(remark);
     }
     try {
-        trainer.restore(earlier_->state);
-        report_.metrics = report::parse_metrics(earlier_->metrics);
+        report_.metrics = report::parse_metrics(earlier_->checkpoint().metrics);
+        restore_times();
+        trainer.restore(*earlier_);
     } catch (const InputError& error) {
         throw InputError(folder_.checkpoint().string() + ": " + error.what() + "; --force starts anew");
     }
-    earlier_wall_ = earlier_->wall_seconds;
-    last_ = earlier_->state.report;
+    last_ = earlier_->head().report;
     const int steps = options().train.steps;
     // The checkpoint of a finished run lacks the line of its last evaluation.
     if (steps > earlier_steps_ && last_.step == earlier_steps_)
@@ -263,6 +267,27 @@ void Run::restore(Trainer& trainer) {
         "resumed after step {} of {}{}", last_.step, steps,
         steps == earlier_steps_ ? "" : fmt::format(", before which the run had --steps {}", earlier_steps_)));
     earlier_.reset();
+}
+
+/// The times of the checkpoint, from times.json. One of an earlier version has them itself.
+void Run::restore_times() {
+    const StepReport& report = earlier_->head().report;
+    train::TimesAt own{report.step, report.seconds, earlier_->checkpoint().wall_seconds};
+    if (own.wall_seconds == 0) try {
+            train::RunTimes known = train::read_times(folder_.times());
+            for (const train::TimesAt& time : known.checkpoints)
+                if (time.step == own.step) own = time;
+            train::take_times(report_.metrics, known);
+        } catch (const InputError&) {
+            // What was trained matters more than how long it took.
+        }
+    if (own.wall_seconds == 0) {
+        report_.remarks.push_back("resumed without its earlier times, since times.json lacks them");
+        observer_.on_note(report_.remarks.back());
+    }
+    earlier_->set_seconds(own.seconds);
+    earlier_wall_ = own.wall_seconds;
+    train::add_checkpoint(times_, own);
 }
 
 void Run::save_splats(const Gaussians& gaussians) const {
@@ -309,9 +334,14 @@ void Run::save_cameras(bool aligned) const {
 
 void Run::save_checkpoint(const Trainer& trainer) {
     const auto start = Clock::now();
-    train::write_checkpoint(folder_.checkpoint(),
-                            {settings_.dump(-1, ' ', false, Json::error_handler_t::replace),
-                             report::metrics_text(report_.metrics), wall_seconds(), trainer.state()});
+    times_.metrics = train::times_of(report_.metrics);
+    train::add_checkpoint(times_, {last_.step, last_.seconds, wall_seconds()});
+    train::write_times(folder_.times(), times_);
+    train::CheckpointWriter writer(folder_.checkpoint(),
+                                   settings_.dump(-1, ' ', false, Json::error_handler_t::replace),
+                                   report::metrics_text(train::without_times(report_.metrics)));
+    trainer.save(writer);
+    writer.commit();
     pace_.saved(seconds_since(start));
 }
 
@@ -344,7 +374,10 @@ void Run::after_step(Trainer& trainer, int before) {
         observer_.on_evaluation(step, *evaluation);
     }
     const int log_every = std::max(1, options().train.steps / 100);
-    if (evaluation || before == 0 || at(log_every)) log(evaluation);
+    if (evaluation || before == 0 || at(log_every)) {
+        last_ = trainer.report();  // the step's own, also where steps overlap
+        log(evaluation);
+    }
     if (options().save_every > 0 ? at(options().save_every) : pace_.due()) save_checkpoint(trainer);
     if (at(options().save_every)) save_result(trainer);
     observer_.between_steps(last_, trainer, [&] {

@@ -37,7 +37,7 @@ void RunFolder::begin(const nlohmann::ordered_json& config, bool continues) cons
     if (continues) return;
     std::error_code absent;
     for (const char* result :
-         {"checkpoint.ewa", "summary.json", "report.html", "exposures.json", "cameras.json",
+         {"checkpoint.ewa", "times.json", "summary.json", "report.html", "exposures.json", "cameras.json",
           "cameras/sparse/0/cameras.bin", "cameras/sparse/0/images.bin", "cameras/sparse/0/points3D.bin"})
         fs::remove(path_ / result, absent);
 }

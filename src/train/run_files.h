@@ -22,6 +22,7 @@ class RunFolder {
 
     const std::filesystem::path& path() const { return path_; }
     std::filesystem::path checkpoint() const { return path_ / "checkpoint.ewa"; }
+    std::filesystem::path times() const { return path_ / "times.json"; }
     std::filesystem::path metrics() const { return path_ / "metrics.jsonl"; }
 
     // All of these throw RunError.

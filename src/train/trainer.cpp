@@ -155,10 +155,10 @@ void Trainer::follow() {
                 take_step();
                 break;
             case Call::state:
-                join_state();
+                join_state(nullptr);
                 break;
             case Call::restore:
-                share_state({});
+                share_state(nullptr);
                 break;
             case Call::gaussians:
                 join_gaussians();
@@ -221,6 +221,11 @@ size_t Trainer::images_on_disk() const {
 }
 int Trainer::steps_done() const {
     return state_->report.step;
+}
+
+StepReport Trainer::report() const {
+    state_->finish_all();
+    return state_->report;
 }
 
 double Trainer::extent() const {

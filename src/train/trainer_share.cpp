@@ -11,6 +11,7 @@
 #include "ewa/error.h"
 #include "pipeline/share.h"
 #include "train/collect.h"
+#include "train/state_stream.h"
 #include "train/trainer_state.h"
 
 namespace ewa {
@@ -54,56 +55,117 @@ std::vector<NamedBuffer> buffers_of(const Plan& plan, Model& model, Exposures& e
 
 }  // namespace
 
-TrainerState Trainer::state() const {
-    state_->call(Call::state);
-    return join_state();
+namespace {
+
+std::span<const std::byte> bytes_of(const glm::dvec3& origin) {
+    return std::as_bytes(std::span(&origin, 1));
 }
 
-TrainerState Trainer::join_state() const {
+/// Keeps a state in memory.
+struct StateKeeper : train::StateWriter {
+    TrainerState state;
+    void begin(const train::StateHead& head, size_t) override { state = {head.report, head.sh_degree, {}}; }
+    void begin_array(const std::string& name, uint64_t bytes, uint32_t) override {
+        state.arrays.push_back({name, {}});
+        state.arrays.back().bytes.reserve(bytes);
+    }
+    void write(std::span<const std::byte> piece) override {
+        std::vector<std::byte>& bytes = state.arrays.back().bytes;
+        bytes.insert(bytes.end(), piece.begin(), piece.end());
+    }
+};
+
+/// Reads a state in memory.
+class KeptState : public train::StateReader {
+  public:
+    explicit KeptState(const TrainerState& state) : state_(state), head_{state.report, state.sh_degree} {
+        for (const TrainerArray& array : state.arrays) arrays_.push_back({array.name, array.bytes.size()});
+    }
+    const train::StateHead& head() const override { return head_; }
+    const std::vector<Array>& arrays() const override { return arrays_; }
+    void read(size_t array, uint64_t offset, std::span<std::byte> into) override {
+        std::copy_n(state_.arrays[array].bytes.begin() + std::ptrdiff_t(offset), into.size(), into.begin());
+    }
+
+  private:
+    const TrainerState& state_;
+    train::StateHead head_;
+    std::vector<Array> arrays_;
+};
+
+}  // namespace
+
+TrainerState Trainer::state() const {
+    StateKeeper keeper;
+    save(keeper);
+    return std::move(keeper.state);
+}
+
+void Trainer::save(train::StateWriter& to) const {
+    state_->call(Call::state);
+    join_state(&to);
+}
+
+void Trainer::join_state(train::StateWriter* to) const {
     State& s = *state_;
     s.finish_all();
-    TrainerState state{s.report, s.model.sh_degree, {}};
-    for (const NamedBuffer& named : buffers_of(s.plan, s.model, s.exposures, s.motions, s.model.capacity))
-        state.arrays.push_back(
-            {named.name, train::joined(*s.ranks, named.buffer->download<std::byte>(named.bytes))});
-    const auto origin = std::as_bytes(std::span(&s.model.origin, 1));
-    if (s.model.origin != glm::dvec3(0)) state.arrays.push_back({"origin", {origin.begin(), origin.end()}});
-    return state;
+    const auto buffers = buffers_of(s.plan, s.model, s.exposures, s.motions, s.model.capacity);
+    const bool moved = s.model.origin != glm::dvec3(0);
+    if (to) to->begin({s.report, s.model.sh_degree}, buffers.size() + moved);
+    for (const NamedBuffer& named : buffers)
+        train::pass_on(
+            *s.ranks, named.buffer->download<std::byte>(named.bytes),
+            [&](uint64_t bytes, uint32_t checksum) { to->begin_array(named.name, bytes, checksum); },
+            [&](std::span<const std::byte> piece) { to->write(piece); });
+    if (!to || !moved) return;
+    // All ranks have the same.
+    train::pass_on(
+        *alone(), bytes_of(s.model.origin),
+        [&](uint64_t bytes, uint32_t checksum) { to->begin_array("origin", bytes, checksum); },
+        [&](std::span<const std::byte> piece) { to->write(piece); });
 }
 
 void Trainer::restore(const TrainerState& state) {
+    KeptState kept(state);
+    restore(kept);
+}
+
+void Trainer::restore(train::StateReader& from) {
     State& s = *state_;
-    const uint32_t splats = state.report.splats;
-    if (state.sh_degree != s.model.sh_degree || state.report.step > s.options.steps ||
+    const train::StateHead& head = from.head();
+    const auto& arrays = from.arrays();
+    const uint32_t splats = head.report.splats;
+    if (head.sh_degree != s.model.sh_degree || head.report.step > s.options.steps ||
         splats > s.options.max_splats || splats == 0)
         throw InputError(
             "the state does not fit this training: another SH degree, more steps or more splats");
     const auto buffers = buffers_of(s.plan, s.model, s.exposures, s.motions, splats);
-    const bool moved = !state.arrays.empty() && state.arrays.back().name == "origin";
+    const bool moved = !arrays.empty() && arrays.back().name == "origin";
     glm::dvec3 origin(0);
-    if (moved && state.arrays.back().bytes.size() == sizeof(origin))
-        std::memcpy(&origin, state.arrays.back().bytes.data(), sizeof(origin));
+    if (moved && arrays.back().bytes == sizeof(origin))
+        from.read(arrays.size() - 1, 0, std::as_writable_bytes(std::span(&origin, 1)));
     if (origin != s.model.origin)
         throw InputError("the state does not fit this training: its means are relative to another origin");
-    if (state.arrays.size() != buffers.size() + moved)
+    if (arrays.size() != buffers.size() + moved)
         throw InputError(
             "the state does not fit this training: it is of another strategy or has moments of other bits");
     for (size_t i = 0; i < buffers.size(); ++i)
-        if (state.arrays[i].name != buffers[i].name || state.arrays[i].bytes.size() != buffers[i].bytes)
+        if (arrays[i].name != buffers[i].name || arrays[i].bytes != buffers[i].bytes)
             throw InputError("the state does not fit this training: it lacks " +
                              std::string(buffers[i].name) + " of " + std::to_string(splats) + " splats");
     s.call(Call::restore);
-    share_state(state);
+    share_state(&from);
 }
 
-void Trainer::share_state(const TrainerState& state) {
+void Trainer::share_state(train::StateReader* from) {
     State& s = *state_;
     const int rank = s.ranks->rank(), ranks = s.ranks->size();
     s.finish_all();
-    StepReport report = state.report;
+    StepReport report;
+    if (from) report = from->head().report;
     if (ranks > 1) {
-        const auto own = train::told(*s.ranks, std::as_bytes(std::span(&state.report, 1)));
-        std::memcpy(&report, own.data(), sizeof(report));
+        const auto told = train::told(*s.ranks, std::as_bytes(std::span(&report, 1)));
+        std::memcpy(&report, told.data(), sizeof(report));
     }
     check_share(report.splats, ranks);
     const int sh_degree = s.model.sh_degree;
@@ -113,26 +175,22 @@ void Trainer::share_state(const TrainerState& state) {
     s.model.sh_degree = sh_degree;
     s.model.origin = origin;
     s.take_share(report.splats);
-    const auto bytes_of = [&](int of, size_t array) {
+    const auto part_bytes = [&](int of, size_t array) {
         const uint32_t splats = range_of(report.splats, of, ranks).splats;
         return buffers_of(s.plan, s.model, s.exposures, s.motions, splats)[array].bytes;
     };
     const auto buffers = buffers_of(s.plan, s.model, s.exposures, s.motions, s.model.splats);
     for (size_t i = 0; i < buffers.size(); ++i) {
         *buffers[i].buffer = gpu::Buffer(*s.device, buffers[i].name, buffers[i].bytes, buffers[i].texel);
-        if (ranks == 1) {
-            buffers[i].buffer->upload(std::span<const std::byte>(state.arrays[i].bytes));
-            continue;
-        }
         std::vector<uint64_t> sizes;
-        for (int of = 0; of < ranks; ++of) sizes.push_back(bytes_of(of, i));
-        const std::span<const std::byte> all =
-            rank == 0 ? std::span<const std::byte>(state.arrays[i].bytes) : std::span<const std::byte>();
-        buffers[i].buffer->upload(std::span<const std::byte>(train::part_of(*s.ranks, all, sizes)));
+        for (int of = 0; of < ranks; ++of) sizes.push_back(part_bytes(of, i));
+        const auto read = [&](uint64_t offset, std::span<std::byte> into) { from->read(i, offset, into); };
+        buffers[i].buffer->upload(std::span<const std::byte>(train::part_of(*s.ranks, sizes, read)));
     }
     s.report = report;
     s.instance_capacity = std::max(s.instance_capacity, first_capacity(report.splats));
 }
+
 Gaussians Trainer::gaussians() const {
     state_->call(Call::gaussians);
     return join_gaussians();

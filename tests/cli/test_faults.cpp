@@ -157,7 +157,8 @@ TEST_P(LateFaults, KeepWhatWasThere) {
         }
         expect_no_traces("o");
     }
-    for (const char* file : {"config.json", "splats.ply", "checkpoint.ewa", "summary.json", "report.html"})
+    for (const char* file :
+         {"config.json", "splats.ply", "times.json", "checkpoint.ewa", "summary.json", "report.html"})
         EXPECT_TRUE(refused.contains(file)) << file;
     expect_goes_on("o");
 

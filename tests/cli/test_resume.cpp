@@ -66,6 +66,7 @@ TEST_P(Resume, AfterTenKillsEndsWithTheSameBytes) {
     }
     expect_success(train("cut", again));
     EXPECT_EQ(read_file(folder / "cut/splats.ply"), read_file(folder / "whole/splats.ply"));
+    EXPECT_EQ(read_file(folder / "cut/checkpoint.ewa"), read_file(folder / "whole/checkpoint.ewa"));
     EXPECT_EQ(logged_steps("cut"), logged_steps("whole"));
     EXPECT_EQ(files_below(folder / "cut"), files_below(folder / "whole"));  // nothing half written is left
     const auto summary = read_json(folder / "cut/summary.json");
@@ -240,6 +241,75 @@ TEST_F(ResumeEdges, NamesACheckpointThatIsWholeButWrong) {
 
     write_file(path, with_section(good, "settings", "settings"));
     expect_success(train("o", options));
+}
+
+/// The times of a run are beside the checkpoint. Those of one that lacks them begin anew.
+TEST_F(ResumeEdges, TimesGoOn) {
+    const Names options{"--steps", "40", "--strategy", "none", "--resume"};
+    ASSERT_EQ(train("o", options, held_at(20, folder / "held", SIGINT)).status, 130);
+    const std::string times = folder / "o/times.json", first = metrics_line("o", 1);
+    const auto saved = read_json(times)["checkpoints"].back();
+    EXPECT_GT(saved[1], 0);
+    EXPECT_GT(saved[2], saved[1]);
+    const std::string checkpoint = read_file(folder / "o/checkpoint.ewa");
+
+    const auto ends = [&](double seconds, double wall_seconds, bool known) {
+        expect_success(train("o", options));
+        const auto summary = read_json(folder / "o/summary.json");
+        EXPECT_GT(summary["seconds"], seconds);
+        EXPECT_GT(summary["wall_seconds"], wall_seconds);
+        EXPECT_EQ(metrics_line("o", 1) == first, known);
+        const std::string report = read_file(folder / "o/report.html");
+        EXPECT_EQ(report.find("resumed without its earlier times") == std::string::npos, known);
+        write_file(folder / "o/checkpoint.ewa", checkpoint);
+    };
+    const int step = saved[0];
+    const auto row = [&](int at, const char* rest) { return "[" + std::to_string(at) + rest; };
+    const std::string line =
+        "[[1," +
+        first.substr(first.find("seconds\":") + 9, first.find(",\"wall") - first.find("seconds\":") - 9) +
+        "," +
+        first.substr(first.find("wall_seconds\":") + 14,
+                     first.find(",\"loss") - first.find("wall_seconds\":") - 14) +
+        "]]";
+    // After a kill between the two files, times.json has another checkpoint too.
+    write_file(times, "{\"metrics\":" + line + ",\"checkpoints\":[" + row(step, ",100,200],") +
+                          row(step + 3, ",300,400]]}"));
+    ends(100, 200, true);
+    EXPECT_LT(read_json(folder / "o/summary.json")["wall_seconds"], 300);
+    EXPECT_EQ(read_json(times)["checkpoints"].front()[2], 200);
+    for (const char* wrong :
+         {"", "{}", "[1]", "{\"metrics\":[],\"checkpoints\":[[20,-1,2]]}",
+          "{\"metrics\":[],\"checkpoints\":[[-20,1,2]]}", "{\"metrics\":[],\"checkpoints\":[[20,1]]}",
+          "{\"metrics\":3,\"checkpoints\":[]}"}) {
+        SCOPED_TRACE(wrong);
+        write_file(times, wrong);
+        ends(0, 0, false);
+    }
+    fs::remove(times);
+    ends(0, 0, false);
+}
+
+/// Before there was times.json, the checkpoint had the times.
+TEST_F(ResumeEdges, AnEarlierCheckpointHasItsTimes) {
+    const Names options{"--steps", "40", "--strategy", "none", "--resume"};
+    ASSERT_EQ(train("o", options, held_at(20, folder / "held", SIGINT)).status, 130);
+    const std::string path = folder / "o/checkpoint.ewa", good = read_file(path);
+    const std::string metrics = metrics_line("o", 1) + "\n";
+    constexpr size_t kSeconds = 8, kStateBytes = 64, kHeader = 32;
+    const size_t state = good.find(std::string("state\0\0", 7)) + kHeader;
+    std::string block = good.substr(state, kStateBytes);
+    EXPECT_EQ(block.substr(kSeconds, 16), std::string(16, '\0'));
+    const double times[] = {100, 200};
+    std::memcpy(&block[kSeconds], times, sizeof(times));
+    write_file(path,
+               with_section(with_section(good, "state", "state", block), "metrics", "metrics", metrics));
+    fs::remove(folder / "o/times.json");
+    expect_success(train("o", options));
+    const auto summary = read_json(folder / "o/summary.json");
+    EXPECT_GT(summary["seconds"], 100);
+    EXPECT_GT(summary["wall_seconds"], 200);
+    EXPECT_EQ(metrics_line("o", 1) + "\n", metrics);
 }
 
 /// The folder that a run has without -o carries the name of what its dataset is made from.

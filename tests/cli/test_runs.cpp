@@ -394,8 +394,8 @@ TEST_F(Runs, FilesOfARunStayWhole) {
         EXPECT_EQ(whole(), before);
     };
     const std::string reason = "is a file of the training run in " + run;
-    for (const char* file : {"config.json", "checkpoint.ewa", "summary.json", "metrics.jsonl", "splats.ply",
-                             "report.html", "exposures.json", "cameras.json"})
+    for (const char* file : {"config.json", "checkpoint.ewa", "times.json", "summary.json", "metrics.jsonl",
+                             "splats.ply", "report.html", "exposures.json", "cameras.json"})
         refused({"eval", run, "--json", run + "/" + file}, reason);
     refused({"grad", run, "--frame", "0", "-o", folder / "x.ply", "--json", run + "/summary.json"}, reason);
     refused({"compare", run, other, "--json", run + "/metrics.jsonl"}, reason);

@@ -36,8 +36,9 @@ TEST_F(Train, WritesEverythingItPromises) {
     expect_success(outcome);
     EXPECT_NE(outcome.out.find("held-out PSNR"), std::string::npos) << outcome.out;
     EXPECT_NE(outcome.out.find("report.html"), std::string::npos) << outcome.out;
-    EXPECT_EQ(files_below(folder / "o"), (Names{"checkpoint.ewa", "config.json", "metrics.jsonl",
-                                                "report.html", "splats.ply", "summary.json", "test/0.png"}));
+    EXPECT_EQ(files_below(folder / "o"),
+              (Names{"checkpoint.ewa", "config.json", "metrics.jsonl", "report.html", "splats.ply",
+                     "summary.json", "test/0.png", "times.json"}));
 
     const auto summary = read_json(folder / "o/summary.json");
     EXPECT_EQ(summary["steps"], 20);
@@ -260,7 +261,8 @@ TEST_F(Train, FullDiskKeepsTheEarlierSplats) {
     const Circumstances full = with_fault("EWA_FAULT_BYTES", "4096");
     expect_failure(train("o", {"--steps", "2", "--quiet", "--force"}, full), 1, "splats.ply");
     EXPECT_EQ(read_file(folder / "o/splats.ply"), before);
-    EXPECT_FALSE(fs::exists(folder / "o/summary.json"));
+    for (const char* gone : {"o/summary.json", "o/checkpoint.ewa", "o/times.json"})
+        EXPECT_FALSE(fs::exists(folder / gone)) << gone;
 }
 
 }  // namespace

@@ -101,6 +101,14 @@ void check_scene(const std::map<std::string, Exposure>& exposures) {
     for (const auto& [name, exposure] : exposures)
         for (const float value : exposure) EWA_REQUIRE(std::isfinite(value));
 }
+#elif defined(EWA_READ_TIMES)
+void check_scene(const train::RunTimes& times) {
+    const std::string text = std::to_string(times.metrics.size()) + " times";
+    for (const auto* all : {&times.metrics, &times.checkpoints})
+        for (const train::TimesAt& time : *all)
+            EWA_REQUIRE(time.step >= 0 && time.seconds >= 0 && std::isfinite(time.seconds) &&
+                        time.wall_seconds >= 0 && std::isfinite(time.wall_seconds));
+}
 #elif defined(EWA_READ_MESH)
 void check_scene(const scene::MeshScene& scene) {
     const std::string text = std::to_string(scene.triangles.size()) + " triangles";

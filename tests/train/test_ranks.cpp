@@ -2,15 +2,21 @@
 // Training by several ranks: the bytes of one that trains alone, and no more memory than a share.
 #include <gtest/gtest.h>
 
+#include <zlib.h>
+
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "ewa/error.h"
 #include "ewa/renderer.h"
 #include "ewa/trainer.h"
 #include "gpu/test_device.h"
 #include "pipeline/share.h"
+#include "support/temp_folder.h"
 #include "support/thread_ranks.h"
+#include "train/checkpoint.h"
+#include "train/collect.h"
 #include "train/synthetic.h"
 
 namespace ewa::test {
@@ -56,15 +62,13 @@ Gaussians start() {
     return splats;
 }
 
-/// The state after training by so many ranks. resume: where it begins.
-TrainerState trained(const TrainOptions& options, int ranks, int until,
-                     const TrainerState* resume = nullptr) {
+/// The state after training by so many ranks.
+TrainerState trained(const TrainOptions& options, int ranks, int until) {
     TrainerState result;
     run_ranks(ranks, [&](std::shared_ptr<Ranks> group) {
         const auto own = open_test_device(false);
         Trainer trainer(own, capture().dataset, all_frames(capture().dataset), start(), options, group);
         if (group->rank() != 0) return trainer.follow();
-        if (resume) trainer.restore(*resume);
         while (trainer.steps_done() < until) trainer.step();
         trainer.keep_waiting();
         result = trainer.state();
@@ -144,14 +148,67 @@ INSTANTIATE_TEST_SUITE_P(
                     RanksCase{Strategy::none, 2, 2}, RanksCase{Strategy::none, 1, 4, wide_moments, "_wide"}),
     name_of_case);
 
-TEST(Ranks, ARunMayContinueWithAnotherNumberOfThem) {
+/// The file after `until` steps of so many ranks. resume: a checkpoint where they begin.
+std::string checkpoint_of(const TrainOptions& options, int ranks, int until,
+                          const std::filesystem::path& path, const std::filesystem::path& resume = {}) {
+    run_ranks(ranks, [&](std::shared_ptr<Ranks> group) {
+        const auto own = open_test_device(false);
+        Trainer trainer(own, capture().dataset, all_frames(capture().dataset), start(), options, group);
+        if (group->rank() != 0) return trainer.follow();
+        if (!resume.empty()) {
+            train::CheckpointReader reader(resume);
+            trainer.restore(reader);
+        }
+        while (trainer.steps_done() < until) trainer.step();
+        train::CheckpointWriter writer(path, "settings", "metrics");
+        trainer.save(writer);
+        writer.commit();
+    });
+    return file_bytes(path);
+}
+
+TEST(Ranks, WriteTheSameCheckpointAndContinueFromIt) {
+    TempFolder folder;
     for (const Strategy strategy : {Strategy::adc, Strategy::mcmc}) {
         const TrainOptions options = busy(strategy, 4);
-        const TrainerState whole = trained(options, 1, options.steps);
-        const TrainerState half = trained(options, 3, 28);
-        expect_same(trained(options, 2, options.steps, &half), whole);
-        expect_same(trained(options, 1, options.steps, &half), whole);
+        const std::string half = checkpoint_of(options, 1, 28, folder / "half");
+        EXPECT_TRUE(checkpoint_of(options, 2, 28, folder / "two") == half);
+        EXPECT_TRUE(checkpoint_of(options, 3, 28, folder / "three") == half);
+        const std::string whole = checkpoint_of(options, 1, options.steps, folder / "one");
+        EXPECT_TRUE(checkpoint_of(options, 2, options.steps, folder / "resumed", folder / "three") == whole);
+        EXPECT_TRUE(checkpoint_of(options, 3, options.steps, folder / "again", folder / "two") == whole);
     }
+}
+
+TEST(Ranks, HandOnBytesInPieces) {
+    const std::vector<uint64_t> sizes{3, (uint64_t(9) << 20) + 5, 0, uint64_t(4) << 20};
+    std::vector<std::byte> all;
+    for (uint64_t size = std::accumulate(sizes.begin(), sizes.end(), uint64_t(0)), i = 0; i < size; ++i)
+        all.push_back(std::byte((i * i) >> 7));
+    const auto* data = reinterpret_cast<const Bytef*>(all.data());
+    run_ranks(int(sizes.size()), [&](std::shared_ptr<Ranks> group) {
+        const size_t rank = size_t(group->rank());
+        const uint64_t first = std::accumulate(sizes.begin(), sizes.begin() + group->rank(), uint64_t(0));
+        const std::span<const std::byte> own = std::span(all).subspan(first, sizes[rank]);
+        const auto part = train::part_of(*group, sizes, [&](uint64_t offset, std::span<std::byte> into) {
+            EXPECT_EQ(rank, 0u);
+            EXPECT_LE(into.size(), size_t(4) << 20);
+            std::copy_n(all.begin() + std::ptrdiff_t(offset), into.size(), into.begin());
+        });
+        EXPECT_TRUE(std::ranges::equal(part, own));
+        std::vector<std::byte> joined;
+        train::pass_on(
+            *group, own,
+            [&](uint64_t bytes, uint32_t checksum) {
+                EXPECT_EQ(bytes, all.size());
+                EXPECT_EQ(checksum, crc32_z(0, data, all.size()));
+            },
+            [&](std::span<const std::byte> piece) {
+                EXPECT_LE(piece.size(), size_t(4) << 20);
+                joined.insert(joined.end(), piece.begin(), piece.end());
+            });
+        EXPECT_TRUE(rank == 0 ? joined == all : joined.empty());
+    });
 }
 
 TEST(Ranks, EachHoldsItsShareOfTheState) {

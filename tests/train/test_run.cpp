@@ -90,8 +90,8 @@ TEST(Run, WritesItsFilesAndTellsItsObserver) {
     recorder.save_at = 7;
     recorder.save_file = folder / "o/splats.ply";
     const RunResult result = run_training(options, recorder);
-    for (const char* file : {"config.json", "metrics.jsonl", "checkpoint.ewa", "splats.ply", "summary.json",
-                             "report.html", "exposures.json"})
+    for (const char* file : {"config.json", "metrics.jsonl", "checkpoint.ewa", "times.json", "splats.ply",
+                             "summary.json", "report.html", "exposures.json"})
         EXPECT_TRUE(fs::exists(folder / "o" / file)) << file;
     EXPECT_EQ(result.folder, folder / "o");
     EXPECT_TRUE(fs::exists(result.first_render)) << result.first_render;

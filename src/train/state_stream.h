@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// A training's state on its way to a file or from one, in pieces: no process has to hold it whole.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "ewa/trainer.h"
+
+namespace ewa::train {
+
+/// Of a state: all but the bytes of its arrays.
+struct StateHead {
+    StepReport report;
+    int sh_degree = 0;
+};
+
+/// Takes a state, one array after another.
+class StateWriter {
+  public:
+    virtual ~StateWriter() = default;
+    virtual void begin(const StateHead& head, size_t arrays) = 0;
+    /// checksum: zlib's CRC-32 of the array's bytes, which come next.
+    virtual void begin_array(const std::string& name, uint64_t bytes, uint32_t checksum) = 0;
+    virtual void write(std::span<const std::byte> piece) = 0;
+};
+
+/// Has a state.
+class StateReader {
+  public:
+    struct Array {
+        std::string name;
+        uint64_t bytes = 0;
+    };
+    virtual ~StateReader() = default;
+    virtual const StateHead& head() const = 0;
+    virtual const std::vector<Array>& arrays() const = 0;
+    /// Fills `into` with the bytes of an array from `offset` on.
+    virtual void read(size_t array, uint64_t offset, std::span<std::byte> into) = 0;
+};
+
+}  // namespace ewa::train
