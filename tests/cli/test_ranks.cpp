@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // ewa train on several ranks under mpirun, on four small pictures. Skipped where there is no MPI.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <map>
 
 #include "cli/expect.h"
+#include "cli/faulty.h"
 #include "ewa/splat_files.h"
 
 namespace {
@@ -32,6 +36,12 @@ std::vector<pid_t> processes_with(const std::string& text) {
     return found;
 }
 
+std::string node_name() {
+    char name[256] = "";
+    gethostname(name, sizeof(name) - 1);
+    return name;
+}
+
 class TrainRanks : public testing::Test {
   protected:
     void SetUp() override {
@@ -55,7 +65,10 @@ class TrainRanks : public testing::Test {
         arguments.insert(arguments.end(), options.begin(), options.end());
         for (const Names& program : programs) {
             if (&program != &programs.front()) arguments.push_back(":");
-            for (const char* word : {"-n", "1", EWA_PROGRAM}) arguments.push_back(word);
+            for (const char* word : {"-n", "1"}) arguments.push_back(word);
+            const Names& prefix = prefixes[int(&program - programs.data())];
+            arguments.insert(arguments.end(), prefix.begin(), prefix.end());
+            arguments.push_back(EWA_PROGRAM);
             arguments.insert(arguments.end(), program.begin(), program.end());
         }
         circumstances.program = EWA_MPIRUN;
@@ -77,6 +90,7 @@ class TrainRanks : public testing::Test {
     }
 
     Folder folder;
+    std::map<int, Names> prefixes;  // of a rank's command
     std::string steps = "120";
 };
 
@@ -101,22 +115,6 @@ TEST_F(TrainRanks, EndWithTheBytesOfOneProcess) {
     EXPECT_FALSE(read_json(folder / "one/summary.json").contains("ranks"));
 }
 
-TEST_F(TrainRanks, ContinueWithAnotherNumberAfterAKill) {
-    expect_success(alone("one"));
-    const Names saving{"--save-every", "10"};
-    Circumstances killing;
-    killing.await_file = folder / "o/checkpoint.ewa";
-    killing.then = [&] {
-        const auto found = processes_with(folder / "o");
-        ASSERT_EQ(found.size(), 3u);
-        kill(found.back(), SIGKILL);
-    };
-    EXPECT_NE(ranks(3, "o", saving, {}, killing).status, 0);
-    ASSERT_FALSE(fs::exists(folder / "o/splats.ply") && splats("o") == splats("one"));
-    expect_success(ranks(2, "o", {"--resume"}));
-    expect_same("o", "one");
-}
-
 TEST_F(TrainRanks, SaveOnASignalToTheLauncher) {
     steps = "4000";
     Circumstances asking;
@@ -128,19 +126,75 @@ TEST_F(TrainRanks, SaveOnASignalToTheLauncher) {
     EXPECT_TRUE(processes_with(folder / "o").empty());
 }
 
-TEST_F(TrainRanks, NameTheOneThatFallsSilent) {
-    steps = "100000";
-    Circumstances stopping;
-    stopping.await_file = folder / "o/checkpoint.ewa";
-    stopping.then = [&] {
-        const auto found = processes_with(folder / "o");
-        ASSERT_EQ(found.size(), 3u);
-        kill(found.back(), SIGSTOP);
-    };
-    const Outcome outcome = ranks(3, "o", {"--save-every", "10", "--rank-timeout", "2"}, {}, stopping);
-    EXPECT_EQ(outcome.status, 1) << outcome.err;
-    EXPECT_NE(outcome.err.find("has not answered for 2 s"), std::string::npos) << outcome.err;
-    for (const pid_t left : processes_with(folder / "o")) kill(left, SIGKILL);
+/// A run that ends by one fault after another, each time goes on from its checkpoint, and ends with the bytes of an
+/// undisturbed one.
+class RankFaults : public TrainRanks {
+  protected:
+    void SetUp() override {
+        TrainRanks::SetUp();
+        expect_success(alone("whole"));
+        const Names begin = arguments_of(folder / "data", "o", {});
+        ASSERT_EQ(run_ewa(begin, held_at(20, folder / "held", SIGINT)).status, 130);
+    }
+    /// Ends two ranks by a fault of one of them.
+    Outcome fail(int rank, const Names& variables, Circumstances circumstances = {}) {
+        const Names program =
+            arguments_of(folder / "data", "o", {"--resume", "--save-every", "10", "--rank-timeout", "2"});
+        prefixes[rank] = {"/usr/bin/env", std::string("LD_PRELOAD=") + EWA_FAULTS_LIBRARY};
+        prefixes[rank].insert(prefixes[rank].end(), variables.begin(), variables.end());
+        const Outcome outcome = mpirun({program, program}, {}, std::move(circumstances));
+        prefixes.clear();
+        return outcome;
+    }
+    /// The one line of a rank's error.
+    void expect_told(const Outcome& outcome, int rank, const std::string& text) {
+        EXPECT_EQ(outcome.status, 1) << outcome.err;
+        EXPECT_EQ(outcome.err.find("ewa train: rank " + std::to_string(rank) + " ("), 0u) << outcome.err;
+        EXPECT_NE(outcome.err.find(text), std::string::npos) << outcome.err;
+        EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+    }
+    /// Sends a signal to a rank that stands still before its 20th work for the device.
+    Outcome fail_by_signal(int rank, int signal) {
+        const std::string held = folder / "held";
+        Circumstances sending;
+        sending.await_file = held;
+        sending.then = [&, rank, signal] {
+            const pid_t process = process_of(rank);
+            ASSERT_GT(process, 0);
+            kill(process, signal);
+            fs::remove(held);
+        };
+        return fail(rank, {"EWA_FAULT_HOLD=20:" + held}, sending);
+    }
+    pid_t process_of(int rank) {
+        for (const pid_t process : processes_with(folder / "o"))
+            if (read_file("/proc/" + std::to_string(process) + "/environ")
+                    .find("OMPI_COMM_WORLD_RANK=" + std::to_string(rank) + '\0') != std::string::npos)
+                return process;
+        return 0;
+    }
+};
+
+TEST_F(RankFaults, EndTheJobAndCostNoBytes) {
+    for (const int rank : {0, 1}) {
+        SCOPED_TRACE(rank);
+        const std::string number = std::to_string(rank);
+        EXPECT_EQ(fail_by_signal(rank, SIGKILL).status, 128 + SIGKILL);
+        expect_told(fail_by_signal(rank, SIGSTOP), 1 - rank,
+                    ": rank " + number + " (" + node_name() + ") has not answered for 2 s");
+        expect_told(fail(rank, {"EWA_FAULT_SUBMITS=20"}), rank, "lost");
+    }
+    expect_told(fail(1, {"EWA_FAULT_ALLOCATIONS=20"}), 1, "out of device memory");
+    expect_told(fail(1, {"EWA_FAULT_HEAP=20"}), 1, "out of host memory");
+
+    const std::string checkpoint = read_file(folder / "o/checkpoint.ewa");
+    expect_told(fail(0, {"EWA_FAULT_BYTES=12000"}), 0, "checkpoint.ewa: cannot be written: No space left");
+    EXPECT_EQ(read_file(folder / "o/checkpoint.ewa"), checkpoint);
+    EXPECT_TRUE(processes_with(folder / "o").empty());
+
+    // The others write nothing.
+    expect_success(fail(1, {"EWA_FAULT_BYTES=0"}));
+    expect_same("o", "whole");
 }
 
 TEST_F(TrainRanks, AreRefusedWithDifferentInputs) {

@@ -2,6 +2,7 @@
 // Loaded in front of the system's libraries (LD_PRELOAD), so that a program meets faults at chosen moments:
 //   EWA_FAULT_ALLOCATIONS=N  from the N-th on, there is no memory for a buffer or a block of device memory
 //   EWA_FAULT_BLOCKS=N       from the N-th on, the driver allows no further block of device memory
+//   EWA_FAULT_HEAP=N         from the N-th submission on, there is no host memory for an array of 1 KiB or more
 //   EWA_FAULT_SUBMITS=N      the N-th submission and those after it find the device lost
 //   EWA_FAULT_WAITS=N        the same of waiting for one
 //   EWA_FAULT_ACQUIRE=N,R    the N-th picture of a window cannot be had: the VkResult R
@@ -29,6 +30,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <new>
 #include <string>
 
 namespace {
@@ -100,6 +102,9 @@ void die() {
     kill(getpid(), SIGKILL);
 }
 
+/// Whether EWA_FAULT_HEAP has begun.
+std::atomic<bool> heap_is_full{false};
+
 /// Waits at the submission that EWA_FAULT_HOLD names; no longer than its parent lives.
 void hold() {
     static std::atomic<long> calls{0};
@@ -115,6 +120,15 @@ void hold() {
 }
 
 }  // namespace
+
+/// The threads of drivers and libraries keep their memory.
+void* operator new(std::size_t size) {
+    constexpr std::size_t kSmall = 1024;
+    const bool refused = heap_is_full && size >= kSmall && getpid() == gettid();
+    void* memory = refused ? nullptr : std::malloc(size);
+    if (!memory) throw std::bad_alloc();
+    return memory;
+}
 
 extern "C" {
 
@@ -133,8 +147,9 @@ VkResult vkCreateBuffer(VkDevice device, const VkBufferCreateInfo* info,
 }
 
 VkResult vkQueueSubmit(VkQueue queue, uint32_t count, const VkSubmitInfo* submits, VkFence fence) {
-    static std::atomic<long> calls{0};
+    static std::atomic<long> calls{0}, heap_calls{0};
     if (due("EWA_FAULT_SUBMITS", calls)) return VK_ERROR_DEVICE_LOST;
+    if (due("EWA_FAULT_HEAP", heap_calls)) heap_is_full = true;
     if (last_moment(true)) die();
     hold();
     return next<PFN_vkQueueSubmit>("vkQueueSubmit")(queue, count, submits, fence);
