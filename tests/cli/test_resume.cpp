@@ -278,10 +278,7 @@ TEST_F(ResumeEdges, TimesGoOn) {
     ends(100, 200, true);
     EXPECT_LT(read_json(folder / "o/summary.json")["wall_seconds"], 300);
     EXPECT_EQ(read_json(times)["checkpoints"].front()[2], 200);
-    for (const char* wrong :
-         {"", "{}", "[1]", "{\"metrics\":[],\"checkpoints\":[[20,-1,2]]}",
-          "{\"metrics\":[],\"checkpoints\":[[-20,1,2]]}", "{\"metrics\":[],\"checkpoints\":[[20,1]]}",
-          "{\"metrics\":3,\"checkpoints\":[]}"}) {
+    for (const char* wrong : {"", R"({"metrics":[],"checkpoints":[[20,-1,2]]})"}) {
         SCOPED_TRACE(wrong);
         write_file(times, wrong);
         ends(0, 0, false);
