@@ -29,6 +29,9 @@ struct TrainOptions {
     /// Views a step, at least 1. Their gradients are averaged. Rates and Adam's decays follow the square root rule of
     /// Grendel (Zhao et al. 2024, section 3.3): rates times sqrt(batch), decays to the power of batch.
     int batch = 1;
+    /// Bands of tile rows that each view is cut into, at least 1, so that several ranks can draw one view. An image needs
+    /// a row of tiles for each.
+    int bands = 1;
     Strategy strategy = Strategy::mcmc;
     uint32_t max_splats = 1000000;   // hard limit
     int sh_degree = 3;               // 0 to 3, or kAutomaticShDegree

@@ -42,6 +42,7 @@ const std::vector<Field>& fields() {
     static const std::vector<Field> all = {
         {"steps", &O::steps, 1, 1e9},
         {"batch", &O::batch, 1, 256},
+        {"bands", &O::bands, 1, 64},
         {"max_splats", &O::max_splats, 1, 1e9},
         {"seed", &O::seed, 0, kMost},
         {"image_cache_bytes", &O::image_cache_bytes, 0, kMost},

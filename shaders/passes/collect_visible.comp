@@ -1,10 +1,11 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Lists the splats of a view that reach a tile, in the order of the splats.
+// Lists the splats of a view, or of its band, that reach a tile, in the order of the splats.
 // One invocation owns splat i. It reads its record, its tile count and the prefix sums of the tile counts' flags. It writes
-// its place among the lists of all views, and copies its record to the view's records.
+// its place among all lists, and copies its record to the list's records. A record of a band has its mean in the band.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
+#include "lib/band.glsl"
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 TEXELS(0, records);
@@ -20,9 +21,9 @@ void main() {
     if (i >= push.splats) return;
     const bool listed = tile_counts[i] > 0u;
     const uint index = prefix[i] + totals[i / push.scan_block];
-    places[push.view * push.splats + i] = listed ? push.first_place + index : NOT_LISTED;
+    places[push.list * push.splats + i] = listed ? push.first_place + index : NOT_LISTED;
     if (!listed) return;
-    [[unroll]] for (uint t = 0; t < RECORD_TEXELS; ++t) {
-        visible[RECORD_TEXELS * (push.first_record + index) + t] = fetch(records, RECORD_TEXELS * i + t);
-    }
+    const uint at = RECORD_TEXELS * (push.first_record + index);
+    visible[at] = from_row(fetch(records, RECORD_TEXELS * i), push.first_row);
+    [[unroll]] for (uint t = 1; t < RECORD_TEXELS; ++t) visible[at + t] = fetch(records, RECORD_TEXELS * i + t);
 }

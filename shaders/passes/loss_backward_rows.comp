@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Gradient of the SSIM window along the rows, and the gradient of the whole loss by the render x:
 // dL/dx = ssim_scale (blur dS/d(mean x) + 2 x blur dS/d(mean x^2) + y blur dS/d(mean x y)) + l1_scale sign(x - y).
-// The first term applies where |x| is within SSIM_LIMIT.
+// The first term applies where |x| is within SSIM_LIMIT, the last one in the image's own rows.
 // One invocation owns LOSS_TEXELS texels of channel workgroup.z; one subgroup owns one partial sum of |x - y|
 // and, in a second row, one of (x - y)^2 with both clamped to [0, 1].
 // It reads the blurred derivatives, the render and the target, and writes dL/d(image) and the partial sums.
@@ -24,6 +24,9 @@ void main() {
     const uint row_texels = push.image.stride / 4u, plane = push.image.plane_floats / 4u, channel = gl_WorkGroupID.z;
     const uint row_items = (row_texels + LOSS_TEXELS - 1u) / LOSS_TEXELS;
     const bool inside = item < row_items * push.image.size[1];
+    // Differences in other rows than the picture's own belong to another band.
+    const bool counts = inside && item >= row_items * push.own[0] && item < row_items * push.own[1];
+    const float l1_scale = counts ? push.l1_scale : 0.0;
     const int row = int(item / row_items) * int(row_texels), first = int(item % row_items * LOSS_TEXELS);
     vec4 m[DERIVATIVE_PLANES][LOSS_TEXELS];
     [[unroll]] for (uint q = 0; q < DERIVATIVE_PLANES; ++q) {
@@ -44,13 +47,13 @@ void main() {
         if (there)
             image_gradient[at] = push.ssim_scale * seen * (m[0][o] + 2.0 * clamp(x, -limit, limit) * m[1][o] +
                                                            clamp(y, -limit, limit) * m[2][o]) +
-                                 push.l1_scale * sign(x - y);
+                                 l1_scale * sign(x - y);
         differences += abs(x - y);
         const vec4 shown = clamp(x, 0.0, 1.0) - clamp(y, 0.0, 1.0);
         squares += shown * shown;
     }
-    const float sum = subgroup_sum(differences.x + differences.y + differences.z + differences.w);
-    const float square_sum = subgroup_sum(squares.x + squares.y + squares.z + squares.w);
+    const float sum = subgroup_sum(counts ? differences.x + differences.y + differences.z + differences.w : 0.0);
+    const float square_sum = subgroup_sum(counts ? squares.x + squares.y + squares.z + squares.w : 0.0);
     const uint group = (gl_WorkGroupID.z * gl_NumWorkGroups.y + gl_WorkGroupID.y) * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     if (LANE != 0u) return;
     const uint groups = gl_NumWorkGroups.x * gl_NumWorkGroups.y * gl_NumWorkGroups.z, at = group * (GROUP_SIZE / SUBGROUP) + SUBGROUP_INDEX;

@@ -4,7 +4,7 @@
 // S = A1 A2 / (B1 B2), A1 = 2 mx my + C1, A2 = 2 (mxy - mx my) + C2, B1 = mx^2 + my^2 + C1,
 // B2 = m(x^2 + y^2) - mx^2 - my^2 + C2.
 // One invocation owns LOSS_TEXELS texels of channel workgroup.z; one subgroup owns one partial sum of S.
-// It reads the moments, and writes the derivatives and the partial sums.
+// It reads the moments, and writes the derivatives and the partial sums. Rows that are not the image's own count as zero.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
 #include "lib/subgroup.glsl"
@@ -21,6 +21,8 @@ void main() {
     const uint row_texels = push.image.stride / 4u, plane = push.image.plane_floats / 4u, channel = gl_WorkGroupID.z;
     const uint row_items = (row_texels + LOSS_TEXELS - 1u) / LOSS_TEXELS;
     const bool inside = item < row_items * push.image.size[1];
+    // Windows around other rows than the picture's own belong to another band.
+    const bool counts = inside && item >= row_items * push.own[0] && item < row_items * push.own[1];
     const int row = int(item / row_items) * int(row_texels), first = int(item % row_items * LOSS_TEXELS);
     vec4 m[MOMENT_PLANES][LOSS_TEXELS];
     [[unroll]] for (uint q = 0; q < MOMENT_PLANES; ++q) {
@@ -41,7 +43,7 @@ void main() {
         const vec4 inverse = 1.0 / (b1 * b2);
         // Columns past the image's width are in the last texel and do not count.
         const uint x = 4u * uint(first + o);
-        const vec4 mask = inside ? vec4(lessThan(uvec4(x, x + 1u, x + 2u, x + 3u), uvec4(push.image.size[0]))) : vec4(0.0);
+        const vec4 mask = counts ? vec4(lessThan(uvec4(x, x + 1u, x + 2u, x + 3u), uvec4(push.image.size[0]))) : vec4(0.0);
         const vec4 s = mask * a1 * a2 * inverse;
         if (inside && first + o < int(row_texels)) {
             const uint at = DERIVATIVE_PLANES * channel * plane + uint(row + first + o);

@@ -9,12 +9,12 @@
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 COLOR_TEXELS(0, photo);
 layout(set = 0, binding = 1, scalar) buffer ImageGradient { float image_gradient[]; };
-layout(push_constant, scalar) uniform Push { ImageLayout push; };
+layout(push_constant, scalar) uniform Push { MaskPush push; };
 
 void main() {
     const uint i = item_index();
-    if (i >= push.size[0] * push.size[1]) return;
-    const float weight = fetch_color(photo, i).a;
-    const uint at = pixel_offset(push, i);
-    for (uint c = 0; c < 3; ++c) image_gradient[c * push.plane_floats + at] *= weight;
+    if (i >= push.image.size[0] * push.image.size[1]) return;
+    const float weight = fetch_color(photo, push.first_pixel + i).a;
+    const uint at = pixel_offset(push.image, i);
+    for (uint c = 0; c < 3; ++c) image_gradient[c * push.image.plane_floats + at] *= weight;
 }

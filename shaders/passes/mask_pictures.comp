@@ -12,15 +12,15 @@ COLOR_TEXELS(0, photo);
 layout(set = 0, binding = 1, scalar) readonly buffer Image { float image[]; };
 layout(set = 0, binding = 2, scalar) writeonly buffer Target { float target[]; };
 layout(set = 0, binding = 3, scalar) writeonly buffer Masked { float masked[]; };
-layout(push_constant, scalar) uniform Push { ImageLayout push; };
+layout(push_constant, scalar) uniform Push { MaskPush push; };
 
 void main() {
     const uint i = item_index();
-    if (i >= push.size[0] * push.size[1]) return;
-    const vec4 texel = fetch_color(photo, i);
-    const uint at = pixel_offset(push, i);
+    if (i >= push.image.size[0] * push.image.size[1]) return;
+    const vec4 texel = fetch_color(photo, push.first_pixel + i);
+    const uint at = pixel_offset(push.image, i);
     for (uint c = 0; c < 3; ++c) {
-        const uint k = c * push.plane_floats + at;
+        const uint k = c * push.image.plane_floats + at;
         target[k] = texel[c];
         // Exact where the weight is 1 and where the images are equal.
         masked[k] = texel.a == 1.0 ? image[k] : texel[c] + texel.a * (image[k] - texel[c]);

@@ -14,7 +14,7 @@ layout(push_constant, scalar) uniform Push { UnpackPush push; };
 void main() {
     const uint i = item_index();
     if (i >= push.image.size[0] * push.image.size[1]) return;
-    const vec4 texel = fetch_color(photo, i);
+    const vec4 texel = fetch_color(photo, push.first_pixel + i);
     const vec3 background = vec3(push.background[0], push.background[1], push.background[2]);
     const vec3 color = texel.rgb * texel.a + background * (1.0 - texel.a);
     const uint at = pixel_offset(push.image, i);

@@ -1,7 +1,7 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
 // Gradient of the projection in several views, fused with Adam.
-// One invocation owns splat i. It carries the sums of each view that lists the splat back through the projection, adds the
+// One invocation owns splat i. It adds the sums of each view's bands, carries them back through the projection, adds the
 // gradients in the order of the views, and writes parameters and moments. The gradient is the mean over all views. As in
 // update.comp, a splat that no view lists has gradient zero, a step that is too long is shortened and counted, and an update
 // that is not finite is dropped and counted. SPEC_MODE: UPDATE_* bits.
@@ -19,7 +19,7 @@ layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3;
 layout(constant_id = SPEC_MODE) const uint MODE = 0;
 const bool GRADIENT_ONLY = false, STATISTICS = (MODE & UPDATE_STATISTICS) != 0u,
            REGULARISED = (MODE & UPDATE_REGULARISED) != 0u, ABSOLUTE = (MODE & UPDATE_ABSOLUTE) != 0u,
-           PACKED_MOMENTS = (MODE & UPDATE_PACKED_MOMENTS) != 0u;
+           PACKED_MOMENTS = (MODE & UPDATE_PACKED_MOMENTS) != 0u, BANDS = (MODE & UPDATE_BANDS) != 0u;
 const uint FLOATS = ABSOLUTE ? SUM_FLOATS_ABSOLUTE : SUM_FLOATS;
 
 TEXELS(0, params);
@@ -42,6 +42,26 @@ Sums sums_at(uint place) {
     return Sums(s[0], vec2(s[1], s[2]), vec3(s[3], s[4], s[5]), vec3(s[6], s[7], s[8]), vec2(s[9], s[10]));
 }
 
+Sums added(Sums a, Sums b) {
+    return Sums(a.g + b.g, a.gw + b.gw, a.gww + b.gww, a.color + b.color, a.absolute + b.absolute);
+}
+
+// The sums of splat i over the bands of a view, in their order. Whether a band lists the splat.
+bool sums_of(uint view, uint i, out Sums sums) {
+    bool listed = false;
+    const uint bands = BANDS ? push.bands : 1u;
+    for (uint band = 0u; band < bands; ++band) {
+        const uint place = places[(view * bands + band) * push.splats + i];
+        if (place == NOT_LISTED) continue;
+        if (listed)
+            sums = added(sums, sums_at(place));
+        else
+            sums = sums_at(place);
+        listed = true;
+    }
+    return listed;
+}
+
 // Zero plus a value is not that value if it is -0: the first view's gradient is not added.
 vec4 added(bool first, vec4 sum, vec4 value) { return first ? push.share * value : sum + push.share * value; }
 
@@ -55,11 +75,10 @@ void main() {
     float depth = 3.4e38;
     vec2 seen = vec2(0.0);
     for (uint view = 0u; view < push.views; ++view) {
-        const uint place = places[view * push.splats + i];
-        if (place == NOT_LISTED) continue;
+        Sums s;
+        if (!sums_of(view, i, s)) continue;
         const bool first = depth == 3.4e38;
         camera_index = view;
-        Sums s = sums_at(place);
         const StoredProjection stored = project_splat(splat);
         const Projection p = stored.footprint;
         cut_off_gradient(stored, s);

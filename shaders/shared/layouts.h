@@ -62,7 +62,8 @@ EWA_UINT(SLOT_FLOATS, 12u);
 EWA_UINT(SLOT_TEXELS, 3u);
 
 // ---- A batch of views: each view has a list of the splats that reach a tile of it, in the order of the splats ----
-EWA_UINT(NOT_LISTED, 0xffffffffu);  // place of a splat that is not in a view's list
+// A view may be cut into bands of tile rows. Then each band has a list.
+EWA_UINT(NOT_LISTED, 0xffffffffu);  // place of a splat that is not in a list
 // Sums over the slots of a listed splat: the first 9 floats of a slot, with UPDATE_ABSOLUTE 11. The gradient of a colour
 // that is cut off at 0 is 0.
 EWA_UINT(SUM_FLOATS, 9u);
@@ -131,6 +132,7 @@ EWA_UINT(UPDATE_REGULARISED, 4u);
 EWA_UINT(UPDATE_ABSOLUTE, 8u);
 EWA_UINT(UPDATE_PACKED_MOMENTS, 16u);  // moments1 holds both moments in 16 bits each
 EWA_UINT(UPDATE_MOTION, 32u);          // also writes sums of the gradient by the camera's motion
+EWA_UINT(UPDATE_BANDS, 64u);  // of update_views.comp alone: a view has several lists, one of each band
 // project_views.comp, project_views_backward.comp, bits; SHAPE_WHITENERS too
 EWA_UINT(VIEWS_COVARIANCES, 1u);  // shapes are covariances, not quaternions and scales
 EWA_UINT(VIEWS_OPACITIES, 2u);    // the radii depend on the opacities
@@ -317,6 +319,12 @@ struct GatherPush {
 struct UnpackPush {
     float background[3];
     ImageLayout image;
+    uint first_pixel;  // of the photo: the image's first
+};
+
+struct MaskPush {
+    ImageLayout image;
+    uint first_pixel;  // of the photo: the image's first
 };
 
 struct PackPush {
@@ -355,6 +363,7 @@ struct LossPush {
     ImageLayout image;
     float ssim_scale;  // d(loss)/d(SSIM of one pixel and channel)
     float l1_scale;    // d(loss)/d|x - y| of one pixel and channel
+    uint own[2];       // first and one-past-last of the rows that the loss counts
 };
 
 struct ReducePush {
@@ -379,12 +388,19 @@ struct UpdatePush {
     uint step;
 };
 
+struct BandTilesPush {
+    uint splats;
+    uint first_row;  // of the view: the band's first
+    uint size[2];    // px, of the band
+};
+
 struct CollectVisiblePush {
     uint splats;
     uint scan_block;
-    uint view;
-    uint first_place;   // of the view's list, among the lists of all views
-    uint first_record;  // where the view's records begin
+    uint list;          // number of the view's list, or of its band's
+    uint first_place;   // of the list, among all lists
+    uint first_record;  // where the list's records begin
+    uint first_row;     // of the view: the band's first
 };
 
 struct ReceivePush {
@@ -403,6 +419,7 @@ struct UpdateViewsPush {
     uint first;   // number of the first splat, among those of all ranks
     uint planes;  // texel planes a splat
     uint views;
+    uint bands;   // lists of a view, with UPDATE_BANDS
     float share;  // of a view in the gradient: 1 / views
     float mean_rate, opacity_rate, quaternion_rate, scale_rate, sh0_rate, sh_rest_rate;
     float beta1, beta2, epsilon;  // Adam's

@@ -18,13 +18,14 @@ static_assert(sizeof(ScanTotalsPush) == 12 && sizeof(EmitPush) == 32 && sizeof(T
 static_assert(sizeof(BlendPush) == 48 && offsetof(BlendPush, capacity) == 44);
 static_assert(sizeof(RayPush) == 56);
 static_assert(sizeof(CollectPush) == 20 && sizeof(GatherPush) == 12);
-static_assert(sizeof(UnpackPush) == 28 && sizeof(LossPush) == 24 && sizeof(ReducePush) == 20);
+static_assert(sizeof(UnpackPush) == 32 && sizeof(MaskPush) == 20 && sizeof(LossPush) == 32 &&
+              sizeof(ReducePush) == 20);
 static_assert(sizeof(ImageLayout) == 16 && sizeof(PackPush) == 4 && sizeof(ExposurePush) == 20 &&
               sizeof(ExposureUpdatePush) == 28);
 static_assert(sizeof(MoveCameraPush) == 4 && sizeof(MotionUpdatePush) == 40);
 static_assert(sizeof(UpdatePush) == 72 && sizeof(DensifyPush) == 52 && sizeof(ResetPush) == 12);
-static_assert(sizeof(CollectVisiblePush) == 20 && sizeof(ReceivePush) == 12 && sizeof(SumSlotsPush) == 8 &&
-              sizeof(UpdateViewsPush) == 84);
+static_assert(sizeof(BandTilesPush) == 16 && sizeof(CollectVisiblePush) == 24 && sizeof(ReceivePush) == 12 &&
+              sizeof(SumSlotsPush) == 8 && sizeof(UpdateViewsPush) == 88);
 static_assert(sizeof(McmcPush) == 68 && sizeof(PerturbPush) == 36);
 static_assert(sizeof(TraceView) == 4 * (9 + 3 + 2 + 2 + 2 + 9 + 1) && sizeof(TraceCounts) == 8 &&
               sizeof(TracePush) == 24);

@@ -34,7 +34,14 @@ struct Update {
 
 // A batch of views. Each view has a list of the splats that reach a tile of it.
 
-/// Lists a view's visible splats: writes each splat's place and copies the listed records.
+/// Counts the tiles of a view's band that each splat reaches, after Project.
+struct BandTiles {
+    static constexpr char shader[] = "band_tiles";
+    using Work = PerElement<&shared::BandTilesPush::splats>;
+    gpu::BufferPart records, depth_keys, tile_counts;
+};
+
+/// Lists the visible splats of a view, or of its band: writes each splat's place and copies the listed records.
 struct CollectVisible {
     static constexpr char shader[] = "collect_visible";
     using Work = PerElement<&shared::CollectVisiblePush::splats>;
@@ -316,14 +323,14 @@ struct UnpackTarget {
 /// Variant: SPEC_COLOR_FLOATS.
 struct MaskPictures {
     static constexpr char shader[] = "mask_pictures";
-    using Work = PerElement<pixels<shared::ImageLayout>>;
+    using Work = PerElement<pixels<shared::MaskPush>>;
     gpu::BufferPart photo, image, target, masked;
 };
 
 /// Gradient of MaskPictures, in place. Variant: SPEC_COLOR_FLOATS.
 struct MaskGradient {
     static constexpr char shader[] = "mask_gradient";
-    using Work = PerElement<pixels<shared::ImageLayout>>;
+    using Work = PerElement<pixels<shared::MaskPush>>;
     gpu::BufferPart photo, image_gradient;
 };
 

@@ -112,18 +112,28 @@ std::vector<Exposure> Exposures::download() const {
     return values.download<Exposure>(photos);
 }
 
+double loss_of(double l1, double ssim) {
+    return (1 - shared::SSIM_WEIGHT) * l1 + shared::SSIM_WEIGHT * (1 - ssim);
+}
+
 double loss_of(const shared::Counts& counts) {
-    return (1 - shared::SSIM_WEIGHT) * double(counts.l1) + shared::SSIM_WEIGHT * (1 - double(counts.ssim));
+    return loss_of(double(counts.l1), double(counts.ssim));
 }
 
 void record_loss(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame,
                  const FrameInputs& inputs, const gpu::Buffer& photo, bool masked,
                  const ExposureUse* exposure) {
     const shared::ImageLayout layout = frame.sizes.image();
-    const double share = 1.0 / (3.0 * layout.size[0] * layout.size[1]);
+    const Band whole{.rows = layout.size[1], .own_end = layout.size[1]};
+    const Band& band = inputs.band.rows > 0 ? inputs.band : whole;
+    const uint32_t height = inputs.band.rows > 0 ? inputs.camera.height : layout.size[1];
+    const double share = 1.0 / (3.0 * layout.size[0] * height);
     const shared::LossPush push{.image = layout,
                                 .ssim_scale = float(-shared::SSIM_WEIGHT * share),
-                                .l1_scale = float((1 - shared::SSIM_WEIGHT) * share)};
+                                .l1_scale = float((1 - shared::SSIM_WEIGHT) * share),
+                                .own = {band.own_begin, band.own_end}};
+    const uint32_t first_pixel = band.first * layout.size[0];
+    const shared::MaskPush mask{.image = layout, .first_pixel = first_pixel};
     const gpu::Buffer& render = exposure ? frame.exposed : frame.planes;
     const gpu::Buffer& image = masked ? frame.masked : render;
     const passes::Constants colors{
@@ -132,12 +142,13 @@ void record_loss(gpu::Recording& recording, passes::PassCache& cache, const Fram
     if (masked)
         cache.get<passes::MaskPictures>(colors).record(
             recording, {.photo = photo, .image = render, .target = frame.target, .masked = frame.masked},
-            layout);
+            mask);
     else
         cache.get<passes::UnpackTarget>(colors).record(
             recording, {.photo = photo, .planes = frame.target},
             {.background = {inputs.background[0], inputs.background[1], inputs.background[2]},
-             .image = layout});
+             .image = layout,
+             .first_pixel = first_pixel});
     cache.get<passes::LossColumns>().record(
         recording, {.image = image, .target = frame.target, .moments = frame.moments}, push);
     cache.get<passes::LossRows>().record(
@@ -155,7 +166,7 @@ void record_loss(gpu::Recording& recording, passes::PassCache& cache, const Fram
                                                  push);
     if (masked)
         cache.get<passes::MaskGradient>(colors).record(
-            recording, {.photo = photo, .image_gradient = frame.image_gradient}, layout);
+            recording, {.photo = photo, .image_gradient = frame.image_gradient}, mask);
     record_mean(recording, cache, frame, shared::REDUCE_TO_L1, 2, float(share));
     if (exposure) record_expose_backward(recording, cache, frame, *exposure);
 }

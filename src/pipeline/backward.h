@@ -40,7 +40,8 @@ struct Rates {
     float opacity_weight = 0, scale_weight = 0;
 };
 
-/// Leaves the parts of the loss in Counts and dL/d(image) in frame.image_gradient.
+/// Leaves the parts of the loss in Counts and dL/d(image) in frame.image_gradient. The loss is that of the whole view: those
+/// of its bands add up to it, and so do their gradients.
 /// photo: width * height texels, RGBA. Its alpha composites it over the background or, if `masked`, is the
 /// weight of each pixel; `frame` must then be reserved with masks.
 /// exposure: that of the training image, if exposures are learned. It takes its own step of Adam; `frame`
@@ -65,6 +66,7 @@ void record_blend_backward(gpu::Recording& recording, passes::PassCache& cache, 
 uint32_t update_mode(const Plan& plan);
 
 /// (1 - SSIM_WEIGHT) l1 + SSIM_WEIGHT (1 - ssim).
+double loss_of(double l1, double ssim);
 double loss_of(const shared::Counts& counts);
 
 }  // namespace ewa::pipeline

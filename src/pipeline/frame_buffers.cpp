@@ -165,7 +165,7 @@ Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request)
     s.planes = uint64_t(s.plane_floats) * s.image_planes * word;
     if (request.gradients && request.given_gradient) s.image_gradient = uint64_t(s.plane_floats) * 5 * word;
     if (request.gradients && !request.given_gradient) {
-        const auto groups = passes::LossRows::Work::groups(config, {s.image(), 0, 0});
+        const auto groups = passes::LossRows::Work::groups(config, {s.image(), 0, 0, {}});
         s.partials = groups[0] * groups[1] * groups[2] * (config.element_group / config.subgroup);
         s.reduce_block = 64 * config.subgroup;
         s.reduce_blocks = divide_up(s.partials, s.reduce_block);

@@ -82,6 +82,18 @@ FrameInputs inputs_of(const gpu::Buffer& block, const Camera& camera, const Rend
             .samples = uint32_t(std::max(options.samples, 1))};
 }
 
+Band band_of(const passes::KernelConfig& config, uint32_t height, uint32_t bands, uint32_t band) {
+    const uint32_t tile = config.tile_height, tile_rows = (height + tile - 1) / tile;
+    const auto border = [&](uint32_t b) {
+        return std::min(uint32_t(uint64_t(tile_rows) * b / bands) * tile, height);
+    };
+    // A value of SSIM depends on the picture up to SSIM_RADIUS rows away. Its gradient goes to those rows of the same band.
+    const uint32_t halo = (shared::SSIM_RADIUS + tile - 1) / tile * tile;
+    const uint32_t begin = border(band), end = border(band + 1);
+    const uint32_t first = begin - std::min(begin, halo), last = std::min(end + halo, height);
+    return {.first = first, .rows = last - first, .own_begin = begin - first, .own_end = end - first};
+}
+
 gpu::Buffer upload_photo(gpu::Device& device, const Image& image, bool round_to_8_bit) {
     const auto level = [](float value) { return std::round(std::clamp(value, 0.0f, 1.0f) * 255.0f); };
     bool eight_bit = true;

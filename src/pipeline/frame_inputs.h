@@ -19,13 +19,24 @@ struct CameraUse {
     uint32_t width = 0, height = 0;       // px
 };
 
+/// Rows of a view that a picture shows. The loss counts some of them: the others are a halo, which the windows of SSIM reach.
+struct Band {
+    uint32_t first = 0;                   // row of the view that is the picture's first
+    uint32_t rows = 0;                    // of the picture; 0: it shows the whole view
+    uint32_t own_begin = 0, own_end = 0;  // of the picture's rows, those that count
+};
+
 struct FrameInputs {
     CameraUse camera;
     std::array<float, 3> background{0, 0, 0};
     bool keep_overflow = false;    // the frame before may not be done: if it overflows, this one does nothing
     int sh_degree = kMaxShDegree;  // evaluated: at most this, and at most what the plan stores
     uint32_t samples = 1;          // of a ray, with Integrator::march
+    Band band{};
 };
+
+/// Band `band` of a view that is cut into `bands` bands of whole tile rows, with its halo. A view needs a tile row for each.
+Band band_of(const passes::KernelConfig& config, uint32_t height, uint32_t bands, uint32_t band);
 
 /// A camera as the shaders read it: each float64 value in two floats. origin: of the scene's means, world
 /// units. Throws InputError if a value is not finite, or a size or focal length is not positive.

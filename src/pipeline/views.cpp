@@ -27,12 +27,14 @@ float decay(double beta, uint32_t views) {
     return float(std::pow(beta, views));
 }
 
-shared::UpdateViewsPush update_views_push(const Model& model, const Rates& rates, uint32_t first) {
+shared::UpdateViewsPush update_views_push(const Model& model, const Rates& rates, uint32_t first,
+                                          uint32_t bands) {
     const auto [bias1, bias2] = adam_biases(rates.step);
     return {.splats = model.splats,
             .first = first,
             .planes = model.planes(),
             .views = rates.views,
+            .bands = bands,
             .share = 1.0f / float(rates.views),
             .mean_rate = rates.mean,
             .opacity_rate = rates.opacity,
@@ -57,14 +59,15 @@ uint64_t ViewBuffers::sum_bytes(const Plan& plan, uint64_t splats) {
     return 4 * splats * (plan.absolute ? shared::SUM_FLOATS_ABSOLUTE : shared::SUM_FLOATS);
 }
 
-uint64_t ViewBuffers::most_bytes(const Plan& plan, uint64_t splats, uint64_t views) {
-    return kRecordBytes * splats +
-           views * (sizeof(shared::CameraBlock) + 4 * splats + sum_bytes(plan, splats));
+uint64_t ViewBuffers::most_bytes(const Plan& plan, uint64_t splats, uint64_t views, uint64_t bands) {
+    return kRecordBytes * splats + views * (sizeof(shared::CameraBlock) + bands * 4 * splats +
+                                            std::min<uint64_t>(bands, 2) * sum_bytes(plan, splats));
 }
 
-void ViewBuffers::reserve(gpu::Device& device, uint32_t splats, uint32_t views, uint32_t records) {
+void ViewBuffers::reserve(gpu::Device& device, uint32_t splats, uint32_t views, uint32_t bands,
+                          uint32_t records) {
     make_room(device, cameras, "cameras of a batch", sizeof(shared::CameraBlock) * uint64_t(views));
-    make_room(device, places, "places", 4 * uint64_t(views) * splats);
+    make_room(device, places, "places", 4 * uint64_t(views) * bands * splats);
     make_room(device, visible, "visible records", kRecordBytes * records, gpu::Texel::rgba32f);
 }
 
@@ -84,10 +87,19 @@ void ViewBuffers::reserve_sums(gpu::Device& device, gpu::Executor& executor, con
 
 void record_list(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan, const Model& model,
                  const FrameBuffers& frame, const FrameInputs& inputs, const ViewBuffers& buffers,
-                 uint32_t view, uint32_t first_place, uint32_t first_record) {
+                 const ListPlace& place, bool projected) {
     constexpr uint64_t kBlock = sizeof(shared::CameraBlock);
-    recording.copy(*inputs.camera.buffer, inputs.camera.offset, buffers.cameras, view * kBlock, kBlock);
-    record_projection(recording, cache, plan, model, frame, inputs);
+    const Band& band = inputs.band;
+    if (!projected) {
+        recording.copy(*inputs.camera.buffer, inputs.camera.offset, buffers.cameras, place.view * kBlock,
+                       kBlock);
+        record_projection(recording, cache, plan, model, frame, inputs);
+    }
+    if (band.rows > 0)
+        cache.get<passes::BandTiles>().record(
+            recording,
+            {.records = frame.records, .depth_keys = frame.depth_keys[0], .tile_counts = frame.tile_counts},
+            {.splats = model.splats, .first_row = band.first, .size = {inputs.camera.width, band.rows}});
     record_scan(recording, cache,
                 {.source = frame.tile_counts,
                  .order = nullptr,
@@ -108,9 +120,10 @@ void record_list(gpu::Recording& recording, passes::PassCache& cache, const Plan
                                                 .visible = buffers.visible},
                                                {.splats = model.splats,
                                                 .scan_block = frame.sizes.scan_block,
-                                                .view = view,
-                                                .first_place = first_place,
-                                                .first_record = first_record});
+                                                .list = place.list,
+                                                .first_place = place.first_place,
+                                                .first_record = place.first_record,
+                                                .first_row = band.first});
 }
 
 Sorted record_list_forward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
@@ -140,12 +153,13 @@ void record_list_backward(gpu::Recording& recording, passes::PassCache& cache, c
 
 void record_update_views(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
                          const Model& model, const FrameBuffers& frame, const ViewBuffers& buffers,
-                         const Rates& rates, uint32_t first, int sh_degree) {
+                         const Rates& rates, uint32_t first, int sh_degree, uint32_t bands) {
     const gpu::Buffer& moments2 = model.second_moments();
     cache
-        .get<passes::UpdateViews>({{shared::SPEC_SH_DEGREE, plan.evaluated_degree(sh_degree)},
-                                   {shared::SPEC_MODE, update_mode(plan)},
-                                   {shared::SPEC_KERNEL, uint32_t(plan.kernel)}})
+        .get<passes::UpdateViews>(
+            {{shared::SPEC_SH_DEGREE, plan.evaluated_degree(sh_degree)},
+             {shared::SPEC_MODE, update_mode(plan) | (bands > 1 ? shared::UPDATE_BANDS : 0)},
+             {shared::SPEC_KERNEL, uint32_t(plan.kernel)}})
         .record(recording,
                 {.params = model.params,
                  .cameras = buffers.cameras,
@@ -159,7 +173,7 @@ void record_update_views(gpu::Recording& recording, passes::PassCache& cache, co
                  .moments2_out = moments2,
                  // A binding that a mode does not use needs a buffer.
                  .statistics = plan.statistics ? model.statistics : frame.partials},
-                update_views_push(model, rates, first));
+                update_views_push(model, rates, first, bands));
 }
 
 Rates batch_rates(const Rates& rates) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A step of several views. Each view draws a list of the splats that it sees. Then one update adds the gradients of all
 // views to each splat, in the order of the views. The list of a view and its sums are all that passes between the model and
-// the picture, so another process may draw the view.
+// the picture, so another process may draw the view. A view may be cut into bands, which are pictures with a list each.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -14,27 +14,34 @@ namespace ewa::pipeline {
 
 struct ViewBuffers {
     gpu::Buffer cameras;  // CameraBlocks, one view after another
-    gpu::Buffer places;  // a word a splat of each view: its place among the lists of all views, or NOT_LISTED
-    gpu::Buffer visible;  // records of a view's list, or of the lists of several views
+    gpu::Buffer places;   // a word a splat of each list: its place among all lists, or NOT_LISTED
+    gpu::Buffer visible;  // records of one list or several
     gpu::Buffer sums;     // by place: see SUM_FLOATS
 
     /// Bytes of `splats` listed splats in sums.
     static uint64_t sum_bytes(const Plan& plan, uint64_t splats);
-    /// Bytes of all buffers for a step of `views` views that all see `splats` splats.
-    static uint64_t most_bytes(const Plan& plan, uint64_t splats, uint64_t views);
+    /// Bytes of all buffers for a step of `views` views that all see `splats` splats, in at most two bands each.
+    static uint64_t most_bytes(const Plan& plan, uint64_t splats, uint64_t views, uint64_t bands);
 
-    /// Makes room for the places of `splats` splats in `views` views, and for `records` records.
-    void reserve(gpu::Device& device, uint32_t splats, uint32_t views, uint32_t records);
+    /// Makes room for the places of `splats` splats in `bands` bands of `views` views, and for `records` records.
+    void reserve(gpu::Device& device, uint32_t splats, uint32_t views, uint32_t bands, uint32_t records);
     /// Makes room for the sums of `splats` listed splats. Keeps those that are there. The device must be idle.
     void reserve_sums(gpu::Device& device, gpu::Executor& executor, const Plan& plan, uint64_t splats);
 };
 
-/// Projects the model's splats for a view and lists those that reach a tile. After the submission Counts.scan_total is their
-/// number. `frame` must be reserved for the model's splats.
-/// first_place: number of splats in the lists of the views before. first_record: where the records go in buffers.visible.
+/// Where a list goes.
+struct ListPlace {
+    uint32_t view = 0, list = 0;
+    uint32_t first_place = 0;   // number of splats in the lists before
+    uint32_t first_record = 0;  // in ViewBuffers::visible
+};
+
+/// Projects the model's splats for a view and lists those that reach a tile of inputs.band. After the submission
+/// Counts.scan_total is their number. `frame` must be reserved for the model's splats.
+/// projected: `frame` still has what it projected for another band of the view.
 void record_list(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan, const Model& model,
                  const FrameBuffers& frame, const FrameInputs& inputs, const ViewBuffers& buffers,
-                 uint32_t view, uint32_t first_place, uint32_t first_record);
+                 const ListPlace& place, bool projected = false);
 
 /// A forward frame of a list of `splats` splats, whose records are in frame.records. As with record_forward,
 /// Counts.instances tells whether it has to be repeated.
@@ -47,10 +54,11 @@ void record_list_backward(gpu::Recording& recording, passes::PassCache& cache, c
                           const Sorted& sorted, const gpu::Buffer& sums, uint32_t first_place);
 
 /// Moves the model by the mean gradient of the views. rates: of one view; batch_rates turns them into those of the step.
-/// first: number of the model's first splat, among those of all ranks. sh_degree: evaluated in this step.
+/// first: number of the model's first splat, among those of all ranks. sh_degree: evaluated in this step. bands: lists of each
+/// view; list `view * bands + band`.
 void record_update_views(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
                          const Model& model, const FrameBuffers& frame, const ViewBuffers& buffers,
-                         const Rates& rates, uint32_t first, int sh_degree);
+                         const Rates& rates, uint32_t first, int sh_degree, uint32_t bands = 1);
 
 /// The rates of a step of rates.views views, from those of a step of one view (Zhao et al. 2024, Grendel, section 3.3):
 /// times the square root of their number.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bit>
 #include <chrono>
+#include <cmath>
 #include <numeric>
 
 namespace ewa::train {
@@ -74,6 +75,31 @@ shared::Counts run(const BatchParts& parts, gpu::Recording& recording) {
     return parts.frame.read_counts();
 }
 
+/// Parts of the loss of a view.
+struct PictureLoss {
+    double l1 = 0, ssim = 0, squared = 0;
+};
+
+PictureLoss loss_from(std::span<const uint64_t, 3> words) {
+    return {std::bit_cast<double>(words[0]), std::bit_cast<double>(words[1]),
+            std::bit_cast<double>(words[2])};
+}
+
+/// losses: of the bands of each view.
+void add_losses(std::span<const PictureLoss> losses, size_t bands, BatchReport& report) {
+    const double views = double(losses.size() / bands);
+    for (size_t first = 0; first < losses.size(); first += bands) {
+        PictureLoss view = losses[first];
+        for (const PictureLoss& band : losses.subspan(first + 1, bands - 1)) {
+            view.l1 += band.l1;
+            view.ssim += band.ssim;
+            view.squared += band.squared;
+        }
+        report.loss += loss_of(view.l1, view.ssim) / views;
+        report.psnr += -10 * std::log10(view.squared) / views;
+    }
+}
+
 }  // namespace
 
 std::vector<uint64_t> Batch::gather(std::span<const uint64_t> own) {
@@ -92,14 +118,24 @@ void Batch::exchange(std::span<const std::span<const std::byte>> out,
         if (rank != size_t(ranks_->rank())) traffic_.sent_bytes += out[rank].size();
 }
 
-/// Views that are drawn at one time: at most one by each rank. View `first` + k is drawn by rank k.
+/// A view, or a band of it, which one rank draws.
+struct Batch::Picture {
+    size_t number;  // among those of all views: that of its list
+    size_t view;
+    const BatchView& of;
+    FrameInputs inputs;    // with its band
+    FrameRequest request;  // without splats and instances
+};
+
+/// Pictures that are drawn at one time: at most one by each rank. Picture `first` + k is drawn by rank k.
 struct Batch::Round {
-    size_t first = 0, views = 0;
-    std::vector<uint64_t> listed;  // by this rank, of each view
+    uint32_t bands;  // of each view
+    size_t first = 0, pictures = 0;
+    std::vector<uint64_t> listed;  // by this rank, of each picture
     std::vector<uint32_t> places;  // of the first of them
-    std::vector<uint64_t> of_own;  // listed by each rank, of the view that this rank draws
+    std::vector<uint64_t> of_own;  // listed by each rank, of the picture that this rank draws
     uint64_t skipped = 0;          // of the last view
-    bool draws(int rank) const { return size_t(rank) < views; }
+    bool draws(int rank) const { return size_t(rank) < pictures; }
     uint64_t own() const { return std::accumulate(of_own.begin(), of_own.end(), uint64_t(0)); }
 };
 
@@ -109,17 +145,35 @@ void Batch::reserve(const BatchParts& parts, FrameRequest request, uint64_t list
     parts.frame.reserve(parts.cache.device(), parts.cache.config(), request);
 }
 
+Batch::Picture Batch::picture_of(const BatchParts& parts, std::span<const BatchView> views,
+                                 const Round& round, size_t rank) {
+    const size_t number = round.first + rank, view = number / round.bands;
+    Picture picture{number, view, views[view], views[view].inputs, views[view].request};
+    if (round.bands == 1) return picture;
+    picture.inputs.band =
+        band_of(parts.cache.config(), picture.request.height, round.bands, uint32_t(number % round.bands));
+    picture.request.height = picture.inputs.band.rows;
+    return picture;
+}
+
 void Batch::list(const BatchParts& parts, std::span<const BatchView> views, Round& round) {
     gpu::Device& device = parts.cache.device();
     const uint32_t splats = parts.model.splats;
-    buffers_.reserve(device, splats, uint32_t(views.size()), uint32_t(round.views * splats));
+    buffers_.reserve(device, splats, uint32_t(views.size()), round.bands, uint32_t(round.pictures * splats));
     uint64_t records = 0;
-    for (size_t k = 0; k < round.views; ++k) {
-        const size_t view = round.first + k;
-        reserve(parts, views[view].request, 0);
+    size_t projected = views.size();
+    for (size_t k = 0; k < round.pictures; ++k) {
+        const Picture picture = picture_of(parts, views, round, k);
+        const bool again = picture.view == projected;
+        if (!again) reserve(parts, picture.request, 0);
+        projected = picture.view;
         gpu::Recording recording(device.limits());
-        record_list(recording, parts.cache, parts.plan, parts.model, parts.frame, views[view].inputs,
-                    buffers_, uint32_t(view), places_, uint32_t(records));
+        record_list(recording, parts.cache, parts.plan, parts.model, parts.frame, picture.inputs, buffers_,
+                    {.view = uint32_t(picture.view),
+                     .list = uint32_t(picture.number),
+                     .first_place = places_,
+                     .first_record = uint32_t(records)},
+                    again);
         const shared::Counts counts = run(parts, recording);
         round.places.push_back(places_);
         round.listed.push_back(counts.scan_total);
@@ -127,7 +181,7 @@ void Batch::list(const BatchParts& parts, std::span<const BatchView> views, Roun
         records += counts.scan_total;
         places_ += counts.scan_total;
     }
-    // A view without a splat draws one that is not visible, which has a place behind the others.
+    // A picture without a splat draws one that is not visible, which has a place behind the others.
     buffers_.reserve_sums(device, parts.executor, parts.plan, uint64_t(places_) + 1);
 }
 
@@ -139,7 +193,7 @@ void Batch::tell_counts(Round& round, BatchReport& report) {
     report.skipped_nonfinite = 0;
     for (size_t rank = 0; rank < ranks; ++rank) {
         round.of_own.push_back(round.draws(int(own)) ? all[rank * told.size() + own] : 0);
-        report.skipped_nonfinite += all[rank * told.size() + round.views];
+        report.skipped_nonfinite += all[rank * told.size() + round.pictures];
     }
 }
 
@@ -152,7 +206,7 @@ void Batch::send_records(const BatchParts& parts, const Round& round) {
     std::vector<std::span<std::byte>> in(ranks);
     uint64_t from = 0, to = 0;
     for (size_t rank = 0; rank < ranks; ++rank) {
-        if (rank < round.views) out[rank] = records.part(from, round.listed[rank] * kRecordBytes);
+        if (rank < round.pictures) out[rank] = records.part(from, round.listed[rank] * kRecordBytes);
         in[rank] = list.part(to, round.of_own[rank] * kRecordBytes);
         from += out[rank].size();
         to += in[rank].size();
@@ -172,7 +226,7 @@ void Batch::return_sums(const BatchParts& parts, const Round& round) {
     uint64_t from = 0, to = 0;
     for (size_t rank = 0; rank < ranks; ++rank) {
         out[rank] = drawn.part(from, round.of_own[rank] * splat);
-        if (rank < round.views) in[rank] = sums.part(to, round.listed[rank] * splat);
+        if (rank < round.pictures) in[rank] = sums.part(to, round.listed[rank] * splat);
         from += out[rank].size();
         to += in[rank].size();
     }
@@ -180,25 +234,25 @@ void Batch::return_sums(const BatchParts& parts, const Round& round) {
     sums.finish();
 }
 
-shared::Counts Batch::draw_own(const BatchParts& parts, const BatchView& view, const Round& round) {
+shared::Counts Batch::draw_own(const BatchParts& parts, const Picture& picture, const Round& round) {
     gpu::Device& device = parts.cache.device();
     const bool alone = ranks_->size() == 1;
     const uint64_t listed = round.own();
     const uint32_t splats = uint32_t(std::max<uint64_t>(listed, 1));
     const gpu::Buffer& sums = alone ? buffers_.sums : own_sums_;
     for (;;) {
-        reserve(parts, view.request, listed);
+        reserve(parts, picture.request, listed);
         gpu::Recording recording(device.limits());
         if (listed == 0)
             recording.fill(parts.frame.records, 0, 0, kRecordBytes);
         else if (alone)
             recording.copy(buffers_.visible, 0, parts.frame.records, 0, listed * kRecordBytes);
         const Sorted sorted =
-            record_list_forward(recording, parts.cache, parts.plan, splats, parts.frame, view.inputs);
-        if (view.record_loss) {
-            view.record_loss(recording);
-            record_list_backward(recording, parts.cache, parts.plan, splats, parts.frame, view.inputs, sorted,
-                                 sums, alone ? round.places.front() : 0);
+            record_list_forward(recording, parts.cache, parts.plan, splats, parts.frame, picture.inputs);
+        if (picture.of.record_loss) {
+            picture.of.record_loss(recording, picture.inputs);
+            record_list_backward(recording, parts.cache, parts.plan, splats, parts.frame, picture.inputs,
+                                 sorted, sums, alone ? round.places.front() : 0);
         }
         const shared::Counts counts = run(parts, recording);
         if (counts.instances <= parts.frame.instance_capacity) return counts;
@@ -206,7 +260,7 @@ shared::Counts Batch::draw_own(const BatchParts& parts, const BatchView& view, c
     }
 }
 
-/// Afterwards each rank has the list of the view that it draws.
+/// Afterwards each rank has the list of the picture that it draws.
 void Batch::exchange_lists(const BatchParts& parts, std::span<const BatchView> views, Round& round,
                            BatchReport& report) {
     list(parts, views, round);
@@ -214,7 +268,7 @@ void Batch::exchange_lists(const BatchParts& parts, std::span<const BatchView> v
     if (ranks_->size() == 1) return;
     const int own = ranks_->rank();
     if (round.draws(own)) {
-        reserve(parts, views[round.first + size_t(own)].request, round.own());
+        reserve(parts, picture_of(parts, views, round, size_t(own)).request, round.own());
         make_room_for_own(parts, round.own());
     }
     send_records(parts, round);
@@ -223,35 +277,34 @@ void Batch::exchange_lists(const BatchParts& parts, std::span<const BatchView> v
 bool Batch::draw_pictures(const BatchParts& parts, std::span<const BatchView> views) {
     BatchReport report;
     places_ = 0;
-    Round round{0, views.size(), {}, {}, {}};
+    Round round{1, 0, views.size(), {}, {}, {}};
     exchange_lists(parts, views, round, report);
     const bool draws = round.draws(ranks_->rank());
-    if (draws) draw_own(parts, views[size_t(ranks_->rank())], round);
+    if (draws) draw_own(parts, picture_of(parts, views, round, size_t(ranks_->rank())), round);
     return draws;
 }
 
 BatchReport Batch::draw(const BatchParts& parts, std::span<const BatchView> views) {
     BatchReport report;
     const int ranks = ranks_->size(), own = ranks_->rank();
+    std::vector<PictureLoss> losses(views.size() * bands_);
     places_ = 0;
-    for (size_t first = 0; first < views.size(); first += size_t(ranks)) {
-        Round round{first, std::min(size_t(ranks), views.size() - first), {}, {}, {}};
+    for (size_t first = 0; first < losses.size(); first += size_t(ranks)) {
+        Round round{bands_, first, std::min(size_t(ranks), losses.size() - first), {}, {}, {}};
         exchange_lists(parts, views, round, report);
-        std::array<double, 2> losses{};
+        PictureLoss loss{};
         if (round.draws(own)) {
-            const BatchView& view = views[first + size_t(own)];
-            const shared::Counts counts = draw_own(parts, view, round);
-            losses = {loss_of(counts), view.psnr(counts)};
+            const Picture picture = picture_of(parts, views, round, size_t(own));
+            const shared::Counts counts = draw_own(parts, picture, round);
+            loss = {counts.l1, counts.ssim, double(counts.squared) / picture.of.weight()};
         }
         // Waits for the slowest of them.
-        const auto words = std::bit_cast<std::array<uint64_t, 2>>(losses);
-        const std::vector<uint64_t> all = gather(words);
+        const std::vector<uint64_t> all = gather(std::bit_cast<std::array<uint64_t, 3>>(loss));
         if (ranks > 1) return_sums(parts, round);
-        for (size_t k = 0; k < round.views; ++k) {
-            report.loss += std::bit_cast<double>(all[2 * k]) / double(views.size());
-            report.psnr += std::bit_cast<double>(all[2 * k + 1]) / double(views.size());
-        }
+        for (size_t k = 0; k < round.pictures; ++k)
+            losses[first + k] = loss_from(std::span(all).subspan(3 * k).first<3>());
     }
+    add_losses(losses, bands_, report);
     return report;
 }
 
@@ -259,7 +312,7 @@ void Batch::make_room_for_own(const BatchParts& parts, uint64_t listed) {
     const uint64_t bytes = ViewBuffers::sum_bytes(parts.plan, listed + 1);
     if (own_sums_ && own_sums_.bytes() >= bytes) return;
     own_sums_ = gpu::Buffer();
-    own_sums_ = gpu::Buffer(parts.cache.device(), "sums of a view", bytes + bytes / 4);
+    own_sums_ = gpu::Buffer(parts.cache.device(), "sums of a picture", bytes + bytes / 4);
 }
 
 void Batch::update(const BatchParts& parts, const Rates& rates, uint32_t first, int sh_degree,
@@ -267,7 +320,7 @@ void Batch::update(const BatchParts& parts, const Rates& rates, uint32_t first, 
     gpu::Recording recording(parts.cache.device().limits());
     recording.fill(parts.frame.counts, 0, 0, sizeof(shared::Counts));
     record_update_views(recording, parts.cache, parts.plan, parts.model, parts.frame, buffers_, rates, first,
-                        sh_degree);
+                        sh_degree, bands_);
     if (more) more(recording);
     const shared::Counts counts = run(parts, recording);
     const std::vector<uint64_t> all =

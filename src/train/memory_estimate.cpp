@@ -45,6 +45,7 @@ constexpr uint64_t kRefineBytes = 16;  // a splat, of a refinement's own lists
 struct Footprint2D {
     double a = 0, b = 0, c = 0;  // covariance, px^2
     double opacity = 0;
+    double y = 0;  // of the mean, px
 };
 
 /// Empty if the splat's mean is not in the image.
@@ -55,7 +56,7 @@ std::optional<Footprint2D> project(const Gaussians& g, size_t i, const Camera& c
     if (!(x >= 0 && x < camera.width && y >= 0 && y < camera.height)) return {};
     const float* q = &g.quaternions[4 * i];
     const glm::dmat3 turn = glm::mat3_cast(glm::normalize(glm::dquat(q[0], q[1], q[2], q[3])));
-    Footprint2D f{.a = shared::LOW_PASS, .b = 0, .c = shared::LOW_PASS};
+    Footprint2D f{.a = shared::LOW_PASS, .b = 0, .c = shared::LOW_PASS, .y = y};
     for (int axis = 0; axis < 3; ++axis) {
         const glm::dvec3 v =
             camera.rotation * turn[axis] * std::exp(double(g.log_scales[3 * i + size_t(axis)]));
@@ -81,18 +82,27 @@ struct Footprints {
     double area = 0;   // of the ellipse, tiles
 };
 
-/// Adds the ellipse {alpha >= ALPHA_MIN} of a splat that has at least this opacity.
+/// The share of a height around y that lies in the rows of a band.
+double share_of(const Band& band, double y, double height) {
+    if (band.rows == 0) return 1;
+    const double low = std::max(y - height / 2, double(band.first)),
+                 high = std::min(y + height / 2, double(band.first + band.rows));
+    return std::max(high - low, 0.0) / height;
+}
+
+/// Adds the ellipse {alpha >= ALPHA_MIN} of a splat that has at least this opacity, as far as it lies in the band.
 void add_footprint(Footprints& sum, const Footprint2D& f, double least_opacity, const Camera& camera,
-                   const passes::KernelConfig& config) {
+                   const passes::KernelConfig& config, const Band& band) {
     const double opacity = std::max(f.opacity, least_opacity);
     const double reach = 2 * std::log(opacity / shared::ALPHA_MIN);  // squared, in standard deviations
     if (!(reach > 0)) return;
     const double width = std::min(2 * std::sqrt(reach * f.a), double(camera.width)),
                  height = std::min(2 * std::sqrt(reach * f.c), double(camera.height));
     const double area = std::min(std::numbers::pi * reach * standard_area(f), 0.785 * width * height);
-    sum.splats += 1;
-    sum.sides += width / config.tile_width + height / config.tile_height;
-    sum.area += area / (config.tile_width * config.tile_height);
+    const double share = share_of(band, f.y, height);
+    sum.splats += share;
+    sum.sides += share * (width / config.tile_width + height / config.tile_height);
+    sum.area += share * area / (config.tile_width * config.tile_height);
 }
 
 /// A training view, and the sampled splats that it sees.
@@ -124,7 +134,15 @@ double optical_depth(const std::vector<View>& views, size_t stride) {
     return sum / double(views.size());
 }
 
-/// (Splat, tile) pairs of the view that has most of them, for `splats` splats that descend from `start`.
+/// The pictures that ranks draw of a view.
+std::vector<Band> bands_of(const passes::KernelConfig& config, uint32_t height, int bands) {
+    std::vector<Band> all;
+    for (int band = 0; bands > 1 && band < bands; ++band)
+        all.push_back(band_of(config, height, uint32_t(bands), uint32_t(band)));
+    return all.empty() ? std::vector<Band>(1) : all;
+}
+
+/// (Splat, tile) pairs of the picture that has most of them, for `splats` splats that descend from `start`.
 /// - A convex shape at a random place of a grid touches 1 + sides + area cells in the mean.
 /// - Splats that multiply share what their parents covered, but not all of it: sides shrink with a power of the number,
 ///   areas with its square.
@@ -136,13 +154,14 @@ uint64_t estimated_pairs(const Gaussians& start, const Dataset& dataset, const s
     const double growth = opaque ? 1 : double(splats) / double(start.size());
     const double shrink = std::pow(growth, options.strategy == Strategy::mcmc ? -kMcmcShrink : -kAdcShrink);
     double most = 0;
-    for (const View& view : views) {
-        Footprints sum;
-        for (const Footprint2D& f : view.seen)
-            add_footprint(sum, f, opaque ? 0 : kLeastOpacity, *view.camera, config);
-        const double pairs = sum.splats + shrink * sum.sides + shrink * shrink * sum.area;
-        most = std::max(most, pairs * double(stride) * growth);
-    }
+    for (const View& view : views)
+        for (const Band& band : bands_of(config, uint32_t(view.camera->height), options.bands)) {
+            Footprints sum;
+            for (const Footprint2D& f : view.seen)
+                add_footprint(sum, f, opaque ? 0 : kLeastOpacity, *view.camera, config, band);
+            const double pairs = sum.splats + shrink * sum.sides + shrink * shrink * sum.area;
+            most = std::max(most, pairs * double(stride) * growth);
+        }
     return uint64_t(most * kCapacity);
 }
 
@@ -196,9 +215,12 @@ MemoryEstimate estimate_memory(const gpu::Device& device, const Dataset& dataset
                              first_capacity(start.size()), kMostPairs);
     for (const int index : train_frames) {
         const Frame& frame = dataset.frames[size_t(index)];
+        uint32_t rows = 0;
+        for (const Band& band : bands_of(config, uint32_t(frame.camera.height), options.bands))
+            rows = std::max(rows, band.rows);
         const FrameRequest request{.splats = estimate.splats,
                                    .width = uint32_t(frame.camera.width),
-                                   .height = uint32_t(frame.camera.height),
+                                   .height = rows > 0 ? rows : uint32_t(frame.camera.height),
                                    .instances = uint32_t(pairs),
                                    .gradients = true,
                                    .masks = frame.masks == MaskUse::ignore,
@@ -210,8 +232,9 @@ MemoryEstimate estimate_memory(const gpu::Device& device, const Dataset& dataset
         const uint64_t second = grows ? array + kRefineBytes * estimate.splats : 0;
         estimate.frame = std::max(estimate.frame, sizes.total() - instances + std::max(instances, second));
     }
-    if (options.batch > 1)
-        estimate.frame += ViewBuffers::most_bytes(plan, estimate.splats, uint64_t(options.batch));
+    if (options.batch > 1 || options.bands > 1)
+        estimate.frame +=
+            ViewBuffers::most_bytes(plan, estimate.splats, uint64_t(options.batch), uint64_t(options.bands));
     estimate.images = image_bytes(dataset, train_frames, options);
     return estimate;
 }

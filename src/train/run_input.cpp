@@ -147,8 +147,21 @@ void check_downscale(const RunInput& input) {
     }
 }
 
+/// What lets all ranks draw, if some do not.
+std::optional<std::string> idle_ranks_remark(const TrainOptions& options, int ranks) {
+    const int pictures = std::min(options.batch, options.steps) * options.bands;
+    if (ranks <= pictures) return std::nullopt;
+    return fmt::format(
+        "{} of {} ranks draw nothing: a step has {} in {}; --batch {} or --bands {} lets all draw",
+        ranks - pictures, ranks, core::counted(uint64_t(options.batch), "view"),
+        core::counted(uint64_t(options.bands), "band"), (ranks + options.bands - 1) / options.bands,
+        (ranks + options.batch - 1) / options.batch);
+}
+
 void add_remarks(RunInput& input) {
     const Dataset& dataset = input.dataset;
+    if (const auto remark = idle_ranks_remark(input.options.train, input.options.ranks->size()))
+        input.remarks.push_back(*remark);
     if (input.without_view_dependence())
         input.remarks.emplace_back("the dataset says that no colour depends on the view: SH degree 0");
     if (input.options.init == "sfm" && dataset.points.positions.empty())

@@ -21,7 +21,7 @@ template <class T>
 using Names = std::vector<std::pair<const char*, T>>;
 
 constexpr int kMostSteps = 1000000000;
-constexpr int kMostBatch = 256;
+constexpr int kMostBatch = 256, kMostBands = 64;
 constexpr bool kDecides = true, kDoesNotDecide = false;
 
 const Names<Strategy> kStrategies = {{"auto", Strategy::automatic},
@@ -216,6 +216,16 @@ RunOption batch_option() {
     return option;
 }
 
+RunOption bands_option() {
+    RunOption option = number<int>(
+        "bands", "N",
+        "Bands of rows that each view is cut into. Each of several ranks then draws a band, so that up to N "
+        "times --batch of them work. The result is the same for any number of ranks",
+        kDecides, [](RunOptions& o) -> int& { return o.train.bands; }, 1, kMostBands);
+    option.before = "1";
+    return option;
+}
+
 RunOption background_option() {
     RunOption option{
         "background", "COLOUR",
@@ -243,6 +253,7 @@ std::vector<RunOption> make_table() {
             "steps", "N", "Training views: an optimisation step takes one of them, or --batch", kDecides,
             [](RunOptions& o) -> int& { return o.train.steps; }, 1, kMostSteps),
         batch_option(),
+        bands_option(),
         choice<Strategy>(
             "strategy",
             "adc adds and removes splats (3DGS). mcmc relocates dead splats and grows to --max-splats "

@@ -41,14 +41,16 @@ pipeline::PlanRequest plan_request(const Gaussians& start, const TrainOptions& o
 
 void check_training(const TrainOptions& options, int ranks) {
     if (options.batch < 1) throw InputError("--batch: a step has at least one view");
-    if (options.batch > 1 || ranks > 1) {
-        const std::string several = ranks > 1 ? "several ranks" : "--batch";
+    if (options.bands < 1) throw InputError("--bands: a view has at least one band");
+    if (options.batch > 1 || options.bands > 1 || ranks > 1) {
+        const std::string several = ranks > 1 ? "several ranks" : options.batch > 1 ? "--batch" : "--bands";
         if (options.refine_poses)
             throw InputError(several +
                              " and --refine-poses exclude each other: a camera learns from its own step");
         if (options.render.points) throw InputError(several + " and --points exclude each other");
     }
     if (options.exposure && ranks > 1) throw InputError("several ranks and --exposure exclude each other");
+    if (options.exposure && options.bands > 1) throw InputError("--bands and --exposure exclude each other");
     check_points(options.render);
     if (options.render.points && options.strategy == Strategy::mcmc)
         throw InputError(

@@ -66,6 +66,19 @@ Gaussians prepared(Gaussians start, Footprint kernel) {
     return start;
 }
 
+/// Throws InputError unless each band of each image has a row of tiles. images: of the lowest resolution.
+void check_bands(const TrainOptions& options, const passes::KernelConfig& config,
+                 const train::ImageCache& images) {
+    for (size_t i = 0; i < images.count(); ++i) {
+        const uint32_t height = images.camera(i).height;
+        const uint32_t most = (height + config.tile_height - 1) / config.tile_height;
+        if (uint32_t(options.bands) > most)
+            throw InputError("--bands " + std::to_string(options.bands) + ": an image with " +
+                             std::to_string(height) + " rows of pixels takes at most --bands " +
+                             std::to_string(most));
+    }
+}
+
 /// A rank's part of the first splats.
 Gaussians share_of(Gaussians start, const Ranks& ranks) {
     if (ranks.size() == 1) return start;
@@ -105,7 +118,8 @@ Trainer::State::State(std::shared_ptr<gpu::Device> d, const Dataset& dataset, co
     }
     take_share(uint32_t(ready.size()));
     report.splats = model.share.all;
-    if (o.batch > 1 || ranks->size() > 1) batch.emplace(ranks);
+    check_bands(o, cache.config(), smaller.empty() ? images : smaller.back());
+    if (o.batch > 1 || o.bands > 1 || ranks->size() > 1) batch.emplace(ranks, o.bands);
 }
 
 void Trainer::State::take_share(uint32_t all) {

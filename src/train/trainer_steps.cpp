@@ -186,16 +186,13 @@ train::BatchView Trainer::State::view_of(int step, train::ImageCache& seen, int 
     return {.inputs = inputs,
             .request = request_of(camera),
             .record_loss =
-                [this, inputs, exposure, weight, index, &seen](gpu::Recording& recording) {
+                [this, exposure, weight, index, &seen](gpu::Recording& recording, const FrameInputs& drawn) {
                     const auto& photo = seen.photo(index);
                     *weight = photo.weight;
-                    record_loss(recording, cache, frame, inputs, photo.texels, photo.masked,
+                    record_loss(recording, cache, frame, drawn, photo.texels, photo.masked,
                                 plan.exposure ? &exposure : nullptr);
                 },
-            .psnr =
-                [weight](const shared::Counts& counts) {
-                    return -10 * std::log10(double(counts.squared) / *weight);
-                }};
+            .weight = [weight] { return *weight; }};
 }
 
 void Trainer::State::optimise_batch(int first, int last) {
@@ -233,7 +230,7 @@ Image Trainer::State::render_own(std::span<const Camera> cameras) {
     for (size_t i = 0; i < cameras.size(); ++i) {
         const FrameInputs inputs = inputs_of(blocks[i], cameras[i], options.render);
         views.push_back(
-            {.inputs = inputs, .request = request_of(inputs.camera), .record_loss = {}, .psnr = {}});
+            {.inputs = inputs, .request = request_of(inputs.camera), .record_loss = {}, .weight = {}});
     }
     train::BatchParts parts = batch_parts();
     parts.submitted = [] {};

@@ -82,6 +82,7 @@ void compile_splatting(Compiler& compiler) {
           {UPDATE_GRADIENT_ONLY, UPDATE_GRADIENT_ONLY | UPDATE_MOTION, packed | UPDATE_MOTION, 0,
            UPDATE_STATISTICS, packed, packed | UPDATE_STATISTICS, packed | UPDATE_REGULARISED,
            packed | UPDATE_STATISTICS | UPDATE_ABSOLUTE}}});
+    compiler.compile<passes::BandTiles>();
     compiler.compile<passes::CollectVisible>();
     compiler.compile<passes::ReceiveRecords>();
     compiler.compile<passes::SumSlots>({{SPEC_MODE, {0, UPDATE_ABSOLUTE}}});

@@ -148,7 +148,7 @@ TEST_P(Loss, MomentsAreBlurredDownTheColumns) {
         blurred("blurred", sizes.derivatives, gpu::Texel::rgba32f);
     // Any nine planes do as derivatives: the moments' first nine.
     r.run([&](gpu::Recording& recording) {
-        const shared::LossPush push{sizes.image(), 0, 0};
+        const shared::LossPush push{sizes.image(), 0, 0, {}};
         r.cache.get<passes::LossColumns>().record(recording, {image, target, moments}, push);
         r.cache.get<passes::LossBackwardColumns>().record(recording, {moments, blurred}, push);
     });
@@ -224,7 +224,7 @@ TEST(Photo, EightBitAndFloatImagesUnpackTheSame) {
         Guarded planes("planes", 12 * 5 * 3 * 4);
         r.run([&](gpu::Recording& recording) {
             r.cache.get<passes::UnpackTarget>({{shared::SPEC_COLOR_FLOATS, texel == gpu::Texel::rgba32f}})
-                .record(recording, {photo, planes}, {{1, 0.5f, 0}, {{9, 5}, 12, 60}});
+                .record(recording, {photo, planes}, {{1, 0.5f, 0}, {{9, 5}, 12, 60}, 0});
         });
         expect_intact({&planes});
         return planes.read<float>();

@@ -457,11 +457,12 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     // A step of two views. The sums have room for both.
     request.motion = false;
     const auto plan_of_views = plan_for(request);
-    views.reserve(*device(), 50, 2, 50);
+    views.reserve(*device(), 50, 2, 1, 50);
     views.reserve_sums(*device(), r.executor, plan_of_views, 100);
     gpu::Recording batch = r.recording();
     for (uint32_t view = 0; view < 2; ++view) {
-        record_list(batch, r.cache, plan_of_views, model, frame, inputs, views, view, 50 * view, 0);
+        record_list(batch, r.cache, plan_of_views, model, frame, inputs, views,
+                    {.view = view, .list = view, .first_place = 50 * view});
         batch.copy(views.visible, 0, frame.records, 0, 48 * 50);
         const auto drawn = record_list_forward(batch, r.cache, plan_of_views, 50, frame, inputs);
         record_loss(batch, r.cache, frame, inputs, photo);

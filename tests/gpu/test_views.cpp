@@ -85,7 +85,7 @@ struct Step {
                        .instances = 1 << 16,
                        .gradients = true,
                        .overlaid = true});
-        buffers.reserve(*device(), model.splats, uint32_t(cameras.size()), model.splats);
+        buffers.reserve(*device(), model.splats, uint32_t(cameras.size()), 1, model.splats);
     }
     FrameInputs inputs(const SeenScene& seen, size_t view) const {
         return {.camera = {&cameras[view], 0, uint32_t(kWidth), uint32_t(kHeight)},
@@ -94,8 +94,8 @@ struct Step {
     void list(const SeenScene& seen, size_t view) {
         Rig& r = rig();
         gpu::Recording recording = r.recording();
-        record_list(recording, r.cache, plan, model, frame, inputs(seen, view), buffers, uint32_t(view),
-                    first_places[view], 0);
+        record_list(recording, r.cache, plan, model, frame, inputs(seen, view), buffers,
+                    {.view = uint32_t(view), .list = uint32_t(view), .first_place = first_places[view]});
         frame.record_counts(recording);
         r.executor.run(recording);
         first_places.push_back(first_places[view] + frame.read_counts().scan_total);

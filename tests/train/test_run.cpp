@@ -220,6 +220,7 @@ TEST(RunOptions, TableReadsWhatItWrites) {
                                                    {"background", "0.25,1,0"},
                                                    {"kernel", "density"},
                                                    {"batch", "4"},
+                                                   {"bands", "2"},
                                                    {"points", "true"},
                                                    {"nearest", "3"},
                                                    {"refine-poses", "true"},
