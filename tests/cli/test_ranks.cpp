@@ -55,7 +55,7 @@ class TrainRanks : public testing::Test {
     Names arguments_of(const std::string& data, const std::string& out, const Names& more) {
         Names arguments{"train",        data,      "-o",     folder / out, "--init",  folder / "s.ply",
                         "--max-splats", "400",     "--seed", "5",          "--quiet", "--strategy",
-                        "mcmc",         "--batch", "2",      "--steps",    steps};
+                        "mcmc",         "--batch", batch,    "--steps",    steps};
         arguments.insert(arguments.end(), more.begin(), more.end());
         return arguments;
     }
@@ -95,7 +95,7 @@ class TrainRanks : public testing::Test {
 
     Folder folder;
     std::map<int, Names> prefixes;  // of a rank's command
-    std::string steps = "120";
+    std::string steps = "120", batch = "2";
 };
 
 TEST_F(TrainRanks, EndWithTheBytesOfOneProcess) {
@@ -117,6 +117,26 @@ TEST_F(TrainRanks, EndWithTheBytesOfOneProcess) {
             << figure;
     EXPECT_NE(read_file(folder / "three/report.html").find("What the ranks exchanged"), std::string::npos);
     EXPECT_FALSE(read_json(folder / "one/summary.json").contains("ranks"));
+}
+
+TEST_F(TrainRanks, DrawBandsOfTheViews) {
+    steps = "40";
+    batch = "4";
+    const Names cut{"--bands", "2"};
+    expect_success(alone("one", cut));
+    expect_success(ranks(8, "eight", cut));
+    EXPECT_EQ(splats("eight"), splats("one"));
+    EXPECT_EQ(read_json(folder / "eight/config.json")["bands"], 2);
+    EXPECT_EQ(read_file(folder / "eight/report.html").find("draw nothing"), std::string::npos);
+}
+
+TEST_F(TrainRanks, SayHowManyOfThemDrawNothing) {
+    steps = "4";
+    expect_success(ranks(3, "o"));
+    EXPECT_NE(read_file(folder / "o/report.html")
+                  .find("1 of 3 ranks draw nothing: a step has 2 views in 1 band; --batch 3 or --bands 2 "
+                        "lets all draw"),
+              std::string::npos);
 }
 
 TEST_F(TrainRanks, SaveOnASignalToTheLauncher) {

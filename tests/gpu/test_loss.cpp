@@ -135,6 +135,90 @@ TEST_P(Loss, OfMaskedPicturesMatchesTheReference) {
     EXPECT_EQ(frame.planes.download<float>(planes.size()), planes);
 }
 
+/// The loss of each band of a picture, with its halo. Their sums are those of the picture.
+TEST_P(Loss, OfBandsAddsUpToThatOfTheView) {
+    const int width = GetParam().first, height = GetParam().second;
+    const LossInputs in = random_inputs(uint64_t(width * 53 + height), width, height);
+    reference::Raster photo(width, height, 3), weights(width, height, 1);
+    for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x) {
+            weights.at(x, y)[0] = in.photo.at(x, y)[3];
+            for (int k = 0; k < 3; ++k) photo.at(x, y)[k] = in.photo.at(x, y)[k];
+        }
+    Rig& r = rig();
+    const gpu::Buffer texels = pipeline::upload_photo(*device(), in.photo);
+    const uint32_t tile_rows = (uint32_t(height) + r.config().tile_height - 1) / r.config().tile_height;
+    for (const bool masked : {false, true})
+        for (const uint32_t bands : {1u, 2u, 3u, tile_rows}) {
+            if (bands > tile_rows) continue;
+            double l1 = 0, squared = 0, ssim = 0;
+            reference::Raster gradient(width, height, 3);
+            for (uint32_t b = 0; b < bands; ++b) {
+                const pipeline::Band band = pipeline::band_of(r.config(), uint32_t(height), bands, b);
+                GuardedFrame guarded(r.config(), {1, uint32_t(width), band.rows, 1, true, false, masked});
+                pipeline::FrameBuffers& frame = guarded.frame;
+                reference::Raster rows(width, int(band.rows), 3);
+                for (int y = 0; y < int(band.rows); ++y)
+                    for (int x = 0; x < width; ++x)
+                        for (int c = 0; c < 3; ++c) rows.at(x, y)[c] = in.image.at(x, int(band.first) + y)[c];
+                frame.planes.upload(std::span<const float>(pack_planes(rows, 3, frame.sizes.stride)));
+                pipeline::FrameInputs inputs{{nullptr, 0, uint32_t(width), uint32_t(height)}, in.background};
+                inputs.band = band;
+                r.run([&](gpu::Recording& recording) {
+                    record_loss(recording, r.cache, frame, inputs, texels, masked);
+                });
+                EXPECT_TRUE(guarded.intact());
+                const shared::Counts counts = frame.read_counts();
+                l1 += counts.l1;
+                squared += counts.squared;
+                ssim += counts.ssim;
+                const auto own = frame.image_gradient.download<float>(frame.sizes.image_gradient / 4);
+                for (int y = 0; y < int(band.rows); ++y)
+                    for (int x = 0; x < width; ++x)
+                        for (int c = 0; c < 3; ++c)
+                            gradient.at(x, int(band.first) + y)[c] +=
+                                own[size_t(c) * frame.sizes.plane_floats + size_t(y) * frame.sizes.stride +
+                                    size_t(x)];
+            }
+            const reference::Loss cpu = masked ? reference::image_loss(in.image, photo, weights)
+                                               : reference::image_loss(in.image, in.target);
+            EXPECT_NEAR(l1, cpu.l1, 2e-7 + 1e-6 * cpu.l1);
+            EXPECT_NEAR(squared, cpu.squared, 1e-7 + 1e-6 * cpu.squared);
+            EXPECT_NEAR(ssim, cpu.ssim, 5e-7);
+            double worst = 0, largest = 0;
+            for (size_t i = 0; i < gradient.values.size(); ++i) {
+                worst = std::max(worst, std::abs(gradient.values[i] - cpu.gradient.values[i]));
+                largest = std::max(largest, std::abs(cpu.gradient.values[i]));
+            }
+            EXPECT_LT(worst, 1e-5 * largest) << bands << " bands";
+        }
+}
+
+TEST(LossBands, AreWholeTileRowsWithAHaloForTheWindow) {
+    for (const uint32_t tile : {4u, 8u, 16u, 64u})
+        for (const uint32_t height : {1u, 47u, 64u, 480u}) {
+            passes::KernelConfig config;
+            config.tile_height = tile;
+            for (uint32_t bands = 1; bands <= (height + tile - 1) / tile; ++bands) {
+                uint32_t next = 0;
+                for (uint32_t b = 0; b < bands; ++b) {
+                    const pipeline::Band band = pipeline::band_of(config, height, bands, b);
+                    const uint32_t begin = band.first + band.own_begin, end = band.first + band.own_end;
+                    EXPECT_EQ(begin, next);
+                    EXPECT_LT(begin, end);
+                    EXPECT_EQ(band.first % tile, 0u);
+                    EXPECT_TRUE(band.first == 0 || begin - band.first >= shared::SSIM_RADIUS);
+                    EXPECT_TRUE(band.first + band.rows == height ||
+                                band.rows - band.own_end >= shared::SSIM_RADIUS);
+                    EXPECT_LE(begin - band.first, 8u > tile ? 8u : tile);
+                    EXPECT_LE(band.first + band.rows, height);
+                    next = end;
+                }
+                EXPECT_EQ(next, height);
+            }
+        }
+}
+
 /// The window's first half: exact up to float32 rounding of eleven products.
 TEST_P(Loss, MomentsAreBlurredDownTheColumns) {
     const int width = GetParam().first, height = GetParam().second;

@@ -471,6 +471,15 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     pipeline::Rates rates;
     rates.views = 2;
     record_update_views(batch, r.cache, plan_of_views, model, frame, views, rates, 0, 2);
+    // A step of one view in two bands.
+    for (uint32_t band = 0; band < 2; ++band) {
+        pipeline::FrameInputs of_band = inputs;
+        of_band.band = pipeline::band_of(r.config(), 47, 2, band);
+        record_list(batch, r.cache, plan_of_views, model, frame, of_band, views,
+                    {.list = band, .first_place = 50 * band}, band > 0);
+    }
+    rates.views = 1;
+    record_update_views(batch, r.cache, plan_of_views, model, frame, views, rates, 0, 2, 2);
     out.push_back(batch.commands());
 
     request.purpose = pipeline::Purpose::picture;

@@ -58,8 +58,9 @@ struct SeenScene {
     }
 };
 
-/// The device's step of a scene's views.
+/// The device's step of a scene's views, whose pictures are the bands of one view after those of another.
 struct Step {
+    uint32_t bands;
     Plan plan;
     Model model;
     FrameBuffers frame;
@@ -68,7 +69,7 @@ struct Step {
     std::vector<uint32_t> first_places{0};
     std::vector<std::vector<float>> pictures;
 
-    Step(const SeenScene& seen, PlanRequest request) {
+    Step(const SeenScene& seen, PlanRequest request, uint32_t of_view = 1) : bands(of_view) {
         request.purpose = Purpose::training;
         request.scene_degree = request.present_degree = seen.scene.gaussians.sh_degree;
         request.render = seen.scene.options;
@@ -78,54 +79,63 @@ struct Step {
             cameras.push_back(camera_buffer(seen.cameras[v], rig().config()));
             photos.push_back(upload_photo(*device(), seen.targets[v]));
         }
+        reserve(kHeight);
+        buffers.reserve(*device(), model.splats, uint32_t(cameras.size()), bands, model.splats);
+    }
+    void reserve(uint32_t height) {
         frame.reserve(*device(), rig().config(),
                       {.splats = model.splats,
                        .width = kWidth,
-                       .height = kHeight,
+                       .height = height,
                        .instances = 1 << 16,
                        .gradients = true,
                        .overlaid = true});
-        buffers.reserve(*device(), model.splats, uint32_t(cameras.size()), 1, model.splats);
     }
-    FrameInputs inputs(const SeenScene& seen, size_t view) const {
-        return {.camera = {&cameras[view], 0, uint32_t(kWidth), uint32_t(kHeight)},
-                .background = seen.scene.options.background};
+    FrameInputs inputs(const SeenScene& seen, size_t picture) const {
+        FrameInputs result{.camera = {&cameras[picture / bands], 0, uint32_t(kWidth), uint32_t(kHeight)},
+                           .background = seen.scene.options.background};
+        if (bands > 1) result.band = band_of(rig().config(), kHeight, bands, uint32_t(picture % bands));
+        return result;
     }
-    void list(const SeenScene& seen, size_t view) {
+    void list(const SeenScene& seen, size_t picture, bool projected = false) {
         Rig& r = rig();
         gpu::Recording recording = r.recording();
-        record_list(recording, r.cache, plan, model, frame, inputs(seen, view), buffers,
-                    {.view = uint32_t(view), .list = uint32_t(view), .first_place = first_places[view]});
+        record_list(recording, r.cache, plan, model, frame, inputs(seen, picture), buffers,
+                    {.view = uint32_t(picture / bands),
+                     .list = uint32_t(picture),
+                     .first_place = first_places[picture]},
+                    projected);
         frame.record_counts(recording);
         r.executor.run(recording);
-        first_places.push_back(first_places[view] + frame.read_counts().scan_total);
+        first_places.push_back(first_places[picture] + frame.read_counts().scan_total);
     }
-    uint32_t listed(size_t view) const { return first_places[view + 1] - first_places[view]; }
-    void draw(const SeenScene& seen, size_t view) {
+    uint32_t listed(size_t picture) const { return first_places[picture + 1] - first_places[picture]; }
+    void draw(const SeenScene& seen, size_t picture) {
         Rig& r = rig();
+        const FrameInputs drawn = inputs(seen, picture);
+        if (bands > 1) reserve(drawn.band.rows);
         buffers.reserve_sums(*device(), r.executor, plan, first_places.back());
         gpu::Recording recording = r.recording();
-        recording.copy(buffers.visible, 0, frame.records, 0, 48ull * listed(view));
-        const Sorted sorted =
-            record_list_forward(recording, r.cache, plan, listed(view), frame, inputs(seen, view));
-        record_loss(recording, r.cache, frame, inputs(seen, view), photos[view]);
-        record_list_backward(recording, r.cache, plan, listed(view), frame, inputs(seen, view), sorted,
-                             buffers.sums, first_places[view]);
+        recording.copy(buffers.visible, 0, frame.records, 0, 48ull * listed(picture));
+        const Sorted sorted = record_list_forward(recording, r.cache, plan, listed(picture), frame, drawn);
+        record_loss(recording, r.cache, frame, drawn, photos[picture / bands]);
+        record_list_backward(recording, r.cache, plan, listed(picture), frame, drawn, sorted, buffers.sums,
+                             first_places[picture]);
         r.executor.run(recording);
         pictures.push_back(frame.planes.download<float>(frame.sizes.planes / 4));
     }
     void update(const SeenScene& seen, Rates rates) {
         Rig& r = rig();
         first_places = {0};
-        for (size_t v = 0; v < cameras.size(); ++v) {
-            list(seen, v);
-            draw(seen, v);
+        for (size_t p = 0; p < cameras.size() * bands; ++p) {
+            list(seen, p);
+            draw(seen, p);
         }
         rates.views = uint32_t(cameras.size());
         gpu::Recording recording = r.recording();
         recording.fill(frame.counts, 0, 0, sizeof(shared::Counts));
         record_update_views(recording, r.cache, plan, model, frame, buffers, batch_rates(rates), 0,
-                            kMaxShDegree);
+                            kMaxShDegree, bands);
         r.executor.run(recording);
     }
 };
@@ -182,13 +192,14 @@ struct ViewsCase {
     Footprint kernel;
     SplatKind kind;
     size_t views;
+    uint32_t bands = 1;
 };
 class ViewBatchGradient : public testing::TestWithParam<ViewsCase> {};
 
 TEST_P(ViewBatchGradient, IsTheMeanOfTheViews) {
-    const auto& [kernel, kind, views] = GetParam();
+    const auto& [kernel, kind, views, bands] = GetParam();
     const SeenScene seen(80 + uint64_t(kernel), 300, views, kind, kernel);
-    Step step(seen, {});
+    Step step(seen, {}, bands);
     step.update(seen, some_rates(uint32_t(views)));
     // The first moment of the first step is (1 - beta^views) times the gradient.
     Gaussians moments = download_model(step.model, step.model.moments1);
@@ -206,7 +217,97 @@ INSTANTIATE_TEST_SUITE_P(ViewBatch, ViewBatchGradient,
                                          ViewsCase{Footprint::peak, SplatKind::mixed, 3},
                                          ViewsCase{Footprint::antialias, SplatKind::mixed, 2},
                                          ViewsCase{Footprint::density, SplatKind::ordinary, 2},
-                                         ViewsCase{Footprint::peak, SplatKind::needles, 2}));
+                                         ViewsCase{Footprint::peak, SplatKind::needles, 2},
+                                         ViewsCase{Footprint::peak, SplatKind::mixed, 2, 2},
+                                         ViewsCase{Footprint::antialias, SplatKind::ordinary, 1, 3},
+                                         ViewsCase{Footprint::density, SplatKind::mixed, 2, 3}));
+
+/// The rows that the loss of a band counts have those of the view's picture.
+TEST(ViewBatch, ABandDrawsItsRowsOfTheView) {
+    const SeenScene seen(72, 900, 1);
+    Step whole(seen, {}), cut(seen, {}, 3);
+    whole.list(seen, 0);
+    whole.draw(seen, 0);
+    const shared::ImageLayout layout = whole.frame.sizes.image();
+    uint32_t rows = 0;
+    for (uint32_t b = 0; b < 3; ++b) {
+        cut.list(seen, b);
+        cut.draw(seen, b);
+        const Band band = cut.inputs(seen, b).band;
+        const uint32_t plane_floats = cut.frame.sizes.plane_floats;
+        for (uint32_t y = 0; y < band.rows; ++y)
+            for (uint32_t x = 0; x < kWidth; ++x)
+                for (uint32_t c = 0; c < 4; ++c)
+                    ASSERT_NEAR(
+                        cut.pictures[b][c * plane_floats + y * layout.stride + x],
+                        whole.pictures[0][c * layout.plane_floats + (band.first + y) * layout.stride + x],
+                        2e-5);
+        rows += band.own_end - band.own_begin;
+    }
+    EXPECT_EQ(rows, uint32_t(kHeight));
+}
+
+TEST(ViewBatch, AListOfABandHasTheSplatsThatReachIt) {
+    const SeenScene seen(73, 700, 2, SplatKind::off_screen_and_close);
+    Step step(seen, {}, 3);
+    uint32_t elsewhere = 0;
+    for (size_t p = 0; p < 6; ++p) {
+        const Band band = step.inputs(seen, p).band;
+        step.list(seen, p, p % 3 > 0);
+        const auto keys = step.frame.depth_keys[0].download<uint32_t>(700);
+        const auto counts = step.frame.tile_counts.download<uint32_t>(700);
+        const auto records = step.frame.records.download<std::array<float, 12>>(700);
+        const auto visible = step.buffers.visible.download<std::array<float, 12>>(step.listed(p));
+        const auto places = step.buffers.places.download<uint32_t>(4200);
+        uint32_t next = step.first_places[p];
+        for (uint32_t i = 0; i < 700; ++i) {
+            const auto& record = records[i];
+            // Beyond the farthest pixel that its alpha can reach.
+            const double y = double(record[1]) - band.first,
+                         reach =
+                             std::sqrt(std::max(std::log(record[7] / shared::ALPHA_MIN), 0.0)) / record[6];
+            const bool outside = y + reach < 0 || y - reach > band.rows;
+            const bool across =
+                y > 1 && y < band.rows - 1 && record[7] > 0.1 && record[0] > 1 && record[0] < kWidth - 1;
+            elsewhere += outside && keys[i] != 0xffffffffu;
+            if (counts[i] == 0) {
+                EXPECT_EQ(places[700 * p + i], shared::NOT_LISTED);
+                EXPECT_FALSE(keys[i] != 0xffffffffu && across) << i;
+                continue;
+            }
+            EXPECT_NE(keys[i], 0xffffffffu);
+            EXPECT_FALSE(reach > 0 && y + 1.01 * reach < -2) << i;
+            EXPECT_FALSE(reach > 0 && y - 1.01 * reach > band.rows + 2) << i;
+            ASSERT_EQ(places[700 * p + i], next);
+            std::array<float, 12> copied = visible[next - step.first_places[p]];
+            const double mean = double(copied[1]) + copied[3], expected = double(record[1]) + record[3];
+            EXPECT_NEAR(mean + band.first, expected, 1e-11 * (std::abs(expected) + band.first));
+            EXPECT_LE(std::abs(copied[3]), 1e-7f * std::abs(copied[1]));
+            copied[1] = record[1];
+            copied[3] = record[3];
+            EXPECT_EQ(copied, record);
+            ++next;
+        }
+        EXPECT_EQ(next, step.first_places[p + 1]);
+        EXPECT_GT(step.listed(p), 10u);
+    }
+    EXPECT_GT(elsewhere, 20u);
+}
+
+/// Norms are those of the whole view's gradient, and a view counts once.
+TEST(ViewBatch, StatisticsOfBandsAreThoseOfTheirView) {
+    const SeenScene seen(96, 200, 2, SplatKind::off_screen_and_close);
+    Step whole(seen, {.render = {}, .statistics = true}), cut(seen, {.render = {}, .statistics = true}, 3);
+    whole.update(seen, some_rates(1));
+    cut.update(seen, some_rates(1));
+    const auto expected = whole.model.statistics.download<float>(400),
+               actual = cut.model.statistics.download<float>(400);
+    const float largest = *std::max_element(expected.begin(), expected.end());
+    for (size_t i = 0; i < 200; ++i) {
+        EXPECT_NEAR(actual[2 * i], expected[2 * i], 1e-4 * largest);
+        EXPECT_EQ(actual[2 * i + 1], expected[2 * i + 1]);
+    }
+}
 
 TEST(ViewBatch, AStepFollowsAdamWithTheRulesOfABatch) {
     constexpr double kViews = 3;

@@ -62,12 +62,32 @@ Gaussians start() {
     return splats;
 }
 
+/// The same capture with a mask that excludes columns of each image, and rows of some.
+const Dataset& masked_capture() {
+    static const Dataset* const made = [] {
+        static Synthetic data;
+        make_synthetic(data, 300, 7, 64, 48, 11);
+        std::filesystem::create_directories(data.folder / "masks");
+        for (size_t i = 0; i < data.dataset.frames.size(); ++i) {
+            Image mask(64, 48, 3);
+            for (int y = 0; y < 48; ++y)
+                for (int x = 0; x < 64; ++x)
+                    for (int c = 0; c < 3; ++c)
+                        mask.at(x, y)[c] = (x >= 18 && x < 28) || (i % 3 == 1 && y >= 20) ? 0.0f : 1.0f;
+            save_image(data.folder / "masks" / data.dataset.frames[i].name, mask);
+        }
+        return new Dataset(load_dataset(data.folder.path(), {}));
+    }();
+    return *made;
+}
+
 /// The state after training by so many ranks.
-TrainerState trained(const TrainOptions& options, int ranks, int until) {
+TrainerState trained(const TrainOptions& options, int ranks, int until,
+                     const Dataset& dataset = capture().dataset) {
     TrainerState result;
     run_ranks(ranks, [&](std::shared_ptr<Ranks> group) {
         const auto own = open_test_device(false);
-        Trainer trainer(own, capture().dataset, all_frames(capture().dataset), start(), options, group);
+        Trainer trainer(own, dataset, all_frames(dataset), start(), options, group);
         if (group->rank() != 0) return trainer.follow();
         while (trainer.steps_done() < until) trainer.step();
         trainer.keep_waiting();
@@ -116,6 +136,15 @@ void antialiased(TrainOptions& options) {
     options.random_background = true;
 }
 
+template <int bands>
+void cut(TrainOptions& options) {
+    options.bands = bands;
+}
+void cut_absolute(TrainOptions& options) {
+    absolute_density(options);
+    options.bands = 2;
+}
+
 std::string name_of_case(const testing::TestParamInfo<RanksCase>& tested) {
     const char* names[] = {"none", "adc", "mcmc"};
     std::string name = names[int(tested.param.strategy)];
@@ -145,7 +174,14 @@ INSTANTIATE_TEST_SUITE_P(
                     RanksCase{Strategy::mcmc, 4, 2}, RanksCase{Strategy::mcmc, 3, 4},
                     RanksCase{Strategy::mcmc, 1, 3}, RanksCase{Strategy::mcmc, 2, 2, wide_moments, "_wide"},
                     RanksCase{Strategy::mcmc, 2, 3, absolute_density, "_absolute_density"},
-                    RanksCase{Strategy::none, 2, 2}, RanksCase{Strategy::none, 1, 4, wide_moments, "_wide"}),
+                    RanksCase{Strategy::none, 2, 2}, RanksCase{Strategy::none, 1, 4, wide_moments, "_wide"},
+                    RanksCase{Strategy::adc, 1, 2, cut<2>, "_bands2"},
+                    RanksCase{Strategy::adc, 2, 3, cut<2>, "_bands2"},
+                    RanksCase{Strategy::adc, 1, 5, cut<3>, "_bands3"},
+                    RanksCase{Strategy::adc, 1, 3, cut_absolute, "_bands2_absolute"},
+                    RanksCase{Strategy::mcmc, 1, 4, cut<3>, "_bands3"},
+                    RanksCase{Strategy::mcmc, 3, 2, cut<3>, "_bands3"},
+                    RanksCase{Strategy::mcmc, 4, 8, cut<2>, "_bands2"}),
     name_of_case);
 
 /// The file after `until` steps of so many ranks. resume: a checkpoint where they begin.
@@ -209,6 +245,48 @@ TEST(Ranks, HandOnBytesInPieces) {
             });
         EXPECT_TRUE(rank == 0 ? joined == all : joined.empty());
     });
+}
+
+TEST(Bands, ARunMayContinueWithAnotherNumberOfRanks) {
+    TempFolder folder;
+    for (const Strategy strategy : {Strategy::adc, Strategy::mcmc}) {
+        TrainOptions options = busy(strategy, 2);
+        options.bands = 2;
+        const std::string whole = checkpoint_of(options, 2, options.steps, folder / "whole");
+        checkpoint_of(options, 4, 28, folder / "half");
+        EXPECT_TRUE(checkpoint_of(options, 3, options.steps, folder / "rest", folder / "half") == whole);
+    }
+}
+
+TEST(Bands, OfMaskedImagesHaveTheBytesOfOneRank) {
+    TrainOptions options = busy(Strategy::adc, 2);
+    options.steps = 24;
+    options.bands = 3;
+    const TrainerState alone = trained(options, 1, 24, masked_capture());
+    expect_same(trained(options, 4, 24, masked_capture()), alone);
+}
+
+/// The first step sees the same splats. Its loss and error are those of the whole view, but for rounding.
+TEST(Bands, HaveTheLossAndTheErrorOfTheirView) {
+    for (const Dataset* dataset : {&capture().dataset, &masked_capture()})
+        for (const int batch : {1, 3}) {
+            TrainOptions options = busy(Strategy::none, batch);
+            const StepReport whole = trained(options, 1, 1, *dataset).report;
+            for (const int bands : {2, 3}) {
+                options.bands = bands;
+                const StepReport cut_up = trained(options, 2, 1, *dataset).report;
+                EXPECT_NEAR(cut_up.loss, whole.loss, 2e-6);
+                EXPECT_NEAR(cut_up.psnr, whole.psnr, 1e-4);
+            }
+        }
+}
+
+TEST(Bands, TrainTheSameScene) {
+    TrainOptions options = busy(Strategy::none, 1);
+    const StepReport whole = trained(options, 1, 60).report;
+    options.bands = 3;
+    const StepReport cut_up = trained(options, 1, 60).report;
+    EXPECT_NEAR(cut_up.psnr, whole.psnr, 0.05);
 }
 
 TEST(Ranks, EachHoldsItsShareOfTheState) {
@@ -306,6 +384,21 @@ TEST(Ranks, AreRefusedWhatTheyCannotDo) {
     TrainOptions options = busy(Strategy::none, 2);
     options.refine_poses = true;
     EXPECT_THROW(trained(options, 1, 1), InputError);
+    options = busy(Strategy::none, 1);
+    options.bands = 2;
+    options.exposure = true;
+    EXPECT_THROW(trained(options, 1, 1), InputError);
+    options.exposure = false;
+    options.bands = 49;
+    try {
+        trained(options, 1, 1);
+        ADD_FAILURE() << "there are 48 rows";
+    } catch (const InputError& error) {
+        EXPECT_EQ(std::string(error.what())
+                      .find("--bands 49: an image with 48 rows of pixels takes at most --bands "),
+                  0u)
+            << error.what();
+    }
     // 300 splats are 38 blocks.
     EXPECT_THROW(pipeline::check_share(300, 39), RunError);
     EXPECT_NO_THROW(pipeline::check_share(300, 38));

@@ -476,17 +476,18 @@ struct ManyPoints : Synthetic {
 };
 SharedByTests<ManyPoints>* const many_points = SharedByTests<ManyPoints>::add();
 
-/// Strategy, bits of the moments, views a step.
-class MemoryOf : public testing::TestWithParam<std::tuple<Strategy, int, int>> {};
+/// Strategy, bits of the moments, views a step, bands.
+class MemoryOf : public testing::TestWithParam<std::tuple<Strategy, int, int, int>> {};
 
 TEST_P(MemoryOf, ARunIsEstimatedAndAKilobyteASplat) {
-    const auto& [strategy, bits, batch] = GetParam();
+    const auto& [strategy, bits, batch, bands] = GetParam();
     const ManyPoints& capture = many_points->get([] { return ManyPoints(); });
     TrainOptions options;
     options.steps = strategy == Strategy::none ? 30 : 160;
     options.strategy = strategy;
     options.moment_bits = bits;
     options.batch = batch;
+    options.bands = bands;
     options.max_splats = strategy == Strategy::none ? 6000 : 12000;
     options.grow_gradient = 1e-7;
     options.refine_stop = options.relocate_stop = 30000;
@@ -498,10 +499,11 @@ TEST_P(MemoryOf, ARunIsEstimatedAndAKilobyteASplat) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Strategies, MemoryOf,
-                         testing::Values(std::tuple(Strategy::none, 16, 1), std::tuple(Strategy::adc, 16, 1),
-                                         std::tuple(Strategy::mcmc, 16, 1), std::tuple(Strategy::mcmc, 32, 1),
-                                         std::tuple(Strategy::mcmc, 16, 4)));
+INSTANTIATE_TEST_SUITE_P(
+    Strategies, MemoryOf,
+    testing::Values(std::tuple(Strategy::none, 16, 1, 1), std::tuple(Strategy::adc, 16, 1, 1),
+                    std::tuple(Strategy::mcmc, 16, 1, 1), std::tuple(Strategy::mcmc, 32, 1, 1),
+                    std::tuple(Strategy::mcmc, 16, 4, 1), std::tuple(Strategy::mcmc, 16, 2, 3)));
 
 TEST(Trainer, ABatchLearnsAsMuchFromAsManyViews) {
     const Gaussians start = shaken_start(small_capture(), 0.05, 1, 0);
