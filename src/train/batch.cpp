@@ -87,7 +87,7 @@ PictureLoss loss_from(std::span<const uint64_t, 3> words) {
 
 /// losses: of the bands of each view.
 void add_losses(std::span<const PictureLoss> losses, size_t bands, BatchReport& report) {
-    const double views = double(losses.size() / bands);
+    const size_t views = losses.size() / bands;
     for (size_t first = 0; first < losses.size(); first += bands) {
         PictureLoss view = losses[first];
         for (const PictureLoss& band : losses.subspan(first + 1, bands - 1)) {
@@ -95,8 +95,8 @@ void add_losses(std::span<const PictureLoss> losses, size_t bands, BatchReport& 
             view.ssim += band.ssim;
             view.squared += band.squared;
         }
-        report.loss += loss_of(view.l1, view.ssim) / views;
-        report.psnr += -10 * std::log10(view.squared) / views;
+        report.loss += loss_of(view.l1, view.ssim) / double(views);
+        report.psnr += -10 * std::log10(view.squared) / double(views);
     }
 }
 
