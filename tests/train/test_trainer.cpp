@@ -503,7 +503,7 @@ INSTANTIATE_TEST_SUITE_P(
     Strategies, MemoryOf,
     testing::Values(std::tuple(Strategy::none, 16, 1, 1), std::tuple(Strategy::adc, 16, 1, 1),
                     std::tuple(Strategy::mcmc, 16, 1, 1), std::tuple(Strategy::mcmc, 32, 1, 1),
-                    std::tuple(Strategy::mcmc, 16, 4, 1), std::tuple(Strategy::mcmc, 16, 1, 2)));
+                    std::tuple(Strategy::mcmc, 16, 4, 1), std::tuple(Strategy::none, 16, 2, 3)));
 
 TEST(Trainer, ABatchLearnsAsMuchFromAsManyViews) {
     const Gaussians start = shaken_start(small_capture(), 0.05, 1, 0);
