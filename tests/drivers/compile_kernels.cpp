@@ -91,7 +91,8 @@ void compile_splatting(Compiler& compiler) {
          {SPEC_KERNEL, kFootprints},
          {SPEC_MODE,
           {0, UPDATE_STATISTICS, packed, packed | UPDATE_STATISTICS, packed | UPDATE_REGULARISED,
-           packed | UPDATE_STATISTICS | UPDATE_ABSOLUTE}}});
+           packed | UPDATE_STATISTICS | UPDATE_ABSOLUTE, packed | UPDATE_STATISTICS | UPDATE_BANDS,
+           packed | UPDATE_REGULARISED | UPDATE_BANDS}}});
     compiler.compile<passes::ScanBlocks>({{SPEC_MODE, {0, SCAN_GATHERED, SCAN_FLAGS}}});
     compiler.compile<passes::ScanTotals>();
     const Values scatter_modes = {0,
