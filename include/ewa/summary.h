@@ -27,6 +27,15 @@ struct RankFigures {
     double peak_device_bytes = 0;
 };
 
+/// Of a training whose splats are not all on the device (TrainOptions::device_memory_bytes).
+struct ChunkFigures {
+    int chunks = 0;             // into which the splats are divided
+    double streamed_bytes = 0;  // that were copied to the device and back: mean of an optimisation step
+    double streaming = 0;       // ms that this took: mean of an optimisation step
+    uint64_t state_bytes = 0;   // parameters, moments and statistics of all splats
+    uint64_t limit = 0;         // device_memory_bytes
+};
+
 /// summary.json. A figure that does not exist (no test set, not evaluated) is null there. So is one that is not
 /// finite, such as the PSNR of equal images.
 struct Summary {
@@ -45,6 +54,7 @@ struct Summary {
     bool interrupted = false;            // the run was stopped before its end
     std::optional<CameraMoves> cameras;  // with TrainOptions::refine_poses
     std::vector<RankFigures> ranks;      // of several ranks
+    std::optional<ChunkFigures> chunks;  // of a training in chunks
 };
 
 /// A line of metrics.jsonl.

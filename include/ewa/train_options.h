@@ -39,6 +39,9 @@ struct TrainOptions {
     bool random_background = false;  // a new background colour each step
     /// Device memory for decoded training images, in bytes. Images beyond it are read again for each step.
     uint64_t image_cache_bytes = uint64_t(4) << 30;
+    /// Device memory that a training takes at most, in bytes; 0: as much as it needs. Splats that do not fit stay in host
+    /// memory and are on the device while a step uses them. The result has the same bytes.
+    uint64_t device_memory_bytes = 0;
     /// Bits of each of Adam's two moments, 16 or 32. With 16 a splat needs a third less memory.
     int moment_bits = 16;
     RenderOptions render{};  // background and kernel of training and evaluation

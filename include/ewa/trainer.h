@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -130,7 +131,8 @@ class Trainer {
     double extent() const;                             // the length that rates are relative to, world units
     std::vector<PlanLine> plan() const;                // what the run skips
     StepTimes step_times() const;
-    std::vector<RankFigures> rank_figures() const;  // of every rank; empty for one that is alone
+    std::vector<RankFigures> rank_figures() const;      // of every rank; empty for one that is alone
+    std::optional<ChunkFigures> chunk_figures() const;  // empty if all splats stay on the device
 
   private:
     struct State;

@@ -46,6 +46,7 @@ const std::vector<Field>& fields() {
         {"max_splats", &O::max_splats, 1, 1e9},
         {"seed", &O::seed, 0, kMost},
         {"image_cache_bytes", &O::image_cache_bytes, 0, kMost},
+        {"device_memory_bytes", &O::device_memory_bytes, 0, kMost},
         {"means_rate", &O::means_rate},
         {"means_rate_final", &O::means_rate_final},
         {"sh0_rate", &O::sh0_rate},

@@ -49,7 +49,7 @@ const std::map<std::string, std::string>& subjects() {
                        "heat-scale", "eval-every", "save-every", "serve",   "accuracy",   "spz-version",
                        "check",      "ranks",      "quiet",      "verbose", "results",    "compare",
                        "threshold",  "max-error",  "resume",     "force",   "allow-empty"});
-        add("Device", {"device", "moments", "image-cache", "rank-timeout"});
+        add("Device", {"device", "moments", "image-cache", "device-memory", "rank-timeout"});
         return made;
     }();
     return table;

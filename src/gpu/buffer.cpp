@@ -2,6 +2,7 @@
 #include "gpu/buffer.h"
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cassert>
 #include <cstring>
@@ -56,6 +57,8 @@ Buffer::Buffer(const Buffer& memory, uint64_t offset, std::string name, uint64_t
 /// find_memory: sets memory_ when there is a buffer that tells what it needs.
 template <class FindMemory>
 void Buffer::create(FindMemory find_memory) {
+    static std::atomic<uint64_t> last_serial{0};
+    serial_ = ++last_serial;
     const Limits& limits = device_->limits();
     const bool bound = texel_ != Texel::any;
     const bool fetched = texel_ != Texel::none && limits.texel_buffers;
@@ -139,6 +142,7 @@ Buffer& Buffer::operator=(Buffer&& other) noexcept {
     if (this == &other) return *this;
     device_ = other.device_;
     name_ = std::move(other.name_);
+    serial_ = other.serial_;
     bytes_ = std::exchange(other.bytes_, 0);
     texel_ = other.texel_;
     uniform_ = other.uniform_;
@@ -181,16 +185,16 @@ void Buffer::download(std::span<std::byte> data, uint64_t offset) const {
 
 void Buffer::copy_through_staging(std::span<const std::byte> source, std::span<std::byte> target,
                                   uint64_t offset) const {
-    constexpr size_t kPiece = size_t(64) << 20;
+    const size_t piece = device_->staging_bytes();
     const bool up = !source.empty();
     const size_t total = up ? source.size() : target.size();
-    Buffer staging(*device_, "staging", std::min(total, kPiece), Texel::none, false, true);
+    Buffer staging(*device_, "staging", std::min(total, piece), Texel::none, false, true);
     const vk::Device device = device_->handle();
     vk::CommandPoolCreateInfo pool_info;
     pool_info.setQueueFamilyIndex(device_->queue_family());
     const auto pool = device.createCommandPoolUnique(pool_info);
-    for (size_t done = 0; done < total; done += kPiece) {
-        const size_t size = std::min(kPiece, total - done);
+    for (size_t done = 0; done < total; done += piece) {
+        const size_t size = std::min(piece, total - done);
         if (up) std::memcpy(staging.mapped(), source.data() + done, size);
         vk::CommandBufferAllocateInfo allocate;
         allocate.setCommandPool(*pool).setCommandBufferCount(1);

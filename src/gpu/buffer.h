@@ -43,6 +43,8 @@ class Buffer {
     Texel texel() const { return texel_; }
     bool uniform() const { return uniform_; }
     vk::Buffer handle() const { return *buffer_; }
+    /// Differs between all buffers of a process; 0 for none.
+    uint64_t serial() const { return buffer_ ? serial_ : 0; }
     vk::BufferView view() const { return *view_; }
     /// Bytes of the handle in front of the buffer's own: an address of the host decides where it begins.
     uint64_t begin() const { return begin_; }
@@ -88,6 +90,7 @@ class Buffer {
 
     Device* device_ = nullptr;
     std::string name_;
+    uint64_t serial_ = 0;
     uint64_t bytes_ = 0;
     Texel texel_ = Texel::none;
     bool uniform_ = false;

@@ -2,6 +2,7 @@
 #include "gpu/device.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <utility>
@@ -182,11 +183,35 @@ void Device::create_device(bool own_queue) {
 
 Memory Device::allocate(const vk::MemoryRequirements& requirements, bool host_visible) {
     auto memory = memory_->allocate(requirements, host_visible);
+    while (!memory && make_room_ && make_room_()) memory = memory_->allocate(requirements, host_visible);
     if (!memory) throw out_of_memory(requirements.size);
     return std::move(*memory);
 }
 
+void Device::limit_memory(uint64_t bytes, std::function<bool()> make_room) {
+    memory_->limit_bytes(bytes);
+    make_room_ = std::move(make_room);
+}
+
+uint64_t Device::staging_bytes() const {
+    constexpr uint64_t kMost = uint64_t(64) << 20, kLeast = uint64_t(1) << 16;
+    const uint64_t limit = memory_limit();
+    // Half of the part that is kept for it: the host sees other small buffers, too.
+    return limit == 0 ? kMost : std::clamp(MemoryPool::host_part(limit) / 2, kLeast, kMost);
+}
+
 RunError Device::out_of_memory(uint64_t bytes) const {
+    if (const uint64_t limit = memory_limit(); limit > 0) {
+        const auto mib = [](double value) {
+            return std::to_string(uint64_t(std::ceil(value / double(1 << 20))));
+        };
+        const double held = double(memory_use().held + bytes);
+        // What stays here beside what could not be freed.
+        const double least = held * double(limit) / double(limit - MemoryPool::host_part(limit));
+        return RunError("--device-memory is too little: " + mib(double(limit)) +
+                        " MiB are allowed, and this needs " + mib(least) +
+                        " MiB or more; --downscale, a smaller --image-cache or fewer splats need less");
+    }
     return RunError("out of device memory on " + info_.name + ": " + core::address_limit_text() +
                     std::to_string(bytes >> 20) + " MiB are needed beside the " +
                     std::to_string(allocated_bytes() >> 20) +

@@ -3,9 +3,11 @@
 // kernels are sized for. Vulkan-Hpp is used with unique handles; it checks results in every build type.
 #pragma once
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
+#include <utility>
 #include <vector>
 #include <vulkan/vulkan.hpp>
 
@@ -69,6 +71,13 @@ class Device {
     void pretend(const Limits& limits) { limits_ = limits; }
     /// Device memory is mapped for no more than this from now on, as on other devices. For tests.
     void limit_host_access(HostAccess most) { memory_->limit_host_access(most); }
+    /// All blocks together take at most this many bytes from now on; 0: as many as there are. make_room: frees something
+    /// that is not needed now, when an allocation does not fit; false if there is nothing.
+    void limit_memory(uint64_t bytes, std::function<bool()> make_room);
+    void make_room_with(std::function<bool()> make_room) { make_room_ = std::move(make_room); }
+    uint64_t memory_limit() const { return memory_->limit(); }
+    /// Bytes of a buffer through which the host copies at one time.
+    uint64_t staging_bytes() const;
     MemoryUse memory_use() const { return memory_->use(); }
     uint64_t allocated_bytes() const { return memory_use().used; }
     uint64_t peak_bytes() const { return memory_use().peak; }
@@ -88,6 +97,7 @@ class Device {
     vk::PhysicalDevice physical_;
     vk::UniqueDevice device_;
     std::unique_ptr<MemoryPool> memory_;
+    std::function<bool()> make_room_;
     vk::Queue queue_;
     vk::UniquePipelineCache pipeline_cache_;
     std::unique_ptr<PipelineStore> pipelines_;

@@ -85,11 +85,12 @@ std::optional<Memory> MemoryPool::allocate(const vk::MemoryRequirements& require
         wishes.push_back({});
     }
     const std::lock_guard lock(mutex_);
+    const uint64_t most = limit_ == 0 ? UINT64_MAX : host_visible ? limit_ : limit_ - host_part(limit_);
     for (const vk::MemoryPropertyFlags wish : wishes) {
         for (uint32_t type = 0; type < properties_.memoryTypeCount; ++type) {
             const vk::MemoryPropertyFlags flags = properties_.memoryTypes[type].propertyFlags;
             if (!(requirements.memoryTypeBits & (1u << type)) || (flags & wish) != wish) continue;
-            std::optional<Memory> memory = take(requirements, type);
+            std::optional<Memory> memory = take(requirements, type, most);
             if (!memory) continue;
             memory->access_ = (flags & kHost) != kHost    ? HostAccess::none
                               : flags & Flag::eHostCached ? HostAccess::read_write
@@ -101,13 +102,14 @@ std::optional<Memory> MemoryPool::allocate(const vk::MemoryRequirements& require
     return std::nullopt;
 }
 
-std::optional<Memory> MemoryPool::take(const vk::MemoryRequirements& requirements, uint32_t type) {
+std::optional<Memory> MemoryPool::take(const vk::MemoryRequirements& requirements, uint32_t type,
+                                       uint64_t most) {
     for (Block& block : blocks_) {
         if (block.type != type) continue;
         if (const auto offset = block.free.take(requirements.size, requirements.alignment))
             return take_from(block, *offset, requirements.size);
     }
-    Block* block = new_block(requirements, type);
+    Block* block = new_block(requirements, type, most);
     if (!block) return std::nullopt;
     return take_from(*block, *block->free.take(requirements.size, requirements.alignment), requirements.size);
 }
@@ -123,18 +125,20 @@ Memory MemoryPool::take_from(Block& block, uint64_t offset, uint64_t bytes) {
     return memory;
 }
 
-MemoryPool::Block* MemoryPool::new_block(const vk::MemoryRequirements& requirements, uint32_t type) {
+MemoryPool::Block* MemoryPool::new_block(const vk::MemoryRequirements& requirements, uint32_t type,
+                                         uint64_t most) {
     uint64_t held = 0;
     for (const Block& block : blocks_)
         if (block.type == type) held += block.bytes;
     const uint64_t heap = properties_.memoryHeaps[properties_.memoryTypes[type].heapIndex].size;
     const uint64_t whole = block_bytes(aligned(requirements.size, requirements.alignment), held, heap);
-    Block* block = try_block(whole, type);
-    if (!block && whole > requirements.size) block = try_block(requirements.size, type);
+    Block* block = try_block(whole, type, most);
+    if (!block && whole > requirements.size) block = try_block(requirements.size, type, most);
     return block;
 }
 
-MemoryPool::Block* MemoryPool::try_block(uint64_t bytes, uint32_t type) {
+MemoryPool::Block* MemoryPool::try_block(uint64_t bytes, uint32_t type, uint64_t most) {
+    if (bytes > most || use_.held > most - bytes) return nullptr;
     vk::MemoryAllocateInfo info;
     info.setAllocationSize(bytes).setMemoryTypeIndex(type);
     Block block{{}, type, bytes, nullptr, FreeRanges(bytes)};

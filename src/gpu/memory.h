@@ -89,21 +89,28 @@ class MemoryPool {
     std::optional<Memory> allocate(const vk::MemoryRequirements& requirements, bool host_visible);
     /// Memory of the device is mapped for no more than this from now on, as on other devices. For tests.
     void limit_host_access(HostAccess most) { most_access_ = most; }
+    /// All blocks together take at most this many bytes from now on. A small part is for memory that the host can see:
+    /// copies go through it. 0: no limit.
+    void limit_bytes(uint64_t bytes) { limit_ = bytes; }
+    uint64_t limit() const { return limit_; }
+    /// The part of the limit for memory that the host can see.
+    static uint64_t host_part(uint64_t limit) { return limit / 32; }
     MemoryUse use() const;
 
   private:
     friend class Memory;
     using Block = Memory::Block;
-    std::optional<Memory> take(const vk::MemoryRequirements& requirements, uint32_t type);
+    std::optional<Memory> take(const vk::MemoryRequirements& requirements, uint32_t type, uint64_t most);
     Memory take_from(Block& block, uint64_t offset, uint64_t bytes);
-    Block* new_block(const vk::MemoryRequirements& requirements, uint32_t type);
-    Block* try_block(uint64_t bytes, uint32_t type);
+    Block* new_block(const vk::MemoryRequirements& requirements, uint32_t type, uint64_t most);
+    Block* try_block(uint64_t bytes, uint32_t type, uint64_t most);
     void give_back(Block* block, uint64_t offset, uint64_t bytes);
 
     vk::Device device_;
     vk::PhysicalDeviceMemoryProperties properties_;
     bool mapped_is_fast_;
     HostAccess most_access_ = HostAccess::read_write;
+    uint64_t limit_ = 0;  // bytes of all blocks; 0: none
     mutable std::mutex mutex_;
     std::list<Block> blocks_;
     MemoryUse use_;

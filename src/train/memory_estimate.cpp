@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The device memory of a training, before it begins. The buffers' sizes come from the functions that the frame itself
 // uses. The number of (splat, tile) pairs is estimated from the first splats in the training views.
+#include "train/memory_estimate.h"
+
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -238,5 +240,29 @@ MemoryEstimate estimate_memory(const gpu::Device& device, const Dataset& dataset
     estimate.images = image_bytes(dataset, train_frames, options);
     return estimate;
 }
+
+namespace train {
+
+uint64_t limited_cache(const TrainOptions& options) {
+    return std::min(options.image_cache_bytes, options.device_memory_bytes / 4);
+}
+
+int chunks_for(const gpu::Device& device, const Dataset& dataset, const std::vector<int>& frames,
+               const Gaussians& start, const TrainOptions& options) {
+    // A tenth of the limit: while one is in use with its gradients, most of the device is free for others.
+    constexpr uint64_t kPart = 10;
+    // Of chunks. Each has a thread while splats multiply.
+    constexpr uint64_t kMost = 256;
+    constexpr uint64_t kLeastSplats = 64;  // of the start, in a chunk
+    const uint64_t limit = options.device_memory_bytes;
+    if (limit == 0) return 1;
+    const MemoryEstimate whole = estimate_memory(device, dataset, frames, start, options);
+    // The frame's part is a guess that some trainings exceed by half.
+    if (whole.total() + whole.frame <= limit) return 1;
+    const uint64_t wanted = (whole.model * kPart + limit - 1) / limit;
+    return int(std::clamp<uint64_t>(wanted, 2, std::clamp<uint64_t>(start.size() / kLeastSplats, 2, kMost)));
+}
+
+}  // namespace train
 
 }  // namespace ewa

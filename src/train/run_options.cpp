@@ -187,6 +187,22 @@ RunOption image_cache_option() {
     return option;
 }
 
+RunOption device_memory_option() {
+    constexpr double kGib = double(uint64_t(1) << 30);
+    const Member<uint64_t> member = [](RunOptions& o) -> uint64_t& { return o.train.device_memory_bytes; };
+    RunOption option = member_option("device-memory", "GIB",
+                                     "Take at most this much device memory: splats that do not fit stay in "
+                                     "host memory. 0: as much as needed",
+                                     kDoesNotDecide, member, [](std::string text) {
+                                         const std::string problem =
+                                             core::settle_number(text, 0.0, 1048576.0);
+                                         if (!problem.empty()) throw InputError(problem);
+                                         return uint64_t(core::parse_number(text).value() * kGib);
+                                     });
+    option.get = [](const RunOptions& options) { return double(options.train.device_memory_bytes) / kGib; };
+    return option;
+}
+
 RunOption points_option() {
     RunOption option =
         flag("points",
@@ -315,6 +331,7 @@ std::vector<RunOption> make_table() {
             [](RunOptions& o) -> uint64_t& { return o.train.seed; }, uint64_t(0), UINT64_MAX),
         moments_option(),
         image_cache_option(),
+        device_memory_option(),
         background_option(),
         choice<Footprint>(
             "kernel",

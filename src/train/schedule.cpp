@@ -49,6 +49,12 @@ void check_training(const TrainOptions& options, int ranks) {
                              " and --refine-poses exclude each other: a camera learns from its own step");
         if (options.render.points) throw InputError(several + " and --points exclude each other");
     }
+    if (options.device_memory_bytes > 0) {
+        if (ranks > 1) throw InputError("several ranks and --device-memory exclude each other");
+        if (options.exposure) throw InputError("--device-memory and --exposure exclude each other");
+        if (options.refine_poses) throw InputError("--device-memory and --refine-poses exclude each other");
+        if (options.render.points) throw InputError("--device-memory and --points exclude each other");
+    }
     if (options.exposure && ranks > 1) throw InputError("several ranks and --exposure exclude each other");
     if (options.exposure && options.bands > 1) throw InputError("--bands and --exposure exclude each other");
     check_points(options.render);

@@ -13,6 +13,7 @@
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
 #include "pipeline/share.h"
+#include "train/memory_estimate.h"
 #include "train/run_input.h"
 #include "train/trainer_state.h"
 
@@ -93,7 +94,8 @@ Gaussians share_of(Gaussians start, const Ranks& ranks) {
 }  // namespace
 
 Trainer::State::State(std::shared_ptr<gpu::Device> d, const Dataset& dataset, const std::vector<int>& frames,
-                      const Gaussians& ready, double length, const TrainOptions& o, std::shared_ptr<Ranks> r)
+                      const Gaussians& ready, double length, const TrainOptions& o, std::shared_ptr<Ranks> r,
+                      int chunk_count)
     : device(std::move(d)),
       ranks(std::move(r)),
       options(o),
@@ -103,11 +105,14 @@ Trainer::State::State(std::shared_ptr<gpu::Device> d, const Dataset& dataset, co
       executor(*device, cache.config().frames_in_flight),
       images(*device, cache.config(), dataset, frames, train::cache_share(o, 0), ready.origin),
       plan(plan_for(train::plan_request(ready, o, images.any_masked()))),
-      model(upload_model(*device, share_of(ready, *ranks), plan.moment_buffers(), plan.statistics)),
       instance_capacity(first_capacity(ready.size())) {
+    if (chunk_count > 1)
+        divide(ready, chunk_count);
+    else
+        model = upload_model(*device, share_of(ready, *ranks), plan.moment_buffers(), plan.statistics);
     for (int halvings = 1; halvings <= o.halvings; ++halvings)
         smaller.emplace_back(*device, cache.config(), dataset, frames, train::cache_share(o, halvings),
-                             model.origin, 1 << halvings);
+                             ready.origin, 1 << halvings);
     if (plan.exposure) exposures = Exposures(*device, images.count());
     if (plan.motion) {
         std::vector<MotionBasis> bases;
@@ -119,7 +124,7 @@ Trainer::State::State(std::shared_ptr<gpu::Device> d, const Dataset& dataset, co
     take_share(uint32_t(ready.size()));
     report.splats = model.share.all;
     check_bands(o, cache.config(), smaller.empty() ? images : smaller.back());
-    if (o.batch > 1 || o.bands > 1 || ranks->size() > 1) batch.emplace(ranks, o.bands);
+    if (!chunks && (o.batch > 1 || o.bands > 1 || ranks->size() > 1)) batch.emplace(ranks, o.bands);
 }
 
 void Trainer::State::take_share(uint32_t all) {
@@ -144,9 +149,13 @@ Trainer::Trainer(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
     train::check_start(start.size(), options);
     train::check_training(options, ranks->size());
     const double extent = extent_for(dataset, train_frames, start);
+    TrainOptions resolved = resolve(options, dataset);
+    const int chunks = train::chunks_for(*device, dataset, train_frames, start, resolved);
+    device->limit_memory(resolved.device_memory_bytes, {});
+    if (chunks > 1) resolved.image_cache_bytes = train::limited_cache(resolved);
     state_ = std::make_unique<State>(std::move(device), dataset, train_frames,
-                                     prepared(std::move(start), options.render.kernel), extent,
-                                     resolve(options, dataset), std::move(ranks));
+                                     prepared(std::move(start), options.render.kernel), extent, resolved,
+                                     std::move(ranks), chunks);
 }
 
 Trainer::~Trainer() {
@@ -199,7 +208,7 @@ StepReport Trainer::take_step() {
     State& s = *state_;
     const auto start = Clock::now();
     const int first = s.report.step + 1, last = std::min(s.report.step + s.options.batch, s.options.steps);
-    if (s.batch)
+    if (s.batch || s.chunks)
         s.optimise_batch(first, last);
     else
         s.optimise(first);

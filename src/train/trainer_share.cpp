@@ -109,20 +109,24 @@ void Trainer::save(train::StateWriter& to) const {
 void Trainer::join_state(train::StateWriter* to) const {
     State& s = *state_;
     s.finish_all();
-    const auto buffers = buffers_of(s.plan, s.model, s.exposures, s.motions, s.model.capacity);
     const bool moved = s.model.origin != glm::dvec3(0);
-    if (to) to->begin({s.report, s.model.sh_degree}, buffers.size() + moved);
-    for (const NamedBuffer& named : buffers)
+    const auto pass_on = [to](Ranks& ranks, std::span<const std::byte> own, const std::string& name) {
         train::pass_on(
-            *s.ranks, named.buffer->download<std::byte>(named.bytes),
-            [&](uint64_t bytes, uint32_t checksum) { to->begin_array(named.name, bytes, checksum); },
+            ranks, own, [&](uint64_t bytes, uint32_t checksum) { to->begin_array(name, bytes, checksum); },
             [&](std::span<const std::byte> piece) { to->write(piece); });
-    if (!to || !moved) return;
+    };
+    if (s.chunks) {
+        const std::vector<TrainerArray> arrays = s.chunk_arrays();
+        to->begin({s.report, s.model.sh_degree}, arrays.size() + moved);
+        for (const TrainerArray& array : arrays) pass_on(*s.ranks, array.bytes, array.name);
+    } else {
+        const auto buffers = buffers_of(s.plan, s.model, s.exposures, s.motions, s.model.capacity);
+        if (to) to->begin({s.report, s.model.sh_degree}, buffers.size() + moved);
+        for (const NamedBuffer& named : buffers)
+            pass_on(*s.ranks, named.buffer->download<std::byte>(named.bytes), named.name);
+    }
     // All ranks have the same.
-    train::pass_on(
-        *alone(), bytes_of(s.model.origin),
-        [&](uint64_t bytes, uint32_t checksum) { to->begin_array("origin", bytes, checksum); },
-        [&](std::span<const std::byte> piece) { to->write(piece); });
+    if (to && moved) pass_on(*alone(), bytes_of(s.model.origin), "origin");
 }
 
 void Trainer::restore(const TrainerState& state) {
@@ -167,6 +171,12 @@ void Trainer::share_state(train::StateReader* from) {
         const auto told = train::told(*s.ranks, std::as_bytes(std::span(&report, 1)));
         std::memcpy(&report, told.data(), sizeof(report));
     }
+    if (s.chunks) {
+        s.set_chunk_arrays(*from);
+        s.take_share(report.splats);
+        s.report = report;
+        return;
+    }
     check_share(report.splats, ranks);
     const int sh_degree = s.model.sh_degree;
     const glm::dvec3 origin = s.model.origin;
@@ -199,7 +209,13 @@ Gaussians Trainer::join_gaussians() const {
     State& s = *state_;
     s.finish_all();
     Gaussians gaussians;
-    if (s.ranks->size() == 1) {
+    if (s.chunks) {
+        const auto bytes = s.chunks->joined(
+            train::Chunks::params, [&](uint32_t n) { return parameter_bytes(n, s.model.sh_degree); });
+        gaussians = gaussians_of(s.model,
+                                 {reinterpret_cast<const float*>(bytes.data()), bytes.size() / sizeof(float)},
+                                 s.model.share.all);
+    } else if (s.ranks->size() == 1) {
         gaussians = download_model(s.model, s.model.params);
     } else {
         const auto bytes = train::joined(

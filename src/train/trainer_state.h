@@ -2,6 +2,7 @@
 // What a trainer holds, and its steps.
 #pragma once
 #include <deque>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -13,6 +14,8 @@
 #include "pipeline/frame_buffers.h"
 #include "pipeline/strategy.h"
 #include "train/batch.h"
+#include "train/chunk_batch.h"
+#include "train/chunks.h"
 #include "train/image_cache.h"
 #include "train/schedule.h"
 
@@ -34,7 +37,7 @@ struct Trainer::State {
     gpu::Executor executor;
     train::ImageCache images;
     const pipeline::Plan plan;
-    pipeline::Model model;
+    pipeline::Model model;  // without arrays if the splats are in chunks
     pipeline::FrameBuffers frame;
     std::vector<train::ImageCache> smaller;  // by downsample level, from 1; freed after its last step
     pipeline::Exposures exposures;
@@ -51,9 +54,14 @@ struct Trainer::State {
     int timed_steps = 0;
     std::optional<train::Batch> batch;  // empty: a step has one view
     uint64_t most_own_bytes = 0;        // of the state that this rank has held after a step
+    // Destroyed first: what they hold is not needed to make room for.
+    std::optional<train::Chunks> chunks;  // empty: all splats stay on the device
+    train::ChunkBatch chunk_batch;
+    pipeline::FrameRequest chunk_request;  // of the last view
 
     State(std::shared_ptr<gpu::Device> d, const Dataset& dataset, const std::vector<int>& frames,
-          const Gaussians& ready, double length, const TrainOptions& o, std::shared_ptr<Ranks> r);
+          const Gaussians& ready, double length, const TrainOptions& o, std::shared_ptr<Ranks> r,
+          int chunk_count);
 
     /// Notes which splats of `all` the model has.
     void take_share(uint32_t all);
@@ -102,6 +110,17 @@ struct Trainer::State {
     Image render_own(std::span<const Camera> cameras);
     void follow_up(int step);
     void control_density(int step);
+
+    /// Divides the first splats into chunks.
+    void divide(const Gaussians& ready, int count);
+    /// refine: changes the number of a model's splats. Called for the model, or for each chunk.
+    void refine(const std::function<void(pipeline::Model&)>& refine);
+    /// change: records what changes a model in place.
+    void change(const std::function<void(gpu::Recording&, const pipeline::Model&)>& change);
+    uint64_t state_bytes() const;
+    /// The arrays of all chunks for a TrainerState, and the other way.
+    std::vector<TrainerArray> chunk_arrays();
+    void set_chunk_arrays(train::StateReader& from);
 };
 
 }  // namespace ewa

@@ -201,15 +201,23 @@ void Trainer::State::optimise_batch(int first, int last) {
     std::vector<train::BatchView> views;
     for (int step = first; step <= last; ++step) views.push_back(view_of(step, seen, sh_degree));
     const train::BatchParts parts = batch_parts();
-    train::BatchReport drawn = batch->draw(parts, views);
     Rates of_step = rates(last);
     of_step.views = uint32_t(views.size());
     Noise of_noise = noise(last);
     of_noise.amplitude *= float(std::sqrt(double(views.size())));
-    const auto more = [&](gpu::Recording& recording) {
-        if (options.strategy == Strategy::mcmc) record_noise(recording, cache, model, frame, of_noise);
+    const auto more = [&](gpu::Recording& recording, const Model& moved) {
+        if (options.strategy == Strategy::mcmc) record_noise(recording, cache, moved, frame, of_noise);
     };
-    batch->update(parts, batch_rates(of_step), model.share.first, sh_degree, more, drawn);
+    train::BatchReport drawn;
+    if (chunks) {
+        chunk_request = views.back().request;
+        drawn = chunk_batch.step(parts, *chunks, views, batch_rates(of_step), sh_degree, more);
+    } else {
+        drawn = batch->draw(parts, views);
+        batch->update(
+            parts, batch_rates(of_step), model.share.first, sh_degree,
+            [&](gpu::Recording& recording) { more(recording, model); }, drawn);
+    }
     timed_steps += int(views.size());
     report.loss = drawn.loss;
     report.psnr = drawn.psnr;
@@ -241,15 +249,14 @@ Image Trainer::State::render_own(std::span<const Camera> cameras) {
 void Trainer::State::follow_up(int step) {
     if (options.strategy == Strategy::adc) control_density(step);
     if (options.strategy != Strategy::mcmc || !schedule.relocates(step)) return;
-    frame.free_instances();  // the second copy of an array takes its place
-    refine_mcmc(cache, executor, model, frame,
-                {.dead_opacity = options.dead_opacity,
-                 .growth = schedule.growth,
-                 .max_splats = options.max_splats,
-                 .spread = schedule.copy_spread,
-                 .kernel = options.render.kernel,
-                 .seed = options.seed,
-                 .step = uint32_t(step)});
+    const McmcRules rules{.dead_opacity = options.dead_opacity,
+                          .growth = schedule.growth,
+                          .max_splats = options.max_splats,
+                          .spread = schedule.copy_spread,
+                          .kernel = options.render.kernel,
+                          .seed = options.seed,
+                          .step = uint32_t(step)};
+    refine([&](Model& of) { refine_mcmc(cache, executor, of, frame, rules); });
 }
 
 void Trainer::State::control_density(int step) {
@@ -265,13 +272,12 @@ void Trainer::State::control_density(int step) {
         rules.seed = options.seed;
         rules.step = uint32_t(step);
         rules.max_splats = options.max_splats;
-        frame.free_instances();  // the second copy of an array takes its place
-        densify(cache, executor, model, frame, rules);
+        refine([&](Model& of) { densify(cache, executor, of, frame, rules); });
     }
     if (schedule.resets_opacity(step)) {
-        gpu::Recording recording(device->limits());
-        record_reset_opacity(recording, cache, model, float(logit(kResetOpacity)));
-        executor.run(recording);
+        change([&](gpu::Recording& recording, const Model& of) {
+            record_reset_opacity(recording, cache, of, float(logit(kResetOpacity)));
+        });
     }
 }
 

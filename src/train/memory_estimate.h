@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+// What TrainOptions::device_memory_bytes makes of a training.
+#pragma once
+#include <vector>
+
+#include "ewa/trainer.h"
+
+namespace ewa::train {
+
+/// Into how many chunks the splats are divided: 1 if the training fits in its limit. Such a training keeps within the
+/// limit too. The number comes from the splats at the end, so chunks never have to be divided again.
+int chunks_for(const gpu::Device& device, const Dataset& dataset, const std::vector<int>& frames,
+               const Gaussians& start, const TrainOptions& options);
+
+/// The bytes of the image cache of a training in chunks.
+uint64_t limited_cache(const TrainOptions& options);
+
+}  // namespace ewa::train
