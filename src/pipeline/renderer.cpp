@@ -10,6 +10,8 @@
 #include "passes/passes.h"
 #include "pipeline/backward.h"
 #include "pipeline/picture.h"
+#include "pipeline/share.h"
+#include "pipeline/views.h"
 
 namespace ewa {
 namespace {
@@ -41,13 +43,20 @@ std::vector<PlanLine> plan_lines(const Gaussians& gaussians, const RenderOptions
     return describe(plan_for(request), request.scene_degree, gaussians.size());
 }
 
+/// Parameters in host memory of a part of a scene that the device cannot hold.
+struct ScenePart {
+    uint32_t splats = 0;
+    std::vector<std::byte> params;
+};
+
 struct Renderer::State {
     std::shared_ptr<gpu::Device> device;
     passes::PassCache cache;
     gpu::Executor executor;
     RenderOptions options;
-    PlanRequest request;  // of the scene; drawings ask for more
-    Model model;
+    PlanRequest request;           // of the scene; drawings ask for more
+    Model model;                   // without arrays if the scene is in parts
+    std::vector<ScenePart> parts;  // of a scene that would take too much of the device's limit
     FrameBuffers frame;
     shared::Counts counts{};
     gpu::Buffer packed;  // host visible; allocated at the first render_bytes
@@ -63,9 +72,23 @@ struct Renderer::State {
     }
     void upload(const Gaussians& gaussians) {
         const int degree = plan_for(request).stored_degree;
+        parts.clear();
+        // Of a limit that a training has left on the device, the picture needs the larger part.
+        const uint64_t limit = device->memory_limit();
+        if (limit > 0 && parameter_bytes(uint32_t(gaussians.size()), degree) > limit / 4) {
+            divide(degree < gaussians.sh_degree ? with_degree(gaussians, degree) : gaussians, limit / 16);
+            return;
+        }
         model = degree < gaussians.sh_degree ? upload_model(*device, with_degree(gaussians, degree), 0, false)
                                              : upload_model(*device, gaussians, 0, false);
     }
+
+    void divide(const Gaussians& gaussians, uint64_t part_bytes);
+    /// Lists what a view sees of all parts: records for record_list_forward. Sets the counts.
+    std::vector<std::byte> list(const Plan& plan, const FrameInputs& inputs, FrameRequest size);
+    /// then: what to record after the image.
+    template <class Record>
+    void submit_parts(const Plan& plan, const FrameInputs& inputs, FrameRequest size, Record then);
 
     Plan plan_of(const DrawOptions& options) const;
     /// then: what to record after the image.
@@ -73,6 +96,66 @@ struct Renderer::State {
     void submit(const Camera& camera, const Plan& plan, const RenderOptions& look, Record then);
     Rendering draw(const Camera& camera, const Plan& plan, const RenderOptions& look);
 };
+
+void Renderer::State::divide(const Gaussians& gaussians, uint64_t part_bytes) {
+    const uint64_t block = parameter_bytes(1, gaussians.sh_degree);
+    const size_t most = size_t(std::max<uint64_t>(part_bytes / block, 1)) * shared::PARAM_BLOCK;
+    for (size_t first = 0; first < gaussians.size(); first += most) {
+        const size_t splats = std::min(most, gaussians.size() - first);
+        const Model part = upload_model(*device, slice_of(gaussians, first, splats), 0, false);
+        parts.push_back({uint32_t(splats), part.params.download<std::byte>(part.params.bytes())});
+    }
+    model.splats = model.capacity = uint32_t(gaussians.size());
+    model.sh_degree = gaussians.sh_degree;
+    model.origin = gaussians.origin;
+}
+
+std::vector<std::byte> Renderer::State::list(const Plan& plan, const FrameInputs& inputs, FrameRequest size) {
+    constexpr uint64_t kRecord = 16 * shared::RECORD_TEXELS;
+    std::vector<std::byte> records;
+    ViewBuffers buffers;
+    counts = {};
+    for (const ScenePart& part : parts) {
+        Model resident;
+        resident.splats = resident.capacity = size.splats = part.splats;
+        resident.sh_degree = model.sh_degree;
+        resident.origin = model.origin;
+        resident.params =
+            parameter_buffer(*device, "params", gpu::Texel::rgba32f, part.splats, model.sh_degree);
+        resident.params.upload(std::span<const std::byte>(part.params));
+        buffers.reserve(*device, part.splats, 1, part.splats);
+        frame.reserve(*device, cache.config(), size);
+        gpu::Recording recording(device->limits());
+        record_list(recording, cache, plan, resident, frame, inputs, buffers, 0, 0, 0);
+        frame.record_counts(recording);
+        executor.run(recording, true);
+        const shared::Counts of_part = frame.read_counts();
+        counts.skipped_nonfinite += of_part.skipped_nonfinite;
+        const auto listed = buffers.visible.download<std::byte>(of_part.scan_total * kRecord);
+        records.insert(records.end(), listed.begin(), listed.end());
+    }
+    return records;
+}
+
+template <class Record>
+void Renderer::State::submit_parts(const Plan& plan, const FrameInputs& inputs, FrameRequest size,
+                                   Record then) {
+    constexpr uint64_t kRecord = 16 * shared::RECORD_TEXELS;
+    size.instances = std::max(frame.instance_capacity, 1u);
+    const std::vector<std::byte> records = list(plan, inputs, size);
+    const uint32_t skipped = counts.skipped_nonfinite, listed = uint32_t(records.size() / kRecord);
+    size.splats = std::max(listed, 1u);
+    counts = run_until_it_fits(cache, executor, frame, size, [&](gpu::Recording& recording) {
+        if (records.empty())
+            recording.fill(frame.records, 0, 0, kRecord);
+        else
+            frame.records.upload(std::span<const std::byte>(records));
+        record_list_forward(recording, cache, plan, size.splats, frame, inputs);
+        then(recording);
+    });
+    counts.skipped_nonfinite = skipped;
+    counts.visible = listed;
+}
 
 template <class Record>
 void Renderer::State::submit(const Camera& camera, const Plan& plan, const RenderOptions& look, Record then) {
@@ -84,6 +167,12 @@ void Renderer::State::submit(const Camera& camera, const Plan& plan, const Rende
                             .instances = std::max(frame.instance_capacity, first_capacity(model.splats)),
                             .fifth_plane = plan.fifth_plane(),
                             .rays = plan.rays()};
+    if (!parts.empty()) {
+        if (plan.rays())
+            throw RunError("a scene that is larger than the device's limit cannot be integrated along rays");
+        submit_parts(plan, inputs, size, then);
+        return;
+    }
     counts = run_until_it_fits(cache, executor, frame, size, [&](gpu::Recording& recording) {
         record_forward(recording, cache, plan, model, frame, inputs);
         then(recording);

@@ -95,6 +95,24 @@ Range range_of(uint32_t all, int rank, int ranks) {
     return {begin(rank), begin(rank + 1) - begin(rank)};
 }
 
+Gaussians slice_of(const Gaussians& all, size_t first, size_t count) {
+    Gaussians part;
+    part.sh_degree = all.sh_degree;
+    part.origin = all.origin;
+    part.density = all.density;
+    part.resize(count);
+    const auto copy = [&](const std::vector<float>& from, std::vector<float>& to) {
+        const size_t values = from.size() / all.size();
+        std::copy_n(from.begin() + std::ptrdiff_t(values * first), values * count, to.begin());
+    };
+    copy(all.means, part.means);
+    copy(all.opacity_logits, part.opacity_logits);
+    copy(all.quaternions, part.quaternions);
+    copy(all.log_scales, part.log_scales);
+    copy(all.sh, part.sh);
+    return part;
+}
+
 void check_share(uint32_t all, int ranks) {
     if (ranks > 1 && (uint64_t(all) + shared::PARAM_BLOCK - 1) / shared::PARAM_BLOCK < uint64_t(ranks))
         throw RunError(std::to_string(all) + " splats are too few for " + std::to_string(ranks) +

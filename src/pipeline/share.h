@@ -13,6 +13,9 @@ struct Range {
 };
 Range range_of(uint32_t all, int rank, int ranks);
 
+/// Splats `first` to first + count.
+Gaussians slice_of(const Gaussians& all, size_t first, size_t count);
+
 /// Throws RunError if some rank would have no splats.
 void check_share(uint32_t all, int ranks);
 

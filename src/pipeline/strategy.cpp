@@ -101,6 +101,8 @@ Refinement densify(passes::PassCache& cache, gpu::Executor& executor, Model& mod
         fitting_threshold(rules, [&](float t) { return uint32_t(sum_over(ranks, count(t))); });
     const uint32_t after = count(threshold), before = model.share.all;
     if (sum_over(ranks, after) == 0) return {before, before, 0};
+    // Ranks that are chunks of one process share the frame: others have left their offsets in it.
+    if (ranks.size() > 1) count(threshold);
 
     const shared::DensifyPush push = densify_push(model, frame, rules, threshold, after);
     replace_generation(device, model, after,

@@ -124,8 +124,8 @@ std::string settings(const ReportData& data) {
 std::string html_report(const ReportData& data) {
     return html_page(data.title, headline(data) + views_html(data.views, data.held_out) +
                                      charts(data.metrics) + step_time_html(data.times) +
-                                     ranks_html(data.summary.ranks) + data.section + plan(data.plan) +
-                                     settings(data));
+                                     ranks_html(data.summary.ranks) + chunks_html(data.summary.chunks) +
+                                     data.section + plan(data.plan) + settings(data));
 }
 
 }  // namespace ewa::report

@@ -82,6 +82,16 @@ std::vector<StageTime> stages_of(const StepTime& time) {
     return result;
 }
 
+std::string chunks_html(const std::optional<ChunkFigures>& chunks) {
+    if (!chunks) return "";
+    return fmt::format(
+        "<h2>Larger than the device</h2>\n<p>The splats take {:.1f} MiB, and the device was to take at most "
+        "{:.1f} "
+        "MiB. They were in {} chunks. A step copied {:.1f} MiB to the device and back, in {:.1f} ms.</p>\n",
+        double(chunks->state_bytes) / (1 << 20), double(chunks->limit) / (1 << 20), chunks->chunks,
+        chunks->streamed_bytes / (1 << 20), chunks->streaming);
+}
+
 std::string ranks_html(const std::vector<RankFigures>& ranks) {
     if (ranks.empty()) return "";
     std::string html =

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where the time of a training step goes, in words.
 #pragma once
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,5 +35,8 @@ std::string step_time_html(const StepTime& time);
 
 /// What the ranks of a run exchanged, as a table; empty without ranks.
 std::string ranks_html(const std::vector<RankFigures>& ranks);
+
+/// What a training in chunks copied, as a paragraph; empty without chunks.
+std::string chunks_html(const std::optional<ChunkFigures>& chunks);
 
 }  // namespace ewa::report

@@ -68,6 +68,12 @@ Json to_json(const Summary& s) {
                  {"version", s.version},
                  {"command", s.command}};
     if (s.cameras) json["cameras"] = to_json(*s.cameras);
+    if (s.chunks)
+        json["chunks"] = {{"count", s.chunks->chunks},
+                          {"device_memory_bytes", s.chunks->limit},
+                          {"state_bytes", s.chunks->state_bytes},
+                          {"streamed_bytes_per_step", figure(s.chunks->streamed_bytes)},
+                          {"streaming_ms_per_step", figure(s.chunks->streaming)}};
     for (const RankFigures& rank : s.ranks)
         json["ranks"].push_back({{"name", rank.name},
                                  {"sent_bytes_per_view", figure(rank.sent_bytes)},

@@ -519,6 +519,7 @@ void Run::finish(std::unique_ptr<Trainer> trainer) {
     save_checkpoint(*trainer);  // from here on, a kill costs no training
     report_.times = report_times(trainer->step_times());
     report_.summary.ranks = trainer->rank_figures();
+    report_.summary.chunks = trainer->chunk_figures();
     if (!draws_with_ranks()) trainer.reset();  // the renderer takes its memory
     observer_.on_saved(last_);
 
@@ -552,6 +553,11 @@ RunResult Run::run() {
         observer_.on_note(
             fmt::format("{} training images exceed --image-cache {} MiB and are read again for each step",
                         trainer.images_on_disk(), options().train.image_cache_bytes >> 20));
+    if (const auto chunks = trainer.chunk_figures())
+        observer_.on_note(
+            fmt::format("larger than --device-memory: the splats are in {} chunks, most of which wait "
+                        "in host memory",
+                        chunks->chunks));
     last_.splats = trainer.splats();
     restore(trainer);
     begin_files();

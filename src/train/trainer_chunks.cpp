@@ -12,28 +12,6 @@ namespace ewa {
 using namespace pipeline;
 using train::Chunks;
 
-namespace {
-
-Gaussians slice_of(const Gaussians& all, const Range& range) {
-    Gaussians part;
-    part.sh_degree = all.sh_degree;
-    part.origin = all.origin;
-    part.density = all.density;
-    part.resize(range.splats);
-    const auto copy = [&](const std::vector<float>& from, std::vector<float>& to) {
-        const size_t values = from.size() / all.size();
-        std::copy_n(from.begin() + std::ptrdiff_t(values * range.first), values * range.splats, to.begin());
-    };
-    copy(all.means, part.means);
-    copy(all.opacity_logits, part.opacity_logits);
-    copy(all.quaternions, part.quaternions);
-    copy(all.log_scales, part.log_scales);
-    copy(all.sh, part.sh);
-    return part;
-}
-
-}  // namespace
-
 void Trainer::State::divide(const Gaussians& ready, int count) {
     const uint32_t all = uint32_t(ready.size());
     check_share(all, count);
@@ -42,7 +20,8 @@ void Trainer::State::divide(const Gaussians& ready, int count) {
     model.origin = ready.origin;
     for (int chunk = 0; chunk < count; ++chunk) {
         const Range range = range_of(all, chunk, count);
-        Model made = upload_model(*device, slice_of(ready, range), plan.moment_buffers(), plan.statistics);
+        Model made = upload_model(*device, slice_of(ready, range.first, range.splats), plan.moment_buffers(),
+                                  plan.statistics);
         made.share = {alone(), range.first, all};
         chunks->set(chunk, std::move(made));
     }
