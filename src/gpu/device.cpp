@@ -9,6 +9,7 @@
 
 #include "core/system_limits.h"
 #include "core/text.h"
+#include "core/typing.h"
 #include "ewa/error.h"
 #include "gpu/capabilities.h"
 #include "gpu/choose.h"
@@ -202,15 +203,16 @@ uint64_t Device::staging_bytes() const {
 
 RunError Device::out_of_memory(uint64_t bytes) const {
     if (const uint64_t limit = memory_limit(); limit > 0) {
-        const auto mib = [](double value) {
-            return std::to_string(uint64_t(std::ceil(value / double(1 << 20))));
-        };
-        const double held = double(memory_use().held + bytes);
         // What stays here beside what could not be freed.
+        const double held = double(memory_use().held + bytes);
         const double least = held * double(limit) / double(limit - MemoryPool::host_part(limit));
-        return RunError("--device-memory is too little: " + mib(double(limit)) +
-                        " MiB are allowed, and this needs " + mib(least) +
-                        " MiB or more; --downscale, a smaller --image-cache or fewer splats need less");
+        // GiB, as the option has them.
+        const auto shown = [](double value) {
+            return core::shown_number(std::ceil(1e4 * value / double(uint64_t(1) << 30)) / 1e4);
+        };
+        return RunError("--device-memory " + shown(double(limit)) + " is too little: this needs " +
+                        shown(least) +
+                        " or more; --downscale, a smaller --image-cache or fewer splats need less");
     }
     return RunError("out of device memory on " + info_.name + ": " + core::address_limit_text() +
                     std::to_string(bytes >> 20) + " MiB are needed beside the " +

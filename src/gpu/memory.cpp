@@ -131,7 +131,10 @@ MemoryPool::Block* MemoryPool::new_block(const vk::MemoryRequirements& requireme
     for (const Block& block : blocks_)
         if (block.type == type) held += block.bytes;
     const uint64_t heap = properties_.memoryHeaps[properties_.memoryTypes[type].heapIndex].size;
-    const uint64_t whole = block_bytes(aligned(requirements.size, requirements.alignment), held, heap);
+    const uint64_t stride = aligned(requirements.size, requirements.alignment);
+    // Within a limit, what a block has left over is missing elsewhere.
+    const uint64_t whole =
+        limit_ > 0 ? stride * std::max<uint64_t>(1, limit_ / 256 / stride) : block_bytes(stride, held, heap);
     Block* block = try_block(whole, type, most);
     if (!block && whole > requirements.size) block = try_block(requirements.size, type, most);
     return block;

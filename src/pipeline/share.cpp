@@ -166,20 +166,23 @@ struct Targets {
 
 }  // namespace
 
-ForeignSources fetch_sources(gpu::Device& device, Model& model, const gpu::Buffer& sources,
-                             const gpu::Buffer& hits, uint32_t dead, uint32_t added) {
+ForeignSources fetch_sources(gpu::Device& device, Model& model, gpu::Buffer sources, gpu::Buffer hits,
+                             uint32_t dead, uint32_t added) {
     Ranks& ranks = *model.share.ranks;
     const size_t size = size_t(ranks.size()), own = size_t(ranks.rank());
     const uint32_t planes = model.planes();
     const size_t splat = sizeof(SentSource) + planes * kTexel;
+    // Read before others take their turn: then no rank of this process keeps the device's memory meanwhile.
+    const auto drawn = sources.download<uint32_t>(sources.bytes() / 4);
+    auto all_hits = hits.download<uint32_t>(model.splats);
+    sources = {};
+    hits = {};
     const uint64_t own_dead = dead;
     Targets targets{ranks.gather(std::span(&own_dead, 1))};
     std::partial_sum(targets.dead.begin(), targets.dead.end(), targets.dead.begin());
     const uint64_t draws = targets.dead.back() + added;
 
     const auto params = model.params.download<std::byte>(parameter_bytes(model.splats, model.sh_degree));
-    auto all_hits = hits.download<uint32_t>(model.splats);
-    const auto drawn = sources.download<uint32_t>(draws);
     Parcels parcels(size);
     for (uint32_t d = 0; d < draws; ++d) {
         if (drawn[d] == shared::NOT_LISTED) continue;

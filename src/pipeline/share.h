@@ -34,7 +34,7 @@ struct ForeignSources {
 };
 /// dead: splats of this rank that get a copy. added: new splats of all ranks, which the last rank gets. Sources of other
 /// ranks are appended to model.params.
-ForeignSources fetch_sources(gpu::Device& device, Model& model, const gpu::Buffer& sources,
-                             const gpu::Buffer& hits, uint32_t dead, uint32_t added);
+ForeignSources fetch_sources(gpu::Device& device, Model& model, gpu::Buffer sources, gpu::Buffer hits,
+                             uint32_t dead, uint32_t added);
 
 }  // namespace ewa::pipeline

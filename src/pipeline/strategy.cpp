@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <utility>
 
 #include "passes/passes.h"
 #include "pipeline/share.h"
@@ -195,7 +196,8 @@ Refinement refine_mcmc(passes::PassCache& cache, gpu::Executor& executor, Model&
     push.new_splats = model.splats;
     if (own + 1 == size_t(ranks.size())) push.new_splats += added;
     if (ranks.size() > 1) {
-        ForeignSources fetched = fetch_sources(device, model, sources, hits, push.dead, added);
+        ForeignSources fetched =
+            fetch_sources(device, model, std::move(sources), std::move(hits), push.dead, added);
         sources = std::move(fetched.sources);
         hits = std::move(fetched.hits);
     }
@@ -217,6 +219,9 @@ Refinement refine_mcmc(passes::PassCache& cache, gpu::Executor& executor, Model&
                                push);
                            executor.run(write);
                        });
+    dead = {};  // others take their turn: their memory is used again
+    sources = {};
+    hits = {};
     level(device, model);
     return {before, after, all_dead};
 }

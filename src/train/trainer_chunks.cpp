@@ -30,21 +30,20 @@ void Trainer::State::divide(const Gaussians& ready, int count) {
 }
 
 void Trainer::State::refine(const std::function<void(Model&)>& refine) {
-    frame.free_instances();  // the second copy of an array takes its place
     if (!chunks) {
+        frame.free_instances();  // the second copy of an array takes its place
         refine(model);
         return;
     }
-    // Buffers of a value a splat are for the splats of any chunk.
-    FrameRequest request = chunk_request;
-    request.splats = chunks->largest();
-    request.instances = 1;
-    frame.reserve(*device, cache.config(), request);
-    frame.free_instances();
+    // A value a splat of any chunk, and no picture: with mcmc one chunk holds all new splats until the chunks are level.
+    frame = {};
+    frame.reserve(*device, cache.config(),
+                  {.splats = chunks->largest(), .width = 1, .height = 1, .instances = 1});
     chunks->together([&](Model& chunk) {
         refine(chunk);
         model.share.all = chunk.share.all;
     });
+    frame = {};
 }
 
 void Trainer::State::change(const std::function<void(gpu::Recording&, const Model&)>& change) {

@@ -57,7 +57,6 @@ struct Trainer::State {
     // Destroyed first: what they hold is not needed to make room for.
     std::optional<train::Chunks> chunks;  // empty: all splats stay on the device
     train::ChunkBatch chunk_batch;
-    pipeline::FrameRequest chunk_request;  // of the last view
 
     State(std::shared_ptr<gpu::Device> d, const Dataset& dataset, const std::vector<int>& frames,
           const Gaussians& ready, double length, const TrainOptions& o, std::shared_ptr<Ranks> r,

@@ -210,7 +210,6 @@ void Trainer::State::optimise_batch(int first, int last) {
     };
     train::BatchReport drawn;
     if (chunks) {
-        chunk_request = views.back().request;
         drawn = chunk_batch.step(parts, *chunks, views, batch_rates(of_step), sh_degree, more);
     } else {
         drawn = batch->draw(parts, views);

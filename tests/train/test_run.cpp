@@ -217,6 +217,7 @@ TEST(RunOptions, TableReadsWhatItWrites) {
                                                    {"seed", "18446744073709551615"},
                                                    {"moments", "32"},
                                                    {"image-cache", "9"},
+                                                   {"device-memory", "0.25"},
                                                    {"background", "0.25,1,0"},
                                                    {"kernel", "density"},
                                                    {"batch", "4"},
@@ -253,6 +254,7 @@ TEST(RunOptions, TableReadsWhatItWrites) {
         EXPECT_EQ(train::value_text(train::run_option(name), all), text) << name;
     EXPECT_EQ(all.train.moment_bits, 32);
     EXPECT_EQ(all.train.image_cache_bytes, uint64_t(9) << 20);
+    EXPECT_EQ(all.train.device_memory_bytes, uint64_t(256) << 20);
     EXPECT_EQ(all.train.render.kernel, Footprint::density);
     EXPECT_EQ(config.begin().key(), "dataset");
 }

@@ -1,0 +1,297 @@
+// SPDX-License-Identifier: Apache-2.0
+// Training of scenes that are larger than the device: the bytes of one that fits, within the limit.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "ewa/error.h"
+#include "ewa/evaluation.h"
+#include "ewa/trainer.h"
+#include "gpu/test_device.h"
+#include "support/thread_ranks.h"
+#include "train/chunks.h"
+#include "train/synthetic.h"
+
+namespace ewa::test {
+namespace {
+
+constexpr uint64_t kChunkMiB = uint64_t(1) << 20;
+
+const Synthetic& tall_capture() {
+    static const Synthetic* const made = [] {
+        auto* data = new Synthetic;
+        make_synthetic(*data, 300, 7, 64, 48, 11);
+        return data;
+    }();
+    return *made;
+}
+
+/// Splats of which the cameras see one in twenty: the others are far above and below.
+Gaussians tall_scene(size_t splats) {
+    Random random(5);
+    Gaussians g;
+    g.sh_degree = 3;
+    g.resize(splats);
+    for (size_t i = 0; i < splats; ++i) {
+        const bool seen = i % 20 == 0;
+        g.means[3 * i] = float(random.uniform(-1, 1));
+        g.means[3 * i + 1] = float(random.uniform(-1, 1)) + (seen ? 0.0f : i % 2 == 0 ? 30.0f : -30.0f);
+        g.means[3 * i + 2] = float(random.uniform(-1, 1));
+        for (size_t k = 0; k < 3; ++k) g.log_scales[3 * i + k] = float(std::log(random.uniform(0.03, 0.1)));
+        for (size_t k = 0; k < 4; ++k) g.quaternions[4 * i + k] = float(random.normal());
+        for (size_t k = 0; k < g.sh_stride(); ++k) g.sh[g.sh_stride() * i + k] = float(random.uniform(-1, 1));
+        g.opacity_logits[i] = i % 9 == 0 ? -3.0f : -1.0f;
+    }
+    return g;
+}
+
+/// Densifies, resets and relocates within some tens of steps.
+TrainOptions busy_chunks(Strategy strategy, int batch) {
+    TrainOptions options;
+    options.steps = 36;
+    options.batch = batch;
+    options.strategy = strategy;
+    options.seed = 3;
+    options.sh_degree = 3;
+    options.max_splats = 28000;
+    options.grow_gradient = 1e-5;
+    options.refine_start = 10;
+    options.refine_every = 20;
+    options.refine_stop = 30000;
+    options.relocate_stop = 30000;
+    options.dead_opacity = 0.06;
+    options.growth = 1.2;
+    options.opacity_reset_every = 25;
+    options.means_rate = 3e-3;
+    options.noise_rate = 2e4;  // as much as usual: the others stay out of sight
+    options.opacity_rate = 0.3;
+    return options;
+}
+
+struct ChunksTrained {
+    TrainerState state;
+    uint64_t peak = 0;
+    std::optional<ChunkFigures> chunks;
+    Gaussians splats;
+};
+
+/// resume: where the training begins.
+ChunksTrained train_within(TrainOptions options, uint64_t limit, size_t splats, int until,
+                           const TrainerState* resume = nullptr) {
+    options.device_memory_bytes = limit;
+    const auto device = open_test_device(false);
+    Trainer trainer(device, tall_capture().dataset, all_frames(tall_capture().dataset), tall_scene(splats),
+                    options);
+    if (resume) trainer.restore(*resume);
+    while (trainer.steps_done() < until) trainer.step();
+    return {trainer.state(), peak_device_bytes(*device), trainer.chunk_figures(), trainer.gaussians()};
+}
+
+void expect_same_training(const ChunksTrained& a, const ChunksTrained& b) {
+    EXPECT_EQ(a.state.report.step, b.state.report.step);
+    EXPECT_EQ(a.state.report.splats, b.state.report.splats);
+    EXPECT_EQ(a.state.report.loss, b.state.report.loss);
+    EXPECT_EQ(a.state.report.psnr, b.state.report.psnr);
+    EXPECT_EQ(a.state.report.limited_steps, b.state.report.limited_steps);
+    EXPECT_EQ(a.state.report.dropped_updates, b.state.report.dropped_updates);
+    EXPECT_EQ(a.state.report.skipped_nonfinite, b.state.report.skipped_nonfinite);
+    ASSERT_EQ(a.state.arrays.size(), b.state.arrays.size());
+    for (size_t i = 0; i < a.state.arrays.size(); ++i) {
+        EXPECT_EQ(a.state.arrays[i].name, b.state.arrays[i].name);
+        EXPECT_TRUE(a.state.arrays[i].bytes == b.state.arrays[i].bytes) << a.state.arrays[i].name;
+    }
+    EXPECT_EQ(a.splats.means, b.splats.means);
+    EXPECT_EQ(a.splats.sh, b.splats.sh);
+}
+
+struct ChunksCase {
+    Strategy strategy;
+    int batch;
+    void (*change)(TrainOptions&) = nullptr;
+    const char* name = "";
+};
+void wide(TrainOptions& options) {
+    options.moment_bits = 32;
+}
+void absolute(TrainOptions& options) {
+    options.absolute_gradients = true;
+    options.render.kernel = Footprint::density;
+    options.grow_gradient_absolute = 1e-5;
+}
+void from_disk(TrainOptions& options) {
+    options.image_cache_bytes = 0;
+    options.halvings = 1;
+}
+
+std::string name_of_chunks_case(const testing::TestParamInfo<ChunksCase>& tested) {
+    const char* names[] = {"none", "adc", "mcmc"};
+    std::string name = names[int(tested.param.strategy)];
+    return name + tested.param.name + "_batch" + std::to_string(tested.param.batch);
+}
+
+class ChunksTrain : public testing::TestWithParam<ChunksCase> {};
+
+TEST_P(ChunksTrain, TheBytesOfOneThatFits) {
+    const auto& [strategy, batch, change, name] = GetParam();
+    TrainOptions options = busy_chunks(strategy, batch);
+    if (change) change(options);
+    // One chunk holds all that mcmc adds until the chunks are level.
+    const size_t splats = strategy == Strategy::none ? 28000 : strategy == Strategy::mcmc ? 26500 : 20000;
+    const ChunksTrained whole = train_within(options, 0, splats, options.steps);
+    EXPECT_FALSE(whole.chunks);
+    EXPECT_EQ(whole.state.report.splats == splats, strategy == Strategy::none)
+        << "the number of splats should change";
+    uint64_t state = 0;
+    for (const TrainerArray& array : whole.state.arrays) state += array.bytes.size();
+
+    const uint64_t limit = state / 4;
+    const ChunksTrained chunked = train_within(options, limit, splats, options.steps);
+    ASSERT_TRUE(chunked.chunks);
+    EXPECT_GE(chunked.chunks->chunks, 4);
+    EXPECT_EQ(chunked.chunks->state_bytes, state);
+    EXPECT_GT(chunked.chunks->streamed_bytes, double(limit)) << "no splats should have left the device";
+    EXPECT_LE(chunked.peak, limit);
+    expect_same_training(chunked, whole);
+}
+
+INSTANTIATE_TEST_SUITE_P(Chunks, ChunksTrain,
+                         testing::Values(ChunksCase{Strategy::adc, 1}, ChunksCase{Strategy::adc, 3},
+                                         ChunksCase{Strategy::mcmc, 1}, ChunksCase{Strategy::mcmc, 3},
+                                         ChunksCase{Strategy::none, 1},
+                                         ChunksCase{Strategy::mcmc, 2, wide, "_wide"},
+                                         ChunksCase{Strategy::adc, 1, absolute, "_absolute_density"},
+                                         ChunksCase{Strategy::adc, 2, from_disk, "_from_disk"}),
+                         name_of_chunks_case);
+
+TEST(Chunks, GoOnFromAnyOtherLimit) {
+    const TrainOptions options = busy_chunks(Strategy::adc, 1);
+    const uint64_t limits[] = {0, 5 * kChunkMiB, 3 * kChunkMiB};
+    const ChunksTrained whole = train_within(options, 0, 20000, 24);
+    for (const uint64_t first : limits) {
+        const ChunksTrained begun = train_within(options, first, 20000, 12);
+        for (const uint64_t then : limits) {
+            SCOPED_TRACE(std::to_string(first) + " to " + std::to_string(then));
+            expect_same_training(train_within(options, then, 20000, 24, &begun.state), whole);
+        }
+    }
+}
+
+TEST(Chunks, AScenesPicturesAreDrawnWithinTheLimit) {
+    const Gaussians scene = tall_scene(28000);
+    const Dataset& dataset = tall_capture().dataset;
+    const auto free = open_test_device(false), limited = open_test_device(false);
+    limited->limit_memory(3 * kChunkMiB, {});
+    Renderer whole(free, scene, {}), parts(limited, scene, {});
+    for (const Frame& frame : dataset.frames) {
+        const Rendering a = whole.render(frame.camera, true), b = parts.render(frame.camera, true);
+        EXPECT_EQ(a.color.pixels, b.color.pixels);
+        EXPECT_EQ(a.alpha.pixels, b.alpha.pixels);
+        EXPECT_EQ(a.depth.pixels, b.depth.pixels);
+        EXPECT_EQ(whole.render_bytes(frame.camera, {}), parts.render_bytes(frame.camera, {}));
+        EXPECT_EQ(whole.splats_drawn(), parts.splats_drawn());
+    }
+    EXPECT_GT(peak_device_bytes(*free), 3 * kChunkMiB);
+    EXPECT_LE(peak_device_bytes(*limited), 3 * kChunkMiB);
+}
+
+TEST(Chunks, ALimitThatNoStepFitsInIsOneError) {
+    const TrainOptions options = busy_chunks(Strategy::adc, 1);
+    try {
+        train_within(options, kChunkMiB / 4, 20000, 1);
+        FAIL() << "no error";
+    } catch (const RunError& error) {
+        EXPECT_NE(std::string(error.what()).find("--device-memory 0.0003 is too little: this needs 0.0"),
+                  std::string::npos)
+            << error.what();
+    }
+}
+
+TEST(Chunks, AMuchLargerLimitChangesNothing) {
+    const TrainOptions options = busy_chunks(Strategy::adc, 1);
+    EXPECT_FALSE(train_within(options, 1024 * kChunkMiB, 2000, 2).chunks);
+}
+
+TEST(Chunks, ExcludeWhatTheyCannotTrain) {
+    const auto refused = [](auto change) {
+        TrainOptions options = busy_chunks(Strategy::adc, 1);
+        change(options);
+        EXPECT_THROW(train_within(options, kChunkMiB, 2000, 1), InputError);
+    };
+    refused([](TrainOptions& o) { o.exposure = true; });
+    refused([](TrainOptions& o) { o.refine_poses = true; });
+    refused([](TrainOptions& o) { o.render.points = true; });
+}
+
+/// A chunk's model of some splats whose parameters are all `value`.
+pipeline::Model model_of(gpu::Device& device, uint32_t splats, float value) {
+    pipeline::Model model;
+    model.splats = model.capacity = splats;
+    model.params = pipeline::parameter_buffer(device, "params", gpu::Texel::rgba32f, splats, 0);
+    model.params.upload(std::span<const float>(std::vector<float>(model.params.bytes() / 4, value)));
+    return model;
+}
+
+TEST(ChunksTogether, WorkInTurnsAndKeepWhatTheyHadOnTheDevice) {
+    const auto device = open_test_device(false);
+    train::Chunks chunks(*device, 5, 2 * kChunkMiB);  // two of five fit
+    for (int chunk = 0; chunk < 5; ++chunk) chunks.set(chunk, model_of(*device, 12000, float(chunk)));
+    int working = 0;
+    chunks.together([&](pipeline::Model& model) {
+        Ranks& ranks = *model.share.ranks;
+        EXPECT_EQ(++working, 1) << "one at a time";
+        for (uint64_t turn = 0; turn < 4; ++turn) {
+            const uint64_t own = 10 * turn + uint64_t(ranks.rank());
+            --working;
+            const auto all = ranks.gather(std::span(&own, 1));
+            EXPECT_EQ(++working, 1);
+            for (uint64_t rank = 0; rank < 5; ++rank) EXPECT_EQ(all.at(rank), 10 * turn + rank);
+            EXPECT_EQ(model.params.download<float>(1).front(), float(ranks.rank()));
+            std::vector<std::vector<std::byte>> sent(5), got(5);
+            std::vector<std::span<const std::byte>> out;
+            std::vector<std::span<std::byte>> in;
+            for (size_t rank = 0; rank < 5; ++rank) {
+                sent[rank].assign(3, std::byte(16 * ranks.rank() + int(rank)));
+                got[rank].resize(3);
+                out.emplace_back(sent[rank]);
+                in.emplace_back(got[rank]);
+            }
+            --working;
+            ranks.exchange(out, in);
+            EXPECT_EQ(++working, 1);
+            for (size_t rank = 0; rank < 5; ++rank)
+                EXPECT_EQ(int(got[rank][2]), 16 * int(rank) + ranks.rank());
+        }
+        model.params = model_of(*device, 12000, float(100 + ranks.rank())).params;
+        --working;
+    });
+    const auto all =
+        chunks.joined(train::Chunks::params, [](uint32_t n) { return pipeline::parameter_bytes(n, 0); });
+    for (size_t chunk = 0; chunk < 5; ++chunk) {
+        float value;
+        std::memcpy(&value, &all[chunk * all.size() / 5], sizeof(value));
+        EXPECT_EQ(value, float(100 + chunk));
+    }
+    EXPECT_LE(peak_device_bytes(*device), 2 * kChunkMiB);
+}
+
+TEST(ChunksTogether, AnErrorOfOneEndsAll) {
+    const auto device = open_test_device(false);
+    train::Chunks chunks(*device, 4, 2 * kChunkMiB);
+    for (int chunk = 0; chunk < 4; ++chunk) chunks.set(chunk, model_of(*device, 800, 1));
+    try {
+        chunks.together([&](pipeline::Model& model) {
+            const uint64_t none = 0;
+            model.share.ranks->gather(std::span(&none, 1));
+            if (model.share.ranks->rank() == 2) throw RunError("the second one");
+            model.share.ranks->gather(std::span(&none, 1));
+        });
+        FAIL() << "no error";
+    } catch (const RunError& error) {
+        EXPECT_STREQ(error.what(), "the second one");
+    }
+}
+
+}  // namespace
+}  // namespace ewa::test
