@@ -66,7 +66,8 @@ TrainOptions busy_chunks(Strategy strategy, int batch) {
     options.opacity_reset_every = 25;
     options.means_rate = 3e-3;
     options.noise_rate = 2e4;  // as much as usual: the others stay out of sight
-    options.opacity_rate = 0.3;
+    // With mcmc the opacity of what no camera sees falls. It should not all die and move to where it is seen.
+    options.opacity_rate = strategy == Strategy::mcmc ? 0.02 : 0.3;
     return options;
 }
 
