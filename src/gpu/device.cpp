@@ -202,7 +202,9 @@ uint64_t Device::staging_bytes() const {
 }
 
 RunError Device::out_of_memory(uint64_t bytes) const {
-    if (const uint64_t limit = memory_limit(); limit > 0) {
+    // The driver may have less than the limit.
+    const uint64_t limit = memory_limit();
+    if (limit > 0 && memory_use().held + bytes > limit - MemoryPool::host_part(limit)) {
         // What stays here beside what could not be freed.
         const double held = double(memory_use().held + bytes);
         const double least = held * double(limit) / double(limit - MemoryPool::host_part(limit));

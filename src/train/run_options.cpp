@@ -194,12 +194,14 @@ RunOption device_memory_option() {
                                      "Take at most this much device memory: splats that do not fit stay in "
                                      "host memory. 0: as much as needed",
                                      kDoesNotDecide, member, [](std::string text) {
-                                         const std::string problem =
-                                             core::settle_number(text, 0.0, 1048576.0);
+                                         const std::string problem = core::settle_number(text, 0.0, 65536.0);
                                          if (!problem.empty()) throw InputError(problem);
                                          return uint64_t(core::parse_number(text).value() * kGib);
                                      });
-    option.get = [](const RunOptions& options) { return double(options.train.device_memory_bytes) / kGib; };
+    option.get = [](const RunOptions& options) {
+        const uint64_t bytes = options.train.device_memory_bytes;
+        return bytes == 0 ? Json(0) : Json(double(bytes) / kGib);
+    };
     return option;
 }
 

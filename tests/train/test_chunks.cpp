@@ -179,6 +179,20 @@ TEST(Chunks, GoOnFromAnyOtherLimit) {
     }
 }
 
+/// Where the host cannot map the device's memory, staging buffers count too.
+TEST(Chunks, CopiesThroughStagingBuffersKeepWithinTheLimit) {
+    TrainOptions options = busy_chunks(Strategy::adc, 1);
+    const ChunksTrained whole = train_within(options, 0, 20000, 16);
+    const auto device = open_test_device(false);
+    device->limit_host_access(gpu::HostAccess::none);
+    options.device_memory_bytes = 3 * kChunkMiB;
+    Trainer trainer(device, tall_capture().dataset, all_frames(tall_capture().dataset), tall_scene(20000),
+                    options);
+    while (trainer.steps_done() < 16) trainer.step();
+    EXPECT_LE(peak_device_bytes(*device), 3 * kChunkMiB);
+    EXPECT_TRUE(trainer.gaussians().means == whole.splats.means);
+}
+
 TEST(Chunks, AScenesPicturesAreDrawnWithinTheLimit) {
     const Gaussians scene = tall_scene(28000);
     const Dataset& dataset = tall_capture().dataset;
