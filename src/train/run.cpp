@@ -549,15 +549,16 @@ RunResult Run::run() {
     Trainer& trainer = *owned;
     report_.plan = plan_of(trainer, input_);
     observer_.on_plan(report_.plan);
+    const auto chunks = trainer.chunk_figures();
     if (trainer.images_on_disk() > 0)
-        observer_.on_note(
-            fmt::format("{} training images exceed --image-cache {} MiB and are read again for each step",
-                        trainer.images_on_disk(), options().train.image_cache_bytes >> 20));
-    if (const auto chunks = trainer.chunk_figures())
-        observer_.on_note(
-            fmt::format("larger than --device-memory: the splats are in {} chunks, most of which wait "
-                        "in host memory",
-                        chunks->chunks));
+        observer_.on_note(fmt::format(
+            "{} training images exceed {} and are read again for each step", trainer.images_on_disk(),
+            chunks ? "--image-cache or a quarter of --device-memory"
+                   : fmt::format("--image-cache {} MiB", options().train.image_cache_bytes >> 20)));
+    if (chunks)
+        observer_.on_note(fmt::format(
+            "larger than --device-memory: the splats are in {} chunks, most of which wait in host memory",
+            chunks->chunks));
     last_.splats = trainer.splats();
     restore(trainer);
     begin_files();

@@ -210,6 +210,7 @@ Gaussians Trainer::join_gaussians() const {
     s.finish_all();
     Gaussians gaussians;
     if (s.chunks) {
+        s.frame = {};  // the caller may draw the splats: the next step makes another
         const auto bytes = s.chunks->joined(
             train::Chunks::params, [&](uint32_t n) { return parameter_bytes(n, s.model.sh_degree); });
         gaussians = gaussians_of(s.model,
