@@ -51,6 +51,7 @@ void check_training(const TrainOptions& options, int ranks) {
     }
     if (options.device_memory_bytes > 0) {
         if (ranks > 1) throw InputError("several ranks and --device-memory exclude each other");
+        if (options.bands > 1) throw InputError("--bands and --device-memory exclude each other");
         if (options.exposure) throw InputError("--device-memory and --exposure exclude each other");
         if (options.refine_poses) throw InputError("--device-memory and --refine-poses exclude each other");
         if (options.render.points) throw InputError("--device-memory and --points exclude each other");
