@@ -123,10 +123,10 @@ std::vector<std::byte> Renderer::State::list(const Plan& plan, const FrameInputs
         resident.params =
             parameter_buffer(*device, "params", gpu::Texel::rgba32f, part.splats, model.sh_degree);
         resident.params.upload(std::span<const std::byte>(part.params));
-        buffers.reserve(*device, part.splats, 1, part.splats);
+        buffers.reserve(*device, part.splats, 1, 1, part.splats);
         frame.reserve(*device, cache.config(), size);
         gpu::Recording recording(device->limits());
-        record_list(recording, cache, plan, resident, frame, inputs, buffers, 0, 0, 0);
+        record_list(recording, cache, plan, resident, frame, inputs, buffers, {});
         frame.record_counts(recording);
         executor.run(recording, true);
         const shared::Counts of_part = frame.read_counts();

@@ -2,6 +2,7 @@
 #include "train/chunk_batch.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <utility>
 
@@ -41,13 +42,13 @@ void ChunkBatch::list(const BatchParts& parts, Chunks& chunks, std::span<const B
                       const Model& model) {
     gpu::Device& device = parts.cache.device();
     buffers_.places = chunks.take_places();
-    buffers_.reserve(device, model.splats, uint32_t(views.size()), model.splats);
+    buffers_.reserve(device, model.splats, uint32_t(views.size()), 1, model.splats);
     uint64_t places = 0;
     for (size_t v = 0; v < views.size(); ++v) {
         reserve(parts, views[v].request, model.splats);
         gpu::Recording recording(device.limits());
         record_list(recording, parts.cache, parts.plan, model, parts.frame, views[v].inputs, buffers_,
-                    uint32_t(v), uint32_t(places), 0);
+                    {.view = uint32_t(v), .list = uint32_t(v), .first_place = uint32_t(places)});
         const shared::Counts counts = counted_run(parts, recording);
         Seen& seen = seen_[v];
         seen.listed[size_t(chunk)] = counts.scan_total;
@@ -71,7 +72,7 @@ shared::Counts ChunkBatch::draw_until_it_fits(const BatchParts& parts, const Bat
             parts.frame.records.upload(std::span<const std::byte>(records));
         const Sorted sorted =
             record_list_forward(recording, parts.cache, parts.plan, splats, parts.frame, view.inputs);
-        view.record_loss(recording);
+        view.record_loss(recording, view.inputs);
         record_list_backward(recording, parts.cache, parts.plan, splats, parts.frame, view.inputs, sorted,
                              buffers_.sums, 0);
         const shared::Counts counts = counted_run(parts, recording);
@@ -100,7 +101,7 @@ void ChunkBatch::draw(const BatchParts& parts, Chunks& chunks, const BatchView& 
     make_room_for_sums(parts, splats);
     const shared::Counts counts = draw_until_it_fits(parts, view, splats, records);
     seen.loss = loss_of(counts);
-    seen.psnr = view.psnr(counts);
+    seen.psnr = -10 * std::log10(double(counts.squared) / view.weight());
     seen.sums.resize(ViewBuffers::sum_bytes(parts.plan, listed));
     chunks.stream(records.size() + seen.sums.size(),
                   [&] { buffers_.sums.download(std::span<std::byte>(seen.sums)); });
