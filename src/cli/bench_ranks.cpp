@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <bit>
+#include <chrono>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numeric>
@@ -46,16 +47,30 @@ double visible_share(const Gaussians& gaussians, const Camera& camera) {
     return double(visible) / double(gaussians.size());
 }
 
-/// The time of a training step, on all devices at once: that of the slowest.
-double slowest_step_ms(Ranks& ranks, Trainer& trainer) {
-    constexpr int kWarmUp = 3, kSteps = 20;
+/// The times of training steps in ms, on all devices at once: those of the slowest device.
+std::vector<double> slowest_steps(Ranks& ranks, Trainer& trainer) {
+    constexpr int kWarmUp = 3;
+    constexpr size_t kSteps = 40;
     while (trainer.steps_done() < kWarmUp) trainer.step();
-    const double before = trainer.state().report.seconds;
-    while (trainer.steps_done() < kWarmUp + kSteps) trainer.step();
-    const double ms = (trainer.state().report.seconds - before) * 1000 / kSteps;
-    const uint64_t own[] = {std::bit_cast<uint64_t>(ms)};
-    double slowest = 0;
-    for (const uint64_t one : ranks.gather(own)) slowest = std::max(slowest, std::bit_cast<double>(one));
+    trainer.report();  // waits for the device
+    std::vector<uint64_t> own;
+    while (own.size() < kSteps) {
+        const auto begin = std::chrono::steady_clock::now();
+        trainer.step();
+        trainer.report();
+        const std::chrono::duration<double, std::milli> time = std::chrono::steady_clock::now() - begin;
+        own.push_back(std::bit_cast<uint64_t>(time.count()));
+    }
+    const std::vector<uint64_t> all = ranks.gather(own);
+    std::vector<double> slowest;
+    const auto sum = [](const std::vector<double>& times) {
+        return std::accumulate(times.begin(), times.end(), 0.0);
+    };
+    for (size_t first = 0; first < all.size(); first += kSteps) {
+        std::vector<double> times;
+        for (size_t i = 0; i < kSteps; ++i) times.push_back(std::bit_cast<double>(all[first + i]));
+        if (sum(times) > sum(slowest)) slowest = std::move(times);
+    }
     return slowest;
 }
 
@@ -78,7 +93,9 @@ ViewCost measure_view(Ranks& ranks, const fs::path& dataset_path, const fs::path
         cost.visible +=
             visible_share(gaussians, dataset.frames[i * frames.size() / views].camera) / double(views);
     Trainer trainer(open_device(device), dataset, frames, std::move(gaussians), options);
-    cost.milliseconds = slowest_step_ms(ranks, trainer);
+    cost.views = slowest_steps(ranks, trainer);
+    cost.milliseconds =
+        std::accumulate(cost.views.begin(), cost.views.end(), 0.0) / double(cost.views.size());
     return cost;
 }
 
@@ -94,13 +111,13 @@ void print_network(const Ranks& ranks, const Network& network) {
 void print_costs(const ViewCost& view, const std::vector<StepCost>& costs) {
     fmt::print(
         "\n{:.0f} splats, of which a view sees {:.0f} %; {:.1f} ms a view\n"
-        "predicted, with as many views a step as ranks:\n\n{:>6} {:>12} {:>12} {:>10} {:>10} {:>11}\n",
-        view.splats, view.visible * 100, view.milliseconds, "ranks", "MB a rank", "exchange ms", "step ms",
-        "views/s", "efficiency");
+        "predicted, with as many views a step as ranks:\n\n{:>6} {:>12} {:>12} {:>12} {:>10} {:>10} {:>11}\n",
+        view.splats, view.visible * 100, view.milliseconds, "ranks", "MB a rank", "slowest ms", "exchange ms",
+        "step ms", "views/s", "efficiency");
     for (const StepCost& cost : costs)
-        fmt::print("{:>6} {:>12.2f} {:>12.2f} {:>10.1f} {:>10.2f} {:>9.0f} %\n", cost.ranks,
-                   cost.sent_bytes / 1e6, cost.exchange_ms, cost.step_ms, cost.views_per_second,
-                   cost.efficiency * 100);
+        fmt::print("{:>6} {:>12.2f} {:>12.1f} {:>12.2f} {:>10.1f} {:>10.2f} {:>9.0f} %\n", cost.ranks,
+                   cost.sent_bytes / 1e6, cost.slowest_ms, cost.exchange_ms, cost.step_ms,
+                   cost.views_per_second, cost.efficiency * 100);
 }
 
 report::Json json_of(const Network& network, const ViewCost& view, const std::vector<StepCost>& costs) {
@@ -111,6 +128,7 @@ report::Json json_of(const Network& network, const ViewCost& view, const std::ve
     for (const StepCost& cost : costs)
         json["predicted"].push_back({{"ranks", cost.ranks},
                                      {"sent_bytes", cost.sent_bytes},
+                                     {"slowest_ms", cost.slowest_ms},
                                      {"exchange_ms", cost.exchange_ms},
                                      {"step_ms", cost.step_ms},
                                      {"views_per_second", cost.views_per_second},
@@ -151,7 +169,7 @@ int run_rank_bench(const RankBench& bench, const fs::path& dataset, const fs::pa
         throw InputError(
             "--ranks measures the network between several processes; start them together: mpirun -n 2 ewa "
             "bench --ranks");
-    ViewCost view{double(bench.splats), bench.visible_percent / 100, bench.view_ms, false};
+    ViewCost view{double(bench.splats), bench.visible_percent / 100, bench.view_ms, false, {}};
     if (!dataset.empty()) view = measure_view(*group, dataset, splats, device);
     view.absolute_gradients = bench.absolute_gradients;
     const Network network = ranks::measure_network(*group, kTransferBytes);

@@ -2,6 +2,7 @@
 #include "ranks/scaling.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace ewa::ranks {
 namespace {
@@ -24,6 +25,20 @@ double transfer_ms(const Network& network, double bytes) {
     return low.milliseconds + std::max(0.0, slope) * (bytes - double(low.bytes));
 }
 
+/// The expected time of the slowest of `count` views that are drawn at random.
+double slowest_ms(const ViewCost& view, int count) {
+    std::vector<double> sorted = view.views;
+    std::sort(sorted.begin(), sorted.end());
+    double expected = sorted.empty() ? view.milliseconds : 0;
+    for (size_t i = 0; i < sorted.size(); ++i) {
+        // That none of them is slower, less that all are faster.
+        const double share = std::pow(double(i + 1) / double(sorted.size()), count) -
+                             std::pow(double(i) / double(sorted.size()), count);
+        expected += share * sorted[i];
+    }
+    return expected;
+}
+
 }  // namespace
 
 StepCost predict_step(const ViewCost& view, const Network& network, int ranks) {
@@ -42,7 +57,8 @@ StepCost predict_step(const ViewCost& view, const Network& network, int ranks) {
         cost.exchange_ms =
             exchange_ms(away * kOutBytes) + exchange_ms(away * back) + kGathers * (ranks - 1) * message_ms;
     }
-    cost.step_ms = view.milliseconds + cost.exchange_ms;
+    cost.slowest_ms = slowest_ms(view, ranks);
+    cost.step_ms = cost.slowest_ms + cost.exchange_ms;
     cost.views_per_second = ranks * 1000 / cost.step_ms;
     cost.efficiency = view.milliseconds / cost.step_ms;
     return cost;

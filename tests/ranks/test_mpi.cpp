@@ -97,10 +97,10 @@ TEST(RankBench, PredictsTheStepsOfAStatedScene) {
     const Outcome outcome =
         start(2, EWA_PROGRAM " bench --ranks --scene-splats 1M --visible 50 --view-time 80");
     expect_success(outcome);
-    for (const char* text :
-         {"2 ranks: rank 0 (", "\n      67108864 ",
-          "1000000 splats, of which a view sees 50 %; 80.0 ms a view",
-          "\n     1         0.00         0.00       80.0      12.50       100 %\n     2        21.00 "})
+    for (const char* text : {"2 ranks: rank 0 (", "\n      67108864 ",
+                             "1000000 splats, of which a view sees 50 %; 80.0 ms a view",
+                             "\n     1         0.00         80.0         0.00       80.0      12.50       "
+                             "100 %\n     2        21.00 "})
         EXPECT_NE(outcome.out.find(text), std::string::npos) << text << " not in:\n" << outcome.out;
     EXPECT_EQ(outcome.out.find(" ranks: ", outcome.out.find(" ranks: ") + 1), std::string::npos)
         << outcome.out;
@@ -114,7 +114,7 @@ TEST(RankBench, MeasuresAView) {
     expect_success(outcome);
     EXPECT_NE(outcome.out.find(" splats, of which a view sees "), std::string::npos) << outcome.out;
     EXPECT_EQ(outcome.out.find("1000000 splats"), std::string::npos) << outcome.out;
-    for (const char* text : {"\"gather_ms\"", "\"transfers\"", "\"predicted\""})
+    for (const char* text : {"\"gather_ms\"", "\"transfers\"", "\"predicted\"", "\"slowest_ms\""})
         EXPECT_NE(ewa::test::file_bytes(json).find(text), std::string::npos) << text;
 }
 

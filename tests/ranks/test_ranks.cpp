@@ -136,6 +136,17 @@ TEST(Scaling, FollowsFromBytesAndMessages) {
     EXPECT_NEAR(predict_step(absolute, kNetwork, 3).exchange_ms, 35 + 2, 1e-9);
 }
 
+TEST(Scaling, AStepWaitsForTheSlowestOfItsViews) {
+    const ViewCost view{.milliseconds = 25, .views = {40, 10, 30, 20}};
+    EXPECT_DOUBLE_EQ(predict_step(view, kNetwork, 1).slowest_ms, 25);
+    // The slowest of two is 10, 20, 30 or 40 ms in 1, 3, 5 and 7 cases of 16.
+    const StepCost two = predict_step(view, kNetwork, 2);
+    EXPECT_DOUBLE_EQ(two.slowest_ms, 31.25);
+    EXPECT_DOUBLE_EQ(two.step_ms, 31.25 + two.exchange_ms);
+    EXPECT_DOUBLE_EQ(two.efficiency, 25 / two.step_ms);
+    EXPECT_NEAR(predict_step(view, kNetwork, 1000).slowest_ms, 40, 1e-9);
+}
+
 TEST(Scaling, CountsAMessageForEachFurtherRank) {
     ViewCost view{.splats = 1e6, .visible = 0, .milliseconds = 50};
     EXPECT_NEAR(predict_step(view, kNetwork, 3).exchange_ms, 2 * 2 + 4 * 2, 1e-9);
