@@ -63,6 +63,7 @@ class TrainObserver::Served {
             }
             if (server_->take_save()) save();
             if (!server_->paused() || interrupted()) return;
+            trainer.keep_waiting();
             std::this_thread::sleep_for(kPausedLook);
         }
     }
@@ -112,7 +113,7 @@ void TrainObserver::on_start(const RunStart& start) {
     if (memory.total() > start.device.memory_bytes)
         on_note(
             fmt::format("the device has {}: if memory runs out, a smaller --max-splats or --image-cache, or "
-                        "a larger --downscale, takes less",
+                        "a larger --downscale, takes less; --device-memory keeps splats in host memory",
                         core::bytes_text(start.device.memory_bytes)));
     watch_.emplace();
 }

@@ -15,6 +15,7 @@
 #include "core/outputs.h"
 #include "ewa/error.h"
 #include "ewa/renderer.h"
+#include "gpu/device.h"
 #include "pipeline/model.h"
 #include "report/pictures.h"
 #include "report/step_time.h"
@@ -157,7 +158,7 @@ class Run {
     bool draws_with_ranks() const { return options().ranks->size() > 1; }
     train::Drawing drawing(const Gaussians& gaussians, const Trainer* trainer) const;
     void evaluate_result(const train::Drawing& drawing, const Gaussians& gaussians,
-                         const std::vector<Exposure>& exposures);
+                         const std::vector<Exposure>& exposures, const std::function<void()>& before_frame);
     void add_view(int index, const train::RenderedView& view, const EvalFrame& figures);
     void add_full_size(const train::Drawing& drawing, const std::vector<Exposure>& exposures);
     void add_section(const Gaussians& gaussians);
@@ -396,8 +397,8 @@ void Run::train(Trainer& trainer) {
             if (last_.step < steps) after_step(trainer, before);  // finish() does so after the last step
         }
     } catch (const InputError&) {
-        // An image that vanished is found before its step begins, so the state is consistent.
-        save_checkpoint(trainer);
+        // An image that vanished is found before the step changes the splats. Other ranks may be in the middle of it.
+        if (options().ranks->size() == 1) save_checkpoint(trainer);
         throw;
     }
 }
@@ -426,21 +427,21 @@ train::Drawing Run::drawing(const Gaussians& gaussians, const Trainer* trainer) 
 }
 
 void Run::evaluate_result(const train::Drawing& drawing, const Gaussians& gaussians,
-                          const std::vector<Exposure>& exposures) {
+                          const std::vector<Exposure>& exposures, const std::function<void()>& before_frame) {
     observer_.on_note("evaluating");
     const bool held_out = !input_.split.test.empty();
     // The report shows the held-out views, or the training views without a test set.
     const auto evaluated = [&](const std::vector<int>& frames, const std::vector<Exposure>& of_frames,
                                bool shown) {
         return train::evaluate_views(
-            drawing, input_.dataset, frames, options().train.render, of_frames, [this] { stop_if_asked(); },
+            drawing, input_.dataset, frames, options().train.render, of_frames, before_frame,
             [&](size_t i, const train::RenderedView& view, const EvalFrame& figures) {
                 if (shown) add_view(frames[i], view, figures);
             });
     };
     if (held_out) {
         if (refines()) {
-            align_test_cameras(gaussians, [this] { stop_if_asked(); });
+            align_test_cameras(gaussians, before_frame);
             report_.summary.cameras->test_aligned = true;
             save_cameras(true);
         }
@@ -521,20 +522,28 @@ void Run::finish(std::unique_ptr<Trainer> trainer) {
     report_.summary.ranks = trainer->rank_figures();
     report_.summary.chunks = trainer->chunk_figures();
     if (!draws_with_ranks()) trainer.reset();  // the renderer takes its memory
+    if (options().train.device_memory_bytes > 0)
+        device_->limit_memory(options().train.device_memory_bytes, {});
     observer_.on_saved(last_);
 
     const train::Drawing draw = drawing(gaussians, trainer.get());
-    const bool evaluated = done_unless_stopped([&] { evaluate_result(draw, gaussians, exposures); });
+    const auto before_frame = [&] {
+        stop_if_asked();
+        if (trainer) trainer->keep_waiting();
+    };
+    const bool evaluated =
+        done_unless_stopped([&] { evaluate_result(draw, gaussians, exposures, before_frame); });
     if (last_.step > 0) log(last_evaluation_);
     observer_.on_evaluated(last_, gaussians);
     report_.held_out = !input_.split.test.empty();
     const auto fill_report = [&] {
         add_full_size(draw, exposures);
+        trainer.reset();  // ends the other ranks
         add_section(gaussians);
     };
     if (!evaluated) report_.views.clear();
     report_.summary.interrupted = !evaluated || !done_unless_stopped(fill_report);
-    trainer.reset();  // ends the other ranks
+    trainer.reset();
     fill_summary();
     folder_.save_report(report_);
 }
