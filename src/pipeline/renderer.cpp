@@ -98,6 +98,7 @@ struct Renderer::State {
 };
 
 void Renderer::State::divide(const Gaussians& gaussians, uint64_t part_bytes) {
+    model = {};  // free the memory of an earlier scene
     const uint64_t block = parameter_bytes(1, gaussians.sh_degree);
     const size_t most = size_t(std::max<uint64_t>(part_bytes / block, 1)) * shared::PARAM_BLOCK;
     for (size_t first = 0; first < gaussians.size(); first += most) {

@@ -121,7 +121,9 @@ void Chunks::changed() {
 }
 
 gpu::Buffer Chunks::take_places() {
-    return std::move(chunks_[size_t(in_use_)].places);
+    Chunk& chunk = chunks_[size_t(in_use_)];
+    chunk.kept[Array::places] = {};
+    return std::move(chunk.places);
 }
 
 void Chunks::keep_places(gpu::Buffer listed) {

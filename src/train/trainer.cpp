@@ -80,6 +80,25 @@ void check_bands(const TrainOptions& options, const passes::KernelConfig& config
     }
 }
 
+/// Limits a device's memory for as long as the trainer is made, or longer if that succeeds.
+class LimitedMemory {
+  public:
+    LimitedMemory(std::shared_ptr<gpu::Device> device, uint64_t bytes)
+        : device_(bytes > 0 ? std::move(device) : nullptr) {
+        if (device_) device_->limit_memory(bytes, {});
+    }
+    ~LimitedMemory() {
+        if (device_ && !kept_) device_->limit_memory(0, {});
+    }
+    LimitedMemory(const LimitedMemory&) = delete;
+    LimitedMemory& operator=(const LimitedMemory&) = delete;
+    void keep() { kept_ = true; }
+
+  private:
+    std::shared_ptr<gpu::Device> device_;
+    bool kept_ = false;
+};
+
 /// A rank's part of the first splats.
 Gaussians share_of(Gaussians start, const Ranks& ranks) {
     if (ranks.size() == 1) return start;
@@ -151,14 +170,19 @@ Trainer::Trainer(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
     const double extent = extent_for(dataset, train_frames, start);
     TrainOptions resolved = resolve(options, dataset);
     const int chunks = train::chunks_for(*device, dataset, train_frames, start, resolved);
-    device->limit_memory(resolved.device_memory_bytes, {});
+    if (resolved.device_memory_bytes > 0 && device->memory_limit() > 0)
+        throw InputError(
+            "another training has limited this device's memory: a device takes one such training");
+    LimitedMemory limited(device, resolved.device_memory_bytes);
     if (chunks > 1) resolved.image_cache_bytes = train::limited_cache(resolved);
     state_ = std::make_unique<State>(std::move(device), dataset, train_frames,
                                      prepared(std::move(start), options.render.kernel), extent, resolved,
                                      std::move(ranks), chunks);
+    limited.keep();
 }
 
 Trainer::~Trainer() {
+    if (state_ && state_->options.device_memory_bytes > 0) state_->device->limit_memory(0, {});
     // After an exception the other ranks may be in the middle of something else.
     if (!state_ || state_->ranks->rank() != 0 || std::uncaught_exceptions() > 0) return;
     try {

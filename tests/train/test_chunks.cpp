@@ -230,18 +230,51 @@ TEST(Chunks, ALimitThatNoStepFitsInIsOneError) {
 
 TEST(Chunks, AMuchLargerLimitChangesNothing) {
     const TrainOptions options = busy_chunks(Strategy::adc, 1);
-    EXPECT_FALSE(train_within(options, 1024 * kChunkMiB, 2000, 2).chunks);
+    const ChunksTrained limited = train_within(options, 1024 * kChunkMiB, 2000, 2);
+    EXPECT_FALSE(limited.chunks);
+    expect_same_training(limited, train_within(options, 0, 2000, 2));
 }
 
 TEST(Chunks, ExcludeWhatTheyCannotTrain) {
-    const auto refused = [](auto change) {
+    const auto refused = [](const std::string& option, auto change) {
         TrainOptions options = busy_chunks(Strategy::adc, 1);
         change(options);
-        EXPECT_THROW(train_within(options, kChunkMiB, 2000, 1), InputError);
+        try {
+            train_within(options, kChunkMiB, 2000, 1);
+            ADD_FAILURE() << option;
+        } catch (const InputError& error) {
+            const std::string text = error.what();
+            EXPECT_NE(text.find(option), std::string::npos) << text;
+            EXPECT_NE(text.find("--device-memory"), std::string::npos) << text;
+        }
     };
-    refused([](TrainOptions& o) { o.exposure = true; });
-    refused([](TrainOptions& o) { o.refine_poses = true; });
-    refused([](TrainOptions& o) { o.render.points = true; });
+    refused("--exposure", [](TrainOptions& o) { o.exposure = true; });
+    refused("--refine-poses", [](TrainOptions& o) { o.refine_poses = true; });
+    refused("--points", [](TrainOptions& o) { o.render.points = true; });
+    refused("--bands", [](TrainOptions& o) { o.bands = 2; });
+}
+
+/// The limit is that of one training, and ends with it.
+TEST(Chunks, ADeviceTakesOneLimitedTraining) {
+    const auto device = open_test_device(false);
+    const Dataset& dataset = tall_capture().dataset;
+    TrainOptions options = busy_chunks(Strategy::adc, 1);
+    options.device_memory_bytes = 3 * kChunkMiB;
+    {
+        Trainer first(device, dataset, all_frames(dataset), tall_scene(20000), options);
+        EXPECT_THROW(Trainer(device, dataset, all_frames(dataset), tall_scene(20000), options), InputError);
+        // The one that failed has left the limit to the first.
+        while (first.steps_done() < 4) first.step();
+        EXPECT_LE(peak_device_bytes(*device), 3 * kChunkMiB);
+    }
+    EXPECT_EQ(device->memory_limit(), 0u);
+    Trainer second(device, dataset, all_frames(dataset), tall_scene(20000), options);
+    EXPECT_EQ(device->memory_limit(), 3 * kChunkMiB);
+}
+
+TEST(Chunks, AFewSplatsAreNotDivided) {
+    TrainOptions options = busy_chunks(Strategy::none, 1);
+    EXPECT_FALSE(train_within(options, 16 * kChunkMiB, 5, 2).chunks);
 }
 
 /// A chunk's model of some splats whose parameters are all `value`.
