@@ -116,7 +116,7 @@ Gaussians slice_of(const Gaussians& all, size_t first, size_t count) {
 void check_share(uint32_t all, int ranks) {
     if (ranks > 1 && (uint64_t(all) + shared::PARAM_BLOCK - 1) / shared::PARAM_BLOCK < uint64_t(ranks))
         throw RunError(std::to_string(all) + " splats are too few for " + std::to_string(ranks) +
-                       " ranks: each needs " + std::to_string(shared::PARAM_BLOCK));
+                       " parts: each needs " + std::to_string(shared::PARAM_BLOCK));
 }
 
 uint64_t sum_over(Ranks& ranks, uint64_t own) {

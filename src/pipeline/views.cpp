@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <utility>
 
+#include "ewa/error.h"
 #include "passes/passes.h"
 #include "pipeline/adam.h"
 #include "pipeline/sorting.h"
@@ -66,6 +68,10 @@ uint64_t ViewBuffers::most_bytes(const Plan& plan, uint64_t splats, uint64_t vie
 
 void ViewBuffers::reserve(gpu::Device& device, uint32_t splats, uint32_t views, uint32_t bands,
                           uint32_t records) {
+    if (uint64_t(views) * bands * splats >= shared::NOT_LISTED)
+        throw RunError(std::to_string(splats) + " splats are too many for " + std::to_string(views) +
+                       " views a step in " + std::to_string(bands) +
+                       " bands: take a smaller --batch or --bands");
     make_room(device, cameras, "cameras of a batch", sizeof(shared::CameraBlock) * uint64_t(views));
     make_room(device, places, "places", 4 * uint64_t(views) * bands * splats);
     make_room(device, visible, "visible records", kRecordBytes * records, gpu::Texel::rgba32f);

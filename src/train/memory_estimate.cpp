@@ -255,7 +255,7 @@ int chunks_for(const gpu::Device& device, const Dataset& dataset, const std::vec
     constexpr uint64_t kMost = 256;
     constexpr uint64_t kLeastSplats = 64;  // of the start, in a chunk
     const uint64_t limit = options.device_memory_bytes;
-    if (limit == 0) return 1;
+    if (limit == 0 || start.size() < 2 * kLeastSplats) return 1;
     const MemoryEstimate whole = estimate_memory(device, dataset, frames, start, options);
     // The frame's part is a guess that some trainings exceed by half.
     if (whole.total() + whole.frame <= limit) return 1;

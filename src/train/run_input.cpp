@@ -320,6 +320,8 @@ void check_options(const RunOptions& options) {
         (train.absolute_gradients || train.revised_opacity))
         throw InputError("--absgrad and --revised-opacity are options of --strategy adc");
     train::check_training(train, options.ranks->size());
+    if (train.device_memory_bytes > 0 && options.report_section)
+        throw InputError("--device-memory and --accuracy exclude each other");
     if (train.render.points && options.init_opacity != RunOptions().init_opacity)
         throw InputError("--init-opacity is for splats with an opacity, not for --points");
     if (!train.render.points && train.render.nearest != RenderOptions().nearest)

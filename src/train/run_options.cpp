@@ -196,7 +196,10 @@ RunOption device_memory_option() {
                                      kDoesNotDecide, member, [](std::string text) {
                                          const std::string problem = core::settle_number(text, 0.0, 65536.0);
                                          if (!problem.empty()) throw InputError(problem);
-                                         return uint64_t(core::parse_number(text).value() * kGib);
+                                         const double bytes = core::parse_number(text).value() * kGib;
+                                         if (bytes > 0 && bytes < double(uint64_t(1) << 20))
+                                             throw InputError("not 0, or at least 0.001 GiB");
+                                         return uint64_t(bytes);
                                      });
     option.get = [](const RunOptions& options) {
         const uint64_t bytes = options.train.device_memory_bytes;

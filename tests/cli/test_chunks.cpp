@@ -67,6 +67,17 @@ TEST_F(DeviceMemory, GoesOnAfterCtrlCWithAnotherLimit) {
     EXPECT_EQ(read_file(folder / "o/splats.ply"), read_file(folder / "whole/splats.ply"));
 }
 
+TEST_F(DeviceMemory, RefusesWhatItCannotDo) {
+    const Outcome accuracy = train("o", {"--device-memory", "0.003", "--accuracy"});
+    EXPECT_EQ(accuracy.status, 2);
+    EXPECT_NE(accuracy.err.find("--device-memory and --accuracy exclude each other"), std::string::npos)
+        << accuracy.err;
+    const Outcome tiny = train("o", {"--device-memory", "1e-9"});
+    EXPECT_EQ(tiny.status, 2);
+    EXPECT_NE(tiny.err.find("0.001 GiB"), std::string::npos) << tiny.err;
+    EXPECT_FALSE(fs::exists(folder / "o"));
+}
+
 /// At any moment, also while chunks wait for each other.
 TEST_F(DeviceMemory, AFaultEndsItWithOneLine) {
     for (const auto& [variable, text] : {std::pair{"EWA_FAULT_SUBMITS", "lost"},
@@ -86,8 +97,8 @@ TEST_F(DeviceMemory, AFaultEndsItWithOneLine) {
 }
 
 TEST_F(DeviceMemory, TooLittleIsOneLine) {
-    expect_failure(train("o", {"--device-memory", "0.0002"}), 1,
-                   "--device-memory 0.0002 is too little: this needs");
+    expect_failure(train("o", {"--device-memory", "0.001"}), 1,
+                   "--device-memory 0.001 is too little: this needs 0.00");
     expect_failure(train("o", {"--device-memory", "-1"}), 2, "'-1' is not a number from 0 to 65536");
     expect_failure(train("o", {"--device-memory", "1", "--exposure"}), 2,
                    "--device-memory and --exposure exclude each other");
