@@ -124,4 +124,36 @@ inline TrainOptions quick(int steps) {
     return options;
 }
 
+/// Options with which a run densifies, resets and relocates within some tens of steps.
+inline TrainOptions busy(Strategy strategy, int batch) {
+    TrainOptions options;
+    options.steps = 60;
+    options.batch = batch;
+    options.strategy = strategy;
+    options.seed = 3;
+    options.sh_degree = 1;
+    options.max_splats = 900;
+    options.grow_gradient = 1e-5;
+    options.refine_start = 10;
+    options.refine_every = 20;
+    options.refine_stop = 30000;
+    options.relocate_stop = 30000;
+    options.dead_opacity = 0.09;
+    options.growth = 1.2;
+    options.opacity_reset_every = 50;
+    options.means_rate = 3e-3;
+    options.opacity_rate = 0.3;
+    return options;
+}
+
+/// Seven small images of 300 splats, made once.
+inline const Synthetic& seven_views() {
+    static const Synthetic* const made = [] {
+        auto* data = new Synthetic;
+        make_synthetic(*data, 300, 7, 64, 48, 11);
+        return data;
+    }();
+    return *made;
+}
+
 }  // namespace ewa::test

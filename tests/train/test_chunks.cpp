@@ -21,15 +21,6 @@ namespace {
 
 constexpr uint64_t kChunkMiB = uint64_t(1) << 20;
 
-const Synthetic& tall_capture() {
-    static const Synthetic* const made = [] {
-        auto* data = new Synthetic;
-        make_synthetic(*data, 300, 7, 64, 48, 11);
-        return data;
-    }();
-    return *made;
-}
-
 /// Splats of which the cameras see one in twenty: the others are far above and below.
 Gaussians tall_scene(size_t splats) {
     Random random(5);
@@ -51,25 +42,15 @@ Gaussians tall_scene(size_t splats) {
 
 /// Densifies, resets and relocates within some tens of steps.
 TrainOptions busy_chunks(Strategy strategy, int batch) {
-    TrainOptions options;
+    TrainOptions options = busy(strategy, batch);
     options.steps = 36;
-    options.batch = batch;
-    options.strategy = strategy;
-    options.seed = 3;
     options.sh_degree = 3;
     options.max_splats = 28000;
-    options.grow_gradient = 1e-5;
-    options.refine_start = 10;
-    options.refine_every = 20;
-    options.refine_stop = 30000;
-    options.relocate_stop = 30000;
     options.dead_opacity = 0.06;
-    options.growth = 1.2;
     options.opacity_reset_every = 25;
-    options.means_rate = 3e-3;
     options.noise_rate = 2e4;  // as much as usual: the others stay out of sight
     // With mcmc the opacity of what no camera sees falls. It should not all die and move to where it is seen.
-    options.opacity_rate = strategy == Strategy::mcmc ? 0.02 : 0.3;
+    if (strategy == Strategy::mcmc) options.opacity_rate = 0.02;
     return options;
 }
 
@@ -85,7 +66,7 @@ ChunksTrained train_within(TrainOptions options, uint64_t limit, size_t splats, 
                            const TrainerState* resume = nullptr) {
     options.device_memory_bytes = limit;
     const auto device = open_test_device(false);
-    Trainer trainer(device, tall_capture().dataset, all_frames(tall_capture().dataset), tall_scene(splats),
+    Trainer trainer(device, seven_views().dataset, all_frames(seven_views().dataset), tall_scene(splats),
                     options);
     if (resume) trainer.restore(*resume);
     while (trainer.steps_done() < until) trainer.step();
@@ -191,7 +172,7 @@ TEST(Chunks, CopiesThroughStagingBuffersKeepWithinTheLimit) {
     const auto device = open_test_device(false);
     device->limit_host_access(gpu::HostAccess::none);
     options.device_memory_bytes = 3 * kChunkMiB;
-    Trainer trainer(device, tall_capture().dataset, all_frames(tall_capture().dataset), tall_scene(20000),
+    Trainer trainer(device, seven_views().dataset, all_frames(seven_views().dataset), tall_scene(20000),
                     options);
     while (trainer.steps_done() < 16) trainer.step();
     EXPECT_LE(peak_device_bytes(*device), 3 * kChunkMiB);
@@ -200,7 +181,7 @@ TEST(Chunks, CopiesThroughStagingBuffersKeepWithinTheLimit) {
 
 TEST(Chunks, AScenesPicturesAreDrawnWithinTheLimit) {
     const Gaussians scene = tall_scene(28000);
-    const Dataset& dataset = tall_capture().dataset;
+    const Dataset& dataset = seven_views().dataset;
     const auto free = open_test_device(false), limited = open_test_device(false);
     limited->limit_memory(3 * kChunkMiB, {});
     Renderer whole(free, scene, {}), parts(limited, scene, {});
@@ -257,7 +238,7 @@ TEST(Chunks, ExcludeWhatTheyCannotTrain) {
 /// The limit is that of one training, and ends with it.
 TEST(Chunks, ADeviceTakesOneLimitedTraining) {
     const auto device = open_test_device(false);
-    const Dataset& dataset = tall_capture().dataset;
+    const Dataset& dataset = seven_views().dataset;
     TrainOptions options = busy_chunks(Strategy::adc, 1);
     options.device_memory_bytes = 3 * kChunkMiB;
     {

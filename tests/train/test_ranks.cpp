@@ -22,39 +22,8 @@
 namespace ewa::test {
 namespace {
 
-/// Densifies, resets and relocates within some tens of steps.
-TrainOptions busy(Strategy strategy, int batch) {
-    TrainOptions options;
-    options.steps = 60;
-    options.batch = batch;
-    options.strategy = strategy;
-    options.seed = 3;
-    options.sh_degree = 1;
-    options.max_splats = 900;
-    options.grow_gradient = 1e-5;
-    options.refine_start = 10;
-    options.refine_every = 20;
-    options.refine_stop = 30000;
-    options.relocate_stop = 30000;
-    options.dead_opacity = 0.09;
-    options.growth = 1.2;
-    options.opacity_reset_every = 50;
-    options.means_rate = 3e-3;
-    options.opacity_rate = 0.3;
-    return options;
-}
-
-const Synthetic& capture() {
-    static const Synthetic* const made = [] {
-        auto* data = new Synthetic;
-        make_synthetic(*data, 300, 7, 64, 48, 11);
-        return data;
-    }();
-    return *made;
-}
-
 Gaussians start() {
-    Gaussians splats = capture().truth;
+    Gaussians splats = seven_views().truth;
     for (size_t i = 0; i < splats.size(); ++i) {
         splats.means[3 * i] += 0.05f;
         splats.opacity_logits[i] = i % 5 == 0 ? -3.0f : -1.0f;
@@ -83,7 +52,7 @@ const Dataset& masked_capture() {
 
 /// The state after training by so many ranks.
 TrainerState trained(const TrainOptions& options, int ranks, int until,
-                     const Dataset& dataset = capture().dataset) {
+                     const Dataset& dataset = seven_views().dataset) {
     TrainerState result;
     run_ranks(ranks, [&](std::shared_ptr<Ranks> group) {
         const auto own = open_test_device(false);
@@ -189,7 +158,8 @@ std::string checkpoint_of(const TrainOptions& options, int ranks, int until,
                           const std::filesystem::path& path, const std::filesystem::path& resume = {}) {
     run_ranks(ranks, [&](std::shared_ptr<Ranks> group) {
         const auto own = open_test_device(false);
-        Trainer trainer(own, capture().dataset, all_frames(capture().dataset), start(), options, group);
+        Trainer trainer(own, seven_views().dataset, all_frames(seven_views().dataset), start(), options,
+                        group);
         if (group->rank() != 0) return trainer.follow();
         if (!resume.empty()) {
             train::CheckpointReader reader(resume);
@@ -268,7 +238,7 @@ TEST(Bands, OfMaskedImagesHaveTheBytesOfOneRank) {
 
 /// The first step sees the same splats. Its loss and error are those of the whole view, but for rounding.
 TEST(Bands, HaveTheLossAndTheErrorOfTheirView) {
-    for (const Dataset* dataset : {&capture().dataset, &masked_capture()})
+    for (const Dataset* dataset : {&seven_views().dataset, &masked_capture()})
         for (const int batch : {1, 3}) {
             TrainOptions options = busy(Strategy::none, batch);
             const StepReport whole = trained(options, 1, 1, *dataset).report;
@@ -296,7 +266,8 @@ TEST(Ranks, EachHoldsItsShareOfTheState) {
         uint64_t state = 0;
         run_ranks(ranks, [&](std::shared_ptr<Ranks> group) {
             const auto own = open_test_device(false);
-            Trainer trainer(own, capture().dataset, all_frames(capture().dataset), start(), options, group);
+            Trainer trainer(own, seven_views().dataset, all_frames(seven_views().dataset), start(), options,
+                            group);
             if (group->rank() != 0) return trainer.follow();
             while (trainer.steps_done() < 30) trainer.step();
             figures = trainer.rank_figures();
@@ -322,11 +293,12 @@ TEST(Ranks, DrawThePicturesOfARenderer) {
         const TrainOptions options = busy(Strategy::adc, 2);
         run_ranks(ranks, [&](std::shared_ptr<Ranks> group) {
             const auto own = open_test_device(false);
-            Trainer trainer(own, capture().dataset, all_frames(capture().dataset), start(), options, group);
+            Trainer trainer(own, seven_views().dataset, all_frames(seven_views().dataset), start(), options,
+                            group);
             if (group->rank() != 0) return trainer.follow();
             while (trainer.steps_done() < 30) trainer.step();
             std::vector<Camera> cameras;
-            for (const Frame& frame : capture().dataset.frames) cameras.push_back(frame.camera);
+            for (const Frame& frame : seven_views().dataset.frames) cameras.push_back(frame.camera);
             // One that sees nothing, between others.
             cameras[4].rotation = glm::dmat3(-1, 0, 0, 0, 1, 0, 0, 0, -1) * cameras[4].rotation;
             cameras[4].translation = glm::dvec3(0, 0, -1e4);
