@@ -231,6 +231,8 @@ Gaussians Trainer::join_gaussians() const {
 }
 
 std::vector<Image> Trainer::render(std::span<const Camera> cameras) const {
+    if (!state_->batch)
+        throw InputError("this trainer does not draw pictures: a Renderer of its splats does");
     state_->call(Call::render);
     return join_renders(cameras);
 }

@@ -246,6 +246,7 @@ TEST(Chunks, ADeviceTakesOneLimitedTraining) {
         EXPECT_THROW(Trainer(device, dataset, all_frames(dataset), tall_scene(20000), options), InputError);
         // The one that failed has left the limit to the first.
         while (first.steps_done() < 4) first.step();
+        EXPECT_THROW(first.render({}), InputError);
         EXPECT_LE(peak_device_bytes(*device), 3 * kChunkMiB);
     }
     EXPECT_EQ(device->memory_limit(), 0u);
