@@ -51,9 +51,9 @@ struct TrainOptions {
     double sh0_rate = 2.5e-3, sh_rest_rate = 1.25e-4;
     double opacity_rate = 0.025;
     double scale_rate = 5e-3, quaternion_rate = 1e-3;
-    /// Multiplies the rates of means and of SH above degree 0 in short runs: by this at 0 steps, linearly down
-    /// to 1 at 30,000 steps. Not used with mcmc, whose noise depends on the means' rate.
-    double short_run_gain = 2;
+    /// A run of fewer than 30,000 steps multiplies these rates by (30,000 / steps)^short_run_power at its start, and by the
+    /// square root of that at its end (src/train/schedule.h). 0: the rates of a full run.
+    double short_run_power = 0.5;
 
     bool exposure = false;  // learns an exposure for each training image, from the identity
     double exposure_rate = 0.01, exposure_rate_final = 0.001;

@@ -54,7 +54,7 @@ const std::vector<Field>& fields() {
         {"opacity_rate", &O::opacity_rate},
         {"scale_rate", &O::scale_rate},
         {"quaternion_rate", &O::quaternion_rate},
-        {"short_run_gain", &O::short_run_gain},
+        {"short_run_power", &O::short_run_power},
         {"exposure", &O::exposure},
         {"exposure_rate", &O::exposure_rate},
         {"exposure_rate_final", &O::exposure_rate_final},

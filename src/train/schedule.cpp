@@ -13,6 +13,8 @@ namespace {
 constexpr double kFullRun = 30000;
 // Lower limits of intervals, in steps.
 constexpr int kLeastRefineEvery = 50;    // a small capture shows each of its images about once
+constexpr int kShortRefineEvery = 20;    // of a run that cannot show each of its images before it refines
+constexpr int kLeastRefinements = 6;     // of adc, unless they would last for more than two thirds of the run
 constexpr int kLeastRelocateEvery = 25;  // a relocated splat has time to fade or to stay
 constexpr int kLeastResetEvery = 1000;
 constexpr int kLeastShEvery = 50;
@@ -90,6 +92,14 @@ int Schedule::halvings_at(int step) const {
     return std::clamp(halvings - (step - 1) / resolution_every, 0, most_halvings);
 }
 
+double Schedule::gain(int step) const {
+    return std::pow(shortness, power * (1 - 0.5 * double(step) / steps));
+}
+
+double Schedule::opacity_gain(int step) const {
+    return std::pow(shortness, 0.6 * power * (1 - double(step) / steps));
+}
+
 double Schedule::mean_rate(int step, double extent) const {
     return extent * decayed(means_rate, means_rate_final, double(step) / steps);
 }
@@ -118,9 +128,14 @@ Schedule schedule_for(const TrainOptions& options) {
     };
     Schedule s;
     s.steps = options.steps;
-    s.refine_every = scaled(options.refine_every, std::min(options.refine_every, kLeastRefineEvery));
-    s.refine_start = scaled(options.refine_start, std::min(options.refine_start, 2 * kLeastRefineEvery));
-    s.refine_stop = scaled(options.refine_stop, 1);
+    const int least_every = std::clamp(options.steps / 10, kShortRefineEvery, kLeastRefineEvery);
+    s.refine_every = scaled(options.refine_every, std::min(options.refine_every, least_every));
+    s.refine_start = scaled(options.refine_start,
+                            std::min(options.refine_start, std::clamp(options.steps / 10, kShortRefineEvery,
+                                                                      2 * kLeastRefineEvery)));
+    s.refine_stop = std::max(scaled(options.refine_stop, 1),
+                             std::min({s.refine_start + kLeastRefinements * s.refine_every,
+                                       options.steps * 2 / 3, options.refine_stop}));
     s.relocate_stop = scaled(options.relocate_stop, 1);
     s.relocate_every = scaled(options.refine_every, std::min(options.refine_every, kLeastRelocateEvery));
     s.growth = std::pow(options.growth, std::max(1.0, s.relocate_every / (share * options.refine_every)));
@@ -134,10 +149,10 @@ Schedule schedule_for(const TrainOptions& options) {
     s.least_degree = options.least_sh_degree;
     s.most_halvings = options.most_halvings;
     s.resolution_every = scaled(options.resolution_every, 1);
-    const double gain = options.strategy == Strategy::mcmc ? 1 : share + (1 - share) * options.short_run_gain;
-    s.means_rate = gain * options.means_rate;
-    s.means_rate_final = gain * options.means_rate_final;
-    s.sh_rest_rate = gain * options.sh_rest_rate;
+    s.shortness = 1 / share;
+    s.power = options.short_run_power;
+    s.means_rate = options.means_rate;
+    s.means_rate_final = options.means_rate_final;
     s.exposures_rate = options.exposure_rate;
     s.exposures_rate_final = options.exposure_rate_final;
     s.poses_rate = options.pose_rate;

@@ -9,8 +9,8 @@
 // steps, and opaque clones never separate: they get the same gradient. A shorter run therefore starts clones apart,
 // the more the shorter it is.
 //
-// The learning rates of 3DGS are those of 30,000 steps. In a shorter run the means do not reach their positions and
-// view-dependent colour does not develop. Both therefore learn faster, the more the shorter the run is.
+// The learning rates of 3DGS are those of 30,000 steps. A step of Adam moves a parameter by about its rate, whatever the
+// gradient is. So parameters of a short run do not come as far as they have to. A shorter run has higher rates: see gain.
 #pragma once
 #include <cstdint>
 
@@ -30,8 +30,9 @@ struct Schedule {
     int sh_degree = 0;  // the highest
     int halvings = 0, resolution_every = 0;
     int least_degree = 0, most_halvings = 64;     // what the run has reached before
-    double means_rate = 0, means_rate_final = 0;  // per unit of scene extent
-    double sh_rest_rate = 0;                      // of SH above degree 0
+    double means_rate = 0, means_rate_final = 0;  // per unit of scene extent, of a full run
+    double shortness = 1;                         // 30,000 over the steps, at least 1
+    double power = 0;                             // TrainOptions::short_run_power
     double exposures_rate = 0, exposures_rate_final = 0;
     double poses_rate = 0, poses_rate_final = 0;
 
@@ -46,7 +47,12 @@ struct Schedule {
     int degree(int step) const;
     /// How many times the training images' sides are halved in this step (OpenSplat's resolution schedule).
     int halvings_at(int step) const;
-    /// Learning rate of the means: exponential from means_rate to means_rate_final over the run (Plenoxels'
+    /// Factor of the splats' learning rates in this step: shortness^power at the first step, falling exponentially to its
+    /// square root at the last.
+    double gain(int step) const;
+    /// The same of opacities, which need less: shortness^(0.6 power), falling to 1.
+    double opacity_gain(int step) const;
+    /// Learning rate of the means without gain: exponential from means_rate to means_rate_final over the run (Plenoxels'
     /// decay, as 3DGS uses it), times the scene extent.
     double mean_rate(int step, double extent) const;
     /// Learning rate of the exposures, with the same decay.

@@ -31,12 +31,13 @@ std::array<float, 3> random_background(int step, uint64_t seed) {
 
 Rates Trainer::State::rates(int step) const {
     Rates r;
-    r.mean = float(schedule.mean_rate(step, extent));
-    r.opacity = float(options.opacity_rate);
-    r.quaternion = float(options.quaternion_rate);
-    r.scale = float(options.scale_rate);
-    r.sh0 = float(options.sh0_rate);
-    r.sh_rest = float(schedule.sh_rest_rate);
+    const double gain = schedule.gain(step);
+    r.mean = float(gain * schedule.mean_rate(step, extent));
+    r.opacity = float(schedule.opacity_gain(step) * options.opacity_rate);
+    r.quaternion = float(gain * options.quaternion_rate);
+    r.scale = float(gain * options.scale_rate);
+    r.sh0 = float(gain * options.sh0_rate);
+    r.sh_rest = float(gain * options.sh_rest_rate);
     r.step = uint32_t(step);
     r.seed = options.seed;
     if (plan.regularised) {

@@ -27,7 +27,7 @@ TrainOptions training_options() {
     options.seed = 11;
     options.render.background = {0.1f, 0.1f, 0.2f};
     // Eighty steps have to be longer ones than 30,000.
-    options.short_run_gain = 1;
+    options.short_run_power = 0;
     options.means_rate = 3e-3;
     options.means_rate_final = 1e-3;
     options.sh0_rate = 0.02;

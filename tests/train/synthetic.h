@@ -115,8 +115,10 @@ inline TrainOptions quick(int steps) {
     options.strategy = Strategy::none;
     options.seed = 3;
     // Such a run has to take longer steps than a run of 30,000.
-    options.means_rate = 3e-3;
-    options.means_rate_final = 2e-4;
+    options.short_run_power = 0;
+    options.means_rate = 6e-3;
+    options.means_rate_final = 4e-4;
+    options.sh_rest_rate = 2.5e-4;
     options.sh0_rate = 0.05;
     options.opacity_rate = 0.05;
     options.scale_rate = 0.03;
@@ -141,6 +143,7 @@ inline TrainOptions busy(Strategy strategy, int batch) {
     options.dead_opacity = 0.09;
     options.growth = 1.2;
     options.opacity_reset_every = 50;
+    options.short_run_power = 0;
     options.means_rate = 3e-3;
     options.opacity_rate = 0.3;
     return options;

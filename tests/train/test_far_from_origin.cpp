@@ -33,6 +33,7 @@ Trained train(const Dataset& dataset) {
     options.steps = 200;
     options.sh_degree = 1;
     options.strategy = Strategy::none;
+    options.short_run_power = 0;
     options.means_rate = 3e-3;
     options.sh0_rate = 0.05;
     options.scale_rate = 0.03;

@@ -123,18 +123,29 @@ TEST(Schedule, RelocationsStopWhereMcmcsCodeStopsThem) {
     EXPECT_FALSE(tenth.relocates(2500));
 }
 
-TEST(Schedule, ShortRunsLearnMeansAndViewDependenceFaster) {
+TEST(Schedule, ShortRunsLearnFaster) {
     TrainOptions options;
-    options.strategy = Strategy::adc;
-    EXPECT_EQ(schedule_for(options).sh_rest_rate, options.sh_rest_rate);
-    EXPECT_DOUBLE_EQ(schedule_for(options).mean_rate(30000, 2), 2 * options.means_rate_final);
-    options.steps = 3000;
-    EXPECT_DOUBLE_EQ(schedule_for(options).sh_rest_rate, 1.9 * options.sh_rest_rate);
-    EXPECT_DOUBLE_EQ(schedule_for(options).mean_rate(3000, 2), 1.9 * 2 * options.means_rate_final);
-    EXPECT_NEAR(schedule_for(options).mean_rate(0, 1), 1.9 * options.means_rate, 1e-12);
-    options.strategy = Strategy::mcmc;
-    EXPECT_EQ(schedule_for(options).sh_rest_rate, options.sh_rest_rate);
-    EXPECT_DOUBLE_EQ(schedule_for(options).means_rate, options.means_rate);
+    for (const Strategy strategy : {Strategy::adc, Strategy::mcmc}) {
+        options.strategy = strategy;
+        options.steps = 30000;
+        for (const int step : {1, 15000, 30000}) {
+            EXPECT_EQ(schedule_for(options).gain(step), 1);
+            EXPECT_EQ(schedule_for(options).opacity_gain(step), 1);
+        }
+        options.steps = 300;
+        const Schedule s = schedule_for(options);
+        EXPECT_NEAR(s.gain(0), 10, 1e-12);
+        EXPECT_NEAR(s.gain(300), std::sqrt(10), 1e-12);
+        EXPECT_NEAR(s.gain(150), std::pow(10, 0.75), 1e-12);
+        EXPECT_NEAR(s.opacity_gain(0), std::pow(10, 0.6), 1e-12);
+        EXPECT_EQ(s.opacity_gain(300), 1);
+        // MCMC's noise has the rate of the means without the gain.
+        EXPECT_NEAR(s.mean_rate(0, 2), 2 * options.means_rate, 1e-12);
+        EXPECT_DOUBLE_EQ(s.mean_rate(300, 2), 2 * options.means_rate_final);
+    }
+    options.short_run_power = 0;
+    EXPECT_EQ(schedule_for(options).gain(1), 1);
+    EXPECT_EQ(schedule_for(options).opacity_gain(1), 1);
 }
 
 TEST(Schedule, TheResolutionDoublesEachTenthOfTheRun) {
