@@ -196,7 +196,7 @@ TEST_F(Typed, TooSmallImagesAndTooShortRunsAreTold) {
     EXPECT_FALSE(fs::exists(folder / "run"));
     const Outcome few = train({"--steps", "2"});
     EXPECT_NE(
-        few.out.find("\n2 steps are too few for adc to add or remove splats; it needs --steps 301 or more\n"),
+        few.out.find("\n2 steps are too few for adc to add or remove splats; it needs --steps 62 or more\n"),
         std::string::npos)
         << few.out;
     EXPECT_EQ(train({"--steps", "2", "--strategy", "none"}).out.find("too few"), std::string::npos);

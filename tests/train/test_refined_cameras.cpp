@@ -60,8 +60,8 @@ Errors errors_of(const std::vector<Camera>& cameras, const std::vector<Camera>& 
 TrainOptions refining(int steps) {
     TrainOptions options = quick(steps);
     options.short_run_power = 0;
-    options.means_rate = 1e-3;
-    options.means_rate_final = 1e-4;
+    options.means_rate = 2e-3;
+    options.means_rate_final = 2e-4;
     options.refine_poses = true;
     return options;
 }
