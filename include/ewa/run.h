@@ -23,6 +23,13 @@ struct RunScene {
     const RenderOptions& options;
 };
 
+/// Whether splats start between neighbouring points, too.
+enum class DenseStart {
+    automatic,  // in short runs of adc
+    on,
+    off
+};
+
 /// What a run is asked for. `ewa train --help` describes the options of the same names.
 struct RunOptions {
     std::filesystem::path dataset;  // folder or file, as load_dataset takes it
@@ -31,6 +38,7 @@ struct RunOptions {
     TrainOptions train{.strategy = Strategy::automatic, .sh_degree = kAutomaticShDegree};
     std::string init =
         "sfm";  // first splats: "sfm" (the dataset's points), "random", or a file of splats or points
+    DenseStart dense_start = DenseStart::automatic;  // of first splats that come from points
     double init_opacity = 0.1;   // of first splats that come from points or at random; above 0, below 1
     double init_scale = 1;       // factor of their scales, which are the distance to their neighbours
     std::string frames = "all";  // or a list, as scene::frames_named reads it: other frames are not used

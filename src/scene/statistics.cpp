@@ -17,6 +17,8 @@ constexpr size_t kNeighbors = 3;
 struct Places {
     std::vector<glm::dvec3> positions;
     std::vector<size_t> counts;
+    std::vector<size_t> first;     // the lowest index of a point at each
+    std::vector<size_t> place_of;  // of each point
 
     size_t kdtree_get_point_count() const { return positions.size(); }
     double kdtree_get_pt(size_t i, size_t axis) const { return positions[i][int(axis)]; }
@@ -31,6 +33,26 @@ using Tree =
 
 bool before(const glm::dvec3& a, const glm::dvec3& b) {
     return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
+}
+
+Places places_of(const std::vector<glm::dvec3>& positions) {
+    std::vector<size_t> order(positions.size());
+    std::iota(order.begin(), order.end(), size_t(0));
+    std::sort(order.begin(), order.end(), [&](size_t a, size_t b) {
+        return before(positions[a], positions[b]) || (positions[a] == positions[b] && a < b);
+    });
+    Places places;
+    places.place_of.resize(positions.size());
+    for (size_t i : order) {
+        if (places.positions.empty() || places.positions.back() != positions[i]) {
+            places.positions.push_back(positions[i]);
+            places.counts.push_back(0);
+            places.first.push_back(i);
+        }
+        ++places.counts.back();
+        places.place_of[i] = places.positions.size() - 1;
+    }
+    return places;
 }
 
 /// The mean over the three nearest other points, or over all if there are fewer.
@@ -53,28 +75,35 @@ double mean_at(const Places& places, const Tree& tree, size_t place) {
 }  // namespace
 
 std::vector<double> mean_squared_neighbor_distance(const std::vector<glm::dvec3>& positions) {
-    std::vector<size_t> order(positions.size());
-    std::iota(order.begin(), order.end(), size_t(0));
-    std::sort(order.begin(), order.end(),
-              [&](size_t a, size_t b) { return before(positions[a], positions[b]); });
-
-    Places places;
-    std::vector<size_t> place_of(positions.size());
-    for (size_t i : order) {
-        if (places.positions.empty() || places.positions.back() != positions[i]) {
-            places.positions.push_back(positions[i]);
-            places.counts.push_back(0);
-        }
-        ++places.counts.back();
-        place_of[i] = places.positions.size() - 1;
-    }
+    const Places places = places_of(positions);
     if (places.positions.empty()) return {};
 
     const Tree tree(3, places);
     std::vector<double> mean(places.positions.size()), result(positions.size());
     for (size_t i = 0; i < mean.size(); ++i) mean[i] = mean_at(places, tree, i);
-    for (size_t i = 0; i < result.size(); ++i) result[i] = mean[place_of[i]];
+    for (size_t i = 0; i < result.size(); ++i) result[i] = mean[places.place_of[i]];
     return result;
+}
+
+std::vector<std::array<size_t, 2>> neighbor_pairs(const std::vector<glm::dvec3>& positions, size_t count) {
+    const Places places = places_of(positions);
+    if (places.positions.empty()) return {};
+    const Tree tree(3, places);
+    std::vector<std::array<size_t, 2>> pairs;
+    std::vector<size_t> index(count + 1);
+    std::vector<double> squared(count + 1);
+    for (size_t place = 0; place < places.positions.size(); ++place) {
+        const size_t found =
+            tree.knnSearch(&places.positions[place].x, index.size(), index.data(), squared.data());
+        for (size_t i = 0; i < found; ++i) {
+            if (index[i] == place) continue;
+            const size_t a = places.first[place], b = places.first[index[i]];
+            pairs.push_back({std::min(a, b), std::max(a, b)});
+        }
+    }
+    std::sort(pairs.begin(), pairs.end());
+    pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+    return pairs;
 }
 
 }  // namespace ewa::scene

@@ -2,6 +2,7 @@
 // Statistics of values and of points.
 #pragma once
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <glm/vec3.hpp>
 #include <vector>
@@ -22,5 +23,9 @@ T quantile(std::vector<T>& values, double share) {
 /// fewer. -1 for a single point. Points at the same position are neighbours at distance 0. All coordinates
 /// must be finite. O(n log n).
 std::vector<double> mean_squared_neighbor_distance(const std::vector<glm::dvec3>& positions);
+
+/// Pairs of neighbours: each distinct position with the `count` distinct ones nearest to it. A pair is there once, as two
+/// indices of positions, the lower one first. Pairs are sorted. All coordinates must be finite. O(n log n).
+std::vector<std::array<size_t, 2>> neighbor_pairs(const std::vector<glm::dvec3>& positions, size_t count);
 
 }  // namespace ewa::scene

@@ -18,6 +18,7 @@
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
 #include "io/datasets/image_records.h"
+#include "scene/dense_points.h"
 #include "scene/names.h"
 #include "shared/constants.h"
 #include "train/schedule.h"
@@ -26,6 +27,9 @@ namespace ewa::train {
 namespace {
 
 constexpr uint32_t kRandomSplats = 50000;
+// A longer run adds splats by itself where they are needed. fox_270 gains 0.7 dB in 500 steps, and nothing in 1,000.
+constexpr int kDenseStartSteps = 700;
+constexpr double kPixelsOfDenseStart = 4;  // of an image, for each first splat
 
 /// Four numbers of (0, 1) for each seed, splat and use of it.
 std::array<double, 4> uniform(uint64_t seed, uint32_t index, uint32_t use) {
@@ -166,6 +170,11 @@ void add_remarks(RunInput& input) {
         input.remarks.emplace_back("the dataset says that no colour depends on the view: SH degree 0");
     if (input.options.init == "sfm" && dataset.points.positions.empty())
         input.remarks.emplace_back("the dataset has no points: training starts from random splats");
+    if (const size_t points = dataset.points.positions.size();
+        input.options.init == "sfm" && points > 0 && input.start.size() > points)
+        input.remarks.push_back(
+            fmt::format("{} start between neighbouring points; --dense-start off prevents that",
+                        core::counted(input.start.size() - points, "splat")));
     if (const std::filesystem::path dense = dataset.root / "fused.ply";
         input.options.init == "sfm" && core::is_file(dense) &&
         std::ranges::find(dataset.files, dense) == dataset.files.end())
@@ -234,6 +243,32 @@ Gaussians random_gaussians(const Dataset& dataset, const std::vector<int>& frame
     return gaussians_from_points(points, sh_degree);
 }
 
+namespace {
+
+/// How many first splats there should be, or 0 if the points are to be taken as they are.
+size_t dense_start(const RunOptions& options, const Dataset& dataset, const std::vector<int>& frames) {
+    const TrainOptions& train = options.train;
+    if (options.dense_start == DenseStart::off) return 0;
+    if (options.dense_start == DenseStart::automatic &&
+        (train.strategy != Strategy::adc || train.steps > kDenseStartSteps || train.render.points))
+        return 0;
+    double pixels = 0;
+    for (const int i : frames) {
+        const Camera& camera = dataset.frames[size_t(i)].camera;
+        pixels += double(camera.width) * camera.height / double(frames.size());
+    }
+    return std::min(size_t(pixels / kPixelsOfDenseStart), size_t(train.max_splats));
+}
+
+Gaussians splats_of(const PointCloud& points, const RunOptions& options, const Dataset& dataset,
+                    const std::vector<int>& frames) {
+    const size_t wanted = dense_start(options, dataset, frames);
+    if (wanted <= points.positions.size()) return gaussians_from_points(points, options.train.sh_degree);
+    return gaussians_from_points(scene::with_midpoints(points, wanted), options.train.sh_degree);
+}
+
+}  // namespace
+
 Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, const std::vector<int>& frames) {
     const int degree = options.train.sh_degree;
     Gaussians start;
@@ -243,7 +278,7 @@ Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, cons
                 fmt::format("{}: a coordinate is not finite ({} such points in all); remove them, or start "
                             "from --init random",
                             dataset.first_dropped_point, dataset.dropped_points));
-        if (!dataset.points.positions.empty()) start = gaussians_from_points(dataset.points, degree);
+        if (!dataset.points.positions.empty()) start = splats_of(dataset.points, options, dataset, frames);
     }
     if (options.init == "random" || (options.init == "sfm" && start.size() == 0)) {
         const uint32_t count = std::min(kRandomSplats, options.train.max_splats);
@@ -254,7 +289,7 @@ Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, cons
             throw InputError(
                 fmt::format("{}: a coordinate is not finite ({} such points in all); remove them",
                             cloud.dropped.first, cloud.dropped.count));
-        start = gaussians_from_points(cloud.points, degree);
+        start = splats_of(cloud.points, options, dataset, frames);
     } else if (options.init != "sfm") {
         start = load_splats(options.init);
         set_sh_degree(start, degree);

@@ -32,6 +32,8 @@ const Names<MaskUse> kMaskUses = {{"auto", MaskUse::automatic},
                                   {"ignore", MaskUse::ignore},
                                   {"cut", MaskUse::cut},
                                   {"none", MaskUse::none}};
+const Names<DenseStart> kDenseStarts = {
+    {"auto", DenseStart::automatic}, {"on", DenseStart::on}, {"off", DenseStart::off}};
 const Names<Footprint> kKernels = {{"peak", Footprint::peak},
                                    {"antialias", Footprint::antialias},
                                    {"density", Footprint::density},
@@ -311,6 +313,12 @@ std::vector<RunOption> make_table() {
               "First splats. sfm: the dataset's points, or random if it has none. random: where the cameras "
               "look. FILE: a splat file, a PLY of points, or the folder of a run",
               kDecides, [](RunOptions& o) -> std::string& { return o.init; }),
+        choice<DenseStart>(
+            "dense-start",
+            "Whether splats start between neighbouring points, too. auto: in runs of adc of at most 700 "
+            "steps, if "
+            "points are few for the size of the images",
+            [](RunOptions& o) -> DenseStart& { return o.dense_start; }, kDenseStarts),
         real(
             "init-opacity", "X", "Opacity of the first splats. A splat file has its own",
             [](RunOptions& o) -> double& { return o.init_opacity; }, 0.001, 0.999),

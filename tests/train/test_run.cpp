@@ -208,6 +208,7 @@ TEST(RunOptions, TableReadsWhatItWrites) {
                                                    {"exposure", "true"},
                                                    {"resolution-schedule", "3"},
                                                    {"init", "random"},
+                                                   {"dense-start", "on"},
                                                    {"init-opacity", "0.5"},
                                                    {"init-scale", "2.5"},
                                                    {"frames", "0-3"},

@@ -4,6 +4,7 @@
 #include <random>
 
 #include "ewa/dataset.h"
+#include "scene/dense_points.h"
 #include "scene/lens.h"
 #include "scene/statistics.h"
 #include "shared/constants.h"
@@ -66,6 +67,33 @@ TEST(Neighbors, ManyDuplicatesAreQuick) {
     const std::vector<double> found = scene::mean_squared_neighbor_distance(positions);
     EXPECT_EQ(found.front(), 0);
     EXPECT_EQ(found.back(), 1);
+}
+
+// Four points on a line, the last one twice.
+TEST(DensePoints, LieBetweenNeighbours) {
+    const PointCloud line = cloud({{0, 0, 0}, {1, 0, 0}, {3, 0, 0}, {7, 0, 0}, {7, 0, 0}});
+    using Pair = std::array<size_t, 2>;
+    EXPECT_EQ(scene::neighbor_pairs(line.positions, 1), (std::vector<Pair>{{0, 1}, {1, 2}, {2, 3}}));
+    EXPECT_EQ(scene::neighbor_pairs(line.positions, 2),
+              (std::vector<Pair>{{0, 1}, {0, 2}, {1, 2}, {1, 3}, {2, 3}}));
+    EXPECT_TRUE(scene::neighbor_pairs({}, 2).empty());
+    EXPECT_TRUE(scene::neighbor_pairs({{1, 2, 3}, {1, 2, 3}}, 2).empty());
+
+    PointCloud colored = line;
+    colored.colors[0] = {10, 0, 255};
+    colored.colors[1] = {30, 0, 255};
+    const PointCloud dense = scene::with_midpoints(colored, 100);
+    ASSERT_EQ(dense.positions.size(), 10u);
+    EXPECT_EQ(dense.positions[4], line.positions[4]);
+    EXPECT_EQ(dense.positions[5], glm::dvec3(0.5, 0, 0));
+    EXPECT_EQ(dense.colors[5], (std::array<uint8_t, 3>{20, 0, 255}));
+    EXPECT_EQ(dense.positions[9], glm::dvec3(5, 0, 0));
+    // The longest distances first: 6 and 4.
+    const PointCloud limited = scene::with_midpoints(colored, 7);
+    ASSERT_EQ(limited.positions.size(), 7u);
+    EXPECT_EQ(limited.positions[5], glm::dvec3(4, 0, 0));
+    EXPECT_EQ(limited.positions[6], glm::dvec3(5, 0, 0));
+    EXPECT_EQ(scene::with_midpoints(colored, 3).positions.size(), 5u);
 }
 
 TEST(GaussiansFromPoints, ByHand) {
