@@ -29,7 +29,7 @@ namespace {
 constexpr uint32_t kRandomSplats = 50000;
 // A longer run adds splats by itself where they are needed. fox_270 gains 0.7 dB in 500 steps, and nothing in 1,000.
 constexpr int kDenseStartSteps = 700;
-constexpr double kPixelsOfDenseStart = 4;  // of an image, for each first splat
+constexpr double kPixelsOfDenseStart = 2;  // of an image, for each first splat
 
 /// Four numbers of (0, 1) for each seed, splat and use of it.
 std::array<double, 4> uniform(uint64_t seed, uint32_t index, uint32_t use) {
