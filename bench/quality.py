@@ -176,8 +176,9 @@ def find_dataset(name, options):
         made = (folder / "transforms.json").exists()
         if not made:
             say(f"rendering {scene.name} into {folder}, once")
-        if ewa(options.ewa, "dataset", scene, "-o", folder, *(["--quiet"] if made else []))[0] != 0:
-            stop(f"{label}: its views could not be rendered", 1)
+        status, complaint = ewa(options.ewa, "dataset", scene, "-o", folder, *(["--quiet"] if made else []))
+        if status != 0:
+            stop(complaint or f"{label}: its views could not be rendered", 1)
         place = folder
     status, complaint = ewa(options.ewa, "info", place, stdout=subprocess.DEVNULL)
     if status != 0:
