@@ -42,7 +42,7 @@ struct Summary {
     int steps = 0;
     double seconds = 0;       // training alone
     double wall_seconds = 0;  // with start-up, evaluation and saving
-    uint32_t splats = 0;
+    uint32_t splats = 0, max_splats = 0;
     std::optional<double> test_psnr, test_ssim, train_psnr;  // dB
     std::string device;
     uint64_t peak_device_bytes = 0, peak_host_bytes = 0;

@@ -22,6 +22,9 @@ Strategy strategy_for(int steps);
 /// TrainOptions::sh_degree: 3, or 0 if the dataset says that no colour depends on the view.
 inline constexpr int kAutomaticShDegree = -1;
 
+/// TrainOptions::max_splats: splat_cap() of ewa/trainer.h chooses it.
+inline constexpr uint32_t kAutomaticMaxSplats = 0;
+
 /// Options of a Trainer. Learning rates are those of Adam. Lengths are in world units. "Scene extent" is
 /// scene_extent() of ewa/dataset.h, or the median distance of the start's splats if all cameras coincide.
 struct TrainOptions {
@@ -33,10 +36,10 @@ struct TrainOptions {
     /// a row of tiles for each.
     int bands = 1;
     Strategy strategy = Strategy::mcmc;
-    uint32_t max_splats = 1000000;   // hard limit
-    int sh_degree = 3;               // 0 to 3, or kAutomaticShDegree
-    uint64_t seed = 0;               // the same seed on the same device gives the same bytes
-    bool random_background = false;  // a new background colour each step
+    uint32_t max_splats = kAutomaticMaxSplats;  // hard limit
+    int sh_degree = 3;                          // 0 to 3, or kAutomaticShDegree
+    uint64_t seed = 0;                          // the same seed on the same device gives the same bytes
+    bool random_background = false;             // a new background colour each step
     /// Device memory for decoded training images, in bytes. Images beyond it are read again for each step.
     uint64_t image_cache_bytes = uint64_t(4) << 30;
     /// Device memory that a training takes at most, in bytes; 0: as much as it needs. Splats that do not fit stay in host
@@ -72,6 +75,8 @@ struct TrainOptions {
     int resolution_every = 3000;     // one halving is undone this often
     /// Of a run that continues one of another number of steps: the SH degree and resolution that it reached stay.
     int least_sh_degree = 0, most_halvings = 64;
+    uint32_t least_max_splats =
+        0;                        // of a run that continues another: an automatic max_splats is at least this
     double grow_gradient = 2e-4;  // mean norm of dL/d(mean in normalised device coordinates)
     /// Uses the sum of the pixels' absolute gradients, which do not cancel (AbsGS), and their own threshold.
     bool absolute_gradients = false;

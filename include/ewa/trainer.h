@@ -29,6 +29,16 @@ class StateReader;
 /// The options with concrete values for Strategy::automatic and kAutomaticShDegree.
 TrainOptions resolve(TrainOptions options, const Dataset& dataset);
 
+/// The largest number of splats of a training, and why it is that.
+struct SplatCap {
+    uint32_t splats = 0;
+    std::string reason;  // e.g. "one for each 20 training pixels"
+};
+
+/// TrainOptions::max_splats of a Trainer with the same arguments. docs/training.md has the rule of the automatic one.
+SplatCap splat_cap(const gpu::Device& device, const Dataset& dataset, const std::vector<int>& train_frames,
+                   const Gaussians& start, const TrainOptions& options);
+
 /// An estimate of the device memory of a training at its peak, in bytes. docs/performance.md compares it with runs.
 struct MemoryEstimate {
     uint32_t splats = 0;  // at the end; with adc at most, since their number depends on the images
@@ -87,7 +97,7 @@ struct TrainerState {
 /// all other functions wait for it.
 class Trainer {
   public:
-    /// train_frames: indices into dataset.frames. start: the first splats, at most options.max_splats.
+    /// train_frames: indices into dataset.frames. start: the first splats, at most options.max_splats unless that is automatic.
     /// Pass an rvalue to spare a copy of them. Throws InputError (no frame, no or too many splats, an image that cannot be read), RunError (memory).
     /// ranks: the processes that train together. Each makes a trainer of the same arguments, and holds a share of the
     /// splats. Rank 0 calls the functions below; all others call follow() alone. The results do not depend on the number
@@ -123,6 +133,7 @@ class Trainer {
     /// some of them. Throws InputError unless the trainer has several views a step, bands or ranks, and no limit of device memory.
     std::vector<Image> render(std::span<const Camera> cameras) const;
     uint32_t splats() const;
+    uint32_t max_splats() const;  // the number that was chosen if TrainOptions::max_splats is automatic
     int steps_done() const;
     StepReport report() const;                         // of the last step, once the device has finished it
     std::vector<Exposure> exposures() const;           // one for each training frame; empty if not learned

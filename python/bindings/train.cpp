@@ -122,6 +122,7 @@ class Training {
         const std::string fingerprint =
             with_files([&] { return train::dataset_fingerprint(*plan_.dataset, plan_.split()); });
         Json settings = train::checkpoint_settings(plan_.run(), fingerprint);
+        settings["cap"] = trainer_->max_splats();
         settings["fields"] = options_json(plan_.options);
         settings["train_frames"] = plan_.frames;
         settings["init"] = plan_.own_start ? "splats" : word_;
@@ -143,6 +144,12 @@ class Training {
     }
 
     const Plan& plan() const { return plan_; }
+    /// With what was chosen.
+    TrainOptions options() const {
+        TrainOptions all = plan_.options;
+        all.max_splats = trainer_->max_splats();
+        return all;
+    }
     const StepReport& last() const { return last_; }
 
   private:
@@ -308,9 +315,9 @@ void bind_trainer(nb::module_& module) {
         .def_prop_ro("steps_done", [](const Training& t) { return t.last().step; })
         .def_prop_ro("train_frames", [](const Training& t) { return t.plan().frames; })
         .def_prop_ro(
-            "options", [](const Training& t) { return options_dict(t.plan().options); },
+            "options", [](const Training& t) { return options_dict(t.options()); },
             nb::for_getter(nb::sig("def options(self) -> dict[str, object]")),
-            "All options, with the strategy and the SH degree that were chosen.")
+            "All options, with the strategy, the SH degree and the cap of splats that were chosen.")
         .def("__repr__", [](const Training& t) {
             return "Trainer(" + std::to_string(t.last().step) + " of " +
                    core::counted(uint64_t(t.plan().options.steps), "step") + ")";

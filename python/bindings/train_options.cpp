@@ -43,7 +43,6 @@ const std::vector<Field>& fields() {
         {"steps", &O::steps, 1, 1e9},
         {"batch", &O::batch, 1, 256},
         {"bands", &O::bands, 1, 64},
-        {"max_splats", &O::max_splats, 1, 1e9},
         {"seed", &O::seed, 0, kMost},
         {"image_cache_bytes", &O::image_cache_bytes, 0, kMost},
         {"device_memory_bytes", &O::device_memory_bytes, 0, kMost},
@@ -126,6 +125,18 @@ void set_degree(TrainOptions& options, nb::handle value) {
     options.sh_degree = degree;
 }
 
+void set_max_splats(TrainOptions& options, nb::handle value) {
+    constexpr double kMost = 1e9;
+    if (nb::isinstance<nb::str>(value) && nb::cast<std::string>(value) == "auto") {
+        options.max_splats = kAutomaticMaxSplats;
+        return;
+    }
+    const double splats = nb::cast<double>(value);  // 7e3 is a whole number, too
+    if (!(splats >= 1 && splats <= kMost && splats == std::floor(splats)))
+        throw InputError("is no whole number from 1 to " + core::shown_number(kMost) + ", nor \"auto\"");
+    options.max_splats = uint32_t(splats);
+}
+
 void set_moments(TrainOptions& options, nb::handle value) {
     const int bits = nb::cast<int>(value);
     if (bits != 16 && bits != 32) throw InputError("is neither 16 nor 32");
@@ -163,6 +174,12 @@ const std::vector<Special>& specials() {
              return nb::int_(o.sh_degree);
          },
          set_degree},
+        {"max_splats", "int | typing.Literal['auto']",
+         [](const TrainOptions& o) -> nb::object {
+             if (o.max_splats == kAutomaticMaxSplats) return nb::str("auto");
+             return nb::int_(o.max_splats);
+         },
+         set_max_splats},
         {"moment_bits", "typing.Literal[16, 32]",
          [](const TrainOptions& o) -> nb::object { return nb::int_(o.moment_bits); }, set_moments},
         {"background", "numpy.typing.ArrayLike | str", background_value, set_background},

@@ -70,10 +70,8 @@ void add_run_options(CLI::App& app, TrainArguments& arguments) {
 struct Quality {
     const char* name;
     int steps;
-    uint32_t max_splats;
 };
-constexpr std::array<Quality, 3> kQualities{
-    {{"low", 2000, 200000}, {"medium", 7000, 500000}, {"high", 30000, 1000000}}};
+constexpr std::array<Quality, 3> kQualities{{{"low", 2000}, {"medium", 7000}, {"high", 30000}}};
 
 /// A run that is resumed keeps its number of steps.
 void keep_steps(RunOptions& options) {
@@ -84,20 +82,15 @@ void keep_steps(RunOptions& options) {
         train::run_option("steps").set(options, steps->dump());
 }
 
-/// Reads the config, if there is one. Then sets the steps and splats of --quality, unless they are given themselves. A
-/// quality of the command line goes before steps and splats of the config.
+/// Reads the config, if there is one. Then sets the steps of --quality, unless they are given themselves. A quality of the
+/// command line goes before steps of the config.
 void apply_config_and_quality(CLI::App& app, TrainArguments& arguments) {
-    const auto counts = [&] { return std::array{app.count("--steps"), app.count("--max-splats")}; };
     const bool on_command_line = !arguments.quality.empty();
-    auto given = counts();
+    size_t given = app.count("--steps");
     if (!arguments.config.empty()) apply_config(app, arguments.config);
-    if (!on_command_line) given = counts();
-    TrainOptions& train = arguments.run.train;
-    for (const Quality& quality : kQualities) {
-        if (quality.name != arguments.quality) continue;
-        if (given[0] == 0) train.steps = quality.steps;
-        if (given[1] == 0) train.max_splats = quality.max_splats;
-    }
+    if (!on_command_line) given = app.count("--steps");
+    for (const Quality& quality : kQualities)
+        if (quality.name == arguments.quality && given == 0) arguments.run.train.steps = quality.steps;
 }
 
 bool is_mesh_scene(const fs::path& path) {
@@ -221,10 +214,8 @@ Action add_train(CLI::App& app, const std::string& command_line) {
                    "checkpoint.ewa [out/<name of the dataset>]")
         ->type_name("DIR");
     add_run_options(app, *arguments);
-    app.add_option(
-           "--quality", arguments->quality,
-           "low: 2000 steps and at most 200000 splats. medium: 7000 and 500000. high: 30000 and 1000000, the "
-           "defaults. --steps and --max-splats go before it")
+    app.add_option("--quality", arguments->quality,
+                   "low: 2000 steps. medium: 7000. high: 30000, the default. --steps goes before it")
         ->transform(one_of({"low", "medium", "high"}));
     app.add_flag("--accuracy", arguments->accuracy,
                  "At the end, measure error against run time for the report, as ewa bench --accuracy does");

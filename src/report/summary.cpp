@@ -53,6 +53,7 @@ Json to_json(const Summary& s) {
                  {"seconds_per_step", s.steps > 0 ? figure(s.seconds / s.steps) : Json(nullptr)},
                  {"wall_seconds", figure(s.wall_seconds)},
                  {"splats", s.splats},
+                 {"max_splats", s.max_splats},
                  {"test_psnr", figure(s.test_psnr)},
                  {"test_ssim", figure(s.test_ssim)},
                  {"train_psnr", figure(s.train_psnr)},

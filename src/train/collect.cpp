@@ -15,7 +15,7 @@ namespace {
 using OutParts = std::vector<std::span<const std::byte>>;
 using InParts = std::vector<std::span<std::byte>>;
 
-constexpr size_t kPiece = size_t(4) << 20;  // bytes
+constexpr size_t kPassedPiece = size_t(4) << 20;  // bytes
 
 uint32_t checksum_of(std::span<const std::byte> bytes) {
     if (bytes.empty()) return 0;  // zlib restarts the sum for a null pointer
@@ -57,8 +57,8 @@ void pass_on(Ranks& ranks, std::span<const std::byte> own,
     if (first) take(own);
     std::vector<std::byte> buffer;
     for (size_t rank = 1; rank < size_t(ranks.size()); ++rank)
-        for (uint64_t at = 0, size = cards[2 * rank]; at < size; at += kPiece) {
-            const size_t piece = std::min(kPiece, size_t(size - at));
+        for (uint64_t at = 0, size = cards[2 * rank]; at < size; at += kPassedPiece) {
+            const size_t piece = std::min(kPassedPiece, size_t(size - at));
             OutParts out(size_t(ranks.size()));
             InParts in(size_t(ranks.size()));
             if (size_t(ranks.rank()) == rank) out[0] = own.subspan(at, piece);
@@ -76,8 +76,8 @@ std::vector<std::byte> part_of(Ranks& ranks, const std::vector<uint64_t>& sizes,
     if (first) read(0, own);
     uint64_t offset = sizes[0];
     for (size_t rank = 1; rank < sizes.size(); offset += sizes[rank++])
-        for (uint64_t at = 0; at < sizes[rank]; at += kPiece) {
-            const size_t piece = std::min(kPiece, size_t(sizes[rank] - at));
+        for (uint64_t at = 0; at < sizes[rank]; at += kPassedPiece) {
+            const size_t piece = std::min(kPassedPiece, size_t(sizes[rank] - at));
             OutParts out(sizes.size());
             InParts in(sizes.size());
             if (first) buffer.resize(piece);

@@ -203,7 +203,8 @@ uint64_t image_bytes(const Dataset& dataset, const std::vector<int>& frames, con
 MemoryEstimate estimate_memory(const gpu::Device& device, const Dataset& dataset,
                                const std::vector<int>& train_frames, const Gaussians& start,
                                const TrainOptions& given) {
-    const TrainOptions options = resolve(given, dataset);
+    TrainOptions options = resolve(given, dataset);
+    options.max_splats = splat_cap(device, dataset, train_frames, start, options).splats;
     const bool grows = options.strategy != Strategy::none;
     const Plan plan = plan_for(train::plan_request(start, options, false));
     const passes::KernelConfig config = passes::config_for(device.limits());

@@ -41,6 +41,12 @@ int reached(const Json& settings, const char* name, int absent, int most) {
     return value.is_number_unsigned() && value.get<uint64_t>() <= uint64_t(most) ? value.get<int>() : absent;
 }
 
+/// The largest number of splats that a run may have had. 0 if it is not known.
+uint32_t cap_of(const Json& settings) {
+    const Json value = settings.value("cap", Json());
+    return value.is_number_unsigned() && value.get<uint64_t>() <= UINT32_MAX ? value.get<uint32_t>() : 0;
+}
+
 /// The value as to_config writes it: "1.0,1,1" and "1,1,1" are the same background.
 Json normalised(const RunOption& option, const Json& value) {
     try {
@@ -111,6 +117,7 @@ int continue_from(const std::filesystem::path& path, const Checkpoint& earlier, 
         throw InputError(path.string() + ": is at step " + std::to_string(step) +
                          ", after the last of --steps " + std::to_string(options.train.steps) +
                          "; give a larger --steps" + kWaysOut);
+    options.train.least_max_splats = cap_of(then);
     options.train.least_sh_degree = reached(then, "sh_degree", 0, kMaxShDegree);
     options.train.most_halvings =
         reached(then, "halvings", TrainOptions().most_halvings, TrainOptions().most_halvings);

@@ -21,7 +21,7 @@ nlohmann::ordered_json checkpoint_settings(const RunOptions& options, const std:
 
 /// Lets a run continue from the checkpoint at `path`. Strategy::automatic becomes the checkpoint's strategy. If the
 /// checkpoint's run has another number of steps, the options keep what it has reached (TrainOptions::least_sh_degree,
-/// most_halvings). Returns that run's number of steps. Throws InputError if the checkpoint lies behind the last step.
+/// most_halvings). An automatic cap of splats does not fall below the checkpoint's. Returns that run's number of steps. Throws InputError if the checkpoint lies behind the last step.
 /// asked: the strategy before resolve().
 int continue_from(const std::filesystem::path& path, const Checkpoint& earlier, Strategy asked,
                   RunOptions& options);

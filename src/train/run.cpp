@@ -13,6 +13,7 @@
 
 #include "core/folders.h"
 #include "core/outputs.h"
+#include "core/typing.h"
 #include "ewa/error.h"
 #include "ewa/renderer.h"
 #include "gpu/device.h"
@@ -137,6 +138,7 @@ class Run {
     double wall_seconds() const { return earlier_wall_ + options().seconds_before + seconds_since(begin_); }
     void read_checkpoint();
     void begin_files();
+    void choose_cap();
     void start();
     void list_settings();
     void restore(Trainer& trainer);
@@ -214,9 +216,21 @@ void Run::list_settings() {
         if (name == "device" && value.empty()) value = report_.summary.device + " (chosen by ewa)";
 }
 
+/// Notes the largest number of splats, which is automatic unless the options name it. A checkpoint keeps it.
+void Run::choose_cap() {
+    const TrainOptions& train = options().train;
+    const SplatCap cap = splat_cap(*device_, input_.dataset, input_.split.train, input_.start, train);
+    report_.summary.max_splats = cap.splats;
+    settings_["cap"] = cap.splats;
+    if (train.max_splats == kAutomaticMaxSplats && train.strategy != Strategy::none)
+        input_.remarks.push_back(fmt::format("at most {}: {}; --max-splats N sets another limit",
+                                             core::counted(cap.splats, "splat"), cap.reason));
+}
+
 /// Opens the device and tells the observer what the run begins with.
 void Run::start() {
     device_ = open_device(options().device);
+    choose_cap();
     report_.title = input_.name;
     report_.remarks = input_.remarks;
     report::Summary& summary = report_.summary;

@@ -281,7 +281,8 @@ Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, cons
         if (!dataset.points.positions.empty()) start = splats_of(dataset.points, options, dataset, frames);
     }
     if (options.init == "random" || (options.init == "sfm" && start.size() == 0)) {
-        const uint32_t count = std::min(kRandomSplats, options.train.max_splats);
+        const uint32_t most = options.train.max_splats;
+        const uint32_t count = most == kAutomaticMaxSplats ? kRandomSplats : std::min(kRandomSplats, most);
         start = random_gaussians(dataset, frames, static_cast<int>(count), options.train.seed, degree);
     } else if (options.init != "sfm" && io::is_point_cloud(options.init)) {
         const io::PlyPoints cloud = io::read_points_ply(options.init);
@@ -308,7 +309,7 @@ Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, cons
 
 void check_start(size_t splats, const TrainOptions& options) {
     if (splats == 0) throw InputError("there are no splats to start from; --init random makes some");
-    if (splats > options.max_splats)
+    if (options.max_splats != kAutomaticMaxSplats && splats > options.max_splats)
         throw InputError(fmt::format("there are {} splats to start from, more than --max-splats {}", splats,
                                      options.max_splats));
 }

@@ -162,6 +162,23 @@ RunOption sh_degree_option() {
     return option;
 }
 
+RunOption max_splats_option() {
+    constexpr uint32_t kMost = 1000000000;
+    const Member<uint32_t> member = [](RunOptions& o) -> uint32_t& { return o.train.max_splats; };
+    RunOption option = member_option(
+        "max-splats", "auto|N",
+        "Upper limit of the number of splats. auto: by the training images' pixels, the steps and the "
+        "device's memory",
+        kDecides, member, [](const std::string& text) {
+            return text == "auto" ? kAutomaticMaxSplats : parse_within(text, 1u, kMost);
+        });
+    option.get = [](const RunOptions& options) {
+        const uint32_t splats = options.train.max_splats;
+        return splats == kAutomaticMaxSplats ? Json("auto") : Json(splats);
+    };
+    return option;
+}
+
 RunOption moments_option() {
     const Member<int> member = [](RunOptions& o) -> int& { return o.train.moment_bits; };
     RunOption option =
@@ -282,9 +299,7 @@ std::vector<RunOption> make_table() {
             "adc adds and removes splats (3DGS). mcmc relocates dead splats and grows to --max-splats "
             "(3DGS-MCMC). none keeps the number of splats. auto is mcmc from 5000 steps on, else adc",
             [](RunOptions& o) -> Strategy& { return o.train.strategy; }, kStrategies),
-        number<uint32_t>(
-            "max-splats", "N", "Upper limit of the number of splats", kDecides,
-            [](RunOptions& o) -> uint32_t& { return o.train.max_splats; }, 1u, 1000000000u),
+        max_splats_option(),
         sh_degree_option(),
         flag("absgrad",
              "adc: add splats where the sum of the pixels' absolute gradients is large (AbsGS). Such "

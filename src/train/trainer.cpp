@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstring>
 #include <exception>
 #include <glm/geometric.hpp>
 #include <numeric>
@@ -13,6 +14,7 @@
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
 #include "pipeline/share.h"
+#include "train/collect.h"
 #include "train/memory_estimate.h"
 #include "train/run_input.h"
 #include "train/trainer_state.h"
@@ -110,6 +112,15 @@ Gaussians share_of(Gaussians start, const Ranks& ranks) {
     return start;
 }
 
+/// The cap of rank 0. Devices of other ranks may have more or less memory. Collective.
+uint32_t agreed_cap(Ranks& ranks, const SplatCap& own) {
+    if (ranks.size() == 1) return own.splats;
+    uint32_t agreed = 0;
+    const std::vector<std::byte> told = train::told(ranks, std::as_bytes(std::span(&own.splats, 1)));
+    std::memcpy(&agreed, told.data(), sizeof(agreed));
+    return agreed;
+}
+
 }  // namespace
 
 Trainer::State::State(std::shared_ptr<gpu::Device> d, const Dataset& dataset, const std::vector<int>& frames,
@@ -169,6 +180,7 @@ Trainer::Trainer(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
     train::check_training(options, ranks->size());
     const double extent = extent_for(dataset, train_frames, start);
     TrainOptions resolved = resolve(options, dataset);
+    resolved.max_splats = agreed_cap(*ranks, splat_cap(*device, dataset, train_frames, start, resolved));
     const int chunks = train::chunks_for(*device, dataset, train_frames, start, resolved);
     if (resolved.device_memory_bytes > 0 && device->memory_limit() > 0)
         throw InputError(
@@ -262,6 +274,9 @@ std::vector<CameraMotion> Trainer::camera_motions() const {
 }
 uint32_t Trainer::splats() const {
     return state_->model.share.all;
+}
+uint32_t Trainer::max_splats() const {
+    return state_->options.max_splats;
 }
 size_t Trainer::images_on_disk() const {
     return state_->images.on_disk();

@@ -110,20 +110,21 @@ TEST_F(Train, QualityGivesWhatIsNotGiven) {
         interrupt.await_file = folder / (out + "/metrics.jsonl");
         train(out, more, interrupt);
         const auto json = read_json(folder / (out + "/config.json"));
-        return std::pair<int, int>(json["steps"], json["max-splats"]);
+        return std::pair<int, std::string>(json["steps"], json["max-splats"].dump());
     };
-    using Pair = std::pair<int, int>;
-    EXPECT_EQ(config({}), Pair(30000, 1000000));
-    EXPECT_EQ(config({"--quality", "low"}), Pair(2000, 200000));
-    EXPECT_EQ(config({"--quality", "medium"}), Pair(7000, 500000));
-    EXPECT_EQ(config({"--quality", "high"}), Pair(30000, 1000000));
-    EXPECT_EQ(config({"--quality", "low", "--iterations", "6"}), Pair(6, 200000));
-    EXPECT_EQ(config({"--max-splats", "600", "--quality", "low"}), Pair(2000, 600));
-    EXPECT_EQ(config({"--config", folder / "c.json"}), Pair(5, 700));
-    EXPECT_EQ(config({"--quality", "low", "--config", folder / "c.json"}), Pair(2000, 200000));
-    EXPECT_EQ(config({"--quality", "low", "--steps", "8", "--config", folder / "c.json"}), Pair(8, 200000));
-    EXPECT_EQ(config({"--config", folder / "q.json"}), Pair(2000, 700));
-    EXPECT_EQ(config({"--config", folder / "q.json", "--quality", "medium"}), Pair(7000, 500000));
+    using Pair = std::pair<int, std::string>;
+    const std::string automatic = "\"auto\"";
+    EXPECT_EQ(config({}), Pair(30000, automatic));
+    EXPECT_EQ(config({"--quality", "low"}), Pair(2000, automatic));
+    EXPECT_EQ(config({"--quality", "medium"}), Pair(7000, automatic));
+    EXPECT_EQ(config({"--quality", "high"}), Pair(30000, automatic));
+    EXPECT_EQ(config({"--quality", "low", "--iterations", "6"}), Pair(6, automatic));
+    EXPECT_EQ(config({"--max-splats", "600", "--quality", "low"}), Pair(2000, "600"));
+    EXPECT_EQ(config({"--config", folder / "c.json"}), Pair(5, "700"));
+    EXPECT_EQ(config({"--quality", "low", "--config", folder / "c.json"}), Pair(2000, "700"));
+    EXPECT_EQ(config({"--quality", "low", "--steps", "8", "--config", folder / "c.json"}), Pair(8, "700"));
+    EXPECT_EQ(config({"--config", folder / "q.json"}), Pair(2000, "700"));
+    EXPECT_EQ(config({"--config", folder / "q.json", "--quality", "medium"}), Pair(7000, "700"));
     expect_failure(train("o", {"--quality", "best"}), 2, "--quality");
 }
 
@@ -252,7 +253,7 @@ TEST_F(Train, ForceKeepsTheEarlierRunUntilTheNewOneBegins) {
     EXPECT_EQ(files_below(folder / "o"), before);
     expect_failure(train("o", {"--steps", "2", "--force", "--max-splats", "9"}), 2, "--max-splats");
     EXPECT_EQ(files_below(folder / "o"), before);
-    EXPECT_EQ(read_json(folder / "o/config.json")["max-splats"], 1000000);
+    EXPECT_EQ(read_json(folder / "o/config.json")["max-splats"], "auto");
 }
 
 TEST_F(Train, FullDiskKeepsTheEarlierSplats) {

@@ -86,6 +86,19 @@ void expect_same(const TrainerState& a, const TrainerState& b) {
     }
 }
 
+/// As devices of other ranks may have more or less memory.
+TEST(Ranks, TrainUpToTheCapOfTheFirst) {
+    run_ranks(2, [&](std::shared_ptr<Ranks> group) {
+        TrainOptions options = busy(Strategy::mcmc, 2);
+        options.max_splats = kAutomaticMaxSplats;
+        options.least_max_splats = group->rank() == 0 ? 2000 : 3000;
+        const Dataset& dataset = seven_views().dataset;
+        Trainer trainer(open_test_device(false), dataset, all_frames(dataset), start(), options, group);
+        EXPECT_EQ(trainer.max_splats(), 2000u);
+        if (group->rank() != 0) trainer.follow();
+    });
+}
+
 struct RanksCase {
     Strategy strategy;
     int batch, ranks;

@@ -143,6 +143,48 @@ TEST(Run, StoppedAndResumedEndsWithTheSameBytes) {
     expect_error<InputError>([&] { run_training(options); }, {"--seed 3, not 4"});
 }
 
+/// A run that is resumed keeps its cap. With more steps it has that of the longer run.
+TEST(Run, SaysAndKeepsAnAutomaticCap) {
+    TempFolder folder;
+    RunOptions options = small_run(folder / "whole");
+    options.train.max_splats = kAutomaticMaxSplats;
+    Recorder recorder;
+    const RunResult whole = run_training(options, recorder);
+    EXPECT_EQ(whole.summary.max_splats, 6u * 48 * 36 / 20);
+    EXPECT_EQ(json_of(folder / "whole/summary.json")["max_splats"], 518);
+    EXPECT_EQ(json_of(folder / "whole/config.json")["max-splats"], "auto");
+    const std::vector<std::string>& said = recorder.started.remarks;
+    EXPECT_EQ(std::count(said.begin(), said.end(),
+                         "at most 518 splats: one for each 20 training pixels; --max-splats N sets another "
+                         "limit"),
+              1);
+
+    options.output = folder / "cut";
+    options.resume = true;
+    Recorder stops(13);
+    run_training(options, stops);
+    EXPECT_EQ(run_training(options).summary.max_splats, 518u);
+    EXPECT_EQ(file_bytes(folder / "cut/splats.ply"), file_bytes(folder / "whole/splats.ply"));
+    EXPECT_EQ(file_bytes(folder / "cut/checkpoint.ewa"), file_bytes(folder / "whole/checkpoint.ewa"));
+
+    options.train.max_splats = 600;
+    expect_error<InputError>([&] { run_training(options); }, {"--max-splats \"auto\", not 600"});
+}
+
+TEST(Run, AContinuedRunDoesNotLowerItsCap) {
+    TempFolder folder;
+    RunOptions options = small_run(folder / "o");
+    options.train.max_splats = kAutomaticMaxSplats;
+    options.train.steps = 2;  // fewer splats by the steps than by the pixels
+    options.resume = true;
+    EXPECT_EQ(run_training(options).summary.max_splats, 240u);
+    options.train.steps = 40;
+    Recorder stops(3);
+    EXPECT_EQ(run_training(options, stops).summary.max_splats, 518u);
+    options.train.steps = 3;
+    EXPECT_EQ(run_training(options).summary.max_splats, 518u);
+}
+
 TEST(Run, IsNotReplacedUnlessAskedTo) {
     TempFolder folder;
     RunOptions options = small_run(folder / "o");
@@ -267,6 +309,7 @@ TEST(RunOptions, TableRefusesWhatIsOutOfRange) {
                                                          {"steps", "1.5"},
                                                          {"max-splats", "-1"},
                                                          {"max-splats", "0"},
+                                                         {"max-splats", "automatic"},
                                                          {"seed", "-1"},
                                                          {"sh-degree", "4"},
                                                          {"strategy", "luck"},

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// The largest number of splats of a training, unless its options name it.
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "ewa/trainer.h"
+
+namespace ewa {
+namespace {
+
+// A splat of SH degree 3 has 59 parameters, and a pixel has three values. With more splats the photos have fewer values
+// than the splats have parameters.
+constexpr double kPixelsPerSplat = 20;
+// A step changes only so many splats to the better. 30,000 steps can have 3 million, as the papers' largest scenes.
+constexpr double kSplatsPerStep = 100;
+constexpr double kMemoryShare = 0.8;  // of the device's; the rest is for other programs, and for errors of the estimate
+
+double training_pixels(const Dataset& dataset, const std::vector<int>& frames) {
+    double pixels = 0;
+    for (const int index : frames) {
+        const Camera& camera = dataset.frames[size_t(index)].camera;
+        pixels += double(camera.width) * camera.height;
+    }
+    return pixels;
+}
+
+/// The largest number up to `most`, and not below that of the start, with which a training fits in so many bytes.
+uint32_t fitting(const gpu::Device& device, const Dataset& dataset, const std::vector<int>& frames,
+                 const Gaussians& start, TrainOptions options, uint32_t most, double bytes) {
+    const auto fits = [&](uint32_t splats) {
+        options.max_splats = splats;
+        return double(estimate_memory(device, dataset, frames, start, options).total()) <= bytes;
+    };
+    if (fits(most)) return most;
+    auto low = uint32_t(start.size()), high = most;
+    while (high - low > most / 100) {
+        const uint32_t middle = low + (high - low) / 2;
+        (fits(middle) ? low : high) = middle;
+    }
+    return low;
+}
+
+}  // namespace
+
+SplatCap splat_cap(const gpu::Device& device, const Dataset& dataset, const std::vector<int>& train_frames,
+                   const Gaussians& start, const TrainOptions& options) {
+    if (options.max_splats != kAutomaticMaxSplats) return {options.max_splats, "as asked for"};
+    const auto first = uint32_t(start.size());
+    const double by_pixels = training_pixels(dataset, train_frames) / kPixelsPerSplat;
+    const double by_steps = first + kSplatsPerStep * options.steps;
+    SplatCap cap{uint32_t(std::min({by_pixels, by_steps, 1e9})), "one for each 20 training pixels"};
+    if (by_steps < by_pixels) cap.reason = "100 more for each step";
+    if (options.device_memory_bytes == 0) {
+        const uint32_t fit = fitting(device, dataset, train_frames, start, options, std::max(cap.splats, first),
+                                     kMemoryShare * double(device_info(device).memory_bytes));
+        if (fit < cap.splats) cap = {fit, "the device's memory has room for them"};
+    }
+    if (cap.splats < options.least_max_splats) cap = {options.least_max_splats, "as before"};
+    if (cap.splats < first) cap = {first, "as many as there are to start from"};
+    return cap;
+}
+
+}  // namespace ewa

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+// The largest number of splats of a training that does not name it.
+#include <gtest/gtest.h>
+
+#include "ewa/device.h"
+#include "ewa/trainer.h"
+#include "gpu/test_device.h"
+#include "train/synthetic.h"
+
+namespace ewa::test {
+namespace {
+
+/// Cameras alone: a cap needs no images.
+Dataset views_of(int count, int width, int height) {
+    Dataset dataset;
+    dataset.frames.resize(size_t(count));
+    for (Frame& frame : dataset.frames) {
+        frame.camera.width = width;
+        frame.camera.height = height;
+        frame.camera.fx = frame.camera.fy = width;
+        frame.eight_bit = true;
+    }
+    return dataset;
+}
+
+Gaussians some_splats(size_t count) {
+    Gaussians splats;
+    splats.resize(count);
+    return splats;
+}
+
+TrainOptions long_run() {
+    TrainOptions options;
+    options.steps = 30000;
+    return options;
+}
+
+SplatCap cap_of(const Dataset& dataset, const TrainOptions& options, size_t start = 100) {
+    return splat_cap(*device(), dataset, all_frames(dataset), some_splats(start), options);
+}
+
+TEST(SplatCap, HasAsManyParametersAsThePhotosHaveValues) {
+    EXPECT_EQ(cap_of(views_of(10, 200, 100), long_run()).splats, 10000u);
+    EXPECT_EQ(cap_of(views_of(30, 200, 100), long_run()).splats, 30000u);
+    EXPECT_EQ(cap_of(views_of(10, 200, 100), long_run()).reason, "one for each 20 training pixels");
+    const Dataset dataset = views_of(10, 200, 100);
+    EXPECT_EQ(splat_cap(*device(), dataset, {0, 3}, some_splats(9), long_run()).splats, 2000u)
+        << "of the training frames alone";
+}
+
+TEST(SplatCap, RisesWithTheSteps) {
+    const Dataset dataset = views_of(100, 1300, 840);
+    TrainOptions options;
+    options.steps = 1000;
+    EXPECT_EQ(cap_of(dataset, options, 500).splats, 100500u);
+    EXPECT_EQ(cap_of(dataset, options, 500).reason, "100 more for each step");
+    options.steps = 7000;
+    EXPECT_EQ(cap_of(dataset, options, 500).splats, 700500u);
+}
+
+TEST(SplatCap, IsWhatTheOptionsSay) {
+    TrainOptions options = long_run();
+    options.max_splats = 77;
+    EXPECT_EQ(cap_of(views_of(10, 200, 100), options).splats, 77u);
+}
+
+TEST(SplatCap, IsNotBelowTheStartNorAnEarlierCap) {
+    TrainOptions options = long_run();
+    EXPECT_EQ(cap_of(views_of(10, 200, 100), options, 12000).splats, 12000u);
+    options.least_max_splats = 11000;
+    EXPECT_EQ(cap_of(views_of(10, 200, 100), options).splats, 11000u);
+    options.least_max_splats = 9000;
+    EXPECT_EQ(cap_of(views_of(10, 200, 100), options).splats, 10000u);
+}
+
+/// With a limit of device memory, splats that do not fit are in host memory.
+TEST(SplatCap, KeepsTheTrainingOnTheDevice) {
+    const Dataset dataset = views_of(6000, 10000, 10000);
+    const auto frames = all_frames(dataset);
+    const Gaussians start = some_splats(1000);
+    TrainOptions options;
+    options.strategy = Strategy::adc;
+    options.steps = 100000000;
+    options.image_cache_bytes = 0;
+    const double room = 0.8 * double(device_info(*device()).memory_bytes);
+    const SplatCap cap = cap_of(dataset, options, 1000);
+    EXPECT_EQ(cap.reason, "the device's memory has room for them");
+    const auto bytes = [&](double splats) {
+        TrainOptions given = options;
+        given.max_splats = uint32_t(splats);
+        return double(estimate_memory(*device(), dataset, frames, start, given).total());
+    };
+    if (cap.splats > 1000) {
+        EXPECT_LE(bytes(cap.splats), room);
+    }
+    EXPECT_GT(bytes(cap.splats + 1e7), room);
+    options.device_memory_bytes = uint64_t(1) << 30;
+    EXPECT_GT(cap_of(dataset, options, 1000).splats, cap.splats);
+}
+
+/// Also the splats at the end in the estimate of memory.
+TEST(SplatCap, BoundsATraining) {
+    const Gaussians start = shaken_start(small_capture(), 0.05, 1, 1);
+    const auto frames = all_frames(small_capture().dataset);
+    TrainOptions options = busy(Strategy::mcmc, 1);
+    options.max_splats = kAutomaticMaxSplats;
+    options.growth = 10;
+    Trainer trainer(device(), small_capture().dataset, frames, start, options);
+    while (trainer.steps_done() < options.steps) trainer.step();
+    EXPECT_EQ(trainer.max_splats(), 8u * 48 * 36 / 20);
+    EXPECT_EQ(trainer.splats(), trainer.max_splats());
+    EXPECT_EQ(estimate_memory(*device(), small_capture().dataset, frames, start, options).splats,
+              trainer.max_splats());
+}
+
+}  // namespace
+}  // namespace ewa::test
