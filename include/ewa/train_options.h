@@ -58,6 +58,10 @@ struct TrainOptions {
     /// square root of that at its end (src/train/schedule.h). 0: the rates of a full run.
     double short_run_power = 0.5;
 
+    /// Up to so many training photos, adc and none are regularised, unless poses are refined. If a run of fewer than 30,000 steps shows each of them 60
+    /// times, the rates of its splats fade.
+    int few_photos = 16;
+
     bool exposure = false;  // learns an exposure for each training image, from the identity
     double exposure_rate = 0.01, exposure_rate_final = 0.001;
 
@@ -94,9 +98,10 @@ struct TrainOptions {
     /// linearly to 0 at 30,000 steps: long runs have time for noise to separate copies (src/train/schedule.h).
     double copy_spread = 1;
     double dead_opacity = 0.005;
-    double noise_rate = 5e5;       // times the means' learning rate
-    double opacity_weight = 0.01;  // regulariser weight of the mean opacity
-    double scale_weight = 0.01;    // regulariser weight of the mean scale, in units of scene extent
+    double noise_rate = 5e5;  // times the means' learning rate
+    // Regularisers, also of adc and none with few photos.
+    double opacity_weight = 0.01;  // weight of the mean opacity
+    double scale_weight = 0.01;    // weight of the mean scale, in units of scene extent
 };
 
 }  // namespace ewa

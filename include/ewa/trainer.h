@@ -53,7 +53,7 @@ MemoryEstimate estimate_memory(const gpu::Device& device, const Dataset& dataset
                                const std::vector<int>& train_frames, const Gaussians& start,
                                const TrainOptions& options);
 
-/// What a Trainer of these options skips. masks: some training images have pixels that do not count.
+/// What a Trainer of these options and many photos skips. masks: some training images have pixels that do not count.
 std::vector<PlanLine> plan_lines(const Gaussians& start, const TrainOptions& options, bool masks = false);
 
 struct StepReport {

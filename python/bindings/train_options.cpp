@@ -54,6 +54,7 @@ const std::vector<Field>& fields() {
         {"scale_rate", &O::scale_rate},
         {"quaternion_rate", &O::quaternion_rate},
         {"short_run_power", &O::short_run_power},
+        {"few_photos", &O::few_photos},
         {"exposure", &O::exposure},
         {"exposure_rate", &O::exposure_rate},
         {"exposure_rate_final", &O::exposure_rate_final},

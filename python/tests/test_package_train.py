@@ -188,6 +188,18 @@ def test_random_first_splats(still_life):
         ewa.Trainer(still_life, init="rnd")
 
 
+def test_the_cap_is_chosen_and_kept(still_life, tmp_path):
+    trainer = ewa.Trainer(still_life, steps=12)
+    assert trainer.options["max_splats"] == 3000 + 100 * 12
+    trainer.step()
+    trainer.save_checkpoint(tmp_path / "a.ewa")
+    resumed = ewa.Trainer.resume(tmp_path / "a.ewa", still_life)
+    assert resumed.options["max_splats"] == 4200
+    longer = ewa.Trainer.resume(tmp_path / "a.ewa", still_life, steps=20)
+    assert longer.options["max_splats"] == 5000
+    assert ewa.Trainer(still_life, max_splats=4e3).options["max_splats"] == 4000
+
+
 @pytest.mark.parametrize(
     "options, error, message",
     [
@@ -208,6 +220,8 @@ def test_random_first_splats(still_life):
             "train_frames has the index 48; the dataset has 48 frames",
         ),
         ({"max_splats": 10}, ewa.InputError, "3000 splats"),
+        ({"max_splats": 0}, ewa.InputError, "max_splats=0: is no whole number from 1 to"),
+        ({"max_splats": "many"}, TypeError, "max_splats='many' is of the wrong type"),
         ({"init": make_splats(2).means}, TypeError, ""),
     ],
 )

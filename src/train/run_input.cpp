@@ -257,7 +257,8 @@ size_t dense_start(const RunOptions& options, const Dataset& dataset, const std:
         const Camera& camera = dataset.frames[size_t(i)].camera;
         pixels += double(camera.width) * camera.height / double(frames.size());
     }
-    return std::min(size_t(pixels / kPixelsOfDenseStart), size_t(train.max_splats));
+    const auto wanted = size_t(pixels / kPixelsOfDenseStart);
+    return train.max_splats == kAutomaticMaxSplats ? wanted : std::min(wanted, size_t(train.max_splats));
 }
 
 Gaussians splats_of(const PointCloud& points, const RunOptions& options, const Dataset& dataset,

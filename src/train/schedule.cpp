@@ -20,6 +20,9 @@ constexpr int kLeastResetEvery = 1000;
 constexpr int kLeastShEvery = 50;
 // Share of the steps in which the rate of the poses rises from 0: the first splats say little of the cameras.
 constexpr double kPoseWarmUp = 0.1;
+// Of few photos: how often each is seen by a run whose rates fade, and the rates' last factor.
+constexpr int kVisitsOfFading = 60;
+constexpr double kLastFading = 0.1;
 
 double decayed(double first, double last, double share) {
     const double t = std::clamp(share, 0.0, 1.0);
@@ -28,7 +31,13 @@ double decayed(double first, double last, double share) {
 
 }  // namespace
 
-pipeline::PlanRequest plan_request(const Gaussians& start, const TrainOptions& options, bool masks) {
+bool few_photos(const TrainOptions& options, size_t photos) {
+    return photos <= size_t(options.few_photos) && options.strategy != Strategy::mcmc &&
+           !options.render.points && !options.refine_poses;
+}
+
+pipeline::PlanRequest plan_request(const Gaussians& start, const TrainOptions& options, bool masks,
+                                   size_t photos) {
     return {.purpose = pipeline::Purpose::training,
             .scene_degree = start.sh_degree,
             .render = options.render,
@@ -38,7 +47,7 @@ pipeline::PlanRequest plan_request(const Gaussians& start, const TrainOptions& o
             .statistics = options.strategy == Strategy::adc,
             .absolute_gradients = options.absolute_gradients,
             .packed_moments = options.moment_bits == 16,
-            .regularised = options.strategy == Strategy::mcmc};
+            .regularised = options.strategy == Strategy::mcmc || few_photos(options, photos)};
 }
 
 void check_training(const TrainOptions& options, int ranks) {
@@ -100,6 +109,11 @@ double Schedule::opacity_gain(int step) const {
     return std::pow(shortness, 0.6 * power * (1 - double(step) / steps));
 }
 
+double Schedule::fading(int step) const {
+    if (fade_start == 0 || step <= fade_start) return 1;
+    return std::pow(kLastFading, double(step - fade_start) / (steps - fade_start));
+}
+
 double Schedule::mean_rate(int step, double extent) const {
     return extent * decayed(means_rate, means_rate_final, double(step) / steps);
 }
@@ -121,7 +135,7 @@ uint64_t cache_share(const TrainOptions& options, int halvings) {
     return all - smaller;
 }
 
-Schedule schedule_for(const TrainOptions& options) {
+Schedule schedule_for(const TrainOptions& options, size_t photos) {
     const double share = std::min(1.0, options.steps / kFullRun);
     const auto scaled = [&](int steps, int least) {
         return std::max(int(std::lround(steps * share)), least);
@@ -151,6 +165,9 @@ Schedule schedule_for(const TrainOptions& options) {
     s.resolution_every = scaled(options.resolution_every, 1);
     s.shortness = 1 / share;
     s.power = options.short_run_power;
+    if (few_photos(options, photos) && options.steps < kFullRun &&
+        size_t(options.steps) >= photos * kVisitsOfFading)
+        s.fade_start = options.steps / 2;
     s.means_rate = options.means_rate;
     s.means_rate_final = options.means_rate_final;
     s.exposures_rate = options.exposure_rate;

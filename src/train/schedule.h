@@ -11,6 +11,10 @@
 //
 // The learning rates of 3DGS are those of 30,000 steps. A step of Adam moves a parameter by about its rate, whatever the
 // gradient is. So parameters of a short run do not come as far as they have to. A shorter run has higher rates: see gain.
+//
+// With few photos, splats learn views that no other photo confirms, and held-out views get worse while the photos get better.
+// Regularisers then keep splats small and transparent, and the rates of a run that shows each photo often fade: see
+// few_photos.
 #pragma once
 #include <cstdint>
 
@@ -33,6 +37,7 @@ struct Schedule {
     double means_rate = 0, means_rate_final = 0;  // per unit of scene extent, of a full run
     double shortness = 1;                         // 30,000 over the steps, at least 1
     double power = 0;                             // TrainOptions::short_run_power
+    int fade_start = 0;                           // the step after which the rates fade; 0: they do not
     double exposures_rate = 0, exposures_rate_final = 0;
     double poses_rate = 0, poses_rate_final = 0;
 
@@ -52,6 +57,8 @@ struct Schedule {
     double gain(int step) const;
     /// The same of opacities, which need less: shortness^(0.6 power), falling to 1.
     double opacity_gain(int step) const;
+    /// Another factor of all the splats' learning rates: 1 up to fade_start, then falling exponentially to a tenth.
+    double fading(int step) const;
     /// Learning rate of the means without gain: exponential from means_rate to means_rate_final over the run (Plenoxels'
     /// decay, as 3DGS uses it), times the scene extent.
     double mean_rate(int step, double extent) const;
@@ -65,12 +72,18 @@ struct Schedule {
 /// level above it, and the full resolution gets the rest.
 uint64_t cache_share(const TrainOptions& options, int halvings);
 
-Schedule schedule_for(const TrainOptions& options);
+/// Whether adc or none has so few training photos that the run is regularised, and may fade. Not one that refines poses:
+/// its splats have to follow the cameras.
+bool few_photos(const TrainOptions& options, size_t photos);
+
+/// The default of `photos`: many.
+Schedule schedule_for(const TrainOptions& options, size_t photos = SIZE_MAX);
 
 /// Throws InputError if options exclude each other, or exclude several ranks.
 void check_training(const TrainOptions& options, int ranks = 1);
 
-/// The plan that a run asks for. masks: some training images have pixels that do not count.
-pipeline::PlanRequest plan_request(const Gaussians& start, const TrainOptions& options, bool masks);
+/// The plan that a run asks for. masks: some training images have pixels that do not count. photos: for training.
+pipeline::PlanRequest plan_request(const Gaussians& start, const TrainOptions& options, bool masks,
+                                   size_t photos = SIZE_MAX);
 
 }  // namespace ewa::train

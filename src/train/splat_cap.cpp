@@ -1,22 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 // The largest number of splats of a training, unless its options name it.
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 #include <cmath>
 #include <string>
 
+#include "core/typing.h"
 #include "ewa/trainer.h"
 
 namespace ewa {
 namespace {
 
-// A splat of SH degree 3 has 59 parameters, and a pixel has three values. With more splats the photos have fewer values
-// than the splats have parameters.
-constexpr double kPixelsPerSplat = 20;
-// A step changes only so many splats to the better. 30,000 steps can have 3 million, as the papers' largest scenes.
+// Of the pixels of a photo, times the square root of the number of photos: each photo shows less that is new than the one
+// before.
+constexpr double kSplatsPerPixel = 0.6;
+// 30,000 steps can have 3 million, as the papers' largest scenes. Splats that come late have few steps left.
 constexpr double kSplatsPerStep = 100;
-constexpr double kMemoryShare = 0.8;  // of the device's; the rest is for other programs, and for errors of the estimate
+constexpr double kMemoryShare =
+    0.8;  // of the device's; the rest is for other programs, and for errors of the estimate
 
-double training_pixels(const Dataset& dataset, const std::vector<int>& frames) {
+double pixels_of(const Dataset& dataset, const std::vector<int>& frames) {
     double pixels = 0;
     for (const int index : frames) {
         const Camera& camera = dataset.frames[size_t(index)].camera;
@@ -47,13 +51,17 @@ SplatCap splat_cap(const gpu::Device& device, const Dataset& dataset, const std:
                    const Gaussians& start, const TrainOptions& options) {
     if (options.max_splats != kAutomaticMaxSplats) return {options.max_splats, "as asked for"};
     const auto first = uint32_t(start.size());
-    const double by_pixels = training_pixels(dataset, train_frames) / kPixelsPerSplat;
+    const double pixels = pixels_of(dataset, train_frames), photos = double(train_frames.size());
+    const double by_pixels = kSplatsPerPixel * pixels / std::sqrt(photos);
     const double by_steps = first + kSplatsPerStep * options.steps;
-    SplatCap cap{uint32_t(std::min({by_pixels, by_steps, 1e9})), "one for each 20 training pixels"};
+    SplatCap cap{uint32_t(std::min({by_pixels, by_steps, 1e9})),
+                 fmt::format("{} with {:.3g} million pixels have detail for no more",
+                             core::counted(train_frames.size(), "photo"), pixels / 1e6)};
     if (by_steps < by_pixels) cap.reason = "100 more for each step";
     if (options.device_memory_bytes == 0) {
-        const uint32_t fit = fitting(device, dataset, train_frames, start, options, std::max(cap.splats, first),
-                                     kMemoryShare * double(device_info(device).memory_bytes));
+        const uint32_t fit =
+            fitting(device, dataset, train_frames, start, options, std::max(cap.splats, first),
+                    kMemoryShare * double(device_info(device).memory_bytes));
         if (fit < cap.splats) cap = {fit, "the device's memory has room for them"};
     }
     if (cap.splats < options.least_max_splats) cap = {options.least_max_splats, "as before"};

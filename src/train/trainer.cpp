@@ -129,12 +129,12 @@ Trainer::State::State(std::shared_ptr<gpu::Device> d, const Dataset& dataset, co
     : device(std::move(d)),
       ranks(std::move(r)),
       options(o),
-      schedule(train::schedule_for(o)),
+      schedule(train::schedule_for(o, frames.size())),
       extent(length),
       cache(*device),
       executor(*device, cache.config().frames_in_flight),
       images(*device, cache.config(), dataset, frames, train::cache_share(o, 0), ready.origin),
-      plan(plan_for(train::plan_request(ready, o, images.any_masked()))),
+      plan(plan_for(train::plan_request(ready, o, images.any_masked(), frames.size()))),
       instance_capacity(first_capacity(ready.size())) {
     if (chunk_count > 1)
         divide(ready, chunk_count);

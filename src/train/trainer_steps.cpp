@@ -31,9 +31,9 @@ std::array<float, 3> random_background(int step, uint64_t seed) {
 
 Rates Trainer::State::rates(int step) const {
     Rates r;
-    const double gain = schedule.gain(step);
+    const double fading = schedule.fading(step), gain = fading * schedule.gain(step);
     r.mean = float(gain * schedule.mean_rate(step, extent));
-    r.opacity = float(schedule.opacity_gain(step) * options.opacity_rate);
+    r.opacity = float(fading * schedule.opacity_gain(step) * options.opacity_rate);
     r.quaternion = float(gain * options.quaternion_rate);
     r.scale = float(gain * options.scale_rate);
     r.sh0 = float(gain * options.sh0_rate);

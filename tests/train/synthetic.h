@@ -116,6 +116,7 @@ inline TrainOptions quick(int steps) {
     options.seed = 3;
     // Such a run has to take longer steps than a run of 30,000.
     options.short_run_power = 0;
+    options.few_photos = 0;
     options.means_rate = 6e-3;
     options.means_rate_final = 4e-4;
     options.sh_rest_rate = 2.5e-4;
@@ -144,6 +145,7 @@ inline TrainOptions busy(Strategy strategy, int batch) {
     options.growth = 1.2;
     options.opacity_reset_every = 50;
     options.short_run_power = 0;
+    options.few_photos = 0;
     options.means_rate = 3e-3;
     options.opacity_rate = 0.3;
     return options;

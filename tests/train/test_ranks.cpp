@@ -91,10 +91,10 @@ TEST(Ranks, TrainUpToTheCapOfTheFirst) {
     run_ranks(2, [&](std::shared_ptr<Ranks> group) {
         TrainOptions options = busy(Strategy::mcmc, 2);
         options.max_splats = kAutomaticMaxSplats;
-        options.least_max_splats = group->rank() == 0 ? 2000 : 3000;
+        options.least_max_splats = group->rank() == 0 ? 5000 : 6000;
         const Dataset& dataset = seven_views().dataset;
         Trainer trainer(open_test_device(false), dataset, all_frames(dataset), start(), options, group);
-        EXPECT_EQ(trainer.max_splats(), 2000u);
+        EXPECT_EQ(trainer.max_splats(), 5000u);
         if (group->rank() != 0) trainer.follow();
     });
 }

@@ -150,25 +150,38 @@ TEST(Run, SaysAndKeepsAnAutomaticCap) {
     options.train.max_splats = kAutomaticMaxSplats;
     Recorder recorder;
     const RunResult whole = run_training(options, recorder);
-    EXPECT_EQ(whole.summary.max_splats, 6u * 48 * 36 / 20);
-    EXPECT_EQ(json_of(folder / "whole/summary.json")["max_splats"], 518);
+    EXPECT_EQ(whole.summary.max_splats, 2539u);
+    EXPECT_EQ(json_of(folder / "whole/summary.json")["max_splats"], 2539);
     EXPECT_EQ(json_of(folder / "whole/config.json")["max-splats"], "auto");
     const std::vector<std::string>& said = recorder.started.remarks;
     EXPECT_EQ(std::count(said.begin(), said.end(),
-                         "at most 518 splats: one for each 20 training pixels; --max-splats N sets another "
-                         "limit"),
+                         "at most 2539 splats: 6 photos with 0.0104 million pixels have detail for no more; "
+                         "--max-splats N sets another limit"),
               1);
 
     options.output = folder / "cut";
     options.resume = true;
     Recorder stops(13);
     run_training(options, stops);
-    EXPECT_EQ(run_training(options).summary.max_splats, 518u);
+    EXPECT_EQ(run_training(options).summary.max_splats, 2539u);
     EXPECT_EQ(file_bytes(folder / "cut/splats.ply"), file_bytes(folder / "whole/splats.ply"));
     EXPECT_EQ(file_bytes(folder / "cut/checkpoint.ewa"), file_bytes(folder / "whole/checkpoint.ewa"));
 
     options.train.max_splats = 600;
     expect_error<InputError>([&] { run_training(options); }, {"--max-splats \"auto\", not 600"});
+}
+
+TEST(Run, ADenseStartKeepsToACapThatIsGiven) {
+    TempFolder folder;
+    RunOptions options = small_run(folder / "o");
+    options.dense_start = DenseStart::on;
+    options.force = true;
+    for (const uint32_t cap : {kAutomaticMaxSplats, 90u}) {
+        options.train.max_splats = cap;
+        Recorder stops(1);
+        run_training(options, stops);
+        EXPECT_EQ(stops.started.splats > 90, cap == kAutomaticMaxSplats) << stops.started.splats;
+    }
 }
 
 TEST(Run, AContinuedRunDoesNotLowerItsCap) {
@@ -180,9 +193,9 @@ TEST(Run, AContinuedRunDoesNotLowerItsCap) {
     EXPECT_EQ(run_training(options).summary.max_splats, 240u);
     options.train.steps = 40;
     Recorder stops(3);
-    EXPECT_EQ(run_training(options, stops).summary.max_splats, 518u);
+    EXPECT_EQ(run_training(options, stops).summary.max_splats, 2539u);
     options.train.steps = 3;
-    EXPECT_EQ(run_training(options).summary.max_splats, 518u);
+    EXPECT_EQ(run_training(options).summary.max_splats, 2539u);
 }
 
 TEST(Run, IsNotReplacedUnlessAskedTo) {

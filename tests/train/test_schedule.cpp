@@ -148,6 +148,42 @@ TEST(Schedule, ShortRunsLearnFaster) {
     EXPECT_EQ(schedule_for(options).opacity_gain(1), 1);
 }
 
+/// A run that shows each of a few photos often.
+TEST(Schedule, FewPhotosAreNotLearntByHeart) {
+    TrainOptions options;
+    options.strategy = Strategy::adc;
+    options.steps = 1000;
+    const Schedule few = schedule_for(options, 9);
+    EXPECT_EQ(few.fading(1), 1);
+    EXPECT_EQ(few.fading(500), 1);
+    EXPECT_NEAR(few.fading(750), std::sqrt(0.1), 1e-12);
+    EXPECT_NEAR(few.fading(1000), 0.1, 1e-12);
+    EXPECT_EQ(schedule_for(options, 16).fade_start, 500);
+    for (const size_t photos : {size_t(17), size_t(43), SIZE_MAX}) {
+        EXPECT_FALSE(few_photos(options, photos));
+        EXPECT_EQ(schedule_for(options, photos).fading(1000), 1);
+    }
+    EXPECT_TRUE(few_photos(options, 16));
+    options.steps = 539;
+    EXPECT_EQ(schedule_for(options, 9).fading(539), 1) << "seen less than 60 times";
+    options.few_photos = 8;
+    EXPECT_FALSE(few_photos(options, 9));
+    options.few_photos = 16;
+    options.strategy = Strategy::none;
+    EXPECT_TRUE(few_photos(options, 9));
+    options.render.points = true;
+    EXPECT_FALSE(few_photos(options, 9)) << "a sphere has no opacity";
+    options.render.points = false;
+    options.refine_poses = true;
+    EXPECT_FALSE(few_photos(options, 9)) << "splats have to follow the cameras";
+    options.refine_poses = false;
+    options.strategy = Strategy::mcmc;
+    EXPECT_FALSE(few_photos(options, 9)) << "regularised anyway";
+    options.strategy = Strategy::adc;
+    options.steps = 30000;
+    EXPECT_EQ(schedule_for(options, 9).fading(30000), 1);
+}
+
 TEST(Schedule, TheResolutionDoublesEachTenthOfTheRun) {
     TrainOptions options;
     EXPECT_EQ(schedule_for(options).halvings_at(1), 0);

@@ -438,6 +438,24 @@ TEST(Trainer, AResolutionScheduleEndsAtTheWholeResolutionAndResumes) {
     EXPECT_NE(Trainer(device(), small_capture().dataset, frames, start, options).step().loss, loss);
 }
 
+/// The regularisers pull at splats that no photo shows.
+TEST(Trainer, RegularisesAFewPhotos) {
+    const Dataset& dataset = small_capture().dataset;
+    const Gaussians start = shaken_start(small_capture(), 0.05, 1, 0);
+    const auto opacities = [&](size_t photos, double weight) {
+        TrainOptions options = quick(3);
+        options.few_photos = 16;
+        options.opacity_weight = weight;
+        std::vector<int> frames;
+        for (size_t i = 0; i < photos; ++i) frames.push_back(int(i % 8));
+        Trainer trainer(device(), dataset, frames, start, options);
+        while (trainer.steps_done() < 3) trainer.step();
+        return trainer.gaussians().opacity_logits;
+    };
+    EXPECT_NE(opacities(16, 10), opacities(16, 0));
+    EXPECT_EQ(opacities(17, 10), opacities(17, 0));
+}
+
 /// A training on a device of its own: its peak of device memory is within a share of the estimate. Returns the peak.
 uint64_t expect_estimated(const Synthetic& capture, const Gaussians& start, const TrainOptions& options,
                           double share) {
