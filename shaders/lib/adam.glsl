@@ -34,8 +34,8 @@ void move_rounded(uint plane, uint i, vec4 value, vec4 raw_gradient, vec4 rate, 
     if (GRADIENT_ONLY) {
         // Infinities become the largest float32. NaN becomes zero and is counted.
         const bvec4 number = equal(raw_gradient, raw_gradient);
-        moments1_out[at] =
-            floatBitsToUint(mix(vec4(0.0), clamp(raw_gradient, -3.402823466e38, 3.402823466e38), number));
+        moments1_out[at] = as_texel(
+            floatBitsToUint(mix(vec4(0.0), clamp(raw_gradient, -3.402823466e38, 3.402823466e38), number)));
         if (!all(number)) atomicAdd(counts.dropped_updates, 1u);
         return;
     }
@@ -56,12 +56,12 @@ void move_rounded(uint plane, uint i, vec4 value, vec4 raw_gradient, vec4 rate, 
     const bool limited = limit_step(plane, value, depth, moved);
     if (is_finite(moved) && is_finite(m) && is_finite(v)) {
         if (limited) atomicAdd(counts.limited_steps, 1u);
-        params_out[at] = moved;
+        params_out[at] = as_texel(moved);
         if (PACKED_MOMENTS) {
-            moments1_out[at] = pack_moments(m, v, random);
+            moments1_out[at] = as_texel(pack_moments(m, v, random));
         } else {
-            moments1_out[at] = floatBitsToUint(m);
-            moments2_out[at] = floatBitsToUint(v);
+            moments1_out[at] = as_texel(floatBitsToUint(m));
+            moments2_out[at] = as_texel(floatBitsToUint(v));
         }
     } else if (is_finite(value)) {
         atomicAdd(counts.dropped_updates, 1u);

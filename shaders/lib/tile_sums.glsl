@@ -26,16 +26,24 @@ float transposing_sum(float v[8]) {
     return sum;
 }
 
-// Whole texels take fewer memory transactions; without them the unused floats are not written.
+// Whole texels take fewer memory transactions. On a CPU, each store costs, so unused floats are not written: those of a texel,
+// or of half a texel.
 void write_slot(uint index, float slot[12]) {
     [[unroll]] for (uint t = 0; t < SLOT_TEXELS; ++t) {
+        const uint at = SLOT_TEXELS * index + t;
+        const vec4 texel = vec4(slot[4 * t], slot[4 * t + 1], slot[4 * t + 2], slot[4 * t + 3]);
+#ifdef EWA_TEXEL_BUFFERS
+        if (4 * t < SUMS) slots[at].x = as_texel(texel).x;
+        if (4 * t + 2 < SUMS) slots[at].y = as_texel(texel).y;
+#else
         if (WIDE_STORES) {
-            slots[SLOT_TEXELS * index + t] = vec4(slot[4 * t], slot[4 * t + 1], slot[4 * t + 2], slot[4 * t + 3]);
+            slots[at] = texel;
             continue;
         }
         [[unroll]] for (uint c = 0; c < 4; ++c) {
-            if (4 * t + c < SUMS) slots[SLOT_TEXELS * index + t][c] = slot[4 * t + c];
+            if (4 * t + c < SUMS) slots[at][c] = texel[c];
         }
+#endif
     }
 }
 

@@ -19,7 +19,7 @@ layout(set = 0, binding = 1, scalar) readonly buffer Splats { uint splats[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer TileStarts { uint tile_starts[]; };
 layout(set = 0, binding = 3, scalar) readonly buffer Planes { float planes[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer ImageGradient { float image_gradient[]; };
-layout(set = 0, binding = 5, scalar) writeonly buffer Slots { vec4 slots[]; };
+STORED_TEXELS(5, slots);
 layout(push_constant, scalar) uniform Push { BlendPush push; };
 #include "lib/tile.glsl"
 #include "lib/tile_sums.glsl"

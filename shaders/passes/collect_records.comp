@@ -20,7 +20,7 @@ layout(set = 0, binding = 2, scalar) readonly buffer Opacities { float opacities
 layout(set = 0, binding = 3, scalar) readonly buffer Features { float features[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer Depths { float depths[]; };
 layout(set = 0, binding = 5, scalar) readonly buffer Radii { ivec2 radii[]; };
-layout(set = 0, binding = 6, scalar) writeonly buffer Records { vec4 records[]; };
+STORED_TEXELS(6, records);
 layout(set = 0, binding = 7, scalar) writeonly buffer DepthKeys { uint depth_keys[]; };
 layout(set = 0, binding = 8, scalar) buffer TileCounts { uint tile_counts[]; };
 layout(set = 0, binding = 9, scalar) buffer CountsBlock { Counts counts; };
@@ -52,7 +52,7 @@ void main() {
             feature[c] = abs(value) <= float(COLOR_MAX) ? value : 0.0;
         }
     }
-    records[RECORD_TEXELS * i + 2] = feature;
+    records[RECORD_TEXELS * i + 2] = as_texel(feature);
     if (FEATURES_ALONE) return;
 
     const vec2 mean = means[i];
@@ -64,8 +64,8 @@ void main() {
     const bool finite = is_finite(mean.x) && is_finite(mean.y) && is_finite(shape) && shape.x > 0.0 && shape.z > 0.0 &&
                         is_finite(opacity) && is_finite(depth);
     const vec4 record0 = vec4(mean, 0.0, 0.0), record1 = vec4(shape, opacity);
-    records[RECORD_TEXELS * i] = finite ? record0 : vec4(0.0);
-    records[RECORD_TEXELS * i + 1] = finite ? record1 : vec4(1.0, 0.0, 1.0, 0.0);
+    records[RECORD_TEXELS * i] = as_texel(finite ? record0 : vec4(0.0));
+    records[RECORD_TEXELS * i + 1] = as_texel(finite ? record1 : vec4(1.0, 0.0, 1.0, 0.0));
     if (wanted && !(finite && finite_feature)) atomicAdd(counts.skipped_nonfinite, 1u);
     if (LISTED) return;
 

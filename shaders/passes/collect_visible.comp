@@ -13,7 +13,7 @@ layout(set = 0, binding = 1, scalar) readonly buffer TileCounts { uint tile_coun
 layout(set = 0, binding = 2, scalar) readonly buffer Prefix { uint prefix[]; };
 layout(set = 0, binding = 3, scalar) readonly buffer Totals { uint totals[]; };
 layout(set = 0, binding = 4, scalar) writeonly buffer Places { uint places[]; };
-layout(set = 0, binding = 5, scalar) writeonly buffer Visible { vec4 visible[]; };
+STORED_TEXELS(5, visible);
 layout(push_constant, scalar) uniform Push { CollectVisiblePush push; };
 
 void main() {
@@ -24,6 +24,6 @@ void main() {
     places[push.list * push.splats + i] = listed ? push.first_place + index : NOT_LISTED;
     if (!listed) return;
     const uint at = RECORD_TEXELS * (push.first_record + index);
-    visible[at] = from_row(fetch(records, RECORD_TEXELS * i), push.first_row);
-    [[unroll]] for (uint t = 1; t < RECORD_TEXELS; ++t) visible[at + t] = fetch(records, RECORD_TEXELS * i + t);
+    visible[at] = as_texel(from_row(fetch(records, RECORD_TEXELS * i), push.first_row));
+    [[unroll]] for (uint t = 1; t < RECORD_TEXELS; ++t) visible[at + t] = as_texel(fetch(records, RECORD_TEXELS * i + t));
 }

@@ -21,7 +21,7 @@ layout(set = 0, binding = 4, scalar) readonly buffer TileCounts { uint tile_coun
 layout(set = 0, binding = 5, scalar) readonly buffer FirstInstances { uint first_instances[]; };
 layout(set = 0, binding = 6, scalar) buffer CountsBlock { Counts counts; };
 layout(set = 0, binding = 7, scalar) readonly buffer SortedIndices { uint sorted_indices[]; };
-layout(set = 0, binding = 8, scalar) writeonly buffer Gradient { uvec4 gradients[]; };
+STORED_WORD_TEXELS(8, gradients);
 layout(push_constant, scalar) uniform Push { UpdatePush push; };
 
 const uint SH_FLOATS = 3 * (SH_DEGREE + 1) * (SH_DEGREE + 1);
@@ -31,7 +31,7 @@ uint index_of(uint plane, uint i) { return param_texel(push.planes, plane, i); }
 
 void store(uint plane, uint i, vec4 gradient) {
     const bvec4 number = equal(gradient, gradient);
-    gradients[index_of(plane, i)] = floatBitsToUint(mix(vec4(0.0), clamp(gradient, -3.402823466e38, 3.402823466e38), number));
+    gradients[index_of(plane, i)] = as_texel(floatBitsToUint(mix(vec4(0.0), clamp(gradient, -3.402823466e38, 3.402823466e38), number)));
     if (!all(number)) atomicAdd(counts.dropped_updates, 1u);
 }
 

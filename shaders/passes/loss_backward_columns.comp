@@ -8,7 +8,7 @@
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 TEXELS(0, derivatives);
-layout(set = 0, binding = 1, scalar) writeonly buffer Blurred { vec4 blurred[]; };
+STORED_TEXELS(1, blurred);
 layout(push_constant, scalar) uniform Push { LossPush push; };
 
 void main() {
@@ -24,6 +24,6 @@ void main() {
     }
     [[unroll]] for (int o = 0; o < int(LOSS_ROWS); ++o) {
         const vec4 sum = blur_column(values, o);
-        if (top + o < int(push.image.size[1])) blurred[plane + uint(top + o) * row_texels + uint(column)] = sum;
+        if (top + o < int(push.image.size[1])) blurred[plane + uint(top + o) * row_texels + uint(column)] = as_texel(sum);
     }
 }

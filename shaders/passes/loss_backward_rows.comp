@@ -15,7 +15,7 @@ layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 TEXELS(0, blurred);
 TEXELS(1, image);
 TEXELS(2, target);
-layout(set = 0, binding = 3, scalar) writeonly buffer ImageGradient { vec4 image_gradient[]; };
+STORED_TEXELS(3, image_gradient);
 layout(set = 0, binding = 4, scalar) writeonly buffer Partials { float partials[]; };
 layout(push_constant, scalar) uniform Push { LossPush push; };
 
@@ -45,9 +45,9 @@ void main() {
         const vec4 x = fetch_or_zero(image, there, at), y = fetch_or_zero(target, there, at);
         const vec4 limit = vec4(SSIM_LIMIT), seen = vec4(lessThanEqual(abs(x), limit));
         if (there)
-            image_gradient[at] = push.ssim_scale * seen * (m[0][o] + 2.0 * clamp(x, -limit, limit) * m[1][o] +
+            image_gradient[at] = as_texel(push.ssim_scale * seen * (m[0][o] + 2.0 * clamp(x, -limit, limit) * m[1][o] +
                                                            clamp(y, -limit, limit) * m[2][o]) +
-                                 l1_scale * sign(x - y);
+                                 l1_scale * sign(x - y));
         differences += abs(x - y);
         const vec4 shown = clamp(x, 0.0, 1.0) - clamp(y, 0.0, 1.0);
         squares += shown * shown;

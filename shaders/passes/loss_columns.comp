@@ -11,7 +11,7 @@
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 TEXELS(0, image);
 TEXELS(1, target);
-layout(set = 0, binding = 2, scalar) writeonly buffer Moments { vec4 moments[]; };
+STORED_TEXELS(2, moments);
 layout(push_constant, scalar) uniform Push { LossPush push; };
 
 void main() {
@@ -34,7 +34,7 @@ void main() {
         [[unroll]] for (int o = 0; o < int(LOSS_ROWS); ++o) {
             const vec4 mean = blur_column(values, o);
             if (top + o < int(push.image.size[1]))
-                moments[(MOMENT_PLANES * channel + q) * plane + uint(top + o) * row_texels + uint(column)] = mean;
+                moments[(MOMENT_PLANES * channel + q) * plane + uint(top + o) * row_texels + uint(column)] = as_texel(mean);
         }
     }
 }

@@ -12,7 +12,7 @@
 
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 TEXELS(0, moments);
-layout(set = 0, binding = 1, scalar) writeonly buffer Derivatives { vec4 derivatives[]; };
+STORED_TEXELS(1, derivatives);
 layout(set = 0, binding = 2, scalar) writeonly buffer Partials { float partials[]; };
 layout(push_constant, scalar) uniform Push { LossPush push; };
 
@@ -47,9 +47,9 @@ void main() {
         const vec4 s = mask * a1 * a2 * inverse;
         if (inside && first + o < int(row_texels)) {
             const uint at = DERIVATIVE_PLANES * channel * plane + uint(row + first + o);
-            derivatives[at] = mask * (2.0 * my * (a2 - a1) * inverse) - 2.0 * mx * s * (1.0 / b1 - 1.0 / b2);
-            derivatives[at + plane] = -s / b2;
-            derivatives[at + 2u * plane] = mask * 2.0 * a1 * inverse;
+            derivatives[at] = as_texel(mask * (2.0 * my * (a2 - a1) * inverse) - 2.0 * mx * s * (1.0 / b1 - 1.0 / b2));
+            derivatives[at + plane] = as_texel(-s / b2);
+            derivatives[at + 2u * plane] = as_texel(mask * 2.0 * a1 * inverse);
         }
         sums += s;
     }

@@ -18,7 +18,7 @@ layout(constant_id = SPEC_MODE) const uint MODE = 0;
 const bool DEBUG = MODE == PROJECT_DEBUG;
 
 TEXELS(0, params);
-layout(set = 0, binding = 2, scalar) writeonly buffer Records { vec4 records[]; };
+STORED_TEXELS(2, records);
 layout(set = 0, binding = 3, scalar) writeonly buffer DepthKeys { uint depth_keys[]; };
 layout(set = 0, binding = 4, scalar) writeonly buffer TileCounts { uint tile_counts[]; };
 layout(set = 0, binding = 5, scalar) buffer CountsBlock { Counts counts; };
@@ -48,9 +48,9 @@ bool project(uint i) {
         const Footprint f = footprint_of(record0, record1, size);
         count = count_tiles(f, f.row_begin, f.row_end, size);
     }
-    records[RECORD_TEXELS * i] = record0;
-    records[RECORD_TEXELS * i + 1] = record1;
-    records[RECORD_TEXELS * i + 2] = vec4(color, z);
+    records[RECORD_TEXELS * i] = as_texel(record0);
+    records[RECORD_TEXELS * i + 1] = as_texel(record1);
+    records[RECORD_TEXELS * i + 2] = as_texel(vec4(color, z));
     depth_keys[i] = count > 0u ? floatBitsToUint(z) : 0xffffffffu;
     tile_counts[i] = count;
     if (!stored_finite || (in_front && !projected_finite)) atomicAdd(counts.skipped_nonfinite, 1u);

@@ -18,11 +18,11 @@ layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3;
 layout(constant_id = SPEC_MODE) const uint MODE = 0;
 
 TEXELS(0, params);
-layout(set = 0, binding = 2, scalar) writeonly buffer Records { vec4 records[]; };
+STORED_TEXELS(2, records);
 layout(set = 0, binding = 3, scalar) writeonly buffer DepthKeys { uint depth_keys[]; };
 layout(set = 0, binding = 4, scalar) writeonly buffer TileCounts { uint tile_counts[]; };
 layout(set = 0, binding = 5, scalar) buffer CountsBlock { Counts counts; };
-layout(set = 0, binding = 6, scalar) writeonly buffer Rays { vec4 rays[]; };
+STORED_TEXELS(6, rays);
 layout(push_constant, scalar) uniform Push { ProjectPush push; };
 #include "lib/splat_color.glsl"
 
@@ -122,12 +122,12 @@ void project(uint i) {
         const Footprint f = footprint_of(record0, record1, size);
         count = count_tiles(f, f.row_begin, f.row_end, size);
     }
-    rays[RAY_TEXELS * i] = mean;
-    rays[RAY_TEXELS * i + 1] = shape;
-    rays[RAY_TEXELS * i + 2] = bend;
-    records[RECORD_TEXELS * i] = record0;
-    records[RECORD_TEXELS * i + 1] = record1;
-    records[RECORD_TEXELS * i + 2] = vec4(color, z);
+    rays[RAY_TEXELS * i] = as_texel(mean);
+    rays[RAY_TEXELS * i + 1] = as_texel(shape);
+    rays[RAY_TEXELS * i + 2] = as_texel(bend);
+    records[RECORD_TEXELS * i] = as_texel(record0);
+    records[RECORD_TEXELS * i + 1] = as_texel(record1);
+    records[RECORD_TEXELS * i + 2] = as_texel(vec4(color, z));
     depth_keys[i] = count > 0u ? floatBitsToUint(max(least, float(NEAR_PLANE))) : 0xffffffffu;
     tile_counts[i] = count;
     if (!stored_finite || (in_front && !projected_finite)) atomicAdd(counts.skipped_nonfinite, 1u);

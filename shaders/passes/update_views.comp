@@ -28,9 +28,9 @@ layout(set = 0, binding = 3, scalar) readonly buffer SumsIn { float sums[]; };
 WORD_TEXELS(4, moments1);
 WORD_TEXELS(5, moments2);
 layout(set = 0, binding = 6, scalar) buffer CountsBlock { Counts counts; };
-layout(set = 0, binding = 7, scalar) writeonly buffer ParamsOut { vec4 params_out[]; };
-layout(set = 0, binding = 8, scalar) writeonly buffer Moments1Out { uvec4 moments1_out[]; };
-layout(set = 0, binding = 9, scalar) writeonly buffer Moments2Out { uvec4 moments2_out[]; };
+STORED_TEXELS(7, params_out);
+STORED_WORD_TEXELS(8, moments1_out);
+STORED_WORD_TEXELS(9, moments2_out);
 layout(set = 0, binding = 10, scalar) buffer Statistics { vec2 statistics[]; };
 layout(push_constant, scalar) uniform Push { UpdateViewsPush push; };
 #include "lib/adam.glsl"

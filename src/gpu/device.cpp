@@ -142,8 +142,18 @@ void Device::create_device(bool own_queue) {
     vk::PhysicalDeviceVulkan12Features features;
     features.setScalarBlockLayout(true);
     if (subgroup_size_control_) features.setPNext(&wanted_sizes);
+    limits_.cpu = properties.deviceType == vk::PhysicalDeviceType::eCpu;
+    limits_.max_texels = properties.limits.maxTexelBufferElements;
+    // The kernels with texel buffers also store words of 64 bits, and a lane of theirs has at least two pixels of a tile.
+    limits_.texel_buffers = limits_.cpu && limits_.max_texels >= kManyTexels && subgroups.lanes <= 32 &&
+                            physical_.getFeatures().shaderInt64;
+    vk::PhysicalDeviceFeatures core_features;
+    core_features.setShaderInt64(limits_.texel_buffers);
     vk::DeviceCreateInfo create;
-    create.setPNext(&features).setQueueCreateInfos(queue).setPEnabledExtensionNames(extensions);
+    create.setPNext(&features)
+        .setPEnabledFeatures(&core_features)
+        .setQueueCreateInfos(queue)
+        .setPEnabledExtensionNames(extensions);
     device_ = physical_.createDeviceUnique(create);
     queue_ = device_->getQueue(queue_family_, 0);
     pipeline_cache_ = device_->createPipelineCacheUnique({});
@@ -153,7 +163,6 @@ void Device::create_device(bool own_queue) {
         physical_.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceFloatControlsProperties>()
             .get<vk::PhysicalDeviceFloatControlsProperties>());
 
-    limits_.cpu = properties.deviceType == vk::PhysicalDeviceType::eCpu;
     limits_.exact_floats = !limits_.cpu;
     limits_.max_groups = *std::min_element(properties.limits.maxComputeWorkGroupCount.begin(),
                                            properties.limits.maxComputeWorkGroupCount.end());
@@ -167,8 +176,6 @@ void Device::create_device(bool own_queue) {
     limits_.scalar_loads = properties.vendorID == kVendorAmd;
     limits_.ballots = bool(operations & vk::SubgroupFeatureFlagBits::eBallot);
     limits_.max_storage_range = properties.limits.maxStorageBufferRange;
-    limits_.max_texels = properties.limits.maxTexelBufferElements;
-    limits_.texel_buffers = limits_.cpu && limits_.max_texels >= kManyTexels;
     limits_.uniform_alignment = properties.limits.minUniformBufferOffsetAlignment;
     limits_.storage_alignment = properties.limits.minStorageBufferOffsetAlignment;
     limits_.timestamps = families[queue_family_].timestampValidBits > 0;
