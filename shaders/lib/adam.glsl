@@ -22,6 +22,14 @@
 #define FIRST_SPLAT 0u
 #endif
 
+// Of this invocation. They are added to counts once: lavapipe runs an atomic of each texel as a loop over the lanes.
+uint dropped_updates = 0u, limited_steps = 0u;
+
+void count_updates() {
+    if (dropped_updates > 0u) atomicAdd(counts.dropped_updates, dropped_updates);
+    if (limited_steps > 0u) atomicAdd(counts.limited_steps, limited_steps);
+}
+
 const uint SH_FLOATS = 3 * (SH_DEGREE + 1) * (SH_DEGREE + 1);
 const uint PLANES = (PARAM_SH + SH_FLOATS + 3) / 4;
 
@@ -36,7 +44,7 @@ void move_rounded(uint plane, uint i, vec4 value, vec4 raw_gradient, vec4 rate, 
         const bvec4 number = equal(raw_gradient, raw_gradient);
         moments1_out[at] = as_texel(
             floatBitsToUint(mix(vec4(0.0), clamp(raw_gradient, -3.402823466e38, 3.402823466e38), number)));
-        if (!all(number)) atomicAdd(counts.dropped_updates, 1u);
+        if (!all(number)) ++dropped_updates;
         return;
     }
     const vec4 largest = vec4(GRADIENT_MAX);
@@ -55,7 +63,7 @@ void move_rounded(uint plane, uint i, vec4 value, vec4 raw_gradient, vec4 rate, 
     vec4 moved = value - rate * (m * push.bias1) / (sqrt(v * push.bias2) + EPSILON);
     const bool limited = limit_step(plane, value, depth, moved);
     if (is_finite(moved) && is_finite(m) && is_finite(v)) {
-        if (limited) atomicAdd(counts.limited_steps, 1u);
+        if (limited) ++limited_steps;
         params_out[at] = as_texel(moved);
         if (PACKED_MOMENTS) {
             moments1_out[at] = as_texel(pack_moments(m, v, random));
@@ -64,7 +72,7 @@ void move_rounded(uint plane, uint i, vec4 value, vec4 raw_gradient, vec4 rate, 
             moments2_out[at] = as_texel(floatBitsToUint(v));
         }
     } else if (is_finite(value)) {
-        atomicAdd(counts.dropped_updates, 1u);
+        ++dropped_updates;
     }
 }
 

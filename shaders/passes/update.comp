@@ -119,5 +119,6 @@ void main() {
     const uint i = item_index();
     MotionGradient motion = MotionGradient(vec4(0.0), vec3(0.0));
     if (i < push.splats) motion = update_splat(i);
+    count_updates();
     if (MOTION) write_motion_sums(motion);
 }

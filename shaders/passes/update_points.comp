@@ -71,6 +71,7 @@ void main() {
                  vec4(vec3(push.scale_rate), push.sh0_rate), depth, random);
     if (GRADIENT_ONLY) move(1, i, p1, vec4(0.0), vec4(0.0), depth);
     move(0, i, p0, visible ? vec4(mean_gradient, 0.0) : vec4(0.0), vec4(vec3(push.mean_rate), 0.0), depth);
+    count_updates();
     if (STATISTICS && visible) {
         const vec2 size = ABSOLUTE ? 2.0 * p.inverse_radius * sum[2].yz : mean_px;
         const float norm = length(size * vec2(push.half_size[0], push.half_size[1]));

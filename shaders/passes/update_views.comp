@@ -111,4 +111,5 @@ void main() {
     move(1, i, p1, by_quaternion, vec4(push.quaternion_rate), depth);
     move(0, i, p0, by_mean + opacity_pull, vec4(vec3(push.mean_rate), push.opacity_rate), depth);
     if (STATISTICS && seen.y > 0.0) statistics[i] += seen;
+    count_updates();
 }
