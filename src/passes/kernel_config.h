@@ -112,6 +112,12 @@ uint64_t pixels(const Push& push) {
         return pixels(push.image);
 }
 
+/// Texels of an image plane, 4 pixels of a row each.
+template <class Push>
+uint64_t texels(const Push& push) {
+    return uint64_t(push.image.stride / 4) * push.image.size[1];
+}
+
 /// Items of a loss pass down the columns. The image's stride is a multiple of 4.
 inline uint64_t loss_column_items(const shared::LossPush& push) {
     const uint32_t height = push.image.size[1];

@@ -315,7 +315,7 @@ struct Pack {
 /// Unpacks a training image into planes, over the background. Variant: SPEC_COLOR_FLOATS.
 struct UnpackTarget {
     static constexpr char shader[] = "unpack_target";
-    using Work = PerElement<pixels<shared::UnpackPush>>;
+    using Work = PerElement<texels<shared::UnpackPush>>;
     gpu::BufferPart photo, planes;
 };
 
