@@ -15,9 +15,10 @@ const bool WITH_COUNT = MODE == BLEND_COUNT;
 TEXELS(0, records);
 layout(set = 0, binding = 1, scalar) readonly buffer Splats { uint splats[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer TileStarts { uint tile_starts[]; };
-layout(set = 0, binding = 3, scalar) writeonly buffer Planes { float planes[]; };
 layout(push_constant, scalar) uniform Push { BlendPush push; };
 #include "lib/tile.glsl"
+#include "lib/tile_columns.glsl"
+PLANES_OUT(3, planes);
 
 // Draws the splat as a solid: the first hit closes the pixel. The light is at the camera, so the outline is darker.
 void meet_ellipsoid(LaneSplat s, uint p, inout float T, inout vec3 color) {
@@ -47,7 +48,9 @@ void main() {
         depth[p] = count[p] = 0.0;
     }
     const uint end = tile_starts[tile + 1u];
-    for (uint k = tile_starts[tile]; k < end; k += SUBGROUP) {
+    uint k = tile_starts[tile];
+    // The condition of the loop comes last: where it comes first, lavapipe runs the body once more behind the last turn.
+    if (k < end) do {
         const Loaded batch = load_batch(k, end);
         UNROLL_BLOCKS for (uint first = 0; first < SUBGROUP; first += BLOCK) {
             [[unroll]] for (uint j = 0; j < BLOCK; ++j) {
@@ -71,19 +74,20 @@ void main() {
         bool open = false;
         [[unroll]] for (uint p = 0; p < PIXELS; ++p) open = open || T[p] > 0.0;
         if (subgroupAll(!open)) break;
-    }
+        k += SUBGROUP;
+    } while (k < end);
     const vec3 background = vec3(push.background[0], push.background[1], push.background[2]);
+    float red[PIXELS], green[PIXELS], blue[PIXELS], left[PIXELS];
     [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
-        const uint y = py + p * ROW_STEP;
-        if (px < push.image.size[0] && y < push.image.size[1]) {
-            const uint at = y * push.image.stride + px;
-            const float left = abs(T[p]);
-            planes[PLANE_R * push.image.plane_floats + at] = color[p].r + left * background.r;
-            planes[PLANE_G * push.image.plane_floats + at] = color[p].g + left * background.g;
-            planes[PLANE_B * push.image.plane_floats + at] = color[p].b + left * background.b;
-            planes[PLANE_T * push.image.plane_floats + at] = left;
-            if (WITH_DEPTH) planes[PLANE_DEPTH * push.image.plane_floats + at] = depth[p];
-            if (WITH_COUNT) planes[PLANE_COUNT * push.image.plane_floats + at] = count[p];
-        }
+        left[p] = abs(T[p]);
+        red[p] = color[p].r + left[p] * background.r;
+        green[p] = color[p].g + left[p] * background.g;
+        blue[p] = color[p].b + left[p] * background.b;
     }
+    STORE_COLUMN(planes, PLANE_R, red);
+    STORE_COLUMN(planes, PLANE_G, green);
+    STORE_COLUMN(planes, PLANE_B, blue);
+    STORE_COLUMN(planes, PLANE_T, left);
+    if (WITH_DEPTH) { STORE_COLUMN(planes, PLANE_DEPTH, depth); }
+    if (WITH_COUNT) { STORE_COLUMN(planes, PLANE_COUNT, count); }
 }

@@ -18,12 +18,13 @@ const uint SUMS = WITH_FOURTH ? 12u : ABSOLUTE ? 11u : 9u;
 TEXELS(0, records);
 layout(set = 0, binding = 1, scalar) readonly buffer Splats { uint splats[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer TileStarts { uint tile_starts[]; };
-layout(set = 0, binding = 3, scalar) readonly buffer Planes { float planes[]; };
-layout(set = 0, binding = 4, scalar) readonly buffer ImageGradient { float image_gradient[]; };
+TEXELS(3, planes);
+TEXELS(4, image_gradient);
 STORED_TEXELS(5, slots);
 layout(push_constant, scalar) uniform Push { BlendPush push; };
 #include "lib/tile.glsl"
 #include "lib/tile_sums.glsl"
+#include "lib/tile_columns.glsl"
 
 // The middle of a lane's pixels, in pixels of its column.
 #define MIDDLE (0.5 * float(PIXELS - 1u))
@@ -36,30 +37,37 @@ void main() {
     const uint py = (tile / push.tiles[0]) * TILE_HEIGHT + lane / TILE_WIDTH;
     const vec2 pixel = vec2(px, py) + 0.5;
 
-    float T[PIXELS], rest[PIXELS], fourth[PIXELS];
+    float T[PIXELS], rest[PIXELS], fourth[PIXELS], by_red[PIXELS], by_green[PIXELS], by_blue[PIXELS], red[PIXELS],
+        green[PIXELS], blue[PIXELS];
     vec3 gradient[PIXELS];
+    COLUMN_OF(image_gradient, PLANE_R, by_red);
+    COLUMN_OF(image_gradient, PLANE_G, by_green);
+    COLUMN_OF(image_gradient, PLANE_B, by_blue);
+    COLUMN_OF(planes, PLANE_R, red);
+    COLUMN_OF(planes, PLANE_G, green);
+    COLUMN_OF(planes, PLANE_B, blue);
     [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
-        const uint y = py + p * ROW_STEP;
-        const bool inside = px < push.image.size[0] && y < push.image.size[1];
-        const uint at = min(y, push.image.size[1] - 1u) * push.image.stride + min(px, push.image.size[0] - 1u);
-        T[p] = inside ? 1.0 : -1.0;
-        gradient[p] = vec3(image_gradient[PLANE_R * push.image.plane_floats + at],
-                           image_gradient[PLANE_G * push.image.plane_floats + at],
-                           image_gradient[PLANE_B * push.image.plane_floats + at]);
-        rest[p] = dot(gradient[p], vec3(planes[PLANE_R * push.image.plane_floats + at],
-                                        planes[PLANE_G * push.image.plane_floats + at],
-                                        planes[PLANE_B * push.image.plane_floats + at]));
-        // The light that passes all splats also depends on each of them: it is one more thing behind them.
-        if (WITH_ALPHA)
-            rest[p] += image_gradient[PLANE_T * push.image.plane_floats + at] * planes[PLANE_T * push.image.plane_floats + at];
-        if (WITH_FOURTH) {
-            fourth[p] = image_gradient[PLANE_DEPTH * push.image.plane_floats + at];
-            rest[p] += fourth[p] * planes[PLANE_DEPTH * push.image.plane_floats + at];
-        }
+        T[p] = px < push.image.size[0] && py + p * ROW_STEP < push.image.size[1] ? 1.0 : -1.0;
+        gradient[p] = vec3(by_red[p], by_green[p], by_blue[p]);
+        rest[p] = dot(gradient[p], vec3(red[p], green[p], blue[p]));
+    }
+    // The light that passes all splats also depends on each of them: it is one more thing behind them.
+    if (WITH_ALPHA) {
+        float by_left[PIXELS], left[PIXELS];
+        COLUMN_OF(image_gradient, PLANE_T, by_left);
+        COLUMN_OF(planes, PLANE_T, left);
+        [[unroll]] for (uint p = 0; p < PIXELS; ++p) rest[p] += by_left[p] * left[p];
+    }
+    if (WITH_FOURTH) {
+        float depth[PIXELS];
+        COLUMN_OF(image_gradient, PLANE_DEPTH, fourth);
+        COLUMN_OF(planes, PLANE_DEPTH, depth);
+        [[unroll]] for (uint p = 0; p < PIXELS; ++p) rest[p] += fourth[p] * depth[p];
     }
     const uint end = tile_starts[tile + 1u];
     uint k = tile_starts[tile];
-    for (; k < end; k += SUBGROUP) {
+    // The condition of the loop comes last, as in blend.comp.
+    if (k < end) do {
         const Loaded batch = load_batch(k, end);
         float slot[12] = NO_GRADIENT;
         UNROLL_BLOCKS for (uint first = 0; first < SUBGROUP; first += BLOCK) {
@@ -126,10 +134,8 @@ void main() {
         if (k + lane < end) write_slot(k + lane, slot);
         bool open = false;
         [[unroll]] for (uint p = 0; p < PIXELS; ++p) open = open || T[p] > 0.0;
-        if (subgroupAll(!open)) {
-            k += SUBGROUP;
-            break;
-        }
-    }
+        k += SUBGROUP;
+        if (subgroupAll(!open)) break;
+    } while (k < end);
     write_other_slots(k, end, tile);
 }
