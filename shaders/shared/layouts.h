@@ -184,7 +184,6 @@ EWA_UINT(MOTION_VALUES, 7u);  // without the last float
 // A camera's basis: MOTION_VALUES rows of as many floats. The motion changes by the basis times a step of Adam.
 EWA_UINT(MOTION_BASIS_FLOATS, 49u);
 
-EWA_UINT(RADIX_DIGITS_MAX, 256u);
 // A radix sort that ranks in shared memory: a workgroup has RANKED_SUBGROUPS subgroups, and an invocation
 // RANKED_LANE_KEYS keys, or half of that with more than 32 lanes a subgroup.
 EWA_UINT(RANKED_SUBGROUPS, 8u);

@@ -21,7 +21,7 @@ struct KernelConfig {
     uint32_t element_group = 128;  // invocations of an element-wise workgroup, a multiple of subgroup
     uint32_t tile_width = 8, tile_height = 8;  // px; one subgroup owns a tile
     uint32_t sort_lanes_max = 512;             // lanes that share a radix sort
-    uint32_t sort_chunk = 256;                 // least number of items of a sorting lane
+    uint32_t sort_chunk = 512;                 // least number of items of a sorting lane
     uint32_t sort_group = 64;                  // invocations of a sorting workgroup
     bool ranked_sort = false;                  // keys are ranked in shared memory; sort_lanes_max is not used
     uint32_t tile_interleave = 1;              // distance of the tiles of neighbouring workgroups

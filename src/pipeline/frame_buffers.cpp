@@ -38,6 +38,8 @@ void check_image(const passes::KernelConfig& config, const FrameRequest& request
 
 constexpr uint64_t kAlone = ~uint64_t(0);
 
+constexpr uint32_t kWideDigitBits = 11;  // of a sort in one pass
+
 struct Allocation {
     gpu::Buffer* buffer;
     const char* name;
@@ -123,11 +125,14 @@ std::vector<Allocation> allocations(FrameBuffers& f, const Sizes& s) {
 
 RadixCut radix_cut(const passes::KernelConfig& config, uint32_t items, uint32_t key_bits) {
     RadixCut cut;
+    // Lanes that count in memory of their own can take a wider digit, where one pass then does.
+    cut.passes = !config.ranked_sort && key_bits <= kWideDigitBits ? 1 : divide_up(key_bits, 8);
+    cut.bits = divide_up(key_bits, cut.passes);
+    // A lane has no fewer items than counters.
+    const uint32_t chunk = std::max(config.sort_chunk, 1u << cut.bits);
     cut.lanes = config.ranked_sort
                     ? std::max(divide_up(items, ranked_keys(config)), 1u)
-                    : std::clamp(divide_up(items, config.sort_chunk), config.subgroup, config.sort_lanes_max);
-    cut.passes = divide_up(key_bits, 8);
-    cut.bits = divide_up(key_bits, cut.passes);
+                    : std::clamp(divide_up(items, chunk), config.subgroup, config.sort_lanes_max);
     return cut;
 }
 
@@ -159,7 +164,7 @@ Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request)
     s.splat_words = std::max<uint64_t>(request.splats, 1) * word;
     s.scan_totals = (uint64_t(s.scan_blocks) + 1) * word;
     s.counters = std::max(counter_words(s.depth_sort), counter_words(s.tile_sort)) * word;
-    s.digit_totals = (shared::RADIX_DIGITS_MAX + 1) * word;
+    s.digit_totals = ((uint64_t(1) << std::max(s.depth_sort.bits, s.tile_sort.bits)) + 1) * word;
     s.instance_words = std::max<uint64_t>(request.instances, 1) * word;
     s.tile_starts = (uint64_t(s.tiles) + 2) * word;
     s.planes = uint64_t(s.plane_floats) * s.image_planes * word;

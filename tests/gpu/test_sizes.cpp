@@ -117,9 +117,22 @@ TEST(SizesFor, SortsByAsManyBitsAsThereAreTiles) {
     EXPECT_EQ(bits(24, 8), 2u);
     EXPECT_EQ(bits(32, 8), 3u);
     EXPECT_EQ(bits(8 * 255, 8), 8u);
-    EXPECT_EQ(bits(8 * 256, 8), 10u);  // 9, in two passes of 5
+    EXPECT_EQ(bits(8 * 256, 8), 9u);
+    EXPECT_EQ(bits(8 * 2047, 8), 11u);
+    EXPECT_EQ(bits(8 * 4096, 8), 14u);  // 13, in two passes of 7
     const RadixCut depth = sizes_for(config_of(8), {1, 8, 8, 1, false, false}).depth_sort;
     EXPECT_EQ(depth.passes * depth.bits, 32u);
+}
+
+TEST(SizesFor, AWideDigitSavesAPassWhereLanesCountAlone) {
+    passes::KernelConfig config = config_of(8);
+    const RadixCut wide = radix_cut(config, 1'000'000, 11), two = radix_cut(config, 1'000'000, 12);
+    EXPECT_EQ(wide.passes, 1u);
+    EXPECT_EQ(wide.lanes, (1'000'000 + 2047) / 2048);  // no more counters than items
+    EXPECT_EQ(two.passes, 2u);
+    EXPECT_EQ(two.lanes, 512u);
+    config.ranked_sort = true;
+    EXPECT_EQ(radix_cut(config, 1'000'000, 11).passes, 2u);
 }
 
 TEST(SizesFor, LanesAreBetweenASubgroupAndTheMost) {
@@ -129,7 +142,7 @@ TEST(SizesFor, LanesAreBetweenASubgroupAndTheMost) {
     };
     EXPECT_EQ(lanes(0), 8u);
     EXPECT_EQ(lanes(1), 8u);
-    EXPECT_EQ(lanes(256 * 100), 100u);
+    EXPECT_EQ(lanes(512 * 100), 100u);
     EXPECT_EQ(lanes(100'000'000), 512u);
 }
 

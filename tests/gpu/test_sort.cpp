@@ -75,7 +75,7 @@ Sorted run_sort(const std::vector<uint32_t>& input, const RadixCut& cut, bool ow
         places1("places 1", bytes, Texel::rgba32ui),
         counters("counters", (uint64_t(cut.lanes) << cut.bits) * 4),
         prefix("counter prefix", (uint64_t(cut.lanes) << cut.bits) * 4),
-        totals("digit totals", (shared::RADIX_DIGITS_MAX + 1) * 4);
+        totals("digit totals", ((uint64_t(1) << cut.bits) + 1) * 4);
     shared::Counts start{};
     start.instances = items;
     Guarded counts("counts", std::vector<shared::Counts>{start});
