@@ -11,6 +11,7 @@ namespace ewa::train {
 namespace {
 
 constexpr double kFullRun = 30000;
+constexpr double kMostShortness = 300;  // rates of shorter runs than 100 steps would be out of proportion
 // Lower limits of intervals, in steps.
 constexpr int kLeastRefineEvery = 50;    // a small capture shows each of its images about once
 constexpr int kShortRefineEvery = 20;    // of a run that cannot show each of its images before it refines
@@ -163,8 +164,9 @@ Schedule schedule_for(const TrainOptions& options, size_t photos) {
     s.least_degree = options.least_sh_degree;
     s.most_halvings = options.most_halvings;
     s.resolution_every = scaled(options.resolution_every, 1);
-    s.shortness = 1 / share;
-    s.power = options.short_run_power;
+    s.shortness = std::min(1 / share, kMostShortness);
+    // With higher rates the splats follow wrong cameras before these are right.
+    s.power = options.refine_poses ? 0.5 * options.short_run_power : options.short_run_power;
     if (few_photos(options, photos) && options.steps < kFullRun &&
         size_t(options.steps) >= photos * kVisitsOfFading)
         s.fade_start = options.steps / 2;

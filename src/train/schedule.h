@@ -35,9 +35,9 @@ struct Schedule {
     int halvings = 0, resolution_every = 0;
     int least_degree = 0, most_halvings = 64;     // what the run has reached before
     double means_rate = 0, means_rate_final = 0;  // per unit of scene extent, of a full run
-    double shortness = 1;                         // 30,000 over the steps, at least 1
-    double power = 0;                             // TrainOptions::short_run_power
-    int fade_start = 0;                           // the step after which the rates fade; 0: they do not
+    double shortness = 1;                         // 30,000 over the steps, from 1 to 300
+    double power = 0;    // TrainOptions::short_run_power, half of it with refine_poses
+    int fade_start = 0;  // the step after which the rates fade; 0: they do not
     double exposures_rate = 0, exposures_rate_final = 0;
     double poses_rate = 0, poses_rate_final = 0;
 

@@ -142,10 +142,10 @@ TEST_F(Train, FirstSplatsHaveTheOpacityAndScaleAskedFor) {
     const ewa::Gaussians usual = splats({}),
                          other = splats({"--init-opacity", "0.5", "--init-scale", "0.25"});
     for (size_t i = 0; i < usual.size(); ++i) {
-        // One step of Adam moves each by at most its learning rate.
-        EXPECT_NEAR(usual.opacity_logits[i], std::log(0.1 / 0.9), 0.06) << i;
-        EXPECT_NEAR(other.opacity_logits[i], 0, 0.06) << i;
-        EXPECT_NEAR(other.log_scales[3 * i], usual.log_scales[3 * i] + std::log(0.25), 0.03) << i;
+        // One step of Adam moves each by at most its learning rate, which is 6 and 17 times that of a full run here.
+        EXPECT_NEAR(usual.opacity_logits[i], std::log(0.1 / 0.9), 0.2) << i;
+        EXPECT_NEAR(other.opacity_logits[i], 0, 0.2) << i;
+        EXPECT_NEAR(other.log_scales[3 * i], usual.log_scales[3 * i] + std::log(0.25), 0.2) << i;
     }
     expect_failure(train("s", {"--init-opacity", "0.5"}), 2, "s.ply is a splat file");
     expect_failure(train("s", {"--init-scale", "2"}), 2, "s.ply is a splat file");

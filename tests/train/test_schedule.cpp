@@ -138,6 +138,11 @@ TEST(Schedule, ShortRunsLearnFaster) {
         EXPECT_NEAR(s.gain(300), std::sqrt(10), 1e-12);
         EXPECT_NEAR(s.gain(150), std::pow(10, 0.75), 1e-12);
         EXPECT_NEAR(s.opacity_gain(0), std::pow(10, 0.6), 1e-12);
+        options.steps = 3;  // 300 times shorter than a full run at most
+        EXPECT_NEAR(schedule_for(options).gain(0), std::sqrt(300), 1e-12);
+        options.refine_poses = true;
+        EXPECT_NEAR(schedule_for(options).gain(0), std::pow(300, 0.25), 1e-12);
+        options.refine_poses = false;
         EXPECT_EQ(s.opacity_gain(300), 1);
         // MCMC's noise has the rate of the means without the gain.
         EXPECT_NEAR(s.mean_rate(0, 2), 2 * options.means_rate, 1e-12);

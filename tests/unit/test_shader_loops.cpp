@@ -9,6 +9,7 @@
 #include <fstream>
 #include <map>
 #include <regex>
+#include <set>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -142,6 +143,34 @@ bool halves(const std::string& header, const std::string& body) {
     return std::regex_match(body, shape);
 }
 
+/// The text without its loops.
+std::string without_loops(std::string text) {
+    static const std::regex word(R"(\b(for|while)\b)");
+    for (std::smatch loop; std::regex_search(text, loop, word);) {
+        const auto begin = size_t(loop.position());
+        const size_t after = past_bracket(text, text.find('(', begin));
+        const size_t body = std::min(text.find_first_not_of(" \t\n", after), text.size());
+        text.replace(begin, body + statement_at(text, after).size() - begin, ";");
+    }
+    return text;
+}
+
+/// Of a do: a statement of the body itself lets the counter grow, and no `continue` passes it by.
+bool do_counts_up(const std::string& body, const std::string& condition, const Changers& changers) {
+    if (body.empty() || body[0] != '{') return false;
+    std::string flat = without_loops(body.substr(1, body.size() - 2));
+    if (std::regex_search(flat, std::regex(R"(\b(do|continue)\b)"))) return false;
+    for (size_t open; (open = flat.find('{')) != std::string::npos;)
+        flat.replace(open, past_bracket(flat, open) - open, ";");
+    static const std::regex growing(R"((?:^|;)\s*((\w+) \+= [^;]+);)");
+    for (std::sregex_iterator at(flat.begin(), flat.end(), growing), end; at != end; ++at) {
+        std::string header = "(;";
+        header.append(condition, 1, condition.size() - 2).append("; ").append((*at)[1]).append(")");
+        if (counts_up(header, body, changers)) return true;
+    }
+    return false;
+}
+
 Changers changers_in(const std::string& source) {
     static const std::regex function(R"(\b(\w+)\((?=[^(){};]*\b(?:inout|out) ))"),
         changed(R"(\s*(?:inout|out) )");
@@ -162,8 +191,21 @@ std::vector<std::string> unbounded(const std::string& shader, Changers changers 
     changers.merge(changers_in(source));
     static const std::regex word(R"(\b(for|while|do)\b)");
     std::vector<std::string> found;
+    std::set<size_t> ends_of_do;
     for (std::sregex_iterator at(source.begin(), source.end(), word), end; at != end; ++at) {
+        if (ends_of_do.contains(size_t(at->position()))) continue;
         if (loops) ++*loops;
+        if (at->str() == "do") {
+            const size_t begin = source.find_first_not_of(" \t\n", size_t(at->position()) + 2);
+            const std::string body = statement_at(source, begin);
+            const size_t last = source.find("while", begin + body.size());
+            if (last == std::string::npos) return {"do without while"};
+            ends_of_do.insert(last);
+            const size_t open = source.find('(', last);
+            const std::string condition = source.substr(open, past_bracket(source, open) - open);
+            if (!do_counts_up(body, condition, changers)) found.push_back("do ... while " + condition);
+            continue;
+        }
         const size_t bracket = source.find_first_not_of(" \t\n", size_t(at->position() + at->length()));
         if (bracket == std::string::npos || source[bracket] != '(') {
             found.push_back(at->str());
@@ -208,6 +250,9 @@ TEST(ShaderLoops, WhatMayNotEndIsFound) {
              "low = middle + 1u; else high = middle; }",
              "while (b - a > 1u) { const uint middle = (a + b) / 2u; if (f(middle)) a = middle; else b = "
              "middle; }",
+             "do { a(i); i += TILE; } while (i < n);",
+             "do { for (uint j = 0; j < m; ++j) { if (x) continue; } if (y) { break; } k += 8u; } while (k < "
+             "n);",
              "// for (;;)\n/* while (true) */ forward = done;",
          })
         EXPECT_EQ(unbounded(good).size(), 0u) << good;
@@ -230,6 +275,12 @@ TEST(ShaderLoops, WhatMayNotEndIsFound) {
              "low = middle; else high = middle; }",
              "while (b - a > 1u) { const uint middle = (a + b) / 2u; if (f(middle)) a = middle; }",
              "do { i = next[i]; } while (i > 0);",
+             "do { if (x) i += TILE; } while (i < n);",
+             "do { if (x) { i += TILE; } } while (i < n);",
+             "do { if (x) { continue; } i += TILE; } while (i < n);",
+             "do { i += TILE; i = back(i); } while (i < n);",
+             "do { i += TILE; } while (i < n || open);",
+             "do { i += step; } while (i < n);",
              "for (uint i = 0; i < i + 1u; ++i) a[i] = 0;",
              "for (uint i = 0; i < ends(i); ++i) a[i] = 0;",
              "for (uint i = 0; i < n && --i < m; ++i) a[i] = 0;",
