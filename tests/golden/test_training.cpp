@@ -28,6 +28,7 @@ TrainOptions training_options() {
     options.render.background = {0.1f, 0.1f, 0.2f};
     // Eighty steps have to be longer ones than 30,000.
     options.short_run_power = 0;
+    options.few_photos = 0;
     options.means_rate = 3e-3;
     options.means_rate_final = 1e-3;
     options.sh0_rate = 0.02;
