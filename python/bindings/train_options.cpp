@@ -127,14 +127,14 @@ void set_degree(TrainOptions& options, nb::handle value) {
 }
 
 void set_max_splats(TrainOptions& options, nb::handle value) {
-    constexpr double kMost = 1e9;
+    constexpr double kMostSplats = 1e9;
     if (nb::isinstance<nb::str>(value) && nb::cast<std::string>(value) == "auto") {
         options.max_splats = kAutomaticMaxSplats;
         return;
     }
     const double splats = nb::cast<double>(value);  // 7e3 is a whole number, too
-    if (!(splats >= 1 && splats <= kMost && splats == std::floor(splats)))
-        throw InputError("is no whole number from 1 to " + core::shown_number(kMost) + ", nor \"auto\"");
+    if (!(splats >= 1 && splats <= kMostSplats && splats == std::floor(splats)))
+        throw InputError("is no whole number from 1 to " + core::shown_number(kMostSplats) + ", nor \"auto\"");
     options.max_splats = uint32_t(splats);
 }
 
