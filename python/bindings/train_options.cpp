@@ -134,7 +134,8 @@ void set_max_splats(TrainOptions& options, nb::handle value) {
     }
     const double splats = nb::cast<double>(value);  // 7e3 is a whole number, too
     if (!(splats >= 1 && splats <= kMostSplats && splats == std::floor(splats)))
-        throw InputError("is no whole number from 1 to " + core::shown_number(kMostSplats) + ", nor \"auto\"");
+        throw InputError("is no whole number from 1 to " + core::shown_number(kMostSplats) +
+                         ", nor \"auto\"");
     options.max_splats = uint32_t(splats);
 }
 
