@@ -54,12 +54,12 @@ struct TrainOptions {
     double sh0_rate = 2.5e-3, sh_rest_rate = 1.25e-4;
     double opacity_rate = 0.025;
     double scale_rate = 5e-3, quaternion_rate = 1e-3;
-    /// A run of fewer than 30,000 steps multiplies these rates by (30,000 / steps)^short_run_power at its start, and by the
-    /// square root of that at its end (src/train/schedule.h). 0: the rates of a full run.
+    /// A run of fewer than 30,000 steps has higher rates. Their factor is (30,000 / steps)^short_run_power at the start. At
+    /// the end it is the square root of that (src/train/schedule.h). 0: the rates of a full run.
     double short_run_power = 0.5;
 
-    /// Up to so many training photos, adc and none are regularised, unless poses are refined. If a run of fewer than 30,000 steps shows each of them 60
-    /// times, the rates of its splats fade.
+    /// With so many training photos or fewer, adc and none are regularised, unless poses are refined. If such a run shows
+    /// each photo 60 times and has fewer than 30,000 steps, the rates of its splats fade.
     int few_photos = 16;
 
     bool exposure = false;  // learns an exposure for each training image, from the identity

@@ -32,7 +32,7 @@ TrainOptions resolve(TrainOptions options, const Dataset& dataset);
 /// The largest number of splats of a training, and why it is that.
 struct SplatCap {
     uint32_t splats = 0;
-    std::string reason;  // e.g. "one for each 20 training pixels"
+    std::string reason;  // e.g. "100 more for each step"
 };
 
 /// TrainOptions::max_splats of a Trainer with the same arguments. docs/training.md has the rule of the automatic one.
@@ -53,7 +53,7 @@ MemoryEstimate estimate_memory(const gpu::Device& device, const Dataset& dataset
                                const std::vector<int>& train_frames, const Gaussians& start,
                                const TrainOptions& options);
 
-/// What a Trainer of these options and many photos skips. masks: some training images have pixels that do not count.
+/// What a Trainer of these options skips if it has many photos. masks: some training images have pixels that do not count.
 std::vector<PlanLine> plan_lines(const Gaussians& start, const TrainOptions& options, bool masks = false);
 
 struct StepReport {
