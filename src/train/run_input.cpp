@@ -228,6 +228,15 @@ Sphere viewed_sphere(const Dataset& dataset, const std::vector<int>& frames) {
     return {mean, farthest > 0 ? 4 * farthest : 1};
 }
 
+double pixels_of(const Dataset& dataset, const std::vector<int>& frames) {
+    double pixels = 0;
+    for (const int i : frames) {
+        const Camera& camera = dataset.frames[size_t(i)].camera;
+        pixels += double(camera.width) * camera.height;
+    }
+    return pixels;
+}
+
 Gaussians random_gaussians(const Dataset& dataset, const std::vector<int>& frames, int count, uint64_t seed,
                            int sh_degree) {
     const Sphere sphere = viewed_sphere(dataset, frames);
@@ -246,24 +255,20 @@ Gaussians random_gaussians(const Dataset& dataset, const std::vector<int>& frame
 namespace {
 
 /// How many first splats there should be, or 0 if the points are to be taken as they are.
-size_t dense_start(const RunOptions& options, const Dataset& dataset, const std::vector<int>& frames) {
+size_t dense_start_size(const RunOptions& options, const Dataset& dataset, const std::vector<int>& frames) {
     const TrainOptions& train = options.train;
     if (options.dense_start == DenseStart::off) return 0;
     if (options.dense_start == DenseStart::automatic &&
         (train.strategy != Strategy::adc || train.steps > kDenseStartSteps || train.render.points))
         return 0;
-    double pixels = 0;
-    for (const int i : frames) {
-        const Camera& camera = dataset.frames[size_t(i)].camera;
-        pixels += double(camera.width) * camera.height / double(frames.size());
-    }
+    const double pixels = pixels_of(dataset, frames) / double(frames.size());
     const auto wanted = size_t(pixels / kPixelsOfDenseStart);
     return train.max_splats == kAutomaticMaxSplats ? wanted : std::min(wanted, size_t(train.max_splats));
 }
 
 Gaussians splats_of(const PointCloud& points, const RunOptions& options, const Dataset& dataset,
                     const std::vector<int>& frames) {
-    const size_t wanted = dense_start(options, dataset, frames);
+    const size_t wanted = dense_start_size(options, dataset, frames);
     if (wanted <= points.positions.size()) return gaussians_from_points(points, options.train.sh_degree);
     return gaussians_from_points(scene::with_midpoints(points, wanted), options.train.sh_degree);
 }

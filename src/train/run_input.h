@@ -44,6 +44,9 @@ struct Sphere {
 };
 Sphere viewed_sphere(const Dataset& dataset, const std::vector<int>& frames);
 
+/// The number of pixels of all these frames together.
+double pixels_of(const Dataset& dataset, const std::vector<int>& frames);
+
 /// `count` splats, spread evenly over the part of viewed_sphere(frames) that lies in at least one frustum. If
 /// that part is too small to hit, a splat lies on a random ray of a camera, at most the sphere's radius away.
 /// Colours are grey with a little noise, and scales are as in gaussians_from_points. Each splat is a pure

@@ -8,6 +8,7 @@
 
 #include "core/typing.h"
 #include "ewa/trainer.h"
+#include "train/run_input.h"
 
 namespace ewa {
 namespace {
@@ -19,15 +20,6 @@ constexpr double kSplatsPerPixel = 0.6;
 constexpr double kSplatsPerStep = 100;
 constexpr double kMemoryShare =
     0.8;  // of the device's; the rest is for other programs, and for errors of the estimate
-
-double pixels_of(const Dataset& dataset, const std::vector<int>& frames) {
-    double pixels = 0;
-    for (const int index : frames) {
-        const Camera& camera = dataset.frames[size_t(index)].camera;
-        pixels += double(camera.width) * camera.height;
-    }
-    return pixels;
-}
 
 /// The largest number up to `most`, and not below that of the start, with which a training fits in so many bytes.
 uint32_t fitting(const gpu::Device& device, const Dataset& dataset, const std::vector<int>& frames,
@@ -51,7 +43,7 @@ SplatCap splat_cap(const gpu::Device& device, const Dataset& dataset, const std:
                    const Gaussians& start, const TrainOptions& options) {
     if (options.max_splats != kAutomaticMaxSplats) return {options.max_splats, "as asked for"};
     const auto first = uint32_t(start.size());
-    const double pixels = pixels_of(dataset, train_frames), photos = double(train_frames.size());
+    const double pixels = train::pixels_of(dataset, train_frames), photos = double(train_frames.size());
     const double by_pixels = kSplatsPerPixel * pixels / std::sqrt(photos);
     const double by_steps = first + kSplatsPerStep * options.steps;
     SplatCap cap{uint32_t(std::min({by_pixels, by_steps, 1e9})),
