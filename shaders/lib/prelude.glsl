@@ -16,6 +16,11 @@ uint item_index() {
     return (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * GROUP_SIZE + gl_LocalInvocationID.x;
 }
 
+// The same, if neighbouring groups of items are in different rows: some drivers give each thread whole rows of workgroups.
+uint dealt_index() {
+    return (gl_WorkGroupID.x * gl_NumWorkGroups.y + gl_WorkGroupID.y) * GROUP_SIZE + gl_LocalInvocationID.x;
+}
+
 // A NaN fails every comparison, so it is not finite here.
 bool is_finite(float x) { return abs(x) <= 3.402823466e38; }
 bool is_finite(vec3 v) { return is_finite(v.x) && is_finite(v.y) && is_finite(v.z); }

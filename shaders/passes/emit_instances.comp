@@ -24,7 +24,7 @@ layout(set = 0, binding = 8, scalar) writeonly buffer FirstInstances { uint firs
 layout(push_constant, scalar) uniform Push { EmitPush push; };
 
 void main() {
-    const uint rank = item_index();
+    const uint rank = dealt_index();
     if (rank >= push.splats || counts.instances > push.capacity) return;
     const uint splat = order[rank];
     const uint count = tile_counts[splat];

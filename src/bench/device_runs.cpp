@@ -148,6 +148,14 @@ struct Lists {
     uint32_t scan_block = 1, tiles = 0, instances = 0;
 };
 
+/// A sort in several passes leaves the sorted keys. That in one pass leaves the keys as emitted.
+std::vector<uint32_t> sorted_keys(const FrameBuffers& frame, uint32_t instances) {
+    const bool emitted = frame.sizes.tile_sort.passes == 1;
+    std::vector<uint32_t> keys = frame.instance_keys[emitted ? 0 : 1].download<uint32_t>(instances);
+    if (emitted) std::ranges::sort(keys);
+    return keys;
+}
+
 Lists download(FrameRun& run) {
     run.run_forward();
     const FrameBuffers& frame = run.frame();
@@ -161,8 +169,8 @@ Lists download(FrameRun& run) {
     lists.prefix = frame.prefix.download<uint32_t>(n);
     lists.totals = frame.scan_totals.download<uint32_t>(size_t(sizes.scan_blocks) + 1);
     lists.instances = run.counts().instances;
-    lists.keys = frame.instance_keys[1].download<uint32_t>(lists.instances);
     if (run.plan().gradients) lists.indices = run.sorted().indices->download<uint32_t>(lists.instances);
+    lists.keys = sorted_keys(frame, lists.instances);
     lists.splats = run.sorted_splats();
     lists.tile_starts = run.tile_starts();
     lists.scan_block = sizes.scan_block;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <thread>
 #include <utility>
 
 #include "core/system_limits.h"
@@ -143,6 +144,7 @@ void Device::create_device(bool own_queue) {
     features.setScalarBlockLayout(true);
     if (subgroup_size_control_) features.setPNext(&wanted_sizes);
     limits_.cpu = properties.deviceType == vk::PhysicalDeviceType::eCpu;
+    if (limits_.cpu) limits_.threads = std::max(1u, std::thread::hardware_concurrency());
     limits_.max_texels = properties.limits.maxTexelBufferElements;
     // The kernels with texel buffers also store words of 64 bits, and a lane of theirs has at least two pixels of a tile.
     limits_.texel_buffers = limits_.cpu && limits_.max_texels >= kManyTexels && subgroups.lanes <= 32 &&

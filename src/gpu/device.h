@@ -21,6 +21,7 @@ namespace ewa::gpu {
 /// The properties of a device that workgroups and buffers depend on.
 struct Limits {
     bool cpu = false;                  // a software device: each thread takes a contiguous part of a dispatch
+    uint32_t threads = 1;              // that run the kernels of a software device
     uint32_t subgroup_size = 0;        // lanes, the same for every pipeline of this device
     uint32_t max_groups = 65535;       // workgroups of a dispatch, in each dimension
     uint64_t max_storage_range = 0;    // bytes of a storage binding

@@ -24,9 +24,9 @@ struct KernelConfig {
     uint32_t sort_chunk = 512;                 // least number of items of a sorting lane
     uint32_t sort_group = 64;                  // invocations of a sorting workgroup
     bool ranked_sort = false;                  // keys are ranked in shared memory; sort_lanes_max is not used
-    uint32_t tile_interleave = 1;              // distance of the tiles of neighbouring workgroups
-    uint32_t max_groups = 65535;               // workgroups along one dimension
-    uint32_t loop_limit = 65535;               // iterations of a loop in one invocation
+    uint32_t tile_interleave = 1;  // distance of neighbouring workgroups' tiles, or groups of splats
+    uint32_t max_groups = 65535;   // workgroups along one dimension
+    uint32_t loop_limit = 65535;   // iterations of a loop in one invocation
     uint32_t broadcast = shared::BROADCAST_SHUFFLES;  // of blending: SPEC_BROADCAST
     uint32_t frames_in_flight = 1;                    // training steps that are submitted and not finished
     bool texel_buffers = true;  // read-only buffers are texel buffers, or storage buffers
@@ -52,6 +52,8 @@ inline KernelConfig config_for(const gpu::Limits& limits) {
         config.tile_interleave = 16;
         // Small workgroups divide few lanes evenly between threads, and cost next to nothing to start.
         config.sort_group = config.subgroup;
+        // Few lanes have few counters to clear and to add up. Each thread has four workgroups of lanes, for balance.
+        config.sort_lanes_max = config.subgroup * std::clamp(4 * limits.threads, 8u, 64u);
     } else {
         config.sort_lanes_max = 16384;
         config.sort_chunk = 64;
@@ -73,6 +75,13 @@ inline Groups grid_of(const KernelConfig& config, uint64_t groups, uint32_t z = 
 /// Workgroups of an element-wise kernel over `items`, for each of z layers.
 inline Groups element_groups(const KernelConfig& config, uint64_t items, uint32_t z = 1) {
     return grid_of(config, (items + config.element_group - 1) / config.element_group, z);
+}
+
+/// As element_groups, for kernels that take their items by dealt_index (shaders/lib/prelude.glsl).
+inline Groups dealt_groups(const KernelConfig& config, uint64_t items, uint32_t z = 1) {
+    const Groups plain = element_groups(config, items);
+    const uint32_t rows = std::max(plain[1], config.tile_interleave);
+    return {uint32_t((uint64_t(plain[0]) * plain[1] + rows - 1) / rows), rows, z};
 }
 
 /// One workgroup of a single subgroup for each block of `block` items.

@@ -190,8 +190,7 @@ struct EmitInstances {
     static constexpr char shader[] = "emit_instances";
     struct Work : ElementGroup<shared::EmitPush> {
         static Groups groups(const KernelConfig& config, const Push& push) {
-            return element_groups(config, push.splats,
-                                  (push.tiles[1] + push.strip_rows - 1) / push.strip_rows);
+            return dealt_groups(config, push.splats, (push.tiles[1] + push.strip_rows - 1) / push.strip_rows);
         }
     };
     gpu::BufferPart records, order, tile_counts, prefix, totals, counts, keys, splats, first_instances;

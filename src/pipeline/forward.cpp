@@ -149,6 +149,7 @@ void record_tile_order(gpu::Recording& recording, passes::PassCache& cache, bool
     // With gradients a splat must find its instances again: their slots are in sorted order.
     const auto indices = [&](uint32_t i) { return gradients ? &frame.sorted_indices[i] : nullptr; };
     const uint32_t a = frame.tile_sort_start(), b = 1 - a;
+    const Sizes& s = frame.sizes;
     record_sort(recording, cache,
                 {.keys = {&frame.instance_keys[a], &frame.instance_keys[b]},
                  .values = {&frame.instance_splats[a], &frame.instance_splats[b]},
@@ -158,14 +159,19 @@ void record_tile_order(gpu::Recording& recording, passes::PassCache& cache, bool
                  .counter_prefix = frame.counter_prefix,
                  .digit_totals = frame.digit_totals,
                  .counts = frame.counts},
-                {.cut = frame.sizes.tile_sort,
+                {.cut = s.tile_sort,
                  .items = 0,
                  .capacity = frame.instance_capacity,
-                 .keep_keys = true,
+                 .keep_keys = s.tile_sort.passes > 1,
                  .name = "tile order"});
-    cache.get<passes::TileStarts>().record(
-        recording, {.keys = frame.instance_keys[1], .counts = frame.counts, .tile_starts = frame.tile_starts},
-        {.tiles = frame.sizes.tiles, .capacity = frame.instance_capacity});
+    // The one digit of a sort in one pass is the tile.
+    if (s.tile_sort.passes == 1)
+        recording.copy(frame.digit_totals, 0, frame.tile_starts, 0, s.tile_starts);
+    else
+        cache.get<passes::TileStarts>().record(
+            recording,
+            {.keys = frame.instance_keys[1], .counts = frame.counts, .tile_starts = frame.tile_starts},
+            {.tiles = s.tiles, .capacity = frame.instance_capacity});
 }
 
 }  // namespace

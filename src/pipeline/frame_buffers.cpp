@@ -38,7 +38,7 @@ void check_image(const passes::KernelConfig& config, const FrameRequest& request
 
 constexpr uint64_t kAlone = ~uint64_t(0);
 
-constexpr uint32_t kWideDigitBits = 11;  // of a sort in one pass
+constexpr uint32_t kWideDigitBits = 13;  // of a sort in one pass
 
 struct Allocation {
     gpu::Buffer* buffer;

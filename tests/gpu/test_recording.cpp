@@ -401,6 +401,7 @@ std::optional<std::string> unordered_pair(const std::vector<Command>& commands) 
 struct FrameParts {
     pipeline::Model model;
     pipeline::FrameBuffers frame;
+    pipeline::FrameBuffers wide;  // its tiles are sorted in several passes
     gpu::Buffer camera, photo;
     pipeline::Exposures exposures;
     pipeline::Motions motions;
@@ -412,7 +413,7 @@ SharedByTests<FrameParts>* const frame_parts = SharedByTests<FrameParts>::add();
 std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     Rig& r = rig();
     const Scene scene = random_scene(3000, 50, SplatKind::ordinary, 61, 47, 2);
-    auto& [model, frame, camera, photo, exposures, motions, views] =
+    auto& [model, frame, wide, camera, photo, exposures, motions, views] =
         frame_parts->get([] { return FrameParts(); });
     exposures = pipeline::Exposures(*device(), 3);
     const pipeline::ExposureUse exposure{&exposures, 1, 0.01f, 1};
@@ -485,6 +486,9 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     request.purpose = pipeline::Purpose::picture;
     gpu::Recording picture = r.recording();
     record_forward(picture, r.cache, plan_for(request), model, frame, inputs);
+    wide.reserve(*device(), r.config(),
+                 {.splats = 50, .width = 66000, .height = 9, .instances = 4096, .fifth_plane = true});
+    record_forward(picture, r.cache, plan_for(request), model, wide, {.camera = {&camera, 0, 66000, 9}});
     out.push_back(picture.commands());
 
     request.purpose = pipeline::Purpose::gradient;

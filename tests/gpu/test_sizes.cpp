@@ -24,6 +24,7 @@ passes::KernelConfig config_of(uint32_t subgroup, bool cpu = true) {
     gpu::Limits limits;
     limits.subgroup_size = subgroup;
     limits.cpu = cpu;
+    limits.threads = 16;
     return passes::config_for(limits);
 }
 
@@ -56,6 +57,36 @@ TEST(KernelConfig, GroupsCoverTheItemsWithinTheLimit) {
         EXPECT_GE(uint64_t(s[0]) * s[1], items / 128);
         EXPECT_LE(std::max(s[0], s[1]), 10u);
     }
+}
+
+/// Every group of items is some workgroup's, once.
+TEST(KernelConfig, EveryDealtItemHasOneWorkgroup) {
+    for (const bool cpu : {false, true})
+        for (const uint64_t items : {1ull, 128ull, 129ull, 2048ull, 2049ull, 999'999ull, 200'000'000ull}) {
+            const passes::KernelConfig config = config_of(8, cpu);
+            const auto groups = passes::dealt_groups(config, items, 3);
+            EXPECT_LE(std::max(groups[0], groups[1]), config.max_groups);
+            EXPECT_EQ(groups[2], 3u);
+            // dealt_index counts down the columns: it reaches all of them.
+            EXPECT_GE(uint64_t(groups[0]) * groups[1] * config.element_group, items);
+            if (cpu) {
+                EXPECT_GE(groups[1], config.tile_interleave);
+            }
+        }
+}
+
+TEST(KernelConfig, MoreThreadsSortWithMoreLanes) {
+    gpu::Limits limits;
+    limits.subgroup_size = 8;
+    limits.cpu = true;
+    const auto lanes = [&](uint32_t threads) {
+        limits.threads = threads;
+        return passes::config_for(limits).sort_lanes_max;
+    };
+    EXPECT_EQ(lanes(1), 64u);
+    EXPECT_EQ(lanes(2), 64u);
+    EXPECT_EQ(lanes(8), 256u);
+    EXPECT_EQ(lanes(128), 512u);
 }
 
 /// Every tile is some workgroup's, once.
@@ -119,16 +150,17 @@ TEST(SizesFor, SortsByAsManyBitsAsThereAreTiles) {
     EXPECT_EQ(bits(8 * 255, 8), 8u);
     EXPECT_EQ(bits(8 * 256, 8), 9u);
     EXPECT_EQ(bits(8 * 2047, 8), 11u);
-    EXPECT_EQ(bits(8 * 4096, 8), 14u);  // 13, in two passes of 7
+    EXPECT_EQ(bits(8 * 4096, 8), 13u);
+    EXPECT_EQ(bits(8 * 16384, 8), 16u);  // 15, in two passes of 8
     const RadixCut depth = sizes_for(config_of(8), {1, 8, 8, 1, false, false}).depth_sort;
     EXPECT_EQ(depth.passes * depth.bits, 32u);
 }
 
 TEST(SizesFor, AWideDigitSavesAPassWhereLanesCountAlone) {
     passes::KernelConfig config = config_of(8);
-    const RadixCut wide = radix_cut(config, 1'000'000, 11), two = radix_cut(config, 1'000'000, 12);
+    const RadixCut wide = radix_cut(config, 1'000'000, 13), two = radix_cut(config, 1'000'000, 14);
     EXPECT_EQ(wide.passes, 1u);
-    EXPECT_EQ(wide.lanes, (1'000'000 + 2047) / 2048);  // no more counters than items
+    EXPECT_EQ(wide.lanes, (1'000'000 + 8191) / 8192);  // no more counters than items
     EXPECT_EQ(two.passes, 2u);
     EXPECT_EQ(two.lanes, 512u);
     config.ranked_sort = true;
@@ -255,7 +287,7 @@ TEST(SizesFor, OverlaidBuffersShareMemory) {
 /// The tile sort ends in the second buffers, however many passes it takes.
 TEST(FrameReserve, TheTileSortBeginsWhereItEndsInTheSecondBuffers) {
     const auto config = passes::config_for(device()->limits());
-    for (const uint32_t width : {8u, 8u * 300}) {
+    for (const uint32_t width : {8u, 8u * 9000}) {
         pipeline::FrameBuffers frame;
         frame.sizes = sizes_for(config, {1, width, 8, 1, true, false});
         EXPECT_EQ(frame.tile_sort_start(), frame.sizes.tile_sort.passes == 1 ? 0u : 1u);
