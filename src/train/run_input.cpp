@@ -266,6 +266,11 @@ size_t dense_start_size(const RunOptions& options, const Dataset& dataset, const
     return train.max_splats == kAutomaticMaxSplats ? wanted : std::min(wanted, size_t(train.max_splats));
 }
 
+void refuse_dense_start(const RunOptions& options, const std::string& start) {
+    if (options.dense_start == DenseStart::on)
+        throw InputError("--dense-start on puts splats between points, and " + start + " has none");
+}
+
 Gaussians splats_of(const PointCloud& points, const RunOptions& options, const Dataset& dataset,
                     const std::vector<int>& frames) {
     const size_t wanted = dense_start_size(options, dataset, frames);
@@ -287,6 +292,7 @@ Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, cons
         if (!dataset.points.positions.empty()) start = splats_of(dataset.points, options, dataset, frames);
     }
     if (options.init == "random" || (options.init == "sfm" && start.size() == 0)) {
+        refuse_dense_start(options, options.init == "random" ? "--init random" : "the dataset");
         const uint32_t most = options.train.max_splats;
         const uint32_t count = most == kAutomaticMaxSplats ? kRandomSplats : std::min(kRandomSplats, most);
         start = random_gaussians(dataset, frames, static_cast<int>(count), options.train.seed, degree);
@@ -298,6 +304,7 @@ Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, cons
                             cloud.dropped.first, cloud.dropped.count));
         start = splats_of(cloud.points, options, dataset, frames);
     } else if (options.init != "sfm") {
+        refuse_dense_start(options, options.init);
         start = load_splats(options.init);
         set_sh_degree(start, degree);
         if (options.train.render.points) make_opaque(start);

@@ -184,6 +184,18 @@ TEST(Run, ADenseStartKeepsToACapThatIsGiven) {
     }
 }
 
+TEST(Run, ADenseStartNeedsPoints) {
+    TempFolder folder;
+    RunOptions options = small_run(folder / "o");
+    run_training(options);
+    options.dense_start = DenseStart::on;
+    for (const std::string& start : {std::string("random"), (folder / "o/splats.ply").string()}) {
+        options.init = start;
+        options.output = folder / "p";
+        expect_error<InputError>([&] { run_training(options); }, {"--dense-start on", start, "none"});
+    }
+}
+
 TEST(Run, AContinuedRunDoesNotLowerItsCap) {
     TempFolder folder;
     RunOptions options = small_run(folder / "o");
