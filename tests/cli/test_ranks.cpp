@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <sstream>
 #include <thread>
 
 #include "cli/expect.h"
@@ -190,7 +191,12 @@ class RankFaults : public TrainRanks {
         EXPECT_EQ(outcome.status, 1) << outcome.err;
         EXPECT_EQ(outcome.err.find("ewa train: rank " + std::to_string(rank) + " ("), 0u) << outcome.err;
         EXPECT_NE(outcome.err.find(text), std::string::npos) << outcome.err;
-        EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+        // Open MPI's event loop may warn of a connection that the failed rank has closed.
+        std::istringstream said(outcome.err);
+        std::string line;
+        int lines = 0;
+        while (std::getline(said, line)) lines += !line.empty() && !line.starts_with("[warn] Epoll ");
+        EXPECT_EQ(lines, 1) << outcome.err;
     }
     /// Sends a signal to a rank that stands still before its 20th work for the device.
     Outcome fail_by_signal(int rank, int signal) {
