@@ -4,9 +4,12 @@
 
 #include <algorithm>
 #include <csignal>
+#include <filesystem>
 
 #include "cli/expect.h"
 #include "cli/faulty.h"
+
+namespace fs = std::filesystem;
 
 namespace {
 
