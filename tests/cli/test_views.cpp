@@ -9,6 +9,7 @@
 
 #include "cli/expect.h"
 #include "ewa/image.h"
+#include "ewa/splat_files.h"
 #include "io/datasets/view_list.h"
 #include "scene/framing.h"
 
