@@ -70,6 +70,8 @@ if(TARGET ewa_mpi)
     # A package of its own, so that ewa's needs no MPI.
     install(TARGETS ewa_mpi LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/ewa COMPONENT mpi)
 endif()
+# All that an installation needs, and no test: scripts/build makes it.
+add_custom_target(product DEPENDS ${ewa_programs} ewa_library manual)
 install(TARGETS ${ewa_programs} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(TARGETS ewa_library EXPORT ewaTargets LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(DIRECTORY include/ewa DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
@@ -109,6 +111,7 @@ set(CPACK_PACKAGE_DESCRIPTION "Programs ewa, ewa-view and ewa-bench, and libewa 
 become a 3D Gaussian splat scene, on any Vulkan device, a plain CPU included.")
 set(CPACK_STRIP_FILES ON)
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_PACKAGE_DIRECTORY ${PROJECT_BINARY_DIR})
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION graphics)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
