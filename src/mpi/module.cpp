@@ -5,10 +5,14 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
+#include <condition_variable>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
+#include <mutex>
+#include <thread>
 
 #include "ewa/error.h"
 #include "mpi/pause.h"
@@ -29,6 +33,29 @@ void check(int code, const std::string& action) {
     MPI_Error_string(code, text, &length);
     throw RunError("MPI cannot " + action + ": " + text);
 }
+
+/// Ends the process with an error if it lives longer than the timeout: MPI_Init waits without a limit for a process that
+/// ended before it joined.
+class StartLimit {
+  public:
+    explicit StartLimit(std::chrono::milliseconds timeout)
+        : thread_([this, timeout](const std::stop_token& done) {
+              std::unique_lock lock(mutex_);
+              if (condition_.wait_for(lock, done, timeout, [&] { return done.stop_requested(); })) return;
+              std::fprintf(
+                  stderr,
+                  "ewa: MPI has not started after %lld s (--rank-timeout): another process may have ended "
+                  "before it joined\n",
+                  static_cast<long long>(std::chrono::ceil<std::chrono::seconds>(timeout).count()));
+              std::fflush(nullptr);
+              std::_Exit(1);
+          }) {}
+
+  private:
+    std::mutex mutex_;
+    std::condition_variable_any condition_;
+    std::jthread thread_;
+};
 
 /// What each rank tells of itself at the start.
 struct Card {
@@ -104,6 +131,7 @@ void MpiRanks::enter(const MpiOptions& options) {
     if (!has_begun) {
         // Open MPI's other way of sending over TCP uses one direction of the network at a time. The user's choice goes before.
         setenv("OMPI_MCA_btl_tcp_flags", "1", 0);
+        const StartLimit limit(timeout_);
         check(MPI_Init_thread(nullptr, nullptr, MPI_THREAD_SERIALIZED, &level), "start");
         entered_ = true;
     }

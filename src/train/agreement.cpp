@@ -16,9 +16,14 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+/// The value as on the command line.
+std::string shown(const Json& value) {
+    return value.is_string() ? value.get<std::string>() : value.dump();
+}
+
 void take_options(const Json& settings, RunOptions& options) {
     for (const auto& [name, value] : settings.at("options").items())
-        run_option(name).set(options, value.is_string() ? value.get<std::string>() : value.dump());
+        run_option(name).set(options, shown(value));
     const Json reached = settings.value("reached", Json::object());
     options.train.least_sh_degree = reached.value("sh_degree", TrainOptions().least_sh_degree);
     options.train.most_halvings = reached.value("halvings", TrainOptions().most_halvings);
@@ -28,6 +33,23 @@ uint64_t hash_of(const std::string& text) {
     core::Hash hash;
     hash.add(text);
     return hash.value();
+}
+
+uint64_t hash_of(const Gaussians& splats) {
+    core::Hash hash;
+    hash.add(splats.sh_degree);
+    for (int axis = 0; axis < 3; ++axis) hash.add(splats.origin[axis]);
+    for (const std::vector<float>* values :
+         {&splats.means, &splats.quaternions, &splats.log_scales, &splats.opacity_logits, &splats.sh}) {
+        hash.add(uint64_t(values->size()));
+        hash.add(values->data(), values->size() * sizeof(float));
+    }
+    return hash.value();
+}
+
+Json parsed(const std::vector<std::byte>& text) {
+    const char* begin = reinterpret_cast<const char*>(text.data());
+    return Json::parse(begin, begin + text.size());
 }
 
 /// What of the device decides the bytes: which kernels it gets.
@@ -42,13 +64,33 @@ uint64_t kernels_of(const gpu::Device& device) {
 
 }  // namespace
 
-void agree(RunOptions& options, const Json& settings, const std::string& fingerprint,
+void agree_on_options(RunOptions& options) {
+    Ranks& ranks = *options.ranks;
+    if (ranks.size() == 1) return;
+    Json asked{{"resume", options.resume}, {"options", Json::object()}};
+    for (const RunOption& option : run_options())
+        if (option.decides_result) asked["options"][option.name] = option.get(options);
+    const std::string text = asked.dump(-1, ' ', false, Json::error_handler_t::replace);
+    const Json first = parsed(told(ranks, std::as_bytes(std::span(text))));
+    for (const auto& [name, value] : first.at("options").items()) {
+        if (value == asked["options"].value(name, Json())) continue;
+        // The run's folder has the options of a run that is resumed. Another node may lack it.
+        if (!first.at("resume").get<bool>())
+            throw InputError("--" + name + " is " + shown(asked["options"].value(name, Json())) + " on " +
+                             ranks.name(ranks.rank()) + ", and " + shown(value) + " on " + ranks.name(0) +
+                             "; all ranks need the same");
+        run_option(name).set(options, shown(value));
+    }
+}
+
+void agree(RunOptions& options, const Json& settings, const std::string& fingerprint, const Gaussians& start,
            const gpu::Device& device) {
     Ranks& ranks = *options.ranks;
     if (ranks.size() == 1) return;
     constexpr std::array kParts{"another version of ewa", "another dataset, or other images or cameras in it",
+                                "other first splats (--init, or the dataset's points)",
                                 "a device that runs other kernels"};
-    const std::array<uint64_t, kParts.size()> own{hash_of(EWA_VERSION), hash_of(fingerprint),
+    const std::array<uint64_t, kParts.size()> own{hash_of(EWA_VERSION), hash_of(fingerprint), hash_of(start),
                                                   kernels_of(device)};
     const std::vector<uint64_t> all = ranks.gather(own);
     for (size_t i = 0; i < all.size(); ++i)
@@ -57,10 +99,7 @@ void agree(RunOptions& options, const Json& settings, const std::string& fingerp
                              " than " + ranks.name(0));
     const std::string text = settings.dump();
     const std::vector<std::byte> heard = told(ranks, std::as_bytes(std::span(text)));
-    if (ranks.rank() != 0)
-        take_options(Json::parse(reinterpret_cast<const char*>(heard.data()),
-                                 reinterpret_cast<const char*>(heard.data()) + heard.size()),
-                     options);
+    if (ranks.rank() != 0) take_options(parsed(heard), options);
 }
 
 }  // namespace ewa::train

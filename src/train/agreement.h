@@ -4,15 +4,21 @@
 #include <nlohmann/json.hpp>
 
 #include "ewa/device.h"
+#include "ewa/gaussians.h"
 #include "ewa/run.h"
 
 namespace ewa::train {
 
+/// Each rank compares its options that decide the result with those of rank 0, before it loads the first splats. If rank
+/// 0 resumes a run, another rank takes those of rank 0. Collective. Throws InputError on a rank with another value, which
+/// names the option and both values.
+void agree_on_options(RunOptions& options);
+
 /// Rank 0: tells the others the settings of its checkpoint (checkpoint_settings) and returns when all agree.
 /// Another rank: takes the options of rank 0 that decide the result, which a resumed run has from its checkpoint. Collective.
-/// fingerprint: of this rank's dataset. Throws InputError on every rank, which names the first rank that has another
-/// version, dataset or kind of device than rank 0, and what differs.
+/// fingerprint: of this rank's dataset. start: its first splats. Throws InputError on every rank, which names the first
+/// rank that has another version, dataset, first splats or kind of device than rank 0, and what differs.
 void agree(RunOptions& options, const nlohmann::ordered_json& settings, const std::string& fingerprint,
-           const gpu::Device& device);
+           const Gaussians& start, const gpu::Device& device);
 
 }  // namespace ewa::train

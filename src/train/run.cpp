@@ -566,7 +566,8 @@ RunResult Run::run() {
     read_checkpoint();
     start();
     list_settings();
-    train::agree(input_.options, settings_, settings_.at("dataset").get<std::string>(), *device_);
+    train::agree(input_.options, settings_, settings_.at("dataset").get<std::string>(), input_.start,
+                 *device_);
     auto owned = std::make_unique<Trainer>(device_, input_.dataset, input_.split.train,
                                            std::exchange(input_.start, {}), options().train, options().ranks);
     Trainer& trainer = *owned;
@@ -595,7 +596,8 @@ RunResult Run::run() {
 RunResult follow_training(const RunOptions& asked) {
     train::RunInput input = train::load_run(asked);
     const std::shared_ptr<gpu::Device> device = open_device(asked.device);
-    train::agree(input.options, {}, train::dataset_fingerprint(input.dataset, input.split), *device);
+    train::agree(input.options, {}, train::dataset_fingerprint(input.dataset, input.split), input.start,
+                 *device);
     Trainer trainer(device, input.dataset, input.split.train, std::exchange(input.start, {}),
                     input.options.train, asked.ranks);
     trainer.follow();
@@ -604,8 +606,10 @@ RunResult follow_training(const RunOptions& asked) {
 
 }  // namespace
 
-RunResult run_training(const RunOptions& options, RunObserver& observer) {
-    check_options(options);
+RunResult run_training(const RunOptions& asked, RunObserver& observer) {
+    check_options(asked);
+    RunOptions options = asked;
+    train::agree_on_options(options);
     if (options.ranks->rank() != 0) return follow_training(options);
     train::check_free(output_folder(options), options);  // before the dataset is loaded
     return Run(options, observer).run();

@@ -296,6 +296,67 @@ TEST_F(TrainRanks, AreRefusedWithDifferentInputs) {
     EXPECT_FALSE(fs::exists(folder / "o/splats.ply"));
 }
 
+TEST_F(TrainRanks, AreRefusedWithOtherOptions) {
+    const auto refused = [&](const Names& more, const std::string& expected) {
+        const Outcome outcome =
+            mpirun({arguments_of(folder / "data", "o", {}), arguments_of(folder / "data", "o", more)});
+        EXPECT_EQ(outcome.status, 2) << outcome.err;
+        EXPECT_NE(outcome.err.find(expected + " on rank 0 (" + node_name() + ")"), std::string::npos)
+            << expected << "\n"
+            << outcome.err;
+        EXPECT_FALSE(fs::exists(folder / "o/splats.ply")) << expected;
+    };
+    const std::string there = " on rank 1 (" + node_name() + "), and ";
+    refused({"--sh-degree", "1"}, "--sh-degree is 1" + there + "auto");
+    std::ofstream(folder / "other.json") << R"({"dense-start": "on"})";
+    refused({"--config", folder / "other.json"}, "--dense-start is on" + there + "auto");
+    Names fewer = arguments_of(folder / "data", "o", {});
+    fewer.back() = "60";  // --steps
+    const Outcome outcome = mpirun({arguments_of(folder / "data", "o", {}), fewer});
+    EXPECT_EQ(outcome.status, 2) << outcome.err;
+    EXPECT_NE(outcome.err.find("--steps is 60" + there + "120"), std::string::npos) << outcome.err;
+}
+
+TEST_F(TrainRanks, AreRefusedWithOtherFirstSplats) {
+    for (const char* node : {"n0", "n1"}) fs::create_directory(folder / node);
+    make_splats(folder / "n0/start.ply", 60);
+    make_splats(folder / "n1/start.ply", 40);
+    Names each = arguments_of(folder / "data", "o", {});
+    each[5] = "start.ply";
+    const auto at = [&](const char* node) { return Names{"--wdir", folder / node}; };
+    prefixes = {{0, at("n0")}, {1, at("n1")}};
+    const Outcome outcome = mpirun({each, each});
+    EXPECT_EQ(outcome.status, 2) << outcome.err;
+    EXPECT_NE(outcome.err.find("has other first splats (--init, or the dataset's points) than rank 0"),
+              std::string::npos)
+        << outcome.err;
+    EXPECT_FALSE(fs::exists(folder / "o/splats.ply"));
+    fs::copy_file(folder / "n0/start.ply", folder / "n1/start.ply", fs::copy_options::overwrite_existing);
+    expect_success(mpirun({each, each}));
+}
+
+/// Its node may not have the run's folder.
+TEST_F(TrainRanks, TakeTheOptionsOfRankZeroWhereItResumes) {
+    steps = "60";
+    expect_success(ranks(2, "o"));
+    Names other = arguments_of(folder / "data", "elsewhere", {"--resume"});
+    steps = "120";
+    expect_success(mpirun({arguments_of(folder / "data", "o", {"--resume"}), other}));
+    EXPECT_FALSE(fs::exists(folder / "elsewhere"));
+    steps = "60";
+    expect_success(alone("half"));
+    steps = "120";
+    expect_success(alone("half", {"--resume"}));
+    expect_same("o", "half");
+}
+
+TEST_F(TrainRanks, DoNotWaitForeverForOneThatNeverJoins) {
+    const Outcome outcome =
+        mpirun({arguments_of(folder / "data", "o", {"--rank-timeout", "2"}), {"info", folder / "s.ply"}});
+    EXPECT_EQ(outcome.status, 1) << outcome.err;
+    EXPECT_NE(outcome.err.find("ewa: MPI has not started after 2 s"), std::string::npos) << outcome.err;
+}
+
 TEST_F(TrainRanks, SayWhichOneFailed) {
     Names missing = arguments_of(folder / "data", "o", {});
     missing[1] = folder / "nowhere";
