@@ -3,7 +3,7 @@
 
 #include <fcntl.h>
 #include <poll.h>
-#include <spawn.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -22,7 +22,9 @@ extern char** environ;
 namespace ewa::core {
 namespace {
 
-constexpr int kTurn = 100;  // ms
+constexpr int kTurn = 100;       // ms
+constexpr int kShortTurn = 10;   // ms
+constexpr int kPatience = 3000;  // ms that a program has to end after SIGTERM
 
 /// A file descriptor.
 class Descriptor {
@@ -77,10 +79,17 @@ class Child {
         if (id_ > 0) end();
     }
     Child(const Child&) = delete;
-    /// Ends the program and those that it has started.
+    /// Ends the program and those that it has started. What ignores SIGTERM is killed.
     void end() {
         kill(-id_, SIGTERM);
+        for (int waited = 0; waited < kPatience && !has_ended(); waited += kShortTurn)
+            poll(nullptr, 0, kShortTurn);
+        kill(-id_, SIGKILL);  // the group has its number until wait()
         wait();
+    }
+    bool has_ended() const {
+        siginfo_t info{};
+        return waitid(P_PID, id_t(id_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == id_;
     }
     int wait() {
         int status = 0;
@@ -93,6 +102,34 @@ class Child {
   private:
     pid_t id_;
 };
+
+bool give(int descriptor, int place, int mode) {
+    if (descriptor < 0) descriptor = open("/dev/null", mode);
+    if (descriptor == place) return fcntl(place, F_SETFD, 0) == 0;
+    return descriptor >= 0 && dup2(descriptor, place) >= 0;
+}
+
+/// Goes on as the program, between fork and exec: nothing here takes memory or a lock. A reason why not goes to `report`.
+[[noreturn]] void become(char* const* command, char* const* environment, const Streams& streams, pid_t parent,
+                         int report) {
+    setpgid(0, 0);
+    // A killed parent cannot end the program. It would go on for hours, on files that the next run takes over.
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (getppid() != parent) _exit(1);
+    if (give(streams.input, STDIN_FILENO, O_RDONLY) && give(streams.output, STDOUT_FILENO, O_WRONLY) &&
+        (streams.errors < 0 || give(streams.errors, STDERR_FILENO, O_WRONLY)))
+        execve(command[0], command, environment);
+    const int reason = errno;
+    _exit(write(report, &reason, sizeof(reason)) == sizeof(reason) ? 127 : 126);
+}
+
+/// The program's file. A name without a slash is looked up in PATH.
+std::string file_of(const std::string& program) {
+    if (program.find('/') != std::string::npos) return program;
+    const std::filesystem::path file = find_program(program);
+    if (file.empty()) throw RunError("cannot start " + one_line(program) + ": " + std::strerror(ENOENT));
+    return file.string();
+}
 
 }  // namespace
 
@@ -110,28 +147,21 @@ std::filesystem::path find_program(const std::string& name) {
 
 pid_t start_program(std::vector<std::string> command, const std::vector<std::string>& environment,
                     const Streams& streams) {
-    posix_spawn_file_actions_t actions;
-    posix_spawn_file_actions_init(&actions);
-    const auto give = [&](int descriptor, int place, int mode) {
-        if (descriptor >= 0)
-            posix_spawn_file_actions_adddup2(&actions, descriptor, place);
-        else
-            posix_spawn_file_actions_addopen(&actions, place, "/dev/null", mode, 0);
-    };
-    give(streams.input, STDIN_FILENO, O_RDONLY);
-    give(streams.output, STDOUT_FILENO, O_WRONLY);
-    if (streams.errors >= 0) give(streams.errors, STDERR_FILENO, O_WRONLY);
-    posix_spawnattr_t attributes;
-    posix_spawnattr_init(&attributes);
-    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
-    posix_spawnattr_setpgroup(&attributes, 0);
+    const std::string name = one_line(command[0]);
+    command[0] = file_of(command[0]);
     std::vector<std::string> all = environment_with(environment);
-    pid_t child = 0;
-    const int reason = posix_spawnp(&child, command[0].c_str(), &actions, &attributes,
-                                    pointers(command).data(), pointers(all).data());
-    posix_spawnattr_destroy(&attributes);
-    posix_spawn_file_actions_destroy(&actions);
-    if (reason != 0) throw RunError("cannot start " + one_line(command[0]) + ": " + std::strerror(reason));
+    const std::vector<char*> words = pointers(command), changed = pointers(all);
+    int ends[2];
+    if (pipe2(ends, O_CLOEXEC) != 0) throw RunError("cannot create a pipe");
+    const Descriptor from(ends[0]);
+    Descriptor to(ends[1]);
+    const pid_t parent = getpid(), child = fork();
+    if (child == 0) become(words.data(), changed.data(), streams, parent, to.get());
+    int reason = child < 0 ? errno : 0;
+    to.close();
+    // The end of the pipe closes as the program starts.
+    if (child > 0 && read(from.get(), &reason, sizeof(reason)) > 0) waitpid(child, nullptr, 0);
+    if (reason != 0) throw RunError("cannot start " + name + ": " + std::strerror(reason));
     return child;
 }
 
@@ -149,9 +179,12 @@ Ended run_program(const Program& program, const std::function<bool(std::string_v
                               {.input = -1, .output = to.get(), .errors = log.get()}));
     to.close();
     std::array<char, 65536> piece;
-    for (;;) {
+    // A program that has ended may have left its output to another one, which keeps it open.
+    for (bool ended = false;;) {
         pollfd ready{from.get(), POLLIN, 0};
-        const int count = poll(&ready, 1, kTurn);
+        const int count = poll(&ready, 1, ended ? 0 : kTurn);
+        if (count == 0 && ended) break;
+        ended = count == 0 && child.has_ended();
         if (count < 0 && errno != EINTR) throw RunError("cannot wait for " + one_line(program.command[0]));
         std::string_view text;
         if (count > 0) {

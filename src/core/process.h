@@ -22,7 +22,8 @@ struct Streams {
 };
 
 /// Starts a program in a process group of its own, so Ctrl-C reaches this process alone. The caller waits for it.
-/// command: the name or path of the program, then its arguments.
+/// The program is killed if the thread that started it ends.
+/// command: the path of the program, or a name for find_program, then its arguments.
 /// environment: NAME=value, beside those of this process.
 /// Throws RunError if the program cannot be started.
 pid_t start_program(std::vector<std::string> command, const std::vector<std::string>& environment,
@@ -37,9 +38,9 @@ struct Program {
 
 enum class Ended { done, failed, stopped };
 
-/// Runs a program to its end. Its standard input is empty.
+/// Runs a program to its end. What it has started and left behind goes on. Its standard input is empty.
 /// - output(text): called with each piece of standard output, as it arrives, and with an empty text at least every
-///   tenth of a second. False ends the program (SIGTERM), and the result is then `stopped`.
+///   tenth of a second. False ends the program (SIGTERM, after three seconds SIGKILL), and the result is then `stopped`.
 /// The result is `failed` where the exit status is not 0. Throws RunError if the program cannot be started, or the
 /// log cannot be written.
 Ended run_program(const Program& program, const std::function<bool(std::string_view text)>& output);

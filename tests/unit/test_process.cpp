@@ -81,6 +81,34 @@ TEST(Process, StopsWhenAsked) {
     EXPECT_TRUE(state.empty() || state.find(") Z") != std::string::npos) << state;
 }
 
+TEST(Process, WhatIgnoresTheRequestToEndIsKilled) {
+    const test::TempFolder folder;
+    const auto file = folder / "begun";
+    const Program program = shell("trap '' TERM; echo > " + file.string() + "; sleep 1000");
+    EXPECT_EQ(core::run_program(program, [&](std::string_view) { return test::file_bytes(file).empty(); }),
+              Ended::stopped);
+}
+
+TEST(Process, OutputLeftToAnotherProgramIsNotWaitedFor) {
+    const auto [ended, text] = run(shell("sleep 1000 & echo $!"));
+    EXPECT_EQ(ended, Ended::done);
+    EXPECT_EQ(kill(std::stoi(text), SIGKILL), 0);
+}
+
+TEST(Process, TheCurrentFolderIsNotInPath) {
+    const test::TempFolder folder;
+    std::ofstream(folder / "tool") << "#!/bin/sh\n";
+    std::filesystem::permissions(folder / "tool", std::filesystem::perms::owner_all);
+    const std::string path = std::getenv("PATH");
+    const auto before = std::filesystem::current_path();
+    std::filesystem::current_path(folder.path());
+    setenv("PATH", (":" + path).c_str(), 1);
+    EXPECT_THROW(run({.command = {"tool"}, .environment = {}, .log = {}}), RunError);
+    EXPECT_EQ(run({.command = {"./tool"}, .environment = {}, .log = {}}).first, Ended::done);
+    setenv("PATH", path.c_str(), 1);
+    std::filesystem::current_path(before);
+}
+
 TEST(Process, WhatCannotStartIsNamed) {
     test::expect_error<RunError>(
         [] { run({.command = {"ewa-no-such-program"}, .environment = {}, .log = {}}); },
