@@ -26,6 +26,8 @@ struct CloseFile {
 };
 using File = std::unique_ptr<std::FILE, CloseFile>;
 
+constexpr const char* kNotReadable = ": not a readable image: ";
+
 /// Calls `read`. Throws InputError "name: not a readable image: reason" for any reason that it throws.
 template <class Read>
 auto with_name(const std::string& name, const Read& read) {
@@ -43,7 +45,7 @@ auto with_name(const std::string& name, const Read& read) {
     } catch (const std::length_error&) {
         reason = "its header claims more than memory can hold";
     }
-    throw InputError(core::one_line(name + ": not a readable image: " + reason));
+    throw InputError(core::one_line(name + kNotReadable + reason));
 }
 
 File open_file(const fs::path& path) {
@@ -204,19 +206,67 @@ uint64_t little_endian(const std::byte* bytes, int count) {
     return value;
 }
 
-int exif_orientation(const void* exif, uint64_t size) {
-    constexpr uint64_t kTag = 274, kEntryBytes = 12;
-    const auto* bytes = static_cast<const std::byte*>(exif);
-    const auto number = [&](uint64_t at, int count) -> uint64_t {
-        if (at + uint64_t(count) > size) return 0;
-        return bytes[0] == std::byte('M') ? big_endian(bytes + at, count) : little_endian(bytes + at, count);
-    };
-    const uint64_t directory = number(4, 4), count = number(directory, 2);
-    for (uint64_t i = 0; i < count; ++i) {
-        const uint64_t entry = directory + 2 + i * kEntryBytes;
-        if (number(entry, 2) == kTag) return int(number(entry + 8, 2));
+namespace {
+
+/// The directories of an EXIF block. Numbers beyond its end are 0.
+class Exif {
+  public:
+    Exif(const void* bytes, uint64_t size) : bytes_(static_cast<const std::byte*>(bytes)), size_(size) {}
+
+    uint64_t number(uint64_t at, int count) const {
+        if (at + uint64_t(count) > size_) return 0;
+        return bytes_[0] == std::byte('M') ? big_endian(bytes_ + at, count)
+                                           : little_endian(bytes_ + at, count);
     }
-    return 1;
+    uint64_t first() const { return number(4, 4); }
+    /// Where the value of a tag is, which may be an offset. 0: the directory has no such tag.
+    uint64_t find(uint64_t directory, uint64_t tag) const {
+        constexpr uint64_t kEntryBytes = 12;
+        const uint64_t count = number(directory, 2);
+        for (uint64_t i = 0; i < count; ++i) {
+            const uint64_t entry = directory + 2 + i * kEntryBytes;
+            if (number(entry, 2) == tag) return entry + 8;
+        }
+        return 0;
+    }
+    std::string text(uint64_t directory, uint64_t tag) const {
+        constexpr uint64_t kInline = 4;
+        const uint64_t value = find(directory, tag);
+        if (value == 0) return {};
+        const uint64_t length = number(value - 4, 4), at = length > kInline ? number(value, 4) : value;
+        if (at > size_ || length > size_ - at) return {};
+        const std::string all(reinterpret_cast<const char*>(bytes_ + at), length);
+        return all.substr(0, all.find('\0'));
+    }
+
+  private:
+    const std::byte* bytes_;
+    uint64_t size_;
+};
+
+}  // namespace
+
+int exif_orientation(const void* exif, uint64_t size) {
+    constexpr uint64_t kTag = 274;
+    const Exif block(exif, size);
+    const uint64_t value = block.find(block.first(), kTag);
+    return value == 0 ? 1 : int(block.number(value, 2));
+}
+
+std::string exif_lens(const void* exif, uint64_t size) {
+    constexpr uint64_t kMake = 271, kModel = 272, kPhoto = 34665, kFocal = 37386, kFocal35 = 41989;
+    const Exif block(exif, size);
+    const uint64_t first = block.first();
+    std::string lens = block.text(first, kMake);
+    lens.append("/").append(block.text(first, kModel));
+    const uint64_t photo = block.find(first, kPhoto), details = photo == 0 ? 0 : block.number(photo, 4);
+    if (details == 0) return lens;
+    const uint64_t focal = block.find(details, kFocal), focal35 = block.find(details, kFocal35);
+    const uint64_t fraction = focal == 0 ? 0 : block.number(focal, 4);
+    for (const uint64_t number : {block.number(fraction, 4), block.number(fraction + 4, 4),
+                                  focal35 == 0 ? 0 : block.number(focal35, 2)})
+        lens.append("/").append(std::to_string(number));
+    return lens;
 }
 
 Image decode(std::span<const unsigned char> bytes, const std::string& what, int largest) {
@@ -237,6 +287,46 @@ Image decode(std::span<const unsigned char> bytes, const std::string& what, int 
     });
 }
 
+std::string image_fault(const fs::path& path) try {
+    with_name(path.string(), [&] {
+        const File file = open_file(path);
+        if (ewa::format_of(file.get()).read == read_jpeg)
+            check_jpeg(file.get(), fs::file_size(path));
+        else
+            read_file(path, true);
+    });
+    return {};
+} catch (const InputError& error) {
+    // The caller knows the file.
+    const std::string text = error.what();
+    for (const std::string& start : {path.string() + kNotReadable, path.string() + ": "})
+        if (const std::string name = core::one_line(start); text.starts_with(name))
+            return text.substr(name.size());
+    return text;
+}
+
+bool ends_as_an_image(const fs::path& path) try {
+    const std::string_view name = format_name(path);
+    const std::string_view end = name == "jpeg"  ? "\xff\xd9"sv
+                                 : name == "png" ? "IEND\xae\x42\x60\x82"sv
+                                                 : ""sv;
+    core::FileReader reader(path);
+    if (reader.size() < end.size()) return false;
+    reader.go_to(reader.size() - end.size(), "its end");
+    return std::memcmp(reader.take(end.size(), "its end"), end.data(), end.size()) == 0;
+} catch (const InputError&) {
+    return false;
+}
+
+std::string lens_of(const fs::path& path) try {
+    return with_name(path.string(), [&] {
+        const File file = open_file(path);
+        return ewa::format_of(file.get()).read == read_jpeg ? jpeg_lens(file.get()) : std::string();
+    });
+} catch (const InputError&) {
+    return {};
+}
+
 std::string_view format_name(const fs::path& path) {
     return with_name(path.string(), [&] { return ewa::format_of(open_file(path).get()).name; });
 }
@@ -253,7 +343,7 @@ std::vector<fs::path> images_below(const fs::path& folder) try {
     for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder))
         if (const std::string extension = core::lower(entry.path().extension().string());
             entry.is_regular_file() && std::ranges::find(kExtensions, extension) != std::end(kExtensions))
-            found.push_back(fs::relative(entry.path(), folder));
+            found.push_back(entry.path().lexically_relative(folder));  // of links: their own names
     std::ranges::sort(found);
     return found;
 } catch (const fs::filesystem_error& error) {

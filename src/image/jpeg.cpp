@@ -44,17 +44,27 @@ class JpegReader {
     JpegReader& operator=(const JpegReader&) = delete;
 
     StoredImage read(uint64_t file_bytes, bool pixels) {
-        attempt([&] { read_header(); });
-        const bool cmyk = jpeg_.jpeg_color_space == JCS_CMYK || jpeg_.jpeg_color_space == JCS_YCCK;
-        const uint64_t channels = uint64_t(jpeg_.num_components);
-        check_limits({jpeg_.image_width, jpeg_.image_height, channels, 1}, file_bytes);
-        if (channels > 3 && !cmyk) throw std::runtime_error("the JPEG has more than 4 channels");
-        StoredImage image;
-        image.size = {int(jpeg_.image_width), int(jpeg_.image_height), orientation(), true};
-        // The second of two channels has no known meaning.
-        image.channels = channels < 3 ? 1 : 3;
-        if (pixels) read_values(image, cmyk);
+        StoredImage image = begin(file_bytes);
+        if (pixels) read_values(image);
         return image;
+    }
+
+    void check(uint64_t file_bytes) {
+        begin(file_bytes);
+        jpeg_.scale_denom = 8;
+        attempt([&] { jpeg_start_decompress(&jpeg_); });
+        std::vector<JSAMPLE> samples(size_t(jpeg_.output_width) * size_t(jpeg_.output_components));
+        JSAMPROW row = samples.data();
+        for (JDIMENSION y = 0; y < jpeg_.output_height; ++y)
+            attempt([&] { jpeg_read_scanlines(&jpeg_, &row, 1); });
+        attempt([&] { jpeg_finish_decompress(&jpeg_); });
+    }
+
+    std::string lens() {
+        attempt([&] { read_header(); });
+        std::string found;
+        with_exif([&](const JOCTET* exif, uint64_t size) { found = exif_lens(exif, size); });
+        return found;
     }
 
   private:
@@ -109,8 +119,26 @@ class JpegReader {
         jpeg_read_header(&jpeg_, TRUE);
     }
 
-    void read_values(StoredImage& image, bool cmyk) {
-        if (cmyk) jpeg_.out_color_space = JCS_CMYK;
+    bool cmyk() const { return jpeg_.jpeg_color_space == JCS_CMYK || jpeg_.jpeg_color_space == JCS_YCCK; }
+
+    /// Reads the header and checks it.
+    StoredImage begin(uint64_t file_bytes) {
+        attempt([&] { read_header(); });
+        const uint64_t channels = uint64_t(jpeg_.num_components);
+        check_limits({jpeg_.image_width, jpeg_.image_height, channels, 1}, file_bytes);
+        if (channels > 3 && !cmyk()) throw std::runtime_error("the JPEG has more than 4 channels");
+        StoredImage image;
+        int orientation = 1;
+        with_exif([&](const JOCTET* exif, uint64_t size) { orientation = exif_orientation(exif, size); });
+        image.size = {int(jpeg_.image_width), int(jpeg_.image_height), orientation, true};
+        // The second of two channels has no known meaning.
+        image.channels = channels < 3 ? 1 : 3;
+        return image;
+    }
+
+    void read_values(StoredImage& image) {
+        const bool inverted = cmyk();
+        if (inverted) jpeg_.out_color_space = JCS_CMYK;
         attempt([&] { jpeg_start_decompress(&jpeg_); });
         const size_t width = size_t(image.size.width), channels = size_t(image.channels);
         const size_t components = size_t(jpeg_.output_components);
@@ -120,7 +148,7 @@ class JpegReader {
         for (size_t y = 0; y < size_t(image.size.height); ++y) {
             attempt([&] { jpeg_read_scanlines(&jpeg_, &row, 1); });
             float* values = &image.values[y * width * channels];
-            if (cmyk) {
+            if (inverted) {
                 cmyk_to_rgb(row, width, values);
                 continue;
             }
@@ -131,13 +159,13 @@ class JpegReader {
         attempt([&] { jpeg_finish_decompress(&jpeg_); });  // up to the end-of-image marker
     }
 
-    int orientation() const {
+    /// Calls use(bytes, size) with each EXIF block.
+    template <class Use>
+    void with_exif(const Use& use) const {
         static constexpr char kName[] = "Exif\0";  // and the second zero that ends a literal
-        int found = 1;
         for (const jpeg_marker_struct* m = jpeg_.marker_list; m; m = m->next)
             if (m->data_length > sizeof(kName) && std::memcmp(m->data, kName, sizeof(kName)) == 0)
-                found = exif_orientation(m->data + sizeof(kName), m->data_length - sizeof(kName));
-        return found;
+                use(m->data + sizeof(kName), uint64_t(m->data_length - sizeof(kName)));
     }
 
     static constexpr int kExifMarker = JPEG_APP0 + 1;
@@ -217,6 +245,14 @@ std::vector<unsigned char> encode_jpeg(const Image& image, int quality) {
 
 StoredImage read_jpeg(std::FILE* file, uint64_t file_bytes, bool pixels) {
     return JpegReader(file).read(file_bytes, pixels);
+}
+
+void check_jpeg(std::FILE* file, uint64_t file_bytes) {
+    JpegReader(file).check(file_bytes);
+}
+
+std::string jpeg_lens(std::FILE* file) {
+    return JpegReader(file).lens();
 }
 
 }  // namespace ewa::image

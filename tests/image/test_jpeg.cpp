@@ -169,6 +169,56 @@ TEST(Jpeg, ExifSaysTheOrientation) {
     }
 }
 
+TEST(Jpeg, ExifSaysTheLens) {
+    TempFolder folder;
+    const auto path = folder / "a.jpg";
+    write_jpeg(path, 1, JCS_GRAYSCALE, JCS_GRAYSCALE);
+    EXPECT_EQ(image::lens_of(path), "");
+    const std::string whole = test::file_bytes(path);
+    const auto entry = [](uint32_t tag, uint32_t type, uint32_t count, const std::string& value) {
+        return big(tag, 2) + big(type, 2) + big(count) + value;
+    };
+    // The first directory has 3 entries (8 to 50), the second one 2 (50 to 80).
+    const std::string tiff = std::string("MM\0\x2a", 4) + big(8) + big(3, 2) +
+                             entry(271, 2, 3, {"Me\0\0", 4}) + entry(272, 2, 6, big(80)) +
+                             entry(34665, 4, 1, big(50)) + big(0) + big(2, 2) + entry(37386, 5, 1, big(86)) +
+                             entry(41989, 3, 1, big(28, 2) + big(0, 2)) + big(0) + std::string("Phone\0", 6) +
+                             big(42) + big(10);
+    const auto write = [&](const std::string& block) {
+        const std::string exif = std::string("Exif\0\0", 6) + block;
+        std::string bytes = whole;
+        bytes.insert(2, "\xff\xe1" + big(uint32_t(exif.size() + 2), 2) + exif);
+        folder.write("a.jpg", bytes);
+    };
+    write(tiff);
+    EXPECT_EQ(image::lens_of(path), "Me/Phone/42/10/28");
+    // Whatever is cut off counts as absent.
+    for (size_t size = 9; size < tiff.size(); ++size) {
+        write(tiff.substr(0, size));
+        EXPECT_NE(image::lens_of(path), "Me/Phone/42/10/28") << size;
+    }
+}
+
+/// The check before a search decodes at an eighth of the size.
+TEST(Jpeg, FaultsAreThoseOfLoading) {
+    TempFolder folder;
+    const auto path = folder / "a.jpg";
+    for (const bool grey : {true, false}) {
+        write_jpeg(path, grey ? 1 : 3, grey ? JCS_GRAYSCALE : JCS_RGB, grey ? JCS_GRAYSCALE : JCS_YCbCr);
+        const std::string whole = test::file_bytes(path);
+        EXPECT_EQ(image::image_fault(path), "");
+        EXPECT_TRUE(image::ends_as_an_image(path));
+        for (size_t size = 0; size < whole.size(); size += 7) {
+            folder.write("a.jpg", whole.substr(0, size));
+            EXPECT_FALSE(image::ends_as_an_image(path)) << size;
+            const std::string fault = image::image_fault(path);
+            expect_error<InputError>([&] { load_image(path); }, {fault});
+            EXPECT_NE(fault, "") << size;
+            EXPECT_EQ(fault.find("a.jpg"), std::string::npos) << fault;
+        }
+    }
+}
+
 /// 1,800 damaged files: each is a picture or an error of one line, and nothing is printed.
 TEST(Jpeg, RandomDamageIsAnErrorOrAPicture) {
     TempFolder folder;
