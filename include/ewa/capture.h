@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "ewa/image.h"
+
 namespace ewa {
 
 /// Which pairs of images COLMAP compares.
@@ -21,10 +23,15 @@ struct CaptureOptions {
     Matching matching = Matching::automatic;
 };
 
+/// The work, in this order. Without a video there are no frames.
+enum class CapturePhase { photos, frames, features, matches, cameras };
+
 struct CaptureProgress {
+    CapturePhase phase = CapturePhase::photos;
     std::string what;  // a verb, such as "placed"
     std::string unit;  // its plural, such as "photos"
     int done = 0, total = 0;
+    std::string note;  // a line for the user, which comes once; usually empty
 };
 
 struct Capture {
@@ -39,7 +46,14 @@ struct Capture {
 /// no cameras.
 bool is_capture(const std::filesystem::path& path);
 
-/// Throws InputError that says what the path is, unless is_capture holds or it has the files of a dataset.
+/// The size of the smallest photo, or of the video's frames. 0 x 0 where that cannot be known before make_dataset.
+ImageSize smallest_image(const std::filesystem::path& input);
+
+/// The dataset that has cameras of the images in this folder, which is one of its own; empty if there is none.
+std::filesystem::path dataset_of_images(const std::filesystem::path& folder);
+
+/// Throws InputError that says what the path is, unless is_capture holds or it has the files of a dataset. Also for a
+/// folder of images whose cameras a dataset has, which the message names.
 void check_training_input(const std::filesystem::path& path);
 
 /// Makes a dataset of a folder of photos (JPEG, PNG, TIFF, BMP; subfolders too) or a video.

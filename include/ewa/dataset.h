@@ -73,7 +73,8 @@ struct Dataset {
     std::vector<std::filesystem::path> files;  // of cameras and points; the frames name images and masks
     std::vector<Frame> frames;                 // sorted by name
     PointCloud points;                         // may be empty
-    int missing_images = 0;                    // entries whose image file does not exist
+    int missing_images = 0;                    // entries whose image file does not exist, or cannot be read
+    std::vector<std::string> unreadable;       // names of images that exist, and why they count as missing
     int dropped_points = 0;           // points with a coordinate that is not finite; they are not in `points`
     std::string first_dropped_point;  // position of the first: file and byte, line or vertex
     /// False if the dataset has "view_dependent": false. Then SH degree 0 suffices.
@@ -97,7 +98,8 @@ struct DatasetOptions {
 /// without a file are skipped and counted. Each other file has the model's size, or that size resized by one
 /// factor, which the intrinsics then follow. As in COLMAP, cameras belong to the pixels as stored. EXIF's
 /// orientation is applied only if it is a quarter turn and only the turned image has the model's aspect ratio.
-/// With a downscale factor K, images in images_K (beside images) are used as they are. Throws InputError.
+/// With a downscale factor K, images in images_K (beside images) are used as they are. In a folder that make_dataset has
+/// made, an image that is cut off or no image counts as missing. Throws InputError.
 Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& options);
 
 /// Loads the frame's image as the pinhole `frame.camera` sees it: turned, undistorted and downscaled.

@@ -13,6 +13,7 @@
 #include "core/hash.h"
 #include "core/json.h"
 #include "core/text.h"
+#include "core/typing.h"
 #include "ewa/dataset.h"
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
@@ -28,8 +29,6 @@ using core::is_folder;
 using Json = nlohmann::ordered_json;
 
 constexpr int kMostUnordered = 200;  // photos; all pairs of more take hours on a CPU
-constexpr size_t kNamed = 8;         // photos that a remark names
-constexpr size_t kLeastPhotos = 3;
 
 std::string extension_of(const fs::path& path) {
     return core::lower(path.extension().string());
@@ -48,11 +47,6 @@ bool has_cameras(const fs::path& folder) {
     return false;
 }
 
-bool is_heic(const fs::path& path) {
-    const std::string extension = extension_of(path);
-    return extension == ".heic" || extension == ".heif";
-}
-
 /// The photos are in the folder, or in its images/.
 fs::path folder_of_photos(const fs::path& folder) {
     return is_folder(folder / "images") ? folder / "images" : folder;
@@ -65,8 +59,7 @@ const char* name_of(Matching matching) {
 }
 
 /// The photos of the input. Those that a training in a folder of the photos has rendered do not count.
-std::vector<fs::path> photos_of(const fs::path& input, const fs::path& folder) {
-    const fs::path photos = folder_of_photos(input);
+std::vector<fs::path> photos_of(const fs::path& photos, const fs::path& folder) {
     const bool of_run = folder.filename() == "dataset" && is_file(folder.parent_path() / "config.json");
     const fs::path results = fs::weakly_canonical(fs::absolute(of_run ? folder.parent_path() : folder));
     const std::string below = results.lexically_relative(fs::canonical(photos)).string() + "/";
@@ -75,24 +68,17 @@ std::vector<fs::path> photos_of(const fs::path& input, const fs::path& folder) {
     return names;
 }
 
-/// A line for each file: what distinguishes its content, a space, and its name.
-std::vector<std::string> lines_of(const fs::path& folder, const std::vector<fs::path>& names) {
-    std::vector<std::string> lines;
-    for (const fs::path& name : names) {
-        core::Hash hash;
+/// A line for a file: what distinguishes its content, a space, and its name. The record is JSON, which is UTF-8.
+std::string line_of(const fs::path& folder, const fs::path& name) {
+    core::Hash hash;
+    std::string digits = "unreadable";
+    try {
         core::add_file(hash, folder / name);
-        lines.push_back(core::digits_of(hash) + " " + name.string());
+        digits = core::digits_of(hash);
+    } catch (const InputError&) {
+        // It has no content to tell from another one.
     }
-    return lines;
-}
-
-/// files: lines_of the input.
-Json record_of(const fs::path& input, const CaptureOptions& options, bool video,
-               const std::vector<std::string>& files) {
-    Json record{{"input", fs::canonical(input).string()}, {"matching", name_of(options.matching)}};
-    if (video) record["frames"] = options.frames;
-    record["files"] = files;
-    return record;
+    return digits + " " + core::one_line(name.string());
 }
 
 /// By name, what distinguishes the contents.
@@ -106,17 +92,80 @@ std::map<std::string, std::string> contents_in(const Json& lines) {
     return contents;
 }
 
-/// The first file that differs, in words.
-std::string difference(const Json& before, const Json& now) {
-    const auto old = contents_in(before), current = contents_in(now);
-    for (const auto& [name, content] : current) {
-        const auto found = old.find(name);
-        if (found == old.end()) return core::one_line(name) + " is new";
-        if (found->second != content) return core::one_line(name) + " has another content";
+/// Input and options. The contents are added as "files", and those that COLMAP did not get as "skipped".
+Json record_of(const fs::path& input, const CaptureOptions& options, bool video) {
+    Json record{{"input", core::one_line(fs::canonical(input).string())},
+                {"matching", name_of(options.matching)}};
+    if (video) record["frames"] = options.frames;
+    return record;
+}
+
+/// What became of the photos since a search for their cameras began, or what begins it.
+struct Chosen {
+    std::vector<fs::path> names;  // that COLMAP gets
+    std::set<std::string> gone;   // names of photos whose pictures changed: their views do not count
+    std::vector<std::string> remarks;
+};
+
+void add_remark(std::vector<std::string>& remarks, const std::vector<std::string>& names, const char* one,
+                const char* many) {
+    if (names.empty()) return;
+    remarks.push_back(core::counted(names.size(), "photo") + (names.size() == 1 ? one : many) +
+                      capture::names_text(names));
+}
+
+/// Looks at all photos before the search. Those that cannot be used are noted in the record.
+Chosen first_choice(const fs::path& folder, const std::vector<fs::path>& found, Json& record,
+                    const capture::ProgressFunction& progress) {
+    const std::vector<capture::Skipped> skipped = capture::faults_in(folder, found, progress);
+    Chosen chosen;
+    chosen.names = found;
+    record["files"] = Json::array();
+    record["skipped"] = Json::array();
+    for (const capture::Skipped& photo : skipped) {
+        std::erase(chosen.names, photo.name);
+        record["skipped"].push_back({{"file", line_of(folder, photo.name)}, {"reason", photo.reason}});
     }
-    for (const auto& [name, content] : old)
-        if (!current.contains(name)) return core::one_line(name) + " is missing";
-    return "their list is damaged";
+    capture::require_photos(folder, chosen.names.size(), skipped);
+    for (const fs::path& name : chosen.names) record["files"].push_back(line_of(folder, name));
+    if (!skipped.empty()) chosen.remarks.push_back(capture::skipped_text(skipped));
+    return chosen;
+}
+
+/// Leaves out what has changed since a search began. before: its record.
+Chosen later_choice(const fs::path& folder, const std::vector<fs::path>& found, const Json& before) {
+    auto searched = contents_in(before["files"]);
+    std::map<std::string, std::string> reasons;  // by line
+    for (const Json& photo : before.value("skipped", Json::array()))
+        if (photo.is_object()) reasons[photo.value("file", "")] = photo.value("reason", "");
+    Chosen chosen;
+    std::vector<capture::Skipped> skipped;
+    std::vector<std::string> changed, added, missing;
+    for (const fs::path& name : found) {
+        const std::string line = line_of(folder, name), shown = core::one_line(name.string());
+        const auto known = searched.find(shown);
+        if (known != searched.end() && line.starts_with(known->second + " ")) {
+            chosen.names.push_back(name);
+        } else if (known != searched.end()) {
+            changed.push_back(shown);
+            chosen.gone.insert(name.string());
+        } else if (reasons.contains(line)) {
+            skipped.push_back({name, core::one_line(reasons[line])});
+        } else {
+            added.push_back(shown);
+        }
+        if (known != searched.end()) searched.erase(known);
+    }
+    for (const auto& [name, content] : searched) missing.push_back(core::one_line(name));
+    if (!skipped.empty()) chosen.remarks.push_back(capture::skipped_text(skipped));
+    add_remark(chosen.remarks, missing,
+               " is missing, and its view is not used: ", " are missing, and their views are not used: ");
+    add_remark(chosen.remarks, changed,
+               " has changed since the search for its camera, and its view is not used: ",
+               " have changed since the search for their cameras, and their views are not used: ");
+    add_remark(chosen.remarks, added, " is new, and is not used; another -o DIR searches its camera, too: ",
+               " are new, and are not used; another -o DIR searches their cameras, too: ");
+    return chosen;
 }
 
 /// Whether something has been made of the photos or the video.
@@ -125,37 +174,33 @@ bool is_begun(const fs::path& folder, bool video) {
            (video ? is_folder(folder / "images") : is_file(folder / "colmap/database.db"));
 }
 
-/// Makes sure that the folder is new, or was begun with the same input and options. Older records have no files.
-void check_claim(const fs::path& folder, const Json& record, bool video) {
+/// Makes sure that the folder is new, or was begun with the same input and options. Returns the record of what was begun;
+/// null if nothing was.
+Json check_claim(const fs::path& folder, Json record, bool video) {
     const fs::path file = folder / "capture.json";
-    const std::string name = core::one_line(folder.string());
+    const std::string name = core::one_line(folder.string()),
+                      ways_out = "; -o DIR takes another folder, or remove " + name;
     if (!is_file(file)) {
-        if (!is_folder(folder) || fs::is_empty(folder)) return;
+        if (!is_folder(folder) || fs::is_empty(folder)) return {};
         throw InputError(name + " is not empty, and no dataset that ewa has made; choose another folder");
     }
-    Json before = core::read_json_file<Json>(file), now = record;
-    const Json files = before.is_object() ? before.value("files", Json()) : Json();
-    if (before.is_object()) before.erase("files");
-    now.erase("files");
-    if (before != now)
-        throw InputError(name +
-                         " is the dataset of another input, or was made with other options; choose another "
-                         "folder, or remove it");
-    if (files.is_null() || files == record["files"] || !is_begun(folder, video)) return;
-    throw InputError(std::string(video ? "the video has" : "the photos have") + " changed since " + name +
-                     " was made of them (" + difference(files, record["files"]) +
-                     "); choose another folder, or remove this one");
+    const Json before = core::read_json_file<Json>(file);
+    Json options = before;
+    for (Json* each : {&options, &record})
+        if (each->is_object())
+            for (const char* contents : {"files", "skipped"}) each->erase(contents);
+    if (options != record)
+        throw InputError(name + " is the dataset of another input, or was made with other options" +
+                         ways_out);
+    return is_begun(folder, video) ? before : Json();
 }
 
-std::string names_text(const std::vector<std::string>& names) {
-    std::string text;
-    for (size_t i = 0; i < std::min(names.size(), kNamed); ++i) {
-        if (i > 0) text += ", ";
-        text += names[i];
-    }
-    if (names.size() > kNamed)
-        text.append(" and ").append(std::to_string(names.size() - kNamed)).append(" more");
-    return text;
+/// Throws InputError if the video is not the one that the frames are of. Older records have no files.
+void check_same_video(const fs::path& folder, const Json& before, const Json& record) {
+    if (!before.is_object() || !before.contains("files") || before["files"] == record["files"]) return;
+    const std::string name = core::one_line(folder.string());
+    throw InputError("the video has changed since " + name +
+                     " was made of it; -o DIR takes another folder, or remove " + name);
 }
 
 Capture result_of(const fs::path& folder, const std::vector<fs::path>& names) {
@@ -170,7 +215,7 @@ Capture result_of(const fs::path& folder, const std::vector<fs::path>& names) {
     if (!result.not_placed.empty())
         result.remarks.push_back(
             std::to_string(result.not_placed.size()) + " of " + std::to_string(result.images) +
-            " photos could not be placed, and are not used: " + names_text(result.not_placed));
+            " photos could not be placed, and are not used: " + capture::names_text(result.not_placed));
     return result;
 }
 
@@ -179,21 +224,60 @@ void require_programs(const fs::path& folder, bool video) {
     if (!is_folder(folder / "sparse/0")) capture::require_colmap();
 }
 
+/// What COLMAP gets of a folder of photos. before: the record of a search that has begun; null: none. Completes `record`.
+Chosen choose(const fs::path& photos, const fs::path& folder, const Json& before, Json& record,
+              const capture::ProgressFunction& progress) {
+    const std::vector<fs::path> found = photos_of(photos, folder);
+    if (before.is_null()) return first_choice(photos, found, record, progress);
+    if (before.contains("files")) return later_choice(photos, found, before);
+    return {found, {}, {}};
+}
+
+/// Tells the user before the long work.
+void say(const std::vector<std::string>& lines, const capture::ProgressFunction& progress) {
+    for (const std::string& line : lines) {
+        CaptureProgress now;
+        now.note = line;
+        if (!progress(now)) throw capture::Stopped();
+    }
+}
+
+/// Finds the cameras, or removes those of photos that have changed since.
+std::vector<std::string> search(const fs::path& folder, bool video, const Chosen& chosen,
+                                const CaptureOptions& options, const capture::ProgressFunction& progress) {
+    const fs::path model = folder / "sparse/0";
+    std::vector<std::string> remarks;
+    if (!is_folder(model)) {
+        const bool sequence = options.matching == Matching::automatic
+                                  ? video || int(chosen.names.size()) > kMostUnordered
+                                  : options.matching == Matching::sequence;
+        capture::require_photos(folder / "images", chosen.names.size(), {});
+        core::make_folder(model.parent_path());
+        remarks = capture::place_photos({folder / "images", chosen.names, sequence}, folder / "colmap", model,
+                                        progress);
+    }
+    if (!chosen.gone.empty()) capture::remove_views(model, chosen.gone);
+    return remarks;
+}
+
 Capture make(const fs::path& input, const fs::path& folder, const CaptureOptions& options,
              const capture::ProgressFunction& progress) {
     const bool video = is_video(input);
-    const fs::path images = folder / "images", work = folder / "colmap", model = folder / "sparse/0";
+    const fs::path images = folder / "images", work = folder / "colmap";
     // All errors of the input come before the folder is made.
-    const std::vector<std::string> files = video
-                                               ? lines_of(input.parent_path(), {input.filename()})
-                                               : lines_of(folder_of_photos(input), photos_of(input, folder));
-    const Json record = record_of(input, options, video, files);
-    check_claim(folder, record, video);
+    Json record = record_of(input, options, video);
+    const Json before = check_claim(folder, record, video);
+    Chosen chosen;
+    if (video)
+        record["files"] = Json::array({line_of(input.parent_path(), input.filename())});
+    else
+        chosen = choose(folder_of_photos(input), folder, before, record, progress);
+    if (video) check_same_video(folder, before, record);
     require_programs(folder, video);
+    say(chosen.remarks, progress);
     core::make_folder(folder);
     const core::FolderLock lock(folder);
-    if (!is_file(folder / "capture.json") || !is_begun(folder, video))
-        core::write_json(folder / "capture.json", record);
+    if (before.is_null()) core::write_json(folder / "capture.json", record);
     core::make_folder(work);
     if (!fs::exists(fs::symlink_status(images))) {
         if (video)
@@ -201,22 +285,16 @@ Capture make(const fs::path& input, const fs::path& folder, const CaptureOptions
         else
             fs::create_directory_symlink(fs::canonical(folder_of_photos(input)), images);
     }
-    const std::vector<fs::path> names = video ? capture::photos_in(images) : photos_of(input, folder);
-    const bool sequence = options.matching == Matching::automatic
-                              ? video || int(names.size()) > kMostUnordered
-                              : options.matching == Matching::sequence;
-    std::vector<std::string> remarks;
-    if (!is_folder(model)) {
-        core::make_folder(model.parent_path());
-        remarks = capture::place_photos({images, names, sequence}, work, model, progress);
-    }
-    Capture result = result_of(folder, names);
+    if (video) chosen.names = capture::photos_in(images);
+    const std::vector<std::string> remarks = search(folder, video, chosen, options, progress);
+    Capture result = result_of(folder, chosen.names);
     result.remarks.insert(result.remarks.begin(), remarks.begin(), remarks.end());
     return result;
 }
 
 bool is_photo(const fs::path& file) try {
-    return is_heic(file) || !image::format_name(file).empty();
+    const std::string extension = extension_of(file);
+    return extension == ".heic" || extension == ".heif" || !image::format_name(file).empty();
 } catch (const InputError&) {
     return false;
 }
@@ -246,34 +324,47 @@ std::string splat_kind(const fs::path& file) try {
 
 }  // namespace
 
-std::vector<fs::path> capture::photos_in(const fs::path& folder) {
-    const std::string name = core::one_line(folder.string());
-    const std::vector<fs::path> files = image::images_below(folder);
-    const auto heic = std::count_if(files.begin(), files.end(), is_heic);
-    if (heic > 0)
-        throw InputError(
-            name + ": " + std::to_string(heic) +
-            " photos are HEIC, which COLMAP cannot read; convert them, for example with "
-            "heif-convert IMG.HEIC IMG.jpg (Debian: libheif-examples), and remove the originals");
-    std::vector<fs::path> photos;
-    for (const fs::path& file : files) {
-        const std::string_view format = image::format_name(folder / file);
-        if (format == "jpeg" || format == "png" || format == "tiff" || format == "bmp")
-            photos.push_back(file);
-    }
-    if (photos.size() < kLeastPhotos)
-        throw InputError(
-            name + " has " + std::to_string(photos.size()) +
-            " photos (JPEG, PNG, TIFF or BMP); cameras need at least 3, and good splats 30 or more");
-    return photos;
-}
-
 bool is_capture(const fs::path& path) {
     if (is_video(path)) return true;
-    return is_folder(path) && !has_cameras(path) && !image::images_below(folder_of_photos(path)).empty();
+    return is_folder(path) && !has_cameras(path) && !capture::photo_files(folder_of_photos(path)).empty();
+}
+
+ImageSize smallest_image(const fs::path& input) {
+    if (is_video(input)) return capture::video_size(input);
+    ImageSize smallest;
+    const fs::path folder = folder_of_photos(input);
+    for (const fs::path& name : capture::photo_files(folder)) try {
+            const ImageSize size = read_image_size(folder / name);
+            const bool smaller =
+                std::min(size.width, size.height) < std::min(smallest.width, smallest.height);
+            if (smaller || smallest.width == 0) smallest = size;
+        } catch (const InputError&) {
+            continue;  // make_dataset says so
+        }
+    return smallest;
+}
+
+fs::path dataset_of_images(const fs::path& folder) try {
+    if (!is_folder(folder)) return {};
+    const fs::path images = fs::canonical(folder), dataset = images.parent_path();
+    if (!has_cameras(dataset)) return {};
+    const Dataset known = load_dataset(dataset, {.need_images = false, .need_points = false});
+    const bool same = std::ranges::any_of(known.frames, [&](const Frame& frame) {
+        return frame.image_exists && fs::weakly_canonical(frame.image_path).parent_path() == images;
+    });
+    // As the user would name it.
+    return same ? (fs::absolute(folder).lexically_normal() / "").parent_path().parent_path() : fs::path();
+} catch (const InputError&) {
+    return {};
 }
 
 void check_training_input(const fs::path& path) {
+    if (const fs::path dataset = dataset_of_images(path); !dataset.empty()) {
+        const std::string name = core::one_line(fs::proximate(dataset).string());
+        throw InputError(name + " has the cameras of " + core::one_line(path.string()) + ": ewa train " +
+                         name + "; to search them anew, ewa cameras " + core::one_line(path.string()) +
+                         " -o DIR");
+    }
     if (is_capture(path) || (is_folder(path) && has_cameras(path))) return;
     if (is_file(path) && extension_of(path) == ".json") return;
     refuse(path,
@@ -288,6 +379,10 @@ void check_training_input(const fs::path& path) {
 
 Capture make_dataset(const fs::path& input, const fs::path& folder, const CaptureOptions& options,
                      const std::function<bool(const CaptureProgress&)>& progress) {
+    if (is_folder(input) && has_cameras(input))
+        throw InputError(core::one_line(input.string()) +
+                         " is a dataset: its images have cameras; ewa train " +
+                         core::one_line(input.string()) + " trains on them");
     if (!is_capture(input)) refuse(input, "neither a video nor a folder with photos");
     try {
         return make(input, folder, options, progress);

@@ -11,13 +11,13 @@
 #include "core/process.h"
 #include "core/text.h"
 #include "ewa/error.h"
-#include "ewa/image.h"
 
 namespace ewa::capture {
 namespace {
 
 namespace fs = std::filesystem;
 
+constexpr int kLeastBlock = 4;  // photos
 constexpr const char* kOverlap =
     "photos need two thirds of their content in common with a neighbour, from another place";
 
@@ -79,35 +79,52 @@ void mark(const fs::path& file) {
     core::write_text_file(file, "");
 }
 
-bool one_size(const Photos& photos) {
-    const ImageSize first = read_image_size(photos.folder / photos.names.front());
-    return std::all_of(photos.names.begin(), photos.names.end(), [&](const fs::path& name) {
-        const ImageSize size = read_image_size(photos.folder / name);
-        return size.width == first.width && size.height == first.height;
-    });
+/// A path that no program takes for an option.
+std::string argument(const fs::path& path) {
+    return fs::absolute(path).string();
 }
 
+/// A run for each lens: the option that lets photos share a camera holds for a whole run.
 void extract_features(const Colmap& colmap, const Photos& photos, const fs::path& work) {
     if (core::is_file(work / "features.done")) return;
-    std::string list;
-    for (const fs::path& name : photos.names) list += name.string() + "\n";
-    core::write_text_file(work / "photos.txt", list);
-    const bool one = one_size(photos);
     // COLMAP 3.13 has moved the option.
     const std::string gpu = colmap.has_option("feature_extractor", "FeatureExtraction.use_gpu")
                                 ? "--FeatureExtraction.use_gpu"
                                 : "--SiftExtraction.use_gpu";
     static const std::regex pattern(R"(Processed file \[(\d+)/(\d+)\])");
-    colmap.run({"colmap", "feature_extractor", "--database_path", (work / "database.db").string(),
-                "--image_path", photos.folder.string(), "--image_list_path", (work / "photos.txt").string(),
-                "--ImageReader.single_camera", one ? "1" : "0", "--ImageReader.camera_model",
-                one ? "OPENCV" : "SIMPLE_RADIAL", gpu, "0"},
-               {"searched", "photos", 0, int(photos.names.size())},
-               [](const std::string& line) -> std::optional<int> {
-                   const auto numbers = numbers_in(line, pattern);
-                   return numbers ? std::optional(numbers->first) : std::nullopt;
-               });
+    int before = 0;
+    for (const LensGroup& group : lenses_of(photos.folder, photos.names)) {
+        std::string list;
+        for (const fs::path& name : group.photos) list += name.string() + "\n";
+        core::write_text_file(work / "photos.txt", list);
+        colmap.run({"colmap", "feature_extractor", "--database_path", argument(work / "database.db"),
+                    "--image_path", argument(photos.folder), "--image_list_path",
+                    argument(work / "photos.txt"), "--ImageReader.single_camera", group.shared ? "1" : "0",
+                    "--ImageReader.camera_model", group.tangential ? "OPENCV" : "SIMPLE_RADIAL", gpu, "0"},
+                   {CapturePhase::features, "searched", "photos", before, int(photos.names.size()), {}},
+                   [before](const std::string& line) -> std::optional<int> {
+                       const auto numbers = numbers_in(line, pattern);
+                       return numbers ? std::optional(before + numbers->first) : std::nullopt;
+                   });
+        before += int(group.photos.size());
+    }
     mark(work / "features.done");
+}
+
+/// The pairs of photos that COLMAP has compared after some of its steps. A step compares a block of photos with a block;
+/// the blocks have `block` photos, the last one maybe fewer. Pairs that another step has are not among them.
+std::vector<int> pairs_after_steps(int count, int block) {
+    const int blocks = (count + block - 1) / block;
+    std::vector<int> pairs{0};
+    for (int i = 0; i < blocks; ++i)
+        for (int j = 0; j < blocks; ++j) {
+            int now = pairs.back();
+            for (int a = i * block; a < std::min(count, (i + 1) * block); ++a)
+                for (int b = j * block; b < std::min(count, (j + 1) * block); ++b)
+                    now += (a > b && a % block <= b % block) || (a < b && a % block < b % block);
+            pairs.push_back(now);
+        }
+    return pairs;
 }
 
 void match(const Colmap& colmap, const Photos& photos, const fs::path& work) {
@@ -117,7 +134,7 @@ void match(const Colmap& colmap, const Photos& photos, const fs::path& work) {
     const std::string gpu = colmap.has_option(command, "FeatureMatching.use_gpu")
                                 ? "--FeatureMatching.use_gpu"
                                 : "--SiftMatching.use_gpu";
-    std::vector<std::string> words{"colmap", command, "--database_path", (work / "database.db").string(),
+    std::vector<std::string> words{"colmap", command, "--database_path", argument(work / "database.db"),
                                    gpu,      "0"};
     const int count = int(photos.names.size());
     if (photos.in_sequence) {
@@ -126,22 +143,25 @@ void match(const Colmap& colmap, const Photos& photos, const fs::path& work) {
              {"--SequentialMatching.overlap", "10", "--SequentialMatching.quadratic_overlap", "1"})
             words.emplace_back(word);
         static const std::regex pattern(R"(\[(\d+)/(\d+)\])");
-        colmap.run(std::move(words), {"matched", "photos", 0, count},
+        colmap.run(std::move(words), {CapturePhase::matches, "matched", "photos", 0, count, {}},
                    [](const std::string& line) -> std::optional<int> {
                        const auto numbers = numbers_in(line, pattern);
                        return numbers ? std::optional(numbers->first) : std::nullopt;
                    });
     } else {
-        // Small blocks show the progress. COLMAP compares each block with each.
-        constexpr int kBlock = 10;
-        words.insert(words.end(), {"--ExhaustiveMatching.block_size", std::to_string(kBlock)});
-        const int blocks = (count + kBlock - 1) / kBlock;
+        // Small blocks show the progress. COLMAP compares each block with each, and keeps five in memory.
+        const int block = std::max(kLeastBlock, (count + 9) / 10), blocks = (count + block - 1) / block;
+        words.insert(words.end(), {"--ExhaustiveMatching.block_size", std::to_string(block)});
+        const std::vector<int> pairs = pairs_after_steps(count, block);
         static const std::regex pattern(R"(\[(\d+)/\d+, (\d+)/\d+\])");
-        colmap.run(std::move(words), {"matched", "groups of photos", 0, blocks * blocks},
-                   [blocks](const std::string& line) -> std::optional<int> {
+        colmap.run(std::move(words), {CapturePhase::matches, "matched", "pairs", 0, pairs.back(), {}},
+                   [&pairs, blocks](const std::string& line) -> std::optional<int> {
                        const auto numbers = numbers_in(line, pattern);
                        if (!numbers) return {};
-                       return (numbers->first - 1) * blocks + numbers->second - 1;
+                       // Newer releases print the line at the beginning of a step.
+                       const bool over = line.find("] in ") != std::string::npos;
+                       const int steps = (numbers->first - 1) * blocks + numbers->second - (over ? 0 : 1);
+                       return pairs[size_t(std::clamp(steps, 0, int(pairs.size()) - 1))];
                    });
     }
     mark(done);
@@ -175,15 +195,15 @@ std::vector<Model> map(const Colmap& colmap, const Photos& photos, const fs::pat
     std::vector<std::string> words{glomap ? "glomap" : "colmap",
                                    "mapper",
                                    "--database_path",
-                                   (work / "database.db").string(),
+                                   argument(work / "database.db"),
                                    "--image_path",
-                                   photos.folder.string(),
+                                   argument(photos.folder),
                                    "--output_path",
-                                   folder.string()};
+                                   argument(folder)};
     // By default COLMAP throws models of fewer than 10 images away.
     if (!glomap) words.insert(words.end(), {"--Mapper.min_model_size", "3"});
     static const std::regex pattern(R"(Registering image #\d+ \((\d+)\)|num_reg_frames=(\d+))");
-    colmap.run(std::move(words), {"placed", "photos", 0, int(photos.names.size())},
+    colmap.run(std::move(words), {CapturePhase::cameras, "placed", "photos", 0, int(photos.names.size()), {}},
                [](const std::string& line) -> std::optional<int> {
                    const auto numbers = numbers_in(line, pattern);
                    return numbers ? std::optional(std::max(numbers->first, numbers->second)) : std::nullopt;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -49,9 +50,51 @@ void require_colmap();
 void extract_frames(const std::filesystem::path& video, const std::filesystem::path& images, int frames,
                     const std::filesystem::path& log, const ProgressFunction& progress);
 
-/// The photos that COLMAP reads, relative to their folder and sorted. Throws InputError if there are fewer than 3, or if
-/// one is HEIC.
+constexpr size_t kLeastPhotos = 3;
+constexpr size_t kNamed = 8;  // photos that a line names
+
+/// The size of the frames. 0 x 0 where ffprobe does not say it.
+ImageSize video_size(const std::filesystem::path& video);
+
+/// The files of a folder that may be photos, relative to it and sorted. Folders below it that ewa has made do not count.
+std::vector<std::filesystem::path> photo_files(const std::filesystem::path& folder);
+/// The same. Throws InputError if one is HEIC, or a link out of the folder.
 std::vector<std::filesystem::path> photos_in(const std::filesystem::path& folder);
+
+/// A photo that COLMAP does not get.
+struct Skipped {
+    std::filesystem::path name;
+    std::string reason;
+};
+
+/// Decodes all photos, on all cores. Throws Stopped.
+std::vector<Skipped> faults_in(const std::filesystem::path& folder,
+                               const std::vector<std::filesystem::path>& names,
+                               const ProgressFunction& progress);
+
+/// A line for the user, with the first names.
+std::string skipped_text(const std::vector<Skipped>& skipped);
+/// The first names, separated by commas.
+std::string names_text(const std::vector<std::string>& names);
+
+/// Throws InputError if `count` photos are too few.
+void require_photos(const std::filesystem::path& folder, size_t count, const std::vector<Skipped>& skipped);
+
+/// Photos whose cameras COLMAP describes alike.
+struct LensGroup {
+    std::vector<std::filesystem::path> photos;  // sorted
+    bool shared = true;                         // one camera; else one for each photo
+    bool tangential = true;                     // two radial and two tangential terms; else one radial term
+};
+
+/// Photos of one size, camera and focal length share a camera. Tangential terms need ten photos, or all that there are.
+/// Throws InputError where a photo cannot be read.
+std::vector<LensGroup> lenses_of(const std::filesystem::path& folder,
+                                 const std::vector<std::filesystem::path>& names);
+
+/// Removes the views of these images from a COLMAP model (.bin), also from the points' tracks. Throws InputError where the
+/// model cannot be read, RunError.
+void remove_views(const std::filesystem::path& model, const std::set<std::string>& names);
 
 /// What COLMAP has to place.
 struct Photos {

@@ -19,10 +19,31 @@ namespace fs = std::filesystem;
 constexpr int kSmallWidth = 480;  // px, of the frames whose sharpness is compared
 constexpr uint64_t kMostPixels = uint64_t(1) << 24;
 
+/// How ffmpeg and ffprobe are told to read the video. A name that begins with a dash, or has a colon, is a file all the same.
+/// A playlist would lead to other files, and is refused whatever its name.
+std::vector<std::string> input_words(const fs::path& video) {
+    return {"-v",
+            "error",
+            "-protocol_whitelist",
+            "file",
+            "-format_whitelist",
+            "mov,matroska,avi,mpegts,mpeg",
+            "-i",
+            "file:" + video.string()};
+}
+
 std::vector<std::string> ffmpeg(const fs::path& video) {
-    // A name that begins with a dash, or has a colon, is a file all the same.
-    return {"ffmpeg", "-nostdin", "-hide_banner", "-v", "error", "-i", "file:" + video.string(),
-            "-map",   "0:v:0"};
+    std::vector<std::string> words{"ffmpeg", "-nostdin", "-hide_banner"};
+    for (std::string& word : input_words(video)) words.push_back(std::move(word));
+    words.insert(words.end(), {"-map", "0:v:0"});
+    return words;
+}
+
+/// The pattern of the frames' names. A percent sign of the folder is doubled, since ffmpeg counts by the others.
+std::string frame_pattern(const fs::path& folder) {
+    std::string text = "file:";
+    for (const char c : folder.string()) text.append(c == '%' ? 2 : 1, c);
+    return text + "/frame_%05d.jpg";
 }
 
 /// Throws Error, with `what`, if ffmpeg has failed.
@@ -34,20 +55,24 @@ void check(core::Ended ended, const fs::path& video, const char* what, const fs:
                     " has its reason");
 }
 
-/// The number of frames that the video's header states; 0 if it states none.
-int stated_frames(const fs::path& video, const fs::path& log) {
-    if (core::find_program("ffprobe").empty()) return 0;
+/// What ffprobe says of the video; empty if it says nothing.
+std::string probe(const fs::path& video, const char* entries, const fs::path& log) {
+    if (core::find_program("ffprobe").empty()) return {};
+    std::vector<std::string> words{"ffprobe"};
+    for (std::string& word : input_words(video)) words.push_back(std::move(word));
+    words.insert(words.end(), {"-select_streams", "v:0", "-show_entries", entries, "-of", "csv=p=0"});
     std::string text;
-    const core::Program probe{.command = {"ffprobe", "-v", "error", "-select_streams", "v:0", "-show_entries",
-                                          "stream=nb_frames", "-of", "csv=p=0", "file:" + video.string()},
-                              .environment = {},
-                              .log = log};
-    const core::Ended ended = core::run_program(probe, [&](std::string_view piece) {
+    const core::Program program{.command = std::move(words), .environment = {}, .log = log};
+    const core::Ended ended = core::run_program(program, [&](std::string_view piece) {
         text += piece;
         return true;
     });
-    if (ended != core::Ended::done) return 0;
-    return core::parse_integer<int>(core::trim(text)).value_or(0);
+    return ended == core::Ended::done ? std::string(core::trim(text)) : std::string();
+}
+
+/// The number of frames that the video's header states; 0 if it states none.
+int stated_frames(const fs::path& video, const fs::path& log) {
+    return core::parse_integer<int>(probe(video, "stream=nb_frames", log)).value_or(0);
 }
 
 std::vector<double> measure(const fs::path& video, const fs::path& log, const ProgressFunction& progress) {
@@ -61,12 +86,14 @@ std::vector<double> measure(const fs::path& video, const fs::path& log, const Pr
         command.emplace_back(word);
     static_assert(kSmallWidth == 480);
     check<InputError>(
-        core::run_program({.command = std::move(command), .environment = {}, .log = log},
-                          [&](std::string_view piece) {
-                              stream.add(piece);
-                              const int done = int(result.size());
-                              return progress({"looked at", "frames", done, std::max(total, done)});
-                          }),
+        core::run_program(
+            {.command = std::move(command), .environment = {}, .log = log},
+            [&](std::string_view piece) {
+                stream.add(piece);
+                const int done = int(result.size());
+                return progress(
+                    {CapturePhase::frames, "looked at", "frames", done, std::max(total, done), {}});
+            }),
         video, "ffmpeg cannot read the video", log);
     return result;
 }
@@ -139,6 +166,15 @@ void require_ffmpeg() {
         throw RunError("a video needs ffmpeg, which is not installed (Debian: apt install ffmpeg)");
 }
 
+ImageSize video_size(const fs::path& video) {
+    const std::string text = probe(video, "stream=width,height", "/dev/null");
+    const size_t comma = text.find(',');
+    if (comma == std::string::npos) return {};
+    const auto width = core::parse_integer<int>(text.substr(0, comma)),
+               height = core::parse_integer<int>(text.substr(comma + 1));
+    return width && height ? ImageSize{*width, *height} : ImageSize();
+}
+
 void extract_frames(const fs::path& video, const fs::path& images, int frames, const fs::path& log,
                     const ProgressFunction& progress) {
     const std::vector<int> chosen = sharpest(measure(video, log, progress), frames);
@@ -154,17 +190,18 @@ void extract_frames(const fs::path& video, const fs::path& images, int frames, c
     fs::remove_all(partial);
     core::make_folder(partial);
     std::vector<std::string> command = ffmpeg(video);
-    for (const std::string& word :
-         {std::string("-vf"), filter + "'", std::string("-vsync"), std::string("0"), std::string("-q:v"),
-          std::string("2"), (partial / "frame_%05d.jpg").string()})
+    for (const std::string& word : {std::string("-vf"), filter + "'", std::string("-vsync"), std::string("0"),
+                                    std::string("-q:v"), std::string("2"), frame_pattern(partial)})
         command.push_back(word);
     const int total = int(chosen.size());
     check<RunError>(
-        core::run_program({.command = std::move(command), .environment = {}, .log = log},
-                          [&](std::string_view) {
-                              const auto files = std::distance(fs::directory_iterator(partial), {});
-                              return progress({"extracted", "frames", std::min(int(files), total), total});
-                          }),
+        core::run_program(
+            {.command = std::move(command), .environment = {}, .log = log},
+            [&](std::string_view) {
+                const auto files = std::distance(fs::directory_iterator(partial), {});
+                return progress(
+                    {CapturePhase::frames, "extracted", "frames", std::min(int(files), total), total, {}});
+            }),
         video, "ffmpeg cannot write the frames", log);
     fs::rename(partial, images);
 }

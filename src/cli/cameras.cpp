@@ -13,6 +13,7 @@
 #include "cli/interrupt.h"
 #include "cli/output.h"
 #include "core/text.h"
+#include "ewa/error.h"
 
 namespace ewa::cli {
 namespace {
@@ -31,6 +32,11 @@ class CaptureProgressLine {
     explicit CaptureProgressLine(bool quiet) : quiet_(quiet) {}
 
     void update(const CaptureProgress& now) {
+        if (!now.note.empty() && !quiet_) {
+            line_.reset();
+            std::puts(core::one_line(now.note).c_str());
+            std::fflush(stdout);
+        }
         if (now.total < 1) return;
         if (now.what != what_ || now.unit != unit_ || now.total < done_) {
             line_.reset();
@@ -52,12 +58,19 @@ class CaptureProgressLine {
     int done_ = 0, total_ = 0;
 };
 
-int run(const CamerasArguments& arguments) {
+int run(const CLI::App& app, const CamerasArguments& arguments) {
+    if (app.count("--frames") > 0 && fs::is_directory(arguments.input))
+        refuse_frames(std::to_string(arguments.options.frames), arguments.input);
     place_with_progress(arguments.input, arguments.output, arguments.options, arguments.quiet);
     return 0;
 }
 
 }  // namespace
+
+void refuse_frames(const std::string& frames, const fs::path& photos) {
+    throw InputError("--frames " + frames + ": " + core::one_line(photos.string()) +
+                     " is a folder of photos, of which all are used; --frames is for datasets and videos");
+}
 
 void place_with_progress(const fs::path& input, const fs::path& folder, const CaptureOptions& options,
                          bool quiet) {
@@ -110,7 +123,7 @@ Action add_cameras(CLI::App& app) {
         ->type_name("ORDER")
         ->default_str("auto");
     add_quiet_option(app, arguments->quiet);
-    return [arguments] { return run(*arguments); };
+    return [&app, arguments] { return run(app, *arguments); };
 }
 
 }  // namespace ewa::cli

@@ -2,6 +2,7 @@
 // Datasets from photos and videos, for the commands that take them.
 #pragma once
 #include <filesystem>
+#include <string>
 
 #include "ewa/capture.h"
 
@@ -9,6 +10,9 @@ namespace ewa::cli {
 
 // Limits of the number of frames to take from a video.
 inline constexpr int kFewestVideoFrames = 3, kMostVideoFrames = 100000;
+
+/// Throws InputError if --frames is given with a folder of photos.
+void refuse_frames(const std::string& frames, const std::filesystem::path& photos);
 
 /// Makes a dataset of photos or a video, with progress, and prints what was placed. Throws InputError, RunError, and
 /// Interrupted if Ctrl-C ended it.

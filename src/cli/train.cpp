@@ -24,6 +24,7 @@
 #include "ranks/open.h"
 #include "report/chart.h"
 #include "train/earlier_run.h"
+#include "train/run_input.h"
 #include "train/run_options.h"
 #include "train/share_machine.h"
 
@@ -126,6 +127,43 @@ void render_scene(TrainArguments& arguments) {
     if (interrupted()) throw Interrupted();
 }
 
+/// The number of frames to take from a video, as --frames names it.
+int video_frames(const std::string& frames) {
+    if (frames == "all") return CaptureOptions().frames;
+    const auto count = core::parse_count<int>(frames);
+    if (!count || *count < kFewestVideoFrames || *count > kMostVideoFrames)
+        throw InputError(
+            fmt::format("--frames: '{}' is not a number of frames to take from a video, {} to {}", frames,
+                        kFewestVideoFrames, kMostVideoFrames));
+    return *count;
+}
+
+/// Throws what needs no dataset to be known, before the long work that makes it.
+void check_before_scene(const TrainArguments& arguments) {
+    const RunOptions& options = arguments.run;
+    if (options.scene.empty()) return;
+    train::check_without_dataset(options);
+    if (!is_mesh_scene(options.scene)) {
+        if (!fs::is_directory(options.scene))
+            video_frames(options.frames);
+        else if (options.frames != "all")
+            refuse_frames(options.frames, options.scene);
+        // COLMAP begins with a pair of photos that share a hundred points.
+        constexpr uint32_t kLeastPoints = 100;
+        const uint32_t most = options.train.max_splats;
+        if (options.init == "sfm" && most != kAutomaticMaxSplats && most < kLeastPoints)
+            throw InputError(
+                fmt::format("--max-splats {}: training starts with a splat for each point that "
+                            "COLMAP finds, which are {} or more",
+                            most, kLeastPoints));
+        if (const ImageSize size = smallest_image(options.scene); size.width > 0)
+            train::check_downscale(options.downscale, options.downscale, size.width, size.height,
+                                   "the smallest image");
+    }
+    check_serve(arguments.output.serve);
+    open_device(options.device);
+}
+
 /// Makes a dataset of photos without cameras, or of a video, in the run's folder. Throws Interrupted if Ctrl-C ended
 /// that.
 void place_photos(TrainArguments& arguments) {
@@ -135,13 +173,8 @@ void place_photos(TrainArguments& arguments) {
     run.dataset = run.output / "dataset";
     train::check_free(run.output, run);
     CaptureOptions capture;
-    if (run.frames != "all" && fs::is_regular_file(run.scene)) {
-        const auto count = core::parse_count<int>(run.frames);
-        if (!count || *count < kFewestVideoFrames || *count > kMostVideoFrames)
-            throw InputError(
-                fmt::format("--frames: '{}' is not a number of frames to take from a video, {} to {}",
-                            run.frames, kFewestVideoFrames, kMostVideoFrames));
-        capture.frames = *count;
+    if (!fs::is_directory(run.scene)) {
+        capture.frames = video_frames(run.frames);
         run.frames = "all";
     }
     place_with_progress(run.scene, run.dataset, capture, arguments.output.quiet);
@@ -167,13 +200,15 @@ int run(CLI::App& app, TrainArguments& arguments) {
     if (fs::is_directory(options.init)) options.init = splat_input(options.init).file.string();
     Footprint& kernel = options.train.render.kernel;
     kernel = settled_kernel(kernel, arguments.antialias);
-    check_options(options);  // before the images of a mesh scene are rendered
+    if (arguments.accuracy) options.report_section = accuracy_section;
+    check_options(options);
     note_scene(options);
     if (options.ranks->size() > 1 && !options.scene.empty())
         throw InputError(
             options.scene.string() +
             ": several ranks train on a dataset; make it first, with ewa dataset or ewa cameras");
     if (options.resume && arguments.quality.empty() && app.count("--steps") == 0) keep_steps(options);
+    check_before_scene(arguments);
     if (arguments.check_only) {
         train::check_free(output_folder(options), options);
         return 0;
@@ -182,7 +217,6 @@ int run(CLI::App& app, TrainArguments& arguments) {
     if (options.ranks->rank() != 0) return run_follower(options);
     render_scene(arguments);
     place_photos(arguments);
-    if (arguments.accuracy) options.report_section = accuracy_section;
     options.seconds_before = std::chrono::duration<double>(Clock::now() - begin).count();
     arguments.output.force = options.force;
     TrainObserver observer(arguments.output, options.train.steps);

@@ -17,6 +17,34 @@
 
 namespace ewa::cli {
 
+namespace {
+
+/// What [ADDRESS:]PORT says.
+struct ServedAt {
+    std::string address = "127.0.0.1";
+    uint16_t port = 0;
+};
+ServedAt served_at(const std::string& where) {
+    ServedAt result;
+    const size_t colon = where.rfind(':');
+    if (colon != std::string::npos && colon > 0) result.address = where.substr(0, colon);
+    if (result.address.size() > 2 && result.address.front() == '[')
+        result.address = result.address.substr(1, result.address.size() - 2);
+    const auto port = core::parse_integer<uint16_t>(std::string_view(where).substr(colon + 1));
+    if (!port.has_value())
+        throw InputError("--serve: '" + where + "' is not a port, or address:port; 0 takes any free port");
+    result.port = *port;
+    return result;
+}
+
+}  // namespace
+
+void check_serve(const std::string& where) {
+    if (where.empty()) return;
+    const ServedAt at = served_at(where);
+    const live::Server server(at.address, at.port, {});
+}
+
 /// The server of --serve.
 class TrainObserver::Served {
   public:
@@ -24,16 +52,10 @@ class TrainObserver::Served {
     /// Throws InputError, RunError.
     Served(const std::string& where, const std::filesystem::path& folder, int steps)
         : steps_(steps), folder_(folder) {
-        const size_t colon = where.rfind(':');
-        if (colon != std::string::npos && colon > 0) address_ = where.substr(0, colon);
-        if (address_.size() > 2 && address_.front() == '[')
-            address_ = address_.substr(1, address_.size() - 2);
-        const auto port = core::parse_integer<uint16_t>(std::string_view(where).substr(colon + 1));
-        if (!port.has_value())
-            throw InputError("--serve: '" + where +
-                             "' is not a port, or address:port; 0 takes any free port");
+        const ServedAt at = served_at(where);
+        address_ = at.address;
         const std::string token = live::random_token();
-        server_ = std::make_unique<live::Server>(address_, *port, token);
+        server_ = std::make_unique<live::Server>(address_, at.port, token);
         live::write_live_file(folder_, {server_->port(), token});
     }
     ~Served() {
@@ -85,7 +107,7 @@ class TrainObserver::Served {
 
     int steps_;
     std::filesystem::path folder_;
-    std::string address_ = "127.0.0.1";
+    std::string address_;
     std::unique_ptr<live::Server> server_;
 };
 

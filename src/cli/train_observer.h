@@ -19,6 +19,9 @@ struct TrainOutput {
     std::string serve;   // [ADDRESS:]PORT; empty: no server
 };
 
+/// Throws InputError or RunError if --serve cannot listen at [ADDRESS:]PORT.
+void check_serve(const std::string& where);
+
 class TrainObserver : public RunObserver {
   public:
     /// steps: of the whole training.

@@ -134,23 +134,6 @@ std::optional<std::string> too_short_remark(const TrainOptions& options) {
                        core::is_or_are(uint64_t(options.steps)), name, longer.steps);
 }
 
-/// Throws InputError if --downscale makes a training image too small to learn from.
-void check_downscale(const RunInput& input) {
-    constexpr int kLeastSide = 16;  // px; SSIM's window has 11
-    const int factor = input.options.downscale;
-    if (factor == 1) return;
-    for (const int i : input.split.train) {
-        const Frame& frame = input.dataset.frames[size_t(i)];
-        const int side = std::min(frame.camera.width, frame.camera.height);
-        if (side >= kLeastSide) continue;
-        const int most = std::max(1, std::min(frame.pinhole.width, frame.pinhole.height) / kLeastSide);
-        throw InputError(
-            fmt::format("--downscale {} leaves {}x{} pixels of the image {}; a side needs {} or more, as "
-                        "with --downscale {}",
-                        factor, frame.camera.width, frame.camera.height, frame.name, kLeastSide, most));
-    }
-}
-
 /// What lets all ranks draw, if some do not.
 std::optional<std::string> idle_ranks_remark(const TrainOptions& options, int ranks) {
     const int pictures = std::min(options.batch, options.steps) * options.bands;
@@ -179,10 +162,13 @@ void add_remarks(RunInput& input) {
         input.options.init == "sfm" && core::is_file(dense) &&
         std::ranges::find(dataset.files, dense) == dataset.files.end())
         input.remarks.push_back("a dense cloud is there, too: --init " + dense.string() + " starts from it");
-    if (dataset.missing_images > 0)
-        input.remarks.push_back(fmt::format("{} {} missing and skipped",
-                                            core::counted(uint64_t(dataset.missing_images), "image"),
-                                            core::is_or_are(uint64_t(dataset.missing_images))));
+    const uint64_t unreadable = dataset.unreadable.size(),
+                   missing = uint64_t(dataset.missing_images) - unreadable;
+    if (missing > 0)
+        input.remarks.push_back(fmt::format("{} {} missing and skipped", core::counted(missing, "image"),
+                                            core::is_or_are(missing)));
+    for (const std::string& image : dataset.unreadable)
+        input.remarks.push_back("skipped, since it cannot be read: " + image);
     if (dataset.dropped_points > 0)
         input.remarks.push_back(fmt::format("{} with a coordinate that is not finite {} skipped",
                                             core::counted(uint64_t(dataset.dropped_points), "point"),
@@ -327,6 +313,24 @@ void check_start(size_t splats, const TrainOptions& options) {
                                      options.max_splats));
 }
 
+void check_downscale(int factor, int left, int width, int height, const std::string& image) {
+    constexpr int kLeastSide = 16;  // px; SSIM's window has 11
+    const int across = std::max(1, width / left), down = std::max(1, height / left);
+    if (factor == 1 || std::min(across, down) >= kLeastSide) return;
+    throw InputError(fmt::format(
+        "--downscale {} leaves {}x{} pixels of {}; a side needs {} or more, as with --downscale {}", factor,
+        across, down, image, kLeastSide, std::max(1, std::min(width, height) / kLeastSide)));
+}
+
+void check_without_dataset(const RunOptions& options) {
+    if (options.test_every == 1)
+        throw InputError("--test-every 1 holds every image out; none is left to train on");
+    if (options.init == "random")
+        refuse_dense_start(options, "--init random");
+    else if (options.init != "sfm" && !io::is_point_cloud(options.init))
+        initial_splats(options, {}, {});
+}
+
 RunInput load_run(const RunOptions& options) {
     RunInput input;
     input.options = options;
@@ -338,7 +342,11 @@ RunInput load_run(const RunOptions& options) {
                                      options.dataset.string(), input.dataset.frames.size(),
                                      input.dataset.missing_images));
     input.split = chosen_frames(input.dataset, std::move(input.split), options.frames);
-    check_downscale(input);
+    for (const int i : input.split.train) {
+        const Frame& frame = input.dataset.frames[size_t(i)];
+        check_downscale(options.downscale, frame.downscale, frame.pinhole.width, frame.pinhole.height,
+                        "the image " + frame.name);
+    }
     TrainOptions& train = input.options.train;
     train = resolve(train, input.dataset);
     train.render.sh_degree = train.sh_degree;

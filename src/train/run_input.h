@@ -30,6 +30,14 @@ RunInput load_run(const RunOptions& options);
 /// SH degree. Throws InputError (a point that is not finite, a splat file that cannot be read, too many splats).
 Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, const std::vector<int>& frames);
 
+/// Throws InputError for what is wrong with the options on every dataset, the files that they name included. For use before
+/// long work makes the dataset.
+void check_without_dataset(const RunOptions& options);
+
+/// Throws InputError if --downscale leaves too little of an image to learn from. factor: of --downscale. left: the part of it
+/// that is still to be applied to this size.
+void check_downscale(int factor, int left, int width, int height, const std::string& image);
+
 /// Throws InputError if a training cannot start from so many splats.
 void check_start(size_t splats, const TrainOptions& options);
 

@@ -86,20 +86,51 @@ TEST(CapturePgm, WhatIsNoPgmIsAnError) {
         test::expect_error<RunError>([&] { pictures_of(bytes, 7); }, {"not PGM"});
 }
 
-TEST(CapturePhotos, AreThoseThatColmapReads) {
+TEST(CapturePhotos, AreTheImagesOfAFolder) {
     const test::TempFolder folder;
-    const std::string jpeg = "\xff\xd8\xff\xe0 and more bytes", png = "\x89PNG\r\n\x1a\n and more bytes";
-    folder.write("b.jpg", jpeg);
-    folder.write("sub/a.png", png);
-    test::expect_error<InputError>([&] { capture::photos_in(folder.path()); },
-                                   {"has 2 photos", "at least 3"});
-    folder.write("A.JPG", jpeg);
+    folder.write("b.jpg", "");
+    folder.write("sub/a.png", "");
     folder.write("notes.txt", "no photo");
-    EXPECT_EQ(capture::photos_in(folder.path()),
-              (std::vector<std::filesystem::path>{"A.JPG", "b.jpg", "sub/a.png"}));
+    // What ewa has made.
+    folder.write("out/run/config.json", "{}");
+    folder.write("out/run/metrics.jsonl", "");
+    folder.write("out/run/test/a.png", "");
+    folder.write("out/dataset/capture.json", "{}");
+    folder.write("out/dataset/images/a.png", "");
+    EXPECT_EQ(capture::photos_in(folder.path()), (std::vector<std::filesystem::path>{"b.jpg", "sub/a.png"}));
+    test::expect_error<InputError>(
+        [&] {
+            capture::require_photos("photos", 2, {{"c.jpg", "it is empty"}});
+        },
+        {"has 2 photos", "at least 3", "1 photo cannot be used: c.jpg (it is empty)"});
     folder.write("c.HEIC", "anything");
     test::expect_error<InputError>([&] { capture::photos_in(folder.path()); },
-                                   {"1 photos are HEIC", "heif-convert"});
+                                   {"1 photo is HEIC", "heif-convert"});
+}
+
+/// images.bin and points3D.bin as COLMAP writes them: a point that both images see.
+TEST(CaptureModel, LosesViewsAndTheirPartsOfTracks) {
+    const test::TempFolder folder;
+    const auto bytes = [](auto value) {
+        return std::string(reinterpret_cast<const char*>(&value), sizeof(value));
+    };
+    const auto image = [&](uint32_t id, const std::string& name) {
+        std::string text = bytes(id);
+        for (int i = 0; i < 7; ++i) text += bytes(double(i));
+        text += bytes(uint32_t(1)) + name + '\0' + bytes(uint64_t(1));
+        return text + bytes(1.0) + bytes(2.0) + bytes(int64_t(5));
+    };
+    std::string point = bytes(uint64_t(5));
+    for (int i = 0; i < 3; ++i) point += bytes(double(i));
+    point += "rgb" + bytes(0.5);
+    const auto track = [&](uint32_t id) { return bytes(id) + bytes(uint32_t(0)); };
+    folder.write("images.bin", bytes(uint64_t(2)) + image(7, "a.jpg") + image(8, "b.jpg"));
+    folder.write("points3D.bin", bytes(uint64_t(1)) + point + bytes(uint64_t(2)) + track(7) + track(8));
+    capture::remove_views(folder.path(), {"a.jpg", "other.jpg"});
+    EXPECT_EQ(test::file_bytes(folder / "images.bin"), bytes(uint64_t(1)) + image(8, "b.jpg"));
+    EXPECT_EQ(test::file_bytes(folder / "points3D.bin"),
+              bytes(uint64_t(1)) + point + bytes(uint64_t(1)) + track(8));
+    test::expect_error<InputError>([&] { capture::remove_views(folder.path(), {"b.jpg"}); }, {"every photo"});
 }
 
 TEST(CaptureInput, IsAVideoOrAFolderOfPhotosWithoutCameras) {

@@ -10,6 +10,7 @@
 #include "core/sandboxed_path.h"
 #include "core/text.h"
 #include "ewa/error.h"
+#include "image/image_files.h"
 #include "io/datasets/image_records.h"
 #include "scene/camera.h"
 #include "scene/lens.h"
@@ -52,6 +53,15 @@ ImageFile find_image(const io::ImageRecord& image, const fs::path& folder, int d
             return {copies / inside, true, 1};
     }
     return {image.path, is_file(image.path), downscale};
+}
+
+/// Photos may be damaged long after their cameras were found. One of them costs its view, and not the rest.
+void leave_out_damaged(ImageFile& file, const std::string& name, Dataset& dataset) {
+    if (!file.exists || image::ends_as_an_image(file.path)) return;
+    const std::string fault = image::image_fault(file.path);
+    if (fault.empty()) return;
+    file.exists = false;
+    dataset.unreadable.push_back(core::one_line(name + " (" + fault + ")"));
 }
 
 fs::path find_mask_in(const fs::path& masks, const fs::path& inside) {
@@ -260,8 +270,10 @@ Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& op
     std::stable_sort(model.images.begin(), model.images.end(),
                      [](const io::ImageRecord& a, const io::ImageRecord& b) { return a.name < b.name; });
     PinholeCache pinholes;
+    const bool captured = is_file(dataset.root / "capture.json");
     for (const io::ImageRecord& image : model.images) {
-        const ImageFile file = find_image(image, model.folder, options.downscale);
+        ImageFile file = find_image(image, model.folder, options.downscale);
+        if (captured) leave_out_damaged(file, image.name, dataset);
         dataset.missing_images += !file.exists;
         const bool usable = image.camera.width > 0 && (file.exists || !options.need_images);
         if (!usable) continue;
