@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cstring>
+#include <deque>
 #include <numeric>
+#include <thread>
 
 #include "core/random.h"
 #include "ewa/error.h"
@@ -26,6 +28,36 @@ double mean_weight(const Image& image) {
     return sum / (double(image.width) * image.height);
 }
 
+/// Loads images on all cores and hands them out in order.
+class ParallelLoader {
+  public:
+    explicit ParallelLoader(std::vector<const Frame*> frames) : frames_(std::move(frames)) {
+        uint64_t largest = 1;
+        for (const Frame* frame : frames_)
+            largest = std::max(largest, uint64_t(frame->source.width) * uint64_t(frame->source.height));
+        ahead_ = size_t(std::clamp<uint64_t>(kPixelsAhead / largest, 1,
+                                             std::max(1u, std::thread::hardware_concurrency())));
+    }
+
+    /// Throws what load_frame_image throws for this image.
+    Image next() {
+        for (; started_ < frames_.size() && loading_.size() < ahead_; ++started_)
+            // Without a policy, an image whose thread cannot start is loaded by get.
+            loading_.push_back(std::async([frame = frames_[started_]] { return load_frame_image(*frame); }));
+        std::future<Image> first = std::move(loading_.front());
+        loading_.pop_front();
+        return first.get();
+    }
+
+  private:
+    static constexpr uint64_t kPixelsAhead = 1 << 26;  // 1 GiB as four float32 channels
+
+    std::vector<const Frame*> frames_;
+    size_t started_ = 0;
+    size_t ahead_ = 1;
+    std::deque<std::future<Image>> loading_;
+};
+
 }  // namespace
 
 ImageCache::ImageCache(gpu::Device& device, const passes::KernelConfig& config, const Dataset& dataset,
@@ -36,6 +68,8 @@ ImageCache::ImageCache(gpu::Device& device, const passes::KernelConfig& config, 
     camera_stride_ = (sizeof(shared::CameraBlock) + align - 1) / align * align;
     std::vector<std::byte> blocks(camera_stride_ * std::max<size_t>(frames.size(), 1));
     uint64_t cached_bytes = 0;
+    std::vector<size_t> cached;
+    frames_.reserve(frames.size());  // the loader points into it
     for (size_t i = 0; i < frames.size(); ++i) {
         Frame& frame = frames_.emplace_back(dataset.frames[size_t(frames[i])]);
         if (reduction > 1) {
@@ -46,13 +80,20 @@ ImageCache::ImageCache(gpu::Device& device, const passes::KernelConfig& config, 
         std::memcpy(&blocks[i * camera_stride_], &block, sizeof(block));
         const uint64_t bytes =
             pipeline::photo_bytes(frame.camera.width, frame.camera.height, frame.eight_bit);
-        const bool cached = cached_bytes + bytes <= cache_bytes;
-        on_disk_ += !cached;
-        if (cached) {
+        if (cached_bytes + bytes <= cache_bytes) {
             cached_bytes += bytes;
-            photos_[i] = upload(frame, load_frame_image(frame));
+            cached.push_back(i);
+        } else {
+            ++on_disk_;
+            any_masked_ = any_masked_ || frame.masks == MaskUse::ignore;
         }
-        any_masked_ = any_masked_ || photos_[i].masked || (!cached && frame.masks == MaskUse::ignore);
+    }
+    std::vector<const Frame*> to_load;
+    for (const size_t i : cached) to_load.push_back(&frames_[i]);
+    ParallelLoader loader(std::move(to_load));
+    for (const size_t i : cached) {
+        photos_[i] = upload(frames_[i], loader.next());
+        any_masked_ = any_masked_ || photos_[i].masked;
     }
     cameras_ = gpu::Buffer(device, "cameras", blocks.size(), gpu::Texel::none, true);
     cameras_.upload(std::span<const std::byte>(blocks));
