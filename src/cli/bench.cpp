@@ -32,8 +32,8 @@ constexpr int kEvaluations = 6;
 struct BenchArguments {
     bench::Options options;
     bool accuracy = false;
-    RankBench ranks;
-    // Used only with --accuracy, and the splats with --ranks.
+    bool ranks = false;
+    // Used only with --accuracy.
     fs::path splats, svg;  // splats empty: the result of the training. svg empty: not written
     int steps = 600;       // of each training; 0: no training
 };
@@ -210,8 +210,7 @@ int run_accuracy(const BenchArguments& arguments) {
 void check_modes(const CLI::App& app) {
     const bool accuracy = app.count("--accuracy") > 0;
     if (!accuracy && app.count("--svg") > 0) throw InputError("--svg is an option of --accuracy");
-    if (!accuracy && app.count("--splats") > 0)
-        throw InputError("--splats is an option of --accuracy and of --ranks");
+    if (!accuracy && app.count("--splats") > 0) throw InputError("--splats is an option of --accuracy");
     for (const char* name :
          {"--stability", "--list", "--large", "--cases", "--check", "--compare", "--results", "--runs"})
         if (accuracy && app.count(name) > 0)
@@ -227,20 +226,19 @@ Action add_bench(CLI::App& app) {
                  "Error against run time on the dataset FILE: of rendering, against the integral along each "
                  "ray, and of training with each strategy for --training-steps (600). It takes minutes");
     app.add_option("--splats", arguments->splats,
-                   "With --accuracy: render this scene instead of the trained one. With --ranks: measure it")
+                   "With --accuracy: render this scene instead of the trained one")
         ->type_name("FILE");
     app.add_option("--svg", arguments->svg,
                    "With --accuracy: write the diagram of rendering to FILE, and that of training to "
                    "NAME_training.svg beside it")
         ->type_name("FILE");
-    add_rank_options(app, arguments->ranks);
+    app.add_flag("--ranks", arguments->ranks,
+                 "Under mpirun or srun: measure the network between the processes");
     arguments->options.read_splats = [](const fs::path& path) { return load_splats(splat_input(path).file); };
     const CLI::Option* steps = app.get_option("--training-steps");
     return [&app, arguments, steps] {
-        if (arguments->ranks.asked)
-            return run_rank_bench(arguments->ranks, arguments->options.scene, arguments->splats,
-                                  arguments->options.device, arguments->options.json);
         check_modes(app);
+        if (arguments->ranks) return run_rank_bench(arguments->options.json);
         if (!arguments->accuracy) {
             check_command_outputs({{"--json", arguments->options.json}}, {});
             return bench::run(arguments->options, {"/proc/self/exe", "bench"});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What needs no launcher: a process alone, the environment of launchers, the division of cores, and the cost model.
+// What needs no launcher: a process alone, the environment of launchers, and the division of cores.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -9,7 +9,6 @@
 #include "ranks/network.h"
 #include "ranks/node.h"
 #include "ranks/open.h"
-#include "ranks/scaling.h"
 
 namespace {
 
@@ -108,54 +107,6 @@ TEST(Network, OfOneRankIsMeasuredToo) {
     ASSERT_EQ(network.transfers.size(), 2u);
     EXPECT_EQ(network.transfers[0].bytes, 1000u);
     EXPECT_GE(network.transfers[1].milliseconds, 0);
-}
-
-// 1 ms a message, 1 MB a ms.
-const Network kNetwork{3, 2, {{1000, 3}, {1000000, 4}, {3000000, 6}}};
-
-TEST(Scaling, OfOneRankIsTheView) {
-    const StepCost cost = predict_step({.splats = 1e6, .visible = 0.5, .milliseconds = 50}, kNetwork, 1);
-    EXPECT_EQ(cost.sent_bytes, 0);
-    EXPECT_EQ(cost.step_ms, 50);
-    EXPECT_EQ(cost.views_per_second, 20);
-    EXPECT_EQ(cost.efficiency, 1);
-}
-
-TEST(Scaling, FollowsFromBytesAndMessages) {
-    // A quarter of a million visible splats, two thirds of them for other ranks.
-    const ViewCost view{.splats = 1e6, .visible = 0.375, .milliseconds = 50};
-    const StepCost cost = predict_step(view, kNetwork, 3);
-    EXPECT_DOUBLE_EQ(cost.sent_bytes, 250000 * (48 + 36));
-    // Out 12 MB and back 9 MB at 1 MB a ms after the first 3, and four gathers.
-    EXPECT_NEAR(cost.exchange_ms, (6 + 9) + (6 + 6) + 4 * 2, 1e-9);
-    EXPECT_NEAR(cost.step_ms, 85, 1e-9);
-    EXPECT_NEAR(cost.efficiency, 50 / 85.0, 1e-9);
-    EXPECT_NEAR(cost.views_per_second, 3000 / 85.0, 1e-9);
-    ViewCost absolute = view;
-    absolute.absolute_gradients = true;
-    EXPECT_NEAR(predict_step(absolute, kNetwork, 3).exchange_ms, 35 + 2, 1e-9);
-}
-
-TEST(Scaling, AStepWaitsForTheSlowestOfItsViews) {
-    const ViewCost view{.milliseconds = 25, .views = {40, 10, 30, 20}};
-    EXPECT_DOUBLE_EQ(predict_step(view, kNetwork, 1).slowest_ms, 25);
-    // The slowest of two is 10, 20, 30 or 40 ms in 1, 3, 5 and 7 cases of 16.
-    const StepCost two = predict_step(view, kNetwork, 2);
-    EXPECT_DOUBLE_EQ(two.slowest_ms, 31.25);
-    EXPECT_DOUBLE_EQ(two.step_ms, 31.25 + two.exchange_ms);
-    EXPECT_DOUBLE_EQ(two.efficiency, 25 / two.step_ms);
-    EXPECT_NEAR(predict_step(view, kNetwork, 1000).slowest_ms, 40, 1e-9);
-}
-
-TEST(Scaling, CountsAMessageForEachFurtherRank) {
-    ViewCost view{.splats = 1e6, .visible = 0, .milliseconds = 50};
-    EXPECT_NEAR(predict_step(view, kNetwork, 3).exchange_ms, 2 * 2 + 4 * 2, 1e-9);
-    EXPECT_NEAR(predict_step(view, kNetwork, 64).exchange_ms, 2 * 63 + 4 * 63, 1e-9);
-    view.splats = 1e4, view.visible = 1;  // between the sizes that were measured
-    const double away = 1e4 * 3 / 4;
-    const auto measured = [](double bytes) { return 3 + (bytes - 1000) / 999000; };
-    EXPECT_NEAR(predict_step(view, kNetwork, 4).exchange_ms,
-                measured(away * 48) + 1 + measured(away * 36) + 1 + 4 * 3, 1e-9);
 }
 
 }  // namespace
