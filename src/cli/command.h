@@ -24,6 +24,7 @@ Action add_info(CLI::App& app);
 Action add_dataset(CLI::App& app);
 Action add_cameras(CLI::App& app);
 Action add_devices(CLI::App& app);
+Action add_doctor(CLI::App& app);
 Action add_bench(CLI::App& app);
 Action add_compare(CLI::App& app);
 

@@ -70,6 +70,7 @@ int run_program(int argc, char** argv) {
         {"convert", "Converts, joins and edits splat files", add_convert},
         {"info", "Shows what a splat file or a dataset holds, and what rendering skips", add_info},
         {"devices", "Lists the Vulkan devices of this machine", add_devices},
+        {"doctor", "Shows what works on this machine, and how to get the rest", add_doctor},
         {"dataset", "Renders a mesh scene (glTF) into a dataset to train on", add_dataset},
         {"cameras", "Finds the cameras of photos or of a video, with COLMAP", add_cameras},
         {"bench", "Measures the speed of each pass, and its error against the CPU reference", add_bench},

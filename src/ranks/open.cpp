@@ -10,12 +10,16 @@
 namespace ewa {
 namespace ranks {
 
-std::shared_ptr<Ranks> open_mpi(const MpiOptions& options) {
+const Mpi& load_mpi() {
     constexpr core::Plugin kPlugin{kMpiFile, kMpiEntry,
                                    "which lets the processes of a launcher train together",
                                    "install ewa's module and Open MPI (Debian: openmpi-bin), or start ewa "
                                    "without mpirun and srun"};
-    return static_cast<const Mpi*>(core::load_plugin(kPlugin))->open(options);
+    return *static_cast<const Mpi*>(core::load_plugin(kPlugin));
+}
+
+std::shared_ptr<Ranks> open_mpi(const MpiOptions& options) {
+    return load_mpi().open(options);
 }
 
 }  // namespace ranks

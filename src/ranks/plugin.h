@@ -26,6 +26,8 @@ constexpr const char* kMpiFile = "libewa_mpi.so";
 /// then has no such entry, and is refused.
 constexpr const char* kMpiEntry = "ewa_mpi_layout_1";
 
+/// Loads the module. Throws RunError.
+const Mpi& load_mpi();
 /// Loads the module and enters MPI. Throws RunError.
 std::shared_ptr<Ranks> open_mpi(const MpiOptions& options);
 

@@ -25,7 +25,7 @@ TEST(Usage, HelpAndVersion) {
 /// Terminals of 80 columns break longer lines inside words. Manual pages and completion are made of this
 /// text, by cmake/write-manual; tests/install/check looks at those.
 TEST(Usage, HelpFitsATerminal) {
-    for (const char* command : {"", "train", "render", "eval", "grad", "convert", "info", "devices",
+    for (const char* command : {"", "train", "render", "eval", "grad", "convert", "info", "devices", "doctor",
                                 "dataset", "bench", "compare"}) {
         std::vector<std::string> arguments{"--help"};
         if (*command) arguments.insert(arguments.begin(), command);

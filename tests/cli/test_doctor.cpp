@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+// ewa doctor on machines that lack something.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "cli/expect.h"
+
+namespace {
+
+using namespace ewa::test;
+
+Outcome doctor(const Folder& folder, const Circumstances& circumstances) {
+    return run_ewa({"doctor", "--json", "-o", folder / "out"}, circumstances);
+}
+
+nlohmann::json check_named(const nlohmann::json& json, const std::string& name) {
+    for (const auto& check : json["checks"])
+        if (check["name"] == name) return check;
+    ADD_FAILURE() << "no check " << name << " in " << json;
+    return {};
+}
+
+TEST(Doctor, FindsThatTrainingWorks) {
+    const Folder folder;
+    const Outcome outcome = doctor(folder, {});
+    expect_success(outcome);
+    const auto json = nlohmann::json::parse(outcome.out);
+    EXPECT_TRUE(json["trains"].get<bool>());
+    for (const char* name : {"Vulkan driver", "device", "training", "memory", "output folder"}) {
+        EXPECT_TRUE(check_named(json, name)["works"].get<bool>()) << outcome.out;
+        EXPECT_EQ(check_named(json, name)["remedy"], "") << name;
+    }
+    EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+
+    const Outcome text = run_ewa({"doctor", "-o", folder / "out"});
+    expect_success(text);
+    EXPECT_NE(text.out.find("yes  training"), std::string::npos) << text.out;
+    EXPECT_TRUE(text.out.ends_with("ewa can train on this machine\n")) << text.out;
+}
+
+TEST(Doctor, NamesMissingProgramsAndTrainsWithoutThem) {
+    const Folder folder;
+    std::filesystem::create_directory(folder / "empty");
+    const Outcome outcome = doctor(folder, {.environment = {{"PATH", folder / "empty"}}});
+    expect_success(outcome);
+    const auto json = nlohmann::json::parse(outcome.out);
+    for (const auto& [name, package] :
+         {std::pair("videos and films", "ffmpeg"), {"cameras of photos", "colmap"}}) {
+        const auto check = check_named(json, name);
+        EXPECT_FALSE(check["works"].get<bool>()) << name;
+        EXPECT_EQ(check["detail"], std::string("the program ") + package + " is not there");
+        EXPECT_NE(check["remedy"].get<std::string>().find("install"), std::string::npos) << check;
+    }
+    for (const char* name : {"several processes", "Python package"})
+        EXPECT_FALSE(check_named(json, name)["works"].get<bool>()) << name;
+}
+
+TEST(Doctor, EndsWithOneWithoutADriver) {
+    const Folder folder;
+    for (const char* variable : {"VK_ICD_FILENAMES", "VK_DRIVER_FILES"}) {
+        Circumstances none{
+            .environment = {{"VK_ICD_FILENAMES", "/dev/null"}, {"VK_DRIVER_FILES", "/dev/null"}}};
+        if (variable == std::string("VK_DRIVER_FILES")) none.environment[1].second = "";
+        const Outcome outcome = doctor(folder, none);
+        EXPECT_EQ(outcome.status, 1) << outcome.out;
+        const auto json = nlohmann::json::parse(outcome.out);
+        EXPECT_FALSE(json["trains"].get<bool>());
+        EXPECT_FALSE(check_named(json, "Vulkan driver")["works"].get<bool>());
+        EXPECT_NE(check_named(json, "Vulkan driver")["remedy"].get<std::string>().find("install"),
+                  std::string::npos);
+        EXPECT_FALSE(check_named(json, "training")["works"].get<bool>());
+    }
+}
+
+TEST(Doctor, EndsWithOneWhereNothingCanBeWritten) {
+    const Outcome outcome = run_ewa({"doctor", "-o", "/proc/out"});
+    EXPECT_EQ(outcome.status, 1);
+    EXPECT_NE(outcome.out.find("no   output folder"), std::string::npos) << outcome.out;
+    EXPECT_NE(outcome.out.find("-> name another folder with -o"), std::string::npos) << outcome.out;
+    EXPECT_TRUE(outcome.out.ends_with("ewa cannot train on this machine\n")) << outcome.out;
+}
+
+}  // namespace
