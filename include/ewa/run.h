@@ -74,6 +74,9 @@ struct RunStart {
     size_t train_views = 0, test_views = 0;
     int width = 0, height = 0;         // of the first training image, px
     size_t splats = 0;                 // to start from
+    TrainOptions train;                // with concrete values, but for max_splats
+    uint32_t max_splats = 0;           // of the run
+    size_t evaluated = 0;              // views that are rendered at the end
     std::vector<std::string> remarks;  // one line each, e.g. "3 images are missing and are skipped"
     DeviceInfo device;
     MemoryEstimate memory;
@@ -108,6 +111,8 @@ class RunObserver {
     virtual void between_steps(const StepReport&, const Trainer&, const std::function<void()>& /*save*/) {}
     /// Training has ended. splats.ply and checkpoint.ewa are written.
     virtual void on_saved(const StepReport&) {}
+    /// Of the final evaluation: so many of `views` views are evaluated.
+    virtual void on_view(size_t /*done*/, size_t /*views*/) {}
     /// The final evaluation is done, unless the run was stopped. No more metrics follow.
     virtual void on_evaluated(const StepReport&, const Gaussians&) {}
 };

@@ -26,42 +26,11 @@ struct CamerasArguments {
     bool quiet = false;
 };
 
-/// A progress line for each kind of work.
-class CaptureProgressLine {
-  public:
-    explicit CaptureProgressLine(bool quiet) : quiet_(quiet) {}
-
-    void update(const CaptureProgress& now) {
-        if (!now.note.empty() && !quiet_) {
-            line_.reset();
-            std::puts(core::one_line(now.note).c_str());
-            std::fflush(stdout);
-        }
-        if (now.total < 1) return;
-        if (now.what != what_ || now.unit != unit_ || now.total < done_) {
-            line_.reset();
-            what_ = now.what;
-            unit_ = now.unit;
-            done_ = 0;
-        }
-        // A video may have more frames than its header says.
-        if (!line_ || now.total > total_) line_ = std::make_unique<Progress>(what_, now.total, unit_, quiet_);
-        total_ = now.total;
-        if (now.done > done_) line_->update(now.done);
-        done_ = now.done;
-    }
-
-  private:
-    bool quiet_;
-    std::unique_ptr<Progress> line_;
-    std::string what_, unit_;
-    int done_ = 0, total_ = 0;
-};
-
 int run(const CLI::App& app, const CamerasArguments& arguments) {
     if (app.count("--frames") > 0 && fs::is_directory(arguments.input))
         refuse_frames(std::to_string(arguments.options.frames), arguments.input);
-    place_with_progress(arguments.input, arguments.output, arguments.options, arguments.quiet);
+    Progress progress("searched", 1, "photos", arguments.quiet);
+    place_with_progress(arguments.input, arguments.output, arguments.options, progress, {});
     return 0;
 }
 
@@ -73,23 +42,20 @@ void refuse_frames(const std::string& frames, const fs::path& photos) {
 }
 
 void place_with_progress(const fs::path& input, const fs::path& folder, const CaptureOptions& options,
-                         bool quiet) {
+                         Progress& progress, const CaptureProgressLine::After& after) {
     const InterruptWatch watch;
-    auto line = std::make_unique<CaptureProgressLine>(quiet);
+    CaptureProgressLine line(progress, fs::is_regular_file(input), options.matching, after);
     const Capture capture = make_dataset(input, folder, options, [&](const CaptureProgress& now) {
-        line->update(now);
+        line.update(now);
         return !interrupted();
     });
-    line.reset();
     if (capture.interrupted) {
-        if (!quiet) print_how_to_continue();
+        progress.note(kHowToContinue);
         throw Interrupted();
     }
-    if (quiet) return;
-    for (const std::string& remark : capture.remarks) std::puts(core::one_line(remark).c_str());
-    std::puts(core::one_line(fmt::format("{}: {} of {} photos have cameras", folder.string(), capture.placed,
-                                         capture.images))
-                  .c_str());
+    for (const std::string& remark : capture.remarks) progress.note(remark);
+    progress.note(
+        fmt::format("{}: {} of {} photos have cameras", folder.string(), capture.placed, capture.images));
 }
 
 Action add_cameras(CLI::App& app) {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <string>
 
+#include "cli/capture_progress.h"
 #include "ewa/capture.h"
 
 namespace ewa::cli {
@@ -14,9 +15,10 @@ inline constexpr int kFewestVideoFrames = 3, kMostVideoFrames = 100000;
 /// Throws InputError if --frames is given with a folder of photos.
 void refuse_frames(const std::string& frames, const std::filesystem::path& photos);
 
-/// Makes a dataset of photos or a video, with progress, and prints what was placed. Throws InputError, RunError, and
-/// Interrupted if Ctrl-C ended it.
+/// Makes a dataset of photos or a video, with progress, and prints what was placed. after: the work that follows. Throws
+/// InputError, RunError, and Interrupted if Ctrl-C ended it.
 void place_with_progress(const std::filesystem::path& input, const std::filesystem::path& folder,
-                         const CaptureOptions& options, bool quiet);
+                         const CaptureOptions& options, Progress& progress,
+                         const CaptureProgressLine::After& after);
 
 }  // namespace ewa::cli

@@ -51,8 +51,12 @@ int run(const EvalArguments& arguments) {
     check_command_outputs(written, scene::files_of(dataset, "DATASET"));
     const std::vector<Exposure> exposures = exposures_of(arguments.exposures, arguments.run, dataset, frames);
 
-    const Evaluation evaluation =
-        evaluate(open_device(arguments.views.device), gaussians, dataset, frames, options, exposures);
+    // The lines of the frames follow: a file gets no others.
+    Progress progress("evaluated", int(frames.size()), "views", !core::redraws());
+    int begun = 0;
+    const Evaluation evaluation = evaluate(open_device(arguments.views.device), gaussians, dataset, frames,
+                                           options, exposures, [&] { progress.update(begun++); });
+    progress.clear();
     for (const EvalFrame& frame : evaluation.frames)
         fmt::print("{}  PSNR {:.3f} dB  SSIM {:.5f}\n", core::one_line(frame.name), frame.psnr, frame.ssim);
     if (dataset.missing_images > 0)

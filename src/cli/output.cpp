@@ -40,7 +40,7 @@ void print_json(const report::Json& json) {
 }
 
 void print_how_to_continue() {
-    std::puts("interrupted; to continue, repeat the command");
+    std::puts(kHowToContinue);
 }
 
 }  // namespace ewa::cli

@@ -5,6 +5,7 @@
 #include <array>
 #include <chrono>
 #include <memory>
+#include <utility>
 
 #include "cli/arguments.h"
 #include "cli/bench.h"
@@ -165,10 +166,10 @@ void check_before_scene(const TrainArguments& arguments) {
 }
 
 /// Makes a dataset of photos without cameras, or of a video, in the run's folder. Throws Interrupted if Ctrl-C ended
-/// that.
-void place_photos(TrainArguments& arguments) {
+/// that. Returns the progress, which the training continues; null where the dataset has cameras.
+std::unique_ptr<Progress> place_photos(TrainArguments& arguments) {
     RunOptions& run = arguments.run;
-    if (run.scene.empty() || is_mesh_scene(run.scene)) return;
+    if (run.scene.empty() || is_mesh_scene(run.scene)) return nullptr;
     run.output = output_folder(run);
     run.dataset = run.output / "dataset";
     train::check_free(run.output, run);
@@ -177,7 +178,9 @@ void place_photos(TrainArguments& arguments) {
         capture.frames = video_frames(run.frames);
         run.frames = "all";
     }
-    place_with_progress(run.scene, run.dataset, capture, arguments.output.quiet);
+    auto progress = std::make_unique<Progress>("searched", 1, "photos", arguments.output.quiet);
+    place_with_progress(run.scene, run.dataset, capture, *progress, training_after(run));
+    return progress;
 }
 
 std::string accuracy_section(const RunScene& scene) {
@@ -216,10 +219,10 @@ int run(CLI::App& app, TrainArguments& arguments) {
     train::share_machine(*options.ranks, options.device);
     if (options.ranks->rank() != 0) return run_follower(options);
     render_scene(arguments);
-    place_photos(arguments);
+    std::unique_ptr<Progress> progress = place_photos(arguments);
     options.seconds_before = std::chrono::duration<double>(Clock::now() - begin).count();
     arguments.output.force = options.force;
-    TrainObserver observer(arguments.output, options.train.steps);
+    TrainObserver observer(arguments.output, options.train.steps, std::move(progress));
     const RunResult result = run_training(options, observer);
     observer.print(result);
     return result.summary.interrupted ? kInterruptedStatus : 0;

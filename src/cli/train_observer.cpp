@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <thread>
+#include <utility>
 
 #include "core/messages.h"
 #include "core/text.h"
@@ -111,7 +112,8 @@ class TrainObserver::Served {
     std::unique_ptr<live::Server> server_;
 };
 
-TrainObserver::TrainObserver(const TrainOutput& output, int steps) : output_(output), steps_(steps) {}
+TrainObserver::TrainObserver(const TrainOutput& output, int steps, std::unique_ptr<Progress> progress)
+    : output_(output), steps_(steps), progress_(std::move(progress)) {}
 
 TrainObserver::~TrainObserver() = default;
 
@@ -137,6 +139,12 @@ void TrainObserver::on_start(const RunStart& start) {
             fmt::format("the device has {}: if memory runs out, a smaller --max-splats or --image-cache, or "
                         "a larger --downscale, takes less; --device-memory keeps splats in host memory",
                         core::bytes_text(start.device.memory_bytes)));
+    forecast_.emplace(train::ForecastScene{.pixels = double(start.width) * start.height,
+                                           .photos = start.train_views,
+                                           .splats = uint32_t(start.splats),
+                                           .evaluated = start.evaluated,
+                                           .max_splats = start.max_splats},
+                      start.train);
     watch_.emplace();
 }
 
@@ -153,7 +161,31 @@ void TrainObserver::on_begin(const std::filesystem::path& folder, const std::vec
         for (const MetricsLine& line : metrics) served_->add_metrics(line);
         on_note(served_->announcement());
     }
-    progress_.emplace("trained", steps_, "steps", output_.quiet);
+    if (progress_)
+        progress_->begin("trained", steps_, "steps");
+    else
+        progress_ = std::make_unique<Progress>("trained", steps_, "steps", output_.quiet);
+}
+
+/// Says early how long the run takes, and what would be shorter.
+void TrainObserver::forecast(const StepReport& step) {
+    constexpr double kLong = 60, kVeryLong = 600;  // s
+    constexpr int kShortRun = 2000;                // steps of --quality low
+    forecast_->add(step.step, step.seconds, step.splats);
+    if (first_step_ == 0) {
+        first_step_ = step.step;
+        progress_->skip(step.step);
+    }
+    if (!forecast_->known()) return;
+    const double left = forecast_->left();
+    progress_->set_left(left);
+    if (std::exchange(told_time_, true) || left < kLong || step.step >= steps_) return;
+    const double whole = left + progress_->seconds();
+    std::string line = fmt::format("the training takes about {} on this device", core::duration_text(whole));
+    if (whole > kVeryLong && steps_ > kShortRun && first_step_ < kShortRun)
+        line +=
+            fmt::format(", with --quality low about {}", core::duration_text(forecast_->of_steps(kShortRun)));
+    on_note(line);
 }
 
 void TrainObserver::on_step(const StepReport& step) {
@@ -161,7 +193,12 @@ void TrainObserver::on_step(const StepReport& step) {
         psnr_sum_ += step.psnr;
         ++psnr_steps_;
     }
-    if (!progress_->due(step.step)) return;
+    const bool due = progress_->due(step.step);
+    if (due || !told_time_)
+        forecast(step);
+    else
+        forecast_->add(step.step, step.seconds, step.splats);
+    if (!due) return;
     const std::string psnr =
         psnr_steps_ > 0 ? fmt::format(", PSNR {:.1f} dB", psnr_sum_ / psnr_steps_) : std::string();
     progress_->update(step.step, fmt::format("loss {:.4f}{}, {} splats", step.loss, psnr, step.splats));
@@ -186,7 +223,16 @@ void TrainObserver::on_saved(const StepReport&) {
     progress_.reset();
 }
 
+void TrainObserver::on_view(size_t done, size_t views) {
+    // A file gets the note that comes before.
+    if (!core::redraws()) return;
+    if (!progress_) progress_ = std::make_unique<Progress>("evaluated", int(views), "views", output_.quiet);
+    progress_->update(int(done));
+}
+
 void TrainObserver::on_evaluated(const StepReport& step, const Gaussians& gaussians) {
+    if (progress_) progress_->clear();
+    progress_.reset();
     if (served_) served_->finish(step, gaussians);
 }
 

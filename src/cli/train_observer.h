@@ -10,6 +10,7 @@
 #include "cli/interrupt.h"
 #include "cli/output.h"
 #include "ewa/run.h"
+#include "train/forecast.h"
 
 namespace ewa::cli {
 
@@ -24,8 +25,8 @@ void check_serve(const std::string& where);
 
 class TrainObserver : public RunObserver {
   public:
-    /// steps: of the whole training.
-    TrainObserver(const TrainOutput& output, int steps);
+    /// steps: of the whole training. progress: of the work before it, such as finding cameras; may be null.
+    TrainObserver(const TrainOutput& output, int steps, std::unique_ptr<Progress> progress = nullptr);
     ~TrainObserver() override;
 
     bool should_stop() override { return interrupted(); }
@@ -39,17 +40,23 @@ class TrainObserver : public RunObserver {
     void between_steps(const StepReport& step, const Trainer& trainer,
                        const std::function<void()>& save) override;
     void on_saved(const StepReport& step) override;
+    void on_view(size_t done, size_t views) override;
     void on_evaluated(const StepReport& step, const Gaussians& gaussians) override;
 
     void print(const RunResult& result);
 
   private:
     class Served;
+    void forecast(const StepReport& step);
+
     TrainOutput output_;
     int steps_;
     std::optional<InterruptWatch> watch_;
     std::unique_ptr<Served> served_;  // null without --serve
-    std::optional<Progress> progress_;
+    std::unique_ptr<Progress> progress_;
+    std::optional<train::Forecast> forecast_;
+    int first_step_ = 0;      // of this process; 0 before it
+    bool told_time_ = false;  // how long the run takes
     // Training PSNR of the steps since the progress was last shown; steps differ much, since each has another view.
     double psnr_sum_ = 0;
     int psnr_steps_ = 0;

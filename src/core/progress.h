@@ -2,17 +2,65 @@
 // The progress of long work, with its rate and the time left.
 #pragma once
 #include <chrono>
+#include <optional>
 #include <string>
+#include <vector>
 
 namespace ewa::core {
 
-/// Progress of long work: one line that is redrawn on a terminal, or a line per tenth of the work in a file.
+/// Whether standard output is a terminal on which a line can be redrawn: TERM is not "dumb".
+bool redraws();
+
+/// The pace of work in units of about equal length, from the times at which units were done. Units take the mean time of those
+/// in the later half of the time so far. A unit that takes longer than that makes the estimate longer.
+class Pace {
+  public:
+    /// From `done` units on, which were done before.
+    explicit Pace(double seconds = 0, double done = 0) : marks_{{seconds, done}} {}
+    void add(double seconds, double done);
+    /// Seconds until `total` units are done. Empty until a unit is done.
+    std::optional<double> left(double seconds, double total) const;
+    double rate() const;  // units a second; 0 until a unit is done
+
+  private:
+    struct Mark {
+        double seconds, done;
+    };
+    const Mark& base() const;
+
+    std::vector<Mark> marks_;
+};
+
+/// What a terminal shows of the work.
+struct ProgressLine {
+    double share = 0;            // of the time, 0 to 1
+    std::optional<double> left;  // s
+    std::string text;            // ASCII
+};
+
+/// The line for a terminal: a bar, the share, the time left and the text, cut to `columns` - 1 columns. A narrow terminal gets no
+/// bar. unicode: the bar consists of box drawing characters in place of # and -.
+std::string drawn(const ProgressLine& line, size_t columns, bool unicode);
+
+/// Progress of long work: one line that is redrawn on a terminal, or a line per tenth of the work in a file or on a terminal
+/// without cursor movement (TERM=dumb).
 class Progress {
   public:
     /// what: a verb such as "rendered". unit: the plural of a unit of work, such as "steps". quiet: print
     /// nothing.
     Progress(std::string what, int total, std::string unit, bool quiet);
     ~Progress();
+
+    /// Begins the next part of the work. The bar and the time left are those of all parts together.
+    void begin(std::string what, int total, std::string unit);
+    /// Another number of units in this part.
+    void set_total(int total) { total_ = total; }
+    /// This part's units up to `done` were done before it began.
+    void skip(int done);
+    /// Seconds that this part still takes, in place of what its pace says. They count down until the next call.
+    void set_left(double seconds);
+    /// Seconds that the parts after this one take.
+    void set_rest(double seconds) { rest_ = seconds; }
 
     /// details: more text for the line, such as the loss.
     void update(int done, const std::string& details = "");
@@ -26,16 +74,20 @@ class Progress {
     /// Whether update(done) would print: details may be costly to compute.
     bool due(int done) const;
 
+    /// Seconds since this part began.
+    double seconds() const;
+
   private:
     using Clock = std::chrono::steady_clock;
+    std::optional<double> left_now() const;
+
     std::string what_, unit_;
-    int total_, next_tenth_ = 1;
-    bool quiet_, terminal_, drawn_ = false;
-    Clock::time_point start_ = Clock::now(), printed_{};
-    // Start of the interval that the rate is measured over.
-    Clock::time_point window_start_ = start_;
-    int window_done_ = 0;
-    double rate_ = 0;
+    int total_, next_tenth_ = 1, printed_done_ = -1;
+    bool quiet_, terminal_, drawn_ = false, parts_ = false;
+    Clock::time_point start_ = Clock::now(), part_start_ = start_, printed_{};
+    Pace pace_;
+    std::optional<double> left_;  // of this part, at left_set_
+    double left_set_ = 0, rest_ = 0, share_ = 0;
 };
 
 }  // namespace ewa::core

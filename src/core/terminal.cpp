@@ -19,11 +19,15 @@ void open_standard_streams() {
     if (descriptor >= 0) close(descriptor);
 }
 
-size_t terminal_width() {
-    constexpr size_t kUnknown = 80, kLeast = 40, kMost = 120;
+size_t terminal_columns() {
+    constexpr size_t kUnknown = 80;
     winsize size{};
-    if (ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0) return kUnknown;
-    return std::clamp<size_t>(size.ws_col, kLeast, kMost);
+    return ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0 ? kUnknown : size.ws_col;
+}
+
+size_t terminal_width() {
+    constexpr size_t kLeast = 40, kMost = 120;
+    return std::clamp<size_t>(terminal_columns(), kLeast, kMost);
 }
 
 std::string wrapped_help(std::string_view text, size_t column, size_t width) {

@@ -10,7 +10,9 @@ namespace ewa::core {
 /// opened gets the number, and messages are written into it. Call it first in main().
 void open_standard_streams();
 
-/// Columns of the terminal that standard output is, between 40 and 120. 80 if it is none.
+/// Columns of the terminal that standard output is. 80 if it is none.
+size_t terminal_columns();
+/// The same, between 40 and 120.
 size_t terminal_width();
 
 /// The help text of a command line parser. Breaks lines between words at `width` columns, and turns "-o,--output"

@@ -159,6 +159,9 @@ class Run {
     bool done_unless_stopped(Work&& work) const;
     bool draws_with_ranks() const { return options().ranks->size() > 1; }
     train::Drawing drawing(const Gaussians& gaussians, const Trainer* trainer) const;
+    size_t evaluated_views() const {
+        return input_.split.test.size() + std::min(input_.split.train.size(), kTrainViewsEvaluated);
+    }
     void evaluate_result(const train::Drawing& drawing, const Gaussians& gaussians,
                          const std::vector<Exposure>& exposures, const std::function<void()>& before_frame);
     void add_view(int index, const train::RenderedView& view, const EvalFrame& figures);
@@ -249,6 +252,9 @@ void Run::start() {
     start.width = camera.width;
     start.height = camera.height;
     start.splats = input_.start.size();
+    start.train = options().train;
+    start.max_splats = report_.summary.max_splats;
+    start.evaluated = evaluated_views();
     start.remarks = input_.remarks;
     start.device = device_info(*device_);
     start.memory =
@@ -444,6 +450,7 @@ void Run::evaluate_result(const train::Drawing& drawing, const Gaussians& gaussi
                           const std::vector<Exposure>& exposures, const std::function<void()>& before_frame) {
     observer_.on_note("evaluating");
     const bool held_out = !input_.split.test.empty();
+    size_t done = 0;
     // The report shows the held-out views, or the training views without a test set.
     const auto evaluated = [&](const std::vector<int>& frames, const std::vector<Exposure>& of_frames,
                                bool shown) {
@@ -451,6 +458,7 @@ void Run::evaluate_result(const train::Drawing& drawing, const Gaussians& gaussi
             drawing, input_.dataset, frames, options().train.render, of_frames, before_frame,
             [&](size_t i, const train::RenderedView& view, const EvalFrame& figures) {
                 if (shown) add_view(frames[i], view, figures);
+                observer_.on_view(++done, evaluated_views());
             });
     };
     if (held_out) {

@@ -13,24 +13,24 @@
 namespace ewa::train {
 namespace {
 
-using Json = nlohmann::json;
+using PlainJson = nlohmann::json;
 
-Json rows_of(const std::vector<TimesAt>& times) {
-    Json rows = Json::array();
+PlainJson rows_of(const std::vector<TimesAt>& times) {
+    PlainJson rows = PlainJson::array();
     for (const TimesAt& time : times) rows.push_back({time.step, time.seconds, time.wall_seconds});
     return rows;
 }
 
-std::vector<TimesAt> times_in(const Json& all, const char* name, const std::string& file) {
+std::vector<TimesAt> times_in(const PlainJson& all, const char* name, const std::string& file) {
     const auto wrong = [&] {
         return InputError(file + ": \"" + name + "\" is no list of a step and two times each");
     };
-    const auto is_time = [](const Json& value) {
+    const auto is_time = [](const PlainJson& value) {
         return value.is_number() && std::isfinite(value.get<double>()) && value.get<double>() >= 0;
     };
     if (!all.is_object() || !all.contains(name) || !all[name].is_array()) throw wrong();
     std::vector<TimesAt> times;
-    for (const Json& row : all[name]) {
+    for (const PlainJson& row : all[name]) {
         if (!row.is_array() || row.size() != 3 || !row[0].is_number_unsigned() ||
             row[0].get<uint64_t>() > INT32_MAX || !is_time(row[1]) || !is_time(row[2]))
             throw wrong();
@@ -66,12 +66,12 @@ void take_times(std::vector<MetricsLine>& metrics, const RunTimes& times) {
 }
 
 void write_times(const std::filesystem::path& path, const RunTimes& times) {
-    const Json json{{"metrics", rows_of(times.metrics)}, {"checkpoints", rows_of(times.checkpoints)}};
+    const PlainJson json{{"metrics", rows_of(times.metrics)}, {"checkpoints", rows_of(times.checkpoints)}};
     core::write_text_file(path, json.dump() + '\n');
 }
 
 RunTimes read_times(const std::filesystem::path& path) {
-    const Json all = core::read_json_file<Json>(path);
+    const PlainJson all = core::read_json_file<PlainJson>(path);
     const std::string file = core::one_line(path.string());
     return {times_in(all, "metrics", file), times_in(all, "checkpoints", file)};
 }

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/capture_progress.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "ewa/device.h"
+#include "train/forecast.h"
+
+namespace ewa::cli {
+namespace {
+
+// Seconds by those to search a photo, from photos of 270x480 and 540x960. Photos with twice the details take twice the time to
+// search, and four times to compare.
+double seconds_of_pair(double search) {
+    constexpr double kMostDetails = 2.5;  // COLMAP keeps 8,192 details of a photo
+    return std::min(kMostDetails, 3.3 * std::pow(search, 1.75));
+}
+double seconds_to_place(double search) {
+    return 1.2 * std::sqrt(search);
+}
+
+constexpr double kNeighbours = 19;   // of a photo in a sequence
+constexpr int kMostUnordered = 200;  // photos, with Matching::automatic
+// Of the machine whose times a forecast has without any of this machine's.
+constexpr double kSearchPerPixel = 0.8e-6;  // s
+constexpr double kPointsPerPixel = 0.1;     // first splats, of the pixels of one photo
+constexpr double kSplatsPerPixel = 0.6;     // at most, times the square root of the photos
+constexpr double kOnGpu = 0.02;             // of the time on a CPU
+
+}  // namespace
+
+/// Seconds of the parts after this one.
+double CaptureProgressLine::rest() const {
+    const double after = after_ ? after_(photos_, search_seconds_) : 0;
+    if (phase_ == CapturePhase::cameras) return after;
+    const double placing = photos_ * seconds_to_place(search_seconds_) + after;
+    if (phase_ == CapturePhase::matches) return placing;
+    const bool in_sequence = matching_ == Matching::automatic ? video_ || photos_ > kMostUnordered
+                                                              : matching_ == Matching::sequence;
+    const double each = in_sequence ? std::min(kNeighbours, (photos_ - 1) / 2.0) : (photos_ - 1) / 2.0;
+    const double matching = photos_ * each * seconds_of_pair(search_seconds_) + placing;
+    return phase_ == CapturePhase::features ? matching : matching + photos_ * search_seconds_;
+}
+
+void CaptureProgressLine::update(const CaptureProgress& now) {
+    if (!now.note.empty()) progress_.note(now.note);
+    if (now.total < 1) return;
+    if (now.phase != phase_ || now.what != what_) {
+        phase_ = now.phase;
+        what_ = now.what;
+        total_ = now.total;
+        first_ = done_ = now.done;  // an interrupted search continues
+        progress_.begin(now.what, now.total, now.unit);
+        progress_.skip(now.done);
+        if (now.unit == "photos" || now.what == "extracted") photos_ = now.total;
+    }
+    // A video may have more frames than its header says.
+    if (now.total != total_) progress_.set_total(total_ = now.total);
+    if (phase_ == CapturePhase::features && now.done > done_)
+        search_seconds_ = progress_.seconds() / (now.done - first_);
+    done_ = now.done;
+    progress_.set_rest(rest());
+    progress_.update(now.done);
+}
+
+CaptureProgressLine::After training_after(const RunOptions& options) {
+    TrainOptions train = options.train;
+    if (train.strategy == Strategy::automatic) train.strategy = strategy_for(train.steps);
+    const double speed = device_info(*open_device(options.device)).type == "cpu" ? 1 : kOnGpu;
+    return [train, speed, shrink = double(options.downscale) * options.downscale](int photos, double search) {
+        const double pixels = search / kSearchPerPixel / shrink;
+        const double most = kSplatsPerPixel * pixels * std::sqrt(double(photos));
+        const auto limit = double(std::min<uint32_t>(train.max_splats, 1000000000));
+        const train::ForecastScene scene{.pixels = pixels,
+                                         .photos = size_t(photos),
+                                         .splats = uint32_t(std::min(kPointsPerPixel * pixels, limit)),
+                                         .evaluated = size_t(std::min(photos, 40)),
+                                         .max_splats = uint32_t(std::min(most, limit))};
+        return speed * train::Forecast(scene, train).on_reference();
+    };
+}
+
+}  // namespace ewa::cli
