@@ -30,6 +30,7 @@ def slug(heading):
 def blocks_of_markdown(text):
     """(line, text) of each paragraph, list item, heading and cell of a table."""
     text = re.sub(r"^```.*?^```", lambda m: "\n" * m.group().count("\n"), text, flags=re.M | re.S)
+    text = re.sub(r"<!--.*?-->", lambda m: "\n" * m.group().count("\n"), text, flags=re.S)
     text = re.sub(r"^    .*$", "", text, flags=re.M)
     block, first, heading = [], 1, False
     for number, line in enumerate([*text.splitlines(), ""], 1):
