@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "live/status.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "core/json.h"
@@ -15,6 +17,7 @@ using report::Json;
 
 constexpr const char* kStates[] = {"running", "paused", "done"};
 constexpr size_t kLongestRun = 64;  // bytes
+constexpr size_t kPaceLines = 10;   // of metrics, a tenth of a run
 
 Json figure(double value) {
     return std::isfinite(value) ? Json(value) : Json(nullptr);
@@ -62,6 +65,18 @@ Status decode_status(const std::string& text) {
     } catch (const Json::exception& error) {
         throw InputError(name + " cannot be read: " + core::one_line(core::plain_reason(error.what())));
     }
+}
+
+double seconds_left(const Status& status) {
+    const auto& lines = status.metrics;
+    const double unknown = std::numeric_limits<double>::quiet_NaN();
+    if (status.state != State::running || lines.size() < 2) return unknown;
+    const report::MetricsLine& now = lines.back();
+    const report::MetricsLine& before = lines[lines.size() - std::min(lines.size(), kPaceLines + 1)];
+    const double seconds = now.wall_seconds - before.wall_seconds;
+    const int steps = now.step - before.step;
+    if (!(seconds > 0) || steps < 1) return unknown;
+    return seconds / steps * std::max(0, status.steps - status.step);
 }
 
 }  // namespace ewa::live

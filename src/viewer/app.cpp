@@ -87,6 +87,8 @@ App::App(const Startup& startup)
       times_(startup.times),
       device_name_(startup.device_name),
       capture_(startup.picture.has_value()),
+      search_([this] { system_.wake(); }),
+      dialog_([this] { system_.wake(); }),
       comparison_([this] { system_.wake(); }),
       quality_([this] { system_.wake(); }),
       renders_(startup.open_device, [this] { system_.wake(); }),
@@ -100,12 +102,12 @@ App::App(const Startup& startup)
     settings_.look = startup.settings.look;
     if (startup.film) start_film();
     if (startup.watch) watch(*startup.watch, startup.trainer);
+    if (!startup.scene.photos.empty()) find_cameras(startup.scene.photos);
     times_.window_open = times_.now();
 }
 
 KeptSettings App::kept() const {
     KeptSettings kept{.window = {},
-                      .mode = settings_.look.mode,
                       .text_scale = settings_.text_scale,
                       .gain = settings_.gain,
                       .film_seconds = settings_.film_seconds};
@@ -127,10 +129,12 @@ void App::run() {
         if (!scripted()) {
             for (const KeyPress& key : keys) handle_key(key);
             move_by_itself(std::min(seconds, 0.1));
-            if (const auto dropped = window_.take_dropped(); !dropped.empty()) open(dropped);
+            if (const auto dropped = window_.take_dropped(); !dropped.empty()) open(dropped, scene_);
+            take_chosen();
             change_text();
         }
         take_opened();
+        take_found();
         take_renders();
         take_comparison();
         if (finished(saving_)) say(saving_.get());

@@ -12,6 +12,8 @@
 #include <vector>
 
 #include "io/datasets/view_list.h"
+#include "viewer/camera_search.h"
+#include "viewer/file_dialog.h"
 #include "viewer/kept_settings.h"
 #include "viewer/message.h"
 #include "viewer/overlay.h"
@@ -42,6 +44,13 @@ struct Film {
     std::filesystem::path file() const;
 };
 
+/// A training on photos, which starts once they have cameras.
+struct LaterTraining {
+    std::vector<std::string> options;  // of ewa train, with the photos
+    std::filesystem::path folder;      // of the run
+    CaptureOptions capture;
+};
+
 /// What the command line asks for.
 struct Startup {
     OpenedScene scene;
@@ -57,6 +66,7 @@ struct Startup {
     std::string device;                      // the selector of the command line
     std::optional<live::WhatToWatch> watch;  // a training run
     TrainProcess* trainer = nullptr;         // the viewer's own; outlives the App
+    std::optional<LaterTraining> later;      // if the scene is photos
     bool verbose = false;                    // print times on standard error
     SessionTimes times;
 };
@@ -83,12 +93,18 @@ class App {
 
     // app_open.cpp: scenes that are opened, and training runs.
     void adopt(OpenedScene scene, std::optional<int> frame);
-    void open(const std::vector<std::filesystem::path>& paths);
+    void show_opened(OpenedScene scene);
+    void open(const std::vector<std::filesystem::path>& paths, const OpenedScene& shown);
     void take_opened();
+    void take_chosen();
+    void find_cameras(const std::filesystem::path& photos);
+    void take_found();
     void take_live();
     void train();
+    void start_training(const std::vector<std::string>& options, const std::filesystem::path& folder);
     bool training();  // one that the window has started
     void watch(const live::WhatToWatch& what, TrainProcess* trainer);
+    bool empty() const;  // nothing is open, nor on its way
     std::optional<Headline> headline() const;
     std::string banner() const;
 
@@ -178,10 +194,13 @@ class App {
     double shown_text_ = 0;     // text_height() of the screen
     bool live_failed_ = false;  // a training that cannot be reached was reported
     bool done_ = false;
+    std::string search_failure_;  // why photos have no cameras; one line
     std::future<OpenedScene> opening_;
     std::future<std::string> saving_;  // a screenshot; the message about it
 
     // Their threads call wake() of the window system. Declared last, so that they end before it does.
+    CameraSearch search_;
+    FileDialog dialog_;
     ImageComparison comparison_;
     ViewQuality quality_;
     Renders renders_;

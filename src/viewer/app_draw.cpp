@@ -43,6 +43,7 @@ void App::obey(const PanelActions& actions) {
     if (actions.exr) save_exr();
     if (actions.reset) reset_view();
     if (actions.whole_scene) show_whole_scene();
+    if (actions.open) dialog_.ask(*actions.open);
     if (actions.train) train();
     if (actions.frame) go_to_camera(*actions.frame);
     if (actions.command) live_.command(*actions.command);
@@ -71,6 +72,9 @@ void App::draw_overlays() {
     const Rectangle area = picture_area();
     const std::optional<Headline> words = headline();
     if (words) draw_headline(*words, area);
+    if (empty())
+        if (const auto wanted = draw_open_buttons(area)) dialog_.ask(*wanted);
+    if (search_.running() && draw_search(search_.progress(), area)) search_.cancel();
     if (const std::string text = banner(); !text.empty()) draw_banner(text, area);
     if (!words && message_.hinting(Clock::now()) && !show_help_)
         draw_hint(scene_.dataset != nullptr, panel_shown(), area);

@@ -38,6 +38,8 @@ void App::handle_key(const KeyPress& press) {
     // A text field does not use these keys, so they act while one is edited. The other keys belong to the
     // field.
     if (key == GLFW_KEY_Q && press.control) return window_.close();
+    if (key == GLFW_KEY_O && press.control) return dialog_.ask(press.shift ? Wanted::folder : Wanted::file);
+    if (key == GLFW_KEY_ESCAPE) return search_.cancel();
     switch (key) {
         case GLFW_KEY_F1:
             toggle(show_help_);

@@ -2,8 +2,10 @@
 // What the window shows: scenes that are opened, and training runs.
 #include <cstdio>
 
+#include "core/process.h"
 #include "core/text.h"
 #include "ewa/error.h"
+#include "live/run_folder.h"
 #include "scene/names.h"
 #include "train/earlier_run.h"
 #include "viewer/app.h"
@@ -11,7 +13,7 @@
 namespace ewa::viewer {
 namespace {
 
-/// The folder that `ewa train` takes for the dataset, or the first with a number behind it that no run has used.
+/// The folder that `ewa train` takes for the dataset, or the first with a number behind it that does not exist.
 std::filesystem::path free_run_folder(const std::filesystem::path& dataset) {
     RunOptions run;
     run.dataset = dataset;
@@ -49,10 +51,19 @@ void App::adopt(OpenedScene scene, std::optional<int> frame) {
     redraw(kRedraws);
 }
 
-void App::open(const std::vector<std::filesystem::path>& paths) {
+void App::show_opened(OpenedScene scene) {
+    search_failure_.clear();
+    view_.restart(start_view(scene, {}, picture_area().size()));
+    window_.set_title(window_title(scene));
+    adopt(std::move(scene), {});
+}
+
+/// shown: what the files may add to; an empty scene if they are opened by themselves.
+void App::open(const std::vector<std::filesystem::path>& paths, const OpenedScene& shown) {
     if (opening_.valid()) return say("another file is being opened");
+    if (search_.running()) return say("cameras of photos are being found; Esc stops that");
     say("opening " + core::one_line(paths.front().string()));
-    opening_ = std::async(std::launch::async, [this, paths, shown = scene_] {
+    opening_ = std::async(std::launch::async, [this, paths, shown] {
         const Wake wake{system_};
         return open_dropped(paths, shown);
     });
@@ -62,10 +73,9 @@ void App::take_opened() {
     if (!opening_.valid() || opening_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
     try {
         OpenedScene scene = opening_.get();
+        if (!scene.photos.empty()) return find_cameras(scene.photos);
         const bool same_splats = scene.gaussians == scene_.gaussians;
-        view_.restart(start_view(scene, {}, picture_area().size()));
-        window_.set_title(window_title(scene));
-        adopt(std::move(scene), {});
+        show_opened(std::move(scene));
         if (same_splats) {
             settings_.cameras = true;
             return;
@@ -74,6 +84,44 @@ void App::take_opened() {
         if (!scene_.run.empty()) watch({scene_.run, {}, {}, scene_.splats_time}, nullptr);
     } catch (const std::exception& error) {
         say(error.what());
+    }
+}
+
+/// What the file dialog has answered.
+void App::take_chosen() {
+    try {
+        if (const auto path = dialog_.take()) open({*path}, {});
+    } catch (const std::exception& error) {
+        say(error.what());
+    }
+}
+
+void App::find_cameras(const std::filesystem::path& photos) {
+    search_failure_.clear();
+    message_.note.clear();
+    const bool train = startup_.later && photos == startup_.scene.photos;
+    search_.start(photos, (train ? startup_.later->folder : folder_for_photos(photos)) / "dataset",
+                  train ? startup_.later->capture : CaptureOptions());
+    redraw(kRedraws);
+}
+
+void App::take_found() {
+    if (!search_.running()) return;
+    redraw();
+    if (!search_.ended()) return;
+    try {
+        std::optional<OpenedScene> scene = search_.take();
+        if (!scene) return say("stopped; opened again, the photos go on from here");
+        const bool train = startup_.later && scene->photos == startup_.scene.photos;
+        live_.stop();
+        show_opened(std::move(*scene));
+        settings_.cameras = true;
+        if (train && !training()) start_training(startup_.later->options, startup_.later->folder);
+    } catch (const std::exception& error) {
+        search_failure_ = error.what();
+        if (core::find_program("colmap").empty())
+            search_failure_ += "; or run ewa cameras where it is, and open the dataset that it makes";
+        say(search_failure_);
     }
 }
 
@@ -117,12 +165,21 @@ bool App::training() {
 /// Starts `ewa train` on the dataset that is shown, in a folder of its own.
 void App::train() {
     if (training()) return say("a training that this window has started still runs");
+    // Photos have their dataset in the folder of the run.
+    const std::filesystem::path made_in = scene_.path.parent_path();
+    const bool first = !scene_.photos.empty() && !live::find_run(made_in);
+    const std::filesystem::path dataset = first ? scene_.photos : scene_.path;
+    std::vector<std::string> options{dataset.string(), "--steps", std::to_string(settings_.train_steps),
+                                     "--quiet"};
+    if (!startup_.device.empty()) options.insert(options.end(), {"--device", startup_.device});
+    start_training(options, first                   ? made_in
+                            : scene_.photos.empty() ? free_run_folder(scene_.path)
+                                                    : free_run_folder(scene_.photos));
+}
+
+void App::start_training(const std::vector<std::string>& options, const std::filesystem::path& folder) {
     try {
-        const std::filesystem::path folder = free_run_folder(scene_.path);
         const auto now = std::filesystem::file_time_type::clock::now();
-        std::vector<std::string> options{scene_.path.string(), "--steps",
-                                         std::to_string(settings_.train_steps), "--quiet"};
-        if (!startup_.device.empty()) options.insert(options.end(), {"--device", startup_.device});
         live_.stop();
         trainer_ = std::make_unique<TrainProcess>(options, folder);
         watch({folder, {}, {}, now, now}, trainer_.get());
@@ -132,9 +189,15 @@ void App::train() {
     }
 }
 
+bool App::empty() const {
+    return scene_.gaussians->size() == 0 && scene_.title.empty() && !scene_.dataset && !opening_.valid() &&
+           !search_.running() && !live_.update();
+}
+
 /// What the middle of the picture says where there is nothing to see.
 std::optional<Headline> App::headline() const {
-    if (scene_.gaussians->size() > 0) return std::nullopt;
+    if (scene_.gaussians->size() > 0 || search_.running()) return std::nullopt;
+    if (!search_failure_.empty() && !scene_.dataset) return Headline{"no cameras", search_failure_};
     if (opening_.valid()) return Headline{"opening ...", ""};
     if (const live::Update* run = live_.update()) {
         if (!run->problem.empty())
@@ -144,7 +207,8 @@ std::optional<Headline> App::headline() const {
     if (!scene_.title.empty() && !scene_.dataset)
         return Headline{scene_.title + " has no splats", "Drop another file here."};
     if (scene_.dataset) return std::nullopt;
-    return Headline{"drop a file here", "splats, a dataset, or the folder of a training run"};
+    return Headline{"drop a file here",
+                    "splats, photos, a video, a dataset, or the folder of a training run"};
 }
 
 /// What the picture is, if it is no splats.

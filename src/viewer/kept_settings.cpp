@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "viewer/kept_settings.h"
 
-#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
@@ -17,7 +16,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr uint64_t kMostSettingsBytes = 1u << 16;
 constexpr int kLeastSide = 200, kMostSide = 16384;  // px of a window
-constexpr std::array kModeNames{"color", "depth", "alpha", "count", "ellipsoids"};
 
 /// The number of this name, if it is one in the range.
 template <class T>
@@ -54,9 +52,6 @@ KeptSettings read_settings(const fs::path& file) {
         take(json, "text_scale", kLeastText, kMostText, settings.text_scale);
         take(json, "gain", 1.0f, 16.0f, settings.gain);
         take(json, "film_seconds", 0.2f, 10.0f, settings.film_seconds);
-        const Json mode = json.value("mode", Json());
-        for (size_t i = 0; i < kModeNames.size(); ++i)
-            if (mode == kModeNames[i]) settings.mode = Mode(i);
     } catch (const std::exception&) {
         return {};
     }
@@ -65,8 +60,7 @@ KeptSettings read_settings(const fs::path& file) {
 
 void write_settings(const fs::path& file, const KeptSettings& settings) {
     if (file.empty()) return;
-    Json json{{"mode", kModeNames[size_t(settings.mode)]},
-              {"text_scale", settings.text_scale},
+    Json json{{"text_scale", settings.text_scale},
               {"gain", settings.gain},
               {"film_seconds", settings.film_seconds}};
     if (settings.window) {

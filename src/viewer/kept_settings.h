@@ -12,9 +12,8 @@ inline constexpr float kLeastText = 0.5f, kMostText = 3;  // times the usual siz
 
 struct KeptSettings {
     std::optional<Size> window;  // logical px: of a screen with a content scale of 1
-    Mode mode = Mode::color;
-    float text_scale = 1;  // times the size that the monitor asks for
-    float gain = 4;        // of the difference image
+    float text_scale = 1;        // times the size that the monitor asks for
+    float gain = 4;              // of the difference image
     float film_seconds = 2;
     bool operator==(const KeptSettings&) const = default;
 };

@@ -83,6 +83,26 @@ std::filesystem::path output_of(const Arguments& arguments) {
     return std::filesystem::path("out") / scene::dataset_name(arguments.path);
 }
 
+std::vector<std::string> options_of_training(const Arguments& arguments) {
+    std::vector<std::string> options{arguments.path.string()};
+    options.insert(options.end(), arguments.train_options.begin(), arguments.train_options.end());
+    return options;
+}
+
+/// The frames of a video that --frames names; ewa train checks the number.
+CaptureOptions capture_of(const Arguments& arguments) {
+    CaptureOptions capture;
+    const std::string name = "--frames";
+    const auto& options = arguments.train_options;
+    for (size_t i = 0; i < options.size(); ++i) {
+        std::string value;
+        if (options[i] == name && i + 1 < options.size()) value = options[i + 1];
+        if (options[i].starts_with(name + "=")) value = options[i].substr(name.size() + 1);
+        capture.frames = core::parse_count<int>(value).value_or(capture.frames);
+    }
+    return capture;
+}
+
 OpenedScene open_what(const Arguments& arguments, Startup& startup) {
     if (!arguments.connect.empty()) {
         startup.watch = live::WhatToWatch{{},
@@ -100,8 +120,11 @@ OpenedScene open_what(const Arguments& arguments, Startup& startup) {
         return {};  // files are dropped on the window
     }
     OpenedScene scene = open_scene(arguments.path, arguments.cameras);
+    if (!scene.photos.empty() && (!arguments.picture.empty() || !arguments.film.empty()))
+        throw InputError(arguments.path.string() +
+                         " has no cameras yet; ewa cameras finds them, and so does the window");
     if (arguments.train) {
-        if (!scene.dataset || !scene.run.empty())
+        if ((!scene.dataset && scene.photos.empty()) || !scene.run.empty())
             throw InputError("--train needs a dataset, and " + arguments.path.string() + " is not one");
         scene.remark.clear();
         RunOptions run;
@@ -112,6 +135,11 @@ OpenedScene open_what(const Arguments& arguments, Startup& startup) {
         run.resume = asked("--resume");
         run.force = asked("--force");
         train::check_free(output_of(arguments), run);  // before the window opens
+        if (!scene.photos.empty()) {
+            startup.later =
+                LaterTraining{options_of_training(arguments), output_of(arguments), capture_of(arguments)};
+            return scene;
+        }
         const auto now = std::filesystem::file_time_type::clock::now();
         startup.watch = live::WhatToWatch{output_of(arguments), {}, {}, now, now};
     } else if (!scene.run.empty() && arguments.picture.empty() && arguments.film.empty()) {
@@ -191,7 +219,6 @@ void take_settings(const CLI::App& app, Arguments& arguments) {
     startup.last_size = kept.window;
     startup.settings.text_scale = kept.text_scale;
     startup.settings.gain = kept.gain;
-    if (app.count("--mode") == 0) startup.settings.look.mode = kept.mode;
     if (app.count("--film-seconds") == 0) startup.settings.film_seconds = kept.film_seconds;
 }
 
@@ -215,13 +242,13 @@ void add_options(CLI::App& app, Arguments& arguments) {
     const auto option = [&](const char* name, auto& value, const char* type, const char* help) {
         return app.add_option(name, value, help)->type_name(type);
     };
-    option("PATH", arguments.path, "",
-           "Splat file (.ply .compressed.ply .splat .ksplat .spz .sog meta.json .glb .gltf), dataset, or "
-           "folder of a "
-           "training run. Without it, the window waits for a file to be dropped");
-    CLI::Option* train = app.add_flag(
-        "--train", arguments.train,
-        "Train on the dataset and watch. Other options are passed to ewa train, such as --steps");
+    option(
+        "PATH", arguments.path, "",
+        "Splat file (.ply .compressed.ply .splat .ksplat .spz .sog meta.json .glb .gltf), dataset, folder of "
+        "a training run, folder of photos, or video. Without it, the window waits for a file");
+    CLI::Option* train = app.add_flag("--train", arguments.train,
+                                      "Train on the dataset, photos or video, and watch. Other options are "
+                                      "passed to ewa train, such as --steps");
     option("-o,--output", arguments.output, "DIR",
            "With --train: folder of the run [out/<name of the dataset>]")
         ->needs(train);
@@ -294,10 +321,9 @@ int run(const Arguments& arguments) {
         startup.times.scene_read = startup.times.now();
         std::optional<TrainProcess> trainer;
         if (arguments.train) {
-            std::vector<std::string> options{arguments.path.string()};
-            options.insert(options.end(), arguments.train_options.begin(), arguments.train_options.end());
-            if (!TrainProcess::accepts(options, startup.watch->folder)) return kWrongUse;
-            startup.trainer = &trainer.emplace(options, startup.watch->folder);
+            const std::vector<std::string> options = options_of_training(arguments);
+            if (!TrainProcess::accepts(options, output_of(arguments))) return kWrongUse;
+            if (!startup.later) startup.trainer = &trainer.emplace(options, output_of(arguments));
         }
         const auto first = std::make_shared<std::shared_ptr<gpu::Device>>(opening.get());
         startup.device_name = device_info(**first).name;

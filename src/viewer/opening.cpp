@@ -6,6 +6,7 @@
 
 #include "core/folders.h"
 #include "core/typing.h"
+#include "ewa/capture.h"
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
 #include "ewa/synthetic_dataset.h"
@@ -20,12 +21,6 @@ namespace fs = std::filesystem;
 
 constexpr float kPointOpacity = 3;    // logit
 constexpr float kPointShrink = 1.2f;  // subtracted from the logarithm of a point's size
-
-std::string name_of_path(const fs::path& path) {
-    const fs::path clean = path.lexically_normal();
-    const std::string name = (clean.has_filename() ? clean : clean.parent_path()).filename().string();
-    return name.empty() || name == "." ? path.string() : name;
-}
 
 bool is_dataset_file(const fs::path& path) {
     const std::string name = path.filename().string();
@@ -131,7 +126,7 @@ OpenedScene open_splats(const fs::path& path, const fs::path& cameras) {
     const bool density = splats.gaussians.density;
     if (!splats.remarks.empty()) scene.remark = splats.remarks.front();
     scene.gaussians = std::make_shared<const Gaussians>(std::move(splats.gaussians));
-    if (scene.gaussians->size() == 0) scene.remark = name_of_path(path) + " is empty: it has no splats";
+    if (scene.gaussians->size() == 0) scene.remark = scene_title(path) + " is empty: it has no splats";
     if (!cameras.empty()) scene.dataset = load_cameras(cameras, {}, false);
     if (const auto run = live::run_of_splats(path); run && cameras.empty() && !run->dataset.empty()) {
         scene.look = look_of(*run);
@@ -147,9 +142,9 @@ OpenedScene open_dataset(const fs::path& path) {
     scene.gaussians = std::make_shared<const Gaussians>(splats_of_points(scene.dataset->points));
     scene.points = true;
     scene.remark = is_mesh_scene(path)
-                       ? "these are the views of a mesh scene; ewa train renders it and trains splats"
+                       ? "these are the views of a mesh scene; \"Train splats\" renders it and trains splats"
                    : scene.gaussians->size() > 0
-                       ? "these are the points of the dataset; ewa train trains splats from them"
+                       ? "these are the points of the dataset; \"Train splats\" makes splats of them"
                        : "this dataset has cameras, but no points and no splats";
     return scene;
 }
@@ -160,6 +155,12 @@ void OpenedScene::set_gaussians(std::shared_ptr<const Gaussians> splats) {
     gaussians = std::move(splats);
     sh_degree = sh_degree_present(*gaussians);
     plan = plan_lines(*gaussians, RenderOptions{});
+}
+
+std::string scene_title(const fs::path& path) {
+    const fs::path clean = path.lexically_normal();
+    const std::string name = (clean.has_filename() ? clean : clean.parent_path()).filename().string();
+    return name.empty() || name == "." ? path.string() : name;
 }
 
 Gaussians splats_of_points(const PointCloud& points) {
@@ -174,15 +175,21 @@ OpenedScene open_scene(const fs::path& path, const fs::path& cameras) {
     std::error_code error;
     OpenedScene scene;
     if (!fs::exists(path, error)) throw InputError(path.string() + ": no such file or folder");
-    if (fs::is_directory(path, error)) {
-        const auto run = live::find_run(path);
-        scene = run ? open_run(*run, cameras) : open_dataset(path);
+    const auto run = fs::is_directory(path, error) ? live::find_run(path) : std::nullopt;
+    if (run) {
+        scene = open_run(*run, cameras);
+    } else if (core::is_file(path / "dataset/capture.json")) {
+        return open_scene(path / "dataset", {});  // of photos on which nothing was trained yet
+    } else if (is_capture(path)) {
+        scene.photos = path;
+    } else if (fs::is_directory(path, error)) {
+        scene = open_dataset(path);
     } else if (is_dataset_file(path) || is_mesh_scene(path)) {
         scene = open_dataset(path);
     } else {
         scene = open_splats(path, cameras);
     }
-    scene.title = name_of_path(path);
+    scene.title = scene_title(path);
     scene.path = path;
     return scene;
 }
@@ -209,13 +216,15 @@ OpenedScene open_dropped(const std::vector<fs::path>& paths, const OpenedScene& 
     std::vector<fs::path> opened;
     OpenedScene scene;
     if (dataset != paths.end() && splats != paths.end()) {
-        scene = with_cameras(open_scene(*splats, {}), open_scene(*dataset, {}));
+        const OpenedScene cameras = open_scene(*dataset, {});
+        if (!cameras.photos.empty()) return cameras;
+        scene = with_cameras(open_scene(*splats, {}), cameras);
         opened = {*splats, *dataset};
     } else if (dataset != paths.end()) {
         scene = open_scene(*dataset, {});
         opened = {*dataset};
         const bool has_splats = !shown.points && shown.gaussians->size() > 0;
-        if (has_splats && shown.cameras != *dataset) {
+        if (has_splats && shown.cameras != *dataset && scene.photos.empty()) {
             scene = with_cameras(shown, scene);
             scene.remark += "; drop it again to open the dataset itself";
         }
@@ -229,7 +238,7 @@ OpenedScene open_dropped(const std::vector<fs::path>& paths, const OpenedScene& 
     for (const fs::path& path : paths)
         if (std::find(opened.begin(), opened.end(), path) == opened.end()) {
             scene.remark += scene.remark.empty() ? "" : "; ";
-            scene.remark += "one scene is shown at a time: " + name_of_path(path) + " is left out";
+            scene.remark += "one scene is shown at a time: " + scene_title(path) + " is left out";
         }
     return scene;
 }

@@ -17,7 +17,9 @@ namespace ewa::viewer {
 struct OpenedScene {
     std::string title;           // empty: nothing is open
     std::filesystem::path path;  // as it was named
-    bool points = false;         // the splats are the points of the dataset
+    /// Photos or a video. Without a dataset: their cameras are not known yet. With one: they were found.
+    std::filesystem::path photos;
+    bool points = false;  // the splats are the points of the dataset
     /// Never null; empty if a run has none yet. set_gaussians() also sets the next two.
     std::shared_ptr<const Gaussians> gaussians = std::make_shared<const Gaussians>();
     int sh_degree = 0;                       // the highest that changes the image
@@ -34,18 +36,23 @@ struct OpenedScene {
     void set_gaussians(std::shared_ptr<const Gaussians> splats);
 };
 
+/// What the window calls a scene of this path.
+std::string scene_title(const std::filesystem::path& path);
+
 /// Whether open_scene() would open the path as a dataset, and not as splats or a run. False if it does not exist.
 bool is_dataset(const std::filesystem::path& path);
 
 /// Opens a splat file; a dataset, shown by its points; or the folder of a run (config.json, splats.ply,
 /// metrics.jsonl). A run, and the splats.ply of a run, come with the cameras of the run's dataset, if that is
-/// found. cameras: the dataset to use instead; empty: none. Throws InputError.
+/// found. cameras: the dataset to use instead; empty: none. Of photos without cameras, or a video, only `photos` and
+/// the title are set. Throws InputError.
 OpenedScene open_scene(const std::filesystem::path& path, const std::filesystem::path& cameras);
 
 /// The splats of `splats` with the cameras of `cameras`, and a remark that says so. Both are scenes as opened.
 OpenedScene with_cameras(const OpenedScene& splats, const OpenedScene& cameras);
 
 /// Opens what was dropped on the window, where `shown` is. Throws InputError.
+/// - Photos or a video go before all else: only they are opened.
 /// - A dataset gives its cameras to the splats that are shown, unless it has done so before: then it is opened itself.
 /// - A splat file takes the cameras of a dataset that is shown without splats.
 /// - Of several files, splats and a dataset belong together. The remark names those that are left out.

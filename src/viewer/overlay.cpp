@@ -86,6 +86,17 @@ void draw_message(const char* name, const std::string& text, const Rectangle& ar
     ImGui::End();
 }
 
+/// Begins a window with buttons, centred at a height from 0 (top) to 1.
+bool begin_box(const char* name, const Rectangle& area, float at) {
+    const ImVec2 low = gui_point(area.x, area.y), high = gui_point(area.x + area.width, area.y + area.height);
+    ImGui::SetNextWindowPos(ImVec2((low.x + high.x) / 2, low.y + (high.y - low.y) * at), ImGuiCond_Always,
+                            ImVec2(0.5f, 0.5f));
+    return ImGui::Begin(name, nullptr,
+                        ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize |
+                            ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
+                            ImGuiWindowFlags_NoFocusOnAppearing);
+}
+
 /// A line in the middle of the area, wrapped, whose upper border is at y. Returns the lower border.
 float centered_text(ImDrawList& list, ImFont* font, float size, ImU32 color, const std::string& text,
                     const ImVec2& low, const ImVec2& high, float y) {
@@ -98,7 +109,7 @@ float centered_text(ImDrawList& list, ImFont* font, float size, ImU32 color, con
 }  // namespace
 
 void draw_help(bool& open) {
-    static const std::array<std::array<const char*, 2>, 26> rows{
+    static const std::array<std::array<const char*, 2>, 27> rows{
         {{"left drag", "orbit the scene"},
          {"Ctrl + left drag", "look around"},
          {"right or middle drag", "move sideways"},
@@ -123,17 +134,27 @@ void draw_help(bool& open) {
          {"F12", "screenshot (PNG); with Shift: EXR"},
          {"F1", "show or hide these keys"},
          {"F2", "show or hide the panel"},
+         {"Ctrl + O", "open a file; with Shift: a folder"},
          {"Ctrl + Q", "quit"},
          {"drop a file", "open it; a dataset gives its cameras to splats"}}};
     const ImVec2 size = ImGui::GetIO().DisplaySize;
-    ImGui::SetNextWindowPos(ImVec2(size.x / 2, size.y / 2), ImGuiCond_Appearing, ImVec2(0.5f, 0.5f));
-    ImGui::PushStyleVar(ImGuiStyleVar_CellPadding, ImVec2(ImGui::GetTextLineHeight() / 2, 1));
+    const float line = ImGui::GetTextLineHeight();
+    ImGui::SetNextWindowPos(ImVec2(size.x / 2, size.y / 2), ImGuiCond_Always, ImVec2(0.5f, 0.5f));
+    ImGui::SetNextWindowSizeConstraints(ImVec2(0, 0), size);  // a longer list scrolls
+    ImGui::PushStyleVar(ImGuiStyleVar_CellPadding, ImVec2(line / 2, 1));
     if (ImGui::Begin("Keys", &open, ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse) &&
         ImGui::BeginTable("keys", 2, ImGuiTableFlags_SizingFixedFit)) {
+        // In a narrow window the second column wraps.
+        float keys = 0;
+        for (const auto& row : rows) keys = std::max(keys, ImGui::CalcTextSize(row[0]).x);
+        const float room = std::max(4 * line, size.x - keys - 5 * line);
         for (const auto& row : rows)
             for (const char* text : row) {
                 ImGui::TableNextColumn();
+                const float width = std::min(room, ImGui::CalcTextSize(text).x + 1);
+                ImGui::PushTextWrapPos(ImGui::GetCursorPosX() + (text == row[0] ? keys + 1 : width));
                 ImGui::TextUnformatted(text);
+                ImGui::PopTextWrapPos();
             }
         ImGui::EndTable();
     }
@@ -224,6 +245,37 @@ void draw_headline(const Headline& headline, const Rectangle& area) {
     const float below = centered_text(list, large, 2 * line, kTextColor, headline.text, low, high,
                                       low.y + (high.y - low.y) * 0.4f);
     centered_text(list, ImGui::GetFont(), line, kQuietColor, headline.explanation, low, high, below + line);
+}
+
+std::optional<Wanted> draw_open_buttons(const Rectangle& area) {
+    std::optional<Wanted> wanted;
+    if (begin_box("open", area, 0.65f)) {
+        if (ImGui::Button("Open a file")) wanted = Wanted::file;
+        ImGui::SameLine();
+        if (ImGui::Button("Open a folder")) wanted = Wanted::folder;
+    }
+    ImGui::End();
+    return wanted;
+}
+
+bool draw_search(const CaptureProgress& progress, const Rectangle& area) {
+    bool stop = false;
+    if (begin_box("search", area, 0.5f)) {
+        ImGui::TextUnformatted("finding the cameras of the photos");
+        std::string text = "looking at them ...";
+        if (progress.total > 0)
+            text = progress.what + " " + std::to_string(progress.done) + " of " +
+                   std::to_string(progress.total) + " " + progress.unit;
+        ImGui::TextUnformatted(text.c_str());
+        const float line = ImGui::GetTextLineHeight();
+        ImGui::ProgressBar(float(progress.done) / float(std::max(1, progress.total)),
+                           ImVec2(16 * line, 0.4f * line), "");
+        stop = ImGui::Button("Stop");
+        ImGui::SameLine();
+        ImGui::TextDisabled("Esc; what is done is kept");
+    }
+    ImGui::End();
+    return stop;
 }
 
 }  // namespace ewa::viewer

@@ -5,7 +5,9 @@
 #include <optional>
 #include <string>
 
+#include "ewa/capture.h"
 #include "ewa/dataset.h"
+#include "viewer/file_dialog.h"
 #include "viewer/layout.h"
 
 namespace ewa::viewer {
@@ -41,5 +43,9 @@ struct Headline {
     std::string text, explanation;
 };
 void draw_headline(const Headline& headline, const Rectangle& area);
+/// Below the headline of an empty window. Returns what a clicked button asks for.
+std::optional<Wanted> draw_open_buttons(const Rectangle& area);
+/// How far the search for cameras is. Returns whether its button is clicked.
+bool draw_search(const CaptureProgress& progress, const Rectangle& area);
 
 }  // namespace ewa::viewer

@@ -223,7 +223,14 @@ void draw_footer(const PanelFacts& facts, PanelActions& actions) {
     actions.screenshot = button("PNG", "F12: writes a screenshot");
     ImGui::SameLine();
     actions.exr = button("EXR", "Shift + F12: writes the render in floating point");
-    ImGui::TextDisabled("F1: keys   F2: hide this panel");
+    ImGui::TextDisabled("F1: keys   F2: hide this");
+    ImGui::SameLine();
+    if (ImGui::SmallButton("Open")) ImGui::OpenPopup("open");
+    if (ImGui::BeginPopup("open")) {
+        if (ImGui::MenuItem("A file", "Ctrl+O")) actions.open = Wanted::file;
+        if (ImGui::MenuItem("A folder", "Ctrl+Shift+O")) actions.open = Wanted::folder;
+        ImGui::EndPopup();
+    }
     draw_text_box("note", facts.note, kNoteLines);
 }
 

@@ -9,6 +9,7 @@
 #include "io/datasets/view_list.h"
 #include "live/watcher.h"
 #include "viewer/comparison.h"
+#include "viewer/file_dialog.h"
 #include "viewer/opening.h"
 
 namespace ewa::viewer {
@@ -53,6 +54,7 @@ struct PanelActions {
     std::optional<size_t> view, forget;
     std::optional<glm::dvec3> up;
     std::optional<std::string> command;  // for the training run: pause, resume or save
+    std::optional<Wanted> open;          // by the file dialog
 };
 
 PanelActions draw_panel(const PanelFacts& facts, PanelSettings& settings);

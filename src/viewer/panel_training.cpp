@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <numeric>
 
+#include "core/text.h"
 #include "viewer/panel.h"
 
 namespace ewa::viewer {
@@ -28,20 +29,19 @@ std::vector<float> curve(const std::vector<float>& values) {
     return means;
 }
 
-/// The curve, with the name and the last value in it.
+/// The name, the last value and the curve.
 void plot(const char* name, const std::vector<float>& values, const char* format) {
-    std::array<char, 64> text{};
     if (values.empty())
-        std::snprintf(text.data(), text.size(), "%s: none yet", name);
+        ImGui::Text("%s: none yet", name);
     else
-        std::snprintf(text.data(), text.size(), format, double(values.back()));
+        ImGui::Text(format, double(values.back()));
     std::vector<float> points = curve(values);
     if (points.empty()) points.push_back(0);
     const auto [least, most] = std::minmax_element(points.begin(), points.end());
     const float margin = std::max(1e-6f, 0.05f * (*most - *least));
     ImGui::PushID(name);
-    ImGui::PlotLines("", points.data(), int(points.size()), 0, text.data(), *least - margin, *most + margin,
-                     ImVec2(ImGui::GetContentRegionAvail().x, ImGui::GetTextLineHeight() * 3));
+    ImGui::PlotLines("", points.data(), int(points.size()), 0, nullptr, *least - margin, *most + margin,
+                     ImVec2(ImGui::GetContentRegionAvail().x, ImGui::GetTextLineHeight() * 2));
     ImGui::PopID();
 }
 
@@ -53,8 +53,9 @@ void show_progress(const live::Update& run) {
                       run.problem.empty() ? "waiting for the first step ..." : "no training is reached");
     } else {
         const char* state = status.state == live::State::paused ? "paused"
-                            : status.state == live::State::done ? "done"
-                                                                : "training";
+                            : status.state != live::State::done ? "training"
+                            : status.step < status.steps        ? "interrupted"
+                                                                : "done";
         std::snprintf(text.data(), text.size(), "%s: step %d of %d, %.0f s", state, status.step, status.steps,
                       status.seconds);
     }
@@ -62,6 +63,8 @@ void show_progress(const live::Update& run) {
     const float share = status.steps > 0 ? float(status.step) / float(status.steps) : 0;
     ImGui::ProgressBar(share, ImVec2(ImGui::GetContentRegionAvail().x, 0.4f * ImGui::GetTextLineHeight()),
                        "");
+    const double left = live::seconds_left(status);
+    ImGui::TextUnformatted(std::isnan(left) ? "" : ("about " + core::duration_text(left) + " left").c_str());
 }
 
 /// Which step the picture is of.
@@ -76,12 +79,14 @@ void show_step(const PanelFacts& facts) {
 }
 
 void show_curves(const live::Status& status) {
-    std::vector<float> loss, psnr;
+    std::vector<float> loss, train, psnr;
     for (const report::MetricsLine& line : status.metrics) {
         if (std::isfinite(line.loss)) loss.push_back(float(line.loss));
+        if (line.train_psnr && std::isfinite(*line.train_psnr)) train.push_back(float(*line.train_psnr));
         if (line.test_psnr && std::isfinite(*line.test_psnr)) psnr.push_back(float(*line.test_psnr));
     }
     plot("loss", loss, "loss %.4f");
+    plot("training PSNR", train, "training PSNR %.2f dB");
     plot("held-out PSNR", psnr, "held-out PSNR %.2f dB");
 }
 

@@ -34,6 +34,28 @@ TEST(LiveStatus, ComesBack) {
     EXPECT_EQ(read.metrics[1].test_psnr, 22);
 }
 
+TEST(LiveStatus, TellsTheTimeLeft) {
+    Status status{.run = "r1", .step = 0, .steps = 1000};
+    const auto add = [&](int step, double seconds) {
+        report::MetricsLine line = line_of(step);
+        line.wall_seconds = seconds;
+        status.metrics.push_back(line);
+        status.step = step;
+    };
+    add(100, 1000);  // too long ago to count
+    EXPECT_TRUE(std::isnan(seconds_left(status)));
+    for (int i = 0; i <= 10; ++i) add(200 + 10 * i, 1000 + 5 * i);
+    status.step = 400;
+    EXPECT_DOUBLE_EQ(seconds_left(status), 300);
+    status.state = State::paused;
+    EXPECT_TRUE(std::isnan(seconds_left(status)));
+    status.state = State::running;
+    status.step = status.steps;
+    EXPECT_EQ(seconds_left(status), 0);
+    status.metrics.back().step = 100;  // a clock or a run that goes back
+    EXPECT_TRUE(std::isnan(seconds_left(status)));
+}
+
 TEST(LiveStatus, DamagedTextIsRefused) {
     EXPECT_THROW(decode_status("{}"), InputError);
     EXPECT_THROW(decode_status("[1"), InputError);

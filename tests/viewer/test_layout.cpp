@@ -2,18 +2,19 @@
 // Where the window shows what, what it remembers, and its font: the parts that need no window.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <filesystem>
-#include <optional>
 
 #include "cli/program.h"
 #include "viewer/font.h"
 #include "viewer/kept_settings.h"
 #include "viewer/layout.h"
 #include "viewer/message.h"
+#include "viewer/variable.h"
 
 namespace ewa::viewer {
 namespace {
+
+using test::Variable;
 
 TEST(Layout, ThePictureIsBesideThePanel) {
     EXPECT_EQ(free_area({1100, 800}, 300), (Rectangle{300, 0, 800, 800}));
@@ -64,34 +65,9 @@ TEST(Layout, AnImageWithoutItsLeftColumns) {
     EXPECT_EQ(without_left(image, 9).pixels, (std::vector<float>{3, 6}));
 }
 
-/// Sets a variable of the environment as long as it lives.
-class Variable {
-  public:
-    Variable(const char* name, const std::string& value) : name_(name) {
-        if (const char* before = std::getenv(name)) before_ = before;
-        setenv(name, value.c_str(), 1);
-    }
-    ~Variable() {
-        if (before_)
-            setenv(name_, before_->c_str(), 1);
-        else
-            unsetenv(name_);
-    }
-    Variable(const Variable&) = delete;
-    Variable& operator=(const Variable&) = delete;
-
-  private:
-    const char* name_;
-    std::optional<std::string> before_;
-};
-
 TEST(KeptSettings, ComeBack) {
     const test::Folder folder;
-    const KeptSettings kept{.window = Size{1234, 777},
-                            .mode = Mode::ellipsoids,
-                            .text_scale = 1.5f,
-                            .gain = 8,
-                            .film_seconds = 3};
+    const KeptSettings kept{.window = Size{1234, 777}, .text_scale = 1.5f, .gain = 8, .film_seconds = 3};
     const std::string file = folder / "new/folder/view.json";
     write_settings(file, kept);
     EXPECT_EQ(read_settings(file), kept);
@@ -113,8 +89,8 @@ TEST(KeptSettings, DamageIsIgnored) {
           std::string("{\"window_width\": -5, \"window_height\": 1e300}"),
           std::string("{\"window_width\": 800}"), std::string("\xff\xfe")})
         EXPECT_EQ(read(text), KeptSettings()) << text.substr(0, 60);
-    const KeptSettings partly = read("{\"mode\": \"depth\", \"gain\": null, \"unknown\": {}}");
-    EXPECT_EQ(partly.mode, Mode::depth);
+    const KeptSettings partly = read("{\"text_scale\": 2, \"gain\": null, \"mode\": \"depth\"}");
+    EXPECT_EQ(partly.text_scale, 2);
     EXPECT_EQ(partly.gain, KeptSettings().gain);
 }
 

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "viewer/camera_search.h"
+
+#include <chrono>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "core/folders.h"
+#include "core/json.h"
+#include "ewa/error.h"
+#include "ewa/run.h"
+
+namespace ewa::viewer {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Whether the folder is a dataset that was made, or begun, of these photos.
+bool made_of_photos(const fs::path& dataset, const fs::path& photos) {
+    try {
+        const auto capture = core::read_json_file<nlohmann::json>(dataset / "capture.json");
+        std::error_code error;
+        return capture.is_object() &&
+               capture.value("input", nlohmann::json()) == fs::canonical(photos, error).string();
+    } catch (const InputError&) {
+        return false;
+    }
+}
+
+}  // namespace
+
+fs::path folder_for_photos(const fs::path& photos) {
+    RunOptions run;
+    run.dataset = photos;
+    const fs::path usual = output_folder(run);
+    for (int i = 1;; ++i) {
+        fs::path folder = usual;
+        if (i > 1) folder += "-" + std::to_string(i);
+        std::error_code error;
+        if (!fs::exists(folder, error) || made_of_photos(folder / "dataset", photos)) return folder;
+    }
+}
+
+void CameraSearch::start(const fs::path& photos, const fs::path& folder, const CaptureOptions& options) {
+    stop_ = false;
+    progress_ = {};
+    found_ = std::async(std::launch::async, [=, this]() -> std::optional<OpenedScene> {
+        struct AtEnd {
+            const std::function<void()>& wake;
+            ~AtEnd() { wake(); }
+        } const at_end{wake_};
+        const Capture capture =
+            make_dataset(photos, folder, options, [this](const CaptureProgress& now) { return note(now); });
+        if (capture.interrupted) return std::nullopt;
+        OpenedScene scene = open_scene(folder, {});
+        scene.photos = photos;
+        scene.title = scene_title(photos);
+        for (const std::string& remark : capture.remarks) scene.remark = remark + "; " + scene.remark;
+        return scene;
+    });
+}
+
+bool CameraSearch::ended() const {
+    return found_.valid() && found_.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+}
+
+CaptureProgress CameraSearch::progress() const {
+    const std::lock_guard lock(mutex_);
+    return progress_;
+}
+
+bool CameraSearch::note(const CaptureProgress& now) {
+    bool changed = false;
+    {
+        const std::lock_guard lock(mutex_);
+        changed = now.what != progress_.what || now.unit != progress_.unit || now.done != progress_.done ||
+                  now.total != progress_.total;
+        progress_ = now;
+    }
+    if (changed) wake_();
+    return !stop_;
+}
+
+}  // namespace ewa::viewer

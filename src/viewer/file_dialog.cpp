@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "viewer/file_dialog.h"
+
+#include <algorithm>
+#include <chrono>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/process.h"
+#include "ewa/error.h"
+
+namespace ewa::viewer {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The command of the dialog; empty if neither program is installed.
+std::vector<std::string> dialog_command(Wanted wanted) {
+    const bool folder = wanted == Wanted::folder;
+    if (!core::find_program("zenity").empty()) {
+        std::vector<std::string> command{"zenity", "--file-selection", "--title=Open"};
+        if (folder) command.emplace_back("--directory");
+        return command;
+    }
+    if (!core::find_program("kdialog").empty())
+        return {"kdialog", folder ? "--getexistingdirectory" : "--getopenfilename", "."};
+    return {};
+}
+
+fs::path ask_program(Wanted wanted, const std::atomic<bool>& stop) {
+    std::vector<std::string> command = dialog_command(wanted);
+    if (command.empty())
+        throw RunError(
+            "there is no file dialog here: install zenity (Debian: apt install zenity), or drop the file on "
+            "the window");
+    std::string text;
+    // The toolkits' warnings do not concern the user.
+    const core::Program program{.command = std::move(command), .environment = {}, .log = "/dev/null"};
+    const core::Ended ended = core::run_program(program, [&](std::string_view piece) {
+        text += piece;
+        return !stop;
+    });
+    if (ended != core::Ended::done) return {};  // cancelled
+    if (text.ends_with('\n')) text.pop_back();
+    return text;
+}
+
+}  // namespace
+
+void FileDialog::ask(Wanted wanted) {
+    if (open()) return;
+    answer_ = std::async(std::launch::async, [this, wanted] {
+        struct AtEnd {
+            const std::function<void()>& wake;
+            ~AtEnd() { wake(); }
+        } const at_end{wake_};
+        fs::path chosen;
+        return ask_portal(wanted, stop_, chosen) ? chosen : ask_program(wanted, stop_);
+    });
+}
+
+std::optional<fs::path> FileDialog::take() {
+    if (!open() || answer_.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
+        return std::nullopt;
+    fs::path chosen = answer_.get();
+    if (chosen.empty()) return std::nullopt;
+    return chosen;
+}
+
+fs::path path_of_uri(std::string_view uri) {
+    constexpr std::string_view kScheme = "file://";
+    if (!uri.starts_with(kScheme)) return {};
+    uri.remove_prefix(std::min(uri.find('/', kScheme.size()), uri.size()));  // and a host
+    const auto digit = [](char c) {
+        return c >= '0' && c <= '9'   ? c - '0'
+               : c >= 'a' && c <= 'f' ? c - 'a' + 10
+               : c >= 'A' && c <= 'F' ? c - 'A' + 10
+                                      : -1;
+    };
+    std::string path;
+    for (size_t i = 0; i < uri.size(); ++i) {
+        const bool escape =
+            uri[i] == '%' && i + 2 < uri.size() && digit(uri[i + 1]) >= 0 && digit(uri[i + 2]) >= 0;
+        path += escape ? char(16 * digit(uri[i + 1]) + digit(uri[i + 2])) : uri[i];
+        if (escape) i += 2;
+    }
+    return path;
+}
+
+}  // namespace ewa::viewer

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// The desktop's dialog that asks for a file or a folder.
+#pragma once
+#include <atomic>
+#include <filesystem>
+#include <functional>
+#include <future>
+#include <optional>
+#include <string_view>
+
+namespace ewa::viewer {
+
+enum class Wanted { file, folder };
+
+/// Asks by the desktop's portal, else by the program zenity or kdialog, on a thread of its own.
+class FileDialog {
+  public:
+    /// wake: called on the thread when take() has an answer.
+    explicit FileDialog(std::function<void()> wake) : wake_(std::move(wake)) {}
+    /// Closes the dialog.
+    ~FileDialog() { stop_ = true; }
+    FileDialog(const FileDialog&) = delete;
+    FileDialog& operator=(const FileDialog&) = delete;
+
+    /// Opens the dialog, unless one is open.
+    void ask(Wanted wanted);
+    bool open() const { return answer_.valid(); }
+    /// What the user has chosen, once. Throws RunError where there is no dialog.
+    std::optional<std::filesystem::path> take();
+
+  private:
+    std::function<void()> wake_;
+    std::atomic<bool> stop_ = false;
+    std::future<std::filesystem::path> answer_;  // its thread ends before the rest
+};
+
+/// Asks org.freedesktop.portal.FileChooser on the session bus. Returns false if nobody answers there. chosen: empty if the
+/// user has cancelled, or `stop` was set.
+bool ask_portal(Wanted wanted, const std::atomic<bool>& stop, std::filesystem::path& chosen);
+
+/// The path of a file:// URI; empty for anything else.
+std::filesystem::path path_of_uri(std::string_view uri);
+
+}  // namespace ewa::viewer
