@@ -74,8 +74,10 @@ bool CameraSearch::note(const CaptureProgress& now) {
     {
         const std::lock_guard lock(mutex_);
         changed = now.what != progress_.what || now.unit != progress_.unit || now.done != progress_.done ||
-                  now.total != progress_.total;
+                  now.total != progress_.total || !now.note.empty();
+        const std::string note = now.note.empty() ? progress_.note : now.note;  // it comes once
         progress_ = now;
+        progress_.note = note;
     }
     if (changed) wake_();
     return !stop_;

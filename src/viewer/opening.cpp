@@ -180,6 +180,8 @@ OpenedScene open_scene(const fs::path& path, const fs::path& cameras) {
         scene = open_run(*run, cameras);
     } else if (core::is_file(path / "dataset/capture.json")) {
         return open_scene(path / "dataset", {});  // of photos on which nothing was trained yet
+    } else if (const fs::path dataset = dataset_of_images(path); !dataset.empty()) {
+        return open_scene(dataset, cameras);
     } else if (is_capture(path)) {
         scene.photos = path;
     } else if (fs::is_directory(path, error)) {

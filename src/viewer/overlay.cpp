@@ -270,6 +270,11 @@ bool draw_search(const CaptureProgress& progress, const Rectangle& area) {
         const float line = ImGui::GetTextLineHeight();
         ImGui::ProgressBar(float(progress.done) / float(std::max(1, progress.total)),
                            ImVec2(16 * line, 0.4f * line), "");
+        if (!progress.note.empty()) {
+            ImGui::PushTextWrapPos(16 * line);
+            ImGui::TextUnformatted(progress.note.c_str());
+            ImGui::PopTextWrapPos();
+        }
         stop = ImGui::Button("Stop");
         ImGui::SameLine();
         ImGui::TextDisabled("Esc; what is done is kept");

@@ -141,6 +141,8 @@ TEST(Opening, PhotosAndVideosAreNotOpenedYet) {
     }
     EXPECT_EQ(viewer::open_dropped({folder / "splats.ply", folder / "photos"}, {}).photos, folder / "photos");
     EXPECT_EQ(viewer::open_scene(folder / "views", {}).photos, "");
+    // Images of a dataset open it.
+    EXPECT_TRUE(viewer::open_scene(folder / "views/images", {}).dataset);
     // A run's folder in which nothing was trained yet is the dataset in it.
     fs::create_directories(folder / "out/photos");
     fs::rename(folder / "views", folder / "out/photos/dataset");
