@@ -38,12 +38,14 @@ class WindowTest : public testing::Test {
         // Its messages come on standard output, which expect_silent() wants empty.
         setenv("VK_INSTANCE_LAYERS", "VK_LAYER_KHRONOS_validation", 1);
         setenv("XDG_CONFIG_HOME", config_.c_str(), 1);  // the user's settings are not the tests'
+        setenv("DBUS_SESSION_BUS_ADDRESS", "unix:path=/nonexistent/bus", 1);  // nor are its dialogs
         make_splats(splats_, 400, 2);
         make_dataset(cameras_);
     }
     void TearDown() override {
         unsetenv("VK_INSTANCE_LAYERS");
         unsetenv("XDG_CONFIG_HOME");
+        unsetenv("DBUS_SESSION_BUS_ADDRESS");
     }
 
     static void expect_silent(const Outcome& outcome) {
