@@ -48,11 +48,15 @@ def blocks_of(text):
 
 
 def commands_of(body):
-    """(offset, command): lines without the prompt; a backslash at the end joins the next line."""
+    """(offset, command): lines without the prompt; a backslash at the end joins the next line. Beside lines with a prompt,
+    others are output."""
     whole, start = "", 0
+    prompts = any(line.startswith("$ ") for line in body)
     for offset, line in enumerate(body):
         if not whole:
             start = offset
+            if prompts and not line.startswith("$ "):
+                continue
         whole += line.removeprefix("$ ")
         if line.endswith("\\"):
             whole += "\n"

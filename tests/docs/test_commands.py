@@ -11,7 +11,8 @@ SAMPLE = """# Title
 ```
 $ one thing \\
     more          # a remark
-other thing
+what it answers
+$ other thing
 ```
 <!-- not run: takes a year -->
 ```python
@@ -42,14 +43,14 @@ class Commands(unittest.TestCase):
             "document docs/sample.md",
             "first docs/sample.md:4 'make it'",
             "execute docs/sample.md:5 'one thing \\\n    more          # a remark'",
-            "skipped docs/sample.md:7 'other thing' 'needs two'",
-            "skipped docs/sample.md:11 Python 'takes a year'",
-            "execute docs/sample.md:16 scripts/build",
+            "skipped docs/sample.md:8 'other thing' 'needs two'",
+            "skipped docs/sample.md:12 Python 'takes a year'",
+            "execute docs/sample.md:17 scripts/build",
             "end_document",
         ])
 
     def test_fast_builds_nothing(self):
-        self.assertIn("skipped docs/sample.md:16 scripts/build '--fast: it builds or installs'", self.script(fast=True))
+        self.assertIn("skipped docs/sample.md:17 scripts/build '--fast: it builds or installs'", self.script(fast=True))
 
     def test_every_comment_of_the_documents_is_understood(self):
         for path in [commands.ROOT / "README.md", *(commands.ROOT / "docs").glob("*.md")]:
