@@ -12,6 +12,7 @@
 #include <cstring>
 #include <exception>
 #include <mutex>
+#include <optional>
 #include <thread>
 
 #include "ewa/error.h"
@@ -131,7 +132,8 @@ void MpiRanks::enter(const MpiOptions& options) {
     if (!has_begun) {
         // Open MPI's other way of sending over TCP uses one direction of the network at a time. The user's choice goes before.
         setenv("OMPI_MCA_btl_tcp_flags", "1", 0);
-        const StartLimit limit(timeout_);
+        std::optional<StartLimit> limit;
+        if (options.start.count() > 0) limit.emplace(options.start);
         check(MPI_Init_thread(nullptr, nullptr, MPI_THREAD_SERIALIZED, &level), "start");
         entered_ = true;
     }
@@ -300,5 +302,5 @@ std::shared_ptr<ewa::Ranks> open(const MpiOptions& options) {
 
 }  // namespace
 
-extern "C" [[gnu::visibility("default")]] const ewa::ranks::Mpi ewa_mpi_layout_1;
-const ewa::ranks::Mpi ewa_mpi_layout_1 = {EWA_VERSION, open};
+extern "C" [[gnu::visibility("default")]] const ewa::ranks::Mpi ewa_mpi_layout_2;
+const ewa::ranks::Mpi ewa_mpi_layout_2 = {EWA_VERSION, open};

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ranks/open.h"
 
+#include <algorithm>
 #include <cstdlib>
 
 #include "core/plugin.h"
@@ -27,7 +28,10 @@ std::shared_ptr<Ranks> open_mpi(const MpiOptions& options) {
 std::shared_ptr<Ranks> open_ranks(std::chrono::milliseconds timeout) {
     const auto launcher = ranks::find_launcher([](const char* name) { return std::getenv(name); });
     if (!launcher.found) return alone();
-    return ranks::open_mpi({.timeout = timeout, .size = launcher.size});
+    // Processes may start long after each other on a busy machine.
+    constexpr std::chrono::milliseconds kLeastStart{10000};
+    return ranks::open_mpi(
+        {.timeout = timeout, .start = std::max(timeout, kLeastStart), .size = launcher.size});
 }
 
 }  // namespace ewa

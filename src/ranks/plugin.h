@@ -10,8 +10,9 @@
 namespace ewa::ranks {
 
 struct MpiOptions {
-    std::chrono::milliseconds timeout;  // of gather and exchange
-    int size = 0;                       // the processes that the launcher started; 0: it does not say
+    std::chrono::milliseconds timeout;   // of gather and exchange
+    std::chrono::milliseconds start{0};  // of MPI's start; 0: no limit
+    int size = 0;                        // the processes that the launcher started; 0: it does not say
     // Longer parts travel in several messages: MPI counts bytes with an int, and each one that arrives shows that data
     // still flow.
     size_t message_bytes = size_t(4) << 20;
@@ -24,7 +25,7 @@ struct Mpi {
 constexpr const char* kMpiFile = "libewa_mpi.so";
 /// Ends in the number of the layout. Count it up whenever a type above or Ranks changes: a module of another layout
 /// then has no such entry, and is refused.
-constexpr const char* kMpiEntry = "ewa_mpi_layout_1";
+constexpr const char* kMpiEntry = "ewa_mpi_layout_2";
 
 /// Loads the module. Throws RunError.
 const Mpi& load_mpi();

@@ -366,6 +366,30 @@ TEST_F(Cameras, ColmapEndsWithAKilledEwa) {
     EXPECT_EQ(cameras().status, 0);
 }
 
+/// The time left is that of the search, the comparison, the placing and the training together.
+TEST_F(Cameras, LeaveTimeForTheTrainingAfterThem) {
+    make_program(folder_ / "bin/colmap", R"sh(
+case "$*" in *--help*) exit 0;; esac
+if [ "$1" = feature_extractor ]; then
+    touch "$3"
+    for i in 1 2 3 4; do sleep 0.05; echo "Processed file [$i/4]"; done
+    exit 0
+fi
+exit 1
+)sh");
+    const Outcome alone = cameras();
+    EXPECT_NE(alone.out.find("searched 3/4 photos, "), std::string::npos) << alone.out;
+    EXPECT_EQ(alone.out.find(" h "), std::string::npos) << alone.out;
+    const Outcome with_training =
+        run({"train", folder_ / "photos", "-o", folder_ / "out", "--steps", "20M"});
+    expect_failure(with_training, 1, "colmap exhaustive_matcher failed");
+    const size_t line = with_training.out.find("searched 3/4 photos, ");
+    ASSERT_NE(line, std::string::npos) << with_training.out;
+    const std::string text = with_training.out.substr(line, with_training.out.find('\n', line) - line);
+    EXPECT_NE(text.find(" h "), std::string::npos) << text;
+    EXPECT_TRUE(text.ends_with(" left")) << text;
+}
+
 TEST_F(Cameras, PhotosMayChangeWhileTheyGiveNothing) {
     make_model("0", {"0.png", "1.png", "2.png"});
     make_program(folder_ / "bin/colmap", "exit 1");

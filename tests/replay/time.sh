@@ -28,12 +28,6 @@ row_ranks_with_other_options_are_refused() {
     missing o/splats.ply
 }
 
-row_a_process_that_never_joins_does_not_hold_the_others() {
-    needs_mpi
-    on_two_nodes 1 -n 1 ewa train "$DATASET" -o o --batch 2 --steps 4 --rank-timeout 1 : -n 1 ewa info "$SPLATS"
-    says "MPI has not started after 1 s"
-}
-
 # Prints what a terminal of so many columns gets from the command.
 on_terminal() {
     command -v script > /dev/null || skip "there is no script(1)"
@@ -67,4 +61,18 @@ row_doctor_tells_what_works_and_how_to_get_the_rest() {
     VK_ICD_FILENAMES=/dev/null VK_DRIVER_FILES=/dev/null run 1 ewa doctor
     says "no   training"
     says "ewa cannot train on this machine"
+}
+
+row_a_long_run_says_early_how_long_it_takes() {
+    ewa train "$DATASET" -o o --steps 1M > lines 2>&1 &
+    local trainer=$! try status=0
+    local line='the training takes about .* on this device, with --quality low about '
+    for ((try = 0; try < 600; ++try)); do
+        if grep -q "$line" lines || ! kill -0 $trainer; then break; fi
+        sleep 0.1
+    done
+    kill -TERM $trainer
+    wait $trainer || status=$?
+    [[ $status == 130 ]] || fail "ended with $status"
+    grep -q "$line" lines || fail "no time in: $(cat lines)"
 }
