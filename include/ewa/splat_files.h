@@ -36,8 +36,8 @@ Gaussians load_splats(const std::filesystem::path& path);
 /// Writes the format of the extension to a temporary file and renames it. So the path never holds half a
 /// file. All formats but .ply skip the splats that are not drawable. Returns one line for each thing that the
 /// format cannot store: what is dropped, and the number of bits of quantised values. Throws RunError (disk).
-/// Throws InputError for an unknown extension, values out of the format's range, or a .bin beside a .gltf
-/// that belongs to another file.
+/// Throws InputError for an unknown extension or values out of the format's range. The values of a .gltf or a meta.json
+/// go to files beside it whose names are free; those that the replaced file named are removed.
 std::vector<std::string> save_splats(const std::filesystem::path& path, const Gaussians& gaussians,
                                      const SaveOptions& options);
 

@@ -127,9 +127,11 @@ void check_files(const ConvertArguments& arguments) {
     }
     check_command_outputs(outputs, inputs);
     const SplatFormat format = format_of_name(out);
-    if (format == SplatFormat::gltf) outputs.push_back({"the .bin of OUT", io::new_gltf_values(out)});
-    if (format == SplatFormat::sog_meta)
-        for (const fs::path& image : io::new_sog_images(out)) outputs.push_back({"an image of OUT", image});
+    io::ValueFiles beside;
+    if (format == SplatFormat::gltf) beside = io::gltf_value_files(out);
+    if (format == SplatFormat::sog_meta) beside = io::sog_value_files(out);
+    for (const fs::path& file : beside.written) outputs.push_back({"the file of OUT's values", file});
+    for (const fs::path& file : beside.removed) outputs.push_back({"the file of OUT's older values", file});
     if (outputs.size() > 2) check_command_outputs(outputs, inputs);
 }
 

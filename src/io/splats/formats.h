@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "ewa/splat_scene.h"
+#include "io/splats/value_files.h"
 
 namespace ewa::io {
 
@@ -70,14 +71,11 @@ SplatScene read_gltf_splats(const std::filesystem::path& path);
 /// The files that hold the values of an existing .gltf. Empty if it holds them itself or cannot be read.
 std::vector<std::filesystem::path> gltf_values(const std::filesystem::path& gltf);
 
-/// The file that write_gltf_splats will write beside a .gltf: STEM.bin. If an earlier .gltf of this name has its values
-/// there, it is STEM-2.bin, so that this .gltf stays whole until it is replaced. Throws InputError if STEM.bin belongs
-/// to another file.
-std::filesystem::path new_gltf_values(const std::filesystem::path& gltf);
+/// What write_gltf_splats does beside a .gltf. The usual name of the values is STEM.bin.
+ValueFiles gltf_value_files(const std::filesystem::path& gltf);
 
 /// Writes float32 throughout and sRGB colours. The extension .glb makes one file, any other one a .gltf and the
-/// file of new_gltf_values. The values of an earlier .gltf are removed. Throws InputError for a scene without splats,
-/// more than 4 GiB in a .glb, or as new_gltf_values does.
+/// file of gltf_value_files. Throws InputError for a scene without splats or more than 4 GiB in a .glb.
 std::vector<std::string> write_gltf_splats(const std::filesystem::path& path, const Gaussians& gaussians,
                                            const SaveOptions& options);
 
@@ -96,16 +94,14 @@ bool is_sog_meta(const std::filesystem::path& path);
 std::vector<std::string> write_sog(const std::filesystem::path& path, const Gaussians& gaussians,
                                    const SaveOptions& options);
 
-/// The same as a meta.json with the images of new_sog_images beside it. The images of an earlier meta.json are
-/// removed. Throws InputError also as new_sog_images does.
+/// The same as a meta.json with the images of sog_value_files beside it.
 std::vector<std::string> write_sog_meta(const std::filesystem::path& path, const Gaussians& gaussians,
                                         const SaveOptions& options);
 
 /// The images that an existing meta.json names. Empty if it cannot be read.
 std::vector<std::filesystem::path> sog_images(const std::filesystem::path& meta);
 
-/// The images that write_sog_meta may write, as new_gltf_values: means_l.webp and so on, means_l-2.webp and so on if
-/// the meta.json uses those. Throws InputError if one of them belongs to something else.
-std::vector<std::filesystem::path> new_sog_images(const std::filesystem::path& meta);
+/// What write_sog_meta does beside a meta.json. The usual names are means_l.webp and so on.
+ValueFiles sog_value_files(const std::filesystem::path& meta);
 
 }  // namespace ewa::io

@@ -29,7 +29,6 @@
 #include "io/gltf/document.h"
 #include "io/splats/formats.h"
 #include "io/splats/splat_values.h"
-#include "io/splats/value_files.h"
 #include "scene/color.h"
 
 namespace ewa::io {
@@ -382,31 +381,19 @@ void write_binary(const std::filesystem::path& path, const Gaussians& gaussians,
     file.commit();
 }
 
-/// The names that the values of a .gltf may have. Two are enough for one that is replaced. A kill before its old values
-/// are removed needs the third.
-std::vector<Paths> values_names(const std::filesystem::path& gltf) {
-    std::vector<Paths> names;
-    for (const char* end : {".bin", "-2.bin", "-3.bin"}) {
-        std::filesystem::path name = std::filesystem::path(gltf).replace_extension();
-        name += end;
-        names.push_back({name});
-    }
-    return names;
-}
-
 /// Both files are on disk before either is renamed. The new values have another name than the old ones. The rename of
 /// the .gltf thus replaces all of it at once.
 void write_pair(const std::filesystem::path& path, const Gaussians& gaussians,
                 const std::vector<Attribute>& attributes, Json root, const SaveOptions& options) {
-    const std::filesystem::path buffer = new_gltf_values(path);
-    const bool replaces = !gltf_values(path).empty();
+    const ValueFiles beside = gltf_value_files(path);
+    const std::filesystem::path& buffer = beside.written[0];
     root["buffers"][0]["uri"] = percent_encoded(buffer.filename().string());
     core::AtomicFile values(buffer), file(path);
     write_values(values, gaussians, attributes, options);
     file.write(root.dump(1) + "\n");
     values.commit();
     file.commit();
-    if (replaces) remove_other_names(values_names(path), {buffer});
+    remove_values(beside);
 }
 
 }  // namespace
@@ -423,11 +410,8 @@ std::vector<std::filesystem::path> gltf_values(const std::filesystem::path& gltf
     return {};
 }
 
-std::filesystem::path new_gltf_values(const std::filesystem::path& gltf) {
-    return free_names(
-        values_names(gltf), gltf_values(gltf),
-        ": would be replaced by the values of " + gltf.filename().string() +
-            ", but belongs to another file; choose another name, or .glb, which is one file")[0];
+ValueFiles gltf_value_files(const std::filesystem::path& gltf) {
+    return value_files(gltf, {std::filesystem::path(gltf).replace_extension(".bin")}, gltf_values);
 }
 
 std::vector<std::string> write_gltf_splats(const std::filesystem::path& path, const Gaussians& gaussians,

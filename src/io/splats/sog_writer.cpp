@@ -11,7 +11,6 @@
 #include "io/splats/formats.h"
 #include "io/splats/sog.h"
 #include "io/splats/splat_values.h"
-#include "io/splats/value_files.h"
 #include "io/splats/webp.h"
 
 namespace ewa::io {
@@ -186,19 +185,6 @@ std::vector<std::string> remarks_of(const Gaussians& gaussians, uint64_t palette
     return remarks;
 }
 
-/// The sets of names that the images of a meta.json may have.
-std::vector<Paths> image_names(const std::filesystem::path& meta) {
-    std::vector<Paths> names;
-    for (const char* end : {"", "-2", "-3"}) {
-        Paths& set = names.emplace_back();
-        for (const char* image : kSogImages) {
-            const std::filesystem::path name(image);
-            set.push_back(meta.parent_path() / (name.stem().string() + end + name.extension().string()));
-        }
-    }
-    return names;
-}
-
 SogPacker packer_for(const std::filesystem::path& path, const Gaussians& gaussians,
                      const SaveOptions& options) {
     SogPacker packer(gaussians, options);
@@ -222,27 +208,25 @@ std::vector<std::string> write_sog(const std::filesystem::path& path, const Gaus
     return remarks_of(gaussians, packer.palette());
 }
 
-std::vector<std::filesystem::path> new_sog_images(const std::filesystem::path& meta) {
-    return free_names(
-        image_names(meta), sog_images(meta),
-        ": would be replaced, but no meta.json of a SOG beside it names it; choose another folder, or "
-        ".sog, which is one file");
+ValueFiles sog_value_files(const std::filesystem::path& meta) {
+    Paths usual;
+    for (const char* image : kSogImages) usual.push_back(meta.parent_path() / image);
+    return value_files(meta, usual, sog_images);
 }
 
 std::vector<std::string> write_sog_meta(const std::filesystem::path& path, const Gaussians& gaussians,
                                         const SaveOptions& options) {
     SogPacker packer = packer_for(path, gaussians, options);
-    const Paths images = new_sog_images(path);
-    const bool replaces = !sog_images(path).empty();
+    const ValueFiles beside = sog_value_files(path);
     // All files are on disk before any is renamed, and meta.json comes last. Its rename replaces the SOG at once.
     std::vector<std::unique_ptr<core::AtomicFile>> files;
-    for (const auto& [name, bytes] : packer.pack(images)) {
+    for (const auto& [name, bytes] : packer.pack(beside.written)) {
         files.push_back(
             std::make_unique<core::AtomicFile>(name == kSogMeta ? path : path.parent_path() / name));
         files.back()->write(bytes);
     }
     for (const auto& file : files) file->commit();
-    if (replaces) remove_other_names(image_names(path), images);
+    remove_values(beside);
     return remarks_of(gaussians, packer.palette());
 }
 
