@@ -15,6 +15,7 @@ namespace {
 using namespace ewa;
 using test::bytes_of;
 using test::expect_error;
+using test::file_bytes;
 using test::TempFolder;
 
 Gaussians random_splats(size_t n, int degree) {
@@ -194,17 +195,57 @@ TEST(Ply, CommentsMarksAndExtraProperties) {
     const SplatScene scene = read_splats(folder.write("a.ply", text));
     EXPECT_TRUE(scene.antialiased);
     EXPECT_EQ(scene.variant, "ascii");
-    EXPECT_EQ(scene.comments, (std::vector<std::string>{"SplatRenderMode: mip", "by hand"}));
+    EXPECT_EQ(scene.comments, std::vector<std::string>{"by hand"});
     ASSERT_EQ(scene.remarks.size(), 1u);
     EXPECT_NE(scene.remarks[0].find("confidence"), std::string::npos);
-    for (const bool marked : {false, true}) {
-        save_splats(folder / "b.ply", scene.gaussians, SaveOptions{.comments = {"x"}, .antialiased = marked});
-        EXPECT_EQ(read_splats(folder / "b.ply").antialiased, marked);
-    }
-    // A mark that the comments hold already is not written twice.
-    save_splats(folder / "c.ply", scene.gaussians,
-                SaveOptions{.comments = scene.comments, .antialiased = true});
-    EXPECT_EQ(read_splats(folder / "c.ply").comments, scene.comments);
+}
+
+/// In both kinds of PLY, which SuperSplat and splat-transform mark alike.
+TEST(Ply, TheMarkOfAntialiasing) {
+    TempFolder folder;
+    const Gaussians splats = random_splats(3, 1);
+    struct Case {
+        std::vector<std::string> comments;
+        bool antialiased;
+    };
+    const Case cases[] = {{{"by hand"}, false},
+                          {{"SplatRenderMode: mip", "by hand"}, true},
+                          {{"by hand", "  SPLATRENDERMODE:  MIP  "}, true},
+                          {{"by hand", "SplatRenderMode: default"}, false},
+                          {{"by hand", "SplatRenderMode: banana"}, false},
+                          {{"antialiased 1", "by hand"}, true},
+                          {{"by hand", "antialiased 0"}, false},
+                          {{"antialiased 1", "SplatRenderMode: default", "by hand"}, false},
+                          {{"SplatRenderMode: default", "antialiased 1", "by hand"}, true}};
+    for (const char* name : {"a.ply", "a.compressed.ply"})
+        for (const Case& c : cases) {
+            SCOPED_TRACE(std::string(name) + ", " + c.comments.back());
+            save_splats(folder / name, splats, SaveOptions{.comments = {"HERE"}});
+            std::string text = file_bytes(folder / name), marks;
+            for (const std::string& comment : c.comments) marks += "comment " + comment + "\n";
+            text.replace(text.find("comment HERE\n"), 13, marks);
+            const SplatScene scene = read_splats(folder.write(name, text));
+            EXPECT_EQ(scene.antialiased, c.antialiased);
+            EXPECT_EQ(scene.comments.back(),
+                      c.comments.back() == "SplatRenderMode: banana" ? c.comments.back() : "by hand");
+            EXPECT_TRUE(scene.remarks.empty());
+            // As others read it: one mark in Brush's spelling, none where there is nothing to mark.
+            save_splats(folder / name, scene.gaussians,
+                        SaveOptions{.comments = c.comments, .antialiased = scene.antialiased});
+            const std::string saved = file_bytes(folder / name);
+            const size_t at = saved.find("comment SplatRenderMode: mip\n");
+            EXPECT_EQ(at != std::string::npos, c.antialiased);
+            EXPECT_EQ(saved.find("antialiased"), std::string::npos);
+            EXPECT_EQ(saved.find("default"), std::string::npos);
+            EXPECT_EQ(read_splats(folder / name).antialiased, c.antialiased);
+        }
+    save_splats(folder / "b.ply", splats, SaveOptions{.comments = {"HERE"}});
+    std::string text = file_bytes(folder / "b.ply");
+    text.replace(text.find("HERE"), 4, "SplatRenderMode: 2dgs");
+    const SplatScene flat = read_splats(folder.write("b.ply", text));
+    EXPECT_FALSE(flat.antialiased);
+    ASSERT_EQ(flat.remarks.size(), 1u);
+    EXPECT_NE(flat.remarks[0].find("2DGS"), std::string::npos);
 }
 
 TEST(Ply, ADensityIsSavedAsOthersShowItAndReadAsItWas) {

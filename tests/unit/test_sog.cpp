@@ -399,15 +399,56 @@ TEST(Sog, LeavesImagesOfOthersAlone) {
     TempFolder folder;
     const Gaussians g = test::storable_splats(1, 40, 0);
     folder.write("quats.webp", "somebody's");
-    expect_error<InputError>([&] { save_splats(folder / "meta.json", g); },
-                             {"quats.webp", "would be replaced"});
+    folder.write("sh0-3.webp", "somebody's");
     folder.write("meta.json", "{}");
-    expect_error<InputError>([&] { save_splats(folder / "meta.json", g); }, {"quats.webp"});
-    EXPECT_EQ(test::file_bytes(folder / "quats.webp"), "somebody's");
-    std::filesystem::remove(folder / "quats.webp");
-    for (int again = 0; again < 2; ++again) save_splats(folder / "meta.json", g);  // its own it replaces
-    EXPECT_EQ(load_splats(folder / "meta.json").size(), 40u);
-    EXPECT_EQ(test::files_in(folder.path()), 6u);
+    const auto save = [&] {
+        save_splats(folder / "meta.json", g);
+        EXPECT_EQ(load_splats(folder / "meta.json").size(), 40u);
+        for (const char* other : {"quats.webp", "sh0-3.webp"})
+            EXPECT_EQ(test::file_bytes(folder / other), "somebody's");
+        EXPECT_EQ(test::files_in(folder.path()), 8u);
+    };
+    for (int again = 0; again < 3; ++again) save();  // its own it replaces
+    EXPECT_TRUE(std::filesystem::exists(folder / "quats-2.webp"));
+    // Images that another meta.json names too.
+    std::filesystem::copy_file(folder / "meta.json", folder / "other.json");
+    save_splats(folder / "meta.json", g);
+    EXPECT_EQ(load_splats(folder / "other.json").size(), 40u);
+}
+
+/// PlayCanvas' specification has "antialias", splat-transform writes "model".
+TEST(Sog, TheMarkOfAntialiasing) {
+    TempFolder folder;
+    const std::pair<const char*, bool> cases[] = {{"{}", false},
+                                                  {R"({"antialias": true})", true},
+                                                  {R"({"model": "antialiased"})", true},
+                                                  {R"({"antialias": false, "model": "antialiased"})", true},
+                                                  {R"({"antialias": true, "model": "default"})", false},
+                                                  {R"({"antialias": true, "model": "new"})", true},
+                                                  {R"({"antialias": 1, "model": 2})", false}};
+    Files files = two_splats();
+    json meta = json::parse(files["meta.json"]);
+    meta.erase("antialias");
+    for (const auto& [marks, antialiased] : cases) {
+        json marked = meta;
+        marked.update(json::parse(marks));
+        files["meta.json"] = marked.dump();
+        const SplatScene scene = read_splats(folder.write("a.sog", zipped(files, 0)));
+        EXPECT_EQ(scene.antialiased, antialiased) << marks;
+        EXPECT_TRUE(scene.remarks.empty()) << marks;
+    }
+    meta["model"] = "2dgs";
+    files["meta.json"] = meta.dump();
+    const SplatScene flat = read_splats(folder.write("a.sog", zipped(files, 0)));
+    ASSERT_EQ(flat.remarks.size(), 1u);
+    EXPECT_NE(flat.remarks[0].find("2DGS"), std::string::npos);
+    for (const bool antialiased : {false, true}) {
+        save_splats(folder / "meta.json", flat.gaussians, SaveOptions{.antialiased = antialiased});
+        const json written = json::parse(test::file_bytes(folder / "meta.json"));
+        EXPECT_EQ(written["antialias"], antialiased);
+        EXPECT_EQ(written.contains("model"), antialiased) << "as splat-transform, which marks nothing else";
+        EXPECT_EQ(written.value("model", ""), antialiased ? "antialiased" : "");
+    }
 }
 
 TEST(Clusters, ACodebookIsNear) {

@@ -112,6 +112,10 @@ TEST(SplatFormats, SaysWhatIsLost) {
         std::string::npos);
     EXPECT_NE(all("a.splat", g, {.comments = {"x"}}).find("comments are dropped"), std::string::npos);
     EXPECT_NE(all("a.glb", g, {.antialiased = true}).find("anti-aliased is dropped"), std::string::npos);
+    for (const char* name : {"a.spz", "a.compressed.ply", "a.sog", "meta.json"}) {
+        EXPECT_EQ(all(name, g, {.antialiased = true}).find("anti-aliased"), std::string::npos) << name;
+        EXPECT_TRUE(read_splats(folder / name).antialiased) << name;
+    }
     EXPECT_EQ(all("a.spz", g, {.antialiased = true}).find("anti-aliased"), std::string::npos);
     EXPECT_TRUE(read_splats(folder / "a.spz").antialiased);
     EXPECT_EQ(all("a.spz", g, {}).find("clamped to -1..1\n1"), std::string::npos);
@@ -127,6 +131,21 @@ TEST(SplatFormats, SaysWhatIsLost) {
     }
     EXPECT_EQ(all("a.ply", g, {}), "");
     EXPECT_EQ(load_splats(folder / "a.ply").size(), 10u);
+}
+
+/// What a scene does not have costs nothing after a round trip either.
+TEST(SplatFormats, AbsentDegreesStayAbsent) {
+    TempFolder folder;
+    Gaussians g = storable_splats(1, 2000, 3);
+    const size_t stride = g.sh_stride();
+    for (size_t i = 0; i < g.size(); ++i) std::fill_n(&g.sh[stride * i + 12], stride - 12, 0.0f);
+    ASSERT_EQ(sh_degree_present(g), 1);
+    for (const char* name : {"a.ply", "a.compressed.ply", "a.spz", "a.glb", "a.gltf", "a.sog", "meta.json"}) {
+        save_splats(folder / name, g);
+        const Gaussians back = load_splats(folder / name);
+        EXPECT_EQ(sh_degree_present(back), 1) << name;
+        EXPECT_EQ(back.sh_degree, name == std::string("a.compressed.ply") ? 1 : 3) << name;
+    }
 }
 
 TEST(SplatFormats, NoSplats) {

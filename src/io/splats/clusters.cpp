@@ -313,6 +313,7 @@ std::array<float, 256> make_codebook(std::vector<float> values) {
     codes = first_codes(values);
     constexpr int kIterations = 40;
     for (int round = 0; round < kIterations; ++round) cells.improve(codes);
+    if (std::binary_search(values.begin(), values.end(), 0.0f)) codes[nearest(codes, 0)] = 0;
     return codes;
 }
 

@@ -10,7 +10,8 @@
 namespace ewa::io {
 
 /// 256 values in ascending order that are near all given ones: the values themselves if no more than 256
-/// differ. At least one value, all finite.
+/// differ. 0 is one of them if it is one of the values, so that absent coefficients stay absent. At least one value, all
+/// finite.
 std::array<float, 256> make_codebook(std::vector<float> values);
 
 /// The index of the nearest value of a codebook; the lower one of two.

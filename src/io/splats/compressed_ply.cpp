@@ -16,6 +16,7 @@
 #include "ewa/splat_edit.h"
 #include "io/splats/formats.h"
 #include "io/splats/ply_table.h"
+#include "io/splats/render_mark.h"
 #include "io/splats/splat_values.h"
 
 namespace ewa::io {
@@ -177,7 +178,7 @@ void read_sh(PlyTable& table, Gaussians& gaussians) {
 std::string header(const Gaussians& gaussians, const SaveOptions& options) {
     const std::string count = std::to_string(gaussians.size());
     std::string text = "ply\nformat binary_little_endian 1.0\n";
-    for (const std::string& comment : options.comments) text += "comment " + core::one_line(comment) + "\n";
+    for (const std::string& comment : marked_comments(options)) text += "comment " + comment + "\n";
     text += "element chunk " + std::to_string((gaussians.size() + kChunkSplats - 1) / kChunkSplats) + "\n";
     for (const char* name : kBoxNames) text += std::string("property float ") + name + "\n";
     text += "element vertex " + count + "\n";
@@ -270,6 +271,7 @@ SplatScene read_compressed_ply(const std::filesystem::path& path) {
     SplatScene scene;
     scene.format = SplatFormat::compressed_ply;
     scene.comments = table.comments();
+    take_marks(scene);
     scene.gaussians.sh_degree = scene.file_sh_degree = sh_degree_of(table);
     const std::vector<Box> boxes = read_boxes(table);
     read_vertices(table, boxes, scene.gaussians);
@@ -279,6 +281,12 @@ SplatScene read_compressed_ply(const std::filesystem::path& path) {
 
 std::vector<std::string> write_compressed_ply(const std::filesystem::path& path, const Gaussians& gaussians,
                                               const SaveOptions& options) {
+    // The bytes of a coefficient have no 0.
+    if (const int present = sh_degree_present(gaussians); present < gaussians.sh_degree) {
+        Gaussians lower = gaussians;
+        set_sh_degree(lower, present);
+        return write_compressed_ply(path, lower, options);
+    }
     const std::vector<uint32_t> order = morton_order(gaussians);
     core::AtomicFile file(path);
     file.write(header(gaussians, options));

@@ -17,9 +17,8 @@ class PlyTable;
 
 /// INRIA's PLY. Accepts any property order and scalar type, ascii and binary of either byte order. Other
 /// properties and elements are ignored. Values stay as they are, finite or not. Positions in double far from
-/// the world's origin become means relative to an origin of the scene. A comment "SplatRenderMode: mip"
-/// (Brush) or "antialiased 1" (Postshot) sets SplatScene::antialiased. A comment "ewa kernel density" sets
-/// Gaussians::density; it is not one of SplatScene::comments.
+/// the world's origin become means relative to an origin of the scene. The marks of render_mark.h and the comment
+/// "ewa kernel density", which sets Gaussians::density, are not among SplatScene::comments.
 SplatScene read_ply(const std::filesystem::path& path);
 
 /// Writes binary_little_endian and float32. If the scene has an origin, x y z are world positions in double.
@@ -33,11 +32,12 @@ size_t ply_row_bytes(const Gaussians& gaussians);
 /// Appends the row of splat i, ply_row_bytes() / 4 floats, to `rows`.
 void append_ply_row(const Gaussians& gaussians, size_t i, std::vector<float>& rows);
 
-/// SuperSplat's compressed PLY. is_compressed_ply: whether the header declares this layout.
+/// SuperSplat's compressed PLY, with the marks of read_ply. is_compressed_ply: whether the header declares this layout.
 bool is_compressed_ply(const PlyTable& table);
 SplatScene read_compressed_ply(const std::filesystem::path& path);
 
-/// Writes the splats in Morton order, which keeps the boxes of the chunks small.
+/// Writes the splats in Morton order, which keeps the boxes of the chunks small. The highest SH degrees are left out where
+/// all of their coefficients are 0.
 std::vector<std::string> write_compressed_ply(const std::filesystem::path& path, const Gaussians& gaussians,
                                               const SaveOptions& options);
 
@@ -81,7 +81,7 @@ std::vector<std::string> write_gltf_splats(const std::filesystem::path& path, co
 
 /// SOG (PlayCanvas): read_sog reads a zip archive, read_sog_meta a meta.json with its images beside it. Versions
 /// 1 and 2. The names in meta.json must stay in the archive or the folder. Errors name the file and the image
-/// or the property of meta.json.
+/// or the property of meta.json. render_mark.h has the marks.
 SplatScene read_sog(const std::filesystem::path& path);
 SplatScene read_sog_meta(const std::filesystem::path& path);
 

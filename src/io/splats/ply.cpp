@@ -21,6 +21,7 @@
 #include "ewa/splat_edit.h"
 #include "io/splats/formats.h"
 #include "io/splats/ply_table.h"
+#include "io/splats/render_mark.h"
 #include "io/splats/splat_values.h"
 #include "scene/opacity_fit.h"
 
@@ -80,17 +81,6 @@ std::vector<size_t> splat_columns(const PlyTable& table, const PlyElement& verte
     return columns;
 }
 
-/// Whether the comment is the anti-aliased mark of one of the programs that write it.
-bool says_antialiased(const std::string& comment) {
-    std::string_view rest = comment;
-    const std::string key = core::lower(core::next_word(rest)), value = core::lower(core::trim(rest));
-    return (key == "splatrendermode:" && value == "mip") || (key == "antialiased" && value == "1");
-}
-
-bool any_antialiased(const std::vector<std::string>& comments) {
-    return std::any_of(comments.begin(), comments.end(), says_antialiased);
-}
-
 /// Adds a remark on the contents that are skipped.
 void remark_ignored(const PlyElement& vertex, const std::vector<size_t>& columns, SplatScene& scene) {
     std::string ignored;
@@ -122,8 +112,7 @@ bool in_double(const Gaussians& gaussians) {
 
 std::string ply_header(const Gaussians& gaussians, const SaveOptions& options) {
     std::string text = "ply\nformat binary_little_endian 1.0\n";
-    for (const std::string& comment : options.comments) text += "comment " + core::one_line(comment) + "\n";
-    if (options.antialiased && !any_antialiased(options.comments)) text += "comment SplatRenderMode: mip\n";
+    for (const std::string& comment : marked_comments(options)) text += "comment " + comment + "\n";
     if (gaussians.density) text += std::string("comment ") + kDensityComment + "\n";
     text += "element vertex " + std::to_string(gaussians.size()) + "\n";
     const auto property = [&](const std::string& name) { text += "property float " + name + "\n"; };
@@ -170,7 +159,7 @@ SplatScene read_ply(const std::filesystem::path& path) {
     SplatScene scene;
     scene.comments = table.comments();
     scene.variant = table.format_name();
-    scene.antialiased = any_antialiased(scene.comments);
+    take_marks(scene);
     const bool density = std::erase(scene.comments, kDensityComment) > 0;
     const PlyElement& vertex = table.go_to("vertex");
     scene.file_sh_degree = degree_of(table, vertex);

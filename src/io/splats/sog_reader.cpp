@@ -11,6 +11,7 @@
 #include "core/text.h"
 #include "io/splats/archive.h"
 #include "io/splats/formats.h"
+#include "io/splats/render_mark.h"
 #include "io/splats/sog.h"
 #include "io/splats/splat_values.h"
 #include "io/splats/webp.h"
@@ -111,8 +112,15 @@ class Meta {
     const std::string& name() const { return name_; }
     uint64_t version() const { return version_; }
     uint64_t count() const { return count_; }
+    /// splat-transform's mark; empty where there is none.
+    std::string model() const {
+        const auto found = values_.find("model");
+        return found != values_.end() && found->is_string() ? found->get<std::string>() : std::string();
+    }
     bool antialiased() const {
         const auto found = values_.find("antialias");
+        if (model() == kAntialiasedModel || model() == kSurfels || model() == "default")
+            return model() == kAntialiasedModel;
         return found != values_.end() && found->is_boolean() && found->get<bool>();
     }
     bool has_sh() const { return values_.contains("shN") && !values_["shN"].is_null(); }
@@ -192,6 +200,7 @@ class SogReader {
     SplatScene read() {
         scene_.variant = "version " + std::to_string(meta_.version());
         scene_.antialiased = meta_.antialiased();
+        if (meta_.model() == kSurfels) remark_surfels(scene_);
         Image centroids;
         if (meta_.has_sh()) centroids = palette_image();
         Gaussians& g = scene_.gaussians;

@@ -9,6 +9,7 @@
 #include "io/splats/archive.h"
 #include "io/splats/clusters.h"
 #include "io/splats/formats.h"
+#include "io/splats/render_mark.h"
 #include "io/splats/sog.h"
 #include "io/splats/splat_values.h"
 #include "io/splats/webp.h"
@@ -57,6 +58,7 @@ class SogPacker {
         meta_["asset"]["generator"] = "ewa " EWA_VERSION;
         meta_["count"] = g_.size();
         meta_["antialias"] = options_.antialiased;
+        if (options_.antialiased) meta_["model"] = kAntialiasedModel;
         add_means();
         add_scales();
         add_rotations();

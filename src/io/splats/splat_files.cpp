@@ -190,8 +190,9 @@ std::vector<std::string> save_splats(const std::filesystem::path& path, const Ga
     else
         more = write(path, drawable_only(gaussians, remarks), options);
     remarks.insert(remarks.end(), more.begin(), more.end());
-    const bool sog = format == SplatFormat::sog || format == SplatFormat::sog_meta;
-    if (options.antialiased && !ply && !sog && format != SplatFormat::spz)
+    const bool unmarked =
+        format == SplatFormat::splat || format == SplatFormat::glb || format == SplatFormat::gltf;
+    if (options.antialiased && unmarked)
         remarks.push_back("the mark that the scene was trained anti-aliased is dropped");
     if (!options.comments.empty() && !ply && format != SplatFormat::compressed_ply)
         remarks.push_back("comments are dropped");
