@@ -8,9 +8,11 @@
 #include "cli/interrupt.h"
 #include "cli/output.h"
 #include "core/text.h"
+#include "core/messages.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
 #include "scene/names.h"
+#include "ewa/splat_files.h"
 
 namespace ewa::cli {
 namespace {
@@ -111,9 +113,17 @@ RenderOptions DrawArguments::options() const {
     return render;
 }
 
-void DrawArguments::match_kernel(Gaussians& gaussians, RenderOptions& options) const {
-    if (gaussians.density && !names_kernel() && !options.points) options.kernel = Footprint::density;
-    fit_opacities(gaussians, options.kernel == Footprint::density);
+Gaussians DrawArguments::load(const fs::path& splats, RenderOptions& options) const {
+    SplatScene scene = read_splats(splats);
+    for (const std::string& remark : scene.remarks)
+        core::warn(core::one_line(splats.string()) + ": " + core::one_line(remark));
+    if (!names_kernel() && !options.points) {
+        if (scene.gaussians.density) options.kernel = Footprint::density;
+        if (scene.antialiased && options.integrator == Integrator::splat)
+            options.kernel = Footprint::antialias;
+    }
+    fit_opacities(scene.gaussians, options.kernel == Footprint::density);
+    return std::move(scene.gaussians);
 }
 
 void add_draw_options(CLI::App& app, DrawArguments& arguments) {

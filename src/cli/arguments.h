@@ -56,8 +56,9 @@ struct DrawArguments {
     /// Throws InputError if the background is not a colour, or the options exclude each other.
     RenderOptions options() const;
     bool names_kernel() const { return antialias || (kernel_option && kernel_option->count() > 0); }
-    /// Sets the kernel to that of the splats, or fits their opacities to a kernel that is named.
-    void match_kernel(Gaussians& gaussians, RenderOptions& options) const;
+    /// Reads splats to draw, with warnings of what is skipped. Without a kernel that is named, sets options.kernel to
+    /// that of the file: of its density, or its mark of antialiasing. Fits densities to the kernel.
+    Gaussians load(const std::filesystem::path& splats, RenderOptions& options) const;
 };
 void add_draw_options(CLI::App& app, DrawArguments& arguments);
 

@@ -80,8 +80,7 @@ struct SceneSide : ComparedSide {
   private:
     static Renderer renderer_of(const fs::path& path, RenderOptions options, const DrawArguments& draw,
                                 const std::shared_ptr<gpu::Device>& device) {
-        Gaussians gaussians = load_splats(path);
-        draw.match_kernel(gaussians, options);
+        const Gaussians gaussians = draw.load(path, options);
         return {device, gaussians, options};
     }
 

@@ -44,8 +44,7 @@ int run(const EvalArguments& arguments) {
     const std::vector<NamedFile> written{{"--json", arguments.json}};
     check_command_outputs(written,
                           {{"SPLATS", arguments.views.splats}, {"DATASET", arguments.views.dataset}});
-    Gaussians gaussians = load_splats(arguments.views.splats);
-    arguments.views.draw.match_kernel(gaussians, options);
+    const Gaussians gaussians = arguments.views.draw.load(arguments.views.splats, options);
     const auto [dataset, refined, frames, folder] =
         load_views(arguments.views, arguments.split, arguments.test_every);
     check_command_outputs(written, scene::files_of(dataset, "DATASET"));

@@ -43,8 +43,7 @@ int run(const GradArguments& arguments) {
     const std::vector<NamedFile> written{{"--output", arguments.output}, {"--json", arguments.json}};
     check_command_outputs(written,
                           {{"SPLATS", arguments.views.splats}, {"DATASET", arguments.views.dataset}});
-    Gaussians gaussians = load_splats(arguments.views.splats);
-    arguments.views.draw.match_kernel(gaussians, options);
+    const Gaussians gaussians = arguments.views.draw.load(arguments.views.splats, options);
     const auto [dataset, refined, frames, folder] = load_views(arguments.views, arguments.frame, 0);
     if (frames.size() > 1) throw InputError("--frame: '" + arguments.frame + "' is more than one frame");
     check_command_outputs(written, scene::files_of(dataset, "DATASET"));

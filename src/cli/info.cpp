@@ -69,7 +69,7 @@ void print_file(const fs::path& path, const SplatScene& scene) {
     fmt::print("{}\nformat          {}{}, {}\n", core::one_line(path.string()), name_of(scene.format),
                scene.variant.empty() ? "" : " (" + scene.variant + ")",
                core::bytes_text(fs::file_size(path)));
-    if (scene.antialiased) fmt::print("anti-aliased    yes: render it with --antialias\n");
+    if (scene.antialiased) fmt::print("anti-aliased    yes: drawn as with --antialias\n");
     if (scene.gaussians.density)
         fmt::print("kernel          density; opacities in the file are fitted to 3DGS's kernel\n");
     for (const std::string& comment : scene.comments)
