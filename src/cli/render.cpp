@@ -8,6 +8,7 @@
 #include <glm/matrix.hpp>
 #include <memory>
 #include <optional>
+#include <set>
 
 #include "cli/arguments.h"
 #include "cli/command.h"
@@ -66,25 +67,64 @@ void note_skipped(Progress& progress, uint32_t skipped) {
         progress.note("skipped " + core::counted(skipped, "splat") + " with a value that is not finite");
 }
 
-int render_dataset_views(const RenderArguments& arguments) {
+/// The file of each frame's render, in the output folder or as the one image that --output names.
+std::vector<fs::path> files_of_frames(const RenderArguments& arguments, const Dataset& dataset,
+                                      const std::vector<int>& frames) {
+    const ViewsOutput output = views_output(arguments.output);
+    if (output == ViewsOutput::film)
+        throw InputError(
+            "--output " + core::one_line(arguments.output.string()) +
+            ": a film goes round the scene or along --views; the cameras of a dataset make images in a "
+            "folder");
+    if (output == ViewsOutput::image && frames.size() > 1)
+        throw InputError(
+            fmt::format("--output {}: one image, and there are {} frames; choose one with --frames, or "
+                        "name a folder",
+                        core::one_line(arguments.output.string()), frames.size()));
+    if (output == ViewsOutput::image) return {arguments.output};
+    const std::vector<fs::path> names = report::picture_names(dataset.frames);
+    std::vector<fs::path> files;
+    for (const int frame : frames)
+        files.push_back(arguments.output / (names[size_t(frame)].string() + "." + arguments.format));
+    return files;
+}
+
+/// Throws if a render would replace a file that is read, or is in a folder of the dataset's images.
+void check_renders(const RenderArguments& arguments, const std::vector<fs::path>& files,
+                   const Dataset* dataset) {
+    std::vector<NamedFile> written, read{{"SPLATS", arguments.splats},
+                                         {"--views", arguments.views.views},
+                                         {"--cameras", arguments.cameras}};
+    for (const fs::path& file : files) written.push_back({"the render", file});
+    std::set<fs::path> folders, of_images;
+    if (dataset) {
+        const std::vector<NamedFile> more = scene::files_of(*dataset, "the dataset");
+        read.insert(read.end(), more.begin(), more.end());
+        for (const Frame& frame : dataset->frames) of_images.insert(frame.image_path.parent_path());
+        for (const fs::path& file : files) folders.insert(file.has_parent_path() ? file.parent_path() : ".");
+    }
+    std::error_code none;
+    for (const fs::path& folder : folders)
+        for (const fs::path& images : of_images)
+            if (fs::equivalent(folder, images.empty() ? "." : images, none))
+                throw InputError("--output " + core::one_line(arguments.output.string()) + ": " +
+                                 core::one_line(folder.string()) +
+                                 " holds the images of the dataset; name another folder");
+    check_command_outputs(written, read);
+}
+
+int render_dataset_views(RenderArguments arguments) {
     RenderOptions options = arguments.draw.options();
-    Gaussians gaussians = load_splats(arguments.splats);
-    arguments.draw.match_kernel(gaussians, options);
+    const Gaussians gaussians = arguments.draw.load(arguments.splats, options);
     Dataset dataset = load_cameras_as_trained(arguments.cameras, arguments.downscale);
     const fs::path refined = arguments.cameras_of_run ? refined_cameras_of(*arguments.run) : fs::path();
     if (!refined.empty()) io::use_refined_cameras(dataset, refined);
     const std::vector<int> frames = select_frames(dataset, arguments.frames, arguments.test_every);
-    const std::vector<fs::path> names = report::picture_names(dataset.frames);
-    const auto file_of = [&](int frame) {
-        return arguments.output / (names[size_t(frame)].string() + "." + arguments.format);
-    };
-    std::vector<NamedFile> written, read = scene::files_of(dataset, "--cameras");
-    for (const int frame : frames) written.push_back({"the render", file_of(frame)});
-    read.insert(read.end(), {{"SPLATS", arguments.splats}, {"--cameras", arguments.cameras}});
-    check_command_outputs(written, read);
+    const std::vector<fs::path> files = files_of_frames(arguments, dataset, frames);
+    arguments.format = core::lower(files[0].extension().string()).substr(1);
+    check_renders(arguments, files, &dataset);
     const std::vector<Exposure> exposures = exposures_of(
         arguments.exposures, arguments.cameras_of_run ? arguments.run : std::nullopt, dataset, frames);
-    make_folder(arguments.output);
 
     Renderer renderer(open_device(arguments.device), gaussians, options);
     const InterruptWatch watch;
@@ -98,10 +138,9 @@ int render_dataset_views(const RenderArguments& arguments) {
         skipped = std::max(skipped, renderer.skipped_nonfinite());
 
         std::string remark;
-        const fs::path file = file_of(frames[i]);
-        make_folder(file.parent_path());
-        save_image(file, chosen_image(std::move(rendering), arguments, remark));
-        if (!remark.empty()) progress.note(file.string() + ": " + remark);
+        make_folder(files[i].parent_path());
+        save_image(files[i], chosen_image(std::move(rendering), arguments, remark));
+        if (!remark.empty()) progress.note(files[i].string() + ": " + remark);
         progress.update(static_cast<int>(i) + 1);
     }
     note_skipped(progress, skipped);
@@ -110,17 +149,19 @@ int render_dataset_views(const RenderArguments& arguments) {
     return 0;
 }
 
-/// What the cameras of the run's dataset say about the scene, if they can be read.
-scene::FramingHints hints_of(const RenderArguments& arguments) {
-    if (!arguments.run || arguments.run->dataset.empty()) return {};
-    try {
-        const Dataset dataset = load_cameras_as_trained(arguments.run->dataset, 1);
-        if (dataset.frames.empty()) return {};
-        const glm::dmat3 axes = glm::transpose(dataset.frames[0].camera.rotation);
-        return {.up = scene::mean_up(dataset), .forward = axes[2]};
-    } catch (const InputError&) {
-        return {};  // The scene is framed as one of which nothing is known.
-    }
+/// The dataset of the run, if it can be read. Else the scene is framed as one of which nothing is known.
+std::optional<Dataset> dataset_of_run(const RenderArguments& arguments) try {
+    if (!arguments.run || arguments.run->dataset.empty()) return std::nullopt;
+    return load_cameras_as_trained(arguments.run->dataset, 1);
+} catch (const InputError&) {
+    return std::nullopt;
+}
+
+/// What its cameras say about the scene.
+scene::FramingHints hints_of(const std::optional<Dataset>& dataset) {
+    if (!dataset || dataset->frames.empty()) return {};
+    const glm::dmat3 axes = glm::transpose(dataset->frames[0].camera.rotation);
+    return {.up = scene::mean_up(*dataset), .forward = axes[2]};
 }
 
 /// The film of these views. Returns the exit status.
@@ -140,18 +181,17 @@ int write_film(const RenderArguments& arguments, Renderer& renderer, const Rende
 }
 
 int write_views(const RenderArguments& arguments, Renderer& renderer, const std::vector<Camera>& cameras,
-                bool one_image, Progress& progress) {
+                const std::vector<fs::path>& files, Progress& progress) {
+    const bool one_image = files[0] == arguments.output;
     uint32_t skipped = 0;
-    make_folder(one_image ? arguments.output.parent_path() : arguments.output);
+    make_folder(files[0].parent_path());
     for (size_t i = 0; i < cameras.size(); ++i) {
         if (interrupted()) return kInterruptedStatus;
         Rendering rendering = renderer.render(cameras[i], arguments.mode == "depth");
         skipped = std::max(skipped, renderer.skipped_nonfinite());
         std::string remark;
-        const fs::path file =
-            one_image ? arguments.output : arguments.output / fmt::format("{:05}.{}", i, arguments.format);
-        save_image(file, chosen_image(std::move(rendering), arguments, remark));
-        if (!remark.empty()) progress.note(file.string() + ": " + remark);
+        save_image(files[i], chosen_image(std::move(rendering), arguments, remark));
+        if (!remark.empty()) progress.note(files[i].string() + ": " + remark);
         if (cameras.size() > 1) progress.update(int(i) + 1);
     }
     note_skipped(progress, skipped);
@@ -174,22 +214,25 @@ int render_free_views(RenderArguments arguments) {
         throw InputError("a film has --mode color; a folder can have any mode");
     if (film) find_ffmpeg();
     if (one_image) arguments.format = core::lower(arguments.output.extension().string()).substr(1);
-    if (output != ViewsOutput::folder) {
-        check_command_outputs({{"--output", arguments.output}},
-                              {{"SPLATS", arguments.splats}, {"--views", arguments.views.views}});
+    const std::optional<Dataset> dataset = dataset_of_run(arguments);
+    const Dataset* const known = dataset ? &*dataset : nullptr;
+    std::vector<fs::path> files{arguments.output};
+    if (output != ViewsOutput::folder) check_renders(arguments, files, known);
+    const Gaussians gaussians = arguments.draw.load(arguments.splats, options);
+    const std::vector<Camera> cameras = views_of(arguments.views, gaussians, hints_of(dataset), output);
+    if (output == ViewsOutput::folder) {
+        files.clear();
+        for (size_t i = 0; i < cameras.size(); ++i)
+            files.push_back(arguments.output / fmt::format("{:05}.{}", i, arguments.format));
+        check_renders(arguments, files, known);
     }
-    SplatScene scene = read_splats(arguments.splats);
-    if (scene.antialiased && !arguments.draw.names_kernel()) options.kernel = Footprint::antialias;
-    arguments.draw.match_kernel(scene.gaussians, options);
-    const std::vector<Camera> cameras =
-        views_of(arguments.views, scene.gaussians, hints_of(arguments), output);
     if (film) make_folder(arguments.output.parent_path());
 
-    Renderer renderer(open_device(arguments.device), scene.gaussians, options);
+    Renderer renderer(open_device(arguments.device), gaussians, options);
     const InterruptWatch watch;
     Progress progress("rendered", int(cameras.size()), "views", arguments.quiet);
     if (film) return write_film(arguments, renderer, options, cameras, progress);
-    return write_views(arguments, renderer, cameras, one_image, progress);
+    return write_views(arguments, renderer, cameras, files, progress);
 }
 
 /// Completes the arguments by the run that SPLATS may name, and chooses whose cameras are used.
@@ -206,7 +249,9 @@ int run(CLI::App& app, RenderArguments& arguments) {
         arguments.cameras = dataset_input(arguments.cameras);
         return render_dataset_views(arguments);
     }
-    const bool free = any_given(arguments.views) || views_output(arguments.output) != ViewsOutput::folder;
+    const ViewsOutput output = views_output(arguments.output);
+    const bool free = any_given(arguments.views) || output == ViewsOutput::film ||
+                      (output == ViewsOutput::image && of_frames.empty());
     if (input.run && !free) {
         arguments.cameras = dataset_of(*input.run);
         arguments.run = std::move(input.run);
@@ -229,10 +274,10 @@ Action add_render(CLI::App& app) {
                "Dataset whose cameras to render through [that of a run]. Without, the whole scene is shown "
                "from the front")
             ->type_name("DATASET");
-    app.add_option(
-           "-o,--output", arguments->output,
-           "Folder for the renders, named like the images of the dataset or by number. Without --cameras "
-           "also one image (.png, .exr), or a film (.mp4, .mov, .mkv, .webm) that the program ffmpeg writes")
+    app.add_option("-o,--output", arguments->output,
+                   "Folder for the renders, named like the images of the dataset or by number. Or one image "
+                   "(.png, .exr). "
+                   "Without --cameras also a film (.mp4, .mov, .mkv, .webm) that the program ffmpeg writes")
         ->type_name("OUT")
         ->capture_default_str();
     add_views_options(app, arguments->views, cameras);

@@ -125,6 +125,8 @@ bool any_given(const ViewsArguments& arguments) {
 }
 
 ViewsOutput views_output(const fs::path& path) {
+    std::error_code error;
+    if (fs::is_directory(path, error)) return ViewsOutput::folder;
     const std::string extension = core::lower(path.extension().string());
     if (extension == ".png" || extension == ".exr") return ViewsOutput::image;
     for (const char* other : {".jpg", ".jpeg", ".gif", ".webp", ".bmp", ".tif", ".tiff", ".avi"})
@@ -133,7 +135,11 @@ ViewsOutput views_output(const fs::path& path) {
                 "--output " + core::one_line(path.string()) +
                 ": an image is .png or .exr, a film .mp4, .mov, .mkv or .webm, and a folder has another "
                 "name");
-    return is_film_name(path) ? ViewsOutput::film : ViewsOutput::folder;
+    if (is_film_name(path)) return ViewsOutput::film;
+    if (fs::exists(path, error))
+        throw InputError("--output " + core::one_line(path.string()) +
+                         ": is no folder; an image is .png or .exr, a film .mp4, .mov, .mkv or .webm");
+    return ViewsOutput::folder;
 }
 
 void check_views(const ViewsArguments& arguments) {

@@ -29,8 +29,8 @@ bool any_given(const ViewsArguments& arguments);
 
 /// What the views are written as.
 enum class ViewsOutput { image, folder, film };
-/// By the name: .png and .exr are an image, those of is_film_name a film, others a folder. Throws InputError for the
-/// names of other images and films.
+/// An existing folder is one. Else by the name: .png and .exr are an image, those of is_film_name a film, others a folder.
+/// Throws InputError for the names of other images and films, and of an existing file.
 ViewsOutput views_output(const std::filesystem::path& path);
 
 /// Throws InputError for texts that cannot be read, and options that exclude each other. The scene is not needed.

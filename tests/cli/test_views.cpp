@@ -4,10 +4,12 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <csignal>
 #include <filesystem>
 #include <glm/vec3.hpp>
 
 #include "cli/expect.h"
+#include "cli/faulty.h"
 #include "ewa/image.h"
 #include "ewa/splat_files.h"
 #include "io/datasets/view_list.h"
@@ -96,6 +98,31 @@ TEST_F(Views, TheMarkOfAntialiasingIsUsed) {
     EXPECT_TRUE(same_pixels(marked_image, image("antialias.png", {"--antialias"})));
     EXPECT_FALSE(same_pixels(marked_image, folder / "peak.png"));
     EXPECT_TRUE(same_pixels(image("given.png", {"--kernel", "peak"}), folder / "peak.png"));
+    // Through the cameras of a dataset too.
+    const std::string data = folder / "data", file = folder / "marked.ply";
+    make_dataset(data);
+    const auto text = [&](const Names& arguments) {
+        const Outcome outcome = run_ewa(arguments);
+        expect_success(outcome);
+        return outcome.out.substr(0, outcome.out.find("mean"));
+    };
+    const Names eval{"eval", file, data, "--split", "all"};
+    const auto with = [](Names arguments, const Names& more) {
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return arguments;
+    };
+    EXPECT_EQ(text(eval), text(with(eval, {"--antialias"})));
+    EXPECT_NE(text(eval), text(with(eval, {"--kernel", "peak"})));
+    const Names frame{"render", file, "--cameras", data, "--frames", "0", "--quiet", "-o"};
+    text(with(frame, {folder / "f.png"}));
+    text(with(frame, {folder / "g.png", "--antialias"}));
+    EXPECT_TRUE(same_pixels(folder / "f.png", folder / "g.png"));
+    text({"render", file, "--cameras", data, "--antialias", "--format", "exr", "--quiet", "-o",
+          folder / "all"});
+    text({"compare", file, folder / "all", "--cameras", data, "--max-error", "1e-6"});
+    // What has no footprints ignores it.
+    image("ray.png", {"--integrator", "ray"});
+    image("points.png", {"--points"});
 }
 
 TEST_F(Views, AnOrbitIsAFolder) {
@@ -209,6 +236,64 @@ TEST_F(Views, WrongUse) {
     std::filesystem::create_symlink(views, folder / "link.png");
     expect_failure(render({"--views", views, "-o", folder / "link.png", "--size", "9x9"}), 2, "--views");
     EXPECT_EQ(files_below(folder / ".").size(), 4u) << "a refused command wrote a file";
+}
+
+TEST_F(Views, AFolderOfViewsReplacesNoInput) {
+    const std::string views = saved_views(), out = folder / "d";
+    std::filesystem::create_directory(out);
+    const std::string first = out + "/00000.png";
+    const auto keeps = [&](const Names& arguments, const char* text) {
+        const std::string before = read_file(first);
+        expect_failure(run_ewa(arguments), 2, text);
+        EXPECT_EQ(read_file(first), before);
+        EXPECT_EQ(files_below(out), Names{"00000.png"});
+    };
+    std::filesystem::copy_file(splats, first);
+    keeps({"render", first, "--orbit", "2", "--size", "8x8", "-o", out}, "is the same file as SPLATS");
+    std::filesystem::copy_file(views, first, std::filesystem::copy_options::overwrite_existing);
+    keeps({"render", splats, "--views", first, "-o", out}, "is the same file as --views");
+    // What cannot be written is found before the first render; what a killed render left is removed.
+    std::filesystem::remove(first);
+    ASSERT_EQ(mkfifo((out + "/00001.png").c_str(), 0600), 0);
+    expect_failure(render({"--orbit", "2", "--size", "8x8", "-o", out}), 1, "00001.png");
+    EXPECT_FALSE(std::filesystem::exists(first));
+    std::filesystem::remove(out + "/00001.png");
+    expect_failure(render({"--orbit", "2", "--size", "8x8", "-o", splats}), 2,
+                   "is no folder; an image is .png");
+    const Outcome killed =
+        render({"--orbit", "2", "--size", "8x8", "-o", out}, with_fault("EWA_FAULT_KILL", "2"));
+    ASSERT_EQ(killed.status, 128 + SIGKILL);
+    EXPECT_EQ(files_below(out).size(), 1u);
+    expect_success(render({"--orbit", "2", "--size", "8x8", "-o", out}));
+    EXPECT_EQ(files_below(out), (Names{"00000.png", "00001.png"}));
+}
+
+/// One frame of a dataset, and the photographs beside which nothing is written.
+TEST_F(Views, AFrameOfADatasetIsAnImage) {
+    const std::string data = folder / "data";
+    make_dataset(data);
+    expect_success(render({"--cameras", data, "-o", folder / "all"}));
+    const std::string one = folder / "new/one.png";
+    expect_success(render({"--cameras", data, "--frames", "2", "-o", one}));
+    EXPECT_TRUE(same_pixels(one, folder / "all/2.png"));
+    expect_success(render({"--cameras", data, "--frames", "2", "-o", folder / "one.exr"}));
+    EXPECT_EQ(load_image(folder / "one.exr").channels, 4);
+    expect_failure(render({"--cameras", data, "-o", one}), 2, "there are 4 frames; choose one with --frames");
+    expect_failure(render({"--cameras", data, "-o", folder / "x.mp4"}), 2, "a film goes round the scene");
+    const Names before = files_below(data);
+    for (const char* name : {"data/images", "data/images/new.png"})
+        expect_failure(render({"--cameras", data, "--frames", "2", "-o", folder / name}), 2,
+                       "holds the images of the dataset");
+    EXPECT_EQ(files_below(data), before);
+
+    // A run knows its dataset.
+    const std::string run = folder / "run";
+    expect_success(run_ewa({"train", data, "-o", run, "--steps", "1", "--quiet"}));
+    expect_success(run_ewa({"render", run, "--frames", "2", "-o", folder / "of_run.png"}));
+    expect_success(run_ewa({"render", run, "-o", folder / "all_of_run"}));
+    EXPECT_TRUE(same_pixels(folder / "of_run.png", folder / "all_of_run/2.png"));
+    expect_failure(run_ewa({"render", run, "--orbit", "2", "-o", folder / "data/images"}), 2,
+                   "holds the images of the dataset");
 }
 
 }  // namespace
