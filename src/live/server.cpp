@@ -44,15 +44,24 @@ bool same_secret(const std::string& a, const std::string& b) {
     return difference == 0;
 }
 
+/// Nothing, or ":PORT".
+bool is_port(std::string_view text) {
+    return text.empty() ||
+           (text[0] == ':' && text.find_first_not_of("0123456789", 1) == std::string_view::npos);
+}
+
 /// Whether "HOST[:PORT]" is an address in numbers or localhost. A web page whose name was made to lead here
 /// sends its own name.
 bool own_host(const std::string& text) {
     unsigned char address[16];
     if (text.starts_with('[')) {
         const size_t end = text.find(']');
-        return end != std::string::npos && inet_pton(AF_INET6, text.substr(1, end - 1).c_str(), address) == 1;
+        return end != std::string::npos && is_port(text.substr(end + 1)) &&
+               inet_pton(AF_INET6, text.substr(1, end - 1).c_str(), address) == 1;
     }
-    const std::string host = core::lower(text.substr(0, text.find(':')));
+    const size_t end = std::min(text.find(':'), text.size());
+    const std::string host = core::lower(text.substr(0, end));
+    if (!is_port(text.substr(end))) return false;
     return host == "localhost" || inet_pton(AF_INET, host.c_str(), address) == 1;
 }
 

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "live/wire.h"
 
+#include <linux/sockios.h>
 #include <poll.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <climits>
 
 namespace ewa::live {
 namespace {
@@ -60,11 +63,28 @@ ssize_t Wire::read(char* to, size_t size) {
     }
 }
 
+bool Wire::writable() {
+    Clock::time_point moved = Clock::now();  // when the other side last took something
+    int waiting = INT_MAX;                   // bytes that it has not taken
+    for (;;) {
+        const Clock::time_point now = Clock::now();
+        int left = 0;
+        if (ioctl(socket_, SIOCOUTQ, &left) != 0) left = 0;
+        if (left < waiting) moved = now;
+        waiting = left;
+        const uint64_t taken = written_ - std::min(written_, uint64_t(left));
+        const Clock::time_point due = std::min(
+            moved + write_grace_ / 2, first_write_ + write_grace_ + milliseconds(taken / kLeastRate));
+        if (now >= due || (stop_ && *stop_)) return false;
+        if (ready(POLLOUT, std::min(due, now + kNap))) return true;
+    }
+}
+
 ssize_t Wire::write(const char* from, size_t size) {
     if (written_ == 0) first_write_ = Clock::now();
     size_t sent = 0;
     while (sent < size) {
-        if (!ready(POLLOUT, first_write_ + write_grace_ + milliseconds(written_ / kLeastRate))) return -1;
+        if (!writable()) return -1;
         const ssize_t now = ::send(socket_, from + sent, size - sent, MSG_NOSIGNAL | MSG_DONTWAIT);
         if (now < 0 && try_again()) continue;
         if (now <= 0) return -1;

@@ -24,7 +24,8 @@ class Wire final : public httplib::Stream {
     bool is_writable() const override { return true; }
     /// Returns the number of bytes that came, or -1 at any limit.
     ssize_t read(char* to, size_t size) override;
-    /// Writes all or returns -1. Writing may take write_grace, and a second more for each 16 KB.
+    /// Writes all or returns -1. Writing may take write_grace, and a second more for each 16 KB that the other side has
+    /// taken. It ends if that takes nothing for half of write_grace. What lies in this system's buffer is not taken.
     ssize_t write(const char* from, size_t size) override;
     void get_remote_ip_and_port(std::string&, int&) const override {}
     void get_local_ip_and_port(std::string&, int&) const override {}
@@ -33,6 +34,7 @@ class Wire final : public httplib::Stream {
   private:
     using Clock = std::chrono::steady_clock;
     bool ready(short events, Clock::time_point due) const;
+    bool writable();
 
     const int socket_;
     uint64_t left_;  // bytes that may come

@@ -182,7 +182,8 @@ TEST(LiveServer, WebPagesAreRefused) {
         EXPECT_EQ(with_host("Host: " + std::string(host) + "\r\n"), 200) << host;
     for (const char* host :
          {"evil.example", "evil.example:7000", "127.0.0.1.evil.example", "localhost.evil.example",
-          "localhost.", "", "[::1", "[evil.example]", "0x7f.1", "@127.0.0.1", "127.0.0.1 x"})
+          "localhost.", "", "[::1", "[evil.example]", "0x7f.1", "@127.0.0.1", "127.0.0.1 x",
+          "[::1].evil.example", "[::1]:7000.evil.example", "127.0.0.1:7000.evil.example", "[::1]x"})
         EXPECT_EQ(with_host("Host: " + std::string(host) + "\r\n"), 403) << host;
     EXPECT_EQ(with_host(""), 403) << "no Host at all";
     EXPECT_EQ(with_host("Host: localhost\r\nHost: evil.example\r\n"), 403);
