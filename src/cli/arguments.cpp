@@ -4,15 +4,16 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <cstdlib>
 
 #include "cli/interrupt.h"
 #include "cli/output.h"
-#include "core/text.h"
 #include "core/messages.h"
+#include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
-#include "scene/names.h"
 #include "ewa/splat_files.h"
+#include "scene/names.h"
 
 namespace ewa::cli {
 namespace {
@@ -69,11 +70,13 @@ CLI::Validator accepted_by(const train::RunOption& option) {
 }
 
 core::PixelSize size_of(const std::string& text) {
-    constexpr int kLargestSide = 16384;  // px
+    constexpr int kLargestSide = 16384;            // px
+    constexpr uint64_t kMostPixels = 134'000'000;  // 8 * 65,535 tiles of 16 x 16
     const auto size = core::parse_size(text, kLargestSide);
-    if (!size)
-        throw InputError(fmt::format("--size: '{}' is not a size such as 1280x720, of at most {} a side",
-                                     text, kLargestSide));
+    if (!size || uint64_t(size->width) * uint64_t(size->height) > kMostPixels)
+        throw InputError(fmt::format(
+            "--size: '{}' is not a size such as 1280x720, of at most {} a side and {} million pixels", text,
+            kLargestSide, kMostPixels / 1'000'000));
     return *size;
 }
 
@@ -166,7 +169,8 @@ void add_draw_options(CLI::App& app, DrawArguments& arguments) {
 
 void add_device_options(CLI::App& app, DeviceOptions& options) {
     const train::RunOption& device = train::run_option("device");
-    app.add_option("--device", options.selector, device.help)->type_name(device.value);
+    if (const char* named = std::getenv("EWA_DEVICE")) options.selector = named;
+    app.add_option("--device", options.selector, device.help + " [$EWA_DEVICE]")->type_name(device.value);
     app.add_flag("--validation", options.validation, "Enable the Vulkan validation layer")
         ->group("For developers");
 }

@@ -30,6 +30,7 @@ using report::Json;
 
 struct ConvertArguments {
     std::vector<fs::path> files;         // the last is written
+    fs::path output;                     // -o, which becomes the last of the files
     std::vector<glm::dmat4> placements;  // of the inputs
     std::vector<std::string> transform;
     std::string crop, sort;
@@ -230,13 +231,16 @@ void add_editing_options(CLI::App& app, ConvertArguments& arguments) {
 Action add_convert(CLI::App& app) {
     const auto arguments = std::make_shared<ConvertArguments>();
     app.add_option("FILES", arguments->files,
-                   "One or more inputs, which are joined, then the output. Formats: .ply .compressed.ply "
+                   "One or more inputs, which are joined, then the output unless -o names it. Formats: .ply "
+                   ".compressed.ply "
                    ".splat .spz .sog meta.json .glb .gltf, and inputs also .ksplat. An input may be the "
                    "folder of a training run. IN:STEP, as in b.ply:move=1,0,0, moves one input alone; more "
                    "steps follow after more colons")
         ->required()
-        ->expected(2, -1)
+        ->expected(1, -1)
         ->type_name("IN... OUT");
+    app.add_option("-o,--output", arguments->output, "The output; all FILES are then inputs")
+        ->type_name("OUT");
     add_editing_options(app, *arguments);
     app.add_option("--spz-version", arguments->spz_version,
                    "SPZ version: 3 (every reader supports it) or 4 (newer, smaller files)")
@@ -252,6 +256,10 @@ Action add_convert(CLI::App& app) {
         ->type_name("FILE");
     add_quiet_option(app, arguments->quiet);
     return [arguments] {
+        if (!arguments->output.empty()) arguments->files.push_back(arguments->output);
+        if (arguments->files.size() < 2)
+            throw InputError("FILES: an input and the output are needed, and there is only " +
+                             core::one_line(arguments->files[0].string()));
         for (size_t i = 0; i + 1 < arguments->files.size(); ++i) {
             const PlacedInput input = parse_input(arguments->files[i].string());
             arguments->files[i] = splat_input(input.file).file;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// ewa info: what a splat file, a training run, a dataset or a mesh scene holds.
+// ewa info: what a splat file, a training run, a dataset, a mesh scene or an image holds.
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
@@ -9,6 +9,7 @@
 #include <map>
 #include <memory>
 #include <numeric>
+#include <string_view>
 #include <tuple>
 
 #include "cli/arguments.h"
@@ -16,6 +17,8 @@
 #include "cli/output.h"
 #include "cli/run_inputs.h"
 #include "cli/splat_statistics.h"
+#include "core/file_reader.h"
+#include "core/folders.h"
 #include "core/messages.h"
 #include "core/text.h"
 #include "ewa/error.h"
@@ -23,6 +26,7 @@
 #include "ewa/splat_files.h"
 #include "ewa/synthetic_dataset.h"
 #include "ewa/trainer.h"
+#include "image/image_files.h"
 #include "io/datasets/image_records.h"
 #include "io/gltf/mesh.h"
 #include "io/splats/formats.h"
@@ -303,6 +307,35 @@ void info_mesh(const fs::path& path, int test_every, bool json) {
                                            : "every material is diffuse: training skips SH degrees 1 to 3");
 }
 
+/// The image format that the first bytes tell; empty for other files, and for .splat, which may begin with any bytes.
+std::string_view image_format(const fs::path& path) {
+    if (core::lower(path.extension().string()) == ".splat" || !core::is_file(path)) return {};
+    constexpr uint64_t kHeadBytes = 16;
+    core::FileReader reader(path);
+    const size_t size = size_t(std::min(reader.size(), kHeadBytes));
+    const image::Format* format =
+        image::format_of({reinterpret_cast<const char*>(reader.take(size, "the header")), size});
+    return format ? format->name : std::string_view();
+}
+
+void info_image(const fs::path& path, std::string_view format, bool json) {
+    const ImageSize size = read_image_size(path);
+    const auto bytes = fs::file_size(path);
+    if (json)
+        return print_json({{"kind", "image"},
+                           {"format", format},
+                           {"bytes", bytes},
+                           {"width", size.width},
+                           {"height", size.height},
+                           {"orientation", size.orientation},
+                           {"eight_bit", size.eight_bit}});
+    fmt::print("{}\nkind            image ({}), {}\nsize            {}x{}, {}\n",
+               core::one_line(path.string()), format, core::bytes_text(bytes), size.width, size.height,
+               size.eight_bit ? "8 bits a channel" : "more than 8 bits a channel");
+    if (size.orientation != 1)
+        fmt::print("orientation     {} in EXIF: to be turned or mirrored when shown\n", size.orientation);
+}
+
 int run(const InfoArguments& arguments) {
     const fs::path& path = arguments.path;
     std::error_code error;
@@ -311,6 +344,8 @@ int run(const InfoArguments& arguments) {
         info_splats(splat_input(path).file, &*run, arguments);
     else if (fs::is_directory(path) || (path.extension() == ".json" && !is_sog(path)))
         info_dataset(path, arguments.test_every, arguments.json);
+    else if (const std::string_view format = image_format(path); !format.empty())
+        info_image(path, format, arguments.json);
     else if (is_mesh_scene(path))
         info_mesh(path, arguments.test_every, arguments.json);
     else
@@ -326,7 +361,7 @@ Action add_info(CLI::App& app) {
            "PATH", arguments->path,
            "Splat file (.ply .compressed.ply .splat .ksplat .spz .sog meta.json .glb .gltf), COLMAP folder, "
            "transforms.json, "
-           "glTF file of meshes, or folder of a training run")
+           "glTF file of meshes, image, or folder of a training run")
         ->required();
     add_test_every_option(app, arguments->test_every);
     app.add_flag("--json", arguments->json, "Print JSON");

@@ -4,12 +4,15 @@
 #include <CLI/CLI.hpp>
 #include <functional>
 #include <sstream>
+#include <string>
+#include <vector>
 
 #include "cli/command.h"
 #include "cli/interrupt.h"
 #include "cli/status.h"
 #include "cli/usage.h"
 #include "core/terminal.h"
+#include "core/text.h"
 
 namespace ewa::cli {
 namespace {
@@ -51,9 +54,20 @@ std::string command_line(int argc, char** argv) {
     return line;
 }
 
-}  // namespace
+/// The arguments with `help`, `help COMMAND`, `version`, -v and -V as the options that they stand for.
+std::vector<std::string> usual_arguments(int argc, char** argv) {
+    std::vector<std::string> words(argv, argv + argc);
+    if (argc < 2) return words;
+    if (argc <= 3 && words[1] == "help") {
+        words.erase(words.begin() + 1);
+        words.emplace_back("--help");
+    } else if (argc == 2 && (words[1] == "version" || words[1] == "-v" || words[1] == "-V")) {
+        words[1] = "--version";
+    }
+    return words;
+}
 
-int run_program(int argc, char** argv) {
+int run_arguments(int argc, char** argv) {
     CLI::App app{
         "Trains, renders and inspects 3D Gaussian splats on any Vulkan device, a plain CPU included."};
     app.name("ewa");
@@ -85,7 +99,6 @@ int run_program(int argc, char** argv) {
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
-        if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) return print_text(app, error);
         std::string who = "ewa";
         const CLI::App* given = &app;
         for (const Command& command : commands)
@@ -93,12 +106,24 @@ int run_program(int argc, char** argv) {
                 who += std::string(" ") + command.name;
                 given = command.app;
             }
+        const bool unknown = given == &app && argc > 1 && argv[1][0] != '-';
+        if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success) && !unknown)
+            return print_text(app, error);
         return fail(who, usage_error(app, *given, error, argc, argv) + " (see " + who + " --help)",
                     kWrongUse);
     }
     for (const Command& command : commands)
         if (command.app->parsed()) return run(command);
     return kWrongUse;  // not reached: the parser requires a command
+}
+
+}  // namespace
+
+int run_program(int argc, char** argv) {
+    std::vector<std::string> words = usual_arguments(argc, argv);
+    std::vector<char*> pointers;
+    for (std::string& word : words) pointers.push_back(word.data());
+    return run_arguments(int(pointers.size()), pointers.data());
 }
 
 }  // namespace ewa::cli

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <map>
+#include <string_view>
 #include <vector>
 
 #include "core/typing.h"
@@ -83,6 +84,13 @@ std::string missing_value(const std::string& text) {
            " needs a value: " + text.substr(required + kRequired, end - required - kRequired);
 }
 
+/// Where -o was forgotten: what one would type.
+std::string output_hint(const CLI::App& command, const std::vector<std::string>& unknown) {
+    const CLI::Option* output = command.get_option_no_throw("--output");
+    return output && output->count() == 0 && unknown.size() == 1 ? "; -o " + unknown[0] + " names the output"
+                                                                 : std::string();
+}
+
 }  // namespace
 
 void group_by_subject(CLI::App& command) {
@@ -102,10 +110,16 @@ std::string usage_error(const CLI::App& app, const CLI::App& command, const CLI:
     const bool options = std::any_of(unknown.begin(), unknown.end(),
                                      [](const std::string& word) { return word.starts_with('-'); });
     const std::vector<std::string> commands = command_names(app);
-    if (&app == &command && argc > 1 && argv[1][0] != '-')
-        return std::string("unknown command '") + argv[1] + "'" + core::did_you_mean(argv[1], commands);
+    if (&app == &command && argc > 1 && argv[1][0] != '-') {
+        const std::string text = std::string("unknown command '") + argv[1] + "'";
+        if (argv[1] == std::string_view("view") || argv[1] == std::string_view("viewer"))
+            return text + "; the window is the program ewa-view" +
+                   (argc > 2 ? ": ewa-view " + std::string(argv[2]) : "");
+        return text + core::did_you_mean(argv[1], commands);
+    }
     if (options || dynamic_cast<const CLI::ExtrasError*>(&error))
-        return core::unexpected_arguments(argc, argv, unknown, option_names(command));
+        return core::unexpected_arguments(argc, argv, unknown, option_names(command)) +
+               (options ? std::string() : output_hint(command, unknown));
     if (&app == &command && error.get_name() == "RequiredError") {
         std::string all;
         for (const std::string& name : commands) all += (all.empty() ? "" : ", ") + name;

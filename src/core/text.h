@@ -55,8 +55,8 @@ void use_help_text(App& app) {
                 std::string text = option->get_type_size() == 0 ? "" : option->get_type_name();
                 // Options of a few words have these in place of a type.
                 const size_t colon = text.rfind(':');
-                if (colon < text.size() - 1 && !std::isupper(static_cast<unsigned char>(text[colon + 1])))
-                    text.erase(0, colon + 1);
+                const auto next = static_cast<unsigned char>(colon + 1 < text.size() ? text[colon + 1] : 0);
+                if (std::islower(next) || std::isdigit(next)) text.erase(0, colon + 1);
                 if (text == "TEXT" && option->get_positional()) text.clear();
                 if (!text.empty()) text.insert(0, " ");
                 if (!option->get_default_str().empty()) text += " [" + option->get_default_str() + "]";

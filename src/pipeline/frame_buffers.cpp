@@ -33,7 +33,7 @@ void check_image(const passes::KernelConfig& config, const FrameRequest& request
     const uint64_t most_tiles = uint64_t(8) * config.loop_limit;
     if (sizes.tiles_x + sizes.tiles_y + 2 > config.loop_limit || sizes.tiles > most_tiles)
         throw InputError("an image of " + size + " pixels has more than the " + std::to_string(most_tiles) +
-                         " tiles that can be drawn; --downscale makes it smaller");
+                         " tiles that can be drawn; choose a smaller size, or --downscale with a dataset");
 }
 
 constexpr uint64_t kAlone = ~uint64_t(0);
@@ -281,7 +281,7 @@ uint32_t grown_capacity(uint32_t needed) {
     constexpr uint32_t kMost = 0xe0000000u;
     if (needed > kMost)
         throw RunError(
-            "more than 3.7 billion (splat, tile) pairs in one picture; --downscale makes them fewer");
+            "more than 3.7 billion (splat, tile) pairs in one picture; a smaller size has fewer");
     return uint32_t(std::min<uint64_t>(uint64_t(needed) + needed / 8, kMost));
 }
 

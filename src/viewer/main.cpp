@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <future>
 #include <map>
@@ -283,8 +284,9 @@ void add_options(CLI::App& app, Arguments& arguments) {
     option("--film-seconds", startup.settings.film_seconds, "S", "Duration of the film from view to view (2)")
         ->transform(
             CLI::Validator([](std::string& text) { return core::settle_number(text, 0.04f, 3600.0f); }, ""));
+    if (const char* named = std::getenv("EWA_DEVICE")) arguments.device.selector = named;
     option("--device", arguments.device.selector, "NAME|N",
-           "Number of the device that renders, or part of its name (see ewa devices)");
+           "Number of the device that renders, or part of its name (see ewa devices) [$EWA_DEVICE]");
     app.add_flag("--verbose", startup.verbose,
                  "At the end, print the time of the first frame and the frame rate of the moving camera");
 }

@@ -208,12 +208,14 @@ TEST(Convert, NoFileTakesAnothersPlace) {
     refuse("o.ply", folder / "o.ply", "OUT");
     refuse("o.ply", folder / "none/../o.ply", "OUT");
     refuse("o.ply", folder / "s.ply", "an input");
-    refuse("o.gltf", folder / "o.bin", "the .bin of OUT");
+    refuse("o.gltf", folder / "o.bin", "the file of OUT's values");
     fs::create_symlink(folder / "s.ply", folder / "link.json");
     refuse("o.ply", folder / "link.json", "an input");
     fs::copy_file(folder / "s.ply", folder / "o.bin");
-    expect_failure(run_ewa({"convert", folder / "o.bin", folder / "o.gltf"}), 2, "o.bin");
+    expect_success(run_ewa({"convert", folder / "o.bin", folder / "o.gltf"}));
     EXPECT_EQ(read_file(folder / "o.bin"), good);
+    expect_failure(run_ewa({"convert", folder / "s.ply", folder / "o.gltf", "--json", folder / "o-2.bin"}), 2,
+                   "the file of OUT's older values");
     // An output that is an input, by any name.
     fs::create_symlink(folder / "s.ply", folder / "soft.ply");
     fs::create_hard_link(folder / "s.ply", folder / "hard.ply");
@@ -226,16 +228,6 @@ TEST(Convert, NoFileTakesAnothersPlace) {
     EXPECT_EQ(read_file(folder / "s.ply"), good);
     EXPECT_TRUE(fs::is_symlink(folder / "soft.ply"));
     expect_success(run_ewa({"convert", folder / "s.ply", folder / "s.ply", folder / "twice.ply"}));
-}
-
-TEST(Convert, KeepsTheBinOfAGltfThatItReads) {
-    const Folder folder;
-    make_splats(folder / "s.ply");
-    expect_success(run_ewa({"convert", folder / "s.ply", folder / "g.gltf"}));
-    const std::string good = read_file(folder / "g.bin");
-    expect_failure(run_ewa({"convert", folder / "g.gltf", folder / "o.ply", "--json", folder / "g.bin"}), 2,
-                   "values of an input");
-    EXPECT_EQ(read_file(folder / "g.bin"), good);
 }
 
 TEST(Convert, RefusesAnEmptyResult) {
@@ -253,80 +245,27 @@ TEST(Convert, RefusesAnEmptyResult) {
     EXPECT_FALSE(fs::exists(folder / "p.ply"));
 }
 
-TEST(Convert, NamesTheBinOfAGltfAndLeavesOthersAlone) {
+TEST(Convert, TheOutputMayHaveItsOption) {
     const Folder folder;
     make_splats(folder / "s.ply");
-    const std::vector<std::string> convert{"convert", folder / "s.ply", folder / "g.gltf", "--json",
-                                           folder / "g.json"};
-    write_file(folder / "g.bin", "somebody's");
-    expect_failure(run_ewa(convert), 2, "g.bin");
-    EXPECT_FALSE(fs::exists(folder / "g.gltf"));
-    write_file(folder / "g.gltf", R"({"asset": {"version": "2.0"}})");
-    expect_failure(run_ewa(convert), 2, "g.bin");
-    EXPECT_THROW(ewa::save_splats(folder / "g.gltf", ewa::load_splats(folder / "s.ply")), ewa::InputError);
-    EXPECT_EQ(read_file(folder / "g.bin"), "somebody's");
-    fs::remove(folder / "g.bin");
-    const char* turns[] = {"g.bin", "g-2.bin", "g.bin"};  // its own it replaces
-    for (const char* name : turns) {
-        SCOPED_TRACE(name);
-        const Outcome outcome = run_ewa(convert);
-        expect_success(outcome);
-        EXPECT_EQ(files_below(folder / ""), (Names{name, "g.gltf", "g.json", "s.ply"}));
-        const auto bytes = fs::file_size(folder / name);
-        EXPECT_EQ(bytes, 50u * (12 + 8 + 16 + 12 + 4 + 4 * 12));
-        EXPECT_NE(outcome.out.find((folder / name) + ": the values of this glTF, 5 kB"), std::string::npos)
-            << outcome.out;
-        EXPECT_EQ(read_json(folder / "g.json")["output"]["values"]["bytes"], bytes);
-    }
-    // A kill may leave the values of an earlier file.
-    write_file(folder / "g-2.bin", "left");
-    expect_success(run_ewa(convert));
-    EXPECT_EQ(files_below(folder / ""), (Names{"g-3.bin", "g.gltf", "g.json", "s.ply"}));
+    expect_success(run_ewa({"convert", folder / "s.ply", "-o", folder / "o.spz"}));
+    expect_success(run_ewa({"convert", folder / "s.ply", folder / "o.spz", "-o", folder / "both.ply"}));
+    EXPECT_EQ(ewa::load_splats(folder / "both.ply").size(), 100u);
+    expect_failure(run_ewa({"convert", folder / "s.ply"}), 2, "an input and the output are needed");
+    expect_failure(run_ewa({"convert", folder / "s.ply", "-o", folder / "s.ply"}), 2, "an input");
 }
 
-TEST(Convert, ProtectsTheValuesOfAGltfUnderAnyName) {
+TEST(Convert, SaysWhatToWriteInstead) {
     const Folder folder;
     make_splats(folder / "s.ply");
-    expect_success(run_ewa({"convert", folder / "s.ply", folder / "g.gltf"}));
-    fs::rename(folder / "g.bin", folder / "v.ply");
-    std::string text = read_file(folder / "g.gltf");
-    text.replace(text.find("g.bin"), 5, "v.ply");
-    write_file(folder / "g.gltf", text);
-    const std::string values = read_file(folder / "v.ply");
-    expect_failure(run_ewa({"convert", folder / "g.gltf", folder / "v.ply"}), 2, "values of an input");
-    EXPECT_EQ(read_file(folder / "v.ply"), values);
-}
-
-TEST(Convert, UnpacksASogAndLeavesOtherImagesAlone) {
-    const Folder folder;
-    make_splats(folder / "s.ply", 50, 1);
-    fs::create_directory(folder / "sog");
-    write_file(folder / "sog/sh0.webp", "somebody's");
-    const Names convert{"convert", folder / "s.ply", folder / "sog/meta.json",
-                        "--check", "--json",         folder / "g.json"};
-    expect_failure(run_ewa(convert), 2, "sh0.webp: would be replaced");
-    EXPECT_EQ(files_below(folder / "sog"), Names{"sh0.webp"});
-    fs::remove(folder / "sog/sh0.webp");
-    for (const char* first : {"means_l", "means_l-2", "means_l"}) {  // its own it replaces
-        const Outcome outcome = run_ewa(convert);
-        expect_success(outcome);
-        EXPECT_TRUE(fs::exists(folder / (std::string("sog/") + first + ".webp")));
-        EXPECT_NE(outcome.out.find(std::string(first) + ".webp and 6 other images: the values of this SOG"),
-                  std::string::npos)
-            << outcome.out;
-        EXPECT_EQ(files_below(folder / "sog").size(), 8u);
+    for (const char* name : {"o.obj", "o.ksplat"}) {
+        const Outcome outcome = run_ewa({"convert", folder / "s.ply", folder / name});
+        expect_failure(outcome, 2,
+                       ".ply, .compressed.ply, .splat, .spz, .sog, meta.json of a SOG, .glb, .gltf\n");
     }
-    const auto json = read_json(folder / "g.json");
-    EXPECT_EQ(json["output"]["values"]["files"].size(), 7u);
-    // Compared in the order in which it is written.
-    EXPECT_LT(json["check"]["position"]["largest"].get<double>(), 0.001);
-    expect_failure(
-        run_ewa({"convert", folder / "sog/meta.json", folder / "o.ply", "--json", folder / "sog/quats.webp"}),
-        2, "values of an input");
-    fs::rename(folder / "sog/meta.json", folder / "sog/other.json");
-    const Outcome info = run_ewa({"info", folder / "sog/other.json", "--json"});
-    expect_success(info);
-    EXPECT_EQ(nlohmann::json::parse(info.out)["variant"], "version 2, unpacked");
+    expect_failure(run_ewa({"convert", folder / "s.ply", folder / "o.html"}), 2,
+                   "ewa writes no web page; SuperSplat (superspl.at/editor) shows o.sog and o.ply");
+    EXPECT_EQ(files_below(folder / ""), Names{"s.ply"});
 }
 
 TEST(Convert, FullDiskLeavesNoHalfFile) {

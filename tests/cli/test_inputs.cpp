@@ -139,4 +139,19 @@ TEST(Inputs, DevicesThatAreNotThere) {
         expect_failure(run_ewa({"eval", folder / "s.ply", folder / "data", "--device", device}), 2, device);
 }
 
+TEST(Inputs, InfoOfAnImage) {
+    const Folder folder;
+    make_dataset(folder / "data");
+    fs::copy_file(folder / "data/images/0.png", folder / "photo.jpg");  // by its content
+    const Outcome text = run_ewa({"info", folder / "photo.jpg"});
+    expect_success(text);
+    EXPECT_NE(text.out.find("kind            image (png)"), std::string::npos) << text.out;
+    EXPECT_NE(text.out.find("size            48x32, 8 bits a channel"), std::string::npos) << text.out;
+    const auto json = nlohmann::json::parse(run_ewa({"info", folder / "photo.jpg", "--json"}).out);
+    EXPECT_EQ(json["kind"], "image");
+    EXPECT_EQ(json["width"], 48);
+    write_file(folder / "text.jpg", "no image");
+    expect_failure(run_ewa({"info", folder / "text.jpg"}), 2, "text.jpg");
+}
+
 }  // namespace

@@ -136,7 +136,40 @@ INSTANTIATE_TEST_SUITE_P(
         WrongUse{{"grad", "/a.ply", "/b", "--frame", "-1", "-o", "/c.ply"}, "--frame"},
         WrongUse{{"grad", "/a.ply", "/b", "--frame", "0", "-o", "/c.txt"}, ".ply"},
         WrongUse{{"info"}, "PATH"}, WrongUse{{"info", "/nowhere"}, "/nowhere"},
-        WrongUse{{"devices", "extra"}, "extra"}));
+        WrongUse{{"devices", "extra"}, "extra"},
+        WrongUse{{"render", "/a.ply", "pic.png"},
+                 "unexpected argument: pic.png; -o pic.png names the output"},
+        WrongUse{{"view", "/a.ply"},
+                 "unknown command 'view'; the window is the program ewa-view: ewa-view /a.ply"},
+        WrongUse{{"help", "nothere"}, "unknown command 'nothere'"}, WrongUse{{"help", "train", "x"}, "help"},
+        WrongUse{{"render", "/a.ply", "-o", "o.png", "--size", "16384x16384"},
+                 "of at most 16384 a side and 134 million pixels"}));
+
+TEST(Usage, HelpAndVersionAsPeopleTypeThem) {
+    const auto printed = [](const std::vector<std::string>& arguments) {
+        const Outcome outcome = run_ewa(arguments);
+        expect_success(outcome);
+        EXPECT_EQ(outcome.err, "");
+        return outcome.out;
+    };
+    EXPECT_EQ(printed({"help"}), printed({"--help"}));
+    EXPECT_EQ(printed({"help", "train"}), printed({"train", "--help"}));
+    for (const char* version : {"version", "-v", "-V"}) EXPECT_EQ(printed({version}), printed({"--version"}));
+    EXPECT_NE(printed({"train", "--help"}).find("--serve [ADDRESS:]PORT"), std::string::npos);
+    EXPECT_NE(printed({"convert", "--help"}).find("--spz-version 3|4"), std::string::npos);
+}
+
+TEST(Usage, TheEnvironmentMayNameTheDevice) {
+    const Folder folder;
+    make_splats(folder / "s.ply");
+    const std::vector<std::string> render{"render",         folder / "s.ply", "-o",
+                                          folder / "o.png", "--size",         "8x8"};
+    const Circumstances none{.environment = {{"EWA_DEVICE", "no such device"}}};
+    expect_failure(run_ewa(render, none), 2, "no usable Vulkan device matches 'no such device'");
+    std::vector<std::string> given = render;
+    given.insert(given.end(), {"--device", "0"});
+    expect_success(run_ewa(given, none));
+}
 
 TEST(Usage, ConfigNamesItsMistake) {
     const Folder folder;

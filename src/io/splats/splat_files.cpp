@@ -56,10 +56,29 @@ const Kind* kind_of_name(const std::filesystem::path& path) {
     return nullptr;
 }
 
-[[noreturn]] void refuse(const std::filesystem::path& path) {
-    throw InputError(core::one_line(path.string() +
-                                    ": not a supported kind of splat file; supported: .ply, .compressed.ply, "
-                                    ".splat, .ksplat, .spz, .sog, meta.json of a SOG, .glb, .gltf"));
+constexpr const char* kWritten = ".ply, .compressed.ply, .splat, .spz, .sog, meta.json of a SOG, .glb, .gltf";
+
+std::string all_kinds() {
+    return std::string(kWritten) + ", .ksplat";
+}
+
+[[noreturn]] void refuse(const std::filesystem::path& path, const std::string& kinds) {
+    throw InputError(
+        core::one_line(path.string() + ": not a supported kind of splat file; supported: " + kinds));
+}
+
+/// Says what to write instead.
+[[noreturn]] void refuse_to_write(const std::filesystem::path& path, bool read_only) {
+    const std::string extension = core::lower(path.extension().string()), stem = path.stem().string();
+    std::string text = path.string();
+    if (extension == ".html" || extension == ".htm")
+        text += ": ewa writes no web page; SuperSplat (superspl.at/editor) shows " + stem + ".sog and " +
+                stem + ".ply, Babylon.js and Spark also show " + stem + ".spz";
+    else if (read_only)
+        text += std::string(": ewa reads this format and does not write it; it writes ") + kWritten;
+    else
+        refuse(path, kWritten);
+    throw InputError(core::one_line(text));
 }
 
 /// The kind that the first bytes identify, or null.
@@ -119,23 +138,20 @@ std::string_view name_of(SplatFormat format) {
 
 SplatFormat format_of_name(const std::filesystem::path& path) {
     const Kind* kind = kind_of_name(path);
-    if (!kind) refuse(path);
+    if (!kind) refuse(path, all_kinds());
     return kind->format;
 }
 
 SplatFormat format_to_write(const std::filesystem::path& path) {
-    const SplatFormat format = format_of_name(path);
-    if (!kind_of(format).write)
-        throw InputError(core::one_line(path.string() +
-                                        ": ewa reads this format and does not write it; write .ply, "
-                                        ".spz or .sog instead"));
-    return format;
+    const Kind* kind = kind_of_name(path);
+    if (!kind || !kind->write) refuse_to_write(path, kind != nullptr);
+    return kind->format;
 }
 
 SplatFormat format_of_file(const std::filesystem::path& path) {
     const Kind* kind = kind_of_name(path);
     std::error_code error;
-    if (!kind && !std::filesystem::is_regular_file(path, error)) refuse(path);
+    if (!kind && !std::filesystem::is_regular_file(path, error)) refuse(path, all_kinds());
     core::FileReader reader(path);
     // A .splat begins with a coordinate, so its first bytes may look like any format.
     if (kind && kind->format == SplatFormat::splat && reader.size() % 32 == 0) return SplatFormat::splat;
@@ -149,7 +165,7 @@ SplatFormat format_of_file(const std::filesystem::path& path) {
         kind = &kind_of(SplatFormat::sog_meta);
     else if (const Kind* told = kind_of_head(head))
         kind = told;
-    if (!kind) refuse(path);
+    if (!kind) refuse(path, all_kinds());
     if (kind->format != SplatFormat::ply) return kind->format;
     return io::is_compressed_ply(io::PlyTable(path)) ? SplatFormat::compressed_ply : SplatFormat::ply;
 }
