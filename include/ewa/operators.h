@@ -110,7 +110,7 @@ struct DepthOrder {
 
 /// Which splats a pixel draws: the list of its tile, in the order of the list.
 struct TileLists {
-    uint32_t tile_size = 16;  // px, a multiple of the device's tiles (8 x 8 on most)
+    uint32_t tile_size = 16;  // px, a multiple of 4
     std::span<const int32_t>
         offsets;  // [tiles + 1], row by row: where each tile's list begins; the last is the end
     std::span<const int32_t> splats;  // the lists, one after another
@@ -141,8 +141,7 @@ struct BlendedImage {
     std::vector<float> features;          // [H, W, D]: sum of f alpha T, and T times the background
     std::vector<float> alphas;            // [H, W], 1 - T
     std::shared_ptr<BlendRecord> record;  // null without BlendOptions::gradients
-    // Splats that were left out because a value is not finite or a conic not positive definite. A feature that is not
-    // finite counts as 0, and its splat as skipped.
+    // Splats that were left out because a value is not finite or a conic not positive definite.
     uint32_t skipped_nonfinite = 0;
 };
 
@@ -152,8 +151,7 @@ struct ScreenGradient {
     std::vector<float> opacities;   // [M]
     std::vector<float> features;    // [M, D]
     std::vector<float> background;  // [D]
-    // [M, 2], sum over the pixels of |dL/d(mean)| (Ye et al. 2024, AbsGS, eq. 7); empty unless asked for. With more
-    // than 4 channels, each 4 channels are taken absolute apart.
+    // [M, 2], sum over the pixels of |dL/d(mean)| (Ye et al. 2024, AbsGS, eq. 7); empty unless asked for.
     std::vector<float> absolute;
 };
 

@@ -11,6 +11,8 @@ layout(constant_id = SPEC_TILE_WIDTH) const uint TILE_WIDTH = 8;
 layout(constant_id = SPEC_TILE_HEIGHT) const uint TILE_HEIGHT = 8;
 layout(constant_id = SPEC_KERNEL) const uint KERNEL = KERNEL_PEAK;
 const bool BY_DEPTH = KERNEL == KERNEL_DENSITY;  // a record's opacity is an optical depth
+layout(constant_id = SPEC_PARTS) const uint PARTS = 0;
+const uint PART_COLUMNS = TILE_WIDTH > PART_SIZE ? TILE_WIDTH / PART_SIZE : 1u;
 const uint PIXELS = TILE_WIDTH * TILE_HEIGHT / SUBGROUP;
 const uint ROW_STEP = SUBGROUP / TILE_WIDTH;
 
@@ -51,8 +53,21 @@ struct LaneSplat {
     float ratio_step;   // exp(-2 (u_step^2 + v_step^2))
     float opacity;
     vec3 color;
-    float z;  // depth
+    float z;     // depth
+    float part;  // of the tile, with PARTS
 };
+
+uint splat_of(uint instance) {
+    const uint word = splats[instance];
+    return PARTS != 0u ? word & ((1u << PART_SHIFT) - 1u) : word;
+}
+
+// Texel 0 of the record of an instance. With PARTS, z is the instance's part: such records have no low digits of the mean.
+vec4 first_texel(uint instance, uint at) {
+    vec4 texel = fetch(records, at);
+    if (PARTS != 0u) texel.z = float(splats[instance] >> PART_SHIFT);
+    return texel;
+}
 
 // exp(-2 (u_step^2 + v_step^2)). record1: as projected.
 float ratio_step_of(vec4 record1) {
@@ -67,8 +82,9 @@ Loaded load_batch(uint first, uint end) {
     own.end = end;
     if (BROADCAST == BROADCAST_UNIFORM) return own;
     const uint lane = LANE;
-    const uint at = RECORD_TEXELS * splats[min(first + lane, end - 1u)];
-    own.record0 = fetch(records, at);
+    const uint instance = min(first + lane, end - 1u);
+    const uint at = RECORD_TEXELS * splat_of(instance);
+    own.record0 = first_texel(instance, at);
     own.record1 = fetch(records, at + 1u);
     own.record2 = fetch(records, at + 2u);
     own.record1.w = first + lane < end ? own.record1.w : 0.0;
@@ -86,7 +102,8 @@ Loaded load_batch(uint first, uint end) {
 }
 
 LaneSplat lane_splat_of(vec4 record0, vec4 record1, vec4 record2, float ratio_step, vec2 pixel) {
-    EXACT const float dx = (pixel.x - record0.x) - record0.z;
+    const float low = PARTS != 0u ? 0.0 : record0.z;
+    EXACT const float dx = (pixel.x - record0.x) - low;
     EXACT const float dy = (pixel.y - record0.y) - record0.w;
     EXACT const float u = record1.x * (dx - record1.y * dy);
     LaneSplat s;
@@ -98,6 +115,7 @@ LaneSplat lane_splat_of(vec4 record0, vec4 record1, vec4 record2, float ratio_st
     s.opacity = record1.w;
     s.color = record2.rgb;
     s.z = record2.w;
+    s.part = record0.z;
     return s;
 }
 
@@ -116,8 +134,9 @@ LaneSplat lane_splat(Loaded own, uint j, vec2 pixel) {
         record1 = shared_batch[RECORD_TEXELS * j + 1u];
         record2 = shared_batch[RECORD_TEXELS * j + 2u];
     } else {
-        const uint at = RECORD_TEXELS * splats[min(own.first + j, own.end - 1u)];
-        record0 = fetch(records, at);
+        const uint instance = min(own.first + j, own.end - 1u);
+        const uint at = RECORD_TEXELS * splat_of(instance);
+        record0 = first_texel(instance, at);
         record1 = fetch(records, at + 1u);
         record2 = fetch(records, at + 2u);
         record1.w = own.first + j < own.end ? record1.w : 0.0;
@@ -147,6 +166,11 @@ void column_alphas(LaneSplat s, out float raw[PIXELS]) {
             raw[p] = raw[p + 1u] * ratio;
             ratio *= s.ratio_step;
         }
+    }
+    if (PARTS == 0u) return;
+    [[unroll]] for (uint p = 0; p < PIXELS; ++p) {
+        const uint x = LANE % TILE_WIDTH, y = LANE / TILE_WIDTH + p * ROW_STEP;
+        raw[p] = float(y / PART_SIZE * PART_COLUMNS + x / PART_SIZE) == s.part ? raw[p] : 0.0;
     }
 }
 

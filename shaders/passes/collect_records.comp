@@ -39,16 +39,26 @@ uint ordered(float x) {
     return (bits & 0x80000000u) != 0u ? ~bits : bits | 0x80000000u;
 }
 
+// Of all channels: a splat without one of its colours is left out. Some drivers stop a loop after 65,535 iterations.
+bool has_finite_features(uint i) {
+    bool finite = true;
+    for (uint first = 0u; first < push.channels; first += 4u) {
+        [[unroll]] for (uint c = 0; c < 4; ++c) {
+            const uint channel = min(first + c, push.channels - 1u);
+            finite = finite && abs(features[push.channels * i + channel]) <= float(COLOR_MAX);
+        }
+    }
+    return finite;
+}
+
 void main() {
     const uint i = item_index();
     if (i >= push.splats) return;
     // Zero times a value that is not finite is not zero: such a feature would spread over its tiles.
     vec4 feature = vec4(0.0);
-    bool finite_feature = true;
     [[unroll]] for (uint c = 0; c < 4; ++c) {
         if (push.first_channel + c < push.channels) {
             const float value = features[push.channels * i + push.first_channel + c];
-            finite_feature = finite_feature && abs(value) <= float(COLOR_MAX);
             feature[c] = abs(value) <= float(COLOR_MAX) ? value : 0.0;
         }
     }
@@ -61,12 +71,12 @@ void main() {
     // A splat that no tile lists may hold anything.
     const bool wanted = LISTED ? tile_counts[i] > 0u : !WITH_RADII || (radii[i].x > 0 && radii[i].y > 0);
     // A NaN fails these comparisons.
-    const bool finite = is_finite(mean.x) && is_finite(mean.y) && is_finite(shape) && shape.x > 0.0 && shape.z > 0.0 &&
-                        is_finite(opacity) && is_finite(depth);
+    const bool finite = has_finite_features(i) && is_finite(mean.x) && is_finite(mean.y) && is_finite(shape) &&
+                        shape.x > 0.0 && shape.z > 0.0 && is_finite(opacity) && is_finite(depth);
     const vec4 record0 = vec4(mean, 0.0, 0.0), record1 = vec4(shape, opacity);
     records[RECORD_TEXELS * i] = as_texel(finite ? record0 : vec4(0.0));
     records[RECORD_TEXELS * i + 1] = as_texel(finite ? record1 : vec4(1.0, 0.0, 1.0, 0.0));
-    if (wanted && !(finite && finite_feature)) atomicAdd(counts.skipped_nonfinite, 1u);
+    if (wanted && !finite) atomicAdd(counts.skipped_nonfinite, 1u);
     if (LISTED) return;
 
     uint count = 0u;

@@ -46,8 +46,8 @@ void main() {
         shape = -vec3(0.5 * ((guu / ux + 2.0 * t * guv) / ux + t * t * gvv), (guv / ux + t * gvv) / vy,
                       0.5 * gvv / (vy * vy));
     }
-    // alpha is proportional to the opacity.
-    float opacity = count > 0u ? g / record1.w : 0.0;
+    // alpha is proportional to the opacity. A listed splat that draws nothing may have opacity 0.
+    float opacity = record1.w > 0.0 ? g / record1.w : 0.0;
     vec2 sizes = 2.0 * vec2(ux * sum[2].y, sum[2].z);
     if (ADD) {
         mean += means[i];

@@ -21,6 +21,7 @@ EWA_UINT(SPEC_BROADCAST, 11u);     // BROADCAST_*: how the lanes of a tile read 
 EWA_UINT(SPEC_SHARP, 12u);         // 1: some footprint is sharper than LOW_PASS leaves any
 EWA_UINT(SPEC_COLOR_FLOATS, 10u);  // a buffer of colours holds 0: 4 bytes a colour; 1: 4 floats
 EWA_UINT(SPEC_NEAREST, 13u);       // spheres that a pixel draws, at least 1
+EWA_UINT(SPEC_PARTS, 14u);         // 1: an instance counts in one part of its tile: see PART_SIZE
 
 // ---- A splat's parameters ----
 // Flat float f is component f % 4 of texel plane f / 4. Splats are stored in blocks of PARAM_BLOCK. Within a
@@ -68,6 +69,12 @@ EWA_UINT(NOT_LISTED, 0xffffffffu);  // place of a splat that is not in a list
 // that is cut off at 0 is 0.
 EWA_UINT(SUM_FLOATS, 9u);
 EWA_UINT(SUM_FLOATS_ABSOLUTE, 11u);
+
+// ---- An instance for a part of its tile, with SPEC_PARTS ----
+// A part is a block of PART_SIZE x PART_SIZE pixels, or of the tile's width. Its number, row by row, stands in the bits of
+// the instance's splat from PART_SHIFT on. A tile has at most 16 parts.
+EWA_UINT(PART_SIZE, 4u);  // px
+EWA_UINT(PART_SHIFT, 28u);
 
 // ---- Image planes ----
 // Plane p of pixel (x, y) is float p * plane_floats + y * stride + x.

@@ -20,6 +20,7 @@ struct BlendFrame {
     // Of the image.
     uint32_t splats = 0, channels = 0, width = 0, height = 0;
     bool whiteners = false;
+    bool parts = false;  // instances count in a part of their tile
     bool sharp = false;  // a footprint is sharper than the low-pass of the projection leaves any
     std::vector<float> background;
     std::vector<uint8_t> tile_mask;
@@ -35,6 +36,7 @@ struct BlendFrame {
     Array means_gradient{"means gradient"}, conics_gradient{"conics gradient"},
         opacities_gradient{"opacities gradient"}, features_gradient{"features gradient"},
         absolute_gradient{"absolute gradient"};
+    Array pixel_gradients{"pixel gradients", gpu::Texel::rgba32f};
 
     uint32_t chunks() const { return (channels + kChunk - 1) / kChunk; }
     const gpu::Buffer& planes(uint32_t chunk) const {

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "operators/blend_frame.h"
+#include "operators/device_lists.h"
 #include "passes/passes.h"
 #include "pipeline/forward.h"
 
@@ -67,10 +68,11 @@ bool has_sharp(const ScreenSplats& splats) {
     return false;
 }
 
-/// A blending pass's constants: its mode, and whether it computes every pixel's exponential.
+/// A blending pass's constants: its mode, whether it computes every pixel's exponential, and whether instances have parts.
 passes::Constants blend_variant(const BlendFrame& f, uint32_t mode) {
     passes::Constants constants{{shared::SPEC_MODE, mode}};
     if (f.sharp) constants.push_back({shared::SPEC_SHARP, 1});
+    if (f.parts) constants.push_back({shared::SPEC_PARTS, 1});
     return constants;
 }
 
@@ -80,6 +82,7 @@ void describe_image(BlendFrame& f, const ScreenSplats& splats, const BlendOption
     f.width = options.width;
     f.height = options.height;
     f.whiteners = splats.whiteners;
+    f.parts = false;
     f.sharp = has_sharp(splats);
     f.background.assign(options.background.begin(), options.background.end());
     f.background.resize(f.channels, 0.0f);
@@ -209,51 +212,6 @@ BlendedImage image_of(BlendFrame& f) {
     return image;
 }
 
-/// The lists of the caller's tiles as lists of the device's smaller tiles, and each splat's place in them.
-struct DeviceLists {
-    std::vector<uint32_t> splats, tile_starts, sorted_indices, first_instances, tile_counts;
-};
-
-DeviceLists device_lists(const TileLists& lists, const Sizes& s, const passes::KernelConfig& config,
-                         uint32_t splat_count) {
-    const uint32_t size = lists.tile_size;
-    const uint32_t columns = divide_up(s.width, size), rows = divide_up(s.height, size);
-    check_size("offsets", lists.offsets.size(), size_t(columns) * rows + 1, "[tiles + 1]");
-    for (size_t t = 0; t + 1 < lists.offsets.size(); ++t)
-        if (lists.offsets[t] < 0 || lists.offsets[t] > lists.offsets[t + 1])
-            throw InputError("offsets decrease at tile " + std::to_string(t));
-    if (size_t(lists.offsets.back()) > lists.splats.size())
-        throw InputError("offsets end at " + std::to_string(lists.offsets.back()) + ", and the lists have " +
-                         std::to_string(lists.splats.size()) + " entries");
-    for (const int32_t splat : lists.splats)
-        if (splat < 0 || uint32_t(splat) >= splat_count)
-            throw InputError("a list with splat " + std::to_string(splat) + " of " +
-                             std::to_string(splat_count));
-
-    DeviceLists d;
-    d.tile_counts.assign(splat_count, 0);
-    d.first_instances.assign(splat_count, 0);
-    for (uint32_t y = 0; y < s.tiles_y; ++y)
-        for (uint32_t x = 0; x < s.tiles_x; ++x) {
-            d.tile_starts.push_back(uint32_t(d.splats.size()));
-            const size_t tile =
-                size_t(y * config.tile_height / size) * columns + x * config.tile_width / size;
-            for (int32_t e = lists.offsets[tile]; e < lists.offsets[tile + 1]; ++e) {
-                d.splats.push_back(uint32_t(lists.splats[size_t(e)]));
-                ++d.tile_counts[d.splats.back()];
-            }
-        }
-    // One end more: no instance stands behind the last tile.
-    d.tile_starts.insert(d.tile_starts.end(), 2, uint32_t(d.splats.size()));
-    uint32_t sum = 0;
-    for (uint32_t i = 0; i < splat_count; ++i)
-        d.first_instances[i] = std::exchange(sum, sum + d.tile_counts[i]);
-    std::vector<uint32_t> next = d.first_instances;
-    d.sorted_indices.resize(d.splats.size());
-    for (uint32_t k = 0; k < d.splats.size(); ++k) d.sorted_indices[next[d.splats[k]]++] = k;
-    return d;
-}
-
 /// A plane of an image gradient, with zeros where the tile mask has none.
 void fill_gradient(const BlendFrame& f, uint32_t chunk, std::span<const float> features,
                    std::span<const float> alphas, std::vector<float>& planes) {
@@ -281,6 +239,32 @@ void fill_gradient(const BlendFrame& f, uint32_t chunk, std::span<const float> f
     }
 }
 
+/// What blend_absolute.comp reads of the pixels: texels of 4 channels, chunk by chunk, and one of the light behind all splats.
+std::vector<float> absolute_inputs(const BlendFrame& f, std::span<const float> features,
+                                   std::span<const float> alphas) {
+    const Sizes& s = f.frame.sizes;
+    const size_t pixels = size_t(f.width) * f.height, chunks = f.chunks();
+    std::vector<float> texels(4 * pixels * (chunks + 1));
+    float* const rest = &texels[4 * pixels * chunks];
+    std::vector<float> gradient;
+    for (uint32_t chunk = 0; chunk < chunks; ++chunk) {
+        fill_gradient(f, chunk, features, alphas, gradient);
+        const std::vector<float> image = f.planes(chunk).download<float>(s.planes / sizeof(float));
+        const uint32_t count = std::min(f.channels - kChunk * chunk, kChunk);
+        for (size_t i = 0; i < pixels; ++i) {
+            const size_t at = i / f.width * s.stride + i % f.width;
+            const auto add = [&](uint32_t plane) {
+                const size_t k = size_t(plane) * s.plane_floats + at;
+                rest[4 * i] += gradient[k] * image[k];
+                return gradient[k];
+            };
+            for (uint32_t c = 0; c < count; ++c) texels[4 * (chunk * pixels + i) + c] = add(plane_of(c));
+            add(shared::PLANE_T);
+        }
+    }
+    return texels;
+}
+
 std::vector<float> background_gradient(const BlendFrame& f, std::span<const float> features) {
     std::vector<double> sums(f.channels, 0.0);
     for (size_t i = 0; i < f.transmittances.size(); ++i)
@@ -289,31 +273,11 @@ std::vector<float> background_gradient(const BlendFrame& f, std::span<const floa
     return {sums.begin(), sums.end()};
 }
 
-void record_gradient(gpu::Recording& recording, Context& context, const BlendFrame& f, uint32_t chunk,
-                     bool absolute) {
-    const bool fourth = has_fourth(f, chunk);
-    uint32_t blend = shared::BLEND_BACKWARD_ALPHA, gather = 0;
-    if (absolute) {
-        blend |= shared::BLEND_BACKWARD_ABSOLUTE;
-        gather |= shared::GATHER_ABSOLUTE;
-    }
-    if (fourth) {
-        blend |= shared::BLEND_BACKWARD_FOURTH;
-        gather |= shared::GATHER_FOURTH;
-    }
-    if (chunk > 0) gather |= shared::GATHER_ADD;
-    if (f.whiteners) gather |= shared::SHAPE_WHITENERS;
-    if (f.chunks() > 1) record_collect(recording, context, f, chunk, shared::COLLECT_FEATURES);
-    context.cache.get<passes::BlendBackward>(blend_variant(f, blend))
-        .record(recording,
-                {.records = f.frame.records,
-                 .splats = f.frame.instance_splats[1],
-                 .tile_starts = f.frame.tile_starts,
-                 .planes = f.planes(chunk),
-                 .image_gradient = f.frame.image_gradient,
-                 .slots = f.frame.slots},
-                pipeline::blend_push(context.cache.config(), f.frame, {0, 0, 0}));
-    context.cache.get<passes::GatherSlots>({{shared::SPEC_MODE, gather}})
+/// Adds the slots of each splat. first: the channel of the slots' first colour. mode: GATHER_* bits.
+void record_gather(gpu::Recording& recording, Context& context, const BlendFrame& f, uint32_t first,
+                   uint32_t mode) {
+    if (f.whiteners) mode |= shared::SHAPE_WHITENERS;
+    context.cache.get<passes::GatherSlots>({{shared::SPEC_MODE, mode}})
         .record(recording,
                 {.records = f.frame.records,
                  .slots = f.frame.slots,
@@ -325,7 +289,46 @@ void record_gradient(gpu::Recording& recording, Context& context, const BlendFra
                  .opacities = f.opacities_gradient.buffer(),
                  .features = f.features_gradient.buffer(),
                  .absolute = f.absolute_gradient.buffer()},
-                {.splats = f.splats, .channels = f.channels, .first_channel = kChunk * chunk});
+                {f.splats, f.channels, first});
+}
+
+void record_gradient(gpu::Recording& recording, Context& context, const BlendFrame& f, uint32_t chunk,
+                     bool absolute) {
+    uint32_t blend = shared::BLEND_BACKWARD_ALPHA, gather = chunk > 0 ? shared::GATHER_ADD : 0;
+    if (absolute) {
+        blend |= shared::BLEND_BACKWARD_ABSOLUTE;
+        gather |= shared::GATHER_ABSOLUTE;
+    }
+    if (has_fourth(f, chunk)) {
+        blend |= shared::BLEND_BACKWARD_FOURTH;
+        gather |= shared::GATHER_FOURTH;
+    }
+    if (f.chunks() > 1) record_collect(recording, context, f, chunk, shared::COLLECT_FEATURES);
+    context.cache.get<passes::BlendBackward>(blend_variant(f, blend))
+        .record(recording,
+                {.records = f.frame.records,
+                 .splats = f.frame.instance_splats[1],
+                 .tile_starts = f.frame.tile_starts,
+                 .planes = f.planes(chunk),
+                 .image_gradient = f.frame.image_gradient,
+                 .slots = f.frame.slots},
+                pipeline::blend_push(context.cache.config(), f.frame, {0, 0, 0}));
+    record_gather(recording, context, f, kChunk * chunk, gather);
+}
+
+/// The absolute gradients of an image with several chunks. The other gradients stay: their sums in the slots are 0.
+void record_absolute(gpu::Recording& recording, Context& context, const BlendFrame& f) {
+    recording.fill(f.absolute_gradient.buffer(), 0, 0, uint64_t(f.splats) * 8);
+    context.cache.get<passes::BlendAbsolute>(blend_variant(f, f.channels))
+        .record(recording,
+                {.records = f.frame.records,
+                 .splats = f.frame.instance_splats[1],
+                 .tile_starts = f.frame.tile_starts,
+                 .features = f.features.buffer(),
+                 .pixels = f.pixel_gradients.buffer(),
+                 .slots = f.frame.slots},
+                pipeline::blend_push(context.cache.config(), f.frame, {0, 0, 0}));
+    record_gather(recording, context, f, f.channels, shared::GATHER_ADD | shared::GATHER_ABSOLUTE);
 }
 
 }  // namespace
@@ -379,18 +382,16 @@ BlendedImage Operators::blend(const ScreenSplats& splats, const TileLists& lists
     check_splats(splats, options);
     Context& context = *context_;
     const passes::KernelConfig& config = context.cache.config();
-    if (lists.tile_size == 0 || lists.tile_size % config.tile_width != 0 ||
-        lists.tile_size % config.tile_height != 0)
-        throw InputError("lists of tiles of " + std::to_string(lists.tile_size) +
-                         " px; this device draws tiles of " + std::to_string(config.tile_width) + "x" +
-                         std::to_string(config.tile_height));
     const std::lock_guard lock(context.mutex);
     auto record = std::shared_ptr<BlendRecord>(new BlendRecord(take_frame(context_, options.gradients)));
     BlendFrame& f = *record->frame_;
     describe_image(f, splats, options);
-    const FrameRequest empty = request_of(f, options, 1);
-    const DeviceLists d = device_lists(lists, pipeline::sizes_for(config, empty), config, f.splats);
-    f.frame.reserve(*context.device, config, request_of(f, options, uint32_t(d.splats.size())));
+    f.parts = lists.tile_size > 0 && have_parts(lists, config);
+    const DeviceLists d =
+        device_lists(splats, lists, pipeline::sizes_for(config, request_of(f, options, 1)), config,
+                     [&](uint32_t instances) {
+                         f.frame.reserve(*context.device, config, request_of(f, options, instances));
+                     });
     upload_splats(context, f, splats);
     f.frame.instance_splats[1].upload(std::span<const uint32_t>(d.splats));
     f.frame.tile_starts.upload(std::span<const uint32_t>(d.tile_starts));
@@ -428,12 +429,20 @@ ScreenGradient Operators::blend_backward(const BlendRecord& record, std::span<co
     f.opacities_gradient.reserve(device, n * 4);
     f.features_gradient.reserve(device, n * 4 * f.channels);
     f.absolute_gradient.reserve(device, absolute ? n * 8 : 16);
+    const bool apart = absolute && f.chunks() > 1 && n > 0;
     std::vector<float> planes;
     for (uint32_t chunk = 0; chunk < f.chunks(); ++chunk) {
         fill_gradient(f, chunk, features_gradient, alphas_gradient, planes);
         f.frame.image_gradient.upload(std::span<const float>(planes));
         gpu::Recording recording(device.limits());
-        record_gradient(recording, context, f, chunk, absolute);
+        record_gradient(recording, context, f, chunk, absolute && !apart);
+        context.executor.run(recording);
+    }
+    if (apart) {
+        const std::vector<float> pixel_texels = absolute_inputs(f, features_gradient, alphas_gradient);
+        f.pixel_gradients.upload(device, std::span<const float>(pixel_texels));
+        gpu::Recording recording(device.limits());
+        record_absolute(recording, context, f);
         context.executor.run(recording);
     }
     ScreenGradient gradient;

@@ -224,6 +224,14 @@ struct BlendBackward {
     gpu::BufferPart records, splats, tile_starts, planes, image_gradient, slots;
 };
 
+/// Absolute gradients by the means over any number of channels, in slots whose other floats are 0. Variant: SPEC_MODE (the
+/// number of channels), SPEC_SHARP, SPEC_PARTS.
+struct BlendAbsolute {
+    static constexpr char shader[] = "blend_absolute";
+    using Work = PerTile;
+    gpu::BufferPart records, splats, tile_starts, features, pixels, slots;
+};
+
 /// Blends the nearest spheres of every pixel. Variant: SPEC_NEAREST, SPEC_MODE (BLEND_COLOR, BLEND_DEPTH or BLEND_COUNT).
 struct BlendPoints {
     static constexpr char shader[] = "blend_points";

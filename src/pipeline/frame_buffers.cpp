@@ -277,12 +277,18 @@ void check_rays_finished(const shared::Counts& counts) {
             "splats");
 }
 
-uint32_t grown_capacity(uint32_t needed) {
-    constexpr uint32_t kMost = 0xe0000000u;
-    if (needed > kMost)
+constexpr uint32_t kMostInstances = 0xe0000000u;
+
+uint32_t checked_instances(uint64_t instances) {
+    if (instances > kMostInstances)
         throw RunError(
             "more than 3.7 billion (splat, tile) pairs in one picture; a smaller size has fewer");
-    return uint32_t(std::min<uint64_t>(uint64_t(needed) + needed / 8, kMost));
+    return uint32_t(instances);
+}
+
+uint32_t grown_capacity(uint32_t needed) {
+    const uint64_t checked = checked_instances(needed);
+    return uint32_t(std::min<uint64_t>(checked + checked / 8, kMostInstances));
 }
 
 }  // namespace ewa::pipeline

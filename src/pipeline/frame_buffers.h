@@ -100,6 +100,9 @@ struct FrameBuffers {
 /// Capacity for (splat, tile) instances of a first try. The first frame tells how many there are.
 uint32_t first_capacity(size_t splats);
 
+/// A number of instances, if an image can have so many. Throws RunError.
+uint32_t checked_instances(uint64_t instances);
+
 /// The next capacity if a frame needs `needed`. Throws RunError beyond what an image can have.
 uint32_t grown_capacity(uint32_t needed);
 

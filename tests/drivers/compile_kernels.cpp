@@ -199,11 +199,15 @@ void compile_operators(Compiler& compiler) {
         {{SPEC_MODE,
           {BLEND_BACKWARD_ALPHA, BLEND_BACKWARD_ALPHA | BLEND_BACKWARD_ABSOLUTE,
            BLEND_BACKWARD_ALPHA | BLEND_BACKWARD_FOURTH,
-           BLEND_BACKWARD_ALPHA | BLEND_BACKWARD_FOURTH | BLEND_BACKWARD_ABSOLUTE}}});
+           BLEND_BACKWARD_ALPHA | BLEND_BACKWARD_FOURTH | BLEND_BACKWARD_ABSOLUTE}},
+         {SPEC_PARTS, {0, 1}}});
+    compiler.compile<passes::Blend>({{SPEC_MODE, {BLEND_COLOR, BLEND_DEPTH}}, {SPEC_PARTS, {1}}});
+    compiler.compile<passes::BlendAbsolute>({{SPEC_MODE, {6, 32}}, {SPEC_PARTS, {0, 1}}});
     compiler.compile<passes::GatherSlots>(
         {{SPEC_MODE,
           {0, GATHER_ADD, GATHER_ABSOLUTE, GATHER_FOURTH, GATHER_ADD | GATHER_FOURTH,
-           GATHER_ABSOLUTE | GATHER_FOURTH, whiteners, GATHER_ABSOLUTE | whiteners}}});
+           GATHER_ADD | GATHER_ABSOLUTE, GATHER_ABSOLUTE | GATHER_FOURTH, whiteners,
+           GATHER_ABSOLUTE | whiteners}}});
 }
 
 void compile_path_tracer(Compiler& compiler) {
