@@ -52,7 +52,14 @@ nb::object numpy_argument(nb::handle value, const std::string& name, const char*
             expected.append(expected.empty() ? "" : " or ").append(expected_text(shape));
         throw nb::value_error((name + " has the shape " + shape_text(is) + "; expected " + expected).c_str());
     }
-    return numpy.attr("asarray")(array, nb::arg("dtype") = dtype, nb::arg("order") = "C");
+    const nb::object converted =
+        numpy.attr("asarray")(array, nb::arg("dtype") = dtype, nb::arg("order") = "C");
+    // Numbers that are not whole, or too large, would become others.
+    const bool whole = nb::cast<std::string>(converted.attr("dtype").attr("kind")) != "f";
+    if (whole && !empty && !converted.is(array) &&
+        !nb::cast<bool>(numpy.attr("array_equal")(converted, array)))
+        throw nb::value_error((name + " holds numbers that are not whole, or not within " + dtype).c_str());
+    return converted;
 }
 
 }  // namespace ewa::python

@@ -9,6 +9,7 @@ namespace ewa::python {
 namespace {
 
 constexpr double kFarFromRotation = 1e-3;  // float32 matrices of a file with few digits are nearer
+constexpr double kFarFromRow = 1e-5;       // an inverse in float32 is nearer
 
 std::string element(const char* name, size_t index, bool batch) {
     return batch ? std::string(name) + "[" + std::to_string(index) + "]" : name;
@@ -28,7 +29,8 @@ bool is_rotation(const glm::dmat3& m) {
 
 void set_pose(Camera& camera, const double* m, const std::string& name) {
     if (!std::all_of(m, m + 16, [](double x) { return std::isfinite(x); })) refuse(name + " is not finite");
-    if (m[12] != 0 || m[13] != 0 || m[14] != 0 || m[15] != 1) refuse(name + ": its last row is not 0 0 0 1");
+    for (size_t c = 0; c < 4; ++c)
+        if (std::abs(m[12 + c] - (c == 3)) > kFarFromRow) refuse(name + ": its last row is not 0 0 0 1");
     for (int r = 0; r < 3; ++r) {
         for (int c = 0; c < 3; ++c) camera.rotation[c][r] = m[4 * r + c];
         camera.translation[r] = m[4 * r + 3];

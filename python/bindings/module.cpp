@@ -3,6 +3,7 @@
 #include <nanobind/nanobind.h>
 
 #include "bindings.h"
+#include "errors.h"
 #include "ewa/error.h"
 
 namespace nb = nanobind;
@@ -20,9 +21,13 @@ void translate(const std::exception_ptr& thrown, void*) {
     try {
         std::rethrow_exception(thrown);
     } catch (const ewa::InputError& error) {
-        PyErr_SetString(error_class("InputError").ptr(), error.what());
+        PyErr_SetString(error_class("InputError").ptr(), ewa::python::spelled(error.what()).c_str());
     } catch (const ewa::RunError& error) {
-        PyErr_SetString(error_class("DeviceError").ptr(), error.what());
+        PyErr_SetString(error_class("DeviceError").ptr(), ewa::python::spelled(error.what()).c_str());
+    } catch (const nb::cast_error&) {
+        PyErr_SetString(
+            PyExc_TypeError,
+            "an argument has another type than expected, or an object was made without its __init__");
     }
 }
 

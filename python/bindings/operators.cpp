@@ -10,7 +10,9 @@
 #include "arrays.h"
 #include "bindings.h"
 #include "device.h"
+#include "errors.h"
 #include "ewa/error.h"
+#include "shared/constants.h"
 
 namespace ewa::python {
 namespace {
@@ -98,11 +100,10 @@ struct BlendArguments {
     }
     nb::tuple result(BlendedImage&& image) const {
         if (image.skipped_nonfinite > 0) {
-            const std::string text = std::to_string(image.skipped_nonfinite) + " of " +
-                                     std::to_string(size()) +
-                                     " splats have a mean, conic, opacity, depth or feature that is not "
-                                     "finite, or a conic that is not positive definite";
-            if (PyErr_WarnEx(PyExc_RuntimeWarning, text.c_str(), 1) != 0) throw nb::python_error();
+            warn(PyExc_RuntimeWarning,
+                 std::to_string(image.skipped_nonfinite) + " of " + std::to_string(size()) +
+                     " splats skipped: a mean, conic, opacity, depth or colour is not finite, or a conic is "
+                     "not positive definite");
         }
         const size_t h = options.height, w = options.width, d = features.length(1);
         nb::object handle = nb::none();
@@ -301,6 +302,12 @@ void bind_operators(nb::module_& module) {
     nb::module_ own = module.def_submodule("operators",
                                            "The steps of splatting with gradients, on arrays. "
                                            "include/ewa/operators.h has the formulas.");
+    own.attr("ALPHA_MIN") = shared::ALPHA_MIN;
+    own.attr("ALPHA_MAX") = shared::ALPHA_MAX;
+    own.attr("TRANSMITTANCE_STOP") = shared::TRANSMITTANCE_STOP;
+    own.attr("RADIUS_SIGMAS") = shared::RADIUS_SIGMAS;
+    own.attr("SPLIT_SCALE") = shared::SPLIT_SCALE;
+    own.attr("SH_C0") = shared::SH_C0;
     nb::class_<BlendHandle>(own, "BlendHandle",
                             "What blend_backward needs of an image. It holds device memory.");
     own.def("project", project, nb::arg("means"), nb::arg("quats").none(), nb::arg("scales").none(),

@@ -141,13 +141,10 @@ Splats join(const nb::args& parts) {
     return all;
 }
 
-void warn(const std::string& text) {
-    if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 1) != 0) throw nb::python_error();
-}
-
 Splats load(const std::filesystem::path& path) {
     SplatScene scene = with_files([&] { return read_splats(path); });
-    for (const std::string& remark : scene.remarks) warn(path.string() + ": " + remark);
+    for (const std::string& remark : scene.remarks)
+        warn(PyExc_UserWarning, spelled((path.string() + ": " + remark).c_str()));
     return {std::move(scene.gaussians), scene.antialiased, std::move(scene.comments)};
 }
 
@@ -156,7 +153,10 @@ std::vector<std::string> save(const std::filesystem::path& path, const Splats& s
                               int spz_version) {
     if (spz_version != 3 && spz_version != 4) throw nb::value_error("spz_version is neither 3 nor 4");
     const SaveOptions options{comments, antialiased.value_or(splats.antialiased), spz_version};
-    return with_files([&] { return save_splats(path, splats.gaussians, options); });
+    std::vector<std::string> remarks =
+        with_new_file(path, [&] { return save_splats(path, splats.gaussians, options); });
+    for (std::string& remark : remarks) remark = spelled(remark.c_str());
+    return remarks;
 }
 
 std::string splats_text(const Splats& splats) {
@@ -245,7 +245,9 @@ void bind_splats(nb::module_& module) {
         nb::sig("def save(path: str | os.PathLike[str], splats: Splats, *, comments: "
                 "collections.abc.Sequence[str] = (), antialiased: bool | None = None, spz_version: int = 3) "
                 "-> list[str]"),
-        "Writes splats in the format of the extension. A file is replaced as a whole. Returns one line for "
+        "Writes splats in the format of the extension. A file is replaced as a whole, and missing folders "
+        "are "
+        "made. Returns one line for "
         "each thing that "
         "the format does not hold. Raises InputError for an unknown extension, OSError if the disk refuses.");
     module.def("join", join, nb::sig("def join(*splats: Splats) -> Splats"),

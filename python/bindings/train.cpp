@@ -2,11 +2,13 @@
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <tuple>
 #include <utility>
 
 #include "arrays.h"
@@ -41,6 +43,7 @@ struct Plan {
     SharedDataset dataset;
     TrainOptions options;  // with a concrete strategy and SH degree
     std::vector<int> frames;
+    int downscale = 1;       // of the dataset
     bool own_start = false;  // the first splats are an argument
 
     void resolve_options() {
@@ -57,6 +60,7 @@ struct Plan {
     RunOptions run() const {
         RunOptions run;
         run.train = options;
+        run.downscale = downscale;
         return run;
     }
 };
@@ -131,7 +135,7 @@ class Training {
             return trainer_->state();
         }();
         const train::Checkpoint checkpoint{settings.dump(), "", last_.seconds, std::move(state)};
-        with_files([&] { train::write_checkpoint(path, checkpoint); });
+        with_new_file(path, [&] { train::write_checkpoint(path, checkpoint); });
     }
     void restore(const std::filesystem::path& path, const TrainerState& state) {
         const DeviceWork work;
@@ -161,7 +165,7 @@ class Training {
 
 void start_training(Training* self, const LoadedDataset& dataset, nb::handle init, nb::handle train_frames,
                     const nb::kwargs& options) {
-    Plan plan{dataset.dataset, usual_options(), {}};
+    Plan plan{dataset.dataset, usual_options(), {}, dataset.options.downscale};
     for (const auto& [name, value] : options) set_option(plan.options, nb::cast<std::string>(name), value);
     plan.frames = train_frames.is_none() ? split_frames(*dataset.dataset, usual_test_every()).train
                                          : frames_of(train_frames, *dataset.dataset, "train_frames");
@@ -191,10 +195,20 @@ void read_settings(const Json& settings, Plan& plan) {
     plan.frames = split_frames(*plan.dataset, run.test_every).train;
 }
 
+/// Why a checkpoint does not continue with this dataset.
+std::string other_dataset(const Json& settings, const Plan& plan) {
+    const Json options = settings.value("options", Json());
+    const Json then = options.is_object() ? options.value("downscale", Json()) : Json();
+    if (then.is_number_unsigned() && then.get<uint64_t>() != uint64_t(plan.downscale))
+        return "its images had downscale=" + then.dump() +
+               ", and those of this Dataset have downscale=" + std::to_string(plan.downscale);
+    return "is of another dataset, or its images or cameras have changed";
+}
+
 Training resume(const std::filesystem::path& path, const LoadedDataset& dataset, nb::handle init,
                 std::optional<int> steps) {
     const train::Checkpoint checkpoint = with_files([&] { return train::read_checkpoint(path); });
-    Plan plan{dataset.dataset, usual_options(), {}};
+    Plan plan{dataset.dataset, usual_options(), {}, dataset.options.downscale};
     Json settings;
     try {
         settings = core::parse_json<Json>(checkpoint.settings, "its settings");
@@ -203,7 +217,7 @@ Training resume(const std::filesystem::path& path, const LoadedDataset& dataset,
         throw InputError(path.string() + ": " + error.what());
     }
     if (settings.value("dataset", Json()) != train::dataset_fingerprint(*dataset.dataset, plan.split()))
-        throw InputError(path.string() + ": is of another dataset, or its images or cameras have changed");
+        throw InputError(path.string() + ": " + other_dataset(settings, plan));
     const Json begun = settings.value("init", Json("sfm"));
     if (begun == "splats" && init.is_none())
         throw InputError(path.string() + ": its training began with splats; pass them again as init");
@@ -240,36 +254,66 @@ std::string report_text(const StepReport& report) {
            ", splats=" + std::to_string(report.splats) + ")";
 }
 
+/// Pickles an object of which `fields` makes a tuple, and `made` the object again.
+template <class Class, class Fields, class Made>
+void bind_pickle(Class& bound, Fields fields, Made made) {
+    using Object = typename Class::Type;
+    using State = decltype(fields(std::declval<const Object&>()));
+    bound.def(
+        "__getstate__", [=](const Object& object) { return fields(object); },
+        nb::sig("def __getstate__(self) -> tuple[object, ...]"));
+    bound.def(
+        "__setstate__",
+        [=](Object& object, const State& state) { new (&object) Object(std::apply(made, state)); },
+        nb::sig("def __setstate__(self, state: tuple[object, ...], /) -> None"));
+}
+
 void bind_results(nb::module_& module) {
-    nb::class_<StepReport>(module, "StepReport", "What a step of a training did.")
-        .def_ro("step", &StepReport::step, "Steps done.")
-        .def_ro("seconds", &StepReport::seconds, "In steps so far.")
-        .def_ro("loss", &StepReport::loss,
-                "Of the last step that the device has finished; a GPU may be one behind.")
-        .def_ro("psnr", &StepReport::psnr, "dB, of the image that loss is of.")
-        .def_ro("splats", &StepReport::splats)
-        .def_ro("dropped_updates", &StepReport::dropped_updates, "Updates so far that were not finite.")
-        .def_ro("skipped_nonfinite", &StepReport::skipped_nonfinite,
-                "Splats skipped in the last step: a value is not finite.")
-        .def_ro("limited_steps", &StepReport::limited_steps, "Updates so far that were shortened.")
-        .def("__repr__", report_text);
-    nb::class_<EvalFrame>(module, "EvalFrame", "How close the render of a frame is to its image.")
-        .def_ro("name", &EvalFrame::name)
-        .def_ro("psnr", &EvalFrame::psnr, "dB")
-        .def_ro("ssim", &EvalFrame::ssim)
-        .def("__repr__", [](const EvalFrame& f) {
-            return "EvalFrame('" + f.name + "', psnr=" + std::to_string(f.psnr) +
-                   ", ssim=" + std::to_string(f.ssim) + ")";
-        });
-    nb::class_<Evaluation>(module, "Evaluation", "How close renders are to a dataset's images.")
-        .def_ro("psnr", &Evaluation::psnr, "dB, the mean over the frames.")
-        .def_ro("ssim", &Evaluation::ssim, "The mean over the frames.")
-        .def_ro("frames", &Evaluation::frames)
-        .def_ro("seconds", &Evaluation::seconds)
-        .def("__repr__", [](const Evaluation& e) {
-            return "Evaluation(psnr=" + std::to_string(e.psnr) + ", ssim=" + std::to_string(e.ssim) + ", " +
-                   core::counted(e.frames.size(), "frame") + ")";
-        });
+    auto report =
+        nb::class_<StepReport>(module, "StepReport", "What a step of a training did.")
+            .def_ro("step", &StepReport::step, "Steps done.")
+            .def_ro("seconds", &StepReport::seconds, "In steps so far.")
+            .def_ro("loss", &StepReport::loss,
+                    "Of the last step that the device has finished; a GPU may be one behind.")
+            .def_ro("psnr", &StepReport::psnr, "dB, of the image that loss is of.")
+            .def_ro("splats", &StepReport::splats)
+            .def_ro("dropped_updates", &StepReport::dropped_updates, "Updates so far that were not finite.")
+            .def_ro("skipped_nonfinite", &StepReport::skipped_nonfinite,
+                    "Splats skipped in the last step: a value is not finite.")
+            .def_ro("limited_steps", &StepReport::limited_steps, "Updates so far that were shortened.")
+            .def("__repr__", report_text);
+    bind_pickle(
+        report,
+        [](const StepReport& r) {
+            return std::tuple(r.step, r.seconds, r.loss, r.splats, r.dropped_updates, r.skipped_nonfinite,
+                              r.limited_steps, r.psnr);
+        },
+        [](const auto&... values) { return StepReport{values...}; });
+    auto frame =
+        nb::class_<EvalFrame>(module, "EvalFrame", "How close the render of a frame is to its image.")
+            .def_ro("name", &EvalFrame::name)
+            .def_ro("psnr", &EvalFrame::psnr, "dB")
+            .def_ro("ssim", &EvalFrame::ssim)
+            .def("__repr__", [](const EvalFrame& f) {
+                return "EvalFrame('" + f.name + "', psnr=" + std::to_string(f.psnr) +
+                       ", ssim=" + std::to_string(f.ssim) + ")";
+            });
+    bind_pickle(
+        frame, [](const EvalFrame& f) { return std::tuple(f.name, f.psnr, f.ssim); },
+        [](const auto&... values) { return EvalFrame{values...}; });
+    auto evaluation =
+        nb::class_<Evaluation>(module, "Evaluation", "How close renders are to a dataset's images.")
+            .def_ro("psnr", &Evaluation::psnr, "dB, the mean over the frames.")
+            .def_ro("ssim", &Evaluation::ssim, "The mean over the frames.")
+            .def_ro("frames", &Evaluation::frames)
+            .def_ro("seconds", &Evaluation::seconds)
+            .def("__repr__", [](const Evaluation& e) {
+                return "Evaluation(psnr=" + std::to_string(e.psnr) + ", ssim=" + std::to_string(e.ssim) +
+                       ", " + core::counted(e.frames.size(), "frame") + ")";
+            });
+    bind_pickle(
+        evaluation, [](const Evaluation& e) { return std::tuple(e.psnr, e.ssim, e.frames, e.seconds); },
+        [](const auto&... values) { return Evaluation{values...}; });
 }
 
 void bind_trainer(nb::module_& module) {

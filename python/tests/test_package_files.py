@@ -236,6 +236,7 @@ def test_files_that_cannot_be_written(tmp_path):
     splats = make_splats(2)
     with pytest.raises(ewa.InputError, match="not a supported kind"):
         ewa.save(tmp_path / "a.txt", splats)
+    (tmp_path / "nowhere").write_text("a file")
     with pytest.raises(OSError, match="nowhere"):
         ewa.save(tmp_path / "nowhere/a.ply", splats)
     with pytest.raises(ValueError, match="spz_version"):

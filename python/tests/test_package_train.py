@@ -168,8 +168,9 @@ def test_checkpoints_that_cannot_be_used(still_life, tmp_path):
     trainer.step()
     path = tmp_path / "a.ewa"
     trainer.save_checkpoint(path)
-    with pytest.raises(ewa.InputError, match="a.ewa: is of another dataset"):
+    with pytest.raises(ewa.InputError, match="a.ewa: its images had downscale=1, and those .*=2"):
         ewa.Trainer.resume(path, ewa.Dataset(STILL_LIFE, downscale=2))
+    (tmp_path / "nowhere").write_text("a file")
     with pytest.raises(OSError, match="nowhere"):
         trainer.save_checkpoint(tmp_path / "nowhere/a.ewa")
     data = path.read_bytes()

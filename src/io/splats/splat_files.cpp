@@ -118,6 +118,22 @@ Gaussians in_float_positions(Gaussians gaussians) {
     return gaussians;
 }
 
+/// Throws InputError for comments that a reader of the file would refuse.
+void check_comments(const std::filesystem::path& path, const std::vector<std::string>& comments) {
+    constexpr size_t kMostLine = 65000, kMostHeader = 4000000;  // bytes; less than ply_table.cpp's limits
+    size_t longest = 0, all = 0;
+    for (const std::string& comment : comments) {
+        const size_t bytes = core::one_line(comment).size();
+        longest = std::max(longest, bytes);
+        all += bytes;
+    }
+    if (longest > kMostLine || all > kMostHeader)
+        throw InputError(core::one_line(path.string() + ": comments of " + std::to_string(all) +
+                                        " bytes, the longest of " + std::to_string(longest) + "; at most " +
+                                        std::to_string(kMostHeader) + " and " + std::to_string(kMostLine) +
+                                        " fit in the file"));
+}
+
 std::string rounding_remark(const glm::dvec3& origin) {
     const double farthest = std::max({std::abs(origin.x), std::abs(origin.y), std::abs(origin.z)});
     const float step = std::nextafter(float(farthest), INFINITY) - float(farthest);
@@ -185,6 +201,7 @@ std::vector<std::string> save_splats(const std::filesystem::path& path, const Ga
     const SplatFormat format = format_to_write(path);
     std::vector<std::string> remarks, more;
     const bool ply = format == SplatFormat::ply;
+    if (ply || format == SplatFormat::compressed_ply) check_comments(path, options.comments);
     if (!ply && gaussians.origin != glm::dvec3(0)) {
         remarks = save_splats(path, in_float_positions(gaussians), options);
         remarks.push_back(rounding_remark(gaussians.origin));
