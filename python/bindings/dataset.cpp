@@ -5,35 +5,131 @@
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
+#include <array>
+#include <numeric>
 #include <optional>
+#include <tuple>
 
 #include "arrays.h"
 #include "bindings.h"
 #include "cameras.h"
 #include "core/typing.h"
 #include "errors.h"
+#include "png.h"
 
 namespace ewa::python {
 namespace {
 
 /// ewa.Images: decodes an image when it is asked for.
 struct Images {
-    SharedDataset dataset;
+    LoadedDataset data;
+    std::vector<size_t> frames;  // indices
 
     const Frame& frame(ptrdiff_t index) const {
-        const auto count = ptrdiff_t(dataset->frames.size());
+        const auto count = ptrdiff_t(frames.size());
         if (index < -count || index >= count)
             throw nb::index_error(("there are " + std::to_string(count) + " images").c_str());
-        return dataset->frames[size_t(index < 0 ? index + count : index)];
+        return data.dataset->frames[frames[size_t(index < 0 ? index + count : index)]];
     }
 };
+
+Images images_of(const LoadedDataset& data) {
+    Images images{data, std::vector<size_t>(data.dataset->frames.size())};
+    std::iota(images.frames.begin(), images.frames.end(), size_t(0));
+    return images;
+}
 
 nb::ndarray<nb::numpy, float> image(const Images& images, ptrdiff_t index) {
     const Frame& frame = images.frame(index);
     return to_numpy(with_files([&] { return load_frame_image(frame); }));
+}
+
+Images some_images(const Images& images, const nb::slice& key) {
+    const auto [start, stop, step, count] = key.compute(images.frames.size());
+    Images some{images.data, {}};
+    for (size_t i = 0; i < count; ++i)
+        some.frames.push_back(images.frames[size_t(start + ptrdiff_t(i) * step)]);
+    return some;
+}
+
+// Pickles, for processes that read the same files.
+
+using DatasetState = std::tuple<std::filesystem::path, int, int, bool>;
+
+LoadedDataset opened(const std::filesystem::path& path, const DatasetOptions& options) {
+    auto dataset = std::make_shared<Dataset>(with_files([&] { return load_dataset(path, options); }));
+    return {std::move(dataset), std::filesystem::absolute(path), options};
+}
+
+DatasetState pickled(const LoadedDataset& data) {
+    return {data.path, data.options.downscale, int(data.options.masks), data.options.need_images};
+}
+
+LoadedDataset opened(const DatasetState& state) {
+    const auto& [path, downscale, masks, need_images] = state;
+    return opened(path, {downscale, MaskUse(masks), need_images});
+}
+
+using CameraState = std::tuple<int, int, std::array<double, 16>>;
+
+CameraState pickled(const Camera& c) {
+    std::array<double, 16> values{c.fx, c.fy, c.cx, c.cy};
+    for (int i = 0; i < 3; ++i) {
+        for (int k = 0; k < 3; ++k) values[size_t(4 + 3 * i + k)] = c.rotation[i][k];
+        values[size_t(13 + i)] = c.translation[i];
+    }
+    return {c.width, c.height, values};
+}
+
+Camera camera_of(const CameraState& state) {
+    const auto& [width, height, v] = state;
+    Camera c{.width = width, .height = height, .fx = v[0], .fy = v[1], .cx = v[2], .cy = v[3]};
+    for (int i = 0; i < 3; ++i) {
+        for (int k = 0; k < 3; ++k) c.rotation[i][k] = v[size_t(4 + 3 * i + k)];
+        c.translation[i] = v[size_t(13 + i)];
+    }
+    return c;
+}
+
+using FrameState = std::tuple<std::string, std::filesystem::path, std::optional<std::filesystem::path>, bool,
+                              bool, std::array<int, 5>, std::array<double, 12>, std::array<CameraState, 3>>;
+
+std::optional<std::filesystem::path> mask_path_of(const Frame& frame) {
+    return frame.mask_path.empty() ? std::nullopt : std::optional(frame.mask_path);
+}
+
+FrameState pickled(const Frame& f) {
+    const Distortion& d = f.distortion;
+    return {f.name,
+            f.image_path,
+            mask_path_of(f),
+            f.image_exists,
+            f.eight_bit,
+            {f.orientation, int(f.masks), f.downscale, f.split, int(d.lens)},
+            {d.k1, d.k2, d.p1, d.p2, d.k3, d.k4, d.k5, d.k6, d.s1, d.s2, d.s3, d.s4},
+            {pickled(f.camera), pickled(f.source), pickled(f.pinhole)}};
+}
+
+Frame frame_of(const FrameState& state) {
+    const auto& [name, image_path, mask_path, exists, eight_bit, n, k, cameras] = state;
+    return {
+        .name = name,
+        .image_path = image_path,
+        .image_exists = exists,
+        .orientation = n[0],
+        .eight_bit = eight_bit,
+        .camera = camera_of(cameras[0]),
+        .source = camera_of(cameras[1]),
+        .mask_path = mask_path.value_or(std::filesystem::path()),
+        .masks = MaskUse(n[1]),
+        .distortion = {k[0], k[1], k[2], k[3], k[4], k[5], k[6], k[7], k[8], k[9], k[10], k[11], Lens(n[4])},
+        .pinhole = camera_of(cameras[2]),
+        .downscale = n[2],
+        .split = n[3]};
 }
 
 MaskUse mask_use(std::string word) {
@@ -47,9 +143,7 @@ MaskUse mask_use(std::string word) {
 void open_dataset(LoadedDataset* self, const std::filesystem::path& path, int downscale,
                   const std::string& masks, bool need_images) {
     if (downscale < 1) throw InputError("downscale is less than 1");
-    const DatasetOptions options{downscale, mask_use(masks), need_images};
-    new (self)
-        LoadedDataset{std::make_shared<Dataset>(with_files([&] { return load_dataset(path, options); }))};
+    new (self) LoadedDataset(opened(path, {downscale, mask_use(masks), need_images}));
 }
 
 std::vector<Camera> cameras(const LoadedDataset& data) {
@@ -86,28 +180,60 @@ void bind_frame(nb::module_& module) {
         .def_ro("name", &Frame::name, "In the dataset, such as \"0001.jpg\".")
         .def_ro("image_path", &Frame::image_path)
         .def_ro("image_exists", &Frame::image_exists)
-        .def_prop_ro(
-            "mask_path",
-            [](const Frame& frame) {
-                return frame.mask_path.empty() ? std::nullopt : std::optional(frame.mask_path);
-            },
-            nb::for_getter(nb::sig("def mask_path(self) -> pathlib.Path | None")))
+        .def_prop_ro("mask_path", mask_path_of,
+                     nb::for_getter(nb::sig("def mask_path(self) -> pathlib.Path | None")))
         .def_prop_ro(
             "width", [](const Frame& frame) { return frame.camera.width; }, "px")
         .def_prop_ro(
             "height", [](const Frame& frame) { return frame.camera.height; }, "px")
-        .def("__repr__", [](const Frame& frame) {
-            return "Frame('" + frame.name + "', " + std::to_string(frame.camera.width) + "x" +
-                   std::to_string(frame.camera.height) + ")";
-        });
+        .def("__repr__",
+             [](const Frame& frame) {
+                 return "Frame('" + frame.name + "', " + std::to_string(frame.camera.width) + "x" +
+                        std::to_string(frame.camera.height) + ")";
+             })
+        .def(
+            "_repr_png_",
+            [](const Frame& frame) -> nb::object {
+                if (!frame.image_exists) return nb::none();
+                return png_bytes(with_files([&] { return load_frame_image(frame); }));
+            },
+            nb::sig("def _repr_png_(self) -> bytes | None"), "The image, for notebooks.")
+        .def(
+            "__getstate__", [](const Frame& frame) { return pickled(frame); },
+            nb::sig("def __getstate__(self) -> tuple[object, ...]"))
+        .def(
+            "__setstate__",
+            [](Frame& frame, const FrameState& state) { new (&frame) Frame(frame_of(state)); },
+            nb::sig("def __setstate__(self, state: tuple[object, ...], /) -> None"));
     nb::class_<Images>(module, "Images", "The images of a dataset. Each is decoded when it is asked for.")
-        .def("__len__", [](const Images& images) { return images.dataset->frames.size(); })
+        .def("__len__", [](const Images& images) { return images.frames.size(); })
         .def(
             "__iter__", [](nb::handle self) { return nb::steal<nb::iterator>(PySeqIter_New(self.ptr())); },
             nb::sig("def __iter__(self) -> collections.abc.Iterator[numpy.typing.NDArray[numpy.float32]]"))
         .def("__getitem__", image, nb::arg("index"),
              nb::sig("def __getitem__(self, index: int, /) -> numpy.typing.NDArray[numpy.float32]"),
-             "[H, W, 3], or [H, W, 4] with a mask or alpha, from 0 to 1: as the frame's camera sees it.");
+             "[H, W, 3], or [H, W, 4] with a mask or alpha, from 0 to 1: as the frame's camera sees it.")
+        .def("__getitem__", some_images, nb::arg("index"),
+             nb::sig("def __getitem__(self, index: slice, /) -> Images"), "Images of some frames.")
+        .def("__repr__",
+             [](const Images& images) {
+                 return "Images(" + core::counted(images.frames.size(), "image") + " of '" +
+                        images.data.dataset->root.string() + "')";
+             })
+        .def(
+            "__getstate__",
+            [](const Images& images) { return std::tuple(pickled(images.data), images.frames); },
+            nb::sig("def __getstate__(self) -> tuple[object, ...]"))
+        .def(
+            "__setstate__",
+            [](Images& images, const std::tuple<DatasetState, std::vector<size_t>>& state) {
+                Images read{opened(std::get<0>(state)), std::get<1>(state)};
+                for (const size_t frame : read.frames)
+                    if (frame >= read.data.dataset->frames.size())
+                        throw InputError("the dataset has fewer images than when it was pickled");
+                new (&images) Images(std::move(read));
+            },
+            nb::sig("def __setstate__(self, state: tuple[object, ...], /) -> None"));
 }
 
 }  // namespace
@@ -142,7 +268,7 @@ void bind_dataset(nb::module_& module) {
         .def_prop_ro("root", [](const LoadedDataset& d) { return d.dataset->root; })
         .def_prop_ro(
             "frames", [](const LoadedDataset& d) { return d.dataset->frames; }, "In the order of names.")
-        .def_prop_ro("images", [](const LoadedDataset& d) { return Images{d.dataset}; })
+        .def_prop_ro("images", images_of)
         .def_prop_ro(
             "viewmats", [](const LoadedDataset& d) { return viewmats_of(cameras(d)); }, nb::rv_policy::move,
             nb::for_getter(nb::sig("def viewmats(self) -> numpy.typing.NDArray[numpy.float64]")),
@@ -161,7 +287,14 @@ void bind_dataset(nb::module_& module) {
         .def("split", split, nb::arg("test_every") = 8,
              "The indices of the training frames and of those held out, as ewa train chooses them.")
         .def("__len__", [](const LoadedDataset& d) { return d.dataset->frames.size(); })
-        .def("__repr__", dataset_text);
+        .def("__repr__", dataset_text)
+        .def(
+            "__getstate__", [](const LoadedDataset& data) { return pickled(data); },
+            nb::sig("def __getstate__(self) -> tuple[object, ...]"))
+        .def(
+            "__setstate__",
+            [](LoadedDataset& data, const DatasetState& state) { new (&data) LoadedDataset(opened(state)); },
+            nb::sig("def __setstate__(self, state: tuple[object, ...], /) -> None"));
 }
 
 }  // namespace ewa::python

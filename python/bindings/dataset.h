@@ -3,6 +3,7 @@
 #pragma once
 #include <nanobind/nanobind.h>
 
+#include <filesystem>
 #include <memory>
 #include <vector>
 
@@ -14,6 +15,9 @@ using SharedDataset = std::shared_ptr<const Dataset>;
 
 struct LoadedDataset {
     SharedDataset dataset;
+    std::filesystem::path
+        path;  // absolute; it and the options below load the dataset again in another process
+    DatasetOptions options;
 };
 
 /// Indices of frames from Python. Throws IndexError that names the argument.

@@ -6,6 +6,8 @@
 #include "bindings.h"
 #include "errors.h"
 #include "ewa/image.h"
+#include "image/image_files.h"
+#include "png.h"
 
 namespace ewa::python {
 namespace {
@@ -22,10 +24,15 @@ void write_image(const std::filesystem::path& path, nb::handle pixels) {
     const auto dtype = nb::module_::import_("numpy").attr("asarray")(pixels).attr("dtype");
     if (nb::cast<std::string>(dtype.attr("kind")) != "f")
         for (float& value : image.pixels) value /= 255;
-    with_files([&] { save_image(path, image); });
+    with_new_file(path, [&] { save_image(path, image); });
 }
 
 }  // namespace
+
+nb::bytes png_bytes(const Image& image) {
+    const std::vector<unsigned char> file = image::encode_png(image);
+    return nb::bytes(file.data(), file.size());
+}
 
 void bind_images(nb::module_& module) {
     module.def("load_image", read_image, nb::arg("path"),

@@ -14,8 +14,10 @@
 #include "cameras.h"
 #include "core/typing.h"
 #include "device.h"
+#include "errors.h"
 #include "ewa/error.h"
 #include "options.h"
+#include "png.h"
 
 namespace ewa::python {
 namespace {
@@ -23,6 +25,52 @@ namespace {
 /// The renders of one call. Arrays that were not asked for are None.
 struct Renders {
     nb::object color, alpha, depth, count;
+};
+
+std::string renders_text(const Renders& renders) {
+    std::string text = "Renders(";
+    for (const auto& [name, array] : {std::pair("color", &renders.color), std::pair("alpha", &renders.alpha),
+                                      std::pair("depth", &renders.depth), std::pair("count", &renders.count)})
+        if (!array->is_none())
+            text.append(text.back() == '(' ? "" : ", ")
+                .append(name)
+                .append(" ")
+                .append(nb::repr(nb::list(array->attr("shape"))).c_str());
+    return text + ")";
+}
+
+/// The colours of all renders side by side.
+nb::bytes renders_png(const Renders& renders) {
+    const Array<float> color(renders.color, "color",
+                             {Shape{any('C'), any('H'), any('W'), 3}, Shape{any('H'), any('W'), 3}});
+    const bool batch = color.dimensions() == 4;
+    constexpr size_t kMostShown = 8;
+    const size_t count = batch ? std::min(color.length(0), kMostShown) : 1;
+    const size_t height = color.length(batch ? 1 : 0), width = color.length(batch ? 2 : 1);
+    if (count * width * height == 0) return nb::bytes("", 0);
+    Image all(int(count * width), int(height), 3);
+    for (size_t i = 0; i < count; ++i)
+        for (size_t y = 0; y < height; ++y)
+            std::copy_n(color.data() + (i * height + y) * width * 3, width * 3,
+                        &all.pixels[(y * count + i) * width * 3]);
+    return png_bytes(all);
+}
+
+/// What was wrong with the splats or cameras of a call.
+struct Doubts {
+    uint32_t skipped = 0;
+    std::optional<size_t> unseen;  // the first camera that sees no splat
+
+    void warn_of(size_t splats) const {
+        if (skipped > 0)
+            warn(PyExc_RuntimeWarning, std::to_string(skipped) + " of " + core::counted(splats, "splat") +
+                                           " skipped: a value is not finite, or a quaternion is zero");
+        if (unseen && skipped < splats)
+            warn(PyExc_RuntimeWarning,
+                 "the camera of viewmats[" + std::to_string(*unseen) +
+                     "] sees no splat; viewmats map the world to the camera: numpy.linalg.inv makes them of "
+                     "camera-to-world matrices");
+    }
 };
 
 /// The images of one kind, one after the other.
@@ -60,6 +108,7 @@ Drawing drawing_of(std::string mode) {
 class SceneRenderer {
   public:
     SceneRenderer(const Splats& splats, const LookArguments& look) : options_(look_of(look, splats)) {
+        splats_ = splats.gaussians.size();
         const DeviceWork work;
         Gaussians fitted;
         renderer_ = OnDevice(
@@ -67,6 +116,7 @@ class SceneRenderer {
     }
 
     void replace(const Splats& splats) {
+        splats_ = splats.gaussians.size();
         const DeviceWork work;
         Gaussians fitted;
         renderer_->replace(fitted_to(options_.kernel, splats, fitted));
@@ -82,7 +132,7 @@ class SceneRenderer {
         std::optional<Planes> more;
         if (options.drawing == Drawing::depth || options.drawing == Drawing::count)
             more.emplace(count, width, height, 1);
-        draw(cameras.all, options, color, alpha, more ? &*more : nullptr);
+        draw(cameras.all, options, color, alpha, more ? &*more : nullptr).warn_of(splats_);
         Renders renders{color.array(cameras.batch), alpha.array(cameras.batch), nb::none(), nb::none()};
         if (more)
             (options.drawing == Drawing::depth ? renders.depth : renders.count) = more->array(cameras.batch);
@@ -90,19 +140,25 @@ class SceneRenderer {
     }
 
   private:
-    void draw(const std::vector<Camera>& cameras, const DrawOptions& options, Planes& color, Planes& alpha,
-              Planes* more) {
+    Doubts draw(const std::vector<Camera>& cameras, const DrawOptions& options, Planes& color, Planes& alpha,
+                Planes* more) {
+        Doubts doubts;
         const DeviceWork work;
         for (size_t i = 0; i < cameras.size(); ++i) {
             const Rendering rendering = renderer_->render(cameras[i], options);
             color.set(i, rendering.color);
             alpha.set(i, rendering.alpha);
             if (more) more->set(i, options.drawing == Drawing::depth ? rendering.depth : rendering.count);
+            doubts.skipped = std::max(doubts.skipped, renderer_->skipped_nonfinite());
+            const bool seen = std::ranges::any_of(rendering.alpha.pixels, [](float a) { return a > 0; });
+            if (splats_ > 0 && !seen && !doubts.unseen) doubts.unseen = i;
             check_signals();
         }
+        return doubts;
     }
 
     RenderOptions options_;
+    size_t splats_ = 0;
     OnDevice<Renderer> renderer_;
 };
 
@@ -147,7 +203,21 @@ void bind_render(nb::module_& module) {
                 "mode \"depth\".")
         .def_ro("count", &Renders::count,
                 nb::for_getter(nb::sig("def count(self) -> numpy.typing.NDArray[numpy.float32] | None")),
-                "[C, H, W, 1], the number of splats blended. For mode \"count\".");
+                "[C, H, W, 1], the number of splats blended. For mode \"count\".")
+        .def("__repr__", renders_text)
+        .def("_repr_png_", renders_png, nb::sig("def _repr_png_(self) -> bytes"),
+             "The colours side by side, at most eight renders, for notebooks.")
+        .def(
+            "__getstate__",
+            [](const Renders& r) { return nb::make_tuple(r.color, r.alpha, r.depth, r.count); },
+            nb::sig("def __getstate__(self) -> tuple[object, ...]"))
+        .def(
+            "__setstate__",
+            [](Renders& r, const nb::tuple& state) {
+                if (state.size() != 4) throw nb::value_error("no state of Renders");
+                new (&r) Renders{state[0], state[1], state[2], state[3]};
+            },
+            nb::sig("def __setstate__(self, state: tuple[object, ...], /) -> None"));
     nb::class_<SceneRenderer>(
         module, "Renderer", "A scene on the device, for more than one call of render(). Threads take turns.")
         .def(

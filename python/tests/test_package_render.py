@@ -182,7 +182,8 @@ def test_backgrounds(background, expected):
 def test_splats_that_are_not_finite_are_skipped():
     splats = make_splats(3)
     splats.means[:] = np.nan
-    assert np.all(ewa.render(splats, *camera()).alpha == 0)
+    with pytest.warns(RuntimeWarning, match="3 of 3 splats skipped"):
+        assert np.all(ewa.render(splats, *camera()).alpha == 0)
 
 
 @pytest.mark.parametrize(

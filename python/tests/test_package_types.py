@@ -29,6 +29,8 @@ for report in trainer:
     loss: float = report.loss
 result: ewa.Evaluation = ewa.evaluate(trainer.splats(), data)
 names: list[str] = [frame.name for frame in result.frames]
+some_images: ewa.Images = data.images[0:3]
+first: npt.NDArray[np.float32] = some_images[0]
 for image in data.images:
     print(image.shape)
 ewa.set_device(0)
