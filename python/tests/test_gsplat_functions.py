@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The lower functions of ewa.gsplat against the torch reference of gsplat's own package."""
 
+import itertools
 import math
 
 import pytest
@@ -8,9 +9,7 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from ewa import gsplat as ours
-from gsplat_scenes import HEIGHT, WIDTH, Scene, assert_close, blend, gradients
-
-reference = pytest.importorskip("gsplat.cuda._torch_impl")
+from gsplat_scenes import HEIGHT, WIDTH, Scene, assert_close, blend, gradients, reference
 
 BATCHES = [(), (2,), (1, 2)]
 
@@ -232,6 +231,46 @@ def test_harmonics_of_views(channels):
         ours.spherical_harmonics(3, s.means)
 
 
+def test_degree_0_needs_no_higher_coefficients():
+    none, dirs = torch.empty(9, 0, 3, requires_grad=True), torch.randn(2, 9, 3, requires_grad=True)
+    rest = ours.spherical_harmonics_l1_plus(0, dirs, none)
+    assert rest.shape == (2, 9, 3) and not rest.any()
+    by_none, by_dirs = torch.autograd.grad(rest.sum(), (none, dirs))
+    assert by_none.shape == none.shape and not by_dirs.any()
+
+
+def test_harmonics_take_half_precision_and_strided_gradients():
+    torch.manual_seed(6)
+    coeffs = torch.randn(40, 26, 3).half().requires_grad_()
+    dirs = torch.randn(40, 3, requires_grad=True)
+    colors = ours.spherical_harmonics(3, dirs, coeffs)
+    assert colors.dtype == torch.float32
+    wide = torch.randn(40, 6)
+    by_coeffs, by_dirs = torch.autograd.grad(colors, (coeffs, dirs), wide[:, :3])
+    assert by_coeffs.dtype == torch.float16 and not by_coeffs[:, 16:].any()
+    full = coeffs.detach().float().requires_grad_()
+    again = ours.spherical_harmonics(3, dirs, full)
+    expected = torch.autograd.grad(again, (full, dirs), wide[:, :3].contiguous())
+    torch.testing.assert_close(by_coeffs.float(), expected[0], rtol=2e-3, atol=5e-4)
+    torch.testing.assert_close(by_dirs, expected[1])
+
+
+def test_a_batch_of_scenes_with_equal_cameras_keeps_its_gradients_apart():
+    means = torch.tensor([0.0, 0, 2]).repeat(2, 8, 1).requires_grad_()
+    covars = torch.tensor([0.01, 0, 0, 0.01, 0, 0.01]).repeat(2, 8, 1)
+    viewmats = torch.eye(4).repeat(2, 2, 1, 1).requires_grad_()
+    Ks = torch.tensor([[20.0, 0, 16], [0, 20, 16], [0, 0, 1]]).repeat(2, 2, 1, 1)
+    for packed, model in itertools.product((False, True), ("pinhole", "ortho", "fisheye")):
+        out = ours.fully_fused_projection(
+            means, covars, None, None, viewmats, Ks, 32, 32, packed=packed, camera_model=model
+        )
+        depths = out[6] if packed else out[2]
+        assert depths.numel() == 2 * 2 * 8
+        by_means, by_views = torch.autograd.grad(depths.sum(), (means, viewmats))
+        assert (by_means == torch.tensor([0.0, 0, 2])).all()
+        assert (by_views[..., 2, :] == torch.tensor([0.0, 0, 16, 8])).all()
+
+
 def _footprints(s):
     out = ours.fully_fused_projection(*_call(s))
     return [t.detach() for t in out[:4]]
@@ -372,8 +411,45 @@ def test_masked_tiles_show_the_background():
     assert (image[0][hole] == background).all() and not alpha[0][hole].any()
     assert torch.equal(image[0][~hole], full[0][~hole])
     assert (full[0][hole] - background).abs().max() > 0.1
-    with pytest.raises(ValueError, match="multiples of 8"):
-        ours.rasterize_to_pixels(*call[:6], 12, *call[7:])
+    with pytest.raises(ValueError, match="multiple of 4"):
+        ours.rasterize_to_pixels(*call[:6], 18, *call[7:])
+
+
+@pytest.mark.parametrize("size", [4, 12, 16])
+def test_tiles_of_any_multiple_of_four(size):
+    """gsplat draws tiles of 4 and 16 pixels."""
+    s = Scene(cameras=2)
+    radii, means2d, depths, conics = _footprints(s)
+    columns, rows = math.ceil(WIDTH / size), math.ceil(HEIGHT / size)
+    _, ids, flatten = ours.isect_tiles(means2d, radii, depths, size, columns, rows)
+    offsets = ours.isect_offset_encode(ids, 2, columns, rows)
+    colors, opacities = (t.detach().expand(2, *t.shape).clone() for t in (s.colors, s.opacities))
+    splats = [t.requires_grad_() for t in (means2d, conics, colors, opacities)]
+    actual = ours.rasterize_to_pixels(*splats, WIDTH, HEIGHT, size, offsets, flatten, absgrad=True)
+    m, c, f, o = splats
+    expected = [blend(m[i], c[i], depths[i], o[i], f[i], radii[i]) for i in range(2)]
+    expected = [torch.stack(t) for t in zip(*expected)]
+    for a, e in zip(actual, expected):
+        assert_close(a, e)
+    for a, e in zip(gradients(actual, splats), gradients(expected, splats)):
+        assert_close(a, e)
+    light = torch.ones(2, HEIGHT, WIDTH)
+    lists = (WIDTH, HEIGHT, size, offsets, flatten)
+    triples = ours.rasterize_to_indices_in_range(0, 2**30, light, m, c, o, *lists)
+    again = ours.accumulate(m, c, o, f, *triples, WIDTH, HEIGHT)
+    for a, e in zip(again, actual):
+        assert_close(a, e)
+
+
+def test_a_listed_splat_of_opacity_zero_has_no_gradient():
+    means2d, conics = torch.full((1, 2, 2), 4.5), torch.tensor([0.1, 0.0, 0.1]).expand(1, 2, 3)
+    opacities = torch.tensor([[0.0, 0.5]], requires_grad=True)
+    offsets, ids = torch.zeros(1, 1, 1, dtype=torch.int32), torch.arange(2, dtype=torch.int32)
+    image, _ = ours.rasterize_to_pixels(
+        means2d, conics, torch.ones(1, 2, 3), opacities, 8, 8, 8, offsets, ids
+    )
+    image.sum().backward()
+    assert opacities.grad[0, 0] == 0 and opacities.grad[0, 1] > 0
 
 
 @pytest.mark.parametrize("packed", [False, True])

@@ -14,9 +14,7 @@ torch = pytest.importorskip("torch")
 
 import ewa
 from ewa import gsplat as ours
-from gsplat_scenes import HEIGHT, WIDTH, Scene, assert_close, blend, gradients
-
-reference = pytest.importorskip("gsplat.cuda._torch_impl")
+from gsplat_scenes import HEIGHT, WIDTH, Scene, assert_close, blend, gradients, reference
 
 MODES = {"RGB": 3, "D": 1, "ED": 1, "RGB+D": 4, "RGB+ED": 4}
 META = {
@@ -203,18 +201,22 @@ def test_second_derivatives_are_refused(packed, sparse):
 def test_the_projected_means_are_between_two_nodes(packed):
     s = Scene(cameras=2)
     image, _, meta = ours.rasterization(**s.arguments(packed=packed, absgrad=True))
+    before = meta["means2d"].absgrad
+    assert before.shape == meta["means2d"].shape and not before.any() and not before.requires_grad
     meta["means2d"].retain_grad()
     (image * torch.linspace(-1, 1, WIDTH)[:, None]).sum().backward()
     grad, absolute = meta["means2d"].grad, meta["means2d"].absgrad
-    assert grad.shape == absolute.shape == meta["means2d"].shape
+    assert grad.shape == absolute.shape == meta["means2d"].shape and absolute is before
     assert grad.abs().max() > 0
     assert (absolute >= grad.abs() * 0.999 - 1e-6).all()
     again = ours.rasterization(**s.arguments(packed=packed))[2]["means2d"]
     assert not hasattr(again, "absgrad")
 
 
-def test_absolute_gradients_are_sums_over_pixels():
-    s = Scene(splats=12)
+@pytest.mark.parametrize("channels", [3, 7])
+def test_absolute_gradients_are_sums_over_pixels(channels):
+    """Of the gradient by all channels: |a + b| and not |a| + |b|."""
+    s = Scene(splats=12, channels=channels)
     image, alpha, meta = ours.rasterization(**s.arguments(absgrad=True, packed=False))
     gradients((image, alpha), s.tensors())
     values = [meta[k][0].detach() for k in ("conics", "depths", "opacities")]
@@ -415,9 +417,32 @@ def test_values_that_are_not_finite_are_skipped_with_a_warning():
         s.colors[2] = float("nan")
         s.opacities[3] = float("inf")
     arguments = s.arguments(opacities=s.opacities.detach())
-    with pytest.warns(RuntimeWarning, match="2 of .* splats have a mean, conic, opacity"):
+    with pytest.warns(RuntimeWarning, match="2 of .* splats skipped: a mean, conic, opacity"):
         image = ours.rasterization(**arguments)[0]
     assert torch.isfinite(image).all()
+
+
+@pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.parametrize("channel", [0, 4])
+def test_a_splat_without_a_colour_hides_nothing(packed, channel):
+    s = Scene(channels=5)
+    with torch.no_grad():
+        s.colors[2, channel] = float("nan")
+    with pytest.warns(RuntimeWarning, match="1 of .* splats skipped"):
+        image, alpha, _ = ours.rasterization(**s.arguments(packed=packed))
+    without = torch.where(torch.arange(60) == 2, 0.0, s.opacities)
+    colors = torch.nan_to_num(s.colors)
+    expected = ours.rasterization(**s.arguments(packed=packed, opacities=without, colors=colors))
+    torch.testing.assert_close((image, alpha), expected[:2])
+    assert all(torch.isfinite(g).all() for g in gradients((image, alpha), s.tensors()[:4]))
+
+
+def test_view_matrices_need_not_end_in_exactly_0_0_0_1():
+    s = Scene()
+    noisy = s.viewmats.detach().clone()
+    noisy[..., 3, :] += torch.tensor([3e-6, -3e-6, 3e-6, 3e-6])
+    plain = ours.rasterization(**s.arguments())[0]
+    assert torch.equal(ours.rasterization(**s.arguments(viewmats=noisy))[0], plain)
 
 
 def test_strided_and_expanded_tensors():

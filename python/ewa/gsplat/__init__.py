@@ -19,7 +19,7 @@ except ModuleNotFoundError as error:
     if error.name != "torch":
         raise
     raise ImportError(
-        "ewa.gsplat needs PyTorch: pip install ewa-splatting[torch]", name="torch"
+        "ewa.gsplat needs PyTorch: pip install torch", name="torch"
     ) from None
 
 from ._dialect import dialect
@@ -114,6 +114,7 @@ __all__ = [
 _SUBMODULES = (
     "compression",
     "cuda",
+    "cuda._constants",
     "cuda._torch_impl",
     "cuda._wrapper",
     "distributed",

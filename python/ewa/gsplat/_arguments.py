@@ -12,8 +12,8 @@ from torch import Tensor
 _warned_of_double = False
 
 
-class ArgumentError(ValueError, AssertionError):
-    """A wrong argument. gsplat asserts the same conditions, so callers may expect either base."""
+class ArgumentError(ValueError, AssertionError, RuntimeError):
+    """A wrong argument. gsplat's functions assert such conditions, or its kernels check them."""
 
 
 def check(condition, message):

@@ -3,7 +3,6 @@
 
 import functools
 import math
-import weakref
 
 import numpy as np
 import torch
@@ -241,10 +240,11 @@ class Harmonics(Function):
 class Images:
     """The images of a blend call: their size, their rows of splats and what orders them.
 
-    `rows[i]` is the range of image i in the flattened tensors of splats.
+    `rows[i]` is the range of image i in the flattened tensors of splats. `absgrad` is the tensor
+    that each backward pass fills with absolute gradients, or None.
     """
 
-    def __init__(self, dims, width, height, tile_size, rows, absgrad=False, masks=None):
+    def __init__(self, dims, width, height, tile_size, rows, absgrad=None, masks=None):
         self.dims, self.width, self.height = tuple(dims), width, height
         self.tile_size, self.rows, self.absgrad = tile_size, rows, absgrad
         self.masks = None
@@ -329,7 +329,6 @@ class Blend(Function):
         size = images.dims + (images.height, images.width)
         ctx.images, ctx.channels, ctx.count = images, channels, len(splats[0])
         ctx.shapes = [t.shape for t in (means2d, conics, opacities, features)]
-        ctx.means2d = weakref.ref(means2d)
         ctx.set_materialize_grads(False)
         # For first_derivatives alone: the device keeps the values that the backward pass reads.
         ctx.save_for_backward(means2d, conics, opacities, features)
@@ -347,7 +346,7 @@ class Blend(Function):
             v_colors = array(v_colors).reshape(size + (ctx.channels,))
         v_alphas = [None] * size[0] if v_alphas is None else array(v_alphas).reshape(size)
         parts = [
-            operators().blend_backward(handle, v_colors[i], v_alphas[i], images.absgrad)
+            operators().blend_backward(handle, v_colors[i], v_alphas[i], images.absgrad is not None)
             for i, handle in enumerate(ctx.handles)
         ]
         results = zip(*parts) if parts else [()] * 6  # there may be no camera
@@ -356,14 +355,19 @@ class Blend(Function):
             torch.from_numpy(_gather(v, images.rows, ctx.count)).reshape(s) if v else torch.zeros(s)
             for v, s in zip((v_means2d, v_conics, v_opacities, v_features), ctx.shapes)
         ]
-        means2d = ctx.means2d()
-        if images.absgrad and means2d is not None and parts:
+        if images.absgrad is not None and parts:
             absolute = torch.from_numpy(_gather(absolute, images.rows, ctx.count))
-            means2d.absgrad = absolute.reshape(ctx.shapes[0])
+            images.absgrad.copy_(absolute.reshape(ctx.shapes[0]))
         v_background = None
         if ctx.needs_input_grad[4]:
             v_background = _stack(v_backgrounds, images.dims + (ctx.channels,))
         return (*joined, v_background, None, None)
+
+
+def attach_absgrad(means2d):
+    """Gives means2d its attribute `absgrad`: zeros, which each backward pass fills (gsplat 1.6)."""
+    means2d.absgrad = torch.zeros_like(means2d, requires_grad=False)
+    return means2d.absgrad
 
 
 def _stack(arrays, shape):

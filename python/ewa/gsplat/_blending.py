@@ -6,8 +6,8 @@ import math
 import numpy as np
 from torch import Tensor
 
-from ._arguments import ArgumentError, array, check, integer, mismatch, shape, tensor
-from ._autograd import Blend, ByLists, needs_gradient
+from ._arguments import array, check, integer, mismatch, shape, tensor
+from ._autograd import Blend, ByLists, attach_absgrad, needs_gradient
 
 
 def rasterize_to_pixels(
@@ -30,9 +30,10 @@ def rasterize_to_pixels(
     Footprints are [..., N, ...], or [nnz, ...] where `packed` is set. `isect_offsets` [..., rows,
     columns] and `flatten_ids` are from isect_offset_encode and isect_tiles. `masks`, of the shape
     of `isect_offsets`, are False where a tile shall show the background alone. `absgrad` gives
-    means2d an attribute of that name after the backward pass. `tile_size` is a multiple of 8.
+    means2d an attribute of that name, which the backward pass fills. A tile has a multiple
+    of 4 pixels a side.
     """
-    means2d, conics = tensor("means2d", means2d), tensor("conics", conics)
+    given, means2d, conics = means2d, tensor("means2d", means2d), tensor("conics", conics)
     colors, opacities = tensor("colors", colors), tensor("opacities", opacities)
     image_width = integer("image_width", image_width)
     image_height = integer("image_height", image_height)
@@ -53,12 +54,12 @@ def rasterize_to_pixels(
         shape("backgrounds", backgrounds, dims + (channels,))
     if masks is not None:
         shape("masks", masks, isect_offsets.shape)
-    if tile_size % 8:
-        raise ArgumentError(f"tile_size is {tile_size}; the device draws multiples of 8")
+    check(tile_size % 4 == 0, f"tile_size is {tile_size}; expected a multiple of 4")
     check(rows * tile_size >= image_height, f"{rows} rows of tiles do not cover {image_height} px")
     check(columns * tile_size >= image_width, f"{columns} tiles do not cover {image_width} px")
     ranges, offsets, ids = _lists(isect_offsets, flatten_ids, lead[-1], packed)
-    images = ByLists(dims, image_width, image_height, tile_size, ranges, absgrad, masks)
+    holder = attach_absgrad(given) if absgrad else None
+    images = ByLists(dims, image_width, image_height, tile_size, ranges, holder, masks)
     keep = needs_gradient(means2d, conics, colors, opacities, backgrounds)
     images.order(offsets, ids)
     return Blend.apply(means2d, conics, opacities, colors, backgrounds, images, keep)

@@ -4,13 +4,8 @@
 import torch
 from torch import Tensor
 
+from .._native import operators
 from ._arguments import ArgumentError, check, full_precision, shape, tensor
-
-# A splat is drawn where its alpha reaches this; beyond `reach` deviations no alpha does.
-ALPHA_THRESHOLD = 1.0 / 255.0
-MAX_ALPHA = 0.99
-MIN_TRANSMITTANCE = 1e-4
-REACH = 3.33
 
 _UPPER = ([0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2])
 _FULL = [0, 1, 2, 1, 3, 4, 2, 4, 5]
@@ -171,11 +166,11 @@ def footprint(covars2d, eps2d):
 @torch.no_grad()
 def radii_of(center, depths, sides, det, opacities, options):
     """Radii [..., 2] in whole pixels; zero where the splat reaches no pixel of the image."""
-    reach = torch.full_like(depths, REACH)
+    reach = torch.full_like(depths, operators.RADIUS_SIGMAS)
     drawn = (det > 0) & (depths > options.near) & (depths < options.far)
     if opacities is not None:
         # Below the threshold the reach is 0, and so is the radius.
-        ratio = torch.clamp(opacities / ALPHA_THRESHOLD, min=1.0)
+        ratio = torch.clamp(opacities / operators.ALPHA_MIN, min=1.0)
         reach = torch.minimum(reach, torch.sqrt(2.0 * torch.log(ratio)))
     radii = torch.ceil(reach[..., None] * torch.sqrt(torch.clamp(torch.stack(sides, -1), min=0)))
     drawn &= (radii > options.radius_clip).any(-1)

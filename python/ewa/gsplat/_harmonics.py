@@ -4,11 +4,10 @@
 import torch
 from torch import Tensor
 
+from .._native import operators
 from ._arguments import bytes_of, check, integer, mismatch, shape, tensor, unavailable
 from ._autograd import Harmonics
 from ._geometry import camera_offsets
-
-_CONSTANT = 0.28209479177387814
 
 
 _NAMES_OF_VIEWS = (
@@ -118,7 +117,7 @@ def evaluate(degree, dirs, coeffs, masks):
 
 def spherical_harmonics_l0(sh0: Tensor) -> Tensor:
     """The part of degree 0: sh0 [N, 1, D] gives [N, D]."""
-    return tensor("sh0", sh0)[:, 0] * _CONSTANT
+    return tensor("sh0", sh0)[:, 0] * operators.SH_C0
 
 
 def spherical_harmonics_l1_plus(
@@ -129,5 +128,6 @@ def spherical_harmonics_l1_plus(
         named["coeffs"] = named.pop("shN")
     given = _named(arguments, named)
     rest = given["coeffs"]
-    given["coeffs"] = torch.cat((torch.zeros_like(rest[..., :1, :]), rest), -2)
+    constant = rest.new_zeros(rest.shape[:-2] + (1,) + rest.shape[-1:])
+    given["coeffs"] = torch.cat((constant, rest), -2)
     return spherical_harmonics(degrees_to_use, **given)

@@ -6,8 +6,8 @@ import math
 import torch
 from torch import Tensor
 
+from .._native import operators
 from ._arguments import check, shape
-from ._geometry import ALPHA_THRESHOLD, MAX_ALPHA, MIN_TRANSMITTANCE
 
 
 def _tile_bits(tile_width, tile_height):
@@ -87,7 +87,7 @@ def _reached(corner, tile_size, conics, opacities):
         x = torch.minimum(torch.maximum(-b * y / a, x0), x1)
         least = torch.minimum(least, _exponent(a, b, c, x, y))
     # A little more than the ellipse, so that rounding drops no pixel.
-    limit = torch.log(torch.clamp(opacities / ALPHA_THRESHOLD, min=1.0))
+    limit = torch.log(torch.clamp(opacities / operators.ALPHA_MIN, min=1.0))
     return inside | (least <= limit * 1.0001 + 1e-4)
 
 
@@ -164,10 +164,10 @@ def _drawn(pixels, light, splats, listed, width):
     x = (pixels % width)[:, None] + 0.5 - means2d[listed, 0]
     y = pixels.div(width, rounding_mode="floor")[:, None] + 0.5 - means2d[listed, 1]
     exponent = _exponent(*conics[listed].unbind(-1), x, y)
-    alpha = torch.clamp(opacities[listed] * torch.exp(-exponent), max=MAX_ALPHA)
-    counted = (exponent >= 0) & (alpha >= ALPHA_THRESHOLD)
+    alpha = torch.clamp(opacities[listed] * torch.exp(-exponent), max=operators.ALPHA_MAX)
+    counted = (exponent >= 0) & (alpha >= operators.ALPHA_MIN)
     left = torch.cumprod(1 - alpha * counted, 1) * light[pixels][:, None]
-    return counted & (left > MIN_TRANSMITTANCE)
+    return counted & (left > operators.TRANSMITTANCE_STOP)
 
 
 def accumulate(
@@ -201,7 +201,7 @@ def accumulate(
     x = pixel % image_width + 0.5 - mean[:, 0]
     y = pixel.div(image_width, rounding_mode="floor") + 0.5 - mean[:, 1]
     exponent = _exponent(*conics.reshape(-1, 3)[row].unbind(-1), x, y)
-    alpha = torch.clamp(opacities.reshape(-1)[row] * torch.exp(-exponent), max=MAX_ALPHA)
+    alpha = torch.clamp(opacities.reshape(-1)[row] * torch.exp(-exponent), max=operators.ALPHA_MAX)
     # A table with one row a ray turns the product over a ray's entries into a cumprod.
     used, entries = torch.unique_consecutive(ray, return_counts=True)
     first = torch.repeat_interleave(entries.cumsum(0) - entries, entries)

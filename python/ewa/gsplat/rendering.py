@@ -3,14 +3,14 @@
 
 import math
 from enum import IntEnum
-from typing import Any
+from typing import Any, Literal
 
 import torch
 from torch import Tensor
 
 from . import _dialect
 from ._arguments import check, integer, mismatch, refusal, shape, tensor, unavailable
-from ._autograd import Blend, ByDepth, ProjectOptions, needs_gradient
+from ._autograd import Blend, ByDepth, ProjectOptions, attach_absgrad, needs_gradient
 from ._geometry import camera_offsets, upper_triangle
 from ._harmonics import evaluate
 from ._projection import cameras_of, project
@@ -20,6 +20,9 @@ _COLOR_MODES = {"RGB", "RGB+D", "RGB+ED", "RGB-d", "RGB-Ed"}
 _DEPTH_MODES = {"D", "ED", "RGB+D", "RGB+ED"}
 _HIT_MODES = {"d", "Ed", "RGB-d", "RGB-Ed"}
 _EXPECTED_MODES = {"ED", "RGB+ED", "Ed", "RGB-Ed"}
+
+
+RenderMode = Literal["RGB", "D", "ED", "RGB+D", "RGB+ED", "d", "Ed", "RGB-d", "RGB-Ed"]
 
 
 def render_mode_has_color(mode: str) -> bool:
@@ -189,7 +192,8 @@ def rasterization(
         render_mode in _DEPTH_MODES,
         backgrounds,
     )
-    images = ByDepth(scene.dims, width, height, tile_size, scene.rows(ids), absgrad)
+    holder = attach_absgrad(means2d) if absgrad else None
+    images = ByDepth(scene.dims, width, height, tile_size, scene.rows(ids), holder)
     keep = needs_gradient(means2d, conics, opacities, features, backgrounds)
     image, alpha = Blend.apply(
         means2d, conics, opacities, features, backgrounds, images.order(depths, radii), keep

@@ -11,12 +11,10 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
+from ..._native import operators
 from .._geometry import normalized_quat_to_rotmat
 from ..relocation import compute_relocation
 from .base import Optimizers, Parameters
-
-# A split splat becomes two whose deviations are smaller by this (Kerbl et al. 2023, section 5.2).
-_SPLIT_FACTOR = 1.6
 
 
 def _multinomial_sample(weights, n, replacement=True):
@@ -104,7 +102,7 @@ def split(
         if name == "means":
             both = (own + moves).flatten(0, 1)
         elif name == "scales":
-            both = torch.log(scales / _SPLIT_FACTOR).repeat(2, 1)
+            both = torch.log(scales / operators.SPLIT_SCALE).repeat(2, 1)
         elif name == "opacities" and revised_opacity:
             alpha = 1.0 - torch.sqrt(1.0 - torch.sigmoid(own))
             both = torch.cat((torch.logit(alpha),) * 2)
