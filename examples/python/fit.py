@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fits splats to images in a plain torch loop: fit.py DATASET [--steps N] [--out FILE]
 
+Its learning rates are those of long runs. With a few hundred steps, `ewa train` comes further.
+
 DATASET is a COLMAP model or a transforms.json with points. The last line is the PSNR of the
 held-out images.
 """
