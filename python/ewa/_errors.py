@@ -28,10 +28,6 @@ _ADVICE = (
     ("--resume continues a training run", "Trainer.resume continues from a checkpoint"),
     ("a larger --test-every leaves more of them", "name some as train_frames="),
     ("with --transform move=", "by their means and origin"),
-    (
-        "more than 3.7 billion (splat, tile) pairs in one picture; --downscale makes them fewer",
-        "more than 3.7 billion (splat, tile) pairs in one image; a smaller image has fewer",
-    ),
 )
 # Options of the programs that have another name in Python.
 _NAMES = {
