@@ -2,14 +2,13 @@
 #include "io/splats/clusters.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cassert>
 #include <cmath>
-#include <future>
 #include <limits>
 #include <numeric>
 #include <span>
-#include <thread>
+
+#include "core/parallel.h"
 
 namespace ewa::io {
 
@@ -226,19 +225,6 @@ Clusters cluster(const VectorTable& vectors, std::span<const uint32_t> members, 
     return clusters;
 }
 
-/// Calls work(i) for each i < count on all cores. The work of different i must be independent.
-template <class Work>
-void on_all_cores(size_t count, const Work& work) {
-    std::atomic<size_t> next{0};
-    std::vector<std::future<void>> threads;
-    const size_t cores = std::max(1u, std::thread::hardware_concurrency());
-    for (size_t t = 0; t < std::min(cores, count); ++t)
-        threads.push_back(std::async(std::launch::async, [&] {
-            for (size_t i = next++; i < count; i = next++) work(i);
-        }));
-    for (std::future<void>& thread : threads) thread.get();
-}
-
 /// How many rows each group gets: one, and the others by the groups' errors, but no more than it has members.
 std::vector<size_t> shares_of(size_t rows, const std::vector<double>& errors,
                               const std::vector<size_t>& sizes) {
@@ -279,7 +265,7 @@ Groups group(const VectorTable& vectors, size_t count) {
     std::vector<uint32_t> labels(vectors.count);
     std::vector<float> scores(vectors.count);
     constexpr size_t kPiece = 4096;
-    on_all_cores((vectors.count + kPiece - 1) / kPiece, [&](size_t piece) {
+    core::on_all_cores((vectors.count + kPiece - 1) / kPiece, [&](size_t piece) {
         const size_t begin = piece * kPiece, end = std::min(vectors.count, begin + kPiece);
         centroids.nearest_to(
             end - begin, [&](size_t i) { return vectors[begin + i]; }, &labels[begin], &scores[begin]);
@@ -343,7 +329,7 @@ Palette make_palette(const VectorTable& vectors, size_t most) {
     const std::vector<size_t> shares = shares_of(most, groups.errors, sizes);
     std::vector<Clusters> fine(count);
     constexpr int kIterations = 5;
-    on_all_cores(count, [&](size_t g) {
+    core::on_all_cores(count, [&](size_t g) {
         if (shares[g] > 0) fine[g] = cluster(vectors, groups.members[g], shares[g], kIterations);
     });
     for (size_t g = 0; g < count; ++g) {
