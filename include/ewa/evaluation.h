@@ -10,6 +10,7 @@
 #include "ewa/device.h"
 #include "ewa/exposure.h"
 #include "ewa/gaussians.h"
+#include "ewa/metrics.h"
 #include "ewa/render_options.h"
 
 namespace ewa {
@@ -18,10 +19,25 @@ struct EvalFrame {
     std::string name;  // Frame::name
     double psnr = 0;   // dB
     double ssim = 0;
+    std::vector<Figure> figures;  // of Measures::meter
+};
+
+/// How renders and images are compared. docs/figures.md tells what each protocol does.
+enum class Protocol {
+    ewa,            // values as they are
+    nerfbaselines,  // as NeRFBaselines: 8-bit values, SSIM without the image's rim
+    inria  // as the evaluation of 3D Gaussian Splatting by INRIA: 8-bit values, images resized as Pillow does
+};
+
+/// What an evaluation measures beside PSNR and SSIM.
+struct Measures {
+    Protocol protocol = Protocol::ewa;
+    Meter meter;
 };
 
 struct Evaluation {
-    double psnr = 0, ssim = 0;  // means over `frames`
+    double psnr = 0, ssim = 0;    // means over `frames`
+    std::vector<Figure> figures;  // means; NaN if a frame has NaN
     std::vector<EvalFrame> frames;
     double seconds = 0;  // wall time
 };
@@ -35,6 +51,6 @@ struct Evaluation {
 Evaluation evaluate(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians, const Dataset& dataset,
                     const std::vector<int>& frames, const RenderOptions& options,
                     const std::vector<Exposure>& exposures = {},
-                    const std::function<void()>& before_frame = {});
+                    const std::function<void()>& before_frame = {}, const Measures& measures = {});
 
 }  // namespace ewa

@@ -12,6 +12,7 @@
 
 #include "cli/command.h"
 #include "cli/compare_inputs.h"
+#include "cli/metric_arguments.h"
 #include "cli/output.h"
 #include "cli/run_inputs.h"
 #include "core/text.h"
@@ -30,6 +31,7 @@ constexpr int kTooFarApart = 1;
 
 struct CompareArguments {
     CompareInputs inputs;
+    MetricArguments metrics;
     fs::path json, heat_map;
     // The limits that each pair must meet; empty: none.
     std::optional<double> threshold;  // dB: the least PSNR
@@ -40,6 +42,7 @@ struct CompareArguments {
 struct Compared {
     std::string name;
     ImageDifference difference;
+    std::vector<Figure> figures = {};
     std::vector<std::string> failed = {};  // names of the figures that exceed their limit
     std::string reasons = {};              // the same for the user
 };
@@ -47,6 +50,7 @@ struct Compared {
 /// Means and extremes over the pairs.
 struct CompareTotals {
     double psnr = 0, ssim = 0;        // means
+    std::vector<Figure> figures;      // means
     double max_error = 0, rms = 0;    // largest
     const Compared* worst = nullptr;  // the pair with the lowest PSNR, or RMS over all values in dB
     bool passed = true;
@@ -90,17 +94,19 @@ Json number(double value) {
 
 Json to_json(const Compared& compared) {
     const ImageDifference& d = compared.difference;
-    return {{"name", compared.name},
-            {"psnr", number(d.psnr)},
-            {"ssim", number(d.ssim)},
-            {"max_error", number(d.max_error)},
-            {"max_error_at", {d.max_x, d.max_y}},
-            {"mean_error", number(d.mean_error)},
-            {"rms", number(d.rms_error)},
-            {"identical", d.max_error == 0},
-            {"nan", std::isnan(d.psnr)},
-            {"passed", compared.failed.empty()},
-            {"failed", compared.failed}};
+    Json json{{"name", compared.name},
+              {"psnr", number(d.psnr)},
+              {"ssim", number(d.ssim)},
+              {"max_error", number(d.max_error)},
+              {"max_error_at", {d.max_x, d.max_y}},
+              {"mean_error", number(d.mean_error)},
+              {"rms", number(d.rms_error)},
+              {"identical", d.max_error == 0},
+              {"nan", std::isnan(d.psnr)},
+              {"passed", compared.failed.empty()},
+              {"failed", compared.failed}};
+    add_figures(json, compared.figures);
+    return json;
 }
 
 void print(const Compared& one) {
@@ -113,7 +119,10 @@ void print(const Compared& one) {
 
 CompareTotals totals_of(const std::vector<Compared>& all) {
     CompareTotals out;
+    for (const Figure& figure : all.front().figures) out.figures.push_back({figure.name, 0});
     for (const Compared& one : all) {
+        for (size_t k = 0; k < out.figures.size(); ++k)
+            out.figures[k].value += one.figures[k].value / double(all.size());
         out.psnr += one.difference.psnr / double(all.size());
         out.ssim += one.difference.ssim / double(all.size());
         out.max_error = std::max(out.max_error, one.difference.max_error);
@@ -136,7 +145,10 @@ fs::path heat_map_file(const ImagePair& pair, const CompareArguments& arguments)
 void check_files(const CompareArguments& arguments, const Sides& sides, const ImagePairs& pairs) {
     const CompareInputs& inputs = arguments.inputs;
     std::vector<NamedFile> written = {{"--json", arguments.json}};
-    std::vector<NamedFile> read = {{"A", inputs.a}, {"B", inputs.b}, {"--cameras", inputs.cameras}};
+    std::vector<NamedFile> read = {{"A", inputs.a},
+                                   {"B", inputs.b},
+                                   {"--cameras", inputs.cameras},
+                                   {"--lpips-weights", arguments.metrics.lpips_weights}};
     for (const ImagePair& pair : pairs.pairs) {
         written.push_back({"--heat-map", heat_map_file(pair, arguments)});
         if (!sides.a->is_scene) read.push_back({"an image of A", sides.a->place(pair.a)});
@@ -147,7 +159,8 @@ void check_files(const CompareArguments& arguments, const Sides& sides, const Im
     check_command_outputs(written, read);
 }
 
-Compared compare(const ImagePair& pair, const Sides& sides, const CompareArguments& arguments) {
+Compared compare(const ImagePair& pair, const Sides& sides, const CompareArguments& arguments,
+                 const Meter& meter) {
     ComparedImage a = sides.a->picture(pair.a), b = sides.b->picture(pair.b);
     const bool drawn_a = sides.a->is_scene, drawn_b = sides.b->is_scene;
     if (drawn_a && !drawn_b) match_format(a, b, sides.options.background);
@@ -155,6 +168,7 @@ Compared compare(const ImagePair& pair, const Sides& sides, const CompareArgumen
     Compared out{pair.name, {}};
     try {
         out.difference = compare_images(a.image, b.image);
+        if (!meter.empty()) out.figures = meter.measure(a.image, b.image);
     } catch (const InputError& error) {
         throw InputError(sides.a->place(pair.a) + " and " + sides.b->place(pair.b) + ": " + error.what() +
                          (drawn_a || drawn_b ? "; scenes are rendered through undistorted cameras, at "
@@ -178,6 +192,14 @@ void print(const CompareTotals& totals, size_t pictures) {
             core::one_line(totals.worst->name));
 }
 
+void print_all_figures(const std::vector<Compared>& all, const CompareTotals& totals,
+                       const CompareArguments& arguments) {
+    std::vector<FigureRow> rows;
+    for (const Compared& one : all) rows.push_back({one.name, one.figures});
+    if (rows.size() > 1) rows.push_back({"mean", totals.figures});
+    fmt::print("{}{}", figure_table(rows), lpips_note(totals.figures, arguments.metrics.lpips_weights));
+}
+
 /// One line: a folder of all images is often compared with renders of a few. --json names them all.
 void print_unpaired(const ComparedSide& side, const std::vector<fs::path>& names) {
     if (names.empty()) return;
@@ -193,9 +215,10 @@ int run(const CompareArguments& arguments) {
     const Sides sides = open_sides(arguments.inputs);
     const ImagePairs pairs = pair_images(*sides.a, *sides.b);
     check_files(arguments, sides, pairs);
+    const Meter meter = arguments.metrics.measures().meter;
     std::vector<Compared> all;
     for (const ImagePair& pair : pairs.pairs) {
-        all.push_back(compare(pair, sides, arguments));
+        all.push_back(compare(pair, sides, arguments, meter));
         print(all.back());
     }
     std::vector<std::string> unpaired;
@@ -204,6 +227,7 @@ int run(const CompareArguments& arguments) {
 
     const CompareTotals totals = totals_of(all);
     print(totals, all.size());
+    print_all_figures(all, totals, arguments);
     print_unpaired(*sides.a, pairs.only_a);
     print_unpaired(*sides.b, pairs.only_b);
     for (const ComparedSide* side : {sides.a.get(), sides.b.get()})
@@ -225,6 +249,7 @@ int run(const CompareArguments& arguments) {
                      {"pictures", Json::array()},
                      {"unpaired", unpaired},
                      {"skipped_nonfinite", {sides.a->skipped_splats, sides.b->skipped_splats}}};
+        add_figures(json, totals.figures);
         if (arguments.threshold) json["threshold"] = *arguments.threshold;
         if (arguments.max_error) json["max_error_allowed"] = *arguments.max_error;
         for (const Compared& one : all) json["pictures"].push_back(to_json(one));
@@ -254,6 +279,7 @@ Action add_compare(CLI::App& app) {
            "Exit with status 1 if two values, alpha included, differ by more, or if an image has no partner")
         ->transform(in_range(0.0, 1e9))
         ->type_name("E");
+    add_metric_options(app, arguments->metrics);
     app.add_option("--json", arguments->json, "Write the results to this file")->type_name("FILE");
     app.add_option(
            "--heat-map", arguments->heat_map,

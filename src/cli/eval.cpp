@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// ewa eval: PSNR and SSIM of a splat scene against the images of a dataset.
+// ewa eval: PSNR, SSIM and other metrics of a splat scene against the images of a dataset.
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include <memory>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "cli/arguments.h"
 #include "cli/command.h"
+#include "cli/metric_arguments.h"
 #include "cli/output.h"
 #include "cli/run_inputs.h"
 #include "core/text.h"
@@ -21,29 +24,43 @@ namespace {
 
 struct EvalArguments {
     ViewArguments views;
+    MetricArguments metrics;
     std::filesystem::path json;
     std::string split = "test", exposures = "auto";
     std::optional<live::Run> run;  // that of SPLATS, if its dataset is used
     int test_every = 8;
 };
 
-report::Json to_json(const Evaluation& evaluation, const io::RefinedUse& refined) {
+report::Json to_json(const Evaluation& evaluation, const io::RefinedUse& refined,
+                     const std::string& protocol) {
     report::Json frames = report::Json::array();
-    for (const EvalFrame& frame : evaluation.frames)
+    for (const EvalFrame& frame : evaluation.frames) {
         frames.push_back({{"name", frame.name}, {"psnr", frame.psnr}, {"ssim", frame.ssim}});
-    report::Json json{{"psnr", evaluation.psnr},
-                      {"ssim", evaluation.ssim},
-                      {"frames", frames},
-                      {"seconds", evaluation.seconds}};
+        add_figures(frames.back(), frame.figures);
+    }
+    report::Json json{{"psnr", evaluation.psnr}, {"ssim", evaluation.ssim}};
+    add_figures(json, evaluation.figures);
+    json["frames"] = frames;
+    json["seconds"] = evaluation.seconds;
+    if (protocol != "ewa") json["protocol"] = protocol;
     if (refined.used) json["test_cameras_aligned"] = refined.aligned;
     return json;
+}
+
+void print_figures(const Evaluation& evaluation, const MetricArguments& arguments) {
+    std::vector<FigureRow> rows;
+    for (const EvalFrame& frame : evaluation.frames) rows.push_back({frame.name, frame.figures});
+    rows.push_back({"mean", evaluation.figures});
+    fmt::print("{}{}", figure_table(rows), lpips_note(evaluation.figures, arguments.lpips_weights));
 }
 
 int run(const EvalArguments& arguments) {
     RenderOptions options = arguments.views.draw.options();
     const std::vector<NamedFile> written{{"--json", arguments.json}};
-    check_command_outputs(written,
-                          {{"SPLATS", arguments.views.splats}, {"DATASET", arguments.views.dataset}});
+    check_command_outputs(written, {{"SPLATS", arguments.views.splats},
+                                    {"DATASET", arguments.views.dataset},
+                                    {"--lpips-weights", arguments.metrics.lpips_weights}});
+    const Measures measures = arguments.metrics.measures();
     const Gaussians gaussians = arguments.views.draw.load(arguments.views.splats, options);
     const auto [dataset, refined, frames, folder] =
         load_views(arguments.views, arguments.split, arguments.test_every);
@@ -53,8 +70,9 @@ int run(const EvalArguments& arguments) {
     // The lines of the frames follow: a file gets no others.
     Progress progress("evaluated", int(frames.size()), "views", !core::redraws());
     int begun = 0;
-    const Evaluation evaluation = evaluate(open_device(arguments.views.device), gaussians, dataset, frames,
-                                           options, exposures, [&] { progress.update(begun++); });
+    const Evaluation evaluation = evaluate(
+        open_device(arguments.views.device), gaussians, dataset, frames, options, exposures,
+        [&] { progress.update(begun++); }, measures);
     progress.clear();
     for (const EvalFrame& frame : evaluation.frames)
         fmt::print("{}  PSNR {:.3f} dB  SSIM {:.5f}\n", core::one_line(frame.name), frame.psnr, frame.ssim);
@@ -66,7 +84,9 @@ int run(const EvalArguments& arguments) {
     fmt::print("mean of {} ({})  PSNR {:.3f} dB  SSIM {:.5f}  in {:.2f} s\n",
                core::counted(evaluation.frames.size(), "frame"), arguments.split, evaluation.psnr,
                evaluation.ssim, evaluation.seconds);
-    if (!arguments.json.empty()) write_json(arguments.json, to_json(evaluation, refined));
+    print_figures(evaluation, arguments.metrics);
+    if (!arguments.json.empty())
+        write_json(arguments.json, to_json(evaluation, refined, arguments.metrics.protocol));
     return 0;
 }
 
@@ -80,6 +100,8 @@ Action add_eval(CLI::App& app) {
         ->capture_default_str();
     add_test_every_option(app, arguments->test_every);
     add_exposures_option(app, arguments->exposures);
+    add_metric_options(app, arguments->metrics);
+    add_protocol_option(app, arguments->metrics);
     app.add_option("--json", arguments->json, "Write the results to this file")->type_name("FILE");
     add_view_options(app, arguments->views);
     return [&app, arguments] {

@@ -4,9 +4,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <string>
 #include <utility>
 
 #include "ewa/error.h"
+#include "image/metric.h"
+#include "image/pillow.h"
 
 namespace ewa {
 
@@ -31,10 +34,67 @@ RenderedView with_photo(Image rendering, const Frame& frame, const RenderOptions
     return {std::move(photo), std::move(weights), std::move(rendering)};
 }
 
+namespace {
+
+/// Of 255 levels, as Python's float32 images become bytes. NaN becomes 0.
+float level(float value, bool round_down) {
+    const float levels = 255 * (value > 0 ? std::min(value, 1.0f) : 0.0f);
+    return std::floor(round_down ? levels : levels + 0.5f) / 255;
+}
+
+/// Both evaluations cut the fraction off after compositing.
+Image composited(const Image& image, const std::array<float, 3>& background) {
+    Image result(image.width, image.height, 3);
+    for (size_t i = 0; 4 * i < image.pixels.size(); ++i) {
+        const double alpha = double(image.pixels[4 * i + 3]);
+        for (size_t c = 0; c < 3; ++c) {
+            const double color = std::round(255 * double(image.pixels[4 * i + c])) / 255;
+            const double mixed = color * alpha + double(background[c]) * (1 - alpha);
+            result.pixels[3 * i + c] = float(std::floor(255 * std::min(mixed, 1.0) + 1e-6)) / 255;
+        }
+    }
+    return result;
+}
+
+Image channels_between(const Image& image, int first, int end) {
+    Image result(image.width, image.height, end - first);
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x)
+            std::copy(image.at(x, y) + first, image.at(x, y) + end, result.at(x, y));
+    return result;
+}
+
+/// As with_photo, as another protocol than ewa's compares a frame.
+RenderedView view_of_protocol(Protocol protocol, Image rendering, const Frame& frame,
+                              const RenderOptions& options, const Exposure* exposure) {
+    const bool inria = protocol == Protocol::inria;
+    if (exposure) rendering = exposed(std::move(rendering), *exposure);
+    for (float& value : rendering.pixels) value = level(value, !inria);
+    Frame unscaled = frame;
+    if (inria) unscaled.downscale = 1;
+    Image photo = load_frame_image(unscaled), weights;
+    if (photo.channels == 4 && frame.masks == MaskUse::ignore) {
+        weights = channels_between(photo, 3, 4);
+        if (inria) weights = downscale(weights, frame.downscale);
+        photo = channels_between(photo, 0, 3);
+    } else if (photo.channels == 4) {
+        photo = composited(photo, options.background);
+    }
+    for (float& value : photo.pixels) value = level(value, false);
+    if (inria && frame.downscale > 1)
+        photo = image::resized_as_pillow(photo, frame.camera.width, frame.camera.height);
+    if (photo.width != rendering.width || photo.height != rendering.height)
+        throw InputError("frame " + frame.name + ": the picture's size is not the camera's");
+    return {std::move(photo), std::move(weights), std::move(rendering)};
+}
+
+}  // namespace
+
 Evaluation evaluate_views(const Drawing& drawing, const Dataset& dataset, const std::vector<int>& frames,
                           const RenderOptions& options, const std::vector<Exposure>& exposures,
                           const std::function<void()>& before_frame,
-                          const std::function<void(size_t, const RenderedView&, const EvalFrame&)>& on_view) {
+                          const std::function<void(size_t, const RenderedView&, const EvalFrame&)>& on_view,
+                          const Measures& measures) {
     const auto start = std::chrono::steady_clock::now();
     Evaluation result;
     std::vector<Image> drawn;
@@ -48,14 +108,23 @@ Evaluation evaluate_views(const Drawing& drawing, const Dataset& dataset, const 
             drawn = drawing.images(cameras);
         }
         const Frame& frame = dataset.frames[size_t(frames[i])];
-        const RenderedView view = with_photo(std::move(drawn[place]), frame, options,
-                                             exposures.empty() ? nullptr : &exposures.at(i));
+        const Exposure* exposure = exposures.empty() ? nullptr : &exposures.at(i);
+        const RenderedView view =
+            measures.protocol == Protocol::ewa
+                ? with_photo(std::move(drawn[place]), frame, options, exposure)
+                : view_of_protocol(measures.protocol, std::move(drawn[place]), frame, options, exposure);
         const double db = psnr(view.rendering, view.photo, view.weights);
         if (std::isnan(db)) continue;  // no pixel counts
-        result.frames.push_back({frame.name, db, ssim(view.rendering, view.photo, view.weights)});
+        const auto similarity = measures.protocol == Protocol::nerfbaselines ? image::ssim_valid : ewa::ssim;
+        result.frames.push_back({frame.name, db, similarity(view.rendering, view.photo, view.weights),
+                                 measures.meter.measure(view.rendering, view.photo, view.weights)});
         if (on_view) on_view(i, view, result.frames.back());
     }
+    const double none = result.frames.empty() ? std::nan("") : 0.0;
+    for (const std::string& name : measures.meter.names()) result.figures.push_back({name, none});
     for (const EvalFrame& frame : result.frames) {
+        for (size_t k = 0; k < frame.figures.size(); ++k)
+            result.figures[k].value += frame.figures[k].value / double(result.frames.size());
         result.psnr += frame.psnr / double(result.frames.size());
         result.ssim += frame.ssim / double(result.frames.size());
     }
@@ -67,9 +136,10 @@ Evaluation evaluate_views(const Drawing& drawing, const Dataset& dataset, const 
 
 Evaluation evaluate(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians, const Dataset& dataset,
                     const std::vector<int>& frames, const RenderOptions& options,
-                    const std::vector<Exposure>& exposures, const std::function<void()>& before_frame) {
+                    const std::vector<Exposure>& exposures, const std::function<void()>& before_frame,
+                    const Measures& measures) {
     return train::evaluate_views(train::drawing_of(std::move(device), gaussians, options), dataset, frames,
-                                 options, exposures, before_frame, {});
+                                 options, exposures, before_frame, {}, measures);
 }
 
 }  // namespace ewa

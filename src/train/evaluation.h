@@ -36,6 +36,7 @@ RenderedView with_photo(Image rendering, const Frame& frame, const RenderOptions
 Evaluation evaluate_views(const Drawing& drawing, const Dataset& dataset, const std::vector<int>& frames,
                           const RenderOptions& options, const std::vector<Exposure>& exposures,
                           const std::function<void()>& before_frame,
-                          const std::function<void(size_t, const RenderedView&, const EvalFrame&)>& on_view);
+                          const std::function<void(size_t, const RenderedView&, const EvalFrame&)>& on_view,
+                          const Measures& measures = {});
 
 }  // namespace ewa::train

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/metric_arguments.h"
+
+#include <spdlog/fmt/fmt.h>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+#include "cli/arguments.h"
+#include "core/text.h"
+#include "ewa/error.h"
+
+namespace ewa::cli {
+namespace {
+
+constexpr size_t kLineWidth = 100, kLongestName = 40;
+
+int decimals_of(const std::string& metric) {
+    const auto& all = all_metrics();
+    const auto found =
+        std::find_if(all.begin(), all.end(), [&](const Metric& known) { return known.name == metric; });
+    return found == all.end() ? 4 : found->decimals;
+}
+
+std::string value_text(const Figure& figure) {
+    return std::isnan(figure.value) ? "-" : fmt::format("{:.{}f}", figure.value, decimals_of(figure.name));
+}
+
+size_t column_width(const Figure& figure) {
+    return std::max<size_t>(9, figure.name.size() + 2);
+}
+
+/// Columns first .. end of all rows, below their names.
+std::string table_part(const std::vector<FigureRow>& rows, size_t name_width, size_t first, size_t end) {
+    std::string text = fmt::format("{:{}}", "", name_width);
+    for (size_t k = first; k < end; ++k)
+        text += fmt::format("{:>{}}", rows.front().figures[k].name, column_width(rows.front().figures[k]));
+    text += '\n';
+    for (const FigureRow& row : rows) {
+        text += fmt::format("{:{}}", core::one_line(row.name), name_width);
+        for (size_t k = first; k < end; ++k)
+            text += fmt::format("{:>{}}", value_text(row.figures[k]), column_width(row.figures[k]));
+        text += '\n';
+    }
+    return text;
+}
+
+}  // namespace
+
+Measures MetricArguments::measures() const {
+    Measures result;
+    std::string list = metrics;
+    if (protocol == "nerfbaselines") {
+        result.protocol = Protocol::nerfbaselines;
+        if (list.empty()) list = "lpips";
+    } else if (protocol == "inria") {
+        result.protocol = Protocol::inria;
+        if (list.empty()) list = "lpips_vgg";
+    }
+    try {
+        if (!list.empty())
+            result.meter = Meter(metrics_named(list), lpips_weights, result.protocol == Protocol::inria);
+    } catch (const InputError& error) {
+        throw InputError((lpips_weights.empty() ? "--metrics: " : "") + std::string(error.what()));
+    }
+    return result;
+}
+
+void add_metric_options(CLI::App& app, MetricArguments& arguments) {
+    std::string names;
+    for (const Metric& metric : all_metrics()) names += (names.empty() ? "" : ", ") + metric.name;
+    app.add_option("--metrics", arguments.metrics,
+                   "Metrics beside PSNR and SSIM: all, bands, lpips, or some of " + names +
+                       ", with commas between them")
+        ->transform(CLI::Validator(
+            [](std::string& text) {
+                try {
+                    metrics_named(text);
+                    return std::string();
+                } catch (const InputError& error) {
+                    return std::string(error.what());
+                }
+            },
+            ""))
+        ->type_name("LIST");
+    app.add_option(
+           "--lpips-weights", arguments.lpips_weights,
+           "Networks of LPIPS, as scripts/lpips-weights writes them. Without them LPIPS is not computed")
+        ->type_name("FILE");
+}
+
+void add_protocol_option(CLI::App& app, MetricArguments& arguments) {
+    app.add_option(
+           "--protocol", arguments.protocol,
+           "How images are compared. ewa: as they are. nerfbaselines, inria: as these round, composite "
+           "and resize, for figures beside theirs")
+        ->transform(one_of({"ewa", "nerfbaselines", "inria"}))
+        ->capture_default_str();
+}
+
+std::string figure_table(const std::vector<FigureRow>& rows) {
+    if (rows.empty() || rows.front().figures.empty()) return "";
+    size_t name_width = 0;
+    for (const FigureRow& row : rows) name_width = std::max(name_width, core::one_line(row.name).size());
+    name_width = std::min(name_width, kLongestName);
+    std::string text;
+    const std::vector<Figure>& columns = rows.front().figures;
+    for (size_t first = 0, end = 0; first < columns.size(); first = end) {
+        size_t width = name_width;
+        while (end < columns.size() && (end == first || width + column_width(columns[end]) <= kLineWidth))
+            width += column_width(columns[end++]);
+        text += table_part(rows, name_width, first, end);
+    }
+    return text;
+}
+
+std::string figures_text(const std::vector<Figure>& figures) {
+    std::string text;
+    for (const Figure& figure : figures)
+        text += (text.empty() ? "" : ", ") + figure.name + " " +
+                (std::isnan(figure.value) ? "not computed" : value_text(figure));
+    return text;
+}
+
+std::string lpips_note(const std::vector<Figure>& figures, const std::filesystem::path& weights) {
+    std::string missing;
+    for (const Figure& figure : figures)
+        if (figure.name.starts_with("lpips_") && std::isnan(figure.value))
+            missing += (missing.empty() ? "" : " and ") + figure.name;
+    if (missing.empty()) return "";
+    return missing + (weights.empty()
+                          ? " not computed: --lpips-weights FILE names the networks\n"
+                          : " not computed: the file lacks the network, or an image is too small\n");
+}
+
+void add_figures(report::Json& json, const std::vector<Figure>& figures) {
+    for (const Figure& figure : figures)
+        json[figure.name] = std::isfinite(figure.value) ? report::Json(figure.value) : report::Json();
+}
+
+}  // namespace ewa::cli

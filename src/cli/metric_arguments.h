@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// The metrics of ewa eval and ewa compare beside PSNR and SSIM: their options, tables and JSON.
+#pragma once
+#include <CLI/CLI.hpp>
+
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "ewa/evaluation.h"
+#include "report/summary.h"
+
+namespace ewa::cli {
+
+struct MetricArguments {
+    std::string metrics;  // a list; empty: those of the protocol
+    std::filesystem::path lpips_weights;
+    std::string protocol = "ewa";
+
+    /// Throws InputError, also if the file of weights cannot be read.
+    Measures measures() const;
+};
+/// --metrics and --lpips-weights.
+void add_metric_options(CLI::App& app, MetricArguments& arguments);
+/// --protocol.
+void add_protocol_option(CLI::App& app, MetricArguments& arguments);
+
+/// The figures of an image, or their means.
+struct FigureRow {
+    std::string name;
+    std::vector<Figure> figures;  // the same metrics in each row
+};
+/// One row a line, in parts that fit a terminal. Empty without figures.
+std::string figure_table(const std::vector<FigureRow>& rows);
+/// "cc_psnr 24.312, flip 0.08123"; empty without figures.
+std::string figures_text(const std::vector<Figure>& figures);
+/// One line if an LPIPS is not computed, else nothing. weights: MetricArguments::lpips_weights.
+std::string lpips_note(const std::vector<Figure>& figures, const std::filesystem::path& weights);
+
+/// Adds them by their names. A figure that is not finite is null.
+void add_figures(report::Json& json, const std::vector<Figure>& figures);
+
+}  // namespace ewa::cli

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// The metrics behind include/ewa/metrics.h. a is the image that is judged, b the reference. Both have equal sizes and at least
+// 3 channels, of which the first three count, clamped to [0, 1]. weights: of each pixel, one channel; an empty image means
+// equal weights. Every function throws InputError if the sizes differ, and returns NaN if all weights are zero.
+#pragma once
+#include <array>
+
+#include "ewa/image.h"
+
+namespace ewa::image {
+
+/// Channels that are compared: RGB, without alpha. Throws InputError.
+int compared_channels(const Image& a, const Image& b);
+/// The number of pixels, each with its weight. Throws InputError if the weights have another size.
+double weight_sum(const Image& weights, const Image& picture);
+
+inline double weight_at(const Image& weights, int x, int y) {
+    return weights.pixels.empty() ? 1.0 : double(*weights.at(x, y));
+}
+
+/// a where the weight is 1, b where it is 0, and their mixture between. So pixels of weight 0 show no difference to a metric
+/// that looks at their surroundings.
+Image pulled_onto(const Image& a, const Image& b, const Image& weights);
+
+/// Mean SSIM as ewa::ssim, over the pixels whose whole window is in the image. NaN if there are none.
+double ssim_valid(const Image& a, const Image& b, const Image& weights);
+/// Multi-scale SSIM (Wang et al. 2003): five scales by means of 2 x 2 pixels, windows wholly in the image, negative factors as
+/// 0. NaN if a side is under 176 px: the window must fit on the coarsest scale.
+double ms_ssim(const Image& a, const Image& b, const Image& weights);
+
+/// Per channel, the inverse of the affine map that takes b to a in the least-squares sense, applied to a (gsplat's
+/// color_correct_affine).
+Image affine_corrected(const Image& a, const Image& b, const Image& weights);
+/// Five rounds of the quadratic map of a's colours that comes closest to b in the least-squares sense, without pixels that are
+/// saturated (multinerf's color_correct).
+Image quadratic_corrected(const Image& a, const Image& b, const Image& weights);
+
+/// Mean of LDR-FLIP's error map (Andersson et al. 2020) at 67.02 pixels a degree, as flip-evaluator.
+double flip(const Image& a, const Image& b, const Image& weights);
+
+/// The difference is the sum of parts: part k < 4 is what means over squares of 2^k px have and those over squares of
+/// 2^(k+1) px lack; the last is the mean over squares of 16 px. Squares start at the top left corner. The parts are
+/// orthogonal, so that their mean squares add up to the MSE. These are their PSNRs.
+constexpr size_t kBands = 5;
+std::array<double, kBands> band_psnr(const Image& a, const Image& b, const Image& weights);
+
+}  // namespace ewa::image

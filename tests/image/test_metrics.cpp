@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: Apache-2.0
+// Metrics beside PSNR and SSIM: what holds for any images. python/tests/test_figures.py compares their values with those of other
+// implementations.
+#include "ewa/metrics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <random>
+
+#include "image/pillow.h"
+#include "image/tensors.h"
+#include "support/temp_folder.h"
+
+namespace {
+
+using namespace ewa;
+using test::expect_error;
+using test::TempFolder;
+
+Image grain(int width, int height, int channels, unsigned seed) {
+    Image image(width, height, channels);
+    std::mt19937 generator(seed);
+    std::uniform_real_distribution<float> uniform(0.05f, 0.95f);
+    for (float& v : image.pixels) v = uniform(generator);
+    return image;
+}
+
+/// All that need no file.
+Meter every_metric() {
+    std::vector<std::string> names = metrics_named("all");
+    std::erase_if(names, [](const std::string& name) { return name.starts_with("lpips"); });
+    return Meter(names);
+}
+
+TEST(Metrics, OfEqualImagesAreTheBest) {
+    const Image image = grain(181, 177, 3, 1);
+    for (const Figure& figure : every_metric().measure(image, image)) {
+        if (figure.name.find("psnr") != std::string::npos)
+            EXPECT_GT(figure.value, figure.name.starts_with("cc") ? 100 : 1e9) << figure.name;
+        else
+            EXPECT_NEAR(figure.value, figure.name == "flip" ? 0 : 1, 1e-6) << figure.name;
+    }
+}
+
+TEST(Metrics, NoPixelOfWeightZeroCounts) {
+    const Image reference = grain(190, 180, 3, 2);
+    Image image = reference, weights(190, 180, 1);
+    for (float& v : image.pixels) v = 0.8f * v + 0.1f;
+    for (int y = 0; y < weights.height; ++y)
+        for (int x = 0; x < weights.width; ++x) *weights.at(x, y) = x < 70 && y > 20 ? 0.0f : 1.0f;
+    const std::vector<Figure> figures = every_metric().measure(image, reference, weights);
+    Image other = image;
+    for (int y = 0; y < weights.height; ++y)
+        for (int x = 0; x < weights.width; ++x)
+            if (*weights.at(x, y) == 0) std::fill_n(other.at(x, y), 3, 1.0f);
+    const std::vector<Figure> same = every_metric().measure(other, reference, weights);
+    const std::vector<Figure> unweighted = every_metric().measure(other, reference);
+    for (size_t i = 0; i < figures.size(); ++i) {
+        EXPECT_EQ(figures[i].value, same[i].value) << figures[i].name;
+        EXPECT_NE(figures[i].value, unweighted[i].value) << figures[i].name;
+    }
+    for (float& weight : weights.pixels) weight = 0;
+    for (const Figure& figure : every_metric().measure(image, reference, weights))
+        EXPECT_TRUE(std::isnan(figure.value)) << figure.name;
+}
+
+TEST(Metrics, EqualWeightsAreNone) {
+    const Image image = grain(178, 180, 4, 3), reference = grain(178, 180, 3, 4);
+    Image weights(178, 180, 1);
+    for (float& weight : weights.pixels) weight = 1;
+    const auto plain = every_metric().measure(image, reference);
+    const auto weighted = every_metric().measure(image, reference, weights);
+    for (size_t i = 0; i < plain.size(); ++i)
+        EXPECT_NEAR(plain[i].value, weighted[i].value, 1e-9) << plain[i].name;
+}
+
+TEST(Metrics, TheSameBytesEachTime) {
+    const Image image = grain(200, 180, 3, 5), reference = grain(200, 180, 3, 6);
+    const auto first = every_metric().measure(image, reference);
+    for (int i = 0; i < 3; ++i) {
+        const auto again = every_metric().measure(image, reference);
+        for (size_t k = 0; k < first.size(); ++k) EXPECT_EQ(first[k].value, again[k].value) << first[k].name;
+    }
+}
+
+TEST(Metrics, ColourCorrectionUndoesAnAffineChange) {
+    const Image reference = grain(40, 30, 3, 7);
+    Image image = reference;
+    for (size_t i = 0; i < image.pixels.size(); ++i)
+        image.pixels[i] = (0.5f + 0.1f * float(i % 3)) * image.pixels[i] + 0.05f;
+    for (const Figure& figure :
+         Meter({"cc_psnr", "cc_ssim", "cc2_psnr", "cc2_ssim"}).measure(image, reference))
+        EXPECT_GT(figure.value, figure.name.ends_with("psnr") ? 90 : 0.99999) << figure.name;
+}
+
+TEST(Metrics, OfSmallImagesAreNotComputedWhereTheWindowDoesNotFit) {
+    const auto figures =
+        Meter({"ssim_valid", "ms_ssim", "flip"}).measure(grain(10, 175, 3, 8), grain(10, 175, 3, 9));
+    EXPECT_TRUE(std::isnan(figures[0].value));
+    EXPECT_TRUE(std::isnan(figures[1].value));
+    EXPECT_GT(figures[2].value, 0);
+}
+
+TEST(Metrics, AreNamedInLists) {
+    EXPECT_EQ(metrics_named("flip,cc_psnr,flip"), (std::vector<std::string>{"cc_psnr", "flip"}));
+    EXPECT_EQ(metrics_named("bands").size(), 5u);
+    EXPECT_EQ(metrics_named("all").size(), all_metrics().size());
+    expect_error<InputError>([] { metrics_named("flop"); }, {"flop", "did you mean flip?"});
+    expect_error<InputError>([] { metrics_named(""); }, {"''"});
+    expect_error<InputError>([] { Meter({"flip"}).measure(grain(4, 5, 3, 1), grain(5, 4, 3, 1)); },
+                             {"4 x 5"});
+}
+
+/// A file of the format safetensors.
+void write_tensors(const std::filesystem::path& path, const std::string& json, size_t values,
+                   float value = 0.5f) {
+    std::ofstream file(path, std::ios::binary);
+    const uint64_t length = json.size();
+    file.write(reinterpret_cast<const char*>(&length), sizeof(length));
+    file << json;
+    for (size_t i = 0; i < values; ++i) file.write(reinterpret_cast<const char*>(&value), sizeof(value));
+}
+
+TEST(Tensors, AreReadByName) {
+    TempFolder folder;
+    write_tensors(folder / "t",
+                  R"({"__metadata__":{"format":"pt"},"a":{"dtype":"F32","shape":[2,3],"data_offsets":[0,24]},
+        "b":{"dtype":"F32","shape":[],"data_offsets":[24,28]}})",
+                  7);
+    const auto tensors = image::read_tensors(folder / "t");
+    ASSERT_EQ(tensors.size(), 2u);
+    EXPECT_EQ(tensors.at("a").shape, (std::vector<uint64_t>{2, 3}));
+    EXPECT_EQ(tensors.at("a").values, std::vector<float>(6, 0.5f));
+    EXPECT_EQ(tensors.at("b").values.size(), 1u);
+}
+
+TEST(Tensors, ADamagedFileIsNamedInOneLine) {
+    TempFolder folder;
+    const std::filesystem::path path = folder / "t";
+    const auto refused = [&](const std::string& json, size_t values, const char* reason, float value = 0.5f) {
+        write_tensors(path, json, values, value);
+        expect_error<InputError>([&] { image::read_tensors(path); }, {path.string() + ": byte", reason});
+    };
+    refused("[1]", 0, "no object");
+    refused(R"({"a":{"dtype":"F16","shape":[1],"data_offsets":[0,2]}})", 1, "another type");
+    refused(R"({"a":{"dtype":"F32","shape":[2],"data_offsets":[0,4]}})", 1, "do not fill");
+    refused(R"({"a":{"dtype":"F32","shape":[4294967296,4294967296],"data_offsets":[0,0]}})", 1,
+            "do not fill");
+    refused(R"({"a":{"dtype":"F32","shape":[4],"data_offsets":[0,16]}})", 3, "the values");
+    refused(
+        R"({"a":{"dtype":"F32","shape":[1],"data_offsets":[0,4]},"b":{"dtype":"F32","shape":[1],"data_offsets":[0,4]}})",
+        1, "more values");
+    refused(R"({"a":{"dtype":"F32","shape":"x","data_offsets":[0,4]}})", 1, "no shape");
+    refused(R"({"a":7})", 1, "another type");
+    refused(R"({"a":{"dtype":"F32","shape":[1],"data_offsets":[0,4]}})", 1, "not finite", INFINITY);
+    std::ofstream(path, std::ios::binary) << "\x89PNG\r\n\x1a\n and more";
+    expect_error<InputError>([&] { image::read_tensors(path); }, {"no file of tensors"});
+}
+
+TEST(Lpips, AFileWithoutTheNetworkIsRefused) {
+    TempFolder folder;
+    const std::string path = folder / "t";
+    write_tensors(path, R"({"alex.features.0.weight":{"dtype":"F32","shape":[1],"data_offsets":[0,4]}})", 1);
+    expect_error<InputError>([&] { Meter({"lpips_vgg"}, path); },
+                             {path, "vgg.features.0.weight", "scripts/lpips-weights"});
+    expect_error<InputError>([&] { Meter({"lpips_alex"}, path); }, {path, "has 1 values, not 23232"});
+    EXPECT_TRUE(
+        std::isnan(Meter({"lpips_vgg"}).measure(grain(40, 40, 3, 1), grain(40, 40, 3, 2)).front().value));
+}
+
+TEST(Pillow, AHalvedRampStaysOne) {
+    Image ramp(64, 2, 3);
+    for (int y = 0; y < 2; ++y)
+        for (int x = 0; x < 64; ++x) std::fill_n(ramp.at(x, y), 3, float(2 * x) / 255);
+    const Image half = image::resized_as_pillow(ramp, 32, 1);
+    ASSERT_EQ(half.height, 1);
+    for (int x = 4; x < 28; ++x) EXPECT_EQ(*half.at(x, 0), float(4 * x + 1) / 255) << x;
+    EXPECT_EQ(image::resized_as_pillow(ramp, 64, 2).pixels, ramp.pixels);
+}
+
+}  // namespace
