@@ -44,8 +44,11 @@ struct RunOptions {
     std::string frames = "all";  // or a list, as scene::frames_named reads it: other frames are not used
     int downscale = 1;           // divides the images' width and height
     MaskUse masks = MaskUse::automatic;
-    int test_every = 8;  // every K-th image in name order is held out; 0: none
-    int eval_every = 0;  // evaluates the held-out views every N steps; 0: only at the end
+    int test_every = 8;                   // every K-th image in name order is held out; 0: none
+    int eval_every = 0;                   // evaluates the held-out views every N steps; 0: only at the end
+    std::string metrics;                  // that evaluations measure beside PSNR and SSIM: see metrics_named
+    std::filesystem::path lpips_weights;  // see Meter; empty: LPIPS is not computed
+    bool tensorboard = false;             // also writes the figures of metrics.jsonl as TensorBoard's events
     int save_every = 0;  // saves splats and checkpoint every N steps; 0: the checkpoint every 30 s or more
     // A folder with the result or the checkpoint of a run is refused, unless one of these is set.
     bool resume = false;  // continues from the folder's checkpoint, if there is one
@@ -126,6 +129,7 @@ struct RunResult {
 /// Trains, evaluates, and writes into the run's folder:
 /// - config.json: the options, as `ewa train --config` takes them.
 /// - metrics.jsonl: a MetricsLine every 1 % of the steps and at each evaluation.
+/// - events.out.tfevents.0.ewa, with RunOptions::tensorboard: the same figures for TensorBoard.
 /// - checkpoint.ewa, times.json: the state to resume from, and the times up to it.
 /// - splats.ply: the splats.
 /// - cameras.json and the COLMAP model cameras/sparse/0, with TrainOptions::refine_poses: the refined cameras.

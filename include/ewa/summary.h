@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "ewa/metrics.h"
+
 namespace ewa {
 
 /// How far training moved the cameras of the training images, and of the test images.
@@ -44,6 +46,7 @@ struct Summary {
     double wall_seconds = 0;  // with start-up, evaluation and saving
     uint32_t splats = 0, max_splats = 0;
     std::optional<double> test_psnr, test_ssim, train_psnr;  // dB
+    std::vector<Figure> test_figures;                        // of RunOptions::metrics; empty if not evaluated
     std::string device;
     uint64_t peak_device_bytes = 0, peak_host_bytes = 0;
     uint64_t seed = 0;
@@ -65,6 +68,7 @@ struct MetricsLine {
     uint32_t splats = 0;
     std::optional<double> test_psnr, test_ssim;  // if the test views were evaluated after this step
     std::optional<double> train_psnr;            // dB, of this step's training view, as StepReport::psnr
+    std::vector<Figure> test_figures = {};       // of RunOptions::metrics, with test_psnr
 };
 
 }  // namespace ewa

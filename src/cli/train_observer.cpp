@@ -8,6 +8,7 @@
 #include <thread>
 #include <utility>
 
+#include "cli/metric_arguments.h"
 #include "core/messages.h"
 #include "core/text.h"
 #include "core/typing.h"
@@ -246,6 +247,7 @@ void TrainObserver::print(const RunResult& result) {
         on_note(fmt::format(
             "held-out PSNR {:.2f} dB, SSIM {:.4f}{}", *s.test_psnr, *s.test_ssim,
             s.cameras && s.cameras->test_aligned ? ", with cameras aligned to their images" : ""));
+    if (const std::string text = figures_text(s.test_figures); !text.empty()) on_note("held-out " + text);
     if (s.train_psnr) on_note(fmt::format("training PSNR {:.2f} dB", *s.train_psnr));
     if (s.cameras) on_note(report::cameras_text(*s.cameras));
     if (s.skipped_nonfinite > 0)

@@ -48,6 +48,9 @@ std::string headline(const ReportData& data) {
     html += "<div class=\"figures\">";
     html += figure(decibels_or_none(s.test_psnr), "PSNR, held-out views");
     html += figure(s.test_ssim ? fmt::format("{:.4f}", *s.test_ssim) : "–", "SSIM, held-out views");
+    for (const Figure& one : s.test_figures)
+        if (!std::isnan(one.value))
+            html += figure(fmt::format("{:.4f}", one.value), one.name + ", held-out views");
     html += figure(decibels_or_none(s.train_psnr), "PSNR, training views");
     html += figure(short_number(s.splats), "splats");
     html += figure(duration(s.seconds), fmt::format("training, of {} in total", duration(s.wall_seconds)));

@@ -68,6 +68,7 @@ Json to_json(const Summary& s) {
                  {"interrupted", s.interrupted},
                  {"version", s.version},
                  {"command", s.command}};
+    for (const Figure& one : s.test_figures) json["test_" + one.name] = figure(one.value);
     if (s.cameras) json["cameras"] = to_json(*s.cameras);
     if (s.chunks)
         json["chunks"] = {{"count", s.chunks->chunks},
@@ -94,6 +95,7 @@ Json to_json(const MetricsLine& line) {
     if (line.test_psnr) json["test_psnr"] = figure(line.test_psnr);
     if (line.test_ssim) json["test_ssim"] = figure(line.test_ssim);
     if (line.train_psnr) json["train_psnr"] = figure(line.train_psnr);
+    for (const Figure& one : line.test_figures) json["test_" + one.name] = figure(one.value);
     return json;
 }
 
@@ -121,6 +123,10 @@ MetricsLine metrics_line(const Json& json) {
     if (json.contains("test_psnr")) line.test_psnr = number_or_nan(json, "test_psnr");
     if (json.contains("test_ssim")) line.test_ssim = number_or_nan(json, "test_ssim");
     if (json.contains("train_psnr")) line.train_psnr = number_or_nan(json, "train_psnr");
+    for (const Metric& metric : all_metrics())
+        if (const std::string key = "test_" + metric.name;
+            metric.name != "psnr" && metric.name != "ssim" && json.contains(key))
+            line.test_figures.push_back({metric.name, number_or_nan(json, key.c_str())});
     return line;
 }
 

@@ -90,6 +90,13 @@ RenderedView view_of_protocol(Protocol protocol, Image rendering, const Frame& f
 
 }  // namespace
 
+Measures measures_of(const RunOptions& options) {
+    Measures measures;
+    if (!options.metrics.empty())
+        measures.meter = Meter(metrics_named(options.metrics), options.lpips_weights);
+    return measures;
+}
+
 Evaluation evaluate_views(const Drawing& drawing, const Dataset& dataset, const std::vector<int>& frames,
                           const RenderOptions& options, const std::vector<Exposure>& exposures,
                           const std::function<void()>& before_frame,

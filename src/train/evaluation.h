@@ -8,6 +8,7 @@
 
 #include "ewa/evaluation.h"
 #include "ewa/renderer.h"
+#include "ewa/run.h"
 
 namespace ewa::train {
 
@@ -31,6 +32,9 @@ struct RenderedView {
 /// read or changed its size).
 RenderedView with_photo(Image rendering, const Frame& frame, const RenderOptions& options,
                         const Exposure* exposure);
+
+/// What the options of a run measure. Throws InputError (weights that cannot be read).
+Measures measures_of(const RunOptions& options);
 
 /// As ewa::evaluate. on_view: called after each view that counts, with its place in `frames`.
 Evaluation evaluate_views(const Drawing& drawing, const Dataset& dataset, const std::vector<int>& frames,

@@ -20,6 +20,7 @@
 #include "pipeline/model.h"
 #include "report/pictures.h"
 #include "report/step_time.h"
+#include "report/tensorboard.h"
 #include "report/views.h"
 #include "scene/dataset_files.h"
 #include "train/agreement.h"
@@ -104,7 +105,7 @@ const std::filesystem::path& checked_folder(const train::RunInput& input) {
     for (const char* name :
          {"config.json", "metrics.jsonl", "checkpoint.ewa", "times.json", "splats.ply", "summary.json",
           "report.html", "exposures.json", "cameras.json", "cameras/sparse/0/cameras.bin",
-          "cameras/sparse/0/images.bin", "cameras/sparse/0/points3D.bin"})
+          "cameras/sparse/0/images.bin", "cameras/sparse/0/points3D.bin", report::kEventsFile})
         written.push_back({"the run's file", folder / name});
     const auto renders = render_files(input);
     for (const int index : saved_frames(input.split))
@@ -112,6 +113,7 @@ const std::filesystem::path& checked_folder(const train::RunInput& input) {
     if (input.options.init != "sfm" && input.options.init != "random")
         read.push_back({"--init", input.options.init});
     read.push_back({"DATASET", input.options.scene});
+    read.push_back({"--lpips-weights", input.options.lpips_weights});
     core::check_outputs(written, read);
     return folder;
 }
@@ -129,6 +131,7 @@ class Run {
           begin_(Clock::now()),
           asked_strategy_(options.train.strategy),
           input_(train::load_run(options)),
+          measures_(train::measures_of(options)),
           folder_(checked_folder(input_)) {}
 
     RunResult run();
@@ -175,6 +178,7 @@ class Run {
     double earlier_wall_ = 0;  // of the run that this one continues
     Strategy asked_strategy_;
     train::RunInput input_;
+    Measures measures_;
     train::RunFolder folder_;
     train::SavePace pace_;
     Json settings_;  // of the checkpoint
@@ -187,6 +191,7 @@ class Run {
     double extent_ = 1;                  // Trainer::extent
     std::shared_ptr<gpu::Device> device_;
     std::optional<report::MetricsLog> log_file_;
+    std::optional<report::EventsLog> events_;
     StepReport last_;
     std::optional<Evaluation> last_evaluation_;
     report::ReportData report_;
@@ -210,6 +215,11 @@ void Run::read_checkpoint() {
 void Run::begin_files() {
     folder_.begin(train::to_config(options()), continues_);
     log_file_.emplace(folder_.metrics(), report_.metrics);
+    if (options().tensorboard)
+        events_.emplace(
+            folder_.path() / report::kEventsFile, report_.metrics,
+            std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count() -
+                wall_seconds());
 }
 
 void Run::list_settings() {
@@ -372,8 +382,10 @@ void Run::log(const std::optional<Evaluation>& evaluation) {
     if (evaluation) {
         line.test_psnr = evaluation->psnr;
         line.test_ssim = evaluation->ssim;
+        line.test_figures = evaluation->figures;
     }
     log_file_->append(line);
+    if (events_) events_->append(line);
     report_.metrics.push_back(line);
     observer_.on_metrics(line);
 }
@@ -390,7 +402,8 @@ void Run::after_step(Trainer& trainer, int before) {
         if (refines()) align_test_cameras(gaussians, {});
         evaluation = train::evaluate_views(
             drawing(gaussians, &trainer), input_.dataset, input_.split.test, options().train.render, {},
-            [&] { trainer.keep_waiting(); }, [](size_t, const train::RenderedView&, const EvalFrame&) {});
+            [&] { trainer.keep_waiting(); }, [](size_t, const train::RenderedView&, const EvalFrame&) {},
+            measures_);
         use_given_cameras();
         observer_.on_evaluation(step, *evaluation);
     }
@@ -453,13 +466,14 @@ void Run::evaluate_result(const train::Drawing& drawing, const Gaussians& gaussi
     size_t done = 0;
     // The report shows the held-out views, or the training views without a test set.
     const auto evaluated = [&](const std::vector<int>& frames, const std::vector<Exposure>& of_frames,
-                               bool shown) {
+                               bool shown, const Measures& measures) {
         return train::evaluate_views(
             drawing, input_.dataset, frames, options().train.render, of_frames, before_frame,
             [&](size_t i, const train::RenderedView& view, const EvalFrame& figures) {
                 if (shown) add_view(frames[i], view, figures);
                 observer_.on_view(++done, evaluated_views());
-            });
+            },
+            measures);
     };
     if (held_out) {
         if (refines()) {
@@ -467,12 +481,13 @@ void Run::evaluate_result(const train::Drawing& drawing, const Gaussians& gaussi
             report_.summary.cameras->test_aligned = true;
             save_cameras(true);
         }
-        last_evaluation_ = evaluated(input_.split.test, {}, true);
+        last_evaluation_ = evaluated(input_.split.test, {}, true, measures_);
+        report_.summary.test_figures = last_evaluation_->figures;
         report_.summary.test_psnr = last_evaluation_->psnr;
         report_.summary.test_ssim = last_evaluation_->ssim;
     }
     report_.summary.train_psnr = evaluated(spread_out(input_.split.train, kTrainViewsEvaluated),
-                                           spread_out(exposures, kTrainViewsEvaluated), !held_out)
+                                           spread_out(exposures, kTrainViewsEvaluated), !held_out, {})
                                      .psnr;
 }
 

@@ -16,6 +16,7 @@
 #include "io/datasets/image_records.h"
 #include "io/datasets/refined_cameras.h"
 #include "report/summary.h"
+#include "report/tensorboard.h"
 #include "scene/lens.h"
 
 namespace ewa::train {
@@ -38,7 +39,8 @@ void RunFolder::begin(const nlohmann::ordered_json& config, bool continues) cons
     std::error_code absent;
     for (const char* result :
          {"checkpoint.ewa", "times.json", "summary.json", "report.html", "exposures.json", "cameras.json",
-          "cameras/sparse/0/cameras.bin", "cameras/sparse/0/images.bin", "cameras/sparse/0/points3D.bin"})
+          "cameras/sparse/0/cameras.bin", "cameras/sparse/0/images.bin", "cameras/sparse/0/points3D.bin",
+          report::kEventsFile})
         fs::remove(path_ / result, absent);
 }
 

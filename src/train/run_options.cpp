@@ -266,6 +266,32 @@ RunOption bands_option() {
     return option;
 }
 
+RunOption metrics_option() {
+    return member_option(
+        "metrics", "LIST", "Metrics of evaluations beside PSNR and SSIM, as ewa eval --metrics takes them",
+        kDoesNotDecide, Member<std::string>([](RunOptions& o) -> std::string& { return o.metrics; }),
+        [](const std::string& text) {
+            if (!text.empty()) metrics_named(text);
+            return text;
+        });
+}
+
+RunOption lpips_weights_option() {
+    RunOption option{"lpips-weights", "FILE",
+                     "With --metrics: the networks of LPIPS, as scripts/lpips-weights writes them",
+                     kDoesNotDecide};
+    option.get = [](const RunOptions& options) { return options.lpips_weights.string(); };
+    option.set = [](RunOptions& options, const std::string& text) { options.lpips_weights = text; };
+    return option;
+}
+
+RunOption tensorboard_option() {
+    RunOption option = flag("tensorboard", "Also write the curves of metrics.jsonl in a file for TensorBoard",
+                            [](RunOptions& o) -> bool& { return o.tensorboard; });
+    option.decides_result = kDoesNotDecide;
+    return option;
+}
+
 RunOption background_option() {
     RunOption option{
         "background", "COLOUR",
@@ -371,6 +397,9 @@ std::vector<RunOption> make_table() {
         number<int>(
             "eval-every", "N", "Evaluate the held-out views every N steps. 0: only at the end",
             kDoesNotDecide, [](RunOptions& o) -> int& { return o.eval_every; }, 0, kMostSteps),
+        metrics_option(),
+        lpips_weights_option(),
+        tensorboard_option(),
         number<int>(
             "save-every", "N",
             "Save splats.ply and checkpoint.ewa every N steps. 0: save the checkpoint every 30 seconds or "

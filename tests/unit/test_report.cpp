@@ -6,9 +6,13 @@
 #include <algorithm>
 #include <cmath>
 #include <csignal>
+#include <cstdint>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <string>
+#include <vector>
 
 #include "ewa/error.h"
 #include "image/image_files.h"
@@ -16,6 +20,7 @@
 #include "report/html.h"
 #include "report/pictures.h"
 #include "report/summary.h"
+#include "report/tensorboard.h"
 #include "support/temp_folder.h"
 
 namespace {
@@ -64,6 +69,53 @@ TEST(Report, MetricsHaveTestFiguresOnlyWhereEvaluated) {
     line.train_psnr = 25.5;
     EXPECT_EQ(to_json(line)["train_psnr"], 25.5);
     EXPECT_EQ(metrics_line(Json::parse(to_json(line).dump())).train_psnr, 25.5);
+    line.test_figures = {{"cc_psnr", 21.5}, {"lpips_vgg", std::nan("")}};
+    EXPECT_EQ(to_json(line)["test_cc_psnr"], 21.5);
+    EXPECT_TRUE(to_json(line)["test_lpips_vgg"].is_null());
+    const MetricsLine read = metrics_line(Json::parse(to_json(line).dump()));
+    ASSERT_EQ(read.test_figures.size(), 2u);
+    EXPECT_EQ(read.test_figures[0].name, "cc_psnr");
+    EXPECT_EQ(read.test_figures[0].value, 21.5);
+    EXPECT_TRUE(std::isnan(read.test_figures[1].value));
+}
+
+/// The events in a file of TFRecords.
+std::vector<std::string> events_in(const std::filesystem::path& path) {
+    std::vector<std::string> events;
+    const std::string bytes = test::file_bytes(path);
+    for (size_t at = 0; at < bytes.size();) {
+        uint64_t length = 0;
+        std::memcpy(&length, &bytes.at(at), sizeof(length));
+        events.push_back(bytes.substr(at + 12, length));
+        at += 16 + length;
+        EXPECT_LE(at, bytes.size());
+    }
+    return events;
+}
+
+TEST(Report, EventsForTensorBoardHaveTheEarlierLinesToo) {
+    const test::TempFolder folder;
+    MetricsLine line;
+    line.step = 10;
+    line.seconds = 2;
+    line.train_psnr = std::numeric_limits<double>::infinity();
+    EventsLog log(folder / kEventsFile, {line}, 1e9);
+    line.step = 20;
+    line.seconds = 4;
+    line.test_figures = {{"flip", 0.25}};
+    log.append(line);
+    const std::vector<std::string> events = events_in(folder / kEventsFile);
+    ASSERT_EQ(events.size(), 3u);
+    EXPECT_NE(events[0].find("brain.Event:2"), std::string::npos);
+    EXPECT_EQ(events[1].find("test/flip"), std::string::npos);
+    EXPECT_EQ(events[1].find("train/psnr"), std::string::npos) << "not finite";
+    EXPECT_NE(events[2].find("test/flip"), std::string::npos);
+    // A value: its tag, then field 2 as four bytes. Five steps a second.
+    const std::string rate("train/steps_per_second\x15\x00\x00\xa0\x40", 27);
+    EXPECT_NE(events[2].find(rate), std::string::npos);
+    // The checksums of the first length, 24 bytes, as TensorFlow writes them.
+    EXPECT_EQ(test::file_bytes(folder / kEventsFile).substr(0, 12),
+              std::string("\x18\0\0\0\0\0\0\0\xa3\x7f\x4b\x22", 12));
 }
 
 TEST(Report, MetricsLogCanBeReadWhileItGrows) {
