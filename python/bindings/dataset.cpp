@@ -45,9 +45,11 @@ MaskUse mask_use(std::string word) {
 }
 
 void open_dataset(LoadedDataset* self, const std::filesystem::path& path, int downscale,
-                  const std::string& masks, bool need_images) {
+                  const std::string& masks, bool need_images, int max_width) {
     if (downscale < 1) throw InputError("downscale is less than 1");
-    const DatasetOptions options{downscale, mask_use(masks), need_images};
+    if (max_width < 0) throw InputError("max_width is less than 0");
+    const DatasetOptions options{
+        .downscale = downscale, .masks = mask_use(masks), .need_images = need_images, .max_width = max_width};
     new (self)
         LoadedDataset{std::make_shared<Dataset>(with_files([&] { return load_dataset(path, options); }))};
 }
@@ -131,10 +133,11 @@ void bind_dataset(nb::module_& module) {
     nb::class_<LoadedDataset>(module, "Dataset",
                               "Images with cameras, and the points that they were reconstructed from.")
         .def("__init__", open_dataset, nb::arg("path"), nb::kw_only(), nb::arg("downscale") = 1,
-             nb::arg("masks") = "auto", nb::arg("need_images") = true,
+             nb::arg("masks") = "auto", nb::arg("need_images") = true, nb::arg("max_width") = 0,
              nb::sig(
                  "def __init__(self, path: str | os.PathLike[str], *, downscale: int = 1, "
-                 "masks: typing.Literal['auto', 'ignore', 'cut', 'none'] = 'auto', need_images: bool = True) "
+                 "masks: typing.Literal['auto', 'ignore', 'cut', 'none'] = 'auto', need_images: bool = True, "
+                 "max_width: int = 0) "
                  "-> None"),
              "Reads a COLMAP model or transforms.json: a folder, or the file. need_images False reads only "
              "cameras. Raises "

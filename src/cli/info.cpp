@@ -228,7 +228,7 @@ void print_cameras(const Dataset& dataset) {
 }
 
 void info_dataset(const fs::path& path, int test_every, bool json) {
-    const Dataset dataset = load_cameras_as_trained(path, 1, true);
+    const Dataset dataset = load_cameras_as_trained(path, 1, 0, true);
     const char* kind = dataset_kind(path);
     const Split split = split_frames(dataset, test_every);
     std::vector<int> every(dataset.frames.size());

@@ -32,7 +32,7 @@ namespace fs = std::filesystem;
 struct RenderArguments {
     fs::path splats, cameras, output = "out/render";
     std::string frames = "all", format = "png", mode = "color", exposures = "auto";
-    int test_every = 8, downscale = 1;
+    int test_every = 8, downscale = 1, max_width = 0;
     ViewsArguments views;
     DrawArguments draw;
     DeviceOptions device;
@@ -70,7 +70,7 @@ int render_dataset_views(const RenderArguments& arguments) {
     RenderOptions options = arguments.draw.options();
     Gaussians gaussians = load_splats(arguments.splats);
     arguments.draw.match_kernel(gaussians, options);
-    Dataset dataset = load_cameras_as_trained(arguments.cameras, arguments.downscale);
+    Dataset dataset = load_cameras_as_trained(arguments.cameras, arguments.downscale, arguments.max_width);
     const fs::path refined = arguments.cameras_of_run ? refined_cameras_of(*arguments.run) : fs::path();
     if (!refined.empty()) io::use_refined_cameras(dataset, refined);
     const std::vector<int> frames = select_frames(dataset, arguments.frames, arguments.test_every);
@@ -114,7 +114,7 @@ int render_dataset_views(const RenderArguments& arguments) {
 scene::FramingHints hints_of(const RenderArguments& arguments) {
     if (!arguments.run || arguments.run->dataset.empty()) return {};
     try {
-        const Dataset dataset = load_cameras_as_trained(arguments.run->dataset, 1);
+        const Dataset dataset = load_cameras_as_trained(arguments.run->dataset, 1, 0);
         if (dataset.frames.empty()) return {};
         const glm::dmat3 axes = glm::transpose(dataset.frames[0].camera.rotation);
         return {.up = scene::mean_up(dataset), .forward = axes[2]};
@@ -195,7 +195,7 @@ int render_free_views(RenderArguments arguments) {
 /// Completes the arguments by the run that SPLATS may name, and chooses whose cameras are used.
 int run(CLI::App& app, RenderArguments& arguments) {
     std::string of_frames;  // a given option that only a dataset's views have
-    for (const char* option : {"--frames", "--test-every", "--downscale", "--exposures"})
+    for (const char* option : {"--frames", "--test-every", "--downscale", "--max-width", "--exposures"})
         if (app.count(option) > 0) of_frames = option;
     if (arguments.mode == "depth" && arguments.draw.integrator == "march")
         throw InputError("--mode depth: the integrator march draws no depth; splat and ray do");
@@ -246,7 +246,7 @@ Action add_render(CLI::App& app) {
         ->transform(one_of({"color", "depth", "alpha"}))
         ->capture_default_str();
     add_draw_options(app, arguments->draw);
-    add_downscale_option(app, arguments->downscale);
+    add_size_options(app, arguments->downscale, arguments->max_width);
     add_exposures_option(app, arguments->exposures);
     add_device_options(app, arguments->device);
     add_quiet_option(app, arguments->quiet);
