@@ -87,6 +87,11 @@ void check_scene(const io::PlyPoints& read) {
     for (const glm::dvec3& p : read.points.positions)
         EWA_REQUIRE(std::isfinite(float(p.x)) && std::isfinite(float(p.y)) && std::isfinite(float(p.z)));
 }
+#elif defined(EWA_READ_ZIP)
+void check_scene(uint64_t bytes) {
+    const std::string text = std::to_string(bytes) + " bytes";
+    EWA_REQUIRE(bytes < uint64_t(1) << 40);
+}
 #elif defined(EWA_READ_VIEWS)
 void check_scene(const std::vector<io::NamedView>& views) {
     const std::string text = std::to_string(views.size()) + " views";
