@@ -21,4 +21,7 @@ struct Camera {
 /// >= 1.
 Camera downscale(const Camera& camera, int factor);
 
+/// The same view in an image of another size in px.
+Camera resized(const Camera& camera, int width, int height);
+
 }  // namespace ewa

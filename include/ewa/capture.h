@@ -42,9 +42,18 @@ struct Capture {
     std::vector<std::string> remarks;     // for the user: a line each
 };
 
-/// Whether the path is a video by its extension, or a folder with photos that load_dataset does not read because it has
-/// no cameras.
+/// Whether the path is a video by its extension, a zip archive, or a folder with photos that load_dataset does not read
+/// because it has no cameras.
 bool is_capture(const std::filesystem::path& path);
+
+/// Whether the path is a zip archive by its extension and its first bytes.
+bool is_archive(const std::filesystem::path& path);
+/// Whether an archive has the files of a dataset. Throws InputError, also for an archive that make_dataset refuses.
+bool archive_has_cameras(const std::filesystem::path& archive);
+/// Unpacks an archive into a new folder. Returns that folder, or the one in it that has everything else. Throws InputError,
+/// RunError.
+std::filesystem::path unpack_archive(const std::filesystem::path& archive,
+                                     const std::filesystem::path& folder);
 
 /// The size of the smallest photo, or of the video's frames. 0 x 0 where that cannot be known before make_dataset.
 ImageSize smallest_image(const std::filesystem::path& input);
@@ -56,7 +65,8 @@ std::filesystem::path dataset_of_images(const std::filesystem::path& folder);
 /// folder of images whose cameras a dataset has, which the message names.
 void check_training_input(const std::filesystem::path& path);
 
-/// Makes a dataset of a folder of photos (JPEG, PNG, TIFF, BMP; subfolders too) or a video.
+/// Makes a dataset of a folder of photos (JPEG, PNG, TIFF, BMP; subfolders too), a video, or a zip archive. An archive is
+/// unpacked into unpacked/. If it holds a dataset, that becomes the folder's, and nothing is searched.
 /// - images: the frames of the video, or a link to the photos' folder.
 /// - sparse/0: COLMAP's model, made last. The lens has OpenCV's radial and tangential terms if all images have one size,
 ///   else one radial term per image.

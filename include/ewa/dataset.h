@@ -55,6 +55,7 @@ struct Frame {
     bool eight_bit = true;  // the file has at most 256 levels
     Camera camera;          // the pinhole camera of load_frame_image's result
     Camera source;          // the camera of the file's pixels, before undistortion and downscaling
+    bool reduced = false;   // DatasetOptions::max_width has made `source` smaller than the file
     std::filesystem::path mask_path;  // empty: none
     MaskUse masks = MaskUse::cut;     // the use of alpha in load_frame_image's result; never automatic
     Distortion distortion;            // of the file
@@ -87,6 +88,8 @@ struct DatasetOptions {
     bool need_images = true;  // false: only cameras; frames without a file are kept if the size is known
     bool need_points =
         true;  // false: the points of a transforms.json, which are in a file of their own, are not read
+    int max_width =
+        0;  // px; wider images are reduced so that they have this width after `downscale`; 0: none are
 };
 
 /// Loads a dataset. There are three kinds of paths:
@@ -102,7 +105,7 @@ struct DatasetOptions {
 /// made, an image that is cut off or no image counts as missing. Throws InputError.
 Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& options);
 
-/// Loads the frame's image as the pinhole `frame.camera` sees it: turned, undistorted and downscaled.
+/// Loads the frame's image as the pinhole `frame.camera` sees it: turned, reduced, undistorted and downscaled.
 /// Undistortion is bilinear and keeps the focal lengths; the size changes so that no pixel is blank
 /// (src/scene/lens.h). The result has 3 channels, or 4 if the frame has a mask or the file has alpha. The
 /// fourth is their product, for the use frame.masks. Throws InputError, also if a value of the file is not

@@ -53,6 +53,9 @@ void save_image(const std::filesystem::path& path, const Image& image);
 /// share.
 Image downscale(const Image& image, int factor);
 
+/// The image with a smaller size, as downscale makes it. width, height: 1 to those of the image.
+Image reduced(const Image& image, int width, int height);
+
 /// The RGB of an image composited over a background. RGB images stay as they are.
 Image over_background(const Image& image, const std::array<float, 3>& background);
 

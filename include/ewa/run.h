@@ -43,6 +43,7 @@ struct RunOptions {
     double init_scale = 1;       // factor of their scales, which are the distance to their neighbours
     std::string frames = "all";  // or a list, as scene::frames_named reads it: other frames are not used
     int downscale = 1;           // divides the images' width and height
+    int max_width = 0;           // px; images that are wider after `downscale` are reduced to it; 0: none are
     MaskUse masks = MaskUse::automatic;
     int test_every = 8;                   // every K-th image in name order is held out; 0: none
     int eval_every = 0;                   // evaluates the held-out views every N steps; 0: only at the end

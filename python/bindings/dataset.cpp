@@ -58,7 +58,7 @@ Images some_images(const Images& images, const nb::slice& key) {
 
 // Pickles, for processes that read the same files.
 
-using DatasetState = std::tuple<std::filesystem::path, int, int, bool>;
+using DatasetState = std::tuple<std::filesystem::path, int, int, bool, int>;
 
 LoadedDataset opened(const std::filesystem::path& path, const DatasetOptions& options) {
     auto dataset = std::make_shared<Dataset>(with_files([&] { return load_dataset(path, options); }));
@@ -66,12 +66,16 @@ LoadedDataset opened(const std::filesystem::path& path, const DatasetOptions& op
 }
 
 DatasetState pickled(const LoadedDataset& data) {
-    return {data.path, data.options.downscale, int(data.options.masks), data.options.need_images};
+    return {data.path, data.options.downscale, int(data.options.masks), data.options.need_images,
+            data.options.max_width};
 }
 
 LoadedDataset opened(const DatasetState& state) {
-    const auto& [path, downscale, masks, need_images] = state;
-    return opened(path, {downscale, MaskUse(masks), need_images});
+    const auto& [path, downscale, masks, need_images, max_width] = state;
+    return opened(path, {.downscale = downscale,
+                         .masks = MaskUse(masks),
+                         .need_images = need_images,
+                         .max_width = max_width});
 }
 
 using CameraState = std::tuple<int, int, std::array<double, 16>>;
@@ -96,7 +100,7 @@ Camera camera_of(const CameraState& state) {
 }
 
 using FrameState = std::tuple<std::string, std::filesystem::path, std::optional<std::filesystem::path>, bool,
-                              bool, std::array<int, 5>, std::array<double, 12>, std::array<CameraState, 3>>;
+                              bool, std::array<int, 6>, std::array<double, 12>, std::array<CameraState, 3>>;
 
 std::optional<std::filesystem::path> mask_path_of(const Frame& frame) {
     return frame.mask_path.empty() ? std::nullopt : std::optional(frame.mask_path);
@@ -109,7 +113,7 @@ FrameState pickled(const Frame& f) {
             mask_path_of(f),
             f.image_exists,
             f.eight_bit,
-            {f.orientation, int(f.masks), f.downscale, f.split, int(d.lens)},
+            {f.orientation, int(f.masks), f.downscale, f.split, int(d.lens), int(f.reduced)},
             {d.k1, d.k2, d.p1, d.p2, d.k3, d.k4, d.k5, d.k6, d.s1, d.s2, d.s3, d.s4},
             {pickled(f.camera), pickled(f.source), pickled(f.pinhole)}};
 }
@@ -124,6 +128,7 @@ Frame frame_of(const FrameState& state) {
         .eight_bit = eight_bit,
         .camera = camera_of(cameras[0]),
         .source = camera_of(cameras[1]),
+        .reduced = n[5] != 0,
         .mask_path = mask_path.value_or(std::filesystem::path()),
         .masks = MaskUse(n[1]),
         .distortion = {k[0], k[1], k[2], k[3], k[4], k[5], k[6], k[7], k[8], k[9], k[10], k[11], Lens(n[4])},
@@ -141,9 +146,13 @@ MaskUse mask_use(std::string word) {
 }
 
 void open_dataset(LoadedDataset* self, const std::filesystem::path& path, int downscale,
-                  const std::string& masks, bool need_images) {
+                  const std::string& masks, bool need_images, int max_width) {
     if (downscale < 1) throw InputError("downscale is less than 1");
-    new (self) LoadedDataset(opened(path, {downscale, mask_use(masks), need_images}));
+    if (max_width < 0) throw InputError("max_width is less than 0");
+    new (self) LoadedDataset(opened(path, {.downscale = downscale,
+                                           .masks = mask_use(masks),
+                                           .need_images = need_images,
+                                           .max_width = max_width}));
 }
 
 std::vector<Camera> cameras(const LoadedDataset& data) {
@@ -257,10 +266,11 @@ void bind_dataset(nb::module_& module) {
     nb::class_<LoadedDataset>(module, "Dataset",
                               "Images with cameras, and the points that they were reconstructed from.")
         .def("__init__", open_dataset, nb::arg("path"), nb::kw_only(), nb::arg("downscale") = 1,
-             nb::arg("masks") = "auto", nb::arg("need_images") = true,
+             nb::arg("masks") = "auto", nb::arg("need_images") = true, nb::arg("max_width") = 0,
              nb::sig(
                  "def __init__(self, path: str | os.PathLike[str], *, downscale: int = 1, "
-                 "masks: typing.Literal['auto', 'ignore', 'cut', 'none'] = 'auto', need_images: bool = True) "
+                 "masks: typing.Literal['auto', 'ignore', 'cut', 'none'] = 'auto', need_images: bool = True, "
+                 "max_width: int = 0) "
                  "-> None"),
              "Reads a COLMAP model or transforms.json: a folder, or the file. need_images False reads only "
              "cameras. Raises "

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <map>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -19,6 +21,7 @@
 #include "ewa/splat_files.h"
 #include "image/image_files.h"
 #include "io/datasets/image_records.h"
+#include "io/datasets/zip_files.h"
 
 namespace ewa {
 namespace {
@@ -47,6 +50,16 @@ bool has_cameras(const fs::path& folder) {
     return false;
 }
 
+/// The folder in which an archive has everything: itself, or a folder that is alone in it.
+fs::path main_folder(fs::path folder) {
+    while (!has_cameras(folder)) {
+        const auto first = fs::directory_iterator(folder);
+        if (std::distance(first, {}) != 1 || !fs::directory_iterator(folder)->is_directory()) break;
+        folder = fs::directory_iterator(folder)->path();
+    }
+    return folder;
+}
+
 /// The photos are in the folder, or in its images/.
 fs::path folder_of_photos(const fs::path& folder) {
     return is_folder(folder / "images") ? folder / "images" : folder;
@@ -68,104 +81,12 @@ std::vector<fs::path> photos_of(const fs::path& photos, const fs::path& folder) 
     return names;
 }
 
-/// A line for a file: what distinguishes its content, a space, and its name. The record is JSON, which is UTF-8.
-std::string line_of(const fs::path& folder, const fs::path& name) {
-    core::Hash hash;
-    std::string digits = "unreadable";
-    try {
-        core::add_file(hash, folder / name);
-        digits = core::digits_of(hash);
-    } catch (const InputError&) {
-        // It has no content to tell from another one.
-    }
-    return digits + " " + core::one_line(name.string());
-}
-
-/// By name, what distinguishes the contents.
-std::map<std::string, std::string> contents_in(const Json& lines) {
-    std::map<std::string, std::string> contents;
-    for (const Json& value : lines) {
-        const std::string line = value.is_string() ? value.get<std::string>() : "";
-        const size_t space = line.find(' ');
-        if (space != std::string::npos) contents[line.substr(space + 1)] = line.substr(0, space);
-    }
-    return contents;
-}
-
 /// Input and options. The contents are added as "files", and those that COLMAP did not get as "skipped".
 Json record_of(const fs::path& input, const CaptureOptions& options, bool video) {
     Json record{{"input", core::one_line(fs::canonical(input).string())},
                 {"matching", name_of(options.matching)}};
     if (video) record["frames"] = options.frames;
     return record;
-}
-
-/// What became of the photos since a search for their cameras began, or what begins it.
-struct Chosen {
-    std::vector<fs::path> names;  // that COLMAP gets
-    std::set<std::string> gone;   // names of photos whose pictures changed: their views do not count
-    std::vector<std::string> remarks;
-};
-
-void add_remark(std::vector<std::string>& remarks, const std::vector<std::string>& names, const char* one,
-                const char* many) {
-    if (names.empty()) return;
-    remarks.push_back(core::counted(names.size(), "photo") + (names.size() == 1 ? one : many) +
-                      capture::names_text(names));
-}
-
-/// Looks at all photos before the search. Those that cannot be used are noted in the record.
-Chosen first_choice(const fs::path& folder, const std::vector<fs::path>& found, Json& record,
-                    const capture::ProgressFunction& progress) {
-    const std::vector<capture::Skipped> skipped = capture::faults_in(folder, found, progress);
-    Chosen chosen;
-    chosen.names = found;
-    record["files"] = Json::array();
-    record["skipped"] = Json::array();
-    for (const capture::Skipped& photo : skipped) {
-        std::erase(chosen.names, photo.name);
-        record["skipped"].push_back({{"file", line_of(folder, photo.name)}, {"reason", photo.reason}});
-    }
-    capture::require_photos(folder, chosen.names.size(), skipped);
-    for (const fs::path& name : chosen.names) record["files"].push_back(line_of(folder, name));
-    if (!skipped.empty()) chosen.remarks.push_back(capture::skipped_text(skipped));
-    return chosen;
-}
-
-/// Leaves out what has changed since a search began. before: its record.
-Chosen later_choice(const fs::path& folder, const std::vector<fs::path>& found, const Json& before) {
-    auto searched = contents_in(before["files"]);
-    std::map<std::string, std::string> reasons;  // by line
-    for (const Json& photo : before.value("skipped", Json::array()))
-        if (photo.is_object()) reasons[photo.value("file", "")] = photo.value("reason", "");
-    Chosen chosen;
-    std::vector<capture::Skipped> skipped;
-    std::vector<std::string> changed, added, missing;
-    for (const fs::path& name : found) {
-        const std::string line = line_of(folder, name), shown = core::one_line(name.string());
-        const auto known = searched.find(shown);
-        if (known != searched.end() && line.starts_with(known->second + " ")) {
-            chosen.names.push_back(name);
-        } else if (known != searched.end()) {
-            changed.push_back(shown);
-            chosen.gone.insert(name.string());
-        } else if (reasons.contains(line)) {
-            skipped.push_back({name, core::one_line(reasons[line])});
-        } else {
-            added.push_back(shown);
-        }
-        if (known != searched.end()) searched.erase(known);
-    }
-    for (const auto& [name, content] : searched) missing.push_back(core::one_line(name));
-    if (!skipped.empty()) chosen.remarks.push_back(capture::skipped_text(skipped));
-    add_remark(chosen.remarks, missing,
-               " is missing, and its view is not used: ", " are missing, and their views are not used: ");
-    add_remark(chosen.remarks, changed,
-               " has changed since the search for its camera, and its view is not used: ",
-               " have changed since the search for their cameras, and their views are not used: ");
-    add_remark(chosen.remarks, added, " is new, and is not used; another -o DIR searches its camera, too: ",
-               " are new, and are not used; another -o DIR searches their cameras, too: ");
-    return chosen;
 }
 
 /// Whether something has been made of the photos or the video.
@@ -188,18 +109,20 @@ Json check_claim(const fs::path& folder, Json record, bool video) {
     Json options = before;
     for (Json* each : {&options, &record})
         if (each->is_object())
-            for (const char* contents : {"files", "skipped"}) each->erase(contents);
+            for (const char* contents : {"files", "skipped", "archive"}) each->erase(contents);
     if (options != record)
         throw InputError(name + " is the dataset of another input, or was made with other options" +
                          ways_out);
     return is_begun(folder, video) ? before : Json();
 }
 
-/// Throws InputError if the video is not the one that the frames are of. Older records have no files.
-void check_same_video(const fs::path& folder, const Json& before, const Json& record) {
-    if (!before.is_object() || !before.contains("files") || before["files"] == record["files"]) return;
+/// Throws InputError if the video or archive is not the one that the folder was made of. Older records do not say it.
+void check_same_file(const fs::path& folder, const Json& before, const Json& record,
+                     const std::string& what) {
+    const char* key = what == "video" ? "files" : "archive";
+    if (!before.is_object() || !before.contains(key) || before[key] == record[key]) return;
     const std::string name = core::one_line(folder.string());
-    throw InputError("the video has changed since " + name +
+    throw InputError("the " + what + " has changed since " + name +
                      " was made of it; -o DIR takes another folder, or remove " + name);
 }
 
@@ -225,11 +148,11 @@ void require_programs(const fs::path& folder, bool video) {
 }
 
 /// What COLMAP gets of a folder of photos. before: the record of a search that has begun; null: none. Completes `record`.
-Chosen choose(const fs::path& photos, const fs::path& folder, const Json& before, Json& record,
-              const capture::ProgressFunction& progress) {
+capture::Chosen choose(const fs::path& photos, const fs::path& folder, const Json& before, Json& record,
+                       const capture::ProgressFunction& progress) {
     const std::vector<fs::path> found = photos_of(photos, folder);
-    if (before.is_null()) return first_choice(photos, found, record, progress);
-    if (before.contains("files")) return later_choice(photos, found, before);
+    if (before.is_null()) return capture::first_choice(photos, found, record, progress);
+    if (before.contains("files")) return capture::later_choice(photos, found, before);
     return {found, {}, {}};
 }
 
@@ -243,8 +166,8 @@ void say(const std::vector<std::string>& lines, const capture::ProgressFunction&
 }
 
 /// Finds the cameras, or removes those of photos that have changed since.
-std::vector<std::string> search(const fs::path& folder, bool video, const Chosen& chosen,
-                                const CaptureOptions& options, const capture::ProgressFunction& progress) {
+Capture search(const fs::path& folder, bool video, const capture::Chosen& chosen,
+               const CaptureOptions& options, const capture::ProgressFunction& progress) {
     const fs::path model = folder / "sparse/0";
     std::vector<std::string> remarks;
     if (!is_folder(model)) {
@@ -257,39 +180,113 @@ std::vector<std::string> search(const fs::path& folder, bool video, const Chosen
                                         progress);
     }
     if (!chosen.gone.empty()) capture::remove_views(model, chosen.gone);
-    return remarks;
+    Capture result = result_of(folder, chosen.names);
+    result.remarks.insert(result.remarks.begin(), remarks.begin(), remarks.end());
+    return result;
+}
+
+/// A dataset that is being made: its folder, and what its record says.
+struct Making {
+    fs::path input, folder;
+    CaptureOptions options;
+    const capture::ProgressFunction& progress;
+    Json record, before;  // before: of what has begun; null: nothing has
+    std::unique_ptr<core::FolderLock> lock = nullptr;
+
+    /// After all errors of the input: they leave no folder.
+    void begin() {
+        if (!lock) {
+            core::make_folder(folder);
+            lock = std::make_unique<core::FolderLock>(folder);
+        }
+        if (before.is_null()) core::write_json(folder / "capture.json", record);
+    }
+};
+
+Capture make_of_video(Making& now) {
+    const fs::path images = now.folder / "images", work = now.folder / "colmap";
+    now.record["files"] = Json::array({capture::line_of(now.input.parent_path(), now.input.filename())});
+    check_same_file(now.folder, now.before, now.record, "video");
+    require_programs(now.folder, true);
+    now.begin();
+    core::make_folder(work);
+    if (!fs::exists(fs::symlink_status(images)))
+        capture::extract_frames(now.input, images, now.options.frames, work / "log.txt", now.progress);
+    const capture::Chosen chosen{capture::photos_in(images), {}, {}};
+    return search(now.folder, true, chosen, now.options, now.progress);
+}
+
+/// link: what images/ refers to.
+Capture make_of_photos(Making& now, const fs::path& photos, const fs::path& link) {
+    const capture::Chosen chosen = choose(photos, now.folder, now.before, now.record, now.progress);
+    require_programs(now.folder, false);
+    say(chosen.remarks, now.progress);
+    now.begin();
+    core::make_folder(now.folder / "colmap");
+    const fs::path images = now.folder / "images";
+    if (!fs::exists(fs::symlink_status(images))) fs::create_directory_symlink(link, images);
+    return search(now.folder, false, chosen, now.options, now.progress);
+}
+
+/// Moves the dataset of an archive into the folder that unpacked/ is in.
+void move_up(const fs::path& root, const fs::path& folder) {
+    std::vector<fs::path> names;
+    for (const fs::directory_entry& entry : fs::directory_iterator(root))
+        names.push_back(entry.path().filename());
+    // The cameras last: a move that was interrupted goes on as long as they are there.
+    const auto last = [](const fs::path& name) {
+        return name != "images" && name.string().find("mask") != 0;
+    };
+    std::ranges::stable_partition(names, [&](const fs::path& name) { return !last(name); });
+    for (const fs::path& name : names) fs::rename(root / name, folder / name);
+    fs::remove_all(folder / "unpacked");
+}
+
+Capture make_of_archive(Making& now) {
+    const fs::path unpacked = now.folder / "unpacked", partial = now.folder / "unpacked.partial";
+    now.record["archive"] = Json::array({capture::line_of(now.input.parent_path(), now.input.filename())});
+    const bool cameras = archive_has_cameras(now.input);
+    if (!cameras) require_programs(now.folder, false);
+    if (is_file(now.folder / "capture.json"))
+        check_same_file(now.folder, core::read_json_file<Json>(now.folder / "capture.json"), now.record,
+                        "archive");
+    if (!is_folder(unpacked) && !has_cameras(now.folder)) {
+        now.begin();
+        fs::remove_all(partial);
+        const io::ZipFiles zip(now.input);
+        const int total = int(zip.entries().size());
+        if (!zip.unpack(partial, [&](int done) {
+                return now.progress({CapturePhase::photos, "unpacked", "files", done, total, {}});
+            }))
+            throw capture::Stopped();
+        fs::rename(partial, unpacked);
+    }
+    if (!cameras) {
+        const fs::path photos = folder_of_photos(main_folder(unpacked));
+        return make_of_photos(now, photos, fs::relative(photos, now.folder));
+    }
+    if (is_folder(unpacked)) {
+        const fs::path root = main_folder(unpacked);
+        if (!has_cameras(root) && !has_cameras(now.folder))
+            throw InputError(core::one_line(now.input.string()) +
+                             " has cameras in one of several folders; unzip it, and name the folder");
+        move_up(root, now.folder);
+    }
+    Capture result;
+    result.images = result.placed =
+        int(load_dataset(now.folder, {.need_images = false, .need_points = false}).frames.size());
+    return result;
 }
 
 Capture make(const fs::path& input, const fs::path& folder, const CaptureOptions& options,
              const capture::ProgressFunction& progress) {
     const bool video = is_video(input);
-    const fs::path images = folder / "images", work = folder / "colmap";
-    // All errors of the input come before the folder is made.
-    Json record = record_of(input, options, video);
-    const Json before = check_claim(folder, record, video);
-    Chosen chosen;
-    if (video)
-        record["files"] = Json::array({line_of(input.parent_path(), input.filename())});
-    else
-        chosen = choose(folder_of_photos(input), folder, before, record, progress);
-    if (video) check_same_video(folder, before, record);
-    require_programs(folder, video);
-    say(chosen.remarks, progress);
-    core::make_folder(folder);
-    const core::FolderLock lock(folder);
-    if (before.is_null()) core::write_json(folder / "capture.json", record);
-    core::make_folder(work);
-    if (!fs::exists(fs::symlink_status(images))) {
-        if (video)
-            capture::extract_frames(input, images, options.frames, work / "log.txt", progress);
-        else
-            fs::create_directory_symlink(fs::canonical(folder_of_photos(input)), images);
-    }
-    if (video) chosen.names = capture::photos_in(images);
-    const std::vector<std::string> remarks = search(folder, video, chosen, options, progress);
-    Capture result = result_of(folder, chosen.names);
-    result.remarks.insert(result.remarks.begin(), remarks.begin(), remarks.end());
-    return result;
+    Making now{input, folder, options, progress, record_of(input, options, video), {}};
+    now.before = check_claim(folder, now.record, video);
+    if (video) return make_of_video(now);
+    if (is_archive(input)) return make_of_archive(now);
+    const fs::path photos = folder_of_photos(input);
+    return make_of_photos(now, photos, fs::canonical(photos));
 }
 
 bool is_photo(const fs::path& file) try {
@@ -324,14 +321,33 @@ std::string splat_kind(const fs::path& file) try {
 
 }  // namespace
 
+bool is_archive(const fs::path& path) {
+    return extension_of(path) == ".zip" && io::is_zip(path);
+}
+
+bool archive_has_cameras(const fs::path& archive) {
+    const io::ZipFiles zip(archive);
+    return std::ranges::any_of(zip.entries(), [](const io::ZipFiles::Entry& entry) {
+        const std::string name = entry.name.filename().string();
+        return name == "cameras.bin" || name == "cameras.txt" || name == "transforms.json" ||
+               name == "transforms_train.json" || name == "transforms_test.json";
+    });
+}
+
+fs::path unpack_archive(const fs::path& archive, const fs::path& folder) {
+    io::ZipFiles(archive).unpack(folder, [](int) { return true; });
+    return main_folder(folder);
+}
+
 bool is_capture(const fs::path& path) {
-    if (is_video(path)) return true;
+    if (is_video(path) || is_archive(path)) return true;
     return is_folder(path) && !has_cameras(path) && !capture::photo_files(folder_of_photos(path)).empty();
 }
 
 ImageSize smallest_image(const fs::path& input) {
     if (is_video(input)) return capture::video_size(input);
     ImageSize smallest;
+    if (!is_folder(input)) return smallest;
     const fs::path folder = folder_of_photos(input);
     for (const fs::path& name : capture::photo_files(folder)) try {
             const ImageSize size = read_image_size(folder / name);
@@ -362,7 +378,7 @@ void check_training_input(const fs::path& path) {
     if (const fs::path dataset = dataset_of_images(path); !dataset.empty()) {
         const std::string name = core::one_line(fs::proximate(dataset).string());
         throw InputError(name + " has the cameras of " + core::one_line(path.string()) + ": ewa train " +
-                         name + "; to search them anew, ewa cameras " + core::one_line(path.string()) +
+                         name + "; to search them again, ewa cameras " + core::one_line(path.string()) +
                          " -o DIR");
     }
     if (is_capture(path) || (is_folder(path) && has_cameras(path))) return;
@@ -373,7 +389,8 @@ void check_training_input(const fs::path& path) {
                  ".txt) in sparse/0, sparse or the folder itself, or transforms.json, "
                  "transforms_train.json or transforms_test.json; the folder of a training run has "
                  "config.json"
-               : "neither a video nor a dataset; a dataset is a folder, a transforms.json, or a glTF of "
+               : "neither a video nor a dataset; a dataset is a folder, a zip of one, a transforms.json, or "
+                 "a glTF of "
                  "meshes (.gltf, .glb)");
 }
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <nlohmann/json_fwd.hpp>
 #include <set>
 #include <string>
 #include <string_view>
@@ -79,6 +80,27 @@ std::string names_text(const std::vector<std::string>& names);
 
 /// Throws InputError if `count` photos are too few.
 void require_photos(const std::filesystem::path& folder, size_t count, const std::vector<Skipped>& skipped);
+
+using Json = nlohmann::ordered_json;  // of capture.json
+
+/// A line for a file: what distinguishes its content, a space, and its name. The record is JSON, which is UTF-8.
+std::string line_of(const std::filesystem::path& folder, const std::filesystem::path& name);
+
+/// What became of the photos since a search for their cameras began, or what begins it.
+struct Chosen {
+    std::vector<std::filesystem::path> names;  // that COLMAP gets
+    std::set<std::string> gone;  // names of photos whose pictures changed: their views do not count
+    std::vector<std::string> remarks;
+};
+
+/// Looks at all photos that were found, before a search. Those that cannot be used are noted in the record. Throws InputError
+/// if too few are left, Stopped.
+Chosen first_choice(const std::filesystem::path& folder, const std::vector<std::filesystem::path>& found,
+                    Json& record, const ProgressFunction& progress);
+
+/// Leaves out what has changed since a search began. before: its record.
+Chosen later_choice(const std::filesystem::path& folder, const std::vector<std::filesystem::path>& found,
+                    const Json& before);
 
 /// Photos whose cameras COLMAP describes alike.
 struct LensGroup {

@@ -13,6 +13,7 @@
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
+#include "scene/camera.h"
 #include "scene/names.h"
 
 namespace ewa::cli {
@@ -175,10 +176,14 @@ void add_device_options(CLI::App& app, DeviceOptions& options) {
         ->group("For developers");
 }
 
-void add_downscale_option(CLI::App& app, int& downscale) {
+void add_size_options(CLI::App& app, int& downscale, int& max_width) {
     app.add_option("--downscale", downscale, train::run_option("downscale").help)
         ->transform(in_range(1, 1024))
         ->type_name("K")
+        ->capture_default_str();
+    app.add_option("--max-width", max_width, train::run_option("max-width").help)
+        ->transform(in_range(0, 65535))
+        ->type_name("N")
         ->capture_default_str();
 }
 
@@ -224,14 +229,17 @@ std::vector<int> select_frames(const Dataset& dataset, const std::string& which,
     return frames;
 }
 
-Dataset load_cameras_as_trained(const fs::path& path, int downscale, bool points) {
+Dataset load_cameras_as_trained(const fs::path& path, int downscale, int max_width, bool points) {
     if (names_mesh_scene(path)) {
         Dataset dataset = scene_cameras(path, {});
-        for (Frame& frame : dataset.frames) frame.camera = ewa::downscale(frame.camera, downscale);
+        for (Frame& frame : dataset.frames) {
+            if (max_width > 0) frame.camera = narrowed(frame.camera, int64_t(max_width) * downscale);
+            frame.camera = ewa::downscale(frame.camera, downscale);
+        }
         return dataset;
     }
-    Dataset dataset =
-        load_dataset(path, {.downscale = downscale, .need_images = false, .need_points = points});
+    Dataset dataset = load_dataset(
+        path, {.downscale = downscale, .need_images = false, .need_points = points, .max_width = max_width});
     auto missing = [](const Frame& frame) { return !frame.image_exists; };
     const auto count = std::count_if(dataset.frames.begin(), dataset.frames.end(), missing);
     dataset.missing_images = static_cast<int>(count);
@@ -267,7 +275,7 @@ void add_view_positionals(CLI::App& app, ViewArguments& arguments) {
 
 void add_view_options(CLI::App& app, ViewArguments& arguments) {
     add_draw_options(app, arguments.draw);
-    add_downscale_option(app, arguments.downscale);
+    add_size_options(app, arguments.downscale, arguments.max_width);
     const train::RunOption& masks = train::run_option("masks");
     app.add_option_function<std::string>(
            "--masks",
@@ -296,7 +304,9 @@ Views load_views(const ViewArguments& arguments, const std::string& which, int t
             if (interrupted()) throw Interrupted();
         }
     }
-    Dataset dataset = load_dataset(folder, {.downscale = arguments.downscale, .masks = arguments.masks});
+    Dataset dataset = load_dataset(
+        folder,
+        {.downscale = arguments.downscale, .masks = arguments.masks, .max_width = arguments.max_width});
     io::RefinedUse refined;
     if (!arguments.refined_cameras.empty())
         refined = io::use_refined_cameras(dataset, arguments.refined_cameras);

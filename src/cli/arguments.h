@@ -68,7 +68,8 @@ void add_splats(CLI::App& app, std::filesystem::path& splats);
 /// --device and --validation.
 void add_device_options(CLI::App& app, DeviceOptions& options);
 
-void add_downscale_option(CLI::App& app, int& downscale);
+/// --downscale and --max-width.
+void add_size_options(CLI::App& app, int& downscale, int& max_width);
 /// --frames and --test-every.
 void add_frames_options(CLI::App& app, std::string& frames, int& test_every);
 void add_quiet_option(CLI::App& app, bool& quiet);
@@ -83,7 +84,8 @@ std::vector<int> select_frames(const Dataset& dataset, const std::string& which,
 /// The cameras of a dataset, whose images may be missing. If only some are, their frames are skipped as in
 /// training, so that the same frames are held out; Dataset::missing_images counts them. Of a mesh scene: the
 /// views that `ewa train` renders. points: also reads the points.
-Dataset load_cameras_as_trained(const std::filesystem::path& path, int downscale, bool points = false);
+Dataset load_cameras_as_trained(const std::filesystem::path& path, int downscale, int max_width,
+                                bool points = false);
 
 /// Renders a mesh scene into a dataset, with progress, and prints its notes. Throws InputError, RunError, and
 /// Interrupted if Ctrl-C ended it.
@@ -95,7 +97,7 @@ struct ViewArguments {
     std::filesystem::path splats, dataset;
     std::filesystem::path refined_cameras = {};  // cameras.json of that run; empty: none
     std::string run_frames = "all";              // --frames of the run SPLATS, if the dataset is its own
-    int downscale = 1;
+    int downscale = 1, max_width = 0;
     MaskUse masks = MaskUse::automatic;
     DrawArguments draw;
     DeviceOptions device;

@@ -27,7 +27,7 @@ struct CamerasArguments {
 };
 
 int run(const CLI::App& app, const CamerasArguments& arguments) {
-    if (app.count("--frames") > 0 && fs::is_directory(arguments.input))
+    if (app.count("--frames") > 0 && (fs::is_directory(arguments.input) || is_archive(arguments.input)))
         refuse_frames(std::to_string(arguments.options.frames), arguments.input);
     Progress progress("searched", 1, "photos", arguments.quiet);
     place_with_progress(arguments.input, arguments.output, arguments.options, progress, {});
@@ -38,13 +38,14 @@ int run(const CLI::App& app, const CamerasArguments& arguments) {
 
 void refuse_frames(const std::string& frames, const fs::path& photos) {
     throw InputError("--frames " + frames + ": " + core::one_line(photos.string()) +
-                     " is a folder of photos, of which all are used; --frames is for datasets and videos");
+                     " has photos, of which all are used; --frames is for datasets and videos");
 }
 
 void place_with_progress(const fs::path& input, const fs::path& folder, const CaptureOptions& options,
                          Progress& progress, const CaptureProgressLine::After& after) {
     const InterruptWatch watch;
-    CaptureProgressLine line(progress, fs::is_regular_file(input), options.matching, after);
+    const bool video = fs::is_regular_file(input) && !is_archive(input);
+    CaptureProgressLine line(progress, video, options.matching, after);
     const Capture capture = make_dataset(input, folder, options, [&](const CaptureProgress& now) {
         line.update(now);
         return !interrupted();

@@ -21,6 +21,7 @@
 #include "core/folders.h"
 #include "core/messages.h"
 #include "core/text.h"
+#include "ewa/capture.h"
 #include "ewa/error.h"
 #include "ewa/renderer.h"
 #include "ewa/splat_files.h"
@@ -28,6 +29,7 @@
 #include "ewa/trainer.h"
 #include "image/image_files.h"
 #include "io/datasets/image_records.h"
+#include "io/datasets/zip_files.h"
 #include "io/gltf/mesh.h"
 #include "io/splats/formats.h"
 #include "report/summary.h"
@@ -168,6 +170,12 @@ bool is_sog(const fs::path& path) {
     return core::lower(path.filename().string()) == "meta.json" || io::is_sog_meta(path);
 }
 
+/// Whether a zip archive has the list of a SOG.
+bool is_sog_archive(const fs::path& path) {
+    const io::ZipFiles zip(path);
+    return std::ranges::any_of(zip.entries(), [](const auto& entry) { return entry.name == "meta.json"; });
+}
+
 const char* dataset_kind(const fs::path& path) {
     if (!fs::is_directory(path)) return "transforms";
     return io::find_colmap_model(path) ? "COLMAP" : "transforms";
@@ -231,15 +239,16 @@ void print_cameras(const Dataset& dataset) {
     if (groups.size() > kShown) fmt::print("{:<16}and {} more\n", "", groups.size() - kShown);
 }
 
-void info_dataset(const fs::path& path, int test_every, bool json) {
-    const Dataset dataset = load_cameras_as_trained(path, 1, true);
+/// named: what the user calls it.
+void info_dataset(const fs::path& path, const fs::path& named, int test_every, bool json) {
+    const Dataset dataset = load_cameras_as_trained(path, 1, 0, true);
     const char* kind = dataset_kind(path);
     const Split split = split_frames(dataset, test_every);
     std::vector<int> every(dataset.frames.size());
     std::iota(every.begin(), every.end(), 0);
     const double extent = every.empty() ? 0 : scene_extent(dataset, every);
     if (json) return print_json(dataset_json(dataset, kind, split, extent));
-    fmt::print("{}\nkind            {}\n", core::one_line(path.string()), kind);
+    fmt::print("{}\nkind            {}\n", core::one_line(named.string()), kind);
     fmt::print("frames          {} ({} train, {} test with --test-every {})\n", dataset.frames.size(),
                split.train.size(), split.test.size(), test_every);
     if (dataset.missing_images > 0)
@@ -255,6 +264,15 @@ void info_dataset(const fs::path& path, int test_every, bool json) {
                    kMaxShDegree);
     fmt::print("extent          {:.6g} (1.1 times the largest distance of a camera from their mean)\n",
                extent);
+}
+
+/// Of a zip archive with a dataset, which is unpacked for that.
+void info_archive(const fs::path& path, int test_every, bool json) {
+    const core::TemporaryFolder folder("ewa-zip-");
+    if (!archive_has_cameras(path))
+        throw InputError(core::one_line(path.string()) +
+                         ": an archive without cameras; ewa cameras searches those of the photos in it");
+    info_dataset(unpack_archive(path, folder.path()), path, test_every, json);
 }
 
 void info_mesh(const fs::path& path, int test_every, bool json) {
@@ -343,7 +361,9 @@ int run(const InfoArguments& arguments) {
     if (const auto run = find_run(path))
         info_splats(splat_input(path).file, &*run, arguments);
     else if (fs::is_directory(path) || (path.extension() == ".json" && !is_sog(path)))
-        info_dataset(path, arguments.test_every, arguments.json);
+        info_dataset(path, path, arguments.test_every, arguments.json);
+    else if (is_archive(path) && !is_sog_archive(path))
+        info_archive(path, arguments.test_every, arguments.json);
     else if (const std::string_view format = image_format(path); !format.empty())
         info_image(path, format, arguments.json);
     else if (is_mesh_scene(path))
@@ -360,7 +380,7 @@ Action add_info(CLI::App& app) {
     app.add_option(
            "PATH", arguments->path,
            "Splat file (.ply .compressed.ply .splat .ksplat .spz .sog meta.json .glb .gltf), COLMAP folder, "
-           "transforms.json, "
+           "transforms.json, zip archive of one of these, "
            "glTF file of meshes, image, or folder of a training run")
         ->required();
     add_test_every_option(app, arguments->test_every);

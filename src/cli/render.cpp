@@ -33,7 +33,7 @@ namespace fs = std::filesystem;
 struct RenderArguments {
     fs::path splats, cameras, output = "out/render";
     std::string frames = "all", format = "png", mode = "color", exposures = "auto";
-    int test_every = 8, downscale = 1;
+    int test_every = 8, downscale = 1, max_width = 0;
     ViewsArguments views;
     DrawArguments draw;
     DeviceOptions device;
@@ -116,7 +116,7 @@ void check_renders(const RenderArguments& arguments, const std::vector<fs::path>
 int render_dataset_views(RenderArguments arguments) {
     RenderOptions options = arguments.draw.options();
     const Gaussians gaussians = arguments.draw.load(arguments.splats, options);
-    Dataset dataset = load_cameras_as_trained(arguments.cameras, arguments.downscale);
+    Dataset dataset = load_cameras_as_trained(arguments.cameras, arguments.downscale, arguments.max_width);
     const fs::path refined = arguments.cameras_of_run ? refined_cameras_of(*arguments.run) : fs::path();
     if (!refined.empty()) io::use_refined_cameras(dataset, refined);
     const std::vector<int> frames = select_frames(dataset, arguments.frames, arguments.test_every);
@@ -152,7 +152,7 @@ int render_dataset_views(RenderArguments arguments) {
 /// The dataset of the run, if it can be read. Else the scene is framed as one of which nothing is known.
 std::optional<Dataset> dataset_of_run(const RenderArguments& arguments) try {
     if (!arguments.run || arguments.run->dataset.empty()) return std::nullopt;
-    return load_cameras_as_trained(arguments.run->dataset, 1);
+    return load_cameras_as_trained(arguments.run->dataset, 1, 0);
 } catch (const InputError&) {
     return std::nullopt;
 }
@@ -238,7 +238,7 @@ int render_free_views(RenderArguments arguments) {
 /// Completes the arguments by the run that SPLATS may name, and chooses whose cameras are used.
 int run(CLI::App& app, RenderArguments& arguments) {
     std::string of_frames;  // a given option that only a dataset's views have
-    for (const char* option : {"--frames", "--test-every", "--downscale", "--exposures"})
+    for (const char* option : {"--frames", "--test-every", "--downscale", "--max-width", "--exposures"})
         if (app.count(option) > 0) of_frames = option;
     if (arguments.mode == "depth" && arguments.draw.integrator == "march")
         throw InputError("--mode depth: the integrator march draws no depth; splat and ray do");
@@ -291,7 +291,7 @@ Action add_render(CLI::App& app) {
         ->transform(one_of({"color", "depth", "alpha"}))
         ->capture_default_str();
     add_draw_options(app, arguments->draw);
-    add_downscale_option(app, arguments->downscale);
+    add_size_options(app, arguments->downscale, arguments->max_width);
     add_exposures_option(app, arguments->exposures);
     add_device_options(app, arguments->device);
     add_quiet_option(app, arguments->quiet);

@@ -145,14 +145,16 @@ void check_before_scene(const TrainArguments& arguments) {
     if (options.scene.empty()) return;
     train::check_without_dataset(options);
     if (!is_mesh_scene(options.scene)) {
-        if (!fs::is_directory(options.scene))
+        const bool archive = is_archive(options.scene);
+        const bool searched = !archive || !archive_has_cameras(options.scene);
+        if (!fs::is_directory(options.scene) && !archive)
             video_frames(options.frames);
-        else if (options.frames != "all")
+        else if (options.frames != "all" && searched)
             refuse_frames(options.frames, options.scene);
         // COLMAP begins with a pair of photos that share a hundred points.
         constexpr uint32_t kLeastPoints = 100;
         const uint32_t most = options.train.max_splats;
-        if (options.init == "sfm" && most != kAutomaticMaxSplats && most < kLeastPoints)
+        if (searched && options.init == "sfm" && most != kAutomaticMaxSplats && most < kLeastPoints)
             throw InputError(
                 fmt::format("--max-splats {}: training starts with a splat for each point that "
                             "COLMAP finds, which are {} or more",
@@ -174,7 +176,7 @@ std::unique_ptr<Progress> place_photos(TrainArguments& arguments) {
     run.dataset = run.output / "dataset";
     train::check_free(run.output, run);
     CaptureOptions capture;
-    if (!fs::is_directory(run.scene)) {
+    if (!fs::is_directory(run.scene) && !is_archive(run.scene)) {
         capture.frames = video_frames(run.frames);
         run.frames = "all";
     }

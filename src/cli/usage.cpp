@@ -20,11 +20,11 @@ const std::map<std::string, std::string>& subjects() {
         const auto add = [&made](const char* subject, std::initializer_list<const char*> names) {
             for (const char* name : names) made[name] = subject;
         };
-        add("Data", {"cameras",      "frame",    "frames",       "split",       "test-every",   "downscale",
-                     "masks",        "init",     "transform",    "dense-start", "init-opacity", "init-scale",
-                     "exposures",    "crop",     "min-opacity",  "max-sh",      "sort",         "splats",
-                     "cases",        "views",    "size",         "look-at",     "up",           "orbit",
-                     "film-seconds", "matching", "scene-splats", "visible",     "view-time"});
+        add("Data", {"cameras",    "frame",        "frames",   "split",        "test-every",  "downscale",
+                     "max-width",  "masks",        "init",     "transform",    "dense-start", "init-opacity",
+                     "init-scale", "exposures",    "crop",     "min-opacity",  "max-sh",      "sort",
+                     "splats",     "cases",        "views",    "size",         "look-at",     "up",
+                     "orbit",      "film-seconds", "matching", "scene-splats", "visible",     "view-time"});
         add("Quality", {"quality",
                         "steps",
                         "strategy",

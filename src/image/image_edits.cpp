@@ -34,8 +34,13 @@ std::vector<Cover> covers(int old_size, int new_size) {
 
 Image downscale(const Image& image, int factor) {
     assert(factor >= 1);
-    if (factor == 1) return image;
-    Image result(std::max(1, image.width / factor), std::max(1, image.height / factor), image.channels);
+    return reduced(image, std::max(1, image.width / factor), std::max(1, image.height / factor));
+}
+
+Image reduced(const Image& image, int width, int height) {
+    assert(width >= 1 && height >= 1 && width <= image.width && height <= image.height);
+    if (width == image.width && height == image.height) return image;
+    Image result(width, height, image.channels);
     const std::vector<Cover> columns = covers(image.width, result.width);
     const std::vector<Cover> rows = covers(image.height, result.height);
     const double area = double(image.width) / result.width * (double(image.height) / result.height);

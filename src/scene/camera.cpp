@@ -19,15 +19,26 @@ namespace ewa {
 
 Camera downscale(const Camera& camera, int factor) {
     assert(factor >= 1);
+    return resized(camera, std::max(1, camera.width / factor), std::max(1, camera.height / factor));
+}
+
+Camera resized(const Camera& camera, int width, int height) {
     Camera result = camera;
-    result.width = std::max(1, camera.width / factor);
-    result.height = std::max(1, camera.height / factor);
+    result.width = width;
+    result.height = height;
     const double x = double(result.width) / camera.width, y = double(result.height) / camera.height;
     result.fx *= x;
     result.cx *= x;
     result.fy *= y;
     result.cy *= y;
     return result;
+}
+
+Camera narrowed(const Camera& camera, int64_t most_width) {
+    const int64_t width = camera.width;
+    if (width <= most_width) return camera;
+    const int64_t height = (2 * camera.height * most_width + width) / (2 * width);
+    return resized(camera, int(most_width), int(std::max<int64_t>(1, height)));
 }
 
 Camera moved(const Camera& camera, const CameraMotion& motion) {

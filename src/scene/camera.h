@@ -2,6 +2,7 @@
 // Cameras: paths between them, their frusta as lines, and the aspect ratio of their images.
 #pragma once
 #include <array>
+#include <cstdint>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <optional>
@@ -34,6 +35,9 @@ std::array<Segment, 10> frustum_segments(const Camera& camera, double depth);
 std::optional<std::array<glm::dvec2, 2>> projected(const Segment& segment, const Camera& camera);
 /// The pixel of a point. Empty behind the near plane.
 std::optional<glm::dvec2> projected(const glm::dvec3& point, const Camera& camera);
+
+/// The camera, or one of the same view whose image is reduced to this width. Its height keeps the ratio, rounded.
+Camera narrowed(const Camera& camera, int64_t most_width);
 
 /// Whether an image of the new size is the old one resized by one factor, with each side rounded to a whole
 /// pixel. A factor near 1 must be exact: an image that is a pixel off is a different one (cropped, or of

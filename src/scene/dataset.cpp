@@ -94,6 +94,8 @@ double scene_extent(const Dataset& dataset, const std::vector<int>& frames) {
 Image load_frame_image(const Frame& frame) {
     Image image = load_file(frame);
     if (frame.orientation != 1) image = oriented(image, frame.orientation);
+    if (frame.reduced && image.width >= frame.source.width && image.height >= frame.source.height)
+        image = reduced(image, frame.source.width, frame.source.height);
     if (image.width != frame.source.width || image.height != frame.source.height)
         throw InputError(frame.image_path.string() + ": is " + std::to_string(image.width) + " x " +
                          std::to_string(image.height) + " pixels, but its camera has " +

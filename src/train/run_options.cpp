@@ -312,6 +312,15 @@ RunOption background_option() {
     return option;
 }
 
+RunOption max_width_option() {
+    RunOption option = number<int>(
+        "max-width", "N",
+        "Reduce images that are wider than this after --downscale, px. Others stay as they are. 0: no limit",
+        kDecides, [](RunOptions& o) -> int& { return o.max_width; }, 0, 65535);
+    option.before = "0";
+    return option;
+}
+
 std::vector<RunOption> make_table() {
     return {
         dataset_option(),
@@ -372,6 +381,7 @@ std::vector<RunOption> make_table() {
         number<int>(
             "downscale", "K", "Divide the images' width and height by this", kDecides,
             [](RunOptions& o) -> int& { return o.downscale; }, 1, 1024),
+        max_width_option(),
         choice<MaskUse>(
             "masks",
             "What masks/ and alpha are for. ignore: masked pixels do not count. cut: masked pixels have the "

@@ -68,6 +68,9 @@ DatasetOptions images_of(const live::Run& run) {
     const auto downscale = run.config.find("downscale");
     if (downscale != run.config.end() && downscale->is_number_integer())
         options.downscale = std::clamp(downscale->get<int>(), 1, 1024);
+    const auto width = run.config.find("max-width");
+    if (width != run.config.end() && width->is_number_integer())
+        options.max_width = std::clamp(width->get<int>(), 0, 65535);
     const std::string masks = run.text("masks");
     if (masks == "ignore") options.masks = MaskUse::ignore;
     if (masks == "cut") options.masks = MaskUse::cut;

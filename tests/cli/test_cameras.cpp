@@ -13,6 +13,7 @@
 #include "cli/program.h"
 #include "core/process.h"
 #include "ewa/image.h"
+#include "io/splats/archive.h"
 
 namespace {
 
@@ -316,14 +317,14 @@ TEST_F(Cameras, OptionsAreCheckedBeforeTheSearch) {
     refused({"--downscale", "1000"}, "--downscale 1000 leaves 1x1 pixels of the smallest image");
     refused({"--test-every", "1"}, "--test-every 1 holds every image out");
     refused({"--max-splats", "1"}, "--max-splats 1: training starts with a splat for each point");
-    refused({"--frames", "5"}, "--frames 5: " + folder_ / "photos" + " is a folder of photos");
+    refused({"--frames", "5"}, "--frames 5: " + folder_ / "photos" + " has photos, of which all are used");
     refused({"--frames", "2"}, "--frames: '2' is not a number of frames", "film.mp4");
     refused({"--init", "random", "--dense-start", "on"}, "--dense-start on");
     refused({"--accuracy", "--device-memory", "1"}, "--device-memory and --accuracy exclude each other");
     refused({"--absgrad", "--strategy", "mcmc"}, "--absgrad");
     refused({"--config", "nothere.json"}, "nothere.json");
     expect_failure(run({"cameras", folder_ / "photos", "-o", folder_ / "run", "--frames", "5"}), 2,
-                   "--frames 5: " + folder_ / "photos" + " is a folder of photos");
+                   "--frames 5: " + folder_ / "photos" + " has photos, of which all are used");
     EXPECT_EQ(calls(), "");
 }
 
@@ -493,6 +494,61 @@ esac
     expect_success(train_with("3"));
     EXPECT_NE(read_file(folder_ / "calls.ffmpeg").find("select='eq(n,1)+eq(n,4)+eq(n,7)'"),
               std::string::npos);
+}
+
+/// A zip archive of the files below a folder.
+void zip_folder(const std::string& folder, const std::string& path, const std::string& above = "") {
+    ewa::io::ArchiveWriter writer;
+    for (const std::string& name : files_below(folder))
+        writer.add(above + name, read_file(folder + "/" + name));
+    write_file(path, writer.finish());
+}
+
+TEST_F(Cameras, PhotosMayComeInAnArchive) {
+    make_model("0", {"0.png", "1.png", "2.png", "3.png"});
+    zip_folder(folder_ / "photos", folder_ / "holiday.zip", "trip/");
+    const std::vector<std::string> train{"train", folder_ / "holiday.zip", "-o", folder_ / "run", "--steps",
+                                         "2"};
+    const Outcome outcome = run(train);
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_NE(outcome.out.find("4 of 4 photos have cameras"), std::string::npos) << outcome.out;
+    EXPECT_EQ(fs::read_symlink(folder_ / "run/dataset/images"), "unpacked/trip");
+    expect_success(run_ewa({"eval", folder_ / "run", "--split", "train"}));
+    // Nothing is done twice, and a changed archive is noticed.
+    expect_success(run({"cameras", folder_ / "holiday.zip", "-o", folder_ / "run/dataset"}));
+    EXPECT_EQ(calls(), "feature_extractor\nexhaustive_matcher\nmapper\n");
+    zip_folder(folder_ / "photos", folder_ / "holiday.zip");
+    expect_failure(run({"cameras", folder_ / "holiday.zip", "-o", folder_ / "run/dataset"}), 2,
+                   "the archive has changed since " + folder_ / "run/dataset" + " was made of it");
+    expect_failure(run({"cameras", folder_ / "holiday.zip", "-o", folder_ / "x", "--frames", "3"}), 2,
+                   "--frames 3");
+    expect_failure(run_ewa({"info", folder_ / "holiday.zip"}), 2, "an archive without cameras");
+}
+
+TEST_F(Cameras, ADatasetMayComeInAnArchive) {
+    fs::remove(folder_ / "bin/colmap");
+    zip_folder(folder_ / "source", folder_ / "scene.zip", "scene/");
+    const Outcome info = run_ewa({"info", folder_ / "scene.zip"});
+    expect_success(info);
+    EXPECT_NE(info.out.find(folder_ / "scene.zip" + "\n"), std::string::npos) << info.out;
+    EXPECT_NE(info.out.find("frames          4"), std::string::npos) << info.out;
+    const std::vector<std::string> train{
+        "train", folder_ / "scene.zip", "-o", folder_ / "run", "--steps", "2", "--frames", "0-2"};
+    expect_success(run(train));
+    EXPECT_TRUE(fs::exists(folder_ / "run/dataset/transforms.json"));
+    EXPECT_FALSE(fs::exists(folder_ / "run/dataset/unpacked"));
+    expect_success(run_ewa({"eval", folder_ / "run", "--split", "train"}));
+    std::vector<std::string> again = train;
+    again.emplace_back("--force");
+    expect_success(run(again));
+    EXPECT_EQ(calls(), "");
+    // An entry that leads elsewhere.
+    ewa::io::ArchiveWriter writer;
+    writer.add("../outside.png", "x");
+    write_file(folder_ / "bad.zip", writer.finish());
+    expect_failure(run({"train", folder_ / "bad.zip", "-o", folder_ / "bad"}), 2,
+                   folder_ / "bad.zip: \"../outside.png\" leads out of the folder");
+    EXPECT_FALSE(fs::exists(folder_ / "bad"));
 }
 
 TEST_F(Cameras, TrainingPlacesPhotosFirst) {

@@ -324,6 +324,17 @@ TEST_F(Runs, RenderShowsTheViewsOfTheDataset) {
     EXPECT_LT(compare_images(load_image(folder / "x.png"), load_image(folder / "down.png")).psnr, 40);
 }
 
+TEST_F(Runs, KeepTheLimitOfTheImagesWidth) {
+    const std::string run = train("run", {"--max-width", "20"});
+    EXPECT_EQ(read_json(run + "/config.json")["max-width"], 20);
+    EXPECT_EQ(load_image(run + "/test/0.png.png").width, 20);
+    expect_success(run_ewa({"render", run, "-o", folder / "views"}));
+    EXPECT_EQ(load_image(folder / "views/0.png").width, 20);
+    expect_success(run_ewa({"eval", run, "--json", folder / "e.json"}));
+    EXPECT_NEAR(read_json(folder / "e.json")["psnr"].get<double>(),
+                read_json(run + "/summary.json")["test_psnr"], 1e-6);
+}
+
 TEST_F(Runs, InfoConvertGradAndCompareTakeThem) {
     const std::string run = train("run");
     const Outcome info = run_ewa({"info", run});

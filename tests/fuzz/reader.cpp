@@ -97,6 +97,11 @@ void check_scene(const std::map<std::string, image::Tensor>& tensors) {
         for (const float value : tensor.values) EWA_REQUIRE(std::isfinite(value));
     }
 }
+#elif defined(EWA_READ_ZIP)
+void check_scene(uint64_t bytes) {
+    const std::string text = std::to_string(bytes) + " bytes";
+    EWA_REQUIRE(bytes < uint64_t(1) << 40);
+}
 #elif defined(EWA_READ_VIEWS)
 void check_scene(const std::vector<io::NamedView>& views) {
     const std::string text = std::to_string(views.size()) + " views";

@@ -108,3 +108,16 @@ row_attack_a_playlist_is_no_video() {
     run 1 ewa cameras "50%: private.mp4" --output=-y --frames 3
     exists ./-y/images/frame_00003.jpg
 }
+
+row_archives_of_datasets_are_trained_and_listed() {
+    (cd "$DATASET/.." && python3 -m zipfile -c "$OLDPWD/scene.zip" "$(basename "$DATASET")")
+    run 0 ewa info scene.zip
+    says "frames          8"
+    run 0 ewa train scene.zip -o out --steps 2 --max-width 40
+    run 0 ewa eval out
+    python3 -c "import zipfile; zipfile.ZipFile('evil.zip', 'w').writestr('../evil.png', b'x')"
+    run 2 ewa train evil.zip -o evil
+    one_line
+    says "leads out of the folder"
+    missing evil ../evil.png evil.png
+}

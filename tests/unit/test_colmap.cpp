@@ -398,6 +398,31 @@ TEST(Dataset, Downscale) {
     expect_error<InputError>([&] { model.load(options); }, {"downscale"});
 }
 
+TEST(Dataset, ImagesWiderThanTheLimitAreReduced) {
+    Model model;
+    Image picture(8, 6, 3);
+    for (size_t i = 0; i < picture.pixels.size(); ++i) picture.pixels[i] = float(i % 5) / 5;
+    save_image(model.folder / "images" / "b.png", picture);
+    const Image stored = load_image(model.folder / "images" / "b.png");
+    const Frame whole = model.load().frames[0];
+    const Frame frame = model.load({.max_width = 6}).frames[0];
+    EXPECT_EQ(frame.camera.width, 6);
+    EXPECT_EQ(frame.camera.height, 5);  // 4.5, rounded
+    EXPECT_DOUBLE_EQ(frame.camera.fx, whole.camera.fx * 6 / 8);
+    EXPECT_DOUBLE_EQ(frame.camera.cy, whole.camera.cy * 5 / 6);
+    EXPECT_EQ(load_frame_image(frame).pixels, reduced(stored, 6, 5).pixels);
+    // Others stay as they are.
+    EXPECT_EQ(load_frame_image(model.load({.max_width = 8}).frames[0]).pixels, stored.pixels);
+    // The limit is that of the downscaled image.
+    EXPECT_EQ(model.load({.downscale = 2, .max_width = 4}).frames[0].camera.width, 4);
+    const Frame both = model.load({.downscale = 2, .max_width = 3}).frames[0];
+    EXPECT_EQ(both.camera.width, 3);
+    EXPECT_EQ(load_frame_image(both).pixels, downscale(reduced(stored, 6, 5), 2).pixels);
+    // Without the file, the camera alone is reduced.
+    std::filesystem::remove(model.folder / "images" / "b.png");
+    EXPECT_EQ(model.load({.need_images = false, .max_width = 3}).frames[0].camera.width, 3);
+}
+
 TEST(Dataset, SaysWhatItLookedFor) {
     TempFolder folder;
     expect_error<InputError>([&] { load_dataset(folder.path(), {}); },

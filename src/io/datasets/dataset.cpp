@@ -163,6 +163,11 @@ Frame make_frame(const io::ImageRecord& image, const ImageFile& file, const Data
         if (options.need_images) throw;
         frame.downscale = options.downscale;
     }
+    if (options.max_width > 0) {
+        const int width = frame.source.width;
+        frame.source = narrowed(frame.source, int64_t(options.max_width) * frame.downscale);
+        frame.reduced = frame.source.width < width;
+    }
     frame.distortion = image.distortion;
     frame.split = image.split;
     try {

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// Zip archives of whole folders: photos, or a dataset. They come from strangers, so all entries are checked before one is
+// written.
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace ewa::io {
+
+/// Whether the file's first bytes are those of a zip archive. False on any error.
+bool is_zip(const std::filesystem::path& path);
+
+/// The files of an archive, which is read from disk piece by piece.
+class ZipFiles {
+  public:
+    struct Entry {
+        std::filesystem::path name;  // normalised, relative, inside the folder
+        uint64_t bytes = 0;          // unpacked
+        uint64_t index = 0;          // among all entries
+    };
+
+    /// Throws InputError if the file is no zip archive or is damaged, and for an entry that is not a plain file or leads
+    /// elsewhere. Also if the archive is encrypted, holds more than 100,000 entries, or would unpack to 200 times its size and
+    /// 16 MiB more.
+    explicit ZipFiles(const std::filesystem::path& path);
+    ~ZipFiles();
+    ZipFiles(const ZipFiles&) = delete;
+    ZipFiles& operator=(const ZipFiles&) = delete;
+
+    /// Without folders, and without the files that desktops add.
+    const std::vector<Entry>& entries() const;
+    uint64_t bytes() const;  // of all entries, unpacked
+
+    /// Gives the content of an entry in pieces. Throws InputError if it is damaged.
+    void read(const Entry& entry, const std::function<void(std::string_view)>& piece) const;
+
+    /// Writes all entries into a new folder. progress(entries done) is called after each; false ends it, and the result is
+    /// false. Throws InputError, RunError (disk).
+    bool unpack(const std::filesystem::path& folder, const std::function<bool(int)>& progress) const;
+
+  private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+/// Reads all entries and keeps nothing. Throws as they do.
+uint64_t check_zip(const std::filesystem::path& path);
+
+}  // namespace ewa::io
