@@ -4,7 +4,10 @@
 #include <CLI/CLI.hpp>
 #include <functional>
 #include <sstream>
+#include <string>
+#include <vector>
 
+#include "cli/arguments.h"
 #include "cli/command.h"
 #include "cli/interrupt.h"
 #include "cli/status.h"
@@ -53,7 +56,13 @@ std::string command_line(int argc, char** argv) {
 
 }  // namespace
 
-int run_program(int argc, char** argv) {
+int run_program(int argc, char** typed) {
+    std::vector<std::string> words;
+    for (int i = 0; i < argc; ++i) words.push_back(with_home(typed[i]));
+    std::vector<char*> arguments;
+    for (std::string& word : words) arguments.push_back(word.data());
+    arguments.push_back(nullptr);
+    char** argv = arguments.data();
     CLI::App app{
         "Trains, renders and inspects 3D Gaussian splats on any Vulkan device, a plain CPU included."};
     app.name("ewa");
