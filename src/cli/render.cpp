@@ -20,6 +20,7 @@
 #include "ewa/error.h"
 #include "ewa/renderer.h"
 #include "ewa/splat_files.h"
+#include "io/datasets/dataset_folders.h"
 #include "io/datasets/refined_cameras.h"
 #include "report/pictures.h"
 #include "scene/dataset_files.h"
@@ -78,6 +79,7 @@ int render_dataset_views(const RenderArguments& arguments) {
     const auto file_of = [&](int frame) {
         return arguments.output / (names[size_t(frame)].string() + "." + arguments.format);
     };
+    io::check_output_folder("-o", arguments.output, dataset);
     std::vector<NamedFile> written, read = scene::files_of(dataset, "--cameras");
     for (const int frame : frames) written.push_back({"the render", file_of(frame)});
     read.insert(read.end(), {{"SPLATS", arguments.splats}, {"--cameras", arguments.cameras}});
@@ -139,6 +141,11 @@ int write_film(const RenderArguments& arguments, Renderer& renderer, const Rende
     return 0;
 }
 
+/// The file of a view without a name.
+fs::path view_file(const RenderArguments& arguments, size_t view) {
+    return arguments.output / fmt::format("{:05}.{}", view, arguments.format);
+}
+
 int write_views(const RenderArguments& arguments, Renderer& renderer, const std::vector<Camera>& cameras,
                 bool one_image, Progress& progress) {
     uint32_t skipped = 0;
@@ -148,8 +155,7 @@ int write_views(const RenderArguments& arguments, Renderer& renderer, const std:
         Rendering rendering = renderer.render(cameras[i], arguments.mode == "depth");
         skipped = std::max(skipped, renderer.skipped_nonfinite());
         std::string remark;
-        const fs::path file =
-            one_image ? arguments.output : arguments.output / fmt::format("{:05}.{}", i, arguments.format);
+        const fs::path file = one_image ? arguments.output : view_file(arguments, i);
         save_image(file, chosen_image(std::move(rendering), arguments, remark));
         if (!remark.empty()) progress.note(file.string() + ": " + remark);
         if (cameras.size() > 1) progress.update(int(i) + 1);
@@ -183,6 +189,13 @@ int render_free_views(RenderArguments arguments) {
     arguments.draw.match_kernel(scene.gaussians, options);
     const std::vector<Camera> cameras =
         views_of(arguments.views, scene.gaussians, hints_of(arguments), output);
+    if (output == ViewsOutput::folder) {
+        io::check_output_folder("-o", arguments.output);
+        std::vector<NamedFile> written;
+        for (size_t i = 0; i < cameras.size(); ++i)
+            written.push_back({"the render", view_file(arguments, i)});
+        check_command_outputs(written, {{"SPLATS", arguments.splats}, {"--views", arguments.views.views}});
+    }
     if (film) make_folder(arguments.output.parent_path());
 
     Renderer renderer(open_device(arguments.device), scene.gaussians, options);
