@@ -38,6 +38,8 @@ struct RunOptions {
     TrainOptions train{.strategy = Strategy::automatic, .sh_degree = kAutomaticShDegree};
     std::string init =
         "sfm";  // first splats: "sfm" (the dataset's points), "random", or a file of splats or points
+    std::filesystem::path
+        init_folder;  // that a relative file of `init` is relative to; empty: the current one
     DenseStart dense_start = DenseStart::automatic;  // of first splats that come from points
     double init_opacity = 0.1;   // of first splats that come from points or at random; above 0, below 1
     double init_scale = 1;       // factor of their scales, which are the distance to their neighbours
@@ -51,6 +53,9 @@ struct RunOptions {
     std::filesystem::path lpips_weights;  // see Meter; empty: LPIPS is not computed
     bool tensorboard = false;             // also writes the figures of metrics.jsonl as TensorBoard's events
     int save_every = 0;  // saves splats and checkpoint every N steps; 0: the checkpoint every 30 s or more
+    int keep = 0;        // of the splats of save_every, the last N stay as splats_007000.ply and the like
+    bool inria =
+        false;  // also writes the folder inria/, as INRIA's trainer would, for viewers that read its runs
     // A folder with the result or the checkpoint of a run is refused, unless one of these is set.
     bool resume = false;  // continues from the folder's checkpoint, if there is one
     bool force = false;   // replaces the run in the folder
@@ -135,6 +140,8 @@ struct RunResult {
 /// - splats.ply: the splats.
 /// - cameras.json and the COLMAP model cameras/sparse/0, with TrainOptions::refine_poses: the refined cameras.
 /// - exposures.json, with TrainOptions::exposure: three rows of four numbers for each training image.
+/// - splats_007000.ply and so on, with `keep`: the splats after these steps.
+/// - inria/, with `inria`: cfg_args, cameras.json, input.ply, point_cloud/iteration_N/point_cloud.ply.
 /// - test/*.png: renders of some test views (train/*.png without a test set).
 /// - summary.json: the Summary.
 /// - report.html: the figures, curves and views in one page. It needs no other file and no network.

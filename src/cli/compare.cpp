@@ -18,6 +18,7 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "ewa/image.h"
+#include "io/datasets/dataset_folders.h"
 #include "report/pictures.h"
 #include "scene/dataset_files.h"
 
@@ -144,6 +145,8 @@ fs::path heat_map_file(const ImagePair& pair, const CompareArguments& arguments)
 /// Throws if an output is also an input, or cannot be written.
 void check_files(const CompareArguments& arguments, const Sides& sides, const ImagePairs& pairs) {
     const CompareInputs& inputs = arguments.inputs;
+    const bool maps = !arguments.heat_map.empty() && !pairs.pairs.empty() && !pairs.pairs[0].name.empty();
+    if (maps) io::check_output_folder("--heat-map", arguments.heat_map, sides.cameras);
     std::vector<NamedFile> written = {{"--json", arguments.json}};
     std::vector<NamedFile> read = {{"A", inputs.a},
                                    {"B", inputs.b},

@@ -5,7 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <nlohmann/json.hpp>
+#include <string_view>
+#include <utility>
+#include <vector>
 
+#include "cli/arguments.h"
 #include "core/json.h"
 #include "core/text.h"
 #include "ewa/error.h"
@@ -16,6 +20,8 @@ namespace ewa::cli {
 namespace {
 
 using report::Json;
+
+constexpr std::array<std::string_view, 4> kOnlyOnCommandLine{"output", "force", "resume", "serve"};
 
 /// Whether the option's value is a number, as config.json of a run has it.
 bool takes_number(const std::string& name, const Json& value) {
@@ -42,14 +48,14 @@ void check_type(const CLI::Option& option, const Json& value, const std::string&
     if (value.is_string() && takes_number(name, value))
         throw InputError(where + " must be a number, without quotes");
     // A device and a port may be numbers or texts.
-    const bool text = name == "dataset" || name == "init" || name == "output";
+    const bool text = name == "dataset" || name == "init";
     if (text && !value.is_string()) throw InputError(where + " must be a text in quotes");
     if (value.is_array() && name != "background") throw InputError(where + " takes one value, not a list");
 }
 
 /// As the value would stand on the command line.
 std::string option_text(const Json& value, const std::string& where) {
-    if (value.is_string()) return value.get<std::string>();
+    if (value.is_string()) return with_home(value.get<std::string>());
     if (value.is_number() || value.is_boolean()) return value.dump();
     if (value.is_array()) {  // a background
         std::string text;
@@ -86,6 +92,9 @@ void apply_config(CLI::App& app, const std::filesystem::path& file) {
         const std::string where = file.string() + ": \"" + name + "\"";
         CLI::Option* option = find_option(app, name);
         if (!option) throw InputError(where + " is not an option of ewa " + app.get_name());
+        // A file from a stranger decides neither what is replaced nor who may connect.
+        if (std::ranges::find(kOnlyOnCommandLine, name) != kOnlyOnCommandLine.end())
+            throw InputError(where + " belongs on the command line, not into a file: --" + name);
         if (value.is_null() || given(app, name)) continue;
         values.emplace_back(option, option_text(value, where));
         check_type(*option, value, where);
@@ -96,16 +105,26 @@ void apply_config(CLI::App& app, const std::filesystem::path& file) {
     }
 }
 
-void apply_config_value(CLI::App& app, const std::string& name, const nlohmann::json& value,
-                        const std::filesystem::path& where) {
-    CLI::Option* option = find_option(app, name);
-    if (!option || given(app, name)) return;
+void apply_run_config(CLI::App& app, const nlohmann::json& values, const std::filesystem::path& where) {
+    std::vector<std::pair<CLI::Option*, std::string>> given_by_run;
+    for (const auto& [name, value] : values.items()) {
+        CLI::Option* option = find_option(app, name);
+        if (!option || value.is_null() || value == false || given(app, name)) continue;
+        given_by_run.emplace_back(option, option_text(value, where.string() + ": \"" + name + "\""));
+    }
     try {
-        option->add_result(option_text(value, where.string() + ": \"" + name + "\""));
-        option->run_callback();
+        for (const auto& [option, text] : given_by_run) {
+            option->add_result(text);
+            option->run_callback();
+        }
     } catch (const CLI::Error& error) {
         throw InputError(core::one_line(where.string()) + ": " + error.what());
     }
+}
+
+void apply_config_value(CLI::App& app, const std::string& name, const nlohmann::json& value,
+                        const std::filesystem::path& where) {
+    apply_run_config(app, {{name, value}}, where);
 }
 
 }  // namespace ewa::cli

@@ -16,6 +16,10 @@ namespace ewa::cli {
 /// another JSON type than a run's config.json has. Throws CLI::Error for a value that its option refuses.
 void apply_config(CLI::App& app, const std::filesystem::path& file);
 
+/// The same with the values of a run, whose config.json `where` is. It ignores names that `app` lacks: other versions of ewa
+/// have other options. Throws InputError for a value that its option refuses.
+void apply_run_config(CLI::App& app, const nlohmann::json& values, const std::filesystem::path& where);
+
 /// The same for one option, which `app` may lack. where: the file that has the value. Throws InputError for a value
 /// that its option refuses.
 void apply_config_value(CLI::App& app, const std::string& name, const nlohmann::json& value,

@@ -9,6 +9,7 @@
 #include "cli/command.h"
 #include "core/text.h"
 #include "ewa/error.h"
+#include "io/datasets/dataset_folders.h"
 
 namespace ewa::cli {
 namespace {
@@ -25,6 +26,7 @@ struct DatasetArguments {
 };
 
 int run(const DatasetArguments& arguments) {
+    io::check_not_inside_dataset("-o", arguments.output);
     SyntheticOptions options = arguments.options;
     const core::PixelSize size = size_of(arguments.size);
     options.width = size.width;

@@ -12,8 +12,9 @@
 namespace ewa::cli {
 namespace {
 
-// SIGUSR1 is what mpirun passes on without ending the job, and what batch systems send before a time limit.
-constexpr std::array kSignals{SIGINT, SIGTERM, SIGHUP, SIGUSR1};
+// SIGUSR1 is what mpirun passes on without ending the job, and what batch systems send before a time limit. SIGXCPU comes
+// at the soft limit of ulimit -t.
+constexpr std::array kSignals{SIGINT, SIGTERM, SIGHUP, SIGUSR1, SIGXCPU};
 constexpr std::string_view kNote = "\nsaving, then ending; Ctrl-\\ ends at once without saving\n";
 
 // Two threads can handle two signals at the same time.
@@ -65,6 +66,8 @@ bool interrupted() {
 }
 
 void remove_temporary_files_on_signals() {
+    // A write beyond ulimit -f then fails, and says so.
+    std::signal(SIGXFSZ, SIG_IGN);
     for (const int signal : kSignals) {
         const struct sigaction before = handle(signal, remove_files_and_end);
         if (before.sa_handler == SIG_IGN) sigaction(signal, &before, nullptr);

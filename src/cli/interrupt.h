@@ -7,7 +7,7 @@
 
 namespace ewa::cli {
 
-/// While a watch exists, SIGINT, SIGTERM, SIGUSR1 and SIGHUP (unless nohup ignores it) only set a flag, however often
+/// While a watch exists, SIGINT, SIGTERM, SIGUSR1, SIGXCPU and SIGHUP (unless nohup ignores it) only set a flag, however often
 /// they arrive. timeout(1) signals the program and then its group, and a second Ctrl-C must not prevent what
 /// the first one saves. SIGQUIT (Ctrl-\, as a terminal is told) and SIGKILL still end the program at once.
 /// The destructor restores the handlers. At most one watch exists at a time.
@@ -19,7 +19,7 @@ class InterruptWatch {
     InterruptWatch& operator=(const InterruptWatch&) = delete;
 
   private:
-    std::array<struct sigaction, 4> before_;
+    std::array<struct sigaction, 5> before_;
 };
 
 /// Whether a signal has arrived during a watch.
@@ -29,7 +29,7 @@ bool interrupted();
 struct Interrupted {};
 
 /// Outside a watch: the same signals delete the temporary files, then end the program. Ignored signals stay
-/// ignored.
+/// ignored. A file size limit becomes an error of the write, as a full disk is.
 void remove_temporary_files_on_signals();
 
 /// The exit status after Ctrl-C.

@@ -9,6 +9,7 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "live/run_folder.h"
+#include "report/run_file_names.h"
 
 namespace ewa::cli {
 
@@ -19,7 +20,7 @@ void add_run_files(std::vector<NamedFile>& read) {
     for (size_t i = 0, count = read.size(); i < count; ++i) {
         const auto run = live::run_of_splats(read[i].path);
         if (!run) continue;
-        for (const char* name : live::kRunFiles) read.push_back({"a file of the run", run->folder / name});
+        for (const char* name : report::kRunFiles) read.push_back({"a file of the run", run->folder / name});
     }
 }
 

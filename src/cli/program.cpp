@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/arguments.h"
 #include "cli/command.h"
 #include "cli/interrupt.h"
 #include "cli/status.h"
@@ -54,9 +55,11 @@ std::string command_line(int argc, char** argv) {
     return line;
 }
 
-/// The arguments with `help`, `help COMMAND`, `version`, -v and -V as the options that they stand for.
+/// The arguments with ~ as the home folder, and with `help`, `help COMMAND`, `version`, -v and -V as the options that they
+/// stand for.
 std::vector<std::string> usual_arguments(int argc, char** argv) {
-    std::vector<std::string> words(argv, argv + argc);
+    std::vector<std::string> words;
+    for (int i = 0; i < argc; ++i) words.push_back(with_home(argv[i]));
     if (argc < 2) return words;
     if (argc <= 3 && words[1] == "help") {
         words.erase(words.begin() + 1);
@@ -123,7 +126,8 @@ int run_program(int argc, char** argv) {
     std::vector<std::string> words = usual_arguments(argc, argv);
     std::vector<char*> pointers;
     for (std::string& word : words) pointers.push_back(word.data());
-    return run_arguments(int(pointers.size()), pointers.data());
+    pointers.push_back(nullptr);
+    return run_arguments(int(words.size()), pointers.data());
 }
 
 }  // namespace ewa::cli

@@ -8,7 +8,6 @@
 #include <glm/matrix.hpp>
 #include <memory>
 #include <optional>
-#include <set>
 
 #include "cli/arguments.h"
 #include "cli/command.h"
@@ -21,6 +20,7 @@
 #include "ewa/error.h"
 #include "ewa/renderer.h"
 #include "ewa/splat_files.h"
+#include "io/datasets/dataset_folders.h"
 #include "io/datasets/refined_cameras.h"
 #include "report/pictures.h"
 #include "scene/dataset_files.h"
@@ -89,27 +89,25 @@ std::vector<fs::path> files_of_frames(const RenderArguments& arguments, const Da
     return files;
 }
 
-/// Throws if a render would replace a file that is read, or is in a folder of the dataset's images.
+/// Throws if a render would replace a file that is read, or land among photos.
 void check_renders(const RenderArguments& arguments, const std::vector<fs::path>& files,
                    const Dataset* dataset) {
+    // Of a single file the user has chosen the name, so that its folder may be a dataset.
+    const fs::path folder = files[0] == arguments.output ? fs::path() : arguments.output;
+    if (folder.empty())
+        io::check_not_inside_dataset("-o", fs::absolute(arguments.output).parent_path());
+    else if (dataset)
+        io::check_output_folder("-o", folder, *dataset);
+    else
+        io::check_output_folder("-o", folder);
     std::vector<NamedFile> written, read{{"SPLATS", arguments.splats},
                                          {"--views", arguments.views.views},
                                          {"--cameras", arguments.cameras}};
     for (const fs::path& file : files) written.push_back({"the render", file});
-    std::set<fs::path> folders, of_images;
     if (dataset) {
         const std::vector<NamedFile> more = scene::files_of(*dataset, "the dataset");
         read.insert(read.end(), more.begin(), more.end());
-        for (const Frame& frame : dataset->frames) of_images.insert(frame.image_path.parent_path());
-        for (const fs::path& file : files) folders.insert(file.has_parent_path() ? file.parent_path() : ".");
     }
-    std::error_code none;
-    for (const fs::path& folder : folders)
-        for (const fs::path& images : of_images)
-            if (fs::equivalent(folder, images.empty() ? "." : images, none))
-                throw InputError("--output " + core::one_line(arguments.output.string()) + ": " +
-                                 core::one_line(folder.string()) +
-                                 " holds the images of the dataset; name another folder");
     check_command_outputs(written, read);
 }
 
@@ -178,6 +176,11 @@ int write_film(const RenderArguments& arguments, Renderer& renderer, const Rende
     progress.note(fmt::format("{}: {} frames, {:.1f} s", arguments.output.string(), cameras.size(),
                               double(cameras.size()) / kFilmRate));
     return 0;
+}
+
+/// The file of a view without a name.
+fs::path view_file(const RenderArguments& arguments, size_t view) {
+    return arguments.output / fmt::format("{:05}.{}", view, arguments.format);
 }
 
 int write_views(const RenderArguments& arguments, Renderer& renderer, const std::vector<Camera>& cameras,

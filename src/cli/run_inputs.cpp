@@ -9,23 +9,17 @@
 #include "core/messages.h"
 #include "core/text.h"
 #include "ewa/error.h"
-#include "io/datasets/image_records.h"
+#include "io/datasets/dataset_folders.h"
 
 namespace ewa::cli {
 namespace {
 
 namespace fs = std::filesystem;
 
-bool holds_dataset(const fs::path& folder) {
-    for (const char* name : {"transforms.json", "transforms_train.json", "transforms_test.json"})
-        if (core::is_file(folder / name)) return true;
-    return io::find_colmap_model(folder).has_value();
-}
-
 }  // namespace
 
 std::optional<live::Run> find_run(const fs::path& path) {
-    if (!core::is_folder(path) || holds_dataset(path)) return std::nullopt;
+    if (!core::is_folder(path) || io::is_dataset_folder(path)) return std::nullopt;
     return live::find_run(path);
 }
 

@@ -13,6 +13,7 @@
 #include "cli/command.h"
 #include "cli/config.h"
 #include "cli/interrupt.h"
+#include "cli/resumed_run.h"
 #include "cli/run_inputs.h"
 #include "cli/status.h"
 #include "cli/train_observer.h"
@@ -40,7 +41,8 @@ struct TrainArguments {
     TrainOutput output;
     fs::path config;
     bool antialias = false, accuracy = false, check_only = false;
-    std::string quality;  // empty: not given
+    bool makes_dataset = false;  // of RunOptions::scene
+    std::string quality;         // empty: not given
 };
 
 void add_run_option(CLI::App& app, const train::RunOption& option, RunOptions& options) {
@@ -75,15 +77,6 @@ struct Quality {
 };
 constexpr std::array<Quality, 3> kQualities{{{"low", 2000}, {"medium", 7000}, {"high", 30000}}};
 
-/// A run that is resumed keeps its number of steps.
-void keep_steps(RunOptions& options) {
-    const auto run = live::find_run(output_folder(options));
-    if (!run) return;
-    const auto steps = run->config.find("steps");
-    if (steps != run->config.end() && steps->is_number_unsigned())
-        train::run_option("steps").set(options, steps->dump());
-}
-
 /// Reads the config, if there is one. Then sets the steps of --quality, unless they are given themselves. A quality of the
 /// command line goes before steps of the config.
 void apply_config_and_quality(CLI::App& app, TrainArguments& arguments) {
@@ -101,23 +94,26 @@ bool is_mesh_scene(const fs::path& path) {
 }
 
 /// Notes what a dataset will be made from: a mesh scene, photos or a video. The run's folder has its name.
-void note_scene(RunOptions& run) {
+void note_scene(TrainArguments& arguments) {
+    RunOptions& run = arguments.run;
+    if (run.dataset.empty() || !run.scene.empty()) return;
     if (is_mesh_scene(run.dataset)) {
         run.scene = run.dataset;
-        return;
+    } else {
+        check_training_input(run.dataset);
+        // The run's name is the last part of the path, which "photos/" and "." do not have.
+        if (is_capture(run.dataset))
+            run.scene = (fs::absolute(run.dataset).lexically_normal() / "").parent_path();
     }
-    check_training_input(run.dataset);
-    // The run's name is the last part of the path, which "photos/" and "." do not have.
-    if (is_capture(run.dataset))
-        run.scene = (fs::absolute(run.dataset).lexically_normal() / "").parent_path();
+    arguments.makes_dataset = !run.scene.empty();
 }
 
 /// Renders a mesh scene into the run's folder, which becomes the dataset. Throws Interrupted if Ctrl-C ended that.
 void render_scene(TrainArguments& arguments) {
     RunOptions& run = arguments.run;
-    if (!is_mesh_scene(run.scene)) return;
+    if (!arguments.makes_dataset || !is_mesh_scene(run.scene)) return;
     run.output = output_folder(run);
-    run.dataset = run.output / "dataset";
+    run.dataset = run.output / live::kMadeDataset;
     train::check_free(run.output, run);
     // Another training may be reading the images that are there.
     std::unique_ptr<core::FolderLock> lock;
@@ -142,7 +138,7 @@ int video_frames(const std::string& frames) {
 /// Throws what needs no dataset to be known, before the long work that makes it.
 void check_before_scene(const TrainArguments& arguments) {
     const RunOptions& options = arguments.run;
-    if (options.scene.empty()) return;
+    if (!arguments.makes_dataset) return;
     train::check_without_dataset(options);
     if (!is_mesh_scene(options.scene)) {
         const bool archive = is_archive(options.scene);
@@ -171,9 +167,9 @@ void check_before_scene(const TrainArguments& arguments) {
 /// that. Returns the progress, which the training continues; null where the dataset has cameras.
 std::unique_ptr<Progress> place_photos(TrainArguments& arguments) {
     RunOptions& run = arguments.run;
-    if (run.scene.empty() || is_mesh_scene(run.scene)) return nullptr;
+    if (!arguments.makes_dataset || is_mesh_scene(run.scene)) return nullptr;
     run.output = output_folder(run);
-    run.dataset = run.output / "dataset";
+    run.dataset = run.output / live::kMadeDataset;
     train::check_free(run.output, run);
     CaptureOptions capture;
     if (!fs::is_directory(run.scene) && !is_archive(run.scene)) {
@@ -200,19 +196,19 @@ int run_follower(const RunOptions& options) {
 int run(CLI::App& app, TrainArguments& arguments) {
     const auto begin = Clock::now();
     RunOptions& options = arguments.run;
+    settle_dataset(options);
+    note_scene(arguments);
+    take_options_of_run(app, options, app.count("--steps") > 0 || !arguments.quality.empty());
     if (options.dataset.empty()) throw InputError("DATASET is required (see ewa train --help)");
-    options.dataset = dataset_input(options.dataset);
     if (fs::is_directory(options.init)) options.init = splat_input(options.init).file.string();
     Footprint& kernel = options.train.render.kernel;
     kernel = settled_kernel(kernel, arguments.antialias);
     if (arguments.accuracy) options.report_section = accuracy_section;
     check_options(options);
-    note_scene(options);
-    if (options.ranks->size() > 1 && !options.scene.empty())
+    if (options.ranks->size() > 1 && arguments.makes_dataset)
         throw InputError(
             options.scene.string() +
             ": several ranks train on a dataset; make it first, with ewa dataset or ewa cameras");
-    if (options.resume && arguments.quality.empty() && app.count("--steps") == 0) keep_steps(options);
     check_before_scene(arguments);
     if (arguments.check_only) {
         train::check_free(output_folder(options), options);
@@ -223,7 +219,6 @@ int run(CLI::App& app, TrainArguments& arguments) {
     render_scene(arguments);
     std::unique_ptr<Progress> progress = place_photos(arguments);
     options.seconds_before = std::chrono::duration<double>(Clock::now() - begin).count();
-    arguments.output.force = options.force;
     TrainObserver observer(arguments.output, options.train.steps, std::move(progress));
     const RunResult result = run_training(options, observer);
     observer.print(result);
@@ -264,10 +259,11 @@ Action add_train(CLI::App& app, const std::string& command_line) {
            "connect, unless an address stands before the port. Pausing and saving need the token in "
            "DIR/live.json")
         ->type_name("[ADDRESS:]PORT");
-    CLI::Option* resume = app.add_flag("--resume", options.resume,
-                                       "Continue from DIR's checkpoint.ewa, or start if there is none. The "
-                                       "run keeps its steps; more --steps "
-                                       "than before train it further");
+    CLI::Option* resume =
+        app.add_flag("--resume", options.resume,
+                     "Continue the run in DIR, which DATASET may also name, from its "
+                     "checkpoint.ewa, or start if there is none. The run keeps its options; "
+                     "more --steps than before train it further");
     app.add_flag("--force", options.force,
                  "Replace the run in DIR. Without --resume or --force it is refused")
         ->excludes(resume);

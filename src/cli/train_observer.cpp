@@ -239,8 +239,9 @@ void TrainObserver::on_evaluated(const StepReport& step, const Gaussians& gaussi
 
 void TrainObserver::print(const RunResult& result) {
     const Summary& s = result.summary;
+    const bool all_steps = s.steps >= steps_;
     on_note(fmt::format("{} {} in {} of training ({} in all), {}",
-                        s.interrupted ? "interrupted after" : "trained",
+                        s.interrupted && !all_steps ? "interrupted after" : "trained",
                         core::counted(uint64_t(s.steps), "step"), core::duration_text(s.seconds),
                         core::duration_text(s.wall_seconds), core::counted(s.splats, "splat")));
     if (s.test_psnr)
@@ -255,15 +256,16 @@ void TrainObserver::print(const RunResult& result) {
                 " with a value that is not finite");
     if (s.dropped_updates > 0)
         on_note("dropped " + core::counted(s.dropped_updates, "update") + " that were not finite");
-    if (s.limited_steps > 0)
+    if (report::shortens_many(s))
         on_note("shortened " + core::counted(s.limited_steps, "update") +
                 " that were too long for their splat");
     on_note("splats:  " + (result.folder / "splats.ply").string());
     on_note("report:  " + (result.folder / "report.html").string());
     if (!result.first_render.empty()) on_note("render:  " + result.first_render.string());
     if (s.interrupted)
-        on_note(std::string("to continue, repeat the command with --resume") +
-                (output_.force ? " in place of --force" : ""));
+        on_note(fmt::format("{}: ewa train {} --resume",
+                            all_steps ? "the evaluation was interrupted; to complete it" : "to continue",
+                            result.folder.string()));
 }
 
 }  // namespace ewa::cli

@@ -16,8 +16,7 @@ namespace ewa::cli {
 
 struct TrainOutput {
     bool quiet = false, verbose = false;
-    bool force = false;  // the run replaces an earlier one
-    std::string serve;   // [ADDRESS:]PORT; empty: no server
+    std::string serve;  // [ADDRESS:]PORT; empty: no server
 };
 
 /// Throws InputError or RunError if --serve cannot listen at [ADDRESS:]PORT.

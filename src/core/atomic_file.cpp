@@ -42,6 +42,18 @@ int list_unfinished(const std::filesystem::path& path) {
     return -1;
 }
 
+/// Whether the link is a stranger's, in a folder like /tmp, where all may create files. Linux does not follow such links
+/// with fs.protected_symlinks, but that rule does not reach a path that the program resolves.
+bool is_strangers_link(const std::filesystem::path& link) {
+    struct stat of_link {
+    }, folder{};
+    const std::filesystem::path above = link.parent_path();
+    if (lstat(link.c_str(), &of_link) != 0 || !S_ISLNK(of_link.st_mode)) return false;
+    if (stat(above.empty() ? "." : above.c_str(), &folder) != 0) return false;
+    const bool shared = (folder.st_mode & S_ISVTX) != 0 && (folder.st_mode & S_IWOTH) != 0;
+    return shared && of_link.st_uid != geteuid() && of_link.st_uid != folder.st_uid;
+}
+
 }  // namespace
 
 void remove_unfinished_files() noexcept {
@@ -49,15 +61,23 @@ void remove_unfinished_files() noexcept {
         if (one.state == Unfinished::named) unlink(one.path);
 }
 
+void fail_to_write(const std::filesystem::path& path, const char* doing, int reason) {
+    const std::string text = one_line(path.string()) + ": " + doing + ": " + std::strerror(reason);
+    if (reason == ENOSPC || reason == EDQUOT || reason == EFBIG) throw FullDisk(text);
+    throw RunError(text);
+}
+
 void AtomicFile::fail(const char* doing) const {
-    const int reason = errno;
-    throw RunError(one_line(target_.string()) + ": " + doing + ": " + std::strerror(reason));
+    fail_to_write(target_, doing, errno);
 }
 
 AtomicFile::AtomicFile(const std::filesystem::path& path, Readers readers) : target_(path) {
     if (path.filename().empty() || path.filename() == "." || path.filename() == "..")
         throw RunError(one_line(path.string()) + ": cannot be written: it names a folder");
     std::error_code ignored;
+    if (readers == Readers::usual && is_strangers_link(path))
+        throw RunError(one_line(path.string()) +
+                       ": cannot be written: it is another user's link in a folder that all may write");
     if (readers == Readers::usual && std::filesystem::is_symlink(path, ignored)) {
         const std::filesystem::path resolved = std::filesystem::weakly_canonical(path, ignored);
         if (!resolved.empty()) target_ = resolved;

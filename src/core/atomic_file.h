@@ -5,12 +5,24 @@
 #include <filesystem>
 #include <string_view>
 
+#include "ewa/error.h"
+
 namespace ewa::core {
+
+/// A write failed because the disk, a quota or a limit of the file's size is full.
+class FullDisk : public RunError {
+  public:
+    using RunError::RunError;
+};
+
+/// Throws FullDisk or RunError for a file that cannot be written. doing: what failed. reason: an errno.
+[[noreturn]] void fail_to_write(const std::filesystem::path& path, const char* doing, int reason);
 
 /// Writes a temporary file in the same directory, which commit() renames to the path. Until then, and after
 /// any failure, the path keeps its content. The destructor removes the temporary file. Throws RunError that
 /// names the path and the system's reason; a full disk shows at write, fsync or close. An existing target
-/// keeps its permissions. A symbolic link is followed. A target that is not a regular file is refused.
+/// keeps its permissions. A symbolic link is followed, but refused if it is another user's in a folder like /tmp. A target
+/// that is not a regular file is refused.
 class AtomicFile {
   public:
     /// usual: the umask or the existing file decides who may read. owner: only the owner may, and a symbolic

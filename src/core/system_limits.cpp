@@ -4,6 +4,7 @@
 #include <sys/mman.h>
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <latch>
 #include <system_error>
 #include <thread>
@@ -16,6 +17,16 @@ std::string address_limit_text() {
     if (getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return "";
     return "this process may use only " + std::to_string(limit.rlim_cur >> 20) +
            " MiB of address space (ulimit -v); ";
+}
+
+uint64_t memory_limit() {
+    uint64_t least = UINT64_MAX;
+    for (const auto resource : {RLIMIT_AS, RLIMIT_DATA}) {
+        rlimit limit{};
+        if (getrlimit(resource, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY)
+            least = std::min(least, uint64_t(limit.rlim_cur));
+    }
+    return least;
 }
 
 bool has_room(uint64_t bytes, int threads) {

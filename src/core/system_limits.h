@@ -10,6 +10,9 @@ namespace ewa::core {
 /// space is short, libraries give other reasons for their failure.
 std::string address_limit_text();
 
+/// The bytes of address space and of private memory that the process may use (ulimit -v, -d), whichever is less.
+uint64_t memory_limit();
+
 /// Whether the process could now map so many bytes, and start so many threads beside that.
 bool has_room(uint64_t bytes, int threads);
 

@@ -68,9 +68,20 @@ VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT
     return VK_FALSE;
 }
 
+/// Mesa's compiler for CPUs crashes where it gets no memory.
+void check_address_space(const DeviceInfo& info) {
+    constexpr uint64_t kLeast = uint64_t(960) << 20;
+    const uint64_t limit = core::memory_limit();
+    if (info.type != "cpu" || limit >= kLeast) return;
+    throw RunError(info.name + " needs " + std::to_string(kLeast >> 20) +
+                   " MiB of address space; this process may use only " + std::to_string(limit >> 20) +
+                   " MiB; a higher limit (ulimit -v, ulimit -d) helps");
+}
+
 }  // namespace
 
 Device::Device(const DeviceInfo& info, bool validation, bool own_queue) : info_(info) {
+    check_address_space(info);
     try {
         create_instance(validation);
         physical_ = instance_->enumeratePhysicalDevices().at(size_t(info.index));

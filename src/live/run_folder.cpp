@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "live/run_folder.h"
 
-#include <algorithm>
-
 #include "core/folders.h"
 #include "core/json.h"
 #include "core/text.h"
 #include "ewa/error.h"
+#include "report/run_file_names.h"
 
 namespace ewa::live {
 namespace {
@@ -39,27 +38,35 @@ bool made_of(const fs::path& dataset, const fs::path& named) {
 
 fs::path dataset_of(const fs::path& run, const fs::path& named) {
     if (named.empty()) return {};
-    std::error_code error;
     const std::string extension = core::lower(named.extension().string());
     const bool mesh = extension == ".gltf" || extension == ".glb";
-    if (mesh && fs::exists(run / "dataset/transforms.json", error)) return run / "dataset";
-    if (made_of(run / "dataset", named)) return run / "dataset";
-    if (fs::exists(named, error)) return named;
-    if (named.is_absolute()) return {};
-    for (fs::path folder = fs::absolute(run, error); folder.has_relative_path();
-         folder = folder.parent_path())
-        if (fs::exists(folder / named, error)) return folder / named;
-    return {};
+    if (mesh && core::is_file(run / kMadeDataset / "transforms.json")) return run / kMadeDataset;
+    if (made_of(run / kMadeDataset, named)) return run / kMadeDataset;
+    const std::optional<fs::path> base = base_of(run, named);
+    return base ? *base / named : fs::path();
 }
 
-/// Programs other than ewa also write a config.json. A run that has begun has metrics.jsonl beside it.
+}  // namespace
+
+std::optional<fs::path> base_of(const fs::path& run, const fs::path& named) {
+    std::error_code error;
+    if (fs::exists(named, error)) return fs::path();
+    if (named.is_absolute()) return std::nullopt;
+    for (fs::path folder = fs::absolute(run, error); folder.has_relative_path();
+         folder = folder.parent_path())
+        if (fs::exists(folder / named, error)) return folder;
+    return std::nullopt;
+}
+
 bool is_run(const fs::path& folder) {
     const auto present = [&](const char* name) { return core::is_file(folder / name); };
     return present("config.json") &&
            (present("metrics.jsonl") || present("splats.ply") || present("checkpoint.ewa"));
 }
 
-}  // namespace
+bool Run::made_dataset() const {
+    return dataset == folder / kMadeDataset && fs::path(named_dataset) != dataset;
+}
 
 std::string Run::text(const char* option) const {
     const auto found = config.find(option);
@@ -89,7 +96,8 @@ std::optional<Run> find_run(const fs::path& folder) {
 }
 
 std::optional<Run> run_of_splats(const fs::path& splats) {
-    if (splats.filename() != "splats.ply") return std::nullopt;
+    const std::string name = splats.filename().string();
+    if (name != report::kSplatsFile && !report::step_of_kept_splats(name)) return std::nullopt;
     const fs::path folder = splats.parent_path();
     if (!core::is_file(folder / "config.json")) return std::nullopt;
     return find_run(folder);
@@ -99,7 +107,7 @@ std::optional<fs::path> run_of_file(const fs::path& file) {
     std::error_code error;
     for (const fs::path& path : {file, fs::weakly_canonical(file, error)}) {
         const fs::path folder = path.parent_path();
-        if (std::ranges::find(kRunFiles, path.filename()) != kRunFiles.end() && is_run(folder))
+        if (report::is_run_file(path.filename().string()) && is_run(folder))
             return folder.empty() ? "." : folder;
     }
     return std::nullopt;

@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 // The folder of a training run, for those who read it: its splats, its dataset and the options of the run.
 #pragma once
-#include <array>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
+#include "report/run_file_names.h"
+
 namespace ewa::live {
 
-/// The files that `ewa train` writes beside its renders.
-inline constexpr std::array kRunFiles{"config.json", "metrics.jsonl",  "checkpoint.ewa",
-                                      "times.json",  "splats.ply",     "summary.json",
-                                      "report.html", "exposures.json", "cameras.json"};
+using report::kRunFiles;
+
+/// The folder in a run's folder for the dataset that the run makes of a mesh scene, photos or a video.
+inline constexpr const char* kMadeDataset = "dataset";
 
 struct Run {
     std::filesystem::path folder;
@@ -25,21 +26,31 @@ struct Run {
 
     /// folder/cameras.json, the refined cameras of the dataset; empty if there is none.
     std::filesystem::path refined_cameras() const;
+    /// Whether the run made its dataset, of named_dataset.
+    bool made_dataset() const;
     /// The option's text in config.json; empty if it is not a text.
     std::string text(const char* option) const;
     /// Whether the option is a flag that is set.
     bool flag(const char* option) const;
 };
 
+/// Whether the folder has config.json, and beside it what a run has that has begun: other programs also write a config.json.
+bool is_run(const std::filesystem::path& folder);
+
+/// The folder that a path of the run's config.json is relative to: empty for the current one, or any folder above the run.
+/// No value if the path names nothing there.
+std::optional<std::filesystem::path> base_of(const std::filesystem::path& run,
+                                             const std::filesystem::path& named);
+
 /// The run whose folder this is, also if it has just begun: with config.json, splats.ply or metrics.jsonl. Empty for
 /// any other path. The dataset is searched relative to the folder where the training was started: the current one, or
 /// any folder above the run.
 std::optional<Run> find_run(const std::filesystem::path& folder);
 
-/// The run that wrote this splat file: it is splats.ply, and config.json is beside it. Empty for any other path.
+/// The run that wrote this splat file: it is splats.ply, or one that --keep keeps, and config.json is beside it. Empty for any other path.
 std::optional<Run> run_of_splats(const std::filesystem::path& splats);
 
-/// The folder of the run that this path is a file of, also through symbolic links: it has a name of kRunFiles, and a
+/// The folder of the run that this path is a file of, also through symbolic links: it has the name of such a file, and a
 /// run's config.json is in its folder. The file itself need not exist. Empty for any other path.
 std::optional<std::filesystem::path> run_of_file(const std::filesystem::path& file);
 

@@ -31,11 +31,12 @@ std::string headline(const ReportData& data) {
     std::string html =
         fmt::format("<h1>{}</h1>\n<p class=\"soft\">{} steps on {}{}</p>\n", escape_html(data.title), s.steps,
                     escape_html(s.device), s.interrupted ? " — interrupted before the end" : "");
+    for (const std::string& note : data.notes) html += "<p class=\"soft\">" + escape_html(note) + "</p>\n";
     for (const std::string& remark : data.remarks)
         html += "<p class=\"warn\">" + escape_html(remark) + "</p>\n";
     const std::pair<uint64_t, const char*> warnings[] = {
         {s.skipped_nonfinite, "splats with a value that is not finite are skipped."},
-        {s.limited_steps, "steps were too long for their splat and were shortened."},
+        {shortens_many(s) ? s.limited_steps : 0, "steps were too long for their splat and were shortened."},
         {s.dropped_updates, "parameter updates were not finite and were dropped."}};
     for (const auto& [count, what] : warnings)
         if (count > 0) html += fmt::format("<p class=\"warn\">{} {}</p>\n", count, what);
@@ -126,7 +127,7 @@ std::string settings(const ReportData& data) {
 
 std::string html_report(const ReportData& data) {
     return html_page(data.title, headline(data) + views_html(data.views, data.held_out) +
-                                     charts(data.metrics) + step_time_html(data.times) +
+                                     charts(data.metrics) + step_time_html(data.times, data.earlier_steps) +
                                      ranks_html(data.summary.ranks) + chunks_html(data.summary.chunks) +
                                      data.section + plan(data.plan) + settings(data));
 }

@@ -17,8 +17,10 @@ struct ReportData {
     Summary summary;
     std::vector<MetricsLine> metrics;
     StepTime times;
+    int earlier_steps = 0;  // of the run that this one continues: `times` has those after them
     std::vector<PlanLine> plan;
-    std::vector<std::string> remarks;                           // e.g. "3 images are missing"
+    std::vector<std::string> notes;                             // e.g. "at most 500000 splats: ..."
+    std::vector<std::string> remarks;                           // warnings, e.g. "3 images are missing"
     std::vector<std::pair<std::string, std::string>> settings;  // name, value
     std::vector<ReportView> views;                              // sorted
     std::string section;                                        // HTML that the report contains as it is

@@ -111,7 +111,7 @@ std::string ranks_html(const std::vector<RankFigures>& ranks) {
            "</table>\n<p class=\"soft\">A rank waits until the others have come as far as it has.</p>\n";
 }
 
-std::string step_time_html(const StepTime& time) {
+std::string step_time_html(const StepTime& time, int earlier) {
     if (time.steps == 0 || !(time.step > 0)) return "";
     const std::vector<StageTime> all = stages_of(time);
     double longest = 0;
@@ -122,10 +122,12 @@ std::string step_time_html(const StepTime& time) {
     for (const StageTime& stage : all) html += row(stage, time.step, longest);
     html += fmt::format(
         "<tr><td><b>a step</b></td><td class=\"number\">{:.3f}</td><td></td><td class=\"bar\"></td></tr>\n"
-        "</table>\n<p class=\"soft\">Means over {} steps. Where steps overlap on the device, its passes are "
+        "</table>\n<p class=\"soft\">Means over {} steps{}. Where steps overlap on the device, its passes "
+        "are "
         "timed "
         "in every 100th step.</p>\n",
-        time.step, time.steps);
+        time.step, time.steps,
+        earlier > 0 ? fmt::format(", after the run was resumed at step {}", earlier) : "");
     return html + single_passes(time.passes);
 }
 

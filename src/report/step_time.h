@@ -30,8 +30,8 @@ struct StageTime {
 /// The stages of a step. They add up to time.step. Passes that were measured to take longer than the step are scaled.
 std::vector<StageTime> stages_of(const StepTime& time);
 
-/// The stages as a table, with the single passes below; empty without a step.
-std::string step_time_html(const StepTime& time);
+/// The stages as a table, with the single passes below; empty without a step. earlier: steps before the measured ones.
+std::string step_time_html(const StepTime& time, int earlier = 0);
 
 /// What the ranks of a run exchanged, as a table; empty without ranks.
 std::string ranks_html(const std::vector<RankFigures>& ranks);

@@ -99,6 +99,10 @@ Json to_json(const MetricsLine& line) {
     return json;
 }
 
+bool shortens_many(const Summary& summary) {
+    return double(summary.limited_steps) > 1e-3 * double(summary.steps) * double(summary.splats);
+}
+
 uint64_t whole_number(const Json& object, const char* name, uint64_t most) {
     const auto found = object.is_object() ? object.find(name) : object.end();
     if (found == object.end() || !found->is_number_unsigned() || found->get<uint64_t>() > most)
@@ -162,7 +166,7 @@ MetricsLog::MetricsLog(const std::filesystem::path& path, const std::vector<Metr
 void MetricsLog::append(const MetricsLine& line) {
     // Device and driver names and paths may hold bytes that are not UTF-8; those become U+FFFD.
     file_ << to_json(line).dump(-1, ' ', false, Json::error_handler_t::replace) << '\n' << std::flush;
-    if (!file_) throw RunError("cannot write " + path_.string() + ": " + std::strerror(errno));
+    if (!file_) core::fail_to_write(path_, "cannot be written", errno);
 }
 
 }  // namespace ewa::report

@@ -23,6 +23,9 @@ Json to_json(const Summary& summary);
 /// A sentence without a full stop.
 std::string cameras_text(const CameraMoves& moves);
 
+/// Whether more updates were shortened than the few of ordinary scenes: one in a thousand.
+bool shortens_many(const Summary& summary);
+
 /// The whole number in 0..most that an object has under this name. Throws InputError if it has none.
 uint64_t whole_number(const Json& object, const char* name, uint64_t most);
 /// The number under this name; NaN for null. Throws InputError if there is neither.

@@ -10,9 +10,6 @@
 
 namespace ewa::report {
 
-/// The file's name. TensorBoard looks for "tfevents" in it.
-constexpr const char* kEventsFile = "events.out.tfevents.0.ewa";
-
 /// Writes the figures of each line of metrics.jsonl as scalars: train/loss, train/psnr, train/splats, train/steps_per_second,
 /// and test/ with the name of each metric. A figure that is not finite is skipped. As in MetricsLog, each line reaches the
 /// operating system at once.

@@ -12,8 +12,10 @@
 #include "core/text.h"
 #include "core/typing.h"
 #include "ewa/error.h"
+#include "io/datasets/dataset_folders.h"
 #include "report/summary.h"
 #include "train/checkpoint.h"
+#include "train/run_files.h"
 
 namespace ewa::train {
 namespace {
@@ -21,7 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kReplace = "--force replaces it, -o DIR takes another folder";
+constexpr const char* kReplace = "-o DIR takes another folder, --force replaces it";
 
 /// The facts of a run that an error names.
 struct EarlierRun {
@@ -63,9 +65,21 @@ std::string described(const EarlierRun& run) {
                        run.psnr ? fmt::format(" ({:.2f} dB)", *run.psnr) : "", kReplace);
 }
 
+/// Throws InputError if the run would lie among photos. A run that lies there already may go on.
+void check_no_dataset(const fs::path& folder, const RunOptions& options) {
+    if (options.resume && core::is_file(folder / "checkpoint.ewa")) return;
+    io::check_output_folder("-o", folder);
+    std::error_code missing;
+    for (const fs::path& photos : {options.scene, options.scene / "images"})
+        if (!options.scene.empty() && fs::equivalent(folder, photos, missing))
+            throw InputError("-o " + core::one_line(folder.string()) +
+                             " holds the photos, where no outputs belong; name another folder");
+}
+
 }  // namespace
 
 void check_free(const fs::path& folder, const RunOptions& options) {
+    check_no_dataset(folder, options);
     if (options.force) return;
     const auto has = [&](const char* file) { return core::is_file(folder / file); };
     const std::string where = core::one_line(folder.string()) + ": ";
@@ -77,7 +91,7 @@ void check_free(const fs::path& folder, const RunOptions& options) {
             run->psnr = summary->psnr;
         throw InputError(where + described(*run));
     }
-    if (!has("splats.ply") && !has("summary.json")) return;
+    if (!has("splats.ply") && !has("summary.json") && kept_splats(folder).empty()) return;
     // Splats are saved just before the checkpoint. A kill between the two leaves no summary.
     if (options.resume && has("metrics.jsonl") && !has("summary.json")) return;
     const auto run = from_summary(folder);

@@ -10,7 +10,8 @@ namespace ewa::train {
 /// Throws InputError if the folder has the result or the checkpoint of a run which the new one would replace. The
 /// message says which run that is, and the ways out. A folder that does not exist is free.
 /// With options.resume, only a result without a checkpoint is refused. The splats of a run that was killed before its
-/// first checkpoint count as free. With options.force, nothing is refused.
+/// first checkpoint count as free. With options.force, no run is refused.
+/// Also throws InputError if the folder is a dataset, or a folder of images.
 void check_free(const std::filesystem::path& folder, const RunOptions& options);
 
 }  // namespace ewa::train

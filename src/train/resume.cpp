@@ -18,7 +18,7 @@ using Json = nlohmann::ordered_json;
 
 // Of an option's value in an error. The checkpoint may come from a stranger.
 constexpr size_t kLongestValue = 200;
-constexpr const char* kWaysOut = "; --force starts anew, -o DIR takes another folder";
+constexpr const char* kWaysOut = "; -o DIR starts another run, --force replaces this one";
 constexpr double kLeastPause = 30;      // seconds
 constexpr double kPausePerSaving = 50;  // times the duration of a save
 
@@ -116,7 +116,7 @@ int continue_from(const std::filesystem::path& path, const Checkpoint& earlier, 
     if (options.train.steps < step)
         throw InputError(path.string() + ": is at step " + std::to_string(step) +
                          ", after the last of --steps " + std::to_string(options.train.steps) +
-                         "; give a larger --steps" + kWaysOut);
+                         "; a larger --steps trains it further, -o DIR starts another run");
     options.train.least_max_splats = cap_of(then);
     options.train.least_sh_degree = reached(then, "sh_degree", 0, kMaxShDegree);
     options.train.most_halvings =
@@ -152,12 +152,14 @@ void check_resumable(const std::filesystem::path& path, const std::string& store
         if (other.is_null() && !option.before.empty()) other = normalised(option, option.before);
         if (normalised(option, other) != value)
             throw InputError(path.string() + ": was written with --" + name + " " +
-                             other.dump().substr(0, kLongestValue) + ", not " + value.dump() + kWaysOut);
+                             other.dump().substr(0, kLongestValue) + ", not " + value.dump() +
+                             "; with its own value the run continues, -o DIR starts another run");
     }
     // Options such as --downscale change the dataset too, and say more.
     if (then.value("dataset", Json()) != now["dataset"])
-        throw InputError(path.string() + ": is of another dataset, or its images or cameras have changed" +
-                         kWaysOut);
+        throw InputError(path.string() +
+                         ": is of another dataset, or its images or cameras have changed; with the "
+                         "former images it continues, -o DIR starts another run");
 }
 
 std::string resume_remark(const std::string& stored, const Json& now) {

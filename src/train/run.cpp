@@ -11,22 +11,27 @@
 #include <optional>
 #include <utility>
 
+#include "core/atomic_file.h"
 #include "core/folders.h"
 #include "core/outputs.h"
 #include "core/typing.h"
 #include "ewa/error.h"
 #include "ewa/renderer.h"
 #include "gpu/device.h"
+#include "io/datasets/dataset_folders.h"
 #include "pipeline/model.h"
 #include "report/pictures.h"
+#include "report/run_file_names.h"
 #include "report/step_time.h"
 #include "report/tensorboard.h"
 #include "report/views.h"
 #include "scene/dataset_files.h"
 #include "train/agreement.h"
 #include "train/checkpoint.h"
+#include "train/disk_room.h"
 #include "train/earlier_run.h"
 #include "train/evaluation.h"
+#include "train/inria_files.h"
 #include "train/refined_cameras.h"
 #include "train/resume.h"
 #include "train/run_files.h"
@@ -101,17 +106,16 @@ std::vector<std::filesystem::path> render_files(const train::RunInput& input) {
 /// writes, since that has the same options.
 const std::filesystem::path& checked_folder(const train::RunInput& input) {
     const std::filesystem::path& folder = input.options.output;
+    if (!input.options.resume || !core::is_file(folder / report::kCheckpointFile))
+        io::check_output_folder("-o", folder, input.dataset);
     std::vector<core::NamedFile> written, read = scene::files_of(input.dataset, "DATASET");
-    for (const char* name :
-         {"config.json", "metrics.jsonl", "checkpoint.ewa", "times.json", "splats.ply", "summary.json",
-          "report.html", "exposures.json", "cameras.json", "cameras/sparse/0/cameras.bin",
-          "cameras/sparse/0/images.bin", "cameras/sparse/0/points3D.bin", report::kEventsFile})
-        written.push_back({"the run's file", folder / name});
+    for (const char* name : report::kRunFiles) written.push_back({"the run's file", folder / name});
+    for (const char* name : report::kCameraModelFiles) written.push_back({"the run's file", folder / name});
     const auto renders = render_files(input);
     for (const int index : saved_frames(input.split))
         written.push_back({"the run's render", renders[size_t(index)]});
     if (input.options.init != "sfm" && input.options.init != "random")
-        read.push_back({"--init", input.options.init});
+        read.push_back({"--init", input.options.init_folder / input.options.init});
     read.push_back({"DATASET", input.options.scene});
     read.push_back({"--lpips-weights", input.options.lpips_weights});
     core::check_outputs(written, read);
@@ -147,13 +151,15 @@ class Run {
     void restore(Trainer& trainer);
     void restore_times();
     void save_splats(const Gaussians& gaussians) const;
-    void save_result(const Trainer& trainer);
+    void keep_splats(const Gaussians& gaussians) const;
+    void save_result(const Trainer& trainer, bool kept);
     bool refines() const { return options().train.refine_poses; }
     void use_refined_cameras(const Trainer& trainer);
     void use_given_cameras();
     void align_test_cameras(const Gaussians& gaussians, const std::function<void()>& before_frame);
     void save_cameras(bool aligned) const;
     void save_checkpoint(const Trainer& trainer);
+    void save_what_fits(const Trainer& trainer);
     void train(Trainer& trainer);
     void after_step(Trainer& trainer, int before);
     void log(const std::optional<Evaluation>& evaluation);
@@ -196,6 +202,8 @@ class Run {
     std::optional<Evaluation> last_evaluation_;
     report::ReportData report_;
     std::filesystem::path first_render_;
+    int checkpoint_step_ = -1;      // of checkpoint.ewa; -1: there is none
+    mutable int splats_step_ = -1;  // of splats.ply, if this run wrote it
 };
 
 void Run::read_checkpoint() {
@@ -236,8 +244,10 @@ void Run::choose_cap() {
     report_.summary.max_splats = cap.splats;
     settings_["cap"] = cap.splats;
     if (train.max_splats == kAutomaticMaxSplats && train.strategy != Strategy::none)
-        input_.remarks.push_back(fmt::format("at most {}: {}; --max-splats N sets another limit",
-                                             core::counted(cap.splats, "splat"), cap.reason));
+        input_.notes.push_back(fmt::format("at most {}: {}; --max-splats N sets another limit",
+                                           core::counted(cap.splats, "splat"), cap.reason));
+    const std::string full = train::check_disk_room(folder_.path(), input_.start.size(), cap.splats, train);
+    if (!full.empty()) input_.remarks.push_back(full);
 }
 
 /// Opens the device and tells the observer what the run begins with.
@@ -245,6 +255,7 @@ void Run::start() {
     device_ = open_device(options().device);
     choose_cap();
     report_.title = input_.name;
+    report_.notes = input_.notes;
     report_.remarks = input_.remarks;
     report::Summary& summary = report_.summary;
     summary.device = device_info(*device_).name;
@@ -265,7 +276,8 @@ void Run::start() {
     start.train = options().train;
     start.max_splats = report_.summary.max_splats;
     start.evaluated = evaluated_views();
-    start.remarks = input_.remarks;
+    start.remarks = input_.notes;
+    start.remarks.insert(start.remarks.end(), input_.remarks.begin(), input_.remarks.end());
     start.device = device_info(*device_);
     start.memory =
         estimate_memory(*device_, input_.dataset, input_.split.train, input_.start, options().train);
@@ -288,6 +300,7 @@ void Run::restore(Trainer& trainer) {
         throw InputError(folder_.checkpoint().string() + ": " + error.what() + "; --force starts anew");
     }
     last_ = earlier_->head().report;
+    checkpoint_step_ = report_.earlier_steps = last_.step;
     const int steps = options().train.steps;
     // The checkpoint of a finished run lacks the line of its last evaluation.
     if (steps > earlier_steps_ && last_.step == earlier_steps_)
@@ -323,11 +336,19 @@ void Run::restore_times() {
 
 void Run::save_splats(const Gaussians& gaussians) const {
     folder_.save_splats(gaussians, last_.step, options().train.render);
+    splats_step_ = last_.step;
 }
 
-/// The splats, and the cameras that belong to them.
-void Run::save_result(const Trainer& trainer) {
-    save_splats(trainer.gaussians());
+void Run::keep_splats(const Gaussians& gaussians) const {
+    if (options().keep > 0)
+        folder_.keep_splats(gaussians, last_.step, options().train.render, options().keep);
+}
+
+/// The splats, and the cameras that belong to them. kept: of a step that --keep counts.
+void Run::save_result(const Trainer& trainer, bool kept) {
+    const Gaussians gaussians = trainer.gaussians();
+    save_splats(gaussians);
+    if (kept) keep_splats(gaussians);
     if (!refines()) return;
     use_refined_cameras(trainer);
     save_cameras(false);
@@ -373,7 +394,23 @@ void Run::save_checkpoint(const Trainer& trainer) {
                                    report::metrics_text(train::without_times(report_.metrics)));
     trainer.save(writer);
     writer.commit();
+    checkpoint_step_ = last_.step;
     pace_.saved(seconds_since(start));
+}
+
+/// After a write that found the disk full: the checkpoint, or the smaller splats.
+void Run::save_what_fits(const Trainer& trainer) {
+    // Other ranks may be in the middle of a step or of a checkpoint.
+    if (draws_with_ranks() || checkpoint_step_ == last_.step) return;
+    try {
+        save_checkpoint(trainer);
+    } catch (const core::FullDisk&) {
+        try {
+            if (splats_step_ != last_.step) save_splats(trainer.gaussians());
+        } catch (const core::FullDisk&) {
+            // The error that the user sees says what is left.
+        }
+    }
 }
 
 void Run::log(const std::optional<Evaluation>& evaluation) {
@@ -412,11 +449,12 @@ void Run::after_step(Trainer& trainer, int before) {
         last_ = trainer.report();  // the step's own, also where steps overlap
         log(evaluation);
     }
+    // The checkpoint comes first: with it alone, no step is lost where the disk is full.
     if (options().save_every > 0 ? at(options().save_every) : pace_.due()) save_checkpoint(trainer);
-    if (at(options().save_every)) save_result(trainer);
+    if (at(options().save_every)) save_result(trainer, true);
     observer_.between_steps(last_, trainer, [&] {
-        save_result(trainer);
         save_checkpoint(trainer);
+        save_result(trainer, false);
     });
 }
 
@@ -432,6 +470,9 @@ void Run::train(Trainer& trainer) {
     } catch (const InputError&) {
         // An image that vanished is found before the step changes the splats. Other ranks may be in the middle of it.
         if (options().ranks->size() == 1) save_checkpoint(trainer);
+        throw;
+    } catch (const core::FullDisk&) {
+        save_what_fits(trainer);
         throw;
     }
 }
@@ -500,7 +541,7 @@ void Run::add_view(int index, const train::RenderedView& view, const EvalFrame& 
     if (std::find(saved.begin(), saved.end(), index) == saved.end()) return;
     const std::filesystem::path file = render_files(input_)[size_t(index)];
     core::make_folder(file.parent_path());
-    save_image(file, view.rendering);
+    save_image(train::without_link(file), view.rendering);
     if (first_render_.empty()) first_render_ = file;
 }
 
@@ -546,15 +587,22 @@ void Run::fill_summary() {
 void Run::finish(std::unique_ptr<Trainer> trainer) {
     const Gaussians gaussians = trainer->gaussians();
     const std::vector<Exposure> exposures = trainer->exposures();
+    try {
+        save_checkpoint(*trainer);  // from here on, neither a kill nor a full disk costs training
+    } catch (const core::FullDisk&) {
+        save_what_fits(*trainer);
+        throw;
+    }
     save_splats(gaussians);
+    if (options().save_every > 0 && last_.step % options().save_every == 0) keep_splats(gaussians);
     if (refines()) {
         use_refined_cameras(*trainer);
         save_cameras(false);
         report_.summary.cameras =
             train::moves_of(input_.dataset, input_.split.train, given_cameras_, extent_);
     }
+    if (options().inria) train::save_inria(folder_.path(), input_, gaussians, last_.step);
     if (options().train.exposure) folder_.save_exposures(input_.dataset, input_.split.train, exposures);
-    save_checkpoint(*trainer);  // from here on, a kill costs no training
     report_.times = report_times(trainer->step_times());
     report_.summary.ranks = trainer->rank_figures();
     report_.summary.chunks = trainer->chunk_figures();
@@ -610,8 +658,12 @@ RunResult Run::run() {
     restore(trainer);
     begin_files();
     observer_.on_begin(folder_.path(), report_.metrics);
-    train(trainer);
-    finish(std::move(owned));
+    try {
+        train(trainer);
+        finish(std::move(owned));
+    } catch (const core::FullDisk& error) {
+        throw RunError(error.what() + train::after_full_disk(last_.step, checkpoint_step_, splats_step_));
+    }
     return {report_.summary, folder_.path(), first_render_};
 }
 

@@ -2,6 +2,7 @@
 // The files in a run's folder.
 #pragma once
 #include <filesystem>
+#include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
@@ -10,9 +11,20 @@
 #include "core/folders.h"
 #include "ewa/run.h"
 #include "report/html.h"
+#include "report/run_file_names.h"
 #include "train/refined_cameras.h"
 
 namespace ewa::train {
+
+/// Writes splats with comments that say what made them. Throws RunError.
+void write_splats(const std::filesystem::path& file, const Gaussians& gaussians, int step,
+                  const RenderOptions& render);
+
+/// Removes a symbolic link at the path, through which nothing is to be written. Returns the path.
+const std::filesystem::path& without_link(const std::filesystem::path& path);
+
+/// The splats that --keep kept in a run's folder, by their steps.
+std::map<int, std::filesystem::path> kept_splats(const std::filesystem::path& folder);
 
 /// A run's folder. No other process can train in it while this lives.
 class RunFolder {
@@ -21,17 +33,20 @@ class RunFolder {
     explicit RunFolder(const std::filesystem::path& path);
 
     const std::filesystem::path& path() const { return path_; }
-    std::filesystem::path checkpoint() const { return path_ / "checkpoint.ewa"; }
-    std::filesystem::path times() const { return path_ / "times.json"; }
-    std::filesystem::path metrics() const { return path_ / "metrics.jsonl"; }
+    std::filesystem::path checkpoint() const { return path_ / report::kCheckpointFile; }
+    std::filesystem::path times() const { return path_ / report::kTimesFile; }
+    std::filesystem::path metrics() const { return path_ / report::kMetricsFile; }
 
     // All of these throw RunError.
-    /// Writes config.json. If the run does not continue an earlier one, removes that run's checkpoint and results,
+    /// Writes config.json, after the removal of symbolic links in the places of the run's files: a folder from an archive
+    /// may have some, which lead out of it. If the run does not continue an earlier one, removes that run's checkpoint and results,
     /// but splats.ply: they must not stay beside this run's metrics if it fails.
     void begin(const nlohmann::ordered_json& config, bool continues) const;
     /// The last line of metrics.jsonl for this step, if there is one.
     std::optional<MetricsLine> logged(int step) const;
     void save_splats(const Gaussians& gaussians, int step, const RenderOptions& render) const;
+    /// The same as one of the last `count` kept splats. Removes those before.
+    void keep_splats(const Gaussians& gaussians, int step, const RenderOptions& render, int count) const;
     /// exposures: one for each of the training frames.
     void save_exposures(const Dataset& dataset, const std::vector<int>& frames,
                         const std::vector<Exposure>& exposures) const;
@@ -43,6 +58,8 @@ class RunFolder {
     void save_report(const report::ReportData& report) const;
 
   private:
+    void remove_links() const;
+
     std::filesystem::path path_;
     core::FolderLock lock_;
 };

@@ -150,18 +150,18 @@ void add_remarks(RunInput& input) {
     if (const auto remark = idle_ranks_remark(input.options.train, input.options.ranks->size()))
         input.remarks.push_back(*remark);
     if (input.without_view_dependence())
-        input.remarks.emplace_back("the dataset says that no colour depends on the view: SH degree 0");
+        input.notes.emplace_back("the dataset says that no colour depends on the view: SH degree 0");
     if (input.options.init == "sfm" && dataset.points.positions.empty())
         input.remarks.emplace_back("the dataset has no points: training starts from random splats");
     if (const size_t points = dataset.points.positions.size();
         input.options.init == "sfm" && points > 0 && input.start.size() > points)
-        input.remarks.push_back(
+        input.notes.push_back(
             fmt::format("{} start between neighbouring points; --dense-start off prevents that",
                         core::counted(input.start.size() - points, "splat")));
     if (const std::filesystem::path dense = dataset.root / "fused.ply";
         input.options.init == "sfm" && core::is_file(dense) &&
         std::ranges::find(dataset.files, dense) == dataset.files.end())
-        input.remarks.push_back("a dense cloud is there, too: --init " + dense.string() + " starts from it");
+        input.notes.push_back("a dense cloud is there, too: --init " + dense.string() + " starts from it");
     const uint64_t unreadable = dataset.unreadable.size(),
                    missing = uint64_t(dataset.missing_images) - unreadable;
     if (missing > 0)
@@ -174,7 +174,7 @@ void add_remarks(RunInput& input) {
                                             core::counted(uint64_t(dataset.dropped_points), "point"),
                                             core::is_or_are(uint64_t(dataset.dropped_points))));
     if (input.options.train.render.kernel == Footprint::density)
-        input.remarks.emplace_back(
+        input.notes.emplace_back(
             "opacities in splats.ply are fitted to 3DGS's kernel, so that other viewers show about the same");
     if (const auto remark = too_short_remark(input.options.train)) input.remarks.push_back(*remark);
 }
@@ -268,6 +268,7 @@ Gaussians splats_of(const PointCloud& points, const RunOptions& options, const D
 
 Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, const std::vector<int>& frames) {
     const int degree = options.train.sh_degree;
+    const std::filesystem::path file = options.init_folder / options.init;
     Gaussians start;
     if (options.init == "sfm") {
         if (dataset.dropped_points > 0)
@@ -282,8 +283,8 @@ Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, cons
         const uint32_t most = options.train.max_splats;
         const uint32_t count = most == kAutomaticMaxSplats ? kRandomSplats : std::min(kRandomSplats, most);
         start = random_gaussians(dataset, frames, static_cast<int>(count), options.train.seed, degree);
-    } else if (options.init != "sfm" && io::is_point_cloud(options.init)) {
-        const io::PlyPoints cloud = io::read_points_ply(options.init);
+    } else if (options.init != "sfm" && io::is_point_cloud(file)) {
+        const io::PlyPoints cloud = io::read_points_ply(file);
         if (cloud.dropped.count > 0)
             throw InputError(
                 fmt::format("{}: a coordinate is not finite ({} such points in all); remove them",
@@ -291,7 +292,7 @@ Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, cons
         start = splats_of(cloud.points, options, dataset, frames);
     } else if (options.init != "sfm") {
         refuse_dense_start(options, options.init);
-        start = load_splats(options.init);
+        start = load_splats(file);
         set_sh_degree(start, degree);
         if (options.train.render.points) make_opaque(start);
         const RunOptions usual;
@@ -374,6 +375,7 @@ fs::path output_folder(const RunOptions& options) {
 
 void check_options(const RunOptions& options) {
     if (options.resume && options.force) throw InputError("--resume and --force exclude each other");
+    if (options.keep > 0 && options.save_every == 0) throw InputError("--keep is an option of --save-every");
     const TrainOptions& train = options.train;
     if (train.strategy != Strategy::adc && train.strategy != Strategy::automatic &&
         (train.absolute_gradients || train.revised_opacity))

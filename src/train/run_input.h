@@ -15,7 +15,8 @@ struct RunInput {
     Dataset dataset;
     Split split;
     Gaussians start;
-    std::vector<std::string> remarks;  // for the user and the report
+    // For the user and the report: what ewa chose, and what may be wrong.
+    std::vector<std::string> notes, remarks;
 
     /// The dataset says that SH degree 0 suffices, and the run uses that.
     bool without_view_dependence() const {

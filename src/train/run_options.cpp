@@ -292,6 +292,24 @@ RunOption tensorboard_option() {
     return option;
 }
 
+RunOption keep_option() {
+    RunOption option = number<int>(
+        "keep", "N",
+        "With --save-every: also keep the splats of the last N saves, as splats_007000.ply and so on",
+        kDoesNotDecide, [](RunOptions& o) -> int& { return o.keep; }, 0, 1000000);
+    return option;
+}
+
+RunOption inria_option() {
+    RunOption option =
+        flag("inria",
+             "Also write DIR/inria with cfg_args, cameras.json, input.ply and point_cloud/, as "
+             "INRIA's trainer does: SIBR's viewers open it",
+             [](RunOptions& o) -> bool& { return o.inria; });
+    option.decides_result = false;
+    return option;
+}
+
 RunOption background_option() {
     RunOption option{
         "background", "COLOUR",
@@ -415,6 +433,8 @@ std::vector<RunOption> make_table() {
             "Save splats.ply and checkpoint.ewa every N steps. 0: save the checkpoint every 30 seconds or "
             "more",
             kDoesNotDecide, [](RunOptions& o) -> int& { return o.save_every; }, 0, kMostSteps),
+        keep_option(),
+        inria_option(),
         words("device", "NAME|N", "Number of a device, or part of its name (see ewa devices)", kDoesNotDecide,
               [](RunOptions& o) -> std::string& { return o.device.selector; }),
         number<int>(

@@ -122,6 +122,8 @@ TEST_F(Faults, FullDisk) {
         if (outcome.status == 0) continue;
         expect_failure(outcome, 1, "No space left");
         EXPECT_NE(outcome.err.find("/o/"), std::string::npos) << outcome.err;
+        const bool known = outcome.err.find("free some space, then --resume") != std::string::npos;
+        EXPECT_EQ(fs::exists(folder / "o/checkpoint.ewa"), known) << outcome.err;
         expect_no_traces("o");
     }
     expect_failure(train("p", {}, with_fault("EWA_FAULT_BYTES", "100")), 1, "No space left");

@@ -289,18 +289,18 @@ TEST(Outputs, DatasetsStayWhole) {
         expect_failure(run_ewa(arguments), 2, text);
         EXPECT_EQ(whole(), before);
     };
-    refused({"render", splats, "--cameras", data, "-o", data + "/images"}, "an image of --cameras");
+    refused({"render", splats, "--cameras", data, "-o", data + "/images"}, "is a folder of a dataset");
     fs::create_directory_symlink(data + "/images", folder / "link");
-    refused({"render", splats, "--cameras", data, "-o", folder / "link"}, "an image of --cameras");
+    refused({"render", splats, "--cameras", data, "-o", folder / "link"}, "is a folder of a dataset");
     refused({"eval", splats, data, "--json", data + "/transforms.json"}, "a file of DATASET");
     refused({"eval", splats, data + "/transforms.json", "--json", data + "/transforms.json"}, "DATASET");
     refused({"eval", splats, data, "--json", data + "/images/1.png"}, "an image of DATASET");
     fs::create_hard_link(data + "/images/1.png", folder / "hard.ply");
     refused({"grad", splats, data, "--frame", "0", "-o", folder / "hard.ply"}, "an image of DATASET");
     refused({"compare", splats, splats, "--cameras", data, "--heat-map", data + "/images"},
-            "an image of --cameras");
+            "is a folder of a dataset");
 
-    // Held-out images in test/, where a run in the dataset's folder puts its renders.
+    // Held-out images in test/, where a run puts its renders.
     make_dataset(folder / "blender", {"test/0.png", "test/1.png", "test/2.png"});
     fs::rename(folder / "blender/images/test", folder / "blender/test");
     auto json = read_json(folder / "blender/transforms.json");
@@ -310,7 +310,9 @@ TEST(Outputs, DatasetsStayWhole) {
     const std::string image = read_file(folder / "blender/test/0.png");
     expect_failure(
         run_ewa({"train", folder / "blender", "-o", folder / "blender", "--init", splats, "--steps", "1"}), 2,
-        "an image of DATASET");
+        "is a dataset");
+    expect_failure(run_ewa({"render", splats, "--cameras", folder / "blender", "-o", folder / "blender/test"}),
+                   2, "holds images of");
     EXPECT_EQ(read_file(folder / "blender/test/0.png"), image);
     fs::create_directory(folder / "o");
     fs::rename(splats, folder / "o/splats.ply");

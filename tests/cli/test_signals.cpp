@@ -29,7 +29,7 @@ Circumstances storm(int first, int signal) {
 }
 
 TEST_F(Signals, AskATrainingToEnd) {
-    for (const int signal : {SIGTERM, SIGHUP, SIGINT, SIGUSR1})
+    for (const int signal : {SIGTERM, SIGHUP, SIGINT, SIGUSR1, SIGXCPU})
         for (const int submission : signal == SIGTERM ? std::vector{1, 2, 20, 55} : std::vector{20}) {
             std::string out = std::to_string(signal);
             out.append("_").append(std::to_string(submission));
@@ -79,6 +79,11 @@ TEST_F(Signals, EndTheEvaluationOfAFinishedTraining) {
         expect_no_traces("o");
     }
     EXPECT_GT(cut_short, 1);
+    const Outcome told = run_ewa({"train", folder / "o", "--resume"}, storm(16, SIGTERM));
+    EXPECT_EQ(told.status, 130);
+    EXPECT_NE(told.out.find("trained 60 steps"), std::string::npos) << told.out;
+    EXPECT_NE(told.out.find("the evaluation was interrupted; to complete it: ewa train"), std::string::npos)
+        << told.out;
     expect_goes_on("o");
 }
 

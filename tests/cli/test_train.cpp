@@ -183,7 +183,7 @@ TEST_F(Train, InterruptKeepsWhatIsThere) {
         const Outcome outcome = train(out, {"--steps", "100000000", "--strategy", "none"}, interrupt);
         EXPECT_EQ(outcome.status, 130) << outcome.err;
         EXPECT_EQ(outcome.err, "");
-        EXPECT_TRUE(outcome.out.ends_with("to continue, repeat the command with --resume\n")) << outcome.out;
+        EXPECT_TRUE(outcome.out.ends_with("to continue: ewa train " + (folder / out) + " --resume\n")) << outcome.out;
         const auto summary = read_json(folder / (out + "/summary.json"));
         EXPECT_EQ(summary["interrupted"], true);
         EXPECT_GE(summary["steps"].get<int>(), 1);
@@ -199,7 +199,7 @@ TEST_F(Train, RefusesTheFolderOfAnotherRun) {
             all += file + "\n" + read_file((folder / out) + "/" + file);
         return all;
     };
-    const std::string ways = "--force replaces it, -o DIR takes another folder";
+    const std::string ways = "-o DIR takes another folder, --force replaces it";
     const auto refused = [&](const std::string& out, const Names& more, const std::string& text) {
         const std::string before = files(out);
         const Outcome outcome = train(out, more);
@@ -260,7 +260,7 @@ TEST_F(Train, FullDiskKeepsTheEarlierSplats) {
     expect_success(train("o", {"--steps", "1", "--quiet"}));
     const std::string before = read_file(folder / "o/splats.ply");
     const Circumstances full = with_fault("EWA_FAULT_BYTES", "4096");
-    expect_failure(train("o", {"--steps", "2", "--quiet", "--force"}, full), 1, "splats.ply");
+    expect_failure(train("o", {"--steps", "2", "--quiet", "--force"}, full), 1, "no checkpoint fitted");
     EXPECT_EQ(read_file(folder / "o/splats.ply"), before);
     for (const char* gone : {"o/summary.json", "o/checkpoint.ewa", "o/times.json"})
         EXPECT_FALSE(fs::exists(folder / gone)) << gone;

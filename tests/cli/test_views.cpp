@@ -283,7 +283,7 @@ TEST_F(Views, AFrameOfADatasetIsAnImage) {
     const Names before = files_below(data);
     for (const char* name : {"data/images", "data/images/new.png"})
         expect_failure(render({"--cameras", data, "--frames", "2", "-o", folder / name}), 2,
-                       "holds the images of the dataset");
+                       "is a folder of a dataset");
     EXPECT_EQ(files_below(data), before);
 
     // A run knows its dataset.
@@ -293,7 +293,7 @@ TEST_F(Views, AFrameOfADatasetIsAnImage) {
     expect_success(run_ewa({"render", run, "-o", folder / "all_of_run"}));
     EXPECT_TRUE(same_pixels(folder / "of_run.png", folder / "all_of_run/2.png"));
     expect_failure(run_ewa({"render", run, "--orbit", "2", "-o", folder / "data/images"}), 2,
-                   "holds the images of the dataset");
+                   "is a folder of a dataset");
 }
 
 }  // namespace

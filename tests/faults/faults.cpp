@@ -8,6 +8,7 @@
 //   EWA_FAULT_ACQUIRE=N,R    the N-th picture of a window cannot be had: the VkResult R
 //   EWA_FAULT_PRESENT=N,R    the N-th picture of a window is shown with the VkResult R
 //   EWA_FAULT_BYTES=N        the disk is full once N bytes have been written to regular files
+//   EWA_FAULT_ROOM=N         every disk says that it has N bytes free
 //   EWA_FAULT_FSYNC=N        from the N-th on, regular files cannot be brought to the disk: a quota's end
 //   EWA_FAULT_CLOSE=N        the same of closing a regular file that has been written
 //   EWA_FAULT_READ_ONLY=DIR  nothing below DIR can be created, changed or removed
@@ -20,6 +21,7 @@
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <sys/stat.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 #include <vulkan/vulkan.h>
 
@@ -210,6 +212,13 @@ int open(const char* path, int flags, ...) {
     const int file = next<int (*)(const char*, int, ...)>("open")(path, flags, mode);
     if (own) temporary = file;
     return file;
+}
+
+int statvfs(const char* path, struct statvfs* disk) {
+    const int result = next<int (*)(const char*, struct statvfs*)>("statvfs")(path, disk);
+    if (const char* room = std::getenv("EWA_FAULT_ROOM"); room && result == 0)
+        disk->f_bavail = fsblkcnt_t(std::atol(room)) / disk->f_frsize;
+    return result;
 }
 
 int fsync(int file) {

@@ -95,7 +95,7 @@ row_an_orbit_and_saved_views_replace_no_input() {
 
 row_photographs_get_no_renders_among_them() {
     run 2 ewa render "$SPLATS" --cameras "$DATASET" -o "$DATASET/images"
-    says "holds the images of the dataset"
+    says "is a folder of a dataset"
     run 2 ewa render "$RUN" --orbit 2 -o "$DATASET/images"
     one_line
     [[ -z $(find "$DATASET/images" -newer "$SPLATS") ]] || fail "a file appeared among the images"

@@ -296,6 +296,8 @@ TEST(RunOptions, TableReadsWhatItWrites) {
                                                    {"refine-focal", "true"},
                                                    {"eval-every", "6"},
                                                    {"save-every", "4"},
+                                                   {"keep", "3"},
+                                                   {"inria", "true"},
                                                    {"device", "cpu"},
                                                    {"rank-timeout", "7"}};
     ASSERT_EQ(train::run_options().size(), other.size());

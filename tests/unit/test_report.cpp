@@ -19,6 +19,7 @@
 #include "report/chart.h"
 #include "report/html.h"
 #include "report/pictures.h"
+#include "report/run_file_names.h"
 #include "report/summary.h"
 #include "report/tensorboard.h"
 #include "support/temp_folder.h"
@@ -204,6 +205,22 @@ TEST(Report, HtmlHoldsEverythingAndNothingFromOutside) {
     for (const char* part :
          {"<script>alert", "src=\"http", "http://", "https://", "url(", "<link", "nan", "@import"})
         EXPECT_EQ(html.find(part), std::string::npos) << part;
+}
+
+TEST(Report, WarnsOnlyOfWhatMatters) {
+    ReportData data = made_up_data();
+    data.notes = {"at most 500 splats: by the pixels"};
+    data.summary.splats = 1000;
+    data.summary.limited_steps = 100;  // of 100,000 updates
+    data.earlier_steps = 40;
+    std::string html = html_report(data);
+    EXPECT_NE(html.find("<p class=\"soft\">at most 500 splats"), std::string::npos);
+    EXPECT_NE(html.find("<p class=\"warn\">3 images are missing"), std::string::npos);
+    EXPECT_NE(html.find("after the run was resumed at step 40"), std::string::npos);
+    EXPECT_EQ(html.find("were shortened"), std::string::npos);
+    data.summary.limited_steps = 101;
+    html = html_report(data);
+    EXPECT_NE(html.find("<p class=\"warn\">101 steps were too long"), std::string::npos);
 }
 
 size_t count_of(const std::string& text, const std::string& part) {
