@@ -10,7 +10,6 @@
 #include "passes/passes.h"
 #include "pipeline/backward.h"
 #include "pipeline/picture.h"
-#include "pipeline/share.h"
 #include "pipeline/views.h"
 
 namespace ewa {

@@ -6,6 +6,7 @@
 
 #include "core/random.h"
 #include "pipeline/picture.h"
+#include "portions/refine.h"
 #include "train/trainer_state.h"
 
 namespace ewa {
@@ -41,8 +42,8 @@ Rates Trainer::State::rates(int step) const {
     r.step = uint32_t(step);
     r.seed = options.seed;
     if (plan.regularised) {
-        r.opacity_weight = float(options.opacity_weight / model.share.all);
-        r.scale_weight = float(options.scale_weight / (3.0 * model.share.all * extent));
+        r.opacity_weight = float(options.opacity_weight / portions.splats());
+        r.scale_weight = float(options.scale_weight / (3.0 * portions.splats() * extent));
     }
     return r;
 }
@@ -64,7 +65,7 @@ train::ImageCache& Trainer::State::images_at(int step) {
 }
 
 FrameRequest Trainer::State::request_of(const CameraUse& camera) const {
-    return {.splats = model.splats,
+    return {.splats = portions.largest(),
             .width = camera.width,
             .height = camera.height,
             .instances = instance_capacity,
@@ -95,6 +96,7 @@ void Trainer::State::record_step(gpu::Recording& recording, int step, size_t ind
             options.random_background ? random_background(step, options.seed) : options.render.background,
         .keep_overflow = !in_flight.empty(),
         .sh_degree = schedule.degree(step)};
+    const Model& model = portions.use(0, portions::Portions::Need::state);
     const Sorted sorted = record_forward(recording, cache, plan, model, frame, inputs);
     record_loss(recording, cache, frame, inputs, photo.texels, photo.masked,
                 plan.exposure ? &exposure : nullptr);
@@ -169,12 +171,13 @@ bool Trainer::State::must_finish(int step) const {
            (options.strategy == Strategy::adc && (schedule.densifies(step) || schedule.resets_opacity(step)));
 }
 
-void Trainer::State::optimise(int step) {
-    submit(step);
-    if (must_finish(step) || cache.config().frames_in_flight == 1) finish_all();
+void Trainer::State::optimise(int first, int last) {
+    if (!fused()) return optimise_several(first, last);
+    submit(first);
+    if (must_finish(first) || cache.config().frames_in_flight == 1) finish_all();
 }
 
-train::BatchView Trainer::State::view_of(int step, train::ImageCache& seen, int sh_degree) {
+portions::StepView Trainer::State::view_of(int step, train::ImageCache& seen, int sh_degree) {
     const size_t index = train::frame_of_step(step, images.count(), options.seed);
     const CameraUse camera = seen.camera(index);
     const FrameInputs inputs{.camera = camera,
@@ -196,28 +199,23 @@ train::BatchView Trainer::State::view_of(int step, train::ImageCache& seen, int 
             .weight = [weight] { return *weight; }};
 }
 
-void Trainer::State::optimise_batch(int first, int last) {
+void Trainer::State::optimise_several(int first, int last) {
     train::ImageCache& seen = images_at(first);
     const int sh_degree = schedule.degree(first);
-    std::vector<train::BatchView> views;
+    std::vector<portions::StepView> views;
     for (int step = first; step <= last; ++step) views.push_back(view_of(step, seen, sh_degree));
-    const train::BatchParts parts = batch_parts();
+    const portions::StepParts parts = step_parts();
     Rates of_step = rates(last);
     of_step.views = uint32_t(views.size());
     Noise of_noise = noise(last);
     of_noise.amplitude *= float(std::sqrt(double(views.size())));
-    const auto more = [&](gpu::Recording& recording, const Model& moved) {
-        if (options.strategy == Strategy::mcmc) record_noise(recording, cache, moved, frame, of_noise);
-    };
-    train::BatchReport drawn;
-    if (chunks) {
-        drawn = chunk_batch.step(parts, *chunks, views, batch_rates(of_step), sh_degree, more);
-    } else {
-        drawn = batch->draw(parts, views);
-        batch->update(
-            parts, batch_rates(of_step), model.share.first, sh_degree,
-            [&](gpu::Recording& recording) { more(recording, model); }, drawn);
-    }
+    portions::StepSums drawn = several.draw(parts, views);
+    several.update(
+        parts, batch_rates(of_step), sh_degree,
+        [&](gpu::Recording& recording, const Model& moved) {
+            if (options.strategy == Strategy::mcmc) record_noise(recording, cache, moved, frame, of_noise);
+        },
+        drawn);
     timed_steps += int(views.size());
     report.loss = drawn.loss;
     report.psnr = drawn.psnr;
@@ -226,24 +224,36 @@ void Trainer::State::optimise_batch(int first, int last) {
     report.limited_steps += drawn.limited_steps;
 }
 
-train::BatchParts Trainer::State::batch_parts() {
-    return {cache, executor, plan, model, frame, instance_capacity, [this] { add_pass_times(); }};
+portions::StepParts Trainer::State::step_parts() {
+    return {cache, executor, plan, frame, instance_capacity, [this] { add_pass_times(); }};
 }
 
 Image Trainer::State::render_own(std::span<const Camera> cameras) {
     std::vector<gpu::Buffer> blocks;
     for (const Camera& camera : cameras)
-        blocks.push_back(upload_camera(*device, camera, cache.config(), model.origin));
-    std::vector<train::BatchView> views;
+        blocks.push_back(upload_camera(*device, camera, cache.config(), portions.origin()));
+    std::vector<portions::StepView> views;
     for (size_t i = 0; i < cameras.size(); ++i) {
         const FrameInputs inputs = inputs_of(blocks[i], cameras[i], options.render);
         views.push_back(
             {.inputs = inputs, .request = request_of(inputs.camera), .record_loss = {}, .weight = {}});
     }
-    train::BatchParts parts = batch_parts();
+    portions::StepParts parts = step_parts();
     parts.submitted = [] {};
-    if (!batch->draw_pictures(parts, views)) return {};
+    if (!several.draw_pictures(parts, views)) return {};
     return Picture(frame).image(shared::PLANE_R, 3);
+}
+
+void Trainer::State::refine(const std::function<void(const Phase&)>& refine) {
+    frame.free_instances();  // the second copy of an array takes its place
+    if (portions.streamed()) {
+        // A value a splat of any portion, and no picture: with mcmc one portion holds all new splats until they are level.
+        frame = {};
+        frame.reserve(*device, cache.config(),
+                      {.splats = portions.largest(), .width = 1, .height = 1, .instances = 1});
+    }
+    refine({cache, executor, frame});
+    if (portions.streamed()) frame = {};
 }
 
 void Trainer::State::follow_up(int step) {
@@ -256,7 +266,7 @@ void Trainer::State::follow_up(int step) {
                           .kernel = options.render.kernel,
                           .seed = options.seed,
                           .step = uint32_t(step)};
-    refine([&](Model& of) { refine_mcmc(cache, executor, of, frame, rules); });
+    refine([&](const Phase& phase) { refine_mcmc(portions, phase, rules); });
 }
 
 void Trainer::State::control_density(int step) {
@@ -272,11 +282,14 @@ void Trainer::State::control_density(int step) {
         rules.seed = options.seed;
         rules.step = uint32_t(step);
         rules.max_splats = options.max_splats;
-        refine([&](Model& of) { densify(cache, executor, of, frame, rules); });
+        refine([&](const Phase& phase) { densify(portions, phase, rules); });
     }
     if (schedule.resets_opacity(step)) {
-        change([&](gpu::Recording& recording, const Model& of) {
-            record_reset_opacity(recording, cache, of, float(logit(kResetOpacity)));
+        portions.visit(portions::Portions::Need::state, [&](int, const Model& model) {
+            gpu::Recording recording(device->limits());
+            record_reset_opacity(recording, cache, model, float(logit(kResetOpacity)));
+            executor.run(recording);
+            portions.changed();
         });
     }
 }

@@ -12,11 +12,11 @@
 #include "ewa/renderer.h"
 #include "ewa/trainer.h"
 #include "gpu/test_device.h"
-#include "pipeline/share.h"
+#include "portions/collect.h"
+#include "portions/portions.h"
 #include "support/temp_folder.h"
 #include "support/thread_ranks.h"
 #include "train/checkpoint.h"
-#include "train/collect.h"
 #include "train/synthetic.h"
 
 namespace ewa::test {
@@ -209,14 +209,22 @@ TEST(Ranks, HandOnBytesInPieces) {
         const size_t rank = size_t(group->rank());
         const uint64_t first = std::accumulate(sizes.begin(), sizes.begin() + group->rank(), uint64_t(0));
         const std::span<const std::byte> own = std::span(all).subspan(first, sizes[rank]);
-        const auto part = train::part_of(*group, sizes, [&](uint64_t offset, std::span<std::byte> into) {
-            EXPECT_EQ(rank, 0u);
-            EXPECT_LE(into.size(), size_t(4) << 20);
-            std::copy_n(all.begin() + std::ptrdiff_t(offset), into.size(), into.begin());
-        });
-        EXPECT_TRUE(std::ranges::equal(part, own));
+        size_t taken = 0;
+        portions::hand_out(
+            *group, sizes,
+            [&](uint64_t offset, std::span<std::byte> into) {
+                EXPECT_EQ(rank, 0u);
+                EXPECT_LE(into.size(), size_t(4) << 20);
+                std::copy_n(all.begin() + std::ptrdiff_t(offset), into.size(), into.begin());
+            },
+            [&](size_t part, const std::vector<std::byte>& bytes) {
+                EXPECT_EQ(part, rank);
+                EXPECT_TRUE(std::ranges::equal(bytes, own));
+                ++taken;
+            });
+        EXPECT_EQ(taken, 1u);
         std::vector<std::byte> joined;
-        train::pass_on(
+        portions::pass_on(
             *group, own,
             [&](uint64_t bytes, uint32_t checksum) {
                 EXPECT_EQ(bytes, all.size());
@@ -339,7 +347,7 @@ TEST(Ranks, EachHoldsItsRange) {
         for (const int ranks : {1, 2, 3, 7, 64}) {
             uint32_t next = 0;
             for (int rank = 0; rank < ranks; ++rank) {
-                const pipeline::Range range = pipeline::range_of(all, rank, ranks);
+                const portions::Range range = portions::range_of(all, rank, ranks);
                 EXPECT_EQ(range.first, next);
                 EXPECT_EQ(range.first % shared::PARAM_BLOCK == 0 || range.splats == 0, true);
                 EXPECT_LE(range.splats, all / uint32_t(ranks) + 2 * shared::PARAM_BLOCK);
@@ -385,8 +393,8 @@ TEST(Ranks, AreRefusedWhatTheyCannotDo) {
             << error.what();
     }
     // 300 splats are 38 blocks.
-    EXPECT_THROW(pipeline::check_share(300, 39), RunError);
-    EXPECT_NO_THROW(pipeline::check_share(300, 38));
+    EXPECT_THROW(portions::check_portions(300, 39), RunError);
+    EXPECT_NO_THROW(portions::check_portions(300, 38));
 }
 
 }  // namespace
