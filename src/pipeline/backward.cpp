@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pipeline/backward.h"
 
-#include <bit>
-
 #include "passes/passes.h"
 #include "pipeline/adam.h"
 #include "shared/constants.h"
@@ -236,8 +234,8 @@ void record_blend_backward_as(gpu::Recording& recording, passes::PassCache& cach
                                         blend_push(cache.config(), frame, inputs.background));
 }
 
-passes::UpdatePoints update_buffers(const Plan& plan, const Model& model, const FrameBuffers& frame,
-                                    const CameraUse& camera, const Sorted& sorted) {
+passes::UpdateBuffers update_buffers(const Plan& plan, const Model& model, const FrameBuffers& frame,
+                                     const CameraUse& camera, const Sorted& sorted) {
     // Packed moments and a gradient alone have no buffer of second moments, and a gradient no statistics. The kernel
     // does not use those bindings, but they need a buffer.
     const gpu::Buffer& moments2 = model.second_moments();
@@ -258,12 +256,6 @@ passes::UpdatePoints update_buffers(const Plan& plan, const Model& model, const 
             .sorted_indices = *sorted.indices};
 }
 
-/// passes::Update has the buffers of UpdatePoints, and one more.
-struct MoreBuffers {
-    passes::UpdatePoints buffers;
-    gpu::BufferPart motion_sums;
-};
-
 }  // namespace
 
 void record_blend_backward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
@@ -280,21 +272,20 @@ void record_backward(gpu::Recording& recording, passes::PassCache& cache, const 
     if (plan.rays()) return record_backward_of_rays(recording, cache, plan, model, frame, inputs, sorted);
     passes::Constants updating{{shared::SPEC_SH_DEGREE, plan.evaluated_degree(inputs.sh_degree)},
                                {shared::SPEC_MODE, update_mode(plan)}};
-    const passes::UpdatePoints buffers = update_buffers(plan, model, frame, inputs.camera, sorted);
+    const passes::UpdateBuffers buffers = update_buffers(plan, model, frame, inputs.camera, sorted);
     const shared::UpdatePush push = update_push(model, frame, rates);
     if (plan.points()) {
         record_blend_backward_as<passes::BlendPointsBackward>(
             recording, cache, frame, inputs, sorted,
             {{shared::SPEC_MODE, plan.absolute ? shared::BLEND_BACKWARD_ABSOLUTE : 0},
              {shared::SPEC_NEAREST, plan.nearest}});
-        cache.get<passes::UpdatePoints>(updating).record(recording, buffers, push);
+        cache.get<passes::UpdatePoints>(updating).record(recording, {buffers}, push);
         return;
     }
     record_blend_backward(recording, cache, plan, frame, inputs, sorted);
     updating.push_back({shared::SPEC_KERNEL, uint32_t(plan.kernel)});
     const gpu::Buffer& motion_sums = plan.motion ? frame.motion_sums : frame.partials;
-    cache.get<passes::Update>(updating).record(
-        recording, std::bit_cast<passes::Update>(MoreBuffers{buffers, motion_sums}), push);
+    cache.get<passes::Update>(updating).record(recording, {buffers, motion_sums}, push);
     if (plan.motion) record_motion_sums(recording, cache, frame);
     if (motion) record_motion_update(recording, cache, frame, *motion);
 }
