@@ -368,20 +368,16 @@ TEST(Ranks, AreRefusedWhatTheyCannotDo) {
         }
         return std::string();
     };
-    EXPECT_EQ(message([](TrainOptions& o) { o.exposure = true; }),
-              "several ranks and --exposure exclude each other");
-    EXPECT_EQ(message([](TrainOptions& o) { o.render.points = true; }),
-              "several ranks and --points exclude each other");
-    EXPECT_NE(message([](TrainOptions& o) { o.refine_poses = true; }).find("--refine-poses"),
-              std::string::npos);
-    TrainOptions options = busy(Strategy::none, 2);
-    options.refine_poses = true;
-    EXPECT_THROW(trained(options, 1, 1), InputError);
-    options = busy(Strategy::none, 1);
-    options.bands = 2;
-    options.exposure = true;
-    EXPECT_THROW(trained(options, 1, 1), InputError);
-    options.exposure = false;
+    const auto begins = [](const std::string& text, const std::string& with) {
+        EXPECT_TRUE(text.starts_with(with)) << text;
+    };
+    begins(message([](TrainOptions& o) { o.exposure = true; }),
+           "several ranks and --exposure exclude each other: ");
+    begins(message([](TrainOptions& o) { o.render.points = true; }),
+           "several ranks and --points exclude each other: ");
+    begins(message([](TrainOptions& o) { o.refine_poses = true; }),
+           "several ranks and --refine-poses exclude each other: ");
+    TrainOptions options = busy(Strategy::none, 1);
     options.bands = 49;
     try {
         trained(options, 1, 1);
