@@ -54,13 +54,11 @@ void record_loss(gpu::Recording& recording, passes::PassCache& cache, const Fram
 /// the gradient to model.moments1.
 /// With plan.motion, the gradient of the camera's motion is in frame.motion_reduced, which must be reserved for it.
 /// motion: that of the training image's camera, if motions are learned. It takes its own step of Adam.
-void record_backward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
-                     const Model& model, const FrameBuffers& frame, const FrameInputs& inputs,
+void record_backward(const FramePasses& on, const Model& model, const FrameInputs& inputs,
                      const Sorted& sorted, const Rates& rates, const MotionUse* motion = nullptr);
 
 /// Gradients of blending, which are left in frame.slots. Not for points and rays.
-void record_blend_backward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
-                           const FrameBuffers& frame, const FrameInputs& inputs, const Sorted& sorted);
+void record_blend_backward(const FramePasses& on, const FrameInputs& inputs, const Sorted& sorted);
 
 /// SPEC_MODE of the update: UPDATE_* bits.
 uint32_t update_mode(const Plan& plan);

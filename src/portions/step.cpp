@@ -190,7 +190,7 @@ void Step::list(const StepParts& parts, const Views& of, size_t first, size_t pi
             if (!again) reserve(parts, picture.request, model.splats);
             projected = picture.view;
             gpu::Recording recording(device.limits());
-            record_list(recording, parts.cache, parts.plan, model, parts.frame, picture.inputs, buffers_,
+            record_list({recording, parts.cache, parts.plan, parts.frame}, model, picture.inputs, buffers_,
                         {.view = uint32_t(picture.view),
                          .list = uint32_t(number),
                          .first_place = uint32_t(places),
@@ -316,10 +316,10 @@ shared::Counts Step::draw_own(const StepParts& parts, const Picture& picture, co
         else if (alone)
             recording.copy(buffers_.visible, 0, parts.frame.records, 0, listed * kRecordBytes);
         const Sorted sorted =
-            record_list_forward(recording, parts.cache, parts.plan, splats, parts.frame, picture.inputs);
+            record_list_forward({recording, parts.cache, parts.plan, parts.frame}, splats, picture.inputs);
         if (picture.of.record_loss) {
             picture.of.record_loss(recording, picture.inputs);
-            record_list_backward(recording, parts.cache, parts.plan, splats, parts.frame, picture.inputs,
+            record_list_backward({recording, parts.cache, parts.plan, parts.frame}, splats, picture.inputs,
                                  sorted, sums, alone ? uint32_t(seen_[picture.number].places.front()) : 0);
         }
         const shared::Counts counts = run(parts, recording);
@@ -397,8 +397,8 @@ void Step::update(const StepParts& parts, const Rates& rates, int sh_degree,
         if (portions_.streamed()) upload_sums(parts, size_t(portion));
         gpu::Recording recording(parts.cache.device().limits());
         recording.fill(parts.frame.counts, 0, 0, sizeof(shared::Counts));
-        record_update_views(recording, parts.cache, parts.plan, model, parts.frame, buffers_, rates,
-                            model.first, sh_degree, bands_);
+        record_update_views({recording, parts.cache, parts.plan, parts.frame}, model, buffers_, rates,
+                            sh_degree, bands_);
         if (more) more(recording, model);
         const shared::Counts counts = run(parts, recording);
         own[0] += counts.dropped_updates;

@@ -97,10 +97,10 @@ void Trainer::State::record_step(gpu::Recording& recording, int step, size_t ind
         .keep_overflow = !in_flight.empty(),
         .sh_degree = schedule.degree(step)};
     const Model& model = portions.use(0, portions::Portions::Need::state);
-    const Sorted sorted = record_forward(recording, cache, plan, model, frame, inputs);
+    const Sorted sorted = record_forward({recording, cache, plan, frame}, model, inputs);
     record_loss(recording, cache, frame, inputs, photo.texels, photo.masked,
                 plan.exposure ? &exposure : nullptr);
-    record_backward(recording, cache, plan, model, frame, inputs, sorted, rates(step),
+    record_backward({recording, cache, plan, frame}, model, inputs, sorted, rates(step),
                     plan.motion ? &motion : nullptr);
     if (options.strategy == Strategy::mcmc) record_noise(recording, cache, model, frame, noise(step));
 }
