@@ -110,6 +110,31 @@ std::vector<Exposure> Exposures::download() const {
     return values.download<Exposure>(photos);
 }
 
+namespace {
+
+constexpr size_t kExposureWords = shared::EXPOSURE_FLOATS / 2;
+
+}  // namespace
+
+Exposures::Words Exposures::words(uint32_t photo) const {
+    Words words;
+    size_t at = 0;
+    for (const gpu::Buffer* buffer : {&values, &moments1, &moments2}) {
+        buffer->download(std::as_writable_bytes(std::span(words).subspan(at, kExposureWords)),
+                         8 * kExposureWords * photo);
+        at += kExposureWords;
+    }
+    return words;
+}
+
+void Exposures::set(uint32_t photo, std::span<const uint64_t> words) {
+    size_t at = 0;
+    for (gpu::Buffer* buffer : {&values, &moments1, &moments2}) {
+        buffer->upload(words.subspan(at, kExposureWords), 8 * kExposureWords * photo);
+        at += kExposureWords;
+    }
+}
+
 double loss_of(double l1, double ssim) {
     return (1 - shared::SSIM_WEIGHT) * l1 + shared::SSIM_WEIGHT * (1 - ssim);
 }

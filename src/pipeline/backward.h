@@ -4,6 +4,9 @@
 // Each training image may have an exposure: an affine map of colours, learned beside the splats. The
 // published code of 3DGS does the same for captures with automatic exposure; see include/ewa/exposure.h.
 #pragma once
+#include <array>
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "ewa/exposure.h"
@@ -21,6 +24,11 @@ struct Exposures {
     Exposures(gpu::Device& device, size_t photos);
     uint64_t bytes() const { return 4ull * shared::EXPOSURE_FLOATS * photos; }  // of each buffer
     std::vector<Exposure> download() const;
+
+    /// A photo's exposure and moments, for other ranks.
+    using Words = std::array<uint64_t, 3 * shared::EXPOSURE_FLOATS / 2>;
+    Words words(uint32_t photo) const;
+    void set(uint32_t photo, std::span<const uint64_t> words);
 };
 
 /// A step of one training image's exposure.

@@ -16,32 +16,10 @@ namespace {
 
 constexpr uint64_t kRecordBytes = 16 * shared::RECORD_TEXELS;
 
-/// A part of a device buffer as the host reads it: its memory, or a copy.
-class Sent {
+/// A part of a device buffer on the host: its memory, or a copy.
+class OnHost {
   public:
-    Sent(const gpu::Buffer& buffer, uint64_t offset, uint64_t bytes) {
-        if (bytes == 0) return;
-        if (const std::byte* memory = buffer.readable()) {
-            bytes_ = {memory + offset, bytes};
-            return;
-        }
-        copy_.resize(bytes);
-        buffer.download(std::span<std::byte>(copy_), offset);
-        bytes_ = copy_;
-    }
-    std::span<const std::byte> part(uint64_t offset, uint64_t bytes) const {
-        return bytes_.subspan(offset, bytes);
-    }
-
-  private:
-    std::vector<std::byte> copy_;
-    std::span<const std::byte> bytes_;
-};
-
-/// A part of a device buffer as the host fills it.
-class Received {
-  public:
-    Received(gpu::Buffer& buffer, uint64_t offset, uint64_t bytes) : buffer_(buffer), offset_(offset) {
+    OnHost(gpu::Buffer& buffer, uint64_t offset, uint64_t bytes) : buffer_(buffer), offset_(offset) {
         if (bytes == 0) return;
         if (buffer.readable()) {
             bytes_ = {buffer.mapped() + offset, bytes};
@@ -51,8 +29,11 @@ class Received {
         bytes_ = copy_;
     }
     std::span<std::byte> part(uint64_t offset, uint64_t bytes) const { return bytes_.subspan(offset, bytes); }
-    /// Called when all parts are filled.
-    void finish() {
+    /// Called before parts are read, and after all parts are written.
+    void read() {
+        if (!copy_.empty()) buffer_.download(std::span<std::byte>(copy_), offset_);
+    }
+    void write() {
         if (!copy_.empty()) buffer_.upload(std::span<const std::byte>(copy_), offset_);
     }
 
@@ -88,7 +69,9 @@ struct PictureLoss {
     double l1 = 0, ssim = 0, squared = 0;
 };
 
-PictureLoss loss_from(std::span<const uint64_t, 3> words) {
+constexpr size_t kLossWords = 3;
+
+PictureLoss loss_from(std::span<const uint64_t, kLossWords> words) {
     return {std::bit_cast<double>(words[0]), std::bit_cast<double>(words[1]),
             std::bit_cast<double>(words[2])};
 }
@@ -250,8 +233,9 @@ void Step::send(const StepParts& parts, const Views& of, const Turn& turn) {
                   ViewBuffers::sum_bytes(parts.plan, turn.own() + 1));
     }
     const bool streamed = portions_.streamed();
-    const Sent on_device(buffers_.visible, 0, streamed ? 0 : sum_of(turn.listed) * kRecordBytes);
-    Received list(parts.frame.records, 0, turn.own() * kRecordBytes);
+    OnHost on_device(buffers_.visible, 0, streamed ? 0 : sum_of(turn.listed) * kRecordBytes);
+    on_device.read();
+    OnHost list(parts.frame.records, 0, turn.own() * kRecordBytes);
     std::vector<std::vector<std::byte>> on_host(ranks);
     std::vector<std::span<const std::byte>> out(ranks);
     std::vector<std::span<std::byte>> in(ranks);
@@ -272,7 +256,7 @@ void Step::send(const StepParts& parts, const Views& of, const Turn& turn) {
     }
     portions_.stream(to, [&] {
         exchange(out, in);
-        list.finish();
+        list.write();
     });
 }
 
@@ -281,9 +265,10 @@ void Step::return_sums(const StepParts& parts, const Turn& turn) {
     const bool streamed = portions_.streamed();
     const size_t ranks = size_t(portions_.ranks().size());
     const uint64_t splat = ViewBuffers::sum_bytes(parts.plan, 1);
-    const Sent drawn(own_sums_, 0, turn.own() * splat);
-    Received sums(buffers_.sums, streamed ? 0 : seen_[turn.first].places.front() * splat,
-                  streamed ? 0 : sum_of(turn.listed) * splat);
+    OnHost drawn(own_sums_, 0, turn.own() * splat);
+    drawn.read();
+    OnHost sums(buffers_.sums, streamed ? 0 : seen_[turn.first].places.front() * splat,
+                streamed ? 0 : sum_of(turn.listed) * splat);
     std::vector<std::span<const std::byte>> out(ranks);
     std::vector<std::span<std::byte>> in(ranks);
     uint64_t from = 0, to = 0;
@@ -298,7 +283,7 @@ void Step::return_sums(const StepParts& parts, const Turn& turn) {
     }
     portions_.stream(from, [&] {
         exchange(out, in);
-        sums.finish();
+        sums.write();
     });
 }
 
@@ -355,17 +340,24 @@ StepSums Step::draw(const StepParts& parts, std::span<const StepView> views) {
         for (size_t begin = first; begin < first + pictures; begin += ranks) {
             const Turn turn = turn_of(listed, first, pictures, begin);
             send(parts, of, turn);
-            PictureLoss loss{};
+            std::vector<uint64_t> told(kLossWords + parts.learned);
             if (turn.draws(int(own))) {
                 const Picture picture = picture_of(parts, of, begin + own);
                 const shared::Counts counts = draw_own(parts, picture, turn);
-                loss = {counts.l1, counts.ssim, double(counts.squared) / picture.of.weight()};
+                const PictureLoss loss{counts.l1, counts.ssim, double(counts.squared) / picture.of.weight()};
+                std::ranges::copy(std::bit_cast<std::array<uint64_t, kLossWords>>(loss), told.begin());
+                if (parts.learned > 0 && ranks > 1)
+                    std::ranges::copy(picture.of.learned(), told.begin() + kLossWords);
             }
             // Waits for the slowest of them.
-            const std::vector<uint64_t> all = gather(std::bit_cast<std::array<uint64_t, 3>>(loss));
+            const std::vector<uint64_t> all = gather(told);
             return_sums(parts, turn);
-            for (size_t k = 0; k < turn.pictures; ++k)
-                losses[begin + k] = loss_from(std::span(all).subspan(3 * k).first<3>());
+            for (size_t k = 0; k < turn.pictures; ++k) {
+                const auto of_picture = std::span(all).subspan(told.size() * k, told.size());
+                losses[begin + k] = loss_from(of_picture.first<kLossWords>());
+                if (parts.learned > 0 && k != own)
+                    views[(begin + k) / bands_].learn(of_picture.subspan(kLossWords));
+            }
         }
     }
     add_losses(losses, bands_, sums);

@@ -26,6 +26,10 @@ struct StepView {
     std::function<void(gpu::Recording&, const pipeline::FrameInputs& inputs)> record_loss;
     /// Weight of the view's pixels in its mean squared error. Called after record_loss.
     std::function<double()> weight;
+    /// What the loss has learned besides the splats, in StepParts::learned words, and the same for a rank that has not drawn the
+    /// view.
+    std::function<std::vector<uint64_t>()> learned;
+    std::function<void(std::span<const uint64_t>)> learn;
 };
 
 struct StepSums {
@@ -41,6 +45,7 @@ struct StepParts {
     pipeline::FrameBuffers& frame;
     uint32_t& instance_capacity;
     std::function<void()> submitted;  // called after each submission
+    size_t learned = 0;               // words that ranks learn of a view
 };
 
 /// What this rank has exchanged with others so far.

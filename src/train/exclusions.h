@@ -32,8 +32,8 @@ inline constexpr std::array kExclusions{
               "a camera learns while the splats of its own step are moved"},
     Exclusion{"--exposure",
               [](const TrainOptions& options) { return options.exposure; },
-              {true, false, true, false},
-              "an exposure learns from a whole picture, on the device that has all exposures"}};
+              {false, false, true, false},
+              "an exposure learns from the whole picture of its view"}};
 
 /// Throws InputError if options exclude what divides the training.
 void check_exclusions(const TrainOptions& options, int ranks);

@@ -187,16 +187,23 @@ portions::StepView Trainer::State::view_of(int step, train::ImageCache& seen, in
     const ExposureUse exposure{&exposures, uint32_t(index), float(schedule.exposure_rate(step)),
                                uint32_t(size_t(step - 1) / images.count() + 1)};
     const auto weight = std::make_shared<double>(1);
-    return {.inputs = inputs,
-            .request = request_of(camera),
-            .record_loss =
-                [this, exposure, weight, index, &seen](gpu::Recording& recording, const FrameInputs& drawn) {
-                    const auto& photo = seen.photo(index);
-                    *weight = photo.weight;
-                    record_loss(recording, cache, frame, drawn, photo.texels, photo.masked,
-                                plan.exposure ? &exposure : nullptr);
-                },
-            .weight = [weight] { return *weight; }};
+    return {
+        .inputs = inputs,
+        .request = request_of(camera),
+        .record_loss =
+            [this, exposure, weight, index, &seen](gpu::Recording& recording, const FrameInputs& drawn) {
+                const auto& photo = seen.photo(index);
+                *weight = photo.weight;
+                record_loss(recording, cache, frame, drawn, photo.texels, photo.masked,
+                            plan.exposure ? &exposure : nullptr);
+            },
+        .weight = [weight] { return *weight; },
+        .learned =
+            [this, index] {
+                const auto words = exposures.words(uint32_t(index));
+                return std::vector<uint64_t>(words.begin(), words.end());
+            },
+        .learn = [this, index](std::span<const uint64_t> words) { exposures.set(uint32_t(index), words); }};
 }
 
 void Trainer::State::optimise_several(int first, int last) {
@@ -225,7 +232,13 @@ void Trainer::State::optimise_several(int first, int last) {
 }
 
 portions::StepParts Trainer::State::step_parts() {
-    return {cache, executor, plan, frame, instance_capacity, [this] { add_pass_times(); }};
+    return {cache,
+            executor,
+            plan,
+            frame,
+            instance_capacity,
+            [this] { add_pass_times(); },
+            plan.exposure ? std::tuple_size_v<Exposures::Words> : 0};
 }
 
 Image Trainer::State::render_own(std::span<const Camera> cameras) {
@@ -235,8 +248,12 @@ Image Trainer::State::render_own(std::span<const Camera> cameras) {
     std::vector<portions::StepView> views;
     for (size_t i = 0; i < cameras.size(); ++i) {
         const FrameInputs inputs = inputs_of(blocks[i], cameras[i], options.render);
-        views.push_back(
-            {.inputs = inputs, .request = request_of(inputs.camera), .record_loss = {}, .weight = {}});
+        views.push_back({.inputs = inputs,
+                         .request = request_of(inputs.camera),
+                         .record_loss = {},
+                         .weight = {},
+                         .learned = {},
+                         .learn = {}});
     }
     portions::StepParts parts = step_parts();
     parts.submitted = [] {};
