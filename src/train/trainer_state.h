@@ -73,11 +73,11 @@ struct Trainer::State {
 
     /// What a step needs of the frame's buffers.
     pipeline::FrameRequest request_of(const pipeline::CameraUse& camera) const;
-    pipeline::MotionUse motion_of(int step, size_t index, uint32_t visit) const;
+    /// How often the step's image has been seen then.
+    uint32_t visit_of(int step) const { return uint32_t(size_t(step - 1) / images.count() + 1); }
 
     /// All that changes from step to step is a pure function of the step's number: a step can be repeated.
-    void record_step(gpu::Recording& recording, int step, size_t index, const train::ImageCache::Photo& photo,
-                     const pipeline::CameraUse& camera);
+    void record_fused(gpu::Recording& recording, int step, size_t index, const portions::StepView& view);
 
     /// Submits a step. Afterwards at most frames_in_flight steps are in flight.
     void submit(int step);

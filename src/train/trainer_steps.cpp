@@ -76,52 +76,42 @@ FrameRequest Trainer::State::request_of(const CameraUse& camera) const {
             .motion = plan.motion};
 }
 
-MotionUse Trainer::State::motion_of(int step, size_t index, uint32_t visit) const {
-    return {.motions = &motions,
-            .photo = uint32_t(index),
-            .rate = float(schedule.pose_rate(step)),
-            .extent = float(extent),
-            .visit = visit};
-}
-
-void Trainer::State::record_step(gpu::Recording& recording, int step, size_t index,
-                                 const train::ImageCache::Photo& photo, const CameraUse& camera) {
-    const uint32_t visit = uint32_t(size_t(step - 1) / images.count() + 1);
-    const ExposureUse exposure{&exposures, uint32_t(index), float(schedule.exposure_rate(step)), visit};
-    const MotionUse motion = motion_of(step, index, visit);
-    const FrameInputs inputs{
-        .camera =
-            plan.motion ? record_move_camera(recording, cache, motions, uint32_t(index), camera) : camera,
-        .background =
-            options.random_background ? random_background(step, options.seed) : options.render.background,
-        .keep_overflow = !in_flight.empty(),
-        .sh_degree = schedule.degree(step)};
+void Trainer::State::record_fused(gpu::Recording& recording, int step, size_t index,
+                                  const portions::StepView& view) {
+    FrameInputs inputs = view.inputs;
+    inputs.keep_overflow = !in_flight.empty();
+    if (plan.motion)
+        inputs.camera = record_move_camera(recording, cache, motions, uint32_t(index), inputs.camera);
+    const MotionUse motion{.motions = &motions,
+                           .photo = uint32_t(index),
+                           .rate = float(schedule.pose_rate(step)),
+                           .extent = float(extent),
+                           .visit = visit_of(step)};
     const Model& model = portions.use(0, portions::Portions::Need::state);
-    const Sorted sorted = record_forward({recording, cache, plan, frame}, model, inputs);
-    record_loss(recording, cache, frame, inputs, photo.texels, photo.masked,
-                plan.exposure ? &exposure : nullptr);
-    record_backward({recording, cache, plan, frame}, model, inputs, sorted, rates(step),
-                    plan.motion ? &motion : nullptr);
+    const FramePasses on{recording, cache, plan, frame};
+    const Sorted sorted = record_forward(on, model, inputs);
+    view.record_loss(recording, inputs);
+    record_backward(on, model, inputs, sorted, rates(step), plan.motion ? &motion : nullptr);
     if (options.strategy == Strategy::mcmc) record_noise(recording, cache, model, frame, noise(step));
 }
 
 void Trainer::State::submit(int step) {
     train::ImageCache& seen = images_at(step);
     const size_t index = train::frame_of_step(step, images.count(), options.seed);
-    const CameraUse camera = seen.camera(index);
+    const portions::StepView view = view_of(step, seen, schedule.degree(step));
+    const CameraUse& camera = view.inputs.camera;
     // Buffers of another size, and an image from disk, take the place of what a step in flight reads.
     if (!seen.cached(index) || camera.width != frame.sizes.width || camera.height != frame.sizes.height)
         finish_all();
     while (in_flight.size() >= cache.config().frames_in_flight) finish_oldest();
-    const auto& photo = seen.photo(index);
-    if (schedule.halvings_at(step + 1) == schedule.halvings_at(step))
-        seen.prepare(train::frame_of_step(step + 1, images.count(), options.seed));
     if (in_flight.empty()) frame.reserve(cache.device(), cache.config(), request_of(camera));
     gpu::Recording recording(device->limits());
-    record_step(recording, step, index, photo, camera);
+    record_fused(recording, step, index, view);
+    if (schedule.halvings_at(step + 1) == schedule.halvings_at(step))
+        seen.prepare(train::frame_of_step(step + 1, images.count(), options.seed));
     frame.record_counts(recording, slot_of(step));
     executor.submit(recording, is_timed(step));
-    in_flight.push_back({step, photo.weight});
+    in_flight.push_back({step, view.weight()});
     // An image from disk may be gone when its step has to be repeated: no other step follows before it is done.
     if (!seen.cached(index)) finish_all();
 }
@@ -185,7 +175,7 @@ portions::StepView Trainer::State::view_of(int step, train::ImageCache& seen, in
                                                                      : options.render.background,
                              .sh_degree = sh_degree};
     const ExposureUse exposure{&exposures, uint32_t(index), float(schedule.exposure_rate(step)),
-                               uint32_t(size_t(step - 1) / images.count() + 1)};
+                               visit_of(step)};
     const auto weight = std::make_shared<double>(1);
     return {
         .inputs = inputs,
