@@ -180,6 +180,9 @@ TEST(Modules, ForbiddenIncludesAreFound) {
     folder.write("src/io/splats/wrong.cpp", "#include \"../../train/a.h\"\n");
     folder.write("src/io/splats/wrong_library.cpp", "#include <vulkan/vulkan.h>\n");
     folder.write("src/train/a.h", "#include \"io/splats/a.h\"\n");
+    folder.write("src/ranks/a.h", "");
+    folder.write("src/portions/a.h", "#include \"ranks/a.h\"\n");
+    folder.write("src/pipeline/wrong.h", "#include \"ranks/a.h\"\n");
     folder.write("src/cellar/wrong.h", "#include \"core/a.h\"\n");
     folder.write("src/cli/main.cpp", "#include \"train/a.h\"\n#include \"io/splats/a.h\"\n");
     folder.write("src/cli/wrong.cpp", "#include <GLFW/glfw3.h>\n");
@@ -191,9 +194,9 @@ TEST(Modules, ForbiddenIncludesAreFound) {
     folder.write("shaders/passes/a.comp", "#include \"lib/a.glsl\"\n");
     size_t files = 0;
     const std::vector<std::string> found = complaints(folder.path(), files);
-    EXPECT_EQ(files, 19u);
+    EXPECT_EQ(files, 22u);
     for (const std::string& text : found) EXPECT_NE(text.find("wrong"), std::string::npos) << text;
-    EXPECT_EQ(found.size(), 9u);
+    EXPECT_EQ(found.size(), 10u);
 }
 
 }  // namespace
