@@ -2,7 +2,6 @@
 #include "portions/refine.h"
 
 #include <algorithm>
-#include <array>
 #include <cstring>
 #include <numeric>
 #include <utility>

@@ -2,6 +2,7 @@
 #include "portions/step.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <chrono>
 #include <cmath>

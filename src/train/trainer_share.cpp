@@ -5,11 +5,12 @@
 #include <bit>
 #include <cstring>
 #include <span>
+#include <string>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "ewa/error.h"
-#include "pipeline/picture.h"
 #include "portions/collect.h"
 #include "train/state_stream.h"
 #include "train/trainer_state.h"
