@@ -130,7 +130,7 @@ class Trainer {
     /// The splats, read back from the device. Their order is the trainer's own.
     Gaussians gaussians() const;
     /// Pictures of the splats as they are, without exposures: those that a Renderer of gaussians() draws. Every rank draws
-    /// some of them. Throws InputError unless the trainer has several views a step, bands or ranks, and no limit of device memory.
+    /// some of them. Throws InputError if the splats are points.
     std::vector<Image> render(std::span<const Camera> cameras) const;
     uint32_t splats() const;
     uint32_t max_splats() const;  // the number that was chosen if TrainOptions::max_splats is automatic

@@ -20,9 +20,7 @@
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3;
 layout(constant_id = SPEC_MODE) const uint MODE = 0;
-const bool GRADIENT_ONLY = (MODE & UPDATE_GRADIENT_ONLY) != 0u, STATISTICS = (MODE & UPDATE_STATISTICS) != 0u,
-           REGULARISED = (MODE & UPDATE_REGULARISED) != 0u, ABSOLUTE = (MODE & UPDATE_ABSOLUTE) != 0u,
-           PACKED_MOMENTS = (MODE & UPDATE_PACKED_MOMENTS) != 0u, MOTION = (MODE & UPDATE_MOTION) != 0u;
+const bool GRADIENT_ONLY = (MODE & UPDATE_GRADIENT_ONLY) != 0u, MOTION = (MODE & UPDATE_MOTION) != 0u;
 
 TEXELS(0, params);
 TEXELS(2, records);
@@ -40,7 +38,7 @@ layout(set = 0, binding = 13, scalar) readonly buffer SortedIndices { uint sorte
 layout(set = 0, binding = 14, scalar) writeonly buffer MotionSums { float motion_sums[]; };
 layout(push_constant, scalar) uniform Push { UpdatePush push; };
 #include "lib/slots.glsl"
-#include "lib/adam.glsl"
+#include "lib/splat_update.glsl"
 
 // A splat's share of the gradient by the camera's motion, in the order of a motion's floats. Rotation and shift are
 // relative to the moved camera.
@@ -94,18 +92,10 @@ MotionGradient update_splat(uint i) {
     const float depth = visible ? p.view.z.x : 3.4e38;
 
     const vec4 zero = vec4(0.0);
-    const float opacity = KERNEL == KERNEL_DENSITY ? sigmoid(p0.w) : stored.peak;
-    const vec4 scale_pull = REGULARISED ? vec4(push.scale_weight * exp(p2.xyz), 0.0) : zero;
-    const vec4 opacity_pull = REGULARISED ? vec4(vec3(0.0), push.opacity_weight * opacity * transparency_of(p0.w)) : zero;
-    move(2, i, p2, (visible ? vec4(g.log_scale, red_gradient) : zero) + scale_pull,
-         vec4(vec3(push.scale_rate), push.sh0_rate), depth);
-    move(1, i, p1, visible ? g.quaternion : zero, vec4(push.quaternion_rate), depth);
-    move(0, i, p0, (visible ? vec4(g.mean, g.logit) : zero) + opacity_pull,
-         vec4(vec3(push.mean_rate), push.opacity_rate), depth);
-    if (STATISTICS && visible) {
-        const float norm = length((ABSOLUTE ? f.absolute : f.mean) * vec2(push.half_size[0], push.half_size[1]));
-        if (is_finite(norm)) statistics[i] += vec2(norm, 1.0);
-    }
+    move_splat(i, p0, p1, p2, visible ? vec4(g.mean, g.logit) : zero, visible ? g.quaternion : zero,
+               visible ? vec4(g.log_scale, red_gradient) : zero,
+               KERNEL == KERNEL_DENSITY ? sigmoid(p0.w) : stored.peak, depth);
+    if (STATISTICS && visible) statistics[i] += statistics_of(f, vec2(push.half_size[0], push.half_size[1]));
     const MotionGradient none = MotionGradient(vec4(0.0), vec3(0.0));
     if (!MOTION || !visible) return none;
     const MotionGradient motion = motion_gradient(f, stored, g.view, g.torque, g.mean);

@@ -17,10 +17,7 @@
 layout(local_size_x_id = SPEC_GROUP_SIZE) in;
 layout(constant_id = SPEC_SH_DEGREE) const uint SH_DEGREE = 3;
 layout(constant_id = SPEC_MODE) const uint MODE = 0;
-const bool GRADIENT_ONLY = false, STATISTICS = (MODE & UPDATE_STATISTICS) != 0u,
-           REGULARISED = (MODE & UPDATE_REGULARISED) != 0u, ABSOLUTE = (MODE & UPDATE_ABSOLUTE) != 0u,
-           PACKED_MOMENTS = (MODE & UPDATE_PACKED_MOMENTS) != 0u, BANDS = (MODE & UPDATE_BANDS) != 0u;
-const uint FLOATS = ABSOLUTE ? SUM_FLOATS_ABSOLUTE : SUM_FLOATS;
+const bool GRADIENT_ONLY = false, BANDS = (MODE & UPDATE_BANDS) != 0u;
 
 TEXELS(0, params);
 layout(set = 0, binding = 2, scalar) readonly buffer Places { uint places[]; };
@@ -33,7 +30,9 @@ STORED_WORD_TEXELS(8, moments1_out);
 STORED_WORD_TEXELS(9, moments2_out);
 layout(set = 0, binding = 10, scalar) buffer Statistics { vec2 statistics[]; };
 layout(push_constant, scalar) uniform Push { UpdateViewsPush push; };
-#include "lib/adam.glsl"
+#include "lib/splat_update.glsl"
+
+const uint FLOATS = ABSOLUTE ? SUM_FLOATS_ABSOLUTE : SUM_FLOATS;
 
 Sums sums_at(uint place) {
     float s[SUM_FLOATS_ABSOLUTE];
@@ -95,21 +94,13 @@ void main() {
         by_quaternion = added(first, by_quaternion, g.quaternion);
         by_scale = added(first, by_scale, vec4(g.log_scale, basis.value[0] * s.color.r));
         depth = min(depth, p.view.z.x);
-        const float norm =
-            length((ABSOLUTE ? f.absolute : f.mean) * (0.5 * vec2(camera.size[0], camera.size[1])));
-        if (is_finite(norm)) seen += vec2(norm, 1.0);
+        seen += statistics_of(f, 0.5 * vec2(camera.size[0], camera.size[1]));
     }
 
-    const float opacity = sigmoid(p0.w);
-    const vec4 scale_pull = REGULARISED ? vec4(push.scale_weight * exp(p2.xyz), 0.0) : vec4(0.0);
-    const vec4 opacity_pull =
-        REGULARISED ? vec4(vec3(0.0), push.opacity_weight * opacity * transparency_of(p0.w)) : vec4(0.0);
     [[unroll]] for (uint plane = FIRST_SH_PLANE; plane < PLANES; ++plane) {
         move(plane, i, fetch(params, index_of(plane, i)), by_sh[plane], sh_rates(plane), 0.0);
     }
-    move(2, i, p2, by_scale + scale_pull, vec4(vec3(push.scale_rate), push.sh0_rate), depth);
-    move(1, i, p1, by_quaternion, vec4(push.quaternion_rate), depth);
-    move(0, i, p0, by_mean + opacity_pull, vec4(vec3(push.mean_rate), push.opacity_rate), depth);
+    move_splat(i, p0, p1, p2, by_mean, by_quaternion, by_scale, sigmoid(p0.w), depth);
     if (STATISTICS && seen.y > 0.0) statistics[i] += seen;
     count_updates();
 }

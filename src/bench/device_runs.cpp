@@ -39,10 +39,10 @@ FrameRun::FrameRun(std::shared_ptr<gpu::Device> device, const BenchScene& scene,
 }
 
 void FrameRun::record(gpu::Recording& recording) {
-    sorted_ = record_forward(recording, cache_, plan_, model_, frame_, inputs_);
+    sorted_ = record_forward({recording, cache_, plan_, frame_}, model_, inputs_);
     if (!train_) return;
     record_loss(recording, cache_, frame_, inputs_, image_);
-    record_backward(recording, cache_, plan_, model_, frame_, inputs_, sorted_, rates_);
+    record_backward({recording, cache_, plan_, frame_}, model_, inputs_, sorted_, rates_);
 }
 
 void FrameRun::run() {
@@ -59,7 +59,7 @@ void FrameRun::run() {
 
 void FrameRun::run_forward() {
     gpu::Recording recording(device_->limits());
-    sorted_ = record_forward(recording, cache_, plan_, model_, frame_, inputs_);
+    sorted_ = record_forward({recording, cache_, plan_, frame_}, model_, inputs_);
     executor_.run(recording);
 }
 

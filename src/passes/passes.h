@@ -23,13 +23,17 @@ struct ProjectRays {
     gpu::BufferPart params, camera, records, depth_keys, tile_counts, counts, rays;
 };
 
-/// Gradient of the projection, fused with Adam. Variant: SPEC_SH_DEGREE, SPEC_KERNEL, SPEC_MODE (UPDATE_*
-/// bits).
-struct Update {
-    static constexpr char shader[] = "update";
+/// What the gradient of a projection, fused with Adam, reads and writes.
+struct UpdateBuffers {
     using Work = PerElement<&shared::UpdatePush::splats>;
     gpu::BufferPart params, camera, records, slots, moments1, moments2, tile_counts, first_instances, counts,
-        params_out, moments1_out, moments2_out, statistics, sorted_indices, motion_sums;
+        params_out, moments1_out, moments2_out, statistics, sorted_indices;
+};
+
+/// Gradient of Project. Variant: SPEC_SH_DEGREE, SPEC_KERNEL, SPEC_MODE (UPDATE_* bits).
+struct Update : UpdateBuffers {
+    static constexpr char shader[] = "update";
+    gpu::BufferPart motion_sums;
 };
 
 // A batch of views. Each view has a list of the splats that reach a tile of it.
@@ -97,11 +101,8 @@ struct ProjectPoints {
 
 /// Gradient of ProjectPoints, fused with Adam. Variant: SPEC_SH_DEGREE, SPEC_MODE (UPDATE_* bits without
 /// UPDATE_REGULARISED).
-struct UpdatePoints {
+struct UpdatePoints : UpdateBuffers {
     static constexpr char shader[] = "update_points";
-    using Work = PerElement<&shared::UpdatePush::splats>;
-    gpu::BufferPart params, camera, records, slots, moments1, moments2, tile_counts, first_instances, counts,
-        params_out, moments1_out, moments2_out, statistics, sorted_indices;
 };
 
 // The operators of projection and of spherical harmonics. Their arrays are the caller's: include/ewa/operators.h.

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pipeline/backward.h"
 
-#include <bit>
-
 #include "passes/passes.h"
 #include "pipeline/adam.h"
 #include "shared/constants.h"
@@ -112,6 +110,31 @@ std::vector<Exposure> Exposures::download() const {
     return values.download<Exposure>(photos);
 }
 
+namespace {
+
+constexpr size_t kExposureWords = shared::EXPOSURE_FLOATS / 2;
+
+}  // namespace
+
+Exposures::Words Exposures::words(uint32_t photo) const {
+    Words words;
+    size_t at = 0;
+    for (const gpu::Buffer* buffer : {&values, &moments1, &moments2}) {
+        buffer->download(std::as_writable_bytes(std::span(words).subspan(at, kExposureWords)),
+                         8 * kExposureWords * photo);
+        at += kExposureWords;
+    }
+    return words;
+}
+
+void Exposures::set(uint32_t photo, std::span<const uint64_t> words) {
+    size_t at = 0;
+    for (gpu::Buffer* buffer : {&values, &moments1, &moments2}) {
+        buffer->upload(words.subspan(at, kExposureWords), 8 * kExposureWords * photo);
+        at += kExposureWords;
+    }
+}
+
 double loss_of(double l1, double ssim) {
     return (1 - shared::SSIM_WEIGHT) * l1 + shared::SSIM_WEIGHT * (1 - ssim);
 }
@@ -175,12 +198,13 @@ namespace {
 
 /// A driver may limit the iterations of an invocation: each strip of the tiles has its own dispatch.
 template <class Backward>
-void record_rays_backward(gpu::Recording& recording, const passes::Pass<Backward>& backward,
-                          const FrameBuffers& frame, const FrameInputs& inputs, const Sorted& sorted,
-                          const shared::BlendPush& blend) {
-    recording.fill(frame.slots, 0, 0, frame.sizes.slots);
+void record_rays_backward(const FramePasses& on, const passes::Pass<Backward>& backward,
+                          const FrameInputs& inputs, const Sorted& sorted) {
+    const FrameBuffers& frame = on.frame;
+    const shared::BlendPush blend = blend_push(on.cache.config(), frame, inputs.background);
+    on.recording.fill(frame.slots, 0, 0, frame.sizes.slots);
     for (uint32_t strip = 0; strip < passes::strips_of(backward.config); ++strip)
-        backward.record(recording,
+        backward.record(on.recording,
                         {{.records = frame.records,
                           .splats = *sorted.splats,
                           .tile_starts = frame.tile_starts,
@@ -194,19 +218,17 @@ void record_rays_backward(gpu::Recording& recording, const passes::Pass<Backward
 }
 
 /// The gradient of integration along rays, to model.moments1.
-void record_backward_of_rays(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
-                             const Model& model, const FrameBuffers& frame, const FrameInputs& inputs,
+void record_backward_of_rays(const FramePasses& on, const Model& model, const FrameInputs& inputs,
                              const Sorted& sorted) {
+    const auto& [recording, cache, plan, frame] = on;
     const gpu::SpecConstant kernel{shared::SPEC_KERNEL, uint32_t(plan.kernel)};
-    const shared::BlendPush blend = blend_push(cache.config(), frame, inputs.background);
     if (plan.integrator == Integrator::ray)
-        record_rays_backward(recording, cache.get<passes::BlendRaysBackward>({kernel}), frame, inputs, sorted,
-                             blend);
+        record_rays_backward(on, cache.get<passes::BlendRaysBackward>({kernel}), inputs, sorted);
     else
-        record_rays_backward(recording,
+        record_rays_backward(on,
                              cache.get<passes::MarchRaysBackward>(
                                  {kernel, {shared::SPEC_MODE, march_chunk(inputs.samples, 8)}}),
-                             frame, inputs, sorted, blend);
+                             inputs, sorted);
     cache.get<passes::GatherRays>({{shared::SPEC_SH_DEGREE, plan.evaluated_degree(inputs.sh_degree)}, kernel})
         .record(recording,
                 {.params = model.params,
@@ -223,9 +245,9 @@ void record_backward_of_rays(gpu::Recording& recording, passes::PassCache& cache
 
 /// Blending: passes::BlendBackward or BlendPointsBackward.
 template <class Blending>
-void record_blend_backward_as(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame,
-                              const FrameInputs& inputs, const Sorted& sorted,
+void record_blend_backward_as(const FramePasses& on, const FrameInputs& inputs, const Sorted& sorted,
                               const passes::Constants& variant) {
+    const auto& [recording, cache, plan, frame] = on;
     cache.get<Blending>(variant).record(recording,
                                         {.records = frame.records,
                                          .splats = *sorted.splats,
@@ -236,8 +258,8 @@ void record_blend_backward_as(gpu::Recording& recording, passes::PassCache& cach
                                         blend_push(cache.config(), frame, inputs.background));
 }
 
-passes::UpdatePoints update_buffers(const Plan& plan, const Model& model, const FrameBuffers& frame,
-                                    const CameraUse& camera, const Sorted& sorted) {
+passes::UpdateBuffers update_buffers(const Plan& plan, const Model& model, const FrameBuffers& frame,
+                                     const CameraUse& camera, const Sorted& sorted) {
     // Packed moments and a gradient alone have no buffer of second moments, and a gradient no statistics. The kernel
     // does not use those bindings, but they need a buffer.
     const gpu::Buffer& moments2 = model.second_moments();
@@ -258,43 +280,35 @@ passes::UpdatePoints update_buffers(const Plan& plan, const Model& model, const 
             .sorted_indices = *sorted.indices};
 }
 
-/// passes::Update has the buffers of UpdatePoints, and one more.
-struct MoreBuffers {
-    passes::UpdatePoints buffers;
-    gpu::BufferPart motion_sums;
-};
-
 }  // namespace
 
-void record_blend_backward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
-                           const FrameBuffers& frame, const FrameInputs& inputs, const Sorted& sorted) {
+void record_blend_backward(const FramePasses& on, const FrameInputs& inputs, const Sorted& sorted) {
     record_blend_backward_as<passes::BlendBackward>(
-        recording, cache, frame, inputs, sorted,
-        {{shared::SPEC_MODE, plan.absolute ? shared::BLEND_BACKWARD_ABSOLUTE : 0},
-         {shared::SPEC_KERNEL, uint32_t(plan.kernel)}});
+        on, inputs, sorted,
+        {{shared::SPEC_MODE, on.plan.absolute ? shared::BLEND_BACKWARD_ABSOLUTE : 0},
+         {shared::SPEC_KERNEL, uint32_t(on.plan.kernel)}});
 }
 
-void record_backward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
-                     const Model& model, const FrameBuffers& frame, const FrameInputs& inputs,
+void record_backward(const FramePasses& on, const Model& model, const FrameInputs& inputs,
                      const Sorted& sorted, const Rates& rates, const MotionUse* motion) {
-    if (plan.rays()) return record_backward_of_rays(recording, cache, plan, model, frame, inputs, sorted);
+    if (on.plan.rays()) return record_backward_of_rays(on, model, inputs, sorted);
+    const auto& [recording, cache, plan, frame] = on;
     passes::Constants updating{{shared::SPEC_SH_DEGREE, plan.evaluated_degree(inputs.sh_degree)},
                                {shared::SPEC_MODE, update_mode(plan)}};
-    const passes::UpdatePoints buffers = update_buffers(plan, model, frame, inputs.camera, sorted);
+    const passes::UpdateBuffers buffers = update_buffers(plan, model, frame, inputs.camera, sorted);
     const shared::UpdatePush push = update_push(model, frame, rates);
     if (plan.points()) {
         record_blend_backward_as<passes::BlendPointsBackward>(
-            recording, cache, frame, inputs, sorted,
+            on, inputs, sorted,
             {{shared::SPEC_MODE, plan.absolute ? shared::BLEND_BACKWARD_ABSOLUTE : 0},
              {shared::SPEC_NEAREST, plan.nearest}});
-        cache.get<passes::UpdatePoints>(updating).record(recording, buffers, push);
+        cache.get<passes::UpdatePoints>(updating).record(recording, {buffers}, push);
         return;
     }
-    record_blend_backward(recording, cache, plan, frame, inputs, sorted);
+    record_blend_backward(on, inputs, sorted);
     updating.push_back({shared::SPEC_KERNEL, uint32_t(plan.kernel)});
     const gpu::Buffer& motion_sums = plan.motion ? frame.motion_sums : frame.partials;
-    cache.get<passes::Update>(updating).record(
-        recording, std::bit_cast<passes::Update>(MoreBuffers{buffers, motion_sums}), push);
+    cache.get<passes::Update>(updating).record(recording, {buffers, motion_sums}, push);
     if (plan.motion) record_motion_sums(recording, cache, frame);
     if (motion) record_motion_update(recording, cache, frame, *motion);
 }

@@ -4,6 +4,9 @@
 // Each training image may have an exposure: an affine map of colours, learned beside the splats. The
 // published code of 3DGS does the same for captures with automatic exposure; see include/ewa/exposure.h.
 #pragma once
+#include <array>
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "ewa/exposure.h"
@@ -21,6 +24,11 @@ struct Exposures {
     Exposures(gpu::Device& device, size_t photos);
     uint64_t bytes() const { return 4ull * shared::EXPOSURE_FLOATS * photos; }  // of each buffer
     std::vector<Exposure> download() const;
+
+    /// A photo's exposure and moments, for other ranks.
+    using Words = std::array<uint64_t, 3 * shared::EXPOSURE_FLOATS / 2>;
+    Words words(uint32_t photo) const;
+    void set(uint32_t photo, std::span<const uint64_t> words);
 };
 
 /// A step of one training image's exposure.
@@ -54,13 +62,11 @@ void record_loss(gpu::Recording& recording, passes::PassCache& cache, const Fram
 /// the gradient to model.moments1.
 /// With plan.motion, the gradient of the camera's motion is in frame.motion_reduced, which must be reserved for it.
 /// motion: that of the training image's camera, if motions are learned. It takes its own step of Adam.
-void record_backward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
-                     const Model& model, const FrameBuffers& frame, const FrameInputs& inputs,
+void record_backward(const FramePasses& on, const Model& model, const FrameInputs& inputs,
                      const Sorted& sorted, const Rates& rates, const MotionUse* motion = nullptr);
 
 /// Gradients of blending, which are left in frame.slots. Not for points and rays.
-void record_blend_backward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
-                           const FrameBuffers& frame, const FrameInputs& inputs, const Sorted& sorted);
+void record_blend_backward(const FramePasses& on, const FrameInputs& inputs, const Sorted& sorted);
 
 /// SPEC_MODE of the update: UPDATE_* bits.
 uint32_t update_mode(const Plan& plan);

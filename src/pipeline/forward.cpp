@@ -16,9 +16,9 @@ constexpr uint32_t kBlendModes[] = {shared::BLEND_COLOR, shared::BLEND_DEPTH, sh
 
 /// Projection: passes::Project or ProjectPoints.
 template <class Projection>
-void record_project_as(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
-                       const Model& model, const FrameBuffers& frame, const FrameInputs& inputs,
+void record_project_as(const FramePasses& on, const Model& model, const FrameInputs& inputs,
                        const passes::Constants& variant) {
+    const auto& [recording, cache, plan, frame] = on;
     const CameraUse& camera = inputs.camera;
     cache.get<Projection>(variant).record(
         recording,
@@ -31,21 +31,19 @@ void record_project_as(gpu::Recording& recording, passes::PassCache& cache, cons
         {.splats = model.splats, .planes = model.planes(), .log_scale_shift = plan.log_scale_shift});
 }
 
-void record_project(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan, const Model& model,
-                    const FrameBuffers& frame, const FrameInputs& inputs) {
+void record_project(const FramePasses& on, const Model& model, const FrameInputs& inputs) {
+    const Plan& plan = on.plan;
     passes::Constants variant{{shared::SPEC_SH_DEGREE, plan.evaluated_degree(inputs.sh_degree)},
                               {shared::SPEC_MODE, plan.debug ? shared::PROJECT_DEBUG : 0}};
-    if (plan.points())
-        return record_project_as<passes::ProjectPoints>(recording, cache, plan, model, frame, inputs,
-                                                        variant);
+    if (plan.points()) return record_project_as<passes::ProjectPoints>(on, model, inputs, variant);
     variant.push_back({shared::SPEC_KERNEL, uint32_t(plan.kernel)});
-    record_project_as<passes::Project>(recording, cache, plan, model, frame, inputs, variant);
+    record_project_as<passes::Project>(on, model, inputs, variant);
 }
 
 /// Blending: passes::Blend or BlendPoints.
 template <class Blending>
-void record_blend_as(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame,
-                     const FrameInputs& inputs, const passes::Constants& variant) {
+void record_blend_as(const FramePasses& on, const FrameInputs& inputs, const passes::Constants& variant) {
+    const auto& [recording, cache, plan, frame] = on;
     cache.get<Blending>(variant).record(recording,
                                         {.records = frame.records,
                                          .splats = frame.instance_splats[1],
@@ -54,8 +52,8 @@ void record_blend_as(gpu::Recording& recording, passes::PassCache& cache, const 
                                         blend_push(cache.config(), frame, inputs.background));
 }
 
-void record_project_rays(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
-                         const Model& model, const FrameBuffers& frame, const FrameInputs& inputs) {
+void record_project_rays(const FramePasses& on, const Model& model, const FrameInputs& inputs) {
+    const auto& [recording, cache, plan, frame] = on;
     cache
         .get<passes::ProjectRays>(
             {{shared::SPEC_SH_DEGREE, plan.evaluated_degree(inputs.sh_degree)},
@@ -74,8 +72,8 @@ void record_project_rays(gpu::Recording& recording, passes::PassCache& cache, co
 
 /// Integration along rays: passes::BlendRays or MarchRays.
 template <class Integration>
-void record_integrate_as(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
-                         const FrameBuffers& frame, const FrameInputs& inputs, uint32_t mode) {
+void record_integrate_as(const FramePasses& on, const FrameInputs& inputs, uint32_t mode) {
+    const auto& [recording, cache, plan, frame] = on;
     cache.get<Integration>({{shared::SPEC_KERNEL, uint32_t(plan.kernel)}, {shared::SPEC_MODE, mode}})
         .record(recording,
                 {{.records = frame.records,
@@ -202,43 +200,40 @@ void record_tile_lists(gpu::Recording& recording, passes::PassCache& cache, bool
     record_tile_order(recording, cache, gradients, frame);
 }
 
-void record_projection(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
-                       const Model& model, const FrameBuffers& frame, const FrameInputs& inputs) {
-    recording.fill(frame.counts, 0, 0,
-                   inputs.keep_overflow ? offsetof(shared::Counts, overflowed) : sizeof(shared::Counts));
-    if (plan.rays())
-        record_project_rays(recording, cache, plan, model, frame, inputs);
+void record_projection(const FramePasses& on, const Model& model, const FrameInputs& inputs) {
+    on.recording.fill(on.frame.counts, 0, 0,
+                      inputs.keep_overflow ? offsetof(shared::Counts, overflowed) : sizeof(shared::Counts));
+    if (on.plan.rays())
+        record_project_rays(on, model, inputs);
     else
-        record_project(recording, cache, plan, model, frame, inputs);
+        record_project(on, model, inputs);
 }
 
-Sorted record_picture(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan, uint32_t splats,
-                      const FrameBuffers& frame, const FrameInputs& inputs) {
+Sorted record_picture(const FramePasses& on, uint32_t splats, const FrameInputs& inputs) {
+    const auto& [recording, cache, plan, frame] = on;
     record_tile_lists(recording, cache, plan.gradients, splats, frame);
-    passes::Constants variant{{shared::SPEC_MODE, kBlendModes[size_t(plan.drawing)]}};
+    const uint32_t mode = kBlendModes[size_t(plan.drawing)];
+    passes::Constants variant{{shared::SPEC_MODE, mode}};
     if (plan.rays()) {
         if (plan.integrator == Integrator::ray)
-            record_integrate_as<passes::BlendRays>(recording, cache, plan, frame, inputs,
-                                                   kBlendModes[size_t(plan.drawing)]);
+            record_integrate_as<passes::BlendRays>(on, inputs, mode);
         else
             record_integrate_as<passes::MarchRays>(
-                recording, cache, plan, frame, inputs,
-                march_chunk(inputs.samples, cache.config().texel_buffers ? 16 : 8));
+                on, inputs, march_chunk(inputs.samples, cache.config().texel_buffers ? 16 : 8));
     } else if (plan.points()) {
         variant.push_back({shared::SPEC_NEAREST, plan.nearest});
-        record_blend_as<passes::BlendPoints>(recording, cache, frame, inputs, variant);
+        record_blend_as<passes::BlendPoints>(on, inputs, variant);
     } else {
         variant.push_back({shared::SPEC_KERNEL, uint32_t(plan.kernel)});
-        record_blend_as<passes::Blend>(recording, cache, frame, inputs, variant);
+        record_blend_as<passes::Blend>(on, inputs, variant);
     }
     return {.splats = &frame.instance_splats[1],
             .indices = plan.gradients ? &frame.sorted_indices[1] : nullptr};
 }
 
-Sorted record_forward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
-                      const Model& model, const FrameBuffers& frame, const FrameInputs& inputs) {
-    record_projection(recording, cache, plan, model, frame, inputs);
-    return record_picture(recording, cache, plan, model.splats, frame, inputs);
+Sorted record_forward(const FramePasses& on, const Model& model, const FrameInputs& inputs) {
+    record_projection(on, model, inputs);
+    return record_picture(on, model.splats, inputs);
 }
 
 }  // namespace ewa::pipeline

@@ -10,6 +10,14 @@
 
 namespace ewa::pipeline {
 
+/// What the passes of a frame are recorded with.
+struct FramePasses {
+    gpu::Recording& recording;
+    passes::PassCache& cache;
+    const Plan& plan;
+    const FrameBuffers& frame;
+};
+
 /// Which of the ping-pong buffers hold the sorted instances after the forward frame.
 struct Sorted {
     const gpu::Buffer* splats = nullptr;   // each instance's splat
@@ -19,16 +27,13 @@ struct Sorted {
 /// Records: project, depth order, instances, tile order, tile starts, blend. `frame` must be reserved for the
 /// model's splats and the camera's size. After the submission, Counts.instances is the number of instances
 /// needed. If that exceeds frame.instance_capacity, the image is empty: repeat the frame with more capacity.
-Sorted record_forward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
-                      const Model& model, const FrameBuffers& frame, const FrameInputs& inputs);
+Sorted record_forward(const FramePasses& on, const Model& model, const FrameInputs& inputs);
 
 /// The first part of a forward frame: clears the counts and projects the model's splats.
-void record_projection(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
-                       const Model& model, const FrameBuffers& frame, const FrameInputs& inputs);
+void record_projection(const FramePasses& on, const Model& model, const FrameInputs& inputs);
 
 /// The rest of a forward frame: from frame's records, depth_keys[0] and tile_counts of `splats` splats to the image planes.
-Sorted record_picture(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan, uint32_t splats,
-                      const FrameBuffers& frame, const FrameInputs& inputs);
+Sorted record_picture(const FramePasses& on, uint32_t splats, const FrameInputs& inputs);
 
 /// The part between projection and blending: depth order, instances, tile order, tile starts. It reads frame's records,
 /// depth_keys[0] and tile_counts, and leaves each tile's splats in instance_splats[1] and tile_starts; with gradients also

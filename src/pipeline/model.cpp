@@ -52,6 +52,12 @@ void zero(gpu::Buffer& buffer) {
         buffer.upload(std::span(zeros).first(std::min<uint64_t>(zeros.size(), buffer.bytes() - at)), at);
 }
 
+gpu::Buffer fresh_statistics(gpu::Device& device, uint32_t splats) {
+    gpu::Buffer statistics(device, "statistics", std::max<uint64_t>(8ull * splats, 8));
+    zero(statistics);
+    return statistics;
+}
+
 gpu::Buffer parameter_buffer(gpu::Device& device, const char* name, gpu::Texel texel, uint32_t capacity,
                              int sh_degree) {
     const uint64_t bytes = parameter_bytes(capacity, sh_degree);
@@ -75,9 +81,27 @@ void replace_generation(
     model.splats = model.capacity = splats;
 }
 
+Gaussians slice_of(const Gaussians& all, size_t first, size_t count) {
+    Gaussians part;
+    part.sh_degree = all.sh_degree;
+    part.origin = all.origin;
+    part.density = all.density;
+    part.resize(count);
+    const auto copy = [&](const std::vector<float>& from, std::vector<float>& to) {
+        const size_t values = from.size() / all.size();
+        std::copy_n(from.begin() + std::ptrdiff_t(values * first), values * count, to.begin());
+    };
+    copy(all.means, part.means);
+    copy(all.opacity_logits, part.opacity_logits);
+    copy(all.quaternions, part.quaternions);
+    copy(all.log_scales, part.log_scales);
+    copy(all.sh, part.sh);
+    return part;
+}
+
 Model upload_model(gpu::Device& device, const Gaussians& gaussians, int moments, bool statistics) {
     Model model;
-    model.splats = model.capacity = model.share.all = uint32_t(gaussians.size());
+    model.splats = model.capacity = model.all = uint32_t(gaussians.size());
     model.sh_degree = gaussians.sh_degree;
     model.origin = gaussians.origin;
     const uint64_t bytes = parameter_bytes(model.capacity, model.sh_degree);
@@ -90,10 +114,9 @@ Model upload_model(gpu::Device& device, const Gaussians& gaussians, int moments,
         });
     if (moments >= 1) model.moments1 = gpu::Buffer(device, "moments1", bytes, gpu::Texel::rgba32ui);
     if (moments >= 2) model.moments2 = gpu::Buffer(device, "moments2", bytes, gpu::Texel::rgba32ui);
-    if (statistics)
-        model.statistics = gpu::Buffer(device, "statistics", std::max<uint64_t>(8ull * model.capacity, 8));
-    for (gpu::Buffer* buffer : {&model.moments1, &model.moments2, &model.statistics})
+    for (gpu::Buffer* buffer : {&model.moments1, &model.moments2})
         if (*buffer) zero(*buffer);
+    if (statistics) model.statistics = fresh_statistics(device, model.capacity);
     return model;
 }
 

@@ -4,11 +4,9 @@
 #pragma once
 #include <cstdint>
 #include <functional>
-#include <memory>
 #include <span>
 
 #include "ewa/gaussians.h"
-#include "ewa/ranks.h"
 #include "gpu/buffer.h"
 #include "shared/layouts.h"
 
@@ -33,16 +31,11 @@ constexpr size_t parameter_index(uint32_t planes, uint32_t f, size_t i) {
     return ((block * planes + f / 4) * shared::PARAM_BLOCK + within) * 4 + f % 4;
 }
 
-/// Which splats of a run a model has: a range of the one order that all ranks agree on.
-struct Share {
-    std::shared_ptr<Ranks> ranks = alone();
-    uint32_t first = 0;  // number of the model's first splat
-    uint32_t all = 0;    // splats of all ranks
-};
-
 struct Model {
     uint32_t splats = 0, capacity = 0;
-    Share share;
+    // A model may be a portion of a scene: a range of its splats.
+    uint32_t first = 0;      // number of the model's first splat in the scene
+    uint32_t all = 0;        // splats of the scene
     int sh_degree = 0;       // stored
     glm::dvec3 origin{0.0};  // of the means, see Gaussians; camera positions are relative to it too
     uint32_t planes() const { return parameter_planes(sh_degree); }
@@ -67,6 +60,9 @@ void replace_generation(
     gpu::Device& device, Model& model, uint32_t splats,
     const std::function<void(const gpu::Buffer& target, const gpu::Buffer& source, bool is_moments)>& write);
 
+/// Splats `first` to first + count.
+Gaussians slice_of(const Gaussians& all, size_t first, size_t count);
+
 /// moments: how many buffers of them, 0 to 2. They and the statistics are zeroed.
 Model upload_model(gpu::Device& device, const Gaussians& gaussians, int moments, bool statistics);
 
@@ -76,6 +72,9 @@ Gaussians download_model(const Model& model, const gpu::Buffer& values);
 
 /// The same for values on the host, of `splats` splats.
 Gaussians gaussians_of(const Model& model, std::span<const float> values, uint32_t splats);
+
+/// Densification statistics of a new generation: zeros.
+gpu::Buffer fresh_statistics(gpu::Device& device, uint32_t splats);
 
 /// Sets a buffer to zero bytes from the host; the device must be idle.
 void zero(gpu::Buffer& buffer);

@@ -10,7 +10,6 @@
 #include "passes/passes.h"
 #include "pipeline/backward.h"
 #include "pipeline/picture.h"
-#include "pipeline/share.h"
 #include "pipeline/views.h"
 
 namespace ewa {
@@ -127,7 +126,7 @@ std::vector<std::byte> Renderer::State::list(const Plan& plan, const FrameInputs
         buffers.reserve(*device, part.splats, 1, 1, part.splats);
         frame.reserve(*device, cache.config(), size);
         gpu::Recording recording(device->limits());
-        record_list(recording, cache, plan, resident, frame, inputs, buffers, {});
+        record_list({recording, cache, plan, frame}, resident, inputs, buffers, {});
         frame.record_counts(recording);
         executor.run(recording, true);
         const shared::Counts of_part = frame.read_counts();
@@ -151,7 +150,7 @@ void Renderer::State::submit_parts(const Plan& plan, const FrameInputs& inputs, 
             recording.fill(frame.records, 0, 0, kRecord);
         else
             frame.records.upload(std::span<const std::byte>(records));
-        record_list_forward(recording, cache, plan, size.splats, frame, inputs);
+        record_list_forward({recording, cache, plan, frame}, size.splats, inputs);
         then(recording);
     });
     counts.skipped_nonfinite = skipped;
@@ -175,7 +174,7 @@ void Renderer::State::submit(const Camera& camera, const Plan& plan, const Rende
         return;
     }
     counts = run_until_it_fits(cache, executor, frame, size, [&](gpu::Recording& recording) {
-        record_forward(recording, cache, plan, model, frame, inputs);
+        record_forward({recording, cache, plan, frame}, model, inputs);
         then(recording);
     });
 }
@@ -295,9 +294,9 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
     FrameBuffers frame;
     const shared::Counts counts =
         run_until_it_fits(cache, executor, frame, size, [&](gpu::Recording& recording) {
-            const Sorted sorted = record_forward(recording, cache, plan, model, frame, inputs);
+            const Sorted sorted = record_forward({recording, cache, plan, frame}, model, inputs);
             record_loss(recording, cache, frame, inputs, photo, plan.masks);
-            record_backward(recording, cache, plan, model, frame, inputs, sorted, {});
+            record_backward({recording, cache, plan, frame}, model, inputs, sorted, {});
         });
     LossGradient result;
     result.l1 = counts.l1;

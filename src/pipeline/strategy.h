@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Strategies that change the number of splats, on the device. Each replaces the model's arrays by those of the next
-// generation, one after another: at most one array is there twice. frame: provides sizes, counts and scratch buffers of
-// a value a splat.
+// Strategies that change the number of splats, on the device. A scene may be in portions, each a model of its own. So a
+// refinement has phases: each portion is counted, the counts of all decide, and each portion is written. Nothing that the
+// device holds passes from one phase to the next. A write replaces the model's arrays by those of the next generation, one
+// after another: at most one array is there twice.
 #pragma once
 #include <cstdint>
+#include <functional>
+#include <span>
 
+#include "ewa/render_options.h"
 #include "gpu/executor.h"
 #include "pipeline/frame_buffers.h"
 #include "pipeline/model.h"
@@ -15,6 +19,13 @@ namespace ewa::pipeline {
 struct Refinement {
     uint32_t before = 0, after = 0;
     uint32_t relocated = 0;  // by MCMC
+};
+
+/// What a phase runs with. frame: provides sizes, counts and scratch buffers of a value a splat.
+struct Phase {
+    passes::PassCache& cache;
+    gpu::Executor& executor;
+    const FrameBuffers& frame;
 };
 
 /// Of adaptive density control.
@@ -29,10 +40,19 @@ struct DensifyRules {
     uint32_t max_splats = 0;  // hard cap: the threshold is raised until the next generation fits
 };
 
-/// Adaptive density control: counts first, then writes the next generation, and zeroes its statistics. If the
-/// next generation has no splats, the model stays as it is.
-Refinement densify(passes::PassCache& cache, gpu::Executor& executor, Model& model, const FrameBuffers& frame,
-                   const DensifyRules& rules);
+/// The splats of a model's next generation, if mean gradient norms above `threshold` grow.
+uint32_t count_densified(const Phase& phase, const Model& model, const DensifyRules& rules, float threshold);
+
+/// What all portions do.
+struct Densified {
+    float threshold = 0;  // infinity if not even that fits
+    uint64_t splats = 0;  // of the next generation; 0: the scene has to stay as it is
+};
+/// count: the splats of the next generation at a threshold, of all portions.
+Densified decide_densify(const DensifyRules& rules, const std::function<uint64_t(float)>& count);
+
+/// Writes the next generation. The model then has no statistics.
+void write_densified(const Phase& phase, Model& model, const DensifyRules& rules, float threshold);
 
 /// Lowers every opacity to at most this logit and zeroes its moments.
 void record_reset_opacity(gpu::Recording& recording, passes::PassCache& cache, const Model& model,
@@ -50,12 +70,35 @@ struct McmcRules {
     uint32_t step = 0;
 };
 
+/// A portion's part of a refinement.
+struct McmcPart {
+    uint32_t weight = 0, dead = 0;  // of its splats: sums
+    // As decide_mcmc fills them in:
+    uint32_t all_weight = 0, weight_before = 0;  // of all portions, and of those before
+    uint32_t draws = 0;                          // by all portions
+    uint32_t first_draw = 0;                     // of the portion's dead splats
+    uint32_t added = 0;                          // splats that this portion gets: the last one gets all
+};
 /// Every dead splat and every added splat becomes a copy of a source. Sources are drawn with probability in
 /// proportion to opacity (integer weights in units of 1 / min(65535, 2^32 / splats)). A source and its copies
 /// share its opacity and scales by eq. 9, or its optical depth with Footprint::density, and start with zero moments. With `spread`, each is placed by a draw
-/// of the source's Gaussian, `spread` times as wide. No-op if all splats are dead or nothing changes.
-Refinement refine_mcmc(passes::PassCache& cache, gpu::Executor& executor, Model& model,
-                       const FrameBuffers& frame, const McmcRules& rules);
+/// of the source's Gaussian, `spread` times as wide.
+McmcPart weigh_mcmc(const Phase& phase, const Model& model, const McmcRules& rules);
+
+/// parts: of all portions. If all splats are dead or nothing changes, there are no draws, and no phase follows.
+Refinement decide_mcmc(std::span<McmcPart> parts, uint32_t splats, const McmcRules& rules);
+
+/// Draws of which the sources are this model's.
+struct McmcSources {
+    gpu::Buffer sources;  // of all draws: the source's index in this model or NOT_LISTED
+    gpu::Buffer hits;     // of each splat
+};
+McmcSources draw_mcmc(const Phase& phase, const Model& model, const McmcRules& rules, const McmcPart& part);
+
+/// Writes the next generation. from: the sources of this portion's dead splats, and then of those that it gets. Sources that are
+/// no splats of the model are in model.params behind them, and have hits too.
+void write_mcmc(const Phase& phase, Model& model, const McmcRules& rules, const McmcPart& part,
+                const McmcSources& from);
 
 struct Noise {
     float amplitude = 0;   // 1 / world units

@@ -29,11 +29,10 @@ float decay(double beta, uint32_t views) {
     return float(std::pow(beta, views));
 }
 
-shared::UpdateViewsPush update_views_push(const Model& model, const Rates& rates, uint32_t first,
-                                          uint32_t bands) {
+shared::UpdateViewsPush update_views_push(const Model& model, const Rates& rates, uint32_t bands) {
     const auto [bias1, bias2] = adam_biases(rates.step);
     return {.splats = model.splats,
-            .first = first,
+            .first = model.first,
             .planes = model.planes(),
             .views = rates.views,
             .bands = bands,
@@ -91,15 +90,15 @@ void ViewBuffers::reserve_sums(gpu::Device& device, gpu::Executor& executor, con
     sums = std::move(larger);
 }
 
-void record_list(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan, const Model& model,
-                 const FrameBuffers& frame, const FrameInputs& inputs, const ViewBuffers& buffers,
-                 const ListPlace& place, bool projected) {
+void record_list(const FramePasses& on, const Model& model, const FrameInputs& inputs,
+                 const ViewBuffers& buffers, const ListPlace& place, bool projected) {
+    const auto& [recording, cache, plan, frame] = on;
     constexpr uint64_t kBlock = sizeof(shared::CameraBlock);
     const Band& band = inputs.band;
     if (!projected) {
         recording.copy(*inputs.camera.buffer, inputs.camera.offset, buffers.cameras, place.view * kBlock,
                        kBlock);
-        record_projection(recording, cache, plan, model, frame, inputs);
+        record_projection(on, model, inputs);
     }
     if (band.rows > 0)
         cache.get<passes::BandTiles>().record(
@@ -132,20 +131,20 @@ void record_list(gpu::Recording& recording, passes::PassCache& cache, const Plan
                                                 .first_row = band.first});
 }
 
-Sorted record_list_forward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
-                           uint32_t splats, const FrameBuffers& frame, const FrameInputs& inputs) {
+Sorted record_list_forward(const FramePasses& on, uint32_t splats, const FrameInputs& inputs) {
+    const auto& [recording, cache, plan, frame] = on;
     recording.fill(frame.counts, 0, 0, sizeof(shared::Counts));
     cache.get<passes::ReceiveRecords>().record(
         recording,
         {.records = frame.records, .depth_keys = frame.depth_keys[0], .tile_counts = frame.tile_counts},
         {.splats = splats, .size = {frame.sizes.width, frame.sizes.height}});
-    return record_picture(recording, cache, plan, splats, frame, inputs);
+    return record_picture(on, splats, inputs);
 }
 
-void record_list_backward(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
-                          uint32_t splats, const FrameBuffers& frame, const FrameInputs& inputs,
+void record_list_backward(const FramePasses& on, uint32_t splats, const FrameInputs& inputs,
                           const Sorted& sorted, const gpu::Buffer& sums, uint32_t first_place) {
-    record_blend_backward(recording, cache, plan, frame, inputs, sorted);
+    const auto& [recording, cache, plan, frame] = on;
+    record_blend_backward(on, inputs, sorted);
     cache.get<passes::SumSlots>({{shared::SPEC_MODE, plan.absolute ? shared::UPDATE_ABSOLUTE : 0}})
         .record(recording,
                 {.records = frame.records,
@@ -157,9 +156,9 @@ void record_list_backward(gpu::Recording& recording, passes::PassCache& cache, c
                 {.splats = splats, .first_place = first_place});
 }
 
-void record_update_views(gpu::Recording& recording, passes::PassCache& cache, const Plan& plan,
-                         const Model& model, const FrameBuffers& frame, const ViewBuffers& buffers,
-                         const Rates& rates, uint32_t first, int sh_degree, uint32_t bands) {
+void record_update_views(const FramePasses& on, const Model& model, const ViewBuffers& buffers,
+                         const Rates& rates, int sh_degree, uint32_t bands) {
+    const auto& [recording, cache, plan, frame] = on;
     const gpu::Buffer& moments2 = model.second_moments();
     cache
         .get<passes::UpdateViews>(
@@ -179,7 +178,7 @@ void record_update_views(gpu::Recording& recording, passes::PassCache& cache, co
                  .moments2_out = moments2,
                  // A binding that a mode does not use needs a buffer.
                  .statistics = plan.statistics ? model.statistics : frame.partials},
-                update_views_push(model, rates, first, bands));
+                update_views_push(model, rates, bands));
 }
 
 Rates batch_rates(const Rates& rates) {

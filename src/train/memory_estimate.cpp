@@ -248,20 +248,20 @@ uint64_t limited_cache(const TrainOptions& options) {
     return std::min(options.image_cache_bytes, options.device_memory_bytes / 4);
 }
 
-int chunks_for(const gpu::Device& device, const Dataset& dataset, const std::vector<int>& frames,
-               const Gaussians& start, const TrainOptions& options) {
+int portions_for(const gpu::Device& device, const Dataset& dataset, const std::vector<int>& frames,
+                 const Gaussians& start, const TrainOptions& options, int ranks) {
     // A tenth of the limit: while one is in use with its gradients, most of the device is free for others.
     constexpr uint64_t kPart = 10;
-    // Of chunks. Each has a thread while splats multiply.
-    constexpr uint64_t kMost = 256;
-    constexpr uint64_t kLeastSplats = 64;  // of the start, in a chunk
-    const uint64_t limit = options.device_memory_bytes;
-    if (limit == 0 || start.size() < 2 * kLeastSplats) return 1;
+    constexpr uint64_t kMost = 256;        // of portions
+    constexpr uint64_t kLeastSplats = 64;  // of the start, in a portion
+    const uint64_t limit = options.device_memory_bytes, own = start.size() / uint64_t(ranks);
+    if (limit == 0 || own < 2 * kLeastSplats) return 1;
     const MemoryEstimate whole = estimate_memory(device, dataset, frames, start, options);
+    const uint64_t model = whole.model / uint64_t(ranks);
     // The frame's part is a guess that some trainings exceed by half.
-    if (whole.total() + whole.frame <= limit) return 1;
-    const uint64_t wanted = (whole.model * kPart + limit - 1) / limit;
-    return int(std::clamp<uint64_t>(wanted, 2, std::clamp<uint64_t>(start.size() / kLeastSplats, 2, kMost)));
+    if (model + 2 * whole.frame + whole.images <= limit) return 1;
+    const uint64_t wanted = (model * kPart + limit - 1) / limit;
+    return int(std::clamp<uint64_t>(wanted, 2, std::clamp<uint64_t>(own / kLeastSplats, 2, kMost)));
 }
 
 }  // namespace train

@@ -82,9 +82,9 @@ class Alignment {
                 .camera = record_move_camera(recording, cache_, motions_, use.photo, base),
                 .background = options_.render.background,
                 .sh_degree = options_.render.sh_degree};
-            const auto sorted = record_forward(recording, cache_, plan_, model_, frame_, inputs);
+            const auto sorted = record_forward({recording, cache_, plan_, frame_}, model_, inputs);
             record_loss(recording, cache_, frame_, inputs, photo.texels, photo.masked);
-            record_backward(recording, cache_, plan_, model_, frame_, inputs, sorted, {}, &use);
+            record_backward({recording, cache_, plan_, frame_}, model_, inputs, sorted, {}, &use);
         });
     }
 

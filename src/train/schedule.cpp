@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/schedule.h"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "ewa/error.h"
+#include "train/exclusions.h"
 #include "train/run_options.h"
 
 namespace ewa::train {
@@ -51,25 +55,20 @@ pipeline::PlanRequest plan_request(const Gaussians& start, const TrainOptions& o
             .regularised = options.strategy == Strategy::mcmc || few_photos(options, photos)};
 }
 
+void check_exclusions(const TrainOptions& options, int ranks) {
+    const std::array<bool, divisions> divided{ranks > 1, options.batch > 1, options.bands > 1,
+                                              options.device_memory_bytes > 0};
+    for (const Exclusion& row : kExclusions)
+        for (size_t by = 0; by < divisions; ++by)
+            if (row.used(options) && divided[by] && row.excludes[by])
+                throw InputError(
+                    fmt::format("{} and {} exclude each other: {}", kDivisions[by], row.option, row.reason));
+}
+
 void check_training(const TrainOptions& options, int ranks) {
     if (options.batch < 1) throw InputError("--batch: a step has at least one view");
     if (options.bands < 1) throw InputError("--bands: a view has at least one band");
-    if (options.batch > 1 || options.bands > 1 || ranks > 1) {
-        const std::string several = ranks > 1 ? "several ranks" : options.batch > 1 ? "--batch" : "--bands";
-        if (options.refine_poses)
-            throw InputError(several +
-                             " and --refine-poses exclude each other: a camera learns from its own step");
-        if (options.render.points) throw InputError(several + " and --points exclude each other");
-    }
-    if (options.device_memory_bytes > 0) {
-        if (ranks > 1) throw InputError("several ranks and --device-memory exclude each other");
-        if (options.bands > 1) throw InputError("--bands and --device-memory exclude each other");
-        if (options.exposure) throw InputError("--device-memory and --exposure exclude each other");
-        if (options.refine_poses) throw InputError("--device-memory and --refine-poses exclude each other");
-        if (options.render.points) throw InputError("--device-memory and --points exclude each other");
-    }
-    if (options.exposure && ranks > 1) throw InputError("several ranks and --exposure exclude each other");
-    if (options.exposure && options.bands > 1) throw InputError("--bands and --exposure exclude each other");
+    check_exclusions(options, ranks);
     check_points(options.render);
     if (options.render.points && options.strategy == Strategy::mcmc)
         throw InputError(

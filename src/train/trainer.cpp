@@ -8,13 +8,11 @@
 #include <cstring>
 #include <exception>
 #include <glm/geometric.hpp>
-#include <numeric>
 #include <utility>
 
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
-#include "pipeline/share.h"
-#include "train/collect.h"
+#include "portions/collect.h"
 #include "train/memory_estimate.h"
 #include "train/run_input.h"
 #include "train/trainer_state.h"
@@ -101,31 +99,17 @@ class LimitedMemory {
     bool kept_ = false;
 };
 
-/// A rank's part of the first splats.
-Gaussians share_of(Gaussians start, const Ranks& ranks) {
-    if (ranks.size() == 1) return start;
-    check_share(uint32_t(start.size()), ranks.size());
-    const Range range = range_of(uint32_t(start.size()), ranks.rank(), ranks.size());
-    std::vector<uint32_t> indices(range.splats);
-    std::iota(indices.begin(), indices.end(), range.first);
-    select_splats(start, indices);
-    return start;
-}
-
-/// The cap of rank 0. Devices of other ranks may have more or less memory. Collective.
-uint32_t agreed_cap(Ranks& ranks, const SplatCap& own) {
-    if (ranks.size() == 1) return own.splats;
-    uint32_t agreed = 0;
-    const std::vector<std::byte> told = train::told(ranks, std::as_bytes(std::span(&own.splats, 1)));
-    std::memcpy(&agreed, told.data(), sizeof(agreed));
-    return agreed;
+/// The number of rank 0. Devices of other ranks may have more or less memory. Collective.
+uint32_t agreed(Ranks& ranks, uint32_t own) {
+    const uint64_t word = own;
+    return uint32_t(ranks.gather(std::span(&word, 1)).front());
 }
 
 }  // namespace
 
 Trainer::State::State(std::shared_ptr<gpu::Device> d, const Dataset& dataset, const std::vector<int>& frames,
                       const Gaussians& ready, double length, const TrainOptions& o, std::shared_ptr<Ranks> r,
-                      int chunk_count)
+                      int portions_of_rank)
     : device(std::move(d)),
       ranks(std::move(r)),
       options(o),
@@ -135,11 +119,14 @@ Trainer::State::State(std::shared_ptr<gpu::Device> d, const Dataset& dataset, co
       executor(*device, cache.config().frames_in_flight),
       images(*device, cache.config(), dataset, frames, train::cache_share(o, 0), ready.origin),
       plan(plan_for(train::plan_request(ready, o, images.any_masked(), frames.size()))),
-      instance_capacity(first_capacity(ready.size())) {
-    if (chunk_count > 1)
-        divide(ready, chunk_count);
-    else
-        model = upload_model(*device, share_of(ready, *ranks), plan.moment_buffers(), plan.statistics);
+      portions(*device, ranks, ready,
+               {.count = portions_of_rank,
+                .limit = o.device_memory_bytes,
+                .moments = plan.moment_buffers(),
+                .statistics = plan.statistics}),
+      several(portions, o.bands),
+      // The first frame tells how many there are. With a limit, a capacity for all splats might not fit.
+      instance_capacity(first_capacity(portions.streamed() ? 0 : ready.size())) {
     for (int halvings = 1; halvings <= o.halvings; ++halvings)
         smaller.emplace_back(*device, cache.config(), dataset, frames, train::cache_share(o, halvings),
                              ready.origin, 1 << halvings);
@@ -151,14 +138,8 @@ Trainer::State::State(std::shared_ptr<gpu::Device> d, const Dataset& dataset, co
                 motion_basis(dataset.frames[size_t(frame_index)].camera, ready, o.refine_focal, extent));
         motions = Motions(*device, bases);
     }
-    take_share(uint32_t(ready.size()));
-    report.splats = model.share.all;
+    report.splats = portions.splats();
     check_bands(o, cache.config(), smaller.empty() ? images : smaller.back());
-    if (!chunks && (o.batch > 1 || o.bands > 1 || ranks->size() > 1)) batch.emplace(ranks, o.bands);
-}
-
-void Trainer::State::take_share(uint32_t all) {
-    model.share = {ranks, range_of(all, ranks->rank(), ranks->size()).first, all};
 }
 
 void Trainer::State::call(Call what) const {
@@ -180,16 +161,17 @@ Trainer::Trainer(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
     train::check_training(options, ranks->size());
     const double extent = extent_for(dataset, train_frames, start);
     TrainOptions resolved = resolve(options, dataset);
-    resolved.max_splats = agreed_cap(*ranks, splat_cap(*device, dataset, train_frames, start, resolved));
-    const int chunks = train::chunks_for(*device, dataset, train_frames, start, resolved);
+    resolved.max_splats = agreed(*ranks, splat_cap(*device, dataset, train_frames, start, resolved).splats);
+    const auto count = int(agreed(*ranks, uint32_t(train::portions_for(*device, dataset, train_frames, start,
+                                                                       resolved, ranks->size()))));
     if (resolved.device_memory_bytes > 0 && device->memory_limit() > 0)
         throw InputError(
             "another training has limited this device's memory: a device takes one such training");
     LimitedMemory limited(device, resolved.device_memory_bytes);
-    if (chunks > 1) resolved.image_cache_bytes = train::limited_cache(resolved);
+    if (count > 1) resolved.image_cache_bytes = train::limited_cache(resolved);
     state_ = std::make_unique<State>(std::move(device), dataset, train_frames,
                                      prepared(std::move(start), options.render.kernel), extent, resolved,
-                                     std::move(ranks), chunks);
+                                     std::move(ranks), count);
     limited.keep();
 }
 
@@ -244,20 +226,13 @@ StepReport Trainer::take_step() {
     State& s = *state_;
     const auto start = Clock::now();
     const int first = s.report.step + 1, last = std::min(s.report.step + s.options.batch, s.options.steps);
-    if (s.batch || s.chunks)
-        s.optimise_batch(first, last);
-    else
-        s.optimise(first);
+    s.optimise(first, last);
     const auto optimised = Clock::now();
     for (int step = first; step <= last; ++step) s.follow_up(step);
     const auto end = Clock::now();
     s.report.step = last;
-    s.report.splats = s.model.share.all;
-    uint64_t bytes = 0;
-    for (const gpu::Buffer* buffer :
-         {&s.model.params, &s.model.moments1, &s.model.moments2, &s.model.statistics})
-        bytes += buffer->bytes();
-    s.most_own_bytes = std::max(s.most_own_bytes, bytes);
+    s.report.splats = s.portions.splats();
+    s.most_own_bytes = std::max(s.most_own_bytes, s.portions.state_bytes(s.portions.own_splats()));
     s.report.seconds += std::chrono::duration<double>(end - start).count();
     s.times.steps += last - first + 1;
     s.times.step += milliseconds(end - start);
@@ -273,7 +248,7 @@ std::vector<CameraMotion> Trainer::camera_motions() const {
     return state_->plan.motion ? state_->motions.download() : std::vector<CameraMotion>();
 }
 uint32_t Trainer::splats() const {
-    return state_->model.share.all;
+    return state_->portions.splats();
 }
 uint32_t Trainer::max_splats() const {
     return state_->options.max_splats;
@@ -295,7 +270,7 @@ double Trainer::extent() const {
 }
 
 std::vector<PlanLine> Trainer::plan() const {
-    return describe(state_->plan, state_->model.sh_degree, state_->model.share.all);
+    return describe(state_->plan, state_->portions.sh_degree(), state_->portions.splats());
 }
 
 StepTimes Trainer::step_times() const {

@@ -5,12 +5,13 @@
 #include <bit>
 #include <cstring>
 #include <span>
+#include <string>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "ewa/error.h"
-#include "pipeline/share.h"
-#include "train/collect.h"
+#include "portions/collect.h"
 #include "train/state_stream.h"
 #include "train/trainer_state.h"
 
@@ -25,37 +26,25 @@ struct NamedBuffer {
     const char* name;
     gpu::Buffer* buffer;
     uint64_t bytes;
-    gpu::Texel texel;
 };
 
-/// The buffers that a run of `splats` splats keeps from step to step.
-std::vector<NamedBuffer> buffers_of(const Plan& plan, Model& model, Exposures& exposures, Motions& motions,
-                                    uint32_t splats) {
-    const uint64_t bytes = parameter_bytes(splats, model.sh_degree);
-    std::vector<NamedBuffer> buffers{{"params", &model.params, bytes, gpu::Texel::rgba32f},
-                                     {"moments1", &model.moments1, bytes, gpu::Texel::rgba32ui}};
-    if (plan.moment_buffers() > 1)
-        buffers.push_back({"moments2", &model.moments2, bytes, gpu::Texel::rgba32ui});
-    if (plan.statistics)
-        buffers.push_back({"statistics", &model.statistics, 8ull * splats, gpu::Texel::none});
+/// What a run keeps from step to step besides the splats. All ranks have the same.
+std::vector<NamedBuffer> common_buffers(const Plan& plan, Exposures& exposures, Motions& motions) {
+    std::vector<NamedBuffer> buffers;
     if (plan.exposure)
         for (const auto& [name, buffer] : {std::pair{"exposures", &exposures.values},
                                            {"exp_moments1", &exposures.moments1},
                                            {"exp_moments2", &exposures.moments2}})
-            buffers.push_back({name, buffer, exposures.bytes(), gpu::Texel::none});
-    if (plan.motion)
+            buffers.push_back({name, buffer, exposures.bytes()});
+    if (plan.motion) {
         for (const auto& [name, buffer] : {std::pair{"motions", &motions.values},
                                            {"motion_moments1", &motions.moments1},
                                            {"motion_moments2", &motions.moments2}})
-            buffers.push_back({name, buffer, motions.bytes(), gpu::Texel::none});
-    if (plan.motion)
-        buffers.push_back({"motion_bases", &motions.bases, motions.basis_bytes(), gpu::Texel::none});
+            buffers.push_back({name, buffer, motions.bytes()});
+        buffers.push_back({"motion_bases", &motions.bases, motions.basis_bytes()});
+    }
     return buffers;
 }
-
-}  // namespace
-
-namespace {
 
 std::span<const std::byte> bytes_of(const glm::dvec3& origin) {
     return std::as_bytes(std::span(&origin, 1));
@@ -109,24 +98,20 @@ void Trainer::save(train::StateWriter& to) const {
 void Trainer::join_state(train::StateWriter* to) const {
     State& s = *state_;
     s.finish_all();
-    const bool moved = s.model.origin != glm::dvec3(0);
+    const auto common = common_buffers(s.plan, s.exposures, s.motions);
+    const bool moved = s.portions.origin() != glm::dvec3(0);
     const auto pass_on = [to](Ranks& ranks, std::span<const std::byte> own, const std::string& name) {
-        train::pass_on(
+        portions::pass_on(
             ranks, own, [&](uint64_t bytes, uint32_t checksum) { to->begin_array(name, bytes, checksum); },
             [&](std::span<const std::byte> piece) { to->write(piece); });
     };
-    if (s.chunks) {
-        const std::vector<TrainerArray> arrays = s.chunk_arrays();
-        to->begin({s.report, s.model.sh_degree}, arrays.size() + moved);
-        for (const TrainerArray& array : arrays) pass_on(*s.ranks, array.bytes, array.name);
-    } else {
-        const auto buffers = buffers_of(s.plan, s.model, s.exposures, s.motions, s.model.capacity);
-        if (to) to->begin({s.report, s.model.sh_degree}, buffers.size() + moved);
-        for (const NamedBuffer& named : buffers)
-            pass_on(*s.ranks, named.buffer->download<std::byte>(named.bytes), named.name);
-    }
-    // All ranks have the same.
-    if (to && moved) pass_on(*alone(), bytes_of(s.model.origin), "origin");
+    if (to) to->begin({s.report, s.portions.sh_degree()}, s.portions.kept().size() + common.size() + moved);
+    for (const portions::Array array : s.portions.kept())
+        pass_on(*s.ranks, s.portions.bytes(array), portions::Portions::name_of(array));
+    if (!to) return;
+    for (const NamedBuffer& named : common)
+        pass_on(*alone(), named.buffer->download<std::byte>(named.bytes), named.name);
+    if (moved) pass_on(*alone(), bytes_of(s.portions.origin()), "origin");
 }
 
 void Trainer::restore(const TrainerState& state) {
@@ -139,66 +124,62 @@ void Trainer::restore(train::StateReader& from) {
     const train::StateHead& head = from.head();
     const auto& arrays = from.arrays();
     const uint32_t splats = head.report.splats;
-    if (head.sh_degree != s.model.sh_degree || head.report.step > s.options.steps ||
+    if (head.sh_degree != s.portions.sh_degree() || head.report.step > s.options.steps ||
         splats > s.options.max_splats || splats == 0)
         throw InputError(
             "the state does not fit this training: another SH degree, more steps or more splats");
-    const auto buffers = buffers_of(s.plan, s.model, s.exposures, s.motions, splats);
     const bool moved = !arrays.empty() && arrays.back().name == "origin";
     glm::dvec3 origin(0);
     if (moved && arrays.back().bytes == sizeof(origin))
         from.read(arrays.size() - 1, 0, std::as_writable_bytes(std::span(&origin, 1)));
-    if (origin != s.model.origin)
+    if (origin != s.portions.origin())
         throw InputError("the state does not fit this training: its means are relative to another origin");
-    if (arrays.size() != buffers.size() + moved)
+    std::vector<train::StateReader::Array> expected;
+    for (const portions::Array array : s.portions.kept())
+        expected.push_back({portions::Portions::name_of(array), s.portions.bytes_of(array, splats)});
+    for (const NamedBuffer& named : common_buffers(s.plan, s.exposures, s.motions))
+        expected.push_back({named.name, named.bytes});
+    if (arrays.size() != expected.size() + moved)
         throw InputError(
             "the state does not fit this training: it is of another strategy or has moments of other bits");
-    for (size_t i = 0; i < buffers.size(); ++i)
-        if (arrays[i].name != buffers[i].name || arrays[i].bytes != buffers[i].bytes)
-            throw InputError("the state does not fit this training: it lacks " +
-                             std::string(buffers[i].name) + " of " + std::to_string(splats) + " splats");
+    for (size_t i = 0; i < expected.size(); ++i)
+        if (arrays[i].name != expected[i].name || arrays[i].bytes != expected[i].bytes)
+            throw InputError("the state does not fit this training: it lacks " + expected[i].name + " of " +
+                             std::to_string(splats) + " splats");
     s.call(Call::restore);
     share_state(&from);
 }
 
 void Trainer::share_state(train::StateReader* from) {
     State& s = *state_;
-    const int rank = s.ranks->rank(), ranks = s.ranks->size();
     s.finish_all();
     StepReport report;
     if (from) report = from->head().report;
-    if (ranks > 1) {
-        const auto told = train::told(*s.ranks, std::as_bytes(std::span(&report, 1)));
-        std::memcpy(&report, told.data(), sizeof(report));
-    }
-    if (s.chunks) {
-        s.set_chunk_arrays(*from);
-        s.take_share(report.splats);
-        s.report = report;
-        return;
-    }
-    check_share(report.splats, ranks);
-    const int sh_degree = s.model.sh_degree;
-    const glm::dvec3 origin = s.model.origin;
-    s.model = {};  // free its memory first
-    s.model.splats = s.model.capacity = range_of(report.splats, rank, ranks).splats;
-    s.model.sh_degree = sh_degree;
-    s.model.origin = origin;
-    s.take_share(report.splats);
-    const auto part_bytes = [&](int of, size_t array) {
-        const uint32_t splats = range_of(report.splats, of, ranks).splats;
-        return buffers_of(s.plan, s.model, s.exposures, s.motions, splats)[array].bytes;
-    };
-    const auto buffers = buffers_of(s.plan, s.model, s.exposures, s.motions, s.model.splats);
-    for (size_t i = 0; i < buffers.size(); ++i) {
-        *buffers[i].buffer = gpu::Buffer(*s.device, buffers[i].name, buffers[i].bytes, buffers[i].texel);
+    const auto told = portions::told(*s.ranks, std::as_bytes(std::span(&report, 1)));
+    std::memcpy(&report, told.data(), sizeof(report));
+    s.portions.clear(report.splats);
+    size_t read = 0;  // arrays
+    for (const portions::Array array : s.portions.kept()) {
         std::vector<uint64_t> sizes;
-        for (int of = 0; of < ranks; ++of) sizes.push_back(part_bytes(of, i));
-        const auto read = [&](uint64_t offset, std::span<std::byte> into) { from->read(i, offset, into); };
-        buffers[i].buffer->upload(std::span<const std::byte>(train::part_of(*s.ranks, sizes, read)));
+        for (int p = 0; p < s.portions.all(); ++p)
+            sizes.push_back(
+                s.portions.bytes_of(array, portions::range_of(report.splats, p, s.portions.all()).splats));
+        portions::hand_out(
+            *s.ranks, sizes,
+            [&](uint64_t offset, std::span<std::byte> into) { from->read(read, offset, into); },
+            [&](size_t part, std::vector<std::byte> bytes) {
+                s.portions.give(int(part) - s.portions.first(), array, std::move(bytes));
+            });
+        ++read;
+    }
+    for (const NamedBuffer& named : common_buffers(s.plan, s.exposures, s.motions)) {
+        std::vector<std::byte> bytes(from ? named.bytes : 0);
+        if (from) from->read(read++, 0, bytes);
+        named.buffer->upload(std::span<const std::byte>(portions::told(*s.ranks, bytes)));
     }
     s.report = report;
-    s.instance_capacity = std::max(s.instance_capacity, first_capacity(report.splats));
+    if (!s.portions.streamed())
+        s.instance_capacity = std::max(s.instance_capacity, first_capacity(report.splats));
 }
 
 Gaussians Trainer::gaussians() const {
@@ -209,30 +190,23 @@ Gaussians Trainer::join_gaussians() const {
     State& s = *state_;
     s.finish_all();
     Gaussians gaussians;
-    if (s.chunks) {
-        s.frame = {};  // the caller may draw the splats: the next step makes another
-        const auto bytes = s.chunks->joined(
-            train::Chunks::params, [&](uint32_t n) { return parameter_bytes(n, s.model.sh_degree); });
-        gaussians = gaussians_of(s.model,
-                                 {reinterpret_cast<const float*>(bytes.data()), bytes.size() / sizeof(float)},
-                                 s.model.share.all);
-    } else if (s.ranks->size() == 1) {
-        gaussians = download_model(s.model, s.model.params);
+    if (s.portions.alone()) {
+        const Model& model = s.portions.use(0, portions::Portions::Need::params);
+        gaussians = download_model(model, model.params);
     } else {
-        const auto bytes = train::joined(
-            *s.ranks, s.model.params.download<std::byte>(parameter_bytes(s.model.splats, s.model.sh_degree)));
+        if (s.portions.streamed())
+            s.frame = {};  // the caller may draw the splats: the next step makes another
+        const auto bytes = portions::joined(*s.ranks, s.portions.bytes(portions::params));
         if (s.ranks->rank() != 0) return gaussians;
-        gaussians = gaussians_of(s.model,
-                                 {reinterpret_cast<const float*>(bytes.data()), bytes.size() / sizeof(float)},
-                                 s.model.share.all);
+        gaussians = s.portions.gaussians_of(bytes);
     }
-    gaussians.density = state_->plan.kernel == Footprint::density;
+    gaussians.density = s.plan.kernel == Footprint::density;
     return gaussians;
 }
 
 std::vector<Image> Trainer::render(std::span<const Camera> cameras) const {
-    if (!state_->batch)
-        throw InputError("this trainer does not draw pictures: a Renderer of its splats does");
+    if (state_->plan.points())
+        throw InputError("a trainer of points does not draw pictures: a Renderer of its splats does");
     state_->call(Call::render);
     return join_renders(cameras);
 }
@@ -242,7 +216,7 @@ namespace {
 /// The images of all ranks on rank 0, the one of view k from rank k. own: empty pixels of a rank that has none.
 std::vector<Image> joined_images(Ranks& ranks, const Image& own, std::span<const Camera> cameras) {
     const auto bytes = std::as_bytes(std::span(own.pixels));
-    const auto all = train::joined(ranks, {bytes.begin(), bytes.end()});
+    const auto all = portions::joined(ranks, {bytes.begin(), bytes.end()});
     std::vector<Image> images;
     if (ranks.rank() != 0) return images;
     size_t at = 0;
@@ -260,8 +234,9 @@ std::vector<Image> joined_images(Ranks& ranks, const Image& own, std::span<const
 
 std::vector<Image> Trainer::join_renders(std::span<const Camera> asked) const {
     State& s = *state_;
+    s.finish_all();
     static_assert(std::is_trivially_copyable_v<Camera>);
-    const auto told = train::told(*s.ranks, std::as_bytes(asked));
+    const auto told = portions::told(*s.ranks, std::as_bytes(asked));
     std::vector<Camera> cameras(told.size() / sizeof(Camera));
     std::memcpy(cameras.data(), told.data(), told.size());
     const size_t ranks = size_t(s.ranks->size());
@@ -282,7 +257,7 @@ std::vector<RankFigures> Trainer::rank_figures() const {
 
 std::vector<RankFigures> Trainer::join_figures() const {
     const State& s = *state_;
-    const train::Traffic& traffic = s.batch->traffic();
+    const portions::Traffic& traffic = s.several.traffic();
     const double views = std::max(1, s.times.steps);
     const std::array<double, 5> own{double(traffic.sent_bytes) / views, traffic.exchange / views,
                                     traffic.waiting / views, double(s.most_own_bytes),
@@ -295,6 +270,15 @@ std::vector<RankFigures> Trainer::join_figures() const {
             {s.ranks->name(int(i / own.size())), value(0), value(1), value(2), value(3), value(4)});
     }
     return figures;
+}
+
+std::optional<ChunkFigures> Trainer::chunk_figures() const {
+    const State& s = *state_;
+    if (!s.portions.streamed()) return {};
+    const double steps = std::max(1.0, double(s.times.steps) / s.options.batch);
+    return ChunkFigures{s.portions.count(), double(s.portions.streamed_bytes()) / steps,
+                        s.portions.streaming() / steps, s.portions.state_bytes(s.portions.splats()),
+                        s.options.device_memory_bytes};
 }
 
 }  // namespace ewa

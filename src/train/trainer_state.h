@@ -13,9 +13,8 @@
 #include "pipeline/backward.h"
 #include "pipeline/frame_buffers.h"
 #include "pipeline/strategy.h"
-#include "train/batch.h"
-#include "train/chunk_batch.h"
-#include "train/chunks.h"
+#include "portions/portions.h"
+#include "portions/step.h"
 #include "train/image_cache.h"
 #include "train/schedule.h"
 
@@ -37,7 +36,8 @@ struct Trainer::State {
     gpu::Executor executor;
     train::ImageCache images;
     const pipeline::Plan plan;
-    pipeline::Model model;  // without arrays if the splats are in chunks
+    portions::Portions portions;
+    portions::Step several;  // steps of several pictures or portions
     pipeline::FrameBuffers frame;
     std::vector<train::ImageCache> smaller;  // by downsample level, from 1; freed after its last step
     pipeline::Exposures exposures;
@@ -52,18 +52,14 @@ struct Trainer::State {
     StepReport report;
     StepTimes times;  // sums, over `timed_steps` steps for the passes
     int timed_steps = 0;
-    std::optional<train::Batch> batch;  // empty: a step has one view
-    uint64_t most_own_bytes = 0;        // of the state that this rank has held after a step
-    // Destroyed first: what they hold is not needed to make room for.
-    std::optional<train::Chunks> chunks;  // empty: all splats stay on the device
-    train::ChunkBatch chunk_batch;
+    uint64_t most_own_bytes = 0;  // of the state that this rank has held after a step
 
     State(std::shared_ptr<gpu::Device> d, const Dataset& dataset, const std::vector<int>& frames,
           const Gaussians& ready, double length, const TrainOptions& o, std::shared_ptr<Ranks> r,
-          int chunk_count);
+          int portions_of_rank);
 
-    /// Notes which splats of `all` the model has.
-    void take_share(uint32_t all);
+    /// Whether a step has one picture of one portion: one kernel then gathers its gradients and moves the splats.
+    bool fused() const { return portions.alone() && options.batch == 1 && options.bands == 1; }
 
     /// Of rank 0: begins what all ranks do together.
     void call(train::Call what) const;
@@ -77,11 +73,11 @@ struct Trainer::State {
 
     /// What a step needs of the frame's buffers.
     pipeline::FrameRequest request_of(const pipeline::CameraUse& camera) const;
-    pipeline::MotionUse motion_of(int step, size_t index, uint32_t visit) const;
+    /// How often the step's image has been seen then.
+    uint32_t visit_of(int step) const { return uint32_t(size_t(step - 1) / images.count() + 1); }
 
     /// All that changes from step to step is a pure function of the step's number: a step can be repeated.
-    void record_step(gpu::Recording& recording, int step, size_t index, const train::ImageCache::Photo& photo,
-                     const pipeline::CameraUse& camera);
+    void record_fused(gpu::Recording& recording, int step, size_t index, const portions::StepView& view);
 
     /// Submits a step. Afterwards at most frames_in_flight steps are in flight.
     void submit(int step);
@@ -98,28 +94,20 @@ struct Trainer::State {
 
     /// Whether something happens after a step that needs its result.
     bool must_finish(int step) const;
-    void optimise(int step);
-    train::BatchView view_of(int step, train::ImageCache& seen, int sh_degree);
+    portions::StepView view_of(int step, train::ImageCache& seen, int sh_degree);
 
-    /// A step of several views, of which `last` is the last.
-    void optimise_batch(int first, int last);
-    train::BatchParts batch_parts();
+    /// An optimisation step. Each of its views is a step of the schedule.
+    void optimise(int first, int last);
+    void optimise_several(int first, int last);
+    portions::StepParts step_parts();
 
     /// The picture through the camera of this rank's number; without pixels if there is none. Collective.
     Image render_own(std::span<const Camera> cameras);
     void follow_up(int step);
     void control_density(int step);
 
-    /// Divides the first splats into chunks.
-    void divide(const Gaussians& ready, int count);
-    /// refine: changes the number of a model's splats. Called for the model, or for each chunk.
-    void refine(const std::function<void(pipeline::Model&)>& refine);
-    /// change: records what changes a model in place.
-    void change(const std::function<void(gpu::Recording&, const pipeline::Model&)>& change);
-    uint64_t state_bytes() const;
-    /// The arrays of all chunks for a TrainerState, and the other way.
-    std::vector<TrainerArray> chunk_arrays();
-    void set_chunk_arrays(train::StateReader& from);
+    /// refine: changes the numbers of the portions' splats.
+    void refine(const std::function<void(const pipeline::Phase&)>& refine);
 };
 
 }  // namespace ewa

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
 
 #include "core/random.h"
 #include "pipeline/picture.h"
+#include "portions/refine.h"
 #include "train/trainer_state.h"
 
 namespace ewa {
@@ -41,8 +43,8 @@ Rates Trainer::State::rates(int step) const {
     r.step = uint32_t(step);
     r.seed = options.seed;
     if (plan.regularised) {
-        r.opacity_weight = float(options.opacity_weight / model.share.all);
-        r.scale_weight = float(options.scale_weight / (3.0 * model.share.all * extent));
+        r.opacity_weight = float(options.opacity_weight / portions.splats());
+        r.scale_weight = float(options.scale_weight / (3.0 * portions.splats() * extent));
     }
     return r;
 }
@@ -64,7 +66,7 @@ train::ImageCache& Trainer::State::images_at(int step) {
 }
 
 FrameRequest Trainer::State::request_of(const CameraUse& camera) const {
-    return {.splats = model.splats,
+    return {.splats = portions.largest(),
             .width = camera.width,
             .height = camera.height,
             .instances = instance_capacity,
@@ -75,51 +77,42 @@ FrameRequest Trainer::State::request_of(const CameraUse& camera) const {
             .motion = plan.motion};
 }
 
-MotionUse Trainer::State::motion_of(int step, size_t index, uint32_t visit) const {
-    return {.motions = &motions,
-            .photo = uint32_t(index),
-            .rate = float(schedule.pose_rate(step)),
-            .extent = float(extent),
-            .visit = visit};
-}
-
-void Trainer::State::record_step(gpu::Recording& recording, int step, size_t index,
-                                 const train::ImageCache::Photo& photo, const CameraUse& camera) {
-    const uint32_t visit = uint32_t(size_t(step - 1) / images.count() + 1);
-    const ExposureUse exposure{&exposures, uint32_t(index), float(schedule.exposure_rate(step)), visit};
-    const MotionUse motion = motion_of(step, index, visit);
-    const FrameInputs inputs{
-        .camera =
-            plan.motion ? record_move_camera(recording, cache, motions, uint32_t(index), camera) : camera,
-        .background =
-            options.random_background ? random_background(step, options.seed) : options.render.background,
-        .keep_overflow = !in_flight.empty(),
-        .sh_degree = schedule.degree(step)};
-    const Sorted sorted = record_forward(recording, cache, plan, model, frame, inputs);
-    record_loss(recording, cache, frame, inputs, photo.texels, photo.masked,
-                plan.exposure ? &exposure : nullptr);
-    record_backward(recording, cache, plan, model, frame, inputs, sorted, rates(step),
-                    plan.motion ? &motion : nullptr);
+void Trainer::State::record_fused(gpu::Recording& recording, int step, size_t index,
+                                  const portions::StepView& view) {
+    FrameInputs inputs = view.inputs;
+    inputs.keep_overflow = !in_flight.empty();
+    if (plan.motion)
+        inputs.camera = record_move_camera(recording, cache, motions, uint32_t(index), inputs.camera);
+    const MotionUse motion{.motions = &motions,
+                           .photo = uint32_t(index),
+                           .rate = float(schedule.pose_rate(step)),
+                           .extent = float(extent),
+                           .visit = visit_of(step)};
+    const Model& model = portions.use(0, portions::Portions::Need::state);
+    const FramePasses on{recording, cache, plan, frame};
+    const Sorted sorted = record_forward(on, model, inputs);
+    view.record_loss(recording, inputs);
+    record_backward(on, model, inputs, sorted, rates(step), plan.motion ? &motion : nullptr);
     if (options.strategy == Strategy::mcmc) record_noise(recording, cache, model, frame, noise(step));
 }
 
 void Trainer::State::submit(int step) {
     train::ImageCache& seen = images_at(step);
     const size_t index = train::frame_of_step(step, images.count(), options.seed);
-    const CameraUse camera = seen.camera(index);
+    const portions::StepView view = view_of(step, seen, schedule.degree(step));
+    const CameraUse& camera = view.inputs.camera;
     // Buffers of another size, and an image from disk, take the place of what a step in flight reads.
     if (!seen.cached(index) || camera.width != frame.sizes.width || camera.height != frame.sizes.height)
         finish_all();
     while (in_flight.size() >= cache.config().frames_in_flight) finish_oldest();
-    const auto& photo = seen.photo(index);
-    if (schedule.halvings_at(step + 1) == schedule.halvings_at(step))
-        seen.prepare(train::frame_of_step(step + 1, images.count(), options.seed));
     if (in_flight.empty()) frame.reserve(cache.device(), cache.config(), request_of(camera));
     gpu::Recording recording(device->limits());
-    record_step(recording, step, index, photo, camera);
+    record_fused(recording, step, index, view);
+    if (schedule.halvings_at(step + 1) == schedule.halvings_at(step))
+        seen.prepare(train::frame_of_step(step + 1, images.count(), options.seed));
     frame.record_counts(recording, slot_of(step));
     executor.submit(recording, is_timed(step));
-    in_flight.push_back({step, photo.weight});
+    in_flight.push_back({step, view.weight()});
     // An image from disk may be gone when its step has to be repeated: no other step follows before it is done.
     if (!seen.cached(index)) finish_all();
 }
@@ -169,12 +162,13 @@ bool Trainer::State::must_finish(int step) const {
            (options.strategy == Strategy::adc && (schedule.densifies(step) || schedule.resets_opacity(step)));
 }
 
-void Trainer::State::optimise(int step) {
-    submit(step);
-    if (must_finish(step) || cache.config().frames_in_flight == 1) finish_all();
+void Trainer::State::optimise(int first, int last) {
+    if (!fused()) return optimise_several(first, last);
+    submit(first);
+    if (must_finish(first) || cache.config().frames_in_flight == 1) finish_all();
 }
 
-train::BatchView Trainer::State::view_of(int step, train::ImageCache& seen, int sh_degree) {
+portions::StepView Trainer::State::view_of(int step, train::ImageCache& seen, int sh_degree) {
     const size_t index = train::frame_of_step(step, images.count(), options.seed);
     const CameraUse camera = seen.camera(index);
     const FrameInputs inputs{.camera = camera,
@@ -182,42 +176,44 @@ train::BatchView Trainer::State::view_of(int step, train::ImageCache& seen, int 
                                                                      : options.render.background,
                              .sh_degree = sh_degree};
     const ExposureUse exposure{&exposures, uint32_t(index), float(schedule.exposure_rate(step)),
-                               uint32_t(size_t(step - 1) / images.count() + 1)};
+                               visit_of(step)};
     const auto weight = std::make_shared<double>(1);
-    return {.inputs = inputs,
-            .request = request_of(camera),
-            .record_loss =
-                [this, exposure, weight, index, &seen](gpu::Recording& recording, const FrameInputs& drawn) {
-                    const auto& photo = seen.photo(index);
-                    *weight = photo.weight;
-                    record_loss(recording, cache, frame, drawn, photo.texels, photo.masked,
-                                plan.exposure ? &exposure : nullptr);
-                },
-            .weight = [weight] { return *weight; }};
+    return {
+        .inputs = inputs,
+        .request = request_of(camera),
+        .record_loss =
+            [this, exposure, weight, index, &seen](gpu::Recording& recording, const FrameInputs& drawn) {
+                const auto& photo = seen.photo(index);
+                *weight = photo.weight;
+                record_loss(recording, cache, frame, drawn, photo.texels, photo.masked,
+                            plan.exposure ? &exposure : nullptr);
+            },
+        .weight = [weight] { return *weight; },
+        .learned =
+            [this, index] {
+                const auto words = exposures.words(uint32_t(index));
+                return std::vector<uint64_t>(words.begin(), words.end());
+            },
+        .learn = [this, index](std::span<const uint64_t> words) { exposures.set(uint32_t(index), words); }};
 }
 
-void Trainer::State::optimise_batch(int first, int last) {
+void Trainer::State::optimise_several(int first, int last) {
     train::ImageCache& seen = images_at(first);
     const int sh_degree = schedule.degree(first);
-    std::vector<train::BatchView> views;
+    std::vector<portions::StepView> views;
     for (int step = first; step <= last; ++step) views.push_back(view_of(step, seen, sh_degree));
-    const train::BatchParts parts = batch_parts();
+    const portions::StepParts parts = step_parts();
     Rates of_step = rates(last);
     of_step.views = uint32_t(views.size());
     Noise of_noise = noise(last);
     of_noise.amplitude *= float(std::sqrt(double(views.size())));
-    const auto more = [&](gpu::Recording& recording, const Model& moved) {
-        if (options.strategy == Strategy::mcmc) record_noise(recording, cache, moved, frame, of_noise);
-    };
-    train::BatchReport drawn;
-    if (chunks) {
-        drawn = chunk_batch.step(parts, *chunks, views, batch_rates(of_step), sh_degree, more);
-    } else {
-        drawn = batch->draw(parts, views);
-        batch->update(
-            parts, batch_rates(of_step), model.share.first, sh_degree,
-            [&](gpu::Recording& recording) { more(recording, model); }, drawn);
-    }
+    portions::StepSums drawn = several.draw(parts, views);
+    several.update(
+        parts, batch_rates(of_step), sh_degree,
+        [&](gpu::Recording& recording, const Model& moved) {
+            if (options.strategy == Strategy::mcmc) record_noise(recording, cache, moved, frame, of_noise);
+        },
+        drawn);
     timed_steps += int(views.size());
     report.loss = drawn.loss;
     report.psnr = drawn.psnr;
@@ -226,24 +222,46 @@ void Trainer::State::optimise_batch(int first, int last) {
     report.limited_steps += drawn.limited_steps;
 }
 
-train::BatchParts Trainer::State::batch_parts() {
-    return {cache, executor, plan, model, frame, instance_capacity, [this] { add_pass_times(); }};
+portions::StepParts Trainer::State::step_parts() {
+    return {cache,
+            executor,
+            plan,
+            frame,
+            instance_capacity,
+            [this] { add_pass_times(); },
+            plan.exposure ? std::tuple_size_v<Exposures::Words> : 0};
 }
 
 Image Trainer::State::render_own(std::span<const Camera> cameras) {
     std::vector<gpu::Buffer> blocks;
     for (const Camera& camera : cameras)
-        blocks.push_back(upload_camera(*device, camera, cache.config(), model.origin));
-    std::vector<train::BatchView> views;
+        blocks.push_back(upload_camera(*device, camera, cache.config(), portions.origin()));
+    std::vector<portions::StepView> views;
     for (size_t i = 0; i < cameras.size(); ++i) {
         const FrameInputs inputs = inputs_of(blocks[i], cameras[i], options.render);
-        views.push_back(
-            {.inputs = inputs, .request = request_of(inputs.camera), .record_loss = {}, .weight = {}});
+        views.push_back({.inputs = inputs,
+                         .request = request_of(inputs.camera),
+                         .record_loss = {},
+                         .weight = {},
+                         .learned = {},
+                         .learn = {}});
     }
-    train::BatchParts parts = batch_parts();
+    portions::StepParts parts = step_parts();
     parts.submitted = [] {};
-    if (!batch->draw_pictures(parts, views)) return {};
+    if (!several.draw_pictures(parts, views)) return {};
     return Picture(frame).image(shared::PLANE_R, 3);
+}
+
+void Trainer::State::refine(const std::function<void(const Phase&)>& refine) {
+    frame.free_instances();  // the second copy of an array takes its place
+    if (portions.streamed()) {
+        // A value a splat of any portion, and no picture: with mcmc one portion holds all new splats until they are level.
+        frame = {};
+        frame.reserve(*device, cache.config(),
+                      {.splats = portions.largest(), .width = 1, .height = 1, .instances = 1});
+    }
+    refine({cache, executor, frame});
+    if (portions.streamed()) frame = {};
 }
 
 void Trainer::State::follow_up(int step) {
@@ -256,7 +274,7 @@ void Trainer::State::follow_up(int step) {
                           .kernel = options.render.kernel,
                           .seed = options.seed,
                           .step = uint32_t(step)};
-    refine([&](Model& of) { refine_mcmc(cache, executor, of, frame, rules); });
+    refine([&](const Phase& phase) { refine_mcmc(portions, phase, rules); });
 }
 
 void Trainer::State::control_density(int step) {
@@ -272,11 +290,14 @@ void Trainer::State::control_density(int step) {
         rules.seed = options.seed;
         rules.step = uint32_t(step);
         rules.max_splats = options.max_splats;
-        refine([&](Model& of) { densify(cache, executor, of, frame, rules); });
+        refine([&](const Phase& phase) { densify(portions, phase, rules); });
     }
     if (schedule.resets_opacity(step)) {
-        change([&](gpu::Recording& recording, const Model& of) {
-            record_reset_opacity(recording, cache, of, float(logit(kResetOpacity)));
+        portions.visit(portions::Portions::Need::state, [&](int, const Model& model) {
+            gpu::Recording recording(device->limits());
+            record_reset_opacity(recording, cache, model, float(logit(kResetOpacity)));
+            executor.run(recording);
+            portions.changed();
         });
     }
 }

@@ -103,8 +103,8 @@ TEST_F(DeviceMemory, TooLittleIsOneLine) {
     expect_failure(train("o", {"--device-memory", "0.001"}), 1,
                    "--device-memory 0.001 is too little: this needs 0.00");
     expect_failure(train("o", {"--device-memory", "-1"}), 2, "'-1' is not a number from 0 to 65536");
-    expect_failure(train("o", {"--device-memory", "1", "--exposure"}), 2,
-                   "--device-memory and --exposure exclude each other");
+    expect_failure(train("o", {"--device-memory", "1", "--refine-poses"}), 2,
+                   "--device-memory and --refine-poses exclude each other");
 }
 
 }  // namespace

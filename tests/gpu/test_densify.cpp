@@ -10,10 +10,10 @@
 #include "core/random.h"
 #include "gpu/guarded.h"
 #include "gpu/reference_inputs.h"
+#include "gpu/refinement.h"
 #include "passes/passes.h"
 #include "pipeline/frame_buffers.h"
 #include "pipeline/sorting.h"
-#include "pipeline/strategy.h"
 #include "reference/training.h"
 
 namespace ewa::test {
@@ -113,7 +113,7 @@ Expected expected_of(const Start& start, const DensifyRules& rules) {
 pipeline::Refinement run_densify(pipeline::Model& model, const DensifyRules& rules) {
     Rig& r = rig();
     GuardedFrame guarded(r.config(), {model.splats, 16, 16, 1, true, false});
-    const auto result = densify(r.cache, r.executor, model, guarded.frame, rules);
+    const auto result = densify({r.cache, r.executor, guarded.frame}, model, rules);
     EXPECT_TRUE(guarded.intact());
     return result;
 }
@@ -257,7 +257,7 @@ TEST(DensifyEdges, WritesOneArrayAfterAnother) {
     const uint64_t rest = own->allocated_bytes(), peak = own->peak_bytes();
     DensifyRules rules = rules_for(1u << 20);
     rules.prune_scale = 0;
-    const auto result = densify(cache, executor, model, frame, rules);
+    const auto result = densify({cache, executor, frame}, model, rules);
     ASSERT_EQ(result.after, 40000u);
     const uint64_t array = pipeline::parameter_bytes(result.after, 3),
                    old = pipeline::parameter_bytes(20000, 3);

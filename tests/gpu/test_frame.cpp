@@ -47,10 +47,10 @@ Result run_frame(const Scene& scene, uint32_t capacity, bool gradients) {
     Result out;
     pipeline::Sorted sorted;
     r.run([&](gpu::Recording& recording) {
-        sorted = record_forward(recording, r.cache, plan, model, frame, inputs);
+        sorted = record_forward({recording, r.cache, plan, frame}, model, inputs);
         if (!gradients) return;
         record_loss(recording, r.cache, frame, inputs, photo);
-        record_backward(recording, r.cache, plan, model, frame, inputs, sorted, {});
+        record_backward({recording, r.cache, plan, frame}, model, inputs, sorted, {});
     });
     EXPECT_TRUE(guarded.intact());
     out.counts = frame.read_counts();

@@ -34,9 +34,9 @@ FrameBytes frame_with(const passes::KernelConfig& config, const Scene& scene) {
         cache, rig().executor, frame,
         {.splats = model.splats, .width = width, .height = height, .instances = 40000, .gradients = true},
         [&](gpu::Recording& recording) {
-            sorted = record_forward(recording, cache, plan, model, frame, inputs);
+            sorted = record_forward({recording, cache, plan, frame}, model, inputs);
             record_loss(recording, cache, frame, inputs, photo);
-            record_backward(recording, cache, plan, model, frame, inputs, sorted, {});
+            record_backward({recording, cache, plan, frame}, model, inputs, sorted, {});
         });
     EXPECT_GT(counts.instances, 2000u);
     return {frame.planes.download<float>(frame.sizes.planes / 4),

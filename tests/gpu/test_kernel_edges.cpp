@@ -11,8 +11,8 @@
 #include "ewa/renderer.h"
 #include "gpu/guarded.h"
 #include "gpu/reference_inputs.h"
+#include "gpu/refinement.h"
 #include "passes/passes.h"
-#include "pipeline/strategy.h"
 #include "reference/training.h"
 
 namespace ewa::test {
@@ -170,7 +170,7 @@ TEST(RelocationEdges, BothMomentsOfASourceStartAnew) {
     rules.step = 3;
     Rig& r = rig();
     GuardedFrame guarded(r.config(), {model.splats, 16, 16, 1, true, false});
-    ASSERT_EQ(refine_mcmc(r.cache, r.executor, model, guarded.frame, rules).relocated, 6u);
+    ASSERT_EQ(refine_mcmc({r.cache, r.executor, guarded.frame}, model, rules).relocated, 6u);
     const auto m1 = download_model(model, model.moments1).opacity_logits,
                m2 = download_model(model, model.moments2).opacity_logits;
     EXPECT_EQ(m1, m2);
@@ -194,7 +194,7 @@ TEST(RelocationEdges, PackedMomentsOfASourceStartAnew) {
     rules.step = 3;
     Rig& r = rig();
     GuardedFrame guarded(r.config(), {model.splats, 16, 16, 1, true, false});
-    ASSERT_EQ(refine_mcmc(r.cache, r.executor, model, guarded.frame, rules).relocated, 6u);
+    ASSERT_EQ(refine_mcmc({r.cache, r.executor, guarded.frame}, model, rules).relocated, 6u);
     const auto words = model.moments1.download<uint32_t>(model.moments1.bytes() / 4);
     size_t anew = 0;
     for (uint32_t i = 0; i < 40; ++i) {

@@ -11,8 +11,8 @@
 #include "core/random.h"
 #include "gpu/guarded.h"
 #include "gpu/reference_inputs.h"
+#include "gpu/refinement.h"
 #include "passes/passes.h"
-#include "pipeline/strategy.h"
 #include "reference/projection.h"
 #include "reference/training.h"
 
@@ -56,7 +56,7 @@ McmcRules mcmc_rules_for(uint32_t max_splats) {
 pipeline::Refinement run_refine(pipeline::Model& model, const McmcRules& rules) {
     Rig& r = rig();
     GuardedFrame guarded(r.config(), {model.splats, 16, 16, 1, true, false});
-    const auto result = refine_mcmc(r.cache, r.executor, model, guarded.frame, rules);
+    const auto result = refine_mcmc({r.cache, r.executor, guarded.frame}, model, rules);
     EXPECT_TRUE(guarded.intact());
     return result;
 }

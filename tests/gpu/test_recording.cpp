@@ -448,9 +448,9 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     const auto plan = plan_for(request);
     const pipeline::FrameInputs moved{
         .camera = record_move_camera(step, r.cache, motions, motion.photo, inputs.camera)};
-    const auto sorted = record_forward(step, r.cache, plan, model, frame, moved);
+    const auto sorted = record_forward({step, r.cache, plan, frame}, model, moved);
     record_loss(step, r.cache, frame, inputs, photo, false, &exposure);
-    record_backward(step, r.cache, plan, model, frame, inputs, sorted, {}, &motion);
+    record_backward({step, r.cache, plan, frame}, model, inputs, sorted, {}, &motion);
     record_reset_opacity(step, r.cache, model, 0);
     record_noise(step, r.cache, model, frame, {.amplitude = 0.1f, .max_length = 1, .seed = 1, .step = 1});
     out.push_back(step.commands());
@@ -462,47 +462,48 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     views.reserve_sums(*device(), r.executor, plan_of_views, 100);
     gpu::Recording batch = r.recording();
     for (uint32_t view = 0; view < 2; ++view) {
-        record_list(batch, r.cache, plan_of_views, model, frame, inputs, views,
+        record_list({batch, r.cache, plan_of_views, frame}, model, inputs, views,
                     {.view = view, .list = view, .first_place = 50 * view});
         batch.copy(views.visible, 0, frame.records, 0, 48 * 50);
-        const auto drawn = record_list_forward(batch, r.cache, plan_of_views, 50, frame, inputs);
+        const auto drawn = record_list_forward({batch, r.cache, plan_of_views, frame}, 50, inputs);
         record_loss(batch, r.cache, frame, inputs, photo);
-        record_list_backward(batch, r.cache, plan_of_views, 50, frame, inputs, drawn, views.sums, 50 * view);
+        record_list_backward({batch, r.cache, plan_of_views, frame}, 50, inputs, drawn, views.sums,
+                             50 * view);
     }
     pipeline::Rates rates;
     rates.views = 2;
-    record_update_views(batch, r.cache, plan_of_views, model, frame, views, rates, 0, 2);
+    record_update_views({batch, r.cache, plan_of_views, frame}, model, views, rates, 2);
     // A step of one view in two bands.
     for (uint32_t band = 0; band < 2; ++band) {
         pipeline::FrameInputs of_band = inputs;
         of_band.band = pipeline::band_of(r.config(), 47, 2, band);
-        record_list(batch, r.cache, plan_of_views, model, frame, of_band, views,
+        record_list({batch, r.cache, plan_of_views, frame}, model, of_band, views,
                     {.list = band, .first_place = 50 * band}, band > 0);
     }
     rates.views = 1;
-    record_update_views(batch, r.cache, plan_of_views, model, frame, views, rates, 0, 2, 2);
+    record_update_views({batch, r.cache, plan_of_views, frame}, model, views, rates, 2, 2);
     out.push_back(batch.commands());
 
     request.purpose = pipeline::Purpose::picture;
     gpu::Recording picture = r.recording();
-    record_forward(picture, r.cache, plan_for(request), model, frame, inputs);
+    record_forward({picture, r.cache, plan_for(request), frame}, model, inputs);
     wide.reserve(*device(), r.config(),
                  {.splats = 50, .width = 66000, .height = 9, .instances = 4096, .fifth_plane = true});
-    record_forward(picture, r.cache, plan_for(request), model, wide, {.camera = {&camera, 0, 66000, 9}});
+    record_forward({picture, r.cache, plan_for(request), wide}, model, {.camera = {&camera, 0, 66000, 9}});
     out.push_back(picture.commands());
 
     request.purpose = pipeline::Purpose::gradient;
     gpu::Recording gradient = r.recording();
-    const auto again = record_forward(gradient, r.cache, plan_for(request), model, frame, inputs);
+    const auto again = record_forward({gradient, r.cache, plan_for(request), frame}, model, inputs);
     record_loss(gradient, r.cache, frame, inputs, photo, true);
-    record_backward(gradient, r.cache, plan_for(request), model, frame, inputs, again, {});
+    record_backward({gradient, r.cache, plan_for(request), frame}, model, inputs, again, {});
     out.push_back(gradient.commands());
 
     request.render.points = true;
     gpu::Recording points = r.recording();
-    const auto listed = record_forward(points, r.cache, plan_for(request), model, frame, inputs);
+    const auto listed = record_forward({points, r.cache, plan_for(request), frame}, model, inputs);
     record_loss(points, r.cache, frame, inputs, photo);
-    record_backward(points, r.cache, plan_for(request), model, frame, inputs, listed, {});
+    record_backward({points, r.cache, plan_for(request), frame}, model, inputs, listed, {});
     out.push_back(points.commands());
 
     request.render.points = false;
@@ -510,9 +511,9 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     for (const Integrator integrator : {Integrator::ray, Integrator::march}) {
         request.render.integrator = integrator;
         gpu::Recording rays = r.recording();
-        const auto met = record_forward(rays, r.cache, plan_for(request), model, frame, inputs);
+        const auto met = record_forward({rays, r.cache, plan_for(request), frame}, model, inputs);
         record_loss(rays, r.cache, frame, inputs, photo);
-        record_backward(rays, r.cache, plan_for(request), model, frame, inputs, met, {});
+        record_backward({rays, r.cache, plan_for(request), frame}, model, inputs, met, {});
         out.push_back(rays.commands());
     }
     for (const auto& commands : out)

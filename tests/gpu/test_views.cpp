@@ -100,7 +100,7 @@ struct Step {
     void list(const SeenScene& seen, size_t picture, bool projected = false) {
         Rig& r = rig();
         gpu::Recording recording = r.recording();
-        record_list(recording, r.cache, plan, model, frame, inputs(seen, picture), buffers,
+        record_list({recording, r.cache, plan, frame}, model, inputs(seen, picture), buffers,
                     {.view = uint32_t(picture / bands),
                      .list = uint32_t(picture),
                      .first_place = first_places[picture]},
@@ -117,9 +117,9 @@ struct Step {
         buffers.reserve_sums(*device(), r.executor, plan, first_places.back());
         gpu::Recording recording = r.recording();
         recording.copy(buffers.visible, 0, frame.records, 0, 48ull * listed(picture));
-        const Sorted sorted = record_list_forward(recording, r.cache, plan, listed(picture), frame, drawn);
+        const Sorted sorted = record_list_forward({recording, r.cache, plan, frame}, listed(picture), drawn);
         record_loss(recording, r.cache, frame, drawn, photos[picture / bands]);
-        record_list_backward(recording, r.cache, plan, listed(picture), frame, drawn, sorted, buffers.sums,
+        record_list_backward({recording, r.cache, plan, frame}, listed(picture), drawn, sorted, buffers.sums,
                              first_places[picture]);
         r.executor.run(recording);
         pictures.push_back(frame.planes.download<float>(frame.sizes.planes / 4));
@@ -134,7 +134,7 @@ struct Step {
         rates.views = uint32_t(cameras.size());
         gpu::Recording recording = r.recording();
         recording.fill(frame.counts, 0, 0, sizeof(shared::Counts));
-        record_update_views(recording, r.cache, plan, model, frame, buffers, batch_rates(rates), 0,
+        record_update_views({recording, r.cache, plan, frame}, model, buffers, batch_rates(rates),
                             kMaxShDegree, bands);
         r.executor.run(recording);
     }
@@ -182,7 +182,7 @@ TEST(ViewBatch, AListDrawsThePictureOfItsView) {
         step.list(seen, v);
         step.draw(seen, v);
         gpu::Recording whole = rig().recording();
-        record_forward(whole, rig().cache, step.plan, step.model, step.frame, step.inputs(seen, v));
+        record_forward({whole, rig().cache, step.plan, step.frame}, step.model, step.inputs(seen, v));
         rig().executor.run(whole);
         EXPECT_EQ(step.frame.planes.download<float>(step.frame.sizes.planes / 4), step.pictures[v]);
     }
@@ -410,10 +410,10 @@ TEST(ViewBatch, AStepOfOneViewHasTheBytesOfTheFusedKernel) {
                 gpu::Recording recording = rig().recording();
                 const FrameInputs inputs = fused.inputs(seen, 0);
                 const Sorted sorted =
-                    record_forward(recording, rig().cache, fused.plan, fused.model, fused.frame, inputs);
+                    record_forward({recording, rig().cache, fused.plan, fused.frame}, fused.model, inputs);
                 record_loss(recording, rig().cache, fused.frame, inputs, fused.photos[0]);
-                record_backward(recording, rig().cache, fused.plan, fused.model, fused.frame, inputs, sorted,
-                                rates);
+                record_backward({recording, rig().cache, fused.plan, fused.frame}, fused.model, inputs,
+                                sorted, rates);
                 rig().executor.run(recording);
             }
             const size_t floats = parameter_bytes(400, 2) / 4;
@@ -438,8 +438,8 @@ TEST(ViewBatch, WhatNoViewSeesMovesByItsMomentsAlone) {
     Rates rates = some_rates(4);
     rates.views = 2;
     gpu::Recording recording = rig().recording();
-    record_update_views(recording, rig().cache, step.plan, step.model, step.frame, step.buffers,
-                        batch_rates(rates), 0, kMaxShDegree);
+    record_update_views({recording, rig().cache, step.plan, step.frame}, step.model, step.buffers,
+                        batch_rates(rates), kMaxShDegree);
     rig().executor.run(recording);
     const auto after = step.model.moments1.download<float>(m.size());
     for (size_t i = 0; i < m.size(); ++i)

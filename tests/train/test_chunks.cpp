@@ -3,17 +3,17 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
-#include <cstring>
 #include <optional>
 
 #include "ewa/error.h"
 #include "ewa/evaluation.h"
 #include "ewa/trainer.h"
 #include "gpu/test_device.h"
+#include "portions/portions.h"
 #include "support/thread_ranks.h"
-#include "train/chunks.h"
 #include "train/synthetic.h"
 
 namespace ewa::test {
@@ -124,14 +124,15 @@ TEST_P(ChunksTrain, TheBytesOfOneThatFits) {
     // One chunk holds all that mcmc adds until the chunks are level.
     const size_t splats = strategy == Strategy::none ? 28000 : strategy == Strategy::mcmc ? 26500 : 20000;
     // With kernels of a GPU, a step of one view that is not in chunks has a kernel that rounds in another order.
-    const bool other_kernel = batch == 1 && std::getenv("EWA_TEST_KERNELS");
+    const bool other_kernel = batch == 1 && options.bands == 1 && std::getenv("EWA_TEST_KERNELS");
     const ChunksTrained whole =
         train_within(options, other_kernel ? 9 * kChunkMiB : 0, splats, options.steps);
     EXPECT_EQ(bool(whole.chunks), other_kernel);
     EXPECT_EQ(whole.state.report.splats == splats, strategy == Strategy::none)
         << "the number of splats should change";
     uint64_t state = 0;
-    for (const TrainerArray& array : whole.state.arrays) state += array.bytes.size();
+    for (const TrainerArray& array : whole.state.arrays)
+        if (!array.name.starts_with("exp")) state += array.bytes.size();
 
     const uint64_t limit = state / 4;
     const ChunksTrained chunked = train_within(options, limit, splats, options.steps);
@@ -143,14 +144,47 @@ TEST_P(ChunksTrain, TheBytesOfOneThatFits) {
     expect_same_training(chunked, whole);
 }
 
+void exposed_views(TrainOptions& options) {
+    options.exposure = true;
+}
+void in_bands(TrainOptions& options) {
+    options.bands = 2;
+}
+
 INSTANTIATE_TEST_SUITE_P(Chunks, ChunksTrain,
                          testing::Values(ChunksCase{Strategy::adc, 1}, ChunksCase{Strategy::adc, 3},
                                          ChunksCase{Strategy::mcmc, 1}, ChunksCase{Strategy::mcmc, 3},
                                          ChunksCase{Strategy::none, 1},
                                          ChunksCase{Strategy::mcmc, 2, wide, "_wide"},
                                          ChunksCase{Strategy::adc, 1, absolute, "_absolute_density"},
-                                         ChunksCase{Strategy::adc, 2, from_disk, "_from_disk"}),
+                                         ChunksCase{Strategy::adc, 2, from_disk, "_from_disk"},
+                                         ChunksCase{Strategy::adc, 2, exposed_views, "_exposure"},
+                                         ChunksCase{Strategy::adc, 1, in_bands, "_bands"}),
                          name_of_chunks_case);
+
+/// Each rank holds its splats in chunks, and views are cut into bands.
+TEST(Chunks, OfSeveralRanksHaveTheBytesOfOneThatFits) {
+    for (const Strategy strategy : {Strategy::adc, Strategy::mcmc}) {
+        TrainOptions options = busy_chunks(strategy, 1);
+        options.bands = 2;
+        const size_t splats = strategy == Strategy::mcmc ? 26500 : 20000;
+        const ChunksTrained whole = train_within(options, 0, splats, options.steps);
+        options.device_memory_bytes = 3 * kChunkMiB;
+        ChunksTrained together;
+        run_ranks(2, [&](std::shared_ptr<Ranks> group) {
+            const auto device = open_test_device(false);
+            Trainer trainer(device, seven_views().dataset, all_frames(seven_views().dataset),
+                            tall_scene(splats), options, group);
+            EXPECT_TRUE(trainer.chunk_figures());
+            if (group->rank() != 0) return trainer.follow();
+            while (trainer.steps_done() < options.steps) trainer.step();
+            together = {trainer.state(), peak_device_bytes(*device), trainer.chunk_figures(),
+                        trainer.gaussians()};
+        });
+        EXPECT_LE(together.peak, 3 * kChunkMiB);
+        expect_same_training(together, whole);
+    }
+}
 
 TEST(Chunks, GoOnFromAnyOtherLimit) {
     const TrainOptions options = busy_chunks(Strategy::adc, 2);
@@ -229,10 +263,8 @@ TEST(Chunks, ExcludeWhatTheyCannotTrain) {
             EXPECT_NE(text.find("--device-memory"), std::string::npos) << text;
         }
     };
-    refused("--exposure", [](TrainOptions& o) { o.exposure = true; });
     refused("--refine-poses", [](TrainOptions& o) { o.refine_poses = true; });
     refused("--points", [](TrainOptions& o) { o.render.points = true; });
-    refused("--bands", [](TrainOptions& o) { o.bands = 2; });
 }
 
 /// The limit is that of one training, and ends with it.
@@ -246,7 +278,8 @@ TEST(Chunks, ADeviceTakesOneLimitedTraining) {
         EXPECT_THROW(Trainer(device, dataset, all_frames(dataset), tall_scene(20000), options), InputError);
         // The one that failed has left the limit to the first.
         while (first.steps_done() < 4) first.step();
-        EXPECT_THROW(first.render({}), InputError);
+        const std::array cameras{dataset.frames[0].camera};
+        EXPECT_EQ(first.render(cameras).size(), 1u);
         EXPECT_LE(peak_device_bytes(*device), 3 * kChunkMiB);
     }
     EXPECT_EQ(device->memory_limit(), 0u);
@@ -259,73 +292,75 @@ TEST(Chunks, AFewSplatsAreNotDivided) {
     EXPECT_FALSE(train_within(options, 16 * kChunkMiB, 5, 2).chunks);
 }
 
-/// A chunk's model of some splats whose parameters are all `value`.
-pipeline::Model model_of(gpu::Device& device, uint32_t splats, float value) {
-    pipeline::Model model;
-    model.splats = model.capacity = splats;
-    model.params = pipeline::parameter_buffer(device, "params", gpu::Texel::rgba32f, splats, 0);
-    model.params.upload(std::span<const float>(std::vector<float>(model.params.bytes() / 4, value)));
-    return model;
+/// Splats whose parameters are all their portion's number.
+Gaussians numbered(uint32_t portions, uint32_t each) {
+    Gaussians splats;
+    splats.resize(size_t(portions) * each);
+    for (size_t i = 0; i < splats.size(); ++i) splats.opacity_logits[i] = float(i / each);
+    return splats;
 }
 
-TEST(ChunksTogether, WorkInTurnsAndKeepWhatTheyHadOnTheDevice) {
+TEST(Portions, LeaveTheDeviceAndComeBack) {
     const auto device = open_test_device(false);
-    train::Chunks chunks(*device, 5, 2 * kChunkMiB);  // two of five fit
-    for (int chunk = 0; chunk < 5; ++chunk) chunks.set(chunk, model_of(*device, 12000, float(chunk)));
-    int working = 0;
-    chunks.together([&](pipeline::Model& model) {
-        Ranks& ranks = *model.share.ranks;
-        EXPECT_EQ(++working, 1) << "one at a time";
-        for (uint64_t turn = 0; turn < 4; ++turn) {
-            const uint64_t own = 10 * turn + uint64_t(ranks.rank());
-            --working;
-            const auto all = ranks.gather(std::span(&own, 1));
-            EXPECT_EQ(++working, 1);
-            for (uint64_t rank = 0; rank < 5; ++rank) EXPECT_EQ(all.at(rank), 10 * turn + rank);
-            EXPECT_EQ(model.params.download<float>(1).front(), float(ranks.rank()));
-            std::vector<std::vector<std::byte>> sent(5), got(5);
-            std::vector<std::span<const std::byte>> out;
-            std::vector<std::span<std::byte>> in;
-            for (size_t rank = 0; rank < 5; ++rank) {
-                sent[rank].assign(3, std::byte(16 * ranks.rank() + int(rank)));
-                got[rank].resize(3);
-                out.emplace_back(sent[rank]);
-                in.emplace_back(got[rank]);
-            }
-            --working;
-            ranks.exchange(out, in);
-            EXPECT_EQ(++working, 1);
-            for (size_t rank = 0; rank < 5; ++rank)
-                EXPECT_EQ(int(got[rank][2]), 16 * int(rank) + ranks.rank());
-        }
-        model.params = model_of(*device, 12000, float(100 + ranks.rank())).params;
-        --working;
-    });
-    const auto all =
-        chunks.joined(train::Chunks::params, [](uint32_t n) { return pipeline::parameter_bytes(n, 0); });
-    for (size_t chunk = 0; chunk < 5; ++chunk) {
-        float value;
-        std::memcpy(&value, &all[chunk * all.size() / 5], sizeof(value));
-        EXPECT_EQ(value, float(100 + chunk));
-    }
-    EXPECT_LE(peak_device_bytes(*device), 2 * kChunkMiB);
-}
-
-TEST(ChunksTogether, AnErrorOfOneEndsAll) {
-    const auto device = open_test_device(false);
-    train::Chunks chunks(*device, 4, 2 * kChunkMiB);
-    for (int chunk = 0; chunk < 4; ++chunk) chunks.set(chunk, model_of(*device, 800, 1));
-    try {
-        chunks.together([&](pipeline::Model& model) {
-            const uint64_t none = 0;
-            model.share.ranks->gather(std::span(&none, 1));
-            if (model.share.ranks->rank() == 2) throw RunError("the second one");
-            model.share.ranks->gather(std::span(&none, 1));
+    portions::Portions portions(*device, alone(), numbered(5, 12000),
+                                {.count = 5, .limit = 3 * kChunkMiB, .moments = 1});  // two of five fit
+    for (int turn = 0; turn < 3; ++turn) {
+        std::vector<int> visited;
+        portions.visit(portions::Portions::Need::state, [&](int portion, pipeline::Model& model) {
+            visited.push_back(portion);
+            EXPECT_EQ(model.first, 12000u * uint32_t(portion));
+            const Gaussians splats = download_model(model, model.params);
+            EXPECT_EQ(splats.opacity_logits.front(), float(100 * turn + portion));
+            EXPECT_EQ(splats.opacity_logits.back(), float(100 * turn + portion));
+            Gaussians more = splats;
+            for (float& logit : more.opacity_logits) logit += 100;
+            model.params = pipeline::upload_model(*device, more, 0, false).params;
+            portions.changed();
         });
-        FAIL() << "no error";
-    } catch (const RunError& error) {
-        EXPECT_STREQ(error.what(), "the second one");
+        std::vector<int> expected{0, 1, 2, 3, 4};
+        if (turn == 1) std::ranges::reverse(expected);
+        EXPECT_EQ(visited, expected);
     }
+    const Gaussians all = portions.gaussians_of(portions.bytes(portions::params));
+    for (size_t i = 0; i < all.size(); ++i) ASSERT_EQ(all.opacity_logits[i], float(300 + i / 12000));
+    EXPECT_LE(peak_device_bytes(*device), 3 * kChunkMiB);
+}
+
+/// Their numbers change, on one rank or several. Afterwards each has its range, and the order is as before.
+TEST(Portions, AreLevelAgainAfterTheirNumbersHaveChanged) {
+    for (const int ranks : {1, 2})
+        for (const int each : {1, 3})
+            run_ranks(ranks, [&](std::shared_ptr<Ranks> group) {
+                const auto device = open_test_device(false);
+                portions::Portions portions(*device, group, numbered(uint32_t(ranks * each), 64),
+                                            {.count = each, .limit = 8 * kChunkMiB, .moments = 2});
+                std::vector<float> expected;
+                const auto size_of = [&](int portion) { return uint32_t(20 + 37 * (portion % 4)); };
+                for (int p = 0; p < portions.all(); ++p)
+                    for (uint32_t i = 0; i < size_of(p); ++i) expected.push_back(float(1000 * p) + float(i));
+                portions.visit(portions::Portions::Need::state, [&](int portion, pipeline::Model& model) {
+                    const int number = portions.first() + portion;
+                    Gaussians other = numbered(1, size_of(number));
+                    for (size_t i = 0; i < other.size(); ++i)
+                        other.opacity_logits[i] = float(1000 * number) + float(i);
+                    model = pipeline::upload_model(*device, other, 2, false);
+                    portions.changed();
+                });
+                portions.level();
+                EXPECT_EQ(portions.splats(), expected.size());
+                portions.visit(portions::Portions::Need::state, [&](int portion, pipeline::Model& model) {
+                    const portions::Range range =
+                        portions::range_of(portions.splats(), portions.first() + portion, portions.all());
+                    EXPECT_EQ(model.first, range.first);
+                    EXPECT_EQ(model.splats, range.splats);
+                    EXPECT_EQ(model.all, portions.splats());
+                    const auto logits = download_model(model, model.params).opacity_logits;
+                    ASSERT_EQ(logits.size(), range.splats);
+                    for (size_t i = 0; i < logits.size(); ++i)
+                        ASSERT_EQ(logits[i], expected[range.first + i]);
+                    EXPECT_TRUE(model.moments1 && model.moments2);
+                });
+            });
 }
 
 }  // namespace

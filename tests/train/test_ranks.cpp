@@ -12,11 +12,11 @@
 #include "ewa/renderer.h"
 #include "ewa/trainer.h"
 #include "gpu/test_device.h"
-#include "pipeline/share.h"
+#include "portions/collect.h"
+#include "portions/portions.h"
 #include "support/temp_folder.h"
 #include "support/thread_ranks.h"
 #include "train/checkpoint.h"
-#include "train/collect.h"
 #include "train/synthetic.h"
 
 namespace ewa::test {
@@ -118,6 +118,9 @@ void antialiased(TrainOptions& options) {
     options.random_background = true;
 }
 
+void exposed_photos(TrainOptions& options) {
+    options.exposure = true;
+}
 template <int bands>
 void cut(TrainOptions& options) {
     options.bands = bands;
@@ -148,22 +151,23 @@ TEST_P(RanksTrain, TheBytesOfOneRank) {
 
 INSTANTIATE_TEST_SUITE_P(
     Ranks, RanksTrain,
-    testing::Values(RanksCase{Strategy::adc, 4, 2}, RanksCase{Strategy::adc, 4, 3},
-                    RanksCase{Strategy::adc, 3, 5}, RanksCase{Strategy::adc, 1, 2},
-                    RanksCase{Strategy::adc, 2, 2, wide_moments, "_wide"},
-                    RanksCase{Strategy::adc, 1, 2, absolute_density, "_absolute_density"},
-                    RanksCase{Strategy::adc, 2, 3, antialiased, "_antialiased"},
-                    RanksCase{Strategy::mcmc, 4, 2}, RanksCase{Strategy::mcmc, 3, 4},
-                    RanksCase{Strategy::mcmc, 1, 3}, RanksCase{Strategy::mcmc, 2, 2, wide_moments, "_wide"},
-                    RanksCase{Strategy::mcmc, 2, 3, absolute_density, "_absolute_density"},
-                    RanksCase{Strategy::none, 2, 2}, RanksCase{Strategy::none, 1, 4, wide_moments, "_wide"},
-                    RanksCase{Strategy::adc, 1, 2, cut<2>, "_bands2"},
-                    RanksCase{Strategy::adc, 2, 3, cut<2>, "_bands2"},
-                    RanksCase{Strategy::adc, 1, 5, cut<3>, "_bands3"},
-                    RanksCase{Strategy::adc, 1, 3, cut_absolute, "_bands2_absolute"},
-                    RanksCase{Strategy::mcmc, 1, 4, cut<3>, "_bands3"},
-                    RanksCase{Strategy::mcmc, 3, 2, cut<3>, "_bands3"},
-                    RanksCase{Strategy::mcmc, 4, 8, cut<2>, "_bands2"}),
+    testing::Values(
+        RanksCase{Strategy::adc, 4, 2}, RanksCase{Strategy::adc, 4, 3}, RanksCase{Strategy::adc, 3, 5},
+        RanksCase{Strategy::adc, 1, 2}, RanksCase{Strategy::adc, 2, 2, wide_moments, "_wide"},
+        RanksCase{Strategy::adc, 1, 2, absolute_density, "_absolute_density"},
+        RanksCase{Strategy::adc, 2, 3, antialiased, "_antialiased"}, RanksCase{Strategy::mcmc, 4, 2},
+        RanksCase{Strategy::mcmc, 3, 4}, RanksCase{Strategy::mcmc, 1, 3},
+        RanksCase{Strategy::mcmc, 2, 2, wide_moments, "_wide"},
+        RanksCase{Strategy::mcmc, 2, 3, absolute_density, "_absolute_density"},
+        RanksCase{Strategy::none, 2, 2}, RanksCase{Strategy::adc, 4, 3, exposed_photos, "_exposure"},
+        RanksCase{Strategy::mcmc, 1, 2, exposed_photos, "_exposure"},
+        RanksCase{Strategy::none, 1, 4, wide_moments, "_wide"},
+        RanksCase{Strategy::adc, 1, 2, cut<2>, "_bands2"}, RanksCase{Strategy::adc, 2, 3, cut<2>, "_bands2"},
+        RanksCase{Strategy::adc, 1, 5, cut<3>, "_bands3"},
+        RanksCase{Strategy::adc, 1, 3, cut_absolute, "_bands2_absolute"},
+        RanksCase{Strategy::mcmc, 1, 4, cut<3>, "_bands3"},
+        RanksCase{Strategy::mcmc, 3, 2, cut<3>, "_bands3"},
+        RanksCase{Strategy::mcmc, 4, 8, cut<2>, "_bands2"}),
     name_of_case);
 
 /// The file after `until` steps of so many ranks. resume: a checkpoint where they begin.
@@ -209,14 +213,22 @@ TEST(Ranks, HandOnBytesInPieces) {
         const size_t rank = size_t(group->rank());
         const uint64_t first = std::accumulate(sizes.begin(), sizes.begin() + group->rank(), uint64_t(0));
         const std::span<const std::byte> own = std::span(all).subspan(first, sizes[rank]);
-        const auto part = train::part_of(*group, sizes, [&](uint64_t offset, std::span<std::byte> into) {
-            EXPECT_EQ(rank, 0u);
-            EXPECT_LE(into.size(), size_t(4) << 20);
-            std::copy_n(all.begin() + std::ptrdiff_t(offset), into.size(), into.begin());
-        });
-        EXPECT_TRUE(std::ranges::equal(part, own));
+        size_t taken = 0;
+        portions::hand_out(
+            *group, sizes,
+            [&](uint64_t offset, std::span<std::byte> into) {
+                EXPECT_EQ(rank, 0u);
+                EXPECT_LE(into.size(), size_t(4) << 20);
+                std::copy_n(all.begin() + std::ptrdiff_t(offset), into.size(), into.begin());
+            },
+            [&](size_t part, const std::vector<std::byte>& bytes) {
+                EXPECT_EQ(part, rank);
+                EXPECT_TRUE(std::ranges::equal(bytes, own));
+                ++taken;
+            });
+        EXPECT_EQ(taken, 1u);
         std::vector<std::byte> joined;
-        train::pass_on(
+        portions::pass_on(
             *group, own,
             [&](uint64_t bytes, uint32_t checksum) {
                 EXPECT_EQ(bytes, all.size());
@@ -303,7 +315,8 @@ TEST(Ranks, EachHoldsItsShareOfTheState) {
 TEST(Ranks, DrawThePicturesOfARenderer) {
     for (const int ranks : {1, 3}) {
         std::vector<Image> drawn, expected;
-        const TrainOptions options = busy(Strategy::adc, 2);
+        // One that is alone draws them too, where its steps have one view.
+        const TrainOptions options = busy(Strategy::adc, ranks == 1 ? 1 : 2);
         run_ranks(ranks, [&](std::shared_ptr<Ranks> group) {
             const auto own = open_test_device(false);
             Trainer trainer(own, seven_views().dataset, all_frames(seven_views().dataset), start(), options,
@@ -339,7 +352,7 @@ TEST(Ranks, EachHoldsItsRange) {
         for (const int ranks : {1, 2, 3, 7, 64}) {
             uint32_t next = 0;
             for (int rank = 0; rank < ranks; ++rank) {
-                const pipeline::Range range = pipeline::range_of(all, rank, ranks);
+                const portions::Range range = portions::range_of(all, rank, ranks);
                 EXPECT_EQ(range.first, next);
                 EXPECT_EQ(range.first % shared::PARAM_BLOCK == 0 || range.splats == 0, true);
                 EXPECT_LE(range.splats, all / uint32_t(ranks) + 2 * shared::PARAM_BLOCK);
@@ -360,20 +373,14 @@ TEST(Ranks, AreRefusedWhatTheyCannotDo) {
         }
         return std::string();
     };
-    EXPECT_EQ(message([](TrainOptions& o) { o.exposure = true; }),
-              "several ranks and --exposure exclude each other");
-    EXPECT_EQ(message([](TrainOptions& o) { o.render.points = true; }),
-              "several ranks and --points exclude each other");
-    EXPECT_NE(message([](TrainOptions& o) { o.refine_poses = true; }).find("--refine-poses"),
-              std::string::npos);
-    TrainOptions options = busy(Strategy::none, 2);
-    options.refine_poses = true;
-    EXPECT_THROW(trained(options, 1, 1), InputError);
-    options = busy(Strategy::none, 1);
-    options.bands = 2;
-    options.exposure = true;
-    EXPECT_THROW(trained(options, 1, 1), InputError);
-    options.exposure = false;
+    const auto begins = [](const std::string& text, const std::string& with) {
+        EXPECT_TRUE(text.starts_with(with)) << text;
+    };
+    begins(message([](TrainOptions& o) { o.render.points = true; }),
+           "several ranks and --points exclude each other: ");
+    begins(message([](TrainOptions& o) { o.refine_poses = true; }),
+           "several ranks and --refine-poses exclude each other: ");
+    TrainOptions options = busy(Strategy::none, 1);
     options.bands = 49;
     try {
         trained(options, 1, 1);
@@ -385,8 +392,8 @@ TEST(Ranks, AreRefusedWhatTheyCannotDo) {
             << error.what();
     }
     // 300 splats are 38 blocks.
-    EXPECT_THROW(pipeline::check_share(300, 39), RunError);
-    EXPECT_NO_THROW(pipeline::check_share(300, 38));
+    EXPECT_THROW(portions::check_portions(300, 39), RunError);
+    EXPECT_NO_THROW(portions::check_portions(300, 38));
 }
 
 }  // namespace

@@ -4,13 +4,61 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <fstream>
+#include <iterator>
 #include <set>
+#include <string>
 
+#include "ewa/error.h"
+#include "train/exclusions.h"
 #include "train/image_cache.h"
 
 namespace ewa::train {
 namespace {
+
+std::string refusal(const TrainOptions& options, int ranks) {
+    try {
+        check_exclusions(options, ranks);
+    } catch (const InputError& error) {
+        return error.what();
+    }
+    return {};
+}
+
+/// Each row with what it excludes, one at a time, and the document that shows the rows.
+TEST(Exclusions, AreThoseOfTheDocument) {
+    std::ifstream file(EWA_SOURCE_DIR "/docs/scale.md");
+    const std::string all{std::istreambuf_iterator<char>(file), {}};
+    const size_t begin = all.find("## Exclusions\n");
+    ASSERT_NE(begin, std::string::npos);
+    const std::string section = all.substr(begin, all.find("\n## ", begin + 1) - begin);
+    EXPECT_EQ(std::ranges::count(section, '\n') - 5, std::ptrdiff_t(kExclusions.size()) + 1) << section;
+    for (const Exclusion& row : kExclusions) {
+        std::string others;
+        for (size_t by = 0; by < divisions; ++by) {
+            TrainOptions options;
+            options.render.points = row.option == "--points";
+            options.refine_poses = row.option == "--refine-poses";
+            options.exposure = row.option == "--exposure";
+            EXPECT_TRUE(row.used(options));
+            EXPECT_EQ(refusal(options, 1), "");
+            if (by == by_batch) options.batch = 2;
+            if (by == by_bands) options.bands = 2;
+            if (by == by_memory) options.device_memory_bytes = 1;
+            const std::string text = refusal(options, by == by_ranks ? 2 : 1);
+            EXPECT_EQ(!text.empty(), row.excludes[by]) << text;
+            if (!row.excludes[by]) continue;
+            const std::string name(kDivisions[by]), option(row.option), reason(row.reason);
+            EXPECT_EQ(text, name + " and " + option + " exclude each other: " + reason);
+            others += (others.empty() ? "" : ", ") + (by == by_ranks ? name : "`" + name + "`");
+        }
+        const std::string line =
+            "| `" + std::string(row.option) + "` | " + others + " | " + std::string(row.reason) + " |\n";
+        EXPECT_NE(section.find(line), std::string::npos) << line;
+    }
+}
 
 TEST(FrameOfStep, VisitsEachImageOnceAnEpochInAnOrderOfItsOwn) {
     for (const size_t count : {size_t(1), size_t(2), size_t(7), size_t(48)}) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/collect.h"
+#include "portions/collect.h"
 
 #include <zlib.h>
 
@@ -8,7 +8,7 @@
 #include <numeric>
 #include <utility>
 
-namespace ewa::train {
+namespace ewa::portions {
 namespace {
 
 /// A part for each rank.
@@ -69,24 +69,44 @@ void pass_on(Ranks& ranks, std::span<const std::byte> own,
         }
 }
 
-std::vector<std::byte> part_of(Ranks& ranks, const std::vector<uint64_t>& sizes,
-                               const std::function<void(uint64_t, std::span<std::byte>)>& read) {
-    std::vector<std::byte> own(sizes[size_t(ranks.rank())]), buffer;
-    const bool first = ranks.rank() == 0;
-    if (first) read(0, own);
-    uint64_t offset = sizes[0];
-    for (size_t rank = 1; rank < sizes.size(); offset += sizes[rank++])
-        for (uint64_t at = 0; at < sizes[rank]; at += kPassedPiece) {
-            const size_t piece = std::min(kPassedPiece, size_t(sizes[rank] - at));
-            OutParts out(sizes.size());
-            InParts in(sizes.size());
-            if (first) buffer.resize(piece);
-            if (first) read(offset + at, buffer);
-            if (first) out[rank] = buffer;
-            if (size_t(ranks.rank()) == rank) in[0] = std::span(own).subspan(at, piece);
+void hand_out(Ranks& ranks, const std::vector<uint64_t>& sizes,
+              const std::function<void(uint64_t, std::span<std::byte>)>& read,
+              const std::function<void(size_t, std::vector<std::byte>)>& take) {
+    const size_t each = sizes.size() / size_t(ranks.size()), own = size_t(ranks.rank());
+    uint64_t offset = 0;
+    for (size_t part = 0; part < sizes.size(); offset += sizes[part++]) {
+        const size_t to = part / each;
+        std::vector<std::byte> taken(to == own ? sizes[part] : 0), buffer;
+        if (to == 0 && own == 0) read(offset, taken);
+        for (uint64_t at = 0; to > 0 && at < sizes[part]; at += kPassedPiece) {
+            const size_t piece = std::min(kPassedPiece, size_t(sizes[part] - at));
+            OutParts out(size_t(ranks.size()));
+            InParts in(size_t(ranks.size()));
+            if (own == 0) buffer.resize(piece);
+            if (own == 0) read(offset + at, buffer);
+            if (own == 0) out[to] = buffer;
+            if (to == own) in[0] = std::span(taken).subspan(at, piece);
             ranks.exchange(out, in);
         }
-    return own;
+        if (to == own) take(part, std::move(taken));
+    }
+}
+
+std::vector<std::vector<std::byte>> exchanged(Ranks& ranks, std::vector<std::vector<std::byte>> out) {
+    const size_t size = out.size(), own = size_t(ranks.rank());
+    std::vector<std::vector<std::byte>> in(size);
+    in[own] = std::exchange(out[own], {});  // stays here
+    if (size == 1) return in;
+    std::vector<uint64_t> sizes;
+    for (const auto& part : out) sizes.push_back(part.size());
+    const std::vector<uint64_t> all = ranks.gather(sizes);
+    for (size_t rank = 0; rank < size; ++rank)
+        if (rank != own) in[rank].resize(all[rank * size + own]);
+    OutParts sent(out.begin(), out.end());
+    InParts received(in.begin(), in.end());
+    received[own] = {};
+    ranks.exchange(sent, received);
+    return in;
 }
 
 std::vector<std::byte> told(Ranks& ranks, std::span<const std::byte> own) {
@@ -100,4 +120,4 @@ std::vector<std::byte> told(Ranks& ranks, std::span<const std::byte> own) {
     return heard;
 }
 
-}  // namespace ewa::train
+}  // namespace ewa::portions

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bytes that the ranks hold together: joined on rank 0, whole or in pieces, and divided again.
+// Bytes that the ranks hold together: joined on rank 0, whole or in pieces, divided again, and exchanged.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 #include "ewa/ranks.h"
 
-namespace ewa::train {
+namespace ewa::portions {
 
 /// The bytes of all ranks one after another, on rank 0; empty on the others. Collective.
 std::vector<std::byte> joined(Ranks& ranks, std::vector<std::byte> own);
@@ -20,12 +20,16 @@ void pass_on(Ranks& ranks, std::span<const std::byte> own,
              const std::function<void(uint64_t bytes, uint32_t checksum)>& begin,
              const std::function<void(std::span<const std::byte>)>& take);
 
-/// This rank's part of bytes that rank 0 reads, in pieces of some MiB. read: fills a piece from an offset on; called on rank 0
-/// alone. sizes: of the part of each rank. Collective.
-std::vector<std::byte> part_of(Ranks& ranks, const std::vector<uint64_t>& sizes,
-                               const std::function<void(uint64_t offset, std::span<std::byte>)>& read);
+/// Divides bytes that rank 0 reads into parts, in pieces of some MiB. sizes: of all parts; each rank gets as many. read: fills a
+/// piece from an offset on; called on rank 0 alone. take: gets this rank's parts. Collective.
+void hand_out(Ranks& ranks, const std::vector<uint64_t>& sizes,
+              const std::function<void(uint64_t offset, std::span<std::byte>)>& read,
+              const std::function<void(size_t part, std::vector<std::byte>)>& take);
+
+/// Sends out[r] to rank r. Returns what each rank has sent to this one. Collective.
+std::vector<std::vector<std::byte>> exchanged(Ranks& ranks, std::vector<std::vector<std::byte>> out);
 
 /// Bytes of rank 0, on every rank. own: ignored on other ranks. Collective.
 std::vector<std::byte> told(Ranks& ranks, std::span<const std::byte> own);
 
-}  // namespace ewa::train
+}  // namespace ewa::portions

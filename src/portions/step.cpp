@@ -1,0 +1,415 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "portions/step.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <chrono>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+namespace ewa::portions {
+
+using namespace pipeline;
+
+namespace {
+
+constexpr uint64_t kRecordBytes = 16 * shared::RECORD_TEXELS;
+
+/// A part of a device buffer on the host: its memory, or a copy.
+class OnHost {
+  public:
+    OnHost(gpu::Buffer& buffer, uint64_t offset, uint64_t bytes) : buffer_(buffer), offset_(offset) {
+        if (bytes == 0) return;
+        if (buffer.readable()) {
+            bytes_ = {buffer.mapped() + offset, bytes};
+            return;
+        }
+        copy_.resize(bytes);
+        bytes_ = copy_;
+    }
+    std::span<std::byte> part(uint64_t offset, uint64_t bytes) const { return bytes_.subspan(offset, bytes); }
+    /// Called before parts are read, and after all parts are written.
+    void read() {
+        if (!copy_.empty()) buffer_.download(std::span<std::byte>(copy_), offset_);
+    }
+    void write() {
+        if (!copy_.empty()) buffer_.upload(std::span<const std::byte>(copy_), offset_);
+    }
+
+  private:
+    gpu::Buffer& buffer_;
+    uint64_t offset_;
+    std::vector<std::byte> copy_;
+    std::span<std::byte> bytes_;
+};
+
+using Clock = std::chrono::steady_clock;
+
+double milliseconds_since(Clock::time_point begin) {
+    return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
+}
+
+/// An eighth more: the next views are of about this size.
+void make_room(gpu::Device& device, gpu::Buffer& buffer, const char* name, uint64_t bytes) {
+    if (buffer && buffer.bytes() >= bytes) return;
+    buffer = gpu::Buffer();  // free the old one first
+    buffer = gpu::Buffer(device, name, bytes + bytes / 8);
+}
+
+shared::Counts run(const StepParts& parts, gpu::Recording& recording) {
+    parts.frame.record_counts(recording);
+    parts.executor.run(recording, true);
+    parts.submitted();
+    return parts.frame.read_counts();
+}
+
+/// Parts of the loss of a view.
+struct PictureLoss {
+    double l1 = 0, ssim = 0, squared = 0;
+};
+
+constexpr size_t kLossWords = 3;
+
+PictureLoss loss_from(std::span<const uint64_t, kLossWords> words) {
+    return {std::bit_cast<double>(words[0]), std::bit_cast<double>(words[1]),
+            std::bit_cast<double>(words[2])};
+}
+
+/// losses: of the bands of each view.
+void add_losses(std::span<const PictureLoss> losses, size_t bands, StepSums& sums) {
+    const size_t views = losses.size() / bands;
+    for (size_t first = 0; first < losses.size(); first += bands) {
+        PictureLoss view = losses[first];
+        for (const PictureLoss& band : losses.subspan(first + 1, bands - 1)) {
+            view.l1 += band.l1;
+            view.ssim += band.ssim;
+            view.squared += band.squared;
+        }
+        sums.loss += loss_of(view.l1, view.ssim) / double(views);
+        sums.psnr += -10 * std::log10(view.squared) / double(views);
+    }
+}
+
+uint64_t sum_of(std::span<const uint64_t> values) {
+    return std::accumulate(values.begin(), values.end(), uint64_t(0));
+}
+
+}  // namespace
+
+/// The views of a step, each in so many bands.
+struct Step::Views {
+    std::span<const StepView> views;
+    uint32_t bands;
+};
+
+/// A view, or a band of it, which one rank draws.
+struct Step::Picture {
+    size_t number;  // among those of all views: that of its list
+    size_t view;
+    const StepView& of;
+    FrameInputs inputs;    // with its band
+    FrameRequest request;  // without splats and instances
+};
+
+/// Pictures that are drawn at one time: at most one by each rank. Picture `first` + k is drawn by rank k.
+struct Step::Turn {
+    size_t first, pictures;
+    std::vector<uint64_t> listed{};  // by this rank, of each picture
+    std::vector<uint64_t> of_own{};  // listed by each rank, of the picture that this rank draws
+    bool draws(int rank) const { return size_t(rank) < pictures; }
+    uint64_t own() const { return sum_of(of_own); }
+};
+
+std::vector<uint64_t> Step::gather(std::span<const uint64_t> own) {
+    const auto begin = Clock::now();
+    std::vector<uint64_t> all = portions_.ranks().gather(own);
+    traffic_.waiting += milliseconds_since(begin);
+    return all;
+}
+
+void Step::exchange(std::span<const std::span<const std::byte>> out,
+                    std::span<const std::span<std::byte>> in) {
+    const auto begin = Clock::now();
+    portions_.ranks().exchange(out, in);
+    traffic_.exchange += milliseconds_since(begin);
+    for (size_t rank = 0; rank < out.size(); ++rank)
+        if (rank != size_t(portions_.ranks().rank())) traffic_.sent_bytes += out[rank].size();
+}
+
+void Step::reserve(const StepParts& parts, FrameRequest request, uint64_t splats) {
+    // Where all stays on the device, the frame has room for a portion and for a list.
+    const uint64_t least = portions_.streamed() ? 1 : portions_.largest();
+    request.splats = uint32_t(std::max(least, splats));
+    request.instances = parts.instance_capacity;
+    parts.frame.reserve(parts.cache.device(), parts.cache.config(), request);
+}
+
+Step::Picture Step::picture_of(const StepParts& parts, const Views& of, size_t number) {
+    const size_t view = number / of.bands;
+    Picture picture{number, view, of.views[view], of.views[view].inputs, of.views[view].request};
+    if (of.bands == 1) return picture;
+    picture.inputs.band =
+        band_of(parts.cache.config(), picture.request.height, of.bands, uint32_t(number % of.bands));
+    picture.request.height = picture.inputs.band.rows;
+    return picture;
+}
+
+/// Lists what some pictures show of this rank's portions, so that each is needed once.
+void Step::list(const StepParts& parts, const Views& of, size_t first, size_t pictures) {
+    gpu::Device& device = parts.cache.device();
+    const bool streamed = portions_.streamed();
+    portions_.visit(Portions::Need::params, [&](int index, const Model& model) {
+        const size_t portion = size_t(index);
+        buffers_.places = portions_.take_places();
+        buffers_.reserve(device, model.splats, uint32_t(of.views.size()), of.bands,
+                         uint32_t(streamed ? model.splats : pictures * model.splats));
+        uint64_t places = 0, records = 0;
+        if (first > 0) places = seen_[first - 1].places[portion] + seen_[first - 1].listed[portion];
+        size_t projected = of.views.size();
+        for (size_t number = first; number < first + pictures; ++number) {
+            const Picture picture = picture_of(parts, of, number);
+            const bool again = picture.view == projected;
+            if (!again) reserve(parts, picture.request, model.splats);
+            projected = picture.view;
+            gpu::Recording recording(device.limits());
+            record_list({recording, parts.cache, parts.plan, parts.frame}, model, picture.inputs, buffers_,
+                        {.view = uint32_t(picture.view),
+                         .list = uint32_t(number),
+                         .first_place = uint32_t(places),
+                         .first_record = uint32_t(records)},
+                        again);
+            const shared::Counts counts = run(parts, recording);
+            Seen& seen = seen_[number];
+            seen.places[portion] = places;
+            seen.listed[portion] = counts.scan_total;
+            seen.skipped += counts.skipped_nonfinite;
+            places += counts.scan_total;
+            if (streamed) {
+                seen.records[portion].resize(counts.scan_total * kRecordBytes);
+                portions_.stream(seen.records[portion].size(), [&] {
+                    buffers_.visible.download(std::span<std::byte>(seen.records[portion]));
+                });
+            } else {
+                records += counts.scan_total;
+            }
+        }
+        // A picture without a splat draws one that is not visible, which has a place behind the others.
+        if (!streamed) buffers_.reserve_sums(device, parts.executor, parts.plan, places + 1);
+        portions_.keep_places(std::move(buffers_.places));
+    });
+    if (streamed) buffers_.visible = {};  // the picture takes its memory
+}
+
+/// What each rank lists of some pictures.
+std::vector<uint64_t> Step::tell(size_t first, size_t pictures, StepSums& sums) {
+    std::vector<uint64_t> told;
+    for (size_t k = 0; k < pictures; ++k) told.push_back(sum_of(seen_[first + k].listed));
+    told.push_back(seen_[first + pictures - 1].skipped);
+    std::vector<uint64_t> all = gather(told);
+    sums.skipped_nonfinite = 0;
+    for (size_t at = pictures; at < all.size(); at += told.size()) sums.skipped_nonfinite += all[at];
+    return all;
+}
+
+/// listed: of pictures from `first` on, as tell() returns it. begin: the first picture of the turn.
+Step::Turn Step::turn_of(const std::vector<uint64_t>& listed, size_t first, size_t pictures,
+                         size_t begin) const {
+    const size_t ranks = size_t(portions_.ranks().size()), own = size_t(portions_.ranks().rank());
+    Turn turn{begin, std::min(ranks, first + pictures - begin)};
+    for (size_t k = 0; k < turn.pictures; ++k) turn.listed.push_back(sum_of(seen_[begin + k].listed));
+    for (size_t rank = 0; rank < ranks; ++rank)
+        turn.of_own.push_back(turn.draws(int(own)) ? listed[rank * (pictures + 1) + begin - first + own] : 0);
+    return turn;
+}
+
+/// Afterwards each rank has the list of the picture that it draws.
+void Step::send(const StepParts& parts, const Views& of, const Turn& turn) {
+    if (portions_.alone()) return;
+    const size_t ranks = size_t(portions_.ranks().size()), own = size_t(portions_.ranks().rank());
+    if (turn.draws(int(own))) {
+        reserve(parts, picture_of(parts, of, turn.first + own).request, turn.own());
+        make_room(parts.cache.device(), own_sums_, "sums of a picture",
+                  ViewBuffers::sum_bytes(parts.plan, turn.own() + 1));
+    }
+    const bool streamed = portions_.streamed();
+    OnHost on_device(buffers_.visible, 0, streamed ? 0 : sum_of(turn.listed) * kRecordBytes);
+    on_device.read();
+    OnHost list(parts.frame.records, 0, turn.own() * kRecordBytes);
+    std::vector<std::vector<std::byte>> on_host(ranks);
+    std::vector<std::span<const std::byte>> out(ranks);
+    std::vector<std::span<std::byte>> in(ranks);
+    uint64_t from = 0, to = 0;
+    for (size_t rank = 0; rank < ranks; ++rank) {
+        if (rank < turn.pictures && streamed) {
+            for (std::vector<std::byte>& records : seen_[turn.first + rank].records) {
+                on_host[rank].insert(on_host[rank].end(), records.begin(), records.end());
+                records = {};
+            }
+            out[rank] = on_host[rank];
+        } else if (rank < turn.pictures) {
+            out[rank] = on_device.part(from, turn.listed[rank] * kRecordBytes);
+        }
+        in[rank] = list.part(to, turn.of_own[rank] * kRecordBytes);
+        from += out[rank].size();
+        to += in[rank].size();
+    }
+    portions_.stream(to, [&] {
+        exchange(out, in);
+        list.write();
+    });
+}
+
+void Step::return_sums(const StepParts& parts, const Turn& turn) {
+    if (portions_.alone()) return;
+    const bool streamed = portions_.streamed();
+    const size_t ranks = size_t(portions_.ranks().size());
+    const uint64_t splat = ViewBuffers::sum_bytes(parts.plan, 1);
+    OnHost drawn(own_sums_, 0, turn.own() * splat);
+    drawn.read();
+    OnHost sums(buffers_.sums, streamed ? 0 : seen_[turn.first].places.front() * splat,
+                streamed ? 0 : sum_of(turn.listed) * splat);
+    std::vector<std::span<const std::byte>> out(ranks);
+    std::vector<std::span<std::byte>> in(ranks);
+    uint64_t from = 0, to = 0;
+    for (size_t rank = 0; rank < ranks; ++rank) {
+        out[rank] = drawn.part(from, turn.of_own[rank] * splat);
+        from += out[rank].size();
+        if (rank >= turn.pictures) continue;
+        std::vector<std::byte>& waiting = seen_[turn.first + rank].sums;
+        if (streamed) waiting.resize(turn.listed[rank] * splat);
+        in[rank] = streamed ? std::span(waiting) : sums.part(to, turn.listed[rank] * splat);
+        to += in[rank].size();
+    }
+    portions_.stream(from, [&] {
+        exchange(out, in);
+        sums.write();
+    });
+}
+
+shared::Counts Step::draw_own(const StepParts& parts, const Picture& picture, const Turn& turn) {
+    gpu::Device& device = parts.cache.device();
+    const bool alone = portions_.alone();
+    const uint64_t listed = turn.own();
+    const uint32_t splats = uint32_t(std::max<uint64_t>(listed, 1));
+    const gpu::Buffer& sums = alone ? buffers_.sums : own_sums_;
+    for (;;) {
+        reserve(parts, picture.request, listed);
+        gpu::Recording recording(device.limits());
+        if (listed == 0)
+            recording.fill(parts.frame.records, 0, 0, kRecordBytes);
+        else if (alone)
+            recording.copy(buffers_.visible, 0, parts.frame.records, 0, listed * kRecordBytes);
+        const Sorted sorted =
+            record_list_forward({recording, parts.cache, parts.plan, parts.frame}, splats, picture.inputs);
+        if (picture.of.record_loss) {
+            picture.of.record_loss(recording, picture.inputs);
+            record_list_backward({recording, parts.cache, parts.plan, parts.frame}, splats, picture.inputs,
+                                 sorted, sums, alone ? uint32_t(seen_[picture.number].places.front()) : 0);
+        }
+        const shared::Counts counts = run(parts, recording);
+        if (counts.instances <= parts.frame.instance_capacity) return counts;
+        parts.instance_capacity = grown_capacity(counts.instances);
+    }
+}
+
+bool Step::draw_pictures(const StepParts& parts, std::span<const StepView> views) {
+    const Views of{views, 1};
+    const int own = portions_.ranks().rank();
+    StepSums sums;
+    seen_.assign(views.size(), Seen(size_t(portions_.count())));
+    list(parts, of, 0, views.size());
+    const Turn turn = turn_of(tell(0, views.size(), sums), 0, views.size(), 0);
+    send(parts, of, turn);
+    if (turn.draws(own)) draw_own(parts, picture_of(parts, of, size_t(own)), turn);
+    return turn.draws(own);
+}
+
+StepSums Step::draw(const StepParts& parts, std::span<const StepView> views) {
+    StepSums sums;
+    const Views of{views, bands_};
+    const size_t ranks = size_t(portions_.ranks().size()), own = size_t(portions_.ranks().rank());
+    std::vector<PictureLoss> losses(views.size() * bands_);
+    seen_.assign(losses.size(), Seen(size_t(portions_.count())));
+    // Lists on the device are drawn at once. In host memory those of all pictures wait.
+    const size_t round = portions_.streamed() ? losses.size() : ranks;
+    for (size_t first = 0; first < losses.size(); first += round) {
+        const size_t pictures = std::min(round, losses.size() - first);
+        list(parts, of, first, pictures);
+        const std::vector<uint64_t> listed = tell(first, pictures, sums);
+        for (size_t begin = first; begin < first + pictures; begin += ranks) {
+            const Turn turn = turn_of(listed, first, pictures, begin);
+            send(parts, of, turn);
+            std::vector<uint64_t> told(kLossWords + parts.learned);
+            if (turn.draws(int(own))) {
+                const Picture picture = picture_of(parts, of, begin + own);
+                const shared::Counts counts = draw_own(parts, picture, turn);
+                const PictureLoss loss{counts.l1, counts.ssim, double(counts.squared) / picture.of.weight()};
+                std::ranges::copy(std::bit_cast<std::array<uint64_t, kLossWords>>(loss), told.begin());
+                if (parts.learned > 0 && ranks > 1)
+                    std::ranges::copy(picture.of.learned(), told.begin() + kLossWords);
+            }
+            // Waits for the slowest of them.
+            const std::vector<uint64_t> all = gather(told);
+            return_sums(parts, turn);
+            for (size_t k = 0; k < turn.pictures; ++k) {
+                const auto of_picture = std::span(all).subspan(told.size() * k, told.size());
+                losses[begin + k] = loss_from(of_picture.first<kLossWords>());
+                if (parts.learned > 0 && k != own)
+                    views[(begin + k) / bands_].learn(of_picture.subspan(kLossWords));
+            }
+        }
+    }
+    add_losses(losses, bands_, sums);
+    return sums;
+}
+
+/// The sums of a portion, which have waited in host memory.
+void Step::upload_sums(const StepParts& parts, size_t portion) {
+    const uint64_t splat = ViewBuffers::sum_bytes(parts.plan, 1);
+    const Seen& last = seen_.back();
+    buffers_.sums = std::move(own_sums_);
+    make_room(parts.cache.device(), buffers_.sums, "sums of a picture",
+              (last.places[portion] + last.listed[portion] + 1) * splat);
+    for (const Seen& seen : seen_) {
+        const uint64_t from = sum_of(std::span(seen.listed).first(portion)) * splat,
+                       bytes = seen.listed[portion] * splat;
+        portions_.stream(bytes, [&] {
+            buffers_.sums.upload(std::span<const std::byte>(seen.sums).subspan(from, bytes),
+                                 seen.places[portion] * splat);
+        });
+    }
+}
+
+void Step::update(const StepParts& parts, const Rates& rates, int sh_degree,
+                  const std::function<void(gpu::Recording&, const Model&)>& more, StepSums& sums) {
+    std::array<uint64_t, 2> own{};
+    portions_.visit(Portions::Need::state, [&](int portion, const Model& model) {
+        buffers_.places = portions_.take_places();
+        if (portions_.streamed()) upload_sums(parts, size_t(portion));
+        gpu::Recording recording(parts.cache.device().limits());
+        recording.fill(parts.frame.counts, 0, 0, sizeof(shared::Counts));
+        record_update_views({recording, parts.cache, parts.plan, parts.frame}, model, buffers_, rates,
+                            sh_degree, bands_);
+        if (more) more(recording, model);
+        const shared::Counts counts = run(parts, recording);
+        own[0] += counts.dropped_updates;
+        own[1] += counts.limited_steps;
+        portions_.changed();
+        if (portions_.streamed()) {
+            buffers_.places = {};
+            own_sums_ = std::move(buffers_.sums);
+        } else {
+            portions_.keep_places(std::move(buffers_.places));
+        }
+    });
+    seen_.clear();
+    const std::vector<uint64_t> all = gather(own);
+    for (size_t i = 0; i < all.size(); i += 2) {
+        sums.dropped_updates += all[i];
+        sums.limited_steps += all[i + 1];
+    }
+}
+
+}  // namespace ewa::portions

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+// A training step over portions of the splats. Each portion lists what the step's pictures show of it. A picture is drawn from
+// the lists of all portions, by one rank, and the sums of its gradients go back to the portions. Then each portion is updated.
+// A picture is a view, or a band of tile rows of one.
+//
+// Between a list and a picture, and back, data stay on the device, wait in host memory, or go to another rank. Which of these
+// follows from the portions alone.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "pipeline/views.h"
+#include "portions/portions.h"
+
+namespace ewa::portions {
+
+/// A view of a step, and how a rank that draws a picture of it computes its loss.
+struct StepView {
+    pipeline::FrameInputs inputs;    // without a band
+    pipeline::FrameRequest request;  // of the whole view, without splats and instances
+    /// Records the loss after the picture. inputs: with the picture's band. Called once for every attempt to draw.
+    /// Empty: the view is only a picture.
+    std::function<void(gpu::Recording&, const pipeline::FrameInputs& inputs)> record_loss;
+    /// Weight of the view's pixels in its mean squared error. Called after record_loss.
+    std::function<double()> weight;
+    /// What the loss has learned besides the splats, in StepParts::learned words, and the same for a rank that has not drawn the
+    /// view.
+    std::function<std::vector<uint64_t>()> learned;
+    std::function<void(std::span<const uint64_t>)> learn;
+};
+
+struct StepSums {
+    double loss = 0, psnr = 0;  // means over the views
+    uint64_t skipped_nonfinite = 0, dropped_updates = 0, limited_steps = 0;
+};
+
+/// The trainer's parts that a step uses.
+struct StepParts {
+    passes::PassCache& cache;
+    gpu::Executor& executor;
+    const pipeline::Plan& plan;
+    pipeline::FrameBuffers& frame;
+    uint32_t& instance_capacity;
+    std::function<void()> submitted;  // called after each submission
+    size_t learned = 0;               // words that ranks learn of a view
+};
+
+/// What this rank has exchanged with others so far.
+struct Traffic {
+    uint64_t sent_bytes = 0;
+    double exchange = 0, waiting = 0;  // ms
+};
+
+class Step {
+  public:
+    /// bands: of each view. A view needs a tile row for each.
+    Step(Portions& portions, int bands) : portions_(portions), bands_(uint32_t(bands)) {}
+
+    /// Draws all views and leaves the sums of their gradients. Collective, as all that follows.
+    StepSums draw(const StepParts& parts, std::span<const StepView> views);
+    /// Moves the splats. more: what else the submission of a portion's update does. Adds to the sums.
+    void update(const StepParts& parts, const pipeline::Rates& rates, int sh_degree,
+                const std::function<void(gpu::Recording&, const pipeline::Model&)>& more, StepSums& sums);
+
+    /// Draws pictures of whole views: view k by rank k. There are at most as many views as ranks. Returns whether this rank has drawn one,
+    /// which the frame then holds.
+    bool draw_pictures(const StepParts& parts, std::span<const StepView> views);
+
+    const Traffic& traffic() const { return traffic_; }
+
+  private:
+    /// What this rank's portions list of a picture.
+    struct Seen {
+        std::vector<uint64_t> listed, places;  // of each portion: splats, and the place of the first one
+        std::vector<std::vector<std::byte>> records;  // of portions that leave the device
+        std::vector<std::byte> sums;                  // for such portions, one after another
+        uint64_t skipped = 0;                         // splats
+        explicit Seen(size_t portions) : listed(portions), places(portions), records(portions) {}
+    };
+    struct Picture;
+    struct Turn;
+    struct Views;
+    static Picture picture_of(const StepParts& parts, const Views& of, size_t number);
+    std::vector<uint64_t> gather(std::span<const uint64_t> own);
+    void exchange(std::span<const std::span<const std::byte>> out, std::span<const std::span<std::byte>> in);
+    void reserve(const StepParts& parts, pipeline::FrameRequest request, uint64_t splats);
+    void list(const StepParts& parts, const Views& of, size_t first, size_t pictures);
+    Turn turn_of(const std::vector<uint64_t>& listed, size_t first, size_t pictures, size_t begin) const;
+    std::vector<uint64_t> tell(size_t first, size_t pictures, StepSums& sums);
+    void send(const StepParts& parts, const Views& of, const Turn& turn);
+    shared::Counts draw_own(const StepParts& parts, const Picture& picture, const Turn& turn);
+    void return_sums(const StepParts& parts, const Turn& turn);
+    void upload_sums(const StepParts& parts, size_t portion);
+
+    Portions& portions_;
+    uint32_t bands_;
+    pipeline::ViewBuffers buffers_;  // of a portion
+    gpu::Buffer own_sums_;           // of the picture that this rank draws, unless all is in one portion
+    std::vector<Seen> seen_;         // by picture
+    Traffic traffic_;
+};
+
+}  // namespace ewa::portions
