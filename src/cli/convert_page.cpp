@@ -8,7 +8,7 @@
 #include "core/typing.h"
 #include "ewa/error.h"
 #include "io/datasets/refined_cameras.h"
-#include "report/page.h"
+#include "report/scene_page.h"
 #include "scene/framing.h"
 
 namespace ewa::cli {
@@ -41,7 +41,7 @@ bool names_page(const fs::path& path) {
 std::vector<std::string> write_page(const fs::path& path, const Gaussians& gaussians,
                                     const SaveOptions& options, const std::optional<live::Run>& run) {
     std::vector<std::string> remarks;
-    report::Page page;
+    report::ScenePage page;
     page.title = path.stem().string();
     core::AtomicFile file(path);
     scene::FramingHints hints;
@@ -59,7 +59,7 @@ std::vector<std::string> write_page(const fs::path& path, const Gaussians& gauss
     page.target = framing.target;
     page.up = framing.up;
     page.sog = sog_bytes(path, gaussians, options, remarks);
-    file.write(report::page_html(page));
+    file.write(report::scene_page_html(page));
     file.commit();
     return remarks;
 }

@@ -1,31 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// One HTML file that shows a scene of splats in a browser, without a network. Its program is in web/.
+// The frame of a self-contained HTML page.
 #pragma once
-#include <array>
 #include <string>
-#include <vector>
-
-#include <glm/vec3.hpp>
-
-#include "ewa/camera.h"
 
 namespace ewa::report {
 
-struct PageView {
-    std::string name;
-    Camera camera;
-};
-
-struct Page {
-    std::string title;
-    std::string sog;                     // a .sog file of version 2 with stored entries
-    std::array<float, 3> background{};   // RGB, 0..1
-    Camera start;                        // the first view
-    glm::dvec3 up{0, -1, 0}, target{0};  // world: unit length; the point that the views turn about
-    std::vector<PageView> views = {};    // those that the page can go to
-};
-
-/// The text of the file.
-std::string page_html(const Page& page);
+/// A page in the style of the report, with the script of its sliders and charts. It can be read without scripts.
+/// Escapes the title; `body` is HTML.
+std::string html_page(const std::string& title, const std::string& body);
 
 }  // namespace ewa::report

@@ -269,7 +269,8 @@ TEST(Convert, SaysWhatToWriteInstead) {
 TEST(Convert, WritesAPage) {
     const Folder folder;
     make_splats(folder / "s.ply");
-    expect_success(run_ewa({"convert", folder / "s.ply", folder / "a <b>.html", "--json", folder / "j.json"}));
+    expect_success(
+        run_ewa({"convert", folder / "s.ply", folder / "a <b>.html", "--json", folder / "j.json"}));
     const std::string page = read_file(folder / "a <b>.html");
     EXPECT_NE(page.find("<title>a &lt;b&gt;</title>"), std::string::npos);
     EXPECT_NE(page.find("id=\"scene\">UEsDB"), std::string::npos) << "no archive in the page";

@@ -18,8 +18,8 @@
 #include "image/image_files.h"
 #include "report/chart.h"
 #include "report/html.h"
-#include "report/page.h"
 #include "report/pictures.h"
+#include "report/scene_page.h"
 #include "report/summary.h"
 #include "report/tensorboard.h"
 #include "support/temp_folder.h"
@@ -437,13 +437,13 @@ TEST(Report, PictureNamesNeverCollideNorEscape) {
     EXPECT_EQ(names_of({"", ".."}), (Names{"frame", "frame-2"}));
 }
 
-TEST(Page, HoldsTheSceneAndItsViews) {
-    Page page;
+TEST(ScenePage, HoldsTheSceneAndItsViews) {
+    ScenePage page;
     page.title = "a <b> & @SCENE@";
     page.sog = "PK\3\4 scene";
     page.start = {4, 3, 5, 6, 2, 1.5};
     page.views = {{"</script>.jpg", page.start}};
-    const std::string html = page_html(page);
+    const std::string html = scene_page_html(page);
     EXPECT_NE(html.find("<title>a &lt;b&gt; &amp; @SCENE@</title>"), std::string::npos);
     EXPECT_NE(html.find(R"(id="scene">UEsDBCBzY2VuZQ==</script>)"), std::string::npos);
     EXPECT_NE(html.find(R"("name":"\u003c/script>.jpg")"), std::string::npos);

@@ -70,8 +70,8 @@ std::string all_kinds() {
 /// Says what to write instead.
 [[noreturn]] void refuse_to_write(const std::filesystem::path& path, bool read_only) {
     if (!read_only) refuse(path, kWritten);
-    throw InputError(core::one_line(
-        path.string() + ": ewa reads this format and does not write it; it writes " + kWritten));
+    throw InputError(core::one_line(path.string() +
+                                    ": ewa reads this format and does not write it; it writes " + kWritten));
 }
 
 /// The kind that the first bytes identify, or null.
