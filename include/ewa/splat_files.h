@@ -41,7 +41,12 @@ Gaussians load_splats(const std::filesystem::path& path);
 std::vector<std::string> save_splats(const std::filesystem::path& path, const Gaussians& gaussians,
                                      const SaveOptions& options);
 
-/// The same with default options. Returned lines become warnings. `comments` are PLY comments, one line each.
+/// The bytes of the .sog that save_splats would write. Adds a line to `remarks` for each thing that it does not store.
+/// `path` is what errors name. Throws InputError for more splats than a WebP image has pixels.
+std::string sog_bytes(const std::filesystem::path& path, const Gaussians& gaussians,
+                      const SaveOptions& options, std::vector<std::string>& remarks);
+
+/// The same as save_splats with default options. Returned lines become warnings. `comments` are PLY comments, one line each.
 void save_splats(const std::filesystem::path& path, const Gaussians& gaussians,
                  const std::vector<std::string>& comments = {});
 

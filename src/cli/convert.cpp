@@ -11,6 +11,7 @@
 #include "cli/arguments.h"
 #include "cli/command.h"
 #include "cli/convert_edits.h"
+#include "cli/convert_page.h"
 #include "cli/orbit_check.h"
 #include "cli/output.h"
 #include "cli/run_inputs.h"
@@ -38,6 +39,7 @@ struct ConvertArguments {
     int spz_version = 3;
     fs::path json;
     bool check = false, allow_empty = false, quiet = false;
+    std::optional<live::Run> run;  // that the only input is of
 };
 
 struct Work {
@@ -47,11 +49,11 @@ struct Work {
     Json inputs = Json::array();
 };
 
-std::string described(const fs::path& path, SplatFormat format, const std::string& variant,
+std::string described(const fs::path& path, std::string_view format, const std::string& variant,
                       const Gaussians& gaussians) {
-    return fmt::format("{}: {}{}, {} splats of SH degree {}, {}", core::one_line(path.string()),
-                       name_of(format), variant.empty() ? "" : " (" + variant + ")", gaussians.size(),
-                       gaussians.sh_degree, core::bytes_text(fs::file_size(path)));
+    return fmt::format("{}: {}{}, {} splats of SH degree {}, {}", core::one_line(path.string()), format,
+                       variant.empty() ? "" : " (" + variant + ")", gaussians.size(), gaussians.sh_degree,
+                       core::bytes_text(fs::file_size(path)));
 }
 
 /// Reads the inputs and appends each to the one before.
@@ -63,7 +65,7 @@ Work read_all(const ConvertArguments& arguments) {
         SplatScene scene = read_splats(path);
         place_splats(scene.gaussians, arguments.placements.at(i), path.string());
         if (!arguments.quiet)
-            fmt::print("{}\n", described(path, scene.format, scene.variant, scene.gaussians));
+            fmt::print("{}\n", described(path, name_of(scene.format), scene.variant, scene.gaussians));
         work.inputs.push_back({{"file", path.string()},
                                {"format", name_of(scene.format)},
                                {"splats", scene.gaussians.size()},
@@ -127,6 +129,7 @@ void check_files(const ConvertArguments& arguments) {
             inputs.push_back({"values of an input", values});
     }
     check_command_outputs(outputs, inputs);
+    if (names_page(out)) return;
     const SplatFormat format = format_of_name(out);
     io::ValueFiles beside;
     if (format == SplatFormat::gltf) beside = io::gltf_value_files(out);
@@ -149,7 +152,7 @@ Json output_json(const ConvertArguments& arguments, const Gaussians& gaussians) 
     const fs::path& out = arguments.files.back();
     const std::vector<fs::path> values = values_of(out);
     Json json = {{"file", out.string()},
-                 {"format", name_of(format_of_name(out))},
+                 {"format", names_page(out) ? "page" : name_of(format_of_name(out))},
                  {"splats", gaussians.size()},
                  {"sh_degree", gaussians.sh_degree},
                  {"bytes", fs::file_size(out)}};
@@ -160,7 +163,10 @@ Json output_json(const ConvertArguments& arguments, const Gaussians& gaussians) 
 
 int run(const ConvertArguments& arguments) {
     const fs::path& out = arguments.files.back();
-    const SplatFormat format = format_to_write(out);
+    const bool page = names_page(out);
+    if (page && arguments.check)
+        throw InputError("--check: ewa does not read a page; check a .sog, which it holds");
+    const SplatFormat format = page ? SplatFormat::sog : format_to_write(out);
     // Report wrong use before the inputs are read: they may be large.
     Edits edits = arguments.edits;
     edits.transform = parse_transform(arguments.transform);
@@ -179,12 +185,15 @@ int run(const ConvertArguments& arguments) {
                       arguments.quiet || count < kShowFrom);
     work.save.spz_version = arguments.spz_version;
     work.save.progress = [&](uint64_t done, uint64_t) { progress.update(static_cast<int>(done)); };
-    const std::vector<std::string> quantised = save_splats(out, work.gaussians, work.save);
+    const bool in_place = edits.transform == glm::dmat4(1);
+    const std::vector<std::string> quantised =
+        page ? write_page(out, work.gaussians, work.save, in_place ? arguments.run : std::nullopt)
+             : save_splats(out, work.gaussians, work.save);
     std::vector<std::string> remarks = work.lost;
     remarks.insert(remarks.end(), quantised.begin(), quantised.end());
 
     if (!arguments.quiet) {
-        fmt::print("{}\n", described(out, format, "", work.gaussians));
+        fmt::print("{}\n", described(out, page ? "page" : name_of(format), "", work.gaussians));
         const std::vector<fs::path> values = values_of(out);
         if (!values.empty())
             fmt::print("{}{}: the values of this {}, {}\n", core::one_line(values[0].string()),
@@ -230,12 +239,13 @@ void add_editing_options(CLI::App& app, ConvertArguments& arguments) {
 
 Action add_convert(CLI::App& app) {
     const auto arguments = std::make_shared<ConvertArguments>();
-    app.add_option("FILES", arguments->files,
-                   "One or more inputs, which are joined, then the output unless -o names it. Formats: .ply "
-                   ".compressed.ply "
-                   ".splat .spz .sog meta.json .glb .gltf, and inputs also .ksplat. An input may be the "
-                   "folder of a training run. IN:STEP, as in b.ply:move=1,0,0, moves one input alone; more "
-                   "steps follow after more colons")
+    app.add_option(
+           "FILES", arguments->files,
+           "One or more inputs, which are joined, then the output unless -o names it. Formats: .ply "
+           ".compressed.ply .splat .spz .sog meta.json .glb .gltf, inputs also .ksplat, and an output "
+           "also .html, a page that shows the scene in a browser. An input may be the folder of a "
+           "training run. IN:STEP, as in b.ply:move=1,0,0, moves one input alone; more steps follow "
+           "after more colons")
         ->required()
         ->expected(1, -1)
         ->type_name("IN... OUT");
@@ -262,7 +272,10 @@ Action add_convert(CLI::App& app) {
                              core::one_line(arguments->files[0].string()));
         for (size_t i = 0; i + 1 < arguments->files.size(); ++i) {
             const PlacedInput input = parse_input(arguments->files[i].string());
-            arguments->files[i] = splat_input(input.file).file;
+            SplatInput splats = splat_input(input.file);
+            if (arguments->files.size() == 2 && input.transform == glm::dmat4(1))
+                arguments->run = splats.run ? std::move(splats.run) : live::run_of_splats(splats.file);
+            arguments->files[i] = splats.file;
             arguments->placements.push_back(input.transform);
         }
         return run(*arguments);

@@ -124,7 +124,7 @@ Image value_error_map(const Image& a, const Image& b, double full_scale) {
     });
 }
 
-std::string base64(const std::vector<unsigned char>& bytes) {
+std::string base64(std::span<const unsigned char> bytes) {
     static constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     std::string text;
     text.reserve((bytes.size() + 2) / 3 * 4);

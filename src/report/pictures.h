@@ -2,6 +2,7 @@
 // File names of renders, error maps, and base64.
 #pragma once
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,6 @@ Image error_map(const Image& a, const Image& b, double full_scale);
 /// only one image has it. A value that is not finite is brightest, unless both are equal.
 Image value_error_map(const Image& a, const Image& b, double full_scale);
 
-std::string base64(const std::vector<unsigned char>& bytes);
+std::string base64(std::span<const unsigned char> bytes);
 
 }  // namespace ewa::report

@@ -381,8 +381,7 @@ exit 1
     const Outcome alone = cameras();
     EXPECT_NE(alone.out.find("searched 3/4 photos, "), std::string::npos) << alone.out;
     EXPECT_EQ(alone.out.find(" h "), std::string::npos) << alone.out;
-    const Outcome with_training =
-        run({"train", folder_ / "photos", "-o", folder_ / "out", "--steps", "20M"});
+    const Outcome with_training = run({"train", folder_ / "photos", "-o", folder_ / "out", "--steps", "20M"});
     expect_failure(with_training, 1, "colmap exhaustive_matcher failed");
     const size_t line = with_training.out.find("searched 3/4 photos, ");
     ASSERT_NE(line, std::string::npos) << with_training.out;

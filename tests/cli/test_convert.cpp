@@ -263,9 +263,21 @@ TEST(Convert, SaysWhatToWriteInstead) {
         expect_failure(outcome, 2,
                        ".ply, .compressed.ply, .splat, .spz, .sog, meta.json of a SOG, .glb, .gltf\n");
     }
-    expect_failure(run_ewa({"convert", folder / "s.ply", folder / "o.html"}), 2,
-                   "ewa writes no web page; SuperSplat (superspl.at/editor) shows o.sog and o.ply");
     EXPECT_EQ(files_below(folder / ""), Names{"s.ply"});
+}
+
+TEST(Convert, WritesAPage) {
+    const Folder folder;
+    make_splats(folder / "s.ply");
+    expect_success(
+        run_ewa({"convert", folder / "s.ply", folder / "a <b>.html", "--json", folder / "j.json"}));
+    const std::string page = read_file(folder / "a <b>.html");
+    EXPECT_NE(page.find("<title>a &lt;b&gt;</title>"), std::string::npos);
+    EXPECT_NE(page.find("id=\"scene\">UEsDB"), std::string::npos) << "no archive in the page";
+    EXPECT_EQ(read_json(folder / "j.json")["output"]["format"], "page");
+    expect_failure(run_ewa({"convert", folder / "s.ply", folder / "c.html", "--check"}), 2, "check a .sog");
+    expect_failure(run_ewa({"convert", folder / "a <b>.html", folder / "d.ply"}), 2, "not a supported kind");
+    EXPECT_EQ(files_below(folder / ""), (Names{"a <b>.html", "j.json", "s.ply"}));
 }
 
 TEST(Convert, FullDiskLeavesNoHalfFile) {

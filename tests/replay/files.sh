@@ -132,9 +132,8 @@ row_convert_takes_its_output_as_other_commands_do() {
     run 2 ewa convert "$SPLATS" x.obj
     one_line
     silent_about .ksplat
-    run 2 ewa convert "$RUN" x.html
-    says "ewa writes no web page"
-    says x.sog
+    run 0 ewa convert "$RUN" x.html
+    exists x.html
 }
 
 row_help_and_version_as_people_type_them() {

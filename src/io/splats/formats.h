@@ -94,6 +94,10 @@ bool is_sog_meta(const std::filesystem::path& path);
 std::vector<std::string> write_sog(const std::filesystem::path& path, const Gaussians& gaussians,
                                    const SaveOptions& options);
 
+/// The bytes that write_sog would write to `path`, which errors name.
+std::string pack_sog(const std::filesystem::path& path, const Gaussians& gaussians,
+                     const SaveOptions& options, std::vector<std::string>& remarks);
+
 /// The same as a meta.json with the images of sog_value_files beside it.
 std::vector<std::string> write_sog_meta(const std::filesystem::path& path, const Gaussians& gaussians,
                                         const SaveOptions& options);

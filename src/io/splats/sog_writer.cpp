@@ -200,14 +200,21 @@ SogPacker packer_for(const std::filesystem::path& path, const Gaussians& gaussia
 
 std::vector<std::string> write_sog(const std::filesystem::path& path, const Gaussians& gaussians,
                                    const SaveOptions& options) {
-    SogPacker packer = packer_for(path, gaussians, options);
     core::AtomicFile file(path);
+    std::vector<std::string> remarks;
+    file.write(pack_sog(path, gaussians, options, remarks));
+    file.commit();
+    return remarks;
+}
+
+std::string pack_sog(const std::filesystem::path& path, const Gaussians& gaussians,
+                     const SaveOptions& options, std::vector<std::string>& remarks) {
+    SogPacker packer = packer_for(path, gaussians, options);
     ArchiveWriter archive;
     for (const auto& [name, bytes] : packer.pack(Paths(kSogImages.begin(), kSogImages.end())))
         archive.add(name, bytes);
-    file.write(archive.finish());
-    file.commit();
-    return remarks_of(gaussians, packer.palette());
+    remarks = remarks_of(gaussians, packer.palette());
+    return archive.finish();
 }
 
 ValueFiles sog_value_files(const std::filesystem::path& meta) {

@@ -69,16 +69,9 @@ std::string all_kinds() {
 
 /// Says what to write instead.
 [[noreturn]] void refuse_to_write(const std::filesystem::path& path, bool read_only) {
-    const std::string extension = core::lower(path.extension().string()), stem = path.stem().string();
-    std::string text = path.string();
-    if (extension == ".html" || extension == ".htm")
-        text += ": ewa writes no web page; SuperSplat (superspl.at/editor) shows " + stem + ".sog and " +
-                stem + ".ply, Babylon.js and Spark also show " + stem + ".spz";
-    else if (read_only)
-        text += std::string(": ewa reads this format and does not write it; it writes ") + kWritten;
-    else
-        refuse(path, kWritten);
-    throw InputError(core::one_line(text));
+    if (!read_only) refuse(path, kWritten);
+    throw InputError(core::one_line(path.string() +
+                                    ": ewa reads this format and does not write it; it writes " + kWritten));
 }
 
 /// The kind that the first bytes identify, or null.
@@ -230,6 +223,28 @@ std::vector<std::string> save_splats(const std::filesystem::path& path, const Ga
     if (!options.comments.empty() && !ply && format != SplatFormat::compressed_ply)
         remarks.push_back("comments are dropped");
     return remarks;
+}
+
+std::string sog_bytes(const std::filesystem::path& path, const Gaussians& gaussians,
+                      const SaveOptions& options, std::vector<std::string>& remarks) {
+    Gaussians plain = gaussians;
+    if (plain.origin != glm::dvec3(0)) {
+        remarks.push_back(rounding_remark(plain.origin));
+        plain = in_float_positions(std::move(plain));
+    }
+    if (plain.density) {
+        fit_opacities(plain, false);
+        remarks.push_back("opacities of --kernel density are fitted to 3DGS's kernel");
+    }
+    for (size_t i = 0; i < plain.size(); ++i)
+        if (!drawable(plain, i)) {
+            plain = drawable_only(plain, remarks);
+            break;
+        }
+    std::vector<std::string> more;
+    std::string bytes = io::pack_sog(path, plain, options, more);
+    remarks.insert(remarks.end(), more.begin(), more.end());
+    return bytes;
 }
 
 void save_splats(const std::filesystem::path& path, const Gaussians& gaussians,

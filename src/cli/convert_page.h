@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// ewa convert IN... page.html: a page that shows the scene in a browser.
+#pragma once
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "ewa/splat_files.h"
+#include "live/run_folder.h"
+
+namespace ewa::cli {
+
+/// Whether the name is that of a page: .html or .htm.
+bool names_page(const std::filesystem::path& path);
+
+/// Writes the page. run: its dataset's cameras become the views of the page, and its background is the page's; empty: none.
+/// Returns a line for each thing that the page does not have. Throws InputError, RunError.
+std::vector<std::string> write_page(const std::filesystem::path& path, const Gaussians& gaussians,
+                                    const SaveOptions& options, const std::optional<live::Run>& run);
+
+}  // namespace ewa::cli

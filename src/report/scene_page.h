@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// One HTML file that shows a scene of splats in a browser, without a network. Its program is in web/.
+#pragma once
+#include <array>
+#include <string>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include "ewa/camera.h"
+
+namespace ewa::report {
+
+struct PageView {
+    std::string name;
+    Camera camera;
+};
+
+struct ScenePage {
+    std::string title;
+    std::string sog;                     // a .sog file of version 2 with stored entries
+    std::array<float, 3> background{};   // RGB, 0..1
+    Camera start;                        // the first view
+    glm::dvec3 up{0, -1, 0}, target{0};  // world: unit length; the point that the views turn about
+    std::vector<PageView> views = {};    // those that the page can go to
+};
+
+/// The text of the file.
+std::string scene_page_html(const ScenePage& page);
+
+}  // namespace ewa::report

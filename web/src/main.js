@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+// The page: decodes its scene, and draws it when something changes.
+import {between, Camera} from "./camera.js";
+import {Controls} from "./controls.js";
+import {Renderer} from "./renderer.js";
+import {decodeSog} from "./sog.js";
+import {Sorter} from "./sorter.js";
+import {turn} from "./vector.js";
+
+const byId = (id) => document.getElementById(id);
+const state = document.documentElement.dataset;  // for whoever drives the page
+const kSecondsAView = 1.5, kSecondsARound = 20;
+
+function say(text) {
+    byId("message").hidden = text === "";
+    byId("text").textContent = text;
+    byId("progress").hidden = text !== "Loading";
+}
+
+function bytesOf(text) {
+    const bytes = new Uint8Array(Math.floor(text.length / 4) * 3 - (text.endsWith("==") ? 2 : text.endsWith("=") ? 1 : 0));
+    for (let from = 0, at = 0; from < text.length; from += 1 << 16) {
+        const part = atob(text.slice(from, from + (1 << 16)));
+        for (let i = 0; i < part.length; ++i) bytes[at++] = part.charCodeAt(i);
+    }
+    return bytes;
+}
+
+class Page {
+    constructor(gl, scene, settings) {
+        Object.assign(this, {gl, settings, canvas: gl.canvas, renderer: new Renderer(gl, scene), index: -1, film: 0,
+                             light: false, drawn: false});
+        this.camera = new Camera(settings.start, settings.up, settings.target);
+        this.sorter = new Sorter(scene.positions, (order) => {
+            this.renderer.setOrder(order);
+            this.request();
+        });
+        new Controls(this.canvas, this.camera, () => {
+            this.film = 0;
+            this.request();
+        });
+        new ResizeObserver(() => this.request()).observe(this.canvas);
+        byId("count").textContent = `${scene.count.toLocaleString("en")} splats`;
+        this.addCommands();
+        this.jump();
+        this.request();
+    }
+
+    /// The view that the address names: #camera=3, #camera=NAME, #light.
+    jump() {
+        const wanted = new URLSearchParams(location.hash.slice(1));
+        this.light = wanted.has("light");
+        if (!wanted.has("camera")) return;
+        const name = wanted.get("camera"), found = this.settings.cameras.findIndex((one) => one.name === name);
+        this.view(found >= 0 ? found : Number(name) || 0);
+    }
+
+    addCommands() {
+        const commands = {
+            home: () => this.home(),
+            previous: () => this.view(this.index < 0 ? -1 : this.index - 1),
+            next: () => this.view(this.index + 1),
+            play: () => this.play(),
+            shade: () => this.shade(),
+            full: () => (document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen()),
+            about: () => (byId("help").open ? byId("help").close() : byId("help").showModal())
+        };
+        const keys = {KeyR: "home", BracketLeft: "previous", BracketRight: "next", Space: "play", KeyB: "shade", KeyF: "full",
+                      KeyH: "about"};
+        for (const id in commands) byId(id).onclick = commands[id];
+        addEventListener("keydown", (event) => {
+            if (event.ctrlKey || event.metaKey || event.altKey || event.repeat || !(event.code in keys)) return;
+            if (event.code === "Space" && event.target instanceof HTMLButtonElement) return;  // it presses the button
+            event.preventDefault();
+            commands[keys[event.code]]();
+        });
+        addEventListener("hashchange", () => this.jump());
+        const none = this.settings.cameras.length === 0;
+        for (const id of ["previous", "next", "where"]) byId(id).hidden = none;
+    }
+
+    home() {
+        this.index = -1;
+        this.film = 0;
+        this.camera.show(this.settings.start, this.settings.target);
+        this.request();
+    }
+
+    view(index) {
+        const {cameras, target} = this.settings;
+        if (cameras.length === 0) return;
+        this.film = 0;
+        this.index = (index % cameras.length + cameras.length) % cameras.length;
+        this.camera.show(cameras[this.index], target);
+        this.request();
+    }
+
+    shade() {
+        this.light = !this.light;
+        this.request();
+    }
+
+    /// The views of the photos one after another, or once round the scene.
+    play() {
+        this.film = this.film ? 0 : performance.now() - 1;
+        this.from = {...this.camera.view, eye: this.camera.eye, rows: this.camera.rows};
+        this.request();
+    }
+
+    step() {
+        const seconds = (performance.now() - this.film) / 1000, {cameras, up, target} = this.settings;
+        if (cameras.length > 1) {
+            const at = seconds / kSecondsAView, first = Math.floor(at) % cameras.length, t = at % 1;
+            this.camera.show(between(cameras[first], cameras[(first + 1) % cameras.length], t * t * (3 - 2 * t)), target);
+        } else {
+            const angle = seconds / kSecondsARound * 2 * Math.PI;
+            const eye = turn(this.from.eye.map((v, i) => v - target[i]), up, angle).map((v, i) => v + target[i]);
+            this.camera.show({...this.from, eye, rows: this.from.rows.map((row) => turn(row, up, angle))}, target);
+        }
+    }
+
+    request() {
+        state.scene = "drawing";
+        if (this.waiting) return;
+        this.waiting = true;
+        requestAnimationFrame(() => {
+            this.waiting = false;
+            this.draw();
+        });
+    }
+
+    draw() {
+        if (this.film) this.step();
+        const scale = Math.min(devicePixelRatio, 2), {canvas, camera} = this;
+        const width = Math.max(1, Math.round(canvas.clientWidth * scale)),
+              height = Math.max(1, Math.round(canvas.clientHeight * scale));
+        if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, {width, height});
+        this.sorter.sort([...camera.eye], [...camera.forward]);
+        this.renderer.draw(camera.for(width, height), width, height, this.light ? [1, 1, 1] : this.settings.background);
+        byId("where").textContent = this.index < 0 ? "" : this.settings.cameras[this.index].name;
+        byId("play").textContent = this.film ? "⏸" : "▶";
+        if (!this.sorter.current()) return;
+        state.scene = "ready";
+        say("");
+        if (this.film) this.request();
+    }
+}
+
+async function start() {
+    const canvas = byId("view"), gl = canvas.getContext("webgl2", {antialias: false, alpha: false, preserveDrawingBuffer: true});
+    if (!gl) {
+        state.scene = "failed";
+        byId("bar").hidden = true;
+        return say("This browser shows no WebGL2, which the scene needs. A current Firefox, Chrome, Edge or Safari does; " +
+                   "hardware acceleration must be on.");
+    }
+    canvas.addEventListener("webglcontextlost", () => say("The graphics device was lost. Reload the page."));
+    try {
+        const settings = JSON.parse(byId("settings").textContent), text = byId("scene").textContent.trim();
+        byId("scene").remove();
+        const scene = await decodeSog(gl, bytesOf(text), (part) => { byId("progress").value = part; });
+        new Page(gl, scene, settings);
+    } catch (error) {
+        state.scene = "failed";
+        say(`The scene cannot be shown: ${error.message}`);
+    }
+}
+
+state.scene = "loading";
+start();
