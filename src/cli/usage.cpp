@@ -46,12 +46,11 @@ const std::map<std::string, std::string>& subjects() {
                         "nearest",
                         "runs",
                         "training-steps"});
-        add("Output",
-            {"output",     "format",      "mode",    "json",     "svg",           "heat-map",    "heat-scale",
-             "eval-every", "save-every",  "serve",   "accuracy", "spz-version",   "check",       "ranks",
-             "quiet",      "verbose",     "results", "compare",  "threshold",     "max-error",   "resume",
-             "force",      "allow-empty", "metrics", "protocol", "lpips-weights", "tensorboard", "keep",
-             "inria"});
+        add("Output", {"output",     "format",        "mode",        "json",    "svg",         "heat-map",
+                       "heat-scale", "eval-every",    "save-every",  "serve",   "accuracy",    "spz-version",
+                       "check",      "ranks",         "quiet",       "verbose", "results",     "compare",
+                       "threshold",  "max-error",     "resume",      "force",   "allow-empty", "metrics",
+                       "protocol",   "lpips-weights", "tensorboard", "keep",    "inria"});
         add("Device", {"device", "moments", "image-cache", "device-memory", "rank-timeout"});
         return made;
     }();

@@ -281,8 +281,7 @@ constexpr uint32_t kMostInstances = 0xe0000000u;
 
 uint32_t checked_instances(uint64_t instances) {
     if (instances > kMostInstances)
-        throw RunError(
-            "more than 3.7 billion (splat, tile) pairs in one picture; a smaller size has fewer");
+        throw RunError("more than 3.7 billion (splat, tile) pairs in one picture; a smaller size has fewer");
     return uint32_t(instances);
 }
 

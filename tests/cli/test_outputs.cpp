@@ -311,8 +311,9 @@ TEST(Outputs, DatasetsStayWhole) {
     expect_failure(
         run_ewa({"train", folder / "blender", "-o", folder / "blender", "--init", splats, "--steps", "1"}), 2,
         "is a dataset");
-    expect_failure(run_ewa({"render", splats, "--cameras", folder / "blender", "-o", folder / "blender/test"}),
-                   2, "holds images of");
+    expect_failure(
+        run_ewa({"render", splats, "--cameras", folder / "blender", "-o", folder / "blender/test"}), 2,
+        "holds images of");
     EXPECT_EQ(read_file(folder / "blender/test/0.png"), image);
     fs::create_directory(folder / "o");
     fs::rename(splats, folder / "o/splats.ply");

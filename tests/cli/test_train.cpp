@@ -183,7 +183,8 @@ TEST_F(Train, InterruptKeepsWhatIsThere) {
         const Outcome outcome = train(out, {"--steps", "100000000", "--strategy", "none"}, interrupt);
         EXPECT_EQ(outcome.status, 130) << outcome.err;
         EXPECT_EQ(outcome.err, "");
-        EXPECT_TRUE(outcome.out.ends_with("to continue: ewa train " + (folder / out) + " --resume\n")) << outcome.out;
+        EXPECT_TRUE(outcome.out.ends_with("to continue: ewa train " + (folder / out) + " --resume\n"))
+            << outcome.out;
         const auto summary = read_json(folder / (out + "/summary.json"));
         EXPECT_EQ(summary["interrupted"], true);
         EXPECT_GE(summary["steps"].get<int>(), 1);
