@@ -323,11 +323,13 @@ TEST_F(Runs, RenderShowsTheViewsOfTheDataset) {
 }
 
 TEST_F(Runs, KeepTheLimitOfTheImagesWidth) {
-    const std::string run = train("run", {"--max-width", "20"});
-    EXPECT_EQ(read_json(run + "/config.json")["max-width"], 20);
-    EXPECT_EQ(load_image(run + "/test/0.png.png").width, 20);
+    const std::string run = folder / "run";
+    expect_success(run_ewa({"train", folder / "data", "-o", run, "--steps", "3", "--test-every", "2",
+                            "--quiet", "--max-width", "30"}));
+    EXPECT_EQ(read_json(run + "/config.json")["max-width"], 30);
+    EXPECT_EQ(load_image(run + "/test/0.png").width, 30);
     expect_success(run_ewa({"render", run, "-o", folder / "views"}));
-    EXPECT_EQ(load_image(folder / "views/0.png").width, 20);
+    EXPECT_EQ(load_image(folder / "views/0.png").width, 30);
     expect_success(run_ewa({"eval", run, "--json", folder / "e.json"}));
     EXPECT_NEAR(read_json(folder / "e.json")["psnr"].get<double>(),
                 read_json(run + "/summary.json")["test_psnr"], 1e-6);
