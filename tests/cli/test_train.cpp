@@ -263,7 +263,7 @@ TEST_F(Train, FullDiskKeepsTheEarlierSplats) {
     const Circumstances full = with_fault("EWA_FAULT_BYTES", "4096");
     expect_failure(train("o", {"--steps", "2", "--quiet", "--force"}, full), 1, "no checkpoint fitted");
     EXPECT_EQ(read_file(folder / "o/splats.ply"), before);
-    for (const char* gone : {"o/summary.json", "o/checkpoint.ewa", "o/times.json"})
+    for (const char* gone : {"o/summary.json", "o/checkpoint.ewa"})
         EXPECT_FALSE(fs::exists(folder / gone)) << gone;
 }
 
