@@ -204,21 +204,21 @@ TEST(Ply, CommentsMarksAndExtraProperties) {
 TEST(Ply, TheMarkOfAntialiasing) {
     TempFolder folder;
     const Gaussians splats = random_splats(3, 1);
-    struct Case {
+    struct Marked {
         std::vector<std::string> comments;
         bool antialiased;
     };
-    const Case cases[] = {{{"by hand"}, false},
-                          {{"SplatRenderMode: mip", "by hand"}, true},
-                          {{"by hand", "  SPLATRENDERMODE:  MIP  "}, true},
-                          {{"by hand", "SplatRenderMode: default"}, false},
-                          {{"by hand", "SplatRenderMode: banana"}, false},
-                          {{"antialiased 1", "by hand"}, true},
-                          {{"by hand", "antialiased 0"}, false},
-                          {{"antialiased 1", "SplatRenderMode: default", "by hand"}, false},
-                          {{"SplatRenderMode: default", "antialiased 1", "by hand"}, true}};
+    const Marked cases[] = {{{"by hand"}, false},
+                            {{"SplatRenderMode: mip", "by hand"}, true},
+                            {{"by hand", "  SPLATRENDERMODE:  MIP  "}, true},
+                            {{"by hand", "SplatRenderMode: default"}, false},
+                            {{"by hand", "SplatRenderMode: banana"}, false},
+                            {{"antialiased 1", "by hand"}, true},
+                            {{"by hand", "antialiased 0"}, false},
+                            {{"antialiased 1", "SplatRenderMode: default", "by hand"}, false},
+                            {{"SplatRenderMode: default", "antialiased 1", "by hand"}, true}};
     for (const char* name : {"a.ply", "a.compressed.ply"})
-        for (const Case& c : cases) {
+        for (const Marked& c : cases) {
             SCOPED_TRACE(std::string(name) + ", " + c.comments.back());
             save_splats(folder / name, splats, SaveOptions{.comments = {"HERE"}});
             std::string text = file_bytes(folder / name), marks;
