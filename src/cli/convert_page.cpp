@@ -21,7 +21,7 @@ constexpr int kStartWidth = 1280, kStartHeight = 720;
 /// The cameras of the run's dataset, in the order of their names. Empty, with a remark, where they cannot be read.
 Dataset cameras_of(const live::Run& run, std::vector<std::string>& remarks) {
     try {
-        Dataset dataset = load_cameras_as_trained(dataset_of(run), 1);
+        Dataset dataset = load_cameras_as_trained(dataset_of(run), 1, 0);
         const fs::path refined = refined_cameras_of(run);
         if (!refined.empty()) io::use_refined_cameras(dataset, refined);
         return dataset;

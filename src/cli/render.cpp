@@ -178,11 +178,6 @@ int write_film(const RenderArguments& arguments, Renderer& renderer, const Rende
     return 0;
 }
 
-/// The file of a view without a name.
-fs::path view_file(const RenderArguments& arguments, size_t view) {
-    return arguments.output / fmt::format("{:05}.{}", view, arguments.format);
-}
-
 int write_views(const RenderArguments& arguments, Renderer& renderer, const std::vector<Camera>& cameras,
                 const std::vector<fs::path>& files, Progress& progress) {
     const bool one_image = files[0] == arguments.output;
