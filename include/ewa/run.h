@@ -50,8 +50,7 @@ struct RunOptions {
     int eval_every = 0;  // evaluates the held-out views every N steps; 0: only at the end
     int save_every = 0;  // saves splats and checkpoint every N steps; 0: the checkpoint every 30 s or more
     int keep = 0;        // of the splats of save_every, the last N stay as splats_007000.ply and the like
-    bool inria =
-        false;  // also writes the folder inria/, as INRIA's trainer would, for viewers that read its runs
+    bool inria = false;  // also writes the folder inria/, for viewers of INRIA's runs
     // A folder with the result or the checkpoint of a run is refused, unless one of these is set.
     bool resume = false;  // continues from the folder's checkpoint, if there is one
     bool force = false;   // replaces the run in the folder

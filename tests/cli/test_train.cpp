@@ -183,7 +183,8 @@ TEST_F(Train, InterruptKeepsWhatIsThere) {
         const Outcome outcome = train(out, {"--steps", "100000000", "--strategy", "none"}, interrupt);
         EXPECT_EQ(outcome.status, 130) << outcome.err;
         EXPECT_EQ(outcome.err, "");
-        EXPECT_TRUE(outcome.out.ends_with("to continue: ewa train " + (folder / out) + " --resume\n")) << outcome.out;
+        EXPECT_TRUE(outcome.out.ends_with("to continue: ewa train " + (folder / out) + " --resume\n"))
+            << outcome.out;
         const auto summary = read_json(folder / (out + "/summary.json"));
         EXPECT_EQ(summary["interrupted"], true);
         EXPECT_GE(summary["steps"].get<int>(), 1);
@@ -262,7 +263,7 @@ TEST_F(Train, FullDiskKeepsTheEarlierSplats) {
     const Circumstances full = with_fault("EWA_FAULT_BYTES", "4096");
     expect_failure(train("o", {"--steps", "2", "--quiet", "--force"}, full), 1, "no checkpoint fitted");
     EXPECT_EQ(read_file(folder / "o/splats.ply"), before);
-    for (const char* gone : {"o/summary.json", "o/checkpoint.ewa", "o/times.json"})
+    for (const char* gone : {"o/summary.json", "o/checkpoint.ewa"})
         EXPECT_FALSE(fs::exists(folder / gone)) << gone;
 }
 
