@@ -54,8 +54,7 @@ struct RunOptions {
     bool tensorboard = false;             // also writes the figures of metrics.jsonl as TensorBoard's events
     int save_every = 0;  // saves splats and checkpoint every N steps; 0: the checkpoint every 30 s or more
     int keep = 0;        // of the splats of save_every, the last N stay as splats_007000.ply and the like
-    bool inria =
-        false;  // also writes the folder inria/, as INRIA's trainer would, for viewers that read its runs
+    bool inria = false;  // also writes the folder inria/, for viewers of INRIA's runs
     // A folder with the result or the checkpoint of a run is refused, unless one of these is set.
     bool resume = false;  // continues from the folder's checkpoint, if there is one
     bool force = false;   // replaces the run in the folder
