@@ -300,7 +300,9 @@ void bind_results(nb::module_& module) {
             });
     bind_pickle(
         frame, [](const EvalFrame& f) { return std::tuple(f.name, f.psnr, f.ssim); },
-        [](const auto&... values) { return EvalFrame{values...}; });
+        [](std::string name, double psnr, double ssim) {
+            return EvalFrame{.name = std::move(name), .psnr = psnr, .ssim = ssim, .figures = {}};
+        });
     auto evaluation =
         nb::class_<Evaluation>(module, "Evaluation", "How close renders are to a dataset's images.")
             .def_ro("psnr", &Evaluation::psnr, "dB, the mean over the frames.")
@@ -313,7 +315,10 @@ void bind_results(nb::module_& module) {
             });
     bind_pickle(
         evaluation, [](const Evaluation& e) { return std::tuple(e.psnr, e.ssim, e.frames, e.seconds); },
-        [](const auto&... values) { return Evaluation{values...}; });
+        [](double psnr, double ssim, std::vector<EvalFrame> frames, double seconds) {
+            return Evaluation{
+                .psnr = psnr, .ssim = ssim, .figures = {}, .frames = std::move(frames), .seconds = seconds};
+        });
 }
 
 void bind_trainer(nb::module_& module) {
