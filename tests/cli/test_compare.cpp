@@ -342,7 +342,6 @@ TEST_F(CompareScenes, WriteOverNothing) {
     };
     const std::string before = there();
     for (const Names& rest : {
-             Names{scene_, other_, "--cameras", data_, "--heat-map", data_ + "/images"},
              Names{scene_, other_, "--cameras", transforms, "--json", transforms},
              Names{scene_, other_, "--cameras", data_, "--json", transforms},
              Names{scene_, pictures, "--cameras", data_, "--json", scene_},
@@ -356,6 +355,8 @@ TEST_F(CompareScenes, WriteOverNothing) {
         command.insert(command.end(), rest.begin(), rest.end());
         expect_failure(run_ewa(command), 2, "it would be overwritten");
     }
+    expect_failure(run_ewa({"compare", scene_, other_, "--cameras", data_, "--heat-map", data_ + "/images"}),
+                   2, "is a folder of a dataset, where no outputs belong");
     EXPECT_EQ(there(), before);
 }
 
