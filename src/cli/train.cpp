@@ -196,6 +196,8 @@ int run_follower(const RunOptions& options) {
 int run(CLI::App& app, TrainArguments& arguments) {
     const auto begin = Clock::now();
     RunOptions& options = arguments.run;
+    // What the command line alone says is checked before any file is looked at.
+    settled_kernel(options.train.render.kernel, arguments.antialias);
     settle_dataset(options);
     note_scene(arguments);
     take_options_of_run(app, options, app.count("--steps") > 0 || !arguments.quality.empty());
