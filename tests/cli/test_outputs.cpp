@@ -289,9 +289,9 @@ TEST(Outputs, DatasetsStayWhole) {
         expect_failure(run_ewa(arguments), 2, text);
         EXPECT_EQ(whole(), before);
     };
-    refused({"render", splats, "--cameras", data, "-o", data + "/images"}, "an image of --cameras");
+    refused({"render", splats, "--cameras", data, "-o", data + "/images"}, "holds the images of the dataset");
     fs::create_directory_symlink(data + "/images", folder / "link");
-    refused({"render", splats, "--cameras", data, "-o", folder / "link"}, "an image of --cameras");
+    refused({"render", splats, "--cameras", data, "-o", folder / "link"}, "holds the images of the dataset");
     refused({"eval", splats, data, "--json", data + "/transforms.json"}, "a file of DATASET");
     refused({"eval", splats, data + "/transforms.json", "--json", data + "/transforms.json"}, "DATASET");
     refused({"eval", splats, data, "--json", data + "/images/1.png"}, "an image of DATASET");
