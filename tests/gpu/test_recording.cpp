@@ -570,7 +570,7 @@ TEST(FrameHazards, EveryPairHasABarrierBetween) {
     const auto elsewhere = [](std::string_view name) {
         if (name.starts_with("radix_")) return name.ends_with("_ranked") != rig().config().ranked_sort;
         for (const char* other : {"densify", "mcmc_", "pack", "trace_", "project_views", "harmonics",
-                                  "collect_records", "gather_slots"})
+                                  "collect_records", "gather_slots", "blend_absolute"})
             if (name.starts_with(other)) return true;
         return false;
     };
