@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # Writes OUT, a C++ source with the text of PAGE, in which STYLE and SCRIPT have taken their places.
+cmake_minimum_required(VERSION 3.25) # an older policy would expand the marks
 file(READ ${PAGE} page)
 file(READ ${STYLE} style)
 file(READ ${SCRIPT} script)
