@@ -23,7 +23,8 @@ InputError.__module__ = DeviceError.__module__ = "ewa"
 
 # What libewa advises to users of its programs, and the advice for Python.
 _ADVICE = (
-    ("--force starts anew, -o DIR takes another folder", "a new Trainer starts anew"),
+    ("-o DIR starts another run, --force replaces this one", "a new Trainer starts anew"),
+    ("-o DIR starts another run", "a new Trainer starts anew"),
     ("--force starts anew", "a new Trainer starts anew"),
     ("--resume continues a training run", "Trainer.resume continues from a checkpoint"),
     ("a larger --test-every leaves more of them", "name some as train_frames="),

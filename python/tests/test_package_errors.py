@@ -157,8 +157,12 @@ COMMAND_LINE = {
     "frames",
     "init-opacity",
     "init-scale",
+    "keep",
+    "lpips-weights",
+    "metrics",
     "output",
     "resume",
+    "save-every",
     "test-every",
     "transform",
 }

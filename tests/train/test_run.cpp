@@ -297,6 +297,10 @@ TEST(RunOptions, TableReadsWhatItWrites) {
                                                    {"eval-every", "6"},
                                                    {"save-every", "4"},
                                                    {"keep", "3"},
+                                                   {"max-width", "800"},
+                                                   {"metrics", "ms_ssim"},
+                                                   {"lpips-weights", "w"},
+                                                   {"tensorboard", "true"},
                                                    {"inria", "true"},
                                                    {"device", "cpu"},
                                                    {"rank-timeout", "7"}};
