@@ -17,10 +17,18 @@ function say(text) {
     byId("progress").hidden = text !== "Loading";
 }
 
+function decoded(base64) {
+    try {
+        return atob(base64);
+    } catch {
+        throw new Error("the scene in this page is damaged");
+    }
+}
+
 function bytesOf(text) {
     const bytes = new Uint8Array(Math.floor(text.length / 4) * 3 - (text.endsWith("==") ? 2 : text.endsWith("=") ? 1 : 0));
     for (let from = 0, at = 0; from < text.length; from += 1 << 16) {
-        const part = atob(text.slice(from, from + (1 << 16)));
+        const part = decoded(text.slice(from, from + (1 << 16)));
         for (let i = 0; i < part.length; ++i) bytes[at++] = part.charCodeAt(i);
     }
     return bytes;
@@ -51,7 +59,7 @@ class Page {
         const wanted = new URLSearchParams(location.hash.slice(1));
         this.light = wanted.has("light");
         if (!wanted.has("camera")) return;
-        const name = wanted.get("camera"), found = this.settings.cameras.findIndex((one) => one.name === name);
+        const name = wanted.get("camera"), found = this.settings.cameras.findIndex((one) => `/${one.name}`.endsWith(`/${name}`));
         this.view(found >= 0 ? found : Number(name) || 0);
     }
 
