@@ -187,9 +187,7 @@ OpenedScene open_scene(const fs::path& path, const fs::path& cameras) {
         return open_scene(dataset, cameras);
     } else if (is_capture(path)) {
         scene.photos = path;
-    } else if (fs::is_directory(path, error)) {
-        scene = open_dataset(path);
-    } else if (is_dataset_file(path) || is_mesh_scene(path)) {
+    } else if (fs::is_directory(path, error) || is_dataset_file(path) || is_mesh_scene(path)) {
         scene = open_dataset(path);
     } else {
         scene = open_splats(path, cameras);
