@@ -237,7 +237,7 @@ void move_up(const fs::path& root, const fs::path& folder) {
     const auto last = [](const fs::path& name) {
         return name != "images" && name.string().find("mask") != 0;
     };
-    std::ranges::stable_partition(names, [&](const fs::path& name) { return !last(name); });
+    std::stable_partition(names.begin(), names.end(), [&](const fs::path& name) { return !last(name); });
     for (const fs::path& name : names) fs::rename(root / name, folder / name);
     fs::remove_all(folder / "unpacked");
 }

@@ -168,11 +168,11 @@ std::vector<LensGroup> lenses_of(const fs::path& folder, const std::vector<fs::p
     std::vector<LensGroup> groups;
     LensGroup single{.photos = {}, .shared = false, .tangential = false};
     for (auto& [key, group] : alike) {
-        const bool all = group.size() == names.size();
+        const bool tangential = group.size() == names.size() || group.size() >= kWholeLens;
         if (group.size() == 1)
             single.photos.push_back(group.front());
         else
-            groups.push_back({std::move(group), true, all || group.size() >= kWholeLens});
+            groups.push_back({.photos = std::move(group), .shared = true, .tangential = tangential});
     }
     std::ranges::stable_sort(
         groups, [](const LensGroup& a, const LensGroup& b) { return a.photos.front() < b.photos.front(); });
