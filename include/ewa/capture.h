@@ -13,7 +13,7 @@ namespace ewa {
 
 /// Which pairs of images COLMAP compares.
 enum class Matching {
-    automatic,  // of a video: sequence. Of photos: unordered up to 200, else sequence
+    automatic,  // sequence for a video; for photos unordered up to 200, else sequence
     sequence,   // each image with those that follow it in the order of names
     unordered   // all pairs; the time grows with the square of their number
 };
@@ -70,7 +70,7 @@ void check_training_input(const std::filesystem::path& path);
 /// - images: the frames of the video, or a link to the photos' folder.
 /// - sparse/0: COLMAP's model, made last. The lens has OpenCV's radial and tangential terms if all images have one size,
 ///   else one radial term per image.
-/// - colmap/: what COLMAP needs to go on, and log.txt with what the programs print.
+/// - colmap/: what COLMAP needs to continue, and log.txt with what the programs print.
 /// - capture.json: input, options, and what distinguishes the contents of the photos or the video. A folder with the
 ///   same ones is continued; what is done is kept.
 ///

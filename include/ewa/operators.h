@@ -105,7 +105,7 @@ struct ScreenSplats {
 /// Which splats a pixel draws: all, nearest first, equal depths by index.
 struct DepthOrder {
     std::span<const float> depths;     // [M]
-    std::span<const int32_t> radii{};  // [M, 2]; a splat with a radius of 0 is left out; empty: none is
+    std::span<const int32_t> radii{};  // [M, 2]; a splat with a radius of 0 is skipped; empty: none is
 };
 
 /// Which splats a pixel draws: the list of its tile, in the order of the list.
@@ -141,7 +141,7 @@ struct BlendedImage {
     std::vector<float> features;          // [H, W, D]: sum of f alpha T, and T times the background
     std::vector<float> alphas;            // [H, W], 1 - T
     std::shared_ptr<BlendRecord> record;  // null without BlendOptions::gradients
-    // Splats that were left out because a value is not finite or a conic not positive definite.
+    // Splats that were skipped because a value is not finite or a conic not positive definite.
     uint32_t skipped_nonfinite = 0;
 };
 

@@ -28,7 +28,7 @@ class Ranks {
     /// empty. The sizes of a part at both ends agree.
     virtual void exchange(std::span<const std::span<const std::byte>> out,
                           std::span<const std::span<std::byte>> in) = 0;
-    /// Ends all ranks with this exit status. The caller has told the user why.
+    /// Ends all ranks with this exit status. The caller has printed the reason.
     [[noreturn]] virtual void end_all(int status) = 0;
 };
 

@@ -35,7 +35,7 @@ class Renderer {
     /// Throws InputError when the camera's size is not positive or exceeds what the device can address.
     Rendering render(const Camera& camera, bool with_depth = false);
 
-    /// The same with other options than the renderer's. SH degrees above those it was made for stay left out.
+    /// The same with other options than the renderer's. SH degrees above those it was made for stay off.
     Rendering render(const Camera& camera, const DrawOptions& options);
 
     /// The colour alone, as 8-bit RGBA: rounded and clamped as save_image does it. What a window shows: the

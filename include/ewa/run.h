@@ -90,8 +90,8 @@ struct RunStart {
     MemoryEstimate memory;
 };
 
-/// Follows a run and may end it. All calls come from the thread that called run_training, in the order in which
-/// they stand here. An exception from any of them ends the run and reaches the caller of run_training.
+/// Follows a run and may end it. All calls come from the thread that called run_training, in the order of
+/// their declarations. An exception from any of them ends the run and reaches the caller of run_training.
 class RunObserver {
   public:
     virtual ~RunObserver() = default;
@@ -119,7 +119,7 @@ class RunObserver {
     virtual void between_steps(const StepReport&, const Trainer&, const std::function<void()>& /*save*/) {}
     /// Training has ended. splats.ply and checkpoint.ewa are written.
     virtual void on_saved(const StepReport&) {}
-    /// Of the final evaluation: so many of `views` views are evaluated.
+    /// The final evaluation has evaluated `done` of `views` views.
     virtual void on_view(size_t /*done*/, size_t /*views*/) {}
     /// The final evaluation is done, unless the run was stopped. No more metrics follow.
     virtual void on_evaluated(const StepReport&, const Gaussians&) {}

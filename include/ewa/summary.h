@@ -29,7 +29,7 @@ struct RankFigures {
     double peak_device_bytes = 0;
 };
 
-/// Of a training whose splats are not all on the device (TrainOptions::device_memory_bytes).
+/// Figures of a training whose splats are not all on the device (TrainOptions::device_memory_bytes).
 struct ChunkFigures {
     int chunks = 0;             // into which the splats are divided
     double streamed_bytes = 0;  // that were copied to the device and back: mean of an optimisation step

@@ -76,8 +76,8 @@ struct TrainOptions {
     int opacity_reset_every = 3000;  // 0: never
     int sh_degree_every = 1000;      // the SH degree rises by one this often
     int halvings = 0;                // the images' sides are halved this often at the start
-    int resolution_every = 3000;     // one halving is undone this often
-    /// Of a run that continues one of another number of steps: the SH degree and resolution that it reached stay.
+    int resolution_every = 3000;     // the sides are doubled again this often
+    /// For a run that continues one of another number of steps: the SH degree and resolution that it reached stay.
     int least_sh_degree = 0, most_halvings = 64;
     uint32_t least_max_splats =
         0;                        // of a run that continues another: an automatic max_splats is at least this

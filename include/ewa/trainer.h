@@ -106,7 +106,7 @@ class Trainer {
             Gaussians start, const TrainOptions& options, std::shared_ptr<Ranks> ranks = alone());
     ~Trainer();
 
-    /// Of a rank other than 0: does its part of what rank 0 calls, until that one's trainer ends. Throws what those
+    /// For a rank other than 0: does its part of what rank 0 calls, until the trainer of rank 0 ends. Throws what those
     /// functions throw.
     void follow();
     /// Tells ranks that wait for the next call that this one is at work. Call it at least once in the time that the ranks

@@ -135,7 +135,7 @@ std::shared_ptr<gpu::Device> DeviceWork::device() const {
         try {
             one.device = open_device({.selector = one.selector});
         } catch (const InputError& error) {
-            throw RunError(error.what());  // a device that is missing is a DeviceError, whoever named it
+            throw RunError(error.what());  // a device that is missing is a DeviceError
         }
         one.opened_by = getpid();
     }

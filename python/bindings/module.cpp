@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The extension module ewa._native, on which the package ewa stands.
+// The extension module ewa._native, on which the package ewa is built.
 #include <nanobind/nanobind.h>
 
 #include "bindings.h"

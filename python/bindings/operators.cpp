@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// ewa._native.operators: libewa's operators on arrays. ewa.gsplat stands on them.
+// ewa._native.operators: libewa's operators on arrays. ewa.gsplat is built on them.
 #include "ewa/operators.h"
 
 #include <nanobind/stl/optional.h>

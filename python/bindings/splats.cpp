@@ -88,7 +88,7 @@ void make_splats(Splats* self, nb::handle means, nb::handle quats, nb::handle lo
     new (self) Splats(std::move(made));
 }
 
-/// For pickle and copy. Views: whoever stores them copies.
+/// For pickle and copy. The arrays are views: pickle and copy copy them.
 nb::tuple state_of(nb::handle self) {
     nb::list values;
     for (const char* name : {"means", "quats", "log_scales", "opacity_logits", "sh", "origin", "antialiased",

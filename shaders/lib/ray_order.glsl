@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The splats that each ray of a tile meets, in the order of their middles; ties in the order of the tile's list. The list is
 // sorted by the least view depth of each splat. So a splat can be blended once nothing from there on can be nearer. Until
-// then it is held, in order. If a lane holds too many, it drops the farthest, and walks the list again from the first one
+// then the lane keeps it, in order. If a lane has too many, it drops the farthest, and walks the list again from the first one
 // that it dropped. The order is exact.
 // Needs rays.glsl. The including pass declares HELD before this file.
 #ifndef EWA_LIB_RAY_ORDER

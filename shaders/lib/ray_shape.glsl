@@ -23,7 +23,7 @@ float robust_length(vec3 v) {
     return largest > 0.0 ? largest * length(v / largest) : 0.0;
 }
 
-// Of three values, the one that is neither the least nor the largest.
+// The median of three values.
 float middle_of(vec3 v) { return max(min(v.x, v.y), min(max(v.x, v.y), v.z)); }
 
 // The root mean square of a splat's shadow over all directions, over the product of its two larger scales.

@@ -44,7 +44,7 @@ void walk_rays(uint tile, uint strip, Ray ray) {
                 if (!in_time() || done) break;
                 next_block(own, i, count);
                 const float to_come = subgroupShuffle(own.bend.w, 0u);
-                // The splats are held as long as there is room: lanes then blend more of them at a time.
+                // The splats wait as long as there is room: lanes then blend more of them at a time.
                 const bool room = subgroupAll(o.depths[HELD / 2u] == NEVER);
                 blend_held(o, room ? 0.0 : to_come);
                 hold_block(o, own, ray, start, start_at);

@@ -73,7 +73,7 @@ void main() {
                     const float alpha = alpha_of(raw[p]);
                     bool blended;
                     const float weight = composite(alpha, T[p], blended);
-                    // The features of a splat that is left out may be anything.
+                    // The features of a skipped splat may be anything.
                     const float own = weight > 0.0 ? weight * shade[p] : 0.0;
                     rest[p] -= own;
                     const bool moves = blended && raw[p] <= float(ALPHA_MAX);

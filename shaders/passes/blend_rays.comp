@@ -27,7 +27,7 @@ const uint HELD = 16u;  // splats that a lane holds
 float T = 1.0, depth_sum = 0.0;
 vec3 color = vec3(0.0);
 
-// Blends the nearest splats that are held, of lanes where they are nearer than what is still to come.
+// Blends the nearest waiting splats of each lane, where they are nearer than all splats to come.
 void blend_held(inout RayOrder o, float to_come) {
     for (uint turn = 0u; turn < HELD; ++turn) {
         const bool next = T > 0.0 && o.depths[0] < NEVER && o.depths[0] <= to_come;

@@ -31,7 +31,7 @@ float T, rest;
 vec3 gradient;
 Ray own_ray;
 
-// Blends the nearest splats that are held, of lanes where they are nearer than what is still to come.
+// Blends the nearest waiting splats of each lane, where they are nearer than all splats to come.
 void blend_held(inout RayOrder o, float to_come) {
     for (uint turn = 0u; turn < HELD * SUBGROUP; ++turn) {
         const bool next = T > 0.0 && o.depths[0] < NEVER && o.depths[0] <= to_come;

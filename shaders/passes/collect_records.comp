@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Makes the records of 2D Gaussians that come as arrays.
 // One invocation owns splat i. It reads its entry of each array, and writes its record, its depth key and the number of
-// tiles that it reaches; with COLLECT_LISTED it reads that number. A splat that is left out gets count 0 and the last key.
+// tiles that it reaches; with COLLECT_LISTED it reads that number. A skipped splat gets count 0 and the last key.
 // SPEC_MODE: COLLECT_* bits and SHAPE_WHITENERS.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
@@ -39,7 +39,7 @@ uint ordered(float x) {
     return (bits & 0x80000000u) != 0u ? ~bits : bits | 0x80000000u;
 }
 
-// Of all channels: a splat without one of its colours is left out. Some drivers stop a loop after 65,535 iterations.
+// Tests all channels: a splat with a colour that is not finite is skipped. Some drivers stop a loop after 65,535 iterations.
 bool has_finite_features(uint i) {
     bool finite = true;
     for (uint first = 0u; first < push.channels; first += 4u) {

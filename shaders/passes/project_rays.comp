@@ -59,7 +59,7 @@ Outline outline_of(RayShape r, float reach) {
 // Half the squared radius of the ellipsoid that holds every ray that counts, in standard deviations; below 0: there is none.
 float reach_of(RayShape r) {
     if (KERNEL != KERNEL_DENSITY) return log(r.depth / depth_min());
-    // Of all directions, that with the least shadow has the most depth. Inside the ellipsoid that follows from it, |b| has a
+    // The direction with the least shadow has the most depth. Inside the ellipsoid that follows from it, |b| has a
     // better bound, which gives a smaller ellipsoid.
     const float most = r.depth * longest_direction(), least = min(min(r.sharpness.x, r.sharpness.y), r.sharpness.z);
     float reach = log(most / depth_min()) + log(robust_length((vec3(r.view.x.x, r.view.y.x, r.view.z.x) / r.view.z.x * r.directions) * r.sharpness) / least);

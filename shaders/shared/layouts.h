@@ -71,8 +71,8 @@ EWA_UINT(SUM_FLOATS, 9u);
 EWA_UINT(SUM_FLOATS_ABSOLUTE, 11u);
 
 // ---- An instance for a part of its tile, with SPEC_PARTS ----
-// A part is a block of PART_SIZE x PART_SIZE pixels, or of the tile's width. Its number, row by row, stands in the bits of
-// the instance's splat from PART_SHIFT on. A tile has at most 16 parts.
+// A part is a block of PART_SIZE x PART_SIZE pixels, or of the tile's width. Its number, row by row, is in the bits of
+// the instance's splat from PART_SHIFT up. A tile has at most 16 parts.
 EWA_UINT(PART_SIZE, 4u);  // px
 EWA_UINT(PART_SHIFT, 28u);
 
@@ -119,7 +119,7 @@ EWA_UINT(BLEND_BACKWARD_ALPHA, 2u);     // dL/d(image) also has dL/dT, in PLANE_
 EWA_UINT(BLEND_BACKWARD_FOURTH, 4u);    // a fourth channel, which takes the place of the depth
 // collect_records.comp, bits
 EWA_UINT(COLLECT_FEATURES, 1u);  // writes the features alone, of records that are there
-EWA_UINT(COLLECT_RADII, 2u);     // a splat with a radius of 0 is left out
+EWA_UINT(COLLECT_RADII, 2u);     // a splat with a radius of 0 is skipped
 EWA_UINT(COLLECT_LISTED, 4u);    // the tiles' lists are given: no depth keys and no tile counts
 EWA_UINT(SHAPE_WHITENERS,
          8u);  // shapes are ux, k, vy; else conics. Also of gather_slots.comp, and of project_views

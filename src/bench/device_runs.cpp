@@ -204,7 +204,7 @@ Check check_scan(const Lists& lists) {
     return wrong_entries("instance offsets: wrong entries", wrong);
 }
 
-/// Tiles ascend; within a tile instances stand in the order they were emitted in, which is that of depth; and
+/// Tiles ascend; within a tile instances keep the order in which they were emitted, which is by depth; and
 /// every splat is there as often as it was counted; with gradients, no two instances share a place.
 Check check_tile_order(const Lists& lists) {
     const size_t n = lists.tile_counts.size();

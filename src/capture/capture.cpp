@@ -233,7 +233,7 @@ void move_up(const fs::path& root, const fs::path& folder) {
     std::vector<fs::path> names;
     for (const fs::directory_entry& entry : fs::directory_iterator(root))
         names.push_back(entry.path().filename());
-    // The cameras last: a move that was interrupted goes on as long as they are there.
+    // The cameras last: an interrupted move continues as long as they exist.
     const auto last = [](const fs::path& name) {
         return name != "images" && name.string().find("mask") != 0;
     };

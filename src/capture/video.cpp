@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 constexpr int kSmallWidth = 480;  // px, of the frames whose sharpness is compared
 constexpr uint64_t kMostPixels = uint64_t(1) << 24;
 
-/// How ffmpeg and ffprobe are told to read the video. A name that begins with a dash, or has a colon, is a file all the same.
+/// Arguments with which ffmpeg and ffprobe read the video. A name that begins with a dash, or has a colon, is a file all the same.
 /// A playlist would lead to other files, and is refused whatever its name.
 std::vector<std::string> input_words(const fs::path& video) {
     return {"-v",

@@ -82,7 +82,7 @@ std::vector<int> select_frames(const Dataset& dataset, const std::string& which,
 // A DATASET is what load_dataset reads, or a glTF file of meshes.
 
 /// The cameras of a dataset, whose images may be missing. If only some are, their frames are skipped as in
-/// training, so that the same frames are held out; Dataset::missing_images counts them. Of a mesh scene: the
+/// training, so that the same frames are held out; Dataset::missing_images counts them. A mesh scene has the
 /// views that `ewa train` renders. points: also reads the points.
 Dataset load_cameras_as_trained(const std::filesystem::path& path, int downscale, int max_width,
                                 bool points = false);
@@ -113,8 +113,8 @@ struct Views {
     std::vector<int> frames;                        // those that were asked for
     std::unique_ptr<core::TemporaryFolder> folder;  // of the images, or null
 };
-/// Loads a dataset with its images. Of a mesh scene: the images that `ewa train` left in `dataset` beside the
-/// splats, if they show this scene. Else renders it into a temporary folder. which, test_every: as in
+/// Loads a dataset with its images. A mesh scene has the images that `ewa train` stored in `dataset` beside the
+/// splats, if they show this scene. Else it is rendered into a temporary folder. which, test_every: as in
 /// select_frames, whose error comes before the rendering. Throws Interrupted if Ctrl-C ended the rendering.
 Views load_views(const ViewArguments& arguments, const std::string& which, int test_every);
 

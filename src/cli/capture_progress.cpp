@@ -23,7 +23,7 @@ double seconds_to_place(double search) {
 
 constexpr double kNeighbours = 19;   // of a photo in a sequence
 constexpr int kMostUnordered = 200;  // photos, with Matching::automatic
-// Of the machine whose times a forecast has without any of this machine's.
+// Costs on the machine of docs/performance.md, used until this machine has measured its own.
 constexpr double kSearchPerPixel = 0.8e-6;  // s
 constexpr double kPointsPerPixel = 0.1;     // first splats, of the pixels of one photo
 constexpr double kSplatsPerPixel = 0.6;     // at most, times the square root of the photos

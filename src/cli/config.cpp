@@ -53,7 +53,7 @@ void check_type(const CLI::Option& option, const Json& value, const std::string&
     if (value.is_array() && name != "background") throw InputError(where + " takes one value, not a list");
 }
 
-/// As the value would stand on the command line.
+/// The value as the command line takes it.
 std::string option_text(const Json& value, const std::string& where) {
     if (value.is_string()) return with_home(value.get<std::string>());
     if (value.is_number() || value.is_boolean()) return value.dump();

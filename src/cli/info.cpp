@@ -266,7 +266,7 @@ void info_dataset(const fs::path& path, const fs::path& named, int test_every, b
                extent);
 }
 
-/// Of a zip archive with a dataset, which is unpacked for that.
+/// Describes a zip archive that has a dataset, which is unpacked first.
 void info_archive(const fs::path& path, int test_every, bool json) {
     const core::TemporaryFolder folder("ewa-zip-");
     if (!archive_has_cameras(path))

@@ -9,7 +9,7 @@ namespace ewa::cli {
 
 /// While a watch exists, SIGINT, SIGTERM, SIGUSR1, SIGXCPU and SIGHUP (unless nohup ignores it) only set a flag, however often
 /// they arrive. timeout(1) signals the program and then its group, and a second Ctrl-C must not prevent what
-/// the first one saves. SIGQUIT (Ctrl-\, as a terminal is told) and SIGKILL still end the program at once.
+/// the first one saves. SIGQUIT (Ctrl-\ on a terminal) and SIGKILL still end the program at once.
 /// The destructor restores the handlers. At most one watch exists at a time.
 class InterruptWatch {
   public:

@@ -22,7 +22,7 @@ void check_command_outputs(const std::vector<NamedFile>& written, std::vector<Na
 /// Prints the value with indentation. Bytes that are not UTF-8 become U+FFFD: text from a file may hold some.
 void print_json(const report::Json& json);
 
-/// How interrupted work goes on.
+/// How a user continues interrupted work.
 inline constexpr const char* kHowToContinue = "interrupted; to continue, repeat the command";
 void print_how_to_continue();
 

@@ -38,7 +38,7 @@ struct RenderArguments {
     DrawArguments draw;
     DeviceOptions device;
     bool quiet = false;
-    // Of the run that SPLATS names; empty: none.
+    // The run that SPLATS names; empty: none.
     std::optional<live::Run> run;
     bool cameras_of_run = false;
 };
@@ -92,7 +92,7 @@ std::vector<fs::path> files_of_frames(const RenderArguments& arguments, const Da
 /// Throws if a render would replace a file that is read, or land among photos.
 void check_renders(const RenderArguments& arguments, const std::vector<fs::path>& files,
                    const Dataset* dataset) {
-    // Of a single file the user has chosen the name, so that its folder may be a dataset.
+    // The user names a single file, so its folder may be a dataset.
     const fs::path folder = files[0] == arguments.output ? fs::path() : arguments.output;
     if (folder.empty())
         io::check_not_inside_dataset("-o", fs::absolute(arguments.output).parent_path());

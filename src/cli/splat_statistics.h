@@ -32,7 +32,7 @@ std::string histogram_text(const Spread& spread);
 
 struct Difference {
     std::string what, unit;
-    // Of the magnitudes. Two values that are both not finite count as equal.
+    // Differences of the magnitudes. Two values that are both not finite count as equal.
     double largest = 0, mean = 0;
 };
 

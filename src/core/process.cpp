@@ -113,7 +113,7 @@ bool give(int descriptor, int place, int mode) {
 [[noreturn]] void become(char* const* command, char* const* environment, const Streams& streams, pid_t parent,
                          int report) {
     setpgid(0, 0);
-    // A killed parent cannot end the program. It would go on for hours, on files that the next run takes over.
+    // A killed parent cannot end the program. The program would run for hours, on files that the next run takes over.
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (getppid() != parent) _exit(1);
     if (give(streams.input, STDIN_FILENO, O_RDONLY) && give(streams.output, STDOUT_FILENO, O_WRONLY) &&

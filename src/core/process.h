@@ -38,7 +38,7 @@ struct Program {
 
 enum class Ended { done, failed, stopped };
 
-/// Runs a program to its end. What it has started and left behind goes on. Its standard input is empty.
+/// Runs a program to its end. Processes that it started and did not wait for keep running. Its standard input is empty.
 /// - output(text): called with each piece of standard output, as it arrives, and with an empty text at least every
 ///   tenth of a second. False ends the program (SIGTERM, after three seconds SIGKILL), and the result is then `stopped`.
 /// The result is `failed` where the exit status is not 0. Throws RunError if the program cannot be started, or the

@@ -139,7 +139,7 @@ bool Progress::due(int done) const {
            (done == total_ || 10LL * done >= static_cast<long long>(total_) * next_tenth_);
 }
 
-/// Of all parts.
+/// The time left of all parts.
 std::optional<double> Progress::left_now() const {
     if (left_) return std::max(0.0, *left_ - (seconds() - left_set_)) + rest_;
     if (const auto left = pace_.left(seconds(), total_)) return *left + rest_;

@@ -25,7 +25,7 @@ std::array<float, 3> of_bytes(uint32_t rgb) {
     return {float(rgb >> 16) / 255, float(rgb >> 8 & 255) / 255, float(rgb & 255) / 255};
 }
 
-/// Of "#rgb" or "#rrggbb" without the sign.
+/// The colour of "#rgb" or "#rrggbb", without the sign.
 std::optional<std::array<float, 3>> of_digits(std::string_view digits) {
     uint32_t value = 0;
     const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value, 16);

@@ -45,7 +45,7 @@ std::optional<T> parse_count(std::string_view text) {
 std::string shown_number(double number);
 
 /// Empty if the text is a number from low to high, which it then is in plain digits; else what is wrong with it.
-/// Of integers, the number must be whole.
+/// An integer type takes whole numbers only.
 template <class T>
 std::string settle_number(std::string& text, T low, T high) {
     if constexpr (std::is_integral_v<T>) {
@@ -69,7 +69,7 @@ std::string settle_number(std::string& text, T low, T high) {
 std::string settle_word(std::string& text, const std::vector<std::string>& words);
 
 /// sRGB in [0, 1] from "r,g,b" with each in 0..1, "#rgb", "#rrggbb", or the name of a colour of CSS's basic set
-/// (also orange). Commas or blanks stand between numbers. Empty for other text.
+/// (also orange). Commas or blanks separate the numbers. Empty for other text.
 std::optional<std::array<float, 3>> parse_colour(std::string_view text);
 
 /// What a message says of text that parse_colour does not read.

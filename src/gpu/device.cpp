@@ -41,7 +41,7 @@ vk::UniqueInstance make_instance(const std::vector<const char*>& layers,
     return vk::createInstanceUnique(create);
 }
 
-/// Which drivers the loader was told of, where it looks (its LoaderDriverInterface document), and what to install.
+/// Drivers that the environment names for the loader, where it looks (its LoaderDriverInterface document), and what to install.
 std::string what_would_help() {
     constexpr const char* kInstall =
         "a CPU device comes with Mesa (Debian: mesa-vulkan-drivers), that of a GPU with its vendor's driver";

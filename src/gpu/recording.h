@@ -61,7 +61,7 @@ class Recording {
     void fill(const Buffer& target, uint32_t value, uint64_t offset, uint64_t bytes);
     void copy(const Buffer& source, uint64_t source_offset, const Buffer& target, uint64_t target_offset,
               uint64_t bytes);
-    /// Adds a command that may come from another recording. Its barrier is derived anew.
+    /// Adds a command that may come from another recording. Its barrier is derived again.
     void append(Command command);
 
     const std::vector<Command>& commands() const { return commands_; }

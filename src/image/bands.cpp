@@ -20,7 +20,7 @@ struct SquareSums {
           height(height_),
           differences(size_t(width) * size_t(height)),
           weights(differences.size()) {}
-    /// Of squares with twice the side. Those at the right and lower edge may be cut.
+    /// The sums of squares with twice the side. Those at the right and lower edge may be cut.
     SquareSums doubled() const {
         SquareSums result((width + 1) / 2, (height + 1) / 2);
         for (int y = 0; y < height; ++y)
@@ -32,7 +32,7 @@ struct SquareSums {
             }
         return result;
     }
-    /// Of the means over the squares, the sum of squares over the pixels.
+    /// The sum over the pixels of the squared mean of each pixel's square.
     double energy() const {
         double sum = 0;
         for (size_t i = 0; i < weights.size(); ++i)

@@ -332,7 +332,7 @@ std::string_view format_name(const fs::path& path) {
 }
 
 std::vector<fs::path> images_below(const fs::path& folder) try {
-    // Of the formats that are read, and of those that others take for images: these are errors, not
+    // Extensions that are read, and extensions of other images. The latter are errors, so that no image is
     // overlooked.
     static constexpr std::string_view kExtensions[] = {
         ".bmp", ".dib",  ".env",  ".exr",  ".hdr",  ".jfi", ".jfif", ".jif",  ".jpe", ".jpeg",

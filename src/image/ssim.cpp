@@ -78,7 +78,7 @@ void read_rows(const Image& a, const Image& b, int y, int channel, Rows& rows) {
     }
 }
 
-/// Calls at(x, y, moments) for each pixel of a channel. Only the rows under the window are held, however tall the
+/// Calls at(x, y, moments) for each pixel of a channel. Only the rows under the window are in memory, however tall the
 /// picture.
 template <class At>
 void for_windows(const Image& a, const Image& b, int channel, const std::array<double, kTaps>& taps,

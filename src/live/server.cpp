@@ -199,7 +199,7 @@ class Server::Http final : private SigpipeBefore, private httplib::Server {
         connection.socket = socket;
         try {
             connection.thread = std::thread([this, &connection] { serve(connection); });
-        } catch (const std::system_error&) {  // the system has no more threads: the training goes on
+        } catch (const std::system_error&) {  // the system has no more threads: the training continues
             ::close(socket);
             connections_.pop_back();
         }

@@ -28,7 +28,7 @@ std::string encode(const Status& status);
 /// Throws InputError that names the member.
 Status decode_status(const std::string& text);
 
-/// The time to the end of the run, s, if it goes on as in its last lines of metrics. NaN if they do not tell, or it does
+/// The time to the end of the run, s, if it continues as in its last lines of metrics. NaN if these do not suffice, or it does
 /// not run.
 double seconds_left(const Status& status);
 

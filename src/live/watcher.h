@@ -109,7 +109,7 @@ class Watcher {
 
     const WhatToWatch what_;
     std::function<void()> on_news_;
-    // Of the thread alone.
+    // Only the thread uses it.
     std::unique_ptr<Client> client_;
     std::string run_, tag_;  // the run and the splats of the last update; empty: unknown
     std::filesystem::file_time_type splats_time_;

@@ -113,7 +113,7 @@ class MpiRanks final : public ewa::Ranks {
     std::chrono::milliseconds timeout_;
     size_t message_bytes_;
     std::vector<std::string> nodes_;
-    // Of the last messages, kept for their memory.
+    // The last messages' arrivals. Their memory is used again.
     std::vector<int> arrived_;
     std::vector<MPI_Status> statuses_;
 };

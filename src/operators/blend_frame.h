@@ -13,11 +13,11 @@ namespace ewa::operators {
 inline constexpr uint32_t kChunk = 4;
 
 struct BlendFrame {
-    std::shared_ptr<gpu::Device> device;  // outlives the buffers below, whoever else has gone
+    std::shared_ptr<gpu::Device> device;  // outlives the buffers below
     std::weak_ptr<Context> context;       // takes the frame back
     bool gradients = false;               // its buffers overlay each other, in all images that it has
 
-    // Of the image.
+    // The image.
     uint32_t splats = 0, channels = 0, width = 0, height = 0;
     bool whiteners = false;
     bool parts = false;  // instances count in a part of their tile
@@ -32,7 +32,7 @@ struct BlendFrame {
     std::vector<gpu::Buffer> more_planes;  // of the second and later chunks
     std::vector<float> transmittances;     // [H, W]
 
-    // Of the gradient.
+    // The gradient.
     Array means_gradient{"means gradient"}, conics_gradient{"conics gradient"},
         opacities_gradient{"opacities gradient"}, features_gradient{"features gradient"},
         absolute_gradient{"absolute gradient"};

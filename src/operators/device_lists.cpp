@@ -20,7 +20,7 @@ struct Reach {
     double low[2] = {0, 0}, high[2] = {0, 0};
 };
 
-/// A little more than the box of the ellipse in which alpha is 1/255 or more. A splat that is left out has an empty one.
+/// A little more than the box of the ellipse in which alpha is 1/255 or more. A skipped splat has an empty one.
 Reach reach_of(const ScreenSplats& splats, size_t i) {
     const float* shape = &splats.conics[3 * i];
     const double a = shape[0], b = shape[1], c = shape[2];
@@ -154,7 +154,7 @@ DeviceLists device_lists(const ScreenSplats& splats, const TileLists& lists, con
     DeviceLists d;
     for (size_t cell = 0; cell < places.size(); cell += grid.cells())
         d.tile_starts.push_back(uint32_t(places[cell]));
-    // One end more: no instance stands behind the last tile.
+    // One more end: no instance follows those of the last tile.
     d.tile_starts.insert(d.tile_starts.end(), 2, uint32_t(sum));
     d.tile_counts.assign(count, 0);
     d.splats.resize(sum);

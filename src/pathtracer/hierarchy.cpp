@@ -147,7 +147,7 @@ class Builder {
     /// Reorders the triangles and returns how many go left: at least one, and not all.
     uint32_t divide(uint32_t first, uint32_t count, int depth) {
         const auto begin = hierarchy_.order.begin() + first, end = begin + count;
-        // This node and the levels that halving needs below it would exceed the limit.
+        // This node and the levels that its bisection needs would exceed the limit.
         const bool deep = depth + 1 + halving_levels(count) > int(shared::TRACE_STACK);
         if (const Split split = best_split(first, count); split.axis >= 0 && !deep) {
             const FloatBox centers = center_bounds(first, count);

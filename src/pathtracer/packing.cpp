@@ -23,7 +23,7 @@ double mean(const glm::dvec3& v) {
     return (v.r + v.g + v.b) / 3;
 }
 
-/// Of the table of lights.
+/// An entry of the table of lights.
 struct Entry {
     std::array<uint32_t, 4 * shared::LIGHT_TEXELS> words{};
     double power = 0;

@@ -17,8 +17,8 @@ constexpr uint32_t kRows = shared::MOTION_VALUES;
 // the loss, and matters where that is zero: cameras and splats that move together.
 constexpr float kMotionPull = 1e-2f;
 
-// Of Adam. A camera has a step once in as many steps as there are images, some dozen in a short run. The gradients of the
-// first ones, from unfinished splats, must not count any more in the last ones.
+// Adam's decays. A camera is stepped once in as many steps as there are images, some dozen times in a short run. The gradients
+// of the first ones, from unfinished splats, must not count any more in the last ones.
 constexpr double kBeta1 = 0.5, kBeta2 = 0.9;
 
 constexpr size_t kFocalRow = 3;

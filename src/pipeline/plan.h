@@ -23,17 +23,17 @@ struct PlanRequest {
     int present_degree = 0;  // highest SH degree of the scene with a coefficient other than zero
     RenderOptions render;
 
-    // Of a picture.
+    // For an image.
     Drawing drawing = Drawing::color;
     bool debug = false;      // splat_scale applies, and the visible splats are counted
     double splat_scale = 1;  // factor of every splat's scales, above 0
 
-    // Of a gradient or a training.
+    // For a gradient or a training.
     bool masks = false;     // training images in which some pixels count less
     bool exposure = false;  // each training image's exposure is learned
     bool motion = false;    // the gradient by the camera's motion; in a training it is learned
 
-    // Of a training.
+    // For a training.
     bool statistics = false;          // the strategy reads densification statistics
     bool absolute_gradients = false;  // of the statistics: absolute gradients of the pixels
     bool packed_moments = false;      // Adam's moments in 16 bits each

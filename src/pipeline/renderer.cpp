@@ -72,7 +72,7 @@ struct Renderer::State {
     void upload(const Gaussians& gaussians) {
         const int degree = plan_for(request).stored_degree;
         parts.clear();
-        // Of a limit that a training has left on the device, the picture needs the larger part.
+        // A training may have set the device's memory limit. The image may take the larger part of it.
         const uint64_t limit = device->memory_limit();
         if (limit > 0 && parameter_bytes(uint32_t(gaussians.size()), degree) > limit / 4) {
             divide(degree < gaussians.sh_degree ? with_degree(gaussians, degree) : gaussians, limit / 16);

@@ -50,7 +50,7 @@ shared::DensifyPush densify_push(const Model& model, const FrameBuffers& frame, 
             .revised_opacity = rules.revised_opacity ? 1u : 0u};
 }
 
-/// Of a kernel that writes an array of the next generation.
+/// The constants of a kernel that writes an array of the next generation.
 passes::Constants write_variant(const Model& model, bool is_moments) {
     return {{shared::SPEC_SH_DEGREE, uint32_t(model.sh_degree)},
             {shared::SPEC_MODE, is_moments ? shared::WRITE_MOMENTS : shared::WRITE_PARAMS}};

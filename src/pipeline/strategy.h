@@ -28,7 +28,7 @@ struct Phase {
     const FrameBuffers& frame;
 };
 
-/// Of adaptive density control.
+/// The rules of adaptive density control.
 struct DensifyRules {
     float grow_gradient = 0;  // threshold of the mean gradient norm
     float split_scale = 0;    // world units
@@ -58,7 +58,7 @@ void write_densified(const Phase& phase, Model& model, const DensifyRules& rules
 void record_reset_opacity(gpu::Recording& recording, passes::PassCache& cache, const Model& model,
                           float logit);
 
-/// Of 3DGS as Markov chain Monte Carlo (Kheradmand et al. 2024). Dead splats move to living ones, the number
+/// The rules of 3DGS as Markov chain Monte Carlo (Kheradmand et al. 2024). Dead splats move to living ones, the number
 /// of splats grows by a share, and noise lets transparent splats explore.
 struct McmcRules {
     double dead_opacity = 0.005;  // a splat at or below it is dead

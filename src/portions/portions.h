@@ -35,7 +35,7 @@ constexpr size_t kTexelBytes = 16;
 void pack_splat(const std::byte* array, uint32_t planes, size_t i, std::byte* to);
 void unpack_splat(const std::byte* from, uint32_t planes, size_t i, std::byte* array);
 
-/// Of a portion's splats. places: ViewBuffers::places, from a list to its update.
+/// The arrays of a portion's splats. places: ViewBuffers::places, from a list to its update.
 enum Array : size_t { params, moments1, moments2, statistics, places, arrays };
 
 struct Setup {
@@ -82,7 +82,7 @@ class Portions {
     void visit(Need need, const std::function<void(int, pipeline::Model&)>& visit);
 
     /// Moves splats between portions until each has its range again, after their numbers have changed. Statistics
-    /// begin anew. Collective. Throws what check_portions throws.
+    /// begin again. Collective. Throws what check_portions throws.
     void level();
 
     /// The arrays of a state that a training has.

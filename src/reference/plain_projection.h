@@ -69,7 +69,7 @@ struct PlainGradient {
     glm::dvec3 translation{0};
 };
 
-/// Of a splat that is visible.
+/// The gradient of a splat that is visible.
 PlainGradient project_backward(const PlainSplat& splat, const PlainView& view, const PlainOptions& options,
                                const PlainScreenGradient& gradient);
 

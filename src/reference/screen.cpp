@@ -21,7 +21,7 @@ double power_of(const ScreenValues& splats, size_t i, double dx, double dy) {
     return -(u * u + v * v);
 }
 
-/// The splats that a pixel draws; the last transmittance stands in `left`.
+/// The splats that a pixel draws; `left` receives the last transmittance.
 std::vector<Layer> layers_of(const ScreenValues& splats, std::span<const uint32_t> order, int x, int y,
                              const Smoothing& smoothing, double& left) {
     std::vector<Layer> layers;

@@ -34,7 +34,7 @@ struct ScreenValuesGradient {
     std::vector<double> absolute;  // [M, 2], sum over the pixels of |dL/d(mean)|
 };
 
-/// d(alpha_i) has two ways into the image: its own weight, and all that stands behind it. With R_i = (what is behind splat i).
+/// d(alpha_i) has two ways into the image: its own weight, and all that is behind it. With R_i = (what is behind splat i).
 /// dL/dC, the transmittance of the pixel included:  dL/d(alpha_i) = T_i f_i . dL/dC - R_i / (1 - alpha_i).
 /// features_gradient: [H, W, D]; alphas_gradient: [H, W].
 ScreenValuesGradient blend_backward(const ScreenValues& splats, std::span<const uint32_t> order, int width,

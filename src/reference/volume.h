@@ -31,7 +31,7 @@
 
 namespace ewa::reference {
 
-/// What splatting does in place of the integral. Each can be switched on and off, so that its error can be told.
+/// What splatting does in place of the integral. Each can be switched on and off, so that its error can be measured.
 /// Footprint::antialias is no approximation of the integral: its factor is not applied.
 struct Approximations {
     bool overlap = false;  // each splat absorbs at one place: the one of a smaller distance is all in front

@@ -104,7 +104,7 @@ std::vector<ChartPoint> running_mean(const std::vector<ChartPoint>& points) {
     return mean;
 }
 
-// As many values under the pointer as can be told apart.
+// More values under the pointer could not be distinguished.
 constexpr size_t kMostBands = 300;
 
 /// The finite ones.

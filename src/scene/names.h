@@ -9,7 +9,7 @@
 
 namespace ewa::scene {
 
-/// The indices of a list of frames, in the order of the list and each once. Its items stand between commas: an
+/// The indices of a list of frames, in the order of the list and each once. Commas separate its items: an
 /// index in name order from 0, a range of two indices such as 3-7, or the name of a frame ("0001.jpg"). A name may lack its
 /// folder and its extension if no other frame is meant. A name goes before a range. Throws InputError.
 std::vector<int> frames_named(const Dataset& dataset, const std::string& list);

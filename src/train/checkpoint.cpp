@@ -47,7 +47,7 @@ uint32_t added(uint32_t checksum, std::span<const std::byte> data) {
     return uint32_t(crc32_z(checksum, reinterpret_cast<const Bytef*>(data.data()), data.size()));
 }
 
-/// Of the name and the size.
+/// The checksum of the name and the size.
 uint32_t checksum_of(const SectionHeader& header) {
     return added(0, std::as_bytes(std::span(&header, 1)).first(offsetof(SectionHeader, checksum)));
 }

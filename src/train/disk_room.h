@@ -16,7 +16,7 @@ namespace ewa::train {
 std::string check_disk_room(const std::filesystem::path& folder, uint64_t first, uint64_t most,
                             const TrainOptions& options);
 
-/// How a run goes on after its disk was full, for the end of an error.
+/// How a run can be continued after its disk was full, for the end of an error.
 /// step: the last one that was trained. checkpoint, splats: the steps of checkpoint.ewa and of splats.ply, -1: there is none.
 std::string after_full_disk(int step, int checkpoint, int splats);
 

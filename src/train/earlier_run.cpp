@@ -65,7 +65,7 @@ std::string described(const EarlierRun& run) {
                        run.psnr ? fmt::format(" ({:.2f} dB)", *run.psnr) : "", kReplace);
 }
 
-/// Throws InputError if the run would lie among photos. A run that lies there already may go on.
+/// Throws InputError if the run would lie among photos. A run that is already there may continue.
 void check_no_dataset(const fs::path& folder, const RunOptions& options) {
     if (options.resume && core::is_file(folder / "checkpoint.ewa")) return;
     io::check_output_folder("-o", folder);

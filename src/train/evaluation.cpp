@@ -36,7 +36,7 @@ RenderedView with_photo(Image rendering, const Frame& frame, const RenderOptions
 
 namespace {
 
-/// Of 255 levels, as Python's float32 images become bytes. NaN becomes 0.
+/// The nearest of 255 levels, as Python's float32 images become bytes. NaN becomes 0.
 float level(float value, bool round_down) {
     const float levels = 255 * (value > 0 ? std::min(value, 1.0f) : 0.0f);
     return std::floor(round_down ? levels : levels + 0.5f) / 255;

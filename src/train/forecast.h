@@ -21,7 +21,7 @@ struct ForecastScene {
 
 /// A step costs a part for the pixels and a part for each splat. Their ratio is that of lavapipe; the device's speed comes from
 /// the steps so far. mcmc's number of splats follows from its schedule. adc's grows by about the same number at each
-/// refinement; docs/performance.md compares forecasts with runs.
+/// refinement; docs/performance.md compares these times with runs.
 class Forecast {
   public:
     /// options: with concrete strategy and SH degree.
@@ -35,7 +35,7 @@ class Forecast {
     double left() const;
     /// Seconds that a whole run with this number of steps from the same splats takes, with ewa's choice of the strategy.
     double of_steps(int steps) const;
-    /// Seconds of such a run with the forecast's own options on the machine of docs/performance.md on a slow day.
+    /// Seconds of such a run with the same options on the machine of docs/performance.md on a slow day.
     double on_reference() const;
 
   private:

@@ -16,7 +16,7 @@ namespace {
 using core::Hash;
 using Json = nlohmann::ordered_json;
 
-// Of an option's value in an error. The checkpoint may come from a stranger.
+// Characters of an option's value that an error shows. The checkpoint may come from a stranger.
 constexpr size_t kLongestValue = 200;
 constexpr const char* kWaysOut = "; -o DIR starts another run, --force replaces this one";
 constexpr double kLeastPause = 30;      // seconds

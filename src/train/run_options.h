@@ -32,7 +32,7 @@ const std::vector<RunOption>& run_options();
 /// The option with this name, which must exist.
 const RunOption& run_option(std::string_view name);
 
-/// The value as it would stand on the command line.
+/// The value as the command line takes it.
 std::string value_text(const RunOption& option, const RunOptions& options);
 
 /// All options under their names: what config.json holds.

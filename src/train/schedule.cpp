@@ -25,7 +25,7 @@ constexpr int kLeastResetEvery = 1000;
 constexpr int kLeastShEvery = 50;
 // Share of the steps in which the rate of the poses rises from 0: the first splats say little of the cameras.
 constexpr double kPoseWarmUp = 0.1;
-// Of few photos: how often each is seen by a run whose rates fade, and the rates' last factor.
+// With few training images: how often each is seen by a run whose rates fade, and the rates' last factor.
 constexpr int kVisitsOfFading = 60;
 constexpr double kLastFading = 0.1;
 

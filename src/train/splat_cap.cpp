@@ -13,8 +13,8 @@
 namespace ewa {
 namespace {
 
-// Of the pixels of a photo, times the square root of the number of photos: each photo shows less that is new than the one
-// before.
+// Splats per pixel of an image, times the square root of the number of images: each image shows less that is new than the
+// one before.
 constexpr double kSplatsPerPixel = 0.6;
 // 30,000 steps can have 3 million, as the papers' largest scenes. Splats that come late have few steps left.
 constexpr double kSplatsPerStep = 100;

@@ -11,7 +11,7 @@
 
 namespace ewa::train {
 
-/// Of a state: all but the bytes of its arrays.
+/// A state without the bytes of its arrays.
 struct StateHead {
     StepReport report;
     int sh_degree = 0;

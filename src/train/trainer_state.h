@@ -61,9 +61,9 @@ struct Trainer::State {
     /// Whether a step has one picture of one portion: one kernel then gathers its gradients and moves the splats.
     bool fused() const { return portions.alone() && options.batch == 1 && options.bands == 1; }
 
-    /// Of rank 0: begins what all ranks do together.
+    /// Rank 0 begins what all ranks do together.
     void call(train::Call what) const;
-    /// Of the other ranks: what rank 0 begins.
+    /// The other ranks receive what rank 0 begins.
     train::Call next_call() const;
     pipeline::Rates rates(int step) const;
     pipeline::Noise noise(int step) const;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds the cameras of photos or of a video while the window goes on.
+// Finds the cameras of photos or of a video while the window stays responsive.
 #pragma once
 #include <atomic>
 #include <filesystem>

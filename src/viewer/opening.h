@@ -44,8 +44,8 @@ bool is_dataset(const std::filesystem::path& path);
 
 /// Opens a splat file; a dataset, shown by its points; or the folder of a run (config.json, splats.ply,
 /// metrics.jsonl). A run, and the splats.ply of a run, come with the cameras of the run's dataset, if that is
-/// found. cameras: the dataset to use instead; empty: none. Of photos without cameras, or a video, only `photos` and
-/// the title are set. Throws InputError.
+/// found. cameras: the dataset to use instead; empty: none. Photos without cameras, or a video, only set `photos` and
+/// the title. Throws InputError.
 OpenedScene open_scene(const std::filesystem::path& path, const std::filesystem::path& cameras);
 
 /// The splats of `splats` with the cameras of `cameras`, and a remark that says so. Both are scenes as opened.
@@ -55,7 +55,7 @@ OpenedScene with_cameras(const OpenedScene& splats, const OpenedScene& cameras);
 /// - Photos or a video go before all else: only they are opened.
 /// - A dataset gives its cameras to the splats that are shown, unless it has done so before: then it is opened itself.
 /// - A splat file takes the cameras of a dataset that is shown without splats.
-/// - Of several files, splats and a dataset belong together. The remark names those that are left out.
+/// - Among several files, splats and a dataset belong together. The remark names the skipped ones.
 OpenedScene open_dropped(const std::vector<std::filesystem::path>& paths, const OpenedScene& shown);
 
 /// Converts points to small opaque splats.

@@ -207,7 +207,7 @@ std::optional<glm::dvec3> RenderThread::point_at(const Probe& probe) {
     return world_point(camera, x + 0.5, y + 0.5, *rendering.depth.at(x, y));
 }
 
-/// Of the exception that is being handled.
+/// Reports the exception that is being handled.
 void RenderThread::fail(const Work& work) {
     report([&](News& news) {
         news.failure = std::current_exception();

@@ -38,7 +38,7 @@ class ViewQuality {
     /// Forgets the frame: indices of another dataset mean other images.
     void forget() { index_ = -1; }
 
-    /// Of this frame, dB. The value of earlier splats stays until that of the present ones is known. Empty: unknown.
+    /// The frame's PSNR, dB. The value of earlier splats stays until that of the present ones is known. Empty: unknown.
     std::optional<double> psnr(int index) const;
 
   private:

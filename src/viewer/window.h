@@ -24,7 +24,7 @@ class WindowSystem {
 
     /// The free size for a window on the main monitor, in the units of window sizes; zero if unknown.
     Size work_area() const;
-    /// Of text on the main monitor: larger than 1 on high-density displays.
+    /// The scale of text on the main monitor: larger than 1 on high-density displays.
     float scale() const;
     std::vector<const char*> vulkan_extensions() const;
     /// Makes Window::wait() return. Any thread may call it.

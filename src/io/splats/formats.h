@@ -36,7 +36,7 @@ void append_ply_row(const Gaussians& gaussians, size_t i, std::vector<float>& ro
 bool is_compressed_ply(const PlyTable& table);
 SplatScene read_compressed_ply(const std::filesystem::path& path);
 
-/// Writes the splats in Morton order, which keeps the boxes of the chunks small. The highest SH degrees are left out where
+/// Writes the splats in Morton order, which keeps the boxes of the chunks small. The highest SH degrees are not written where
 /// all of their coefficients are 0.
 std::vector<std::string> write_compressed_ply(const std::filesystem::path& path, const Gaussians& gaussians,
                                               const SaveOptions& options);

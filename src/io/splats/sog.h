@@ -4,7 +4,7 @@
 // count for nothing. Images are lossless WebP with 8 bits a channel:
 //   means_l, means_u   the low and high bytes of x y z in r g b. Their 16 bits span means.mins .. means.maxs of
 //                      sign(v) ln(1 + |v|)
-//   quats              the largest of w x y z is left out, and positive: a = 252 + its index; r g b are the
+//   quats              the largest of w x y z is not stored, and positive: a = 252 + its index; r g b are the
 //                      others in order, c as 255 (c / sqrt(2) + 0.5)
 //   scales             r g b index a table of 256 logarithms of scales
 //   sh0                r g b index a table of 256 SH coefficients; a = 255 * opacity

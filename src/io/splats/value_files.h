@@ -17,7 +17,7 @@ struct ValueFiles {
 };
 
 /// `usual`: the names of the values where all of them are free; else all end in -2, in -3 and so on. `named_by`: the
-/// values that an existing naming file names, empty if there is none. Of those that `naming` names, the ones with such a
+/// values that an existing naming file names, empty if there is none. Values of `naming` with such a
 /// name are removed, unless another naming file in the folder names them too.
 ValueFiles value_files(const std::filesystem::path& naming, const Paths& usual,
                        Paths (*named_by)(const std::filesystem::path&));
