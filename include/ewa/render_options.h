@@ -15,7 +15,7 @@ enum class Integrator {
     march   // the volume of all splats, in intervals along the ray
 };
 
-inline constexpr int kMostSamples = 4096;
+inline constexpr int kMostSamples = 4096, kMostNearest = 1000;
 
 struct RenderOptions {
     std::array<float, 3> background{0, 0, 0};

@@ -8,7 +8,7 @@
 #include "core/typing.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
-#include "train/run_options.h"
+#include "run/run_options.h"
 
 namespace ewa::python {
 
@@ -75,7 +75,7 @@ RenderOptions look_of(const LookArguments& arguments, const Splats& splats) {
         throw InputError("samples: only integrator=\"march\" takes samples of a ray");
     if (arguments.nearest && !look.points) throw InputError("nearest is an argument of points=True");
     if (arguments.samples) look.samples = whole_number("samples", *arguments.samples, kMostSamples);
-    if (arguments.nearest) look.nearest = whole_number("nearest", *arguments.nearest, train::kMostNearest);
+    if (arguments.nearest) look.nearest = whole_number("nearest", *arguments.nearest, kMostNearest);
     return look;
 }
 

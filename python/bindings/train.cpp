@@ -22,10 +22,10 @@
 #include "ewa/splat_edit.h"
 #include "ewa/trainer.h"
 #include "options.h"
+#include "run/resume.h"
+#include "run/run_input.h"
+#include "run/run_options.h"
 #include "train/checkpoint.h"
-#include "train/resume.h"
-#include "train/run_input.h"
-#include "train/run_options.h"
 #include "train_options.h"
 
 namespace ewa::python {

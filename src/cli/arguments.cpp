@@ -13,6 +13,7 @@
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
+#include "pipeline/plan.h"
 #include "scene/camera.h"
 #include "scene/names.h"
 
@@ -108,7 +109,7 @@ RenderOptions DrawArguments::options() const {
     render.integrator = integrator == "ray"     ? Integrator::ray
                         : integrator == "march" ? Integrator::march
                                                 : Integrator::splat;
-    train::check_points(render);
+    pipeline::check_points(render);
     if (render.integrator != Integrator::splat && render.kernel == Footprint::antialias)
         throw InputError("--integrator " + integrator + ": there are no footprints to antialias");
     if (samples && render.integrator != Integrator::march)

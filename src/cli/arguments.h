@@ -17,7 +17,7 @@
 #include "ewa/render_options.h"
 #include "ewa/synthetic_dataset.h"
 #include "io/datasets/refined_cameras.h"
-#include "train/run_options.h"
+#include "run/run_options.h"
 
 namespace ewa::cli {
 

@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "ewa/device.h"
-#include "train/forecast.h"
+#include "run/forecast.h"
 
 namespace ewa::cli {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "cli/output.h"
 #include "ewa/capture.h"
-#include "ewa/run.h"
+#include "ewa/run_options.h"
 
 namespace ewa::cli {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The folder of a run as DATASET of `ewa train`, and the options that --resume takes from the run.
 #pragma once
-#include "ewa/run.h"
+#include "ewa/run_options.h"
 
 namespace CLI {
 class App;

@@ -25,10 +25,10 @@
 #include "live/run_folder.h"
 #include "ranks/open.h"
 #include "report/chart.h"
-#include "train/earlier_run.h"
-#include "train/run_input.h"
-#include "train/run_options.h"
-#include "train/share_machine.h"
+#include "run/earlier_run.h"
+#include "run/run_input.h"
+#include "run/run_options.h"
+#include "run/share_machine.h"
 
 namespace ewa::cli {
 namespace {

@@ -10,7 +10,7 @@
 #include "cli/interrupt.h"
 #include "cli/output.h"
 #include "ewa/run.h"
-#include "train/forecast.h"
+#include "run/forecast.h"
 
 namespace ewa::cli {
 

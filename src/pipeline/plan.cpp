@@ -37,6 +37,16 @@ void check_integrator(const PlanRequest& request) {
 
 }  // namespace
 
+void check_points(const RenderOptions& options) {
+    if (!options.points) return;
+    if (options.kernel != Footprint::peak)
+        throw InputError(std::string("--points and --kernel ") +
+                         (options.kernel == Footprint::density ? "density" : "antialias") +
+                         " exclude each other: a sphere has no footprint");
+    if (options.integrator != Integrator::splat)
+        throw InputError("--points and --integrator exclude each other: spheres are blended on the image");
+}
+
 uint32_t Plan::evaluated_degree(int wanted) const {
     return uint32_t(std::clamp(wanted, 0, stored_degree));
 }

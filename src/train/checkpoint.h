@@ -6,7 +6,7 @@
 //
 // The CRC-32 (zlib's) is over the section's name, its size and its bytes. The first three sections are
 //
-//   settings  JSON: options and fingerprint of the dataset (train/resume.h)
+//   settings  JSON: options and fingerprint of the dataset (run/resume.h)
 //   metrics   the lines of metrics.jsonl so far
 //   state     i64 step; f64 seconds, wall seconds, loss; u64 dropped updates; u32 splats, skipped splats, SH
 //             degree, shortened updates (at most 2^32 - 1); f64 PSNR, which earlier versions do not write
@@ -14,7 +14,7 @@
 // The other sections are the arrays of TrainerState under their names, in the device's layout
 // (shaders/shared/layouts.h).
 //
-// A run leaves all times in it zero, so that equal runs have equal files. They are in times.json (train/run_times.h).
+// A run leaves all times in it zero, so that equal runs have equal files. They are in times.json (run/run_times.h).
 // Earlier versions wrote them here.
 #pragma once
 #include <cstddef>

@@ -20,7 +20,6 @@
 #include "pipeline/views.h"
 #include "shared/constants.h"
 #include "train/image_cache.h"
-#include "train/run_input.h"
 #include "train/schedule.h"
 
 namespace ewa {

@@ -9,7 +9,6 @@
 
 #include "ewa/error.h"
 #include "train/exclusions.h"
-#include "train/run_options.h"
 
 namespace ewa::train {
 namespace {
@@ -69,7 +68,7 @@ void check_training(const TrainOptions& options, int ranks) {
     if (options.batch < 1) throw InputError("--batch: a step has at least one view");
     if (options.bands < 1) throw InputError("--bands: a view has at least one band");
     check_exclusions(options, ranks);
-    check_points(options.render);
+    pipeline::check_points(options.render);
     if (options.render.points && options.strategy == Strategy::mcmc)
         throw InputError(
             "--strategy mcmc moves splats of low opacity, and a sphere has none: --points needs adc or none");

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The largest number of splats of a training, unless its options name it.
+#include "train/splat_cap.h"
+
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
@@ -7,8 +9,8 @@
 #include <string>
 
 #include "core/typing.h"
+#include "ewa/error.h"
 #include "ewa/trainer.h"
-#include "train/run_input.h"
 
 namespace ewa {
 namespace {
@@ -62,3 +64,23 @@ SplatCap splat_cap(const gpu::Device& device, const Dataset& dataset, const std:
 }
 
 }  // namespace ewa
+
+namespace ewa::train {
+
+void check_start(size_t splats, const TrainOptions& options) {
+    if (splats == 0) throw InputError("there are no splats to start from; --init random makes some");
+    if (options.max_splats != kAutomaticMaxSplats && splats > options.max_splats)
+        throw InputError(fmt::format("there are {} splats to start from, more than --max-splats {}", splats,
+                                     options.max_splats));
+}
+
+double pixels_of(const Dataset& dataset, const std::vector<int>& frames) {
+    double pixels = 0;
+    for (const int i : frames) {
+        const Camera& camera = dataset.frames[size_t(i)].camera;
+        pixels += double(camera.width) * camera.height;
+    }
+    return pixels;
+}
+
+}  // namespace ewa::train

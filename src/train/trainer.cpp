@@ -14,7 +14,7 @@
 #include "ewa/splat_edit.h"
 #include "portions/collect.h"
 #include "train/memory_estimate.h"
-#include "train/run_input.h"
+#include "train/splat_cap.h"
 #include "train/trainer_state.h"
 
 namespace ewa {

@@ -6,8 +6,8 @@
 #include "core/text.h"
 #include "ewa/error.h"
 #include "live/run_folder.h"
+#include "run/earlier_run.h"
 #include "scene/names.h"
-#include "train/earlier_run.h"
 #include "viewer/app.h"
 
 namespace ewa::viewer {

@@ -8,7 +8,7 @@
 #include "core/folders.h"
 #include "core/json.h"
 #include "ewa/error.h"
-#include "ewa/run.h"
+#include "ewa/run_options.h"
 
 namespace ewa::viewer {
 namespace {

@@ -12,7 +12,7 @@
 #include "ewa/synthetic_dataset.h"
 #include "io/datasets/refined_cameras.h"
 #include "live/run_folder.h"
-#include "train/run_options.h"
+#include "run/run_options.h"
 
 namespace ewa::viewer {
 namespace {
@@ -57,7 +57,7 @@ Look look_of(const live::Run& run) {
     look.points = run.flag("points");
     const auto nearest = run.config.find("nearest");
     if (nearest != run.config.end() && nearest->is_number_integer())
-        look.nearest = std::clamp(nearest->get<int>(), 1, train::kMostNearest);
+        look.nearest = std::clamp(nearest->get<int>(), 1, kMostNearest);
     look.background = core::parse_colour(run.text("background")).value_or(look.background);
     return look;
 }

@@ -8,7 +8,7 @@
 
 #include "ewa/error.h"
 #include "gpu/test_device.h"
-#include "train/resume.h"
+#include "run/resume.h"
 #include "train/synthetic.h"
 
 namespace ewa::test {

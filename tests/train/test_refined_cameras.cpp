@@ -14,7 +14,7 @@
 #include "gpu/test_device.h"
 #include "io/datasets/image_records.h"
 #include "io/datasets/refined_cameras.h"
-#include "train/refined_cameras.h"
+#include "run/refined_cameras.h"
 #include "train/synthetic.h"
 
 namespace ewa::test {

@@ -10,7 +10,7 @@
 
 #include "core/json.h"
 #include "ewa/error.h"
-#include "train/run_options.h"
+#include "run/run_options.h"
 #include "train/synthetic.h"
 
 namespace ewa::test {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // How long a training takes, against times of real runs on lavapipe with two cores.
-#include "train/forecast.h"
+#include "run/forecast.h"
 
 #include <gtest/gtest.h>
 

@@ -8,8 +8,8 @@
 
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
+#include "run/run_input.h"
 #include "support/temp_folder.h"
-#include "train/run_input.h"
 
 namespace {
 

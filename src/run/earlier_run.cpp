@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/earlier_run.h"
+#include "run/earlier_run.h"
 
 #include <spdlog/fmt/fmt.h>
 
@@ -14,8 +14,8 @@
 #include "ewa/error.h"
 #include "io/datasets/dataset_folders.h"
 #include "report/summary.h"
+#include "run/run_files.h"
 #include "train/checkpoint.h"
-#include "train/run_files.h"
 
 namespace ewa::train {
 namespace {

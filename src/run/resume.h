@@ -6,7 +6,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
-#include "ewa/run.h"
+#include "ewa/run_options.h"
 #include "train/checkpoint.h"
 
 namespace ewa::train {

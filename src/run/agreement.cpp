@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/agreement.h"
+#include "run/agreement.h"
 
 #include <array>
 
@@ -8,8 +8,8 @@
 #include "gpu/device.h"
 #include "passes/kernel_config.h"
 #include "portions/collect.h"
-#include "train/resume.h"
-#include "train/run_options.h"
+#include "run/resume.h"
+#include "run/run_options.h"
 
 namespace ewa::train {
 namespace {

@@ -9,10 +9,12 @@
 #include <vector>
 
 #include "core/folders.h"
-#include "ewa/run.h"
+#include "ewa/exposure.h"
+#include "ewa/run_options.h"
+#include "ewa/summary.h"
 #include "report/html.h"
 #include "report/run_file_names.h"
-#include "train/refined_cameras.h"
+#include "run/refined_cameras.h"
 
 namespace ewa::train {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/run_files.h"
+#include "run/run_files.h"
 
 #include <spdlog/fmt/fmt.h>
 #include <sys/resource.h>
@@ -18,8 +18,8 @@
 #include "report/run_file_names.h"
 #include "report/summary.h"
 #include "report/tensorboard.h"
+#include "run/inria_files.h"
 #include "scene/lens.h"
-#include "train/inria_files.h"
 
 namespace ewa::train {
 namespace fs = std::filesystem;

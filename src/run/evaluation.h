@@ -8,7 +8,7 @@
 
 #include "ewa/evaluation.h"
 #include "ewa/renderer.h"
-#include "ewa/run.h"
+#include "ewa/run_options.h"
 
 namespace ewa::train {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/run_times.h"
+#include "run/run_times.h"
 
 #include <cmath>
 #include <cstdint>

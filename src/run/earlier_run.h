@@ -3,7 +3,7 @@
 #pragma once
 #include <filesystem>
 
-#include "ewa/run.h"
+#include "ewa/run_options.h"
 
 namespace ewa::train {
 

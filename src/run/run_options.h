@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "ewa/run.h"
+#include "ewa/run_options.h"
 
 namespace ewa::train {
 
@@ -40,10 +40,5 @@ nlohmann::ordered_json to_config(const RunOptions& options);
 
 /// "none", "adc", "mcmc" or "auto".
 std::string name_of(Strategy strategy);
-
-inline constexpr int kMostNearest = 1000;  // spheres at a pixel
-
-/// Throws InputError if the options have points, and what spheres cannot have.
-void check_points(const RenderOptions& options);
 
 }  // namespace ewa::train

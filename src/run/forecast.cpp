@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/forecast.h"
+#include "run/forecast.h"
 
 #include <algorithm>
 #include <cmath>

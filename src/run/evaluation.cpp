@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/evaluation.h"
+#include "run/evaluation.h"
 
 #include <algorithm>
 #include <chrono>

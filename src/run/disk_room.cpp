@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/disk_room.h"
+#include "run/disk_room.h"
 
 #include <spdlog/fmt/fmt.h>
 

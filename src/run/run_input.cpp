@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/run_input.h"
+#include "run/run_input.h"
 
 #include <spdlog/fmt/fmt.h>
 
@@ -22,6 +22,7 @@
 #include "scene/names.h"
 #include "shared/constants.h"
 #include "train/schedule.h"
+#include "train/splat_cap.h"
 
 namespace ewa::train {
 namespace {
@@ -214,15 +215,6 @@ Sphere viewed_sphere(const Dataset& dataset, const std::vector<int>& frames) {
     return {mean, farthest > 0 ? 4 * farthest : 1};
 }
 
-double pixels_of(const Dataset& dataset, const std::vector<int>& frames) {
-    double pixels = 0;
-    for (const int i : frames) {
-        const Camera& camera = dataset.frames[size_t(i)].camera;
-        pixels += double(camera.width) * camera.height;
-    }
-    return pixels;
-}
-
 Gaussians random_gaussians(const Dataset& dataset, const std::vector<int>& frames, int count, uint64_t seed,
                            int sh_degree) {
     const Sphere sphere = viewed_sphere(dataset, frames);
@@ -305,13 +297,6 @@ Gaussians initial_splats(const RunOptions& options, const Dataset& dataset, cons
     adjust_start(options, start);
     check_start(start.size(), options.train);
     return start;
-}
-
-void check_start(size_t splats, const TrainOptions& options) {
-    if (splats == 0) throw InputError("there are no splats to start from; --init random makes some");
-    if (options.max_splats != kAutomaticMaxSplats && splats > options.max_splats)
-        throw InputError(fmt::format("there are {} splats to start from, more than --max-splats {}", splats,
-                                     options.max_splats));
 }
 
 void check_downscale(int factor, int left, int width, int height, const std::string& image) {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "ewa/run.h"
+#include "ewa/run_options.h"
 
 namespace ewa::train {
 
@@ -39,9 +39,6 @@ void check_without_dataset(const RunOptions& options);
 /// that is still to be applied to this size.
 void check_downscale(int factor, int left, int width, int height, const std::string& image);
 
-/// Throws InputError if a training cannot start from so many splats.
-void check_start(size_t splats, const TrainOptions& options);
-
 /// The sphere that the cameras look at. Its centre is the point nearest to all optical axes in the
 /// least-squares sense. Its radius is the mean distance of the cameras from it.
 /// There is no such point if the axes are parallel, and it is not seen if the cameras look away from it. Then
@@ -52,9 +49,6 @@ struct Sphere {
     double radius = 1;       // world units, positive
 };
 Sphere viewed_sphere(const Dataset& dataset, const std::vector<int>& frames);
-
-/// The number of pixels of all these frames together.
-double pixels_of(const Dataset& dataset, const std::vector<int>& frames);
 
 /// `count` splats, spread evenly over the part of viewed_sphere(frames) that lies in at least one frustum. If
 /// that part is too small to hit, a splat lies on a random ray of a camera, at most the sphere's radius away.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/inria_files.h"
+#include "run/inria_files.h"
 
 #include <spdlog/fmt/fmt.h>
 
@@ -12,7 +12,7 @@
 #include "core/folders.h"
 #include "core/json.h"
 #include "io/datasets/image_records.h"
-#include "train/run_files.h"
+#include "run/run_files.h"
 
 namespace ewa::train {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/run_options.h"
+#include "run/run_options.h"
 
 #include <spdlog/fmt/fmt.h>
 
@@ -472,17 +472,6 @@ Json to_config(const RunOptions& options) {
 
 std::string name_of(Strategy strategy) {
     return name_among(kStrategies, strategy);
-}
-
-void check_points(const RenderOptions& options) {
-    if (!options.points) return;
-    if (options.kernel != Footprint::peak) {
-        std::string problem = "--points and --kernel ";
-        problem += name_among(kKernels, options.kernel);
-        throw InputError(problem + " exclude each other: a sphere has no footprint");
-    }
-    if (options.integrator != Integrator::splat)
-        throw InputError("--points and --integrator exclude each other: spheres are blended on the image");
 }
 
 }  // namespace ewa::train

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/refined_cameras.h"
+#include "run/refined_cameras.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/share_machine.h"
+#include "run/share_machine.h"
 
 #include "gpu/choose.h"
 #include "ranks/node.h"

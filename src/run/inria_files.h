@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "ewa/gaussians.h"
-#include "train/run_input.h"
+#include "run/run_input.h"
 
 namespace ewa::train {
 

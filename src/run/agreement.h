@@ -5,7 +5,7 @@
 
 #include "ewa/device.h"
 #include "ewa/gaussians.h"
-#include "ewa/run.h"
+#include "ewa/run_options.h"
 
 namespace ewa::train {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/resume.h"
+#include "run/resume.h"
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
@@ -7,7 +7,7 @@
 #include "core/hash.h"
 #include "core/json.h"
 #include "ewa/error.h"
-#include "train/run_options.h"
+#include "run/run_options.h"
 #include "train/schedule.h"
 
 namespace ewa::train {

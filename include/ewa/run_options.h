@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a whole training run is asked for. ewa/run.h carries it out.
+#pragma once
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "ewa/camera.h"
+#include "ewa/dataset.h"
+#include "ewa/device.h"
+#include "ewa/gaussians.h"
+#include "ewa/ranks.h"
+#include "ewa/train_options.h"
+
+namespace ewa {
+
+/// The result of a training, for RunOptions::report_section.
+struct RunScene {
+    std::shared_ptr<gpu::Device> device;
+    const Gaussians& gaussians;
+    const Camera& camera;  // of the first test view, or of the first training view without a test set
+    const RenderOptions& options;
+};
+
+/// Whether splats start between neighbouring points, too.
+enum class DenseStart {
+    automatic,  // in short runs of adc
+    on,
+    off
+};
+
+/// What a run is asked for. `ewa train --help` describes the options of the same names.
+struct RunOptions {
+    std::filesystem::path dataset;  // folder or file, as load_dataset takes it
+    std::filesystem::path scene;    // mesh scene, photos or video that the dataset was made from; empty: none
+    std::filesystem::path output;   // the run's folder; empty: see output_folder
+    TrainOptions train{.strategy = Strategy::automatic, .sh_degree = kAutomaticShDegree};
+    std::string init =
+        "sfm";  // first splats: "sfm" (the dataset's points), "random", or a file of splats or points
+    std::filesystem::path
+        init_folder;  // that a relative file of `init` is relative to; empty: the current one
+    DenseStart dense_start = DenseStart::automatic;  // of first splats that come from points
+    double init_opacity = 0.1;   // of first splats that come from points or at random; above 0, below 1
+    double init_scale = 1;       // factor of their scales, which are the distance to their neighbours
+    std::string frames = "all";  // or a list, as scene::frames_named reads it: other frames are not used
+    int downscale = 1;           // divides the images' width and height
+    int max_width = 0;           // px; images that are wider after `downscale` are reduced to it; 0: none are
+    MaskUse masks = MaskUse::automatic;
+    int test_every = 8;                   // every K-th image in name order is held out; 0: none
+    int eval_every = 0;                   // evaluates the held-out views every N steps; 0: only at the end
+    std::string metrics;                  // that evaluations measure beside PSNR and SSIM: see metrics_named
+    std::filesystem::path lpips_weights;  // see Meter; empty: LPIPS is not computed
+    bool tensorboard = false;             // also writes the figures of metrics.jsonl as TensorBoard's events
+    int save_every = 0;  // saves splats and checkpoint every N steps; 0: the checkpoint every 30 s or more
+    int keep = 0;        // of the splats of save_every, the last N stay as splats_007000.ply and the like
+    bool inria = false;  // also writes the folder inria/, for viewers of INRIA's runs
+    // A folder with the result or the checkpoint of a run is refused, unless one of these is set.
+    bool resume = false;  // continues from the folder's checkpoint, if there is one
+    bool force = false;   // replaces the run in the folder
+    DeviceOptions device;
+    /// The processes that train together. Rank 0 writes the run's files and calls the observer. The others return an empty
+    /// result when it ends.
+    std::shared_ptr<Ranks> ranks = alone();
+    int rank_timeout = 300;     // s; of several ranks, one that does not answer for so long ends the run
+    std::string command;        // how the run was started, for the report; may be empty
+    double seconds_before = 0;  // wall time spent before the run, counted in Summary::wall_seconds
+    /// Returns HTML that the report contains as it is. Called at the end of a run that was not stopped.
+    std::function<std::string(const RunScene&)> report_section;
+};
+
+/// The run's name in the report: the stem of `scene`, else the name of the dataset's folder.
+std::string run_name(const RunOptions& options);
+/// RunOptions::output, or out/<run_name> if that is empty.
+std::filesystem::path output_folder(const RunOptions& options);
+/// Throws InputError if options exclude each other. run_training calls it first.
+void check_options(const RunOptions& options);
+
+}  // namespace ewa
