@@ -49,7 +49,7 @@ bool is_mesh_scene(const std::filesystem::path& path);
 ///   visible.
 /// - depth/*.exr: camera z in world units, 0 for the sky.
 /// - points.ply: initial points.
-/// - photographs.json identifies scene and options. A matching folder is continued. Views of another scene or of
+/// - `photographs.json` identifies scene and options. A matching folder is continued. Views of another scene or of
 ///   other options are replaced with SyntheticOptions::force, else refused.
 /// - transforms.json: the cameras, written last.
 ///

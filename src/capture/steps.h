@@ -98,7 +98,7 @@ struct Chosen {
 Chosen first_choice(const std::filesystem::path& folder, const std::vector<std::filesystem::path>& found,
                     Json& record, const ProgressFunction& progress);
 
-/// Leaves out what has changed since a search began. before: its record.
+/// Skips what has changed since a search began. before: its record.
 Chosen later_choice(const std::filesystem::path& folder, const std::vector<std::filesystem::path>& found,
                     const Json& before);
 

@@ -109,7 +109,7 @@ bool give(int descriptor, int place, int mode) {
     return descriptor >= 0 && dup2(descriptor, place) >= 0;
 }
 
-/// Goes on as the program, between fork and exec: nothing here takes memory or a lock. A reason why not goes to `report`.
+/// Becomes the program, between fork and exec: nothing here takes memory or a lock. A reason why not goes to `report`.
 [[noreturn]] void become(char* const* command, char* const* environment, const Streams& streams, pid_t parent,
                          int report) {
     setpgid(0, 0);

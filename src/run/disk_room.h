@@ -9,7 +9,7 @@
 
 namespace ewa::train {
 
-/// Compares the free room of the disk that holds `folder`, which must exist, with what the run's files will take. Throws
+/// Compares the free space of the disk that has `folder`, which must exist, with what the run's files will take. Throws
 /// RunError if not even splats and checkpoint of the first splats fit. Returns a remark if those of the largest number of
 /// splats may not, else an empty text. Files of an earlier run in the folder count as room: they are replaced.
 /// most: the largest number of splats. options: with a concrete SH degree.

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Checks the documents: links, anchors, paths of the source tree, long sentences, and words that CONTRIBUTING.md replaces.
+"""Checks documents and comments: links, anchors, paths of the source tree, long sentences, and words that the glossary replaces.
 
-    tests/docs/check_words.py [FILE...]     Markdown files and headers; without any: all documents and include/ewa/*.h
+    tests/docs/check_words.py [FILE...]     Markdown files and sources; without any: all documents, src, include and shaders
     tests/docs/check_words.py --random N    prints N random paragraphs, for a reader to judge
 
 Code does not count as words. Exit status 1 if a check fails.
@@ -19,6 +19,10 @@ BANNED = {  # pattern: what to write
     r"stands?(?! for|.alone)|stood": "is", r"more seldom": "less often", r"laid down": "written", r"there(of|by)|where(of|by)": "of it",
     r"what is so|whoever": "the subject's name", r"arrows? of": "dependency", r"(is|are|being) held(?![- ]out)": "cached, or stored",
 }
+# Only in comments. The last pattern stands for a sentence without a subject.
+BANNED_IN_COMMENTS = {r"told": "printed, sent, or known", r"(?<![^.!?:] )Of(?= )": "the subject's name first"}
+SUFFIXES = {".h", ".cpp", ".glsl", ".comp"}
+SOURCES = ("src", "include", "shaders", "python/bindings")
 WORD = re.compile(r"\w+(?:[-'’.,]\w+)*")
 SOURCE_PATH = re.compile(r"`((?:src|shaders|tests|include|scripts|cmake|docs|examples|scenes)/[\w./-]*)`")
 
@@ -67,10 +71,13 @@ def problems_of(path):
     for line, block in (blocks_of_markdown if markdown else blocks_of_header)(text):
         plain = re.sub(r"`[^`]*`", "x", re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", block))
         for sentence in re.split(r"(?<=[.!?:])\W*\s+", plain):
-            if (words := len(WORD.findall(sentence))) > MOST_WORDS:
+            if (words := len(WORD.findall(sentence))) > MOST_WORDS and (markdown or path.is_relative_to(ROOT / "include")):
                 yield f"{line}: {words} words in a sentence: {sentence[:60]}..."
-        for pattern, instead in BANNED.items() if markdown else ():
+        for pattern, instead in BANNED.items():
             if found := re.search(rf"\b({pattern})\b", plain, re.I):
+                yield f"{line}: '{found.group()}': write {instead}"
+        for pattern, instead in BANNED_IN_COMMENTS.items() if not markdown else ():
+            if found := re.search(pattern, plain):
                 yield f"{line}: '{found.group()}': write {instead}"
         for source in SOURCE_PATH.findall(block) if markdown else ():
             if not (ROOT / source).exists():
@@ -91,7 +98,8 @@ def main(arguments):
         for path, line, block in random.Random(15).sample(long, int(arguments[1])):
             print(f"{path.relative_to(ROOT)}:{line}: {block}\n")
         return 0
-    files = [pathlib.Path(a).resolve() for a in arguments] or documents + sorted(ROOT.glob("include/ewa/*.h"))
+    sources = [p for folder in SOURCES for p in sorted((ROOT / folder).rglob("*")) if p.suffix in SUFFIXES]
+    files = [pathlib.Path(a).resolve() for a in arguments] or documents + sources
     problems = [f"{path.relative_to(ROOT)}:{problem}" for path in files for problem in problems_of(path)]
     print(*problems, f"docs: {len(files)} files, {len(problems)} problems", sep="\n")
     return 1 if problems else 0
