@@ -38,11 +38,12 @@ FrameRun::FrameRun(std::shared_ptr<gpu::Device> device, const BenchScene& scene,
     run();
 }
 
-void FrameRun::record(gpu::Recording& recording) {
-    sorted_ = record_forward({recording, cache_, plan_, frame_}, model_, inputs_);
+void FrameRun::record(const passes::Recorder& recorder) {
+    const FramePasses on{recorder, plan_, frame_, inputs_};
+    sorted_ = on.forward(model_);
     if (!train_) return;
-    record_loss(recording, cache_, frame_, inputs_, image_);
-    record_backward({recording, cache_, plan_, frame_}, model_, inputs_, sorted_, rates_);
+    on.loss(image_);
+    on.backward(model_, sorted_, rates_);
 }
 
 void FrameRun::run() {
@@ -54,12 +55,12 @@ void FrameRun::run() {
                                  .gradients = train_,
                                  .overlaid = train_,
                                  .rays = plan_.rays()},
-                                [&](gpu::Recording& recording) { record(recording); });
+                                [&](const passes::Recorder& on) { record(on); });
 }
 
 void FrameRun::run_forward() {
     gpu::Recording recording(device_->limits());
-    sorted_ = record_forward({recording, cache_, plan_, frame_}, model_, inputs_);
+    sorted_ = FramePasses{{recording, cache_}, plan_, frame_, inputs_}.forward(model_);
     executor_.run(recording);
 }
 
@@ -71,7 +72,7 @@ gpu::Recording FrameRun::only(const gpu::Command& command) const {
 
 void FrameRun::run_apart(const std::function<void(const std::string&, const std::function<void()>&)>& each) {
     gpu::Recording whole(device_->limits());
-    record(whole);
+    record({whole, cache_});
     for (const gpu::Command& command : whole.commands()) {
         const gpu::Recording alone = only(command);
         each(command.name, [&] { executor_.run(alone); });
@@ -81,7 +82,7 @@ void FrameRun::run_apart(const std::function<void(const std::string&, const std:
 void FrameRun::run_update() {
     // Takes the last pass of a whole frame, so that only one place defines the bindings of the pass.
     gpu::Recording whole(device_->limits());
-    record(whole);
+    record({whole, cache_});
     executor_.run(only(whole.commands().back()), true);
 }
 
@@ -116,7 +117,7 @@ void SortRun::run() {
     gpu::Recording recording(device_->limits());
     recording.copy(source_, 0, keys_[0], 0, uint64_t(items_) * 4);
     result_ =
-        record_sort(recording, cache_,
+        record_sort({recording, cache_},
                     {.keys = {&keys_[0], &keys_[1]},
                      .values = {&values_[0], &values_[1]},
                      .indices = {},

@@ -55,7 +55,7 @@ class FrameRun {
     std::vector<float> records() const;
 
   private:
-    void record(gpu::Recording& recording);
+    void record(const passes::Recorder& recorder);
     gpu::Recording only(const gpu::Command& command) const;
 
     std::shared_ptr<gpu::Device> device_;

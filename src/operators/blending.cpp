@@ -105,44 +105,48 @@ bool has_fourth(const BlendFrame& f, uint32_t chunk) {
     return f.channels > kChunk * chunk + 3;
 }
 
-void record_collect(gpu::Recording& recording, Context& context, const BlendFrame& f, uint32_t chunk,
-                    uint32_t mode) {
+void record_collect(const passes::Recorder& on, const BlendFrame& f, uint32_t chunk, uint32_t mode) {
     if (f.whiteners) mode |= shared::SHAPE_WHITENERS;
     // A binding that a mode does not use gets the records.
     const auto or_records = [&](const Array& array) -> const gpu::Buffer& {
         return array.buffer() ? array.buffer() : f.frame.records;
     };
-    context.cache.get<passes::CollectRecords>({{shared::SPEC_MODE, mode}})
-        .record(recording,
-                {.means = f.means.buffer(),
-                 .shapes = f.conics.buffer(),
-                 .opacities = f.opacities.buffer(),
-                 .features = f.features.buffer(),
-                 .depths = or_records(f.depths),
-                 .radii = or_records(f.radii),
-                 .records = f.frame.records,
-                 .depth_keys = f.frame.depth_keys[0],
-                 .tile_counts = f.frame.tile_counts,
-                 .counts = f.frame.counts},
-                {.splats = f.splats,
-                 .channels = f.channels,
-                 .first_channel = kChunk * chunk,
-                 .size = {f.width, f.height}});
+    on.record(passes::CollectRecords{.means = f.means.buffer(),
+                                     .shapes = f.conics.buffer(),
+                                     .opacities = f.opacities.buffer(),
+                                     .features = f.features.buffer(),
+                                     .depths = or_records(f.depths),
+                                     .radii = or_records(f.radii),
+                                     .records = f.frame.records,
+                                     .depth_keys = f.frame.depth_keys[0],
+                                     .tile_counts = f.frame.tile_counts,
+                                     .counts = f.frame.counts},
+              {.splats = f.splats,
+               .channels = f.channels,
+               .first_channel = kChunk * chunk,
+               .size = {f.width, f.height}},
+              {{shared::SPEC_MODE, mode}});
+}
+
+/// The buffers of blending a chunk.
+passes::BlendBuffers buffers_of(const BlendFrame& f, uint32_t chunk) {
+    return {.records = f.frame.records,
+            .splats = f.frame.instance_splats[1],
+            .tile_starts = f.frame.tile_starts,
+            .planes = f.planes(chunk)};
+}
+
+/// The background is added on the host.
+shared::BlendPush push_of(const passes::Recorder& on, const BlendFrame& f) {
+    return pipeline::blend_push(on.cache.config(), f.frame, {0, 0, 0});
 }
 
 /// Blends all chunks. mode: of the first chunk's collection.
-void record_blend(gpu::Recording& recording, Context& context, const BlendFrame& f, uint32_t mode) {
+void record_blend(const passes::Recorder& on, const BlendFrame& f, uint32_t mode) {
     for (uint32_t chunk = 0; chunk < f.chunks(); ++chunk) {
-        if (chunk > 0) record_collect(recording, context, f, chunk, mode | shared::COLLECT_FEATURES);
-        context.cache
-            .get<passes::Blend>(
-                blend_variant(f, has_fourth(f, chunk) ? shared::BLEND_DEPTH : shared::BLEND_COLOR))
-            .record(recording,
-                    {.records = f.frame.records,
-                     .splats = f.frame.instance_splats[1],
-                     .tile_starts = f.frame.tile_starts,
-                     .planes = f.planes(chunk)},
-                    pipeline::blend_push(context.cache.config(), f.frame, {0, 0, 0}));
+        if (chunk > 0) record_collect(on, f, chunk, mode | shared::COLLECT_FEATURES);
+        on.record(passes::Blend{buffers_of(f, chunk)}, push_of(on, f),
+                  blend_variant(f, has_fourth(f, chunk) ? shared::BLEND_DEPTH : shared::BLEND_COLOR));
     }
 }
 
@@ -274,26 +278,23 @@ std::vector<float> background_gradient(const BlendFrame& f, std::span<const floa
 }
 
 /// Adds the slots of each splat. first: the channel of the slots' first colour. mode: GATHER_* bits.
-void record_gather(gpu::Recording& recording, Context& context, const BlendFrame& f, uint32_t first,
-                   uint32_t mode) {
+void record_gather(const passes::Recorder& on, const BlendFrame& f, uint32_t first, uint32_t mode) {
     if (f.whiteners) mode |= shared::SHAPE_WHITENERS;
-    context.cache.get<passes::GatherSlots>({{shared::SPEC_MODE, mode}})
-        .record(recording,
-                {.records = f.frame.records,
-                 .slots = f.frame.slots,
-                 .tile_counts = f.frame.tile_counts,
-                 .first_instances = f.frame.first_instances,
-                 .sorted_indices = f.frame.sorted_indices[1],
-                 .means = f.means_gradient.buffer(),
-                 .shapes = f.conics_gradient.buffer(),
-                 .opacities = f.opacities_gradient.buffer(),
-                 .features = f.features_gradient.buffer(),
-                 .absolute = f.absolute_gradient.buffer()},
-                {f.splats, f.channels, first});
+    on.record(passes::GatherSlots{.records = f.frame.records,
+                                  .slots = f.frame.slots,
+                                  .tile_counts = f.frame.tile_counts,
+                                  .first_instances = f.frame.first_instances,
+                                  .sorted_indices = f.frame.sorted_indices[1],
+                                  .means = f.means_gradient.buffer(),
+                                  .shapes = f.conics_gradient.buffer(),
+                                  .opacities = f.opacities_gradient.buffer(),
+                                  .features = f.features_gradient.buffer(),
+                                  .absolute = f.absolute_gradient.buffer()},
+              {.splats = f.splats, .channels = f.channels, .first_channel = first},
+              {{shared::SPEC_MODE, mode}});
 }
 
-void record_gradient(gpu::Recording& recording, Context& context, const BlendFrame& f, uint32_t chunk,
-                     bool absolute) {
+void record_gradient(const passes::Recorder& on, const BlendFrame& f, uint32_t chunk, bool absolute) {
     uint32_t blend = shared::BLEND_BACKWARD_ALPHA, gather = chunk > 0 ? shared::GATHER_ADD : 0;
     if (absolute) {
         blend |= shared::BLEND_BACKWARD_ABSOLUTE;
@@ -303,32 +304,23 @@ void record_gradient(gpu::Recording& recording, Context& context, const BlendFra
         blend |= shared::BLEND_BACKWARD_FOURTH;
         gather |= shared::GATHER_FOURTH;
     }
-    if (f.chunks() > 1) record_collect(recording, context, f, chunk, shared::COLLECT_FEATURES);
-    context.cache.get<passes::BlendBackward>(blend_variant(f, blend))
-        .record(recording,
-                {.records = f.frame.records,
-                 .splats = f.frame.instance_splats[1],
-                 .tile_starts = f.frame.tile_starts,
-                 .planes = f.planes(chunk),
-                 .image_gradient = f.frame.image_gradient,
-                 .slots = f.frame.slots},
-                pipeline::blend_push(context.cache.config(), f.frame, {0, 0, 0}));
-    record_gather(recording, context, f, kChunk * chunk, gather);
+    if (f.chunks() > 1) record_collect(on, f, chunk, shared::COLLECT_FEATURES);
+    on.record(passes::BlendBackward{{buffers_of(f, chunk), f.frame.image_gradient, f.frame.slots}},
+              push_of(on, f), blend_variant(f, blend));
+    record_gather(on, f, kChunk * chunk, gather);
 }
 
 /// The absolute gradients of an image with several chunks. The other gradients stay: their sums in the slots are 0.
-void record_absolute(gpu::Recording& recording, Context& context, const BlendFrame& f) {
-    recording.fill(f.absolute_gradient.buffer(), 0, 0, uint64_t(f.splats) * 8);
-    context.cache.get<passes::BlendAbsolute>(blend_variant(f, f.channels))
-        .record(recording,
-                {.records = f.frame.records,
-                 .splats = f.frame.instance_splats[1],
-                 .tile_starts = f.frame.tile_starts,
-                 .features = f.features.buffer(),
-                 .pixels = f.pixel_gradients.buffer(),
-                 .slots = f.frame.slots},
-                pipeline::blend_push(context.cache.config(), f.frame, {0, 0, 0}));
-    record_gather(recording, context, f, f.channels, shared::GATHER_ADD | shared::GATHER_ABSOLUTE);
+void record_absolute(const passes::Recorder& on, const BlendFrame& f) {
+    on.recording.fill(f.absolute_gradient.buffer(), 0, 0, uint64_t(f.splats) * 8);
+    on.record(passes::BlendAbsolute{.records = f.frame.records,
+                                    .splats = f.frame.instance_splats[1],
+                                    .tile_starts = f.frame.tile_starts,
+                                    .features = f.features.buffer(),
+                                    .pixels = f.pixel_gradients.buffer(),
+                                    .slots = f.frame.slots},
+              push_of(on, f), blend_variant(f, f.channels));
+    record_gather(on, f, f.channels, shared::GATHER_ADD | shared::GATHER_ABSOLUTE);
 }
 
 }  // namespace
@@ -363,12 +355,12 @@ BlendedImage Operators::blend(const ScreenSplats& splats, const DepthOrder& orde
     f.radii.lend(*context.device, order.radii);
     const uint32_t mode = order.radii.empty() ? 0 : shared::COLLECT_RADII;
     const shared::Counts counts = pipeline::run_until_it_fits(
-        context.cache, context.executor, f.frame, request, [&](gpu::Recording& recording) {
+        context.cache, context.executor, f.frame, request, [&](const passes::Recorder& on) {
             reserve_planes(context, f);
-            recording.fill(f.frame.counts, 0, 0, sizeof(shared::Counts));
-            record_collect(recording, context, f, 0, mode);
-            pipeline::record_tile_lists(recording, context.cache, options.gradients, f.splats, f.frame);
-            record_blend(recording, context, f, mode);
+            on.recording.fill(f.frame.counts, 0, 0, sizeof(shared::Counts));
+            record_collect(on, f, 0, mode);
+            pipeline::record_tile_lists(on, options.gradients, f.splats, f.frame);
+            record_blend(on, f, mode);
         });
     give_back_splats(f);
     BlendedImage image = image_of(f);
@@ -403,8 +395,9 @@ BlendedImage Operators::blend(const ScreenSplats& splats, const TileLists& lists
     reserve_planes(context, f);
     gpu::Recording recording(context.device->limits());
     recording.fill(f.frame.counts, 0, 0, sizeof(shared::Counts));
-    record_collect(recording, context, f, 0, shared::COLLECT_LISTED);
-    record_blend(recording, context, f, shared::COLLECT_LISTED);
+    const passes::Recorder on{recording, context.cache};
+    record_collect(on, f, 0, shared::COLLECT_LISTED);
+    record_blend(on, f, shared::COLLECT_LISTED);
     f.frame.record_counts(recording);
     context.executor.run(recording);
     give_back_splats(f);
@@ -435,14 +428,14 @@ ScreenGradient Operators::blend_backward(const BlendRecord& record, std::span<co
         fill_gradient(f, chunk, features_gradient, alphas_gradient, planes);
         f.frame.image_gradient.upload(std::span<const float>(planes));
         gpu::Recording recording(device.limits());
-        record_gradient(recording, context, f, chunk, absolute && !apart);
+        record_gradient({recording, context.cache}, f, chunk, absolute && !apart);
         context.executor.run(recording);
     }
     if (apart) {
         const std::vector<float> pixel_texels = absolute_inputs(f, features_gradient, alphas_gradient);
         f.pixel_gradients.upload(device, std::span<const float>(pixel_texels));
         gpu::Recording recording(device.limits());
-        record_absolute(recording, context, f);
+        record_absolute({recording, context.cache}, f);
         context.executor.run(recording);
     }
     ScreenGradient gradient;

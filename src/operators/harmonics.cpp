@@ -61,11 +61,13 @@ std::vector<float> Operators::spherical_harmonics(const HarmonicsArrays& h) {
     upload_harmonics(device, b, h);
     b.colors.reserve(device, 4 * count);
     gpu::Recording recording(device.limits());
-    context_->cache.get<passes::Harmonics>(variant_of(h, false))
-        .record(recording,
-                {b.directions.buffer(), b.coefficients.buffer(), b.masks.buffer(), b.colors.buffer(),
-                 b.coefficients.buffer()},
-                push_of(h, shape));
+    passes::Recorder{recording, context_->cache}.record(
+        passes::Harmonics{.directions = b.directions.buffer(),
+                          .coefficients = b.coefficients.buffer(),
+                          .masks = b.masks.buffer(),
+                          .colors = b.colors.buffer(),
+                          .rgb_coefficients = b.coefficients.buffer()},
+        push_of(h, shape), variant_of(h, false));
     context_->executor.run(recording);
     b.give_back();
     return b.colors.download<float>(count);
@@ -89,11 +91,15 @@ HarmonicsGradient Operators::spherical_harmonics_backward(const HarmonicsArrays&
     b.coefficients_gradient.reserve(device, h.coefficients.size_bytes());
     b.directions_gradient.reserve(device, direction_gradients ? h.directions.size_bytes() : 12);
     gpu::Recording recording(device.limits());
-    context_->cache.get<passes::HarmonicsBackward>(variant_of(h, direction_gradients))
-        .record(recording,
-                {b.directions.buffer(), b.coefficients.buffer(), b.masks.buffer(), b.colors.buffer(),
-                 b.coefficients_gradient.buffer(), b.directions_gradient.buffer(), b.coefficients.buffer()},
-                push_of(h, shape));
+    passes::Recorder{recording, context_->cache}.record(
+        passes::HarmonicsBackward{.directions = b.directions.buffer(),
+                                  .coefficients = b.coefficients.buffer(),
+                                  .masks = b.masks.buffer(),
+                                  .colors_gradient = b.colors.buffer(),
+                                  .coefficients_gradient = b.coefficients_gradient.buffer(),
+                                  .directions_gradient = b.directions_gradient.buffer(),
+                                  .rgb_coefficients = b.coefficients.buffer()},
+        push_of(h, shape), variant_of(h, direction_gradients));
     context_->executor.run(recording);
     b.give_back();
     out.coefficients = b.coefficients_gradient.download<float>(h.coefficients.size());

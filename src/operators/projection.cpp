@@ -103,22 +103,20 @@ void upload_gradient(gpu::Device& device, gpu::Recording& recording, operators::
 }
 
 /// Adds the items of each row, in blocks and then blocks of blocks. Returns the buffer that holds the sums.
-operators::Array& reduce_rows(gpu::Recording& recording, operators::Context& context, uint32_t items,
+operators::Array& reduce_rows(const passes::Recorder& on, operators::Context& context, uint32_t items,
                               uint32_t rows) {
     ProjectionBuffers& b = *context.projection;
-    const auto reduce = context.cache.get<passes::Reduce>();
     operators::Array *from = &b.view_sums, *to = &b.reduced;
     const uint32_t most = (items + kReduceBlock - 1) / kReduceBlock;
     b.reduced.reserve(*context.device, uint64_t(4) * rows * most);
     b.counts.reserve(*context.device, sizeof(shared::Counts));
     for (;;) {
-        reduce.record(recording,
-                      {.source = from->buffer(), .sums = to->buffer(), .counts = b.counts.buffer()},
-                      {.items = items,
-                       .block = kReduceBlock,
-                       .target = shared::REDUCE_TO_SUMS,
-                       .rows = rows,
-                       .scale = 1});
+        on.record(passes::Reduce{.source = from->buffer(), .sums = to->buffer(), .counts = b.counts.buffer()},
+                  {.items = items,
+                   .block = kReduceBlock,
+                   .target = shared::REDUCE_TO_SUMS,
+                   .rows = rows,
+                   .scale = 1});
         items = (items + kReduceBlock - 1) / kReduceBlock;
         std::swap(from, to);
         if (items == 1) return *from;
@@ -156,12 +154,18 @@ ProjectedSplats Operators::project(const SplatArrays& splats, const ViewArrays& 
     b.compensations.reserve(device, options.compensations ? 4 * pairs : 4);
     gpu::Recording recording(device.limits());
     const uint32_t bits = splats.opacities.empty() ? 0 : shared::VIEWS_OPACITIES;
-    context_->cache.get<passes::ProjectViews>(variant_of(splats, options, options.compensations, bits))
-        .record(recording,
-                {b.views.buffer(), b.means.buffer(), b.shapes.buffer(), b.scales.buffer(),
-                 b.opacities.buffer(), b.radii.buffer(), b.means2d.buffer(), b.depths.buffer(),
-                 b.conics.buffer(), b.compensations.buffer()},
-                push_of(splats, views, options));
+    passes::Recorder{recording, context_->cache}.record(
+        passes::ProjectViews{.views = b.views.buffer(),
+                             .means = b.means.buffer(),
+                             .shapes = b.shapes.buffer(),
+                             .scales = b.scales.buffer(),
+                             .opacities = b.opacities.buffer(),
+                             .radii = b.radii.buffer(),
+                             .means2d = b.means2d.buffer(),
+                             .depths = b.depths.buffer(),
+                             .conics = b.conics.buffer(),
+                             .compensations = b.compensations.buffer()},
+        push_of(splats, views, options), variant_of(splats, options, options.compensations, bits));
     context_->executor.run(recording);
     b.give_back();
     ProjectedSplats out;
@@ -211,16 +215,22 @@ SplatGradient Operators::project_backward(const SplatArrays& splats, const ViewA
     const uint32_t rows = shared::VIEW_GRADIENT_FLOATS * uint32_t(c),
                    subgroups = groups[0] * groups[1] * (config.element_group / config.subgroup);
     b.view_sums.reserve(device, view_gradients ? uint64_t(4) * rows * subgroups : 4);
-    context_->cache
-        .get<passes::ProjectViewsBackward>(
-            variant_of(splats, options, compensations, view_gradients ? shared::VIEWS_GRADIENTS : 0))
-        .record(recording,
-                {b.views.buffer(), b.means.buffer(), b.shapes.buffer(), b.scales.buffer(), b.radii.buffer(),
-                 b.means2d.buffer(), b.depths.buffer(), b.conics.buffer(), b.compensations.buffer(),
-                 b.means_gradient.buffer(), b.shapes_gradient.buffer(), b.scales_gradient.buffer(),
-                 b.view_sums.buffer()},
-                push);
-    operators::Array* sums = view_gradients ? &reduce_rows(recording, *context_, subgroups, rows) : nullptr;
+    const passes::Recorder on{recording, context_->cache};
+    on.record(passes::ProjectViewsBackward{.views = b.views.buffer(),
+                                           .means = b.means.buffer(),
+                                           .shapes = b.shapes.buffer(),
+                                           .scales = b.scales.buffer(),
+                                           .radii = b.radii.buffer(),
+                                           .means2d_gradient = b.means2d.buffer(),
+                                           .depths_gradient = b.depths.buffer(),
+                                           .conics_gradient = b.conics.buffer(),
+                                           .compensations_gradient = b.compensations.buffer(),
+                                           .means_gradient = b.means_gradient.buffer(),
+                                           .shapes_gradient = b.shapes_gradient.buffer(),
+                                           .scales_gradient = b.scales_gradient.buffer(),
+                                           .view_sums = b.view_sums.buffer()},
+              push, variant_of(splats, options, compensations, view_gradients ? shared::VIEWS_GRADIENTS : 0));
+    operators::Array* sums = view_gradients ? &reduce_rows(on, *context_, subgroups, rows) : nullptr;
     context_->executor.run(recording);
     b.give_back();
     out.means = b.means_gradient.download<float>(3 * n);

@@ -153,4 +153,17 @@ class PassCache {
     std::map<std::pair<std::string_view, Constants>, const gpu::Pipeline*> pipelines_;
 };
 
+/// Where passes are recorded.
+struct Recorder {
+    gpu::Recording& recording;
+    PassCache& cache;
+
+    /// variant: see PassCache::get. name: of the timing.
+    template <class Definition>
+    void record(const Definition& buffers, const typename Pass<Definition>::Push& push,
+                const Constants& variant = {}, const char* name = Definition::shader) const {
+        cache.get<Definition>(variant).record(recording, buffers, push, name);
+    }
+};
+
 }  // namespace ewa::passes

@@ -7,20 +7,22 @@ namespace ewa::passes {
 
 // Projection, and its gradient with the optimiser's step.
 
-/// Projects every splat into pixels. Adds to Counts.skipped_nonfinite. Variant: SPEC_SH_DEGREE, SPEC_KERNEL,
-/// SPEC_MODE (0 or PROJECT_DEBUG).
-struct Project {
-    static constexpr char shader[] = "project";
+/// What the projections read and write. They add to Counts.skipped_nonfinite.
+struct ProjectBuffers {
     using Work = PerElement<&shared::ProjectPush::splats>;
     gpu::BufferPart params, camera, records, depth_keys, tile_counts, counts;
 };
 
-/// Prepares splats for rays. rays: how a ray meets each. Adds to Counts.skipped_nonfinite. Variant: SPEC_SH_DEGREE,
-/// SPEC_KERNEL, SPEC_MODE (0 or PROJECT_RAYS_DEEP).
-struct ProjectRays {
+/// Projects every splat into pixels. Variant: SPEC_SH_DEGREE, SPEC_KERNEL, SPEC_MODE (0 or PROJECT_DEBUG).
+struct Project : ProjectBuffers {
+    static constexpr char shader[] = "project";
+};
+
+/// Prepares splats for rays. rays: how a ray meets each. Variant: SPEC_SH_DEGREE, SPEC_KERNEL, SPEC_MODE (0 or
+/// PROJECT_RAYS_DEEP).
+struct ProjectRays : ProjectBuffers {
     static constexpr char shader[] = "project_rays";
-    using Work = PerElement<&shared::ProjectPush::splats>;
-    gpu::BufferPart params, camera, records, depth_keys, tile_counts, counts, rays;
+    gpu::BufferPart rays;
 };
 
 /// What the gradient of a projection, fused with Adam, reads and writes.
@@ -91,12 +93,9 @@ struct MotionUpdate {
     gpu::BufferPart sums, motions, moments1, moments2, bases, counts;
 };
 
-/// Projects every splat as a sphere. Adds to Counts.skipped_nonfinite. Variant: SPEC_SH_DEGREE, SPEC_MODE (0 or
-/// PROJECT_DEBUG).
-struct ProjectPoints {
+/// Projects every splat as a sphere. Variant: SPEC_SH_DEGREE, SPEC_MODE (0 or PROJECT_DEBUG).
+struct ProjectPoints : ProjectBuffers {
     static constexpr char shader[] = "project_points";
-    using Work = PerElement<&shared::ProjectPush::splats>;
-    gpu::BufferPart params, camera, records, depth_keys, tile_counts, counts;
 };
 
 /// Gradient of ProjectPoints, fused with Adam. Variant: SPEC_SH_DEGREE, SPEC_MODE (UPDATE_* bits without
@@ -164,11 +163,15 @@ struct RadixCount {
     gpu::BufferPart keys, counters, counts;
 };
 
+/// What moving the pairs of a radix pass reads and writes.
+struct ScatterBuffers {
+    gpu::BufferPart keys, values, counters, bases, counts, keys_out, values_out, indices, indices_out;
+};
+
 /// Moves the pairs of a radix pass. Variant: SPEC_RADIX_BITS, SPEC_MODE (SORT_* bits).
-struct RadixScatter {
+struct RadixScatter : ScatterBuffers {
     static constexpr char shader[] = "radix_scatter";
     using Work = PerSortLane;
-    gpu::BufferPart keys, values, counters, bases, counts, keys_out, values_out, indices, indices_out;
 };
 
 /// RadixCount with the counting in shared memory. Variant: SPEC_RADIX_BITS.
@@ -179,10 +182,9 @@ struct RadixCountRanked {
 };
 
 /// RadixScatter with the ranking in shared memory. Variant: SPEC_RADIX_BITS, SPEC_MODE (SORT_* bits).
-struct RadixScatterRanked {
+struct RadixScatterRanked : ScatterBuffers {
     static constexpr char shader[] = "radix_scatter_ranked";
     using Work = PerRankedBlock;
-    gpu::BufferPart keys, values, counters, bases, counts, keys_out, values_out, indices, indices_out;
 };
 
 /// Writes the (splat, tile) instances in depth order, each layer for a strip of tile rows. Variant: SPEC_MODE
@@ -210,19 +212,25 @@ struct TileStarts {
 
 // Blending of splats into image planes, and its gradient.
 
-/// Blends the splats of every tile into the image planes. Variant: SPEC_MODE (BLEND_*).
-struct Blend {
-    static constexpr char shader[] = "blend";
+/// What blending reads and writes.
+struct BlendBuffers {
     using Work = PerTile;
     gpu::BufferPart records, splats, tile_starts, planes;
 };
 
-/// Gradient of blending, written to the slot of every (splat, tile) instance. Variant: SPEC_MODE
-/// (BLEND_BACKWARD_* bits).
-struct BlendBackward {
+/// What the gradients of blending read and write: planes, and the slot of every (splat, tile) instance.
+struct BlendBackwardBuffers : BlendBuffers {
+    gpu::BufferPart image_gradient, slots;
+};
+
+/// Blends the splats of every tile into the image planes. Variant: SPEC_MODE (BLEND_*).
+struct Blend : BlendBuffers {
+    static constexpr char shader[] = "blend";
+};
+
+/// Gradient of Blend. Variant: SPEC_MODE (BLEND_BACKWARD_* bits).
+struct BlendBackward : BlendBackwardBuffers {
     static constexpr char shader[] = "blend_backward";
-    using Work = PerTile;
-    gpu::BufferPart records, splats, tile_starts, planes, image_gradient, slots;
 };
 
 /// Absolute gradients by the means over any number of channels, in slots whose other floats are 0. Variant: SPEC_MODE (the
@@ -234,24 +242,20 @@ struct BlendAbsolute {
 };
 
 /// Blends the nearest spheres of every pixel. Variant: SPEC_NEAREST, SPEC_MODE (BLEND_COLOR, BLEND_DEPTH or BLEND_COUNT).
-struct BlendPoints {
+struct BlendPoints : BlendBuffers {
     static constexpr char shader[] = "blend_points";
-    using Work = PerTile;
-    gpu::BufferPart records, splats, tile_starts, planes;
 };
 
 /// Gradient of BlendPoints, in slots as those of BlendBackward. Variant: SPEC_NEAREST, SPEC_MODE (0 or
 /// BLEND_BACKWARD_ABSOLUTE).
-struct BlendPointsBackward {
+struct BlendPointsBackward : BlendBackwardBuffers {
     static constexpr char shader[] = "blend_points_backward";
-    using Work = PerTile;
-    gpu::BufferPart records, splats, tile_starts, planes, image_gradient, slots;
 };
 
 /// What the passes along rays read and write. They add to Counts.unfinished.
-struct AlongRays {
+struct AlongRays : BlendBuffers {
     using Work = PerStrip;
-    gpu::BufferPart records, splats, tile_starts, planes, rays, camera, counts;
+    gpu::BufferPart rays, camera, counts;
 };
 
 /// Blends the splats of every ray in their order along it. Variant: SPEC_KERNEL, SPEC_MODE (BLEND_COLOR, BLEND_DEPTH).
@@ -266,9 +270,9 @@ struct MarchRays : AlongRays {
 
 /// What the gradients of passes along rays read and write, in a strip of each tile. They add to the slot of every
 /// (splat, tile) instance, and to Counts.unfinished.
-struct AlongRaysBackward {
+struct AlongRaysBackward : BlendBackwardBuffers {
     using Work = StripPerTile;
-    gpu::BufferPart records, splats, tile_starts, planes, image_gradient, slots, rays, camera, counts;
+    gpu::BufferPart rays, camera, counts;
 };
 
 /// Gradient of BlendRays. Variant: SPEC_KERNEL.

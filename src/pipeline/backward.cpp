@@ -12,56 +12,6 @@ namespace {
 // matter, except where the loss is flat: all exposures change one way, and the splats the other way.
 constexpr float kPull = 1e-3f;
 
-/// Writes frame.planes with the exposure applied to frame.exposed.
-void record_expose(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame,
-                   const ExposureUse& use) {
-    cache.get<passes::Expose>().record(
-        recording, {.image = frame.planes, .exposures = use.exposures->values, .exposed = frame.exposed},
-        {.image = frame.sizes.image(), .photo = use.photo});
-}
-
-/// Turns frame.image_gradient from dL/d(exposed image) into dL/d(image). The exposure takes a step of Adam.
-void record_expose_backward(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame,
-                            const ExposureUse& use) {
-    const Exposures& e = *use.exposures;
-    cache.get<passes::ExposeBackward>().record(recording,
-                                               {.image = frame.planes,
-                                                .exposures = e.values,
-                                                .image_gradient = frame.image_gradient,
-                                                .sums = frame.exposure_sums},
-                                               {.image = frame.sizes.image(), .photo = use.photo});
-    const auto [bias1, bias2] = adam_biases(use.visit);
-    cache.get<passes::ExposureUpdate>().record(recording,
-                                               {.sums = frame.exposure_sums,
-                                                .exposures = e.values,
-                                                .moments1 = e.moments1,
-                                                .moments2 = e.moments2,
-                                                .counts = frame.counts},
-                                               {.photo = use.photo,
-                                                .blocks = frame.sizes.exposure_blocks,
-                                                .rate = use.rate,
-                                                .pull = kPull,
-                                                .bias1 = bias1,
-                                                .bias2 = bias2,
-                                                .instance_capacity = frame.instance_capacity});
-}
-
-/// Adds each row of frame.partials, in two steps. target: shared::REDUCE_TO_*.
-void record_mean(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame,
-                 uint32_t target, uint32_t rows, float scale) {
-    const Sizes& s = frame.sizes;
-    const auto reduce = cache.get<passes::Reduce>();
-    reduce.record(recording, {.source = frame.partials, .sums = frame.reduced, .counts = frame.counts},
-                  {.items = s.partials,
-                   .block = s.reduce_block,
-                   .target = shared::REDUCE_TO_SUMS,
-                   .rows = rows,
-                   .scale = 1});
-    reduce.record(
-        recording, {.source = frame.reduced, .sums = frame.partials, .counts = frame.counts},
-        {.items = s.reduce_blocks, .block = s.reduce_blocks, .target = target, .rows = rows, .scale = scale});
-}
-
 shared::UpdatePush update_push(const Model& model, const FrameBuffers& frame, const Rates& rates) {
     const auto [bias1, bias2] = adam_biases(rates.step);
     return {.splats = model.splats,
@@ -143,9 +93,44 @@ double loss_of(const shared::Counts& counts) {
     return loss_of(double(counts.l1), double(counts.ssim));
 }
 
-void record_loss(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame,
-                 const FrameInputs& inputs, const gpu::Buffer& photo, bool masked,
-                 const ExposureUse* exposure) {
+/// Turns frame.image_gradient from dL/d(exposed image) into dL/d(image). The exposure takes a step of Adam.
+void FramePasses::expose_backward(const ExposureUse& use) const {
+    const Exposures& e = *use.exposures;
+    record(passes::ExposeBackward{.image = frame.planes,
+                                  .exposures = e.values,
+                                  .image_gradient = frame.image_gradient,
+                                  .sums = frame.exposure_sums},
+           {.image = frame.sizes.image(), .photo = use.photo});
+    const auto [bias1, bias2] = adam_biases(use.visit);
+    record(passes::ExposureUpdate{.sums = frame.exposure_sums,
+                                  .exposures = e.values,
+                                  .moments1 = e.moments1,
+                                  .moments2 = e.moments2,
+                                  .counts = frame.counts},
+           {.photo = use.photo,
+            .blocks = frame.sizes.exposure_blocks,
+            .rate = use.rate,
+            .pull = kPull,
+            .bias1 = bias1,
+            .bias2 = bias2,
+            .instance_capacity = frame.instance_capacity});
+}
+
+/// Adds each row of frame.partials, in two steps. target: shared::REDUCE_TO_*.
+void FramePasses::mean_of_partials(uint32_t target, uint32_t rows, float scale) const {
+    const Sizes& s = frame.sizes;
+    record(passes::Reduce{.source = frame.partials, .sums = frame.reduced, .counts = frame.counts},
+           {.items = s.partials,
+            .block = s.reduce_block,
+            .target = shared::REDUCE_TO_SUMS,
+            .rows = rows,
+            .scale = 1});
+    record(
+        passes::Reduce{.source = frame.reduced, .sums = frame.partials, .counts = frame.counts},
+        {.items = s.reduce_blocks, .block = s.reduce_blocks, .target = target, .rows = rows, .scale = scale});
+}
+
+void FramePasses::loss(const gpu::Buffer& photo, bool masked, const ExposureUse* exposure) const {
     const shared::ImageLayout layout = frame.sizes.image();
     const Band whole{.rows = layout.size[1], .own_end = layout.size[1]};
     const Band& band = inputs.band.rows > 0 ? inputs.band : whole;
@@ -161,156 +146,118 @@ void record_loss(gpu::Recording& recording, passes::PassCache& cache, const Fram
     const gpu::Buffer& image = masked ? frame.masked : render;
     const passes::Constants colors{
         {shared::SPEC_COLOR_FLOATS, photo.texel() == gpu::Texel::rgba32f ? 1u : 0u}};
-    if (exposure) record_expose(recording, cache, frame, *exposure);
+    if (exposure)
+        record(
+            passes::Expose{
+                .image = frame.planes, .exposures = exposure->exposures->values, .exposed = frame.exposed},
+            {.image = layout, .photo = exposure->photo});
     if (masked)
-        cache.get<passes::MaskPictures>(colors).record(
-            recording, {.photo = photo, .image = render, .target = frame.target, .masked = frame.masked},
-            mask);
+        record(
+            passes::MaskPictures{
+                .photo = photo, .image = render, .target = frame.target, .masked = frame.masked},
+            mask, colors);
     else
-        cache.get<passes::UnpackTarget>(colors).record(
-            recording, {.photo = photo, .planes = frame.target},
-            {.background = {inputs.background[0], inputs.background[1], inputs.background[2]},
-             .image = layout,
-             .first_pixel = first_pixel});
-    cache.get<passes::LossColumns>().record(
-        recording, {.image = image, .target = frame.target, .moments = frame.moments}, push);
-    cache.get<passes::LossRows>().record(
-        recording, {.moments = frame.moments, .derivatives = frame.derivatives, .partials = frame.partials},
+        record(passes::UnpackTarget{.photo = photo, .planes = frame.target},
+               {.background = {inputs.background[0], inputs.background[1], inputs.background[2]},
+                .image = layout,
+                .first_pixel = first_pixel},
+               colors);
+    record(passes::LossColumns{.image = image, .target = frame.target, .moments = frame.moments}, push);
+    record(
+        passes::LossRows{
+            .moments = frame.moments, .derivatives = frame.derivatives, .partials = frame.partials},
         push);
-    record_mean(recording, cache, frame, shared::REDUCE_TO_SSIM, 1, float(share));
-    cache.get<passes::LossBackwardColumns>().record(
-        recording, {.derivatives = frame.derivatives, .blurred = frame.blurred}, push);
-    cache.get<passes::LossBackwardRows>().record(recording,
-                                                 {.blurred = frame.blurred,
-                                                  .image = image,
-                                                  .target = frame.target,
-                                                  .image_gradient = frame.image_gradient,
-                                                  .partials = frame.partials},
-                                                 push);
+    mean_of_partials(shared::REDUCE_TO_SSIM, 1, float(share));
+    record(passes::LossBackwardColumns{.derivatives = frame.derivatives, .blurred = frame.blurred}, push);
+    record(passes::LossBackwardRows{.blurred = frame.blurred,
+                                    .image = image,
+                                    .target = frame.target,
+                                    .image_gradient = frame.image_gradient,
+                                    .partials = frame.partials},
+           push);
     if (masked)
-        cache.get<passes::MaskGradient>(colors).record(
-            recording, {.photo = photo, .image_gradient = frame.image_gradient}, mask);
-    record_mean(recording, cache, frame, shared::REDUCE_TO_L1, 2, float(share));
-    if (exposure) record_expose_backward(recording, cache, frame, *exposure);
+        record(passes::MaskGradient{.photo = photo, .image_gradient = frame.image_gradient}, mask, colors);
+    mean_of_partials(shared::REDUCE_TO_L1, 2, float(share));
+    if (exposure) expose_backward(*exposure);
 }
 
 namespace {
 
-/// A driver may limit the iterations of an invocation: each strip of the tiles has its own dispatch.
-template <class Backward>
-void record_rays_backward(const FramePasses& on, const passes::Pass<Backward>& backward,
-                          const FrameInputs& inputs, const Sorted& sorted) {
-    const FrameBuffers& frame = on.frame;
-    const shared::BlendPush blend = blend_push(on.cache.config(), frame, inputs.background);
-    on.recording.fill(frame.slots, 0, 0, frame.sizes.slots);
-    for (uint32_t strip = 0; strip < passes::strips_of(backward.config); ++strip)
-        backward.record(on.recording,
-                        {{.records = frame.records,
-                          .splats = *sorted.splats,
-                          .tile_starts = frame.tile_starts,
-                          .planes = frame.planes,
-                          .image_gradient = frame.image_gradient,
-                          .slots = frame.slots,
-                          .rays = frame.rays,
-                          .camera = camera_part(inputs),
-                          .counts = frame.counts}},
-                        {.blend = blend, .samples = inputs.samples, .strip = strip});
-}
-
-/// The gradient of integration along rays, to model.moments1.
-void record_backward_of_rays(const FramePasses& on, const Model& model, const FrameInputs& inputs,
-                             const Sorted& sorted) {
-    const auto& [recording, cache, plan, frame] = on;
-    const gpu::SpecConstant kernel{shared::SPEC_KERNEL, uint32_t(plan.kernel)};
-    if (plan.integrator == Integrator::ray)
-        record_rays_backward(on, cache.get<passes::BlendRaysBackward>({kernel}), inputs, sorted);
-    else
-        record_rays_backward(on,
-                             cache.get<passes::MarchRaysBackward>(
-                                 {kernel, {shared::SPEC_MODE, march_chunk(inputs.samples, 8)}}),
-                             inputs, sorted);
-    cache.get<passes::GatherRays>({{shared::SPEC_SH_DEGREE, plan.evaluated_degree(inputs.sh_degree)}, kernel})
-        .record(recording,
-                {.params = model.params,
-                 .camera = camera_part(inputs),
-                 .records = frame.records,
-                 .slots = frame.slots,
-                 .tile_counts = frame.tile_counts,
-                 .first_instances = frame.first_instances,
-                 .counts = frame.counts,
-                 .sorted_indices = *sorted.indices,
-                 .gradients = model.moments1},
-                update_push(model, frame, {}));
-}
-
-/// Blending: passes::BlendBackward or BlendPointsBackward.
-template <class Blending>
-void record_blend_backward_as(const FramePasses& on, const FrameInputs& inputs, const Sorted& sorted,
-                              const passes::Constants& variant) {
-    const auto& [recording, cache, plan, frame] = on;
-    cache.get<Blending>(variant).record(recording,
-                                        {.records = frame.records,
-                                         .splats = *sorted.splats,
-                                         .tile_starts = frame.tile_starts,
-                                         .planes = frame.planes,
-                                         .image_gradient = frame.image_gradient,
-                                         .slots = frame.slots},
-                                        blend_push(cache.config(), frame, inputs.background));
-}
-
-passes::UpdateBuffers update_buffers(const Plan& plan, const Model& model, const FrameBuffers& frame,
-                                     const CameraUse& camera, const Sorted& sorted) {
-    // Packed moments and a gradient alone have no buffer of second moments, and a gradient no statistics. The kernel
-    // does not use those bindings, but they need a buffer.
-    const gpu::Buffer& moments2 = model.second_moments();
-    const gpu::Buffer& statistics = plan.statistics ? model.statistics : frame.partials;
-    return {.params = model.params,
-            .camera = {*camera.buffer, camera.offset, sizeof(shared::CameraBlock)},
-            .records = frame.records,
-            .slots = frame.slots,
-            .moments1 = model.moments1,
-            .moments2 = moments2,
-            .tile_counts = frame.tile_counts,
-            .first_instances = frame.first_instances,
-            .counts = frame.counts,
-            .params_out = model.params,
-            .moments1_out = model.moments1,
-            .moments2_out = moments2,
-            .statistics = statistics,
-            .sorted_indices = *sorted.indices};
+passes::BlendBackwardBuffers blend_buffers(const FrameBuffers& frame, const Sorted& sorted) {
+    return {{.records = frame.records,
+             .splats = *sorted.splats,
+             .tile_starts = frame.tile_starts,
+             .planes = frame.planes},
+            frame.image_gradient,
+            frame.slots};
 }
 
 }  // namespace
 
-void record_blend_backward(const FramePasses& on, const FrameInputs& inputs, const Sorted& sorted) {
-    record_blend_backward_as<passes::BlendBackward>(
-        on, inputs, sorted,
-        {{shared::SPEC_MODE, on.plan.absolute ? shared::BLEND_BACKWARD_ABSOLUTE : 0},
-         {shared::SPEC_KERNEL, uint32_t(on.plan.kernel)}});
+/// A driver may limit the iterations of an invocation: each strip of the tiles has its own dispatch.
+template <class Backward>
+void FramePasses::integrate_backward(const Sorted& sorted, const passes::Constants& variant) const {
+    const shared::BlendPush blend = blend_push(cache.config(), frame, inputs.background);
+    recording.fill(frame.slots, 0, 0, frame.sizes.slots);
+    for (uint32_t strip = 0; strip < passes::strips_of(cache.config()); ++strip)
+        record(Backward{{blend_buffers(frame, sorted), frame.rays, camera(), frame.counts}},
+               {.blend = blend, .samples = inputs.samples, .strip = strip}, variant);
 }
 
-void record_backward(const FramePasses& on, const Model& model, const FrameInputs& inputs,
-                     const Sorted& sorted, const Rates& rates, const MotionUse* motion) {
-    if (on.plan.rays()) return record_backward_of_rays(on, model, inputs, sorted);
-    const auto& [recording, cache, plan, frame] = on;
-    passes::Constants updating{{shared::SPEC_SH_DEGREE, plan.evaluated_degree(inputs.sh_degree)},
-                               {shared::SPEC_MODE, update_mode(plan)}};
-    const passes::UpdateBuffers buffers = update_buffers(plan, model, frame, inputs.camera, sorted);
+/// Gradients of blending, which are left in frame.slots.
+void FramePasses::blend_backward(const Sorted& sorted) const {
+    const passes::BlendBackwardBuffers buffers = blend_buffers(frame, sorted);
+    const shared::BlendPush push = blend_push(cache.config(), frame, inputs.background);
+    const gpu::SpecConstant mode{shared::SPEC_MODE, plan.absolute ? shared::BLEND_BACKWARD_ABSOLUTE : 0};
+    const uint32_t chunk = march_chunk(inputs.samples, 8);
+    if (plan.integrator == Integrator::ray)
+        integrate_backward<passes::BlendRaysBackward>(sorted, {kernel()});
+    else if (plan.integrator == Integrator::march)
+        integrate_backward<passes::MarchRaysBackward>(sorted, {kernel(), {shared::SPEC_MODE, chunk}});
+    else if (plan.points())
+        record(passes::BlendPointsBackward{buffers}, push, {mode, {shared::SPEC_NEAREST, plan.nearest}});
+    else
+        record(passes::BlendBackward{buffers}, push, {mode, kernel()});
+}
+
+void FramePasses::backward(const Model& model, const Sorted& sorted, const Rates& rates,
+                           const MotionUse* motion) const {
+    blend_backward(sorted);
     const shared::UpdatePush push = update_push(model, frame, rates);
-    if (plan.points()) {
-        record_blend_backward_as<passes::BlendPointsBackward>(
-            on, inputs, sorted,
-            {{shared::SPEC_MODE, plan.absolute ? shared::BLEND_BACKWARD_ABSOLUTE : 0},
-             {shared::SPEC_NEAREST, plan.nearest}});
-        cache.get<passes::UpdatePoints>(updating).record(recording, {buffers}, push);
-        return;
-    }
-    record_blend_backward(on, inputs, sorted);
-    updating.push_back({shared::SPEC_KERNEL, uint32_t(plan.kernel)});
-    const gpu::Buffer& motion_sums = plan.motion ? frame.motion_sums : frame.partials;
-    cache.get<passes::Update>(updating).record(recording, {buffers, motion_sums}, push);
-    if (plan.motion) record_motion_sums(recording, cache, frame);
-    if (motion) record_motion_update(recording, cache, frame, *motion);
+    if (plan.rays())
+        return record(passes::GatherRays{.params = model.params,
+                                         .camera = camera(),
+                                         .records = frame.records,
+                                         .slots = frame.slots,
+                                         .tile_counts = frame.tile_counts,
+                                         .first_instances = frame.first_instances,
+                                         .counts = frame.counts,
+                                         .sorted_indices = *sorted.indices,
+                                         .gradients = model.moments1},
+                      push, {degree(), kernel()});
+    const gpu::Buffer& moments2 = model.second_moments();
+    // Packed moments and a gradient alone have no buffer of second moments, and a gradient no statistics. The kernel
+    // does not use those bindings, but they need a buffer.
+    const passes::UpdateBuffers buffers{.params = model.params,
+                                        .camera = camera(),
+                                        .records = frame.records,
+                                        .slots = frame.slots,
+                                        .moments1 = model.moments1,
+                                        .moments2 = moments2,
+                                        .tile_counts = frame.tile_counts,
+                                        .first_instances = frame.first_instances,
+                                        .counts = frame.counts,
+                                        .params_out = model.params,
+                                        .moments1_out = model.moments1,
+                                        .moments2_out = moments2,
+                                        .statistics = plan.statistics ? model.statistics : frame.partials,
+                                        .sorted_indices = *sorted.indices};
+    const gpu::SpecConstant mode{shared::SPEC_MODE, update_mode(plan)};
+    if (plan.points()) return record(passes::UpdatePoints{buffers}, push, {degree(), mode});
+    record(passes::Update{buffers, plan.motion ? frame.motion_sums : frame.partials}, push,
+           {degree(), mode, kernel()});
+    if (plan.motion) record_motion_sums(*this, frame);
+    if (motion) record_motion_update(*this, frame, *motion);
 }
 
 }  // namespace ewa::pipeline

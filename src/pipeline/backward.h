@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Loss and backward passes: from image planes to moved parameters, or to their gradient.
+// What the loss and the backward passes of FramePasses read besides a frame.
 //
 // Each training image may have an exposure: an affine map of colours, learned beside the splats. The
 // published code of 3DGS does the same for captures with automatic exposure; see include/ewa/exposure.h.
@@ -47,26 +47,6 @@ struct Rates {
     // With plan.regularised: d(loss)/d(opacity) and d(loss)/d(scale along one axis) of every splat.
     float opacity_weight = 0, scale_weight = 0;
 };
-
-/// Leaves the parts of the loss in Counts and dL/d(image) in frame.image_gradient. The loss is that of the whole view: those
-/// of its bands add up to it, and so do their gradients.
-/// photo: width * height texels, RGBA. Its alpha composites it over the background or, if `masked`, is the
-/// weight of each pixel; `frame` must then be reserved with masks.
-/// exposure: that of the training image, if exposures are learned. It takes its own step of Adam; `frame`
-/// must be reserved with exposure.
-void record_loss(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame,
-                 const FrameInputs& inputs, const gpu::Buffer& photo, bool masked = false,
-                 const ExposureUse* exposure = nullptr);
-
-/// Gradients of blending and projection. With plan.adam it moves the model; without, it writes
-/// the gradient to model.moments1.
-/// With plan.motion, the gradient of the camera's motion is in frame.motion_reduced, which must be reserved for it.
-/// motion: that of the training image's camera, if motions are learned. It takes its own step of Adam.
-void record_backward(const FramePasses& on, const Model& model, const FrameInputs& inputs,
-                     const Sorted& sorted, const Rates& rates, const MotionUse* motion = nullptr);
-
-/// Gradients of blending, which are left in frame.slots. Not for points and rays.
-void record_blend_backward(const FramePasses& on, const FrameInputs& inputs, const Sorted& sorted);
 
 /// SPEC_MODE of the update: UPDATE_* bits.
 uint32_t update_mode(const Plan& plan);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The forward frame: from parameters to image planes. The order of its passes is written here only.
+// A frame: from parameters to image planes, to the loss, and to moved parameters or their gradient. The order of its passes
+// is written in FramePasses only.
 #pragma once
 #include <array>
 
@@ -10,13 +11,11 @@
 
 namespace ewa::pipeline {
 
-/// What the passes of a frame are recorded with.
-struct FramePasses {
-    gpu::Recording& recording;
-    passes::PassCache& cache;
-    const Plan& plan;
-    const FrameBuffers& frame;
-};
+struct ExposureUse;
+struct ListPlace;
+struct MotionUse;
+struct Rates;
+struct ViewBuffers;
 
 /// Which of the ping-pong buffers hold the sorted instances after the forward frame.
 struct Sorted {
@@ -24,25 +23,70 @@ struct Sorted {
     const gpu::Buffer* indices = nullptr;  // with gradients: each emitted instance's sorted index and slot
 };
 
-/// Records: project, depth order, instances, tile order, tile starts, blend. `frame` must be reserved for the
-/// model's splats and the camera's size. After the submission, Counts.instances is the number of instances
-/// needed. If that exceeds frame.instance_capacity, the image is empty: repeat the frame with more capacity.
-Sorted record_forward(const FramePasses& on, const Model& model, const FrameInputs& inputs);
+/// Records the passes of a frame.
+struct FramePasses : passes::Recorder {
+    const Plan& plan;
+    const FrameBuffers& frame;
+    const FrameInputs& inputs;
 
-/// The first part of a forward frame: clears the counts and projects the model's splats.
-void record_projection(const FramePasses& on, const Model& model, const FrameInputs& inputs);
+    /// Project, depth order, instances, tile order, tile starts, blend. `frame` must be reserved for the
+    /// model's splats and the camera's size. After the submission, Counts.instances is the number of instances
+    /// needed. If that exceeds frame.instance_capacity, the image is empty: repeat the frame with more capacity.
+    Sorted forward(const Model& model) const;
+    /// The first part of forward: clears the counts and projects the model's splats.
+    void project(const Model& model) const;
+    /// The rest of forward: from frame's records, depth_keys[0] and tile_counts of `splats` splats to the image planes.
+    Sorted draw(uint32_t splats) const;
 
-/// The rest of a forward frame: from frame's records, depth_keys[0] and tile_counts of `splats` splats to the image planes.
-Sorted record_picture(const FramePasses& on, uint32_t splats, const FrameInputs& inputs);
+    /// Leaves the parts of the loss in Counts and dL/d(image) in frame.image_gradient. The loss is that of the whole view:
+    /// those of its bands add up to it, and so do their gradients.
+    /// photo: width * height texels, RGBA. Its alpha composites it over the background or, if `masked`, is the
+    /// weight of each pixel; `frame` must then be reserved with masks.
+    /// exposure: that of the training image, if exposures are learned. It takes its own step of Adam; `frame`
+    /// must be reserved with exposure.
+    void loss(const gpu::Buffer& photo, bool masked = false, const ExposureUse* exposure = nullptr) const;
+
+    /// Gradients of blending and projection. With plan.adam it moves the model; without, it writes
+    /// the gradient to model.moments1.
+    /// With plan.motion, the gradient of the camera's motion is in frame.motion_reduced, which must be reserved for it.
+    /// motion: that of the training image's camera, if motions are learned. It takes its own step of Adam.
+    void backward(const Model& model, const Sorted& sorted, const Rates& rates,
+                  const MotionUse* motion = nullptr) const;
+
+    // A step of several views: see views.h.
+
+    /// Projects the model's splats for a view and lists those that reach a tile of inputs.band. After the submission
+    /// Counts.scan_total is their number. `frame` must be reserved for the model's splats.
+    /// projected: `frame` still has what it projected for another band of the view.
+    void list(const Model& model, const ViewBuffers& buffers, const ListPlace& place,
+              bool projected = false) const;
+    /// A forward frame of a list of `splats` splats, whose records are in frame.records. As with forward, Counts.instances
+    /// tells whether it has to be repeated.
+    Sorted draw_list(uint32_t splats) const;
+    /// Gradients of blending a list, after the loss: their sums go to `sums` from first_place on.
+    void list_backward(uint32_t splats, const Sorted& sorted, const gpu::Buffer& sums,
+                       uint32_t first_place) const;
+    /// Moves the model by the mean gradient of the views. rates: of one view; batch_rates turns them into those of the step.
+    /// bands: lists of each view; list `view * bands + band`. It reads only the SH degree of the inputs.
+    void update_views(const Model& model, const ViewBuffers& buffers, const Rates& rates,
+                      uint32_t bands = 1) const;
+
+  private:
+    gpu::BufferPart camera() const;
+    gpu::SpecConstant degree() const;
+    gpu::SpecConstant kernel() const { return {shared::SPEC_KERNEL, uint32_t(plan.kernel)}; }
+    void mean_of_partials(uint32_t target, uint32_t rows, float scale) const;
+    void expose_backward(const ExposureUse& use) const;
+    void blend_backward(const Sorted& sorted) const;
+    template <class Backward>
+    void integrate_backward(const Sorted& sorted, const passes::Constants& variant) const;
+};
 
 /// The part between projection and blending: depth order, instances, tile order, tile starts. It reads frame's records,
 /// depth_keys[0] and tile_counts, and leaves each tile's splats in instance_splats[1] and tile_starts; with gradients also
 /// sorted_indices[1] and first_instances.
-void record_tile_lists(gpu::Recording& recording, passes::PassCache& cache, bool gradients, uint32_t splats,
+void record_tile_lists(const passes::Recorder& on, bool gradients, uint32_t splats,
                        const FrameBuffers& frame);
-
-/// The camera's block, as a binding.
-gpu::BufferPart camera_part(const FrameInputs& inputs);
 
 /// Intervals of a ray that a march evaluates together; most: a power of two.
 uint32_t march_chunk(uint32_t samples, uint32_t most);

@@ -109,14 +109,14 @@ uint32_t grown_capacity(uint32_t needed);
 /// Throws RunError if the rays of a tile met more splats than one invocation may loop over.
 void check_rays_finished(const shared::Counts& counts);
 
-/// Runs a frame, with more capacity each time, until its instances fit. record: fills a recording.
+/// Runs what record(Recorder) records, with more capacity each time, until its instances fit.
 template <class Record>
 shared::Counts run_until_it_fits(passes::PassCache& cache, gpu::Executor& executor, FrameBuffers& frame,
                                  FrameRequest request, Record record) {
     for (;;) {
         frame.reserve(cache.device(), cache.config(), request);
         gpu::Recording recording(cache.device().limits());
-        record(recording);
+        record(passes::Recorder{recording, cache});
         frame.record_counts(recording);
         executor.run(recording, true);
         const shared::Counts counts = frame.read_counts();

@@ -51,7 +51,7 @@ gpu::Buffer upload_camera(gpu::Device& device, const Camera& camera, const passe
 FrameInputs inputs_of(const gpu::Buffer& block, const Camera& camera, const RenderOptions& options);
 
 /// A training image as the loss reads it: width * height RGBA texels, 8-bit if every value is one of 256
-/// levels, or with round_to_8_bit; else float32. An image of 3 channels is opaque. record_loss says what
+/// levels, or with round_to_8_bit; else float32. An image of 3 channels is opaque. FramePasses::loss says what
 /// alpha means.
 gpu::Buffer upload_photo(gpu::Device& device, const Image& image, bool round_to_8_bit = false);
 

@@ -128,20 +128,18 @@ std::vector<CameraMotion> Motions::download() const {
     return motions;
 }
 
-CameraUse record_move_camera(gpu::Recording& recording, passes::PassCache& cache, const Motions& motions,
-                             uint32_t photo, const CameraUse& base) {
-    cache.get<passes::MoveCamera>().record(
-        recording,
-        {.camera = {*base.buffer, base.offset, sizeof(shared::CameraBlock)},
-         .motions = motions.values,
-         .moved = motions.camera},
-        {.photo = photo});
+CameraUse record_move_camera(const passes::Recorder& on, const Motions& motions, uint32_t photo,
+                             const CameraUse& base) {
+    on.record(passes::MoveCamera{.camera = {*base.buffer, base.offset, sizeof(shared::CameraBlock)},
+                                 .motions = motions.values,
+                                 .moved = motions.camera},
+              {.photo = photo});
     return {&motions.camera, 0, base.width, base.height};
 }
 
-void record_motion_sums(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame) {
-    cache.get<passes::Reduce>().record(
-        recording, {.source = frame.motion_sums, .sums = frame.motion_reduced, .counts = frame.counts},
+void record_motion_sums(const passes::Recorder& on, const FrameBuffers& frame) {
+    on.record(
+        passes::Reduce{.source = frame.motion_sums, .sums = frame.motion_reduced, .counts = frame.counts},
         {.items = frame.sizes.motion_items,
          .block = frame.sizes.reduce_block,
          .target = shared::REDUCE_TO_SUMS,
@@ -149,27 +147,25 @@ void record_motion_sums(gpu::Recording& recording, passes::PassCache& cache, con
          .scale = 1});
 }
 
-void record_motion_update(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame,
-                          const MotionUse& use) {
+void record_motion_update(const passes::Recorder& on, const FrameBuffers& frame, const MotionUse& use) {
     const Motions& m = *use.motions;
     const auto [bias1, bias2] = adam_biases(use.visit, kBeta1, kBeta2);
-    cache.get<passes::MotionUpdate>().record(recording,
-                                             {.sums = frame.motion_reduced,
-                                              .motions = m.values,
-                                              .moments1 = m.moments1,
-                                              .moments2 = m.moments2,
-                                              .bases = m.bases,
-                                              .counts = frame.counts},
-                                             {.photo = use.photo,
-                                              .blocks = frame.sizes.motion_blocks,
-                                              .rate = use.rate,
-                                              .pull = kMotionPull,
-                                              .shift_pull = kMotionPull / (use.extent * use.extent),
-                                              .beta1 = float(kBeta1),
-                                              .beta2 = float(kBeta2),
-                                              .bias1 = bias1,
-                                              .bias2 = bias2,
-                                              .instance_capacity = frame.instance_capacity});
+    on.record(passes::MotionUpdate{.sums = frame.motion_reduced,
+                                   .motions = m.values,
+                                   .moments1 = m.moments1,
+                                   .moments2 = m.moments2,
+                                   .bases = m.bases,
+                                   .counts = frame.counts},
+              {.photo = use.photo,
+               .blocks = frame.sizes.motion_blocks,
+               .rate = use.rate,
+               .pull = kMotionPull,
+               .shift_pull = kMotionPull / (use.extent * use.extent),
+               .beta1 = float(kBeta1),
+               .beta2 = float(kBeta2),
+               .bias1 = bias1,
+               .bias2 = bias2,
+               .instance_capacity = frame.instance_capacity});
 }
 
 CameraMotion download_motion_gradient(const FrameBuffers& frame) {

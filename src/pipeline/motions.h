@@ -45,16 +45,15 @@ struct MotionUse {
 };
 
 /// Writes the moved camera. base: the camera of the dataset. Returns the camera for the frame.
-CameraUse record_move_camera(gpu::Recording& recording, passes::PassCache& cache, const Motions& motions,
-                             uint32_t photo, const CameraUse& base);
+CameraUse record_move_camera(const passes::Recorder& on, const Motions& motions, uint32_t photo,
+                             const CameraUse& base);
 
 /// Adds the partial sums of the gradient that the update pass has left in frame.motion_sums. Their blocks are in
 /// frame.motion_reduced.
-void record_motion_sums(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame);
+void record_motion_sums(const passes::Recorder& on, const FrameBuffers& frame);
 
 /// The motion takes its own step of Adam, after record_motion_sums.
-void record_motion_update(gpu::Recording& recording, passes::PassCache& cache, const FrameBuffers& frame,
-                          const MotionUse& use);
+void record_motion_update(const passes::Recorder& on, const FrameBuffers& frame, const MotionUse& use);
 
 /// The gradient of the last frame with record_motion_sums, for no motion.
 CameraMotion download_motion_gradient(const FrameBuffers& frame);

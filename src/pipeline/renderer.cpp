@@ -42,9 +42,9 @@ std::vector<PlanLine> plan_lines(const Gaussians& gaussians, const RenderOptions
     return describe(plan_for(request), request.scene_degree, gaussians.size());
 }
 
-/// Parameters in host memory of a part of a scene that the device cannot hold.
+/// A part of a scene that the device cannot hold. The host holds the parameters.
 struct ScenePart {
-    uint32_t splats = 0;
+    Model model;
     std::vector<std::byte> params;
 };
 
@@ -71,19 +71,18 @@ struct Renderer::State {
     }
     void upload(const Gaussians& gaussians) {
         const int degree = plan_for(request).stored_degree;
+        if (degree < gaussians.sh_degree) return upload(with_degree(gaussians, degree));
         parts.clear();
         // A training may have set the device's memory limit. The image may take the larger part of it.
         const uint64_t limit = device->memory_limit();
-        if (limit > 0 && parameter_bytes(uint32_t(gaussians.size()), degree) > limit / 4) {
-            divide(degree < gaussians.sh_degree ? with_degree(gaussians, degree) : gaussians, limit / 16);
-            return;
-        }
-        model = degree < gaussians.sh_degree ? upload_model(*device, with_degree(gaussians, degree), 0, false)
-                                             : upload_model(*device, gaussians, 0, false);
+        if (limit > 0 && parameter_bytes(uint32_t(gaussians.size()), degree) > limit / 4)
+            divide(gaussians, limit / 16);
+        else
+            model = upload_model(*device, gaussians, 0, false);
     }
 
     void divide(const Gaussians& gaussians, uint64_t part_bytes);
-    /// Lists what a view sees of all parts: records for record_list_forward. Sets the counts.
+    /// Lists what a view sees of all parts: records for draw_list. Sets the counts.
     std::vector<std::byte> list(const Plan& plan, const FrameInputs& inputs, FrameRequest size);
     /// then: what to record after the image.
     template <class Record>
@@ -96,42 +95,42 @@ struct Renderer::State {
     Rendering draw(const Camera& camera, const Plan& plan, const RenderOptions& look);
 };
 
+constexpr uint64_t kListedBytes = 16 * shared::RECORD_TEXELS;  // of a splat
+
 void Renderer::State::divide(const Gaussians& gaussians, uint64_t part_bytes) {
     model = {};  // free the memory of an earlier scene
     const uint64_t block = parameter_bytes(1, gaussians.sh_degree);
     const size_t most = size_t(std::max<uint64_t>(part_bytes / block, 1)) * shared::PARAM_BLOCK;
     for (size_t first = 0; first < gaussians.size(); first += most) {
         const size_t splats = std::min(most, gaussians.size() - first);
-        const Model part = upload_model(*device, slice_of(gaussians, first, splats), 0, false);
-        parts.push_back({uint32_t(splats), part.params.download<std::byte>(part.params.bytes())});
+        ScenePart& part = parts.emplace_back();
+        part.model = upload_model(*device, slice_of(gaussians, first, splats), 0, false);
+        part.params = part.model.params.download<std::byte>(part.model.params.bytes());
+        part.model.params = {};
     }
     model.splats = model.capacity = uint32_t(gaussians.size());
-    model.sh_degree = gaussians.sh_degree;
     model.origin = gaussians.origin;
 }
 
 std::vector<std::byte> Renderer::State::list(const Plan& plan, const FrameInputs& inputs, FrameRequest size) {
-    constexpr uint64_t kRecord = 16 * shared::RECORD_TEXELS;
     std::vector<std::byte> records;
     ViewBuffers buffers;
     counts = {};
-    for (const ScenePart& part : parts) {
-        Model resident;
-        resident.splats = resident.capacity = size.splats = part.splats;
-        resident.sh_degree = model.sh_degree;
-        resident.origin = model.origin;
-        resident.params =
-            parameter_buffer(*device, "params", gpu::Texel::rgba32f, part.splats, model.sh_degree);
-        resident.params.upload(std::span<const std::byte>(part.params));
-        buffers.reserve(*device, part.splats, 1, 1, part.splats);
+    for (ScenePart& part : parts) {
+        Model& m = part.model;
+        m.params = parameter_buffer(*device, "params", gpu::Texel::rgba32f, m.splats, m.sh_degree);
+        m.params.upload(std::span<const std::byte>(part.params));
+        size.splats = m.splats;
+        buffers.reserve(*device, m.splats, 1, 1, m.splats);
         frame.reserve(*device, cache.config(), size);
         gpu::Recording recording(device->limits());
-        record_list({recording, cache, plan, frame}, resident, inputs, buffers, {});
+        FramePasses{{recording, cache}, plan, frame, inputs}.list(m, buffers, {});
         frame.record_counts(recording);
         executor.run(recording, true);
+        m.params = {};
         const shared::Counts of_part = frame.read_counts();
         counts.skipped_nonfinite += of_part.skipped_nonfinite;
-        const auto listed = buffers.visible.download<std::byte>(of_part.scan_total * kRecord);
+        const auto listed = buffers.visible.download<std::byte>(of_part.scan_total * kListedBytes);
         records.insert(records.end(), listed.begin(), listed.end());
     }
     return records;
@@ -140,18 +139,17 @@ std::vector<std::byte> Renderer::State::list(const Plan& plan, const FrameInputs
 template <class Record>
 void Renderer::State::submit_parts(const Plan& plan, const FrameInputs& inputs, FrameRequest size,
                                    Record then) {
-    constexpr uint64_t kRecord = 16 * shared::RECORD_TEXELS;
     size.instances = std::max(frame.instance_capacity, 1u);
     const std::vector<std::byte> records = list(plan, inputs, size);
-    const uint32_t skipped = counts.skipped_nonfinite, listed = uint32_t(records.size() / kRecord);
+    const uint32_t skipped = counts.skipped_nonfinite, listed = uint32_t(records.size() / kListedBytes);
     size.splats = std::max(listed, 1u);
-    counts = run_until_it_fits(cache, executor, frame, size, [&](gpu::Recording& recording) {
+    counts = run_until_it_fits(cache, executor, frame, size, [&](const passes::Recorder& on) {
         if (records.empty())
-            recording.fill(frame.records, 0, 0, kRecord);
+            on.recording.fill(frame.records, 0, 0, kListedBytes);
         else
             frame.records.upload(std::span<const std::byte>(records));
-        record_list_forward({recording, cache, plan, frame}, size.splats, inputs);
-        then(recording);
+        FramePasses{on, plan, frame, inputs}.draw_list(size.splats);
+        then(on);
     });
     counts.skipped_nonfinite = skipped;
     counts.visible = listed;
@@ -173,9 +171,9 @@ void Renderer::State::submit(const Camera& camera, const Plan& plan, const Rende
         submit_parts(plan, inputs, size, then);
         return;
     }
-    counts = run_until_it_fits(cache, executor, frame, size, [&](gpu::Recording& recording) {
-        record_forward({recording, cache, plan, frame}, model, inputs);
-        then(recording);
+    counts = run_until_it_fits(cache, executor, frame, size, [&](const passes::Recorder& on) {
+        FramePasses{on, plan, frame, inputs}.forward(model);
+        then(on);
     });
 }
 
@@ -195,7 +193,7 @@ Plan Renderer::State::plan_of(const DrawOptions& o) const {
 }
 
 Rendering Renderer::State::draw(const Camera& camera, const Plan& plan, const RenderOptions& look) {
-    submit(camera, plan, look, [](gpu::Recording&) {});
+    submit(camera, plan, look, [](const passes::Recorder&) {});
     const Picture picture(frame);
     Rendering result{picture.image(shared::PLANE_R, 3), picture.image(shared::PLANE_T, 1), {}, {}};
     for (float& value : result.alpha.pixels) value = 1.0f - value;
@@ -227,15 +225,15 @@ Rendering Renderer::render(const Camera& camera, const DrawOptions& options) {
 
 const std::vector<uint8_t>& Renderer::render_bytes(const Camera& camera, const DrawOptions& options) {
     State& s = *state_;
-    s.submit(camera, s.plan_of(options), options.render, [&](gpu::Recording& recording) {
+    s.submit(camera, s.plan_of(options), options.render, [&](const passes::Recorder& on) {
         const Sizes& sizes = s.frame.sizes;
         const uint64_t needed = uint64_t(sizes.plane_floats) * 4;
         if (!s.packed || s.packed.bytes() < needed) {
             s.packed = gpu::Buffer();
             s.packed = gpu::Buffer(*s.device, "packed", needed, gpu::Texel::none, false, true);
         }
-        s.cache.get<passes::Pack>().record(recording, {.planes = s.frame.planes, .packed = s.packed},
-                                           {.plane_floats = sizes.plane_floats});
+        on.record(passes::Pack{.planes = s.frame.planes, .packed = s.packed},
+                  {.plane_floats = sizes.plane_floats});
     });
     const size_t row = size_t(camera.width) * 4, stride = size_t(s.frame.sizes.stride) * 4;
     s.bytes.resize(row * size_t(camera.height));
@@ -293,10 +291,11 @@ LossGradient loss_gradient(std::shared_ptr<gpu::Device> device, const Gaussians&
                             .rays = plan.rays()};
     FrameBuffers frame;
     const shared::Counts counts =
-        run_until_it_fits(cache, executor, frame, size, [&](gpu::Recording& recording) {
-            const Sorted sorted = record_forward({recording, cache, plan, frame}, model, inputs);
-            record_loss(recording, cache, frame, inputs, photo, plan.masks);
-            record_backward({recording, cache, plan, frame}, model, inputs, sorted, {});
+        run_until_it_fits(cache, executor, frame, size, [&](const passes::Recorder& recorder) {
+            const FramePasses on{recorder, plan, frame, inputs};
+            const Sorted sorted = on.forward(model);
+            on.loss(photo, plan.masks);
+            on.backward(model, sorted, {});
         });
     LossGradient result;
     result.l1 = counts.l1;

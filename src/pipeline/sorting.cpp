@@ -5,20 +5,16 @@
 
 namespace ewa::pipeline {
 
-void record_scan(gpu::Recording& recording, passes::PassCache& cache, const ScanBuffers& buffers,
-                 const ScanWork& work) {
+void record_scan(const passes::Recorder& on, const ScanBuffers& buffers, const ScanWork& work) {
     const uint32_t mode = buffers.order ? shared::SCAN_GATHERED : work.flags ? shared::SCAN_FLAGS : 0;
-    cache.get<passes::ScanBlocks>({{shared::SPEC_MODE, mode}})
-        .record(recording,
-                {.source = buffers.source,
-                 .order = buffers.order ? *buffers.order : buffers.source,
-                 .prefix = buffers.prefix,
-                 .totals = buffers.totals},
-                {.items = work.items, .block = work.block}, work.name);
+    on.record(passes::ScanBlocks{.source = buffers.source,
+                                 .order = buffers.order ? *buffers.order : buffers.source,
+                                 .prefix = buffers.prefix,
+                                 .totals = buffers.totals},
+              {.items = work.items, .block = work.block}, {{shared::SPEC_MODE, mode}}, work.name);
     const uint32_t blocks = uint32_t((uint64_t(work.items) + work.block - 1) / work.block);
-    cache.get<passes::ScanTotals>().record(recording, {.totals = buffers.totals, .counts = buffers.counts},
-                                           {.blocks = blocks, .total = work.total, .capacity = work.capacity},
-                                           work.name);
+    on.record(passes::ScanTotals{.totals = buffers.totals, .counts = buffers.counts},
+              {.blocks = blocks, .total = work.total, .capacity = work.capacity}, {}, work.name);
 }
 
 namespace {
@@ -36,32 +32,28 @@ uint32_t scatter_mode(const SortBuffers& buffers, const SortWork& work, bool fir
 
 }  // namespace
 
-uint32_t record_sort(gpu::Recording& recording, passes::PassCache& cache, const SortBuffers& buffers,
-                     const SortWork& work) {
+uint32_t record_sort(const passes::Recorder& on, const SortBuffers& buffers, const SortWork& work) {
     const RadixCut& cut = work.cut;
-    const bool ranked = cache.config().ranked_sort;
+    const bool ranked = on.cache.config().ranked_sort, tracked = buffers.indices[0] != nullptr;
     const uint32_t counters = cut.lanes << cut.bits;
     const gpu::SpecConstant bits{shared::SPEC_RADIX_BITS, cut.bits};
     uint32_t from = 0;  // which of the two buffers holds a pass's input
     for (uint32_t pass = 0; pass < cut.passes; ++pass, from ^= 1) {
         const uint32_t to = from ^ 1;
-        const bool first = pass == 0, last = pass + 1 == cut.passes, tracked = buffers.indices[0] != nullptr;
+        const bool first = pass == 0, last = pass + 1 == cut.passes;
         const shared::SortPush push{
             .items = work.items, .capacity = work.capacity, .lanes = cut.lanes, .shift = pass * cut.bits};
         const gpu::Buffer& keys = *buffers.keys[from];
         // A binding that a mode does not use gets another binding's buffer.
         const gpu::Buffer& values = first && buffers.own_indices ? keys : *buffers.values[from];
         if (ranked) {
-            cache.get<passes::RadixCountRanked>({bits}).record(
-                recording, {.keys = keys, .counters = buffers.counters, .counts = buffers.counts}, push,
-                work.name);
+            on.record(passes::RadixCountRanked{keys, buffers.counters, buffers.counts}, push, {bits},
+                      work.name);
         } else {
-            recording.fill(buffers.counters, 0, 0, uint64_t(counters) * 4);
-            cache.get<passes::RadixCount>({bits}).record(
-                recording, {.keys = keys, .counters = buffers.counters, .counts = buffers.counts}, push,
-                work.name);
+            on.recording.fill(buffers.counters, 0, 0, uint64_t(counters) * 4);
+            on.record(passes::RadixCount{keys, buffers.counters, buffers.counts}, push, {bits}, work.name);
         }
-        record_scan(recording, cache,
+        record_scan(on,
                     {.source = buffers.counters,
                      .order = nullptr,
                      .prefix = buffers.counter_prefix,
@@ -69,23 +61,20 @@ uint32_t record_sort(gpu::Recording& recording, passes::PassCache& cache, const 
                      .counts = buffers.counts},
                     {.items = counters, .block = cut.lanes, .total = shared::TOTAL_NONE, .name = work.name});
         const passes::Constants variant{bits, {shared::SPEC_MODE, scatter_mode(buffers, work, first, last)}};
-        const auto scatter = [&]<class Scatter>(const passes::Pass<Scatter>& compiled) {
-            compiled.record(recording,
-                            {.keys = keys,
-                             .values = values,
-                             .counters = buffers.counter_prefix,
-                             .bases = buffers.digit_totals,
-                             .counts = buffers.counts,
-                             .keys_out = *buffers.keys[to],
-                             .values_out = *buffers.values[to],
-                             .indices = tracked && !first ? *buffers.indices[from] : values,
-                             .indices_out = tracked ? *buffers.indices[to] : *buffers.values[to]},
-                            push, work.name);
-        };
+        const passes::ScatterBuffers scattered{
+            .keys = keys,
+            .values = values,
+            .counters = buffers.counter_prefix,
+            .bases = buffers.digit_totals,
+            .counts = buffers.counts,
+            .keys_out = *buffers.keys[to],
+            .values_out = *buffers.values[to],
+            .indices = tracked && !first ? *buffers.indices[from] : values,
+            .indices_out = tracked ? *buffers.indices[to] : *buffers.values[to]};
         if (ranked)
-            scatter(cache.get<passes::RadixScatterRanked>(variant));
+            on.record(passes::RadixScatterRanked{scattered}, push, variant, work.name);
         else
-            scatter(cache.get<passes::RadixScatter>(variant));
+            on.record(passes::RadixScatter{scattered}, push, variant, work.name);
     }
     return from;
 }

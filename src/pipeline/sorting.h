@@ -22,8 +22,7 @@ struct ScanWork {
 };
 
 /// Exclusive prefix sum; that of entry e is totals[e / block] + prefix[e].
-void record_scan(gpu::Recording& recording, passes::PassCache& cache, const ScanBuffers& buffers,
-                 const ScanWork& work);
+void record_scan(const passes::Recorder& on, const ScanBuffers& buffers, const ScanWork& work);
 
 struct SortBuffers {
     const gpu::Buffer* keys[2];     // keys[0] holds the input
@@ -45,7 +44,6 @@ struct SortWork {
 
 /// Stable sort of pairs by the low cut.passes * cut.bits bits of the key. Returns i such that values[i],
 /// indices[i] and, with keep_keys, keys[i] hold the result.
-uint32_t record_sort(gpu::Recording& recording, passes::PassCache& cache, const SortBuffers& buffers,
-                     const SortWork& work);
+uint32_t record_sort(const passes::Recorder& on, const SortBuffers& buffers, const SortWork& work);
 
 }  // namespace ewa::pipeline

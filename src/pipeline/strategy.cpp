@@ -23,15 +23,13 @@ struct Scanned {
           totals(device, name, frame.sizes.scan_totals) {}
 };
 
-/// Records the prefix sums of a value a splat, runs the recording, and returns the sum.
-uint32_t run_scan(const Phase& phase, gpu::Recording& recording, const ScanBuffers& buffers, uint32_t splats,
-                  const char* name) {
+/// Records the prefix sums of a value a splat. The sum is in Counts.scan_total.
+void record_sum(const Phase& phase, const passes::Recorder& on, const ScanBuffers& buffers, uint32_t splats,
+                const char* name) {
     record_scan(
-        recording, phase.cache, buffers,
+        on, buffers,
         {.items = splats, .block = phase.frame.sizes.scan_block, .total = shared::TOTAL_SCAN, .name = name});
-    phase.frame.record_counts(recording);
-    phase.executor.run(recording);
-    return phase.frame.read_counts().scan_total;
+    phase.frame.record_counts(on.recording);
 }
 
 shared::DensifyPush densify_push(const Model& model, const FrameBuffers& frame, const DensifyRules& rules,
@@ -89,24 +87,27 @@ struct Weighed {
     Weighed(const Phase& phase, const Model& model, const shared::McmcPush& push)
         : weights(phase.cache.device(), "weights", model, phase.frame),
           dead(phase.cache.device(), "dead", model, phase.frame) {
-        gpu::Recording recording(phase.cache.device().limits());
-        phase.cache.get<passes::McmcWeigh>().record(
-            recording, {.params = model.params, .weights = weights.values, .dead = dead.values}, push);
-        phase.executor.run(recording);
+        phase.run([&](const passes::Recorder& on) {
+            on.record(
+                passes::McmcWeigh{.params = model.params, .weights = weights.values, .dead = dead.values},
+                push);
+        });
         sums.weight = sum(phase, weights, model.splats);
         sums.dead = sum(phase, dead, model.splats);
     }
 
   private:
     static uint32_t sum(const Phase& phase, const Scanned& scanned, uint32_t splats) {
-        gpu::Recording recording(phase.cache.device().limits());
-        return run_scan(phase, recording,
-                        {.source = scanned.values,
-                         .order = nullptr,
-                         .prefix = scanned.prefix,
-                         .totals = scanned.totals,
-                         .counts = phase.frame.counts},
-                        splats, "relocation offsets");
+        phase.run([&](const passes::Recorder& on) {
+            record_sum(phase, on,
+                       {.source = scanned.values,
+                        .order = nullptr,
+                        .prefix = scanned.prefix,
+                        .totals = scanned.totals,
+                        .counts = phase.frame.counts},
+                       splats, "relocation offsets");
+        });
+        return phase.frame.read_counts().scan_total;
     }
 };
 
@@ -114,18 +115,21 @@ struct Weighed {
 
 uint32_t count_densified(const Phase& phase, const Model& model, const DensifyRules& rules, float threshold) {
     const FrameBuffers& frame = phase.frame;
-    gpu::Recording recording(phase.cache.device().limits());
-    phase.cache.get<passes::DensifyDecide>().record(
-        recording, {.params = model.params, .statistics = model.statistics, .outputs = frame.tile_counts},
-        densify_push(model, frame, rules, threshold, 0));
-    // Leaves the offsets of the next generation in frame.prefix and frame.scan_totals.
-    return run_scan(phase, recording,
-                    {.source = frame.tile_counts,
-                     .order = nullptr,
-                     .prefix = frame.prefix,
-                     .totals = frame.scan_totals,
-                     .counts = frame.counts},
-                    model.splats, "densify offsets");
+    phase.run([&](const passes::Recorder& on) {
+        on.record(
+            passes::DensifyDecide{
+                .params = model.params, .statistics = model.statistics, .outputs = frame.tile_counts},
+            densify_push(model, frame, rules, threshold, 0));
+        // Leaves the offsets of the next generation in frame.prefix and frame.scan_totals.
+        record_sum(phase, on,
+                   {.source = frame.tile_counts,
+                    .order = nullptr,
+                    .prefix = frame.prefix,
+                    .totals = frame.scan_totals,
+                    .counts = frame.counts},
+                   model.splats, "densify offsets");
+    });
+    return frame.read_counts().scan_total;
 }
 
 Densified decide_densify(const DensifyRules& rules, const std::function<uint64_t(float)>& count) {
@@ -152,25 +156,23 @@ void write_densified(const Phase& phase, Model& model, const DensifyRules& rules
     const shared::DensifyPush push = densify_push(model, frame, rules, threshold, after);
     replace_generation(phase.cache.device(), model, after,
                        [&](const gpu::Buffer& target, const gpu::Buffer& source, bool is_moments) {
-                           gpu::Recording recording(phase.cache.device().limits());
-                           phase.cache.get<passes::DensifyWrite>(write_variant(model, is_moments))
-                               .record(recording,
-                                       {.params = model.params,
-                                        .moments = is_moments ? source : model.moments1,
-                                        .statistics = model.statistics,
-                                        .prefix = frame.prefix,
-                                        .totals = frame.scan_totals,
-                                        .array_out = target},
-                                       push);
-                           phase.executor.run(recording);
+                           phase.run([&](const passes::Recorder& on) {
+                               on.record(passes::DensifyWrite{.params = model.params,
+                                                              .moments = is_moments ? source : model.moments1,
+                                                              .statistics = model.statistics,
+                                                              .prefix = frame.prefix,
+                                                              .totals = frame.scan_totals,
+                                                              .array_out = target},
+                                         push, write_variant(model, is_moments));
+                           });
                        });
     model.statistics = gpu::Buffer();
 }
 
-void record_reset_opacity(gpu::Recording& recording, passes::PassCache& cache, const Model& model,
-                          float logit) {
-    cache.get<passes::ResetOpacity>().record(
-        recording, {.params = model.params, .moments1 = model.moments1, .moments2 = model.second_moments()},
+void record_reset_opacity(const passes::Recorder& on, const Model& model, float logit) {
+    on.record(
+        passes::ResetOpacity{
+            .params = model.params, .moments1 = model.moments1, .moments2 = model.second_moments()},
         {.splats = model.splats, .planes = model.planes(), .logit = logit});
 }
 
@@ -203,54 +205,50 @@ McmcSources draw_mcmc(const Phase& phase, const Model& model, const McmcRules& r
     const Weighed weighed(phase, model, push);
     McmcSources drawn{gpu::Buffer(device, "sources", 4ull * part.draws),
                       gpu::Buffer(device, "hits", 4ull * model.splats)};
-    gpu::Recording recording(device.limits());
-    recording.fill(drawn.hits, 0, 0, 4ull * model.splats);
-    phase.cache.get<passes::McmcDraw>().record(recording,
-                                               {.prefix = weighed.weights.prefix,
-                                                .totals = weighed.weights.totals,
-                                                .sources = drawn.sources,
-                                                .hits = drawn.hits},
-                                               push);
-    phase.executor.run(recording);
+    phase.run([&](const passes::Recorder& on) {
+        on.recording.fill(drawn.hits, 0, 0, 4ull * model.splats);
+        on.record(passes::McmcDraw{.prefix = weighed.weights.prefix,
+                                   .totals = weighed.weights.totals,
+                                   .sources = drawn.sources,
+                                   .hits = drawn.hits},
+                  push);
+    });
     return drawn;
 }
 
 void write_mcmc(const Phase& phase, Model& model, const McmcRules& rules, const McmcPart& part,
                 const McmcSources& from) {
-    gpu::Device& device = phase.cache.device();
     const shared::McmcPush push = mcmc_push(phase, model, rules, part);
     const Scanned dead = Weighed(phase, model, push).dead;
-    replace_generation(device, model, push.new_splats,
+    replace_generation(phase.cache.device(), model, push.new_splats,
                        [&](const gpu::Buffer& target, const gpu::Buffer& source, bool is_moments) {
-                           gpu::Recording write(device.limits());
                            passes::Constants variant = write_variant(model, is_moments);
                            variant.push_back({shared::SPEC_KERNEL, uint32_t(rules.kernel)});
-                           phase.cache.get<passes::McmcWrite>(variant).record(
-                               write,
-                               {.params = model.params,
-                                .moments = is_moments ? source : model.moments1,
-                                .dead = dead.values,
-                                .prefix = dead.prefix,
-                                .totals = dead.totals,
-                                .sources = from.sources,
-                                .hits = from.hits,
-                                .array_out = target},
-                               push);
-                           phase.executor.run(write);
+                           phase.run([&](const passes::Recorder& on) {
+                               on.record(passes::McmcWrite{.params = model.params,
+                                                           .moments = is_moments ? source : model.moments1,
+                                                           .dead = dead.values,
+                                                           .prefix = dead.prefix,
+                                                           .totals = dead.totals,
+                                                           .sources = from.sources,
+                                                           .hits = from.hits,
+                                                           .array_out = target},
+                                         push, variant);
+                           });
                        });
 }
 
-void record_noise(gpu::Recording& recording, passes::PassCache& cache, const Model& model,
-                  const FrameBuffers& frame, const Noise& noise) {
-    cache.get<passes::Perturb>().record(recording, {.params = model.params, .counts = frame.counts},
-                                        {.splats = model.splats,
-                                         .planes = model.planes(),
-                                         .instance_capacity = frame.instance_capacity,
-                                         .amplitude = noise.amplitude,
-                                         .max_length = noise.max_length,
-                                         .seed = {uint32_t(noise.seed), uint32_t(noise.seed >> 32)},
-                                         .step = noise.step,
-                                         .first = model.first});
+void record_noise(const passes::Recorder& on, const Model& model, const FrameBuffers& frame,
+                  const Noise& noise) {
+    on.record(passes::Perturb{.params = model.params, .counts = frame.counts},
+              {.splats = model.splats,
+               .planes = model.planes(),
+               .instance_capacity = frame.instance_capacity,
+               .amplitude = noise.amplitude,
+               .max_length = noise.max_length,
+               .seed = {uint32_t(noise.seed), uint32_t(noise.seed >> 32)},
+               .step = noise.step,
+               .first = model.first});
 }
 
 }  // namespace ewa::pipeline

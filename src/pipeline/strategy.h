@@ -26,6 +26,14 @@ struct Phase {
     passes::PassCache& cache;
     gpu::Executor& executor;
     const FrameBuffers& frame;
+
+    /// Runs what record(Recorder) records.
+    template <class Record>
+    void run(Record record) const {
+        gpu::Recording recording(cache.device().limits());
+        record(passes::Recorder{recording, cache});
+        executor.run(recording);
+    }
 };
 
 /// The rules of adaptive density control.
@@ -55,8 +63,7 @@ Densified decide_densify(const DensifyRules& rules, const std::function<uint64_t
 void write_densified(const Phase& phase, Model& model, const DensifyRules& rules, float threshold);
 
 /// Lowers every opacity to at most this logit and zeroes its moments.
-void record_reset_opacity(gpu::Recording& recording, passes::PassCache& cache, const Model& model,
-                          float logit);
+void record_reset_opacity(const passes::Recorder& on, const Model& model, float logit);
 
 /// The rules of 3DGS as Markov chain Monte Carlo (Kheradmand et al. 2024). Dead splats move to living ones, the number
 /// of splats grows by a share, and noise lets transparent splats explore.
@@ -109,7 +116,7 @@ struct Noise {
 
 /// Adds to each mean amplitude * gate(opacity) * Sigma * a standard normal vector
 /// (shaders/passes/perturb.comp).
-void record_noise(gpu::Recording& recording, passes::PassCache& cache, const Model& model,
-                  const FrameBuffers& frame, const Noise& noise);
+void record_noise(const passes::Recorder& on, const Model& model, const FrameBuffers& frame,
+                  const Noise& noise);
 
 }  // namespace ewa::pipeline

@@ -90,22 +90,21 @@ void ViewBuffers::reserve_sums(gpu::Device& device, gpu::Executor& executor, con
     sums = std::move(larger);
 }
 
-void record_list(const FramePasses& on, const Model& model, const FrameInputs& inputs,
-                 const ViewBuffers& buffers, const ListPlace& place, bool projected) {
-    const auto& [recording, cache, plan, frame] = on;
+void FramePasses::list(const Model& model, const ViewBuffers& buffers, const ListPlace& place,
+                       bool projected) const {
     constexpr uint64_t kBlock = sizeof(shared::CameraBlock);
     const Band& band = inputs.band;
     if (!projected) {
         recording.copy(*inputs.camera.buffer, inputs.camera.offset, buffers.cameras, place.view * kBlock,
                        kBlock);
-        record_projection(on, model, inputs);
+        project(model);
     }
     if (band.rows > 0)
-        cache.get<passes::BandTiles>().record(
-            recording,
-            {.records = frame.records, .depth_keys = frame.depth_keys[0], .tile_counts = frame.tile_counts},
-            {.splats = model.splats, .first_row = band.first, .size = {inputs.camera.width, band.rows}});
-    record_scan(recording, cache,
+        record(passes::BandTiles{.records = frame.records,
+                                 .depth_keys = frame.depth_keys[0],
+                                 .tile_counts = frame.tile_counts},
+               {.splats = model.splats, .first_row = band.first, .size = {inputs.camera.width, band.rows}});
+    record_scan(*this,
                 {.source = frame.tile_counts,
                  .order = nullptr,
                  .prefix = frame.prefix,
@@ -116,69 +115,61 @@ void record_list(const FramePasses& on, const Model& model, const FrameInputs& i
                  .total = shared::TOTAL_SCAN,
                  .name = "visible splats",
                  .flags = true});
-    cache.get<passes::CollectVisible>().record(recording,
-                                               {.records = frame.records,
-                                                .tile_counts = frame.tile_counts,
-                                                .prefix = frame.prefix,
-                                                .totals = frame.scan_totals,
-                                                .places = buffers.places,
-                                                .visible = buffers.visible},
-                                               {.splats = model.splats,
-                                                .scan_block = frame.sizes.scan_block,
-                                                .list = place.list,
-                                                .first_place = place.first_place,
-                                                .first_record = place.first_record,
-                                                .first_row = band.first});
+    record(passes::CollectVisible{.records = frame.records,
+                                  .tile_counts = frame.tile_counts,
+                                  .prefix = frame.prefix,
+                                  .totals = frame.scan_totals,
+                                  .places = buffers.places,
+                                  .visible = buffers.visible},
+           {.splats = model.splats,
+            .scan_block = frame.sizes.scan_block,
+            .list = place.list,
+            .first_place = place.first_place,
+            .first_record = place.first_record,
+            .first_row = band.first});
 }
 
-Sorted record_list_forward(const FramePasses& on, uint32_t splats, const FrameInputs& inputs) {
-    const auto& [recording, cache, plan, frame] = on;
+Sorted FramePasses::draw_list(uint32_t splats) const {
     recording.fill(frame.counts, 0, 0, sizeof(shared::Counts));
-    cache.get<passes::ReceiveRecords>().record(
-        recording,
-        {.records = frame.records, .depth_keys = frame.depth_keys[0], .tile_counts = frame.tile_counts},
+    record(
+        passes::ReceiveRecords{
+            .records = frame.records, .depth_keys = frame.depth_keys[0], .tile_counts = frame.tile_counts},
         {.splats = splats, .size = {frame.sizes.width, frame.sizes.height}});
-    return record_picture(on, splats, inputs);
+    return draw(splats);
 }
 
-void record_list_backward(const FramePasses& on, uint32_t splats, const FrameInputs& inputs,
-                          const Sorted& sorted, const gpu::Buffer& sums, uint32_t first_place) {
-    const auto& [recording, cache, plan, frame] = on;
-    record_blend_backward(on, inputs, sorted);
-    cache.get<passes::SumSlots>({{shared::SPEC_MODE, plan.absolute ? shared::UPDATE_ABSOLUTE : 0}})
-        .record(recording,
-                {.records = frame.records,
-                 .slots = frame.slots,
-                 .tile_counts = frame.tile_counts,
-                 .first_instances = frame.first_instances,
-                 .sorted_indices = *sorted.indices,
-                 .sums = sums},
-                {.splats = splats, .first_place = first_place});
+void FramePasses::list_backward(uint32_t splats, const Sorted& sorted, const gpu::Buffer& sums,
+                                uint32_t first_place) const {
+    blend_backward(sorted);
+    record(passes::SumSlots{.records = frame.records,
+                            .slots = frame.slots,
+                            .tile_counts = frame.tile_counts,
+                            .first_instances = frame.first_instances,
+                            .sorted_indices = *sorted.indices,
+                            .sums = sums},
+           {.splats = splats, .first_place = first_place},
+           {{shared::SPEC_MODE, plan.absolute ? shared::UPDATE_ABSOLUTE : 0}});
 }
 
-void record_update_views(const FramePasses& on, const Model& model, const ViewBuffers& buffers,
-                         const Rates& rates, int sh_degree, uint32_t bands) {
-    const auto& [recording, cache, plan, frame] = on;
+void FramePasses::update_views(const Model& model, const ViewBuffers& buffers, const Rates& rates,
+                               uint32_t bands) const {
     const gpu::Buffer& moments2 = model.second_moments();
-    cache
-        .get<passes::UpdateViews>(
-            {{shared::SPEC_SH_DEGREE, plan.evaluated_degree(sh_degree)},
-             {shared::SPEC_MODE, update_mode(plan) | (bands > 1 ? shared::UPDATE_BANDS : 0)},
-             {shared::SPEC_KERNEL, uint32_t(plan.kernel)}})
-        .record(recording,
-                {.params = model.params,
-                 .cameras = buffers.cameras,
-                 .places = buffers.places,
-                 .sums = buffers.sums,
-                 .moments1 = model.moments1,
-                 .moments2 = moments2,
-                 .counts = frame.counts,
-                 .params_out = model.params,
-                 .moments1_out = model.moments1,
-                 .moments2_out = moments2,
-                 // A binding that a mode does not use needs a buffer.
-                 .statistics = plan.statistics ? model.statistics : frame.partials},
-                update_views_push(model, rates, bands));
+    record(passes::UpdateViews{.params = model.params,
+                               .cameras = buffers.cameras,
+                               .places = buffers.places,
+                               .sums = buffers.sums,
+                               .moments1 = model.moments1,
+                               .moments2 = moments2,
+                               .counts = frame.counts,
+                               .params_out = model.params,
+                               .moments1_out = model.moments1,
+                               .moments2_out = moments2,
+                               // A binding that a mode does not use needs a buffer.
+                               .statistics = plan.statistics ? model.statistics : frame.partials},
+           update_views_push(model, rates, bands),
+           {degree(),
+            {shared::SPEC_MODE, update_mode(plan) | (bands > 1 ? shared::UPDATE_BANDS : 0)},
+            kernel()});
 }
 
 Rates batch_rates(const Rates& rates) {

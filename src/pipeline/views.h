@@ -8,7 +8,6 @@
 
 #include "gpu/executor.h"
 #include "pipeline/backward.h"
-#include "pipeline/forward.h"
 
 namespace ewa::pipeline {
 
@@ -35,25 +34,6 @@ struct ListPlace {
     uint32_t first_place = 0;   // number of splats in the lists before
     uint32_t first_record = 0;  // in ViewBuffers::visible
 };
-
-/// Projects the model's splats for a view and lists those that reach a tile of inputs.band. After the submission
-/// Counts.scan_total is their number. `frame` must be reserved for the model's splats.
-/// projected: `frame` still has what it projected for another band of the view.
-void record_list(const FramePasses& on, const Model& model, const FrameInputs& inputs,
-                 const ViewBuffers& buffers, const ListPlace& place, bool projected = false);
-
-/// A forward frame of a list of `splats` splats, whose records are in frame.records. As with record_forward,
-/// Counts.instances tells whether it has to be repeated.
-Sorted record_list_forward(const FramePasses& on, uint32_t splats, const FrameInputs& inputs);
-
-/// Gradients of blending a list, after record_loss: their sums go to `sums` from first_place on.
-void record_list_backward(const FramePasses& on, uint32_t splats, const FrameInputs& inputs,
-                          const Sorted& sorted, const gpu::Buffer& sums, uint32_t first_place);
-
-/// Moves the model by the mean gradient of the views. rates: of one view; batch_rates turns them into those of the step.
-/// sh_degree: evaluated in this step. bands: lists of each view; list `view * bands + band`.
-void record_update_views(const FramePasses& on, const Model& model, const ViewBuffers& buffers,
-                         const Rates& rates, int sh_degree, uint32_t bands = 1);
 
 /// The rates of a step of rates.views views, from those of a step of one view (Zhao et al. 2024, Grendel, section 3.3):
 /// times the square root of their number.

@@ -174,12 +174,13 @@ void Step::list(const StepParts& parts, const Views& of, size_t first, size_t pi
             if (!again) reserve(parts, picture.request, model.splats);
             projected = picture.view;
             gpu::Recording recording(device.limits());
-            record_list({recording, parts.cache, parts.plan, parts.frame}, model, picture.inputs, buffers_,
-                        {.view = uint32_t(picture.view),
-                         .list = uint32_t(number),
-                         .first_place = uint32_t(places),
-                         .first_record = uint32_t(records)},
-                        again);
+            const FramePasses on{{recording, parts.cache}, parts.plan, parts.frame, picture.inputs};
+            on.list(model, buffers_,
+                    {.view = uint32_t(picture.view),
+                     .list = uint32_t(number),
+                     .first_place = uint32_t(places),
+                     .first_record = uint32_t(records)},
+                    again);
             const shared::Counts counts = run(parts, recording);
             Seen& seen = seen_[number];
             seen.places[portion] = places;
@@ -301,12 +302,12 @@ shared::Counts Step::draw_own(const StepParts& parts, const Picture& picture, co
             recording.fill(parts.frame.records, 0, 0, kRecordBytes);
         else if (alone)
             recording.copy(buffers_.visible, 0, parts.frame.records, 0, listed * kRecordBytes);
-        const Sorted sorted =
-            record_list_forward({recording, parts.cache, parts.plan, parts.frame}, splats, picture.inputs);
+        const FramePasses on{{recording, parts.cache}, parts.plan, parts.frame, picture.inputs};
+        const Sorted sorted = on.draw_list(splats);
         if (picture.of.record_loss) {
-            picture.of.record_loss(recording, picture.inputs);
-            record_list_backward({recording, parts.cache, parts.plan, parts.frame}, splats, picture.inputs,
-                                 sorted, sums, alone ? uint32_t(seen_[picture.number].places.front()) : 0);
+            picture.of.record_loss(on);
+            on.list_backward(splats, sorted, sums,
+                             alone ? uint32_t(seen_[picture.number].places.front()) : 0);
         }
         const shared::Counts counts = run(parts, recording);
         if (counts.instances <= parts.frame.instance_capacity) return counts;
@@ -383,16 +384,17 @@ void Step::upload_sums(const StepParts& parts, size_t portion) {
 }
 
 void Step::update(const StepParts& parts, const Rates& rates, int sh_degree,
-                  const std::function<void(gpu::Recording&, const Model&)>& more, StepSums& sums) {
+                  const std::function<void(const passes::Recorder&, const Model&)>& more, StepSums& sums) {
     std::array<uint64_t, 2> own{};
+    const FrameInputs inputs{.camera = {}, .sh_degree = sh_degree};
     portions_.visit(Portions::Need::state, [&](int portion, const Model& model) {
         buffers_.places = portions_.take_places();
         if (portions_.streamed()) upload_sums(parts, size_t(portion));
         gpu::Recording recording(parts.cache.device().limits());
         recording.fill(parts.frame.counts, 0, 0, sizeof(shared::Counts));
-        record_update_views({recording, parts.cache, parts.plan, parts.frame}, model, buffers_, rates,
-                            sh_degree, bands_);
-        if (more) more(recording, model);
+        const FramePasses on{{recording, parts.cache}, parts.plan, parts.frame, inputs};
+        on.update_views(model, buffers_, rates, bands_);
+        if (more) more(on, model);
         const shared::Counts counts = run(parts, recording);
         own[0] += counts.dropped_updates;
         own[1] += counts.limited_steps;

@@ -21,9 +21,9 @@ namespace ewa::portions {
 struct StepView {
     pipeline::FrameInputs inputs;    // without a band
     pipeline::FrameRequest request;  // of the whole view, without splats and instances
-    /// Records the loss after the picture. inputs: with the picture's band. Called once for every attempt to draw.
+    /// Records the loss after the picture. Its inputs have the picture's band. Called once for every attempt to draw.
     /// Empty: the view is only a picture.
-    std::function<void(gpu::Recording&, const pipeline::FrameInputs& inputs)> record_loss;
+    std::function<void(const pipeline::FramePasses&)> record_loss;
     /// Weight of the view's pixels in its mean squared error. Called after record_loss.
     std::function<double()> weight;
     /// What the loss has learned besides the splats, in StepParts::learned words, and the same for a rank that has not drawn the
@@ -63,7 +63,8 @@ class Step {
     StepSums draw(const StepParts& parts, std::span<const StepView> views);
     /// Moves the splats. more: what else the submission of a portion's update does. Adds to the sums.
     void update(const StepParts& parts, const pipeline::Rates& rates, int sh_degree,
-                const std::function<void(gpu::Recording&, const pipeline::Model&)>& more, StepSums& sums);
+                const std::function<void(const passes::Recorder&, const pipeline::Model&)>& more,
+                StepSums& sums);
 
     /// Draws pictures of whole views: view k by rank k. There are at most as many views as ranks. Returns whether this rank has drawn one,
     /// which the frame then holds.

@@ -77,14 +77,15 @@ class Alignment {
             .masks = plan_.masks,
             .overlaid = true,
             .motion = true};
-        run_until_it_fits(cache_, executor_, frame_, size, [&](gpu::Recording& recording) {
+        run_until_it_fits(cache_, executor_, frame_, size, [&](const passes::Recorder& recorder) {
             const pipeline::FrameInputs inputs{
-                .camera = record_move_camera(recording, cache_, motions_, use.photo, base),
+                .camera = record_move_camera(recorder, motions_, use.photo, base),
                 .background = options_.render.background,
                 .sh_degree = options_.render.sh_degree};
-            const auto sorted = record_forward({recording, cache_, plan_, frame_}, model_, inputs);
-            record_loss(recording, cache_, frame_, inputs, photo.texels, photo.masked);
-            record_backward({recording, cache_, plan_, frame_}, model_, inputs, sorted, {}, &use);
+            const pipeline::FramePasses on{recorder, plan_, frame_, inputs};
+            const auto sorted = on.forward(model_);
+            on.loss(photo.texels, photo.masked);
+            on.backward(model_, sorted, {}, &use);
         });
     }
 

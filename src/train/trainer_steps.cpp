@@ -82,18 +82,18 @@ void Trainer::State::record_fused(gpu::Recording& recording, int step, size_t in
     FrameInputs inputs = view.inputs;
     inputs.keep_overflow = !in_flight.empty();
     if (plan.motion)
-        inputs.camera = record_move_camera(recording, cache, motions, uint32_t(index), inputs.camera);
+        inputs.camera = record_move_camera({recording, cache}, motions, uint32_t(index), inputs.camera);
     const MotionUse motion{.motions = &motions,
                            .photo = uint32_t(index),
                            .rate = float(schedule.pose_rate(step)),
                            .extent = float(extent),
                            .visit = visit_of(step)};
     const Model& model = portions.use(0, portions::Portions::Need::state);
-    const FramePasses on{recording, cache, plan, frame};
-    const Sorted sorted = record_forward(on, model, inputs);
-    view.record_loss(recording, inputs);
-    record_backward(on, model, inputs, sorted, rates(step), plan.motion ? &motion : nullptr);
-    if (options.strategy == Strategy::mcmc) record_noise(recording, cache, model, frame, noise(step));
+    const FramePasses on{{recording, cache}, plan, frame, inputs};
+    const Sorted sorted = on.forward(model);
+    view.record_loss(on);
+    on.backward(model, sorted, rates(step), plan.motion ? &motion : nullptr);
+    if (options.strategy == Strategy::mcmc) record_noise(on, model, frame, noise(step));
 }
 
 void Trainer::State::submit(int step) {
@@ -182,11 +182,10 @@ portions::StepView Trainer::State::view_of(int step, train::ImageCache& seen, in
         .inputs = inputs,
         .request = request_of(camera),
         .record_loss =
-            [this, exposure, weight, index, &seen](gpu::Recording& recording, const FrameInputs& drawn) {
+            [this, exposure, weight, index, &seen](const FramePasses& on) {
                 const auto& photo = seen.photo(index);
                 *weight = photo.weight;
-                record_loss(recording, cache, frame, drawn, photo.texels, photo.masked,
-                            plan.exposure ? &exposure : nullptr);
+                on.loss(photo.texels, photo.masked, plan.exposure ? &exposure : nullptr);
             },
         .weight = [weight] { return *weight; },
         .learned =
@@ -210,8 +209,8 @@ void Trainer::State::optimise_several(int first, int last) {
     portions::StepSums drawn = several.draw(parts, views);
     several.update(
         parts, batch_rates(of_step), sh_degree,
-        [&](gpu::Recording& recording, const Model& moved) {
-            if (options.strategy == Strategy::mcmc) record_noise(recording, cache, moved, frame, of_noise);
+        [&](const passes::Recorder& on, const Model& moved) {
+            if (options.strategy == Strategy::mcmc) record_noise(on, moved, frame, of_noise);
         },
         drawn);
     timed_steps += int(views.size());
@@ -295,7 +294,7 @@ void Trainer::State::control_density(int step) {
     if (schedule.resets_opacity(step)) {
         portions.visit(portions::Portions::Need::state, [&](int, const Model& model) {
             gpu::Recording recording(device->limits());
-            record_reset_opacity(recording, cache, model, float(logit(kResetOpacity)));
+            record_reset_opacity({recording, cache}, model, float(logit(kResetOpacity)));
             executor.run(recording);
             portions.changed();
         });

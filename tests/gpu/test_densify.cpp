@@ -196,7 +196,7 @@ TEST(DensifyEdges, WritesNothingPastItsCapacity) {
     r.run([&](gpu::Recording& recording) {
         r.cache.get<passes::DensifyDecide>().record(
             recording, {start.model.params, start.model.statistics, frame.tile_counts}, push(0));
-        pipeline::record_scan(recording, r.cache,
+        pipeline::record_scan({recording, r.cache},
                               {frame.tile_counts, nullptr, frame.prefix, frame.scan_totals, frame.counts},
                               {500, frame.sizes.scan_block, shared::TOTAL_SCAN, "offsets"});
         for (const auto& [mode, out] :

@@ -59,7 +59,7 @@ void run(Inputs& s, pipeline::FrameBuffers& frame, uint32_t visit, uint32_t inst
     const pipeline::CameraUse camera{nullptr, 0, uint32_t(s.picture.width), uint32_t(s.picture.height)};
     const pipeline::ExposureUse use{&s.exposures, kPhoto, kRate, visit};
     r.run([&](gpu::Recording& recording) {
-        record_loss(recording, r.cache, frame, {.camera = camera}, texels, false, &use);
+        pipeline::FramePasses{{recording, r.cache}, {}, frame, {.camera = camera}}.loss(texels, false, &use);
     });
 }
 
@@ -135,7 +135,8 @@ TEST(Exposure, LearnsNothingFromWhatIsMasked) {
     const pipeline::ExposureUse use{&s.exposures, kPhoto, kRate, 1};
     Rig& r = rig();
     r.run([&](gpu::Recording& recording) {
-        record_loss(recording, r.cache, guarded.frame, {.camera = camera}, texels, true, &use);
+        pipeline::FramePasses{{recording, r.cache}, {}, guarded.frame, {.camera = camera}}.loss(texels, true,
+                                                                                                &use);
     });
     EXPECT_TRUE(guarded.intact());
     EXPECT_EQ(s.exposures.download()[kPhoto], kIdentityExposure);

@@ -47,10 +47,11 @@ Result run_frame(const Scene& scene, uint32_t capacity, bool gradients) {
     Result out;
     pipeline::Sorted sorted;
     r.run([&](gpu::Recording& recording) {
-        sorted = record_forward({recording, r.cache, plan, frame}, model, inputs);
+        const pipeline::FramePasses on{{recording, r.cache}, plan, frame, inputs};
+        sorted = on.forward(model);
         if (!gradients) return;
-        record_loss(recording, r.cache, frame, inputs, photo);
-        record_backward({recording, r.cache, plan, frame}, model, inputs, sorted, {});
+        on.loss(photo);
+        on.backward(model, sorted, {});
     });
     EXPECT_TRUE(guarded.intact());
     out.counts = frame.read_counts();

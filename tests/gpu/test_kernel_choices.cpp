@@ -33,10 +33,11 @@ FrameBytes frame_with(const passes::KernelConfig& config, const Scene& scene) {
     const shared::Counts counts = run_until_it_fits(
         cache, rig().executor, frame,
         {.splats = model.splats, .width = width, .height = height, .instances = 40000, .gradients = true},
-        [&](gpu::Recording& recording) {
-            sorted = record_forward({recording, cache, plan, frame}, model, inputs);
-            record_loss(recording, cache, frame, inputs, photo);
-            record_backward({recording, cache, plan, frame}, model, inputs, sorted, {});
+        [&](const passes::Recorder& recorder) {
+            const pipeline::FramePasses on{recorder, plan, frame, inputs};
+            sorted = on.forward(model);
+            on.loss(photo);
+            on.backward(model, sorted, {});
         });
     EXPECT_GT(counts.instances, 2000u);
     return {frame.planes.download<float>(frame.sizes.planes / 4),

@@ -220,7 +220,7 @@ TEST(Noise, StaysFiniteAndMovesWhatJustFitted) {
     frame.counts.upload(std::span<const shared::Counts>(&counts, 1));
     Rig& r = rig();
     r.run([&](gpu::Recording& recording) {
-        record_noise(recording, r.cache, model, frame,
+        record_noise({recording, r.cache}, model, frame,
                      {.amplitude = 5, .max_length = 1e9f, .seed = 1, .step = 12});
     });
     const Gaussians moved = download_model(model, model.params);

@@ -60,7 +60,7 @@ TEST_P(Loss, ValueAndGradientMatchTheReference) {
     const gpu::Buffer photo = pipeline::upload_photo(*device(), in.photo);
     const pipeline::CameraUse camera{nullptr, 0, uint32_t(width), uint32_t(height)};
     r.run([&](gpu::Recording& recording) {
-        record_loss(recording, r.cache, frame, {camera, in.background}, photo);
+        pipeline::FramePasses{{recording, r.cache}, {}, frame, {camera, in.background}}.loss(photo);
     });
     EXPECT_TRUE(guarded.intact());
 
@@ -108,7 +108,7 @@ TEST_P(Loss, OfMaskedPicturesMatchesTheReference) {
     const gpu::Buffer texels = pipeline::upload_photo(*device(), in.photo);
     const pipeline::CameraUse camera{nullptr, 0, uint32_t(width), uint32_t(height)};
     r.run([&](gpu::Recording& recording) {
-        record_loss(recording, r.cache, frame, {camera, in.background}, texels, true);
+        pipeline::FramePasses{{recording, r.cache}, {}, frame, {camera, in.background}}.loss(texels, true);
     });
     EXPECT_TRUE(guarded.intact());
 
@@ -165,7 +165,7 @@ TEST_P(Loss, OfBandsAddsUpToThatOfTheView) {
                 pipeline::FrameInputs inputs{{nullptr, 0, uint32_t(width), uint32_t(height)}, in.background};
                 inputs.band = band;
                 r.run([&](gpu::Recording& recording) {
-                    record_loss(recording, r.cache, frame, inputs, texels, masked);
+                    pipeline::FramePasses{{recording, r.cache}, {}, frame, inputs}.loss(texels, masked);
                 });
                 EXPECT_TRUE(guarded.intact());
                 const shared::Counts counts = frame.read_counts();
@@ -285,7 +285,7 @@ TEST(LossEdges, EqualPicturesHaveNoLossAndNoGradient) {
     frame.planes.upload(std::span<const float>(planes));
     const gpu::Buffer photo = pipeline::upload_photo(*device(), picture);
     r.run([&](gpu::Recording& recording) {
-        record_loss(recording, r.cache, frame, {{nullptr, 0, 40, 30}, {1, 1, 1}}, photo);
+        pipeline::FramePasses{{recording, r.cache}, {}, frame, {{nullptr, 0, 40, 30}, {1, 1, 1}}}.loss(photo);
     });
     EXPECT_EQ(frame.read_counts().l1, 0);
     EXPECT_EQ(frame.read_counts().squared, 0);

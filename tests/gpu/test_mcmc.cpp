@@ -262,7 +262,7 @@ TEST(Noise, MatchesTheReference) {
         frame.counts.upload(std::span<const shared::Counts>(&counts, 1));
         const uint64_t seed = 0xabcdef0123456789ull;
         r.run([&](gpu::Recording& recording) {
-            record_noise(recording, r.cache, start.model, frame,
+            record_noise({recording, r.cache}, start.model, frame,
                          {.amplitude = 5, .max_length = 1e9f, .seed = seed, .step = 12});
         });
         const Gaussians moved = download_model(start.model, start.model.params);
@@ -284,7 +284,7 @@ TEST(Noise, MatchesTheReference) {
         counts.instances = 11;  // the frame is going to be repeated
         frame.counts.upload(std::span<const shared::Counts>(&counts, 1));
         r.run([&](gpu::Recording& recording) {
-            record_noise(recording, r.cache, start.model, frame,
+            record_noise({recording, r.cache}, start.model, frame,
                          {.amplitude = 5, .max_length = 1e9f, .seed = seed, .step = 13});
         });
         EXPECT_EQ(download_model(start.model, start.model.params).means, moved.means);
@@ -304,7 +304,7 @@ TEST(Noise, IsNoLongerThanItsReach) {
     frame.counts.upload(std::span<const shared::Counts>(&counts, 1));
     const double reach = 0.1;
     r.run([&](gpu::Recording& recording) {
-        record_noise(recording, r.cache, start.model, frame,
+        record_noise({recording, r.cache}, start.model, frame,
                      {.amplitude = 5, .max_length = float(reach), .seed = 77, .step = 12});
     });
     const Gaussians moved = download_model(start.model, start.model.params);

@@ -46,7 +46,7 @@ shared::CameraBlock block_of(const Camera& camera, const CameraMotion& motion, c
     set_motion(motions, motion);
     const gpu::Buffer base = pipeline::upload_camera(*device(), camera, r.config(), origin);
     r.run([&](gpu::Recording& recording) {
-        const auto use = record_move_camera(recording, r.cache, motions, kOwn,
+        const auto use = record_move_camera({recording, r.cache}, motions, kOwn,
                                             {.buffer = &base, .width = 61, .height = 47});
         EXPECT_EQ(use.buffer, &motions.camera);
         EXPECT_EQ(use.width, 61u);
@@ -153,8 +153,8 @@ void update(pipeline::Motions& motions, pipeline::FrameBuffers& frame, const std
     counts.instances = instances;
     frame.counts.upload(std::span<const shared::Counts>(&counts, 1));
     r.run([&](gpu::Recording& recording) {
-        record_motion_sums(recording, r.cache, frame);
-        record_motion_update(recording, r.cache, frame,
+        record_motion_sums({recording, r.cache}, frame);
+        record_motion_update({recording, r.cache}, frame,
                              {.motions = &motions,
                               .photo = kOwn,
                               .rate = kMotionRate,

@@ -226,9 +226,10 @@ Stepped take_step(const Scene& scene, const Image& target, const pipeline::PlanR
                                        .background = scene.options.background};
     for (int step = 0; step < steps; ++step)
         r.run([&](gpu::Recording& recording) {
-            const auto sorted = record_forward({recording, r.cache, plan, frame}, model, inputs);
-            record_loss(recording, r.cache, frame, inputs, photo);
-            record_backward({recording, r.cache, plan, frame}, model, inputs, sorted, rates);
+            const pipeline::FramePasses on{{recording, r.cache}, plan, frame, inputs};
+            const auto sorted = on.forward(model);
+            on.loss(photo);
+            on.backward(model, sorted, rates);
             frame.record_counts(recording);
         });
     return {download_model(model, model.params), model.statistics.download<float>(2 * size_t(model.splats)),

@@ -409,12 +409,21 @@ struct FrameParts {
 };
 SharedByTests<FrameParts>* const frame_parts = SharedByTests<FrameParts>::add();
 
+void record_gradient(const FrameParts& parts, gpu::Recording& recording, const pipeline::PlanRequest& request,
+                     const pipeline::FrameInputs& inputs, bool masked = false) {
+    const auto plan = plan_for(request);
+    const pipeline::FramePasses on{{recording, rig().cache}, plan, parts.frame, inputs};
+    const auto sorted = on.forward(parts.model);
+    on.loss(parts.photo, masked);
+    on.backward(parts.model, sorted, {});
+}
+
 /// The commands of a step of training, an opacity reset, a picture with depth, and gradients, also of points and along rays.
 std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     Rig& r = rig();
     const Scene scene = random_scene(3000, 50, SplatKind::ordinary, 61, 47, 2);
-    auto& [model, frame, wide, camera, photo, exposures, motions, views] =
-        frame_parts->get([] { return FrameParts(); });
+    FrameParts& parts = frame_parts->get([] { return FrameParts(); });
+    auto& [model, frame, wide, camera, photo, exposures, motions, views] = parts;
     exposures = pipeline::Exposures(*device(), 3);
     const pipeline::ExposureUse exposure{&exposures, 1, 0.01f, 1};
     motions = pipeline::Motions(*device(), std::vector<pipeline::MotionBasis>(3));
@@ -447,12 +456,13 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     gpu::Recording step = r.recording();
     const auto plan = plan_for(request);
     const pipeline::FrameInputs moved{
-        .camera = record_move_camera(step, r.cache, motions, motion.photo, inputs.camera)};
-    const auto sorted = record_forward({step, r.cache, plan, frame}, model, moved);
-    record_loss(step, r.cache, frame, inputs, photo, false, &exposure);
-    record_backward({step, r.cache, plan, frame}, model, inputs, sorted, {}, &motion);
-    record_reset_opacity(step, r.cache, model, 0);
-    record_noise(step, r.cache, model, frame, {.amplitude = 0.1f, .max_length = 1, .seed = 1, .step = 1});
+        .camera = record_move_camera({step, r.cache}, motions, motion.photo, inputs.camera)};
+    const pipeline::FramePasses stepped{{step, r.cache}, plan, frame, moved};
+    const auto sorted = stepped.forward(model);
+    stepped.loss(photo, false, &exposure);
+    stepped.backward(model, sorted, {}, &motion);
+    record_reset_opacity(stepped, model, 0);
+    record_noise(stepped, model, frame, {.amplitude = 0.1f, .max_length = 1, .seed = 1, .step = 1});
     out.push_back(step.commands());
 
     // A step of two views. The sums have room for both.
@@ -461,49 +471,45 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     views.reserve(*device(), 50, 2, 1, 50);
     views.reserve_sums(*device(), r.executor, plan_of_views, 100);
     gpu::Recording batch = r.recording();
+    const pipeline::FramePasses of_views{{batch, r.cache}, plan_of_views, frame, inputs};
     for (uint32_t view = 0; view < 2; ++view) {
-        record_list({batch, r.cache, plan_of_views, frame}, model, inputs, views,
-                    {.view = view, .list = view, .first_place = 50 * view});
+        of_views.list(model, views, {.view = view, .list = view, .first_place = 50 * view});
         batch.copy(views.visible, 0, frame.records, 0, 48 * 50);
-        const auto drawn = record_list_forward({batch, r.cache, plan_of_views, frame}, 50, inputs);
-        record_loss(batch, r.cache, frame, inputs, photo);
-        record_list_backward({batch, r.cache, plan_of_views, frame}, 50, inputs, drawn, views.sums,
-                             50 * view);
+        const auto drawn = of_views.draw_list(50);
+        of_views.loss(photo);
+        of_views.list_backward(50, drawn, views.sums, 50 * view);
     }
     pipeline::Rates rates;
     rates.views = 2;
-    record_update_views({batch, r.cache, plan_of_views, frame}, model, views, rates, 2);
+    of_views.update_views(model, views, rates);
     // A step of one view in two bands.
     for (uint32_t band = 0; band < 2; ++band) {
         pipeline::FrameInputs of_band = inputs;
         of_band.band = pipeline::band_of(r.config(), 47, 2, band);
-        record_list({batch, r.cache, plan_of_views, frame}, model, of_band, views,
-                    {.list = band, .first_place = 50 * band}, band > 0);
+        pipeline::FramePasses{{batch, r.cache}, plan_of_views, frame, of_band}.list(
+            model, views, {.list = band, .first_place = 50 * band}, band > 0);
     }
     rates.views = 1;
-    record_update_views({batch, r.cache, plan_of_views, frame}, model, views, rates, 2, 2);
+    of_views.update_views(model, views, rates, 2);
     out.push_back(batch.commands());
 
     request.purpose = pipeline::Purpose::picture;
     gpu::Recording picture = r.recording();
-    record_forward({picture, r.cache, plan_for(request), frame}, model, inputs);
+    pipeline::FramePasses{{picture, r.cache}, plan_for(request), frame, inputs}.forward(model);
     wide.reserve(*device(), r.config(),
                  {.splats = 50, .width = 66000, .height = 9, .instances = 4096, .fifth_plane = true});
-    record_forward({picture, r.cache, plan_for(request), wide}, model, {.camera = {&camera, 0, 66000, 9}});
+    pipeline::FramePasses{{picture, r.cache}, plan_for(request), wide, {.camera = {&camera, 0, 66000, 9}}}
+        .forward(model);
     out.push_back(picture.commands());
 
     request.purpose = pipeline::Purpose::gradient;
     gpu::Recording gradient = r.recording();
-    const auto again = record_forward({gradient, r.cache, plan_for(request), frame}, model, inputs);
-    record_loss(gradient, r.cache, frame, inputs, photo, true);
-    record_backward({gradient, r.cache, plan_for(request), frame}, model, inputs, again, {});
+    record_gradient(parts, gradient, request, inputs, true);
     out.push_back(gradient.commands());
 
     request.render.points = true;
     gpu::Recording points = r.recording();
-    const auto listed = record_forward({points, r.cache, plan_for(request), frame}, model, inputs);
-    record_loss(points, r.cache, frame, inputs, photo);
-    record_backward({points, r.cache, plan_for(request), frame}, model, inputs, listed, {});
+    record_gradient(parts, points, request, inputs);
     out.push_back(points.commands());
 
     request.render.points = false;
@@ -511,9 +517,7 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     for (const Integrator integrator : {Integrator::ray, Integrator::march}) {
         request.render.integrator = integrator;
         gpu::Recording rays = r.recording();
-        const auto met = record_forward({rays, r.cache, plan_for(request), frame}, model, inputs);
-        record_loss(rays, r.cache, frame, inputs, photo);
-        record_backward({rays, r.cache, plan_for(request), frame}, model, inputs, met, {});
+        record_gradient(parts, rays, request, inputs);
         out.push_back(rays.commands());
     }
     for (const auto& commands : out)

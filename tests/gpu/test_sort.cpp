@@ -33,7 +33,7 @@ TEST_P(Scan, IsTheExclusivePrefixSum) {
             totals("totals", (blocks + 1) * 4), counts = zero_counts();
         r.run([&](gpu::Recording& recording) {
             pipeline::record_scan(
-                recording, r.cache, {values, gathered ? &ranks.buffer() : nullptr, prefix, totals, counts},
+                {recording, r.cache}, {values, gathered ? &ranks.buffer() : nullptr, prefix, totals, counts},
                 {items, block, gathered ? shared::TOTAL_INSTANCES : shared::TOTAL_SCAN, "scan"});
         });
         const auto within = prefix.read<uint32_t>(), before = totals.read<uint32_t>();
@@ -82,7 +82,7 @@ Sorted run_sort(const std::vector<uint32_t>& input, const RadixCut& cut, bool ow
     uint32_t result = 0;
     r.run([&](gpu::Recording& recording) {
         result = pipeline::record_sort(
-            recording, r.cache,
+            {recording, r.cache},
             {{&keys0.buffer(), &keys1.buffer()},
              {&values0.buffer(), &values1.buffer()},
              {own_numbers ? nullptr : &places0.buffer(), own_numbers ? nullptr : &places1.buffer()},

@@ -100,11 +100,12 @@ struct Step {
     void list(const SeenScene& seen, size_t picture, bool projected = false) {
         Rig& r = rig();
         gpu::Recording recording = r.recording();
-        record_list({recording, r.cache, plan, frame}, model, inputs(seen, picture), buffers,
-                    {.view = uint32_t(picture / bands),
-                     .list = uint32_t(picture),
-                     .first_place = first_places[picture]},
-                    projected);
+        const FrameInputs drawn = inputs(seen, picture);
+        FramePasses{{recording, r.cache}, plan, frame, drawn}.list(model, buffers,
+                                                                   {.view = uint32_t(picture / bands),
+                                                                    .list = uint32_t(picture),
+                                                                    .first_place = first_places[picture]},
+                                                                   projected);
         frame.record_counts(recording);
         r.executor.run(recording);
         first_places.push_back(first_places[picture] + frame.read_counts().scan_total);
@@ -117,10 +118,10 @@ struct Step {
         buffers.reserve_sums(*device(), r.executor, plan, first_places.back());
         gpu::Recording recording = r.recording();
         recording.copy(buffers.visible, 0, frame.records, 0, 48ull * listed(picture));
-        const Sorted sorted = record_list_forward({recording, r.cache, plan, frame}, listed(picture), drawn);
-        record_loss(recording, r.cache, frame, drawn, photos[picture / bands]);
-        record_list_backward({recording, r.cache, plan, frame}, listed(picture), drawn, sorted, buffers.sums,
-                             first_places[picture]);
+        const FramePasses on{{recording, r.cache}, plan, frame, drawn};
+        const Sorted sorted = on.draw_list(listed(picture));
+        on.loss(photos[picture / bands]);
+        on.list_backward(listed(picture), sorted, buffers.sums, first_places[picture]);
         r.executor.run(recording);
         pictures.push_back(frame.planes.download<float>(frame.sizes.planes / 4));
     }
@@ -134,8 +135,8 @@ struct Step {
         rates.views = uint32_t(cameras.size());
         gpu::Recording recording = r.recording();
         recording.fill(frame.counts, 0, 0, sizeof(shared::Counts));
-        record_update_views({recording, r.cache, plan, frame}, model, buffers, batch_rates(rates),
-                            kMaxShDegree, bands);
+        FramePasses{{recording, r.cache}, plan, frame, {}}.update_views(model, buffers, batch_rates(rates),
+                                                                        bands);
         r.executor.run(recording);
     }
 };
@@ -182,7 +183,7 @@ TEST(ViewBatch, AListDrawsThePictureOfItsView) {
         step.list(seen, v);
         step.draw(seen, v);
         gpu::Recording whole = rig().recording();
-        record_forward({whole, rig().cache, step.plan, step.frame}, step.model, step.inputs(seen, v));
+        FramePasses{{whole, rig().cache}, step.plan, step.frame, step.inputs(seen, v)}.forward(step.model);
         rig().executor.run(whole);
         EXPECT_EQ(step.frame.planes.download<float>(step.frame.sizes.planes / 4), step.pictures[v]);
     }
@@ -409,11 +410,10 @@ TEST(ViewBatch, AStepOfOneViewHasTheBytesOfTheFusedKernel) {
                 split.update(seen, rates);
                 gpu::Recording recording = rig().recording();
                 const FrameInputs inputs = fused.inputs(seen, 0);
-                const Sorted sorted =
-                    record_forward({recording, rig().cache, fused.plan, fused.frame}, fused.model, inputs);
-                record_loss(recording, rig().cache, fused.frame, inputs, fused.photos[0]);
-                record_backward({recording, rig().cache, fused.plan, fused.frame}, fused.model, inputs,
-                                sorted, rates);
+                const FramePasses on{{recording, rig().cache}, fused.plan, fused.frame, inputs};
+                const Sorted sorted = on.forward(fused.model);
+                on.loss(fused.photos[0]);
+                on.backward(fused.model, sorted, rates);
                 rig().executor.run(recording);
             }
             const size_t floats = parameter_bytes(400, 2) / 4;
@@ -438,8 +438,8 @@ TEST(ViewBatch, WhatNoViewSeesMovesByItsMomentsAlone) {
     Rates rates = some_rates(4);
     rates.views = 2;
     gpu::Recording recording = rig().recording();
-    record_update_views({recording, rig().cache, step.plan, step.frame}, step.model, step.buffers,
-                        batch_rates(rates), kMaxShDegree);
+    FramePasses{{recording, rig().cache}, step.plan, step.frame, {}}.update_views(step.model, step.buffers,
+                                                                                  batch_rates(rates));
     rig().executor.run(recording);
     const auto after = step.model.moments1.download<float>(m.size());
     for (size_t i = 0; i < m.size(); ++i)
