@@ -8,50 +8,30 @@
 #include <vector>
 
 #include "core/typing.h"
+#include "run/run_options.h"
 
 namespace ewa::cli {
 namespace {
 
 constexpr size_t kFewOptions = 8;  // more are in groups
 
+/// Options that are none of a training. Those have their subject in train::run_options().
 const std::map<std::string, std::string>& subjects() {
     static const std::map<std::string, std::string> table = [] {
         std::map<std::string, std::string> made;
         const auto add = [&made](const char* subject, std::initializer_list<const char*> names) {
             for (const char* name : names) made[name] = subject;
         };
-        add("Data", {"cameras",    "frame",        "frames",   "split",        "test-every",  "downscale",
-                     "max-width",  "masks",        "init",     "transform",    "dense-start", "init-opacity",
-                     "init-scale", "exposures",    "crop",     "min-opacity",  "max-sh",      "sort",
-                     "splats",     "cases",        "views",    "size",         "look-at",     "up",
-                     "orbit",      "film-seconds", "matching", "scene-splats", "visible",     "view-time"});
-        add("Quality", {"quality",
-                        "steps",
-                        "strategy",
-                        "max-splats",
-                        "sh-degree",
-                        "absgrad",
-                        "revised-opacity",
-                        "exposure",
-                        "refine-poses",
-                        "refine-focal",
-                        "resolution-schedule",
-                        "seed",
-                        "background",
-                        "kernel",
-                        "antialias",
-                        "integrator",
-                        "samples",
-                        "points",
-                        "nearest",
-                        "runs",
-                        "training-steps"});
-        add("Output", {"output",     "format",        "mode",        "json",    "svg",         "heat-map",
-                       "heat-scale", "eval-every",    "save-every",  "serve",   "accuracy",    "spz-version",
-                       "check",      "ranks",         "quiet",       "verbose", "results",     "compare",
-                       "threshold",  "max-error",     "resume",      "force",   "allow-empty", "metrics",
-                       "protocol",   "lpips-weights", "tensorboard", "keep",    "inria"});
-        add("Device", {"device", "moments", "image-cache", "device-memory", "rank-timeout"});
+        add("Data",
+            {"cameras", "frame", "split",        "transform", "exposures",    "crop",    "min-opacity",
+             "max-sh",  "sort",  "splats",       "cases",     "views",        "size",    "look-at",
+             "up",      "orbit", "film-seconds", "matching",  "scene-splats", "visible", "view-time"});
+        add("Quality", {"quality", "antialias", "integrator", "samples", "runs", "training-steps"});
+        add("Output", {"output",     "format",  "mode",        "json",        "svg",       "heat-map",
+                       "heat-scale", "serve",   "accuracy",    "spz-version", "check",     "ranks",
+                       "quiet",      "verbose", "results",     "compare",     "threshold", "max-error",
+                       "resume",     "force",   "allow-empty", "protocol"});
+        for (const train::RunOption& option : train::run_options()) made[option.name] = option.subject;
         return made;
     }();
     return table;

@@ -10,20 +10,15 @@
 
 #include "core/typing.h"
 #include "ewa/error.h"
+#include "run/option_rows.h"
 
 namespace ewa::train {
 namespace {
 
 using Json = nlohmann::ordered_json;
-template <class T>
-using Member = T& (*)(RunOptions&);
-template <class T>
-using Names = std::vector<std::pair<const char*, T>>;
 
 constexpr int kMostSteps = 1000000000;
 constexpr int kMostBatch = 256, kMostBands = 64;
-constexpr bool kDecides = true, kDoesNotDecide = false;
-
 const Names<Strategy> kStrategies = {{"auto", Strategy::automatic},
                                      {"adc", Strategy::adc},
                                      {"mcmc", Strategy::mcmc},
@@ -38,90 +33,6 @@ const Names<Footprint> kKernels = {{"peak", Footprint::peak},
                                    {"antialias", Footprint::antialias},
                                    {"density", Footprint::density},
                                    {"ewa", Footprint::density}};
-
-template <class T>
-const T& read(Member<T> member, const RunOptions& options) {
-    return member(const_cast<RunOptions&>(options));
-}
-
-template <class T>
-T parse_within(const std::string& text, T low, T high) {
-    const auto value = core::parse_count<T>(text);
-    if (!value || *value < low || *value > high)
-        throw InputError(fmt::format("'{}' is not a whole number from {} to {}", text, low, high));
-    return *value;
-}
-
-template <class T>
-const char* name_among(const Names<T>& names, T value) {
-    const auto found =
-        std::find_if(names.begin(), names.end(), [&](const auto& named) { return named.second == value; });
-    return found == names.end() ? "" : found->first;
-}
-
-/// An option that is one member, whose value `parse` reads from a text.
-template <class T, class Parse>
-RunOption member_option(const char* name, const char* value, const char* help, bool decides, Member<T> member,
-                        const Parse& parse) {
-    RunOption option{name, value, help, decides};
-    option.get = [=](const RunOptions& options) { return Json(read(member, options)); };
-    option.set = [=](RunOptions& options, const std::string& text) { member(options) = parse(text); };
-    return option;
-}
-
-template <class T>
-RunOption number(const char* name, const char* value, const char* help, bool decides, Member<T> member, T low,
-                 T high) {
-    return member_option(name, value, help, decides, member,
-                         [=](const std::string& text) { return parse_within(text, low, high); });
-}
-
-RunOption flag(const char* name, const char* help, Member<bool> member) {
-    RunOption option = member_option(name, "", help, kDecides, member, [](const std::string& text) {
-        if (text != "true" && text != "false") throw InputError("'" + text + "' is neither true nor false");
-        return text == "true";
-    });
-    option.flag = member;
-    return option;
-}
-
-/// A flag that runs of earlier versions did not have.
-RunOption later_flag(const char* name, const char* help, Member<bool> member) {
-    RunOption option = flag(name, help, member);
-    option.before = "false";
-    return option;
-}
-
-template <class T>
-RunOption choice(const char* name, const char* help, Member<T> member, const Names<T>& names) {
-    RunOption option{name, "TEXT", help, kDecides};
-    for (const auto& [known, value] : names) option.choices.emplace_back(known);
-    option.get = [=, &names](const RunOptions& options) { return name_among(names, read(member, options)); };
-    option.set = [=, &names, choices = option.choices](RunOptions& options, const std::string& text) {
-        std::string word = text;
-        if (const std::string problem = core::settle_word(word, choices); !problem.empty())
-            throw InputError(problem);
-        const auto found = std::find(choices.begin(), choices.end(), word);
-        member(options) = names[size_t(found - choices.begin())].second;
-    };
-    return option;
-}
-
-RunOption real(const char* name, const char* value, const char* help, Member<double> member, double low,
-               double high) {
-    RunOption option = member_option(name, value, help, kDecides, member, [=](std::string text) {
-        const std::string problem = core::settle_number(text, low, high);
-        if (!problem.empty()) throw InputError(problem);
-        return core::parse_number(text).value();
-    });
-    option.before = option.get(RunOptions()).dump();
-    return option;
-}
-
-RunOption words(const char* name, const char* value, const char* help, bool decides,
-                Member<std::string> member) {
-    return member_option(name, value, help, decides, member, [](const std::string& text) { return text; });
-}
 
 RunOption frames_option() {
     RunOption option =
@@ -339,109 +250,136 @@ RunOption max_width_option() {
     return option;
 }
 
-std::vector<RunOption> make_table() {
+/// A row under its heading in the help.
+struct Row {
+    const char* subject;
+    RunOption option;
+};
+
+std::vector<Row> rows() {
     return {
-        dataset_option(),
-        number<int>(
-            "steps", "N", "Training views: an optimisation step takes one of them, or --batch", kDecides,
-            [](RunOptions& o) -> int& { return o.train.steps; }, 1, kMostSteps),
-        batch_option(),
-        bands_option(),
-        choice<Strategy>(
-            "strategy",
-            "adc adds and removes splats (3DGS). mcmc relocates dead splats and grows to --max-splats "
-            "(3DGS-MCMC). none keeps the number of splats. auto is mcmc from 5000 steps on, else adc",
-            [](RunOptions& o) -> Strategy& { return o.train.strategy; }, kStrategies),
-        max_splats_option(),
-        sh_degree_option(),
-        flag("absgrad",
-             "adc: add splats where the sum of the pixels' absolute gradients is large (AbsGS). Such "
-             "gradients "
-             "do not cancel",
-             [](RunOptions& o) -> bool& { return o.train.absolute_gradients; }),
-        flag("revised-opacity", "adc: both halves of a split splat are together as opaque as it was",
-             [](RunOptions& o) -> bool& { return o.train.revised_opacity; }),
-        flag(
-            "exposure",
-            "Learn an exposure (an affine map of colours) for each training image. For captures in which the "
-            "exposure varies",
-            [](RunOptions& o) -> bool& { return o.train.exposure; }),
-        later_flag(
-            "refine-poses",
-            "Learn a small rotation and translation for each training camera. Test cameras are aligned to "
-            "their images before they are scored",
-            [](RunOptions& o) -> bool& { return o.train.refine_poses; }),
-        later_flag("refine-focal", "With --refine-poses: also learn a factor of each camera's focal lengths",
-                   [](RunOptions& o) -> bool& { return o.train.refine_focal; }),
-        number<int>(
-            "resolution-schedule", "N",
-            "Start with the images' sides halved N times. Each tenth of the run doubles them", kDecides,
-            [](RunOptions& o) -> int& { return o.train.halvings; }, 0, 6),
-        words("init", "sfm|random|FILE",
-              "First splats. sfm: the dataset's points, or random if it has none. random: where the cameras "
-              "look. FILE: a splat file, a PLY of points, or the folder of a run",
-              kDecides, [](RunOptions& o) -> std::string& { return o.init; }),
-        choice<DenseStart>(
-            "dense-start",
-            "Whether splats start between neighbouring points, too. auto: in runs of adc of at most 700 "
-            "steps, if "
-            "points are few for the size of the images",
-            [](RunOptions& o) -> DenseStart& { return o.dense_start; }, kDenseStarts),
-        real(
-            "init-opacity", "X", "Opacity of the first splats. A splat file has its own",
-            [](RunOptions& o) -> double& { return o.init_opacity; }, 0.001, 0.999),
-        real(
-            "init-scale", "F",
-            "Scale of the first splats: this factor times the distance to their neighbours. A splat file has "
-            "its own",
-            [](RunOptions& o) -> double& { return o.init_scale; }, 0.001, 1000),
-        frames_option(),
-        number<int>(
-            "downscale", "K", "Divide the images' width and height by this", kDecides,
-            [](RunOptions& o) -> int& { return o.downscale; }, 1, 1024),
-        max_width_option(),
-        choice<MaskUse>(
-            "masks",
-            "What masks/ and alpha are for. ignore: masked pixels do not count. cut: masked pixels have the "
-            "background's colour. none: neither is used. auto: ignore if there are mask files, else cut",
-            [](RunOptions& o) -> MaskUse& { return o.masks; }, kMaskUses),
-        number<int>(
-            "test-every", "K", "Hold out every K-th image in name order. 0: none", kDecides,
-            [](RunOptions& o) -> int& { return o.test_every; }, 0, 1000000000),
-        number<uint64_t>(
-            "seed", "S", "The same seed on the same device gives the same bytes", kDecides,
-            [](RunOptions& o) -> uint64_t& { return o.train.seed; }, uint64_t(0), UINT64_MAX),
-        moments_option(),
-        image_cache_option(),
-        device_memory_option(),
-        background_option(),
-        choice<Footprint>(
-            "kernel",
-            "Footprint of a splat: peak (3DGS), antialias (Mip-Splatting) or density (EWA: a longer way "
-            "through a splat absorbs more)",
-            [](RunOptions& o) -> Footprint& { return o.train.render.kernel; }, kKernels),
-        points_option(),
-        nearest_option(),
-        number<int>(
-            "eval-every", "N", "Evaluate the held-out views every N steps. 0: only at the end",
-            kDoesNotDecide, [](RunOptions& o) -> int& { return o.eval_every; }, 0, kMostSteps),
-        metrics_option(),
-        lpips_weights_option(),
-        tensorboard_option(),
-        number<int>(
-            "save-every", "N",
-            "Save splats.ply and checkpoint.ewa every N steps. 0: save the checkpoint every 30 seconds or "
-            "more",
-            kDoesNotDecide, [](RunOptions& o) -> int& { return o.save_every; }, 0, kMostSteps),
-        keep_option(),
-        inria_option(),
-        words("device", "NAME|N", "Number of a device, or part of its name (see ewa devices)", kDoesNotDecide,
-              [](RunOptions& o) -> std::string& { return o.device.selector; }),
-        number<int>(
-            "rank-timeout", "S",
-            "Under mpirun or srun: end with an error if a process does not answer for so many seconds",
-            kDoesNotDecide, [](RunOptions& o) -> int& { return o.rank_timeout; }, 1, 86400),
+        {"Data", dataset_option()},
+        {"Quality", number<int>(
+                        "steps", "N", "Training views: an optimisation step takes one of them, or --batch",
+                        kDecides, [](RunOptions& o) -> int& { return o.train.steps; }, 1, kMostSteps)},
+        {"Quality", batch_option()},
+        {"Quality", bands_option()},
+        {"Quality",
+         choice<Strategy>(
+             "strategy",
+             "adc adds and removes splats (3DGS). mcmc relocates dead splats and grows to --max-splats "
+             "(3DGS-MCMC). none keeps the number of splats. auto is mcmc from 5000 steps on, else adc",
+             [](RunOptions& o) -> Strategy& { return o.train.strategy; }, kStrategies)},
+        {"Quality", max_splats_option()},
+        {"Quality", sh_degree_option()},
+        {"Quality",
+         flag("absgrad",
+              "adc: add splats where the sum of the pixels' absolute gradients is large (AbsGS). Such "
+              "gradients "
+              "do not cancel",
+              [](RunOptions& o) -> bool& { return o.train.absolute_gradients; })},
+        {"Quality",
+         flag("revised-opacity", "adc: both halves of a split splat are together as opaque as it was",
+              [](RunOptions& o) -> bool& { return o.train.revised_opacity; })},
+        {"Quality", flag("exposure",
+                         "Learn an exposure (an affine map of colours) for each training image. For captures "
+                         "in which the "
+                         "exposure varies",
+                         [](RunOptions& o) -> bool& { return o.train.exposure; })},
+        {"Quality",
+         later_flag(
+             "refine-poses",
+             "Learn a small rotation and translation for each training camera. Test cameras are aligned to "
+             "their images before they are scored",
+             [](RunOptions& o) -> bool& { return o.train.refine_poses; })},
+        {"Quality",
+         later_flag("refine-focal", "With --refine-poses: also learn a factor of each camera's focal lengths",
+                    [](RunOptions& o) -> bool& { return o.train.refine_focal; })},
+        {"Quality", number<int>(
+                        "resolution-schedule", "N",
+                        "Start with the images' sides halved N times. Each tenth of the run doubles them",
+                        kDecides, [](RunOptions& o) -> int& { return o.train.halvings; }, 0, 6)},
+        {"Data",
+         words("init", "sfm|random|FILE",
+               "First splats. sfm: the dataset's points, or random if it has none. random: where the cameras "
+               "look. FILE: a splat file, a PLY of points, or the folder of a run",
+               kDecides, [](RunOptions& o) -> std::string& { return o.init; })},
+        {"Data",
+         choice<DenseStart>(
+             "dense-start",
+             "Whether splats start between neighbouring points, too. auto: in runs of adc of at most 700 "
+             "steps, if "
+             "points are few for the size of the images",
+             [](RunOptions& o) -> DenseStart& { return o.dense_start; }, kDenseStarts)},
+        {"Data", real(
+                     "init-opacity", "X", "Opacity of the first splats. A splat file has its own",
+                     [](RunOptions& o) -> double& { return o.init_opacity; }, 0.001, 0.999)},
+        {"Data", real(
+                     "init-scale", "F",
+                     "Scale of the first splats: this factor times the distance to their neighbours. A splat "
+                     "file has "
+                     "its own",
+                     [](RunOptions& o) -> double& { return o.init_scale; }, 0.001, 1000)},
+        {"Data", frames_option()},
+        {"Data", number<int>(
+                     "downscale", "K", "Divide the images' width and height by this", kDecides,
+                     [](RunOptions& o) -> int& { return o.downscale; }, 1, 1024)},
+        {"Data", max_width_option()},
+        {"Data",
+         choice<MaskUse>(
+             "masks",
+             "What masks/ and alpha are for. ignore: masked pixels do not count. cut: masked pixels have the "
+             "background's colour. none: neither is used. auto: ignore if there are mask files, else cut",
+             [](RunOptions& o) -> MaskUse& { return o.masks; }, kMaskUses)},
+        {"Data", number<int>(
+                     "test-every", "K", "Hold out every K-th image in name order. 0: none", kDecides,
+                     [](RunOptions& o) -> int& { return o.test_every; }, 0, 1000000000)},
+        {"Quality", number<uint64_t>(
+                        "seed", "S", "The same seed on the same device gives the same bytes", kDecides,
+                        [](RunOptions& o) -> uint64_t& { return o.train.seed; }, uint64_t(0), UINT64_MAX)},
+        {"Device", moments_option()},
+        {"Device", image_cache_option()},
+        {"Device", device_memory_option()},
+        {"Quality", background_option()},
+        {"Quality",
+         choice<Footprint>(
+             "kernel",
+             "Footprint of a splat: peak (3DGS), antialias (Mip-Splatting) or density (EWA: a longer way "
+             "through a splat absorbs more)",
+             [](RunOptions& o) -> Footprint& { return o.train.render.kernel; }, kKernels)},
+        {"Quality", points_option()},
+        {"Quality", nearest_option()},
+        {"Output", number<int>(
+                       "eval-every", "N", "Evaluate the held-out views every N steps. 0: only at the end",
+                       kDoesNotDecide, [](RunOptions& o) -> int& { return o.eval_every; }, 0, kMostSteps)},
+        {"Output", metrics_option()},
+        {"Output", lpips_weights_option()},
+        {"Output", tensorboard_option()},
+        {"Output",
+         number<int>(
+             "save-every", "N",
+             "Save splats.ply and checkpoint.ewa every N steps. 0: save the checkpoint every 30 seconds or "
+             "more",
+             kDoesNotDecide, [](RunOptions& o) -> int& { return o.save_every; }, 0, kMostSteps)},
+        {"Output", keep_option()},
+        {"Output", inria_option()},
+        {"Device", words("device", "NAME|N", "Number of a device, or part of its name (see ewa devices)",
+                         kDoesNotDecide, [](RunOptions& o) -> std::string& { return o.device.selector; })},
+        {"Device",
+         number<int>(
+             "rank-timeout", "S",
+             "Under mpirun or srun: end with an error if a process does not answer for so many seconds",
+             kDoesNotDecide, [](RunOptions& o) -> int& { return o.rank_timeout; }, 1, 86400)},
     };
+}
+
+std::vector<RunOption> make_table() {
+    std::vector<RunOption> table;
+    for (Row& row : rows()) {
+        row.option.subject = row.subject;
+        table.push_back(std::move(row.option));
+    }
+    return table;
 }
 
 }  // namespace

@@ -25,6 +25,7 @@ struct RunOption {
     bool& (*flag)(RunOptions&) = nullptr;  // the member of a flag
     /// The value of runs from before the option existed, as on the command line. Empty: it has always existed.
     std::string before = {};
+    std::string subject = {};  // the heading in the help
 };
 
 /// In the order of config.json.

@@ -319,6 +319,7 @@ TEST(RunOptions, TableReadsWhatItWrites) {
         option.set(one, train::value_text(option, RunOptions()));
         EXPECT_EQ(train::to_config(one), before);
         EXPECT_FALSE(option.help.empty());
+        EXPECT_FALSE(option.subject.empty());
         if (option.flag) {
             EXPECT_TRUE(option.flag(all));
         }
