@@ -60,6 +60,7 @@ void add_run_option(CLI::App& app, const train::RunOption& option, RunOptions& o
     else
         added->transform(one_of(option.choices))->type_name(option.value);
     added->default_str(train::value_text(option, options));
+    if (option.subject.empty()) added->group("");
 }
 
 void add_run_options(CLI::App& app, TrainArguments& arguments) {

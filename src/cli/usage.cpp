@@ -31,7 +31,8 @@ const std::map<std::string, std::string>& subjects() {
                        "heat-scale", "serve",   "accuracy",    "spz-version", "check",     "ranks",
                        "quiet",      "verbose", "results",     "compare",     "threshold", "max-error",
                        "resume",     "force",   "allow-empty", "protocol"});
-        for (const train::RunOption& option : train::run_options()) made[option.name] = option.subject;
+        for (const train::RunOption& option : train::run_options())
+            if (!option.subject.empty()) made[option.name] = option.subject;
         return made;
     }();
     return table;

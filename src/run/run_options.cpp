@@ -4,12 +4,14 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <utility>
 
 #include "core/typing.h"
 #include "ewa/error.h"
+#include "run/advanced_options.h"
 #include "run/option_rows.h"
 
 namespace ewa::train {
@@ -93,14 +95,14 @@ RunOption max_splats_option() {
 RunOption moments_option() {
     const Member<int> member = [](RunOptions& o) -> int& { return o.train.moment_bits; };
     RunOption option =
-        member_option("moments", "BITS",
+        member_option("moments", "16|32",
                       "Bits of each of Adam's moments, 16 or 32. With 32 a splat takes up to half as "
                       "much memory again",
                       kDecides, member, [](const std::string& text) {
-                          const int bits = parse_within(text, 16, 32);
-                          if (bits != 16 && bits != 32)
+                          const auto bits = core::parse_count<int>(text);
+                          if (!bits || (*bits != 16 && *bits != 32))
                               throw InputError("'" + text + "' is neither 16 nor 32");
-                          return bits;
+                          return *bits;
                       });
     option.before = "32";
     return option;
@@ -250,122 +252,137 @@ RunOption max_width_option() {
     return option;
 }
 
-/// A row under its heading in the help.
+RunOption dense_start_option() {
+    RunOption option = choice<DenseStart>(
+        "dense-start",
+        "Whether splats start between neighbouring points, too. auto: in runs of adc of at most 700 "
+        "steps, if "
+        "points are few for the size of the images",
+        [](RunOptions& o) -> DenseStart& { return o.dense_start; }, kDenseStarts);
+    option.before = "auto";
+    return option;
+}
+
 struct Row {
     const char* subject;
+    const char* python;  // empty: Python does not have it
     RunOption option;
 };
 
 std::vector<Row> rows() {
     return {
-        {"Data", dataset_option()},
-        {"Quality", number<int>(
-                        "steps", "N", "Training views: an optimisation step takes one of them, or --batch",
-                        kDecides, [](RunOptions& o) -> int& { return o.train.steps; }, 1, kMostSteps)},
-        {"Quality", batch_option()},
-        {"Quality", bands_option()},
-        {"Quality",
+        {"Data", "", dataset_option()},
+        {"Quality", "steps",
+         number<int>(
+             "steps", "N", "Training views: an optimisation step takes one of them, or --batch", kDecides,
+             [](RunOptions& o) -> int& { return o.train.steps; }, 1, kMostSteps)},
+        {"Quality", "batch", batch_option()},
+        {"Quality", "bands", bands_option()},
+        {"Quality", "strategy",
          choice<Strategy>(
              "strategy",
              "adc adds and removes splats (3DGS). mcmc relocates dead splats and grows to --max-splats "
              "(3DGS-MCMC). none keeps the number of splats. auto is mcmc from 5000 steps on, else adc",
              [](RunOptions& o) -> Strategy& { return o.train.strategy; }, kStrategies)},
-        {"Quality", max_splats_option()},
-        {"Quality", sh_degree_option()},
-        {"Quality",
+        {"Quality", "max_splats", max_splats_option()},
+        {"Quality", "sh_degree", sh_degree_option()},
+        {"Quality", "absolute_gradients",
          flag("absgrad",
               "adc: add splats where the sum of the pixels' absolute gradients is large (AbsGS). Such "
               "gradients "
               "do not cancel",
               [](RunOptions& o) -> bool& { return o.train.absolute_gradients; })},
-        {"Quality",
+        {"Quality", "revised_opacity",
          flag("revised-opacity", "adc: both halves of a split splat are together as opaque as it was",
               [](RunOptions& o) -> bool& { return o.train.revised_opacity; })},
-        {"Quality", flag("exposure",
-                         "Learn an exposure (an affine map of colours) for each training image. For captures "
-                         "in which the "
-                         "exposure varies",
-                         [](RunOptions& o) -> bool& { return o.train.exposure; })},
-        {"Quality",
+        {"Quality", "exposure",
+         flag("exposure",
+              "Learn an exposure (an affine map of colours) for each training image. For captures "
+              "in which the "
+              "exposure varies",
+              [](RunOptions& o) -> bool& { return o.train.exposure; })},
+        {"Quality", "refine_poses",
          later_flag(
              "refine-poses",
              "Learn a small rotation and translation for each training camera. Test cameras are aligned to "
              "their images before they are scored",
              [](RunOptions& o) -> bool& { return o.train.refine_poses; })},
-        {"Quality",
+        {"Quality", "refine_focal",
          later_flag("refine-focal", "With --refine-poses: also learn a factor of each camera's focal lengths",
                     [](RunOptions& o) -> bool& { return o.train.refine_focal; })},
-        {"Quality", number<int>(
-                        "resolution-schedule", "N",
-                        "Start with the images' sides halved N times. Each tenth of the run doubles them",
-                        kDecides, [](RunOptions& o) -> int& { return o.train.halvings; }, 0, 6)},
-        {"Data",
+        {"Quality", "halvings",
+         number<int>(
+             "resolution-schedule", "N",
+             "Start with the images' sides halved N times. Each tenth of the run doubles them", kDecides,
+             [](RunOptions& o) -> int& { return o.train.halvings; }, 0, 6)},
+        {"Data", "",
          words("init", "sfm|random|FILE",
                "First splats. sfm: the dataset's points, or random if it has none. random: where the cameras "
                "look. FILE: a splat file, a PLY of points, or the folder of a run",
                kDecides, [](RunOptions& o) -> std::string& { return o.init; })},
-        {"Data",
-         choice<DenseStart>(
-             "dense-start",
-             "Whether splats start between neighbouring points, too. auto: in runs of adc of at most 700 "
-             "steps, if "
-             "points are few for the size of the images",
-             [](RunOptions& o) -> DenseStart& { return o.dense_start; }, kDenseStarts)},
-        {"Data", real(
-                     "init-opacity", "X", "Opacity of the first splats. A splat file has its own",
-                     [](RunOptions& o) -> double& { return o.init_opacity; }, 0.001, 0.999)},
-        {"Data", real(
-                     "init-scale", "F",
-                     "Scale of the first splats: this factor times the distance to their neighbours. A splat "
-                     "file has "
-                     "its own",
-                     [](RunOptions& o) -> double& { return o.init_scale; }, 0.001, 1000)},
-        {"Data", frames_option()},
-        {"Data", number<int>(
-                     "downscale", "K", "Divide the images' width and height by this", kDecides,
-                     [](RunOptions& o) -> int& { return o.downscale; }, 1, 1024)},
-        {"Data", max_width_option()},
-        {"Data",
+        {"Data", "dense_start", dense_start_option()},
+        {"Data", "init_opacity",
+         real(
+             "init-opacity", "X", "Opacity of the first splats. A splat file has its own",
+             [](RunOptions& o) -> double& { return o.init_opacity; }, 0.001, 0.999)},
+        {"Data", "init_scale",
+         real(
+             "init-scale", "F",
+             "Scale of the first splats: this factor times the distance to their neighbours. A splat "
+             "file has "
+             "its own",
+             [](RunOptions& o) -> double& { return o.init_scale; }, 0.001, 1000)},
+        {"Data", "", frames_option()},
+        {"Data", "",
+         number<int>(
+             "downscale", "K", "Divide the images' width and height by this", kDecides,
+             [](RunOptions& o) -> int& { return o.downscale; }, 1, 1024)},
+        {"Data", "", max_width_option()},
+        {"Data", "",
          choice<MaskUse>(
              "masks",
              "What masks/ and alpha are for. ignore: masked pixels do not count. cut: masked pixels have the "
              "background's colour. none: neither is used. auto: ignore if there are mask files, else cut",
              [](RunOptions& o) -> MaskUse& { return o.masks; }, kMaskUses)},
-        {"Data", number<int>(
-                     "test-every", "K", "Hold out every K-th image in name order. 0: none", kDecides,
-                     [](RunOptions& o) -> int& { return o.test_every; }, 0, 1000000000)},
-        {"Quality", number<uint64_t>(
-                        "seed", "S", "The same seed on the same device gives the same bytes", kDecides,
-                        [](RunOptions& o) -> uint64_t& { return o.train.seed; }, uint64_t(0), UINT64_MAX)},
-        {"Device", moments_option()},
-        {"Device", image_cache_option()},
-        {"Device", device_memory_option()},
-        {"Quality", background_option()},
-        {"Quality",
+        {"Data", "",
+         number<int>(
+             "test-every", "K", "Hold out every K-th image in name order. 0: none", kDecides,
+             [](RunOptions& o) -> int& { return o.test_every; }, 0, 1000000000)},
+        {"Quality", "seed",
+         number<uint64_t>(
+             "seed", "S", "The same seed on the same device gives the same bytes", kDecides,
+             [](RunOptions& o) -> uint64_t& { return o.train.seed; }, uint64_t(0), UINT64_MAX)},
+        {"Device", "moment_bits", moments_option()},
+        {"Device", "image_cache_bytes", image_cache_option()},
+        {"Device", "device_memory_bytes", device_memory_option()},
+        {"Quality", "background", background_option()},
+        {"Quality", "kernel",
          choice<Footprint>(
              "kernel",
              "Footprint of a splat: peak (3DGS), antialias (Mip-Splatting) or density (EWA: a longer way "
              "through a splat absorbs more)",
              [](RunOptions& o) -> Footprint& { return o.train.render.kernel; }, kKernels)},
-        {"Quality", points_option()},
-        {"Quality", nearest_option()},
-        {"Output", number<int>(
-                       "eval-every", "N", "Evaluate the held-out views every N steps. 0: only at the end",
-                       kDoesNotDecide, [](RunOptions& o) -> int& { return o.eval_every; }, 0, kMostSteps)},
-        {"Output", metrics_option()},
-        {"Output", lpips_weights_option()},
-        {"Output", tensorboard_option()},
-        {"Output",
+        {"Quality", "points", points_option()},
+        {"Quality", "nearest", nearest_option()},
+        {"Output", "",
+         number<int>(
+             "eval-every", "N", "Evaluate the held-out views every N steps. 0: only at the end",
+             kDoesNotDecide, [](RunOptions& o) -> int& { return o.eval_every; }, 0, kMostSteps)},
+        {"Output", "", metrics_option()},
+        {"Output", "", lpips_weights_option()},
+        {"Output", "", tensorboard_option()},
+        {"Output", "",
          number<int>(
              "save-every", "N",
              "Save splats.ply and checkpoint.ewa every N steps. 0: save the checkpoint every 30 seconds or "
              "more",
              kDoesNotDecide, [](RunOptions& o) -> int& { return o.save_every; }, 0, kMostSteps)},
-        {"Output", keep_option()},
-        {"Output", inria_option()},
-        {"Device", words("device", "NAME|N", "Number of a device, or part of its name (see ewa devices)",
-                         kDoesNotDecide, [](RunOptions& o) -> std::string& { return o.device.selector; })},
-        {"Device",
+        {"Output", "", keep_option()},
+        {"Output", "", inria_option()},
+        {"Device", "",
+         words("device", "NAME|N", "Number of a device, or part of its name (see ewa devices)",
+               kDoesNotDecide, [](RunOptions& o) -> std::string& { return o.device.selector; })},
+        {"Device", "",
          number<int>(
              "rank-timeout", "S",
              "Under mpirun or srun: end with an error if a process does not answer for so many seconds",
@@ -377,8 +394,10 @@ std::vector<RunOption> make_table() {
     std::vector<RunOption> table;
     for (Row& row : rows()) {
         row.option.subject = row.subject;
+        row.option.python = row.python;
         table.push_back(std::move(row.option));
     }
+    std::ranges::move(advanced_options(), std::back_inserter(table));
     return table;
 }
 

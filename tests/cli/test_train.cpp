@@ -99,6 +99,21 @@ TEST_F(Train, ConfigOfARunRepeatsIt) {
     EXPECT_NE(read_file(folder / "a/splats.ply"), read_file(folder / "c/splats.ply"));
 }
 
+TEST_F(Train, ConfigSetsRatesThatTheHelpDoesNotShow) {
+    write_file(folder / "c.json", R"({"means-rate": 1.6e-3, "steps": 5})");
+    write_file(folder / "usual.json", R"({"means-rate": 1.6e-4, "steps": 5})");
+    write_file(folder / "wrong.json", R"({"growth": 0.5})");
+    expect_success(train("a", {"--config", folder / "c.json", "--quiet"}));
+    expect_success(train("b", {"--config", folder / "usual.json", "--quiet"}));
+    expect_success(train("c", {"--steps", "5", "--quiet"}));
+    EXPECT_EQ(read_json(folder / "a/config.json")["means-rate"], 1.6e-3);
+    EXPECT_NE(read_file(folder / "a/splats.ply"), read_file(folder / "b/splats.ply"));
+    EXPECT_EQ(read_file(folder / "b/splats.ply"), read_file(folder / "c/splats.ply"));
+    expect_failure(train("d", {"--config", folder / "wrong.json"}), 2,
+                   "'0.5' is not a number from 1 to 1000");
+    EXPECT_EQ(run_ewa({"train", "--help"}).out.find("means-rate"), std::string::npos);
+}
+
 TEST_F(Train, QualityGivesWhatIsNotGiven) {
     write_file(folder / "c.json", R"({"steps": 5, "max-splats": 700})");
     write_file(folder / "q.json", R"({"quality": "low", "max-splats": 700})");

@@ -151,6 +151,18 @@ INSTANTIATE_TEST_SUITE_P(Strategies, RestoredTrainer,
                          testing::Combine(testing::Values(Strategy::none, Strategy::adc, Strategy::mcmc),
                                           testing::Values(16, 32)));
 
+TEST(CheckpointSettings, WithoutAdvancedOptionsHaveTheUsualOnes) {
+    RunOptions options;
+    auto stored = train::checkpoint_settings(options, "x");
+    ASSERT_EQ(stored["options"].erase("means-rate"), 1u);
+    ASSERT_EQ(stored["options"].erase("refine-every"), 1u);
+    EXPECT_NO_THROW(train::check_resumable("c", stored.dump(), train::checkpoint_settings(options, "x")));
+    options.train.means_rate = 1e-3;
+    expect_error<InputError>(
+        [&] { train::check_resumable("c", stored.dump(), train::checkpoint_settings(options, "x")); },
+        {"--means-rate", "not 0.001"});
+}
+
 /// A checkpoint from before there was --moments has 32 bits.
 TEST(CheckpointSettings, WithoutMomentsHave32Bits) {
     RunOptions options;

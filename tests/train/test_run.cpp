@@ -4,12 +4,15 @@
 
 #include <gtest/gtest.h>
 
+#include <fstream>
+#include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
 #include "core/json.h"
 #include "ewa/error.h"
+#include "run/advanced_options.h"
 #include "run/run_options.h"
 #include "train/synthetic.h"
 
@@ -265,45 +268,55 @@ TEST(RunOptions, AreNamedAfterTheirFolderOrScene) {
 
 /// Every option changes a member of its own, and comes back from its text.
 TEST(RunOptions, TableReadsWhatItWrites) {
-    const std::map<std::string, std::string> other{{"dataset", "d"},
-                                                   {"steps", "7"},
-                                                   {"strategy", "adc"},
-                                                   {"max-splats", "8"},
-                                                   {"sh-degree", "2"},
-                                                   {"absgrad", "true"},
-                                                   {"revised-opacity", "true"},
-                                                   {"exposure", "true"},
-                                                   {"resolution-schedule", "3"},
-                                                   {"init", "random"},
-                                                   {"dense-start", "on"},
-                                                   {"init-opacity", "0.5"},
-                                                   {"init-scale", "2.5"},
-                                                   {"frames", "0-3"},
-                                                   {"downscale", "2"},
-                                                   {"masks", "cut"},
-                                                   {"test-every", "5"},
-                                                   {"seed", "18446744073709551615"},
-                                                   {"moments", "32"},
-                                                   {"image-cache", "9"},
-                                                   {"device-memory", "0.25"},
-                                                   {"background", "0.25,1,0"},
-                                                   {"kernel", "density"},
-                                                   {"batch", "4"},
-                                                   {"bands", "2"},
-                                                   {"points", "true"},
-                                                   {"nearest", "3"},
-                                                   {"refine-poses", "true"},
-                                                   {"refine-focal", "true"},
-                                                   {"eval-every", "6"},
-                                                   {"save-every", "4"},
-                                                   {"keep", "3"},
-                                                   {"max-width", "800"},
-                                                   {"metrics", "ms_ssim"},
-                                                   {"lpips-weights", "w"},
-                                                   {"tensorboard", "true"},
-                                                   {"inria", "true"},
-                                                   {"device", "cpu"},
-                                                   {"rank-timeout", "7"}};
+    std::map<std::string, std::string> other{{"dataset", "d"},
+                                             {"steps", "7"},
+                                             {"strategy", "adc"},
+                                             {"max-splats", "8"},
+                                             {"sh-degree", "2"},
+                                             {"absgrad", "true"},
+                                             {"revised-opacity", "true"},
+                                             {"exposure", "true"},
+                                             {"resolution-schedule", "3"},
+                                             {"init", "random"},
+                                             {"dense-start", "on"},
+                                             {"init-opacity", "0.5"},
+                                             {"init-scale", "2.5"},
+                                             {"frames", "0-3"},
+                                             {"downscale", "2"},
+                                             {"masks", "cut"},
+                                             {"test-every", "5"},
+                                             {"seed", "18446744073709551615"},
+                                             {"moments", "32"},
+                                             {"image-cache", "9"},
+                                             {"device-memory", "0.25"},
+                                             {"background", "0.25,1,0"},
+                                             {"kernel", "density"},
+                                             {"batch", "4"},
+                                             {"bands", "2"},
+                                             {"points", "true"},
+                                             {"nearest", "3"},
+                                             {"refine-poses", "true"},
+                                             {"refine-focal", "true"},
+                                             {"eval-every", "6"},
+                                             {"save-every", "4"},
+                                             {"keep", "3"},
+                                             {"max-width", "800"},
+                                             {"metrics", "ms_ssim"},
+                                             {"lpips-weights", "w"},
+                                             {"tensorboard", "true"},
+                                             {"inria", "true"},
+                                             {"device", "cpu"},
+                                             {"rank-timeout", "7"}};
+    std::ifstream file(EWA_SOURCE_DIR "/docs/training.md");
+    const std::string documents(std::istreambuf_iterator<char>(file), {});
+    for (const train::RunOption& option : train::advanced_options()) {
+        other[option.name] = option.get(RunOptions()).is_number_integer() ? "7"
+                             : option.name == "growth"                    ? "1.25"
+                                                                          : "0.25";
+        EXPECT_EQ(option.before, train::value_text(option, RunOptions())) << option.name;
+        const std::string row = "| `" + option.name + "` | " + option.help + " |";
+        EXPECT_NE(documents.find(row), std::string::npos) << row;
+    }
     ASSERT_EQ(train::run_options().size(), other.size());
     RunOptions all;
     for (const train::RunOption& option : train::run_options()) {
@@ -319,7 +332,7 @@ TEST(RunOptions, TableReadsWhatItWrites) {
         option.set(one, train::value_text(option, RunOptions()));
         EXPECT_EQ(train::to_config(one), before);
         EXPECT_FALSE(option.help.empty());
-        EXPECT_FALSE(option.subject.empty());
+        EXPECT_TRUE(!option.subject.empty() || option.decides_result);
         if (option.flag) {
             EXPECT_TRUE(option.flag(all));
         }
@@ -356,7 +369,10 @@ TEST(RunOptions, TableRefusesWhatIsOutOfRange) {
                                                          {"moments", "8"},
                                                          {"moments", "24"},
                                                          {"moments", "33"},
-                                                         {"image-cache", "x"}};
+                                                         {"image-cache", "x"},
+                                                         {"growth", "0.5"},
+                                                         {"refine-every", "0"},
+                                                         {"means-rate", "-1"}};
     for (const auto& [name, text] : wrong) {
         RunOptions options;
         expect_error<InputError>([&, n = name, t = text] { train::run_option(n).set(options, t); },

@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+// Rows of the options' table that the help does not show: learning rates, thresholds and intervals.
+#pragma once
+#include <vector>
+
+#include "run/run_options.h"
+
+namespace ewa::train {
+
+/// docs/training.md lists them.
+std::vector<RunOption> advanced_options();
+
+}  // namespace ewa::train
