@@ -41,14 +41,13 @@ int usual_test_every() {
 /// What a training begins with.
 struct Plan {
     SharedDataset dataset;
-    TrainOptions options;  // with a concrete strategy and SH degree
+    RunOptions run;  // with a concrete strategy and SH degree
     std::vector<int> frames;
-    int downscale = 1;       // of the dataset
     bool own_start = false;  // the first splats are an argument
 
     void resolve_options() {
-        options = resolve(options, *dataset);
-        options.render.sh_degree = options.sh_degree;
+        run.train = resolve(run.train, *dataset);
+        run.train.render.sh_degree = run.train.sh_degree;
     }
     /// The frames that are not trained on count as held out.
     Split split() const {
@@ -57,22 +56,16 @@ struct Plan {
             if (std::find(frames.begin(), frames.end(), i) == frames.end()) all.test.push_back(i);
         return all;
     }
-    RunOptions run() const {
-        RunOptions run;
-        run.train = options;
-        run.downscale = downscale;
-        return run;
-    }
 };
 
 Gaussians first_splats(const Plan& plan, const Splats* init, const std::string& word) {
     if (!init) {
-        RunOptions run = plan.run();
+        RunOptions run = plan.run;
         run.init = word;
         return train::initial_splats(run, *plan.dataset, plan.frames);
     }
     Gaussians start = init->gaussians;
-    set_sh_degree(start, plan.options.sh_degree);
+    set_sh_degree(start, plan.run.train.sh_degree);
     return start;
 }
 
@@ -90,24 +83,24 @@ class Training {
         word_ = word;
         const DeviceWork work;
         trainer_ = OnDevice(std::make_unique<Trainer>(work.device(), *plan_.dataset, plan_.frames,
-                                                      first_splats(plan_, given, word), plan_.options));
+                                                      first_splats(plan_, given, word), plan_.run.train));
     }
 
     StepReport step() {
         const DeviceWork work;
-        if (trainer_->steps_done() >= plan_.options.steps)
-            throw InputError("all " + core::counted(uint64_t(plan_.options.steps), "step") + " are done");
+        if (trainer_->steps_done() >= plan_.run.train.steps)
+            throw InputError("all " + core::counted(uint64_t(plan_.run.train.steps), "step") + " are done");
         last_ = trainer_->step();
         return last_;
     }
     StepReport next() {
-        if (last_.step >= plan_.options.steps) throw nb::stop_iteration();
+        if (last_.step >= plan_.run.train.steps) throw nb::stop_iteration();
         return step();
     }
 
     Splats splats() const {
         const DeviceWork work;
-        return {trainer_->gaussians(), plan_.options.render.kernel == Footprint::antialias};
+        return {trainer_->gaussians(), plan_.run.train.render.kernel == Footprint::antialias};
     }
     nb::ndarray<nb::numpy, float> exposures() const {
         std::vector<float> values;
@@ -125,9 +118,9 @@ class Training {
     void save_checkpoint(const std::filesystem::path& path) const {
         const std::string fingerprint =
             with_files([&] { return train::dataset_fingerprint(*plan_.dataset, plan_.split()); });
-        Json settings = train::checkpoint_settings(plan_.run(), fingerprint);
+        Json settings = train::checkpoint_settings(plan_.run, fingerprint);
         settings["cap"] = trainer_->max_splats();
-        settings["fields"] = options_json(plan_.options);
+        settings["fields"] = options_json(plan_.run);
         settings["train_frames"] = plan_.frames;
         settings["init"] = plan_.own_start ? "splats" : word_;
         TrainerState state = [this] {
@@ -149,9 +142,9 @@ class Training {
 
     const Plan& plan() const { return plan_; }
     /// With what was chosen.
-    TrainOptions options() const {
-        TrainOptions all = plan_.options;
-        all.max_splats = trainer_->max_splats();
+    RunOptions options() const {
+        RunOptions all = plan_.run;
+        all.train.max_splats = trainer_->max_splats();
         return all;
     }
     const StepReport& last() const { return last_; }
@@ -163,12 +156,19 @@ class Training {
     StepReport last_;
 };
 
+Plan plan_of(const LoadedDataset& dataset) {
+    Plan plan{dataset.dataset, {}, {}};
+    plan.run.downscale = dataset.options.downscale;
+    return plan;
+}
+
 void start_training(Training* self, const LoadedDataset& dataset, nb::handle init, nb::handle train_frames,
                     const nb::kwargs& options) {
-    Plan plan{dataset.dataset, usual_options(), {}, dataset.options.downscale};
-    for (const auto& [name, value] : options) set_option(plan.options, nb::cast<std::string>(name), value);
+    Plan plan = plan_of(dataset);
+    for (const auto& [name, value] : options) set_option(plan.run, nb::cast<std::string>(name), value);
     plan.frames = train_frames.is_none() ? split_frames(*dataset.dataset, usual_test_every()).train
                                          : frames_of(train_frames, *dataset.dataset, "train_frames");
+    check_options(plan.run);
     plan.resolve_options();
     new (self) Training(std::move(plan), init);
 }
@@ -177,7 +177,7 @@ void start_training(Training* self, const LoadedDataset& dataset, nb::handle ini
 void read_settings(const Json& settings, Plan& plan) {
     if (!settings.is_object()) throw InputError("its settings cannot be read");
     if (settings.contains("fields")) {
-        read_options(settings["fields"], plan.options);
+        read_options(settings["fields"], plan.run);
         const Json frames = settings.value("train_frames", Json::array());
         for (const Json& frame : frames)
             if (frame.is_number_unsigned() && frame.get<uint64_t>() < plan.dataset->frames.size())
@@ -191,7 +191,10 @@ void read_settings(const Json& settings, Plan& plan) {
         const Json& value = stored[option.name];
         option.set(run, value.is_string() ? value.get<std::string>() : value.dump());
     }
-    plan.options = run.train;
+    plan.run.train = run.train;
+    plan.run.dense_start = run.dense_start;
+    plan.run.init_opacity = run.init_opacity;
+    plan.run.init_scale = run.init_scale;
     plan.frames = split_frames(*plan.dataset, run.test_every).train;
 }
 
@@ -199,16 +202,16 @@ void read_settings(const Json& settings, Plan& plan) {
 std::string other_dataset(const Json& settings, const Plan& plan) {
     const Json options = settings.value("options", Json());
     const Json then = options.is_object() ? options.value("downscale", Json()) : Json();
-    if (then.is_number_unsigned() && then.get<uint64_t>() != uint64_t(plan.downscale))
+    if (then.is_number_unsigned() && then.get<uint64_t>() != uint64_t(plan.run.downscale))
         return "its images had downscale=" + then.dump() +
-               ", and those of this Dataset have downscale=" + std::to_string(plan.downscale);
+               ", and those of this Dataset have downscale=" + std::to_string(plan.run.downscale);
     return "is of another dataset, or its images or cameras have changed";
 }
 
 Training resume(const std::filesystem::path& path, const LoadedDataset& dataset, nb::handle init,
                 std::optional<int> steps) {
     const train::Checkpoint checkpoint = with_files([&] { return train::read_checkpoint(path); });
-    Plan plan{dataset.dataset, usual_options(), {}, dataset.options.downscale};
+    Plan plan = plan_of(dataset);
     Json settings;
     try {
         settings = core::parse_json<Json>(checkpoint.settings, "its settings");
@@ -221,10 +224,9 @@ Training resume(const std::filesystem::path& path, const LoadedDataset& dataset,
     const Json begun = settings.value("init", Json("sfm"));
     if (begun == "splats" && init.is_none())
         throw InputError(path.string() + ": its training began with splats; pass them again as init");
-    RunOptions run = plan.run();
+    RunOptions& run = plan.run;
     if (steps) run.train.steps = *steps;
     train::continue_from(path, checkpoint, run.train.strategy, run);
-    plan.options = run.train;
     plan.resolve_options();
     const nb::object start =
         init.is_none() ? nb::cast(begun.is_string() ? begun.get<std::string>() : "sfm") : nb::borrow(init);
@@ -360,7 +362,7 @@ void bind_trainer(nb::module_& module) {
             "those of an uninterrupted training. init: the splats that the training began with, if it was "
             "given some. "
             "steps: another number of steps. Raises InputError.")
-        .def_prop_ro("steps", [](const Training& t) { return t.plan().options.steps; })
+        .def_prop_ro("steps", [](const Training& t) { return t.plan().run.train.steps; })
         .def_prop_ro("steps_done", [](const Training& t) { return t.last().step; })
         .def_prop_ro("train_frames", [](const Training& t) { return t.plan().frames; })
         .def_prop_ro(
@@ -369,7 +371,7 @@ void bind_trainer(nb::module_& module) {
             "All options, with the strategy, the SH degree and the cap of splats that were chosen.")
         .def("__repr__", [](const Training& t) {
             return "Trainer(" + std::to_string(t.last().step) + " of " +
-                   core::counted(uint64_t(t.plan().options.steps), "step") + ")";
+                   core::counted(uint64_t(t.plan().run.train.steps), "step") + ")";
         });
 }
 
@@ -379,6 +381,7 @@ void bind_train(nb::module_& module) {
     using namespace nb::literals;
     bind_results(module);
     bind_trainer(module);
+    module.attr("_argument_names") = argument_names();
     module.def(
         "evaluate", evaluate_splats, "splats"_a, "dataset"_a, "frames"_a = nb::none(), nb::kw_only(),
         "background"_a = nb::make_tuple(0, 0, 0), "antialias"_a = nb::none(), "kernel"_a = nb::none(),

@@ -1,29 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
-// The options of ewa.Trainer: the members of TrainOptions under their names.
+// The options of ewa.Trainer: those rows of a run's options that have a name in Python.
 #pragma once
 #include <nanobind/nanobind.h>
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
-#include "ewa/train_options.h"
+#include "ewa/run_options.h"
 
 namespace ewa::python {
 
-/// What ewa train has without options: strategy and SH degree are automatic.
-TrainOptions usual_options();
-
-/// Sets a member. Throws TypeError for an unknown name, with a suggestion, or another type. Throws InputError for a value out of its range.
-void set_option(TrainOptions& options, const std::string& name, nanobind::handle value);
+/// Throws TypeError for an unknown name, with a suggestion, or another type. Throws InputError for a value out of its range.
+void set_option(RunOptions& options, const std::string& name, nanobind::handle value);
 
 /// ", *, steps: int = 30000, ...": the options as parameters in a signature.
 std::string option_parameters();
 
-/// All options under their names.
-nanobind::dict options_dict(const TrainOptions& options);
+/// The arguments whose names are not those of the command line, under the names there.
+nanobind::dict argument_names();
 
-nlohmann::ordered_json options_json(const TrainOptions& options);
-/// Throws InputError if a value is missing or no value of its option.
-void read_options(const nlohmann::ordered_json& json, TrainOptions& options);
+/// All options under their names.
+nanobind::dict options_dict(const RunOptions& options);
+
+nlohmann::ordered_json options_json(const RunOptions& options);
+/// Throws InputError if a value is missing or no value of its option. Options that checkpoints of earlier versions lack
+/// get the value that those had.
+void read_options(const nlohmann::ordered_json& json, RunOptions& options);
 
 }  // namespace ewa::python

@@ -30,14 +30,7 @@ _ADVICE = (
     ("a larger --test-every leaves more of them", "name some as train_frames="),
     ("with --transform move=", "by their means and origin"),
 )
-# Options of the programs that have another name in Python.
-_NAMES = {
-    "absgrad": "absolute_gradients",
-    "device-memory": "device_memory_bytes",
-    "image-cache": "image_cache_bytes",
-    "moments": "moment_bits",
-}
-_VALUES = "adc|mcmc|none|auto|random|sfm|splat|ray|march|peak|antialias|density"
+_VALUES = "adc|mcmc|none|auto|on|off|random|sfm|splat|ray|march|peak|antialias|density"
 _OPTION = re.compile(rf"--([a-z][a-z-]*[a-z])(?: (?:(\d[\d.]*(?<!\.))|({_VALUES}))(?![\w-]))?")
 
 
@@ -46,12 +39,13 @@ def spelled(text: str) -> str:
 
     `--bands 2` becomes `bands=2`, and `--max-splats` becomes `max_splats=`.
     """
+    names = vars(sys.modules["ewa._native"])["_argument_names"]  # that module imports this one
     for words, advice in _ADVICE:
         text = text.replace(words, advice)
 
     def argument(found: re.Match[str]) -> str:
         option, number, word = found.groups()
-        name = _NAMES.get(option, option.replace("-", "_"))
+        name = names.get(option, option.replace("-", "_"))
         return f"{name}=" + (number or (f'"{word}"' if word else ""))
 
     return _OPTION.sub(argument, text)

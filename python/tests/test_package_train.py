@@ -206,13 +206,13 @@ def test_the_cap_is_chosen_and_kept(still_life, tmp_path):
     "options, error, message",
     [
         ({"stepz": 3}, TypeError, "Trainer has no option stepz; did you mean steps?"),
-        ({"steps": 0}, ewa.InputError, "steps=0: is not from 1 to "),
-        ({"steps": 1.5}, ewa.InputError, "steps=1.5: is no whole number"),
+        ({"steps": 0}, ewa.InputError, "steps=0: '0' is not a whole number from 1 to "),
+        ({"steps": 1.5}, ewa.InputError, "steps=1.5: '1.5' is not a whole number"),
         ({"steps": "many"}, TypeError, "steps='many' is of the wrong type"),
-        ({"growth": float("nan")}, ewa.InputError, "growth=nan: is not from 1 to 1000"),
+        ({"growth": float("nan")}, ewa.InputError, "growth=nan: 'nan' is not a number from 1 to 1000"),
         ({"strategy": "mcm"}, ewa.InputError, "strategy='mcm': .*; did you mean mcmc"),
-        ({"sh_degree": 4}, ewa.InputError, "sh_degree=4: is not 0, 1, 2, 3"),
-        ({"moment_bits": 8}, ewa.InputError, "moment_bits=8: is neither 16 nor 32"),
+        ({"sh_degree": 4}, ewa.InputError, "sh_degree=4: '4' is not a whole number from 0 to 3"),
+        ({"moment_bits": 8}, ewa.InputError, "moment_bits=8: '8' is neither 16 nor 32"),
         ({"antialias": "yes"}, TypeError, "antialias='yes' is of the wrong type"),
         ({"background": [1, 2]}, ValueError, r"background has the shape \(2,\); expected \(3,\)"),
         ({"train_frames": []}, ewa.InputError, "no training image"),
@@ -222,14 +222,32 @@ def test_the_cap_is_chosen_and_kept(still_life, tmp_path):
             "train_frames has the index 48; the dataset has 48 frames",
         ),
         ({"max_splats": 10}, ewa.InputError, "3000 splats"),
-        ({"max_splats": 0}, ewa.InputError, "max_splats=0: is no whole number from 1 to"),
+        ({"max_splats": 0}, ewa.InputError, "max_splats=0: '0' is not a whole number from 1 to"),
         ({"max_splats": "many"}, TypeError, "max_splats='many' is of the wrong type"),
         ({"init": make_splats(2).means}, TypeError, ""),
+        ({"image_cache_bytes": -1}, ewa.InputError, "image_cache_bytes=-1: '-1' is not a whole"),
+        ({"nearest": 4}, ewa.InputError, "nearest= is an option of points="),
+        ({"points": True, "init_opacity": 0.5}, ewa.InputError, "init_opacity= .* not for points="),
+        ({"dense_start": "of"}, ewa.InputError, "dense_start='of': .*; did you mean on?"),
     ],
 )
 def test_wrong_options(still_life, options, error, message):
     with pytest.raises(error, match=message):
         ewa.Trainer(still_life, **options)
+
+
+def test_first_splats_and_points(still_life, tmp_path):
+    options = dict(steps=2, init_opacity=0.25, init_scale=2, train_frames=[0], dense_start="off")
+    start = ewa.Trainer(still_life, **options).splats()
+    usual = ewa.Trainer(still_life, steps=2, train_frames=[0], dense_start="off").splats()
+    assert np.allclose(start.opacity_logits, np.log(0.25 / 0.75), atol=1e-5)
+    assert np.allclose(start.log_scales, np.log(2) + usual.log_scales, atol=1e-5)
+    trainer = ewa.Trainer(still_life, steps=2, points=True, nearest=3, train_frames=[0])
+    assert (trainer.options["points"], trainer.options["nearest"]) == (True, 3)
+    assert trainer.step().loss > 0
+    trainer.save_checkpoint(tmp_path / "a.ewa")
+    resumed = ewa.Trainer.resume(tmp_path / "a.ewa", still_life)
+    assert resumed.options == trainer.options
 
 
 def test_whole_floats_and_numpy_numbers_are_options(still_life):
