@@ -19,6 +19,7 @@
 #include "cameras.h"
 #include "core/typing.h"
 #include "errors.h"
+#include "options.h"
 #include "png.h"
 
 namespace ewa::python {
@@ -137,12 +138,8 @@ Frame frame_of(const FrameState& state) {
         .split = n[3]};
 }
 
-MaskUse mask_use(std::string word) {
-    const std::vector<std::string> words{"auto", "ignore", "cut", "none"};
-    if (const std::string problem = core::settle_word(word, words); !problem.empty())
-        throw InputError("masks: " + problem);
-    return std::array{MaskUse::automatic, MaskUse::ignore, MaskUse::cut,
-                      MaskUse::none}[size_t(std::find(words.begin(), words.end(), word) - words.begin())];
+MaskUse mask_use(const std::string& word) {
+    return asked_for("masks", word).masks;
 }
 
 void open_dataset(LoadedDataset* self, const std::filesystem::path& path, int downscale,

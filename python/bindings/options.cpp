@@ -6,6 +6,7 @@
 
 #include "arrays.h"
 #include "core/typing.h"
+#include "core/words.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
 #include "run/run_options.h"
@@ -27,11 +28,10 @@ std::array<float, 3> background_of(nb::handle value) {
 
 namespace {
 
-/// Throws InputError that suggests a word.
-size_t position_of(const char* name, std::string word, const std::vector<std::string>& words) {
-    if (const std::string problem = core::settle_word(word, words); !problem.empty())
-        throw InputError(std::string(name) + ": " + problem);
-    return size_t(std::ranges::find(words, word) - words.begin());
+Integrator integrator_of(const std::string& word) {
+    static const core::Words<Integrator> words{
+        {"splat", Integrator::splat}, {"ray", Integrator::ray}, {"march", Integrator::march}};
+    return of_argument("integrator", [&] { return core::value_of(words, word); });
 }
 
 int whole_number(const char* name, int value, int most) {
@@ -42,7 +42,7 @@ int whole_number(const char* name, int value, int most) {
 
 Footprint kernel_of(const LookArguments& arguments, const Splats& splats) {
     if (arguments.kernel && arguments.antialias) throw InputError("antialias and kernel exclude each other");
-    if (arguments.kernel) return Footprint(position_of("kernel", *arguments.kernel, kernel_words()));
+    if (arguments.kernel) return asked_for("kernel", *arguments.kernel).train.render.kernel;
     if (arguments.points) return footprint_of(arguments.antialias.value_or(false));
     if (!splats.gaussians.density) return footprint_of(arguments.antialias.value_or(splats.antialiased));
     if (arguments.antialias.value_or(false))
@@ -52,9 +52,10 @@ Footprint kernel_of(const LookArguments& arguments, const Splats& splats) {
 
 }  // namespace
 
-const std::vector<std::string>& kernel_words() {
-    static const std::vector<std::string> words{"peak", "antialias", "density"};
-    return words;
+RunOptions asked_for(const char* name, const std::string& text) {
+    RunOptions options;
+    of_argument(name, [&] { train::run_option(name).set(options, text); });
+    return options;
 }
 
 RenderOptions look_of(const LookArguments& arguments, const Splats& splats) {
@@ -63,7 +64,7 @@ RenderOptions look_of(const LookArguments& arguments, const Splats& splats) {
     if (arguments.sh_degree < 0 || arguments.sh_degree > kMaxShDegree)
         throw InputError("sh_degree is not 0, 1, 2 or 3");
     look.sh_degree = arguments.sh_degree;
-    look.integrator = Integrator(position_of("integrator", arguments.integrator, {"splat", "ray", "march"}));
+    look.integrator = integrator_of(arguments.integrator);
     look.points = arguments.points;
     if (look.points && look.kernel != Footprint::peak)
         throw InputError("points and a kernel exclude each other: a sphere has no footprint");

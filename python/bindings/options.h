@@ -6,19 +6,29 @@
 #include <array>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "bindings.h"
 #include "ewa/error.h"
 #include "ewa/render_options.h"
+#include "ewa/run_options.h"
 
 namespace ewa::python {
 
 /// Three numbers, or a colour as core::parse_colour reads it. Throws InputError.
 std::array<float, 3> background_of(nanobind::handle value);
 
-/// In the order of Footprint.
-const std::vector<std::string>& kernel_words();
+/// Calls a function, whose InputError then begins with the argument's name.
+template <class Function>
+auto of_argument(const char* name, const Function& function) {
+    try {
+        return function();
+    } catch (const InputError& error) {
+        throw InputError(std::string(name) + ": " + error.what());
+    }
+}
+
+/// The usual options with this one, which is named as on the command line. Throws InputError.
+RunOptions asked_for(const char* name, const std::string& text);
 
 inline Footprint footprint_of(bool antialias) {
     return antialias ? Footprint::antialias : Footprint::peak;
@@ -41,9 +51,10 @@ RenderOptions look_of(const LookArguments& arguments, const Splats& splats);
 /// The splats with opacities of the kernel. `fitted` holds them if they are not these already.
 const Gaussians& fitted_to(Footprint kernel, const Splats& splats, Gaussians& fitted);
 
-#define EWA_LOOK_TYPES                                                                                      \
-    "antialias: bool | None = None, kernel: typing.Literal['peak', 'antialias', 'density'] | None = None, " \
-    "integrator: typing.Literal['splat', 'ray', 'march'] = 'splat', samples: int | None = None, "           \
+#define EWA_LOOK_TYPES                                                                                       \
+    "antialias: bool | None = None, kernel: typing.Literal['peak', 'antialias', 'density', 'ewa'] | None = " \
+    "None, "                                                                                                 \
+    "integrator: typing.Literal['splat', 'ray', 'march'] = 'splat', samples: int | None = None, "            \
     "points: bool = False, nearest: int | None = None"
 
 }  // namespace ewa::python

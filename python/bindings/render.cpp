@@ -13,6 +13,7 @@
 #include "bindings.h"
 #include "cameras.h"
 #include "core/typing.h"
+#include "core/words.h"
 #include "device.h"
 #include "errors.h"
 #include "ewa/error.h"
@@ -95,13 +96,12 @@ class Planes {
     std::vector<float> values_;
 };
 
-Drawing drawing_of(std::string mode) {
-    const std::vector<std::string> modes{"color", "depth", "count", "ellipsoids"};
-    if (const std::string problem = core::settle_word(mode, modes); !problem.empty())
-        throw InputError("mode: " + problem);
-    return std::array{
-        Drawing::color, Drawing::depth, Drawing::count,
-        Drawing::ellipsoids}[size_t(std::find(modes.begin(), modes.end(), mode) - modes.begin())];
+Drawing drawing_of(const std::string& mode) {
+    static const core::Words<Drawing> modes{{"color", Drawing::color},
+                                            {"depth", Drawing::depth},
+                                            {"count", Drawing::count},
+                                            {"ellipsoids", Drawing::ellipsoids}};
+    return of_argument("mode", [&] { return core::value_of(modes, mode); });
 }
 
 /// ewa.Renderer: a scene on the device.

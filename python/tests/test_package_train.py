@@ -276,6 +276,7 @@ def test_antialiased_training_makes_antialiased_splats(still_life):
 def test_densities_are_trained_and_kept(still_life, tmp_path):
     trainer = ewa.Trainer(still_life, steps=1, kernel="density", train_frames=[0])
     assert trainer.options["kernel"] == "density" and not trainer.options["antialias"]
+    assert ewa.Trainer(still_life, steps=1, kernel="ewa", train_frames=[0]).options == trainer.options
     splats = trainer.splats()
     assert splats.density and not splats.antialiased
     ewa.save(tmp_path / "a.ply", splats)

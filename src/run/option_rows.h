@@ -3,13 +3,11 @@
 #pragma once
 #include <spdlog/fmt/fmt.h>
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <string>
-#include <utility>
-#include <vector>
 
 #include "core/typing.h"
+#include "core/words.h"
 #include "ewa/error.h"
 #include "run/run_options.h"
 
@@ -17,8 +15,6 @@ namespace ewa::train {
 
 template <class T>
 using Member = T& (*)(RunOptions&);
-template <class T>
-using Names = std::vector<std::pair<const char*, T>>;
 
 inline constexpr bool kDecides = true, kDoesNotDecide = false;
 
@@ -33,13 +29,6 @@ T parse_within(const std::string& text, T low, T high) {
     if (!value || *value < low || *value > high)
         throw InputError(fmt::format("'{}' is not a whole number from {} to {}", text, low, high));
     return *value;
-}
-
-template <class T>
-const char* name_among(const Names<T>& names, T value) {
-    const auto found =
-        std::find_if(names.begin(), names.end(), [&](const auto& named) { return named.second == value; });
-    return found == names.end() ? "" : found->first;
 }
 
 /// An option that is one member, whose value `parse` reads from a text.
@@ -78,18 +67,14 @@ inline RunOption later_flag(const char* name, const char* help, Member<bool> mem
 }
 
 template <class T>
-RunOption choice(const char* name, const char* help, Member<T> member, const Names<T>& names) {
+RunOption choice(const char* name, const char* help, Member<T> member, const core::Words<T>& words) {
     RunOption option{name, "TEXT", help, kDecides};
-    for (const auto& [known, value] : names) option.choices.emplace_back(known);
-    option.get = [=, &names](const RunOptions& options) {
-        return name_among(names, read_member(member, options));
+    option.choices = core::words_of(words);
+    option.get = [=, &words](const RunOptions& options) {
+        return core::word_for(words, read_member(member, options));
     };
-    option.set = [=, &names, choices = option.choices](RunOptions& options, const std::string& text) {
-        std::string word = text;
-        if (const std::string problem = core::settle_word(word, choices); !problem.empty())
-            throw InputError(problem);
-        const auto found = std::find(choices.begin(), choices.end(), word);
-        member(options) = names[size_t(found - choices.begin())].second;
+    option.set = [=, &words](RunOptions& options, const std::string& text) {
+        member(options) = core::value_of(words, text);
     };
     return option;
 }

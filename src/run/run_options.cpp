@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "core/typing.h"
+#include "core/words.h"
 #include "ewa/error.h"
 #include "run/advanced_options.h"
 #include "run/option_rows.h"
@@ -21,20 +22,20 @@ using Json = nlohmann::ordered_json;
 
 constexpr int kMostSteps = 1000000000;
 constexpr int kMostBatch = 256, kMostBands = 64;
-const Names<Strategy> kStrategies = {{"auto", Strategy::automatic},
-                                     {"adc", Strategy::adc},
-                                     {"mcmc", Strategy::mcmc},
-                                     {"none", Strategy::none}};
-const Names<MaskUse> kMaskUses = {{"auto", MaskUse::automatic},
-                                  {"ignore", MaskUse::ignore},
-                                  {"cut", MaskUse::cut},
-                                  {"none", MaskUse::none}};
-const Names<DenseStart> kDenseStarts = {
+const core::Words<Strategy> kStrategies = {{"auto", Strategy::automatic},
+                                           {"adc", Strategy::adc},
+                                           {"mcmc", Strategy::mcmc},
+                                           {"none", Strategy::none}};
+const core::Words<MaskUse> kMaskUses = {{"auto", MaskUse::automatic},
+                                        {"ignore", MaskUse::ignore},
+                                        {"cut", MaskUse::cut},
+                                        {"none", MaskUse::none}};
+const core::Words<DenseStart> kDenseStarts = {
     {"auto", DenseStart::automatic}, {"on", DenseStart::on}, {"off", DenseStart::off}};
-const Names<Footprint> kKernels = {{"peak", Footprint::peak},
-                                   {"antialias", Footprint::antialias},
-                                   {"density", Footprint::density},
-                                   {"ewa", Footprint::density}};
+const core::Words<Footprint> kKernels = {{"peak", Footprint::peak},
+                                         {"antialias", Footprint::antialias},
+                                         {"density", Footprint::density},
+                                         {"ewa", Footprint::density}};
 
 RunOption frames_option() {
     RunOption option =
@@ -428,7 +429,7 @@ Json to_config(const RunOptions& options) {
 }
 
 std::string name_of(Strategy strategy) {
-    return name_among(kStrategies, strategy);
+    return core::word_for(kStrategies, strategy);
 }
 
 }  // namespace ewa::train

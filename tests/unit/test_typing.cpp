@@ -5,6 +5,9 @@
 
 #include <string>
 
+#include "core/words.h"
+#include "ewa/error.h"
+
 namespace {
 
 using namespace ewa::core;
@@ -109,6 +112,15 @@ TEST(Typing, Colours) {
           "#fffff", "#fffffff", "#ggg",    "#-ff", "fff",     "whit",    "random"})
         EXPECT_EQ(parse_colour(text), std::nullopt) << text;
     EXPECT_NE(not_a_colour("whit").find("did you mean white?"), std::string::npos);
+}
+
+TEST(Typing, WordsHaveValues) {
+    const Words<int> words{{"gray", 1}, {"black", 2}, {"dark", 2}};
+    EXPECT_EQ(value_of(words, "dark"), 2);
+    EXPECT_EQ(value_of(words, "grey"), 1);
+    EXPECT_STREQ(word_for(words, 2), "black");
+    EXPECT_STREQ(word_for(words, 3), "");
+    EXPECT_THROW(value_of(words, "blak"), ewa::InputError);
 }
 
 TEST(Typing, Plurals) {
