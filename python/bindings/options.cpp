@@ -9,6 +9,7 @@
 #include "core/words.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
+#include "pipeline/plan.h"
 #include "run/run_options.h"
 
 namespace ewa::python {
@@ -66,10 +67,7 @@ RenderOptions look_of(const LookArguments& arguments, const Splats& splats) {
     look.sh_degree = arguments.sh_degree;
     look.integrator = integrator_of(arguments.integrator);
     look.points = arguments.points;
-    if (look.points && look.kernel != Footprint::peak)
-        throw InputError("points and a kernel exclude each other: a sphere has no footprint");
-    if (look.points && look.integrator != Integrator::splat)
-        throw InputError("points and integrator exclude each other: spheres are blended on the image");
+    pipeline::check_points(look);
     if (look.integrator != Integrator::splat && look.kernel == Footprint::antialias)
         throw InputError("integrator: there are no footprints to antialias; kernel=\"peak\" has none");
     if (arguments.samples && look.integrator != Integrator::march)

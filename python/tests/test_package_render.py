@@ -147,9 +147,9 @@ def test_densities_can_be_rendered_as_opacities():
         ({"integrator": "ray", "antialias": True}, "integrator: there are no footprints to antialias"),
         ({"nearest": 3}, "nearest is an argument of points=True"),
         ({"points": True, "nearest": 0}, "nearest is not from 1 to 1000"),
-        ({"points": True, "kernel": "density"}, "points and a kernel exclude each other"),
-        ({"points": True, "antialias": True}, "points and a kernel exclude each other"),
-        ({"points": True, "integrator": "ray"}, "points and integrator exclude each other"),
+        ({"points": True, "kernel": "density"}, 'points= and kernel="density" exclude each other'),
+        ({"points": True, "antialias": True}, 'points= and kernel="antialias" exclude each other'),
+        ({"points": True, "integrator": "ray"}, "points= and integrator= exclude each other"),
     ],
 )
 def test_looks_that_exclude_each_other(look, message, still_life):
