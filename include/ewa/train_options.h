@@ -22,7 +22,7 @@ Strategy strategy_for(int steps);
 /// TrainOptions::sh_degree: 3, or 0 if the dataset says that no colour depends on the view.
 inline constexpr int kAutomaticShDegree = -1;
 
-/// TrainOptions::max_splats: splat_cap() of ewa/trainer.h chooses it.
+/// TrainOptions::max_splats: splat_cap() of ewa/training_needs.h chooses it.
 inline constexpr uint32_t kAutomaticMaxSplats = 0;
 
 /// Options of a Trainer. Learning rates are those of Adam. Lengths are in world units. "Scene extent" is

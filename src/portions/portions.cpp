@@ -197,10 +197,33 @@ std::vector<std::byte> Portions::bytes(Array array) {
     return all;
 }
 
-Gaussians Portions::gaussians_of(std::span<const std::byte> bytes) const {
+void Portions::pass_on(Array array, const std::function<void(uint64_t, uint32_t)>& begin,
+                       const std::function<void(std::span<const std::byte>)>& take) {
+    portions::pass_on(*ranks_, bytes(array), begin, take);
+}
+
+void Portions::hand_out(Array array, const std::function<void(uint64_t, std::span<std::byte>)>& read) {
+    std::vector<uint64_t> sizes;
+    for (int p = 0; p < all(); ++p) sizes.push_back(bytes_of(array, range_of(splats_, p, all()).splats));
+    portions::hand_out(*ranks_, sizes, read, [&](size_t part, std::vector<std::byte> bytes) {
+        give(int(part) - first(), array, std::move(bytes));
+    });
+}
+
+Gaussians Portions::gaussians() {
+    if (alone()) {
+        const pipeline::Model& model = use(0, Need::params);
+        return pipeline::download_model(model, model.params);
+    }
+    const auto bytes = joined(*ranks_, this->bytes(params));
+    if (ranks_->rank() != 0) return {};
     return pipeline::gaussians_of(
         own_.front().model, {reinterpret_cast<const float*>(bytes.data()), bytes.size() / sizeof(float)},
         splats_);
+}
+
+std::vector<std::byte> Portions::sent(std::span<const std::byte> own) const {
+    return told(*ranks_, own);
 }
 
 void Portions::clear(uint32_t splats) {

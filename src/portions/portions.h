@@ -90,15 +90,19 @@ class Portions {
     static const char* name_of(Array array);
     uint64_t bytes_of(Array array, uint32_t splats) const;
     uint64_t state_bytes(uint32_t splats) const;  // of all of them
-    /// An array of all of this rank's portions, one after another.
-    std::vector<std::byte> bytes(Array array);
-    /// The splats of `params` of all portions, one after another.
-    Gaussians gaussians_of(std::span<const std::byte> params) const;
+    // What follows is collective, as level().
+    /// Rank 0 gets an array of all portions in pieces, as by portions::pass_on.
+    void pass_on(Array array, const std::function<void(uint64_t bytes, uint32_t checksum)>& begin,
+                 const std::function<void(std::span<const std::byte>)>& take);
+    /// Gives the portions an array that they lack, of splats() splats, as portions::hand_out divides it.
+    void hand_out(Array array, const std::function<void(uint64_t offset, std::span<std::byte>)>& read);
+    /// The splats, on rank 0; empty on the others.
+    Gaussians gaussians();
+    /// Bytes of rank 0, on every rank.
+    std::vector<std::byte> sent(std::span<const std::byte> own) const;
+
     /// Takes away all arrays, for `splats` splats of all portions.
     void clear(uint32_t splats);
-    /// Gives one of this rank's portions, which lacks it, an array.
-    void give(int portion, Array array, std::vector<std::byte> bytes);
-
     // Bytes that were copied to the device and back so far, and the time that this took, in ms.
     uint64_t streamed_bytes() const { return streamed_; }
     double streaming() const { return streaming_; }
@@ -127,6 +131,9 @@ class Portions {
         gpu::Buffer& buffer(size_t array);
     };
     std::vector<std::byte> bytes_of(Portion& portion, Array array);
+    /// An array of all of this rank's portions, one after another.
+    std::vector<std::byte> bytes(Array array);
+    void give(int portion, Array array, std::vector<std::byte> bytes);
     void copy_to_host(Portion& portion, size_t array);
     bool evict();
     int visits_until(int portion, size_t array) const;

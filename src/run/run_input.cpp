@@ -22,7 +22,7 @@
 #include "scene/names.h"
 #include "shared/constants.h"
 #include "train/schedule.h"
-#include "train/splat_cap.h"
+#include "train/needs.h"
 
 namespace ewa::train {
 namespace {

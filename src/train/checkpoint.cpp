@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "ewa/error.h"
+#include "ewa/gaussians.h"
 
 namespace ewa::train {
 namespace {

@@ -27,7 +27,7 @@
 
 #include "core/atomic_file.h"
 #include "core/file_reader.h"
-#include "ewa/trainer.h"
+#include "ewa/step_report.h"
 #include "train/state_stream.h"
 
 namespace ewa::train {

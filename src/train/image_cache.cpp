@@ -10,6 +10,7 @@
 #include "core/random.h"
 #include "ewa/error.h"
 #include "pipeline/frame_inputs.h"
+#include "train/schedule.h"
 
 namespace ewa::train {
 namespace {
@@ -123,6 +124,19 @@ void ImageCache::prepare(size_t i) {
 pipeline::CameraUse ImageCache::camera(size_t i) const {
     const Camera& camera = frames_[i].camera;
     return {&cameras_, i * camera_stride_, uint32_t(camera.width), uint32_t(camera.height)};
+}
+
+ImageLevels::ImageLevels(gpu::Device& device, const passes::KernelConfig& config, const Dataset& dataset,
+                         const std::vector<int>& frames, const TrainOptions& options,
+                         const glm::dvec3& origin) {
+    for (int level = 0; level <= options.halvings; ++level)
+        levels_.emplace_back(device, config, dataset, frames, cache_share(options, level), origin,
+                             1 << level);
+}
+
+ImageCache& ImageLevels::at(size_t level) {
+    while (frees(level)) levels_.pop_back();
+    return levels_[level];
 }
 
 size_t frame_of_step(int step, size_t count, uint64_t seed) {

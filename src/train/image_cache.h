@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "ewa/dataset.h"
+#include "ewa/train_options.h"
 #include "gpu/buffer.h"
 #include "passes/kernel_config.h"
 #include "pipeline/forward.h"
@@ -55,6 +56,25 @@ class ImageCache {
     std::future<Image> reading_;
     gpu::Buffer cameras_;
     uint64_t camera_stride_ = 0;
+};
+
+/// The training images by downsample level: 0 is the full resolution, and each level halves the sides.
+class ImageLevels {
+  public:
+    /// As ImageCache. Each level has a share of TrainOptions::image_cache_bytes.
+    ImageLevels(gpu::Device& device, const passes::KernelConfig& config, const Dataset& dataset,
+                const std::vector<int>& frames, const TrainOptions& options, const glm::dvec3& origin);
+
+    size_t count() const { return full().count(); }
+    const ImageCache& full() const { return levels_.front(); }
+    const ImageCache& lowest() const { return levels_.back(); }
+    /// Whether at(level) frees images.
+    bool frees(size_t level) const { return levels_.size() > level + 1; }
+    /// The images of a level. Frees those of lower resolutions, since resolutions only rise.
+    ImageCache& at(size_t level);
+
+  private:
+    std::vector<ImageCache> levels_;
 };
 
 /// The index of the image of a step, which counts from 1. Each epoch shows every image once, in an order of its

@@ -1,18 +1,34 @@
 // SPDX-License-Identifier: Apache-2.0
-// What TrainOptions::device_memory_bytes makes of a training.
+// The device memory of a training, before it begins.
 #pragma once
+#include <memory>
 #include <vector>
 
-#include "ewa/trainer.h"
+#include "ewa/training_needs.h"
 
 namespace ewa::train {
 
-/// Into how many portions each of `ranks` ranks divides its splats: 1 if the training fits in its limit. Such a training keeps
-/// within the limit too. The number comes from the splats at the end, so portions never have to be divided again.
-int portions_for(const gpu::Device& device, const Dataset& dataset, const std::vector<int>& frames,
-                 const Gaussians& start, const TrainOptions& options, int ranks = 1);
+/// Estimates the memory of one training with different largest numbers of splats.
+class MemoryEstimator {
+  public:
+    /// options: with concrete strategy and SH degree. What is passed must outlive the estimator.
+    MemoryEstimator(const gpu::Device& device, const Dataset& dataset, const std::vector<int>& frames,
+                    const Gaussians& start, const TrainOptions& options);
+    ~MemoryEstimator();
 
-/// The bytes of the image cache of a training in several portions.
-uint64_t limited_cache(const TrainOptions& options);
+    MemoryEstimate up_to(uint32_t max_splats);
+
+  private:
+    struct Sample;
+
+    uint64_t pairs(uint32_t splats);
+
+    const gpu::Device& device_;
+    const Dataset& dataset_;
+    const std::vector<int>& frames_;
+    const Gaussians& start_;
+    const TrainOptions& options_;
+    std::unique_ptr<const Sample> sample_;  // of the first splats; drawn once, for the first estimate
+};
 
 }  // namespace ewa::train

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "ewa/error.h"
+#include "ewa/training_needs.h"
 #include "train/exclusions.h"
 
 namespace ewa::train {

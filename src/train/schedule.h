@@ -18,7 +18,8 @@
 #pragma once
 #include <cstdint>
 
-#include "ewa/trainer.h"
+#include "ewa/gaussians.h"
+#include "ewa/train_options.h"
 #include "pipeline/plan.h"
 
 namespace ewa::train {

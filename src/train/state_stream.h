@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // A training's state on its way to a file or from one, in pieces: no process has to hold it whole.
 #pragma once
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "ewa/trainer.h"
+#include "ewa/step_report.h"
 
 namespace ewa::train {
 
@@ -39,6 +40,38 @@ class StateReader {
     virtual const std::vector<Array>& arrays() const = 0;
     /// Fills `into` with the bytes of an array from `offset` on.
     virtual void read(size_t array, uint64_t offset, std::span<std::byte> into) = 0;
+};
+
+/// Keeps a state in memory.
+struct StateInMemory : StateWriter {
+    TrainerState state;
+    void begin(const StateHead& head, size_t) override { state = {head.report, head.sh_degree, {}}; }
+    void begin_array(const std::string& name, uint64_t bytes, uint32_t) override {
+        state.arrays.push_back({name, {}});
+        state.arrays.back().bytes.reserve(bytes);
+    }
+    void write(std::span<const std::byte> piece) override {
+        std::vector<std::byte>& bytes = state.arrays.back().bytes;
+        bytes.insert(bytes.end(), piece.begin(), piece.end());
+    }
+};
+
+/// Reads a state in memory.
+class StateOfMemory : public StateReader {
+  public:
+    explicit StateOfMemory(const TrainerState& state) : state_(state), head_{state.report, state.sh_degree} {
+        for (const TrainerArray& array : state.arrays) arrays_.push_back({array.name, array.bytes.size()});
+    }
+    const StateHead& head() const override { return head_; }
+    const std::vector<Array>& arrays() const override { return arrays_; }
+    void read(size_t array, uint64_t offset, std::span<std::byte> into) override {
+        std::copy_n(state_.arrays[array].bytes.begin() + std::ptrdiff_t(offset), into.size(), into.begin());
+    }
+
+  private:
+    const TrainerState& state_;
+    StateHead head_;
+    std::vector<Array> arrays_;
 };
 
 }  // namespace ewa::train

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A training: what it needs before it begins, its steps, and what it tells of itself.
+// A training: what it needs before it begins, and what rank 0 and the other ranks call.
 #include "ewa/trainer.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <exception>
@@ -12,23 +11,12 @@
 
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
-#include "portions/collect.h"
-#include "train/memory_estimate.h"
-#include "train/splat_cap.h"
-#include "train/trainer_state.h"
+#include "gpu/device.h"
+#include "train/needs.h"
+#include "train/training.h"
 
 namespace ewa {
-
-using namespace pipeline;
-using train::Call;
-
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double milliseconds(Clock::duration time) {
-    return std::chrono::duration<double, std::milli>(time).count();
-}
 
 /// The length that rates and thresholds are relative to: the extent of the cameras. Cameras in one place (a
 /// panorama, a single image) have no extent; then it is the median distance of the splats from them.
@@ -67,19 +55,6 @@ Gaussians prepared(Gaussians start, Footprint kernel) {
     return start;
 }
 
-/// Throws InputError unless each band of each image has a row of tiles. images: of the lowest resolution.
-void check_bands(const TrainOptions& options, const passes::KernelConfig& config,
-                 const train::ImageCache& images) {
-    for (size_t i = 0; i < images.count(); ++i) {
-        const uint32_t height = images.camera(i).height;
-        const uint32_t most = (height + config.tile_height - 1) / config.tile_height;
-        if (uint32_t(options.bands) > most)
-            throw InputError("--bands " + std::to_string(options.bands) + ": an image with " +
-                             std::to_string(height) + " rows of pixels takes at most --bands " +
-                             std::to_string(most));
-    }
-}
-
 /// Limits a device's memory for as long as the trainer is made, or longer if that succeeds.
 class LimitedMemory {
   public:
@@ -105,52 +80,18 @@ uint32_t agreed(Ranks& ranks, uint32_t own) {
     return uint32_t(ranks.gather(std::span(&word, 1)).front());
 }
 
-}  // namespace
+/// What rank 0 asks the others to take part in.
+enum class Call : uint64_t { end, wait, step, state, restore, gaussians, render, figures };
 
-Trainer::State::State(std::shared_ptr<gpu::Device> d, const Dataset& dataset, const std::vector<int>& frames,
-                      const Gaussians& ready, double length, const TrainOptions& o, std::shared_ptr<Ranks> r,
-                      int portions_of_rank)
-    : device(std::move(d)),
-      ranks(std::move(r)),
-      options(o),
-      schedule(train::schedule_for(o, frames.size())),
-      extent(length),
-      cache(*device),
-      executor(*device, cache.config().frames_in_flight),
-      images(*device, cache.config(), dataset, frames, train::cache_share(o, 0), ready.origin),
-      plan(plan_for(train::plan_request(ready, o, images.any_masked(), frames.size()))),
-      portions(*device, ranks, ready,
-               {.count = portions_of_rank,
-                .limit = o.device_memory_bytes,
-                .moments = plan.moment_buffers(),
-                .statistics = plan.statistics}),
-      several(portions, o.bands),
-      // The first frame tells how many there are. With a limit, a capacity for all splats might not fit.
-      instance_capacity(first_capacity(portions.streamed() ? 0 : ready.size())) {
-    for (int halvings = 1; halvings <= o.halvings; ++halvings)
-        smaller.emplace_back(*device, cache.config(), dataset, frames, train::cache_share(o, halvings),
-                             ready.origin, 1 << halvings);
-    if (plan.exposure) exposures = Exposures(*device, images.count());
-    if (plan.motion) {
-        std::vector<MotionBasis> bases;
-        for (const int frame_index : frames)
-            bases.push_back(
-                motion_basis(dataset.frames[size_t(frame_index)].camera, ready, o.refine_focal, extent));
-        motions = Motions(*device, bases);
-    }
-    report.splats = portions.splats();
-    check_bands(o, cache.config(), smaller.empty() ? images : smaller.back());
-}
-
-void Trainer::State::call(Call what) const {
+/// Begins what all ranks do together. Called by rank 0.
+train::Training& call(train::Training& training, Call what) {
     const auto word = uint64_t(what);
-    if (ranks->size() > 1) ranks->gather(std::span(&word, 1));
+    Ranks& ranks = training.portions().ranks();
+    if (ranks.size() > 1) ranks.gather(std::span(&word, 1));
+    return training;
 }
 
-Call Trainer::State::next_call() const {
-    const uint64_t none = 0;
-    return Call(ranks->gather(std::span(&none, 1)).front());
-}
+}  // namespace
 
 Trainer::Trainer(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
                  const std::vector<int>& train_frames, Gaussians start, const TrainOptions& options,
@@ -161,129 +102,131 @@ Trainer::Trainer(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
     train::check_training(options, ranks->size());
     const double extent = extent_for(dataset, train_frames, start);
     TrainOptions resolved = resolve(options, dataset);
-    resolved.max_splats = agreed(*ranks, splat_cap(*device, dataset, train_frames, start, resolved).splats);
-    const auto count = int(agreed(*ranks, uint32_t(train::portions_for(*device, dataset, train_frames, start,
-                                                                       resolved, ranks->size()))));
+    train::Needs needs(*device, dataset, train_frames, start, resolved);
+    const uint32_t most = agreed(*ranks, needs.cap().splats);
+    const auto count = int(agreed(*ranks, uint32_t(needs.portions(most, ranks->size()))));
+    resolved.max_splats = most;
     if (resolved.device_memory_bytes > 0 && device->memory_limit() > 0)
         throw InputError(
             "another training has limited this device's memory: a device takes one such training");
     LimitedMemory limited(device, resolved.device_memory_bytes);
     if (count > 1) resolved.image_cache_bytes = train::limited_cache(resolved);
-    state_ = std::make_unique<State>(std::move(device), dataset, train_frames,
-                                     prepared(std::move(start), options.render.kernel), extent, resolved,
-                                     std::move(ranks), count);
+    training_ = std::make_unique<train::Training>(std::move(device), dataset, train_frames,
+                                                  prepared(std::move(start), options.render.kernel), extent,
+                                                  resolved, std::move(ranks), count);
     limited.keep();
 }
 
 Trainer::~Trainer() {
-    if (state_ && state_->options.device_memory_bytes > 0) state_->device->limit_memory(0, {});
     // After an exception the other ranks may be in the middle of something else.
-    if (!state_ || state_->ranks->rank() != 0 || std::uncaught_exceptions() > 0) return;
+    if (!training_ || training_->portions().ranks().rank() != 0 || std::uncaught_exceptions() > 0) return;
     try {
-        state_->call(Call::end);
+        call(*training_, Call::end);
     } catch (const std::exception&) {
         // A rank that does not answer has ended.
     }
 }
 
 void Trainer::follow() {
-    for (;;) switch (state_->next_call()) {
+    for (;;) {
+        const uint64_t none = 0;
+        switch (Call(training_->portions().ranks().gather(std::span(&none, 1)).front())) {
             case Call::end:
                 return;
             case Call::wait:
                 break;
             case Call::step:
-                take_step();
+                training_->step();
                 break;
             case Call::state:
-                join_state(nullptr);
+                training_->save(nullptr);
                 break;
             case Call::restore:
-                share_state(nullptr);
+                training_->restore(nullptr);
                 break;
             case Call::gaussians:
-                join_gaussians();
+                training_->gaussians();
                 break;
             case Call::render:
-                join_renders({});
+                training_->render({});
                 break;
             case Call::figures:
-                join_figures();
+                training_->rank_figures();
                 break;
         }
+    }
 }
 
 void Trainer::keep_waiting() const {
-    state_->call(Call::wait);
+    call(*training_, Call::wait);
 }
-
 StepReport Trainer::step() {
-    state_->call(Call::step);
-    return take_step();
+    return call(*training_, Call::step).step();
 }
-
-StepReport Trainer::take_step() {
-    State& s = *state_;
-    const auto start = Clock::now();
-    const int first = s.report.step + 1, last = std::min(s.report.step + s.options.batch, s.options.steps);
-    s.optimise(first, last);
-    const auto optimised = Clock::now();
-    for (int step = first; step <= last; ++step) s.follow_up(step);
-    const auto end = Clock::now();
-    s.report.step = last;
-    s.report.splats = s.portions.splats();
-    s.most_own_bytes = std::max(s.most_own_bytes, s.portions.state_bytes(s.portions.own_splats()));
-    s.report.seconds += std::chrono::duration<double>(end - start).count();
-    s.times.steps += last - first + 1;
-    s.times.step += milliseconds(end - start);
-    s.times.refinement += milliseconds(end - optimised);
-    return s.report;
+void Trainer::save(train::StateWriter& to) const {
+    call(*training_, Call::state).save(&to);
+}
+TrainerState Trainer::state() const {
+    train::StateInMemory memory;
+    save(memory);
+    return std::move(memory.state);
+}
+void Trainer::restore(train::StateReader& from) {
+    training_->check_fits(from);
+    call(*training_, Call::restore).restore(&from);
+}
+void Trainer::restore(const TrainerState& state) {
+    train::StateOfMemory memory(state);
+    restore(memory);
+}
+Gaussians Trainer::gaussians() const {
+    return call(*training_, Call::gaussians).gaussians();
+}
+std::vector<Image> Trainer::render(std::span<const Camera> cameras) const {
+    if (training_->plan().points())
+        throw InputError("a trainer of points does not draw pictures: a Renderer of its splats does");
+    return call(*training_, Call::render).render(cameras);
+}
+std::vector<RankFigures> Trainer::rank_figures() const {
+    if (training_->portions().ranks().size() == 1) return {};
+    return call(*training_, Call::figures).rank_figures();
+}
+std::optional<ChunkFigures> Trainer::chunk_figures() const {
+    return training_->chunk_figures();
 }
 std::vector<Exposure> Trainer::exposures() const {
-    state_->finish_all();
-    return state_->plan.exposure ? state_->exposures.download() : std::vector<Exposure>();
+    training_->finish_all();
+    return training_->plan().exposure ? training_->learned().exposures.download() : std::vector<Exposure>();
 }
 std::vector<CameraMotion> Trainer::camera_motions() const {
-    state_->finish_all();
-    return state_->plan.motion ? state_->motions.download() : std::vector<CameraMotion>();
+    training_->finish_all();
+    return training_->plan().motion ? training_->learned().motions.download() : std::vector<CameraMotion>();
 }
 uint32_t Trainer::splats() const {
-    return state_->portions.splats();
+    return training_->portions().splats();
 }
 uint32_t Trainer::max_splats() const {
-    return state_->options.max_splats;
+    return training_->options().max_splats;
 }
 size_t Trainer::images_on_disk() const {
-    return state_->images.on_disk();
+    return training_->images_on_disk();
 }
 int Trainer::steps_done() const {
-    return state_->report.step;
+    return training_->log().report.step;
 }
-
 StepReport Trainer::report() const {
-    state_->finish_all();
-    return state_->report;
+    training_->finish_all();
+    return training_->log().report;
 }
-
 double Trainer::extent() const {
-    return state_->extent;
+    return training_->extent();
 }
-
 std::vector<PlanLine> Trainer::plan() const {
-    return describe(state_->plan, state_->portions.sh_degree(), state_->portions.splats());
+    const portions::Portions& portions = training_->portions();
+    return pipeline::describe(training_->plan(), portions.sh_degree(), portions.splats());
 }
-
 StepTimes Trainer::step_times() const {
-    const State& s = *state_;
-    StepTimes times = s.times;
-    times.step /= std::max(1, times.steps);
-    times.refinement /= std::max(1, times.steps);
-    for (PassTime& time : times.passes) time.milliseconds /= std::max(1, s.timed_steps);
-    return times;
-}
-std::vector<PlanLine> plan_lines(const Gaussians& start, const TrainOptions& options, bool masks) {
-    const Plan plan = plan_for(train::plan_request(start, options, masks));
-    return describe(plan, start.sh_degree, start.size());
+    return training_->log().means();
 }
 
 }  // namespace ewa

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "ewa/error.h"
+#include "ewa/trainer.h"
 #include "gpu/test_device.h"
 #include "run/resume.h"
 #include "train/synthetic.h"

@@ -321,7 +321,7 @@ TEST(Portions, LeaveTheDeviceAndComeBack) {
         if (turn == 1) std::ranges::reverse(expected);
         EXPECT_EQ(visited, expected);
     }
-    const Gaussians all = portions.gaussians_of(portions.bytes(portions::params));
+    const Gaussians all = portions.gaussians();
     for (size_t i = 0; i < all.size(); ++i) ASSERT_EQ(all.opacity_logits[i], float(300 + i / 12000));
     EXPECT_LE(peak_device_bytes(*device), 3 * kChunkMiB);
 }

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the steps of a training have done, and the state that they have reached.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "ewa/device.h"
+
+namespace ewa {
+
+struct StepReport {
+    int step = 0;        // steps done
+    double seconds = 0;  // wall time in Trainer::step so far
+    double loss = 0;     // of the last step that the device has finished; a GPU may be a step behind
+    uint32_t splats = 0;
+    uint64_t dropped_updates = 0;    // parameter updates so far that were not finite and were dropped
+    uint32_t skipped_nonfinite = 0;  // splats skipped in the last step: a value is not finite
+    uint64_t limited_steps = 0;      // updates of a mean, quaternion or scale so far that were shortened
+    /// dB, of the image that `loss` is of. In a masked image, pixels count by the square of their weight. NaN if no
+    /// pixel counts.
+    double psnr = 0;
+};
+
+/// Where the time of the steps since the trainer was made or restored went: means, in ms a step.
+struct StepTimes {
+    int steps = 0;
+    double step = 0;               // wall time in Trainer::step
+    double refinement = 0;         // of it: adding, moving and removing splats
+    std::vector<PassTime> passes;  // on the device, in recording order. On a GPU they are of every 100th step
+};
+
+/// One device buffer of a TrainerState.
+struct TrainerArray {
+    std::string name;  // at most 15 bytes
+    std::vector<std::byte> bytes;
+};
+
+/// All that later steps depend on, besides dataset, training frames and options.
+struct TrainerState {
+    StepReport report;
+    int sh_degree = 0;  // of the stored coefficients
+    /// params, moments1, with 32 bits a moment also moments2, and what the strategy gathers, in the device's layout
+    /// (shaders/shared/layouts.h).
+    std::vector<TrainerArray> arrays;
+};
+
+}  // namespace ewa

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a training needs, before it begins: splats, device memory, and what it skips.
+#pragma once
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "ewa/dataset.h"
+#include "ewa/device.h"
+#include "ewa/gaussians.h"
+#include "ewa/plan.h"
+#include "ewa/train_options.h"
+
+namespace ewa {
+
+/// The options with concrete values for Strategy::automatic and kAutomaticShDegree.
+TrainOptions resolve(TrainOptions options, const Dataset& dataset);
+
+/// The largest number of splats of a training, and why it is that.
+struct SplatCap {
+    uint32_t splats = 0;
+    std::string reason;  // e.g. "100 more for each step"
+};
+
+/// TrainOptions::max_splats of a Trainer with the same arguments. docs/training.md has the rule of the automatic one.
+SplatCap splat_cap(const gpu::Device& device, const Dataset& dataset, const std::vector<int>& train_frames,
+                   const Gaussians& start, const TrainOptions& options);
+
+/// An estimate of the device memory of a training at its peak, in bytes. docs/performance.md compares it with runs.
+struct MemoryEstimate {
+    uint32_t splats = 0;  // at the end; with adc at most, since their number depends on the images
+    uint64_t model = 0;   // parameters, moments, statistics
+    uint64_t frame = 0;   // images, sort buffers, gradient slots; or what a refinement needs beside the model
+    uint64_t images = 0;  // cached training images
+    uint64_t total() const { return model + frame + images; }
+};
+
+/// Estimates the memory of a Trainer with the same arguments. Allocates nothing.
+MemoryEstimate estimate_memory(const gpu::Device& device, const Dataset& dataset,
+                               const std::vector<int>& train_frames, const Gaussians& start,
+                               const TrainOptions& options);
+
+/// What a Trainer of these options skips if it has many photos. masks: some training images have pixels that do not count.
+std::vector<PlanLine> plan_lines(const Gaussians& start, const TrainOptions& options, bool masks = false);
+
+}  // namespace ewa

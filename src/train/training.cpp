@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/training.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "ewa/error.h"
+
+namespace ewa::train {
+
+using namespace pipeline;
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double milliseconds(Clock::duration time) {
+    return std::chrono::duration<double, std::milli>(time).count();
+}
+
+/// Throws InputError unless each band of each image has a row of tiles. images: of the lowest resolution.
+void check_bands(const TrainOptions& options, const passes::KernelConfig& config, const ImageCache& images) {
+    for (size_t i = 0; i < images.count(); ++i) {
+        const uint32_t height = images.camera(i).height;
+        const uint32_t most = (height + config.tile_height - 1) / config.tile_height;
+        if (uint32_t(options.bands) > most)
+            throw InputError("--bands " + std::to_string(options.bands) + ": an image with " +
+                             std::to_string(height) + " rows of pixels takes at most --bands " +
+                             std::to_string(most));
+    }
+}
+
+}  // namespace
+
+std::vector<Learned::Array> Learned::arrays() {
+    std::vector<Array> arrays;
+    if (exposures.photos > 0)
+        for (const auto& [name, buffer] : {std::pair{"exposures", &exposures.values},
+                                           {"exp_moments1", &exposures.moments1},
+                                           {"exp_moments2", &exposures.moments2}})
+            arrays.push_back({name, buffer, exposures.bytes()});
+    if (motions.photos > 0) {
+        for (const auto& [name, buffer] : {std::pair{"motions", &motions.values},
+                                           {"motion_moments1", &motions.moments1},
+                                           {"motion_moments2", &motions.moments2}})
+            arrays.push_back({name, buffer, motions.bytes()});
+        arrays.push_back({"motion_bases", &motions.bases, motions.basis_bytes()});
+    }
+    return arrays;
+}
+
+void StepLog::add(const portions::StepSums& sums) {
+    report.loss = sums.loss;
+    report.psnr = sums.psnr;
+    report.skipped_nonfinite = uint32_t(sums.skipped_nonfinite);
+    report.dropped_updates += sums.dropped_updates;
+    report.limited_steps += sums.limited_steps;
+}
+
+void StepLog::add_passes(const std::vector<PassTime>& timings) {
+    for (const PassTime& time : timings) {
+        const auto same = std::find_if(times.passes.begin(), times.passes.end(),
+                                       [&](const PassTime& sum) { return sum.pass == time.pass; });
+        if (same == times.passes.end())
+            times.passes.push_back(time);
+        else
+            same->milliseconds += time.milliseconds;
+    }
+}
+
+StepTimes StepLog::means() const {
+    StepTimes mean = times;
+    mean.step /= std::max(1, times.steps);
+    mean.refinement /= std::max(1, times.steps);
+    for (PassTime& time : mean.passes) time.milliseconds /= std::max(1, timed_steps);
+    return mean;
+}
+
+Training::Training(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
+                   const std::vector<int>& frames, const Gaussians& ready, double extent,
+                   const TrainOptions& options, std::shared_ptr<Ranks> ranks, int portions_of_rank)
+    : device_(std::move(device)),
+      options_(options),
+      schedule_(schedule_for(options, frames.size())),
+      extent_(extent),
+      tools_(*device_),
+      images_(*device_, tools_.cache.config(), dataset, frames, options, ready.origin),
+      plan_(plan_for(plan_request(ready, options, images_.full().any_masked(), frames.size()))),
+      portions_(*device_, std::move(ranks), ready,
+                {.count = portions_of_rank,
+                 .limit = options.device_memory_bytes,
+                 .moments = plan_.moment_buffers(),
+                 .statistics = plan_.statistics}),
+      several_(portions_, options.bands) {
+    check_bands(options, tools_.cache.config(), images_.lowest());
+    // The first frame says how many there are. With a limit, a capacity for all splats might not fit.
+    tools_.instance_capacity = first_capacity(portions_.streamed() ? 0 : ready.size());
+    if (plan_.exposure) learned_.exposures = Exposures(*device_, images_.count());
+    if (plan_.motion) {
+        std::vector<MotionBasis> bases;
+        for (const int index : frames)
+            bases.push_back(
+                motion_basis(dataset.frames[size_t(index)].camera, ready, options.refine_focal, extent));
+        learned_.motions = Motions(*device_, bases);
+    }
+    log_.report.splats = portions_.splats();
+}
+
+StepReport Training::step() {
+    const auto start = Clock::now();
+    StepReport& report = log_.report;
+    const int first = report.step + 1, last = std::min(report.step + options_.batch, options_.steps);
+    optimise(first, last);
+    const auto optimised = Clock::now();
+    for (int step = first; step <= last; ++step) follow_up(step);
+    const auto end = Clock::now();
+    report.step = last;
+    report.splats = portions_.splats();
+    log_.most_own_bytes = std::max(log_.most_own_bytes, portions_.state_bytes(portions_.own_splats()));
+    report.seconds += std::chrono::duration<double>(end - start).count();
+    log_.times.steps += last - first + 1;
+    log_.times.step += milliseconds(end - start);
+    log_.times.refinement += milliseconds(end - optimised);
+    return report;
+}
+
+}  // namespace ewa::train

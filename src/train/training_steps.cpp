@@ -1,0 +1,297 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "core/random.h"
+#include "pipeline/picture.h"
+#include "portions/refine.h"
+#include "train/training.h"
+
+namespace ewa::train {
+
+using namespace pipeline;
+
+namespace {
+
+constexpr int kTimedEvery = 100;  // steps, where several are in flight
+// Of the threshold that adds splats, with points: edges of opaque spheres have larger gradients than soft footprints.
+constexpr float kPointsThreshold = 8;
+constexpr double kResetOpacity = 0.01;  // 3DGS: upper bound of opacities after a reset
+double logit(double p) {
+    return std::log(p / (1 - p));
+}
+
+std::array<float, 3> random_background(int step, uint64_t seed) {
+    const auto u = core::uniform4({uint32_t(step), 0x62636b67u, uint32_t(seed), uint32_t(seed >> 32)});
+    return {float(u[0]), float(u[1]), float(u[2])};
+}
+
+}  // namespace
+
+Rates Training::rates(int step) const {
+    Rates r;
+    const double fading = schedule_.fading(step), gain = fading * schedule_.gain(step);
+    r.mean = float(gain * schedule_.mean_rate(step, extent_));
+    r.opacity = float(fading * schedule_.opacity_gain(step) * options_.opacity_rate);
+    r.quaternion = float(gain * options_.quaternion_rate);
+    r.scale = float(gain * options_.scale_rate);
+    r.sh0 = float(gain * options_.sh0_rate);
+    r.sh_rest = float(gain * options_.sh_rest_rate);
+    r.step = uint32_t(step);
+    r.seed = options_.seed;
+    if (plan_.regularised) {
+        r.opacity_weight = float(options_.opacity_weight / portions_.splats());
+        r.scale_weight = float(options_.scale_weight / (3.0 * portions_.splats() * extent_));
+    }
+    return r;
+}
+
+Noise Training::noise(int step) const {
+    // Sigma is a square of lengths. Divided by the extent it is a length again, as in a scene of unit extent.
+    const double amplitude = options_.noise_rate * schedule_.mean_rate(step, 1) / extent_;
+    return {.amplitude = float(amplitude),
+            .max_length = float(extent_),
+            .seed = options_.seed,
+            .step = uint32_t(step)};
+}
+
+ImageCache& Training::images_at(int step) {
+    const auto level = size_t(schedule_.halvings_at(step));
+    if (images_.frees(level)) finish_all();
+    return images_.at(level);
+}
+
+FrameRequest Training::request_of(const CameraUse& camera) const {
+    return {.splats = portions_.largest(),
+            .width = camera.width,
+            .height = camera.height,
+            .instances = tools_.instance_capacity,
+            .gradients = true,
+            .masks = plan_.masks,
+            .exposure = plan_.exposure,
+            .overlaid = true,
+            .motion = plan_.motion};
+}
+
+void Training::record_fused(gpu::Recording& recording, int step, size_t index,
+                            const portions::StepView& view) {
+    FrameInputs inputs = view.inputs;
+    inputs.keep_overflow = !in_flight_.empty();
+    if (plan_.motion)
+        inputs.camera = record_move_camera({recording, tools_.cache}, learned_.motions, uint32_t(index),
+                                           inputs.camera);
+    const MotionUse motion{.motions = &learned_.motions,
+                           .photo = uint32_t(index),
+                           .rate = float(schedule_.pose_rate(step)),
+                           .extent = float(extent_),
+                           .visit = visit_of(step)};
+    const Model& model = portions_.use(0, portions::Portions::Need::state);
+    const FramePasses on{{recording, tools_.cache}, plan_, tools_.frame, inputs};
+    const Sorted sorted = on.forward(model);
+    view.record_loss(on);
+    on.backward(model, sorted, rates(step), plan_.motion ? &motion : nullptr);
+    if (options_.strategy == Strategy::mcmc) record_noise(on, model, tools_.frame, noise(step));
+}
+
+void Training::submit(int step) {
+    ImageCache& seen = images_at(step);
+    const size_t index = index_of(step);
+    const portions::StepView view = view_of(step, seen, schedule_.degree(step));
+    const CameraUse& camera = view.inputs.camera;
+    // Buffers of another size, and an image from disk, take the place of what a step in flight reads.
+    if (!seen.cached(index) || camera.width != tools_.frame.sizes.width ||
+        camera.height != tools_.frame.sizes.height)
+        finish_all();
+    while (in_flight_.size() >= tools_.frames_in_flight()) finish_oldest();
+    if (in_flight_.empty())
+        tools_.frame.reserve(tools_.cache.device(), tools_.cache.config(), request_of(camera));
+    gpu::Recording recording(device_->limits());
+    record_fused(recording, step, index, view);
+    if (schedule_.halvings_at(step + 1) == schedule_.halvings_at(step)) seen.prepare(index_of(step + 1));
+    tools_.frame.record_counts(recording, slot_of(step));
+    tools_.executor.submit(recording, is_timed(step));
+    in_flight_.push_back({step, view.weight()});
+    // An image from disk may be gone when its step has to be repeated: no other step follows before it is done.
+    if (!seen.cached(index)) finish_all();
+}
+
+void Training::finish_oldest() {
+    const auto [step, weight] = in_flight_.front();
+    tools_.executor.wait();
+    const shared::Counts counts = tools_.frame.read_counts(slot_of(step));
+    if (counts.instances > tools_.frame.instance_capacity) {
+        const std::deque<Flight> again = std::exchange(in_flight_, {});
+        while (tools_.executor.unfinished()) tools_.executor.wait();
+        tools_.instance_capacity = grown_capacity(counts.instances);
+        for (const Flight& repeated : again) {
+            submit(repeated.step);
+            finish_all();
+        }
+        return;
+    }
+    in_flight_.pop_front();
+    log_.add({.loss = loss_of(counts),
+              .psnr = -10 * std::log10(double(counts.squared) / weight),
+              .skipped_nonfinite = counts.skipped_nonfinite,
+              .dropped_updates = counts.dropped_updates,
+              .limited_steps = counts.limited_steps});
+    if (!is_timed(step)) return;
+    ++log_.timed_steps;
+    log_.add_passes(tools_.executor.timings());
+}
+
+void Training::finish_all() {
+    while (!in_flight_.empty()) finish_oldest();
+}
+
+bool Training::must_finish(int step) const {
+    return step == options_.steps || (options_.strategy == Strategy::mcmc && schedule_.relocates(step)) ||
+           (options_.strategy == Strategy::adc &&
+            (schedule_.densifies(step) || schedule_.resets_opacity(step)));
+}
+
+void Training::optimise(int first, int last) {
+    if (!fused()) return optimise_several(first, last);
+    submit(first);
+    if (must_finish(first) || tools_.frames_in_flight() == 1) finish_all();
+}
+
+portions::StepView Training::view_of(int step, ImageCache& seen, int sh_degree) {
+    const size_t index = index_of(step);
+    const CameraUse camera = seen.camera(index);
+    const FrameInputs inputs{.camera = camera,
+                             .background = options_.random_background ? random_background(step, options_.seed)
+                                                                      : options_.render.background,
+                             .sh_degree = sh_degree};
+    const ExposureUse exposure{&learned_.exposures, uint32_t(index), float(schedule_.exposure_rate(step)),
+                               visit_of(step)};
+    const auto weight = std::make_shared<double>(1);
+    return {
+        .inputs = inputs,
+        .request = request_of(camera),
+        .record_loss =
+            [this, exposure, weight, index, &seen](const FramePasses& on) {
+                const auto& photo = seen.photo(index);
+                *weight = photo.weight;
+                on.loss(photo.texels, photo.masked, plan_.exposure ? &exposure : nullptr);
+            },
+        .weight = [weight] { return *weight; },
+        .learned =
+            [this, index] {
+                const auto words = learned_.exposures.words(uint32_t(index));
+                return std::vector<uint64_t>(words.begin(), words.end());
+            },
+        .learn = [this, index](
+                     std::span<const uint64_t> words) { learned_.exposures.set(uint32_t(index), words); }};
+}
+
+void Training::optimise_several(int first, int last) {
+    ImageCache& seen = images_at(first);
+    const int sh_degree = schedule_.degree(first);
+    std::vector<portions::StepView> views;
+    for (int step = first; step <= last; ++step) views.push_back(view_of(step, seen, sh_degree));
+    const portions::StepParts parts = step_parts();
+    Rates of_step = rates(last);
+    of_step.views = uint32_t(views.size());
+    Noise of_noise = noise(last);
+    of_noise.amplitude *= float(std::sqrt(double(views.size())));
+    portions::StepSums drawn = several_.draw(parts, views);
+    several_.update(
+        parts, batch_rates(of_step), sh_degree,
+        [&](const passes::Recorder& on, const Model& moved) {
+            if (options_.strategy == Strategy::mcmc) record_noise(on, moved, tools_.frame, of_noise);
+        },
+        drawn);
+    log_.timed_steps += int(views.size());
+    log_.add(drawn);
+}
+
+portions::StepParts Training::step_parts() {
+    return {tools_.cache,
+            tools_.executor,
+            plan_,
+            tools_.frame,
+            tools_.instance_capacity,
+            [this] { log_.add_passes(tools_.executor.timings()); },
+            plan_.exposure ? std::tuple_size_v<Exposures::Words> : 0};
+}
+
+Image Training::render_own(std::span<const Camera> cameras) {
+    std::vector<gpu::Buffer> blocks;
+    for (const Camera& camera : cameras)
+        blocks.push_back(upload_camera(*device_, camera, tools_.cache.config(), portions_.origin()));
+    std::vector<portions::StepView> views;
+    for (size_t i = 0; i < cameras.size(); ++i) {
+        const FrameInputs inputs = inputs_of(blocks[i], cameras[i], options_.render);
+        views.push_back({.inputs = inputs,
+                         .request = request_of(inputs.camera),
+                         .record_loss = {},
+                         .weight = {},
+                         .learned = {},
+                         .learn = {}});
+    }
+    portions::StepParts parts = step_parts();
+    parts.submitted = [] {};
+    if (!several_.draw_pictures(parts, views)) return {};
+    return Picture(tools_.frame).image(shared::PLANE_R, 3);
+}
+
+void Training::refine(const std::function<void(const Phase&)>& refine) {
+    tools_.frame.free_instances();  // the second copy of an array takes its place
+    if (portions_.streamed()) {
+        // A value a splat of any portion, and no picture: with mcmc one portion holds all new splats until they are level.
+        tools_.frame = {};
+        tools_.frame.reserve(*device_, tools_.cache.config(),
+                             {.splats = portions_.largest(), .width = 1, .height = 1, .instances = 1});
+    }
+    refine({tools_.cache, tools_.executor, tools_.frame});
+    if (portions_.streamed()) tools_.frame = {};
+}
+
+void Training::follow_up(int step) {
+    if (options_.strategy == Strategy::adc) control_density(step);
+    if (options_.strategy != Strategy::mcmc || !schedule_.relocates(step)) return;
+    const McmcRules rules{.dead_opacity = options_.dead_opacity,
+                          .growth = schedule_.growth,
+                          .max_splats = options_.max_splats,
+                          .spread = schedule_.copy_spread,
+                          .kernel = options_.render.kernel,
+                          .seed = options_.seed,
+                          .step = uint32_t(step)};
+    refine([&](const Phase& phase) { refine_mcmc(portions_, phase, rules); });
+}
+
+void Training::control_density(int step) {
+    if (schedule_.densifies(step)) {
+        DensifyRules rules;
+        rules.grow_gradient =
+            float(plan_.absolute ? options_.grow_gradient_absolute : options_.grow_gradient);
+        if (options_.render.points) rules.grow_gradient *= kPointsThreshold;
+        rules.revised_opacity = options_.revised_opacity;
+        rules.split_scale = float(options_.split_scale * extent_);
+        rules.prune_logit = options_.render.points ? -std::numeric_limits<float>::infinity()
+                                                   : float(logit(options_.prune_opacity));
+        rules.prune_scale = schedule_.was_reset(step) ? float(options_.prune_scale * extent_) : 0.0f;
+        rules.seed = options_.seed;
+        rules.step = uint32_t(step);
+        rules.max_splats = options_.max_splats;
+        refine([&](const Phase& phase) { densify(portions_, phase, rules); });
+    }
+    if (schedule_.resets_opacity(step)) {
+        portions_.visit(portions::Portions::Need::state, [&](int, const Model& model) {
+            gpu::Recording recording(device_->limits());
+            record_reset_opacity({recording, tools_.cache}, model, float(logit(kResetOpacity)));
+            tools_.executor.run(recording);
+            portions_.changed();
+        });
+    }
+}
+
+bool Training::is_timed(int step) const {
+    return tools_.frames_in_flight() == 1 || step % kTimedEvery == 1;
+}
+
+}  // namespace ewa::train
