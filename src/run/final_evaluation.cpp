@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "run/final_evaluation.h"
+
+#include <algorithm>
+#include <span>
+#include <utility>
+
+#include "core/folders.h"
+#include "report/pictures.h"
+#include "report/views.h"
+
+namespace ewa::train {
+namespace {
+
+// Their mean says enough. All views of a large set would take longer than its training.
+constexpr size_t kTrainViewsEvaluated = 40;
+constexpr size_t kSavedRenders = 4;
+
+/// Thrown out of a part that the observer stops.
+struct Stopped {};
+
+void stop_if_asked(RunObserver& observer) {
+    if (observer.should_stop()) throw Stopped();
+}
+
+/// `count` of the values, evenly spread, with the first among them. All of them if there are fewer.
+template <class T>
+std::vector<T> spread_out(const std::vector<T>& values, size_t count) {
+    if (values.size() <= count) return values;
+    std::vector<T> some;
+    for (size_t i = 0; i < count; ++i) some.push_back(values[i * values.size() / count]);
+    return some;
+}
+
+/// The views whose renders are saved.
+std::vector<int> saved_frames(const Split& split) {
+    return spread_out(split.test.empty() ? split.train : split.test, kSavedRenders);
+}
+
+}  // namespace
+
+size_t evaluated_views(const Split& split) {
+    return split.test.size() + std::min(split.train.size(), kTrainViewsEvaluated);
+}
+
+std::map<int, std::filesystem::path> saved_renders(const RunInput& input) {
+    const auto names = report::picture_names(input.dataset.frames);
+    const auto folder = input.options.output / (input.split.test.empty() ? "train" : "test");
+    std::map<int, std::filesystem::path> files;
+    for (const int index : saved_frames(input.split))
+        files[index] = folder / (names[size_t(index)].string() + ".png");
+    return files;
+}
+
+bool FinalEvaluation::done_unless_stopped(const std::function<void()>& work) const {
+    try {
+        stop_if_asked(observer_);
+        work();
+        return true;
+    } catch (const Stopped&) {
+        return false;
+    }
+}
+
+bool FinalEvaluation::evaluate(RunCameras& cameras, const RunFolder& folder) {
+    const bool held_out = !input_.split.test.empty();
+    const auto align = [&] {
+        cameras.align_test(scene_.device, scene_.gaussians, [&] {
+            stop_if_asked(observer_);
+            keep_waiting_();
+        });
+        report_.summary.cameras->test_aligned = true;
+        cameras.save(folder, true);
+    };
+    report_.held_out = held_out;
+    const bool done = done_unless_stopped([&] {
+        observer_.on_note("evaluating");
+        if (held_out && cameras.refine()) align();
+        if (held_out) evaluate_test_views();
+        report_.summary.train_psnr =
+            evaluated(spread_out(input_.split.train, kTrainViewsEvaluated),
+                      spread_out(scene_.exposures, kTrainViewsEvaluated), !held_out, {})
+                .psnr;
+    });
+    if (!done) report_.views.clear();
+    return done;
+}
+
+void FinalEvaluation::evaluate_test_views() {
+    of_test_views_ = evaluated(input_.split.test, {}, true, measures_);
+    report_.summary.test_figures = of_test_views_->figures;
+    report_.summary.test_psnr = of_test_views_->psnr;
+    report_.summary.test_ssim = of_test_views_->ssim;
+}
+
+/// shown: the report shows these views. They are the held-out ones, or the training views without a test set.
+Evaluation FinalEvaluation::evaluated(const std::vector<int>& frames, const std::vector<Exposure>& exposures,
+                                      bool shown, const Measures& measures) {
+    const auto before_frame = [&] {
+        stop_if_asked(observer_);
+        keep_waiting_();
+    };
+    return evaluate_views(
+        scene_.drawing, input_.dataset, frames, input_.options.train.render, exposures, before_frame,
+        [&](size_t i, const RenderedView& view, const EvalFrame& figures) {
+            if (shown) add_view(frames[i], view, figures);
+            observer_.on_view(++done_, evaluated_views(input_.split));
+        },
+        measures);
+}
+
+/// Adds a view to the report. Saves its render if it is one of those.
+void FinalEvaluation::add_view(int index, const RenderedView& view, const EvalFrame& figures) {
+    report_.views.push_back(
+        report::small_view(figures.name, view.photo, view.rendering, figures.psnr, figures.ssim));
+    report_.views.back().frame = index;
+    const auto file = saved_.find(index);
+    if (file == saved_.end()) return;
+    core::make_folder(file->second.parent_path());
+    save_image(without_link(file->second), view.rendering);
+    if (first_render_.empty()) first_render_ = file->second;
+}
+
+bool FinalEvaluation::add_full_size() {
+    return done_unless_stopped([&] {
+        report::sort_views(report_.views);
+        size_t bytes = 0;
+        for (const size_t i : report::full_size_order(report_.views.size())) {
+            if (bytes >= report::kFullSizeBytes) break;
+            stop_if_asked(observer_);
+            bytes += add_full_size(report_.views[i]);
+        }
+    });
+}
+
+/// Returns the bytes that it adds.
+size_t FinalEvaluation::add_full_size(report::ReportView& view) const {
+    const std::vector<int>& train = input_.split.train;
+    const auto place = std::find(train.begin(), train.end(), view.frame);
+    const bool exposed = !scene_.exposures.empty() && place != train.end();
+    const Frame& frame = input_.dataset.frames[size_t(view.frame)];
+    const RenderedView rendered = with_photo(
+        std::move(scene_.drawing.images(std::span(&frame.camera, 1)).front()), frame,
+        input_.options.train.render, exposed ? &scene_.exposures[size_t(place - train.begin())] : nullptr);
+    return report::add_full_size(view, rendered.photo, rendered.rendering);
+}
+
+bool FinalEvaluation::add_section() {
+    if (!input_.options.report_section) return true;
+    return done_unless_stopped([&] {
+        const int first = saved_frames(input_.split).front();
+        report_.section = input_.options.report_section({scene_.device, scene_.gaussians,
+                                                         input_.dataset.frames[size_t(first)].camera,
+                                                         input_.options.train.render});
+    });
+}
+
+}  // namespace ewa::train

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// The cameras of a run that refines them.
+#pragma once
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "run/run_files.h"
+#include "run/run_input.h"
+
+namespace ewa::train {
+
+/// Gives the frames of a run's input the dataset's cameras, or for a while those that belong to a trainer's splats.
+class RunCameras {
+  public:
+    /// input: must outlive this.
+    explicit RunCameras(RunInput& input) : input_(input) {}
+
+    bool refine() const { return input_.options.train.refine_poses; }
+    void use_refined(const Trainer& trainer);
+    void use_given();
+    /// Moves the refined test cameras to where the splats fit their images best. before_frame: as of align_cameras.
+    void align_test(const std::shared_ptr<gpu::Device>& device, const Gaussians& gaussians,
+                    const std::function<void()>& before_frame);
+
+    // While the refined cameras are in use:
+    CameraMoves moves() const;
+    /// aligned: align_test has moved the test cameras. Throws RunError.
+    void save(const RunFolder& folder, bool aligned) const;
+
+  private:
+    RunInput& input_;
+    std::vector<Camera> given_;  // of the dataset, while its frames have the refined ones
+    Similarity world_;           // of the refined cameras
+    double extent_ = 1;          // Trainer::extent
+};
+
+}  // namespace ewa::train
