@@ -12,6 +12,7 @@
 #include <string>
 
 #include "ewa/error.h"
+#include "ewa/gaussians.h"
 #include "input.h"
 
 namespace {
