@@ -9,8 +9,8 @@
 #include "core/words.h"
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
-#include "pipeline/plan.h"
 #include "run/run_options.h"
+#include "scene/looks.h"
 
 namespace ewa::python {
 
@@ -29,12 +29,6 @@ std::array<float, 3> background_of(nb::handle value) {
 
 namespace {
 
-Integrator integrator_of(const std::string& word) {
-    static const core::Words<Integrator> words{
-        {"splat", Integrator::splat}, {"ray", Integrator::ray}, {"march", Integrator::march}};
-    return of_argument("integrator", [&] { return core::value_of(words, word); });
-}
-
 int whole_number(const char* name, int value, int most) {
     if (value < 1 || value > most)
         throw InputError(std::string(name) + " is not from 1 to " + std::to_string(most));
@@ -42,7 +36,7 @@ int whole_number(const char* name, int value, int most) {
 }
 
 Footprint kernel_of(const LookArguments& arguments, const Splats& splats) {
-    if (arguments.kernel && arguments.antialias) throw InputError("antialias and kernel exclude each other");
+    scene::check_look({.antialias = arguments.antialias.has_value(), .kernel = arguments.kernel.has_value()});
     if (arguments.kernel) return asked_for("kernel", *arguments.kernel).train.render.kernel;
     if (arguments.points) return footprint_of(arguments.antialias.value_or(false));
     if (!splats.gaussians.density) return footprint_of(arguments.antialias.value_or(splats.antialiased));
@@ -65,14 +59,11 @@ RenderOptions look_of(const LookArguments& arguments, const Splats& splats) {
     if (arguments.sh_degree < 0 || arguments.sh_degree > kMaxShDegree)
         throw InputError("sh_degree is not 0, 1, 2 or 3");
     look.sh_degree = arguments.sh_degree;
-    look.integrator = integrator_of(arguments.integrator);
+    look.integrator = of_argument(
+        "integrator", [&] { return core::value_of(scene::kIntegratorWords, arguments.integrator); });
     look.points = arguments.points;
-    pipeline::check_points(look);
-    if (look.integrator != Integrator::splat && look.kernel == Footprint::antialias)
-        throw InputError("integrator: there are no footprints to antialias; kernel=\"peak\" has none");
-    if (arguments.samples && look.integrator != Integrator::march)
-        throw InputError("samples: only integrator=\"march\" takes samples of a ray");
-    if (arguments.nearest && !look.points) throw InputError("nearest is an argument of points=True");
+    scene::check_look(
+        {.render = look, .nearest = arguments.nearest.has_value(), .samples = arguments.samples.has_value()});
     if (arguments.samples) look.samples = whole_number("samples", *arguments.samples, kMostSamples);
     if (arguments.nearest) look.nearest = whole_number("nearest", *arguments.nearest, kMostNearest);
     return look;

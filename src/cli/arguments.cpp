@@ -13,8 +13,8 @@
 #include "ewa/error.h"
 #include "ewa/splat_edit.h"
 #include "ewa/splat_files.h"
-#include "pipeline/plan.h"
 #include "scene/camera.h"
+#include "scene/looks.h"
 #include "scene/names.h"
 
 namespace ewa::cli {
@@ -83,8 +83,7 @@ core::PixelSize size_of(const std::string& text) {
 }
 
 Footprint settled_kernel(Footprint kernel, bool antialias) {
-    if (antialias && kernel == Footprint::density)
-        throw InputError("--antialias and --kernel density exclude each other");
+    scene::check_look({.antialias = antialias, .kernel = kernel == Footprint::density});
     return antialias ? Footprint::antialias : kernel;
 }
 
@@ -104,16 +103,9 @@ RenderOptions DrawArguments::options() const {
     render.kernel = settled_kernel(render.kernel, antialias);
     render.sh_degree = sh_degree;
     render.points = points;
-    if (nearest && !points) throw InputError("--nearest is an option of --points");
     render.nearest = nearest.value_or(render.nearest);
-    render.integrator = integrator == "ray"     ? Integrator::ray
-                        : integrator == "march" ? Integrator::march
-                                                : Integrator::splat;
-    pipeline::check_points(render);
-    if (render.integrator != Integrator::splat && render.kernel == Footprint::antialias)
-        throw InputError("--integrator " + integrator + ": there are no footprints to antialias");
-    if (samples && render.integrator != Integrator::march)
-        throw InputError("--samples: only --integrator march takes samples of a ray");
+    render.integrator = core::value_of(scene::kIntegratorWords, integrator);
+    scene::check_look({.render = render, .nearest = nearest.has_value(), .samples = samples.has_value()});
     render.samples = samples.value_or(render.samples);
     return render;
 }
@@ -162,7 +154,7 @@ void add_draw_options(CLI::App& app, DrawArguments& arguments) {
            "--integrator", arguments.integrator,
            "How splats become a colour: splat blends footprints, ray orders splats on each ray, march "
            "integrates the volume")
-        ->transform(one_of({"splat", "ray", "march"}))
+        ->transform(one_of(core::words_of(scene::kIntegratorWords)))
         ->capture_default_str();
     app.add_option("--samples", arguments.samples, "Intervals of a ray, with --integrator march (64)")
         ->transform(in_range(1, kMostSamples))

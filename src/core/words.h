@@ -2,7 +2,9 @@
 // The words that people type for the values of an enum.
 #pragma once
 #include <algorithm>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -22,12 +24,19 @@ std::vector<std::string> words_of(const Words<T>& words) {
     return all;
 }
 
+/// Empty if there is no such word.
+template <class T>
+std::optional<T> find_value(const Words<T>& words, std::string_view word) {
+    const auto found = std::ranges::find_if(words, [&](const auto& named) { return word == named.first; });
+    return found == words.end() ? std::nullopt : std::optional(found->second);
+}
+
 /// The value of a word, as settle_word reads it. Throws InputError.
 template <class T>
 T value_of(const Words<T>& words, std::string word) {
     if (const std::string problem = settle_word(word, words_of(words)); !problem.empty())
         throw InputError(problem);
-    return std::ranges::find_if(words, [&](const auto& named) { return word == named.first; })->second;
+    return *find_value(words, word);
 }
 
 /// Empty if the value has no name.

@@ -6,6 +6,7 @@
 
 #include "ewa/error.h"
 #include "pipeline/model.h"
+#include "scene/looks.h"
 #include "shared/layouts.h"
 
 namespace ewa::pipeline {
@@ -19,10 +20,8 @@ void check_integrator(const PlanRequest& request) {
     const auto refuse = [&](const std::string& why) {
         throw InputError("the integrator " + name + " " + why);
     };
-    if (request.render.points) refuse("has no points; splat draws them");
+    scene::check_look({.render = request.render});
     if (request.purpose == Purpose::training) refuse("cannot train; splat can");
-    if (request.render.kernel == Footprint::antialias)
-        refuse("has no footprints to antialias; the kernels peak and density can be used");
     if (request.drawing == Drawing::count || request.drawing == Drawing::ellipsoids)
         refuse("draws neither counts nor ellipsoids; splat does");
     if (integrator == Integrator::march && request.drawing == Drawing::depth)
@@ -36,16 +35,6 @@ void check_integrator(const PlanRequest& request) {
 }
 
 }  // namespace
-
-void check_points(const RenderOptions& options) {
-    if (!options.points) return;
-    if (options.kernel != Footprint::peak)
-        throw InputError(std::string("--points and --kernel ") +
-                         (options.kernel == Footprint::density ? "density" : "antialias") +
-                         " exclude each other: a sphere has no footprint");
-    if (options.integrator != Integrator::splat)
-        throw InputError("--points and --integrator exclude each other: spheres are blended on the image");
-}
 
 uint32_t Plan::evaluated_degree(int wanted) const {
     return uint32_t(std::clamp(wanted, 0, stored_degree));

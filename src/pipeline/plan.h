@@ -70,9 +70,6 @@ struct Plan {
     uint32_t evaluated_degree(int wanted) const;
 };
 
-/// Throws InputError if the options have points, and what spheres cannot have.
-void check_points(const RenderOptions& options);
-
 /// A picture stores the degrees that are present and wanted (request.render.sh_degree). A gradient
 /// and a training store all: every stored coefficient has a gradient. Inputs that do not apply to
 /// the purpose are ignored.

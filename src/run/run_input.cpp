@@ -11,6 +11,7 @@
 #include <glm/matrix.hpp>
 #include <numbers>
 
+#include "core/exclusion.h"
 #include "core/folders.h"
 #include "core/random.h"
 #include "core/typing.h"
@@ -21,8 +22,8 @@
 #include "scene/dense_points.h"
 #include "scene/names.h"
 #include "shared/constants.h"
-#include "train/schedule.h"
 #include "train/needs.h"
+#include "train/schedule.h"
 
 namespace ewa::train {
 namespace {
@@ -344,6 +345,42 @@ RunInput load_run(const RunOptions& options) {
     return input;
 }
 
+namespace {
+
+using core::Relation;
+using RunExclusion = core::Exclusion<RunOptions>;
+
+bool adds_by_gradient(const RunOptions& options) {
+    return options.train.strategy == Strategy::adc || options.train.strategy == Strategy::automatic;
+}
+
+bool draws_points(const RunOptions& options) {
+    return options.train.render.points;
+}
+
+constexpr std::array kRunExclusions{
+    RunExclusion{"--resume", [](const RunOptions& o) { return o.resume; }, Relation::excludes, "--force",
+                 [](const RunOptions& o) { return o.force; }},
+    RunExclusion{"--keep", [](const RunOptions& o) { return o.keep > 0; }, Relation::needs, "--save-every",
+                 [](const RunOptions& o) { return o.save_every > 0; }},
+    RunExclusion{"--absgrad", [](const RunOptions& o) { return o.train.absolute_gradients; }, Relation::needs,
+                 "--strategy adc", adds_by_gradient},
+    RunExclusion{"--revised-opacity", [](const RunOptions& o) { return o.train.revised_opacity; },
+                 Relation::needs, "--strategy adc", adds_by_gradient},
+    RunExclusion{"--device-memory", [](const RunOptions& o) { return o.train.device_memory_bytes > 0; },
+                 Relation::excludes, "--accuracy",
+                 [](const RunOptions& o) { return bool(o.report_section); }},
+    RunExclusion{"--init-opacity",
+                 [](const RunOptions& o) { return o.init_opacity != RunOptions().init_opacity; },
+                 Relation::excludes, "--points", draws_points, "a sphere has no opacity"},
+    RunExclusion{"--nearest",
+                 [](const RunOptions& o) { return o.train.render.nearest != RenderOptions().nearest; },
+                 Relation::needs, "--points", draws_points},
+    RunExclusion{"--refine-focal", [](const RunOptions& o) { return o.train.refine_focal; }, Relation::needs,
+                 "--refine-poses", [](const RunOptions& o) { return o.train.refine_poses; }}};
+
+}  // namespace
+
 }  // namespace ewa::train
 
 namespace ewa {
@@ -359,23 +396,8 @@ fs::path output_folder(const RunOptions& options) {
 }
 
 void check_options(const RunOptions& options) {
-    if (options.resume && options.force) throw InputError("--resume and --force exclude each other");
-    if (options.keep > 0 && options.save_every == 0) throw InputError("--keep is an option of --save-every");
-    const TrainOptions& train = options.train;
-    if (train.strategy != Strategy::adc && train.strategy != Strategy::automatic &&
-        (train.absolute_gradients || train.revised_opacity))
-        throw InputError("--absgrad and --revised-opacity are options of --strategy adc");
-    train::check_training(train, options.ranks->size());
-    if (train.device_memory_bytes > 0 && options.report_section)
-        throw InputError("--device-memory and --accuracy exclude each other");
-    if (train.render.points && options.init_opacity != RunOptions().init_opacity)
-        throw InputError("--init-opacity is for splats with an opacity, not for --points");
-    if (!train.render.points && train.render.nearest != RenderOptions().nearest)
-        throw InputError("--nearest is an option of --points");
-    if (train.refine_focal && !train.refine_poses)
-        throw InputError("--refine-focal is an option of --refine-poses");
-    if (train.refine_poses && train.render.points)
-        throw InputError("--refine-poses does not work with --points");
+    core::check_exclusions(train::kRunExclusions, options);
+    train::check_training(options.train, options.ranks->size());
 }
 
 }  // namespace ewa

@@ -14,6 +14,7 @@
 #include "ewa/error.h"
 #include "run/advanced_options.h"
 #include "run/option_rows.h"
+#include "scene/looks.h"
 
 namespace ewa::train {
 namespace {
@@ -26,16 +27,8 @@ const core::Words<Strategy> kStrategies = {{"auto", Strategy::automatic},
                                            {"adc", Strategy::adc},
                                            {"mcmc", Strategy::mcmc},
                                            {"none", Strategy::none}};
-const core::Words<MaskUse> kMaskUses = {{"auto", MaskUse::automatic},
-                                        {"ignore", MaskUse::ignore},
-                                        {"cut", MaskUse::cut},
-                                        {"none", MaskUse::none}};
 const core::Words<DenseStart> kDenseStarts = {
     {"auto", DenseStart::automatic}, {"on", DenseStart::on}, {"off", DenseStart::off}};
-const core::Words<Footprint> kKernels = {{"peak", Footprint::peak},
-                                         {"antialias", Footprint::antialias},
-                                         {"density", Footprint::density},
-                                         {"ewa", Footprint::density}};
 
 RunOption frames_option() {
     RunOption option =
@@ -344,7 +337,7 @@ std::vector<Row> rows() {
              "masks",
              "What masks/ and alpha are for. ignore: masked pixels do not count. cut: masked pixels have the "
              "background's colour. none: neither is used. auto: ignore if there are mask files, else cut",
-             [](RunOptions& o) -> MaskUse& { return o.masks; }, kMaskUses)},
+             [](RunOptions& o) -> MaskUse& { return o.masks; }, scene::kMaskWords)},
         {"Data", "",
          number<int>(
              "test-every", "K", "Hold out every K-th image in name order. 0: none", kDecides,
@@ -362,7 +355,7 @@ std::vector<Row> rows() {
              "kernel",
              "Footprint of a splat: peak (3DGS), antialias (Mip-Splatting) or density (EWA: a longer way "
              "through a splat absorbs more)",
-             [](RunOptions& o) -> Footprint& { return o.train.render.kernel; }, kKernels)},
+             [](RunOptions& o) -> Footprint& { return o.train.render.kernel; }, scene::kKernelWords)},
         {"Quality", "points", points_option()},
         {"Quality", "nearest", nearest_option()},
         {"Output", "",

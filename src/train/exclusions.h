@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a training cannot do where its splats or its pictures are divided. Errors print these rows, and docs/scale.md shows them.
+// What a training cannot do where its splats or its pictures are divided, and what it cannot do with points. Errors print these
+// rows, and docs/scale.md shows those of a division. src/scene/looks.cpp has the rows of renders, src/run/run_input.cpp those of
+// whole runs.
 #pragma once
 #include <array>
 #include <string>
 #include <string_view>
 
+#include "core/exclusion.h"
 #include "ewa/train_options.h"
 
 namespace ewa::train {
@@ -34,6 +37,22 @@ inline constexpr std::array kExclusions{
               [](const TrainOptions& options) { return options.exposure; },
               {false, false, true, false},
               "an exposure learns from the whole picture of its view"}};
+
+inline bool has_points(const TrainOptions& options) {
+    return options.render.points;
+}
+
+inline constexpr std::array kPointExclusions{
+    core::Exclusion<TrainOptions>{
+        "--points", has_points, core::Relation::excludes, "--strategy mcmc",
+        [](const TrainOptions& options) { return options.strategy == Strategy::mcmc; },
+        "it moves splats of low opacity, and a sphere has none"},
+    core::Exclusion<TrainOptions>{"--points", has_points, core::Relation::excludes, "--revised-opacity",
+                                  [](const TrainOptions& options) { return options.revised_opacity; },
+                                  "a sphere has no opacity"},
+    core::Exclusion<TrainOptions>{"--points", has_points, core::Relation::excludes, "--refine-poses",
+                                  [](const TrainOptions& options) { return options.refine_poses; },
+                                  "spheres have no gradient by the camera"}};
 
 /// Throws InputError if options exclude what divides the training.
 void check_exclusions(const TrainOptions& options, int ranks);

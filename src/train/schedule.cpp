@@ -9,6 +9,7 @@
 
 #include "ewa/error.h"
 #include "ewa/training_needs.h"
+#include "scene/looks.h"
 #include "train/exclusions.h"
 
 namespace ewa::train {
@@ -61,20 +62,15 @@ void check_exclusions(const TrainOptions& options, int ranks) {
     for (const Exclusion& row : kExclusions)
         for (size_t by = 0; by < divisions; ++by)
             if (row.used(options) && divided[by] && row.excludes[by])
-                throw InputError(
-                    fmt::format("{} and {} exclude each other: {}", kDivisions[by], row.option, row.reason));
+                throw InputError(core::excluded(kDivisions[by], row.option, row.reason));
 }
 
 void check_training(const TrainOptions& options, int ranks) {
     if (options.batch < 1) throw InputError("--batch: a step has at least one view");
     if (options.bands < 1) throw InputError("--bands: a view has at least one band");
     check_exclusions(options, ranks);
-    pipeline::check_points(options.render);
-    if (options.render.points && options.strategy == Strategy::mcmc)
-        throw InputError(
-            "--strategy mcmc moves splats of low opacity, and a sphere has none: --points needs adc or none");
-    if (options.render.points && options.revised_opacity)
-        throw InputError("--revised-opacity is for splats with an opacity, not for --points");
+    scene::check_look({.render = options.render});
+    core::check_exclusions(kPointExclusions, options);
 }
 
 bool Schedule::densifies(int step) const {

@@ -6,13 +6,14 @@
 
 #include "core/folders.h"
 #include "core/typing.h"
+#include "core/words.h"
 #include "ewa/capture.h"
 #include "ewa/error.h"
 #include "ewa/splat_files.h"
 #include "ewa/synthetic_dataset.h"
 #include "io/datasets/refined_cameras.h"
 #include "live/run_folder.h"
-#include "run/run_options.h"
+#include "scene/looks.h"
 
 namespace ewa::viewer {
 namespace {
@@ -51,9 +52,7 @@ std::shared_ptr<const Dataset> load_cameras(const fs::path& path, DatasetOptions
 
 Look look_of(const live::Run& run) {
     Look look;
-    const std::string kernel = run.text("kernel");
-    if (kernel == "antialias") look.kernel = Footprint::antialias;
-    if (kernel == "density" || kernel == "ewa") look.kernel = Footprint::density;
+    look.kernel = core::find_value(scene::kKernelWords, run.text("kernel")).value_or(look.kernel);
     look.points = run.flag("points");
     const auto nearest = run.config.find("nearest");
     if (nearest != run.config.end() && nearest->is_number_integer())
@@ -71,10 +70,7 @@ DatasetOptions images_of(const live::Run& run) {
     const auto width = run.config.find("max-width");
     if (width != run.config.end() && width->is_number_integer())
         options.max_width = std::clamp(width->get<int>(), 0, 65535);
-    const std::string masks = run.text("masks");
-    if (masks == "ignore") options.masks = MaskUse::ignore;
-    if (masks == "cut") options.masks = MaskUse::cut;
-    if (masks == "none") options.masks = MaskUse::none;
+    options.masks = core::find_value(scene::kMaskWords, run.text("masks")).value_or(options.masks);
     return options;
 }
 

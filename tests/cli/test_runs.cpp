@@ -98,10 +98,10 @@ TEST_F(Runs, PointsExcludeWhatSpheresDoNotHave) {
     fails(drawing, {"--nearest", "0"}, "'0' is not a whole number from 1 to 1000");
     const Names training{"train", folder / "data", "-o", folder / "t"};
     fails(training, {"--kernel", "antialias"}, "--points and --kernel antialias exclude each other");
-    fails(training, {"--strategy", "mcmc"}, "--points needs adc or none");
-    fails(training, {"--revised-opacity"}, "--revised-opacity is for splats with an opacity");
-    fails(training, {"--init-opacity", "0.5"}, "--init-opacity is for splats with an opacity");
-    fails(training, {"--refine-poses"}, "--refine-poses does not work with --points");
+    fails(training, {"--strategy", "mcmc"}, "--points and --strategy mcmc exclude each other");
+    fails(training, {"--revised-opacity"}, "--points and --revised-opacity exclude each other");
+    fails(training, {"--init-opacity", "0.5"}, "--init-opacity and --points exclude each other");
+    fails(training, {"--refine-poses"}, "--points and --refine-poses exclude each other");
     expect_failure(run_ewa({"train", folder / "data", "-o", folder / "t", "--nearest", "3"}), 2,
                    "--nearest is an option of --points");
     EXPECT_FALSE(fs::exists(folder / "t"));

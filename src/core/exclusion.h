@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which options go together. Errors name options as the command line does, which Python's package respells.
+#pragma once
+#include <string>
+#include <string_view>
+
+#include "ewa/error.h"
+
+namespace ewa::core {
+
+enum class Relation { excludes, needs };
+
+/// Why an option is refused: it is used with another one that it excludes, or without one that it needs.
+template <class Options>
+struct Exclusion {
+    std::string_view option;
+    bool (*used)(const Options&);
+    Relation relation;
+    std::string_view other;
+    bool (*other_used)(const Options&);
+    std::string_view reason = {};
+};
+
+/// "A and B exclude each other: reason"
+inline std::string excluded(std::string_view option, std::string_view other, std::string_view reason) {
+    std::string text(option);
+    text.append(" and ").append(other).append(" exclude each other");
+    return reason.empty() ? text : text.append(": ").append(reason);
+}
+
+/// Throws InputError for the first row that the options violate.
+template <class Rows, class Options>
+void check_exclusions(const Rows& rows, const Options& options) {
+    for (const Exclusion<Options>& row : rows) {
+        const bool excludes = row.relation == Relation::excludes;
+        if (!row.used(options) || row.other_used(options) != excludes) continue;
+        if (excludes) throw InputError(excluded(row.option, row.other, row.reason));
+        throw InputError(std::string(row.option).append(" is an option of ").append(row.other));
+    }
+}
+
+}  // namespace ewa::core

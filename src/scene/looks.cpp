@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scene/looks.h"
+
+#include <array>
+
+#include "core/exclusion.h"
+
+namespace ewa::scene {
+namespace {
+
+using core::Relation;
+using Row = core::Exclusion<Look>;
+
+template <Footprint kernel>
+bool drawn_with(const Look& look) {
+    return look.render.kernel == kernel;
+}
+template <Integrator integrator>
+bool integrated_by(const Look& look) {
+    return look.render.integrator == integrator;
+}
+bool points(const Look& look) {
+    return look.render.points;
+}
+
+constexpr std::string_view kNoFootprint = "a sphere has no footprint";
+constexpr std::string_view kNoAntialias = "there are no footprints to antialias; --kernel peak has none";
+constexpr std::array kRows{
+    Row{"--antialias", [](const Look& look) { return look.antialias; }, Relation::excludes, "--kernel",
+        [](const Look& look) { return look.kernel; }, "--antialias is the kernel antialias"},
+    Row{"--points", points, Relation::excludes, "--kernel antialias", drawn_with<Footprint::antialias>,
+        kNoFootprint},
+    Row{"--points", points, Relation::excludes, "--kernel density", drawn_with<Footprint::density>,
+        kNoFootprint},
+    Row{"--points", points, Relation::excludes, "--integrator",
+        [](const Look& look) { return look.render.integrator != Integrator::splat; },
+        "spheres are blended on the image"},
+    Row{"--integrator ray", integrated_by<Integrator::ray>, Relation::excludes, "--kernel antialias",
+        drawn_with<Footprint::antialias>, kNoAntialias},
+    Row{"--integrator march", integrated_by<Integrator::march>, Relation::excludes, "--kernel antialias",
+        drawn_with<Footprint::antialias>, kNoAntialias},
+    Row{"--nearest", [](const Look& look) { return look.nearest; }, Relation::needs, "--points", points},
+    Row{"--samples", [](const Look& look) { return look.samples; }, Relation::needs, "--integrator march",
+        integrated_by<Integrator::march>}};
+
+}  // namespace
+
+void check_look(const Look& look) {
+    core::check_exclusions(kRows, look);
+}
+
+}  // namespace ewa::scene
