@@ -133,7 +133,7 @@ int continue_from(const std::filesystem::path& path, const Checkpoint& earlier, 
 Json checkpoint_settings(const RunOptions& options, const std::string& fingerprint) {
     Json decisive;
     for (const RunOption& option : run_options())
-        if (option.decides_result) decisive[option.name] = option.get(options);
+        if (option.decides_result && is_listed(option, options)) decisive[option.name] = option.get(options);
     Json settings{{"version", EWA_VERSION}, {"dataset", fingerprint}, {"options", decisive}};
     const TrainOptions none;
     if (options.train.least_sh_degree != none.least_sh_degree ||
@@ -145,13 +145,13 @@ Json checkpoint_settings(const RunOptions& options, const std::string& fingerpri
 
 void check_resumable(const std::filesystem::path& path, const std::string& stored, const Json& now) {
     const Json then = parse_settings(path, stored);
-    for (const auto& [name, value] : now["options"].items()) {
-        if (name == "steps") continue;
-        const RunOption& option = run_option(name);
-        Json other = then["options"].value(name, Json());
+    for (const RunOption& option : run_options()) {
+        if (!option.decides_result || option.name == "steps") continue;
+        const Json value = now["options"].value(option.name, option.get(RunOptions()));
+        Json other = then["options"].value(option.name, Json());
         if (other.is_null() && !option.before.empty()) other = normalised(option, option.before);
         if (normalised(option, other) != value)
-            throw InputError(path.string() + ": was written with --" + name + " " +
+            throw InputError(path.string() + ": was written with --" + option.name + " " +
                              other.dump().substr(0, kLongestValue) + ", not " + value.dump() +
                              "; with its own value the run continues, -o DIR starts another run");
     }

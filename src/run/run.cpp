@@ -175,9 +175,8 @@ void Run::begin_files() {
 
 void Run::list_settings() {
     for (const train::RunOption& option : train::run_options())
-        if (const std::string value = train::value_text(option, options());
-            !option.subject.empty() || value != train::value_text(option, RunOptions()))
-            report_.settings.emplace_back(option.name, value);
+        if (train::is_listed(option, options()))
+            report_.settings.emplace_back(option.name, train::value_text(option, options()));
     for (auto& [name, value] : report_.settings)
         if (name == "device" && value.empty()) value = report_.summary.device + " (chosen by ewa)";
 }

@@ -415,9 +415,14 @@ std::string value_text(const RunOption& option, const RunOptions& options) {
     return value.is_string() ? value.get<std::string>() : value.dump();
 }
 
+bool is_listed(const RunOption& option, const RunOptions& options) {
+    return !option.subject.empty() || option.get(options) != option.get(RunOptions());
+}
+
 Json to_config(const RunOptions& options) {
     Json json;
-    for (const RunOption& option : run_options()) json[option.name] = option.get(options);
+    for (const RunOption& option : run_options())
+        if (is_listed(option, options)) json[option.name] = option.get(options);
     return json;
 }
 

@@ -38,7 +38,9 @@ const RunOption& run_option(std::string_view name);
 /// The value as the command line takes it.
 std::string value_text(const RunOption& option, const RunOptions& options);
 
-/// All options under their names: what config.json holds.
+/// Whether files list the option: an advanced one only if its value is not the usual one.
+bool is_listed(const RunOption& option, const RunOptions& options);
+/// The options that are listed, under their names: what config.json holds.
 nlohmann::ordered_json to_config(const RunOptions& options);
 
 /// "none", "adc", "mcmc" or "auto".

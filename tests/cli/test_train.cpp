@@ -107,6 +107,7 @@ TEST_F(Train, ConfigSetsRatesThatTheHelpDoesNotShow) {
     expect_success(train("b", {"--config", folder / "usual.json", "--quiet"}));
     expect_success(train("c", {"--steps", "5", "--quiet"}));
     EXPECT_EQ(read_json(folder / "a/config.json")["means-rate"], 1.6e-3);
+    EXPECT_FALSE(read_json(folder / "b/config.json").contains("means-rate"));
     EXPECT_NE(read_file(folder / "a/splats.ply"), read_file(folder / "b/splats.ply"));
     EXPECT_EQ(read_file(folder / "b/splats.ply"), read_file(folder / "c/splats.ply"));
     expect_failure(train("d", {"--config", folder / "wrong.json"}), 2,

@@ -328,7 +328,9 @@ TEST(RunOptions, TableReadsWhatItWrites) {
         EXPECT_EQ(train::value_text(option, one), other.at(option.name));
         const Json after = train::to_config(one);
         for (const auto& [name, value] : after.items())
-            EXPECT_EQ(value != before[name], name == option.name) << name;
+            EXPECT_EQ(value != before.value(name, Json()), name == option.name) << name;
+        EXPECT_TRUE(after.contains(option.name));
+        EXPECT_EQ(before.contains(option.name), !option.subject.empty());
         option.set(one, train::value_text(option, RunOptions()));
         EXPECT_EQ(train::to_config(one), before);
         EXPECT_FALSE(option.help.empty());

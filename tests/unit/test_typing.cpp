@@ -5,6 +5,7 @@
 
 #include <string>
 
+#include "core/exclusion.h"
 #include "core/words.h"
 #include "ewa/error.h"
 
@@ -120,7 +121,33 @@ TEST(Typing, WordsHaveValues) {
     EXPECT_EQ(value_of(words, "grey"), 1);
     EXPECT_STREQ(word_for(words, 2), "black");
     EXPECT_STREQ(word_for(words, 3), "");
+    EXPECT_EQ(find_value(words, "dark"), 2);
+    EXPECT_EQ(find_value(words, "blak"), std::nullopt);
     EXPECT_THROW(value_of(words, "blak"), ewa::InputError);
+}
+
+TEST(Typing, ExclusionsNameBothOptions) {
+    struct Asked {
+        bool a = false, b = false, c = false;
+    };
+    using Row = Exclusion<Asked>;
+    const std::array rows{Row{"--a", [](const Asked& asked) { return asked.a; }, Relation::excludes, "--b",
+                              [](const Asked& asked) { return asked.b; }, "because"},
+                          Row{"--c", [](const Asked& asked) { return asked.c; }, Relation::needs, "--a",
+                              [](const Asked& asked) { return asked.a; }}};
+    const auto refusal = [&](const Asked& asked) -> std::string {
+        try {
+            check_exclusions(rows, asked);
+        } catch (const ewa::InputError& error) {
+            return error.what();
+        }
+        return {};
+    };
+    EXPECT_EQ(refusal({}), "");
+    EXPECT_EQ(refusal({.b = true}), "");
+    EXPECT_EQ(refusal({.a = true, .c = true}), "");
+    EXPECT_EQ(refusal({.a = true, .b = true}), "--a and --b exclude each other: because");
+    EXPECT_EQ(refusal({.c = true}), "--c is an option of --a");
 }
 
 TEST(Typing, Plurals) {
