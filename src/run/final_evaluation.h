@@ -55,9 +55,9 @@ class FinalEvaluation {
     /// RunOptions::report_section.
     bool add_section();
 
-    /// Of the test views, once they are evaluated.
+    /// The figures of the test views, once they are evaluated.
     const std::optional<Evaluation>& of_test_views() const { return of_test_views_; }
-    /// Of the report's images; empty if there is none.
+    /// The first of the report's images; empty if there is none.
     const std::filesystem::path& first_render() const { return first_render_; }
 
   private:

@@ -32,7 +32,7 @@ class RunSaves {
              const RunProgress& progress)
         : folder_(folder), options_(options), cameras_(cameras), progress_(progress) {}
 
-    /// Of the checkpoints.
+    /// The settings that checkpoints hold.
     nlohmann::ordered_json& settings() { return settings_; }
     /// The run continues from the checkpoint of this step.
     void continue_from(const TimesAt& checkpoint);

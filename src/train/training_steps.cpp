@@ -81,8 +81,8 @@ void Training::record_fused(gpu::Recording& recording, int step, size_t index,
     FrameInputs inputs = view.inputs;
     inputs.keep_overflow = !in_flight_.empty();
     if (plan_.motion)
-        inputs.camera = record_move_camera({recording, tools_.cache}, learned_.motions, uint32_t(index),
-                                           inputs.camera);
+        inputs.camera =
+            record_move_camera({recording, tools_.cache}, learned_.motions, uint32_t(index), inputs.camera);
     const MotionUse motion{.motions = &learned_.motions,
                            .photo = uint32_t(index),
                            .rate = float(schedule_.pose_rate(step)),
