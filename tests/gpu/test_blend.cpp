@@ -206,7 +206,7 @@ TEST_P(BlendBackwardPass, SlotsAreTheReferencesMoments) {
         slots("slots", std::max<uint64_t>(lists.count(), 1) * shared::SLOT_FLOATS * 4, gpu::Texel::rgba32f);
     r.run([&](gpu::Recording& recording) {
         r.cache.get<passes::BlendBackward>({{shared::SPEC_MODE, shared::BLEND_BACKWARD_ABSOLUTE}})
-            .record(recording, {{lists.records, lists.splats, lists.starts, planes, incoming, slots}},
+            .record(recording, {{{lists.records, lists.splats, lists.starts, planes}, incoming, slots}},
                     lists.push());
     });
     EXPECT_TRUE(slots.intact());
@@ -261,7 +261,7 @@ TEST(BlendBackwardSlots, BehindTheLastTileAreZero) {
         r.cache.get<passes::Blend>({{shared::SPEC_MODE, shared::BLEND_COLOR}})
             .record(recording, {lists.records, lists.splats, lists.starts, planes}, lists.push());
         r.cache.get<passes::BlendBackward>({{shared::SPEC_MODE, 0}})
-            .record(recording, {{lists.records, lists.splats, lists.starts, planes, incoming, slots}},
+            .record(recording, {{{lists.records, lists.splats, lists.starts, planes}, incoming, slots}},
                     lists.push());
     });
     expect_intact({&slots});
@@ -284,7 +284,7 @@ size_t check_one_tile(const Scene& scene) {
         r.cache.get<passes::Blend>({{shared::SPEC_MODE, shared::BLEND_COLOR}})
             .record(recording, {lists.records, lists.splats, lists.starts, planes}, lists.push());
         r.cache.get<passes::BlendBackward>({{shared::SPEC_MODE, shared::BLEND_BACKWARD_ABSOLUTE}})
-            .record(recording, {{lists.records, lists.splats, lists.starts, planes, incoming, slots}},
+            .record(recording, {{{lists.records, lists.splats, lists.starts, planes}, incoming, slots}},
                     lists.push());
     });
     expect_intact({&planes, &slots});
