@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "ewa/appearance.h"
 #include "ewa/dataset.h"
 #include "ewa/device.h"
-#include "ewa/exposure.h"
 #include "ewa/gaussians.h"
 #include "ewa/metrics.h"
 #include "ewa/render_options.h"
@@ -45,12 +45,12 @@ struct Evaluation {
 /// Renders frames of the dataset and compares each with its image. Values are clamped to [0, 1]. Pixels with
 /// weight 0 do not count, and a frame without any other pixel is skipped.
 /// frames: indices into dataset.frames.
-/// exposures: applied to the renders, one for each of `frames` in the same order; or empty.
+/// appearances: applied to the renders, one for each of `frames` in the same order; or empty.
 /// before_frame: called before each frame; an exception from it ends the evaluation.
 /// Throws InputError (an image that cannot be read or changed its size), RunError (device).
 Evaluation evaluate(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians, const Dataset& dataset,
                     const std::vector<int>& frames, const RenderOptions& options,
-                    const std::vector<Exposure>& exposures = {},
+                    const std::vector<Appearance>& appearances = {},
                     const std::function<void()>& before_frame = {}, const Measures& measures = {});
 
 }  // namespace ewa

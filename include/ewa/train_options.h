@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "ewa/appearance.h"
 #include "ewa/render_options.h"
 
 namespace ewa {
@@ -24,6 +25,10 @@ inline constexpr int kAutomaticShDegree = -1;
 
 /// TrainOptions::max_splats: splat_cap() of ewa/training_needs.h chooses it.
 inline constexpr uint32_t kAutomaticMaxSplats = 0;
+
+struct TrainOptions;
+/// TrainOptions::appearance, or affine with TrainOptions::exposure.
+AppearanceModel appearance_of(const TrainOptions& options);
 
 /// Options of a Trainer. Learning rates are those of Adam. Lengths are in world units. "Scene extent" is
 /// scene_extent() of ewa/dataset.h, or the median distance of the start's splats if all cameras coincide.
@@ -62,8 +67,11 @@ struct TrainOptions {
     /// each photo 60 times and has fewer than 30,000 steps, the rates of its splats fade.
     int few_photos = 16;
 
-    bool exposure = false;  // learns an exposure for each training image, from the identity
+    /// Learns the appearance of each training image, from one that changes no colour (docs/training.md).
+    AppearanceModel appearance = AppearanceModel::none;
+    bool exposure = false;  // AppearanceModel::affine; not with another model
     double exposure_rate = 0.01, exposure_rate_final = 0.001;
+    double appearance_rate = 0.002;  // of ppisp and grid, per step of a full run
 
     // Cameras.
     bool refine_poses = false;  // learns a rotation and a translation for each training camera, from none

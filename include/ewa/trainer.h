@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "ewa/appearance.h"
 #include "ewa/camera_motion.h"
 #include "ewa/dataset.h"
 #include "ewa/device.h"
@@ -74,6 +75,7 @@ class Trainer {
     int steps_done() const;
     StepReport report() const;                         // of the last step, once the device has finished it
     std::vector<Exposure> exposures() const;           // one for each training frame; empty if not learned
+    std::vector<Appearance> appearances() const;       // the same of every model
     std::vector<CameraMotion> camera_motions() const;  // one for each training frame; empty if not learned
     size_t images_on_disk() const;                     // training images that are not cached
     double extent() const;                             // the length that rates are relative to, world units

@@ -115,6 +115,41 @@ EWA_UINT(KERNEL_DENSITY, 2u);
 // A larger optical depth at the middle of a density's footprint counts as this.
 EWA_REAL(DEPTH_MAX, 1e4);
 
+// Appearance of a training image: the physically plausible signal processor of a camera (PPISP, 2026).
+// Offsets of the colour targets are latent offsets times a symmetric 2x2 matrix (XX XY; XY YY) each.
+EWA_REAL(PPISP_BLUE_XX, 0.0480542);
+EWA_REAL(PPISP_BLUE_XY, -0.0043631);
+EWA_REAL(PPISP_BLUE_YY, 0.0481283);
+EWA_REAL(PPISP_RED_XX, 0.0580570);
+EWA_REAL(PPISP_RED_XY, -0.0179872);
+EWA_REAL(PPISP_RED_YY, 0.0431061);
+EWA_REAL(PPISP_GREEN_XX, 0.0433336);
+EWA_REAL(PPISP_GREEN_XY, -0.0180537);
+EWA_REAL(PPISP_GREEN_YY, 0.0580500);
+EWA_REAL(PPISP_GREY_XX, 0.0128369);
+EWA_REAL(PPISP_GREY_XY, -0.0034654);
+EWA_REAL(PPISP_GREY_YY, 0.0128158);
+EWA_REAL(PPISP_INTENSITY_MIN, 1e-5);  // added to the intensity that the colours are divided by
+EWA_REAL(PPISP_CURVE_MIN, 0.3);       // least exponent of a response's toe and shoulder
+EWA_REAL(PPISP_GAMMA_MIN, 0.1);
+EWA_REAL(PPISP_BASE_MIN, 1e-6);  // least base of a power
+// Its penalties: smooth L1 of the mean exposure and of the mean offsets, which is quadratic below BETA. The others are means
+// over the values of a camera: squared distance of the vignette's centre, rises of the vignette, variance over the channels.
+EWA_REAL(PPISP_EXPOSURE_BETA, 0.1);
+EWA_REAL(PPISP_COLOR_BETA, 0.005);
+EWA_REAL(PPISP_CENTER_WEIGHT, 0.02);
+EWA_REAL(PPISP_RISE_WEIGHT, 0.01);
+EWA_REAL(PPISP_CHANNEL_WEIGHT, 0.1);
+
+// Appearance of a training image: a bilateral grid of affine maps (Chen et al. 2007; Wang et al. 2024).
+EWA_UINT(GRID_WIDTH, 16u);   // cells along x
+EWA_UINT(GRID_HEIGHT, 16u);  // along y
+EWA_UINT(GRID_DEPTH, 8u);    // along grey
+EWA_REAL(GREY_RED, 0.299);
+EWA_REAL(GREY_GREEN, 0.587);
+EWA_REAL(GREY_BLUE, 0.114);
+EWA_REAL(GRID_VARIATION_WEIGHT, 10.0);  // of the mean squared differences along the three axes
+
 // The path tracer of mesh scenes (docs/meshes.md describes its model).
 EWA_UINT(TRACE_STACK, 48u);         // greatest depth of the hierarchy: children on the stack of a ray
 EWA_UINT(TRACE_LEAF_MAX, 4u);       // triangles a leaf

@@ -182,6 +182,26 @@ EWA_UINT(EXPOSURE_FLOATS, 12u);
 EWA_UINT(EXPOSURE_TEXELS, 3u);
 EWA_UINT(EXPOSURE_BLOCK, 4096u);  // pixels whose gradient one subgroup sums
 
+// ---- PPISP: exposure and colours of a training image, vignette and response of a camera ----
+// The buffer has PPISP_PHOTO_FLOATS for each photo: exposure in stops; latent offsets x y of blue, red, green, grey; 0 0 0.
+// Then it has PPISP_CAMERA_FLOATS for each camera. PPISP_CHANNEL_FLOATS for each channel: the vignette's centre x y and
+// factors of r^2 r^4 r^6; toe, shoulder, gamma and middle of the response, before lib/ppisp.glsl maps them to their ranges.
+// Then the number of steps that the camera has taken. The means of the photos' values at the end of a step come last.
+EWA_UINT(PPISP_PHOTO_FLOATS, 12u);
+EWA_UINT(PPISP_PHOTO_VALUES, 9u);
+EWA_UINT(PPISP_CHANNEL_FLOATS, 9u);
+EWA_UINT(PPISP_CAMERA_VALUES, 27u);
+EWA_UINT(PPISP_CAMERA_FLOATS, 28u);
+// What a pass sums over pixels: dL/d(exposure), dL/d(colour map) by columns, dL/d(camera's values, of the response after
+// their mapping).
+EWA_UINT(PPISP_SUM_FLOATS, 37u);
+
+// ---- A bilateral grid: cell (x, y, z) at x + GRID_WIDTH (y + GRID_HEIGHT z), 3 texels of (row of the matrix, offset) ----
+EWA_UINT(GRID_CELLS, 2048u);
+EWA_UINT(GRID_FLOATS, 24576u);      // of a photo
+EWA_UINT(GRID_LEVELS, 4u);          // levels of grey that a subgroup sums at once
+EWA_UINT(GRID_PART_PIXELS, 8192u);  // pixels of a column of cells that a subgroup sums, or a row of them more
+
 // ---- A camera's motion: what training learns of a camera ----
 // 2 texels at 2 * image: rotation vector (radians, camera axes), logarithm of the factor of the focal lengths; shift of
 // the centre (world units, along the axes that the camera had at the start), 0. lib/motion.glsl has the formulas.
@@ -348,6 +368,44 @@ struct ExposureUpdatePush {
     float rate;
     float pull;          // d(loss)/d(value) for a value 1 away from the identity's
     float bias1, bias2;  // 1 / (1 - beta^visit); each training image has its own number of steps
+    uint instance_capacity;
+};
+
+struct PpispPush {
+    ImageLayout image;
+    uint photo, camera;  // where their values begin, in floats
+};
+
+struct PpispUpdatePush {
+    uint photo, camera, means;  // where their values begin, in floats
+    uint blocks;                // of partial sums
+    uint slot;                  // of the view's gradient of the camera's values, in the step
+    float rate;
+    float bias1, bias2;  // 1 / (1 - beta^visit); each training image has its own number of steps
+    uint instance_capacity;
+};
+
+struct PpispCameraPush {
+    uint camera, means;  // where their values begin, in floats
+    uint photos;
+    uint views;  // of the step, of this camera and of others
+    float rate;
+    uint instance_capacity;
+};
+
+struct GridPush {
+    ImageLayout image;
+    uint photo;  // index of the training image
+    uint parts;  // into which the rows of pixels of a column of cells are divided
+};
+
+struct GridUpdatePush {
+    uint texels;  // of a grid
+    uint photo;
+    uint parts;
+    float rate;
+    float pull;  // d(loss)/d(value) for a value 1 away from the identity's
+    float bias1, bias2;
     uint instance_capacity;
 };
 

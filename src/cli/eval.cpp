@@ -26,7 +26,8 @@ struct EvalArguments {
     ViewArguments views;
     MetricArguments metrics;
     std::filesystem::path json;
-    std::string split = "test", exposures = "auto";
+    std::string split = "test";
+    AppearanceArguments appearance;
     std::optional<live::Run> run;  // that of SPLATS, if its dataset is used
     int test_every = 8;
 };
@@ -65,13 +66,14 @@ int run(const EvalArguments& arguments) {
     const auto [dataset, refined, frames, folder] =
         load_views(arguments.views, arguments.split, arguments.test_every);
     check_command_outputs(written, scene::files_of(dataset, "DATASET"));
-    const std::vector<Exposure> exposures = exposures_of(arguments.exposures, arguments.run, dataset, frames);
+    const std::vector<Appearance> appearances =
+        appearances_of(arguments.appearance, arguments.run, dataset, frames);
 
     // The lines of the frames follow: a file gets no others.
     Progress progress("evaluated", int(frames.size()), "views", !core::redraws());
     int begun = 0;
     const Evaluation evaluation = evaluate(
-        open_device(arguments.views.device), gaussians, dataset, frames, options, exposures,
+        open_device(arguments.views.device), gaussians, dataset, frames, options, appearances,
         [&] { progress.update(begun++); }, measures);
     progress.clear();
     for (const EvalFrame& frame : evaluation.frames)
@@ -99,7 +101,7 @@ Action add_eval(CLI::App& app) {
         ->transform(one_of({"test", "train", "all"}))
         ->capture_default_str();
     add_test_every_option(app, arguments->test_every);
-    add_exposures_option(app, arguments->exposures);
+    add_appearance_options(app, arguments->appearance);
     add_metric_options(app, arguments->metrics);
     add_protocol_option(app, arguments->metrics);
     app.add_option("--json", arguments->json, "Write the results to this file")->type_name("FILE");

@@ -32,7 +32,8 @@ namespace fs = std::filesystem;
 
 struct RenderArguments {
     fs::path splats, cameras, output = "out/render";
-    std::string frames = "all", format = "png", mode = "color", exposures = "auto";
+    std::string frames = "all", format = "png", mode = "color";
+    AppearanceArguments appearance;
     int test_every = 8, downscale = 1, max_width = 0;
     ViewsArguments views;
     DrawArguments draw;
@@ -121,8 +122,8 @@ int render_dataset_views(RenderArguments arguments) {
     const std::vector<fs::path> files = files_of_frames(arguments, dataset, frames);
     arguments.format = core::lower(files[0].extension().string()).substr(1);
     check_renders(arguments, files, &dataset);
-    const std::vector<Exposure> exposures = exposures_of(
-        arguments.exposures, arguments.cameras_of_run ? arguments.run : std::nullopt, dataset, frames);
+    const std::vector<Appearance> appearances = appearances_of(
+        arguments.appearance, arguments.cameras_of_run ? arguments.run : std::nullopt, dataset, frames);
 
     Renderer renderer(open_device(arguments.device), gaussians, options);
     const InterruptWatch watch;
@@ -132,7 +133,8 @@ int render_dataset_views(RenderArguments arguments) {
         if (interrupted()) return kInterruptedStatus;
         const Frame& frame = dataset.frames[frames[i]];
         Rendering rendering = renderer.render(frame.camera, arguments.mode == "depth");
-        if (!exposures.empty()) rendering.color = exposed(std::move(rendering.color), exposures[i]);
+        if (!appearances.empty())
+            rendering.color = with_appearance(std::move(rendering.color), appearances[i]);
         skipped = std::max(skipped, renderer.skipped_nonfinite());
 
         std::string remark;
@@ -236,7 +238,8 @@ int render_free_views(RenderArguments arguments) {
 /// Completes the arguments by the run that SPLATS may name, and chooses whose cameras are used.
 int run(CLI::App& app, RenderArguments& arguments) {
     std::string of_frames;  // a given option that only a dataset's views have
-    for (const char* option : {"--frames", "--test-every", "--downscale", "--max-width", "--exposures"})
+    for (const char* option :
+         {"--frames", "--test-every", "--downscale", "--max-width", "--exposures", "--appearance-of"})
         if (app.count(option) > 0) of_frames = option;
     if (arguments.mode == "depth" && arguments.draw.integrator == "march")
         throw InputError("--mode depth: the integrator march draws no depth; splat and ray do");
@@ -290,7 +293,7 @@ Action add_render(CLI::App& app) {
         ->capture_default_str();
     add_draw_options(app, arguments->draw);
     add_size_options(app, arguments->downscale, arguments->max_width);
-    add_exposures_option(app, arguments->exposures);
+    add_appearance_options(app, arguments->appearance);
     add_device_options(app, arguments->device);
     add_quiet_option(app, arguments->quiet);
     return [&app, arguments] { return run(app, *arguments); };

@@ -8,8 +8,10 @@
 #include "core/folders.h"
 #include "core/messages.h"
 #include "core/text.h"
+#include "core/typing.h"
 #include "ewa/error.h"
 #include "io/datasets/dataset_folders.h"
+#include "report/run_file_names.h"
 
 namespace ewa::cli {
 namespace {
@@ -81,34 +83,62 @@ fs::path refined_cameras_of(const live::Run& run) {
     return file;
 }
 
-void add_exposures_option(CLI::App& app, std::string& exposures) {
+void add_appearance_options(CLI::App& app, AppearanceArguments& arguments) {
     app.add_option(
-           "--exposures", exposures,
-           "Exposures of training images, as ewa train --exposure writes them. auto: exposures.json of the "
-           "run SPLATS, with its own dataset")
+           "--exposures", arguments.file,
+           "Appearance of training images, as ewa train --appearance writes it. auto: exposures.json or "
+           "appearance.json of the run SPLATS, with its own dataset")
         ->type_name("auto|none|FILE")
         ->capture_default_str();
+    app.add_option("--appearance-of", arguments.of,
+                   "Training image whose appearance all images get [each its own, and new ones the mean]")
+        ->type_name("NAME");
 }
 
-std::vector<Exposure> exposures_of(const std::string& which, const std::optional<live::Run>& run,
-                                   const Dataset& dataset, const std::vector<int>& frames) {
-    fs::path file = which;
-    if (which == "auto") {
-        if (!run || !core::is_file(run->folder / "exposures.json")) return {};
-        file = run->folder / "exposures.json";
-    }
-    if (which == "none") return {};
-    const auto known = load_exposures(file);
-    const auto has_exposure = [&](const Frame& frame) { return known.contains(frame.name); };
-    if (which != "auto" && std::ranges::none_of(dataset.frames, has_exposure))
+namespace {
+
+/// Empty: none.
+fs::path appearance_file(const std::string& which, const std::optional<live::Run>& run) {
+    if (which != "auto") return which == "none" ? fs::path() : fs::path(which);
+    if (!run) return {};
+    for (const char* name : {report::kExposuresFile, report::kAppearanceFile})
+        if (core::is_file(run->folder / name)) return run->folder / name;
+    return {};
+}
+
+}  // namespace
+
+std::vector<Appearance> appearances_of(const AppearanceArguments& arguments,
+                                       const std::optional<live::Run>& run, const Dataset& dataset,
+                                       const std::vector<int>& frames) {
+    const fs::path file = appearance_file(arguments.file, run);
+    if (file.empty() && !arguments.of.empty())
+        throw InputError("--appearance-of: there is no appearance.json; --exposures FILE names one");
+    if (file.empty()) return {};
+    const auto known = load_appearances(file);
+    const auto has_appearance = [&](const Frame& frame) { return known.contains(frame.name); };
+    if (arguments.file != "auto" && std::ranges::none_of(dataset.frames, has_appearance))
         throw InputError(core::one_line(file.string()) + ": has no exposure of an image of " +
                          core::one_line(dataset.root.string()) + "; --exposures none uses none");
-    std::vector<Exposure> exposures;
+    std::vector<Appearance> all;
+    for (const auto& [name, appearance] : known) all.push_back(appearance);
+    std::optional<Appearance> other = new_view_appearance(all);
+    if (!arguments.of.empty()) {
+        const auto named = known.find(arguments.of);
+        std::vector<std::string> names;
+        for (const auto& [name, appearance] : known) names.push_back(name);
+        if (named == known.end())
+            throw InputError("--appearance-of " + core::one_line(arguments.of) + ": no image of " +
+                             core::one_line(file.string()) + core::did_you_mean(arguments.of, names));
+        other = named->second;
+    }
+    if (!other) return {};
+    std::vector<Appearance> appearances;
     for (const int index : frames) {
         const auto found = known.find(dataset.frames[size_t(index)].name);
-        exposures.push_back(found == known.end() ? kIdentityExposure : found->second);
+        appearances.push_back(found == known.end() || !arguments.of.empty() ? *other : found->second);
     }
-    return exposures;
+    return appearances;
 }
 
 std::optional<live::Run> resolve_views(CLI::App& app, ViewArguments& arguments) {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "cli/arguments.h"
-#include "ewa/exposure.h"
+#include "ewa/appearance.h"
 #include "live/run_folder.h"
 
 namespace ewa::cli {
@@ -42,15 +42,22 @@ void use_options_of(const live::Run& run, CLI::App& app);
 /// is missing.
 std::filesystem::path refined_cameras_of(const live::Run& run);
 
-/// --exposures of ewa eval and ewa render.
-void add_exposures_option(CLI::App& app, std::string& exposures);
+/// Which appearance images get.
+struct AppearanceArguments {
+    std::string file = "auto";  // or "none", or "auto": the file beside the splats of a run, if it is there
+    std::string of;  // the training image whose appearance all others get; empty: see new_view_appearance
+};
 
-/// The exposure of each of these frames. Frames without one, as those that were held out, get the identity.
-/// which: a file, "none", or "auto": exposures.json beside the splats of a run, if it is there.
-/// run: the run that SPLATS is of; empty: none.
-/// Empty where there are no exposures. Throws InputError, also if the file has none of the dataset's frames.
-std::vector<Exposure> exposures_of(const std::string& which, const std::optional<live::Run>& run,
-                                   const Dataset& dataset, const std::vector<int>& frames);
+/// --exposures and --appearance-of of ewa eval and ewa render.
+void add_appearance_options(CLI::App& app, AppearanceArguments& arguments);
+
+/// The appearance of each of these frames. Those that the file does not have, as those that were held out, get that of a new
+/// view.
+/// run: that of the splats, with its own dataset; empty: none.
+/// Empty where there are none. Throws InputError, also if the file has none of the dataset's frames.
+std::vector<Appearance> appearances_of(const AppearanceArguments& arguments,
+                                       const std::optional<live::Run>& run, const Dataset& dataset,
+                                       const std::vector<int>& frames);
 
 /// Replaces a run's folder among SPLATS and DATASET. Without DATASET, it is that of the run, also of a run that SPLATS
 /// is a file of. The run's options are used as in use_options_of, unless both arguments are files. Throws InputError,

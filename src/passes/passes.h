@@ -411,6 +411,71 @@ struct ExposureUpdate {
     gpu::BufferPart sums, exposures, moments1, moments2, counts;
 };
 
+/// Applies a training image's PPISP to the render.
+struct Ppisp {
+    static constexpr char shader[] = "ppisp";
+    struct Work : OneSubgroup<shared::PpispPush> {
+        static Groups groups(const KernelConfig& config, const Push& push) {
+            return block_groups(config, pixels(push), shared::EXPOSURE_BLOCK);
+        }
+    };
+    gpu::BufferPart image, values, exposed;
+};
+
+/// Gradient of Ppisp: by the render in place, by the values as partial sums.
+struct PpispBackward {
+    static constexpr char shader[] = "ppisp_backward";
+    using Work = Ppisp::Work;
+    gpu::BufferPart image, values, image_gradient, sums;
+};
+
+/// Adam's step of one training image's exposure and colours. slots: each view's gradient of its camera's values.
+struct PpispUpdate {
+    static constexpr char shader[] = "ppisp_update";
+    using Work = OneSubgroup<shared::PpispUpdatePush>;
+    gpu::BufferPart sums, values, moments1, moments2, slots, counts;
+};
+
+/// Adam's step of one camera's vignette and response.
+struct PpispCameraUpdate {
+    static constexpr char shader[] = "ppisp_camera_update";
+    using Work = OneSubgroup<shared::PpispCameraPush>;
+    gpu::BufferPart slots, values, moments1, moments2, counts;
+};
+
+/// Applies a training image's bilateral grid to the render.
+struct GridSlice {
+    static constexpr char shader[] = "grid_slice";
+    using Work = PerElement<pixels<shared::GridPush>>;
+    gpu::BufferPart image, grids, exposed;
+};
+
+/// Gradient of GridSlice by the render, in place.
+struct GridSliceBackward {
+    static constexpr char shader[] = "grid_slice_backward";
+    using Work = GridSlice::Work;
+    gpu::BufferPart image, grids, image_gradient;
+};
+
+/// Gradient of GridSlice by the cells, in parts, and of the total variation.
+struct GridGradient {
+    static constexpr char shader[] = "grid_gradient";
+    struct Work : OneSubgroup<shared::GridPush> {
+        static Groups groups(const KernelConfig&, const Push& push) {
+            return {shared::GRID_WIDTH * shared::GRID_HEIGHT, push.parts,
+                    shared::GRID_DEPTH / shared::GRID_LEVELS};
+        }
+    };
+    gpu::BufferPart image, grids, image_gradient, sums;
+};
+
+/// Adam's step of one training image's bilateral grid.
+struct GridUpdate {
+    static constexpr char shader[] = "grid_update";
+    using Work = PerElement<&shared::GridUpdatePush::texels>;
+    gpu::BufferPart sums, grids, moments1, moments2, counts;
+};
+
 // Strategies that change the number of splats: adaptive density control and MCMC.
 
 /// Decides how many splats each splat becomes.

@@ -3,6 +3,7 @@
 
 #include "passes/passes.h"
 #include "pipeline/adam.h"
+#include "pipeline/appearances.h"
 #include "shared/constants.h"
 
 namespace ewa::pipeline {
@@ -130,7 +131,8 @@ void FramePasses::mean_of_partials(uint32_t target, uint32_t rows, float scale) 
         {.items = s.reduce_blocks, .block = s.reduce_blocks, .target = target, .rows = rows, .scale = scale});
 }
 
-void FramePasses::loss(const gpu::Buffer& photo, bool masked, const ExposureUse* exposure) const {
+void FramePasses::loss(const gpu::Buffer& photo, bool masked, const ExposureUse* exposure,
+                       const AppearanceUse* appearance) const {
     const shared::ImageLayout layout = frame.sizes.image();
     const Band whole{.rows = layout.size[1], .own_end = layout.size[1]};
     const Band& band = inputs.band.rows > 0 ? inputs.band : whole;
@@ -142,7 +144,7 @@ void FramePasses::loss(const gpu::Buffer& photo, bool masked, const ExposureUse*
                                 .own = {band.own_begin, band.own_end}};
     const uint32_t first_pixel = band.first * layout.size[0];
     const shared::MaskPush mask{.image = layout, .first_pixel = first_pixel};
-    const gpu::Buffer& render = exposure ? frame.exposed : frame.planes;
+    const gpu::Buffer& render = exposure || appearance ? frame.exposed : frame.planes;
     const gpu::Buffer& image = masked ? frame.masked : render;
     const passes::Constants colors{
         {shared::SPEC_COLOR_FLOATS, photo.texel() == gpu::Texel::rgba32f ? 1u : 0u}};
@@ -151,6 +153,7 @@ void FramePasses::loss(const gpu::Buffer& photo, bool masked, const ExposureUse*
             passes::Expose{
                 .image = frame.planes, .exposures = exposure->exposures->values, .exposed = frame.exposed},
             {.image = layout, .photo = exposure->photo});
+    if (appearance) apply_appearance(*appearance);
     if (masked)
         record(
             passes::MaskPictures{
@@ -179,6 +182,7 @@ void FramePasses::loss(const gpu::Buffer& photo, bool masked, const ExposureUse*
         record(passes::MaskGradient{.photo = photo, .image_gradient = frame.image_gradient}, mask, colors);
     mean_of_partials(shared::REDUCE_TO_L1, 2, float(share));
     if (exposure) expose_backward(*exposure);
+    if (appearance) appearance_backward(*appearance);
 }
 
 namespace {

@@ -11,6 +11,7 @@
 
 namespace ewa::pipeline {
 
+struct AppearanceUse;
 struct ExposureUse;
 struct ListPlace;
 struct MotionUse;
@@ -42,9 +43,10 @@ struct FramePasses : passes::Recorder {
     /// those of its bands add up to it, and so do their gradients.
     /// photo: width * height texels, RGBA. Its alpha composites it over the background or, if `masked`, is the
     /// weight of each pixel; `frame` must then be reserved with masks.
-    /// exposure: that of the training image, if exposures are learned. It takes its own step of Adam; `frame`
-    /// must be reserved with exposure.
-    void loss(const gpu::Buffer& photo, bool masked = false, const ExposureUse* exposure = nullptr) const;
+    /// exposure, appearance: of the training image, one of them if it is learned. It takes its own step of Adam; `frame`
+    /// must be reserved with its model.
+    void loss(const gpu::Buffer& photo, bool masked = false, const ExposureUse* exposure = nullptr,
+              const AppearanceUse* appearance = nullptr) const;
 
     /// Gradients of blending and projection. With plan.adam it moves the model; without, it writes
     /// the gradient to model.moments1.
@@ -77,6 +79,8 @@ struct FramePasses : passes::Recorder {
     gpu::SpecConstant kernel() const { return {shared::SPEC_KERNEL, uint32_t(plan.kernel)}; }
     void mean_of_partials(uint32_t target, uint32_t rows, float scale) const;
     void expose_backward(const ExposureUse& use) const;
+    void apply_appearance(const AppearanceUse& use) const;
+    void appearance_backward(const AppearanceUse& use) const;
     void blend_backward(const Sorted& sorted) const;
     template <class Backward>
     void integrate_backward(const Sorted& sorted, const passes::Constants& variant) const;

@@ -10,6 +10,7 @@
 
 #include "ewa/error.h"
 #include "passes/passes.h"
+#include "pipeline/appearances.h"
 #include "pipeline/model.h"
 
 namespace ewa::pipeline {
@@ -34,6 +35,20 @@ void check_image(const passes::KernelConfig& config, const FrameRequest& request
     if (sizes.tiles_x + sizes.tiles_y + 2 > config.loop_limit || sizes.tiles > most_tiles)
         throw InputError("an image of " + size + " pixels has more than the " + std::to_string(most_tiles) +
                          " tiles that can be drawn; choose a smaller size, or --downscale with a dataset");
+}
+
+/// Floats that the passes of a model add up.
+uint64_t appearance_sums(AppearanceModel model, const Sizes& s) {
+    switch (model) {
+        case AppearanceModel::affine:
+            return uint64_t(s.exposure_blocks) * shared::EXPOSURE_FLOATS;
+        case AppearanceModel::ppisp:
+            return uint64_t(s.exposure_blocks) * shared::PPISP_SUM_FLOATS;
+        case AppearanceModel::grid:
+            return uint64_t(s.grid_parts) * shared::GRID_FLOATS;
+        default:
+            return 0;
+    }
 }
 
 constexpr uint64_t kAlone = ~uint64_t(0);
@@ -176,9 +191,10 @@ Sizes sizes_for(const passes::KernelConfig& config, const FrameRequest& request)
         s.reduce_blocks = divide_up(s.partials, s.reduce_block);
         s.target = uint64_t(s.plane_floats) * 3 * word;
         s.masked = request.masks ? s.target : 0;
-        s.exposed = request.exposure ? s.target : 0;
+        s.exposed = request.appearance != AppearanceModel::none ? s.target : 0;
         s.exposure_blocks = divide_up(request.width * request.height, shared::EXPOSURE_BLOCK);
-        s.exposure_sums = request.exposure ? uint64_t(s.exposure_blocks) * shared::EXPOSURE_FLOATS * word : 0;
+        s.grid_parts = grid_parts(request.width, request.height);
+        s.exposure_sums = appearance_sums(request.appearance, s) * word;
         s.moments = uint64_t(s.plane_floats) * 3 * shared::MOMENT_PLANES * word;
         s.derivatives = uint64_t(s.plane_floats) * 3 * shared::DERIVATIVE_PLANES * word;
         s.image_gradient = s.target;

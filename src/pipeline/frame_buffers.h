@@ -4,6 +4,7 @@
 #pragma once
 #include <cstdint>
 
+#include "ewa/appearance.h"
 #include "gpu/executor.h"
 #include "passes/pass.h"
 
@@ -16,7 +17,8 @@ struct FrameRequest {
     bool gradients = false;
     bool fifth_plane = false;  // of the image: depth or count
     bool masks = false;        // with gradients: some pixels count less
-    bool exposure = false;     // with gradients: a training image's exposure is applied before the loss
+    // With gradients: what is applied before the loss.
+    AppearanceModel appearance = AppearanceModel::none;
     // With gradients: dL/d(image) comes from outside, in 5 planes. There are no buffers for a loss.
     bool given_gradient = false;
     // With gradients: buffers that are not needed at the same time share memory. The same for all requests of a frame.
@@ -43,6 +45,7 @@ struct Sizes {
     uint32_t partials = 0;  // partial sums of a loss kernel
     uint32_t reduce_block = 0, reduce_blocks = 0;
     uint32_t exposure_blocks = 0;  // of pixels, for the gradient of the exposure
+    uint32_t grid_parts = 0;       // of pixels, for the gradient of the bilateral grid
     uint32_t motion_items = 0;     // subgroups that add the gradient of the camera's motion
     uint32_t motion_blocks = 0;
 

@@ -58,7 +58,7 @@ Plan plan_for(const PlanRequest& request) {
     }
     plan.gradients = true;
     plan.masks = request.masks;
-    plan.exposure = request.exposure;
+    plan.appearance = request.appearance;
     // Spheres and integration along rays have no gradient by the camera.
     plan.motion = request.motion && !request.render.points && !plan.rays();
     if (request.purpose == Purpose::training) {
@@ -95,8 +95,9 @@ std::vector<PlanLine> describe(const Plan& plan, int scene_degree, uint64_t spla
     if (plan.gradients && !plan.masks)
         lines.push_back(
             {"mask passes and the masked image", "every pixel of every training image counts", 0});
-    if (plan.gradients && !plan.exposure)
-        lines.push_back({"exposures, their passes and the exposed image", "not asked for (--exposure)", 0});
+    if (plan.gradients && plan.appearance == AppearanceModel::none)
+        lines.push_back(
+            {"appearance of images, its passes and the image as shown", "not asked for (--appearance)", 0});
     if (plan.gradients && !plan.motion && !plan.points() && !plan.rays())
         lines.push_back({"gradient of the camera and its passes", "not asked for (--refine-poses)", 0});
     if (plan.points()) {

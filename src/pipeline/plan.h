@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "ewa/appearance.h"
 #include "ewa/gaussians.h"
 #include "ewa/plan.h"
 #include "ewa/render_options.h"
@@ -29,9 +30,9 @@ struct PlanRequest {
     double splat_scale = 1;  // factor of every splat's scales, above 0
 
     // For a gradient or a training.
-    bool masks = false;     // training images in which some pixels count less
-    bool exposure = false;  // each training image's exposure is learned
-    bool motion = false;    // the gradient by the camera's motion; in a training it is learned
+    bool masks = false;                                  // training images in which some pixels count less
+    AppearanceModel appearance = AppearanceModel::none;  // of the training images, which is learned
+    bool motion = false;  // the gradient by the camera's motion; in a training it is learned
 
     // For a training.
     bool statistics = false;          // the strategy reads densification statistics
@@ -55,7 +56,7 @@ struct Plan {
     bool absolute = false;        // of absolute gradients
     bool regularised = false;     // opacity and scale regularisers in the loss
     bool masks = false;
-    bool exposure = false;
+    AppearanceModel appearance = AppearanceModel::none;
     bool motion = false;  // the gradient by the camera's motion
 
     bool operator==(const Plan&) const = default;

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <string>
 #include <utility>
+#include <variant>
+#include <vector>
 
 #include "ewa/error.h"
 #include "image/metric.h"
@@ -26,9 +28,9 @@ Drawing drawing_of(std::shared_ptr<gpu::Device> device, const Gaussians& gaussia
 }
 
 RenderedView with_photo(Image rendering, const Frame& frame, const RenderOptions& options,
-                        const Exposure* exposure) {
+                        const Appearance* appearance) {
     auto [photo, weights] = load_training_image(frame, options.background);
-    if (exposure) rendering = exposed(std::move(rendering), *exposure);
+    if (appearance) rendering = with_appearance(std::move(rendering), *appearance);
     if (photo.width != rendering.width || photo.height != rendering.height)
         throw InputError("frame " + frame.name + ": the picture's size is not the camera's");
     return {std::move(photo), std::move(weights), std::move(rendering)};
@@ -66,9 +68,9 @@ Image channels_between(const Image& image, int first, int end) {
 
 /// As with_photo, as another protocol than ewa's compares a frame.
 RenderedView view_of_protocol(Protocol protocol, Image rendering, const Frame& frame,
-                              const RenderOptions& options, const Exposure* exposure) {
+                              const RenderOptions& options, const Appearance* appearance) {
     const bool inria = protocol == Protocol::inria;
-    if (exposure) rendering = exposed(std::move(rendering), *exposure);
+    if (appearance) rendering = with_appearance(std::move(rendering), *appearance);
     for (float& value : rendering.pixels) value = level(value, !inria);
     Frame unscaled = frame;
     if (inria) unscaled.downscale = 1;
@@ -90,6 +92,12 @@ RenderedView view_of_protocol(Protocol protocol, Image rendering, const Frame& f
 
 }  // namespace
 
+std::vector<Appearance> for_new_views(const std::vector<Appearance>& learned, size_t count) {
+    // Exposures leave new views as they are.
+    if (learned.empty() || std::holds_alternative<Exposure>(learned.front())) return {};
+    return std::vector<Appearance>(count, mean_appearance(learned));
+}
+
 Measures measures_of(const RunOptions& options) {
     Measures measures;
     if (!options.metrics.empty())
@@ -98,7 +106,7 @@ Measures measures_of(const RunOptions& options) {
 }
 
 Evaluation evaluate_views(const Drawing& drawing, const Dataset& dataset, const std::vector<int>& frames,
-                          const RenderOptions& options, const std::vector<Exposure>& exposures,
+                          const RenderOptions& options, const std::vector<Appearance>& appearances,
                           const std::function<void()>& before_frame,
                           const std::function<void(size_t, const RenderedView&, const EvalFrame&)>& on_view,
                           const Measures& measures) {
@@ -115,11 +123,11 @@ Evaluation evaluate_views(const Drawing& drawing, const Dataset& dataset, const 
             drawn = drawing.images(cameras);
         }
         const Frame& frame = dataset.frames[size_t(frames[i])];
-        const Exposure* exposure = exposures.empty() ? nullptr : &exposures.at(i);
+        const Appearance* appearance = appearances.empty() ? nullptr : &appearances.at(i);
         const RenderedView view =
             measures.protocol == Protocol::ewa
-                ? with_photo(std::move(drawn[place]), frame, options, exposure)
-                : view_of_protocol(measures.protocol, std::move(drawn[place]), frame, options, exposure);
+                ? with_photo(std::move(drawn[place]), frame, options, appearance)
+                : view_of_protocol(measures.protocol, std::move(drawn[place]), frame, options, appearance);
         const double db = psnr(view.rendering, view.photo, view.weights);
         if (std::isnan(db)) continue;  // no pixel counts
         const auto similarity = measures.protocol == Protocol::nerfbaselines ? image::ssim_valid : ewa::ssim;
@@ -143,10 +151,10 @@ Evaluation evaluate_views(const Drawing& drawing, const Dataset& dataset, const 
 
 Evaluation evaluate(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians, const Dataset& dataset,
                     const std::vector<int>& frames, const RenderOptions& options,
-                    const std::vector<Exposure>& exposures, const std::function<void()>& before_frame,
+                    const std::vector<Appearance>& appearances, const std::function<void()>& before_frame,
                     const Measures& measures) {
     return train::evaluate_views(train::drawing_of(std::move(device), gaussians, options), dataset, frames,
-                                 options, exposures, before_frame, {}, measures);
+                                 options, appearances, before_frame, {}, measures);
 }
 
 }  // namespace ewa

@@ -28,17 +28,20 @@ struct RenderedView {
     Image photo, weights, rendering;  // weights: see psnr
 };
 
-/// rendering: through the frame's camera. exposure: applied to it; null: none. Throws InputError (an image that cannot be
+/// rendering: through the frame's camera. appearance: applied to it; null: none. Throws InputError (an image that cannot be
 /// read or changed its size).
 RenderedView with_photo(Image rendering, const Frame& frame, const RenderOptions& options,
-                        const Exposure* exposure);
+                        const Appearance* appearance);
+
+/// For evaluate_views: the same appearance for `count` views that training has not seen.
+std::vector<Appearance> for_new_views(const std::vector<Appearance>& learned, size_t count);
 
 /// What the options of a run measure. Throws InputError (weights that cannot be read).
 Measures measures_of(const RunOptions& options);
 
 /// As ewa::evaluate. on_view: called after each view that counts, with its place in `frames`.
 Evaluation evaluate_views(const Drawing& drawing, const Dataset& dataset, const std::vector<int>& frames,
-                          const RenderOptions& options, const std::vector<Exposure>& exposures,
+                          const RenderOptions& options, const std::vector<Appearance>& appearances,
                           const std::function<void()>& before_frame,
                           const std::function<void(size_t, const RenderedView&, const EvalFrame&)>& on_view,
                           const Measures& measures = {});

@@ -79,7 +79,7 @@ bool FinalEvaluation::evaluate(RunCameras& cameras, const RunFolder& folder) {
         if (held_out) evaluate_test_views();
         report_.summary.train_psnr =
             evaluated(spread_out(input_.split.train, kTrainViewsEvaluated),
-                      spread_out(scene_.exposures, kTrainViewsEvaluated), !held_out, {})
+                      spread_out(scene_.appearances, kTrainViewsEvaluated), !held_out, {})
                 .psnr;
     });
     if (!done) report_.views.clear();
@@ -87,21 +87,23 @@ bool FinalEvaluation::evaluate(RunCameras& cameras, const RunFolder& folder) {
 }
 
 void FinalEvaluation::evaluate_test_views() {
-    of_test_views_ = evaluated(input_.split.test, {}, true, measures_);
+    of_test_views_ = evaluated(input_.split.test, for_new_views(scene_.appearances, input_.split.test.size()),
+                               true, measures_);
     report_.summary.test_figures = of_test_views_->figures;
     report_.summary.test_psnr = of_test_views_->psnr;
     report_.summary.test_ssim = of_test_views_->ssim;
 }
 
 /// shown: the report shows these views. They are the held-out ones, or the training views without a test set.
-Evaluation FinalEvaluation::evaluated(const std::vector<int>& frames, const std::vector<Exposure>& exposures,
-                                      bool shown, const Measures& measures) {
+Evaluation FinalEvaluation::evaluated(const std::vector<int>& frames,
+                                      const std::vector<Appearance>& appearances, bool shown,
+                                      const Measures& measures) {
     const auto before_frame = [&] {
         stop_if_asked(observer_);
         keep_waiting_();
     };
     return evaluate_views(
-        scene_.drawing, input_.dataset, frames, input_.options.train.render, exposures, before_frame,
+        scene_.drawing, input_.dataset, frames, input_.options.train.render, appearances, before_frame,
         [&](size_t i, const RenderedView& view, const EvalFrame& figures) {
             if (shown) add_view(frames[i], view, figures);
             observer_.on_view(++done_, evaluated_views(input_.split));
@@ -137,11 +139,15 @@ bool FinalEvaluation::add_full_size() {
 size_t FinalEvaluation::add_full_size(report::ReportView& view) const {
     const std::vector<int>& train = input_.split.train;
     const auto place = std::find(train.begin(), train.end(), view.frame);
-    const bool exposed = !scene_.exposures.empty() && place != train.end();
+    const bool known = !scene_.appearances.empty() && place != train.end();
+    const auto of_new_view = new_view_appearance(scene_.appearances);
     const Frame& frame = input_.dataset.frames[size_t(view.frame)];
-    const RenderedView rendered = with_photo(
-        std::move(scene_.drawing.images(std::span(&frame.camera, 1)).front()), frame,
-        input_.options.train.render, exposed ? &scene_.exposures[size_t(place - train.begin())] : nullptr);
+    const RenderedView rendered =
+        with_photo(std::move(scene_.drawing.images(std::span(&frame.camera, 1)).front()), frame,
+                   input_.options.train.render,
+                   known         ? &scene_.appearances[size_t(place - train.begin())]
+                   : of_new_view ? &*of_new_view
+                                 : nullptr);
     return report::add_full_size(view, rendered.photo, rendered.rendering);
 }
 

@@ -28,7 +28,7 @@ std::map<int, std::filesystem::path> saved_renders(const RunInput& input);
 struct TrainedScene {
     std::shared_ptr<gpu::Device> device;
     Gaussians gaussians;
-    std::vector<Exposure> exposures;  // of the training frames, or empty
+    std::vector<Appearance> appearances;  // of the training frames, or empty
     Drawing drawing;
 };
 
@@ -63,8 +63,8 @@ class FinalEvaluation {
   private:
     bool done_unless_stopped(const std::function<void()>& work) const;
     void evaluate_test_views();
-    Evaluation evaluated(const std::vector<int>& frames, const std::vector<Exposure>& exposures, bool shown,
-                         const Measures& measures);
+    Evaluation evaluated(const std::vector<int>& frames, const std::vector<Appearance>& appearances,
+                         bool shown, const Measures& measures);
     void add_view(int index, const RenderedView& view, const EvalFrame& figures);
     size_t add_full_size(report::ReportView& view) const;
 

@@ -311,7 +311,8 @@ Evaluation Run::evaluate(Trainer& trainer) {
         cameras_.align_test(device_, gaussians, {});
     }
     Evaluation evaluation = train::evaluate_views(
-        drawing(gaussians, &trainer), input_.dataset, input_.split.test, options().train.render, {},
+        drawing(gaussians, &trainer), input_.dataset, input_.split.test, options().train.render,
+        train::for_new_views(trainer.appearances(), input_.split.test.size()),
         [&] { trainer.keep_waiting(); }, [](size_t, const train::RenderedView&, const EvalFrame&) {},
         measures_);
     cameras_.use_given();
@@ -387,7 +388,7 @@ void Run::fill_summary() {
 /// Saves the result. Gives back the trainer's memory if no rank draws with it.
 train::TrainedScene Run::save_last(std::unique_ptr<Trainer>& trainer) {
     const StepReport& last = progress_.last;
-    train::TrainedScene scene{device_, trainer->gaussians(), trainer->exposures(), {}};
+    train::TrainedScene scene{device_, trainer->gaussians(), trainer->appearances(), {}};
     saves_.last_checkpoint(*trainer);  // from here on, neither a kill nor a full disk costs training
     saves_.splats(scene.gaussians);
     if (options().save_every > 0 && last.step % options().save_every == 0)
@@ -398,7 +399,8 @@ train::TrainedScene Run::save_last(std::unique_ptr<Trainer>& trainer) {
         report_.summary.cameras = cameras_.moves();
     }
     if (options().inria) train::save_inria(folder_.path(), input_, scene.gaussians, last.step);
-    if (options().train.exposure) folder_.save_exposures(input_.dataset, input_.split.train, scene.exposures);
+    if (!scene.appearances.empty())
+        folder_.save_appearances(input_.dataset, input_.split.train, scene.appearances);
     report_.times = report_times(trainer->step_times());
     report_.summary.ranks = trainer->rank_figures();
     report_.summary.chunks = trainer->chunk_figures();

@@ -64,7 +64,7 @@ void RunFolder::begin(const nlohmann::ordered_json& config, bool continues) cons
     std::error_code absent;
     for (const char* result :
          {report::kCheckpointFile, report::kTimesFile, report::kSummaryFile, report::kReportFile,
-          report::kExposuresFile, report::kCamerasFile, report::kEventsFile})
+          report::kExposuresFile, report::kAppearanceFile, report::kCamerasFile, report::kEventsFile})
         fs::remove(path_ / result, absent);
     for (const char* result : report::kCameraModelFiles) fs::remove(path_ / result, absent);
     for (const auto& [step, file] : kept_splats(path_)) fs::remove(file, absent);
@@ -103,8 +103,15 @@ void RunFolder::keep_splats(const Gaussians& gaussians, int step, const RenderOp
     for (; kept.size() > size_t(count); kept.erase(kept.begin())) fs::remove(kept.begin()->second, absent);
 }
 
-void RunFolder::save_exposures(const Dataset& dataset, const std::vector<int>& frames,
-                               const std::vector<Exposure>& exposures) const {
+void RunFolder::save_appearances(const Dataset& dataset, const std::vector<int>& frames,
+                                 const std::vector<Appearance>& appearances) const {
+    std::vector<Exposure> exposures;
+    std::vector<std::string> names;
+    for (size_t i = 0; i < appearances.size(); ++i) {
+        names.push_back(dataset.frames[size_t(frames[i])].name);
+        if (const auto* exposure = std::get_if<Exposure>(&appearances[i])) exposures.push_back(*exposure);
+    }
+    if (exposures.empty()) return ewa::save_appearances(path_ / report::kAppearanceFile, names, appearances);
     nlohmann::ordered_json json = nlohmann::ordered_json::object();
     for (size_t i = 0; i < exposures.size(); ++i) {
         auto& rows = json[dataset.frames[size_t(frames[i])].name];

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/folders.h"
-#include "ewa/exposure.h"
+#include "ewa/appearance.h"
 #include "ewa/run_options.h"
 #include "ewa/summary.h"
 #include "report/html.h"
@@ -49,9 +49,9 @@ class RunFolder {
     void save_splats(const Gaussians& gaussians, int step, const RenderOptions& render) const;
     /// The same as one of the last `count` kept splats. Removes those before.
     void keep_splats(const Gaussians& gaussians, int step, const RenderOptions& render, int count) const;
-    /// exposures: one for each of the training frames.
-    void save_exposures(const Dataset& dataset, const std::vector<int>& frames,
-                        const std::vector<Exposure>& exposures) const;
+    /// exposures.json, or appearance.json. appearances: one for each of the training frames.
+    void save_appearances(const Dataset& dataset, const std::vector<int>& frames,
+                          const std::vector<Appearance>& appearances) const;
     /// cameras.json, and a COLMAP model of the dataset with these cameras in cameras/, where images is a link. The frames have
     /// the refined cameras. given: those of the dataset. aligned: the test cameras were aligned to their images.
     void save_cameras(const Dataset& dataset, const Split& split, const std::vector<Camera>& given,

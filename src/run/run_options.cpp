@@ -30,6 +30,12 @@ const core::Words<Strategy> kStrategies = {{"auto", Strategy::automatic},
 const core::Words<DenseStart> kDenseStarts = {
     {"auto", DenseStart::automatic}, {"on", DenseStart::on}, {"off", DenseStart::off}};
 
+const core::Words<AppearanceModel> kAppearances = {{"none", AppearanceModel::none},
+                                                   {"affine", AppearanceModel::affine},
+                                                   {"ppisp", AppearanceModel::ppisp},
+                                                   {"grid", AppearanceModel::grid},
+                                                   {"auto", AppearanceModel::automatic}};
+
 RunOption frames_option() {
     RunOption option =
         words("frames", "FRAMES",
@@ -257,6 +263,19 @@ RunOption dense_start_option() {
     return option;
 }
 
+RunOption appearance_option() {
+    RunOption option = choice<AppearanceModel>(
+        "appearance",
+        "What to learn of the colours of each training image, for captures in which the exposure varies. "
+        "affine: a "
+        "map of colours. ppisp: exposure and colours of each image, vignette and response of each camera. "
+        "grid: maps "
+        "that vary over the image. auto: none, affine or ppisp, by how far the images disagree",
+        [](RunOptions& o) -> AppearanceModel& { return o.train.appearance; }, kAppearances);
+    option.before = "none";
+    return option;
+}
+
 struct Row {
     const char* subject;
     const char* python;  // empty: Python does not have it
@@ -289,11 +308,9 @@ std::vector<Row> rows() {
         {"Quality", "revised_opacity",
          flag("revised-opacity", "adc: both halves of a split splat are together as opaque as it was",
               [](RunOptions& o) -> bool& { return o.train.revised_opacity; })},
+        {"Quality", "appearance", appearance_option()},
         {"Quality", "exposure",
-         flag("exposure",
-              "Learn an exposure (an affine map of colours) for each training image. For captures "
-              "in which the "
-              "exposure varies",
+         flag("exposure", "The same as --appearance affine",
               [](RunOptions& o) -> bool& { return o.train.exposure; })},
         {"Quality", "refine_poses",
          later_flag(

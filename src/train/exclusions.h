@@ -33,10 +33,10 @@ inline constexpr std::array kExclusions{
               [](const TrainOptions& options) { return options.refine_poses; },
               {true, true, true, true},
               "a camera learns while the splats of its own step are moved"},
-    Exclusion{"--exposure",
-              [](const TrainOptions& options) { return options.exposure; },
+    Exclusion{"--appearance",
+              [](const TrainOptions& options) { return appearance_of(options) != AppearanceModel::none; },
               {false, false, true, false},
-              "an exposure learns from the whole picture of its view"}};
+              "an appearance learns from the whole picture of its view"}};
 
 inline bool has_points(const TrainOptions& options) {
     return options.render.points;

@@ -239,7 +239,7 @@ MemoryEstimate MemoryEstimator::up_to(uint32_t max_splats) {
                                    .instances = instances_needed,
                                    .gradients = true,
                                    .masks = frame.masks == MaskUse::ignore,
-                                   .exposure = plan.exposure,
+                                   .appearance = plan.appearance,
                                    .overlaid = true,
                                    .motion = plan.motion};
         const Sizes sizes = sizes_for(config, request);
@@ -251,6 +251,8 @@ MemoryEstimate MemoryEstimator::up_to(uint32_t max_splats) {
         estimate.frame +=
             ViewBuffers::most_bytes(plan, estimate.splats, uint64_t(options.batch), uint64_t(options.bands));
     estimate.images = image_bytes(dataset_, frames_, options);
+    if (plan.appearance == AppearanceModel::grid)
+        estimate.images += 3 * 4ull * shared::GRID_FLOATS * frames_.size();  // with both moments
     return estimate;
 }
 

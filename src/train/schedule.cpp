@@ -30,6 +30,10 @@ constexpr double kPoseWarmUp = 0.1;
 constexpr int kVisitsOfFading = 60;
 constexpr double kLastFading = 0.1;
 
+// PPISP and bilateral grids: steps of a full run in which their rates rise, and the rates' first and last factor.
+constexpr double kPpispWarmUp = 500, kGridWarmUp = 1000, kLastAppearanceRate = 0.01;
+constexpr size_t kMostPhotosOfRate = 400;
+
 double decayed(double first, double last, double share) {
     const double t = std::clamp(share, 0.0, 1.0);
     return std::exp((1 - t) * std::log(first) + t * std::log(last));
@@ -48,7 +52,7 @@ pipeline::PlanRequest plan_request(const Gaussians& start, const TrainOptions& o
             .scene_degree = start.sh_degree,
             .render = options.render,
             .masks = masks,
-            .exposure = options.exposure,
+            .appearance = appearance_of(options),
             .motion = options.refine_poses,
             .statistics = options.strategy == Strategy::adc,
             .absolute_gradients = options.absolute_gradients,
@@ -71,6 +75,9 @@ void check_training(const TrainOptions& options, int ranks) {
     check_exclusions(options, ranks);
     scene::check_look({.render = options.render});
     core::check_exclusions(kPointExclusions, options);
+    if (options.exposure && options.appearance != AppearanceModel::none &&
+        options.appearance != AppearanceModel::affine)
+        throw InputError("--exposure is --appearance affine: name one of them");
 }
 
 bool Schedule::densifies(int step) const {
@@ -116,6 +123,16 @@ double Schedule::mean_rate(int step, double extent) const {
 
 double Schedule::exposure_rate(int step) const {
     return decayed(exposures_rate, exposures_rate_final, double(step) / steps);
+}
+
+double Schedule::appearance_rate(int step) const {
+    const double share = double(step) / steps;
+    const double risen = std::min(1.0, kLastAppearanceRate + share / appearance_warm_up);
+    return appearances_rate * gain(step) * risen * decayed(1, kLastAppearanceRate, share);
+}
+
+double Schedule::camera_rate(int step) const {
+    return appearances_rate > 0 ? appearance_rate(step) * cameras_rate / appearances_rate : 0;
 }
 
 double Schedule::pose_rate(int step) const {
@@ -171,6 +188,12 @@ Schedule schedule_for(const TrainOptions& options, size_t photos) {
     s.exposures_rate_final = options.exposure_rate_final;
     s.poses_rate = options.pose_rate;
     s.poses_rate_final = options.pose_rate_final;
+    // Published rates are those of values that take a step of Adam with every image. Here they take one with their own, and
+    // Adam divides a gradient that is there in one of n steps by its mean square's root, which is sqrt(n) times smaller.
+    s.cameras_rate = options.appearance_rate;
+    s.appearances_rate = options.appearance_rate * std::sqrt(double(std::min(photos, kMostPhotosOfRate)));
+    s.appearance_warm_up =
+        (options.appearance == AppearanceModel::grid ? kGridWarmUp : kPpispWarmUp) / kFullRun;
     return s;
 }
 
@@ -185,6 +208,10 @@ TrainOptions resolve(TrainOptions options, const Dataset& dataset) {
     if (options.sh_degree == kAutomaticShDegree)
         options.sh_degree = dataset.color_depends_on_view ? kMaxShDegree : 0;
     return options;
+}
+
+AppearanceModel appearance_of(const TrainOptions& options) {
+    return options.exposure ? AppearanceModel::affine : options.appearance;
 }
 
 Strategy strategy_for(int steps) {

@@ -41,6 +41,8 @@ struct Schedule {
     int fade_start = 0;  // the step after which the rates fade; 0: they do not
     double exposures_rate = 0, exposures_rate_final = 0;
     double poses_rate = 0, poses_rate_final = 0;
+    double appearances_rate = 0, cameras_rate = 0;  // of PPISP or grids of photos, and of PPISP of cameras
+    double appearance_warm_up = 0;                  // share of the steps
 
     /// Densify after this step (steps count from 1)?
     bool densifies(int step) const;
@@ -65,6 +67,10 @@ struct Schedule {
     double mean_rate(int step, double extent) const;
     /// Learning rate of the exposures, with the same decay.
     double exposure_rate(int step) const;
+    /// Learning rate of a photo's PPISP or grid, and of a camera's PPISP: both rise from a hundredth and fall exponentially
+    /// to a hundredth, with gain.
+    double appearance_rate(int step) const;
+    double camera_rate(int step) const;
     /// Learning rate of the cameras' motions, with the same decay after a rise from 0.
     double pose_rate(int step) const;
 };

@@ -196,7 +196,14 @@ std::optional<ChunkFigures> Trainer::chunk_figures() const {
 }
 std::vector<Exposure> Trainer::exposures() const {
     training_->finish_all();
-    return training_->plan().exposure ? training_->learned().exposures.download() : std::vector<Exposure>();
+    return training_->plan().appearance == AppearanceModel::affine ? training_->learned().exposures.download()
+                                                                   : std::vector<Exposure>();
+}
+std::vector<Appearance> Trainer::appearances() const {
+    const std::vector<Exposure> affine = exposures();
+    if (!affine.empty()) return {affine.begin(), affine.end()};
+    const pipeline::Appearances& learned = training_->learned().appearances;
+    return learned.model == AppearanceModel::none ? std::vector<Appearance>() : learned.download();
 }
 std::vector<CameraMotion> Trainer::camera_motions() const {
     training_->finish_all();

@@ -19,6 +19,29 @@ double milliseconds(Clock::duration time) {
     return std::chrono::duration<double, std::milli>(time).count();
 }
 
+/// The camera of each frame, from 0: frames whose files have one lens and one size share a camera. If few frames do, as
+/// where each has a calibration of its own, those of one size share it.
+std::vector<uint32_t> cameras_of(const Dataset& dataset, const std::vector<int>& frames) {
+    constexpr size_t kPhotosPerCamera = 4;
+    for (const bool lenses : {true, false}) {
+        std::vector<const Frame*> seen;
+        std::vector<uint32_t> cameras;
+        for (const int index : frames) {
+            const Frame& frame = dataset.frames[size_t(index)];
+            const auto same = std::find_if(seen.begin(), seen.end(), [&](const Frame* other) {
+                const Camera &a = frame.source, &b = other->source;
+                return a.width == b.width && a.height == b.height &&
+                       (!lenses || (a.fx == b.fx && a.fy == b.fy && a.cx == b.cx && a.cy == b.cy &&
+                                    frame.distortion == other->distortion));
+            });
+            cameras.push_back(uint32_t(same - seen.begin()));
+            if (same == seen.end()) seen.push_back(&frame);
+        }
+        if (!lenses || seen.size() * kPhotosPerCamera <= frames.size() || seen.size() == 1) return cameras;
+    }
+    return {};
+}
+
 /// Throws InputError unless each band of each image has a row of tiles. images: of the lowest resolution.
 void check_bands(const TrainOptions& options, const passes::KernelConfig& config, const ImageCache& images) {
     for (size_t i = 0; i < images.count(); ++i) {
@@ -40,6 +63,11 @@ std::vector<Learned::Array> Learned::arrays() {
                                            {"exp_moments1", &exposures.moments1},
                                            {"exp_moments2", &exposures.moments2}})
             arrays.push_back({name, buffer, exposures.bytes()});
+    if (appearances.model != AppearanceModel::none)
+        for (const auto& [name, buffer] : {std::pair{"appearances", &appearances.values},
+                                           {"app_moments1", &appearances.moments1},
+                                           {"app_moments2", &appearances.moments2}})
+            arrays.push_back({name, buffer, appearances.bytes()});
     if (motions.photos > 0) {
         for (const auto& [name, buffer] : {std::pair{"motions", &motions.values},
                                            {"motion_moments1", &motions.moments1},
@@ -96,7 +124,11 @@ Training::Training(std::shared_ptr<gpu::Device> device, const Dataset& dataset,
     check_bands(options, tools_.cache.config(), images_.lowest());
     // The first frame says how many there are. With a limit, a capacity for all splats might not fit.
     tools_.instance_capacity = first_capacity(portions_.streamed() ? 0 : ready.size());
-    if (plan_.exposure) learned_.exposures = Exposures(*device_, images_.count());
+    if (plan_.appearance == AppearanceModel::affine)
+        learned_.exposures = Exposures(*device_, images_.count());
+    else if (plan_.appearance != AppearanceModel::none)
+        learned_.appearances =
+            Appearances(*device_, plan_.appearance, cameras_of(dataset, frames), uint32_t(options.batch));
     if (plan_.motion) {
         std::vector<MotionBasis> bases;
         for (const int index : frames)

@@ -16,6 +16,7 @@
 #include "ewa/summary.h"
 #include "ewa/train_options.h"
 #include "gpu/executor.h"
+#include "pipeline/appearances.h"
 #include "pipeline/backward.h"
 #include "pipeline/frame_buffers.h"
 #include "pipeline/strategy.h"
@@ -47,6 +48,7 @@ struct Learned {
         uint64_t bytes;
     };
     pipeline::Exposures exposures;
+    pipeline::Appearances appearances;
     pipeline::Motions motions;
 
     std::vector<Array> arrays();  // of a state
@@ -117,7 +119,9 @@ class Training {
     uint32_t visit_of(int step) const { return uint32_t(size_t(step - 1) / images_.count() + 1); }
     /// What a step needs of the frame's buffers.
     pipeline::FrameRequest request_of(const pipeline::CameraUse& camera) const;
-    portions::StepView view_of(int step, ImageCache& seen, int sh_degree);
+    /// slot: of the view in the step.
+    portions::StepView view_of(int step, ImageCache& seen, int sh_degree, uint32_t slot = 0);
+    void update_cameras(int first, int last);
 
     /// All that changes from step to step is a pure function of the step's number: a step can be repeated.
     void record_fused(gpu::Recording& recording, int step, size_t index, const portions::StepView& view);

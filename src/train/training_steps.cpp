@@ -71,7 +71,7 @@ FrameRequest Training::request_of(const CameraUse& camera) const {
             .instances = tools_.instance_capacity,
             .gradients = true,
             .masks = plan_.masks,
-            .exposure = plan_.exposure,
+            .appearance = plan_.appearance,
             .overlaid = true,
             .motion = plan_.motion};
 }
@@ -92,6 +92,9 @@ void Training::record_fused(gpu::Recording& recording, int step, size_t index,
     const FramePasses on{{recording, tools_.cache}, plan_, tools_.frame, inputs};
     const Sorted sorted = on.forward(model);
     view.record_loss(on);
+    const auto photo = uint32_t(index);
+    record_cameras_update(on, learned_.appearances, tools_.frame, std::span(&photo, 1),
+                          float(schedule_.camera_rate(step)), tools_.frame.instance_capacity);
     on.backward(model, sorted, rates(step), plan_.motion ? &motion : nullptr);
     if (options_.strategy == Strategy::mcmc) record_noise(on, model, tools_.frame, noise(step));
 }
@@ -159,7 +162,7 @@ void Training::optimise(int first, int last) {
     if (must_finish(first) || tools_.frames_in_flight() == 1) finish_all();
 }
 
-portions::StepView Training::view_of(int step, ImageCache& seen, int sh_degree) {
+portions::StepView Training::view_of(int step, ImageCache& seen, int sh_degree, uint32_t slot) {
     const size_t index = index_of(step);
     const CameraUse camera = seen.camera(index);
     const FrameInputs inputs{.camera = camera,
@@ -168,37 +171,49 @@ portions::StepView Training::view_of(int step, ImageCache& seen, int sh_degree) 
                              .sh_degree = sh_degree};
     const ExposureUse exposure{&learned_.exposures, uint32_t(index), float(schedule_.exposure_rate(step)),
                                visit_of(step)};
+    const AppearanceUse appearance{&learned_.appearances, uint32_t(index), slot,
+                                   float(schedule_.appearance_rate(step)), visit_of(step)};
+    const bool affine = plan_.appearance == AppearanceModel::affine;
+    const bool learned = learned_.appearances.model != AppearanceModel::none;
     const auto weight = std::make_shared<double>(1);
-    return {
-        .inputs = inputs,
-        .request = request_of(camera),
-        .record_loss =
-            [this, exposure, weight, index, &seen](const FramePasses& on) {
-                const auto& photo = seen.photo(index);
-                *weight = photo.weight;
-                on.loss(photo.texels, photo.masked, plan_.exposure ? &exposure : nullptr);
-            },
-        .weight = [weight] { return *weight; },
-        .learned =
-            [this, index] {
-                const auto words = learned_.exposures.words(uint32_t(index));
-                return std::vector<uint64_t>(words.begin(), words.end());
-            },
-        .learn = [this, index](
-                     std::span<const uint64_t> words) { learned_.exposures.set(uint32_t(index), words); }};
+    return {.inputs = inputs,
+            .request = request_of(camera),
+            .record_loss =
+                [exposure, appearance, affine, learned, weight, index, &seen](const FramePasses& on) {
+                    const auto& photo = seen.photo(index);
+                    *weight = photo.weight;
+                    on.loss(photo.texels, photo.masked, affine ? &exposure : nullptr,
+                            learned ? &appearance : nullptr);
+                },
+            .weight = [weight] { return *weight; },
+            .learned =
+                [this, index, slot, affine] {
+                    if (!affine) return learned_.appearances.words(uint32_t(index), slot);
+                    const auto words = learned_.exposures.words(uint32_t(index));
+                    return std::vector<uint64_t>(words.begin(), words.end());
+                },
+            .learn =
+                [this, index, slot, affine](std::span<const uint64_t> words) {
+                    if (affine)
+                        learned_.exposures.set(uint32_t(index), words);
+                    else
+                        learned_.appearances.set(uint32_t(index), slot, words);
+                }};
 }
 
 void Training::optimise_several(int first, int last) {
     ImageCache& seen = images_at(first);
     const int sh_degree = schedule_.degree(first);
     std::vector<portions::StepView> views;
-    for (int step = first; step <= last; ++step) views.push_back(view_of(step, seen, sh_degree));
+    for (int step = first; step <= last; ++step)
+        views.push_back(view_of(step, seen, sh_degree, uint32_t(step - first)));
     const portions::StepParts parts = step_parts();
     Rates of_step = rates(last);
     of_step.views = uint32_t(views.size());
     Noise of_noise = noise(last);
     of_noise.amplitude *= float(std::sqrt(double(views.size())));
     portions::StepSums drawn = several_.draw(parts, views);
+    update_cameras(first, last);
     several_.update(
         parts, batch_rates(of_step), sh_degree,
         [&](const passes::Recorder& on, const Model& moved) {
@@ -209,6 +224,18 @@ void Training::optimise_several(int first, int last) {
     log_.add(drawn);
 }
 
+/// The cameras' part of a step of several views. Every rank has the gradients of all of them.
+void Training::update_cameras(int first, int last) {
+    if (plan_.appearance != AppearanceModel::ppisp) return;
+    std::vector<uint32_t> photos;
+    for (int step = first; step <= last; ++step) photos.push_back(uint32_t(index_of(step)));
+    gpu::Recording recording(device_->limits());
+    const double rate = schedule_.camera_rate(last) * std::sqrt(double(photos.size()));
+    record_cameras_update({recording, tools_.cache}, learned_.appearances, tools_.frame, photos, float(rate),
+                          std::numeric_limits<uint32_t>::max());
+    tools_.executor.run(recording);
+}
+
 portions::StepParts Training::step_parts() {
     return {tools_.cache,
             tools_.executor,
@@ -216,7 +243,9 @@ portions::StepParts Training::step_parts() {
             tools_.frame,
             tools_.instance_capacity,
             [this] { log_.add_passes(tools_.executor.timings()); },
-            plan_.exposure ? std::tuple_size_v<Exposures::Words> : 0};
+            plan_.appearance == AppearanceModel::none     ? 0
+            : plan_.appearance == AppearanceModel::affine ? std::tuple_size_v<Exposures::Words>
+                                                          : learned_.appearances.words_of_view()};
 }
 
 Image Training::render_own(std::span<const Camera> cameras) {

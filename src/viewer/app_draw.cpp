@@ -134,9 +134,9 @@ void App::measure_view() {
     const auto& shown = renders_.shown();
     if (scripted() || !comparing() || !renders_.settled() || shown->request.look.mode != Mode::color) return;
     const Frame& frame = scene_.dataset->frames[size_t(*at_camera_)];
-    const auto exposure = scene_.exposures.find(frame.name);
+    const auto own = scene_.appearances.find(frame.name);
     quality_.measure(renders_, *at_camera_, frame, settings_.look,
-                     exposure == scene_.exposures.end() ? kIdentityExposure : exposure->second);
+                     own == scene_.appearances.end() ? scene_.of_new_views : own->second);
 }
 
 /// The full frame can be compared if it shows colours from the camera of the image.

@@ -13,6 +13,7 @@
 #include "ewa/synthetic_dataset.h"
 #include "io/datasets/refined_cameras.h"
 #include "live/run_folder.h"
+#include "report/run_file_names.h"
 #include "scene/looks.h"
 
 namespace ewa::viewer {
@@ -74,13 +75,18 @@ DatasetOptions images_of(const live::Run& run) {
     return options;
 }
 
-std::map<std::string, Exposure> exposures_of(const live::Run& run) {
-    const fs::path file = run.folder / "exposures.json";
-    if (!core::is_file(file)) return {};
-    try {
-        return load_exposures(file);
-    } catch (const InputError&) {
-        return {};  // only the PSNR of training images depends on them
+void add_appearances(OpenedScene& scene, const live::Run& run) {
+    for (const char* name : {report::kExposuresFile, report::kAppearanceFile}) {
+        if (!core::is_file(run.folder / name)) continue;
+        try {
+            scene.appearances = load_appearances(run.folder / name);
+        } catch (const InputError&) {
+            return;  // only the PSNR of images depends on them
+        }
+        std::vector<Appearance> all;
+        for (const auto& [image, appearance] : scene.appearances) all.push_back(appearance);
+        scene.of_new_views = new_view_appearance(all).value_or(kIdentityExposure);
+        return;
     }
 }
 
@@ -93,7 +99,7 @@ void add_cameras(OpenedScene& scene, const live::Run& run, const fs::path& camer
                                          cameras.empty() ? run.refined_cameras() : fs::path());
         else
             scene.remark = "the dataset of this run was not found; name it with --cameras DATASET";
-        if (cameras.empty()) scene.exposures = exposures_of(run);
+        if (cameras.empty()) add_appearances(scene, run);
     } catch (const InputError& problem) {
         if (!cameras.empty()) throw;
         scene.remark = problem.what();
@@ -202,7 +208,7 @@ bool is_dataset(const fs::path& path) {
 OpenedScene with_cameras(const OpenedScene& splats, const OpenedScene& cameras) {
     OpenedScene scene = splats;
     scene.dataset = cameras.dataset;
-    scene.exposures.clear();
+    scene.appearances.clear();
     scene.cameras = cameras.path;
     scene.remark = "with the cameras of ";
     scene.remark += cameras.title;

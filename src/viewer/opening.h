@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "ewa/appearance.h"
 #include "ewa/dataset.h"
-#include "ewa/exposure.h"
 #include "viewer/render_thread.h"
 
 namespace ewa::viewer {
@@ -29,9 +29,11 @@ struct OpenedScene {
     std::filesystem::path cameras;           // what gave the dataset, if not `path`
     /// Of the run's splats.ply.
     std::filesystem::file_time_type splats_time = std::filesystem::file_time_type::min();
-    std::map<std::string, Exposure> exposures;  // of the dataset's frames, by name, as the run learned them
-    Look look;                                  // as the file or the run asks for
-    std::string remark;                         // one line: what is missing
+    std::map<std::string, Appearance>
+        appearances;  // of the dataset's frames, by name, as the run learned them
+    Appearance of_new_views = kIdentityExposure;
+    Look look;           // as the file or the run asks for
+    std::string remark;  // one line: what is missing
 
     void set_gaussians(std::shared_ptr<const Gaussians> splats);
 };

@@ -11,7 +11,7 @@ Quality quality_of(const QualityRequest& request) {
     Quality quality{request.rendering->number, std::numeric_limits<double>::quiet_NaN()};
     try {
         const auto [photo, weights] = load_training_image(request.frame, request.background);
-        const Image color = exposed(request.rendering->color, request.exposure);
+        const Image color = with_appearance(request.rendering->color, request.appearance);
         if (photo.width == color.width && photo.height == color.height)
             quality.psnr = psnr(color, photo, weights);
     } catch (const std::exception&) {
@@ -21,7 +21,7 @@ Quality quality_of(const QualityRequest& request) {
 }
 
 void ViewQuality::measure(Renders& renders, int index, const Frame& frame, const Look& look,
-                          const Exposure& exposure) {
+                          const Appearance& appearance) {
     if (index == index_ && renders.scene() == scene_ && look == look_) return;
     asked_ = renders.ask_full(frame.camera, look);
     if (index != index_) first_ = asked_;
@@ -29,13 +29,13 @@ void ViewQuality::measure(Renders& renders, int index, const Frame& frame, const
     scene_ = renders.scene();
     frame_ = frame;
     look_ = look;
-    exposure_ = exposure;
+    appearance_ = appearance;
 }
 
 void ViewQuality::take(const std::shared_ptr<const FullRender>& rendering) {
     if (index_ < 0 || !rendering || rendering->number != asked_ || taken_ == asked_) return;
     taken_ = asked_;
-    measurements_.ask({rendering, frame_, look_.background, exposure_});
+    measurements_.ask({rendering, frame_, look_.background, appearance_});
 }
 
 std::optional<double> ViewQuality::psnr(int index) const {

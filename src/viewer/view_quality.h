@@ -3,8 +3,8 @@
 #pragma once
 #include <optional>
 
+#include "ewa/appearance.h"
 #include "ewa/dataset.h"
-#include "ewa/exposure.h"
 #include "viewer/latest.h"
 #include "viewer/renders.h"
 
@@ -14,7 +14,7 @@ struct QualityRequest {
     std::shared_ptr<const FullRender> rendering;  // of the frame's camera
     Frame frame;
     std::array<float, 3> background{};
-    Exposure exposure = kIdentityExposure;  // of the image
+    Appearance appearance = kIdentityExposure;  // of the image
 };
 
 struct Quality {
@@ -32,7 +32,7 @@ class ViewQuality {
 
     /// Starts to measure this frame of the dataset, unless that is under way or done.
     void measure(Renders& renders, int index, const Frame& frame, const Look& look,
-                 const Exposure& exposure = kIdentityExposure);
+                 const Appearance& appearance = kIdentityExposure);
     /// rendering: the last one of the renders, or null.
     void take(const std::shared_ptr<const FullRender>& rendering);
     /// Forgets the frame: indices of another dataset mean other images.
@@ -46,7 +46,7 @@ class ViewQuality {
     uint64_t scene_ = 0;  // number of the splats
     Frame frame_;
     Look look_;
-    Exposure exposure_ = kIdentityExposure;
+    Appearance appearance_ = kIdentityExposure;
     uint64_t asked_ = 0, taken_ = 0;  // numbers of renders: the last one, and the last one that is measured
     uint64_t first_ = 0;              // number of the first render of this frame
     Latest<QualityRequest, Quality> measurements_;

@@ -156,6 +156,14 @@ void compile_training(Compiler& compiler) {
     compiler.compile<passes::Expose>();
     compiler.compile<passes::ExposeBackward>();
     compiler.compile<passes::ExposureUpdate>();
+    compiler.compile<passes::Ppisp>();
+    compiler.compile<passes::PpispBackward>();
+    compiler.compile<passes::PpispUpdate>();
+    compiler.compile<passes::PpispCameraUpdate>();
+    compiler.compile<passes::GridSlice>();
+    compiler.compile<passes::GridSliceBackward>();
+    compiler.compile<passes::GridGradient>();
+    compiler.compile<passes::GridUpdate>();
     compiler.compile<passes::MoveCamera>();
     compiler.compile<passes::MotionUpdate>();
     compiler.compile<passes::DensifyDecide>();

@@ -95,7 +95,7 @@ class GuardedFrame {
         make(frame.planes, "planes", s.planes, Texel::rgba32f);
         if (request.gradients) {
             make(frame.target, "target", s.target, Texel::rgba32f);
-            if (request.exposure) {
+            if (request.appearance != AppearanceModel::none) {
                 make(frame.exposed, "exposed", s.exposed, Texel::rgba32f);
                 make(frame.exposure_sums, "exposure sums", s.exposure_sums);
             }

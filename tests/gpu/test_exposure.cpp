@@ -68,7 +68,8 @@ class ExposedLoss : public testing::TestWithParam<std::pair<int, int>> {};
 TEST_P(ExposedLoss, GradientsAndAdamsStepMatchTheReference) {
     const auto [width, height] = GetParam();
     Inputs s(width, height);
-    GuardedFrame guarded(rig().config(), {1, uint32_t(width), uint32_t(height), 1, true, false, false, true});
+    GuardedFrame guarded(rig().config(), {1, uint32_t(width), uint32_t(height), 1, true, false, false,
+                                          AppearanceModel::affine});
     pipeline::FrameBuffers& frame = guarded.frame;
 
     reference::Exposure exposure = wide(s.start[kPhoto]);
@@ -120,7 +121,7 @@ INSTANTIATE_TEST_SUITE_P(Sizes, ExposedLoss,
 /// A pixel that does not count says nothing of the exposure.
 TEST(Exposure, LearnsNothingFromWhatIsMasked) {
     Inputs s(40, 30);
-    GuardedFrame guarded(rig().config(), {1, 40, 30, 1, true, false, true, true});
+    GuardedFrame guarded(rig().config(), {1, 40, 30, 1, true, false, true, AppearanceModel::affine});
     Image masked(40, 30, 4);  // alpha 0 everywhere
     for (int y = 0; y < 30; ++y)
         for (int x = 0; x < 40; ++x) std::copy_n(s.photo.at(x, y), 3, masked.at(x, y));
@@ -144,7 +145,7 @@ TEST(Exposure, LearnsNothingFromWhatIsMasked) {
 
 TEST(Exposure, AStepThatIsNotFiniteIsDroppedAndCounted) {
     Inputs s(16, 16);
-    GuardedFrame guarded(rig().config(), {1, 16, 16, 1, true, false, false, true});
+    GuardedFrame guarded(rig().config(), {1, 16, 16, 1, true, false, false, AppearanceModel::affine});
     s.picture.at(3, 3)[1] = std::numeric_limits<double>::infinity();
     run(s, guarded.frame, 1);
     EXPECT_EQ(guarded.frame.read_counts().dropped_updates, 3u);  // each row sees every channel
@@ -153,7 +154,7 @@ TEST(Exposure, AStepThatIsNotFiniteIsDroppedAndCounted) {
 
 TEST(Exposure, NothingMovesWhereTheInstancesDidNotFit) {
     Inputs s(16, 16);
-    GuardedFrame guarded(rig().config(), {1, 16, 16, 1, true, false, false, true});
+    GuardedFrame guarded(rig().config(), {1, 16, 16, 1, true, false, false, AppearanceModel::affine});
     run(s, guarded.frame, 1, guarded.frame.instance_capacity + 1);
     EXPECT_EQ(s.exposures.download()[kPhoto], s.start[kPhoto]);
     run(s, guarded.frame, 1, guarded.frame.instance_capacity);  // they just fit

@@ -404,6 +404,7 @@ struct FrameParts {
     pipeline::FrameBuffers wide;  // its tiles are sorted in several passes
     gpu::Buffer camera, photo;
     pipeline::Exposures exposures;
+    pipeline::Appearances ppisp, grids;
     pipeline::Motions motions;
     pipeline::ViewBuffers views;
 };
@@ -423,9 +424,11 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     Rig& r = rig();
     const Scene scene = random_scene(3000, 50, SplatKind::ordinary, 61, 47, 2);
     FrameParts& parts = frame_parts->get([] { return FrameParts(); });
-    auto& [model, frame, wide, camera, photo, exposures, motions, views] = parts;
+    auto& [model, frame, wide, camera, photo, exposures, ppisp, grids, motions, views] = parts;
     exposures = pipeline::Exposures(*device(), 3);
     const pipeline::ExposureUse exposure{&exposures, 1, 0.01f, 1};
+    ppisp = pipeline::Appearances(*device(), AppearanceModel::ppisp, {0, 1, 0}, 2);
+    grids = pipeline::Appearances(*device(), AppearanceModel::grid, {0, 0}, 1);
     motions = pipeline::Motions(*device(), std::vector<pipeline::MotionBasis>(3));
     const pipeline::MotionUse motion{.motions = &motions, .photo = 1};
     model = pipeline::upload_model(*device(), scene.gaussians, 2, true);
@@ -439,7 +442,7 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
                    .gradients = true,
                    .fifth_plane = true,
                    .masks = true,
-                   .exposure = true,
+                   .appearance = AppearanceModel::grid,  // whose sums have room for those of others
                    .overlaid = true,
                    .motion = true,
                    .rays = true});
@@ -464,6 +467,17 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     record_reset_opacity(stepped, model, 0);
     record_noise(stepped, model, frame, {.amplitude = 0.1f, .max_length = 1, .seed = 1, .step = 1});
     out.push_back(step.commands());
+
+    // Other models of the images' appearance.
+    gpu::Recording appearance = r.recording();
+    const pipeline::FramePasses shown{{appearance, r.cache}, plan, frame, inputs};
+    for (const pipeline::Appearances* each : {&ppisp, &grids}) {
+        const pipeline::AppearanceUse use{each, 1, 0, 0.01f, 1};
+        shown.loss(photo, false, nullptr, &use);
+        const uint32_t photos[] = {1};
+        record_cameras_update(shown, *each, frame, photos, 0.01f, frame.instance_capacity);
+    }
+    out.push_back(appearance.commands());
 
     // A step of two views. The sums have room for both.
     request.motion = false;

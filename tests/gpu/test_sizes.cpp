@@ -379,24 +379,26 @@ TEST(Plan, OfAGradientStoresEveryDegree) {
     const Plan gradient = plan_for(request);
     EXPECT_EQ(gradient.stored_degree, 3);
     EXPECT_TRUE(gradient.gradients && gradient.masks);
-    EXPECT_FALSE(gradient.adam || gradient.statistics || gradient.exposure || gradient.motion);
+    EXPECT_FALSE(gradient.adam || gradient.statistics || gradient.motion);
+    EXPECT_EQ(gradient.appearance, AppearanceModel::none);
 }
 
 TEST(Plan, OfATrainingHasWhatItsStrategyAndItsImagesNeed) {
     PlanRequest request = request_for(Purpose::training);
     const Plan plain = plan_for(request);
     EXPECT_TRUE(plain.gradients && plain.adam);
-    EXPECT_FALSE(plain.statistics || plain.absolute || plain.regularised || plain.masks || plain.exposure ||
-                 plain.motion);
+    EXPECT_FALSE(plain.statistics || plain.absolute || plain.regularised || plain.masks || plain.motion);
     EXPECT_EQ(plain.stored_degree, 3);
     request.absolute_gradients = true;
     EXPECT_EQ(plan_for(request), plain);  // nobody reads them without statistics
     request.statistics = true;
     EXPECT_TRUE(plan_for(request).statistics && plan_for(request).absolute);
     request = request_for(Purpose::training);
-    request.regularised = request.masks = request.exposure = request.motion = true;
+    request.regularised = request.masks = request.motion = true;
+    request.appearance = AppearanceModel::ppisp;
     const Plan other = plan_for(request);
-    EXPECT_TRUE(other.regularised && other.masks && other.exposure && other.motion);
+    EXPECT_TRUE(other.regularised && other.masks && other.motion);
+    EXPECT_EQ(other.appearance, AppearanceModel::ppisp);
     EXPECT_FALSE(other.statistics);
 }
 
@@ -404,7 +406,8 @@ TEST(Plan, OfATrainingHasWhatItsStrategyAndItsImagesNeed) {
 TEST(Plan, IgnoresTheInputsOfOtherPurposes) {
     PlanRequest request = request_for(Purpose::picture);
     const Plan picture = plan_for(request);
-    request.masks = request.exposure = request.motion = request.statistics = request.regularised = true;
+    request.masks = request.motion = request.statistics = request.regularised = true;
+    request.appearance = AppearanceModel::grid;
     EXPECT_EQ(plan_for(request), picture);
     request = request_for(Purpose::training);
     const Plan training = plan_for(request);
@@ -449,10 +452,11 @@ TEST(Plan, IsDescribedByWhatItSkips) {
     request.statistics = request.regularised = true;
     EXPECT_TRUE(skips(plan_for(request), "sums of absolute gradients"));
     EXPECT_TRUE(skips(plan_for(request), "gradient of the camera and its passes"));
-    request.masks = request.motion = request.exposure = request.absolute_gradients = true;
+    request.masks = request.motion = request.absolute_gradients = true;
+    request.appearance = AppearanceModel::affine;
     for (const char* what :
          {"densification statistics", "opacity and scale regularisers", "sums of absolute gradients",
-          "mask passes and the masked image", "exposures, their passes and the exposed image",
+          "mask passes and the masked image", "appearance of images, its passes and the image as shown",
           "gradient of the camera and its passes"})
         EXPECT_FALSE(skips(plan_for(request), what)) << what;
 }

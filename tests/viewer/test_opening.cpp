@@ -54,13 +54,13 @@ TEST(Opening, TheSplatsOfARunHaveItsCameras) {
     EXPECT_EQ(scene.look.nearest, 5);
     EXPECT_EQ(scene.look.background, (std::array<float, 3>{1, 0, 1}));
     EXPECT_TRUE(scene.run.empty()) << "a file is not watched";
-    EXPECT_TRUE(scene.exposures.empty());
+    EXPECT_TRUE(scene.appearances.empty());
     test::write_file(folder / "run/exposures.json",
                      R"({"0.png": [[1, 0, 0, 0.25], [0, 1, 0, 0], [0, 0, 1, 0]]})");
     const OpenedScene exposed = open_scene(splats, {});
-    EXPECT_EQ(exposed.exposures.size(), 1u);
+    EXPECT_EQ(exposed.appearances.size(), 1u);
     test::write_file(folder / "run/exposures.json", "no exposures");
-    EXPECT_TRUE(open_scene(splats, {}).exposures.empty());
+    EXPECT_TRUE(open_scene(splats, {}).appearances.empty());
     // A dataset that is named has precedence; one that is gone leaves the splats.
     EXPECT_EQ(open_scene(splats, folder / "data").dataset->frames[0].camera.width, 48);
     test::write_file(folder / "run/config.json", R"({"dataset": "gone"})");

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a camera does to the colours of a training image, as training learns it.
+#pragma once
+#include <array>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "ewa/exposure.h"
+#include "ewa/image.h"
+
+namespace ewa {
+
+enum class AppearanceModel {
+    none,
+    affine,    // an affine map of colours for each image: Exposure
+    ppisp,     // exposure and colours of each image, vignette and response of each camera: Ppisp
+    grid,      // a bilateral grid of affine maps for each image: ColorGrid
+    automatic  // none, affine or ppisp, by how far the training images disagree
+};
+
+/// PPISP: an image's exposure and colour map, and its camera's vignette and response, in this order
+/// (shaders/lib/ppisp.glsl has the formulas). Without arguments it changes no colour of 0 to 1.
+struct Ppisp {
+    /// Exposure in stops; then latent offsets x, y of the colours that blue, red, green and grey become.
+    std::array<float, 9> photo{};
+    /// Of each channel: the vignette's centre x, y from the image's middle in units of the larger side, and its factors of
+    /// r^2, r^4 and r^6; toe, shoulder, gamma and middle of the response before softplus and sigmoid.
+    std::array<float, 27> camera = neutral_camera();
+
+    static std::array<float, 27> neutral_camera();
+    bool operator==(const Ppisp&) const = default;
+};
+
+/// A bilateral grid: GRID_CELLS affine maps of 12 floats, in the order of shaders/shared/layouts.h.
+struct ColorGrid {
+    std::vector<float> cells = identity_cells();
+
+    static std::vector<float> identity_cells();
+    bool operator==(const ColorGrid&) const = default;
+};
+
+using Appearance = std::variant<Exposure, Ppisp, ColorGrid>;
+
+/// The first three channels as the camera shows them. Other channels stay. 3 channels or more. Ppisp clamps to 0..1.
+Image with_appearance(Image image, const Appearance& appearance);
+
+/// The mean over images, value by value. All have one model; at least one.
+Appearance mean_appearance(const std::vector<Appearance>& appearances);
+
+/// What an image shows that training has not seen: the mean of those that it has seen, or the splats' own colours with
+/// Exposure. Empty without appearances.
+std::optional<Appearance> new_view_appearance(const std::vector<Appearance>& appearances);
+
+/// The appearances of training images under their Frame::name: appearance.json or exposures.json of a run's folder. Throws
+/// InputError if the file cannot be read, or values are missing or not finite.
+std::map<std::string, Appearance> load_appearances(const std::filesystem::path& path);
+/// Writes appearance.json. names: one for each of the appearances, which have one model and are not Exposure. Throws
+/// RunError.
+void save_appearances(const std::filesystem::path& path, const std::vector<std::string>& names,
+                      const std::vector<Appearance>& appearances);
+
+}  // namespace ewa
