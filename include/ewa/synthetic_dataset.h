@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "ewa/appearance.h"
 #include "ewa/dataset.h"
 #include "ewa/device.h"
 
@@ -25,6 +26,9 @@ struct SyntheticOptions {
     /// Stops: a factor of 2^exposure between radiance and the image, where 1 is white. Empty: 95 of 100
     /// surface pixels stay below 0.8, in tenths of a stop.
     std::optional<double> exposure;
+    /// ppisp: each image has an exposure and colours of its own, and all share a vignette and a response. Their means over
+    /// all images change nothing. none: images are as develop makes them.
+    AppearanceModel appearance = AppearanceModel::none;
     bool force = false;  // replaces the views of another scene or of other options in the folder
 };
 
@@ -49,6 +53,7 @@ bool is_mesh_scene(const std::filesystem::path& path);
 ///   visible.
 /// - depth/*.exr: camera z in world units, 0 for the sky.
 /// - points.ply: initial points.
+/// - appearance.json, with SyntheticOptions::appearance: what was applied to each image.
 /// - `photographs.json` identifies scene and options. A matching folder is continued. Views of another scene or of
 ///   other options are replaced with SyntheticOptions::force, else refused.
 /// - transforms.json: the cameras, written last.

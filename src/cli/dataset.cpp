@@ -22,7 +22,7 @@ struct DatasetArguments {
     int views = -1;
     SyntheticOptions options;
     DeviceOptions device;
-    bool quiet = false;
+    bool varied = false, quiet = false;
 };
 
 int run(const DatasetArguments& arguments) {
@@ -32,6 +32,7 @@ int run(const DatasetArguments& arguments) {
     options.width = size.width;
     options.height = size.height;
     if (arguments.views >= 0) options.views = arguments.views;
+    if (arguments.varied) options.appearance = AppearanceModel::ppisp;
     if (arguments.exposure != "auto") {
         options.exposure = core::parse_number(arguments.exposure);
         if (!options.exposure)
@@ -74,6 +75,10 @@ Action add_dataset(CLI::App& app) {
     app.add_option("--exposure", arguments->exposure, "Exposure in stops, or auto")
         ->type_name("EV")
         ->capture_default_str();
+    app.add_flag(
+        "--vary-appearance", arguments->varied,
+        "Give each image an exposure and colours of its own, and the camera a vignette and a response. "
+        "DIR/appearance.json has them");
     app.add_option("--seed", options.seed,
                    "Seed of random numbers. The same seed on the same device gives the same bytes")
         ->check(accepted_by(train::run_option("seed")))

@@ -32,7 +32,7 @@ namespace fs = std::filesystem;
 using pathtracer::PathTracer;
 
 /// The record in a folder of renders. Folders of earlier versions have this name, so it stays.
-constexpr const char* kRecord = "photographs.json";
+constexpr const char *kRecord = "photographs.json", *kAppearances = "appearance.json";
 constexpr int kDomeViews = 48, kEnoughCameras = 8, kMostViews = 100000;
 
 void check(const SyntheticOptions& o) {
@@ -112,6 +112,7 @@ std::string RenderJob::fingerprint() const {
     hash.add(options.points);
     hash.add(options.seed);
     hash.add(options.exposure.value_or(1e9));
+    if (options.appearance != AppearanceModel::none) hash.add(double(options.appearance));
     char text[17];
     std::snprintf(text, sizeof(text), "%016llx", static_cast<unsigned long long>(hash.value()));
     return text;
@@ -168,6 +169,9 @@ class Run {
         result_.color_depends_on_view = scene::color_depends_on_view(job_.scene);
         result_.dropped_triangles = job_.scene.dropped_triangles;
         result_.remarks = job_.scene.remarks;
+        if (options_.appearance == AppearanceModel::none) return;
+        const std::vector<Ppisp> varied = pathtracer::varied_appearances(cameras_.size(), options_.seed);
+        appearances_.assign(varied.begin(), varied.end());
     }
 
     SyntheticDataset run(const std::function<bool(int, int)>& progress) {
@@ -189,7 +193,7 @@ class Run {
   private:
     /// Removes the files of an earlier run, and no others.
     void remove_views() {
-        std::vector<fs::path> old{folder_ / "transforms.json"};
+        std::vector<fs::path> old{folder_ / "transforms.json", folder_ / kAppearances};
         for (const char* name : {"images", "depth"}) {
             std::error_code absent;
             for (const fs::directory_entry& entry : fs::directory_iterator(folder_ / name, absent))
@@ -205,7 +209,7 @@ class Run {
 
     void check_outputs() const {
         std::vector<core::NamedFile> written;
-        for (const char* name : {kRecord, "transforms.json", "points.ply"})
+        for (const char* name : {kRecord, "transforms.json", "points.ply", kAppearances})
             written.push_back({"the dataset's", folder_ / name});
         for (size_t i = 0; i < cameras_.size(); ++i)
             for (const fs::path& name : {fs::path(job_.image_name(i)), fs::path(job_.depth_name(i))})
@@ -231,7 +235,8 @@ class Run {
         check_outputs();
         core::make_folder(folder_);
         const auto earlier = read_record(folder_);
-        for (const char* name : {kRecord, "transforms.json", "points.ply", "images", "depth", "sparse"})
+        for (const char* name :
+             {kRecord, "transforms.json", "points.ply", kAppearances, "images", "depth", "sparse"})
             if (!earlier && fs::exists(folder_ / name))
                 throw InputError(
                     core::one_line(folder_.string() + ": holds \"" + name +
@@ -268,7 +273,9 @@ class Run {
         const uint64_t seed = uint64_t(words[0]) << 32 | words[1];
         const Image radiance =
             tracer_.radiance(cameras_[i], options_.samples, seed, shared::TRACE_SAMPLE_MAX / factor);
-        save_image(folder_ / job_.image_name(i), pathtracer::develop(radiance, factor));
+        Image image = pathtracer::develop(radiance, factor);
+        if (!appearances_.empty()) image = with_appearance(std::move(image), appearances_[i]);
+        save_image(folder_ / job_.image_name(i), image);
         save_image(folder_ / job_.depth_name(i), tracer_.seen(cameras_[i]).depth);
     }
 
@@ -308,6 +315,9 @@ class Run {
             io::write_points_ply(folder_ / "points.ply", cloud);
             file.points = "points.ply";
         }
+        std::vector<std::string> names;
+        for (size_t i = 0; i < cameras_.size(); ++i) names.push_back(job_.image_name(i));
+        if (!appearances_.empty()) save_appearances(folder_ / kAppearances, names, appearances_);
         for (size_t i = 0; i < cameras_.size(); ++i)
             file.frames.push_back({job_.image_name(i), job_.depth_name(i), cameras_[i]});
         io::write_transforms(folder_ / "transforms.json", file);
@@ -319,6 +329,7 @@ class Run {
     fs::path folder_;
     PathTracer tracer_;
     nlohmann::ordered_json record_;
+    std::vector<Appearance> appearances_;  // of the views; empty: none
     SyntheticDataset result_;
 };
 

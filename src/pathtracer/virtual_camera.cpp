@@ -2,11 +2,13 @@
 #include "pathtracer/virtual_camera.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <numbers>
 
+#include "core/random.h"
 #include "scene/color.h"
 #include "scene/statistics.h"
 
@@ -91,6 +93,29 @@ double automatic_exposure(const std::vector<Image>& radiances) {
         }
     const float bright = scene::quantile(values, 0.95);
     return bright > 0 ? std::round(10 * std::log2(0.8 / double(bright))) / 10 : 0;
+}
+
+std::vector<Ppisp> varied_appearances(size_t count, uint64_t seed) {
+    constexpr uint32_t kStream = 0x61707065;
+    constexpr double kStops = 0.6, kColors = 1.0;  // at most
+    // Departures from a neutral camera that photos have: vignette, then response.
+    constexpr std::array<double, 9> kCamera{0.02, -0.015, -0.5, -0.2, 0, 0.3, -0.2, 0.1, 0.25};
+    const auto words = [&](size_t i, uint32_t k) {
+        return core::uniform4({uint32_t(i), k, uint32_t(seed), kStream});
+    };
+    Ppisp common;
+    for (size_t k = 0; k < common.camera.size(); ++k)
+        common.camera[k] += float(kCamera[k % 9] * (1 + 0.2 * (2 * words(k, 9)[0] - 1)));
+    std::vector<Ppisp> all(count, common);
+    for (size_t k = 0; k < common.photo.size(); ++k) {
+        double sum = 0;
+        for (size_t i = 0; i < count; ++i) {
+            all[i].photo[k] = float((k == 0 ? kStops : kColors) * (2 * words(i, uint32_t(k))[0] - 1));
+            sum += double(all[i].photo[k]);
+        }
+        for (Ppisp& each : all) each.photo[k] -= float(sum / double(count));
+    }
+    return all;
 }
 
 }  // namespace ewa::pathtracer

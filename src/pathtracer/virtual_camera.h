@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The cameras of a rendered dataset: where they are, their exposure, and how radiance becomes an image.
 #pragma once
+#include <cstddef>
+#include <cstdint>
 #include <vector>
 
+#include "ewa/appearance.h"
 #include "ewa/camera.h"
 #include "ewa/image.h"
 #include "scene/mesh_scene.h"
@@ -29,5 +32,8 @@ Image develop(const Image& radiance, double factor);
 /// The exposure in stops, rounded to tenths, that maps the 95th percentile of the covered pixels' largest
 /// channel to 0.8. 0 if all pixels are black.
 double automatic_exposure(const std::vector<Image>& radiances);
+
+/// A PPISP for each of `count` images of one camera. Their exposures and colours have the mean 0.
+std::vector<Ppisp> varied_appearances(size_t count, uint64_t seed);
 
 }  // namespace ewa::pathtracer

@@ -111,6 +111,23 @@ void check_scene(const std::vector<io::NamedView>& views) {
         EWA_REQUIRE(view.camera.width > 0 && view.camera.height > 0 && view.camera.fx > 0 &&
                     view.camera.fy > 0);
 }
+#elif defined(EWA_READ_APPEARANCES)
+void check_scene(const std::map<std::string, Appearance>& appearances) {
+    for (const auto& [name, appearance] : appearances) {
+        const auto finite = [](const auto& values) {
+            for (const float value : values) EWA_REQUIRE(std::isfinite(value));
+        };
+        if (const auto* ppisp = std::get_if<Ppisp>(&appearance)) {
+            finite(ppisp->photo);
+            finite(ppisp->camera);
+        } else if (const auto* grid = std::get_if<ColorGrid>(&appearance)) {
+            EWA_REQUIRE(grid->cells.size() == 24576);
+            finite(grid->cells);
+        } else {
+            finite(std::get<Exposure>(appearance));
+        }
+    }
+}
 #elif defined(EWA_READ_EXPOSURES)
 void check_scene(const std::map<std::string, Exposure>& exposures) {
     const std::string text = std::to_string(exposures.size()) + " exposures";
