@@ -16,10 +16,9 @@ namespace ewa {
 
 enum class AppearanceModel {
     none,
-    affine,    // an affine map of colours for each image: Exposure
-    ppisp,     // exposure and colours of each image, vignette and response of each camera: Ppisp
-    grid,      // a bilateral grid of affine maps for each image: ColorGrid
-    automatic  // none, affine or ppisp, by how far the training images disagree
+    affine,  // an affine map of colours for each image: Exposure
+    ppisp,   // exposure and colours of each image, vignette and response of each camera: Ppisp
+    grid     // a bilateral grid of affine maps for each image: ColorGrid
 };
 
 /// PPISP: an image's exposure and colour map, and its camera's vignette and response, in this order
@@ -27,8 +26,8 @@ enum class AppearanceModel {
 struct Ppisp {
     /// Exposure in stops; then latent offsets x, y of the colours that blue, red, green and grey become.
     std::array<float, 9> photo{};
-    /// Of each channel: the vignette's centre x, y from the image's middle in units of the larger side, and its factors of
-    /// r^2, r^4 and r^6; toe, shoulder, gamma and middle of the response before softplus and sigmoid.
+    /// Nine values for each channel. The vignette has a centre x, y from the image's middle, in units of the larger side, and
+    /// factors of r^2, r^4 and r^6. The response has toe, shoulder, gamma and middle, before softplus and sigmoid.
     std::array<float, 27> camera = neutral_camera();
 
     static std::array<float, 27> neutral_camera();

@@ -23,7 +23,7 @@ float penalty_gradient(uint k) {
     const float value = values[push.camera + k];
     const float mean = (values[push.camera + kind] + values[push.camera + PPISP_CHANNEL_FLOATS + kind] +
                         values[push.camera + 2u * PPISP_CHANNEL_FLOATS + kind]) / 3.0;
-    // Of the mean over kinds of the variance over channels: 5 kinds of the vignette, 4 of the response.
+    // The penalty is the mean over kinds of the variance over channels: 5 kinds of the vignette, 4 of the response.
     float sum = float(PPISP_CHANNEL_WEIGHT) * 2.0 / 3.0 * (value - mean) / (kind < 5u ? 5.0 : 4.0);
     if (kind < 2u) sum += float(PPISP_CENTER_WEIGHT) * 2.0 / 3.0 * value;
     if (kind >= 2u && kind < 5u && value > 0.0) sum += float(PPISP_RISE_WEIGHT) / 9.0;

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cassert>
 
-#include "ewa/exposure.h"
 #include "ewa/image.h"
 
 namespace ewa {
@@ -100,17 +99,6 @@ Image oriented(const Image& image, int orientation) {
             for (int c = 0; c < image.channels; ++c) result.at(x, y)[c] = from[c];
         }
     return result;
-}
-
-Image exposed(Image picture, const Exposure& exposure) {
-    for (size_t p = 0; p < picture.pixels.size(); p += size_t(picture.channels)) {
-        float* color = &picture.pixels[p];
-        const float r = color[0], g = color[1], b = color[2];
-        for (size_t c = 0; c < 3; ++c)
-            color[c] =
-                exposure[4 * c] * r + exposure[4 * c + 1] * g + exposure[4 * c + 2] * b + exposure[4 * c + 3];
-    }
-    return picture;
 }
 
 }  // namespace ewa

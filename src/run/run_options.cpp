@@ -33,8 +33,7 @@ const core::Words<DenseStart> kDenseStarts = {
 const core::Words<AppearanceModel> kAppearances = {{"none", AppearanceModel::none},
                                                    {"affine", AppearanceModel::affine},
                                                    {"ppisp", AppearanceModel::ppisp},
-                                                   {"grid", AppearanceModel::grid},
-                                                   {"auto", AppearanceModel::automatic}};
+                                                   {"grid", AppearanceModel::grid}};
 
 RunOption frames_option() {
     RunOption option =
@@ -267,10 +266,9 @@ RunOption appearance_option() {
     RunOption option = choice<AppearanceModel>(
         "appearance",
         "What to learn of the colours of each training image, for captures in which the exposure varies. "
-        "affine: a "
-        "map of colours. ppisp: exposure and colours of each image, vignette and response of each camera. "
-        "grid: maps "
-        "that vary over the image. auto: none, affine or ppisp, by how far the images disagree",
+        "affine: a map of colours. ppisp: exposure and colours of each image, vignette and response of each "
+        "camera. "
+        "grid: maps that vary over the image",
         [](RunOptions& o) -> AppearanceModel& { return o.train.appearance; }, kAppearances);
     option.before = "none";
     return option;

@@ -65,8 +65,11 @@ void check_exclusions(const TrainOptions& options, int ranks) {
                                               options.device_memory_bytes > 0};
     for (const Exclusion& row : kExclusions)
         for (size_t by = 0; by < divisions; ++by)
-            if (row.used(options) && divided[by] && row.excludes[by])
-                throw InputError(core::excluded(kDivisions[by], row.option, row.reason));
+            if (row.used(options) && divided[by] && row.excludes[by]) {
+                const bool synonym = row.option == "--appearance" && options.exposure;
+                throw InputError(
+                    core::excluded(kDivisions[by], synonym ? "--exposure" : row.option, row.reason));
+            }
 }
 
 void check_training(const TrainOptions& options, int ranks) {

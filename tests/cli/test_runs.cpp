@@ -146,6 +146,29 @@ TEST_F(Runs, EvalAndRenderUseTheExposures) {
     EXPECT_EQ(read_file(folder / "auto/1.png"), read_file(folder / "file/1.png"));
 }
 
+TEST_F(Runs, EvalAndRenderUseTheAppearances) {
+    const std::string run = train("run", {"--appearance", "ppisp"});
+    const auto psnr = [&](const Names& more) {
+        Names all{"eval", run, "--split", "train", "--json", folder / "e.json"};
+        all.insert(all.end(), more.begin(), more.end());
+        expect_success(run_ewa(all));
+        return read_json(folder / "e.json")["psnr"].get<double>();
+    };
+    EXPECT_NEAR(psnr({}), read_json(run + "/summary.json")["train_psnr"], 1e-6);
+    EXPECT_NE(psnr({"--exposures", "none"}), psnr({}));
+    expect_success(run_ewa({"eval", run, "--json", folder / "e.json"}));
+    EXPECT_NEAR(read_json(folder / "e.json")["psnr"], read_json(run + "/summary.json")["test_psnr"], 1e-6)
+        << "held-out images have the mean";
+    EXPECT_NE(psnr({"--appearance-of", "images/1.png"}), psnr({}));
+    expect_failure(run_ewa({"render", run, "--appearance-of", "images/1.pgn", "-o", folder / "r"}), 2,
+                   "did you mean images/1.png?");
+    expect_failure(
+        run_ewa({"train", folder / "data", "-o", folder / "t", "--appearance", "grid", "--exposure"}), 2,
+        "--exposure is --appearance affine: name one of them");
+    write_file(folder / "bad.json", "{\"model\": \"ppisp\", \"images\": 3}");
+    expect_failure(run_ewa({"eval", run, "--exposures", folder / "bad.json"}), 2, "bad.json");
+}
+
 TEST_F(Runs, EvalRenderAndGradUseTheRefinedCameras) {
     const std::string run = folder / "run";
     const Outcome trained =

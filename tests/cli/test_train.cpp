@@ -76,12 +76,13 @@ TEST_F(Train, QuietIsQuiet) {
 TEST_F(Train, VerboseTellsThePlan) {
     const Outcome plain = train("o", {"--steps", "1", "--strategy", "adc", "--verbose"});
     expect_success(plain);
-    EXPECT_NE(plain.out.find("left out: exposures"), std::string::npos) << plain.out;
+    EXPECT_NE(plain.out.find("left out: appearance of images"), std::string::npos) << plain.out;
     EXPECT_EQ(plain.out.find("left out: densification statistics"), std::string::npos) << plain.out;
-    EXPECT_NE(read_file(folder / "o/report.html").find("exposures, their passes"), std::string::npos);
+    EXPECT_NE(read_file(folder / "o/report.html").find("appearance of images, its passes"),
+              std::string::npos);
     const Outcome other = train("p", {"--steps", "1", "--strategy", "mcmc", "--exposure", "--verbose"});
     expect_success(other);
-    EXPECT_EQ(other.out.find("left out: exposures"), std::string::npos) << other.out;
+    EXPECT_EQ(other.out.find("left out: appearance of images"), std::string::npos) << other.out;
     EXPECT_NE(other.out.find("left out: densification statistics"), std::string::npos) << other.out;
 }
 

@@ -114,7 +114,8 @@ void check_scene(const std::vector<io::NamedView>& views) {
 #elif defined(EWA_READ_APPEARANCES)
 void check_scene(const std::map<std::string, Appearance>& appearances) {
     for (const auto& [name, appearance] : appearances) {
-        const auto finite = [](const auto& values) {
+        const std::string& text = name;
+        const auto finite = [&](const auto& values) {
             for (const float value : values) EWA_REQUIRE(std::isfinite(value));
         };
         if (const auto* ppisp = std::get_if<Ppisp>(&appearance)) {

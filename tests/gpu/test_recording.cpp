@@ -13,6 +13,7 @@
 #include "gpu/reference_inputs.h"
 #include "passes/passes.h"
 #include "passes/shader_code.h"
+#include "pipeline/appearances.h"
 #include "pipeline/backward.h"
 #include "pipeline/strategy.h"
 #include "pipeline/views.h"

@@ -121,6 +121,10 @@ void antialiased(TrainOptions& options) {
 void exposed_photos(TrainOptions& options) {
     options.exposure = true;
 }
+template <AppearanceModel model>
+void with_model(TrainOptions& options) {
+    options.appearance = model;
+}
 template <int bands>
 void cut(TrainOptions& options) {
     options.bands = bands;
@@ -161,6 +165,9 @@ INSTANTIATE_TEST_SUITE_P(
         RanksCase{Strategy::mcmc, 2, 3, absolute_density, "_absolute_density"},
         RanksCase{Strategy::none, 2, 2}, RanksCase{Strategy::adc, 4, 3, exposed_photos, "_exposure"},
         RanksCase{Strategy::mcmc, 1, 2, exposed_photos, "_exposure"},
+        RanksCase{Strategy::adc, 3, 2, with_model<AppearanceModel::ppisp>, "_ppisp"},
+        RanksCase{Strategy::mcmc, 1, 2, with_model<AppearanceModel::ppisp>, "_ppisp"},
+        RanksCase{Strategy::mcmc, 2, 3, with_model<AppearanceModel::grid>, "_grid"},
         RanksCase{Strategy::none, 1, 4, wide_moments, "_wide"},
         RanksCase{Strategy::adc, 1, 2, cut<2>, "_bands2"}, RanksCase{Strategy::adc, 2, 3, cut<2>, "_bands2"},
         RanksCase{Strategy::adc, 1, 5, cut<3>, "_bands3"},

@@ -276,6 +276,7 @@ TEST(RunOptions, TableReadsWhatItWrites) {
                                              {"absgrad", "true"},
                                              {"revised-opacity", "true"},
                                              {"exposure", "true"},
+                                             {"appearance", "grid"},
                                              {"resolution-schedule", "3"},
                                              {"init", "random"},
                                              {"dense-start", "on"},

@@ -409,13 +409,41 @@ TEST(Trainer, LearnsTheExposureOfEachImage) {
         options.exposure_rate = 0.03;  // each training image is used 50 times
         Trainer trainer(device(), dataset, all_frames(dataset), start, options);
         for (int step = 0; step < 400; ++step) trainer.step();
-        const auto exposures = trainer.exposures();
-        EXPECT_EQ(exposures.size(), exposure ? 8u : 0u);
-        return evaluate(device(), trainer.gaussians(), dataset, all_frames(dataset), {}, exposures).psnr;
+        const auto appearances = trainer.appearances();
+        EXPECT_EQ(appearances.size(), exposure ? 8u : 0u);
+        return evaluate(device(), trainer.gaussians(), dataset, all_frames(dataset), {}, appearances).psnr;
     };
     const double with = learn(true), without = learn(false);
     printf("    %.2f dB with exposures, %.2f dB without\n", with, without);
     EXPECT_GT(with, without + 3);
+}
+
+/// Colours of images that differ are learned, and a checkpoint has all that is learned.
+TEST(Trainer, LearnsTheAppearanceOfEachImageAndResumes) {
+    Synthetic made;
+    const Dataset dataset = exposed_by_itself(made);
+    const Gaussians start = shaken_start(made, 0.05, 11, 0);
+    const std::vector<int> frames = all_frames(dataset);
+    std::map<AppearanceModel, double> psnr;
+    for (const AppearanceModel model :
+         {AppearanceModel::none, AppearanceModel::ppisp, AppearanceModel::grid}) {
+        TrainOptions options = quick(400);
+        options.appearance = model;
+        options.appearance_rate = 0.02;  // each training image is used 50 times
+        Trainer whole(device(), dataset, frames, start, options);
+        while (whole.steps_done() < 150) whole.step();
+        Trainer later(device(), dataset, frames, start, options);
+        later.restore(whole.state());
+        while (whole.steps_done() < 400) whole.step();
+        while (later.steps_done() < 400) later.step();
+        EXPECT_EQ(later.appearances(), whole.appearances());
+        EXPECT_EQ(later.gaussians().sh, whole.gaussians().sh);
+        psnr[model] = evaluate(device(), whole.gaussians(), dataset, frames, {}, whole.appearances()).psnr;
+    }
+    printf("    %.2f dB with PPISP, %.2f dB with grids, %.2f dB without\n", psnr[AppearanceModel::ppisp],
+           psnr[AppearanceModel::grid], psnr[AppearanceModel::none]);
+    EXPECT_GT(psnr[AppearanceModel::ppisp], psnr[AppearanceModel::none] + 3);
+    EXPECT_GT(psnr[AppearanceModel::grid], psnr[AppearanceModel::none] + 3);
 }
 
 /// A run on halves and quarters first ends at the whole resolution, and resumes to the byte in the middle of
