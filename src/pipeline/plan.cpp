@@ -46,10 +46,10 @@ Plan plan_for(const PlanRequest& request) {
     plan.stored_degree = request.scene_degree;
     plan.kernel = request.render.kernel;
     // An ellipsoid of equal scales is the sphere itself.
-    const bool solid = request.purpose == Purpose::picture && request.drawing == Drawing::ellipsoids;
+    const bool solid = request.purpose == Purpose::image && request.drawing == Drawing::ellipsoids;
     if (request.render.points && !solid) plan.nearest = uint32_t(request.render.nearest);
     plan.integrator = request.render.integrator;
-    if (request.purpose == Purpose::picture) {
+    if (request.purpose == Purpose::image) {
         plan.stored_degree = std::clamp(request.render.sh_degree, 0, request.present_degree);
         plan.drawing = request.drawing;
         plan.debug = request.debug;

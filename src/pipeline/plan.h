@@ -13,13 +13,13 @@
 namespace ewa::pipeline {
 
 enum class Purpose {
-    picture,   // image planes only
+    image,     // image planes only
     gradient,  // loss of one view and its gradient
     training   // the gradient moves the splats
 };
 
 struct PlanRequest {
-    Purpose purpose = Purpose::picture;
+    Purpose purpose = Purpose::image;
     int scene_degree = 0;    // stored in the scene
     int present_degree = 0;  // highest SH degree of the scene with a coefficient other than zero
     RenderOptions render;

@@ -9,7 +9,7 @@
 #include "ewa/error.h"
 #include "passes/passes.h"
 #include "pipeline/backward.h"
-#include "pipeline/picture.h"
+#include "pipeline/image_reader.h"
 #include "pipeline/views.h"
 
 namespace ewa {
@@ -28,8 +28,8 @@ Gaussians with_degree(const Gaussians& gaussians, int degree) {
     return result;
 }
 
-PlanRequest picture_request(const Gaussians& gaussians, const RenderOptions& options) {
-    return {.purpose = Purpose::picture,
+PlanRequest image_request(const Gaussians& gaussians, const RenderOptions& options) {
+    return {.purpose = Purpose::image,
             .scene_degree = gaussians.sh_degree,
             .present_degree = sh_degree_present(gaussians),
             .render = options};
@@ -38,7 +38,7 @@ PlanRequest picture_request(const Gaussians& gaussians, const RenderOptions& opt
 }  // namespace
 
 std::vector<PlanLine> plan_lines(const Gaussians& gaussians, const RenderOptions& options) {
-    const PlanRequest request = picture_request(gaussians, options);
+    const PlanRequest request = image_request(gaussians, options);
     return describe(plan_for(request), request.scene_degree, gaussians.size());
 }
 
@@ -66,7 +66,7 @@ struct Renderer::State {
           cache(*device),
           executor(*device),
           options(o),
-          request(picture_request(gaussians, o)) {
+          request(image_request(gaussians, o)) {
         upload(gaussians);
     }
     void upload(const Gaussians& gaussians) {
@@ -194,12 +194,12 @@ Plan Renderer::State::plan_of(const DrawOptions& o) const {
 
 Rendering Renderer::State::draw(const Camera& camera, const Plan& plan, const RenderOptions& look) {
     submit(camera, plan, look, [](const passes::Recorder&) {});
-    const Picture picture(frame);
-    Rendering result{picture.image(shared::PLANE_R, 3), picture.image(shared::PLANE_T, 1), {}, {}};
+    const ImageReader planes(frame);
+    Rendering result{planes.image(shared::PLANE_R, 3), planes.image(shared::PLANE_T, 1), {}, {}};
     for (float& value : result.alpha.pixels) value = 1.0f - value;
-    if (plan.drawing == Drawing::count) result.count = picture.image(shared::PLANE_COUNT, 1);
+    if (plan.drawing == Drawing::count) result.count = planes.image(shared::PLANE_COUNT, 1);
     if (plan.drawing == Drawing::depth) {
-        result.depth = picture.image(shared::PLANE_DEPTH, 1);
+        result.depth = planes.image(shared::PLANE_DEPTH, 1);
         for (size_t i = 0; i < result.depth.pixels.size(); ++i)
             if (result.alpha.pixels[i] > 0) result.depth.pixels[i] /= result.alpha.pixels[i];
     }
@@ -245,7 +245,7 @@ const std::vector<uint8_t>& Renderer::render_bytes(const Camera& camera, const D
 void Renderer::replace(const Gaussians& gaussians) {
     State& s = *state_;
     s.model = {};  // free its memory first
-    s.request = picture_request(gaussians, s.options);
+    s.request = image_request(gaussians, s.options);
     s.upload(gaussians);
 }
 

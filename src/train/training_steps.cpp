@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/random.h"
-#include "pipeline/picture.h"
+#include "pipeline/image_reader.h"
 #include "portions/refine.h"
 #include "train/training.h"
 
@@ -265,7 +265,7 @@ Image Training::render_own(std::span<const Camera> cameras) {
     portions::StepParts parts = step_parts();
     parts.submitted = [] {};
     if (!several_.draw_pictures(parts, views)) return {};
-    return Picture(tools_.frame).image(shared::PLANE_R, 3);
+    return ImageReader(tools_.frame).image(shared::PLANE_R, 3);
 }
 
 void Training::refine(const std::function<void(const Phase&)>& refine) {

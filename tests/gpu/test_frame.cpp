@@ -38,7 +38,7 @@ Result run_frame(const Scene& scene, uint32_t capacity, bool gradients) {
     GuardedFrame guarded(r.config(), {model.splats, use.width, use.height, capacity, gradients, !gradients});
     pipeline::FrameBuffers& frame = guarded.frame;
     const pipeline::Plan plan =
-        pipeline::plan_for({.purpose = gradients ? pipeline::Purpose::gradient : pipeline::Purpose::picture,
+        pipeline::plan_for({.purpose = gradients ? pipeline::Purpose::gradient : pipeline::Purpose::image,
                             .scene_degree = scene.gaussians.sh_degree,
                             .present_degree = scene.gaussians.sh_degree,
                             .render = scene.options,

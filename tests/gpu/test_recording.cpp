@@ -508,7 +508,7 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     of_views.update_views(model, views, rates, 2);
     out.push_back(batch.commands());
 
-    request.purpose = pipeline::Purpose::picture;
+    request.purpose = pipeline::Purpose::image;
     gpu::Recording picture = r.recording();
     pipeline::FramePasses{{picture, r.cache}, plan_for(request), frame, inputs}.forward(model);
     wide.reserve(*device(), r.config(),

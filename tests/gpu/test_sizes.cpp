@@ -350,17 +350,17 @@ PlanRequest request_for(Purpose purpose) {
 }
 
 TEST(Plan, OfAPictureStoresTheDegreesThatArePresentAndWanted) {
-    PlanRequest request = request_for(Purpose::picture);
+    PlanRequest request = request_for(Purpose::image);
     request.drawing = Drawing::depth;
-    const Plan picture = plan_for(request);
-    EXPECT_EQ(picture.stored_degree, 1);
-    EXPECT_EQ(picture.evaluated_degree(3), 1u);
-    EXPECT_EQ(picture.evaluated_degree(0), 0u);
-    EXPECT_EQ(picture.evaluated_degree(-1), 0u);
-    EXPECT_EQ(picture.drawing, Drawing::depth);
-    EXPECT_TRUE(picture.fifth_plane());
-    EXPECT_FALSE(picture.gradients || picture.adam || picture.statistics || picture.debug);
-    EXPECT_EQ(picture.kernel, Footprint::antialias);
+    const Plan drawn = plan_for(request);
+    EXPECT_EQ(drawn.stored_degree, 1);
+    EXPECT_EQ(drawn.evaluated_degree(3), 1u);
+    EXPECT_EQ(drawn.evaluated_degree(0), 0u);
+    EXPECT_EQ(drawn.evaluated_degree(-1), 0u);
+    EXPECT_EQ(drawn.drawing, Drawing::depth);
+    EXPECT_TRUE(drawn.fifth_plane());
+    EXPECT_FALSE(drawn.gradients || drawn.adam || drawn.statistics || drawn.debug);
+    EXPECT_EQ(drawn.kernel, Footprint::antialias);
     request.render.sh_degree = 0;
     EXPECT_EQ(plan_for(request).stored_degree, 0);
     request.drawing = Drawing::ellipsoids;
@@ -404,11 +404,11 @@ TEST(Plan, OfATrainingHasWhatItsStrategyAndItsImagesNeed) {
 
 /// What does not apply to a purpose changes nothing.
 TEST(Plan, IgnoresTheInputsOfOtherPurposes) {
-    PlanRequest request = request_for(Purpose::picture);
-    const Plan picture = plan_for(request);
+    PlanRequest request = request_for(Purpose::image);
+    const Plan drawn = plan_for(request);
     request.masks = request.motion = request.statistics = request.regularised = true;
     request.appearance = AppearanceModel::grid;
-    EXPECT_EQ(plan_for(request), picture);
+    EXPECT_EQ(plan_for(request), drawn);
     request = request_for(Purpose::training);
     const Plan training = plan_for(request);
     request.drawing = Drawing::count;
@@ -428,7 +428,7 @@ TEST(Plan, HasAsManyBuffersOfMomentsAsItNeeds) {
     request.purpose = Purpose::gradient;
     EXPECT_EQ(plan_for(request).moment_buffers(), 1);
     EXPECT_FALSE(plan_for(request).packed_moments);
-    request.purpose = Purpose::picture;
+    request.purpose = Purpose::image;
     EXPECT_EQ(plan_for(request).moment_buffers(), 0);
 }
 
@@ -438,7 +438,7 @@ TEST(Plan, IsDescribedByWhatItSkips) {
         return std::any_of(lines.begin(), lines.end(),
                            [&](const PlanLine& line) { return line.what == what; });
     };
-    const auto lines = describe(plan_for(request_for(Purpose::picture)), 3, 10);
+    const auto lines = describe(plan_for(request_for(Purpose::image)), 3, 10);
     EXPECT_EQ(lines[0].what, "SH degrees 2 to 3");
     EXPECT_EQ(lines[0].bytes_saved,
               (15 - 6) * 16 * 16u);  // planes of 59 and of 23 floats, two blocks of 8 splats

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "pipeline/picture.h"
+#include "pipeline/image_reader.h"
 
 namespace ewa::pipeline {
 
-Image Picture::image(uint32_t first, int count) const {
+Image ImageReader::image(uint32_t first, int count) const {
     Image image(int(sizes_.width), int(sizes_.height), count);
     for (size_t channel = 0; channel < size_t(count); ++channel)
         for (int y = 0; y < image.height; ++y) {

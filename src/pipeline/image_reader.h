@@ -9,9 +9,9 @@
 namespace ewa::pipeline {
 
 /// The planes of a frame that is done, read back from the device.
-class Picture {
+class ImageReader {
   public:
-    explicit Picture(const FrameBuffers& frame)
+    explicit ImageReader(const FrameBuffers& frame)
         : sizes_(frame.sizes), planes_(frame.planes.download<float>(frame.sizes.planes / 4)) {}
     /// An image whose channels are `count` planes from `first` on (shared::PLANE_*).
     Image image(uint32_t first, int count) const;
