@@ -128,7 +128,7 @@ Vector shown(const Vector& color, const Dual& exposure, const std::array<Vector,
 
 /// Calls use(x, y, colour as shown) with the derivatives by each pixel's colour and by all values.
 template <class Use>
-void develop(const Raster& picture, const PpispPhoto& photo, const PpispCamera& camera, const Use& use) {
+void develop(const Raster& image, const PpispPhoto& photo, const PpispCamera& camera, const Use& use) {
     const auto input = [](double value, size_t index) {
         Dual dual(value);
         dual.by[index] = 1;
@@ -137,14 +137,14 @@ void develop(const Raster& picture, const PpispPhoto& photo, const PpispCamera& 
     std::array<Dual, 36> values;
     for (size_t k = 0; k < 36; ++k) values[k] = input(k < 9 ? photo[k] : camera[k - 9], 3 + k);
     const auto h = homography(&values[1]);
-    const double larger = std::max(picture.width, picture.height);
-    for (int y = 0; y < picture.height; ++y)
-        for (int x = 0; x < picture.width; ++x) {
+    const double larger = std::max(image.width, image.height);
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x) {
             Vector color;
-            for (size_t k = 0; k < 3; ++k) color[k] = input(picture.at(x, y)[k], k);
+            for (size_t k = 0; k < 3; ++k) color[k] = input(image.at(x, y)[k], k);
             use(x, y,
                 shown(color, values[0], h, &values[9],
-                      {(x + 0.5 - 0.5 * picture.width) / larger, (y + 0.5 - 0.5 * picture.height) / larger}));
+                      {(x + 0.5 - 0.5 * image.width) / larger, (y + 0.5 - 0.5 * image.height) / larger}));
         }
 }
 
@@ -154,21 +154,21 @@ double smooth_l1(double x, double beta) {
 
 }  // namespace
 
-Raster ppisp(const Raster& picture, const PpispPhoto& photo, const PpispCamera& camera) {
-    Raster out(picture.width, picture.height, 3);
-    develop(picture, photo, camera, [&](int x, int y, const Vector& color) {
+Raster ppisp(const Raster& image, const PpispPhoto& photo, const PpispCamera& camera) {
+    Raster out(image.width, image.height, 3);
+    develop(image, photo, camera, [&](int x, int y, const Vector& color) {
         for (size_t k = 0; k < 3; ++k) out.at(x, y)[k] = color[k].value;
     });
     return out;
 }
 
-PpispGradient ppisp_backward(const Raster& picture, const PpispPhoto& photo, const PpispCamera& camera,
+PpispGradient ppisp_backward(const Raster& image, const PpispPhoto& photo, const PpispCamera& camera,
                              const Raster& gradient) {
-    PpispGradient out{Raster(picture.width, picture.height, 3)};
-    develop(picture, photo, camera, [&](int x, int y, const Vector& color) {
+    PpispGradient out{Raster(image.width, image.height, 3)};
+    develop(image, photo, camera, [&](int x, int y, const Vector& color) {
         for (size_t k = 0; k < 3; ++k) {
             const double g = gradient.at(x, y)[k];
-            for (size_t i = 0; i < 3; ++i) out.picture.at(x, y)[i] += g * color[k].by[i];
+            for (size_t i = 0; i < 3; ++i) out.image.at(x, y)[i] += g * color[k].by[i];
             for (size_t i = 0; i < 9; ++i) out.photo[i] += g * color[k].by[3 + i];
             for (size_t i = 0; i < 27; ++i) out.camera[i] += g * color[k].by[12 + i];
         }
@@ -212,12 +212,12 @@ struct Corner {
     size_t cell;  // its first value
     double weight, by_grey;
 };
-std::array<Corner, 8> corners_of(const Raster& picture, int x, int y) {
-    const double* c = picture.at(x, y);
+std::array<Corner, 8> corners_of(const Raster& image, int x, int y) {
+    const double* c = image.at(x, y);
     const double grey = GREY_RED * c[0] + GREY_GREEN * c[1] + GREY_BLUE * c[2];
     const std::array<int, 3> size{int(GRID_WIDTH), int(GRID_HEIGHT), int(GRID_DEPTH)};
-    const std::array<double, 3> place{(x + 0.5) / picture.width * (size[0] - 1),
-                                      (y + 0.5) / picture.height * (size[1] - 1),
+    const std::array<double, 3> place{(x + 0.5) / image.width * (size[0] - 1),
+                                      (y + 0.5) / image.height * (size[1] - 1),
                                       std::clamp(grey, 0.0, 1.0) * (size[2] - 1)};
     std::array<Corner, 8> corners;
     for (size_t corner = 0; corner < 8; ++corner) {
@@ -250,33 +250,33 @@ void for_neighbours(const Use& use) {
 
 }  // namespace
 
-Raster sliced(const Raster& picture, const Grid& grid) {
-    Raster out(picture.width, picture.height, 3);
-    for (int y = 0; y < picture.height; ++y)
-        for (int x = 0; x < picture.width; ++x)
-            for (const Corner& corner : corners_of(picture, x, y))
+Raster sliced(const Raster& image, const Grid& grid) {
+    Raster out(image.width, image.height, 3);
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x)
+            for (const Corner& corner : corners_of(image, x, y))
                 for (size_t c = 0; c < 3; ++c) {
                     const double* row = &grid[corner.cell + 4 * c];
-                    const double* from = picture.at(x, y);
+                    const double* from = image.at(x, y);
                     out.at(x, y)[c] +=
                         corner.weight * (row[0] * from[0] + row[1] * from[1] + row[2] * from[2] + row[3]);
                 }
     return out;
 }
 
-GridGradient sliced_backward(const Raster& picture, const Grid& grid, const Raster& gradient) {
-    GridGradient out{Raster(picture.width, picture.height, 3), Grid(grid.size())};
+GridGradient sliced_backward(const Raster& image, const Grid& grid, const Raster& gradient) {
+    GridGradient out{Raster(image.width, image.height, 3), Grid(grid.size())};
     constexpr double kGrey[3] = {GREY_RED, GREY_GREEN, GREY_BLUE};
-    for (int y = 0; y < picture.height; ++y)
-        for (int x = 0; x < picture.width; ++x)
-            for (const Corner& corner : corners_of(picture, x, y))
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x)
+            for (const Corner& corner : corners_of(image, x, y))
                 for (size_t c = 0; c < 3; ++c) {
                     const double* row = &grid[corner.cell + 4 * c];
-                    const double* from = picture.at(x, y);
+                    const double* from = image.at(x, y);
                     const double g = gradient.at(x, y)[c];
                     const double mapped = row[0] * from[0] + row[1] * from[1] + row[2] * from[2] + row[3];
                     for (size_t k = 0; k < 3; ++k) {
-                        out.picture.at(x, y)[k] +=
+                        out.image.at(x, y)[k] +=
                             g * (corner.weight * row[k] + corner.by_grey * mapped * kGrey[k]);
                         out.grid[corner.cell + 4 * c + k] += g * corner.weight * from[k];
                     }

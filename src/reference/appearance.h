@@ -20,15 +20,15 @@ namespace ewa::reference {
 using PpispPhoto = std::array<double, 9>;    // as Ppisp::photo
 using PpispCamera = std::array<double, 27>;  // as Ppisp::camera
 
-Raster ppisp(const Raster& picture, const PpispPhoto& photo, const PpispCamera& camera);
+Raster ppisp(const Raster& image, const PpispPhoto& photo, const PpispCamera& camera);
 
 struct PpispGradient {
-    Raster picture;  // dL/d(image)
+    Raster image;  // dL/d(image)
     PpispPhoto photo{};
     PpispCamera camera{};
 };
-/// `picture` is the image before, `gradient` is dL/d(image after).
-PpispGradient ppisp_backward(const Raster& picture, const PpispPhoto& photo, const PpispCamera& camera,
+/// `image` is the image before, `gradient` is dL/d(image after).
+PpispGradient ppisp_backward(const Raster& image, const PpispPhoto& photo, const PpispCamera& camera,
                              const Raster& gradient);
 
 /// The penalties of the means over photos, and of a camera.
@@ -36,13 +36,13 @@ double ppisp_penalty(const PpispPhoto& means);
 double ppisp_penalty(const PpispCamera& camera);
 
 using Grid = std::vector<double>;  // as ColorGrid::cells
-Raster sliced(const Raster& picture, const Grid& grid);
+Raster sliced(const Raster& image, const Grid& grid);
 
 struct GridGradient {
-    Raster picture;
+    Raster image;
     Grid grid;
 };
-GridGradient sliced_backward(const Raster& picture, const Grid& grid, const Raster& gradient);
+GridGradient sliced_backward(const Raster& image, const Grid& grid, const Raster& gradient);
 
 /// The weighted total variation, and its gradient.
 double grid_variation(const Grid& grid);

@@ -180,18 +180,17 @@ ScreenGradient screen_gradient(const Projected& splat, const Moments& m) {
 }
 
 BlendGradients blend_backward(std::span<const Projected> projected, const Instances& instances,
-                              const Blended& blended, const Raster& picture_gradient,
+                              const Blended& blended, const Raster& image_gradient,
                               const Smoothing& smoothing) {
     const int width = instances.grid.image_width, height = instances.grid.image_height;
-    assert(picture_gradient.width == width && picture_gradient.height == height &&
-           picture_gradient.channels == 3);
+    assert(image_gradient.width == width && image_gradient.height == height && image_gradient.channels == 3);
     BlendGradients out;
     out.instances.resize(instances.sorted.size());
     const std::vector<Whitener> whiteners = whiteners_of(projected);
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
             const double* total = blended.color.at(x, y);
-            const double* up = picture_gradient.at(x, y);
+            const double* up = image_gradient.at(x, y);
             const glm::dvec3 pixel_gradient(up[0], up[1], up[2]);
             glm::dvec3 behind(total[0], total[1], total[2]);
             walk_pixel(projected, whiteners, instances, x, y, smoothing, [&](const Contribution& c) {

@@ -217,9 +217,9 @@ struct BlendGradients {
     std::vector<ScreenGradient> splats;  // per splat; its tiles are added in ascending order
 };
 
-/// `blended` is blend()'s result for the same arguments, `picture_gradient` is dL/d(RGB) of each pixel.
+/// `blended` is blend()'s result for the same arguments, `image_gradient` is dL/d(RGB) of each pixel.
 BlendGradients blend_backward(std::span<const Projected> projected, const Instances& instances,
-                              const Blended& blended, const Raster& picture_gradient,
+                              const Blended& blended, const Raster& image_gradient,
                               const Smoothing& smoothing = {});
 
 /// Renders splats as solids. A pixel shows the nearest splat, by its mean's depth, with an opacity of at

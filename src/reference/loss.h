@@ -42,13 +42,13 @@ std::vector<double> ssim_window();
 using Exposure = std::array<double, 12>;
 
 /// The RGB image with the exposure applied.
-Raster exposed(const Raster& picture, const Exposure& exposure);
+Raster exposed(const Raster& image, const Exposure& exposure);
 
 struct ExposureGradient {
-    Raster picture;       // dL/d(image)
+    Raster image;         // dL/d(image)
     Exposure exposure{};  // dL/d(exposure)
 };
-/// `picture` is the image before the exposure, `gradient` is dL/d(exposed image).
-ExposureGradient exposed_backward(const Raster& picture, const Exposure& exposure, const Raster& gradient);
+/// `image` is the image before the exposure, `gradient` is dL/d(exposed image).
+ExposureGradient exposed_backward(const Raster& image, const Exposure& exposure, const Raster& gradient);
 
 }  // namespace ewa::reference

@@ -115,7 +115,7 @@ void walk(const std::vector<Sphere>& spheres, const std::vector<uint32_t>& order
 }
 
 void blend_spheres(const std::vector<Sphere>& spheres, const Camera& camera, const RenderOptions& options,
-                   Picture& out) {
+                   Rendered& out) {
     const Raster plane(camera.width, camera.height, 1);
     const std::vector<uint32_t> counts(plane.values.size());
     Blended& b = out.blended;
@@ -144,14 +144,14 @@ struct SphereGradient {
     glm::dvec2 log_radius{0};  // dL/d(ln radius) of both axes
 };
 
-std::vector<SphereGradient> blend_spheres_backward(const std::vector<Sphere>& spheres, const Picture& picture,
-                                                   const Camera& camera, int nearest,
-                                                   const Raster& picture_gradient) {
+std::vector<SphereGradient> blend_spheres_backward(const std::vector<Sphere>& spheres,
+                                                   const Rendered& rendered, const Camera& camera,
+                                                   int nearest, const Raster& image_gradient) {
     std::vector<SphereGradient> out(spheres.size());
-    Raster behind = picture.blended.color;
-    walk(spheres, picture.order, camera, nearest, [&](int x, int y, const SphereHit& hit) {
+    Raster behind = rendered.blended.color;
+    walk(spheres, rendered.order, camera, nearest, [&](int x, int y, const SphereHit& hit) {
         const Sphere& sphere = spheres[hit.splat];
-        const double* up = picture_gradient.at(x, y);
+        const double* up = image_gradient.at(x, y);
         const glm::dvec3 by_pixel(up[0], up[1], up[2]);
         const double weight = hit.alpha * hit.transmittance;
         double* rest = behind.at(x, y);
@@ -188,9 +188,9 @@ Splat sphere_backward(const Splat& splat, const Sphere& sphere, const Camera& ca
 
 }  // namespace
 
-Picture render_points(const Values& values, const Camera& camera, const RenderOptions& options) {
+Rendered render_points(const Values& values, const Camera& camera, const RenderOptions& options) {
     const std::vector<Sphere> spheres = project_all(values, camera, options);
-    Picture out;
+    Rendered out;
     for (const Sphere& sphere : spheres) {
         out.projected.push_back(sphere.projected);
         if (sphere.projected.skipped_nonfinite) ++out.skipped_nonfinite;
@@ -205,15 +205,15 @@ Picture render_points(const Values& values, const Camera& camera, const RenderOp
 ReferenceGradient points_loss_gradient(const Values& values, const Camera& camera, const Image& target,
                                        const RenderOptions& options) {
     ReferenceGradient out;
-    out.picture = render_points(values, camera, options);
-    const Loss loss = image_loss(out.picture.blended.color, to_double(target));
+    out.rendered = render_points(values, camera, options);
+    const Loss loss = image_loss(out.rendered.blended.color, to_double(target));
     out.loss = loss.loss;
     out.l1 = loss.l1;
     out.ssim = loss.ssim;
-    out.picture_gradient = loss.gradient;
+    out.image_gradient = loss.gradient;
     const std::vector<Sphere> spheres = project_all(values, camera, options);
     const std::vector<SphereGradient> by_sphere =
-        blend_spheres_backward(spheres, out.picture, camera, options.nearest, loss.gradient);
+        blend_spheres_backward(spheres, out.rendered, camera, options.nearest, loss.gradient);
     out.gradient = zeros_like(values);
     for (size_t i = 0; i < values.size(); ++i) {
         out.blend.splats.push_back(by_sphere[i].screen);
@@ -222,7 +222,7 @@ ReferenceGradient points_loss_gradient(const Values& values, const Camera& camer
     }
     // A sphere covers at least one pixel centre wherever its own centre is in the image.
     out.in_view.assign(values.size(), 0);
-    walk(spheres, out.picture.order, camera, std::numeric_limits<int>::max(),
+    walk(spheres, out.rendered.order, camera, std::numeric_limits<int>::max(),
          [&](int, int, const SphereHit& hit) { out.in_view[hit.splat] = 1; });
     return out;
 }

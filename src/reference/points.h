@@ -14,9 +14,9 @@
 
 namespace ewa::reference {
 
-/// The same as render() and loss_gradient(), which call these. Picture::instances has no entries, and
+/// The same as render() and loss_gradient(), which call these. Rendered::instances has no entries, and
 /// neither has ReferenceGradient::blend::instances.
-Picture render_points(const Values& values, const Camera& camera, const RenderOptions& options);
+Rendered render_points(const Values& values, const Camera& camera, const RenderOptions& options);
 ReferenceGradient points_loss_gradient(const Values& values, const Camera& camera, const Image& target,
                                        const RenderOptions& options);
 

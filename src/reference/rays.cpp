@@ -174,7 +174,7 @@ double Rays::march(const std::vector<Met>& line, const std::vector<double>& bord
     return transmittance;
 }
 
-Blended Rays::picture() const {
+Blended Rays::blended() const {
     const Raster plane(camera_.width, camera_.height, 1);
     const std::vector<uint32_t> counts(plane.values.size());
     Blended out{Raster(camera_.width, camera_.height, 3), plane, plane, plane, counts, counts};
@@ -303,11 +303,11 @@ Splat Rays::splat_gradient(const Member& m, const Sums& sums) const {
     return out;
 }
 
-Values Rays::gradient(const Raster& picture_gradient) const {
+Values Rays::gradient(const Raster& image_gradient) const {
     std::vector<Sums> sums(members_.size());
     for (int y = 0; y < camera_.height; ++y)
         for (int x = 0; x < camera_.width; ++x) {
-            const double* up = picture_gradient.at(x, y);
+            const double* up = image_gradient.at(x, y);
             if (options_.integrator == Integrator::ray)
                 ray_gradient(x, y, {up[0], up[1], up[2]}, sums);
             else

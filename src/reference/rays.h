@@ -33,9 +33,9 @@ class Rays {
 
     const std::vector<Projected>& projected() const { return projected_; }  // per splat
     /// evaluated stays 0.
-    Blended picture() const;
+    Blended blended() const;
     /// dL/d(stored value), from dL/d(RGB) of each pixel.
-    Values gradient(const Raster& picture_gradient) const;
+    Values gradient(const Raster& image_gradient) const;
     /// Per pixel: whether a decision of the model (cut-off, clamp, stop, order, near plane) is within a relative distance of
     /// its threshold.
     std::vector<uint8_t> at_threshold(double relative) const;

@@ -8,15 +8,15 @@
 
 namespace ewa::reference {
 
-Picture render(const Values& values, const Camera& camera, const RenderOptions& options,
-               const ReferenceOptions& reference) {
+Rendered render(const Values& values, const Camera& camera, const RenderOptions& options,
+                const ReferenceOptions& reference) {
     if (options.points) return render_points(values, camera, options);
-    Picture out;
+    Rendered out;
     if (options.integrator != Integrator::splat) {
         const Rays rays(values, camera, options, reference.smoothing);
         out.projected = rays.projected();
         for (const Projected& each : out.projected) out.skipped_nonfinite += each.skipped_nonfinite;
-        out.blended = rays.picture();
+        out.blended = rays.blended();
         return out;
     }
     for (size_t i = 0; i < values.size(); ++i) {
@@ -34,18 +34,18 @@ ReferenceGradient loss_gradient(const Values& values, const Camera& camera, cons
                                 const RenderOptions& options, const ReferenceOptions& reference) {
     if (options.points) return points_loss_gradient(values, camera, target, options);
     ReferenceGradient out;
-    out.picture = render(values, camera, options, reference);
-    const Loss loss = image_loss(out.picture.blended.color, to_double(target));
+    out.rendered = render(values, camera, options, reference);
+    const Loss loss = image_loss(out.rendered.blended.color, to_double(target));
     out.loss = loss.loss;
     out.l1 = loss.l1;
     out.ssim = loss.ssim;
-    out.picture_gradient = loss.gradient;
+    out.image_gradient = loss.gradient;
     if (options.integrator != Integrator::splat) {
         out.gradient = Rays(values, camera, options, reference.smoothing).gradient(loss.gradient);
-        for (const Projected& each : out.picture.projected) out.in_view.push_back(each.visible);
+        for (const Projected& each : out.rendered.projected) out.in_view.push_back(each.visible);
         return out;
     }
-    out.blend = blend_backward(out.picture.projected, out.picture.instances, out.picture.blended,
+    out.blend = blend_backward(out.rendered.projected, out.rendered.instances, out.rendered.blended,
                                loss.gradient, reference.smoothing);
     out.gradient = zeros_like(values);
     for (size_t i = 0; i < values.size(); ++i)
@@ -53,7 +53,7 @@ ReferenceGradient loss_gradient(const Values& values, const Camera& camera, cons
             out.gradient, i,
             project_backward(read_splat(values, i), camera, options, out.blend.splats[i], &out.camera));
     out.in_view.assign(values.size(), 0);
-    for (const Instance& instance : out.picture.instances.sorted) out.in_view[instance.splat] = 1;
+    for (const Instance& instance : out.rendered.instances.sorted) out.in_view[instance.splat] = 1;
     return out;
 }
 

@@ -19,7 +19,7 @@ struct ReferenceOptions {
     Smoothing smoothing;
 };
 
-struct Picture {
+struct Rendered {
     std::vector<Projected> projected;  // per splat
     std::vector<uint32_t> order;       // visible splats, nearest first
     Instances instances;
@@ -27,18 +27,18 @@ struct Picture {
     uint32_t skipped_nonfinite = 0;
 };
 
-/// With an integrator along rays, the picture has no order and no instances.
-Picture render(const Values& values, const Camera& camera, const RenderOptions& options,
-               const ReferenceOptions& reference = {});
+/// With an integrator along rays, there is no order and there are no instances.
+Rendered render(const Values& values, const Camera& camera, const RenderOptions& options,
+                const ReferenceOptions& reference = {});
 
 struct ReferenceGradient {
     double loss = 0, l1 = 0, ssim = 0;
     Values gradient;               // dL/d(stored value) for each stored value
     CameraMotion camera;           // dL/d(each value of the camera's motion), for no motion
     std::vector<uint8_t> in_view;  // per splat: it had a tile
-    Raster picture_gradient;       // dL/d(colour)
+    Raster image_gradient;         // dL/d(colour)
     BlendGradients blend;          // gradients of each splat, and moments of each instance
-    Picture picture;
+    Rendered rendered;
 };
 
 /// `target` is RGB of the camera's size. Further channels are ignored.

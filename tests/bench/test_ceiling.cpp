@@ -29,7 +29,7 @@ TEST(Ceiling, SortsStablyByTheLowBits) {
 /// A tiny case as the CPU reference renders it, and its lists as the device would hand them over.
 struct Drawn {
     bench::BenchScene scene;
-    reference::Picture picture;
+    reference::Rendered rendered;
     std::vector<float> records;
     std::vector<uint32_t> splats, tile_starts;
     bench::BlendLists lists;
@@ -43,18 +43,19 @@ struct Drawn {
         scene = bench::make_scene(one);
         RenderOptions options;
         options.background = {0.1f, 0.2f, 0.3f};
-        picture =
+        rendered =
             reference::render(scene.gaussians, scene.camera, options, {tile_width, 64 / tile_width, {}});
-        for (const reference::Projected& splat : picture.projected) add_record(splat);
-        for (const reference::Instance& instance : picture.instances.sorted) splats.push_back(instance.splat);
-        for (const uint64_t first : picture.instances.first_of_tile) tile_starts.push_back(uint32_t(first));
+        for (const reference::Projected& splat : rendered.projected) add_record(splat);
+        for (const reference::Instance& instance : rendered.instances.sorted)
+            splats.push_back(instance.splat);
+        for (const uint64_t first : rendered.instances.first_of_tile) tile_starts.push_back(uint32_t(first));
         lists.records = records.data();
         lists.splats = splats.data();
         lists.tile_starts = tile_starts.data();
         lists.width = uint32_t(one.width);
         lists.height = uint32_t(one.height);
         lists.tile_width = uint32_t(tile_width);
-        lists.tiles_x = uint32_t(picture.instances.grid.columns());
+        lists.tiles_x = uint32_t(rendered.instances.grid.columns());
         for (size_t c = 0; c < 3; ++c) lists.background[c] = options.background[c];
     }
 
@@ -84,17 +85,17 @@ struct Drawn {
 TEST(Ceiling, BlendsAndCountsAsTheReferenceDoes) {
     for (const int tile_width : {4, 8}) {
         const Drawn drawn(tile_width);
-        const uint32_t tiles = drawn.picture.instances.grid.count();
+        const uint32_t tiles = drawn.rendered.instances.grid.count();
         std::vector<float> planes;
         bench::time_blend(drawn.lists, tiles, 1, planes);
         const size_t pixels = size_t(drawn.lists.width) * drawn.lists.height;
         uint64_t evaluated = 0, blended = 0;
         size_t off = 0;
         for (size_t i = 0; i < pixels; ++i) {
-            evaluated += drawn.picture.blended.evaluated[i];
-            blended += drawn.picture.blended.blended[i];
+            evaluated += drawn.rendered.blended.evaluated[i];
+            blended += drawn.rendered.blended.blended[i];
             for (size_t c = 0; c < 3; ++c)
-                off += !(std::abs(planes[c * pixels + i] - drawn.picture.blended.color.values[3 * i + c]) <
+                off += !(std::abs(planes[c * pixels + i] - drawn.rendered.blended.color.values[3 * i + c]) <
                          1e-5);
         }
         EXPECT_LE(off, pixels / 1000);

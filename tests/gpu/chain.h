@@ -27,15 +27,15 @@ inline ChainScene chain_scene(uint64_t seed, SplatKind kind, size_t splats, int 
             RenderOptions{.background = {0.2f, 0.5f, 0.8f}, .kernel = kernel}};
 }
 
-struct PictureErrors {
+struct ImageErrors {
     double worst = 0;
     size_t over = 0, pixels = 0;  // pixels over the bound, and all
 };
 
 /// excluded: per pixel, or empty.
-inline PictureErrors picture_errors(const Image& actual, const reference::Raster& expected, double bound,
-                                    const std::vector<uint8_t>& excluded = {}) {
-    PictureErrors errors;
+inline ImageErrors image_errors(const Image& actual, const reference::Raster& expected, double bound,
+                                const std::vector<uint8_t>& excluded = {}) {
+    ImageErrors errors;
     errors.pixels = size_t(actual.width) * size_t(actual.height);
     for (int y = 0; y < actual.height; ++y)
         for (int x = 0; x < actual.width; ++x) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// PPISP and bilateral grids on the device against the CPU reference: the picture the loss sees, the way back, and Adam's
+// PPISP and bilateral grids on the device against the CPU reference: the image the loss sees, the way back, and Adam's
 // steps.
 #include <gtest/gtest.h>
 
@@ -35,12 +35,12 @@ const std::vector<uint32_t> kCameraOf{1, 0, 1};
 struct ShownInputs {
     pipeline::Appearances appearances;
     std::vector<float> start;
-    reference::Raster picture, target;
+    reference::Raster image, target;
     Image photo;
 
     ShownInputs(AppearanceModel model, int width, int height)
         : appearances(*device(), model, kCameraOf, 2),
-          picture(reference::to_double(random_target(71, width, height))),
+          image(reference::to_double(random_target(71, width, height))),
           target(reference::to_double(random_target(72, width, height))),
           photo(random_target(72, width, height)) {
         Random random(uint64_t(width * 100 + height));
@@ -63,13 +63,13 @@ struct ShownInputs {
 
 void show(ShownInputs& s, pipeline::FrameBuffers& frame, uint32_t visit, uint32_t instances = 0) {
     Rig& r = rig();
-    const auto planes = pack_planes(s.picture, 3, frame.sizes.stride);
+    const auto planes = pack_planes(s.image, 3, frame.sizes.stride);
     frame.planes.upload(std::span<const float>(planes));
     shared::Counts counts{};
     counts.instances = instances;
     frame.counts.upload(std::span<const shared::Counts>(&counts, 1));
     const gpu::Buffer texels = pipeline::upload_photo(*device(), s.photo);
-    const pipeline::CameraUse camera{nullptr, 0, uint32_t(s.picture.width), uint32_t(s.picture.height)};
+    const pipeline::CameraUse camera{nullptr, 0, uint32_t(s.image.width), uint32_t(s.image.height)};
     const pipeline::AppearanceUse use{&s.appearances, kShownPhoto, 0, kShownRate, visit};
     const pipeline::FrameInputs inputs{.camera = camera};
     const pipeline::Plan plan;
@@ -151,11 +151,11 @@ TEST_P(ShownLoss, PpispsGradientsAndStepsMatchTheReference) {
         std::copy_n(s.photo_values(values), 9, photo.begin());
         std::copy_n(s.camera_values(values, 2), 9, means.begin());
         std::copy_n(s.camera_values(values, kCameraOf[kShownPhoto]), 27, camera.begin());
-        const auto loss = reference::image_loss(reference::ppisp(s.picture, photo, camera), s.target);
-        const auto cpu = reference::ppisp_backward(s.picture, photo, camera, loss.gradient);
+        const auto loss = reference::image_loss(reference::ppisp(s.image, photo, camera), s.target);
+        const auto cpu = reference::ppisp_backward(s.image, photo, camera, loss.gradient);
         show(s, guarded.frame, visit);
         EXPECT_TRUE(guarded.intact());
-        expect_loss(guarded.frame, loss, cpu.picture);
+        expect_loss(guarded.frame, loss, cpu.image);
 
         std::vector<double> by_photo = penalty_gradient(means), by_camera = penalty_gradient(camera);
         for (size_t k = 0; k < 9; ++k) by_photo[k] += cpu.photo[k];
@@ -195,11 +195,11 @@ TEST_P(ShownGrid, TheGridsGradientsAndStepsMatchTheReference) {
     reference::AdamState adam(GRID_FLOATS);
     for (uint32_t visit = 1; visit <= 2; ++visit) {
         SCOPED_TRACE("visit " + std::to_string(visit));
-        const auto loss = reference::image_loss(reference::sliced(s.picture, values), s.target);
-        auto cpu = reference::sliced_backward(s.picture, values, loss.gradient);
+        const auto loss = reference::image_loss(reference::sliced(s.image, values), s.target);
+        auto cpu = reference::sliced_backward(s.image, values, loss.gradient);
         show(s, guarded.frame, visit);
         EXPECT_TRUE(guarded.intact());
-        expect_loss(guarded.frame, loss, cpu.picture);
+        expect_loss(guarded.frame, loss, cpu.image);
         const Grid variation = reference::grid_variation_gradient(values);
         for (size_t k = 0; k < GRID_FLOATS; ++k)
             cpu.grid[k] += variation[k] + 1e-3 / 2048 * (values[k] - double(identity[k]));
@@ -265,7 +265,7 @@ class ShownModel : public testing::TestWithParam<AppearanceModel> {};
 TEST_P(ShownModel, DropsAndCountsStepsThatAreNotFinite) {
     ShownInputs s(GetParam(), 16, 16);
     GuardedFrame guarded(rig().config(), shown_request(GetParam(), 16, 16));
-    s.picture.at(3, 3)[1] = std::numeric_limits<double>::quiet_NaN();
+    s.image.at(3, 3)[1] = std::numeric_limits<double>::quiet_NaN();
     show(s, guarded.frame, 1);
     const uint32_t dropped = guarded.frame.read_counts().dropped_updates;
     if (GetParam() == AppearanceModel::ppisp)

@@ -17,7 +17,7 @@ namespace {
 /// The CPU reference's picture and its lists as the device's buffers hold them.
 struct Lists {
     Scene scene;
-    reference::Picture cpu;
+    reference::Rendered cpu;
     pipeline::Sizes sizes;
     Guarded records, splats, starts;
 

@@ -44,9 +44,9 @@ class Chain : public testing::TestWithParam<ChainCase>, protected ChainScene {
 TEST_P(Chain, PictureMatchesTheReference) {
     Renderer renderer(device(), gaussians, options);
     const Rendering rendering = renderer.render(camera, true);
-    const reference::Picture cpu = reference::render(gaussians, camera, options);
+    const reference::Rendered cpu = reference::render(gaussians, camera, options);
     // A contribution on the 1/255 threshold may go either way in float32.
-    const PictureErrors color = picture_errors(rendering.color, cpu.blended.color, 1e-5);
+    const ImageErrors color = image_errors(rendering.color, cpu.blended.color, 1e-5);
     RecordProperty("worst", std::to_string(color.worst));
     printf("    worst %.2e, over 1e-5: %zu of %zu\n", color.worst, color.over, color.pixels);
     EXPECT_LE(color.over, color.pixels / 1000);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Exposures on the device against the CPU reference: the picture the loss sees, the way back, and Adam's
+// Exposures on the device against the CPU reference: the image the loss sees, the way back, and Adam's
 // step.
 #include <gtest/gtest.h>
 
@@ -30,12 +30,12 @@ reference::Exposure wide(const Exposure& exposure) {
 struct Inputs {
     pipeline::Exposures exposures;
     std::vector<Exposure> start;
-    reference::Raster picture, target;
+    reference::Raster image, target;
     Image photo;
 
     Inputs(int width, int height)
         : exposures(*device(), kPhotos),
-          picture(reference::to_double(random_target(71, width, height))),
+          image(reference::to_double(random_target(71, width, height))),
           target(reference::to_double(random_target(72, width, height))),
           photo(random_target(72, width, height)) {
         Random random(uint64_t(width * 100 + height));
@@ -50,13 +50,13 @@ struct Inputs {
 
 void run(Inputs& s, pipeline::FrameBuffers& frame, uint32_t visit, uint32_t instances = 0) {
     Rig& r = rig();
-    const auto planes = pack_planes(s.picture, 3, frame.sizes.stride);
+    const auto planes = pack_planes(s.image, 3, frame.sizes.stride);
     frame.planes.upload(std::span<const float>(planes));
     shared::Counts counts{};
     counts.instances = instances;
     frame.counts.upload(std::span<const shared::Counts>(&counts, 1));
     const gpu::Buffer texels = pipeline::upload_photo(*device(), s.photo);
-    const pipeline::CameraUse camera{nullptr, 0, uint32_t(s.picture.width), uint32_t(s.picture.height)};
+    const pipeline::CameraUse camera{nullptr, 0, uint32_t(s.image.width), uint32_t(s.image.height)};
     const pipeline::ExposureUse use{&s.exposures, kPhoto, kRate, visit};
     r.run([&](gpu::Recording& recording) {
         pipeline::FramePasses{{recording, r.cache}, {}, frame, {.camera = camera}}.loss(texels, false, &use);
@@ -79,8 +79,8 @@ TEST_P(ExposedLoss, GradientsAndAdamsStepMatchTheReference) {
     for (uint32_t visit = 1; visit <= 3; ++visit) {
         SCOPED_TRACE("visit " + std::to_string(visit));
         std::copy(values.begin(), values.end(), exposure.begin());
-        const auto loss = reference::image_loss(reference::exposed(s.picture, exposure), s.target);
-        const auto cpu = reference::exposed_backward(s.picture, exposure, loss.gradient);
+        const auto loss = reference::image_loss(reference::exposed(s.image, exposure), s.target);
+        const auto cpu = reference::exposed_backward(s.image, exposure, loss.gradient);
         run(s, frame, visit);
         EXPECT_TRUE(guarded.intact());
         EXPECT_NEAR(frame.read_counts().l1, loss.l1, 1e-6);
@@ -91,7 +91,7 @@ TEST_P(ExposedLoss, GradientsAndAdamsStepMatchTheReference) {
         for (int c = 0; c < 3; ++c)
             for (int y = 0; y < height; ++y)
                 for (int x = 0; x < width; ++x) {
-                    const double e = cpu.picture.at(x, y)[c];
+                    const double e = cpu.image.at(x, y)[c];
                     const float a = gradient[size_t(c) * frame.sizes.plane_floats +
                                              size_t(y) * frame.sizes.stride + size_t(x)];
                     worst = std::max(worst, std::abs(a - e));
@@ -127,7 +127,7 @@ TEST(Exposure, LearnsNothingFromWhatIsMasked) {
         for (int x = 0; x < 40; ++x) std::copy_n(s.photo.at(x, y), 3, masked.at(x, y));
     const shared::Counts counts{};
     guarded.frame.counts.upload(std::span<const shared::Counts>(&counts, 1));
-    const auto planes = pack_planes(s.picture, 3, guarded.frame.sizes.stride);
+    const auto planes = pack_planes(s.image, 3, guarded.frame.sizes.stride);
     guarded.frame.planes.upload(std::span<const float>(planes));
     const gpu::Buffer texels = pipeline::upload_photo(*device(), masked);
     const pipeline::CameraUse camera{nullptr, 0, 40, 30};
@@ -146,7 +146,7 @@ TEST(Exposure, LearnsNothingFromWhatIsMasked) {
 TEST(Exposure, AStepThatIsNotFiniteIsDroppedAndCounted) {
     Inputs s(16, 16);
     GuardedFrame guarded(rig().config(), {1, 16, 16, 1, true, false, false, AppearanceModel::affine});
-    s.picture.at(3, 3)[1] = std::numeric_limits<double>::infinity();
+    s.image.at(3, 3)[1] = std::numeric_limits<double>::infinity();
     run(s, guarded.frame, 1);
     EXPECT_EQ(guarded.frame.read_counts().dropped_updates, 3u);  // each row sees every channel
     EXPECT_EQ(s.exposures.download()[kPhoto], s.start[kPhoto]);

@@ -18,7 +18,7 @@ struct Emitted {
 };
 
 /// Runs the pass on the CPU reference's records and order. counts: the tiles each splat is said to reach.
-Emitted run_emit(const Scene& scene, const reference::Picture& cpu, const std::vector<uint32_t>& counts,
+Emitted run_emit(const Scene& scene, const reference::Rendered& cpu, const std::vector<uint32_t>& counts,
                  bool with_first, uint32_t capacity, uint32_t strip_rows) {
     Rig& r = rig();
     const uint32_t splats = uint32_t(counts.size()), block = 100;

@@ -51,7 +51,7 @@ TEST(LargeImage, SplatsOverMoreTilesThanALoopHasTurns) {
         for (int x = 0; x < width; ++x)
             for (int c = 0; c < 3; ++c)
                 worst = std::max(worst, std::abs(rendering.color.at(x, y)[c] -
-                                                 expected.picture.blended.color.at(x, y)[c]));
+                                                 expected.rendered.blended.color.at(x, y)[c]));
     EXPECT_LT(worst, 1.0 / 255 + 1e-5);
     EXPECT_GT(rendering.alpha.at(width - 1, height - 1)[0], 0.0f);
 }

@@ -57,7 +57,7 @@ TEST_P(ProjectPass, RecordsMatchTheReference) {
     const Scene scene = random_scene(900 + uint64_t(c.sh_degree) + c.splats, c.splats, c.kind, c.width,
                                      c.height, c.sh_degree, c.kernel);
     const Output out = run_project(scene);
-    const reference::Picture cpu =
+    const reference::Rendered cpu =
         reference::render(scene.gaussians, scene.camera, scene.options, reference_tiles(rig().config()));
     double worst_mean = 0, worst_shape = 0, worst_opacity = 0, worst_color = 0;
     for (size_t i = 0; i < c.splats; ++i) {
@@ -98,7 +98,7 @@ TEST_P(ProjectPass, TileCountsNeverMissATile) {
     const Scene scene =
         random_scene(950 + c.splats, c.splats, c.kind, c.width, c.height, c.sh_degree, c.kernel);
     const Output out = run_project(scene);
-    const reference::Picture cpu =
+    const reference::Rendered cpu =
         reference::render(scene.gaussians, scene.camera, scene.options, reference_tiles(rig().config()));
     uint64_t exact = 0, actual = 0;
     for (size_t i = 0; i < c.splats; ++i) {

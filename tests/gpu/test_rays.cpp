@@ -57,19 +57,18 @@ TEST_P(RayChain, PictureMatchesTheReference) {
     const bool depth = options.integrator == Integrator::ray;
     Renderer renderer(device(), gaussians, options);
     const Rendering rendering = renderer.render(camera, depth);
-    const reference::Picture cpu = reference::render(gaussians, camera, options);
+    const reference::Rendered cpu = reference::render(gaussians, camera, options);
     const auto excluded = reference::Rays(gaussians, camera, options).at_threshold(2e-4);
     EXPECT_LT(std::count(excluded.begin(), excluded.end(), 1), 0.7 * double(excluded.size()) + 1);
     const double bound = has_needles() ? 1e-4 : 1e-5;
-    const double worst = picture_errors(rendering.color, cpu.blended.color, bound, excluded).worst;
+    const double worst = image_errors(rendering.color, cpu.blended.color, bound, excluded).worst;
     printf("    worst %.2e\n", worst);
     EXPECT_LT(worst, bound);
     if (depth) {
         const double deepest =
             *std::max_element(cpu.blended.depth.values.begin(), cpu.blended.depth.values.end());
         const double depth_bound = 2e-4 * std::max(deepest, 1.0);
-        EXPECT_LT(picture_errors(rendering.depth, cpu.blended.depth, depth_bound, excluded).worst,
-                  depth_bound);
+        EXPECT_LT(image_errors(rendering.depth, cpu.blended.depth, depth_bound, excluded).worst, depth_bound);
     }
     EXPECT_EQ(renderer.skipped_nonfinite(), cpu.skipped_nonfinite);
 }
@@ -216,7 +215,7 @@ TEST(RayChainScenes, WhatARayMeetsInFrontOfTheNearPlaneIsNotDrawn) {
     const Image image = Renderer(device(), disc.gaussians, disc.options).render(disc.camera).color;
     const auto expected = reference::render(disc.gaussians, disc.camera, disc.options);
     const auto excluded = reference::Rays(disc.gaussians, disc.camera, disc.options).at_threshold(2e-4);
-    EXPECT_LT(picture_errors(image, expected.blended.color, 1e-5, excluded).worst, 1e-5);
+    EXPECT_LT(image_errors(image, expected.blended.color, 1e-5, excluded).worst, 1e-5);
     EXPECT_EQ(image.at(0, 8)[0], 0.0f);
     EXPECT_GT(image.at(7, 8)[0], 0.1f);
 }
@@ -247,9 +246,9 @@ TEST(RayChainScenes, ATileOfManySplatsIsDrawn) {
              {&met.means, &met.quaternions, &met.log_scales, &met.opacity_logits, &met.sh})
             array->erase(array->begin(), array->end() - std::ptrdiff_t(array->size() / (count + 20) * 20));
         const auto expected = reference::loss_gradient(met, many.camera, many.target, many.options);
-        EXPECT_LT(picture_errors(image, reference::render(met, many.camera, many.options).blended.color, 1e-5)
-                      .worst,
-                  1e-5);
+        EXPECT_LT(
+            image_errors(image, reference::render(met, many.camera, many.options).blended.color, 1e-5).worst,
+            1e-5);
         EXPECT_NEAR(actual.loss, expected.loss, 1e-6);
         const std::vector<double> means(actual.gradient.means.end() - 60, actual.gradient.means.end());
         EXPECT_TRUE(gradients_agree(means, expected.gradient.means));

@@ -32,7 +32,7 @@ struct Slots {
         const Image target = random_target(31, s.camera.width, s.camera.height);
         cpu = reference::loss_gradient(s.gaussians, s.camera, target, s.options,
                                        reference_tiles(rig().config()));
-        const auto& sorted = cpu.picture.instances.sorted;
+        const auto& sorted = cpu.rendered.instances.sorted;
         const size_t splats = s.gaussians.size();
         tile_counts.resize(splats);
         for (const auto& instance : sorted) ++tile_counts[instance.splat];
@@ -45,7 +45,7 @@ struct Slots {
         slots.resize(std::max<size_t>(sum, 1) * shared::SLOT_FLOATS, std::nanf(""));
         std::vector<uint32_t> next = first;
         for (size_t k = 0; k < sorted.size(); ++k) {
-            const auto slot = slot_of(cpu.blend.instances[k], cpu.picture.projected[sorted[k].splat]);
+            const auto slot = slot_of(cpu.blend.instances[k], cpu.rendered.projected[sorted[k].splat]);
             for (size_t j = 0; j < slot.size(); ++j)
                 slots[size_t(places[next[sorted[k].splat]]) * shared::SLOT_FLOATS + j] = float(slot[j]);
             ++next[sorted[k].splat];
@@ -60,7 +60,7 @@ struct Bench {
 
     explicit Bench(const Slots& s)
         : camera(camera_buffer(s.scene.camera, rig().config())),
-          records("records", pack_records(s.cpu.picture.projected), gpu::Texel::rgba32f),
+          records("records", pack_records(s.cpu.rendered.projected), gpu::Texel::rgba32f),
           slots("slots", s.slots, gpu::Texel::rgba32f),
           tile_counts("tile counts", s.tile_counts),
           first("first instances", s.first),
@@ -606,7 +606,7 @@ TEST(UpdateLimits, StepsEndWhereTheRuleSays) {
             turned_to[k] = quaternions[4 * i + k];
             largest = std::max(largest, std::abs(turned[k]));
         }
-        const double depth = slots.cpu.picture.projected[i].z;
+        const double depth = slots.cpu.rendered.projected[i].z;
         const Limited mean = limited_step(from, to, 3, 0.5 * depth),
                       quaternion = limited_step(turned, turned_to, 4, 0.5 * largest);
         limited += mean.limited + quaternion.limited;

@@ -45,7 +45,7 @@ Grid random_grid(uint64_t seed) {
 }
 
 struct AppearanceCase {
-    Raster picture = to_double(test::random_target(5, 11, 7)), weights{11, 7, 3};  // L = sum weights * image
+    Raster image = to_double(test::random_target(5, 11, 7)), weights{11, 7, 3};  // L = sum weights * image
     AppearanceCase() {
         test::Random random(6);
         for (double& w : weights.values) w = random.normal();
@@ -74,12 +74,12 @@ TEST(ReferenceAppearance, PpispsGradientIsTheDifference) {
     for (const uint64_t seed : {1, 2, 3}) {
         PpispPhoto photo = random_photo(seed);
         PpispCamera camera = random_ppisp_camera(seed + 10);
-        const auto gradient = ppisp_backward(c.picture, photo, camera, c.weights);
-        const auto value = [&] { return c.value_of(ppisp(c.picture, photo, camera)); };
+        const auto gradient = ppisp_backward(c.image, photo, camera, c.weights);
+        const auto value = [&] { return c.value_of(ppisp(c.image, photo, camera)); };
         for (size_t k = 0; k < 9; ++k) EXPECT_NEAR(central(photo[k], value), gradient.photo[k], 1e-5) << k;
         for (size_t k = 0; k < 27; ++k) EXPECT_NEAR(central(camera[k], value), gradient.camera[k], 1e-5) << k;
-        for (size_t i = 0; i < c.picture.values.size(); i += 5)
-            EXPECT_NEAR(central(c.picture.values[i], value), gradient.picture.values[i], 1e-5) << i;
+        for (size_t i = 0; i < c.image.values.size(); i += 5)
+            EXPECT_NEAR(central(c.image.values[i], value), gradient.image.values[i], 1e-5) << i;
     }
 }
 
@@ -88,31 +88,31 @@ TEST(ReferenceAppearance, NeutralPpispChangesNoColour) {
     const auto neutral = ewa::Ppisp::neutral_camera();
     PpispCamera camera;
     std::copy(neutral.begin(), neutral.end(), camera.begin());
-    const Raster out = ppisp(c.picture, {}, camera);
+    const Raster out = ppisp(c.image, {}, camera);
     // The intensity is divided by itself and PPISP_INTENSITY_MIN.
-    for (size_t i = 0; i < out.values.size(); ++i) EXPECT_NEAR(out.values[i], c.picture.values[i], 2e-5);
+    for (size_t i = 0; i < out.values.size(); ++i) EXPECT_NEAR(out.values[i], c.image.values[i], 2e-5);
     PpispPhoto brighter{};
     brighter[0] = -1;
-    const Raster half = ppisp(c.picture, brighter, camera);
-    for (size_t i = 0; i < out.values.size(); ++i) EXPECT_NEAR(half.values[i], c.picture.values[i] / 2, 2e-5);
+    const Raster half = ppisp(c.image, brighter, camera);
+    for (size_t i = 0; i < out.values.size(); ++i) EXPECT_NEAR(half.values[i], c.image.values[i] / 2, 2e-5);
 }
 
 TEST(ReferenceAppearance, TheGridsGradientIsTheDifference) {
     AppearanceCase c;
     Grid grid = random_grid(4);
-    const auto gradient = sliced_backward(c.picture, grid, c.weights);
+    const auto gradient = sliced_backward(c.image, grid, c.weights);
     const auto variation = grid_variation_gradient(grid);
-    const auto value = [&] { return c.value_of(sliced(c.picture, grid)); };
+    const auto value = [&] { return c.value_of(sliced(c.image, grid)); };
     for (size_t k = 0; k < grid.size(); k += 61) {
         EXPECT_NEAR(central(grid[k], value), gradient.grid[k], 1e-6) << k;
         EXPECT_NEAR(central(grid[k], [&] { return grid_variation(grid); }), variation[k], 1e-6) << k;
     }
-    for (size_t i = 0; i < c.picture.values.size(); i += 5)
-        EXPECT_NEAR(central(c.picture.values[i], value), gradient.picture.values[i], 1e-5) << i;
+    for (size_t i = 0; i < c.image.values.size(); i += 5)
+        EXPECT_NEAR(central(c.image.values[i], value), gradient.image.values[i], 1e-5) << i;
 }
 
 TEST(ReferenceAppearance, MatchesTheAppearanceOfAnImage) {
-    const Image picture = test::random_target(8, 13, 9);
+    const Image image = test::random_target(8, 13, 9);
     const auto close = [&](const Image& actual, const Raster& expected) {
         for (int y = 0; y < 9; ++y)
             for (int x = 0; x < 13; ++x)
@@ -123,9 +123,9 @@ TEST(ReferenceAppearance, MatchesTheAppearanceOfAnImage) {
     ewa::Ppisp narrow;
     std::copy(photo.begin(), photo.end(), narrow.photo.begin());
     std::copy(camera.begin(), camera.end(), narrow.camera.begin());
-    close(with_appearance(picture, narrow), ppisp(to_double(picture), photo, camera));
+    close(with_appearance(image, narrow), ppisp(to_double(image), photo, camera));
     const Grid grid = random_grid(3);
-    close(with_appearance(picture, ColorGrid{{grid.begin(), grid.end()}}), sliced(to_double(picture), grid));
+    close(with_appearance(image, ColorGrid{{grid.begin(), grid.end()}}), sliced(to_double(image), grid));
 }
 
 TEST(ReferenceAppearance, ANewViewHasTheMean) {

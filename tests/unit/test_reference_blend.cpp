@@ -71,9 +71,9 @@ TEST(ReferenceBlend, ADensityKeepsItsMass) {
     options.kernel = Footprint::density;
     ReferenceOptions reference;
     reference.smoothing.cut = AlphaCut::none;
-    const Picture picture = render(scene, camera, options, reference);
+    const Rendered rendered = render(scene, camera, options, reference);
     double total = 0;
-    for (double t : picture.blended.transmittance.values) total -= std::log(t);
+    for (double t : rendered.blended.transmittance.values) total -= std::log(t);
     // 2 pi softplus(logit) A, in the camera's units times |J|.
     const double shadows = std::exp(-9.0) + std::exp(-11.0) + std::exp(-10.0);
     const double jacobian = 60 * 60 / 4.0 * std::sqrt(1 + 0.025 * 0.025 + 0.05 * 0.05);
@@ -154,11 +154,11 @@ TEST(ReferenceBlend, RampIsContinuousWithItsSlope) {
 }
 
 /// The picture by the quadratic form with the inverse covariance, every splat at every pixel.
-glm::dvec3 plain_pixel(const Picture& picture, int x, int y, const std::array<float, 3>& background) {
+glm::dvec3 plain_pixel(const Rendered& rendered, int x, int y, const std::array<float, 3>& background) {
     glm::dvec3 color(0);
     double t = 1;
-    for (uint32_t i : picture.order) {
-        const Projected& p = picture.projected[i];
+    for (uint32_t i : rendered.order) {
+        const Projected& p = rendered.projected[i];
         const double dx = p.mean2d.x - (x + 0.5), dy = p.mean2d.y - (y + 0.5);
         const double power = -0.5 * (p.c * dx * dx - 2 * p.b * dx * dy + p.a * dy * dy) / p.det;
         const double alpha = std::min(0.99, p.opacity * std::exp(power));
@@ -177,9 +177,9 @@ TEST(ReferenceBlend, TilesDoNotChangeThePicture) {
         const Camera camera = test::random_camera(seed);
         const Gaussians scene =
             test::random_gaussians(seed, 60, test::SplatKind::mixed, camera, int(seed % 4));
-        const Picture first = render(scene, camera, options);
-        const Picture second = render(scene, camera, options, {8, 8, {}});
-        const Picture third = render(scene, camera, options, {5, 32, {}});
+        const Rendered first = render(scene, camera, options);
+        const Rendered second = render(scene, camera, options, {8, 8, {}});
+        const Rendered third = render(scene, camera, options, {5, 32, {}});
         EXPECT_EQ(first.blended.color.values, second.blended.color.values);
         EXPECT_EQ(first.blended.color.values, third.blended.color.values);
         EXPECT_EQ(first.blended.blended, second.blended.blended);
@@ -216,8 +216,8 @@ TEST(ReferenceInstances, ExactlyTheTilesWithAPixelAtTheFloor) {
 TEST(ReferenceInstances, SortedByTileThenDepthWithBounds) {
     const Camera camera = test::random_camera(2, 45, 37);
     const Gaussians scene = test::random_gaussians(2, 40, test::SplatKind::ordinary, camera, 0);
-    const Picture picture = render(scene, camera, {}, {8, 8, {}});
-    const Instances& lists = picture.instances;
+    const Rendered rendered = render(scene, camera, {}, {8, 8, {}});
+    const Instances& lists = rendered.instances;
     ASSERT_EQ(lists.first_of_tile.size(), lists.grid.count() + 1);
     EXPECT_EQ(lists.first_of_tile.back(), lists.sorted.size());
     EXPECT_EQ(lists.first_of_rank.back(), lists.sorted.size());
@@ -225,8 +225,8 @@ TEST(ReferenceInstances, SortedByTileThenDepthWithBounds) {
         for (size_t k = lists.first_of_tile[tile]; k < lists.first_of_tile[tile + 1]; ++k) {
             EXPECT_EQ(lists.sorted[k].tile, tile);
             if (k > lists.first_of_tile[tile]) {
-                EXPECT_LE(picture.projected[lists.sorted[k - 1].splat].z,
-                          picture.projected[lists.sorted[k].splat].z);
+                EXPECT_LE(rendered.projected[lists.sorted[k - 1].splat].z,
+                          rendered.projected[lists.sorted[k].splat].z);
             }
         }
 }

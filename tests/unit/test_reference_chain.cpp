@@ -19,8 +19,8 @@ struct Chain {
     ReferenceOptions reference;
 
     double loss() const {
-        const Picture picture = render(values, camera, options, reference);
-        return image_loss(picture.blended.color, to_double(target)).loss;
+        const Rendered rendered = render(values, camera, options, reference);
+        return image_loss(rendered.blended.color, to_double(target)).loss;
     }
 };
 
@@ -95,14 +95,14 @@ TEST(ReferenceChain, SkippedSplatsChangeNothing) {
     Gaussians scene = test::random_gaussians(7, 20, test::SplatKind::ordinary, camera, 2);
     const Image target = test::random_target(7, camera.width, camera.height);
     const ReferenceGradient clean = loss_gradient(scene, camera, target, {});
-    EXPECT_EQ(clean.picture.skipped_nonfinite, 0u);
+    EXPECT_EQ(clean.rendered.skipped_nonfinite, 0u);
     scene.resize(22);
     for (float& q : scene.quaternions) q = q == 0 ? 1.0f : q;
     scene.means[3 * 20] = std::nanf("");
     scene.log_scales[3 * 21 + 1] = INFINITY;
     const ReferenceGradient with = loss_gradient(scene, camera, target, {});
-    EXPECT_EQ(with.picture.skipped_nonfinite, 2u);
-    EXPECT_EQ(with.picture.blended.color.values, clean.picture.blended.color.values);
+    EXPECT_EQ(with.rendered.skipped_nonfinite, 2u);
+    EXPECT_EQ(with.rendered.blended.color.values, clean.rendered.blended.color.values);
     for (const auto* array : {&with.gradient.means, &with.gradient.quaternions, &with.gradient.sh})
         for (double g : *array) EXPECT_TRUE(std::isfinite(g));
     EXPECT_EQ(with.gradient.means[60], 0);
@@ -110,7 +110,7 @@ TEST(ReferenceChain, SkippedSplatsChangeNothing) {
     ASSERT_EQ(with.in_view.size(), 22u);
     const TileGrid whole{camera.width, camera.height, camera.width, camera.height};
     for (size_t i = 0; i < 22; ++i)
-        EXPECT_EQ(with.in_view[i] != 0, !covered_tiles(with.picture.projected[i], whole).empty()) << i;
+        EXPECT_EQ(with.in_view[i] != 0, !covered_tiles(with.rendered.projected[i], whole).empty()) << i;
 }
 
 TEST(ReferenceChain, ExtremesStayFinite) {

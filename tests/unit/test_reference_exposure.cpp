@@ -12,16 +12,16 @@ namespace ewa::reference {
 namespace {
 
 struct ExposureCase {
-    Raster picture, weights;  // L = sum weights * exposed picture
+    Raster image, weights;  // L = sum weights * exposed image
     Exposure exposure{};
 
-    ExposureCase() : picture(to_double(test::random_target(5, 7, 4))), weights(7, 4, 3) {
+    ExposureCase() : image(to_double(test::random_target(5, 7, 4))), weights(7, 4, 3) {
         test::Random random(6);
         for (double& w : weights.values) w = random.normal();
         for (double& e : exposure) e = random.normal();
     }
     double value() const {
-        const Raster out = exposed(picture, exposure);
+        const Raster out = exposed(image, exposure);
         double sum = 0;
         for (size_t i = 0; i < out.values.size(); ++i) sum += weights.values[i] * out.values[i];
         return sum;
@@ -31,31 +31,31 @@ struct ExposureCase {
 // The map is linear in either argument: a difference is exact but for rounding.
 TEST(ReferenceExposure, GradientIsTheDifference) {
     ExposureCase c;
-    const ExposureGradient gradient = exposed_backward(c.picture, c.exposure, c.weights);
+    const ExposureGradient gradient = exposed_backward(c.image, c.exposure, c.weights);
     const double before = c.value();
     for (size_t k = 0; k < 12; ++k) {
         ExposureCase moved = c;
         moved.exposure[k] += 1;
         EXPECT_NEAR(moved.value() - before, gradient.exposure[k], 1e-10) << k;
     }
-    for (size_t i = 0; i < c.picture.values.size(); i += 5) {
+    for (size_t i = 0; i < c.image.values.size(); i += 5) {
         ExposureCase moved = c;
-        moved.picture.values[i] += 1;
-        EXPECT_NEAR(moved.value() - before, gradient.picture.values[i], 1e-10) << i;
+        moved.image.values[i] += 1;
+        EXPECT_NEAR(moved.value() - before, gradient.image.values[i], 1e-10) << i;
     }
 }
 
 TEST(ReferenceExposure, MatchesTheExposureOfAnImage) {
-    const Image picture = test::random_target(8, 6, 5);
+    const Image image = test::random_target(8, 6, 5);
     ewa::Exposure e{0.5f, 0.1f, 0, 0.2f, 0, 2, 0, -0.1f, 0.3f, 0, 1, 0};
     Exposure wide;
     std::copy(e.begin(), e.end(), wide.begin());
-    const Image actual = ewa::exposed(picture, e);
-    const Raster expected = exposed(to_double(picture), wide);
+    const Image actual = ewa::exposed(image, e);
+    const Raster expected = exposed(to_double(image), wide);
     for (int y = 0; y < 5; ++y)
         for (int x = 0; x < 6; ++x)
             for (int c = 0; c < 3; ++c) EXPECT_NEAR(actual.at(x, y)[c], expected.at(x, y)[c], 1e-6);
-    EXPECT_EQ(ewa::exposed(picture, kIdentityExposure).pixels, picture.pixels);
+    EXPECT_EQ(ewa::exposed(image, kIdentityExposure).pixels, image.pixels);
 }
 
 }  // namespace

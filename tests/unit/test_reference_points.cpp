@@ -47,23 +47,23 @@ RenderOptions spheres(int nearest = 8) {
     return options;
 }
 
-double red(const reference::Picture& picture, int x, int y) {
-    return picture.blended.color.at(x, y)[0];
+double red(const reference::Rendered& rendered, int x, int y) {
+    return rendered.blended.color.at(x, y)[0];
 }
 
 TEST(ReferencePoints, ASphereFadesWithTheSquareOfTheDistance) {
     Gaussians g;
     add_sphere(g, 4, 0.3, 0.75);
-    const auto picture = reference::render(g, level_camera(), spheres());
+    const auto rendered = reference::render(g, level_camera(), spheres());
     const double rx = 2 * std::sqrt(std::pow(40 * 0.3 / 4, 2) + 0.3),
                  ry = 2 * std::sqrt(std::pow(30 * 0.3 / 4, 2) + 0.3);
     for (const auto& [dx, dy] : {std::pair{0, 0}, {1, 0}, {0, 3}, {-4, 1}, {5, 2}, {7, 0}, {0, 5}}) {
         const double q = std::pow(dx / rx, 2) + std::pow(dy / ry, 2);
         const double alpha = q < 1 ? std::min(kAlphaMax, 1 - q) : 0;
-        EXPECT_NEAR(red(picture, 10 + dx, 8 + dy), 0.75 * alpha, 1e-7) << dx << ' ' << dy;
-        EXPECT_NEAR(*picture.blended.transmittance.at(10 + dx, 8 + dy), 1 - alpha, 1e-7);
+        EXPECT_NEAR(red(rendered, 10 + dx, 8 + dy), 0.75 * alpha, 1e-7) << dx << ' ' << dy;
+        EXPECT_NEAR(*rendered.blended.transmittance.at(10 + dx, 8 + dy), 1 - alpha, 1e-7);
     }
-    EXPECT_NEAR(*picture.blended.depth.at(10, 8), 4, 1e-6);
+    EXPECT_NEAR(*rendered.blended.depth.at(10, 8), 4, 1e-6);
 }
 
 TEST(ReferencePoints, OpacityRotationAndTheRatioOfTheScalesDoNotCount) {
@@ -86,7 +86,7 @@ TEST(ReferencePoints, APixelBlendsTheNearestAndNoMore) {
     // Beside the axis, so that none is opaque at the pixel. The farthest is stored first.
     for (int k = 3; k >= 0; --k) add_sphere(g, 4 + 0.1 * k, 0.3, greys[k], 0.3);
     for (int nearest = 1; nearest <= 5; ++nearest) {
-        const auto picture = reference::render(g, level_camera(), spheres(nearest));
+        const auto rendered = reference::render(g, level_camera(), spheres(nearest));
         double color = 0, left = 1;
         for (int k = 0; k < std::min(nearest, 4); ++k) {
             const double z = 4 + 0.1 * k, dx = 40 * 0.3 / z;
@@ -94,8 +94,8 @@ TEST(ReferencePoints, APixelBlendsTheNearestAndNoMore) {
             color += greys[k] * alpha * left;
             left *= 1 - alpha;
         }
-        EXPECT_NEAR(red(picture, 10, 8), color, 1e-6) << nearest;
-        EXPECT_EQ(picture.blended.blended[8 * 21 + 10], uint32_t(std::min(nearest, 4)));
+        EXPECT_NEAR(red(rendered, 10, 8), color, 1e-6) << nearest;
+        EXPECT_EQ(rendered.blended.blended[8 * 21 + 10], uint32_t(std::min(nearest, 4)));
     }
 }
 
@@ -104,9 +104,9 @@ TEST(ReferencePoints, ATinySphereIsAPixelWide) {
         for (const double shift : {0.0, 0.25, 0.5}) {  // px
             Gaussians g;
             add_sphere(g, 4, scale, 0.75, shift * 4 / 40);
-            const auto picture = reference::render(g, level_camera(), spheres());
+            const auto rendered = reference::render(g, level_camera(), spheres());
             double seen = 0;
-            for (const double t : picture.blended.transmittance.values) seen += 1 - t;
+            for (const double t : rendered.blended.transmittance.values) seen += 1 - t;
             EXPECT_GT(seen, 0.9) << scale << ' ' << shift;
             EXPECT_LT(seen, 2.1) << scale << ' ' << shift;
         }
@@ -123,9 +123,9 @@ TEST(ReferencePoints, InvisibleAndDamagedSplatsAreLeftOut) {
     add_sphere(g, 4, 0.3, 0.9);
     g.quaternions[16] = 0;
     add_sphere(g, 4, 1e30, 0.9);
-    const auto picture = reference::render(g, level_camera(), spheres());
-    EXPECT_EQ(picture.order, std::vector<uint32_t>{0});
-    EXPECT_EQ(picture.skipped_nonfinite, 3u);
+    const auto rendered = reference::render(g, level_camera(), spheres());
+    EXPECT_EQ(rendered.order, std::vector<uint32_t>{0});
+    EXPECT_EQ(rendered.skipped_nonfinite, 3u);
 }
 
 struct Stiff {

@@ -26,7 +26,7 @@ struct RayScene {
 
     double loss() const {
         const Rays rays(values, camera, options, smoothing, fixed.get());
-        return image_loss(rays.picture().color, to_double(target)).loss;
+        return image_loss(rays.blended().color, to_double(target)).loss;
     }
 };
 
@@ -69,12 +69,12 @@ double march_error(const Gaussians& gaussians, const Camera& camera, RenderOptio
     options.integrator = Integrator::march;
     options.samples = samples;
     const Volume volume(gaussians, camera, options);
-    const Blended picture = Rays(gaussians, camera, options).picture();
+    const Blended rendered = Rays(gaussians, camera, options).blended();
     double sum = 0;
     for (int y = 0; y < camera.height; ++y)
         for (int x = 0; x < camera.width; ++x) {
             const glm::dvec3 exact = volume.exact(x + 0.5, y + 0.5);
-            for (int k = 0; k < 3; ++k) sum += std::pow(picture.color.at(x, y)[k] - exact[k], 2);
+            for (int k = 0; k < 3; ++k) sum += std::pow(rendered.color.at(x, y)[k] - exact[k], 2);
         }
     return std::sqrt(sum / (3.0 * camera.width * camera.height));
 }

@@ -157,7 +157,7 @@ TEST(Volume, WithAllApproximationsItIsSplatting) {
         if (kernel == Footprint::density)
             for (double& logit : values.opacity_logits) logit -= 1;
         const Volume volume(values, camera(), options, all);
-        const Picture splatted = render(values, camera(), options);
+        const Rendered splatted = render(values, camera(), options);
         for (int y = 0; y < 32; y += 3)
             for (int x = 0; x < 32; x += 3) {
                 const double* expected = splatted.blended.color.at(x, y);

@@ -23,9 +23,9 @@
 namespace ewa::bench {
 namespace {
 
-using reference::Picture;
 using reference::Raster;
 using reference::ReferenceGradient;
+using reference::Rendered;
 using reference::Values;
 
 constexpr double kUnit = 0x1p-24;       // half a float32 step, relative
@@ -63,9 +63,9 @@ Values perturbed(const Values& values, const glm::dvec3& eye, uint32_t draw) {
 }
 
 /// Pixels where a decision of the model (1/255, 0.99, the stop) is within kAtThreshold of its threshold.
-std::vector<uint8_t> pixels_at_threshold(const Picture& picture) {
-    const auto whiteners = reference::whiteners_of(picture.projected);
-    const reference::Instances& lists = picture.instances;
+std::vector<uint8_t> pixels_at_threshold(const Rendered& rendered) {
+    const auto whiteners = reference::whiteners_of(rendered.projected);
+    const reference::Instances& lists = rendered.instances;
     const int width = lists.grid.image_width, height = lists.grid.image_height;
     std::vector<uint8_t> at(size_t(width) * size_t(height));
     const auto near = [](double value, double threshold) {
@@ -78,7 +78,7 @@ std::vector<uint8_t> pixels_at_threshold(const Picture& picture) {
             bool hangs = false;
             for (size_t k = lists.first_of_tile[tile]; k < lists.first_of_tile[tile + 1]; ++k) {
                 const uint32_t splat = lists.sorted[k].splat;
-                const reference::Projected& p = picture.projected[splat];
+                const reference::Projected& p = rendered.projected[splat];
                 const double sampled =
                     reference::sample(p, whiteners[splat], reference::pixel_centre(x, y)).raw;
                 const double raw = p.density ? -std::expm1(-sampled) : sampled;
@@ -113,8 +113,8 @@ struct Expected {
 
 /// The largest error of a pixel that is not excluded. color: an Image or a Raster.
 template <class Pixels>
-double picture_error(const Expected& expected, const Pixels& color) {
-    const Raster& right = expected.reference.picture.blended.color;
+double image_error(const Expected& expected, const Pixels& color) {
+    const Raster& right = expected.reference.rendered.blended.color;
     double largest = 0;
     for (int y = 0; y < right.height; ++y)
         for (int x = 0; x < right.width; ++x)
@@ -135,7 +135,7 @@ template <class Pixels, class Gradient>
 std::vector<Comparison> errors_of(const Expected& expected, const Pixels& color, double loss,
                                   const Gradient& gradient, const CameraMotion& camera) {
     const double right = expected.reference.loss;
-    std::vector<Comparison> errors{{"picture", picture_error(expected, color)},
+    std::vector<Comparison> errors{{"picture", image_error(expected, color)},
                                    {"loss", std::abs(loss - right) / std::max(1.0, right)}};
     for_each_group(gradient, expected.reference.gradient,
                    [&](const std::string& name, const auto& a, const auto& b) {
@@ -183,7 +183,7 @@ CameraTerms least_camera_terms(const StabilityCase& one, const ReferenceGradient
     const Values values = one.gaussians;
     CameraTerms least;
     for (size_t i = 0; i < values.size(); ++i) {
-        if (!gradient.picture.projected[i].visible) continue;
+        if (!gradient.rendered.projected[i].visible) continue;
         const reference::Splat splat = reference::read_splat(values, i);
         CameraMotion term;
         project_backward(splat, one.camera, one.options, gradient.blend.splats[i], &term);
@@ -203,16 +203,16 @@ bool all_finite(const std::vector<float>& values) {
 /// The error of the reference image if each determinant is a c - b^2 in float32, unlike in the pipeline.
 double plain_determinant_error(const Expected& expected, const RenderOptions& options) {
     if (options.points || options.integrator != Integrator::splat) return 0;  // no 2D determinant
-    const Picture& picture = expected.reference.picture;
-    std::vector<reference::Projected> plain = picture.projected;
+    const Rendered& rendered = expected.reference.rendered;
+    std::vector<reference::Projected> plain = rendered.projected;
     for (reference::Projected& p : plain) {
         const float a = float(p.a), b = float(p.b), c = float(p.c);
         p.det = double(a * c - b * b);
         if (!(p.det > 0)) p.visible = false;  // as renderers do that compute it this way
     }
     const auto order = reference::depth_order(plain);
-    const auto lists = reference::make_instances(plain, order, picture.instances.grid);
-    return picture_error(expected, reference::blend(plain, lists, options.background).color);
+    const auto lists = reference::make_instances(plain, order, rendered.instances.grid);
+    return image_error(expected, reference::blend(plain, lists, options.background).color);
 }
 
 Expected expected_of(const StabilityCase& one, const Image& target) {
@@ -220,10 +220,10 @@ Expected expected_of(const StabilityCase& one, const Image& target) {
     const bool on_rays = one.options.integrator != Integrator::splat;
     expected.excluded =
         on_rays ? reference::Rays(one.gaussians, one.camera, one.options).at_threshold(kAtThreshold)
-                : pixels_at_threshold(expected.reference.picture);
+                : pixels_at_threshold(expected.reference.rendered);
     expected.moves_camera = !on_rays && !one.options.points;
     if (expected.moves_camera) expected.least_camera = least_camera_terms(one, expected.reference);
-    for (const double v : expected.reference.picture.blended.color.values)
+    for (const double v : expected.reference.rendered.blended.color.values)
         expected.scale = std::max(expected.scale, std::abs(v));
     expected.least_quaternions = least_quaternion_norm(one, expected.reference.gradient);
     return expected;
@@ -237,7 +237,7 @@ std::vector<double> conditions_of(const StabilityCase& one, const Image& target,
         const ReferenceGradient moved = reference::loss_gradient(
             perturbed(one.gaussians, one.camera.position(), draw), one.camera, target, one.options);
         const auto errors =
-            errors_of(expected, moved.picture.blended.color, moved.loss, moved.gradient, moved.camera);
+            errors_of(expected, moved.rendered.blended.color, moved.loss, moved.gradient, moved.camera);
         largest.resize(errors.size());
         for (size_t i = 0; i < errors.size(); ++i)
             largest[i] = std::max(largest[i], errors[i].error / kPerturbation);
@@ -276,11 +276,11 @@ std::string stability_header(size_t cases) {
 }
 
 std::string stability_line(const StabilityResult& r) {
-    const Comparison &picture = r.comparisons.front(), &worst = tightest(r);
+    const Comparison &image = r.comparisons.front(), &worst = tightest(r);
     std::string line =
         text_of("%-24s %6u %6u %5u | %8.1e %8.1e %9.1e %9.1e | %-14s %8.1e %8.1e %9.1e", r.name.c_str(),
-                r.splats, r.drawn, r.skipped, picture.error, picture.bound, picture.condition,
-                r.plain_determinant, worst.of.c_str(), worst.error, worst.bound, worst.condition);
+                r.splats, r.drawn, r.skipped, image.error, image.bound, image.condition, r.plain_determinant,
+                worst.of.c_str(), worst.error, worst.bound, worst.condition);
     line += " | ";
     line += r.verdict();
     return line;
@@ -393,10 +393,10 @@ StabilityResult compare_with_reference(const std::shared_ptr<gpu::Device>& devic
     result.name = one.name;
     result.what = one.what;
     result.splats = uint32_t(one.gaussians.size());
-    const auto& projected = expected.reference.picture.projected;
+    const auto& projected = expected.reference.rendered.projected;
     result.drawn = uint32_t(
         std::count_if(projected.begin(), projected.end(), [](const auto& each) { return each.visible; }));
-    result.skipped_by_reference = expected.reference.picture.skipped_nonfinite;
+    result.skipped_by_reference = expected.reference.rendered.skipped_nonfinite;
     result.pixels = excluded.size();
     result.pixels_at_threshold = uint64_t(std::count(excluded.begin(), excluded.end(), 1));
     result.plain_determinant = plain_determinant_error(expected, one.options);
