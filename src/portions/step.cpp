@@ -66,23 +66,23 @@ shared::Counts run(const StepParts& parts, gpu::Recording& recording) {
 }
 
 /// Parts of the loss of a view.
-struct PictureLoss {
+struct PartLoss {
     double l1 = 0, ssim = 0, squared = 0;
 };
 
 constexpr size_t kLossWords = 3;
 
-PictureLoss loss_from(std::span<const uint64_t, kLossWords> words) {
+PartLoss loss_from(std::span<const uint64_t, kLossWords> words) {
     return {std::bit_cast<double>(words[0]), std::bit_cast<double>(words[1]),
             std::bit_cast<double>(words[2])};
 }
 
 /// losses: of the bands of each view.
-void add_losses(std::span<const PictureLoss> losses, size_t bands, StepSums& sums) {
+void add_losses(std::span<const PartLoss> losses, size_t bands, StepSums& sums) {
     const size_t views = losses.size() / bands;
     for (size_t first = 0; first < losses.size(); first += bands) {
-        PictureLoss view = losses[first];
-        for (const PictureLoss& band : losses.subspan(first + 1, bands - 1)) {
+        PartLoss view = losses[first];
+        for (const PartLoss& band : losses.subspan(first + 1, bands - 1)) {
             view.l1 += band.l1;
             view.ssim += band.ssim;
             view.squared += band.squared;
@@ -105,7 +105,7 @@ struct Step::Views {
 };
 
 /// A view, or a band of it, which one rank draws.
-struct Step::Picture {
+struct Step::ViewPart {
     size_t number;  // among those of all views: that of its list
     size_t view;
     const StepView& of;
@@ -113,12 +113,12 @@ struct Step::Picture {
     FrameRequest request;  // without splats and instances
 };
 
-/// Pictures that are drawn at one time: at most one by each rank. Picture `first` + k is drawn by rank k.
+/// Parts of views that are drawn at one time: at most one by each rank. Part `first` + k is drawn by rank k.
 struct Step::Turn {
-    size_t first, pictures;
-    std::vector<uint64_t> listed{};  // by this rank, of each picture
-    std::vector<uint64_t> of_own{};  // listed by each rank, of the picture that this rank draws
-    bool draws(int rank) const { return size_t(rank) < pictures; }
+    size_t first, view_parts;
+    std::vector<uint64_t> listed{};  // by this rank, of each part
+    std::vector<uint64_t> of_own{};  // listed by each rank, of the part that this rank draws
+    bool draws(int rank) const { return size_t(rank) < view_parts; }
     uint64_t own() const { return sum_of(of_own); }
 };
 
@@ -146,37 +146,37 @@ void Step::reserve(const StepParts& parts, FrameRequest request, uint64_t splats
     parts.frame.reserve(parts.cache.device(), parts.cache.config(), request);
 }
 
-Step::Picture Step::picture_of(const StepParts& parts, const Views& of, size_t number) {
+Step::ViewPart Step::part_of(const StepParts& parts, const Views& of, size_t number) {
     const size_t view = number / of.bands;
-    Picture picture{number, view, of.views[view], of.views[view].inputs, of.views[view].request};
-    if (of.bands == 1) return picture;
-    picture.inputs.band =
-        band_of(parts.cache.config(), picture.request.height, of.bands, uint32_t(number % of.bands));
-    picture.request.height = picture.inputs.band.rows;
-    return picture;
+    ViewPart view_part{number, view, of.views[view], of.views[view].inputs, of.views[view].request};
+    if (of.bands == 1) return view_part;
+    view_part.inputs.band =
+        band_of(parts.cache.config(), view_part.request.height, of.bands, uint32_t(number % of.bands));
+    view_part.request.height = view_part.inputs.band.rows;
+    return view_part;
 }
 
-/// Lists what some pictures show of this rank's portions, so that each is needed once.
-void Step::list(const StepParts& parts, const Views& of, size_t first, size_t pictures) {
+/// Lists what some parts of views show of this rank's portions, so that each is needed once.
+void Step::list(const StepParts& parts, const Views& of, size_t first, size_t view_parts) {
     gpu::Device& device = parts.cache.device();
     const bool streamed = portions_.streamed();
     portions_.visit(Portions::Need::params, [&](int index, const Model& model) {
         const size_t portion = size_t(index);
         buffers_.places = portions_.take_places();
         buffers_.reserve(device, model.splats, uint32_t(of.views.size()), of.bands,
-                         uint32_t(streamed ? model.splats : pictures * model.splats));
+                         uint32_t(streamed ? model.splats : view_parts * model.splats));
         uint64_t places = 0, records = 0;
         if (first > 0) places = seen_[first - 1].places[portion] + seen_[first - 1].listed[portion];
         size_t projected = of.views.size();
-        for (size_t number = first; number < first + pictures; ++number) {
-            const Picture picture = picture_of(parts, of, number);
-            const bool again = picture.view == projected;
-            if (!again) reserve(parts, picture.request, model.splats);
-            projected = picture.view;
+        for (size_t number = first; number < first + view_parts; ++number) {
+            const ViewPart view_part = part_of(parts, of, number);
+            const bool again = view_part.view == projected;
+            if (!again) reserve(parts, view_part.request, model.splats);
+            projected = view_part.view;
             gpu::Recording recording(device.limits());
-            const FramePasses on{{recording, parts.cache}, parts.plan, parts.frame, picture.inputs};
+            const FramePasses on{{recording, parts.cache}, parts.plan, parts.frame, view_part.inputs};
             on.list(model, buffers_,
-                    {.view = uint32_t(picture.view),
+                    {.view = uint32_t(view_part.view),
                      .list = uint32_t(number),
                      .first_place = uint32_t(places),
                      .first_record = uint32_t(records)},
@@ -196,42 +196,43 @@ void Step::list(const StepParts& parts, const Views& of, size_t first, size_t pi
                 records += counts.scan_total;
             }
         }
-        // A picture without a splat draws one that is not visible, which has a place behind the others.
+        // A part without a splat draws one that is not visible, which has a place behind the others.
         if (!streamed) buffers_.reserve_sums(device, parts.executor, parts.plan, places + 1);
         portions_.keep_places(std::move(buffers_.places));
     });
-    if (streamed) buffers_.visible = {};  // the picture takes its memory
+    if (streamed) buffers_.visible = {};  // the part that is drawn takes its memory
 }
 
-/// What each rank lists of some pictures.
-std::vector<uint64_t> Step::tell(size_t first, size_t pictures, StepSums& sums) {
-    std::vector<uint64_t> told;
-    for (size_t k = 0; k < pictures; ++k) told.push_back(sum_of(seen_[first + k].listed));
-    told.push_back(seen_[first + pictures - 1].skipped);
-    std::vector<uint64_t> all = gather(told);
+/// How many splats each rank lists of some parts of views.
+std::vector<uint64_t> Step::gather_counts(size_t first, size_t view_parts, StepSums& sums) {
+    std::vector<uint64_t> counts;
+    for (size_t k = 0; k < view_parts; ++k) counts.push_back(sum_of(seen_[first + k].listed));
+    counts.push_back(seen_[first + view_parts - 1].skipped);
+    std::vector<uint64_t> all = gather(counts);
     sums.skipped_nonfinite = 0;
-    for (size_t at = pictures; at < all.size(); at += told.size()) sums.skipped_nonfinite += all[at];
+    for (size_t at = view_parts; at < all.size(); at += counts.size()) sums.skipped_nonfinite += all[at];
     return all;
 }
 
-/// listed: of pictures from `first` on, as tell() returns it. begin: the first picture of the turn.
-Step::Turn Step::turn_of(const std::vector<uint64_t>& listed, size_t first, size_t pictures,
+/// listed: of parts from `first` on, as gather_counts() returns it. begin: the first part of the turn.
+Step::Turn Step::turn_of(const std::vector<uint64_t>& listed, size_t first, size_t view_parts,
                          size_t begin) const {
     const size_t ranks = size_t(portions_.ranks().size()), own = size_t(portions_.ranks().rank());
-    Turn turn{begin, std::min(ranks, first + pictures - begin)};
-    for (size_t k = 0; k < turn.pictures; ++k) turn.listed.push_back(sum_of(seen_[begin + k].listed));
+    Turn turn{begin, std::min(ranks, first + view_parts - begin)};
+    for (size_t k = 0; k < turn.view_parts; ++k) turn.listed.push_back(sum_of(seen_[begin + k].listed));
     for (size_t rank = 0; rank < ranks; ++rank)
-        turn.of_own.push_back(turn.draws(int(own)) ? listed[rank * (pictures + 1) + begin - first + own] : 0);
+        turn.of_own.push_back(turn.draws(int(own)) ? listed[rank * (view_parts + 1) + begin - first + own]
+                                                   : 0);
     return turn;
 }
 
-/// Afterwards each rank has the list of the picture that it draws.
+/// Afterwards each rank has the list of the part that it draws.
 void Step::send(const StepParts& parts, const Views& of, const Turn& turn) {
     if (portions_.alone()) return;
     const size_t ranks = size_t(portions_.ranks().size()), own = size_t(portions_.ranks().rank());
     if (turn.draws(int(own))) {
-        reserve(parts, picture_of(parts, of, turn.first + own).request, turn.own());
-        make_room(parts.cache.device(), own_sums_, "sums of a picture",
+        reserve(parts, part_of(parts, of, turn.first + own).request, turn.own());
+        make_room(parts.cache.device(), own_sums_, "sums of a view's part",
                   ViewBuffers::sum_bytes(parts.plan, turn.own() + 1));
     }
     const bool streamed = portions_.streamed();
@@ -243,13 +244,13 @@ void Step::send(const StepParts& parts, const Views& of, const Turn& turn) {
     std::vector<std::span<std::byte>> in(ranks);
     uint64_t from = 0, to = 0;
     for (size_t rank = 0; rank < ranks; ++rank) {
-        if (rank < turn.pictures && streamed) {
+        if (rank < turn.view_parts && streamed) {
             for (std::vector<std::byte>& records : seen_[turn.first + rank].records) {
                 on_host[rank].insert(on_host[rank].end(), records.begin(), records.end());
                 records = {};
             }
             out[rank] = on_host[rank];
-        } else if (rank < turn.pictures) {
+        } else if (rank < turn.view_parts) {
             out[rank] = on_device.part(from, turn.listed[rank] * kRecordBytes);
         }
         in[rank] = list.part(to, turn.of_own[rank] * kRecordBytes);
@@ -277,7 +278,7 @@ void Step::return_sums(const StepParts& parts, const Turn& turn) {
     for (size_t rank = 0; rank < ranks; ++rank) {
         out[rank] = drawn.part(from, turn.of_own[rank] * splat);
         from += out[rank].size();
-        if (rank >= turn.pictures) continue;
+        if (rank >= turn.view_parts) continue;
         std::vector<std::byte>& waiting = seen_[turn.first + rank].sums;
         if (streamed) waiting.resize(turn.listed[rank] * splat);
         in[rank] = streamed ? std::span(waiting) : sums.part(to, turn.listed[rank] * splat);
@@ -289,25 +290,25 @@ void Step::return_sums(const StepParts& parts, const Turn& turn) {
     });
 }
 
-shared::Counts Step::draw_own(const StepParts& parts, const Picture& picture, const Turn& turn) {
+shared::Counts Step::draw_own(const StepParts& parts, const ViewPart& view_part, const Turn& turn) {
     gpu::Device& device = parts.cache.device();
     const bool alone = portions_.alone();
     const uint64_t listed = turn.own();
     const uint32_t splats = uint32_t(std::max<uint64_t>(listed, 1));
     const gpu::Buffer& sums = alone ? buffers_.sums : own_sums_;
     for (;;) {
-        reserve(parts, picture.request, listed);
+        reserve(parts, view_part.request, listed);
         gpu::Recording recording(device.limits());
         if (listed == 0)
             recording.fill(parts.frame.records, 0, 0, kRecordBytes);
         else if (alone)
             recording.copy(buffers_.visible, 0, parts.frame.records, 0, listed * kRecordBytes);
-        const FramePasses on{{recording, parts.cache}, parts.plan, parts.frame, picture.inputs};
+        const FramePasses on{{recording, parts.cache}, parts.plan, parts.frame, view_part.inputs};
         const Sorted sorted = on.draw_list(splats);
-        if (picture.of.record_loss) {
-            picture.of.record_loss(on);
+        if (view_part.of.record_loss) {
+            view_part.of.record_loss(on);
             on.list_backward(splats, sorted, sums,
-                             alone ? uint32_t(seen_[picture.number].places.front()) : 0);
+                             alone ? uint32_t(seen_[view_part.number].places.front()) : 0);
         }
         const shared::Counts counts = run(parts, recording);
         if (counts.instances <= parts.frame.instance_capacity) return counts;
@@ -315,15 +316,15 @@ shared::Counts Step::draw_own(const StepParts& parts, const Picture& picture, co
     }
 }
 
-bool Step::draw_pictures(const StepParts& parts, std::span<const StepView> views) {
+bool Step::draw_views(const StepParts& parts, std::span<const StepView> views) {
     const Views of{views, 1};
     const int own = portions_.ranks().rank();
     StepSums sums;
     seen_.assign(views.size(), Seen(size_t(portions_.count())));
     list(parts, of, 0, views.size());
-    const Turn turn = turn_of(tell(0, views.size(), sums), 0, views.size(), 0);
+    const Turn turn = turn_of(gather_counts(0, views.size(), sums), 0, views.size(), 0);
     send(parts, of, turn);
-    if (turn.draws(own)) draw_own(parts, picture_of(parts, of, size_t(own)), turn);
+    if (turn.draws(own)) draw_own(parts, part_of(parts, of, size_t(own)), turn);
     return turn.draws(own);
 }
 
@@ -331,34 +332,34 @@ StepSums Step::draw(const StepParts& parts, std::span<const StepView> views) {
     StepSums sums;
     const Views of{views, bands_};
     const size_t ranks = size_t(portions_.ranks().size()), own = size_t(portions_.ranks().rank());
-    std::vector<PictureLoss> losses(views.size() * bands_);
+    std::vector<PartLoss> losses(views.size() * bands_);
     seen_.assign(losses.size(), Seen(size_t(portions_.count())));
-    // Lists on the device are drawn at once. In host memory those of all pictures wait.
+    // Lists on the device are drawn at once. In host memory those of all parts wait.
     const size_t round = portions_.streamed() ? losses.size() : ranks;
     for (size_t first = 0; first < losses.size(); first += round) {
-        const size_t pictures = std::min(round, losses.size() - first);
-        list(parts, of, first, pictures);
-        const std::vector<uint64_t> listed = tell(first, pictures, sums);
-        for (size_t begin = first; begin < first + pictures; begin += ranks) {
-            const Turn turn = turn_of(listed, first, pictures, begin);
+        const size_t view_parts = std::min(round, losses.size() - first);
+        list(parts, of, first, view_parts);
+        const std::vector<uint64_t> listed = gather_counts(first, view_parts, sums);
+        for (size_t begin = first; begin < first + view_parts; begin += ranks) {
+            const Turn turn = turn_of(listed, first, view_parts, begin);
             send(parts, of, turn);
-            std::vector<uint64_t> told(kLossWords + parts.learned);
+            std::vector<uint64_t> sent(kLossWords + parts.learned);
             if (turn.draws(int(own))) {
-                const Picture picture = picture_of(parts, of, begin + own);
-                const shared::Counts counts = draw_own(parts, picture, turn);
-                const PictureLoss loss{counts.l1, counts.ssim, double(counts.squared) / picture.of.weight()};
-                std::ranges::copy(std::bit_cast<std::array<uint64_t, kLossWords>>(loss), told.begin());
+                const ViewPart view_part = part_of(parts, of, begin + own);
+                const shared::Counts counts = draw_own(parts, view_part, turn);
+                const PartLoss loss{counts.l1, counts.ssim, double(counts.squared) / view_part.of.weight()};
+                std::ranges::copy(std::bit_cast<std::array<uint64_t, kLossWords>>(loss), sent.begin());
                 if (parts.learned > 0 && ranks > 1)
-                    std::ranges::copy(picture.of.learned(), told.begin() + kLossWords);
+                    std::ranges::copy(view_part.of.learned(), sent.begin() + kLossWords);
             }
             // Waits for the slowest of them.
-            const std::vector<uint64_t> all = gather(told);
+            const std::vector<uint64_t> all = gather(sent);
             return_sums(parts, turn);
-            for (size_t k = 0; k < turn.pictures; ++k) {
-                const auto of_picture = std::span(all).subspan(told.size() * k, told.size());
-                losses[begin + k] = loss_from(of_picture.first<kLossWords>());
+            for (size_t k = 0; k < turn.view_parts; ++k) {
+                const auto of_part = std::span(all).subspan(sent.size() * k, sent.size());
+                losses[begin + k] = loss_from(of_part.first<kLossWords>());
                 if (parts.learned > 0 && k != own)
-                    views[(begin + k) / bands_].learn(of_picture.subspan(kLossWords));
+                    views[(begin + k) / bands_].learn(of_part.subspan(kLossWords));
             }
         }
     }
@@ -371,7 +372,7 @@ void Step::upload_sums(const StepParts& parts, size_t portion) {
     const uint64_t splat = ViewBuffers::sum_bytes(parts.plan, 1);
     const Seen& last = seen_.back();
     buffers_.sums = std::move(own_sums_);
-    make_room(parts.cache.device(), buffers_.sums, "sums of a picture",
+    make_room(parts.cache.device(), buffers_.sums, "sums of a view's part",
               (last.places[portion] + last.listed[portion] + 1) * splat);
     for (const Seen& seen : seen_) {
         const uint64_t from = sum_of(std::span(seen.listed).first(portion)) * splat,

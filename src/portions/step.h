@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// A training step over portions of the splats. Each portion lists what the step's pictures show of it. A picture is drawn from
-// the lists of all portions, by one rank, and the sums of its gradients go back to the portions. Then each portion is updated.
-// A picture is a view, or a band of tile rows of one.
+// A training step over portions of the splats. Each portion lists what the step's views show of it. A part of a view is drawn
+// from the lists of all portions, by one rank, and the sums of its gradients go back to the portions. Then each portion is
+// updated. A part of a view is a band of its tile rows, or the whole view.
 //
-// Between a list and a picture, and back, data stay on the device, wait in host memory, or go to another rank. Which of these
+// Between a list and a part of a view, and back, data stay on the device, wait in host memory, or go to another rank. Which of these
 // follows from the portions alone.
 #pragma once
 #include <cstddef>
@@ -17,12 +17,12 @@
 
 namespace ewa::portions {
 
-/// A view of a step, and how a rank that draws a picture of it computes its loss.
+/// A view of a step, and how a rank that draws a part of it computes its loss.
 struct StepView {
     pipeline::FrameInputs inputs;    // without a band
     pipeline::FrameRequest request;  // of the whole view, without splats and instances
-    /// Records the loss after the picture. Its inputs have the picture's band. Called once for every attempt to draw.
-    /// Empty: the view is only a picture.
+    /// Records the loss after a part is drawn. Its inputs have the part's band. Called once for every attempt to draw.
+    /// Empty: the view is only drawn.
     std::function<void(const pipeline::FramePasses&)> record_loss;
     /// Weight of the view's pixels in its mean squared error. Called after record_loss.
     std::function<double()> weight;
@@ -66,14 +66,14 @@ class Step {
                 const std::function<void(const passes::Recorder&, const pipeline::Model&)>& more,
                 StepSums& sums);
 
-    /// Draws pictures of whole views: view k by rank k. There are at most as many views as ranks. Returns whether this rank has drawn one,
+    /// Draws whole views without a loss: view k by rank k. There are at most as many views as ranks. Returns whether this rank has drawn one,
     /// which the frame then holds.
-    bool draw_pictures(const StepParts& parts, std::span<const StepView> views);
+    bool draw_views(const StepParts& parts, std::span<const StepView> views);
 
     const Traffic& traffic() const { return traffic_; }
 
   private:
-    /// What this rank's portions list of a picture.
+    /// What this rank's portions list of a part of a view.
     struct Seen {
         std::vector<uint64_t> listed, places;  // of each portion: splats, and the place of the first one
         std::vector<std::vector<std::byte>> records;  // of portions that leave the device
@@ -81,26 +81,26 @@ class Step {
         uint64_t skipped = 0;                         // splats
         explicit Seen(size_t portions) : listed(portions), places(portions), records(portions) {}
     };
-    struct Picture;
+    struct ViewPart;
     struct Turn;
     struct Views;
-    static Picture picture_of(const StepParts& parts, const Views& of, size_t number);
+    static ViewPart part_of(const StepParts& parts, const Views& of, size_t number);
     std::vector<uint64_t> gather(std::span<const uint64_t> own);
     void exchange(std::span<const std::span<const std::byte>> out, std::span<const std::span<std::byte>> in);
     void reserve(const StepParts& parts, pipeline::FrameRequest request, uint64_t splats);
-    void list(const StepParts& parts, const Views& of, size_t first, size_t pictures);
-    Turn turn_of(const std::vector<uint64_t>& listed, size_t first, size_t pictures, size_t begin) const;
-    std::vector<uint64_t> tell(size_t first, size_t pictures, StepSums& sums);
+    void list(const StepParts& parts, const Views& of, size_t first, size_t view_parts);
+    Turn turn_of(const std::vector<uint64_t>& listed, size_t first, size_t view_parts, size_t begin) const;
+    std::vector<uint64_t> gather_counts(size_t first, size_t view_parts, StepSums& sums);
     void send(const StepParts& parts, const Views& of, const Turn& turn);
-    shared::Counts draw_own(const StepParts& parts, const Picture& picture, const Turn& turn);
+    shared::Counts draw_own(const StepParts& parts, const ViewPart& view_part, const Turn& turn);
     void return_sums(const StepParts& parts, const Turn& turn);
     void upload_sums(const StepParts& parts, size_t portion);
 
     Portions& portions_;
     uint32_t bands_;
     pipeline::ViewBuffers buffers_;  // of a portion
-    gpu::Buffer own_sums_;           // of the picture that this rank draws, unless all is in one portion
-    std::vector<Seen> seen_;         // by picture
+    gpu::Buffer own_sums_;           // of the part that this rank draws, unless all is in one portion
+    std::vector<Seen> seen_;         // by part of a view
     Traffic traffic_;
 };
 

@@ -264,7 +264,7 @@ Image Training::render_own(std::span<const Camera> cameras) {
     }
     portions::StepParts parts = step_parts();
     parts.submitted = [] {};
-    if (!several_.draw_pictures(parts, views)) return {};
+    if (!several_.draw_views(parts, views)) return {};
     return ImageReader(tools_.frame).image(shared::PLANE_R, 3);
 }
 
