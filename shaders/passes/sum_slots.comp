@@ -1,7 +1,7 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
 // Adds the gradient slots of each splat of a view's list.
-// One invocation owns entry i of the list. It reads its slots in the order of its tiles, and writes their sums at its place
+// One invocation owns entry i of the list. It reads its slots in the order of its tiles, and writes their sums at its list index
 // among the lists of all views. SPEC_MODE: 0 or UPDATE_ABSOLUTE.
 #extension GL_GOOGLE_include_directive : require
 #include "lib/prelude.glsl"
@@ -30,5 +30,5 @@ void main() {
     const vec3 color = vec3(sum[1].zw, sum[2].x) * vec3(greaterThan(shown, vec3(0.0)));
     const float all[SUM_FLOATS_ABSOLUTE] =
         float[](sum[0].x, sum[0].y, sum[0].z, sum[0].w, sum[1].x, sum[1].y, color.x, color.y, color.z, sum[2].y, sum[2].z);
-    [[unroll]] for (uint f = 0; f < FLOATS; ++f) sums[FLOATS * (push.first_place + i) + f] = all[f];
+    [[unroll]] for (uint f = 0; f < FLOATS; ++f) sums[FLOATS * (push.first_index + i) + f] = all[f];
 }

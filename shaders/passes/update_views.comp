@@ -20,7 +20,7 @@ layout(constant_id = SPEC_MODE) const uint MODE = 0;
 const bool GRADIENT_ONLY = false, BANDS = (MODE & UPDATE_BANDS) != 0u;
 
 TEXELS(0, params);
-layout(set = 0, binding = 2, scalar) readonly buffer Places { uint places[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer ListIndices { uint list_indices[]; };
 layout(set = 0, binding = 3, scalar) readonly buffer SumsIn { float sums[]; };
 WORD_TEXELS(4, moments1);
 WORD_TEXELS(5, moments2);
@@ -34,10 +34,10 @@ layout(push_constant, scalar) uniform Push { UpdateViewsPush push; };
 
 const uint FLOATS = ABSOLUTE ? SUM_FLOATS_ABSOLUTE : SUM_FLOATS;
 
-Sums sums_at(uint place) {
+Sums sums_at(uint index) {
     float s[SUM_FLOATS_ABSOLUTE];
     s[9] = s[10] = 0.0;
-    [[unroll]] for (uint f = 0; f < FLOATS; ++f) s[f] = sums[FLOATS * place + f];
+    [[unroll]] for (uint f = 0; f < FLOATS; ++f) s[f] = sums[FLOATS * index + f];
     return Sums(s[0], vec2(s[1], s[2]), vec3(s[3], s[4], s[5]), vec3(s[6], s[7], s[8]), vec2(s[9], s[10]));
 }
 
@@ -50,12 +50,12 @@ bool sums_of(uint view, uint i, out Sums sums) {
     bool listed = false;
     const uint bands = BANDS ? push.bands : 1u;
     for (uint band = 0u; band < bands; ++band) {
-        const uint place = places[(view * bands + band) * push.splats + i];
-        if (place == NOT_LISTED) continue;
+        const uint index = list_indices[(view * bands + band) * push.splats + i];
+        if (index == NOT_LISTED) continue;
         if (listed)
-            sums = added(sums, sums_at(place));
+            sums = added(sums, sums_at(index));
         else
-            sums = sums_at(place);
+            sums = sums_at(index);
         listed = true;
     }
     return listed;

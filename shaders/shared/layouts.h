@@ -64,7 +64,7 @@ EWA_UINT(SLOT_TEXELS, 3u);
 
 // ---- A batch of views: each view has a list of the splats that reach a tile of it, in the order of the splats ----
 // A view may be cut into bands of tile rows. Then each band has a list.
-EWA_UINT(NOT_LISTED, 0xffffffffu);  // place of a splat that is not in a list
+EWA_UINT(NOT_LISTED, 0xffffffffu);  // list index of a splat that is not in a list
 // Sums over the slots of a listed splat: the first 9 floats of a slot, with UPDATE_ABSOLUTE 11. The gradient of a colour
 // that is cut off at 0 is 0.
 EWA_UINT(SUM_FLOATS, 9u);
@@ -462,7 +462,7 @@ struct CollectVisiblePush {
     uint splats;
     uint scan_block;
     uint list;          // number of the view's list, or of its band's
-    uint first_place;   // of the list, among all lists
+    uint first_index;   // of the list, in all lists one after another
     uint first_record;  // where the list's records begin
     uint first_row;     // of the view: the band's first
 };
@@ -474,7 +474,7 @@ struct ReceivePush {
 
 struct SumSlotsPush {
     uint splats;
-    uint first_place;  // of the view's list, among the lists of all views
+    uint first_index;  // of the view's list, in the lists of all views one after another
 };
 
 // Has the members of UpdatePush that lib/adam.glsl uses.

@@ -47,11 +47,11 @@ struct BandTiles {
     gpu::BufferPart records, depth_keys, tile_counts;
 };
 
-/// Lists the visible splats of a view, or of its band: writes each splat's place and copies the listed records.
+/// Lists the visible splats of a view, or of its band: writes each splat's list index and copies the listed records.
 struct CollectVisible {
     static constexpr char shader[] = "collect_visible";
     using Work = PerElement<&shared::CollectVisiblePush::splats>;
-    gpu::BufferPart records, tile_counts, prefix, totals, places, visible;
+    gpu::BufferPart records, tile_counts, prefix, totals, list_indices, visible;
 };
 
 /// Depth keys and tile counts of a list of records.
@@ -73,7 +73,7 @@ struct SumSlots {
 struct UpdateViews {
     static constexpr char shader[] = "update_views";
     using Work = PerElement<&shared::UpdateViewsPush::splats>;
-    gpu::BufferPart params, cameras, places, sums, moments1, moments2, counts, params_out, moments1_out,
+    gpu::BufferPart params, cameras, list_indices, sums, moments1, moments2, counts, params_out, moments1_out,
         moments2_out, statistics;
 };
 

@@ -13,7 +13,7 @@ namespace ewa::pipeline {
 
 struct AppearanceUse;
 struct ExposureUse;
-struct ListPlace;
+struct ListStart;
 struct MotionUse;
 struct Rates;
 struct ViewBuffers;
@@ -60,14 +60,14 @@ struct FramePasses : passes::Recorder {
     /// Projects the model's splats for a view and lists those that reach a tile of inputs.band. After the submission
     /// Counts.scan_total is their number. `frame` must be reserved for the model's splats.
     /// projected: `frame` still has what it projected for another band of the view.
-    void list(const Model& model, const ViewBuffers& buffers, const ListPlace& place,
+    void list(const Model& model, const ViewBuffers& buffers, const ListStart& start,
               bool projected = false) const;
     /// A forward frame of a list of `splats` splats, whose records are in frame.records. As with forward, Counts.instances
     /// tells whether it has to be repeated.
     Sorted draw_list(uint32_t splats) const;
-    /// Gradients of blending a list, after the loss: their sums go to `sums` from first_place on.
+    /// Gradients of blending a list, after the loss: their sums go to `sums` from first_index on.
     void list_backward(uint32_t splats, const Sorted& sorted, const gpu::Buffer& sums,
-                       uint32_t first_place) const;
+                       uint32_t first_index) const;
     /// Moves the model by the mean gradient of the views. rates: of one view; batch_rates turns them into those of the step.
     /// bands: lists of each view; list `view * bands + band`. It reads only the SH degree of the inputs.
     void update_views(const Model& model, const ViewBuffers& buffers, const Rates& rates,

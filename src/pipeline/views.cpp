@@ -72,7 +72,7 @@ void ViewBuffers::reserve(gpu::Device& device, uint32_t splats, uint32_t views, 
                        " views a step in " + std::to_string(bands) +
                        " bands: take a smaller --batch or --bands");
     make_room(device, cameras, "cameras of a batch", sizeof(shared::CameraBlock) * uint64_t(views));
-    make_room(device, places, "places", 4 * uint64_t(views) * bands * splats);
+    make_room(device, list_indices, "list indices", 4 * uint64_t(views) * bands * splats);
     make_room(device, visible, "visible records", kRecordBytes * records, gpu::Texel::rgba32f);
 }
 
@@ -90,12 +90,12 @@ void ViewBuffers::reserve_sums(gpu::Device& device, gpu::Executor& executor, con
     sums = std::move(larger);
 }
 
-void FramePasses::list(const Model& model, const ViewBuffers& buffers, const ListPlace& place,
+void FramePasses::list(const Model& model, const ViewBuffers& buffers, const ListStart& start,
                        bool projected) const {
     constexpr uint64_t kBlock = sizeof(shared::CameraBlock);
     const Band& band = inputs.band;
     if (!projected) {
-        recording.copy(*inputs.camera.buffer, inputs.camera.offset, buffers.cameras, place.view * kBlock,
+        recording.copy(*inputs.camera.buffer, inputs.camera.offset, buffers.cameras, start.view * kBlock,
                        kBlock);
         project(model);
     }
@@ -119,13 +119,13 @@ void FramePasses::list(const Model& model, const ViewBuffers& buffers, const Lis
                                   .tile_counts = frame.tile_counts,
                                   .prefix = frame.prefix,
                                   .totals = frame.scan_totals,
-                                  .places = buffers.places,
+                                  .list_indices = buffers.list_indices,
                                   .visible = buffers.visible},
            {.splats = model.splats,
             .scan_block = frame.sizes.scan_block,
-            .list = place.list,
-            .first_place = place.first_place,
-            .first_record = place.first_record,
+            .list = start.list,
+            .first_index = start.first_index,
+            .first_record = start.first_record,
             .first_row = band.first});
 }
 
@@ -139,7 +139,7 @@ Sorted FramePasses::draw_list(uint32_t splats) const {
 }
 
 void FramePasses::list_backward(uint32_t splats, const Sorted& sorted, const gpu::Buffer& sums,
-                                uint32_t first_place) const {
+                                uint32_t first_index) const {
     blend_backward(sorted);
     record(passes::SumSlots{.records = frame.records,
                             .slots = frame.slots,
@@ -147,7 +147,7 @@ void FramePasses::list_backward(uint32_t splats, const Sorted& sorted, const gpu
                             .first_instances = frame.first_instances,
                             .sorted_indices = *sorted.indices,
                             .sums = sums},
-           {.splats = splats, .first_place = first_place},
+           {.splats = splats, .first_index = first_index},
            {{shared::SPEC_MODE, plan.absolute ? shared::UPDATE_ABSOLUTE : 0}});
 }
 
@@ -156,7 +156,7 @@ void FramePasses::update_views(const Model& model, const ViewBuffers& buffers, c
     const gpu::Buffer& moments2 = model.second_moments();
     record(passes::UpdateViews{.params = model.params,
                                .cameras = buffers.cameras,
-                               .places = buffers.places,
+                               .list_indices = buffers.list_indices,
                                .sums = buffers.sums,
                                .moments1 = model.moments1,
                                .moments2 = moments2,

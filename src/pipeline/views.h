@@ -13,25 +13,26 @@ namespace ewa::pipeline {
 
 struct ViewBuffers {
     gpu::Buffer cameras;  // CameraBlocks, one view after another
-    gpu::Buffer places;   // a word a splat of each list: its place among all lists, or NOT_LISTED
+    gpu::Buffer
+        list_indices;  // a word a splat of each list: its index in all lists, one after another, or NOT_LISTED
     gpu::Buffer visible;  // records of one list or several
-    gpu::Buffer sums;     // by place: see SUM_FLOATS
+    gpu::Buffer sums;     // by list index: see SUM_FLOATS
 
     /// Bytes of `splats` listed splats in sums.
     static uint64_t sum_bytes(const Plan& plan, uint64_t splats);
     /// Bytes of all buffers for a step of `views` views that all see `splats` splats, in at most two bands each.
     static uint64_t most_bytes(const Plan& plan, uint64_t splats, uint64_t views, uint64_t bands);
 
-    /// Makes room for the places of `splats` splats in `bands` bands of `views` views, and for `records` records.
+    /// Makes room for the list indices of `splats` splats in `bands` bands of `views` views, and for `records` records.
     void reserve(gpu::Device& device, uint32_t splats, uint32_t views, uint32_t bands, uint32_t records);
     /// Makes room for the sums of `splats` listed splats. Keeps those that are there. The device must be idle.
     void reserve_sums(gpu::Device& device, gpu::Executor& executor, const Plan& plan, uint64_t splats);
 };
 
-/// Where a list goes.
-struct ListPlace {
+/// Where a list begins.
+struct ListStart {
     uint32_t view = 0, list = 0;
-    uint32_t first_place = 0;   // number of splats in the lists before
+    uint32_t first_index = 0;   // number of splats in the lists before
     uint32_t first_record = 0;  // in ViewBuffers::visible
 };
 

@@ -32,7 +32,7 @@ void check_portions(uint32_t all, int portions) {
 
 gpu::Buffer& Portions::Portion::buffer(size_t array) {
     const std::array<gpu::Buffer*, arrays> all{&model.params, &model.moments1, &model.moments2,
-                                               &model.statistics, &places};
+                                               &model.statistics, &list_indices};
     return *all[array];
 }
 
@@ -143,14 +143,14 @@ void Portions::changed() {
     for (Kept& kept : own_[size_t(in_use_)].kept) kept.same_as = 0;
 }
 
-gpu::Buffer Portions::take_places() {
+gpu::Buffer Portions::take_list_indices() {
     Portion& portion = own_[size_t(in_use_)];
-    portion.kept[Array::places] = {};
-    return std::move(portion.places);
+    portion.kept[Array::list_indices] = {};
+    return std::move(portion.list_indices);
 }
 
-void Portions::keep_places(gpu::Buffer listed) {
-    own_[size_t(in_use_)].places = std::move(listed);
+void Portions::keep_list_indices(gpu::Buffer listed) {
+    own_[size_t(in_use_)].list_indices = std::move(listed);
 }
 
 void Portions::visit(Need need, const std::function<void(int, Model&)>& visit) {

@@ -35,8 +35,8 @@ constexpr size_t kTexelBytes = 16;
 void pack_splat(const std::byte* array, uint32_t planes, size_t i, std::byte* to);
 void unpack_splat(const std::byte* from, uint32_t planes, size_t i, std::byte* array);
 
-/// The arrays of a portion's splats. places: ViewBuffers::places, from a list to its update.
-enum Array : size_t { params, moments1, moments2, statistics, places, arrays };
+/// The arrays of a portion's splats. list_indices: ViewBuffers::list_indices, from a list to its update.
+enum Array : size_t { params, moments1, moments2, statistics, list_indices, arrays };
 
 struct Setup {
     int count = 1;       // portions of each rank
@@ -76,8 +76,8 @@ class Portions {
     pipeline::Model& use(int portion, Need need);
     /// The state of the portion in use has changed in place.
     void changed();
-    gpu::Buffer take_places();
-    void keep_places(gpu::Buffer listed);
+    gpu::Buffer take_list_indices();
+    void keep_list_indices(gpu::Buffer listed);
     /// Calls visit(portion, its model) for this rank's, in the direction that finds most of them on the device.
     void visit(Need need, const std::function<void(int, pipeline::Model&)>& visit);
 
@@ -126,7 +126,7 @@ class Portions {
     };
     struct Portion {
         pipeline::Model model;
-        gpu::Buffer places;
+        gpu::Buffer list_indices;
         std::array<Kept, arrays> kept;
         gpu::Buffer& buffer(size_t array);
     };

@@ -162,11 +162,12 @@ void Step::list(const StepParts& parts, const Views& of, size_t first, size_t vi
     const bool streamed = portions_.streamed();
     portions_.visit(Portions::Need::params, [&](int index, const Model& model) {
         const size_t portion = size_t(index);
-        buffers_.places = portions_.take_places();
+        buffers_.list_indices = portions_.take_list_indices();
         buffers_.reserve(device, model.splats, uint32_t(of.views.size()), of.bands,
                          uint32_t(streamed ? model.splats : view_parts * model.splats));
-        uint64_t places = 0, records = 0;
-        if (first > 0) places = seen_[first - 1].places[portion] + seen_[first - 1].listed[portion];
+        uint64_t next_index = 0, records = 0;
+        if (first > 0)
+            next_index = seen_[first - 1].first_indices[portion] + seen_[first - 1].listed[portion];
         size_t projected = of.views.size();
         for (size_t number = first; number < first + view_parts; ++number) {
             const ViewPart view_part = part_of(parts, of, number);
@@ -178,15 +179,15 @@ void Step::list(const StepParts& parts, const Views& of, size_t first, size_t vi
             on.list(model, buffers_,
                     {.view = uint32_t(view_part.view),
                      .list = uint32_t(number),
-                     .first_place = uint32_t(places),
+                     .first_index = uint32_t(next_index),
                      .first_record = uint32_t(records)},
                     again);
             const shared::Counts counts = run(parts, recording);
             Seen& seen = seen_[number];
-            seen.places[portion] = places;
+            seen.first_indices[portion] = next_index;
             seen.listed[portion] = counts.scan_total;
             seen.skipped += counts.skipped_nonfinite;
-            places += counts.scan_total;
+            next_index += counts.scan_total;
             if (streamed) {
                 seen.records[portion].resize(counts.scan_total * kRecordBytes);
                 portions_.stream(seen.records[portion].size(), [&] {
@@ -196,9 +197,9 @@ void Step::list(const StepParts& parts, const Views& of, size_t first, size_t vi
                 records += counts.scan_total;
             }
         }
-        // A part without a splat draws one that is not visible, which has a place behind the others.
-        if (!streamed) buffers_.reserve_sums(device, parts.executor, parts.plan, places + 1);
-        portions_.keep_places(std::move(buffers_.places));
+        // A part without a splat draws one that is not visible, which has a list index behind the others.
+        if (!streamed) buffers_.reserve_sums(device, parts.executor, parts.plan, next_index + 1);
+        portions_.keep_list_indices(std::move(buffers_.list_indices));
     });
     if (streamed) buffers_.visible = {};  // the part that is drawn takes its memory
 }
@@ -270,7 +271,7 @@ void Step::return_sums(const StepParts& parts, const Turn& turn) {
     const uint64_t splat = ViewBuffers::sum_bytes(parts.plan, 1);
     OnHost drawn(own_sums_, 0, turn.own() * splat);
     drawn.read();
-    OnHost sums(buffers_.sums, streamed ? 0 : seen_[turn.first].places.front() * splat,
+    OnHost sums(buffers_.sums, streamed ? 0 : seen_[turn.first].first_indices.front() * splat,
                 streamed ? 0 : sum_of(turn.listed) * splat);
     std::vector<std::span<const std::byte>> out(ranks);
     std::vector<std::span<std::byte>> in(ranks);
@@ -308,7 +309,7 @@ shared::Counts Step::draw_own(const StepParts& parts, const ViewPart& view_part,
         if (view_part.of.record_loss) {
             view_part.of.record_loss(on);
             on.list_backward(splats, sorted, sums,
-                             alone ? uint32_t(seen_[view_part.number].places.front()) : 0);
+                             alone ? uint32_t(seen_[view_part.number].first_indices.front()) : 0);
         }
         const shared::Counts counts = run(parts, recording);
         if (counts.instances <= parts.frame.instance_capacity) return counts;
@@ -373,13 +374,13 @@ void Step::upload_sums(const StepParts& parts, size_t portion) {
     const Seen& last = seen_.back();
     buffers_.sums = std::move(own_sums_);
     make_room(parts.cache.device(), buffers_.sums, "sums of a view's part",
-              (last.places[portion] + last.listed[portion] + 1) * splat);
+              (last.first_indices[portion] + last.listed[portion] + 1) * splat);
     for (const Seen& seen : seen_) {
         const uint64_t from = sum_of(std::span(seen.listed).first(portion)) * splat,
                        bytes = seen.listed[portion] * splat;
         portions_.stream(bytes, [&] {
             buffers_.sums.upload(std::span<const std::byte>(seen.sums).subspan(from, bytes),
-                                 seen.places[portion] * splat);
+                                 seen.first_indices[portion] * splat);
         });
     }
 }
@@ -389,7 +390,7 @@ void Step::update(const StepParts& parts, const Rates& rates, int sh_degree,
     std::array<uint64_t, 2> own{};
     const FrameInputs inputs{.camera = {}, .sh_degree = sh_degree};
     portions_.visit(Portions::Need::state, [&](int portion, const Model& model) {
-        buffers_.places = portions_.take_places();
+        buffers_.list_indices = portions_.take_list_indices();
         if (portions_.streamed()) upload_sums(parts, size_t(portion));
         gpu::Recording recording(parts.cache.device().limits());
         recording.fill(parts.frame.counts, 0, 0, sizeof(shared::Counts));
@@ -401,10 +402,10 @@ void Step::update(const StepParts& parts, const Rates& rates, int sh_degree,
         own[1] += counts.limited_steps;
         portions_.changed();
         if (portions_.streamed()) {
-            buffers_.places = {};
+            buffers_.list_indices = {};
             own_sums_ = std::move(buffers_.sums);
         } else {
-            portions_.keep_places(std::move(buffers_.places));
+            portions_.keep_list_indices(std::move(buffers_.list_indices));
         }
     });
     seen_.clear();

@@ -75,11 +75,12 @@ class Step {
   private:
     /// What this rank's portions list of a part of a view.
     struct Seen {
-        std::vector<uint64_t> listed, places;  // of each portion: splats, and the place of the first one
+        std::vector<uint64_t> listed,
+            first_indices;  // of each portion: splats, and the list index of the first one
         std::vector<std::vector<std::byte>> records;  // of portions that leave the device
         std::vector<std::byte> sums;                  // for such portions, one after another
         uint64_t skipped = 0;                         // splats
-        explicit Seen(size_t portions) : listed(portions), places(portions), records(portions) {}
+        explicit Seen(size_t portions) : listed(portions), first_indices(portions), records(portions) {}
     };
     struct ViewPart;
     struct Turn;

@@ -488,7 +488,7 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
     gpu::Recording batch = r.recording();
     const pipeline::FramePasses of_views{{batch, r.cache}, plan_of_views, frame, inputs};
     for (uint32_t view = 0; view < 2; ++view) {
-        of_views.list(model, views, {.view = view, .list = view, .first_place = 50 * view});
+        of_views.list(model, views, {.view = view, .list = view, .first_index = 50 * view});
         batch.copy(views.visible, 0, frame.records, 0, 48 * 50);
         const auto drawn = of_views.draw_list(50);
         of_views.loss(photo);
@@ -502,7 +502,7 @@ std::vector<std::vector<Command>> frames(std::vector<std::string>& pipelines) {
         pipeline::FrameInputs of_band = inputs;
         of_band.band = pipeline::band_of(r.config(), 47, 2, band);
         pipeline::FramePasses{{batch, r.cache}, plan_of_views, frame, of_band}.list(
-            model, views, {.list = band, .first_place = 50 * band}, band > 0);
+            model, views, {.list = band, .first_index = 50 * band}, band > 0);
     }
     rates.views = 1;
     of_views.update_views(model, views, rates, 2);

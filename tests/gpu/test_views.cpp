@@ -66,7 +66,7 @@ struct Step {
     FrameBuffers frame;
     ViewBuffers buffers;
     std::vector<gpu::Buffer> cameras, photos;
-    std::vector<uint32_t> first_places{0};
+    std::vector<uint32_t> first_indices{0};
     std::vector<std::vector<float>> pictures;
 
     Step(const SeenScene& seen, PlanRequest request, uint32_t of_view = 1) : bands(of_view) {
@@ -104,30 +104,30 @@ struct Step {
         FramePasses{{recording, r.cache}, plan, frame, drawn}.list(model, buffers,
                                                                    {.view = uint32_t(picture / bands),
                                                                     .list = uint32_t(picture),
-                                                                    .first_place = first_places[picture]},
+                                                                    .first_index = first_indices[picture]},
                                                                    projected);
         frame.record_counts(recording);
         r.executor.run(recording);
-        first_places.push_back(first_places[picture] + frame.read_counts().scan_total);
+        first_indices.push_back(first_indices[picture] + frame.read_counts().scan_total);
     }
-    uint32_t listed(size_t picture) const { return first_places[picture + 1] - first_places[picture]; }
+    uint32_t listed(size_t picture) const { return first_indices[picture + 1] - first_indices[picture]; }
     void draw(const SeenScene& seen, size_t picture) {
         Rig& r = rig();
         const FrameInputs drawn = inputs(seen, picture);
         if (bands > 1) reserve(drawn.band.rows);
-        buffers.reserve_sums(*device(), r.executor, plan, first_places.back());
+        buffers.reserve_sums(*device(), r.executor, plan, first_indices.back());
         gpu::Recording recording = r.recording();
         recording.copy(buffers.visible, 0, frame.records, 0, 48ull * listed(picture));
         const FramePasses on{{recording, r.cache}, plan, frame, drawn};
         const Sorted sorted = on.draw_list(listed(picture));
         on.loss(photos[picture / bands]);
-        on.list_backward(listed(picture), sorted, buffers.sums, first_places[picture]);
+        on.list_backward(listed(picture), sorted, buffers.sums, first_indices[picture]);
         r.executor.run(recording);
         pictures.push_back(frame.planes.download<float>(frame.sizes.planes / 4));
     }
     void update(const SeenScene& seen, Rates rates) {
         Rig& r = rig();
-        first_places = {0};
+        first_indices = {0};
         for (size_t p = 0; p < cameras.size() * bands; ++p) {
             list(seen, p);
             draw(seen, p);
@@ -159,18 +159,18 @@ TEST(ViewBatch, AListHasTheSplatsThatReachATileInTheirOrder) {
         const auto counts = step.frame.tile_counts.download<uint32_t>(700);
         const auto records = step.frame.records.download<std::array<float, 12>>(700);
         const auto visible = step.buffers.visible.download<std::array<float, 12>>(step.listed(v));
-        const auto places = step.buffers.places.download<uint32_t>(1400);
-        uint32_t next = step.first_places[v];
+        const auto list_indices = step.buffers.list_indices.download<uint32_t>(1400);
+        uint32_t next = step.first_indices[v];
         for (uint32_t i = 0; i < 700; ++i) {
             if (counts[i] == 0) {
-                EXPECT_EQ(places[700 * v + i], shared::NOT_LISTED);
+                EXPECT_EQ(list_indices[700 * v + i], shared::NOT_LISTED);
                 continue;
             }
-            ASSERT_EQ(places[700 * v + i], next);
-            EXPECT_EQ(visible[next - step.first_places[v]], records[i]);
+            ASSERT_EQ(list_indices[700 * v + i], next);
+            EXPECT_EQ(visible[next - step.first_indices[v]], records[i]);
             ++next;
         }
-        EXPECT_EQ(next, step.first_places[v + 1]);
+        EXPECT_EQ(next, step.first_indices[v + 1]);
         EXPECT_GT(step.listed(v), 20u);
         EXPECT_LT(step.listed(v), 680u);
     }
@@ -265,8 +265,8 @@ TEST(ViewBatch, AListOfABandHasTheSplatsThatReachIt) {
         const auto counts = step.frame.tile_counts.download<uint32_t>(700);
         const auto records = step.frame.records.download<std::array<float, 12>>(700);
         const auto visible = step.buffers.visible.download<std::array<float, 12>>(step.listed(p));
-        const auto places = step.buffers.places.download<uint32_t>(4200);
-        uint32_t next = step.first_places[p];
+        const auto list_indices = step.buffers.list_indices.download<uint32_t>(4200);
+        uint32_t next = step.first_indices[p];
         for (uint32_t i = 0; i < 700; ++i) {
             const auto& record = records[i];
             // Beyond the farthest pixel that its alpha can reach.
@@ -278,15 +278,15 @@ TEST(ViewBatch, AListOfABandHasTheSplatsThatReachIt) {
                 y > 1 && y < band.rows - 1 && record[7] > 0.1 && record[0] > 1 && record[0] < kWidth - 1;
             elsewhere += outside && keys[i] != 0xffffffffu;
             if (counts[i] == 0) {
-                EXPECT_EQ(places[700 * p + i], shared::NOT_LISTED);
+                EXPECT_EQ(list_indices[700 * p + i], shared::NOT_LISTED);
                 EXPECT_FALSE(keys[i] != 0xffffffffu && across) << i;
                 continue;
             }
             EXPECT_NE(keys[i], 0xffffffffu);
             EXPECT_FALSE(reach > 0 && y + 1.01 * reach < -2) << i;
             EXPECT_FALSE(reach > 0 && y - 1.01 * reach > band.rows + 2) << i;
-            ASSERT_EQ(places[700 * p + i], next);
-            std::array<float, 12> copied = visible[next - step.first_places[p]];
+            ASSERT_EQ(list_indices[700 * p + i], next);
+            std::array<float, 12> copied = visible[next - step.first_indices[p]];
             const double mean = double(copied[1]) + copied[3], expected = double(record[1]) + record[3];
             EXPECT_NEAR(mean + band.first, expected, 1e-11 * (std::abs(expected) + band.first));
             EXPECT_LE(std::abs(copied[3]), 1e-7f * std::abs(copied[1]));
@@ -295,7 +295,7 @@ TEST(ViewBatch, AListOfABandHasTheSplatsThatReachIt) {
             EXPECT_EQ(copied, record);
             ++next;
         }
-        EXPECT_EQ(next, step.first_places[p + 1]);
+        EXPECT_EQ(next, step.first_indices[p + 1]);
         EXPECT_GT(step.listed(p), 10u);
     }
     EXPECT_GT(elsewhere, 20u);
@@ -432,9 +432,9 @@ TEST(ViewBatch, WhatNoViewSeesMovesByItsMomentsAlone) {
     step.cameras.clear();
     for (const Camera& camera : seen.cameras) step.cameras.push_back(camera_buffer(camera, rig().config()));
     const auto m = step.model.moments1.download<float>(parameter_bytes(50, 2) / 4);
-    step.first_places = {0};
+    step.first_indices = {0};
     for (size_t v = 0; v < 2; ++v) step.list(seen, v);
-    EXPECT_EQ(step.first_places.back(), 0u);
+    EXPECT_EQ(step.first_indices.back(), 0u);
     Rates rates = some_rates(4);
     rates.views = 2;
     gpu::Recording recording = rig().recording();
