@@ -17,8 +17,8 @@ namespace ewa {
 
 namespace train {
 
-Drawing drawing_of(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians,
-                   const RenderOptions& options) {
+ViewRenderer view_renderer_of(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians,
+                              const RenderOptions& options) {
     const auto renderer = std::make_shared<Renderer>(std::move(device), gaussians, options);
     return {1, [renderer](std::span<const Camera> cameras) {
                 std::vector<Image> images;
@@ -105,8 +105,9 @@ Measures measures_of(const RunOptions& options) {
     return measures;
 }
 
-Evaluation evaluate_views(const Drawing& drawing, const Dataset& dataset, const std::vector<int>& frames,
-                          const RenderOptions& options, const std::vector<Appearance>& appearances,
+Evaluation evaluate_views(const ViewRenderer& renderer, const Dataset& dataset,
+                          const std::vector<int>& frames, const RenderOptions& options,
+                          const std::vector<Appearance>& appearances,
                           const std::function<void()>& before_frame,
                           const std::function<void(size_t, const RenderedView&, const EvalFrame&)>& on_view,
                           const Measures& measures) {
@@ -115,12 +116,12 @@ Evaluation evaluate_views(const Drawing& drawing, const Dataset& dataset, const 
     std::vector<Image> drawn;
     for (size_t i = 0; i < frames.size(); ++i) {
         if (before_frame) before_frame();
-        const size_t place = i % drawing.at_once;
+        const size_t place = i % renderer.at_once;
         if (place == 0) {
             std::vector<Camera> cameras;
-            for (size_t k = i; k < std::min(i + drawing.at_once, frames.size()); ++k)
+            for (size_t k = i; k < std::min(i + renderer.at_once, frames.size()); ++k)
                 cameras.push_back(dataset.frames[size_t(frames[k])].camera);
-            drawn = drawing.images(cameras);
+            drawn = renderer.images(cameras);
         }
         const Frame& frame = dataset.frames[size_t(frames[i])];
         const Appearance* appearance = appearances.empty() ? nullptr : &appearances.at(i);
@@ -153,8 +154,8 @@ Evaluation evaluate(std::shared_ptr<gpu::Device> device, const Gaussians& gaussi
                     const std::vector<int>& frames, const RenderOptions& options,
                     const std::vector<Appearance>& appearances, const std::function<void()>& before_frame,
                     const Measures& measures) {
-    return train::evaluate_views(train::drawing_of(std::move(device), gaussians, options), dataset, frames,
-                                 options, appearances, before_frame, {}, measures);
+    return train::evaluate_views(train::view_renderer_of(std::move(device), gaussians, options), dataset,
+                                 frames, options, appearances, before_frame, {}, measures);
 }
 
 }  // namespace ewa

@@ -12,16 +12,16 @@
 
 namespace ewa::train {
 
-/// How a scene is drawn.
-struct Drawing {
+/// Renders the views of a scene.
+struct ViewRenderer {
     size_t at_once = 1;  // cameras of a call that draws fastest
     /// The images through the cameras, in their order.
     std::function<std::vector<Image>(std::span<const Camera>)> images;
 };
 
 /// By a renderer of these splats.
-Drawing drawing_of(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians,
-                   const RenderOptions& options);
+ViewRenderer view_renderer_of(std::shared_ptr<gpu::Device> device, const Gaussians& gaussians,
+                              const RenderOptions& options);
 
 /// A training or held-out image and its render, of one size.
 struct RenderedView {
@@ -40,8 +40,9 @@ std::vector<Appearance> for_new_views(const std::vector<Appearance>& learned, si
 Measures measures_of(const RunOptions& options);
 
 /// As ewa::evaluate. on_view: called after each view that counts, with its place in `frames`.
-Evaluation evaluate_views(const Drawing& drawing, const Dataset& dataset, const std::vector<int>& frames,
-                          const RenderOptions& options, const std::vector<Appearance>& appearances,
+Evaluation evaluate_views(const ViewRenderer& renderer, const Dataset& dataset,
+                          const std::vector<int>& frames, const RenderOptions& options,
+                          const std::vector<Appearance>& appearances,
                           const std::function<void()>& before_frame,
                           const std::function<void(size_t, const RenderedView&, const EvalFrame&)>& on_view,
                           const Measures& measures = {});

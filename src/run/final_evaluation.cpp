@@ -103,7 +103,7 @@ Evaluation FinalEvaluation::evaluated(const std::vector<int>& frames,
         keep_waiting_();
     };
     return evaluate_views(
-        scene_.drawing, input_.dataset, frames, input_.options.train.render, appearances, before_frame,
+        scene_.renderer, input_.dataset, frames, input_.options.train.render, appearances, before_frame,
         [&](size_t i, const RenderedView& view, const EvalFrame& figures) {
             if (shown) add_view(frames[i], view, figures);
             observer_.on_view(++done_, evaluated_views(input_.split));
@@ -143,7 +143,7 @@ size_t FinalEvaluation::add_full_size(report::ReportView& view) const {
     const auto of_new_view = new_view_appearance(scene_.appearances);
     const Frame& frame = input_.dataset.frames[size_t(view.frame)];
     const RenderedView rendered =
-        with_photo(std::move(scene_.drawing.images(std::span(&frame.camera, 1)).front()), frame,
+        with_photo(std::move(scene_.renderer.images(std::span(&frame.camera, 1)).front()), frame,
                    input_.options.train.render,
                    known         ? &scene_.appearances[size_t(place - train.begin())]
                    : of_new_view ? &*of_new_view

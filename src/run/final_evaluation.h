@@ -29,7 +29,7 @@ struct TrainedScene {
     std::shared_ptr<gpu::Device> device;
     Gaussians gaussians;
     std::vector<Appearance> appearances;  // of the training frames, or empty
-    Drawing drawing;
+    ViewRenderer renderer;
 };
 
 /// Evaluates a scene and fills the report with it. Each part returns whether it was done: RunObserver::should_stop ends it

@@ -129,7 +129,7 @@ class Run {
     Evaluation evaluate(Trainer& trainer);
     void log(const std::optional<Evaluation>& evaluation);
     bool draws_with_ranks() const { return options().ranks->size() > 1; }
-    train::Drawing drawing(const Gaussians& gaussians, const Trainer* trainer) const;
+    train::ViewRenderer view_renderer(const Gaussians& gaussians, const Trainer* trainer) const;
     train::TrainedScene save_last(std::unique_ptr<Trainer>& trainer);
     void finish(std::unique_ptr<Trainer> trainer);
     void fill_summary();
@@ -311,7 +311,7 @@ Evaluation Run::evaluate(Trainer& trainer) {
         cameras_.align_test(device_, gaussians, {});
     }
     Evaluation evaluation = train::evaluate_views(
-        drawing(gaussians, &trainer), input_.dataset, input_.split.test, options().train.render,
+        view_renderer(gaussians, &trainer), input_.dataset, input_.split.test, options().train.render,
         train::for_new_views(trainer.appearances(), input_.split.test.size()),
         [&] { trainer.keep_waiting(); }, [](size_t, const train::RenderedView&, const EvalFrame&) {},
         measures_);
@@ -366,8 +366,8 @@ void Run::train(Trainer& trainer) {
 }
 
 /// By all ranks from their shares; or by a renderer, without the trainer.
-train::Drawing Run::drawing(const Gaussians& gaussians, const Trainer* trainer) const {
-    if (!draws_with_ranks()) return train::drawing_of(device_, gaussians, options().train.render);
+train::ViewRenderer Run::view_renderer(const Gaussians& gaussians, const Trainer* trainer) const {
+    if (!draws_with_ranks()) return train::view_renderer_of(device_, gaussians, options().train.render);
     return {size_t(options().ranks->size()),
             [trainer](std::span<const Camera> cameras) { return trainer->render(cameras); }};
 }
@@ -408,7 +408,7 @@ train::TrainedScene Run::save_last(std::unique_ptr<Trainer>& trainer) {
     if (options().train.device_memory_bytes > 0)
         device_->limit_memory(options().train.device_memory_bytes, {});
     observer_.on_saved(last);
-    scene.drawing = drawing(scene.gaussians, trainer.get());
+    scene.renderer = view_renderer(scene.gaussians, trainer.get());
     return scene;
 }
 
