@@ -39,7 +39,7 @@ int usual_test_every() {
 }
 
 /// What a training begins with.
-struct Plan {
+struct TrainerStart {
     SharedDataset dataset;
     RunOptions run;  // with a concrete strategy and SH degree
     std::vector<int> frames;
@@ -58,49 +58,49 @@ struct Plan {
     }
 };
 
-Gaussians first_splats(const Plan& plan, const Splats* init, const std::string& word) {
+Gaussians first_splats(const TrainerStart& start, const Splats* init, const std::string& word) {
     if (!init) {
-        RunOptions run = plan.run;
+        RunOptions run = start.run;
         run.init = word;
-        return train::initial_splats(run, *plan.dataset, plan.frames);
+        return train::initial_splats(run, *start.dataset, start.frames);
     }
-    Gaussians start = init->gaussians;
-    set_sh_degree(start, plan.run.train.sh_degree);
-    return start;
+    Gaussians splats = init->gaussians;
+    set_sh_degree(splats, start.run.train.sh_degree);
+    return splats;
 }
 
 /// ewa.Trainer
 class Training {
   public:
-    Training(Plan plan, nb::handle init) : plan_(std::move(plan)) {
+    Training(TrainerStart start, nb::handle init) : start_(std::move(start)) {
         const Splats* given = nb::isinstance<Splats>(init) ? &nb::cast<const Splats&>(init) : nullptr;
         if (!given && !init.is_none() && !nb::isinstance<nb::str>(init))
             throw nb::type_error("init is neither Splats nor text");
         const std::string word = given ? "" : init.is_none() ? "sfm" : nb::cast<std::string>(init);
         if (!given && word != "sfm" && word != "random")
             throw InputError("init is neither splats nor \"sfm\" nor \"random\"");
-        plan_.own_start = given;
+        start_.own_start = given;
         word_ = word;
         const DeviceWork work;
-        trainer_ = OnDevice(std::make_unique<Trainer>(work.device(), *plan_.dataset, plan_.frames,
-                                                      first_splats(plan_, given, word), plan_.run.train));
+        trainer_ = OnDevice(std::make_unique<Trainer>(work.device(), *start_.dataset, start_.frames,
+                                                      first_splats(start_, given, word), start_.run.train));
     }
 
     StepReport step() {
         const DeviceWork work;
-        if (trainer_->steps_done() >= plan_.run.train.steps)
-            throw InputError("all " + core::counted(uint64_t(plan_.run.train.steps), "step") + " are done");
+        if (trainer_->steps_done() >= start_.run.train.steps)
+            throw InputError("all " + core::counted(uint64_t(start_.run.train.steps), "step") + " are done");
         last_ = trainer_->step();
         return last_;
     }
     StepReport next() {
-        if (last_.step >= plan_.run.train.steps) throw nb::stop_iteration();
+        if (last_.step >= start_.run.train.steps) throw nb::stop_iteration();
         return step();
     }
 
     Splats splats() const {
         const DeviceWork work;
-        return {trainer_->gaussians(), plan_.run.train.render.kernel == Footprint::antialias};
+        return {trainer_->gaussians(), start_.run.train.render.kernel == Footprint::antialias};
     }
     nb::ndarray<nb::numpy, float> exposures() const {
         std::vector<float> values;
@@ -117,12 +117,12 @@ class Training {
 
     void save_checkpoint(const std::filesystem::path& path) const {
         const std::string fingerprint =
-            with_files([&] { return train::dataset_fingerprint(*plan_.dataset, plan_.split()); });
-        Json settings = train::checkpoint_settings(plan_.run, fingerprint);
+            with_files([&] { return train::dataset_fingerprint(*start_.dataset, start_.split()); });
+        Json settings = train::checkpoint_settings(start_.run, fingerprint);
         settings["cap"] = trainer_->max_splats();
-        settings["fields"] = options_json(plan_.run);
-        settings["train_frames"] = plan_.frames;
-        settings["init"] = plan_.own_start ? "splats" : word_;
+        settings["fields"] = options_json(start_.run);
+        settings["train_frames"] = start_.frames;
+        settings["init"] = start_.own_start ? "splats" : word_;
         TrainerState state = [this] {
             const DeviceWork work;
             return trainer_->state();
@@ -140,48 +140,48 @@ class Training {
         last_ = state.report;
     }
 
-    const Plan& plan() const { return plan_; }
+    const TrainerStart& start() const { return start_; }
     /// With what was chosen.
     RunOptions options() const {
-        RunOptions all = plan_.run;
+        RunOptions all = start_.run;
         all.train.max_splats = trainer_->max_splats();
         return all;
     }
     const StepReport& last() const { return last_; }
 
   private:
-    Plan plan_;
+    TrainerStart start_;
     std::string word_;
     OnDevice<Trainer> trainer_;
     StepReport last_;
 };
 
-Plan plan_of(const LoadedDataset& dataset) {
-    Plan plan{dataset.dataset, {}, {}};
-    plan.run.downscale = dataset.options.downscale;
-    return plan;
+TrainerStart start_of(const LoadedDataset& dataset) {
+    TrainerStart start{dataset.dataset, {}, {}};
+    start.run.downscale = dataset.options.downscale;
+    return start;
 }
 
 void start_training(Training* self, const LoadedDataset& dataset, nb::handle init, nb::handle train_frames,
                     const nb::kwargs& options) {
-    Plan plan = plan_of(dataset);
-    for (const auto& [name, value] : options) set_option(plan.run, nb::cast<std::string>(name), value);
-    plan.frames = train_frames.is_none() ? split_frames(*dataset.dataset, usual_test_every()).train
-                                         : frames_of(train_frames, *dataset.dataset, "train_frames");
-    check_options(plan.run);
-    plan.resolve_options();
-    new (self) Training(std::move(plan), init);
+    TrainerStart start = start_of(dataset);
+    for (const auto& [name, value] : options) set_option(start.run, nb::cast<std::string>(name), value);
+    start.frames = train_frames.is_none() ? split_frames(*dataset.dataset, usual_test_every()).train
+                                          : frames_of(train_frames, *dataset.dataset, "train_frames");
+    check_options(start.run);
+    start.resolve_options();
+    new (self) Training(std::move(start), init);
 }
 
 /// The options and the training frames that a checkpoint was written with, of this package or of ewa train.
-void read_settings(const Json& settings, Plan& plan) {
+void read_settings(const Json& settings, TrainerStart& start) {
     if (!settings.is_object()) throw InputError("its settings cannot be read");
     if (settings.contains("fields")) {
-        read_options(settings["fields"], plan.run);
+        read_options(settings["fields"], start.run);
         const Json frames = settings.value("train_frames", Json::array());
         for (const Json& frame : frames)
-            if (frame.is_number_unsigned() && frame.get<uint64_t>() < plan.dataset->frames.size())
-                plan.frames.push_back(frame.get<int>());
+            if (frame.is_number_unsigned() && frame.get<uint64_t>() < start.dataset->frames.size())
+                start.frames.push_back(frame.get<int>());
         return;
     }
     RunOptions run;
@@ -191,46 +191,46 @@ void read_settings(const Json& settings, Plan& plan) {
         const Json& value = stored[option.name];
         option.set(run, value.is_string() ? value.get<std::string>() : value.dump());
     }
-    plan.run.train = run.train;
-    plan.run.dense_start = run.dense_start;
-    plan.run.init_opacity = run.init_opacity;
-    plan.run.init_scale = run.init_scale;
-    plan.frames = split_frames(*plan.dataset, run.test_every).train;
+    start.run.train = run.train;
+    start.run.dense_start = run.dense_start;
+    start.run.init_opacity = run.init_opacity;
+    start.run.init_scale = run.init_scale;
+    start.frames = split_frames(*start.dataset, run.test_every).train;
 }
 
 /// Why a checkpoint does not continue with this dataset.
-std::string other_dataset(const Json& settings, const Plan& plan) {
+std::string other_dataset(const Json& settings, const TrainerStart& start) {
     const Json options = settings.value("options", Json());
     const Json then = options.is_object() ? options.value("downscale", Json()) : Json();
-    if (then.is_number_unsigned() && then.get<uint64_t>() != uint64_t(plan.run.downscale))
+    if (then.is_number_unsigned() && then.get<uint64_t>() != uint64_t(start.run.downscale))
         return "its images had downscale=" + then.dump() +
-               ", and those of this Dataset have downscale=" + std::to_string(plan.run.downscale);
+               ", and those of this Dataset have downscale=" + std::to_string(start.run.downscale);
     return "is of another dataset, or its images or cameras have changed";
 }
 
 Training resume(const std::filesystem::path& path, const LoadedDataset& dataset, nb::handle init,
                 std::optional<int> steps) {
     const train::Checkpoint checkpoint = with_files([&] { return train::read_checkpoint(path); });
-    Plan plan = plan_of(dataset);
+    TrainerStart start = start_of(dataset);
     Json settings;
     try {
         settings = core::parse_json<Json>(checkpoint.settings, "its settings");
-        read_settings(settings, plan);
+        read_settings(settings, start);
     } catch (const InputError& error) {
         throw InputError(path.string() + ": " + error.what());
     }
-    if (settings.value("dataset", Json()) != train::dataset_fingerprint(*dataset.dataset, plan.split()))
-        throw InputError(path.string() + ": " + other_dataset(settings, plan));
+    if (settings.value("dataset", Json()) != train::dataset_fingerprint(*dataset.dataset, start.split()))
+        throw InputError(path.string() + ": " + other_dataset(settings, start));
     const Json begun = settings.value("init", Json("sfm"));
     if (begun == "splats" && init.is_none())
         throw InputError(path.string() + ": its training began with splats; pass them again as init");
-    RunOptions& run = plan.run;
+    RunOptions& run = start.run;
     if (steps) run.train.steps = *steps;
     train::continue_from(path, checkpoint, run.train.strategy, run);
-    plan.resolve_options();
-    const nb::object start =
+    start.resolve_options();
+    const nb::object first =
         init.is_none() ? nb::cast(begun.is_string() ? begun.get<std::string>() : "sfm") : nb::borrow(init);
-    Training training(std::move(plan), start);
+    Training training(std::move(start), first);
     training.restore(path, checkpoint.state);
     return training;
 }
@@ -362,16 +362,16 @@ void bind_trainer(nb::module_& module) {
             "those of an uninterrupted training. init: the splats that the training began with, if it was "
             "given some. "
             "steps: another number of steps. Raises InputError.")
-        .def_prop_ro("steps", [](const Training& t) { return t.plan().run.train.steps; })
+        .def_prop_ro("steps", [](const Training& t) { return t.start().run.train.steps; })
         .def_prop_ro("steps_done", [](const Training& t) { return t.last().step; })
-        .def_prop_ro("train_frames", [](const Training& t) { return t.plan().frames; })
+        .def_prop_ro("train_frames", [](const Training& t) { return t.start().frames; })
         .def_prop_ro(
             "options", [](const Training& t) { return options_dict(t.options()); },
             nb::for_getter(nb::sig("def options(self) -> dict[str, object]")),
             "All options, with the strategy, the SH degree and the cap of splats that were chosen.")
         .def("__repr__", [](const Training& t) {
             return "Trainer(" + std::to_string(t.last().step) + " of " +
-                   core::counted(uint64_t(t.plan().run.train.steps), "step") + ")";
+                   core::counted(uint64_t(t.start().run.train.steps), "step") + ")";
         });
 }
 

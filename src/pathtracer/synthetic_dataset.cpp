@@ -156,9 +156,9 @@ std::optional<Record> read_record(const fs::path& folder) {
     return record;
 }
 
-class Run {
+class DatasetJob {
   public:
-    Run(const std::shared_ptr<gpu::Device>& device, RenderJob job, const fs::path& folder)
+    DatasetJob(const std::shared_ptr<gpu::Device>& device, RenderJob job, const fs::path& folder)
         : job_(std::move(job)), folder_(folder), tracer_(device, job_.packed, job_.scene.sky) {
         record_ = {{"scene", job_.name},
                    {"views", cameras_.size()},
@@ -377,7 +377,7 @@ Dataset scene_cameras(const fs::path& path, const SyntheticOptions& options) {
 SyntheticDataset render_dataset(const std::shared_ptr<gpu::Device>& device, const fs::path& scene,
                                 const fs::path& folder, const SyntheticOptions& options,
                                 const std::function<bool(int, int)>& progress) {
-    return Run(device, read_render_job(scene, options), folder).run(progress);
+    return DatasetJob(device, read_render_job(scene, options), folder).run(progress);
 }
 
 }  // namespace ewa

@@ -26,22 +26,20 @@ struct Axis {
     }
 };
 
-/// A drawing and its margins, in units that the page scales.
-struct Drawing {
+/// The area of a chart and its margins, in units that the page scales.
+struct ChartArea {
     double width, height, left, right, top, bottom;
 };
-constexpr Drawing kChart{400, 240, 48, 16, 12, 44}, kWork{740, 420, 64, 210, 36, 52};
+constexpr ChartArea kChart{400, 240, 48, 16, 12, 44}, kWork{740, 420, 64, 210, 36, 52};
 
 /// The axes of a diagram.
 struct Axes {
-    Drawing drawing;
+    ChartArea area;
     Axis x, y;
 
-    double px(double v) const {
-        return drawing.left + x.share(v) * (drawing.width - drawing.left - drawing.right);
-    }
+    double px(double v) const { return area.left + x.share(v) * (area.width - area.left - area.right); }
     double py(double v) const {
-        return drawing.height - drawing.bottom - y.share(v) * (drawing.height - drawing.top - drawing.bottom);
+        return area.height - area.bottom - y.share(v) * (area.height - area.top - area.bottom);
     }
 };
 
